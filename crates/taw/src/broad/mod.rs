@@ -1,0 +1,8 @@
+//! Who might touch. A broad phase names pairs of rows, never fewer than touch and
+//! as few others as it can; whether they do is [`contact`](crate::contact)'s.
+
+mod all_pairs;
+mod grid;
+
+pub use all_pairs::all_pairs;
+pub use grid::Grid;

@@ -1,0 +1,117 @@
+use std::cmp::Ordering;
+
+use cgmath::InnerSpace;
+
+use crate::math::{Scalar, Vec3, length};
+
+/// A touch between two things, named by their rows in the world's columns. Rows
+/// stay put within a step, and only within it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact<S> {
+    /// The row of the first: a wall, or the marble of the lower row.
+    pub a: u32,
+    /// The row of the second: always a marble.
+    pub b: u32,
+    /// The displacement of `b` that parts it from `a`, in metres.
+    pub mtv: Vec3<S>,
+}
+
+/// The touches of a substep.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Contacts<S> {
+    /// Wall against marble.
+    pub wm: Vec<Contact<S>>,
+    /// Marble against marble.
+    pub mm: Vec<Contact<S>>,
+}
+
+impl<S> Default for Contacts<S> {
+    fn default() -> Self {
+        Self { wm: Vec::new(), mm: Vec::new() }
+    }
+}
+
+impl<S: Scalar> Contacts<S> {
+    /// Puts the largest displacement first in both lists. Equal ones are ordered
+    /// by their rows, and a NaN comes last, so that the order never depends on
+    /// how the touches were found.
+    pub fn sort(&mut self) {
+        self.wm.sort_unstable_by(deeper_first);
+        self.mm.sort_unstable_by(deeper_first);
+    }
+
+    /// Empties both lists and keeps their memory.
+    pub fn clear(&mut self) {
+        self.wm.clear();
+        self.mm.clear();
+    }
+
+    /// The number of touches in both lists.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.wm.len() + self.mm.len()
+    }
+
+    /// Whether nothing touches.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+}
+
+fn deeper_first<S: Scalar>(x: &Contact<S>, y: &Contact<S>) -> Ordering {
+    let descending = |x: S, y: S| y.partial_cmp(&x).unwrap_or(Ordering::Equal);
+    let (squared_x, squared_y) = (x.mtv.magnitude2(), y.mtv.magnitude2());
+    (squared_x.is_nan().cmp(&squared_y.is_nan()))
+        .then(descending(squared_x, squared_y))
+        // Squares of the tiny and the huge vanish and overflow alike.
+        .then_with(|| descending(length(x.mtv), length(y.mtv)))
+        .then((x.a, x.b).cmp(&(y.a, y.b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn contact(a: u32, b: u32, depth: f32) -> Contact<f32> {
+        let mtv = Vec3::new(0.0, depth, 0.0);
+        Contact { a, b, mtv }
+    }
+
+    #[test]
+    fn sorting_puts_the_largest_first_and_survives_nan() {
+        let sorted = [
+            contact(7, 8, f32::INFINITY),
+            contact(2, 3, 5.0),
+            contact(0, 1, 2.0),
+            contact(0, 2, 2.0),
+            contact(1, 2, -2.0),
+            contact(8, 9, 2e-30),
+            contact(5, 9, 1e-30),
+            contact(5, 6, 0.0),
+            contact(0, 9, f32::NAN),
+            contact(4, 9, f32::NAN),
+        ];
+        // Every rotation and its reverse, since a broken order shows in some only.
+        for shift in 0..sorted.len() {
+            let mut contacts = Contacts::default();
+            contacts.mm = sorted.to_vec();
+            contacts.mm.rotate_left(shift);
+            contacts.wm = contacts.mm.iter().rev().copied().collect();
+            contacts.sort();
+            let rows = |list: &[Contact<f32>]| list.iter().map(|c| (c.a, c.b)).collect::<Vec<_>>();
+            assert_eq!(rows(&contacts.mm), rows(&sorted), "rotated by {shift}");
+            assert_eq!(rows(&contacts.wm), rows(&sorted), "reversed after {shift}");
+        }
+    }
+
+    #[test]
+    fn clearing_keeps_the_memory() {
+        let mut contacts = Contacts::default();
+        contacts.wm = vec![contact(0, 0, 1.0); 100];
+        let capacity = contacts.wm.capacity();
+        contacts.clear();
+        assert!(contacts.is_empty());
+        assert_eq!(contacts.wm.capacity(), capacity);
+    }
+}

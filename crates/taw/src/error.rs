@@ -1,0 +1,106 @@
+use crate::math::{Point3, Scalar, Vec3};
+use crate::world::{MarbleId, WallId};
+
+/// Why an input was refused. Whatever returns one has changed nothing.
+///
+/// Values are given as `f64`, whichever scalar the world uses.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A number is NaN or infinite.
+    #[error("{field} must be finite, but is {value}")]
+    NotFinite {
+        /// The field, as the caller knows it.
+        field: &'static str,
+        /// The number that was given.
+        value: f64,
+    },
+    /// A number is zero, negative, NaN or infinite.
+    #[error("{field} must be finite and above zero, but is {value}")]
+    NotPositive {
+        /// The field, as the caller knows it.
+        field: &'static str,
+        /// The number that was given.
+        value: f64,
+    },
+    /// A number is outside the range that its meaning allows, or NaN.
+    #[error("{field} must be in [{min}, {max}], but is {value}")]
+    OutOfRange {
+        /// The field, as the caller knows it.
+        field: &'static str,
+        /// The number that was given.
+        value: f64,
+        /// The least that is allowed.
+        min: f64,
+        /// The most that is allowed.
+        max: f64,
+    },
+    /// A direction that must have length one does not.
+    #[error("{field} must have length 1, but has length {value}")]
+    NotUnit {
+        /// The field, as the caller knows it.
+        field: &'static str,
+        /// The length that was given.
+        value: f64,
+    },
+    /// No marble has this handle: it was removed, or is another world's.
+    #[error("no marble has the handle {0:?}")]
+    NoSuchMarble(MarbleId),
+    /// No wall has this handle: it was removed, or is another world's.
+    #[error("no wall has the handle {0:?}")]
+    NoSuchWall(WallId),
+    /// Handles count rows in 32 bits, and all of them are taken.
+    #[error("the world holds {0} rows already, which is all that a handle can name")]
+    Full(usize),
+}
+
+/// The number, if it is finite.
+pub(crate) fn finite<S: Scalar>(field: &'static str, value: S) -> Result<S, Error> {
+    if value.is_finite() {
+        Ok(value)
+    } else {
+        Err(Error::NotFinite { field, value: value.as_f64() })
+    }
+}
+
+/// The number, if it is finite and above zero.
+pub(crate) fn positive<S: Scalar>(field: &'static str, value: S) -> Result<S, Error> {
+    if value.is_finite() && value > S::zero() {
+        Ok(value)
+    } else {
+        Err(Error::NotPositive { field, value: value.as_f64() })
+    }
+}
+
+/// The number, if it is in `[min, max]`.
+pub(crate) fn within<S: Scalar>(field: &'static str, value: S, min: S, max: S) -> Result<S, Error> {
+    if value >= min && value <= max {
+        Ok(value)
+    } else {
+        Err(Error::OutOfRange {
+            field,
+            value: value.as_f64(),
+            min: min.as_f64(),
+            max: max.as_f64(),
+        })
+    }
+}
+
+/// The vector, if all of its components are finite.
+pub(crate) fn finite_vector<S: Scalar>(
+    field: [&'static str; 3],
+    v: Vec3<S>,
+) -> Result<Vec3<S>, Error> {
+    finite(field[0], v.x)?;
+    finite(field[1], v.y)?;
+    finite(field[2], v.z)?;
+    Ok(v)
+}
+
+/// The point, if all of its coordinates are finite.
+pub(crate) fn finite_point<S: Scalar>(
+    field: [&'static str; 3],
+    p: Point3<S>,
+) -> Result<Point3<S>, Error> {
+    finite_vector(field, Vec3::new(p.x, p.y, p.z)).map(|_| p)
+}

@@ -1,0 +1,66 @@
+//! **taw**: marble physics. This crate is its core: pure mathematics on
+//! [`cgmath`], no engine, no clock, no files, and generic over the scalar (`f32`
+//! for speed, `f64` for accuracy).
+//!
+//! The smallest program drops a marble on a floor:
+//!
+//! ```
+//! use taw::prelude::*;
+//!
+//! # fn main() -> Result<(), taw::Error> {
+//! let mut world = World::<f32>::default();
+//! world.walls.insert(Plane::new(Vec3::unit_y(), 0.0)?)?;
+//! let taw = world.marbles.insert(Marble::new(Point3::new(0.0, 2.0, 0.0), 0.5))?;
+//! for _ in 0..180 {
+//!     world.step(1.0 / 60.0)?;
+//! }
+//! let marble = world.marbles.get(taw)?;
+//! assert!((marble.position.y - 0.5).abs() < 1e-4, "it rests on the floor");
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! # Three verbs
+//! A substep is always the same walk, and [`World::step`](world::World::step)
+//! reads like it: *integrate*, *generate contacts*, *restitute*.
+//!
+//! # The rooms
+//! | room | what for |
+//! |---|---|
+//! | [`math`] | names for cgmath's types, the [`Scalar`](math::Scalar), lengths that neither overflow nor vanish |
+//! | [`shape`] | what a thing is: sphere, plane |
+//! | [`contact`] | when things touch, and the shortest way apart |
+//! | [`broad`] | who might touch: a grid for marbles |
+//! | [`motion`] | how a thing moves: integrators |
+//! | [`response`] | what a touch does |
+//! | [`world`] | the state in columns, the [`Model`](world::Model), the step |
+//!
+//! Imports point down this table's order only: a room never uses a later one.
+//!
+//! # Units and bad input
+//! Lengths are metres, times seconds, whatever else follows from them. What
+//! cannot be right (NaN, a negative radius, a step of zero) is refused with an
+//! [`Error`] that names the field and the value, and changes nothing. Nothing in
+//! this crate panics.
+
+pub mod broad;
+pub mod contact;
+mod error;
+pub mod math;
+pub mod motion;
+pub mod response;
+pub mod shape;
+pub mod world;
+
+pub use error::Error;
+
+/// What nearly every program needs.
+pub mod prelude {
+    pub use crate::contact::{Contact, Contacts};
+    pub use crate::math::{Point3, Scalar, Vec3};
+    pub use crate::motion::Integrator;
+    pub use crate::response::Response;
+    pub use crate::shape::{Plane, Sphere};
+    pub use crate::world::{Marble, MarbleId, Material, Model, WallId, World};
+    pub use cgmath::prelude::*;
+}

@@ -1,0 +1,137 @@
+//! Names for cgmath's types and the few functions that it lacks. Nothing here
+//! knows about shapes or time.
+
+use cgmath::num_traits::{self, Float, ToPrimitive};
+use cgmath::{BaseFloat, InnerSpace};
+
+/// A displacement, velocity or direction.
+pub type Vec3<S> = cgmath::Vector3<S>;
+/// A location.
+pub type Point3<S> = cgmath::Point3<S>;
+/// A rotation.
+pub type Quat<S> = cgmath::Quaternion<S>;
+/// A 3×3 matrix, column-major.
+pub type Mat3<S> = cgmath::Matrix3<S>;
+/// A 4×4 matrix, column-major.
+pub type Mat4<S> = cgmath::Matrix4<S>;
+
+/// The number type that a world counts in: `f32` or `f64`.
+pub trait Scalar: BaseFloat + Default + Send + Sync + 'static {
+    /// The nearest value of this type to a constant.
+    #[must_use]
+    fn constant(value: f64) -> Self {
+        // Both implementors convert every f64; NaN is unreachable.
+        num_traits::cast(value).unwrap_or_else(Self::nan)
+    }
+
+    /// This value as an `f64`, exactly.
+    #[must_use]
+    fn as_f64(self) -> f64 {
+        ToPrimitive::to_f64(&self).unwrap_or(f64::NAN)
+    }
+}
+
+impl Scalar for f32 {}
+impl Scalar for f64 {}
+
+/// The length of `v`, right also where squares of its components would overflow
+/// or vanish. Infinite only if a component is, or if the length itself is beyond
+/// the scalar's range.
+#[must_use]
+#[inline]
+pub fn length<S: Scalar>(v: Vec3<S>) -> S {
+    let squared = v.magnitude2();
+    if squared_is_exact(squared) {
+        squared.sqrt()
+    } else {
+        let largest = largest_component(v);
+        if largest > S::zero() && largest.is_finite() {
+            (v / largest).magnitude() * largest
+        } else {
+            largest
+        }
+    }
+}
+
+/// `v` as a unit vector and its length, or `None` if it has no direction: zero,
+/// infinite or NaN.
+#[must_use]
+#[inline]
+pub fn direction_and_length<S: Scalar>(v: Vec3<S>) -> Option<(Vec3<S>, S)> {
+    let squared = v.magnitude2();
+    if squared_is_exact(squared) {
+        let length = squared.sqrt();
+        return Some((v / length, length));
+    }
+    let largest = largest_component(v);
+    if largest > S::zero() && largest.is_finite() {
+        let scaled = v / largest;
+        let length = scaled.magnitude();
+        Some((scaled / length, length * largest))
+    } else {
+        None
+    }
+}
+
+/// Whether a sum of three squares kept all of its digits. Under the smallest
+/// normal number divided by epsilon, a part of it may have been denormal.
+fn squared_is_exact<S: Scalar>(squared: S) -> bool {
+    squared.is_finite() && squared > S::min_positive_value() / S::epsilon()
+}
+
+/// NaN if a component is.
+fn largest_component<S: Scalar>(v: Vec3<S>) -> S {
+    let (x, y, z) = (v.x.abs(), v.y.abs(), v.z.abs());
+    if x.is_nan() || y.is_nan() || z.is_nan() { S::nan() } else { Float::max(x, Float::max(y, z)) }
+}
+
+/// Whether all components are finite.
+#[must_use]
+#[inline]
+pub fn is_finite<S: Scalar>(v: Vec3<S>) -> bool {
+    v.x.is_finite() && v.y.is_finite() && v.z.is_finite()
+}
+
+/// Whether all coordinates are finite.
+#[must_use]
+#[inline]
+pub fn is_finite_point<S: Scalar>(p: Point3<S>) -> bool {
+    p.x.is_finite() && p.y.is_finite() && p.z.is_finite()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lengths_neither_overflow_nor_vanish() {
+        for scale in [1e-44_f32, 1e-40, 1e-30, 1e-20, 1e-3, 1.0, 1e3, 1e20, 1e37] {
+            let v = Vec3::new(2.0 * scale, 3.0 * scale, 6.0 * scale);
+            let expected = 7.0 * f64::from(scale);
+            // Denormals carry fewer digits, so allow their spacing as well.
+            let tolerance = 4e-7 * expected + 3e-45;
+            assert!((f64::from(length(v)) - expected).abs() <= tolerance, "{scale}");
+            let (unit, l) = direction_and_length(v).unwrap();
+            assert_eq!(l.to_bits(), length(v).to_bits(), "{scale}");
+            assert!((unit.magnitude() - 1.0).abs() < 3e-7, "{scale}");
+        }
+    }
+
+    #[test]
+    fn what_has_no_direction_gives_none() {
+        for v in [
+            Vec3::new(0.0_f64, 0.0, 0.0),
+            Vec3::new(-0.0, 0.0, 0.0),
+            Vec3::new(f64::NAN, 1.0, 0.0),
+            Vec3::new(1.0, f64::INFINITY, 0.0),
+        ] {
+            assert_eq!(direction_and_length(v), None, "{v:?}");
+        }
+    }
+
+    #[test]
+    fn nan_and_infinity_show_in_the_length() {
+        assert!(length(Vec3::new(0.0_f32, f32::NAN, 2.0)).is_nan());
+        assert_eq!(length(Vec3::new(f32::NEG_INFINITY, 0.0, 2.0)), f32::INFINITY);
+    }
+}

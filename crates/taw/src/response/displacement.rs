@@ -1,0 +1,135 @@
+use crate::contact::{Contacts, mtv_sphere_plane, mtv_sphere_sphere};
+use crate::math::{Scalar, Vec3, is_finite, is_finite_point};
+use crate::response::Columns;
+use crate::shape::{Plane, Sphere};
+
+/// The lab's restitution, as taught in the lecture: the bottom of the ladder and
+/// the readable reference for the rest.
+///
+/// Largest displacement first, each contact is tested again. If the two still
+/// touch, they are moved apart by their displacement (a wall stays, marbles take
+/// half each), and their velocities change by that displacement per step. The lab
+/// counts velocity in units per frame; here it is metres per second, so the
+/// change is displacement / dt.
+///
+/// What it costs in truth: the same push whatever the masses, no friction, no
+/// restitution coefficient (a [`Material`](crate::world::Material) is not read),
+/// one pass (a tall pile sags), and deep overlap turns into speed.
+///
+/// A row that would become infinite or NaN keeps its place, loses its velocity,
+/// and is added to `stopped`; the other half of its contact is not affected.
+pub fn displacement<S: Scalar>(
+    walls: &[Plane<S>],
+    marbles: &mut Columns<S>,
+    contacts: &mut Contacts<S>,
+    dt: S,
+    stopped: &mut Vec<u32>,
+) {
+    contacts.sort();
+    for contact in &contacts.wm {
+        let wall = &walls[contact.a as usize];
+        if let Some(mtv) = mtv_sphere_plane(&marbles.sphere(contact.b), wall) {
+            marbles.displace(contact.b, mtv, dt, stopped);
+        }
+    }
+    let half = S::constant(0.5);
+    for contact in &contacts.mm {
+        let (a, b) = (marbles.sphere(contact.a), marbles.sphere(contact.b));
+        if let Some(mtv) = mtv_sphere_sphere(&a, &b) {
+            marbles.displace(contact.a, mtv * -half, dt, stopped);
+            marbles.displace(contact.b, mtv * half, dt, stopped);
+        }
+    }
+}
+
+impl<S: Scalar> Columns<'_, S> {
+    fn sphere(&self, row: u32) -> Sphere<S> {
+        Sphere { center: self.position[row as usize], radius: self.radius[row as usize] }
+    }
+
+    fn displace(&mut self, row: u32, by: Vec3<S>, dt: S, stopped: &mut Vec<u32>) {
+        let index = row as usize;
+        let position = self.position[index] + by;
+        let velocity = self.velocity[index] + by / dt;
+        if is_finite_point(position) && is_finite(velocity) {
+            self.position[index] = position;
+            self.velocity[index] = velocity;
+        } else {
+            self.velocity[index] = Vec3::new(S::zero(), S::zero(), S::zero());
+            stopped.push(row);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contact::Contact;
+    use crate::math::Point3;
+
+    /// Runs one restitution over all contacts among `spheres` (center, radius,
+    /// velocity) and a floor at zero, and gives positions and velocities.
+    fn restituted(spheres: &[(Point3<f64>, f64, Vec3<f64>)]) -> (Vec<Point3<f64>>, Vec<Vec3<f64>>) {
+        let floor = Plane::new(Vec3::unit_y(), 0.0).unwrap();
+        let mut position: Vec<_> = spheres.iter().map(|s| s.0).collect();
+        let radius: Vec<_> = spheres.iter().map(|s| s.1).collect();
+        let mut velocity: Vec<_> = spheres.iter().map(|s| s.2).collect();
+        let mut contacts = Contacts::default();
+        let all = Vec3::new(9.0, 9.0, 9.0); // only the order depends on it
+        let count = spheres.len() as u32;
+        contacts.wm = (0..count).map(|b| Contact { a: 0, b, mtv: all }).collect();
+        crate::broad::all_pairs(count, |a, b| contacts.mm.push(Contact { a, b, mtv: all }));
+        let mut stopped = Vec::new();
+        let mut columns =
+            Columns { position: &mut position, velocity: &mut velocity, radius: &radius };
+        displacement(&[floor], &mut columns, &mut contacts, 0.5, &mut stopped);
+        assert_eq!(stopped, []);
+        (position, velocity)
+    }
+
+    #[test]
+    fn a_wall_pushes_out_and_adds_the_displacement_per_step() {
+        let (position, velocity) =
+            restituted(&[(Point3::new(1.0, 0.25, 0.0), 0.5, Vec3::new(3.0, -2.0, 0.0))]);
+        assert_eq!(position, [Point3::new(1.0, 0.5, 0.0)]);
+        assert_eq!(velocity, [Vec3::new(3.0, -1.5, 0.0)], "0.25 m in 0.5 s");
+    }
+
+    #[test]
+    fn marbles_take_half_each() {
+        let still = Vec3::new(0.0, 0.0, 0.0);
+        let (position, velocity) = restituted(&[
+            (Point3::new(0.0, 5.0, 0.0), 1.0, still),
+            (Point3::new(1.5, 5.0, 0.0), 1.0, still),
+        ]);
+        assert_eq!(position, [Point3::new(-0.25, 5.0, 0.0), Point3::new(1.75, 5.0, 0.0)]);
+        assert_eq!(velocity, [Vec3::new(-0.5, 0.0, 0.0), Vec3::new(0.5, 0.0, 0.0)]);
+    }
+
+    #[test]
+    fn a_contact_that_an_earlier_one_settled_does_nothing() {
+        // The first two push the third out of reach of both.
+        let still = Vec3::new(0.0, 0.0, 0.0);
+        let at = Point3::new(0.0, 5.0, 0.0);
+        let (position, _) = restituted(&[(at, 1.0, still), (at, 1.0, still)]);
+        let gap = position[1].x - position[0].x;
+        assert_eq!(gap, 2.0, "coincident marbles part completely, along x");
+    }
+
+    #[test]
+    fn what_would_become_infinite_is_stopped_and_named() {
+        let floor = Plane::new(Vec3::unit_y(), 0.0_f32).unwrap();
+        let mut position = [Point3::new(0.0, 0.0, 0.0), Point3::new(0.0, 0.5, 0.0)];
+        let mut velocity = [Vec3::new(7.0, f32::MAX, 0.0), Vec3::new(0.0, 0.0, 0.0)];
+        let mut contacts = Contacts::default();
+        contacts.wm = [0, 1].map(|b| Contact { a: 0, b, mtv: Vec3::unit_y() }).to_vec();
+        let mut stopped = Vec::new();
+        let mut columns =
+            Columns { position: &mut position, velocity: &mut velocity, radius: &[1.0, 1.0] };
+        // 1 m in 1e-33 s is 1e33 m/s, more than the gap below f32::MAX.
+        displacement(&[floor], &mut columns, &mut contacts, 1e-33, &mut stopped);
+        assert_eq!(stopped, [0]);
+        assert_eq!((position[0].y, velocity[0]), (0.0, Vec3::new(0.0, 0.0, 0.0)));
+        assert_eq!(position[1].y, 1.0, "the other one is restituted as ever");
+    }
+}

@@ -1,0 +1,352 @@
+//! The state as columns, the choice of methods, and the step.
+
+mod handles;
+mod marbles;
+mod model;
+mod optional;
+mod walls;
+
+pub use marbles::{Marble, MarbleId, Marbles, Material};
+pub use model::Model;
+pub use walls::{WallId, Walls};
+
+use crate::Error;
+use crate::broad::Grid;
+use crate::contact::{Contact, Contacts, mtv_sphere_plane, mtv_sphere_sphere};
+use crate::error::{finite_vector, positive};
+use crate::math::{Scalar, Vec3};
+use crate::response::{Columns, Response, displacement};
+
+/// Everything that moves and everything that it can touch.
+///
+/// A world is plain data: a clone is a snapshot, and stepping two clones gives
+/// the same bits. Two worlds are equal when their state and their last contacts
+/// are; what a step only scribbles on does not count.
+#[derive(Clone, Debug)]
+pub struct World<S> {
+    /// How to step. Checked by each step.
+    pub model: Model,
+    /// In m/s², on every marble. Checked by each step.
+    pub gravity: Vec3<S>,
+    /// What moves.
+    pub marbles: Marbles<S>,
+    /// What nothing can move.
+    pub walls: Walls<S>,
+    /// The touches of the last substep. Between [`World::generate_contacts`] and
+    /// [`World::restitute`] they may be changed: what is taken out is not
+    /// restituted, and a row that does not exist is passed over.
+    pub contacts: Contacts<S>,
+    grid: Grid,
+    stopped: Vec<u32>,
+}
+
+impl<S: Scalar> Default for World<S> {
+    /// Empty, with gravity 9.81 m/s² toward −y and the default [`Model`].
+    fn default() -> Self {
+        Self {
+            model: Model::default(),
+            gravity: Vec3::unit_y() * S::constant(-9.81),
+            marbles: Marbles::default(),
+            walls: Walls::default(),
+            contacts: Contacts::default(),
+            grid: Grid::default(),
+            stopped: Vec::new(),
+        }
+    }
+}
+
+impl<S: Scalar> PartialEq for World<S> {
+    fn eq(&self, other: &Self) -> bool {
+        let Self { model, gravity, marbles, walls, contacts, grid: _, stopped } = self;
+        *model == other.model
+            && *gravity == other.gravity
+            && *marbles == other.marbles
+            && *walls == other.walls
+            && *contacts == other.contacts
+            && *stopped == other.stopped
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// Moves the world on by `dt` seconds, in [`Model::substeps`] equal parts.
+    ///
+    /// A marble whose motion overflows keeps its last place, loses its velocity,
+    /// and is named by [`World::stopped`]; no other marble is affected.
+    ///
+    /// # Errors
+    /// [`Error::NotPositive`] for `dt`, [`Error::NotFinite`] for the gravity,
+    /// [`Error::OutOfRange`] for the model; then nothing has moved.
+    pub fn step(&mut self, dt: S) -> Result<(), Error> {
+        self.model.check()?;
+        let dt = positive("dt", dt / S::constant(f64::from(self.model.substeps)))?;
+        self.stopped.clear();
+        for _ in 0..self.model.substeps {
+            self.integrate(dt)?;
+            self.generate_contacts();
+            self.restitute(dt)?;
+        }
+        Ok(())
+    }
+
+    /// The first verb: forces change velocities, velocities change positions, over
+    /// `dt` seconds.
+    ///
+    /// # Errors
+    /// [`Error::NotPositive`] for `dt`, [`Error::NotFinite`] for the gravity.
+    pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
+        let dt = positive("dt", dt)?;
+        finite_vector(["gravity.x", "gravity.y", "gravity.z"], self.gravity)?;
+        self.marbles.integrate(self.model.integrator, self.gravity, dt, &mut self.stopped);
+        Ok(())
+    }
+
+    /// The second verb: finds who touches whom, and by how much.
+    pub fn generate_contacts(&mut self) {
+        self.contacts.clear();
+        for (a, plane) in self.walls.planes().iter().enumerate() {
+            for b in 0..self.marbles.len() {
+                if let Some(mtv) = mtv_sphere_plane(&self.marbles.sphere(b), plane) {
+                    let (a, b) = (a as u32, b as u32);
+                    self.contacts.wm.push(Contact { a, b, mtv });
+                }
+            }
+        }
+        let center = self.marbles.position();
+        self.grid.rebuild(center, self.marbles.radius());
+        self.grid.pairs(center, |a, b| {
+            let (first, second) = (a as usize, b as usize);
+            let (first, second) = (self.marbles.sphere(first), self.marbles.sphere(second));
+            if let Some(mtv) = mtv_sphere_sphere(&first, &second) {
+                self.contacts.mm.push(Contact { a, b, mtv });
+            }
+        });
+    }
+
+    /// The third verb: contacts change positions and velocities back to what the
+    /// scene allows. `dt` is the time that was integrated, in seconds.
+    ///
+    /// # Errors
+    /// [`Error::NotPositive`] for `dt`.
+    pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
+        let dt = positive("dt", dt)?;
+        let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
+        self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
+        self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
+        let (position, velocity, radius) = self.marbles.columns();
+        let mut columns = Columns { position, velocity, radius };
+        match self.model.response {
+            Response::Displacement => displacement(
+                self.walls.planes(),
+                &mut columns,
+                &mut self.contacts,
+                dt,
+                &mut self.stopped,
+            ),
+        }
+        Ok(())
+    }
+
+    /// The marbles that the last step stopped because their motion overflowed
+    /// (since the last step, if the stages are called one by one).
+    pub fn stopped(&self) -> impl Iterator<Item = MarbleId> + '_ {
+        self.stopped.iter().filter_map(|row| self.marbles.id(*row as usize))
+    }
+
+    /// The grid of the last substep, for drawing it.
+    #[must_use]
+    pub fn grid(&self) -> &Grid {
+        &self.grid
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Point3;
+    use crate::motion::Integrator;
+    use crate::shape::Plane;
+
+    const DT: f32 = 1.0 / 60.0;
+
+    fn floor<S: Scalar>() -> World<S> {
+        let mut world = World::default();
+        let plane = Plane::new(Vec3::unit_y(), S::zero()).unwrap();
+        world.walls.insert(plane).unwrap();
+        world
+    }
+
+    /// A heap of marbles of many sizes, dropped on a floor.
+    fn heap() -> World<f32> {
+        let mut world = floor();
+        for i in 0..200_u8 {
+            let f = f32::from(i);
+            let position = Point3::new(f % 5.0, 0.5 + f / 10.0, f * 7.0 % 5.0);
+            let radius = 0.1 + f % 13.0 / 30.0;
+            world.marbles.insert(Marble::new(position, radius)).unwrap();
+        }
+        world
+    }
+
+    #[test]
+    fn a_step_is_its_three_verbs() {
+        let (mut whole, mut parts) = (heap(), heap());
+        for _ in 0..60 {
+            whole.step(DT).unwrap();
+            parts.integrate(DT).unwrap();
+            parts.generate_contacts();
+            parts.restitute(DT).unwrap();
+        }
+        assert_eq!(whole, parts);
+        assert!(!whole.contacts.mm.is_empty() && !whole.contacts.wm.is_empty());
+    }
+
+    #[test]
+    fn a_clone_is_a_snapshot_that_steps_to_the_same_bits() {
+        let mut world = heap();
+        for _ in 0..60 {
+            world.step(DT).unwrap();
+        }
+        let mut clone = world.clone();
+        for _ in 0..60 {
+            world.step(DT).unwrap();
+            clone.step(DT).unwrap();
+        }
+        assert_eq!(world, clone);
+    }
+
+    #[test]
+    fn a_heap_comes_to_rest_and_nothing_falls_through() {
+        let mut world = heap();
+        world.model.substeps = 4;
+        for _ in 0..1200 {
+            world.step(DT).unwrap();
+        }
+        for (center, radius) in world.marbles.position().iter().zip(world.marbles.radius()) {
+            // One pass over the contacts lets a heap sag; through the floor it never goes.
+            assert!(center.y >= radius * 0.99, "a marble of {radius} m is at {} m", center.y);
+        }
+    }
+
+    #[test]
+    fn substeps_are_steps_of_a_part() {
+        let (mut whole, mut parts) = (heap(), heap());
+        whole.model.substeps = 4;
+        for _ in 0..30 {
+            whole.step(DT).unwrap();
+            (0..4).for_each(|_| parts.step(DT / 4.0).unwrap());
+        }
+        assert_eq!(whole.marbles, parts.marbles);
+    }
+
+    #[test]
+    fn a_bad_step_changes_nothing() {
+        let mut world = heap();
+        world.step(DT).unwrap();
+        let before = world.clone();
+        for dt in [0.0, -DT, f32::NAN, f32::INFINITY] {
+            let error = world.step(dt).unwrap_err();
+            assert!(matches!(error, Error::NotPositive { field: "dt", .. }), "{error}");
+        }
+        assert!(world.integrate(0.0).is_err() && world.restitute(-1.0).is_err());
+        assert_eq!(world, before);
+        world.gravity.z = f32::NAN;
+        assert_eq!(world.step(DT).unwrap_err().to_string(), "gravity.z must be finite, but is NaN");
+        assert_eq!(world.marbles, before.marbles);
+        world.gravity.z = 0.0;
+        for substeps in [0, 1001] {
+            world.model.substeps = substeps;
+            let error = world.step(DT).unwrap_err();
+            assert!(matches!(error, Error::OutOfRange { field: "model.substeps", .. }), "{error}");
+        }
+        assert_eq!(world.marbles, before.marbles);
+    }
+
+    #[test]
+    fn a_bad_marble_is_refused_and_changes_nothing() {
+        let mut world = floor::<f32>();
+        let good = Marble::new(Point3::new(0.0, 1.0, 0.0), 0.5);
+        let id = world.marbles.insert(good).unwrap();
+        let before = world.clone();
+        let nan = f32::NAN;
+        let material = |restitution, friction| Some(Material { restitution, friction });
+        let bad = [
+            (Marble { position: Point3::new(nan, 0.0, 0.0), ..good }, "position.x"),
+            (Marble { radius: 0.0, ..good }, "radius"),
+            (Marble { velocity: Vec3::new(0.0, 0.0, f32::INFINITY), ..good }, "velocity.z"),
+            (Marble { material: material(1.1, 0.0), ..good }, "restitution"),
+            (Marble { material: material(0.5, nan), ..good }, "friction"),
+        ];
+        for (marble, field) in bad {
+            let error = world.marbles.insert(marble).unwrap_err().to_string();
+            assert!(error.starts_with(field), "{error}");
+        }
+        assert!(world.marbles.set_position(id, Point3::new(0.0, nan, 0.0)).is_err());
+        assert!(world.marbles.set_velocity(id, Vec3::new(nan, 0.0, 0.0)).is_err());
+        assert!(world.marbles.set_radius(id, -1.0).is_err());
+        assert!(world.marbles.set_material(id, material(-0.1, 0.0)).is_err());
+        assert_eq!(world, before);
+    }
+
+    #[test]
+    fn a_removed_handle_names_nothing() {
+        let mut world = floor::<f32>();
+        let first = world.marbles.insert(Marble::new(Point3::new(0.0, 1.0, 0.0), 0.5)).unwrap();
+        let second = world.marbles.insert(Marble::new(Point3::new(0.0, 9.0, 0.0), 0.2)).unwrap();
+        assert_eq!(world.marbles.remove(first).unwrap().radius, 0.5);
+        assert_eq!(world.marbles.remove(first), Err(Error::NoSuchMarble(first)));
+        assert!(world.marbles.set_radius(first, 1.0).is_err());
+        assert_eq!(world.marbles.get(second).unwrap().radius, 0.2);
+        let wall = world.walls.id(0).unwrap();
+        world.walls.remove(wall).unwrap();
+        assert_eq!(world.walls.get(wall), Err(Error::NoSuchWall(wall)));
+    }
+
+    #[test]
+    fn an_overflowing_marble_is_stopped_and_no_other_changes_by_a_bit() {
+        let (mut healthy, mut sick) = (heap(), heap());
+        let far = Point3::new(-3e38, 0.0, 0.0);
+        for world in [&mut healthy, &mut sick] {
+            world.marbles.insert(Marble::new(far, 0.5)).unwrap();
+        }
+        let id = sick.marbles.id(200).unwrap();
+        sick.marbles.set_velocity(id, Vec3::new(-3e38, 0.0, 0.0)).unwrap();
+        for world in [&mut healthy, &mut sick] {
+            world.step(1.0).unwrap();
+        }
+        assert_eq!(sick.stopped().collect::<Vec<_>>(), [id]);
+        assert_eq!(healthy.stopped().count(), 0);
+        let stopped = sick.marbles.get(id).unwrap();
+        assert_eq!((stopped.position.x, stopped.velocity.x), (-3e38, 0.0));
+        assert_eq!(sick.marbles.position()[..200], healthy.marbles.position()[..200]);
+        assert_eq!(sick.marbles.velocity()[..200], healthy.marbles.velocity()[..200]);
+    }
+
+    #[test]
+    fn a_marble_may_have_its_own_integrator() {
+        let mut world = World::<f64>::default();
+        let origin = Point3::new(0.0, 0.0, 0.0);
+        let explicit =
+            Marble { integrator: Some(Integrator::ExplicitEuler), ..Marble::new(origin, 0.5) };
+        let ids = [Marble::new(origin + Vec3::unit_x() * 9.0, 0.5), explicit]
+            .map(|marble| world.marbles.insert(marble).unwrap());
+        world.gravity = Vec3::new(0.0, -30.0, 0.0);
+        for _ in 0..30 {
+            world.step(1.0 / 30.0).unwrap();
+        }
+        let fallen = ids.map(|id| -world.marbles.get(id).unwrap().position.y);
+        assert!((fallen[0] - 15.5).abs() < 1e-12, "the model's: {}", fallen[0]);
+        assert!((fallen[1] - 14.5).abs() < 1e-12, "its own: {}", fallen[1]);
+    }
+
+    #[test]
+    fn a_contact_taken_out_is_not_restituted_and_a_made_up_one_is_passed_over() {
+        let mut world = floor::<f32>();
+        let id = world.marbles.insert(Marble::new(Point3::new(0.0, 0.0, 0.0), 0.5)).unwrap();
+        world.generate_contacts();
+        assert_eq!(world.contacts.wm.len(), 1);
+        world.contacts.wm[0].b = 77;
+        world.contacts.mm.push(Contact { a: 0, b: 1, mtv: Vec3::unit_x() });
+        world.restitute(DT).unwrap();
+        assert_eq!(world.marbles.get(id).unwrap().position.y, 0.0);
+    }
+}
