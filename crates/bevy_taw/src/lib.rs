@@ -1,1 +1,88 @@
-//! x
+//! **`bevy_taw`**: marble physics for Bevy, on the core of [`taw`].
+//!
+//! A marble is one component, a wall is another:
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy_taw::prelude::*;
+//!
+//! fn main() {
+//!     let mut app = App::new();
+//!     # app.add_plugins(MinimalPlugins);
+//!     # #[cfg(any())]
+//!     app.add_plugins(DefaultPlugins);
+//!     app.add_plugins(TawPlugins);
+//!     app.add_systems(Startup, |mut commands: Commands| {
+//!         commands.spawn(Wall::default()); // a floor: solid below its +Y
+//!         commands.spawn((Marble::new(0.5), Transform::from_xyz(0.0, 3.0, 0.0)));
+//!     });
+//!     # for _ in 0..10 { app.update(); }
+//!     # #[cfg(any())]
+//!     app.run();
+//! }
+//! ```
+//!
+//! # What a step does
+//! Once per [`FixedUpdate`], in the sets of [`TawSystems`]:
+//!
+//! 1. **Gather**: what changed in components and resources goes into the
+//!    [`TawWorld`]. A `Transform` that somebody else wrote teleports its marble.
+//! 2. **Step**: the schedule [`Substep`] runs [`Model::substeps`] times:
+//!    *integrate*, *generate contacts*, *restitute*.
+//! 3. **Scatter**: what moved goes back to `Transform` and [`Velocity`].
+//!
+//! Your own systems go before, after or between any of them.
+//!
+//! # The rooms
+//! | module | what for |
+//! |---|---|
+//! | [`components`] | marbles, walls, and what they may have |
+//! | [`resources`] | the model, gravity, the world |
+//! | [`messages`] | contacts that start, go on and end |
+//! | [`refusal`] | input that was refused, marbles that had to be stopped |
+//! | [`diagnostics`] | step time and counts |
+//! | [`interpolation`] | smooth motion between fixed steps |
+//! | `gizmos` (feature `render`) | contacts, normals, velocities and the grid, drawn |
+//! | `debug_ui` (feature `debug_ui`) | egui panels for any game |
+//!
+//! # Units
+//! Metres, seconds. `Transform::scale` does not change a marble's radius.
+//!
+//! [`FixedUpdate`]: bevy::app::FixedUpdate
+//! [`Model::substeps`]: taw::world::Model::substeps
+//! [`TawSystems`]: crate::TawSystems
+//! [`Velocity`]: crate::components::Velocity
+//! [`TawWorld`]: crate::resources::TawWorld
+
+pub mod components;
+mod convert;
+#[cfg(feature = "debug_ui")]
+pub mod debug_ui;
+pub mod diagnostics;
+mod gather;
+#[cfg(feature = "render")]
+pub mod gizmos;
+pub mod interpolation;
+pub mod messages;
+mod plugin;
+mod reflect;
+pub mod refusal;
+pub mod resources;
+mod scatter;
+
+pub use plugin::{Substep, SubstepDelta, TawPlugin, TawPlugins, TawSystems};
+pub use taw;
+
+/// What nearly every game needs.
+pub mod prelude {
+    pub use crate::components::{Marble, MarbleIntegrator, MarbleMaterial, Velocity, Wall};
+    #[cfg(feature = "render")]
+    pub use crate::gizmos::TawGizmos;
+    pub use crate::messages::{ContactEnded, ContactOngoing, ContactPair, ContactStarted};
+    pub use crate::refusal::{InputRefused, MarbleStopped};
+    pub use crate::resources::{Gravity, TawModel, TawWorld};
+    pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
+    pub use taw::motion::Integrator;
+    pub use taw::response::Response;
+    pub use taw::world::Model;
+}

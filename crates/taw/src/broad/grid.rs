@@ -88,12 +88,11 @@ impl Grid {
     /// corner of each, and their common width in metres.
     pub fn occupied(&self) -> (impl Iterator<Item = [f64; 3]> + '_, f64) {
         let mut last = None;
-        let corners = self.cells[self.level(0)].iter().filter_map(move |cell| {
-            (last.replace(cell.key) != Some(cell.key)).then(|| {
-                let axis = |i: u32| (cell.key >> (i * AXIS_BITS)) & ((1 << AXIS_BITS) - 1);
-                [0, 1, 2]
-                    .map(|i| self.origin[i as usize] + (axis(i) as f64 - AXIS_MIDDLE) * self.width)
-            })
+        let cells = self.cells[self.level(0)].iter();
+        let distinct = cells.filter(move |cell| last.replace(cell.key) != Some(cell.key));
+        let corners = distinct.map(|cell| {
+            let axis = |i: u32| (cell.key >> (i * AXIS_BITS)) & ((1 << AXIS_BITS) - 1);
+            [0, 1, 2].map(|i| self.origin[i as usize] + (axis(i) as f64 - AXIS_MIDDLE) * self.width)
         });
         (corners, self.width)
     }
@@ -281,9 +280,8 @@ mod tests {
 
     #[test]
     fn no_pair_is_named_twice() {
-        let center: Vec<_> = (0..500_u32)
-            .map(|i| Point3::new((i % 7) as f64, (i % 11) as f64, (i % 13) as f64) * 0.7)
-            .collect();
+        let center: Vec<_> =
+            (0..500_u32).map(|i| Point3::new(i % 7, i % 11, i % 13).map(f64::from) * 0.7).collect();
         let radius: Vec<_> = (0..500).map(|i| [0.05, 0.3, 0.6][i % 3]).collect();
         let mut grid = Grid::default();
         grid.rebuild(&center, &radius);

@@ -94,10 +94,10 @@ mod tests {
         ];
         // Every rotation and its reverse, since a broken order shows in some only.
         for shift in 0..sorted.len() {
-            let mut contacts = Contacts::default();
-            contacts.mm = sorted.to_vec();
-            contacts.mm.rotate_left(shift);
-            contacts.wm = contacts.mm.iter().rev().copied().collect();
+            let mut mm = sorted.to_vec();
+            mm.rotate_left(shift);
+            let wm = mm.iter().rev().copied().collect();
+            let mut contacts = Contacts { wm, mm };
             contacts.sort();
             let rows = |list: &[Contact<f32>]| list.iter().map(|c| (c.a, c.b)).collect::<Vec<_>>();
             assert_eq!(rows(&contacts.mm), rows(&sorted), "rotated by {shift}");
@@ -107,8 +107,7 @@ mod tests {
 
     #[test]
     fn clearing_keeps_the_memory() {
-        let mut contacts = Contacts::default();
-        contacts.wm = vec![contact(0, 0, 1.0); 100];
+        let mut contacts = Contacts { wm: vec![contact(0, 0, 1.0); 100], mm: vec![] };
         let capacity = contacts.wm.capacity();
         contacts.clear();
         assert!(contacts.is_empty());

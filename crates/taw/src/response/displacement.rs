@@ -121,8 +121,8 @@ mod tests {
         let floor = Plane::new(Vec3::unit_y(), 0.0_f32).unwrap();
         let mut position = [Point3::new(0.0, 0.0, 0.0), Point3::new(0.0, 0.5, 0.0)];
         let mut velocity = [Vec3::new(7.0, f32::MAX, 0.0), Vec3::new(0.0, 0.0, 0.0)];
-        let mut contacts = Contacts::default();
-        contacts.wm = [0, 1].map(|b| Contact { a: 0, b, mtv: Vec3::unit_y() }).to_vec();
+        let wm = [0, 1].map(|b| Contact { a: 0, b, mtv: Vec3::unit_y() }).to_vec();
+        let mut contacts = Contacts { wm, mm: vec![] };
         let mut stopped = Vec::new();
         let mut columns =
             Columns { position: &mut position, velocity: &mut velocity, radius: &[1.0, 1.0] };

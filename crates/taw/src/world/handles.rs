@@ -34,13 +34,12 @@ impl Handles {
     pub fn push(&mut self) -> Result<Handle, Error> {
         let full = |_| Error::Full(self.rows.len());
         let row = u32::try_from(self.rows.len()).map_err(full)?;
-        let slot = match self.free.pop() {
-            Some(slot) => slot,
-            None => {
-                let slot = u32::try_from(self.slots.len()).map_err(full)?;
-                self.slots.push(Slot { generation: 0, row: None });
-                slot
-            }
+        let slot = if let Some(slot) = self.free.pop() {
+            slot
+        } else {
+            let slot = u32::try_from(self.slots.len()).map_err(full)?;
+            self.slots.push(Slot { generation: 0, row: None });
+            slot
         };
         self.rows.push(slot);
         let entry = &mut self.slots[slot as usize];

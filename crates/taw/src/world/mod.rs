@@ -24,10 +24,8 @@ use crate::response::{Columns, Response, displacement};
 /// are; what a step only scribbles on does not count.
 #[derive(Clone, Debug)]
 pub struct World<S> {
-    /// How to step. Checked by each step.
-    pub model: Model,
-    /// In m/s², on every marble. Checked by each step.
-    pub gravity: Vec3<S>,
+    model: Model,
+    gravity: Vec3<S>,
     /// What moves.
     pub marbles: Marbles<S>,
     /// What nothing can move.
@@ -68,18 +66,46 @@ impl<S: Scalar> PartialEq for World<S> {
 }
 
 impl<S: Scalar> World<S> {
+    /// How this world steps.
+    #[must_use]
+    pub fn model(&self) -> Model {
+        self.model
+    }
+
+    /// Changes how the next step is done.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for the substeps.
+    pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
+        self.model = model.checked()?;
+        Ok(())
+    }
+
+    /// The acceleration of every marble, in m/s².
+    #[must_use]
+    pub fn gravity(&self) -> Vec3<S> {
+        self.gravity
+    }
+
+    /// Changes the acceleration of every marble, in m/s².
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`].
+    pub fn set_gravity(&mut self, gravity: Vec3<S>) -> Result<(), Error> {
+        self.gravity = finite_vector(["gravity.x", "gravity.y", "gravity.z"], gravity)?;
+        Ok(())
+    }
+
     /// Moves the world on by `dt` seconds, in [`Model::substeps`] equal parts.
     ///
     /// A marble whose motion overflows keeps its last place, loses its velocity,
     /// and is named by [`World::stopped`]; no other marble is affected.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`, [`Error::NotFinite`] for the gravity,
-    /// [`Error::OutOfRange`] for the model; then nothing has moved.
+    /// [`Error::NotPositive`] for `dt`; then nothing has moved.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
-        self.model.check()?;
         let dt = positive("dt", dt / S::constant(f64::from(self.model.substeps)))?;
-        self.stopped.clear();
+        self.clear_stopped();
         for _ in 0..self.model.substeps {
             self.integrate(dt)?;
             self.generate_contacts();
@@ -92,10 +118,9 @@ impl<S: Scalar> World<S> {
     /// `dt` seconds.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`, [`Error::NotFinite`] for the gravity.
+    /// [`Error::NotPositive`] for `dt`.
     pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
         let dt = positive("dt", dt)?;
-        finite_vector(["gravity.x", "gravity.y", "gravity.z"], self.gravity)?;
         self.marbles.integrate(self.model.integrator, self.gravity, dt, &mut self.stopped);
         Ok(())
     }
@@ -146,10 +171,15 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// The marbles that the last step stopped because their motion overflowed
-    /// (since the last step, if the stages are called one by one).
+    /// The marbles that the last step stopped because their motion overflowed.
+    /// Whoever calls the stages one by one has to [clear](World::clear_stopped) it.
     pub fn stopped(&self) -> impl Iterator<Item = MarbleId> + '_ {
         self.stopped.iter().filter_map(|row| self.marbles.id(*row as usize))
+    }
+
+    /// Forgets who was [stopped](World::stopped). A step begins with this.
+    pub fn clear_stopped(&mut self) {
+        self.stopped.clear();
     }
 
     /// The grid of the last substep, for drawing it.
@@ -217,7 +247,7 @@ mod tests {
     #[test]
     fn a_heap_comes_to_rest_and_nothing_falls_through() {
         let mut world = heap();
-        world.model.substeps = 4;
+        world.set_model(Model { substeps: 4, ..Model::default() }).unwrap();
         for _ in 0..1200 {
             world.step(DT).unwrap();
         }
@@ -230,7 +260,7 @@ mod tests {
     #[test]
     fn substeps_are_steps_of_a_part() {
         let (mut whole, mut parts) = (heap(), heap());
-        whole.model.substeps = 4;
+        whole.set_model(Model { substeps: 4, ..Model::default() }).unwrap();
         for _ in 0..30 {
             whole.step(DT).unwrap();
             (0..4).for_each(|_| parts.step(DT / 4.0).unwrap());
@@ -249,16 +279,19 @@ mod tests {
         }
         assert!(world.integrate(0.0).is_err() && world.restitute(-1.0).is_err());
         assert_eq!(world, before);
-        world.gravity.z = f32::NAN;
-        assert_eq!(world.step(DT).unwrap_err().to_string(), "gravity.z must be finite, but is NaN");
-        assert_eq!(world.marbles, before.marbles);
-        world.gravity.z = 0.0;
+    }
+
+    #[test]
+    fn a_bad_setting_is_refused_and_changes_nothing() {
+        let mut world = heap();
+        let before = world.clone();
+        let error = world.set_gravity(Vec3::new(0.0, 0.0, f32::NAN)).unwrap_err();
+        assert_eq!(error.to_string(), "gravity.z must be finite, but is NaN");
         for substeps in [0, 1001] {
-            world.model.substeps = substeps;
-            let error = world.step(DT).unwrap_err();
-            assert!(matches!(error, Error::OutOfRange { field: "model.substeps", .. }), "{error}");
+            let error = world.set_model(Model { substeps, ..Model::default() }).unwrap_err();
+            assert!(matches!(error, Error::OutOfRange { field: "substeps", .. }), "{error}");
         }
-        assert_eq!(world.marbles, before.marbles);
+        assert_eq!(world, before);
     }
 
     #[test]
@@ -329,7 +362,7 @@ mod tests {
             Marble { integrator: Some(Integrator::ExplicitEuler), ..Marble::new(origin, 0.5) };
         let ids = [Marble::new(origin + Vec3::unit_x() * 9.0, 0.5), explicit]
             .map(|marble| world.marbles.insert(marble).unwrap());
-        world.gravity = Vec3::new(0.0, -30.0, 0.0);
+        world.set_gravity(Vec3::new(0.0, -30.0, 0.0)).unwrap();
         for _ in 0..30 {
             world.step(1.0 / 30.0).unwrap();
         }

@@ -1,4 +1,5 @@
 use crate::Error;
+use crate::error::within;
 use crate::motion::Integrator;
 use crate::response::Response;
 
@@ -36,17 +37,9 @@ impl Model {
     /// The largest number of [substeps](Model::substeps).
     pub const MAX_SUBSTEPS: u32 = 1000;
 
-    /// Whether a world can step with this model.
-    ///
-    /// # Errors
-    /// [`Error::OutOfRange`] for the substeps.
-    pub fn check(&self) -> Result<(), Error> {
-        crate::error::within(
-            "model.substeps",
-            f64::from(self.substeps),
-            1.0,
-            f64::from(Self::MAX_SUBSTEPS),
-        )
-        .map(|_| ())
+    /// This model, if a world can step with it.
+    pub(super) fn checked(self) -> Result<Self, Error> {
+        let most = f64::from(Self::MAX_SUBSTEPS);
+        within("substeps", f64::from(self.substeps), 1.0, most).map(|_| self)
     }
 }

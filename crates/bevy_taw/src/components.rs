@@ -1,0 +1,112 @@
+//! What an entity may be to the physics. Marbles and walls need nothing but their
+//! own component; the rest is optional.
+
+use bevy::prelude::*;
+use taw::motion::Integrator;
+use taw::world::{MarbleId, WallId};
+
+use crate::reflect::IntegratorReflect;
+
+/// A marble: a ball that moves and collides.
+///
+/// Its place is its [`Transform`]: whoever writes one moves the marble there at
+/// once, keeping its velocity. As a child of another entity it still moves freely,
+/// in world space. Its scale does not count.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+#[require(Transform, MarbleState)]
+pub struct Marble {
+    /// In metres, above zero. May change at any time.
+    pub radius: f32,
+}
+
+impl Default for Marble {
+    /// Half a metre in radius, like Bevy's `Sphere`.
+    fn default() -> Self {
+        Self::new(0.5)
+    }
+}
+
+impl Marble {
+    /// A marble of this radius, in metres.
+    #[must_use]
+    pub const fn new(radius: f32) -> Self {
+        Self { radius }
+    }
+}
+
+/// The velocity of a marble, in metres per second in world space. Without it a
+/// marble starts at rest; with it, it can be read and written.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct Velocity(pub Vec3);
+
+/// What a marble is made of, as far as its contacts can tell. The response
+/// [`Displacement`](taw::response::Response::Displacement) does not read it.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct MarbleMaterial {
+    /// The part of the approach speed that a bounce gives back, in `[0, 1]`.
+    pub restitution: f32,
+    /// The largest friction force over the normal force (Coulomb), at least zero.
+    pub friction: f32,
+}
+
+/// Integrates this marble in its own way instead of the model's.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct MarbleIntegrator(#[reflect(remote = IntegratorReflect)] pub Integrator);
+
+/// A wall: a half-space that no contact can move. Everything behind its surface is
+/// solid.
+///
+/// The surface goes through the entity's [`Transform`]. Move or turn that (or a
+/// parent's) and the wall follows, pushing marbles before it.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+#[require(Transform, WallState)]
+pub struct Wall {
+    /// Where the free side is, in the entity's own frame.
+    pub normal: Dir3,
+}
+
+impl Default for Wall {
+    /// A floor: free above, like Bevy's `Plane3d`.
+    fn default() -> Self {
+        Self { normal: Dir3::Y }
+    }
+}
+
+/// What the physics knows of a marble entity.
+#[derive(Component, Clone, Copy, Debug, Default)]
+pub(crate) struct MarbleState {
+    /// `None` before the first gather, and when the input was refused.
+    pub id: Option<MarbleId>,
+    /// The components as gather or scatter last left them. What differs was
+    /// written by somebody else.
+    pub seen: SeenMarble,
+}
+
+/// A marble's components to the bit, so that even a NaN is seen only once.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(crate) struct SeenMarble {
+    pub translation: [u32; 3],
+    pub radius: u32,
+    pub velocity: Option<[u32; 3]>,
+    pub material: Option<[u32; 2]>,
+    pub integrator: Option<Integrator>,
+}
+
+/// What the physics knows of a wall entity.
+#[derive(Component, Clone, Copy, Debug, Default)]
+pub(crate) struct WallState {
+    /// `None` before the first gather, and when the input was refused.
+    pub id: Option<WallId>,
+    /// Point and direction in world space as last gathered, to the bit.
+    pub seen: Option<[[u32; 3]; 2]>,
+}
+
+/// The bits of a vector.
+pub(crate) fn bits(v: Vec3) -> [u32; 3] {
+    v.to_array().map(f32::to_bits)
+}

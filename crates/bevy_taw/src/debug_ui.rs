@@ -1,0 +1,150 @@
+//! egui panels for any game: put these into a window of your own. They read and
+//! change the resources of the plugin, and know nothing of the game.
+//!
+//! ```
+//! # use bevy::prelude::*;
+//! # use bevy_taw::prelude::*;
+//! # use bevy_egui::{EguiContexts, EguiPrimaryContextPass, egui};
+//! # fn main() {
+//! fn panel(mut contexts: EguiContexts, mut model: ResMut<TawModel>) -> Result {
+//!     egui::Window::new("Physics").show(contexts.ctx_mut()?, |ui| {
+//!         bevy_taw::debug_ui::model(ui, &mut model);
+//!     });
+//!     Ok(())
+//! }
+//! # App::new().add_systems(EguiPrimaryContextPass, panel);
+//! # }
+//! ```
+
+use bevy::diagnostic::{Diagnostic, DiagnosticPath, DiagnosticsStore};
+use bevy::prelude::*;
+use bevy_egui::egui::{self, Ui};
+use egui_plot::{Legend, Line, Plot, PlotPoints};
+use taw::motion::Integrator;
+use taw::response::Response;
+use taw::world::Model;
+
+use crate::diagnostics as paths;
+use crate::resources::{Gravity, TawModel};
+
+/// The choice of methods. Marks the resource as changed only if the user changes
+/// something.
+pub fn model(ui: &mut Ui, model: &mut ResMut<TawModel>) {
+    let mut chosen = ***model;
+    egui::Grid::new("taw model").num_columns(2).show(ui, |ui| {
+        ui.label("Integrator");
+        egui::ComboBox::from_id_salt("integrator")
+            .selected_text(integrator_name(chosen.integrator))
+            .show_ui(ui, |ui| {
+                for integrator in [Integrator::ExplicitEuler, Integrator::SemiImplicitEuler] {
+                    let name = integrator_name(integrator);
+                    ui.selectable_value(&mut chosen.integrator, integrator, name);
+                }
+            });
+        ui.end_row();
+        ui.label("Response");
+        egui::ComboBox::from_id_salt("response")
+            .selected_text(response_name(chosen.response))
+            .show_ui(ui, |ui| {
+                let response = Response::Displacement;
+                ui.selectable_value(&mut chosen.response, response, response_name(response));
+            });
+        ui.end_row();
+        ui.label("Substeps");
+        ui.add(egui::Slider::new(&mut chosen.substeps, 1..=Model::MAX_SUBSTEPS.min(16)));
+        ui.end_row();
+    });
+    model.set_if_neq(TawModel(chosen));
+}
+
+/// A slider for how strong gravity is, from none to that of Jupiter. Its direction
+/// stays.
+pub fn gravity(ui: &mut Ui, gravity: &mut ResMut<Gravity>) {
+    let direction = gravity.try_normalize().unwrap_or(Vec3::NEG_Y);
+    let mut strength = gravity.length();
+    let slider = egui::Slider::new(&mut strength, 0.0..=25.0).suffix(" m/s²").text("Gravity");
+    if ui.add(slider).changed() {
+        gravity.0 = direction * strength;
+    }
+}
+
+/// How many marbles and contacts there are.
+pub fn counts(ui: &mut Ui, diagnostics: &DiagnosticsStore) {
+    egui::Grid::new("taw counts").num_columns(2).show(ui, |ui| {
+        for (name, path) in [
+            ("Marbles", paths::MARBLES),
+            ("Wall contacts", paths::WALL_CONTACTS),
+            ("Marble contacts", paths::MARBLE_CONTACTS),
+        ] {
+            ui.label(name);
+            ui.monospace(format!("{:.0}", value(diagnostics, &path)));
+            ui.end_row();
+        }
+    });
+}
+
+/// The time of a step and its parts, now and over the last steps.
+pub fn step_time(ui: &mut Ui, diagnostics: &DiagnosticsStore) {
+    let parts = [
+        ("Step", paths::STEP_TIME),
+        ("Gather", paths::GATHER_TIME),
+        ("Integrate", paths::INTEGRATE_TIME),
+        ("Contacts", paths::CONTACTS_TIME),
+        ("Restitute", paths::RESTITUTE_TIME),
+    ];
+    egui::Grid::new("taw times").num_columns(2).show(ui, |ui| {
+        for (name, path) in parts {
+            let smoothed = diagnostics.get(&path).and_then(Diagnostic::smoothed).unwrap_or(0.0);
+            ui.label(name);
+            ui.monospace(format!("{smoothed:.3} ms"));
+            ui.end_row();
+        }
+    });
+    Plot::new("taw step time")
+        .height(120.0)
+        .include_y(0.0)
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_scroll(false)
+        .y_axis_label("ms")
+        .show_x(false)
+        .legend(Legend::default())
+        .show(ui, |plot| {
+            for (name, path) in [("Step", paths::STEP_TIME), ("Contacts", paths::CONTACTS_TIME)] {
+                if let Some(diagnostic) = diagnostics.get(&path) {
+                    let points: PlotPoints = (0_u32..)
+                        .zip(diagnostic.values())
+                        .map(|(i, ms)| [f64::from(i), *ms])
+                        .collect();
+                    plot.line(Line::new(name, points));
+                }
+            }
+        });
+}
+
+/// What to draw of the physics.
+#[cfg(feature = "render")]
+pub fn gizmos(ui: &mut Ui, store: &mut GizmoConfigStore) {
+    let (_, config) = store.config_mut::<crate::gizmos::TawGizmos>();
+    ui.checkbox(&mut config.contacts, "Contacts");
+    ui.checkbox(&mut config.normals, "Normals");
+    ui.checkbox(&mut config.velocities, "Velocities");
+    ui.checkbox(&mut config.grid, "Grid");
+}
+
+fn value(diagnostics: &DiagnosticsStore, path: &DiagnosticPath) -> f64 {
+    diagnostics.get(path).and_then(Diagnostic::value).unwrap_or(0.0)
+}
+
+fn integrator_name(integrator: Integrator) -> &'static str {
+    match integrator {
+        Integrator::ExplicitEuler => "Explicit Euler",
+        Integrator::SemiImplicitEuler => "Semi-implicit Euler",
+    }
+}
+
+fn response_name(response: Response) -> &'static str {
+    match response {
+        Response::Displacement => "Displacement",
+    }
+}

@@ -1,0 +1,85 @@
+//! How long a step takes, and how much there is in it, as Bevy diagnostics.
+
+use std::time::Duration;
+
+use bevy::diagnostic::{Diagnostic, DiagnosticPath, Diagnostics, RegisterDiagnostic};
+use bevy::platform::time::Instant;
+use bevy::prelude::*;
+
+use crate::resources::TawWorld;
+
+/// A whole step, from gather to scatter, in milliseconds.
+pub const STEP_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/step");
+/// Components into the world, in milliseconds.
+pub const GATHER_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/gather");
+/// The first verb, all substeps together, in milliseconds.
+pub const INTEGRATE_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/integrate");
+/// The second verb, all substeps together, in milliseconds.
+pub const CONTACTS_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/generate_contacts");
+/// The third verb, all substeps together, in milliseconds.
+pub const RESTITUTE_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/restitute");
+/// The number of marbles.
+pub const MARBLES: DiagnosticPath = DiagnosticPath::const_new("taw/marbles");
+/// The wall–marble contacts of the last substep.
+pub const WALL_CONTACTS: DiagnosticPath = DiagnosticPath::const_new("taw/wall_contacts");
+/// The marble–marble contacts of the last substep.
+pub const MARBLE_CONTACTS: DiagnosticPath = DiagnosticPath::const_new("taw/marble_contacts");
+
+pub(crate) fn register(app: &mut App) {
+    let times = [STEP_TIME, GATHER_TIME, INTEGRATE_TIME, CONTACTS_TIME, RESTITUTE_TIME];
+    for path in times {
+        app.register_diagnostic(Diagnostic::new(path).with_suffix(" ms"));
+    }
+    for path in [MARBLES, WALL_CONTACTS, MARBLE_CONTACTS] {
+        app.register_diagnostic(Diagnostic::new(path).with_smoothing_factor(0.0));
+    }
+}
+
+/// Where the time of a step went.
+#[derive(Resource, Default)]
+pub(crate) struct StepTimes {
+    began: Option<Instant>,
+    gather: Duration,
+    pub integrate: Stopwatch,
+    pub generate_contacts: Stopwatch,
+    pub restitute: Stopwatch,
+}
+
+/// Adds up.
+#[derive(Default)]
+pub(crate) struct Stopwatch(Duration);
+
+impl Stopwatch {
+    /// Runs `work` and adds the time that it took.
+    pub fn time(&mut self, work: impl FnOnce()) {
+        let start = Instant::now();
+        work();
+        self.0 += start.elapsed();
+    }
+}
+
+impl StepTimes {
+    pub fn begin_step(&mut self) {
+        *self = Self { began: Some(Instant::now()), ..Self::default() };
+    }
+
+    pub fn end_gather(&mut self) {
+        self.gather = self.elapsed();
+    }
+
+    fn elapsed(&self) -> Duration {
+        self.began.map_or(Duration::ZERO, |began| began.elapsed())
+    }
+}
+
+pub(crate) fn measure(times: Res<StepTimes>, world: Res<TawWorld>, mut diagnostics: Diagnostics) {
+    let ms = |duration: Duration| duration.as_secs_f64() * 1e3;
+    diagnostics.add_measurement(&STEP_TIME, || ms(times.elapsed()));
+    diagnostics.add_measurement(&GATHER_TIME, || ms(times.gather));
+    diagnostics.add_measurement(&INTEGRATE_TIME, || ms(times.integrate.0));
+    diagnostics.add_measurement(&CONTACTS_TIME, || ms(times.generate_contacts.0));
+    diagnostics.add_measurement(&RESTITUTE_TIME, || ms(times.restitute.0));
+    diagnostics.add_measurement(&MARBLES, || world.marbles.len() as f64);
+    diagnostics.add_measurement(&WALL_CONTACTS, || world.contacts.wm.len() as f64);
+    diagnostics.add_measurement(&MARBLE_CONTACTS, || world.contacts.mm.len() as f64);
+}

@@ -1,0 +1,202 @@
+//! From components and resources into the world, where they changed.
+
+use bevy::prelude::*;
+use taw::shape::Plane;
+use taw::world as core;
+
+use crate::components::{
+    Marble, MarbleIntegrator, MarbleMaterial, MarbleState, SeenMarble, Velocity, Wall, WallState,
+    bits,
+};
+use crate::convert::{to_point, to_vector};
+use crate::diagnostics::StepTimes;
+use crate::refusal::InputRefused;
+use crate::resources::{Gravity, TawModel, TawWorld};
+
+/// Takes the model and gravity over, if they can be stepped with.
+pub fn settings(
+    mut world: ResMut<TawWorld>,
+    model: Res<TawModel>,
+    gravity: Res<Gravity>,
+    mut times: ResMut<StepTimes>,
+    mut refused: MessageWriter<InputRefused>,
+) {
+    times.begin_step();
+    world.clear_stopped();
+    let mut check = |result: Result<(), taw::Error>| {
+        if let Err(error) = result {
+            InputRefused::write(&mut refused, None, error);
+        }
+    };
+    if model.is_changed() {
+        check(world.set_model(**model));
+    }
+    if gravity.is_changed() {
+        check(world.set_gravity(to_vector(**gravity)));
+    }
+}
+
+/// Puts new walls in and moves those that moved.
+pub fn walls(
+    mut world: ResMut<TawWorld>,
+    mut walls: Query<(Entity, &Wall, &mut WallState)>,
+    transforms: TransformHelper,
+    mut refused: MessageWriter<InputRefused>,
+) {
+    for (entity, wall, mut state) in &mut walls {
+        let Ok(transform) = transforms.compute_global_transform(entity) else {
+            continue; // a parent without a Transform: nobody can say where this is
+        };
+        // A normal is perpendicular to its surface also where the scale is uneven.
+        let to_world = transform.affine().matrix3.inverse().transpose();
+        let normal = Vec3::from(to_world * bevy::math::Vec3A::from(*wall.normal));
+        let seen = Some([bits(transform.translation()), bits(normal)]);
+        if state.seen == seen {
+            continue;
+        }
+        state.seen = seen;
+        let result = Plane::through(to_point(transform.translation()), to_vector(normal)).and_then(
+            |plane| match state.id {
+                Some(id) => world.walls.set(id, plane),
+                None => world.walls.insert(plane).map(|id| {
+                    world.wall_entities.insert(id, entity);
+                    state.id = Some(id);
+                }),
+            },
+        );
+        if let Err(error) = result {
+            InputRefused::write(&mut refused, Some(entity), error);
+        }
+    }
+}
+
+type MarbleComponents<'a> = (
+    Entity,
+    &'a Marble,
+    &'a Transform,
+    Option<&'a Velocity>,
+    Option<&'a MarbleMaterial>,
+    Option<&'a MarbleIntegrator>,
+    Has<ChildOf>,
+    &'a mut MarbleState,
+);
+
+/// Puts new marbles in and takes over what somebody else wrote since the last
+/// scatter.
+pub fn marbles(
+    mut world: ResMut<TawWorld>,
+    mut marbles: Query<MarbleComponents>,
+    transforms: TransformHelper,
+    mut refused: MessageWriter<InputRefused>,
+) {
+    for (entity, marble, transform, velocity, material, integrator, is_child, mut state) in
+        &mut marbles
+    {
+        let seen = SeenMarble {
+            translation: bits(transform.translation),
+            radius: marble.radius.to_bits(),
+            velocity: velocity.map(|v| bits(**v)),
+            material: material.map(|m| [m.restitution.to_bits(), m.friction.to_bits()]),
+            integrator: integrator.map(|i| **i),
+        };
+        if state.seen == seen && state.id.is_some() {
+            continue;
+        }
+        let position = if is_child {
+            transforms.compute_global_transform(entity).map(|t| t.translation())
+        } else {
+            Ok(transform.translation)
+        };
+        let Ok(position) = position else {
+            continue; // a parent without a Transform: nobody can say where this is
+        };
+        let last = std::mem::replace(&mut state.seen, seen);
+        let now = core::Marble {
+            position: to_point(position),
+            radius: marble.radius,
+            velocity: to_vector(velocity.map_or(Vec3::ZERO, |v| **v)),
+            integrator: seen.integrator,
+            material: material
+                .map(|m| core::Material { restitution: m.restitution, friction: m.friction }),
+        };
+        let refuse = |error| InputRefused::write(&mut refused, Some(entity), error);
+        match state.id {
+            Some(id) => update(&mut world.marbles, id, &now, &last, &seen, refuse),
+            // What was refused is tried again when it changes.
+            None if last == seen => {}
+            None => match world.marbles.insert(now) {
+                Ok(id) => {
+                    world.marble_entities.insert(id, entity);
+                    state.id = Some(id);
+                }
+                Err(error) => InputRefused::write(&mut refused, Some(entity), error),
+            },
+        }
+    }
+}
+
+/// Takes over the fields that changed from `last` to `seen`, each on its own: one
+/// that is refused does not keep back the rest.
+fn update(
+    marbles: &mut core::Marbles<f32>,
+    id: core::MarbleId,
+    now: &core::Marble<f32>,
+    last: &SeenMarble,
+    seen: &SeenMarble,
+    mut refuse: impl FnMut(taw::Error),
+) {
+    let mut check = |result: Result<(), taw::Error>| {
+        if let Err(error) = result {
+            refuse(error);
+        }
+    };
+    if seen.translation != last.translation {
+        check(marbles.set_position(id, now.position));
+    }
+    if seen.radius != last.radius {
+        check(marbles.set_radius(id, now.radius));
+    }
+    if seen.velocity != last.velocity && seen.velocity.is_some() {
+        check(marbles.set_velocity(id, now.velocity));
+    }
+    if seen.material != last.material {
+        check(marbles.set_material(id, now.material));
+    }
+    if seen.integrator != last.integrator {
+        check(marbles.set_integrator(id, now.integrator));
+    }
+}
+
+/// Notes how long gathering took.
+pub fn finish(mut times: ResMut<StepTimes>) {
+    times.end_gather();
+}
+
+/// Takes a marble out of the world when its component or entity goes.
+pub fn forget_marble(
+    removed: On<Remove, Marble>,
+    states: Query<&MarbleState>,
+    mut world: ResMut<TawWorld>,
+    mut commands: Commands,
+) {
+    if let Ok(MarbleState { id: Some(id), .. }) = states.get(removed.entity) {
+        // It can only be gone already if the game took it out by itself.
+        let _ = world.marbles.remove(*id);
+        world.marble_entities.remove(id);
+    }
+    commands.entity(removed.entity).try_remove::<MarbleState>();
+}
+
+/// Takes a wall out of the world when its component or entity goes.
+pub fn forget_wall(
+    removed: On<Remove, Wall>,
+    states: Query<&WallState>,
+    mut world: ResMut<TawWorld>,
+    mut commands: Commands,
+) {
+    if let Ok(WallState { id: Some(id), .. }) = states.get(removed.entity) {
+        let _ = world.walls.remove(*id);
+        world.wall_entities.remove(id);
+    }
+    commands.entity(removed.entity).try_remove::<WallState>();
+}

@@ -1,0 +1,102 @@
+//! The physics, drawn: contacts, normals, velocities and the grid.
+//!
+//! All of it is in one [`GizmoConfigGroup`], [`TawGizmos`], and off until switched
+//! on there.
+
+use bevy::color::palettes::tailwind;
+use bevy::math::Isometry3d;
+use bevy::prelude::*;
+use taw::contact::Contact;
+
+use crate::convert::{from_point, from_vector};
+use crate::resources::TawWorld;
+
+/// What to draw, and how large. Change it through Bevy's [`GizmoConfigStore`].
+#[expect(clippy::struct_excessive_bools, reason = "independent switches")]
+#[derive(Clone, Debug, Reflect, GizmoConfigGroup)]
+#[reflect(Default)]
+pub struct TawGizmos {
+    /// A small cross at each contact.
+    pub contacts: bool,
+    /// The unit normal of each contact times [`TawGizmos::normal_length`].
+    pub normals: bool,
+    /// Velocities times [`TawGizmos::velocity_scale`].
+    pub velocities: bool,
+    /// The occupied cells of the grid's coarsest level.
+    pub grid: bool,
+    /// In metres.
+    pub normal_length: f32,
+    /// In metres per m/s.
+    pub velocity_scale: f32,
+}
+
+impl Default for TawGizmos {
+    fn default() -> Self {
+        Self {
+            contacts: false,
+            normals: false,
+            velocities: false,
+            grid: false,
+            normal_length: 0.5,
+            velocity_scale: 0.1,
+        }
+    }
+}
+
+/// Draws [`TawGizmos`] after each frame's transforms are final. Does nothing in an
+/// app without Bevy's `GizmoPlugin`.
+#[derive(Debug, Default)]
+pub struct TawGizmosPlugin;
+
+impl Plugin for TawGizmosPlugin {
+    fn build(&self, _: &mut App) {}
+
+    fn finish(&self, app: &mut App) {
+        if app.is_plugin_added::<bevy::gizmos::GizmoPlugin>() {
+            app.init_gizmo_group::<TawGizmos>().add_systems(PostUpdate, draw);
+        }
+    }
+}
+
+fn draw(world: Res<TawWorld>, mut gizmos: Gizmos<TawGizmos>) {
+    let config = gizmos.config_ext.clone();
+    if config.contacts || config.normals {
+        let mut contact = |contact: &Contact<f32>| {
+            let Some((point, normal)) = point_and_normal(&world, contact) else {
+                return;
+            };
+            if config.contacts {
+                gizmos.cross(Isometry3d::from_translation(point), 0.1, tailwind::RED_400);
+            }
+            if config.normals {
+                let end = point + normal * config.normal_length;
+                gizmos.arrow(point, end, tailwind::AMBER_300);
+            }
+        };
+        world.contacts.wm.iter().for_each(&mut contact);
+        world.contacts.mm.iter().for_each(&mut contact);
+    }
+    if config.velocities {
+        for (position, velocity) in world.marbles.position().iter().zip(world.marbles.velocity()) {
+            let position = from_point(*position);
+            let end = position + from_vector(*velocity) * config.velocity_scale;
+            gizmos.arrow(position, end, tailwind::SKY_300);
+        }
+    }
+    if config.grid {
+        let (cells, width) = world.grid().occupied();
+        for corner in cells {
+            let center = Vec3::from(corner.map(|x| x as f32)) + Vec3::splat(width as f32 / 2.0);
+            let cell = Transform::from_translation(center).with_scale(Vec3::splat(width as f32));
+            gizmos.cube(cell, tailwind::EMERALD_700.with_alpha(0.5));
+        }
+    }
+}
+
+/// Where a contact is: on the second marble, where it meets the first thing.
+fn point_and_normal(world: &TawWorld, contact: &Contact<f32>) -> Option<(Vec3, Vec3)> {
+    let row = contact.b as usize;
+    let normal = from_vector(contact.mtv).normalize_or_zero();
+    let center = from_point(*world.marbles.position().get(row)?);
+    Some((center - normal * *world.marbles.radius().get(row)?, normal))
+}

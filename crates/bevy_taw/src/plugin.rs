@@ -1,0 +1,155 @@
+use bevy::app::PluginGroupBuilder;
+use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
+use bevy::prelude::*;
+
+use crate::components::{Marble, MarbleIntegrator, MarbleMaterial, Velocity, Wall};
+use crate::diagnostics::{self, StepTimes};
+use crate::interpolation::TawInterpolationPlugin;
+use crate::messages::{self, Touches};
+use crate::refusal::{self, InputRefused, MarbleStopped, report};
+use crate::resources::{Gravity, TawModel, TawWorld};
+use crate::{gather, scatter};
+
+/// Everything: the physics, interpolation between its steps, and with the feature
+/// `render` the gizmos.
+///
+/// Leave one out with `TawPlugins.build().disable::<TawInterpolationPlugin>()`.
+#[derive(Debug, Default)]
+pub struct TawPlugins;
+
+impl PluginGroup for TawPlugins {
+    fn build(self) -> PluginGroupBuilder {
+        let group = PluginGroupBuilder::start::<Self>().add(TawPlugin).add(TawInterpolationPlugin);
+        #[cfg(feature = "render")]
+        let group = group.add(crate::gizmos::TawGizmosPlugin);
+        group
+    }
+}
+
+/// The physics alone. Needs time to pass (Bevy's `TimePlugin`, which is in
+/// `MinimalPlugins` and `DefaultPlugins`), and nothing else.
+#[derive(Debug, Default)]
+pub struct TawPlugin;
+
+/// Where the physics is in a frame.
+#[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum TawSystems {
+    /// In [`FixedUpdate`]: components and resources go into the world.
+    Gather,
+    /// In [`FixedUpdate`]: runs the schedule [`Substep`], once per substep.
+    Step,
+    /// In [`FixedUpdate`]: the world goes back to components and messages.
+    Scatter,
+    /// In [`Substep`]: the first verb.
+    Integrate,
+    /// In [`Substep`]: the second verb.
+    GenerateContacts,
+    /// In [`Substep`]: the third verb.
+    Restitute,
+}
+
+/// The schedule of one substep.
+///
+/// A system between [`TawSystems::GenerateContacts`] and [`TawSystems::Restitute`]
+/// can look at the contacts and change them:
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// # let mut app = App::new();
+/// // A ghost world: marbles meet walls only.
+/// let ghosts = |mut world: ResMut<TawWorld>| world.contacts.mm.clear();
+/// app.add_systems(
+///     Substep,
+///     ghosts.after(TawSystems::GenerateContacts).before(TawSystems::Restitute),
+/// );
+/// ```
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub struct Substep;
+
+/// The length of a substep, in seconds. Set before each step.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Resource, Debug, Default, PartialEq)]
+pub struct SubstepDelta(pub f32);
+
+impl Plugin for TawPlugin {
+    fn build(&self, app: &mut App) {
+        app.init_resource::<TawWorld>()
+            .init_resource::<TawModel>()
+            .init_resource::<Gravity>()
+            .init_resource::<SubstepDelta>()
+            .init_resource::<StepTimes>()
+            .init_resource::<Touches>()
+            .add_message::<InputRefused>()
+            .add_message::<MarbleStopped>();
+        app.register_type::<(Marble, Velocity, MarbleMaterial, MarbleIntegrator, Wall)>()
+            .register_type::<(TawModel, Gravity, SubstepDelta)>();
+        diagnostics::register(app);
+
+        app.add_observer(gather::forget_marble).add_observer(gather::forget_wall);
+        app.configure_sets(
+            FixedUpdate,
+            (TawSystems::Gather, TawSystems::Step, TawSystems::Scatter).chain(),
+        )
+        .add_systems(
+            FixedUpdate,
+            (
+                (gather::settings, gather::walls, gather::marbles, gather::finish)
+                    .chain()
+                    .in_set(TawSystems::Gather),
+                run_substeps.in_set(TawSystems::Step),
+                (
+                    (scatter::marbles, refusal::report_stopped),
+                    messages::write.run_if(messages::are_read),
+                    diagnostics::measure,
+                )
+                    .chain()
+                    .in_set(TawSystems::Scatter),
+            ),
+        );
+        app.configure_sets(
+            Substep,
+            (TawSystems::Integrate, TawSystems::GenerateContacts, TawSystems::Restitute).chain(),
+        )
+        .add_systems(
+            Substep,
+            (
+                integrate.in_set(TawSystems::Integrate),
+                generate_contacts.in_set(TawSystems::GenerateContacts),
+                messages::collect
+                    .run_if(messages::are_read)
+                    .after(TawSystems::GenerateContacts)
+                    .before(TawSystems::Restitute),
+                restitute.in_set(TawSystems::Restitute),
+            ),
+        )
+        // One verb after the other: threads would only have to be woken for each.
+        .edit_schedule(Substep, |schedule| {
+            schedule.set_executor(SingleThreadedExecutor::new());
+        });
+    }
+}
+
+fn run_substeps(world: &mut World) {
+    let substeps = world.resource::<TawWorld>().model().substeps;
+    let delta = world.resource::<Time>().delta_secs() / substeps as f32;
+    world.resource_mut::<SubstepDelta>().0 = delta;
+    // Only a substep of this very schedule could be without it.
+    let _ = world.try_schedule_scope(Substep, |world, schedule| {
+        for _ in 0..substeps {
+            schedule.run(world);
+        }
+    });
+}
+
+fn integrate(mut world: ResMut<TawWorld>, delta: Res<SubstepDelta>, mut times: ResMut<StepTimes>) {
+    times.integrate.time(|| report("integrate", world.integrate(delta.0)));
+}
+
+fn generate_contacts(mut world: ResMut<TawWorld>, mut times: ResMut<StepTimes>) {
+    times.generate_contacts.time(|| world.generate_contacts());
+}
+
+fn restitute(mut world: ResMut<TawWorld>, delta: Res<SubstepDelta>, mut times: ResMut<StepTimes>) {
+    times.restitute.time(|| report("restitute", world.restitute(delta.0)));
+}

@@ -1,0 +1,35 @@
+//! The core knows nothing of Bevy; these mirrors lend its types `Reflect`. The
+//! compiler checks that they have the same fields.
+
+#![expect(clippy::transmute_ptr_to_ptr, reason = "Bevy's macro casts to a transparent wrapper")]
+
+use bevy::reflect::reflect_remote;
+
+/// Mirrors [`taw::motion::Integrator`].
+#[reflect_remote(taw::motion::Integrator)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub enum IntegratorReflect {
+    ExplicitEuler,
+    SemiImplicitEuler,
+}
+
+/// Mirrors [`taw::response::Response`].
+#[reflect_remote(taw::response::Response)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub enum ResponseReflect {
+    Displacement,
+}
+
+/// Mirrors [`taw::world::Model`].
+#[reflect_remote(taw::world::Model)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub struct ModelReflect {
+    #[reflect(remote = IntegratorReflect)]
+    pub integrator: taw::motion::Integrator,
+    #[reflect(remote = ResponseReflect)]
+    pub response: taw::response::Response,
+    pub substeps: u32,
+}

@@ -1,0 +1,57 @@
+//! What there is one of: the model, gravity, the world.
+
+use bevy::platform::collections::HashMap;
+use bevy::prelude::*;
+use taw::world::{MarbleId, Model, WallId};
+
+use crate::reflect::ModelReflect;
+
+/// How to step. May change at any time; what cannot be right is refused with an
+/// [`InputRefused`](crate::refusal::InputRefused), and the last good one stays.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Deref, DerefMut, Reflect)]
+#[reflect(Resource, Debug, Default, PartialEq)]
+pub struct TawModel(#[reflect(remote = ModelReflect)] pub Model);
+
+/// The gravity on every marble, in m/s² in world space. A gravity that is not
+/// finite is refused like a wrong [`TawModel`].
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(Resource, Debug, Default, PartialEq)]
+pub struct Gravity(pub Vec3);
+
+impl Default for Gravity {
+    /// 9.81 m/s² downward.
+    fn default() -> Self {
+        Self(Vec3::NEG_Y * 9.81)
+    }
+}
+
+/// The physics of this app: a [`taw::world::World`], and which of its rows are
+/// which entities.
+///
+/// Reading it costs nothing. Between gather and scatter it may be changed too, for
+/// example its contacts between `GenerateContacts` and `Restitute`; at other times
+/// change components instead. Its model and gravity are overwritten whenever
+/// [`TawModel`] and [`Gravity`] change.
+#[derive(Resource, Debug, Default, Deref, DerefMut)]
+pub struct TawWorld {
+    #[deref]
+    world: taw::world::World<f32>,
+    pub(crate) marble_entities: HashMap<MarbleId, Entity>,
+    pub(crate) wall_entities: HashMap<WallId, Entity>,
+}
+
+impl TawWorld {
+    /// The entity of the marble in a row, if there is one.
+    #[must_use]
+    pub fn marble_entity(&self, row: u32) -> Option<Entity> {
+        let id = self.world.marbles.id(row as usize)?;
+        self.marble_entities.get(&id).copied()
+    }
+
+    /// The entity of the wall in a row, if there is one.
+    #[must_use]
+    pub fn wall_entity(&self, row: u32) -> Option<Entity> {
+        let id = self.world.walls.id(row as usize)?;
+        self.wall_entities.get(&id).copied()
+    }
+}

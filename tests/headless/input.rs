@@ -1,0 +1,126 @@
+//! Bad input is refused, told once, and changes nothing else.
+
+use bevy::ecs::message::Messages;
+use bevy::prelude::*;
+use bevy_taw::prelude::*;
+
+use crate::scene;
+
+/// What was refused in the last frames, as "whose: why".
+fn refused(app: &mut App, frames: u32) -> Vec<(Option<Entity>, String)> {
+    let mut told = Vec::new();
+    for _ in 0..frames {
+        app.update();
+        let messages = app.world().resource::<Messages<InputRefused>>();
+        told.extend(
+            messages.iter_current_update_messages().map(|m| (m.entity, m.error.to_string())),
+        );
+    }
+    told
+}
+
+#[test]
+fn a_bad_marble_is_refused_once_and_accepted_when_mended() {
+    let mut app = scene::app();
+    let marble = scene::drop_marble(&mut app, -0.5, Vec3::ZERO);
+    let why = "radius must be finite and above zero, but is -0.5".to_string();
+    assert_eq!(refused(&mut app, 5), [(Some(marble), why)]);
+    assert_eq!(scene::position(&app, marble), Vec3::ZERO);
+    app.world_mut().get_mut::<Marble>(marble).unwrap().radius = 0.5;
+    assert_eq!(refused(&mut app, 5), []);
+    assert!(scene::position(&app, marble).y < 0.0);
+}
+
+#[test]
+fn a_bad_change_is_refused_once_and_put_right() {
+    let mut app = scene::app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::ONE);
+    app.world_mut().entity_mut(marble).insert(Velocity(Vec3::ZERO));
+    assert_eq!(refused(&mut app, 2), []);
+    app.world_mut().get_mut::<Transform>(marble).unwrap().translation.z = f32::NAN;
+    app.world_mut().get_mut::<Velocity>(marble).unwrap().x = f32::INFINITY;
+    app.world_mut().get_mut::<Marble>(marble).unwrap().radius = 0.0;
+    let why = |text: &str| (Some(marble), text.to_string());
+    assert_eq!(
+        refused(&mut app, 5),
+        [
+            why("position.z must be finite, but is NaN"),
+            why("radius must be finite and above zero, but is 0"),
+            why("velocity.x must be finite, but is inf"),
+        ]
+    );
+    assert_eq!(scene::position(&app, marble), Vec3::ONE);
+    assert_eq!(**app.world().get::<Velocity>(marble).unwrap(), Vec3::ZERO);
+}
+
+#[test]
+fn a_bad_wall_is_refused_once() {
+    let mut app = scene::app();
+    let flat = Transform::from_scale(Vec3::new(1.0, 0.0, 1.0));
+    let wall = app.world_mut().spawn((Wall::default(), flat)).id();
+    let told = refused(&mut app, 3);
+    assert_eq!(told.len(), 1, "{told:?}");
+    assert_eq!(told[0].0, Some(wall));
+    assert!(app.world().resource::<TawWorld>().walls.is_empty());
+}
+
+#[test]
+fn a_bad_setting_is_refused_once_and_the_last_good_one_stays() {
+    let mut app = scene::app();
+    scene::floor(&mut app);
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 5.0);
+    app.world_mut().resource_mut::<TawModel>().substeps = 0;
+    app.world_mut().resource_mut::<Gravity>().x = f32::NAN;
+    assert_eq!(
+        refused(&mut app, 3),
+        [
+            (None, "substeps must be in [1, 1000], but is 0".to_string()),
+            (None, "gravity.x must be finite, but is NaN".to_string()),
+        ]
+    );
+    assert!(scene::position(&app, marble).y < 5.0, "it falls as before");
+}
+
+#[test]
+fn an_overflowing_marble_is_stopped_told_and_alone() {
+    let mut app = scene::app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    app.world_mut().spawn((Marble::default(), Velocity(Vec3::X)));
+    let far = Transform::from_xyz(3e38, 0.0, 0.0);
+    let sick = app.world_mut().spawn((Marble::default(), far, Velocity(Vec3::X * 3e38))).id();
+    let mut stopped = Vec::new();
+    for _ in 0..64 {
+        app.update();
+        let messages = app.world().resource::<Messages<MarbleStopped>>();
+        stopped.extend(messages.iter_current_update_messages().map(|m| m.entity));
+    }
+    assert_eq!(stopped, [sick]);
+    assert_eq!(**app.world().get::<Velocity>(sick).unwrap(), Vec3::ZERO);
+    let world = app.world().resource::<TawWorld>();
+    assert_eq!(world.marbles.position()[0].x, 1.0, "the other one went on for a second");
+}
+
+#[test]
+fn settings_and_components_are_open_to_reflection() {
+    let mut app = scene::app();
+    let registry = app.world().resource::<AppTypeRegistry>().clone();
+    let registry = registry.read();
+    for name in [
+        "bevy_taw::components::Marble",
+        "bevy_taw::components::Wall",
+        "bevy_taw::components::Velocity",
+        "bevy_taw::components::MarbleMaterial",
+        "bevy_taw::components::MarbleIntegrator",
+        "bevy_taw::resources::TawModel",
+        "bevy_taw::resources::Gravity",
+    ] {
+        assert!(registry.get_with_type_path(name).is_some(), "{name} is not registered");
+    }
+    // An inspector changes the model by path; the next step uses it.
+    let mut model = app.world_mut().resource_mut::<TawModel>();
+    *model.path_mut::<u32>(".0.substeps").unwrap() = 7;
+    drop(registry);
+    app.update();
+    assert_eq!(app.world().resource::<TawWorld>().model().substeps, 7);
+}

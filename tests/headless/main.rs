@@ -1,0 +1,10 @@
+//! Whole scenes in Bevy apps without a window: `MinimalPlugins`, `TawPlugins`, and
+//! a clock that the test turns.
+
+mod board;
+mod contacts;
+mod input;
+mod interpolation;
+mod scene;
+mod spawning;
+mod transforms;
