@@ -1,2 +1,58 @@
-//! x
-fn main() {}
+//! **Marble Madness**: tilt the board and roll every marble onto the pad of its
+//! colour.
+//!
+//! `cargo run --example marble_madness` (`-- --help` for options)
+//!
+//! Tilt with the arrow keys, WASD, a drag of the left mouse button or the left
+//! stick; F1 lists all other keys. What to look at: the panel on the left changes
+//! the physics while it runs, and shows what each choice costs.
+
+mod board;
+mod controls;
+mod goals;
+mod marbles;
+mod panel;
+mod time;
+
+use bevy::prelude::*;
+use bevy_egui::EguiPlugin;
+use bevy_taw::prelude::*;
+use clap::Parser;
+use taw_examples::{ExamplePlugins, OrbitCameraPlugin, Picture};
+
+/// Tilt the board and roll every marble onto the pad of its colour
+#[derive(Parser, Resource, Clone)]
+#[command(version)]
+struct Options {
+    /// How many marbles to begin with
+    #[arg(long, default_value_t = 120, value_name = "N")]
+    marbles: u32,
+    /// What the random sizes, colours and places are drawn from
+    #[arg(long, default_value_t = 1, value_name = "N")]
+    seed: u64,
+    /// Draw contacts, normals, velocities and the grid
+    #[arg(long)]
+    gizmos: bool,
+    /// The board sways by itself until somebody tilts it
+    #[arg(long)]
+    sway: bool,
+    #[command(flatten)]
+    picture: Picture,
+}
+
+fn main() -> AppExit {
+    let options = Options::parse();
+    App::new()
+        .add_plugins(ExamplePlugins { title: "Marble Madness", picture: options.picture.clone() })
+        .add_plugins((EguiPlugin::default(), OrbitCameraPlugin, TawPlugins))
+        .insert_resource(options)
+        .add_plugins((
+            board::plugin,
+            controls::plugin,
+            goals::plugin,
+            marbles::plugin,
+            panel::plugin,
+            time::plugin,
+        ))
+        .run()
+}

@@ -1,0 +1,249 @@
+//! The board: a floor and four rails that turn as one about its middle. How it
+//! looks, and how it tilts.
+
+use std::f32::consts::TAU;
+
+use bevy::color::palettes::tailwind;
+use bevy::image::{ImageAddressMode, ImageLoaderSettings, ImageSampler, ImageSamplerDescriptor};
+use bevy::light::CascadeShadowConfigBuilder;
+use bevy::math::Affine2;
+use bevy::prelude::*;
+use bevy_taw::interpolation::transform_interpolation::prelude::TransformInterpolation;
+use bevy_taw::prelude::*;
+use taw_examples::orbit_camera;
+
+use crate::Options;
+use crate::controls::TiltInput;
+
+const RAIL_HEIGHT: f32 = 1.0;
+const RAIL_WIDTH: f32 = 0.6;
+const FLOOR_DEPTH: f32 = 0.5;
+/// How long the board takes to do most (1 − 1/e) of what the player asks, in
+/// seconds.
+const RESPONSE_TIME: f32 = 0.12;
+
+/// Marks the entity that turns. Floor and rails are its children.
+#[derive(Component)]
+pub struct Board;
+
+/// The size of the board: half of its inner width, in metres.
+#[derive(Resource, Clone, Copy, Deref)]
+pub struct HalfWidth(f32);
+
+impl HalfWidth {
+    /// A board on which this many marbles lie about five deep at most.
+    fn for_marbles(count: u32) -> Self {
+        Self(10.0 * (count as f32 / 1500.0).sqrt().max(1.0))
+    }
+}
+
+/// How the board is tilted.
+#[derive(Resource)]
+pub struct Tilt {
+    /// Toward where (x and z) and how far (its length), in radians.
+    now: Vec2,
+    /// The most that it tilts, in radians.
+    pub limit: f32,
+    /// Sways by itself, for as long.
+    sway: Option<f32>,
+}
+
+impl Tilt {
+    /// Moves toward `wanted` (a part of the limit, at most 1 in length) for `dt`
+    /// seconds.
+    fn follow(&mut self, wanted: Vec2, dt: f32) {
+        let wanted = wanted.clamp_length_max(1.0) * self.limit;
+        self.now = self.now.lerp(wanted, 1.0 - (-dt / RESPONSE_TIME).exp());
+        self.now = self.now.clamp_length_max(self.limit);
+    }
+
+    /// The rotation that lowers the side toward which it tilts.
+    fn rotation(&self) -> Quat {
+        Quat::from_scaled_axis(Vec3::new(self.now.y, 0.0, -self.now.x))
+    }
+
+    /// Level again.
+    pub fn level(&mut self) {
+        self.now = Vec2::ZERO;
+    }
+}
+
+pub fn plugin(app: &mut App) {
+    let options = app.world().resource::<Options>();
+    let (half_width, sway) = (HalfWidth::for_marbles(options.marbles), options.sway.then_some(0.0));
+    app.insert_resource(half_width)
+        .insert_resource(Tilt { now: Vec2::ZERO, limit: 12_f32.to_radians(), sway })
+        .insert_resource(ClearColor(tailwind::SKY_950.into()))
+        .insert_resource(GlobalAmbientLight {
+            color: tailwind::SKY_100.into(),
+            brightness: 260.0,
+            ..default()
+        })
+        .add_systems(Startup, (spawn_board, spawn_surroundings))
+        .add_systems(FixedUpdate, tilt.before(TawSystems::Gather));
+}
+
+fn tilt(
+    mut tilt: ResMut<Tilt>,
+    input: Res<TiltInput>,
+    time: Res<Time>,
+    mut board: Single<&mut Transform, With<Board>>,
+) {
+    let mut wanted = **input;
+    if wanted != Vec2::ZERO {
+        tilt.sway = None;
+    } else if let Some(seconds) = &mut tilt.sway {
+        *seconds += time.delta_secs();
+        wanted = Vec2::from_angle(*seconds * TAU / 7.0) * 0.9;
+    }
+    tilt.follow(wanted, time.delta_secs());
+    board.rotation = tilt.rotation();
+}
+
+pub fn spawn_board(
+    mut commands: Commands,
+    half_width: Res<HalfWidth>,
+    assets: Res<AssetServer>,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+) {
+    let half = **half_width;
+    let wood: Handle<Image> = assets
+        .load_builder()
+        .with_settings(|settings: &mut ImageLoaderSettings| {
+            settings.sampler = ImageSampler::Descriptor(ImageSamplerDescriptor {
+                address_mode_u: ImageAddressMode::Repeat,
+                address_mode_v: ImageAddressMode::Repeat,
+                ..ImageSamplerDescriptor::linear()
+            });
+        })
+        .load("textures/wood.png");
+    let mut planks = |tint: Srgba, repeat: Vec2| {
+        materials.add(StandardMaterial {
+            base_color: tint.into(),
+            base_color_texture: Some(wood.clone()),
+            uv_transform: Affine2::from_scale(repeat),
+            perceptual_roughness: 0.65,
+            reflectance: 0.3,
+            ..default()
+        })
+    };
+    let floor_look = planks(tailwind::AMBER_50, Vec2::splat(half / 5.0));
+    let rail_look = planks(tailwind::AMBER_700, Vec2::new(half / 2.5, 0.25));
+
+    let board = commands
+        .spawn((Board, Transform::default(), Visibility::default(), TransformInterpolation))
+        .id();
+    let outer = 2.0 * (half + RAIL_WIDTH);
+    let floor = Cuboid::new(outer, FLOOR_DEPTH, outer);
+    commands.spawn((
+        ChildOf(board),
+        Wall::default(),
+        Transform::default(),
+        Visibility::default(),
+        children![(
+            Mesh3d(meshes.add(floor)),
+            MeshMaterial3d(floor_look),
+            Transform::from_xyz(0.0, -FLOOR_DEPTH / 2.0, 0.0),
+        )],
+    ));
+    let rail = meshes.add(Cuboid::new(outer, RAIL_HEIGHT, RAIL_WIDTH));
+    for quarter in 0..4_u8 {
+        // A wall's surface is at its origin; the rail's box lies behind that.
+        let turn = Quat::from_rotation_y(f32::from(quarter) * TAU / 4.0);
+        commands.spawn((
+            ChildOf(board),
+            Wall { normal: Dir3::Z },
+            Transform::from_translation(turn * Vec3::NEG_Z * half).with_rotation(turn),
+            Visibility::default(),
+            children![(
+                Mesh3d(rail.clone()),
+                MeshMaterial3d(rail_look.clone()),
+                Transform::from_xyz(0.0, RAIL_HEIGHT / 2.0, -RAIL_WIDTH / 2.0),
+            )],
+        ));
+    }
+}
+
+/// Camera, light, and a table far below.
+fn spawn_surroundings(
+    mut commands: Commands,
+    half_width: Res<HalfWidth>,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+) {
+    let half = **half_width;
+    commands.spawn(orbit_camera(Vec3::new(-0.16 * half, 0.0, 0.04 * half), 2.9 * half));
+    commands.spawn((
+        DirectionalLight {
+            color: tailwind::AMBER_50.into(),
+            illuminance: 9000.0,
+            shadow_maps_enabled: true,
+            ..default()
+        },
+        CascadeShadowConfigBuilder {
+            num_cascades: 2,
+            maximum_distance: 8.0 * half,
+            first_cascade_far_bound: 3.0 * half,
+            ..default()
+        }
+        .build(),
+        Transform::from_xyz(-0.7, 1.6, 0.6).looking_at(Vec3::ZERO, Vec3::Y),
+    ));
+    commands.spawn((
+        Mesh3d(meshes.add(Circle::new(6.0 * half))),
+        MeshMaterial3d(materials.add(StandardMaterial {
+            base_color: tailwind::SKY_900.into(),
+            perceptual_roughness: 0.95,
+            ..default()
+        })),
+        Transform::from_xyz(0.0, -0.35 * half, 0.0)
+            .with_rotation(Quat::from_rotation_x(-TAU / 4.0)),
+    ));
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn tilt() -> Tilt {
+        Tilt { now: Vec2::ZERO, limit: 0.2, sway: None }
+    }
+
+    #[test]
+    fn the_board_goes_smoothly_where_the_player_wants_and_no_further() {
+        let mut tilt = tilt();
+        let mut last = 0.0;
+        for _ in 0..128 {
+            tilt.follow(Vec2::new(3.0, 4.0), 1.0 / 64.0);
+            let now = tilt.now.length();
+            assert!(now > last || (now - tilt.limit).abs() < 1e-4);
+            assert!(now - last < 0.2 * tilt.limit && now <= tilt.limit);
+            last = now;
+        }
+        assert!(tilt.now.distance(Vec2::new(0.6, 0.8) * tilt.limit) < 1e-4);
+    }
+
+    #[test]
+    fn half_steps_follow_as_fast_as_whole_ones() {
+        let (mut whole, mut halves) = (tilt(), tilt());
+        for _ in 0..10 {
+            whole.follow(Vec2::X, 1.0 / 30.0);
+            (0..2).for_each(|_| halves.follow(Vec2::X, 1.0 / 60.0));
+        }
+        assert!(whole.now.distance(halves.now) < 1e-6);
+    }
+
+    #[test]
+    fn the_side_toward_which_it_tilts_goes_down() {
+        for angle in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0] {
+            let mut tilt = tilt();
+            let toward = Vec2::from_angle(angle);
+            (0..100).for_each(|_| tilt.follow(toward, 0.1));
+            let edge = tilt.rotation() * Vec3::new(toward.x, 0.0, toward.y);
+            assert!((edge.y + tilt.limit.sin()).abs() < 1e-5, "toward {toward}: {edge}");
+            let beside = tilt.rotation() * Vec3::new(-toward.y, 0.0, toward.x);
+            assert!(beside.y.abs() < 1e-6, "and nothing else does");
+        }
+    }
+}

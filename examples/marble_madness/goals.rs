@@ -1,0 +1,98 @@
+//! The game: four pads, each of which takes the marbles of its own colour.
+
+use bevy::prelude::*;
+use bevy_taw::prelude::*;
+
+use crate::board::{Board, HalfWidth};
+use crate::marbles::{COLOURS, Colour, Order};
+
+/// The radius of a pad, in metres.
+const PAD_RADIUS: f32 = 1.5;
+
+/// How the game stands.
+#[derive(Resource, Default)]
+pub struct Score {
+    /// Marbles that came home.
+    pub home: u32,
+    /// Seconds since the start, until the last marble came home.
+    pub seconds: f32,
+    /// Whether pads take marbles at all.
+    pub paused: bool,
+}
+
+/// Takes marbles of its [`Colour`].
+#[derive(Component)]
+struct Pad;
+
+pub fn plugin(app: &mut App) {
+    app.init_resource::<Score>()
+        .add_systems(Startup, spawn_pads.after(crate::board::spawn_board))
+        .add_systems(FixedUpdate, (restart, take_home).chain().after(TawSystems::Scatter));
+}
+
+fn spawn_pads(
+    mut commands: Commands,
+    board: Single<Entity, With<Board>>,
+    half_width: Res<HalfWidth>,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+) {
+    let mesh = meshes.add(Cylinder::new(PAD_RADIUS, 0.04));
+    let ring = meshes.add(Torus::new(PAD_RADIUS - 0.08, PAD_RADIUS + 0.08));
+    let away = **half_width - 2.2;
+    for (index, colour) in COLOURS.into_iter().enumerate() {
+        let x = if index % 2 == 0 { -away } else { away };
+        let z = if index < 2 { -away } else { away };
+        let look = |lightness: f32| StandardMaterial {
+            base_color: colour.lighter(lightness).into(),
+            emissive: LinearRgba::from(colour) * 0.05,
+            perceptual_roughness: 0.5,
+            ..default()
+        };
+        commands.spawn((
+            ChildOf(*board),
+            Pad,
+            Colour(index),
+            Mesh3d(mesh.clone()),
+            MeshMaterial3d(materials.add(look(0.0))),
+            Transform::from_xyz(x, 0.0, z),
+            children![(
+                Mesh3d(ring.clone()),
+                MeshMaterial3d(materials.add(look(0.25))),
+                Transform::default(),
+            )],
+        ));
+    }
+}
+
+fn restart(mut orders: MessageReader<Order>, mut score: ResMut<Score>) {
+    if orders.read().any(|order| !matches!(order, Order::Drop(_))) {
+        *score = Score { paused: score.paused, ..default() };
+    }
+}
+
+fn take_home(
+    mut commands: Commands,
+    mut score: ResMut<Score>,
+    time: Res<Time>,
+    board: Single<&Transform, (With<Board>, Without<Marble>)>,
+    pads: Query<(&Transform, &Colour), (With<Pad>, Without<Marble>)>,
+    marbles: Query<(Entity, &Transform, &Marble, &Colour)>,
+) {
+    if score.paused || marbles.is_empty() {
+        return;
+    }
+    score.seconds += time.delta_secs();
+    let to_board = board.to_matrix().inverse();
+    for (entity, at, marble, colour) in &marbles {
+        let at = to_board.transform_point3(at.translation);
+        let on_floor = at.y < 1.2 * marble.radius;
+        let home = pads.iter().any(|(pad, pad_colour)| {
+            pad_colour == colour && pad.translation.xz().distance(at.xz()) < PAD_RADIUS
+        });
+        if on_floor && home {
+            score.home += 1;
+            commands.entity(entity).despawn();
+        }
+    }
+}

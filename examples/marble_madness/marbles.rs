@@ -1,0 +1,168 @@
+//! Marbles come and go.
+
+use bevy::color::palettes::tailwind;
+use bevy::prelude::*;
+use bevy_taw::prelude::*;
+
+use crate::Options;
+use crate::board::{HalfWidth, Tilt};
+use crate::controls::{Action, just_pressed};
+
+/// What somebody wants done with the marbles.
+#[derive(Message, Clone, Copy, Debug)]
+pub enum Order {
+    /// Drop so many more.
+    Drop(u32),
+    /// Take all away.
+    Clear,
+    /// Take all away and begin as at the start.
+    Reset,
+}
+
+/// How marbles are made.
+#[derive(Resource)]
+pub struct Bag {
+    /// The smallest and the largest radius, in metres.
+    pub smallest: f32,
+    pub largest: f32,
+    random: fastrand::Rng,
+}
+
+/// The colour of a marble or pad: an index into [`COLOURS`].
+#[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Colour(pub usize);
+
+/// What marbles and pads are coloured with.
+pub const COLOURS: [Srgba; 4] =
+    [tailwind::RED_500, tailwind::YELLOW_400, tailwind::GREEN_500, tailwind::BLUE_500];
+
+#[derive(Resource)]
+struct Look {
+    mesh: Handle<Mesh>,
+    materials: [Handle<StandardMaterial>; COLOURS.len()],
+}
+
+pub fn plugin(app: &mut App) {
+    let random = fastrand::Rng::with_seed(app.world().resource::<Options>().seed);
+    app.add_message::<Order>()
+        .insert_resource(Bag { smallest: 0.2, largest: 0.6, random })
+        .add_systems(Startup, (make_look, reset))
+        .add_systems(
+            Update,
+            (
+                reset.run_if(just_pressed(Action::Reset)),
+                drop_more.run_if(just_pressed(Action::DropMore)),
+            ),
+        )
+        .add_systems(FixedUpdate, obey.before(TawSystems::Gather));
+}
+
+fn reset(mut orders: MessageWriter<Order>) {
+    orders.write(Order::Reset);
+}
+
+fn drop_more(mut orders: MessageWriter<Order>) {
+    orders.write(Order::Drop(10));
+}
+
+fn make_look(
+    mut commands: Commands,
+    assets: Res<AssetServer>,
+    mut meshes: ResMut<Assets<Mesh>>,
+    mut materials: ResMut<Assets<StandardMaterial>>,
+) {
+    let swirl: Handle<Image> = assets.load("textures/marble.png");
+    commands.insert_resource(Look {
+        mesh: meshes.add(Sphere::new(1.0).mesh().uv(28, 16)),
+        materials: COLOURS.map(|colour| {
+            materials.add(StandardMaterial {
+                base_color: colour.into(),
+                base_color_texture: Some(swirl.clone()),
+                perceptual_roughness: 0.16,
+                reflectance: 0.7,
+                ..default()
+            })
+        }),
+    });
+}
+
+fn obey(
+    mut orders: MessageReader<Order>,
+    mut commands: Commands,
+    mut bag: ResMut<Bag>,
+    mut tilt: ResMut<Tilt>,
+    options: Res<Options>,
+    half_width: Res<HalfWidth>,
+    look: Res<Look>,
+    world: Res<TawWorld>,
+    marbles: Query<Entity, With<Marble>>,
+) {
+    for order in orders.read() {
+        let count = match *order {
+            Order::Drop(count) => count,
+            Order::Clear => 0,
+            Order::Reset => {
+                bag.random = fastrand::Rng::with_seed(options.seed);
+                tilt.level();
+                options.marbles
+            }
+        };
+        let mut highest = 0.0;
+        if let Order::Drop(_) = order {
+            let heights = world.marbles.position().iter().map(|p| p.y);
+            highest = heights.fold(0.0, f32::max);
+        } else {
+            marbles.iter().for_each(|marble| commands.entity(marble).despawn());
+        }
+        let bottom = highest + 2.0 + bag.largest;
+        let lattice = Lattice::new(count, bag.largest, **half_width, bottom);
+        for i in 0..count {
+            commands.spawn(marble(i, &lattice, &mut bag, &look));
+        }
+    }
+}
+
+/// Cells above the board, each wide enough for the largest marble: as many as
+/// there are marbles, in layers if need be.
+struct Lattice {
+    /// Cells along one side of a layer.
+    side: u32,
+    /// The width of a cell along x and z, in metres.
+    pitch: f32,
+    /// The height of a layer, in metres.
+    layer: f32,
+    /// The height of the lowest centers, in metres.
+    bottom: f32,
+}
+
+impl Lattice {
+    fn new(count: u32, largest: f32, half_width: f32, bottom: f32) -> Self {
+        let layer = 2.1 * largest;
+        let room = (2.0 * half_width / layer) as u32;
+        let side = f64::from(count).sqrt().ceil().min(f64::from(room)).max(1.0) as u32;
+        Self { side, pitch: 2.0 * half_width / side as f32, layer, bottom }
+    }
+}
+
+/// The marble in cell number `i`, anywhere in that cell.
+fn marble(i: u32, lattice: &Lattice, bag: &mut Bag, look: &Look) -> impl Bundle + use<> {
+    let Lattice { side, pitch, layer, bottom } = *lattice;
+    let radius = bag.smallest + (bag.largest - bag.smallest) * bag.random.f32();
+    let spare = (pitch - 2.0 * radius).max(0.0);
+    let mut place = |cell: u32| {
+        let middle = (cell as f32 + 0.5 - side as f32 / 2.0) * pitch;
+        middle + spare * (bag.random.f32() - 0.5)
+    };
+    let (x, z) = (place(i % side), place(i / side % side));
+    let y = bottom + (i / (side * side)) as f32 * layer;
+    let colour = bag.random.usize(..COLOURS.len());
+    let mut angle = || bag.random.f32() * std::f32::consts::TAU;
+    let turn = Quat::from_euler(EulerRot::YXZ, angle(), angle(), angle());
+    (
+        Marble::new(radius),
+        Colour(colour),
+        Mesh3d(look.mesh.clone()),
+        MeshMaterial3d(look.materials[colour].clone()),
+        Transform::from_xyz(x, y, z).with_rotation(turn).with_scale(Vec3::splat(radius)),
+    )
+}
