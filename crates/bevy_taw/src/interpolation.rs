@@ -4,7 +4,7 @@
 //! outside the fixed schedules, read a marble's true place from the
 //! [`TawWorld`](crate::resources::TawWorld), or leave this plugin out.
 //! Marbles get it by themselves; give moving walls a
-//! [`TransformInterpolation`](bevy_transform_interpolation::prelude::TransformInterpolation).
+//! [`TransformInterpolation`].
 
 use bevy::prelude::*;
 use bevy_transform_interpolation::prelude::*;

@@ -1,0 +1,92 @@
+//! What a step costs: `cargo bench -p taw`.
+//!
+//! Marbles with radii in [0.2, 0.6] m in a box of planes, as in the demo: while
+//! they fall, and when they lie in a heap. The whole step, and each verb by itself;
+//! 60 Hz, one substep. Add `--profile dev` for the figures of `cargo run --example
+//! marble_madness`, whose profile optimises this crate too.
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use taw::prelude::*;
+
+const DT: f32 = 1.0 / 60.0;
+const COUNTS: [u32; 3] = [100, 1_000, 10_000];
+
+fn main() {
+    divan::main();
+}
+
+/// Marbles on a lattice, each well inside its cell, over a box that fits it.
+fn falling(count: u32) -> World<f32> {
+    let mut world = World::default();
+    let side = f64::from(count / 5).sqrt().ceil() as u32;
+    let half = side as f32 * 1.3 / 2.0;
+    for (direction, offset) in [
+        (Vec3::unit_y(), 0.0),
+        (Vec3::unit_x(), -half),
+        (-Vec3::unit_x(), -half),
+        (Vec3::unit_z(), -half),
+        (-Vec3::unit_z(), -half),
+    ] {
+        let wall = Plane::new(direction, offset).expect("a unit vector");
+        world.walls.insert(wall).expect("few walls");
+    }
+    for i in 0..count {
+        // The fractional parts of multiples of the golden ratio spread evenly.
+        let random = |n: u32| (i * 3 + n) as f32 * 0.618_034 % 1.0;
+        let at = |cell: u32, n: u32| (cell as f32 + 0.5) * 1.3 - half + (random(n) - 0.5) * 0.1;
+        let layer = i / (side * side);
+        let position =
+            Point3::new(at(i % side, 0), 1.0 + layer as f32 * 1.3, at(i / side % side, 1));
+        world.marbles.insert(Marble::new(position, 0.2 + 0.4 * random(2))).expect("a marble");
+    }
+    world
+}
+
+/// The same ten seconds later.
+fn settled(count: u32) -> World<f32> {
+    let mut world = falling(count);
+    for _ in 0..600 {
+        world.step(DT).expect("a step");
+    }
+    world
+}
+
+fn bench(bencher: Bencher, world: World<f32>, run: impl Fn(&mut World<f32>) + Sync) {
+    bencher
+        .counter(ItemsCount::new(world.marbles.len()))
+        .with_inputs(|| world.clone())
+        .bench_local_refs(run);
+}
+
+fn step(world: &mut World<f32>) {
+    world.step(DT).expect("a step");
+}
+
+#[divan::bench(args = COUNTS)]
+fn step_falling(bencher: Bencher, count: u32) {
+    bench(bencher, falling(count), step);
+}
+
+#[divan::bench(args = COUNTS)]
+fn step_settled(bencher: Bencher, count: u32) {
+    bench(bencher, settled(count), step);
+}
+
+#[divan::bench(args = COUNTS)]
+fn verb_1_integrate(bencher: Bencher, count: u32) {
+    bench(bencher, settled(count), |world| world.integrate(DT).expect("a step"));
+}
+
+#[divan::bench(args = COUNTS)]
+fn verb_2_generate_contacts(bencher: Bencher, count: u32) {
+    bench(bencher, settled(count), World::generate_contacts);
+}
+
+#[divan::bench(args = COUNTS)]
+fn verb_3_restitute(bencher: Bencher, count: u32) {
+    let mut world = settled(count);
+    world.integrate(DT).expect("a step");
+    world.generate_contacts();
+    bench(bencher, world, |world| world.restitute(DT).expect("a step"));
+}
