@@ -22,7 +22,7 @@ const OUTSIDE: Region = [1100, 600, 1270, 710];
 
 /// Hue in degrees, saturation and value in [0, 1] (Smith, *Color gamut transform
 /// pairs*, 1978).
-fn hsv(Rgb(rgb): &Rgb<u8>) -> (f32, f32, f32) {
+fn hsv(Rgb(rgb): Rgb<u8>) -> (f32, f32, f32) {
     let [r, g, b] = rgb.map(|channel| f32::from(channel) / 255.0);
     let (value, least) = (r.max(g).max(b), r.min(g).min(b));
     let chroma = value - least;
@@ -48,7 +48,7 @@ fn part(
     let mut count = 0;
     for y in top..bottom {
         for x in left..right {
-            let (h, s, v) = hsv(picture.get_pixel(x, y));
+            let (h, s, v) = hsv(*picture.get_pixel(x, y));
             count += u32::from(test(h, s, v));
         }
     }

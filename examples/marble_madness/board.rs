@@ -18,9 +18,11 @@ use crate::controls::TiltInput;
 const RAIL_HEIGHT: f32 = 1.0;
 const RAIL_WIDTH: f32 = 0.6;
 const FLOOR_DEPTH: f32 = 0.5;
-/// How long the board takes to do most (1 − 1/e) of what the player asks, in
-/// seconds.
-const RESPONSE_TIME: f32 = 0.12;
+/// How fast the rails' speed may change, in m/s². Below gravity, or a board that
+/// stops or sinks would let go of its marbles.
+const EDGE_ACCELERATION: f32 = 6.0;
+/// How closely the board settles: it covers this part of what is left to go, in 1/s.
+const SETTLING_RATE: f32 = 8.0;
 
 /// Marks the entity that turns. Floor and rails are its children.
 #[derive(Component)]
@@ -42,6 +44,8 @@ impl HalfWidth {
 pub struct Tilt {
     /// Toward where (x and z) and how far (its length), in radians.
     now: Vec2,
+    /// How `now` changes, in rad/s.
+    speed: Vec2,
     /// The most that it tilts, in radians.
     pub limit: f32,
     /// Sways by itself, for as long.
@@ -50,11 +54,14 @@ pub struct Tilt {
 
 impl Tilt {
     /// Moves toward `wanted` (a part of the limit, at most 1 in length) for `dt`
-    /// seconds.
-    fn follow(&mut self, wanted: Vec2, dt: f32) {
-        let wanted = wanted.clamp_length_max(1.0) * self.limit;
-        self.now = self.now.lerp(wanted, 1.0 - (-dt / RESPONSE_TIME).exp());
-        self.now = self.now.clamp_length_max(self.limit);
+    /// seconds, as fast as it can still brake in time.
+    fn follow(&mut self, wanted: Vec2, half_width: f32, dt: f32) {
+        let acceleration = EDGE_ACCELERATION / half_width;
+        let way = wanted.clamp_length_max(1.0) * self.limit - self.now;
+        let braking = (2.0 * acceleration * way.length()).sqrt();
+        let speed = (way * SETTLING_RATE).clamp_length_max(0.8 * braking);
+        self.speed += (speed - self.speed).clamp_length_max(acceleration * dt);
+        self.now = (self.now + self.speed * dt).clamp_length_max(self.limit);
     }
 
     /// The rotation that lowers the side toward which it tilts.
@@ -64,7 +71,7 @@ impl Tilt {
 
     /// Level again.
     pub fn level(&mut self) {
-        self.now = Vec2::ZERO;
+        (self.now, self.speed) = (Vec2::ZERO, Vec2::ZERO);
     }
 }
 
@@ -72,7 +79,12 @@ pub fn plugin(app: &mut App) {
     let options = app.world().resource::<Options>();
     let (half_width, sway) = (HalfWidth::for_marbles(options.marbles), options.sway.then_some(0.0));
     app.insert_resource(half_width)
-        .insert_resource(Tilt { now: Vec2::ZERO, limit: 12_f32.to_radians(), sway })
+        .insert_resource(Tilt {
+            now: Vec2::ZERO,
+            speed: Vec2::ZERO,
+            limit: 12_f32.to_radians(),
+            sway,
+        })
         .insert_resource(ClearColor(tailwind::SKY_950.into()))
         .insert_resource(GlobalAmbientLight {
             color: tailwind::SKY_100.into(),
@@ -87,6 +99,7 @@ fn tilt(
     mut tilt: ResMut<Tilt>,
     input: Res<TiltInput>,
     time: Res<Time>,
+    half_width: Res<HalfWidth>,
     mut board: Single<&mut Transform, With<Board>>,
 ) {
     let mut wanted = **input;
@@ -96,7 +109,7 @@ fn tilt(
         *seconds += time.delta_secs();
         wanted = Vec2::from_angle(*seconds * TAU / 7.0) * 0.9;
     }
-    tilt.follow(wanted, time.delta_secs());
+    tilt.follow(wanted, **half_width, time.delta_secs());
     board.rotation = tilt.rotation();
 }
 
@@ -206,40 +219,37 @@ fn spawn_surroundings(
 mod tests {
     use super::*;
 
-    fn tilt() -> Tilt {
-        Tilt { now: Vec2::ZERO, limit: 0.2, sway: None }
+    fn level() -> Tilt {
+        Tilt { now: Vec2::ZERO, speed: Vec2::ZERO, limit: 0.2, sway: None }
     }
 
     #[test]
     fn the_board_goes_smoothly_where_the_player_wants_and_no_further() {
-        let mut tilt = tilt();
-        let mut last = 0.0;
-        for _ in 0..128 {
-            tilt.follow(Vec2::new(3.0, 4.0), 1.0 / 64.0);
-            let now = tilt.now.length();
-            assert!(now > last || (now - tilt.limit).abs() < 1e-4);
-            assert!(now - last < 0.2 * tilt.limit && now <= tilt.limit);
-            last = now;
+        for (half_width, dt) in [(10.0, 1.0 / 64.0), (3.0, 1.0 / 30.0), (50.0, 1.0 / 240.0)] {
+            let mut tilt = level();
+            let mut stay = |wanted: Vec2, seconds: f32| {
+                for _ in 0..(seconds / dt) as u32 {
+                    let speed = tilt.speed;
+                    tilt.follow(wanted, half_width, dt);
+                    let change = (tilt.speed - speed).length() / dt * half_width;
+                    assert!(change < EDGE_ACCELERATION * 1.001, "{change} m/s² at the rails");
+                    assert!(tilt.now.length() <= tilt.limit * 1.000_001);
+                }
+                tilt.now
+            };
+            // There, to the other side, and back before that is reached.
+            let there = Vec2::new(0.6, 0.8) * 0.2;
+            assert!(stay(Vec2::new(3.0, 4.0), 8.0).distance(there) < 1e-4, "{half_width}");
+            stay(Vec2::new(-3.0, -4.0), 0.5);
+            assert!(stay(Vec2::ZERO, 8.0).length() < 1e-4, "{half_width}");
         }
-        assert!(tilt.now.distance(Vec2::new(0.6, 0.8) * tilt.limit) < 1e-4);
-    }
-
-    #[test]
-    fn half_steps_follow_as_fast_as_whole_ones() {
-        let (mut whole, mut halves) = (tilt(), tilt());
-        for _ in 0..10 {
-            whole.follow(Vec2::X, 1.0 / 30.0);
-            (0..2).for_each(|_| halves.follow(Vec2::X, 1.0 / 60.0));
-        }
-        assert!(whole.now.distance(halves.now) < 1e-6);
     }
 
     #[test]
     fn the_side_toward_which_it_tilts_goes_down() {
         for angle in [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0] {
-            let mut tilt = tilt();
             let toward = Vec2::from_angle(angle);
-            (0..100).for_each(|_| tilt.follow(toward, 0.1));
+            let tilt = Tilt { now: toward * 0.2, ..level() };
             let edge = tilt.rotation() * Vec3::new(toward.x, 0.0, toward.y);
             assert!((edge.y + tilt.limit.sin()).abs() < 1e-5, "toward {toward}: {edge}");
             let beside = tilt.rotation() * Vec3::new(-toward.y, 0.0, toward.x);

@@ -3,6 +3,7 @@
 use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
 use bevy_panorbit_camera::PanOrbitCamera;
+use leafwing_input_manager::plugin::InputManagerSystem;
 use leafwing_input_manager::prelude::*;
 
 /// What the player can do.
@@ -69,9 +70,10 @@ pub fn plugin(app: &mut App) {
         .add_systems(Startup, |mut commands: Commands| {
             commands.spawn(bindings());
         })
+        // Before any fixed step of this frame, for which leafwing keeps other records.
         .add_systems(
-            RunFixedMainLoop,
-            (read_tilt, orbit_by_stick).in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
+            PreUpdate,
+            (read_tilt, orbit_by_stick).after(InputManagerSystem::ManualControl),
         );
 }
 
@@ -143,6 +145,7 @@ fn orbit_by_stick(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use bevy::input::InputPlugin;
 
     #[test]
     fn up_is_away_from_the_camera_wherever_it_is() {
@@ -154,5 +157,80 @@ mod tests {
             assert!((away + toward).length() < 1e-6, "from {at}: {away}");
             assert!(to_world(Vec2::X, &camera.into()).dot(away).abs() < 1e-6);
         }
+    }
+
+    /// The controls alone, with a camera that looks along -Z.
+    fn app() -> App {
+        let mut app = App::new();
+        app.add_plugins((MinimalPlugins, InputPlugin, plugin)).init_resource::<EguiWantsInput>();
+        let camera = Transform::from_xyz(0.0, 5.0, 9.0).looking_at(Vec3::ZERO, Vec3::Y);
+        app.world_mut().spawn((Camera3d::default(), GlobalTransform::from(camera)));
+        app.update();
+        app
+    }
+
+    fn tilt(app: &mut App) -> Vec2 {
+        app.update();
+        **app.world().resource::<TiltInput>()
+    }
+
+    #[test]
+    fn keys_tilt_the_board_and_release_it() {
+        let right_away = Vec2::new(1.0, -1.0).normalize();
+        for (keys, toward) in [
+            (&[KeyCode::ArrowRight][..], Vec2::X),
+            (&[KeyCode::KeyA], Vec2::NEG_X),
+            (&[KeyCode::KeyW], Vec2::NEG_Y),
+            (&[KeyCode::ArrowDown], Vec2::Y),
+            (&[KeyCode::KeyD, KeyCode::ArrowUp], right_away),
+            (&[KeyCode::KeyD, KeyCode::ArrowRight], Vec2::X),
+        ] {
+            let mut app = app();
+            for key in keys {
+                key.press(app.world_mut());
+            }
+            let now = tilt(&mut app);
+            assert!(now.distance(toward) < 1e-5, "{keys:?} tilt toward {now}");
+            for key in keys {
+                key.release(app.world_mut());
+            }
+            assert_eq!(tilt(&mut app), Vec2::ZERO, "{keys:?}");
+        }
+    }
+
+    #[test]
+    fn the_left_stick_tilts_as_far_as_it_is_pushed() {
+        let mut app = app();
+        let gamepad = app.world_mut().spawn(Gamepad::default()).id();
+        let mut push = |x: f32, y: f32| {
+            let stick = GamepadStick::LEFT;
+            stick.set_axis_pair_as_gamepad(app.world_mut(), Vec2::new(x, y), Some(gamepad));
+            tilt(&mut app)
+        };
+        assert!(push(1.0, 0.0).distance(Vec2::X) < 1e-5);
+        let half = push(0.0, 0.55);
+        assert!(half.distance(Vec2::new(0.0, -0.5)) < 1e-5, "beyond the dead zone: {half}");
+        assert_eq!(push(0.05, 0.05), Vec2::ZERO, "in the dead zone");
+    }
+
+    #[test]
+    fn a_drag_tilts_until_the_button_is_let_go() {
+        let mut app = app();
+        let drag = |app: &mut App, x: f32, y: f32| {
+            MouseMove::default().set_axis_pair(app.world_mut(), Vec2::new(x, y));
+            tilt(app)
+        };
+        assert_eq!(drag(&mut app, 90.0, 0.0), Vec2::ZERO, "no button is pressed");
+        MouseButton::Left.press(app.world_mut());
+        tilt(&mut app);
+        let mut now = Vec2::ZERO;
+        for _ in 0..5 {
+            now = drag(&mut app, DRAG_PIXELS / 10.0, 0.0);
+        }
+        assert!(now.distance(Vec2::X * 0.5) < 1e-5, "{now}");
+        let down = drag(&mut app, -DRAG_PIXELS / 2.0, DRAG_PIXELS);
+        assert!(down.distance(Vec2::Y) < 1e-5, "toward the camera: {down}");
+        MouseButton::Left.release(app.world_mut());
+        assert_eq!(tilt(&mut app), Vec2::ZERO);
     }
 }

@@ -96,3 +96,33 @@ fn take_home(
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pad_takes_marbles_of_its_colour_that_lie_on_it() {
+        let mut app = App::new();
+        app.add_plugins(MinimalPlugins).init_resource::<Score>().add_systems(Update, take_home);
+        let tilted = Transform::from_rotation(Quat::from_rotation_z(0.3));
+        let board = app.world_mut().spawn((Board, tilted)).id();
+        let pad_at = Transform::from_xyz(5.0, 0.0, 5.0);
+        app.world_mut().spawn((Pad, Colour(2), pad_at, ChildOf(board)));
+        let mut marble = |colour, x, y, z| {
+            let at = tilted.transform_point(Vec3::new(x, y, z));
+            let place = Transform::from_translation(at);
+            app.world_mut().spawn((Marble::new(0.4), Colour(colour), place)).id()
+        };
+        let on_pad = marble(2, 5.9, 0.4, 4.1);
+        let others = [
+            marble(1, 5.0, 0.4, 5.0), // of another colour
+            marble(2, 5.0, 0.4, 3.4), // beside it
+            marble(2, 5.0, 2.0, 5.0), // in the air above it
+        ];
+        app.update();
+        assert!(app.world().get_entity(on_pad).is_err(), "it went home");
+        assert!(others.iter().all(|marble| app.world().get_entity(*marble).is_ok()));
+        assert_eq!(app.world().resource::<Score>().home, 1);
+    }
+}

@@ -29,6 +29,7 @@ pub fn orbit_camera(focus: Vec3, distance: f32) -> impl Bundle {
             pitch_lower_limit: Some(0.1),
             zoom_lower_limit: 2.0,
             zoom_upper_limit: Some(6.0 * distance),
+            zoom_sensitivity: 0.5,
             button_orbit: MouseButton::Right,
             button_pan: MouseButton::Middle,
             use_real_time: true, // also while the game is paused

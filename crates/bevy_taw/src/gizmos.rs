@@ -53,7 +53,9 @@ impl Plugin for TawGizmosPlugin {
 
     fn finish(&self, app: &mut App) {
         if app.is_plugin_added::<bevy::gizmos::GizmoPlugin>() {
-            app.init_gizmo_group::<TawGizmos>().add_systems(PostUpdate, draw);
+            // Contacts are inside of what touches, so nothing may hide them.
+            let in_front = GizmoConfig { depth_bias: -1.0, ..default() };
+            app.insert_gizmo_config(TawGizmos::default(), in_front).add_systems(PostUpdate, draw);
         }
     }
 }

@@ -54,6 +54,8 @@
 //! [`Velocity`]: crate::components::Velocity
 //! [`TawWorld`]: crate::resources::TawWorld
 
+#![cfg_attr(not(test), warn(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
+
 pub mod components;
 mod convert;
 #[cfg(feature = "debug_ui")]
@@ -86,3 +88,8 @@ pub mod prelude {
     pub use taw::response::Response;
     pub use taw::world::Model;
 }
+
+/// Compiles what the README shows.
+#[cfg(doctest)]
+#[doc = include_str!("../../../README.md")]
+struct Readme;

@@ -37,11 +37,16 @@
 //!
 //! Imports point down this table's order only: a room never uses a later one.
 //!
+//! With the feature `mint`, cgmath's types convert to and from those of any other
+//! mathematics library.
+//!
 //! # Units and bad input
 //! Lengths are metres, times seconds, whatever else follows from them. What
 //! cannot be right (NaN, a negative radius, a step of zero) is refused with an
 //! [`Error`] that names the field and the value, and changes nothing. Nothing in
 //! this crate panics.
+
+#![cfg_attr(not(test), warn(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod broad;
 pub mod contact;

@@ -108,12 +108,24 @@ mod tests {
 
     #[test]
     fn a_contact_that_an_earlier_one_settled_does_nothing() {
-        // The first two push the third out of reach of both.
+        // The first pushes the second out of reach of the third, which it touched.
+        let still = Vec3::new(0.0, 0.0, 0.0);
+        let third = Point3::new(-0.6, 6.58, 0.0);
+        let (position, velocity) = restituted(&[
+            (Point3::new(0.0, 5.0, 0.0), 0.2, still),
+            (Point3::new(0.6, 5.0, 0.0), 1.0, still),
+            (third, 1.0, still),
+        ]);
+        assert!((position[1].x - 0.9).abs() < 1e-15);
+        assert_eq!((position[2], velocity[2]), (third, still));
+    }
+
+    #[test]
+    fn coincident_marbles_part_completely() {
         let still = Vec3::new(0.0, 0.0, 0.0);
         let at = Point3::new(0.0, 5.0, 0.0);
         let (position, _) = restituted(&[(at, 1.0, still), (at, 1.0, still)]);
-        let gap = position[1].x - position[0].x;
-        assert_eq!(gap, 2.0, "coincident marbles part completely, along x");
+        assert_eq!(position[1].x - position[0].x, 2.0);
     }
 
     #[test]

@@ -106,8 +106,8 @@ impl<S: Scalar> Marbles<S> {
         self.radius.push(radius);
         self.velocity.push(velocity);
         let rows = self.position.len();
-        self.integrator.push(marble.integrator, rows);
-        self.material.push(material, rows);
+        self.integrator.set(rows - 1, marble.integrator, rows);
+        self.material.set(rows - 1, material, rows);
         Ok(MarbleId(handle))
     }
 

@@ -3,11 +3,13 @@
 pub(super) struct Optional<T> {
     /// Empty, or as long as the other columns.
     values: Vec<Option<T>>,
+    /// How many of them are there.
+    present: usize,
 }
 
 impl<T> Default for Optional<T> {
     fn default() -> Self {
-        Self { values: Vec::new() }
+        Self { values: Vec::new(), present: 0 }
     }
 }
 
@@ -21,37 +23,29 @@ impl<T: Copy> Optional<T> {
         self.values.get(row).copied().flatten()
     }
 
-    /// Sets the value of a new last row, `rows` with it.
-    pub fn push(&mut self, value: Option<T>, rows: usize) {
-        if value.is_some() {
-            self.values.resize(rows - 1, None);
-            self.values.push(value);
-        } else if !self.values.is_empty() {
-            self.values.push(None);
-        }
-    }
-
-    /// Sets the value of one of `rows` rows.
+    /// Sets the value of one of `rows` rows, of which the last may be new.
     pub fn set(&mut self, row: usize, value: Option<T>, rows: usize) {
         if self.values.is_empty() && value.is_none() {
             return;
         }
         self.values.resize(rows, None);
-        self.values[row] = value;
-        self.shrink();
+        if let Some(slot) = self.values.get_mut(row) {
+            let last = std::mem::replace(slot, value);
+            self.count(value.is_some(), last.is_some());
+        }
     }
 
     pub fn swap_remove(&mut self, row: usize) {
         if !self.values.is_empty() {
-            self.values.swap_remove(row);
-            self.shrink();
+            let last = self.values.swap_remove(row);
+            self.count(false, last.is_some());
         }
     }
 
-    /// Gives the column up when the last value is gone. A value in the first row
-    /// answers at once, which is the usual case.
-    fn shrink(&mut self) {
-        if self.values.iter().all(Option::is_none) {
+    /// Notes that a value came or went. With the last one the column goes too.
+    fn count(&mut self, came: bool, went: bool) {
+        self.present = self.present + usize::from(came) - usize::from(went);
+        if self.present == 0 {
             self.values.clear();
         }
     }
@@ -68,11 +62,18 @@ mod tests {
         assert!(column.is_empty());
         column.set(3, Some('x'), 5);
         assert_eq!((column.get(0), column.get(3), column.get(99)), (None, Some('x'), None));
-        column.swap_remove(0); // the last row, without a value, takes its place
-        assert_eq!(column.get(3), Some('x'));
-        column.swap_remove(1); // row 3 takes the place of row 1
-        assert_eq!((column.get(1), column.get(3)), (Some('x'), None));
-        column.set(1, None, 3);
+        column.set(5, None, 6); // a new row without one
+        column.swap_remove(0); // it takes the place of row 0
+        assert_eq!((column.get(0), column.get(3)), (None, Some('x')));
+        column.set(1, Some('y'), 5);
+        column.set(1, Some('z'), 5);
+        column.swap_remove(3); // the row with x
+        assert_eq!((column.get(1), column.get(3)), (Some('z'), None));
+        column.set(1, None, 4);
+        assert!(column.is_empty());
+        column.set(4, Some('w'), 5); // as the first value of a new row
+        assert_eq!(column.get(4), Some('w'));
+        column.swap_remove(4);
         assert!(column.is_empty());
     }
 }
