@@ -78,6 +78,7 @@ impl Tilt {
 pub fn plugin(app: &mut App) {
     let options = app.world().resource::<Options>();
     let (half_width, sway) = (HalfWidth::for_marbles(options.marbles), options.sway.then_some(0.0));
+    app.world_mut().resource_mut::<TawModel>().rotation = Rotation::Rolling;
     app.insert_resource(half_width)
         .insert_resource(Tilt {
             now: Vec2::ZERO,

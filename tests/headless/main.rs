@@ -5,6 +5,7 @@ mod board;
 mod contacts;
 mod input;
 mod interpolation;
+mod motion;
 mod scene;
 mod spawning;
 mod transforms;

@@ -3,7 +3,7 @@
 
 use bevy::prelude::*;
 use taw::motion::Integrator;
-use taw::world::{MarbleId, WallId};
+use taw::world::{MarbleId, Mass, WallId};
 
 use crate::reflect::IntegratorReflect;
 
@@ -40,6 +40,41 @@ impl Marble {
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct Velocity(pub Vec3);
+
+/// The spin of a marble: its angular velocity in radians per second, as an axial
+/// vector in world space. Only a [`Model`](taw::world::Model) with rotation keeps it.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct Spin(pub Vec3);
+
+/// How heavy a marble is. Without it, a marble is of glass.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub enum MarbleMass {
+    /// As a solid ball of this density, in kg/m³, above zero. Follows the radius.
+    Density(f32),
+    /// This many kilograms, above zero, whatever the radius.
+    Kilograms(f32),
+    /// So heavy that no force and no gravity changes its velocity.
+    Infinite,
+}
+
+impl Default for MarbleMass {
+    fn default() -> Self {
+        Mass::default().into()
+    }
+}
+
+/// How many times the world's gravity a marble feels: 0 floats, −1 rises.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct GravityScale(pub f32);
+
+impl Default for GravityScale {
+    fn default() -> Self {
+        Self(1.0)
+    }
+}
 
 /// What a marble is made of, as far as its contacts can tell. The response
 /// [`Displacement`](taw::response::Response::Displacement) does not read it.
@@ -91,8 +126,13 @@ pub(crate) struct MarbleState {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(crate) struct SeenMarble {
     pub translation: [u32; 3],
+    pub rotation: [u32; 4],
     pub radius: u32,
     pub velocity: Option<[u32; 3]>,
+    pub spin: Option<[u32; 3]>,
+    /// Which kind of mass, and its number.
+    pub mass: Option<(u8, u32)>,
+    pub gravity_scale: Option<u32>,
     pub material: Option<[u32; 2]>,
     pub integrator: Option<Integrator>,
 }
@@ -106,7 +146,43 @@ pub(crate) struct WallState {
     pub seen: Option<[[u32; 3]; 2]>,
 }
 
+impl MarbleMass {
+    /// Which kind, and the bits of its number.
+    pub(crate) fn bits(self) -> (u8, u32) {
+        match self {
+            Self::Density(density) => (0, density.to_bits()),
+            Self::Kilograms(mass) => (1, mass.to_bits()),
+            Self::Infinite => (2, 0),
+        }
+    }
+}
+
+impl From<Mass<f32>> for MarbleMass {
+    fn from(mass: Mass<f32>) -> Self {
+        match mass {
+            Mass::Density(density) => Self::Density(density),
+            Mass::Kilograms(mass) => Self::Kilograms(mass),
+            Mass::Infinite => Self::Infinite,
+        }
+    }
+}
+
+impl From<MarbleMass> for Mass<f32> {
+    fn from(mass: MarbleMass) -> Self {
+        match mass {
+            MarbleMass::Density(density) => Self::Density(density),
+            MarbleMass::Kilograms(mass) => Self::Kilograms(mass),
+            MarbleMass::Infinite => Self::Infinite,
+        }
+    }
+}
+
 /// The bits of a vector.
 pub(crate) fn bits(v: Vec3) -> [u32; 3] {
     v.to_array().map(f32::to_bits)
+}
+
+/// The bits of a rotation.
+pub(crate) fn rotation_bits(q: Quat) -> [u32; 4] {
+    q.to_array().map(f32::to_bits)
 }

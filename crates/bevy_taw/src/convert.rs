@@ -1,7 +1,7 @@
 //! Between Bevy's glam and the core's cgmath. No other file converts.
 
-use bevy::math::Vec3;
-use taw::math::{Point3, Vec3 as TawVec3};
+use bevy::math::{Quat, Vec3};
+use taw::math::{Point3, Quat as TawQuat, Vec3 as TawVec3};
 
 /// A glam vector as a displacement, velocity or direction.
 pub fn to_vector(v: Vec3) -> TawVec3<f32> {
@@ -21,4 +21,14 @@ pub fn from_vector(v: TawVec3<f32>) -> Vec3 {
 /// A location for glam.
 pub fn from_point(p: Point3<f32>) -> Vec3 {
     Vec3::new(p.x, p.y, p.z)
+}
+
+/// A glam rotation for the core.
+pub fn to_rotation(q: Quat) -> TawQuat<f32> {
+    TawQuat::new(q.w, q.x, q.y, q.z)
+}
+
+/// A rotation for glam.
+pub fn from_rotation(q: TawQuat<f32>) -> Quat {
+    Quat::from_xyzw(q.v.x, q.v.y, q.v.z, q.s)
 }

@@ -20,7 +20,7 @@ use bevy::diagnostic::{Diagnostic, DiagnosticPath, DiagnosticsStore};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Ui};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
-use taw::motion::Integrator;
+use taw::motion::{Integrator, Rotation};
 use taw::response::Response;
 use taw::world::Model;
 
@@ -32,29 +32,32 @@ use crate::resources::{Gravity, TawModel};
 pub fn model(ui: &mut Ui, model: &mut ResMut<TawModel>) {
     let mut chosen = ***model;
     egui::Grid::new("taw model").num_columns(2).show(ui, |ui| {
-        ui.label("Integrator");
-        egui::ComboBox::from_id_salt("integrator")
-            .selected_text(integrator_name(chosen.integrator))
-            .show_ui(ui, |ui| {
-                for integrator in [Integrator::ExplicitEuler, Integrator::SemiImplicitEuler] {
-                    let name = integrator_name(integrator);
-                    ui.selectable_value(&mut chosen.integrator, integrator, name);
-                }
-            });
-        ui.end_row();
-        ui.label("Response");
-        egui::ComboBox::from_id_salt("response")
-            .selected_text(response_name(chosen.response))
-            .show_ui(ui, |ui| {
-                let response = Response::Displacement;
-                ui.selectable_value(&mut chosen.response, response, response_name(response));
-            });
-        ui.end_row();
+        choice(ui, "Integrator", &mut chosen.integrator, &Integrator::ALL, integrator_name);
+        choice(ui, "Response", &mut chosen.response, &[Response::Displacement], response_name);
+        let rotations = [Rotation::None, Rotation::Rolling];
+        choice(ui, "Rotation", &mut chosen.rotation, &rotations, rotation_name);
         ui.label("Substeps");
         ui.add(egui::Slider::new(&mut chosen.substeps, 1..=Model::MAX_SUBSTEPS.min(16)));
         ui.end_row();
     });
     model.set_if_neq(TawModel(chosen));
+}
+
+/// A row with a name and a box to choose from.
+fn choice<T: Copy + PartialEq>(
+    ui: &mut Ui,
+    name: &str,
+    chosen: &mut T,
+    all: &[T],
+    label: fn(T) -> &'static str,
+) {
+    ui.label(name);
+    egui::ComboBox::from_id_salt(name).selected_text(label(*chosen)).show_ui(ui, |ui| {
+        for value in all {
+            ui.selectable_value(chosen, *value, label(*value));
+        }
+    });
+    ui.end_row();
 }
 
 /// A slider for how strong gravity is, from none to that of Jupiter. Its direction
@@ -140,6 +143,16 @@ fn integrator_name(integrator: Integrator) -> &'static str {
     match integrator {
         Integrator::ExplicitEuler => "Explicit Euler",
         Integrator::SemiImplicitEuler => "Semi-implicit Euler",
+        Integrator::VelocityVerlet => "Velocity Verlet",
+        Integrator::Leapfrog => "Leapfrog",
+        Integrator::Rk4 => "Runge–Kutta 4",
+    }
+}
+
+fn rotation_name(rotation: Rotation) -> &'static str {
+    match rotation {
+        Rotation::None => "None",
+        Rotation::Rolling => "Rolling",
     }
 }
 

@@ -5,19 +5,20 @@ use taw::shape::Plane;
 use taw::world as core;
 
 use crate::components::{
-    Marble, MarbleIntegrator, MarbleMaterial, MarbleState, SeenMarble, Velocity, Wall, WallState,
-    bits,
+    GravityScale, Marble, MarbleIntegrator, MarbleMass, MarbleMaterial, MarbleState, SeenMarble,
+    Spin, Velocity, Wall, WallState, bits, rotation_bits,
 };
-use crate::convert::{to_point, to_vector};
+use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
 use crate::refusal::InputRefused;
-use crate::resources::{Gravity, TawModel, TawWorld};
+use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 
-/// Takes the model and gravity over, if they can be stepped with.
+/// Takes the model, gravity and forces over, if they can be stepped with.
 pub fn settings(
     mut world: ResMut<TawWorld>,
     model: Res<TawModel>,
     gravity: Res<Gravity>,
+    forces: Res<Forces>,
     mut times: ResMut<StepTimes>,
     mut refused: MessageWriter<InputRefused>,
 ) {
@@ -33,6 +34,9 @@ pub fn settings(
     }
     if gravity.is_changed() {
         check(world.set_gravity(to_vector(**gravity)));
+    }
+    if forces.is_changed() {
+        check(world.set_forces(forces.0.clone()));
     }
 }
 
@@ -70,13 +74,19 @@ pub fn walls(
     }
 }
 
+/// A marble entity's components. The optional ones are read together.
 type MarbleComponents<'a> = (
     Entity,
     &'a Marble,
     &'a Transform,
-    Option<&'a Velocity>,
-    Option<&'a MarbleMaterial>,
-    Option<&'a MarbleIntegrator>,
+    (
+        Option<&'a Velocity>,
+        Option<&'a Spin>,
+        Option<&'a MarbleMass>,
+        Option<&'a GravityScale>,
+        Option<&'a MarbleMaterial>,
+        Option<&'a MarbleIntegrator>,
+    ),
     Has<ChildOf>,
     &'a mut MarbleState,
 );
@@ -89,32 +99,39 @@ pub fn marbles(
     transforms: TransformHelper,
     mut refused: MessageWriter<InputRefused>,
 ) {
-    for (entity, marble, transform, velocity, material, integrator, is_child, mut state) in
-        &mut marbles
-    {
+    for (entity, marble, transform, optional, is_child, mut state) in &mut marbles {
+        let (velocity, spin, mass, gravity_scale, material, integrator) = optional;
         let seen = SeenMarble {
             translation: bits(transform.translation),
+            rotation: rotation_bits(transform.rotation),
             radius: marble.radius.to_bits(),
             velocity: velocity.map(|v| bits(**v)),
+            spin: spin.map(|s| bits(**s)),
+            mass: mass.map(|m| m.bits()),
+            gravity_scale: gravity_scale.map(|g| g.to_bits()),
             material: material.map(|m| [m.restitution.to_bits(), m.friction.to_bits()]),
             integrator: integrator.map(|i| **i),
         };
         if state.seen == seen && state.id.is_some() {
             continue;
         }
-        let position = if is_child {
-            transforms.compute_global_transform(entity).map(|t| t.translation())
+        let place = if is_child {
+            transforms.compute_global_transform(entity).map(|t| t.compute_transform())
         } else {
-            Ok(transform.translation)
+            Ok(*transform)
         };
-        let Ok(position) = position else {
+        let Ok(place) = place else {
             continue; // a parent without a Transform: nobody can say where this is
         };
         let last = std::mem::replace(&mut state.seen, seen);
         let now = core::Marble {
-            position: to_point(position),
+            position: to_point(place.translation),
             radius: marble.radius,
             velocity: to_vector(velocity.map_or(Vec3::ZERO, |v| **v)),
+            rotation: to_rotation(place.rotation),
+            spin: to_vector(spin.map_or(Vec3::ZERO, |s| **s)),
+            mass: mass.copied().unwrap_or_default().into(),
+            gravity_scale: *gravity_scale.copied().unwrap_or_default(),
             integrator: seen.integrator,
             material: material
                 .map(|m| core::Material { restitution: m.restitution, friction: m.friction }),
@@ -153,11 +170,23 @@ fn update(
     if seen.translation != last.translation {
         check(marbles.set_position(id, now.position));
     }
+    if seen.rotation != last.rotation {
+        check(marbles.set_rotation(id, now.rotation));
+    }
     if seen.radius != last.radius {
         check(marbles.set_radius(id, now.radius));
     }
     if seen.velocity != last.velocity && seen.velocity.is_some() {
         check(marbles.set_velocity(id, now.velocity));
+    }
+    if seen.spin != last.spin && seen.spin.is_some() {
+        check(marbles.set_spin(id, now.spin));
+    }
+    if seen.mass != last.mass {
+        check(marbles.set_mass(id, now.mass));
+    }
+    if seen.gravity_scale != last.gravity_scale {
+        check(marbles.set_gravity_scale(id, now.gravity_scale));
     }
     if seen.material != last.material {
         check(marbles.set_material(id, now.material));

@@ -9,16 +9,19 @@
 use bevy::prelude::*;
 use bevy_transform_interpolation::prelude::*;
 use bevy_transform_interpolation::{
-    TransformEasingSystems, TranslationEasingState, reset_easing_states_on_transform_change,
+    RotationEasingState, TransformEasingSystems, TranslationEasingState,
+    reset_easing_states_on_transform_change,
 };
+use taw::motion::Rotation;
 
 use crate::TawSystems;
 use crate::components::Marble;
+use crate::resources::TawWorld;
 
 pub use bevy_transform_interpolation as transform_interpolation;
 
-/// Interpolates every marble's translation. A marble with `NoTranslationEasing` is
-/// left out.
+/// Interpolates every marble's translation, and its rotation if the model has one.
+/// A marble with `NoTransformEasing` is left out.
 #[derive(Debug, Default)]
 pub struct TawInterpolationPlugin;
 
@@ -28,7 +31,10 @@ impl Plugin for TawInterpolationPlugin {
             app.add_plugins(TransformInterpolationPlugin::default());
         }
         app.register_required_components::<Marble, TranslationInterpolation>();
-        app.add_systems(FixedUpdate, forget_refused_places.after(TawSystems::Scatter));
+        app.add_systems(
+            FixedUpdate,
+            (ease_rotation, forget_refused_places).after(TawSystems::Scatter),
+        );
         app.init_resource::<EasedAt>().add_systems(
             RunFixedMainLoop,
             (
@@ -51,6 +57,25 @@ fn note_easing(time: Res<Time<Fixed>>, mut eased: ResMut<EasedAt>) {
     eased.0 = time.overstep_fraction();
 }
 
+/// Lets marbles turn smoothly, once they turn.
+fn ease_rotation(
+    world: Res<TawWorld>,
+    still: Query<Entity, (With<Marble>, Without<RotationInterpolation>)>,
+    turning: Query<Entity, (With<Marble>, With<RotationInterpolation>)>,
+    mut commands: Commands,
+) {
+    if world.model().rotation == Rotation::None {
+        for marble in &turning {
+            // By now it may be on its way out.
+            commands.entity(marble).try_remove::<(RotationInterpolation, RotationEasingState)>();
+        }
+    } else {
+        for marble in &still {
+            commands.entity(marble).try_insert(RotationInterpolation);
+        }
+    }
+}
+
 /// A place that gather refused is no place to move on from.
 fn forget_refused_places(mut marbles: Query<&mut TranslationEasingState, With<Marble>>) {
     for mut easing in &mut marbles {
@@ -68,12 +93,21 @@ fn forget_refused_places(mut marbles: Query<&mut TranslationEasingState, With<Ma
 /// by the next step.
 fn tell_teleports_from_easing(
     mut marbles: Query<
-        (&mut Transform, &mut TranslationEasingState),
+        (&mut Transform, &mut TranslationEasingState, Option<&mut RotationEasingState>),
         (With<Marble>, Without<NoTranslationEasing>),
     >,
     eased: Res<EasedAt>,
 ) {
-    for (mut transform, mut easing) in &mut marbles {
+    for (mut transform, mut easing, turning) in &mut marbles {
+        if let Some(mut turning) = turning
+            && let (Some(start), Some(end)) = (turning.start, turning.end)
+        {
+            if transform.rotation == start.slerp(end, eased.0) {
+                transform.rotation = end;
+            } else {
+                *turning = RotationEasingState::default();
+            }
+        }
         if let (Some(start), Some(end)) = (easing.start, easing.end) {
             if transform.translation == start.lerp(end, eased.0) {
                 transform.translation = end;

@@ -77,14 +77,16 @@ pub use taw;
 
 /// What nearly every game needs.
 pub mod prelude {
-    pub use crate::components::{Marble, MarbleIntegrator, MarbleMaterial, Velocity, Wall};
+    pub use crate::components::{
+        GravityScale, Marble, MarbleIntegrator, MarbleMass, MarbleMaterial, Spin, Velocity, Wall,
+    };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;
     pub use crate::messages::{ContactEnded, ContactOngoing, ContactPair, ContactStarted};
     pub use crate::refusal::{InputRefused, MarbleStopped};
-    pub use crate::resources::{Gravity, TawModel, TawWorld};
+    pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
     pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
-    pub use taw::motion::Integrator;
+    pub use taw::motion::{Force, Integrator, Medium, Rotation};
     pub use taw::response::Response;
     pub use taw::world::Model;
 }

@@ -2,12 +2,14 @@ use bevy::app::PluginGroupBuilder;
 use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
 
-use crate::components::{Marble, MarbleIntegrator, MarbleMaterial, Velocity, Wall};
+use crate::components::{
+    GravityScale, Marble, MarbleIntegrator, MarbleMass, MarbleMaterial, Spin, Velocity, Wall,
+};
 use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::messages::{self, Touches};
 use crate::refusal::{self, InputRefused, MarbleStopped, report};
-use crate::resources::{Gravity, TawModel, TawWorld};
+use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::{gather, scatter};
 
 /// Everything: the physics, interpolation between its steps, and with the feature
@@ -77,12 +79,14 @@ impl Plugin for TawPlugin {
         app.init_resource::<TawWorld>()
             .init_resource::<TawModel>()
             .init_resource::<Gravity>()
+            .init_resource::<Forces>()
             .init_resource::<SubstepDelta>()
             .init_resource::<StepTimes>()
             .init_resource::<Touches>()
             .add_message::<InputRefused>()
             .add_message::<MarbleStopped>();
-        app.register_type::<(Marble, Velocity, MarbleMaterial, MarbleIntegrator, Wall)>()
+        app.register_type::<(Marble, Velocity, Spin, MarbleMass, GravityScale)>()
+            .register_type::<(MarbleMaterial, MarbleIntegrator, Wall)>()
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
 

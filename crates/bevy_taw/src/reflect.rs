@@ -12,6 +12,18 @@ use bevy::reflect::reflect_remote;
 pub enum IntegratorReflect {
     ExplicitEuler,
     SemiImplicitEuler,
+    VelocityVerlet,
+    Leapfrog,
+    Rk4,
+}
+
+/// Mirrors [`taw::motion::Rotation`].
+#[reflect_remote(taw::motion::Rotation)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub enum RotationReflect {
+    None,
+    Rolling,
 }
 
 /// Mirrors [`taw::response::Response`].
@@ -31,5 +43,7 @@ pub struct ModelReflect {
     pub integrator: taw::motion::Integrator,
     #[reflect(remote = ResponseReflect)]
     pub response: taw::response::Response,
+    #[reflect(remote = RotationReflect)]
+    pub rotation: taw::motion::Rotation,
     pub substeps: u32,
 }

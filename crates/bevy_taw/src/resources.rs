@@ -2,6 +2,7 @@
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
+use taw::motion::Force;
 use taw::world::{MarbleId, Model, WallId};
 
 use crate::reflect::ModelReflect;
@@ -24,6 +25,11 @@ impl Default for Gravity {
         Self(Vec3::NEG_Y * 9.81)
     }
 }
+
+/// The force fields that act on every marble besides gravity. A field whose numbers
+/// cannot be right is refused like a wrong [`TawModel`], with all the others.
+#[derive(Resource, Clone, Debug, Default, PartialEq, Deref, DerefMut)]
+pub struct Forces(pub Vec<Force<f32>>);
 
 /// The physics of this app: a [`taw::world::World`], and which of its rows are
 /// which entities.

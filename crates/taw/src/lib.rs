@@ -31,7 +31,7 @@
 //! | [`shape`] | what a thing is: sphere, plane |
 //! | [`contact`] | when things touch, and the shortest way apart |
 //! | [`broad`] | who might touch: a grid for marbles |
-//! | [`motion`] | how a thing moves: integrators |
+//! | [`motion`] | how a thing moves: integrators, forces, rotation |
 //! | [`response`] | what a touch does |
 //! | [`world`] | the state in columns, the [`Model`](world::Model), the step |
 //!
@@ -63,9 +63,9 @@ pub use error::Error;
 pub mod prelude {
     pub use crate::contact::{Contact, Contacts};
     pub use crate::math::{Point3, Scalar, Vec3};
-    pub use crate::motion::Integrator;
+    pub use crate::motion::{Force, Integrator};
     pub use crate::response::Response;
     pub use crate::shape::{Plane, Sphere};
-    pub use crate::world::{Marble, MarbleId, Material, Model, WallId, World};
+    pub use crate::world::{Marble, MarbleId, Mass, Material, Model, WallId, World};
     pub use cgmath::prelude::*;
 }

@@ -29,10 +29,24 @@ pub trait Scalar: BaseFloat + Default + Send + Sync + 'static {
     fn as_f64(self) -> f64 {
         ToPrimitive::to_f64(&self).unwrap_or(f64::NAN)
     }
+
+    /// Sine and cosine of an angle in radians, by a pure-Rust library: the same bits
+    /// on every machine, which the platform's own cannot promise.
+    #[must_use]
+    fn sin_cos_portable(self) -> (Self, Self);
 }
 
-impl Scalar for f32 {}
-impl Scalar for f64 {}
+impl Scalar for f32 {
+    fn sin_cos_portable(self) -> (Self, Self) {
+        libm::sincosf(self)
+    }
+}
+
+impl Scalar for f64 {
+    fn sin_cos_portable(self) -> (Self, Self) {
+        libm::sincos(self)
+    }
+}
 
 /// The length of `v`, right also where squares of its components would overflow
 /// or vanish. Infinite only if a component is, or if the length itself is beyond

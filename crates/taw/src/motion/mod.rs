@@ -1,5 +1,9 @@
-//! How a thing moves while nothing touches it.
+//! How a thing moves while nothing touches it: integrators, forces, rotation.
 
+mod force;
 mod integrator;
+mod rotation;
 
-pub use integrator::{Integrator, explicit_euler, semi_implicit_euler};
+pub use force::{Force, Medium};
+pub use integrator::{Integrator, Motion};
+pub use rotation::{FreeRotation, Rotation, turned};

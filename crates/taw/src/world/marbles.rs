@@ -1,9 +1,11 @@
+use cgmath::{InnerSpace, One, Zero};
+
 use super::handles::{Handle, Handles};
 use super::optional::Optional;
 use crate::Error;
-use crate::error::{finite_point, finite_vector, positive, within};
-use crate::math::{Point3, Scalar, Vec3, is_finite, is_finite_point};
-use crate::motion::{Integrator, explicit_euler, semi_implicit_euler};
+use crate::error::{finite, finite_point, finite_vector, positive, within};
+use crate::math::{Point3, Quat, Scalar, Vec3, is_finite, is_finite_point};
+use crate::motion::{Force, Integrator, Motion, turned};
 use crate::shape::Sphere;
 
 /// Names a marble for as long as it is in the world.
@@ -19,6 +21,15 @@ pub struct Marble<S> {
     pub radius: S,
     /// In metres per second.
     pub velocity: Vec3<S>,
+    /// How heavy it is.
+    pub mass: Mass<S>,
+    /// How many times the world's gravity it feels: 0 floats, −1 rises.
+    pub gravity_scale: S,
+    /// How it is turned. Kept only by a model with rotation.
+    pub rotation: Quat<S>,
+    /// Its angular velocity in rad/s, an axial vector in world space. Kept only by a
+    /// model with rotation.
+    pub spin: Vec3<S>,
     /// This marble's own integrator instead of the model's.
     pub integrator: Option<Integrator>,
     /// This marble's own material instead of the default one.
@@ -26,15 +37,60 @@ pub struct Marble<S> {
 }
 
 impl<S: Scalar> Marble<S> {
-    /// A marble at rest.
+    /// A marble of glass, at rest.
     #[must_use]
     pub fn new(position: Point3<S>, radius: S) -> Self {
         Self {
             position,
             radius,
-            velocity: Vec3::new(S::zero(), S::zero(), S::zero()),
+            velocity: Vec3::zero(),
+            rotation: Quat::one(),
+            spin: Vec3::zero(),
+            mass: Mass::default(),
+            gravity_scale: S::one(),
             integrator: None,
             material: None,
+        }
+    }
+}
+
+/// How heavy a marble is.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mass<S> {
+    /// As a solid ball of this density, in kg/m³, above zero. Follows the radius.
+    Density(S),
+    /// This many kilograms, above zero, whatever the radius.
+    Kilograms(S),
+    /// So heavy that no force and no gravity changes its velocity.
+    Infinite,
+}
+
+impl<S: Scalar> Default for Mass<S> {
+    /// That of glass: 2,500 kg/m³.
+    fn default() -> Self {
+        Self::Density(S::constant(2500.0))
+    }
+}
+
+impl<S: Scalar> Mass<S> {
+    fn checked(self) -> Result<Self, Error> {
+        match self {
+            Self::Density(density) => positive("density", density).map(Self::Density),
+            Self::Kilograms(mass) => positive("mass", mass).map(Self::Kilograms),
+            Self::Infinite => Ok(self),
+        }
+    }
+
+    /// In kilograms, for a ball of this radius in metres.
+    #[must_use]
+    pub fn of(self, radius: S) -> S {
+        match self {
+            Self::Density(density) => {
+                let volume_of_unit = S::constant(4.0 / 3.0 * std::f64::consts::PI);
+                volume_of_unit * radius * radius * radius * density
+            }
+            Self::Kilograms(mass) => mass,
+            Self::Infinite => S::infinity(),
         }
     }
 }
@@ -67,9 +123,18 @@ impl<S: Scalar> Material<S> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Marbles<S> {
     handles: Handles,
+    /// Whether there are columns for rotation.
+    turn: bool,
     position: Vec<Point3<S>>,
     radius: Vec<S>,
     velocity: Vec<Vec3<S>>,
+    /// Empty in a model without rotation, as is `spin`.
+    rotation: Vec<Quat<S>>,
+    spin: Vec<Vec3<S>>,
+    /// Only what is not the default.
+    mass: Optional<Mass<S>>,
+    /// Only what is not one.
+    gravity_scale: Optional<S>,
     integrator: Optional<Integrator>,
     material: Optional<Material<S>>,
 }
@@ -78,9 +143,14 @@ impl<S> Default for Marbles<S> {
     fn default() -> Self {
         Self {
             handles: Handles::default(),
+            turn: false,
             position: Vec::new(),
             radius: Vec::new(),
             velocity: Vec::new(),
+            rotation: Vec::new(),
+            spin: Vec::new(),
+            mass: Optional::default(),
+            gravity_scale: Optional::default(),
             integrator: Optional::default(),
             material: Optional::default(),
         }
@@ -88,6 +158,7 @@ impl<S> Default for Marbles<S> {
 }
 
 const POSITION: [&str; 3] = ["position.x", "position.y", "position.z"];
+const SPIN: [&str; 3] = ["spin.x", "spin.y", "spin.z"];
 const VELOCITY: [&str; 3] = ["velocity.x", "velocity.y", "velocity.z"];
 
 impl<S: Scalar> Marbles<S> {
@@ -100,12 +171,22 @@ impl<S: Scalar> Marbles<S> {
         let position = finite_point(POSITION, marble.position)?;
         let radius = positive("radius", marble.radius)?;
         let velocity = finite_vector(VELOCITY, marble.velocity)?;
+        let rotation = checked_rotation(marble.rotation)?;
+        let spin = finite_vector(SPIN, marble.spin)?;
+        let mass = marble.mass.checked()?;
+        let gravity_scale = finite("gravity_scale", marble.gravity_scale)?;
         let material = marble.material.map(Material::check).transpose()?;
         let handle = self.handles.push()?;
         self.position.push(position);
         self.radius.push(radius);
         self.velocity.push(velocity);
+        if self.turn {
+            self.rotation.push(rotation);
+            self.spin.push(spin);
+        }
         let rows = self.position.len();
+        self.mass.set(rows - 1, but(mass, Mass::default()), rows);
+        self.gravity_scale.set(rows - 1, but(gravity_scale, S::one()), rows);
         self.integrator.set(rows - 1, marble.integrator, rows);
         self.material.set(rows - 1, material, rows);
         Ok(MarbleId(handle))
@@ -121,6 +202,12 @@ impl<S: Scalar> Marbles<S> {
             self.position.swap_remove(row);
             self.radius.swap_remove(row);
             self.velocity.swap_remove(row);
+            if self.turn {
+                self.rotation.swap_remove(row);
+                self.spin.swap_remove(row);
+            }
+            self.mass.swap_remove(row);
+            self.gravity_scale.swap_remove(row);
             self.integrator.swap_remove(row);
             self.material.swap_remove(row);
         }
@@ -137,6 +224,10 @@ impl<S: Scalar> Marbles<S> {
             position: self.position[row],
             radius: self.radius[row],
             velocity: self.velocity[row],
+            rotation: self.rotation.get(row).copied().unwrap_or_else(Quat::one),
+            spin: self.spin.get(row).copied().unwrap_or_else(Vec3::zero),
+            mass: self.mass.get(row).unwrap_or_default(),
+            gravity_scale: self.gravity_scale.get(row).unwrap_or(S::one()),
             integrator: self.integrator.get(row),
             material: self.material.get(row),
         })
@@ -169,6 +260,68 @@ impl<S: Scalar> Marbles<S> {
     pub fn set_radius(&mut self, id: MarbleId, radius: S) -> Result<(), Error> {
         let row = self.row(id)?;
         self.radius[row] = positive("radius", radius)?;
+        Ok(())
+    }
+
+    /// Turns a marble at once. Does nothing in a model without rotation.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`]; [`Error::NotUnit`] if the length of the quaternion is
+    /// more than 1e-3 from one.
+    pub fn set_rotation(&mut self, id: MarbleId, rotation: Quat<S>) -> Result<(), Error> {
+        let (row, rotation) = (self.row(id)?, checked_rotation(rotation)?);
+        if let Some(slot) = self.rotation.get_mut(row) {
+            *slot = rotation;
+        }
+        Ok(())
+    }
+
+    /// Gives a marble a new spin, in rad/s as an axial vector in world space. Does
+    /// nothing in a model without rotation.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`], [`Error::NotFinite`].
+    pub fn set_spin(&mut self, id: MarbleId, spin: Vec3<S>) -> Result<(), Error> {
+        let (row, spin) = (self.row(id)?, finite_vector(SPIN, spin)?);
+        if let Some(slot) = self.spin.get_mut(row) {
+            *slot = spin;
+        }
+        Ok(())
+    }
+
+    /// Gives a marble a new mass.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`], [`Error::NotPositive`].
+    pub fn set_mass(&mut self, id: MarbleId, mass: Mass<S>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let mass = but(mass.checked()?, Mass::default());
+        self.mass.set(row, mass, self.handles.len());
+        Ok(())
+    }
+
+    /// Sets how many times the world's gravity a marble feels.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`], [`Error::NotFinite`].
+    pub fn set_gravity_scale(&mut self, id: MarbleId, scale: S) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let scale = but(finite("gravity_scale", scale)?, S::one());
+        self.gravity_scale.set(row, scale, self.handles.len());
+        Ok(())
+    }
+
+    /// Changes a marble's velocity at once, as a hit does: by `impulse` (in N s) over
+    /// its mass.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] if the impulse or the velocity
+    /// after it is not finite.
+    pub fn apply_impulse(&mut self, id: MarbleId, impulse: Vec3<S>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        finite_vector(["impulse.x", "impulse.y", "impulse.z"], impulse)?;
+        let velocity = self.velocity[row] + impulse / self.mass(row);
+        self.velocity[row] = finite_vector(VELOCITY, velocity)?;
         Ok(())
     }
 
@@ -219,6 +372,18 @@ impl<S: Scalar> Marbles<S> {
         &self.velocity
     }
 
+    /// How each marble is turned, by row; empty in a model without rotation.
+    #[must_use]
+    pub fn rotation(&self) -> &[Quat<S>] {
+        &self.rotation
+    }
+
+    /// The spins, by row, in rad/s; empty in a model without rotation.
+    #[must_use]
+    pub fn spin(&self) -> &[Vec3<S>] {
+        &self.spin
+    }
+
     /// The row of a marble, until the next removal.
     ///
     /// # Errors
@@ -250,9 +415,41 @@ impl<S: Scalar> Marbles<S> {
         Sphere { center: self.position[row], radius: self.radius[row] }
     }
 
+    /// Adds or drops the columns for rotation. New ones begin unturned and at rest.
+    pub(super) fn set_turn(&mut self, turn: bool) {
+        if turn != self.turn {
+            self.turn = turn;
+            let rows = if turn { self.position.len() } else { 0 };
+            self.rotation = vec![Quat::one(); rows];
+            self.spin = vec![Vec3::zero(); rows];
+        }
+    }
+
+    /// Turns every row on by its spin for `dt` seconds.
+    pub(super) fn turn(&mut self, dt: S) {
+        for (rotation, spin) in self.rotation.iter_mut().zip(&self.spin) {
+            *rotation = turned(*rotation, *spin, dt);
+        }
+    }
+
+    /// Makes a row spin as if it rolled over a surface at rest with this normal.
+    pub(super) fn roll(&mut self, row: usize, normal: Vec3<S>) {
+        let spin = normal.cross(self.velocity[row]) / self.radius[row];
+        if let Some(slot) = self.spin.get_mut(row)
+            && is_finite(spin)
+        {
+            *slot = spin;
+        }
+    }
+
     /// What a response works on: positions, velocities, radii.
     pub(super) fn columns(&mut self) -> (&mut [Point3<S>], &mut [Vec3<S>], &[S]) {
         (&mut self.position, &mut self.velocity, &self.radius)
+    }
+
+    /// In kilograms; infinite for what nothing accelerates.
+    fn mass(&self, row: usize) -> S {
+        self.mass.get(row).unwrap_or_default().of(self.radius[row])
     }
 
     /// Moves every row on by `dt`. A row that would become infinite or NaN keeps
@@ -260,63 +457,97 @@ impl<S: Scalar> Marbles<S> {
     pub(super) fn integrate(
         &mut self,
         integrator: Integrator,
-        acceleration: Vec3<S>,
+        gravity: Vec3<S>,
+        forces: &[Force<S>],
         dt: S,
         stopped: &mut Vec<u32>,
     ) {
-        // The kernel is chosen once for all rows, unless rows have their own.
-        if !self.integrator.is_empty() {
-            for row in 0..self.position.len() {
-                match self.integrator.get(row).unwrap_or(integrator) {
-                    Integrator::ExplicitEuler => {
-                        self.integrate_rows(
-                            row..row + 1,
-                            explicit_euler,
-                            acceleration,
-                            dt,
-                            stopped,
-                        );
-                    }
-                    Integrator::SemiImplicitEuler => self.integrate_rows(
-                        row..row + 1,
-                        semi_implicit_euler,
-                        acceleration,
-                        dt,
-                        stopped,
-                    ),
+        // The columns leave while they are written, so that the rest can be read.
+        let mut position = std::mem::take(&mut self.position);
+        let mut velocity = std::mem::take(&mut self.velocity);
+        let mut rows = Rows { position: &mut position, velocity: &mut velocity, stopped };
+        let only_gravity =
+            forces.is_empty() && self.gravity_scale.is_empty() && self.mass.is_empty();
+        if only_gravity && self.integrator.is_empty() {
+            rows.integrate(integrator, dt, |_, _| gravity);
+        } else {
+            let all = |row: usize, motion: Motion<S>| {
+                let mass = self.mass(row);
+                if mass.is_infinite() {
+                    return Vec3::zero();
                 }
+                let scale = self.gravity_scale.get(row).unwrap_or(S::one());
+                forces
+                    .iter()
+                    .fold(gravity * scale, |sum, force| sum + force.acceleration(motion, mass))
+            };
+            if self.integrator.is_empty() {
+                rows.integrate(integrator, dt, all);
+            } else {
+                rows.each(|row, motion| {
+                    let integrator = self.integrator.get(row).unwrap_or(integrator);
+                    motion.after(integrator, dt, |motion| all(row, motion))
+                });
             }
-            return;
         }
-        let all = 0..self.position.len();
+        (self.position, self.velocity) = (position, velocity);
+    }
+}
+
+/// The quaternion as a rotation, if its length is about one.
+fn checked_rotation<S: Scalar>(rotation: Quat<S>) -> Result<Quat<S>, Error> {
+    // What a few thousand products in f32 let it drift, and no more.
+    let length = rotation.magnitude();
+    if (length.as_f64() - 1.0).abs() <= 1e-3 {
+        Ok(rotation.normalize())
+    } else {
+        Err(Error::NotUnit { field: "rotation", value: length.as_f64() })
+    }
+}
+
+/// A value, but `None` for the one that goes without saying.
+fn but<T: PartialEq>(value: T, usual: T) -> Option<T> {
+    (value != usual).then_some(value)
+}
+
+/// The columns that an integrator writes.
+struct Rows<'a, S> {
+    position: &'a mut [Point3<S>],
+    velocity: &'a mut [Vec3<S>],
+    stopped: &'a mut Vec<u32>,
+}
+
+impl<S: Scalar> Rows<'_, S> {
+    /// Moves every row on, by a kernel that is chosen once for all of them.
+    fn integrate(
+        &mut self,
+        integrator: Integrator,
+        dt: S,
+        acceleration: impl Fn(usize, Motion<S>) -> Vec3<S>,
+    ) {
+        let at = |row: usize| {
+            let acceleration = &acceleration;
+            move |motion| acceleration(row, motion)
+        };
         match integrator {
-            Integrator::ExplicitEuler => {
-                self.integrate_rows(all, explicit_euler, acceleration, dt, stopped);
-            }
-            Integrator::SemiImplicitEuler => {
-                self.integrate_rows(all, semi_implicit_euler, acceleration, dt, stopped);
-            }
+            Integrator::ExplicitEuler => self.each(|row, m| m.explicit_euler(dt, at(row))),
+            Integrator::SemiImplicitEuler => self.each(|row, m| m.semi_implicit_euler(dt, at(row))),
+            Integrator::VelocityVerlet => self.each(|row, m| m.velocity_verlet(dt, at(row))),
+            Integrator::Leapfrog => self.each(|row, m| m.leapfrog(dt, at(row))),
+            Integrator::Rk4 => self.each(|row, m| m.rk4(dt, at(row))),
         }
     }
 
     #[inline]
-    fn integrate_rows(
-        &mut self,
-        rows: std::ops::Range<usize>,
-        kernel: impl Fn(Point3<S>, Vec3<S>, Vec3<S>, S) -> (Point3<S>, Vec3<S>),
-        acceleration: Vec3<S>,
-        dt: S,
-        stopped: &mut Vec<u32>,
-    ) {
-        let positions = self.position[rows.clone()].iter_mut();
-        let velocities = self.velocity[rows.clone()].iter_mut();
-        for ((row, position), velocity) in rows.zip(positions).zip(velocities) {
-            let next = kernel(*position, *velocity, acceleration, dt);
-            if is_finite_point(next.0) && is_finite(next.1) {
-                (*position, *velocity) = next;
+    fn each(&mut self, kernel: impl Fn(usize, Motion<S>) -> Motion<S>) {
+        let columns = self.position.iter_mut().zip(self.velocity.iter_mut());
+        for (row, (position, velocity)) in columns.enumerate() {
+            let next = kernel(row, Motion { position: *position, velocity: *velocity });
+            if is_finite_point(next.position) && is_finite(next.velocity) {
+                (*position, *velocity) = (next.position, next.velocity);
             } else {
-                *velocity = Vec3::new(S::zero(), S::zero(), S::zero());
-                stopped.push(row as u32);
+                *velocity = Vec3::zero();
+                self.stopped.push(row as u32);
             }
         }
     }

@@ -6,7 +6,7 @@ mod model;
 mod optional;
 mod walls;
 
-pub use marbles::{Marble, MarbleId, Marbles, Material};
+pub use marbles::{Marble, MarbleId, Marbles, Mass, Material};
 pub use model::Model;
 pub use walls::{WallId, Walls};
 
@@ -15,6 +15,7 @@ use crate::broad::Grid;
 use crate::contact::{Contact, Contacts, mtv_sphere_plane, mtv_sphere_sphere};
 use crate::error::{finite_vector, positive};
 use crate::math::{Scalar, Vec3};
+use crate::motion::{Force, Rotation};
 use crate::response::{Columns, Response, displacement};
 
 /// Everything that moves and everything that it can touch.
@@ -26,6 +27,7 @@ use crate::response::{Columns, Response, displacement};
 pub struct World<S> {
     model: Model,
     gravity: Vec3<S>,
+    forces: Vec<Force<S>>,
     /// What moves.
     pub marbles: Marbles<S>,
     /// What nothing can move.
@@ -44,6 +46,7 @@ impl<S: Scalar> Default for World<S> {
         Self {
             model: Model::default(),
             gravity: Vec3::unit_y() * S::constant(-9.81),
+            forces: Vec::new(),
             marbles: Marbles::default(),
             walls: Walls::default(),
             contacts: Contacts::default(),
@@ -55,9 +58,10 @@ impl<S: Scalar> Default for World<S> {
 
 impl<S: Scalar> PartialEq for World<S> {
     fn eq(&self, other: &Self) -> bool {
-        let Self { model, gravity, marbles, walls, contacts, grid: _, stopped } = self;
+        let Self { model, gravity, forces, marbles, walls, contacts, grid: _, stopped } = self;
         *model == other.model
             && *gravity == other.gravity
+            && *forces == other.forces
             && *marbles == other.marbles
             && *walls == other.walls
             && *contacts == other.contacts
@@ -78,6 +82,7 @@ impl<S: Scalar> World<S> {
     /// [`Error::OutOfRange`] for the substeps.
     pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
         self.model = model.checked()?;
+        self.marbles.set_turn(model.rotation != Rotation::None);
         Ok(())
     }
 
@@ -93,6 +98,21 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotFinite`].
     pub fn set_gravity(&mut self, gravity: Vec3<S>) -> Result<(), Error> {
         self.gravity = finite_vector(["gravity.x", "gravity.y", "gravity.z"], gravity)?;
+        Ok(())
+    }
+
+    /// The force fields that act on every marble besides gravity.
+    #[must_use]
+    pub fn forces(&self) -> &[Force<S>] {
+        &self.forces
+    }
+
+    /// Changes the force fields.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a number of one of them.
+    pub fn set_forces(&mut self, forces: Vec<Force<S>>) -> Result<(), Error> {
+        self.forces = forces.into_iter().map(Force::checked).collect::<Result<_, _>>()?;
         Ok(())
     }
 
@@ -121,7 +141,14 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`.
     pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
         let dt = positive("dt", dt)?;
-        self.marbles.integrate(self.model.integrator, self.gravity, dt, &mut self.stopped);
+        self.marbles.integrate(
+            self.model.integrator,
+            self.gravity,
+            &self.forces,
+            dt,
+            &mut self.stopped,
+        );
+        self.marbles.turn(dt);
         Ok(())
     }
 
@@ -168,6 +195,13 @@ impl<S: Scalar> World<S> {
                 &mut self.stopped,
             ),
         }
+        if self.model.rotation == Rotation::Rolling {
+            // The deepest contact comes first in the list, so it has the last word.
+            for contact in self.contacts.wm.iter().rev() {
+                let normal = self.walls.planes()[contact.a as usize].normal();
+                self.marbles.roll(contact.b as usize, normal);
+            }
+        }
         Ok(())
     }
 
@@ -192,9 +226,10 @@ impl<S: Scalar> World<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::Point3;
+    use crate::math::{Point3, Quat};
     use crate::motion::Integrator;
     use crate::shape::Plane;
+    use cgmath::InnerSpace;
 
     const DT: f32 = 1.0 / 60.0;
 
@@ -279,6 +314,78 @@ mod tests {
         }
         assert!(world.integrate(0.0).is_err() && world.restitute(-1.0).is_err());
         assert_eq!(world, before);
+    }
+
+    #[test]
+    fn a_bad_force_is_refused_and_changes_nothing() {
+        let mut world = floor::<f32>();
+        let anchor = Point3::new(0.0, 0.0, 0.0);
+        let spring = |stiffness| Force::Spring { anchor, rest_length: 0.0, stiffness };
+        world.set_forces(vec![spring(1.0)]).unwrap();
+        let error = world.set_forces(vec![spring(2.0), spring(-1.0)]).unwrap_err();
+        assert!(error.to_string().starts_with("stiffness"), "{error}");
+        assert_eq!(world.forces(), [spring(1.0)]);
+    }
+
+    #[test]
+    fn mass_and_gravity_scale_say_what_forces_do() {
+        let mut world = World::<f64>::default();
+        world.set_gravity(Vec3::new(0.0, -8.0, 0.0)).unwrap();
+        world.set_forces(vec![Force::Custom(|_, _| Vec3::new(12.0, 0.0, 0.0))]).unwrap();
+        let fallen = |marble: Marble<f64>| {
+            let mut world = world.clone();
+            let id = world.marbles.insert(marble).unwrap();
+            world.marbles.apply_impulse(id, Vec3::new(0.0, 0.0, 6.0)).unwrap();
+            (0..64).for_each(|_| world.step(1.0 / 64.0).unwrap());
+            world.marbles.get(id).unwrap().velocity
+        };
+        let marble = Marble::new(Point3::new(0.0, 0.0, 0.0), 0.5);
+        let heavy = Marble { mass: Mass::Kilograms(3.0), ..marble };
+        assert_eq!(fallen(heavy), Vec3::new(4.0, -8.0, 2.0));
+        assert_eq!(fallen(Marble { gravity_scale: -0.5, ..heavy }), Vec3::new(4.0, 4.0, 2.0));
+        assert_eq!(fallen(Marble { mass: Mass::Infinite, ..marble }), Vec3::new(0.0, 0.0, 0.0));
+        let glass = fallen(marble);
+        let mass = 2500.0 * std::f64::consts::PI / 6.0;
+        assert!((glass.x - 12.0 / mass).abs() < 1e-15 && (glass.z - 6.0 / mass).abs() < 1e-15);
+    }
+
+    #[test]
+    fn a_rolling_marble_turns_by_its_way_over_its_radius() {
+        let mut world = floor::<f64>();
+        world.set_model(Model { rotation: Rotation::Rolling, ..Model::default() }).unwrap();
+        let velocity = Vec3::new(2.0, 0.0, 0.0);
+        let marble = Marble { velocity, ..Marble::new(Point3::new(0.0, 0.25, 0.0), 0.25) };
+        let id = world.marbles.insert(marble).unwrap();
+        world.step(1.0 / 64.0).unwrap(); // from here on it spins
+        let start = world.marbles.get(id).unwrap();
+        (0..16).for_each(|_| world.step(1.0 / 64.0).unwrap());
+        let end = world.marbles.get(id).unwrap();
+        // Toward +x over a floor is clockwise about z.
+        let angle = -(end.position.x - start.position.x) / 0.25;
+        let turned = start.rotation.conjugate() * end.rotation;
+        let exact = Quat::new((angle / 2.0).cos(), 0.0, 0.0, (angle / 2.0).sin());
+        assert!((turned - exact).magnitude() < 1e-12, "{turned:?}, not {exact:?}");
+        assert_eq!(end.spin, Vec3::new(0.0, 0.0, -8.0));
+    }
+
+    #[test]
+    fn rotation_takes_columns_only_while_it_is_modelled() {
+        let mut world = heap();
+        world.step(DT).unwrap();
+        assert!(world.marbles.rotation().is_empty() && world.marbles.spin().is_empty());
+        let without = world.clone();
+        world.set_model(Model { rotation: Rotation::Rolling, ..Model::default() }).unwrap();
+        assert_eq!(world.marbles.rotation().len(), 200);
+        let id = world.marbles.id(7).unwrap();
+        world.marbles.set_spin(id, Vec3::new(1.0, 0.0, 0.0)).unwrap();
+        world.marbles.remove(world.marbles.id(0).unwrap()).unwrap();
+        assert_eq!(world.marbles.get(id).unwrap().spin.x, 1.0);
+        assert!(world.marbles.set_rotation(id, Quat::new(0.0, 0.0, 0.0, 0.0)).is_err());
+        world.marbles.insert(Marble::new(Point3::new(0.0, 9.0, 0.0), 0.1)).unwrap();
+        (0..60).for_each(|_| world.step(DT).unwrap());
+        world.set_model(Model::default()).unwrap();
+        assert!(world.marbles.rotation().is_empty() && world.marbles.spin().is_empty());
+        assert_eq!(without.marbles.len(), world.marbles.len());
     }
 
     #[test]

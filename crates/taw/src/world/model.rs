@@ -1,6 +1,6 @@
 use crate::Error;
 use crate::error::within;
-use crate::motion::Integrator;
+use crate::motion::{Integrator, Rotation};
 use crate::response::Response;
 
 /// The choice that the user makes: what to model, and how finely. A plain value,
@@ -18,6 +18,8 @@ pub struct Model {
     pub integrator: Integrator,
     /// What touches do.
     pub response: Response,
+    /// Whether marbles turn.
+    pub rotation: Rotation,
     /// Into how many equal parts each step is cut, from 1 to 1,000. Costs as many
     /// times as much.
     pub substeps: u32,
@@ -28,6 +30,7 @@ impl Default for Model {
         Self {
             integrator: Integrator::SemiImplicitEuler,
             response: Response::Displacement,
+            rotation: Rotation::None,
             substeps: 1,
         }
     }

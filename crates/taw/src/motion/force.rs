@@ -1,0 +1,181 @@
+use cgmath::{InnerSpace, Zero};
+
+use crate::Error;
+use crate::error::{finite_point, finite_vector, within};
+use crate::math::{Point3, Scalar, Vec3, direction_and_length};
+use crate::motion::Motion;
+
+/// A force field: what pulls and pushes every marble, wherever it is, besides
+/// gravity.
+#[derive(Clone, Copy, Debug)]
+pub enum Force<S> {
+    /// The resistance of a medium that moves (a wind) or not.
+    Drag(Medium<S>),
+    /// A spring from each marble to one point.
+    Spring {
+        /// Where it is fastened.
+        anchor: Point3<S>,
+        /// Its length without load, in metres, at least zero.
+        rest_length: S,
+        /// In N/m, at least zero.
+        stiffness: S,
+    },
+    /// A point that attracts with the inverse square of the distance, as a planet
+    /// does: the same acceleration for all masses.
+    Attraction {
+        /// Where it is.
+        center: Point3<S>,
+        /// Gravitational constant times mass, in m³/s². Negative repels.
+        strength: S,
+    },
+    /// The user's own: newtons, from a marble's motion and its mass in kg.
+    ///
+    /// A plain function, so that a world stays a plain value; it must depend on
+    /// nothing but its arguments.
+    Custom(fn(Motion<S>, S) -> Vec3<S>),
+}
+
+/// What marbles move through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Medium<S> {
+    /// How the medium itself moves, in m/s.
+    pub velocity: Vec3<S>,
+    /// Force per relative speed, in N s/m, at least zero (Stokes).
+    pub linear: S,
+    /// Force per square of relative speed, in N s²/m², at least zero (Newton).
+    pub quadratic: S,
+}
+
+impl<S: Scalar> PartialEq for Force<S> {
+    /// Two custom forces are equal if they are the same function.
+    fn eq(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Drag(a), Self::Drag(b)) => a == b,
+            (
+                Self::Spring { anchor: a, rest_length: l, stiffness: k },
+                Self::Spring { anchor: b, rest_length: m, stiffness: n },
+            ) => a == b && l == m && k == n,
+            (
+                Self::Attraction { center: a, strength: s },
+                Self::Attraction { center: b, strength: t },
+            ) => a == b && s == t,
+            (Self::Custom(f), Self::Custom(g)) => std::ptr::fn_addr_eq(*f, *g),
+            _ => false,
+        }
+    }
+}
+
+impl<S: Scalar> Force<S> {
+    /// This force, if its numbers can be right.
+    pub(crate) fn checked(self) -> Result<Self, Error> {
+        let not_negative = |field, value| within(field, value, S::zero(), S::max_value());
+        match self {
+            Self::Drag(medium) => {
+                let fields = ["medium.velocity.x", "medium.velocity.y", "medium.velocity.z"];
+                finite_vector(fields, medium.velocity)?;
+                not_negative("medium.linear", medium.linear)?;
+                not_negative("medium.quadratic", medium.quadratic)?;
+            }
+            Self::Spring { anchor, rest_length, stiffness } => {
+                finite_point(["anchor.x", "anchor.y", "anchor.z"], anchor)?;
+                not_negative("rest_length", rest_length)?;
+                not_negative("stiffness", stiffness)?;
+            }
+            Self::Attraction { center, strength } => {
+                finite_point(["center.x", "center.y", "center.z"], center)?;
+                within("strength", strength, S::min_value(), S::max_value())?;
+            }
+            Self::Custom(_) => {}
+        }
+        Ok(self)
+    }
+
+    /// The acceleration of something of this mass (kg), in m/s².
+    #[must_use]
+    pub fn acceleration(&self, motion: Motion<S>, mass: S) -> Vec3<S> {
+        match *self {
+            Self::Drag(Medium { velocity, linear, quadratic }) => {
+                let relative = velocity - motion.velocity;
+                relative * ((linear + quadratic * relative.magnitude()) / mass)
+            }
+            Self::Spring { anchor, rest_length, stiffness } => {
+                direction_and_length(anchor - motion.position)
+                    .map_or_else(Vec3::zero, |(toward, length)| {
+                        toward * (stiffness * (length - rest_length) / mass)
+                    })
+            }
+            Self::Attraction { center, strength } => direction_and_length(center - motion.position)
+                .map_or_else(Vec3::zero, |(toward, length)| {
+                    toward * (strength / (length * length))
+                }),
+            Self::Custom(force) => force(motion, mass) / mass,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    /// Something of 2 kg under `forces` alone, after `seconds` in steps of about a
+    /// millisecond by RK4.
+    fn moved(
+        forces: &[Force<f64>],
+        position: Point3<f64>,
+        velocity: Vec3<f64>,
+        seconds: f64,
+    ) -> Motion<f64> {
+        let steps = (seconds * 1000.0).ceil();
+        let acceleration =
+            |motion| forces.iter().map(|force| force.acceleration(motion, 2.0)).sum::<Vec3<f64>>();
+        (0..steps as u32).fold(Motion { position, velocity }, |motion, _| {
+            motion.rk4(seconds / steps, acceleration)
+        })
+    }
+
+    const ORIGIN: Point3<f64> = Point3::new(0.0, 0.0, 0.0);
+
+    #[test]
+    fn linear_drag_decays_exponentially_toward_the_wind() {
+        let wind = Vec3::new(3.0, 0.0, 0.0);
+        let medium = Medium { velocity: wind, linear: 0.5, quadratic: 0.0 };
+        let end = moved(&[Force::Drag(medium)], ORIGIN, Vec3::new(0.0, 4.0, 0.0), 2.0);
+        let left = (-0.5_f64 / 2.0 * 2.0).exp();
+        let exact = Vec3::new(3.0 * (1.0 - left), 4.0 * left, 0.0);
+        assert!((end.velocity - exact).magnitude() < 1e-12, "{:?}", end.velocity);
+    }
+
+    #[test]
+    fn quadratic_drag_decays_as_one_over_time() {
+        let medium = Medium { velocity: Vec3::zero(), linear: 0.0, quadratic: 0.5 };
+        let end = moved(&[Force::Drag(medium)], ORIGIN, Vec3::new(0.0, 4.0, 0.0), 2.0);
+        let exact = 4.0 / (1.0 + 0.5 / 2.0 * 4.0 * 2.0);
+        assert!((end.velocity.y - exact).abs() < 1e-11, "{:?}", end.velocity);
+    }
+
+    #[test]
+    fn a_spring_swings_with_its_period() {
+        let spring = Force::Spring { anchor: ORIGIN, rest_length: 1.0, stiffness: 8.0 };
+        let start = Point3::new(1.5, 0.0, 0.0);
+        let end = moved(&[spring], start, Vec3::zero(), 1.0);
+        assert!((end.position.x - (1.0 + 0.5 * 2.0_f64.cos())).abs() < 1e-12, "{:?}", end.position);
+        assert_eq!(moved(&[spring], ORIGIN, Vec3::zero(), 0.1).position, ORIGIN);
+    }
+
+    #[test]
+    fn a_planet_comes_round_again() {
+        let sun = Force::Attraction { center: ORIGIN, strength: 4.0 };
+        let period = std::f64::consts::TAU * (8.0_f64 / 4.0).sqrt(); // sqrt(r³ / strength)
+        let start = Point3::new(2.0, 0.0, 0.0);
+        let end = moved(&[sun], start, Vec3::new(0.0, 0.0, 2.0_f64.sqrt()), period);
+        assert!((end.position - start).magnitude() < 1e-10, "{:?}", end.position);
+    }
+
+    #[test]
+    fn forces_add_up_and_a_custom_one_is_a_function() {
+        let push = Force::Custom(|_, mass| Vec3::new(0.0, mass * 3.0, 0.0));
+        let end = moved(&[push, push], ORIGIN, Vec3::zero(), 1.0);
+        assert!((end.position.y - 3.0).abs() < 1e-12, "{:?}", end.position);
+        assert_eq!(push, push);
+        assert_ne!(push, Force::Custom(|_, mass| Vec3::new(mass, 0.0, 0.0)));
+    }
+}
