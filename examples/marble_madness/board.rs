@@ -78,8 +78,9 @@ impl Tilt {
 pub fn plugin(app: &mut App) {
     let options = app.world().resource::<Options>();
     let (half_width, sway) = (HalfWidth::for_marbles(options.marbles), options.sway.then_some(0.0));
-    app.world_mut().resource_mut::<TawModel>().rotation = Rotation::Rolling;
-    app.insert_resource(half_width)
+    let model = model_for(options.marbles);
+    app.insert_resource(TawModel(model))
+        .insert_resource(half_width)
         .insert_resource(Tilt {
             now: Vec2::ZERO,
             speed: Vec2::ZERO,
@@ -94,6 +95,17 @@ pub fn plugin(app: &mut App) {
         })
         .add_systems(Startup, (spawn_board, spawn_surroundings))
         .add_systems(FixedUpdate, tilt.before(TawSystems::Gather));
+}
+
+/// All that there is for a handful of marbles; for a crowd, what keeps up with it.
+fn model_for(marbles: u32) -> Model {
+    let integrator = Integrator::VelocityVerlet;
+    if marbles <= 1500 {
+        let (response, rotation) = (Response::Impulse, Rotation::Dynamic);
+        Model { integrator, response, rotation, substeps: 2, ..default() }
+    } else {
+        Model { integrator, rotation: Rotation::Rolling, ..default() }
+    }
 }
 
 fn tilt(

@@ -87,3 +87,70 @@ fn a_marble_rolls_as_far_as_it_turns() {
     let turned = app.world().get::<Transform>(marble).unwrap().rotation;
     assert!(turned.angle_between(Quat::from_rotation_z(-8.0 * STEP)) < 1e-3, "{turned}");
 }
+
+/// Switches to impulses and spin.
+fn dynamic(app: &mut App) {
+    let mut model = app.world_mut().resource_mut::<TawModel>();
+    (model.response, model.rotation) = (Response::Impulse, Rotation::Dynamic);
+}
+
+#[test]
+fn a_sliding_marble_comes_to_roll() {
+    let mut app = scene::app();
+    dynamic(&mut app);
+    scene::floor(&mut app);
+    let start = Transform::from_xyz(0.0, 0.5, 0.0);
+    let sliding = (Marble::new(0.5), start, Velocity(Vec3::X * 5.0), Spin::default());
+    let marble = app.world_mut().spawn(sliding).id();
+    scene::frames(&mut app, 128);
+    let speed = app.world().get::<Velocity>(marble).unwrap().x;
+    assert!((speed - 25.0 / 7.0).abs() < 1e-4, "{speed} m/s");
+    assert!((app.world().get::<Spin>(marble).unwrap().z * 0.5 + speed).abs() < 1e-4);
+}
+
+#[test]
+fn a_material_says_how_high_a_marble_bounces() {
+    for restitution in [0.0, 0.9] {
+        let mut app = scene::app();
+        dynamic(&mut app);
+        app.world_mut().resource_mut::<TawModel>().substeps = 16;
+        scene::floor(&mut app);
+        let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 1.5);
+        let material = MarbleMaterial { restitution, ..default() };
+        app.world_mut().entity_mut(marble).insert(material);
+        scene::frames(&mut app, 32);
+        let mut highest = 0.5_f32;
+        for _ in 0..32 {
+            app.update();
+            highest = highest.max(scene::position(&app, marble).y);
+        }
+        let exact = 0.5 + restitution * restitution;
+        assert!((highest - exact).abs() < 0.02, "{restitution}: up to {highest}, not {exact}");
+    }
+}
+
+#[test]
+fn a_moving_wall_carries_what_lies_on_it_and_a_moving_parent_does_too() {
+    for parent in [false, true] {
+        let mut app = scene::app();
+        dynamic(&mut app);
+        let floor = scene::floor(&mut app);
+        let mover = if parent { app.world_mut().spawn(Transform::default()).id() } else { floor };
+        if parent {
+            app.world_mut().entity_mut(floor).insert(ChildOf(mover));
+        }
+        let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
+        app.world_mut().entity_mut(marble).insert(Velocity::default());
+        app.update();
+        for _ in 0..64 {
+            app.world_mut().get_mut::<Transform>(mover).unwrap().translation.y += STEP;
+            app.update();
+        }
+        let speed = app.world().get::<Velocity>(marble).unwrap().y;
+        assert!((speed - 1.0).abs() < 1e-3, "it rises at {speed} m/s");
+        assert!((scene::position(&app, marble).y - 1.5).abs() < 3e-3);
+        scene::frames(&mut app, 64);
+        // The floor stopped; the marble flew on for a bit, and lies on it again.
+        assert!((scene::position(&app, marble).y - 1.5).abs() < 3e-3);
+    }
+}

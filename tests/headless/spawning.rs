@@ -94,7 +94,7 @@ fn optional_components_are_taken_over_and_taken_back() {
     };
     app.world_mut().entity_mut(marble).insert((
         Velocity(Vec3::X * 3.0),
-        MarbleMaterial { restitution: 0.5, friction: 0.25 },
+        MarbleMaterial { friction: 0.25, ..default() },
         MarbleIntegrator(Integrator::ExplicitEuler),
     ));
     app.update();

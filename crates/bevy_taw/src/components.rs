@@ -1,8 +1,10 @@
 //! What an entity may be to the physics. Marbles and walls need nothing but their
 //! own component; the rest is optional.
 
+use bevy::math::Isometry3d;
 use bevy::prelude::*;
 use taw::motion::Integrator;
+use taw::response::Material;
 use taw::world::{MarbleId, Mass, WallId};
 
 use crate::reflect::IntegratorReflect;
@@ -76,15 +78,35 @@ impl Default for GravityScale {
     }
 }
 
-/// What a marble is made of, as far as its contacts can tell. The response
-/// [`Displacement`](taw::response::Response::Displacement) does not read it.
-#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+/// What a marble is made of, as far as its contacts can tell; between two marbles the
+/// mean counts. The response [`Displacement`](taw::response::Response::Displacement) does
+/// not read it.
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct MarbleMaterial {
     /// The part of the approach speed that a bounce gives back, in `[0, 1]`.
     pub restitution: f32,
     /// The largest friction force over the normal force (Coulomb), at least zero.
     pub friction: f32,
+    /// The part of the sliding speed of the touching points that a bounce turns round,
+    /// in `[-1, 1]`, as far as friction can: 0 stops them, 1 is a superball, −1 slides
+    /// freely.
+    pub tangential_restitution: f32,
+}
+
+impl Default for MarbleMaterial {
+    /// Somewhat bouncy, somewhat rough: 0.5 and 0.3.
+    fn default() -> Self {
+        let Material { restitution, friction, tangential_restitution } = Material::default();
+        Self { restitution, friction, tangential_restitution }
+    }
+}
+
+impl From<MarbleMaterial> for Material<f32> {
+    fn from(material: MarbleMaterial) -> Self {
+        let MarbleMaterial { restitution, friction, tangential_restitution } = material;
+        Self { restitution, friction, tangential_restitution }
+    }
 }
 
 /// Integrates this marble in its own way instead of the model's.
@@ -96,7 +118,8 @@ pub struct MarbleIntegrator(#[reflect(remote = IntegratorReflect)] pub Integrato
 /// solid.
 ///
 /// The surface goes through the entity's [`Transform`]. Move or turn that (or a
-/// parent's) and the wall follows, pushing marbles before it.
+/// parent's) and the wall follows, pushing marbles before it; how far it came since
+/// the last step is how fast it is.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 #[require(Transform, WallState)]
@@ -133,13 +156,15 @@ pub(crate) struct SeenMarble {
     /// Which kind of mass, and its number.
     pub mass: Option<(u8, u32)>,
     pub gravity_scale: Option<u32>,
-    pub material: Option<[u32; 2]>,
+    pub material: Option<[u32; 3]>,
     pub integrator: Option<Integrator>,
 }
 
 /// What the physics knows of a wall entity.
 #[derive(Component, Clone, Copy, Debug, Default)]
 pub(crate) struct WallState {
+    /// Where it was at the last gather, for how fast it moves.
+    pub last: Option<Isometry3d>,
     /// `None` before the first gather, and when the input was refused.
     pub id: Option<WallId>,
     /// Point and direction in world space as last gathered, to the bit.

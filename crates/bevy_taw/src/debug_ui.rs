@@ -22,7 +22,6 @@ use bevy_egui::egui::{self, Ui};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 use taw::motion::{Integrator, Rotation};
 use taw::response::Response;
-use taw::world::Model;
 
 use crate::diagnostics as paths;
 use crate::resources::{Gravity, TawModel};
@@ -33,11 +32,16 @@ pub fn model(ui: &mut Ui, model: &mut ResMut<TawModel>) {
     let mut chosen = ***model;
     egui::Grid::new("taw model").num_columns(2).show(ui, |ui| {
         choice(ui, "Integrator", &mut chosen.integrator, &Integrator::ALL, integrator_name);
-        choice(ui, "Response", &mut chosen.response, &[Response::Displacement], response_name);
-        let rotations = [Rotation::None, Rotation::Rolling];
+        let responses = [Response::Displacement, Response::Impulse];
+        choice(ui, "Response", &mut chosen.response, &responses, response_name);
+        let rotations = [Rotation::None, Rotation::Rolling, Rotation::Dynamic];
         choice(ui, "Rotation", &mut chosen.rotation, &rotations, rotation_name);
         ui.label("Substeps");
-        ui.add(egui::Slider::new(&mut chosen.substeps, 1..=Model::MAX_SUBSTEPS.min(16)));
+        ui.add(egui::Slider::new(&mut chosen.substeps, 1..=16));
+        ui.end_row();
+        ui.label("Iterations");
+        let used = chosen.response == Response::Impulse;
+        ui.add_enabled(used, egui::Slider::new(&mut chosen.iterations, 1..=64));
         ui.end_row();
     });
     model.set_if_neq(TawModel(chosen));
@@ -153,11 +157,13 @@ fn rotation_name(rotation: Rotation) -> &'static str {
     match rotation {
         Rotation::None => "None",
         Rotation::Rolling => "Rolling",
+        Rotation::Dynamic => "Dynamic",
     }
 }
 
 fn response_name(response: Response) -> &'static str {
     match response {
         Response::Displacement => "Displacement",
+        Response::Impulse => "Impulse",
     }
 }

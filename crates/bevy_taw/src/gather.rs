@@ -1,8 +1,9 @@
 //! From components and resources into the world, where they changed.
 
+use bevy::math::Isometry3d;
 use bevy::prelude::*;
 use taw::shape::Plane;
-use taw::world as core;
+use taw::world::{self as core, WallMotion};
 
 use crate::components::{
     GravityScale, Marble, MarbleIntegrator, MarbleMass, MarbleMaterial, MarbleState, SeenMarble,
@@ -45,6 +46,7 @@ pub fn walls(
     mut world: ResMut<TawWorld>,
     mut walls: Query<(Entity, &Wall, &mut WallState)>,
     transforms: TransformHelper,
+    time: Res<Time>,
     mut refused: MessageWriter<InputRefused>,
 ) {
     for (entity, wall, mut state) in &mut walls {
@@ -54,6 +56,13 @@ pub fn walls(
         // A normal is perpendicular to its surface also where the scale is uneven.
         let to_world = transform.affine().matrix3.inverse().transpose();
         let normal = Vec3::from(to_world * bevy::math::Vec3A::from(*wall.normal));
+        let now = transform.to_isometry();
+        if let Some(id) = state.id {
+            let motion = motion_between(state.last.unwrap_or(now), now, time.delta_secs());
+            // What cannot be right is refused below, with the place that it led to.
+            let _ = world.walls.set_motion(id, motion);
+        }
+        state.last = Some(now);
         let seen = Some([bits(transform.translation()), bits(normal)]);
         if state.seen == seen {
             continue;
@@ -72,6 +81,16 @@ pub fn walls(
             InputRefused::write(&mut refused, Some(entity), error);
         }
     }
+}
+
+/// How something moved that was `last` one step of `dt` seconds ago, or `None` if it
+/// did not.
+fn motion_between(last: Isometry3d, now: Isometry3d, dt: f32) -> Option<WallMotion<f32>> {
+    (last != now && dt > 0.0).then(|| WallMotion {
+        velocity: to_vector(Vec3::from(now.translation - last.translation) / dt),
+        spin: to_vector((now.rotation * last.rotation.inverse()).to_scaled_axis() / dt),
+        pivot: to_point(now.translation.into()),
+    })
 }
 
 /// A marble entity's components. The optional ones are read together.
@@ -109,7 +128,8 @@ pub fn marbles(
             spin: spin.map(|s| bits(**s)),
             mass: mass.map(|m| m.bits()),
             gravity_scale: gravity_scale.map(|g| g.to_bits()),
-            material: material.map(|m| [m.restitution.to_bits(), m.friction.to_bits()]),
+            material: material
+                .map(|m| [m.restitution, m.friction, m.tangential_restitution].map(f32::to_bits)),
             integrator: integrator.map(|i| **i),
         };
         if state.seen == seen && state.id.is_some() {
@@ -133,8 +153,7 @@ pub fn marbles(
             mass: mass.copied().unwrap_or_default().into(),
             gravity_scale: *gravity_scale.copied().unwrap_or_default(),
             integrator: seen.integrator,
-            material: material
-                .map(|m| core::Material { restitution: m.restitution, friction: m.friction }),
+            material: material.map(|m| (*m).into()),
         };
         let refuse = |error| InputRefused::write(&mut refused, Some(entity), error);
         match state.id {

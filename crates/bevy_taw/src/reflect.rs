@@ -24,6 +24,7 @@ pub enum IntegratorReflect {
 pub enum RotationReflect {
     None,
     Rolling,
+    Dynamic,
 }
 
 /// Mirrors [`taw::response::Response`].
@@ -32,6 +33,7 @@ pub enum RotationReflect {
 #[reflect(Debug, PartialEq)]
 pub enum ResponseReflect {
     Displacement,
+    Impulse,
 }
 
 /// Mirrors [`taw::world::Model`].
@@ -46,4 +48,5 @@ pub struct ModelReflect {
     #[reflect(remote = RotationReflect)]
     pub rotation: taw::motion::Rotation,
     pub substeps: u32,
+    pub iterations: u32,
 }

@@ -1,12 +1,13 @@
 //! What a step costs: `cargo bench -p taw`.
 //!
 //! Marbles with radii in [0.2, 0.6] m in a box of planes, as in the demo: while
-//! they fall, and when they lie in a heap. The whole step, and each verb by itself;
-//! 60 Hz, one substep. Add `--profile dev` for the figures of `cargo run --example
+//! they fall, and when they lie in a heap. The whole step, and each verb by itself, by
+//! the default model unless it says otherwise; 60 Hz, one substep. Add `--profile dev` for the figures of `cargo run --example
 //! marble_madness`, whose profile optimises this crate too.
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
+use taw::motion::Rotation;
 use taw::prelude::*;
 
 const DT: f32 = 1.0 / 60.0;
@@ -43,13 +44,19 @@ fn falling(count: u32) -> World<f32> {
     world
 }
 
-/// The same ten seconds later.
-fn settled(count: u32) -> World<f32> {
+/// The same ten seconds later, by this model.
+fn settled_by(model: Model, count: u32) -> World<f32> {
     let mut world = falling(count);
+    world.set_model(model).expect("a model");
     for _ in 0..600 {
         world.step(DT).expect("a step");
     }
     world
+}
+
+/// The same ten seconds later, by the default model.
+fn settled(count: u32) -> World<f32> {
+    settled_by(Model::default(), count)
 }
 
 fn bench(bencher: Bencher, world: World<f32>, run: impl Fn(&mut World<f32>) + Sync) {
@@ -71,6 +78,14 @@ fn step_falling(bencher: Bencher, count: u32) {
 #[divan::bench(args = COUNTS)]
 fn step_settled(bencher: Bencher, count: u32) {
     bench(bencher, settled(count), step);
+}
+
+/// With masses, friction and spin.
+#[divan::bench(args = COUNTS)]
+fn step_settled_impulse(bencher: Bencher, count: u32) {
+    let (response, rotation) = (Response::Impulse, Rotation::Dynamic);
+    let model = Model { response, rotation, ..Model::default() };
+    bench(bencher, settled_by(model, count), step);
 }
 
 #[divan::bench(args = COUNTS)]

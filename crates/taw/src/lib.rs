@@ -64,8 +64,8 @@ pub mod prelude {
     pub use crate::contact::{Contact, Contacts};
     pub use crate::math::{Point3, Scalar, Vec3};
     pub use crate::motion::{Force, Integrator};
-    pub use crate::response::Response;
+    pub use crate::response::{Material, Response};
     pub use crate::shape::{Plane, Sphere};
-    pub use crate::world::{Marble, MarbleId, Mass, Material, Model, WallId, World};
+    pub use crate::world::{Marble, MarbleId, Mass, Model, WallId, World};
     pub use cgmath::prelude::*;
 }

@@ -55,14 +55,16 @@ struct Cell {
 }
 
 impl Grid {
-    /// Sorts the spheres into cells.
-    pub fn rebuild<S: Scalar>(&mut self, center: &[Point3<S>], radius: &[S]) {
-        let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r));
+    /// Sorts the spheres into cells. Spheres with a gap of up to `reach` metres
+    /// between them count as touching; zero for those that do.
+    pub fn rebuild<S: Scalar>(&mut self, center: &[Point3<S>], radius: &[S], reach: S) {
+        let half_reach = reach * S::constant(0.5);
+        let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r)) + half_reach;
         self.width = (2.0 * largest.as_f64() * CELL_MARGIN).max(LEAST_CELL);
         self.origin = middle(center);
         self.cells.clear();
         for (row, (center, radius)) in center.iter().zip(radius).enumerate() {
-            let level = level_of(*radius, largest);
+            let level = level_of(*radius + half_reach, largest);
             self.cells.push(Cell { key: self.key(*center, level), row: row as u32 });
         }
         self.cells.sort_unstable();
@@ -235,7 +237,7 @@ mod tests {
 
     fn assert_finds_all<S: Scalar>(center: &[Point3<S>], radius: &[S]) {
         let mut grid = Grid::default();
-        grid.rebuild(center, radius);
+        grid.rebuild(center, radius, S::zero());
         let by_grid = touching(center, radius, |pair| grid.pairs(center, pair));
         let by_all = touching(center, radius, |pair| all_pairs(center.len() as u32, pair));
         assert_eq!(by_grid, by_all);
@@ -284,7 +286,7 @@ mod tests {
             (0..500_u32).map(|i| Point3::new(i % 7, i % 11, i % 13).map(f64::from) * 0.7).collect();
         let radius: Vec<_> = (0..500).map(|i| [0.05, 0.3, 0.6][i % 3]).collect();
         let mut grid = Grid::default();
-        grid.rebuild(&center, &radius);
+        grid.rebuild(&center, &radius, 0.0);
         let mut pairs = Vec::new();
         grid.pairs(&center, |a, b| pairs.push((a, b)));
         let named = pairs.len();
@@ -303,7 +305,7 @@ mod tests {
             center.truncate(1000);
             center.push(stray);
             let mut grid = Grid::default();
-            grid.rebuild(&center, &radius);
+            grid.rebuild(&center, &radius, 0.0);
             let mut count = 0;
             grid.pairs(&center, |_, _| count += 1);
             count

@@ -28,6 +28,18 @@ pub enum Integrator {
 }
 
 impl Integrator {
+    /// How far a change of velocity within a step has moved the position at its end,
+    /// as a part of change times step: what a force that is found only after the step
+    /// still has to move, for the step to be as if it had been known before.
+    #[must_use]
+    pub(crate) fn follow<S: Scalar>(self) -> S {
+        match self {
+            Self::ExplicitEuler => S::zero(),
+            Self::SemiImplicitEuler => S::one(),
+            Self::VelocityVerlet | Self::Leapfrog | Self::Rk4 => S::constant(0.5),
+        }
+    }
+
     /// All of them, from the crudest to the finest.
     pub const ALL: [Self; 5] = [
         Self::ExplicitEuler,

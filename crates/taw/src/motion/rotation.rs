@@ -12,6 +12,9 @@ pub enum Rotation {
     /// touch, and keep their spin in the air. It follows the motion and does not
     /// change it.
     Rolling,
+    /// Marbles have angular momentum, as solid balls of even density; friction and
+    /// torques change it. Without a response that knows friction, nothing else does.
+    Dynamic,
 }
 
 /// `rotation` turned on by the angular velocity `spin` (an axial vector in world

@@ -3,22 +3,14 @@ use crate::math::{Scalar, Vec3, is_finite, is_finite_point};
 use crate::response::Columns;
 use crate::shape::{Plane, Sphere};
 
-/// The lab's restitution, as taught in the lecture: the bottom of the ladder and
-/// the readable reference for the rest.
+/// [`Response::Displacement`](super::Response::Displacement), exactly as taught in the
+/// lecture: the readable reference for the rest. The lab counts velocity in units per
+/// frame; here it is metres per second, so the change is displacement / dt.
 ///
-/// Largest displacement first, each contact is tested again. If the two still
-/// touch, they are moved apart by their displacement (a wall stays, marbles take
-/// half each), and their velocities change by that displacement per step. The lab
-/// counts velocity in units per frame; here it is metres per second, so the
-/// change is displacement / dt.
-///
-/// What it costs in truth: the same push whatever the masses, no friction, no
-/// restitution coefficient (a [`Material`](crate::world::Material) is not read),
-/// one pass (a tall pile sags), and deep overlap turns into speed.
-///
-/// A row that would become infinite or NaN keeps its place, loses its velocity,
-/// and is added to `stopped`; the other half of its contact is not affected.
-pub fn displacement<S: Scalar>(
+/// The contacts' rows exist. A row that would become infinite or NaN keeps its place,
+/// loses its velocity, and is added to `stopped`; the other half of its contact is not
+/// affected.
+pub(crate) fn displacement<S: Scalar>(
     walls: &[Plane<S>],
     marbles: &mut Columns<S>,
     contacts: &mut Contacts<S>,
@@ -80,8 +72,13 @@ mod tests {
         contacts.wm = (0..count).map(|b| Contact { a: 0, b, mtv: all }).collect();
         crate::broad::all_pairs(count, |a, b| contacts.mm.push(Contact { a, b, mtv: all }));
         let mut stopped = Vec::new();
-        let mut columns =
-            Columns { position: &mut position, velocity: &mut velocity, radius: &radius };
+        let mut columns = Columns {
+            position: &mut position,
+            velocity: &mut velocity,
+            radius: &radius,
+            inverse_mass: &[],
+            spin: &mut [],
+        };
         displacement(&[floor], &mut columns, &mut contacts, 0.5, &mut stopped);
         assert_eq!(stopped, []);
         (position, velocity)
@@ -136,8 +133,13 @@ mod tests {
         let wm = [0, 1].map(|b| Contact { a: 0, b, mtv: Vec3::unit_y() }).to_vec();
         let mut contacts = Contacts { wm, mm: vec![] };
         let mut stopped = Vec::new();
-        let mut columns =
-            Columns { position: &mut position, velocity: &mut velocity, radius: &[1.0, 1.0] };
+        let mut columns = Columns {
+            position: &mut position,
+            velocity: &mut velocity,
+            radius: &[1.0, 1.0],
+            inverse_mass: &[],
+            spin: &mut [],
+        };
         // 1 m in 1e-33 s is 1e33 m/s, more than the gap below f32::MAX.
         displacement(&[floor], &mut columns, &mut contacts, 1e-33, &mut stopped);
         assert_eq!(stopped, [0]);

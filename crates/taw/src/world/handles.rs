@@ -16,6 +16,8 @@ pub(super) struct Handles {
     rows: Vec<u32>,
     /// Slots without a row, the last freed first.
     free: Vec<u32>,
+    /// How often a row went, which moves another.
+    removals: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -28,6 +30,11 @@ struct Slot {
 impl Handles {
     pub fn len(&self) -> usize {
         self.rows.len()
+    }
+
+    /// How many handles were forgotten so far.
+    pub fn removals(&self) -> u64 {
+        self.removals
     }
 
     /// A handle for a new last row.
@@ -52,6 +59,7 @@ impl Handles {
     pub fn swap_remove(&mut self, handle: Handle) -> Option<usize> {
         let row = self.row(handle)?;
         self.rows.swap_remove(row);
+        self.removals += 1;
         if let Some(moved) = self.rows.get(row) {
             self.slots[*moved as usize].row = Some(row as u32);
         }

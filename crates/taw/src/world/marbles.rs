@@ -3,9 +3,10 @@ use cgmath::{InnerSpace, One, Zero};
 use super::handles::{Handle, Handles};
 use super::optional::Optional;
 use crate::Error;
-use crate::error::{finite, finite_point, finite_vector, positive, within};
+use crate::error::{finite, finite_point, finite_vector, positive};
 use crate::math::{Point3, Quat, Scalar, Vec3, is_finite, is_finite_point};
 use crate::motion::{Force, Integrator, Motion, turned};
+use crate::response::{Columns, Material};
 use crate::shape::Sphere;
 
 /// Names a marble for as long as it is in the world.
@@ -95,28 +96,6 @@ impl<S: Scalar> Mass<S> {
     }
 }
 
-/// What a marble is made of, as far as its contacts can tell.
-///
-/// It is stored with the marble. [`Response::Displacement`] knows neither bounce
-/// nor friction and does not read it.
-///
-/// [`Response::Displacement`]: crate::response::Response::Displacement
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Material<S> {
-    /// The part of the approach speed that a bounce gives back, in `[0, 1]`.
-    pub restitution: S,
-    /// The largest friction force over the normal force (Coulomb), at least zero.
-    pub friction: S,
-}
-
-impl<S: Scalar> Material<S> {
-    fn check(self) -> Result<Self, Error> {
-        within("restitution", self.restitution, S::zero(), S::one())?;
-        within("friction", self.friction, S::zero(), S::max_value())?;
-        Ok(self)
-    }
-}
-
 /// Dynamic spheres, in columns: row *i* of each belongs to the same marble.
 ///
 /// Rows move when marbles are removed; a [`MarbleId`] finds its row again.
@@ -175,7 +154,7 @@ impl<S: Scalar> Marbles<S> {
         let spin = finite_vector(SPIN, marble.spin)?;
         let mass = marble.mass.checked()?;
         let gravity_scale = finite("gravity_scale", marble.gravity_scale)?;
-        let material = marble.material.map(Material::check).transpose()?;
+        let material = marble.material.map(Material::checked).transpose()?;
         let handle = self.handles.push()?;
         self.position.push(position);
         self.radius.push(radius);
@@ -349,7 +328,7 @@ impl<S: Scalar> Marbles<S> {
         material: Option<Material<S>>,
     ) -> Result<(), Error> {
         let row = self.row(id)?;
-        let material = material.map(Material::check).transpose()?;
+        let material = material.map(Material::checked).transpose()?;
         self.material.set(row, material, self.handles.len());
         Ok(())
     }
@@ -398,6 +377,11 @@ impl<S: Scalar> Marbles<S> {
         self.handles.handle(row).map(MarbleId)
     }
 
+    /// How many marbles were taken out so far.
+    pub(super) fn removals(&self) -> u64 {
+        self.handles.removals()
+    }
+
     /// The number of marbles.
     #[must_use]
     pub fn len(&self) -> usize {
@@ -442,13 +426,23 @@ impl<S: Scalar> Marbles<S> {
         }
     }
 
-    /// What a response works on: positions, velocities, radii.
-    pub(super) fn columns(&mut self) -> (&mut [Point3<S>], &mut [Vec3<S>], &[S]) {
-        (&mut self.position, &mut self.velocity, &self.radius)
+    /// What a response works on: the columns, and what single marbles have.
+    pub(super) fn columns<'a>(
+        &'a mut self,
+        inverse_mass: &'a [S],
+    ) -> (Columns<'a, S>, &'a Optional<Material<S>>, &'a Optional<Integrator>) {
+        let columns = Columns {
+            position: &mut self.position,
+            velocity: &mut self.velocity,
+            radius: &self.radius,
+            inverse_mass,
+            spin: &mut self.spin,
+        };
+        (columns, &self.material, &self.integrator)
     }
 
     /// In kilograms; infinite for what nothing accelerates.
-    fn mass(&self, row: usize) -> S {
+    pub(super) fn mass(&self, row: usize) -> S {
         self.mass.get(row).unwrap_or_default().of(self.radius[row])
     }
 

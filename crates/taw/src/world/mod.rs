@@ -6,17 +6,19 @@ mod model;
 mod optional;
 mod walls;
 
-pub use marbles::{Marble, MarbleId, Marbles, Mass, Material};
+pub use marbles::{Marble, MarbleId, Marbles, Mass};
 pub use model::Model;
-pub use walls::{WallId, Walls};
+pub use walls::{WallId, WallMotion, Walls};
+
+use cgmath::Zero;
 
 use crate::Error;
 use crate::broad::Grid;
 use crate::contact::{Contact, Contacts, mtv_sphere_plane, mtv_sphere_sphere};
 use crate::error::{finite_vector, positive};
-use crate::math::{Scalar, Vec3};
+use crate::math::{Scalar, Vec3, length};
 use crate::motion::{Force, Rotation};
-use crate::response::{Columns, Response, displacement};
+use crate::response::{BallSpin, Constraint, Response, Settings, Warm, displacement, impulse};
 
 /// Everything that moves and everything that it can touch.
 ///
@@ -38,6 +40,16 @@ pub struct World<S> {
     pub contacts: Contacts<S>,
     grid: Grid,
     stopped: Vec<u32>,
+    /// How wide a gap still makes a contact, in metres: what gravity closes in two
+    /// substeps, for a response that looks ahead.
+    reach: S,
+    inverse_mass: Vec<S>,
+    before: Vec<Vec3<S>>,
+    constraints: Vec<Constraint<S>>,
+    /// What the contacts of the last substep bore, and the removals until then: they
+    /// move rows, after which nothing here has the right name any more.
+    warm: Vec<Warm<S>>,
+    warm_removals: [u64; 2],
 }
 
 impl<S: Scalar> Default for World<S> {
@@ -52,13 +64,34 @@ impl<S: Scalar> Default for World<S> {
             contacts: Contacts::default(),
             grid: Grid::default(),
             stopped: Vec::new(),
+            reach: S::zero(),
+            inverse_mass: Vec::new(),
+            before: Vec::new(),
+            constraints: Vec::new(),
+            warm: Vec::new(),
+            warm_removals: [0; 2],
         }
     }
 }
 
 impl<S: Scalar> PartialEq for World<S> {
     fn eq(&self, other: &Self) -> bool {
-        let Self { model, gravity, forces, marbles, walls, contacts, grid: _, stopped } = self;
+        let Self {
+            model,
+            gravity,
+            forces,
+            marbles,
+            walls,
+            contacts,
+            stopped,
+            grid: _,
+            reach: _,
+            inverse_mass: _,
+            before: _,
+            constraints: _,
+            warm,
+            warm_removals,
+        } = self;
         *model == other.model
             && *gravity == other.gravity
             && *forces == other.forces
@@ -66,6 +99,8 @@ impl<S: Scalar> PartialEq for World<S> {
             && *walls == other.walls
             && *contacts == other.contacts
             && *stopped == other.stopped
+            && *warm == other.warm
+            && *warm_removals == other.warm_removals
     }
 }
 
@@ -82,6 +117,7 @@ impl<S: Scalar> World<S> {
     /// [`Error::OutOfRange`] for the substeps.
     pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
         self.model = model.checked()?;
+        self.warm.clear();
         self.marbles.set_turn(model.rotation != Rotation::None);
         Ok(())
     }
@@ -149,26 +185,40 @@ impl<S: Scalar> World<S> {
             &mut self.stopped,
         );
         self.marbles.turn(dt);
+        self.reach = match self.model.response {
+            Response::Displacement => S::zero(),
+            Response::Impulse => length(self.gravity) * dt * dt * S::constant(2.0),
+        };
         Ok(())
     }
 
     /// The second verb: finds who touches whom, and by how much.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
+        let reach = self.reach;
+        let nothing = Vec3::zero();
         for (a, plane) in self.walls.planes().iter().enumerate() {
             for b in 0..self.marbles.len() {
-                if let Some(mtv) = mtv_sphere_plane(&self.marbles.sphere(b), plane) {
+                let sphere = self.marbles.sphere(b);
+                let near = || plane.signed_distance(sphere.center) - sphere.radius <= reach;
+                let mtv = mtv_sphere_plane(&sphere, plane);
+                if let Some(mtv) = mtv.or_else(|| near().then_some(nothing)) {
                     let (a, b) = (a as u32, b as u32);
                     self.contacts.wm.push(Contact { a, b, mtv });
                 }
             }
         }
         let center = self.marbles.position();
-        self.grid.rebuild(center, self.marbles.radius());
+        self.grid.rebuild(center, self.marbles.radius(), reach);
         self.grid.pairs(center, |a, b| {
             let (first, second) = (a as usize, b as usize);
             let (first, second) = (self.marbles.sphere(first), self.marbles.sphere(second));
-            if let Some(mtv) = mtv_sphere_sphere(&first, &second) {
+            let near = || {
+                let gap = length(second.center - first.center) - first.radius - second.radius;
+                reach > S::zero() && gap <= reach
+            };
+            let mtv = mtv_sphere_sphere(&first, &second);
+            if let Some(mtv) = mtv.or_else(|| near().then_some(nothing)) {
                 self.contacts.mm.push(Contact { a, b, mtv });
             }
         });
@@ -184,8 +234,13 @@ impl<S: Scalar> World<S> {
         let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
-        let (position, velocity, radius) = self.marbles.columns();
-        let mut columns = Columns { position, velocity, radius };
+        self.inverse_mass.clear();
+        if self.model.response == Response::Impulse {
+            let masses = (0..self.marbles.len()).map(|row| self.marbles.mass(row));
+            self.inverse_mass.extend(masses.map(|mass| S::one() / mass));
+        }
+        let removals = [self.walls.removals(), self.marbles.removals()];
+        let (mut columns, material, integrator) = self.marbles.columns(&self.inverse_mass);
         match self.model.response {
             Response::Displacement => displacement(
                 self.walls.planes(),
@@ -194,6 +249,33 @@ impl<S: Scalar> World<S> {
                 dt,
                 &mut self.stopped,
             ),
+            Response::Impulse => {
+                if self.warm_removals != removals {
+                    self.warm.clear();
+                    self.warm_removals = removals;
+                }
+                let settings = Settings {
+                    iterations: self.model.iterations,
+                    spin: match self.model.rotation {
+                        Rotation::Dynamic => BallSpin::Free,
+                        Rotation::None | Rotation::Rolling => BallSpin::Ignored,
+                    },
+                    dt,
+                    bounce_speed: length(self.gravity) * dt * S::constant(2.0),
+                };
+                impulse(
+                    &mut columns,
+                    &mut self.contacts,
+                    &self.walls,
+                    |row| material.get(row).unwrap_or_default(),
+                    |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
+                    &settings,
+                    &mut self.before,
+                    &mut self.constraints,
+                    &mut self.warm,
+                    &mut self.stopped,
+                );
+            }
         }
         if self.model.rotation == Rotation::Rolling {
             // The deepest contact comes first in the list, so it has the last word.
@@ -228,6 +310,7 @@ mod tests {
     use super::*;
     use crate::math::{Point3, Quat};
     use crate::motion::Integrator;
+    use crate::response::Material;
     use crate::shape::Plane;
     use cgmath::InnerSpace;
 
@@ -408,7 +491,8 @@ mod tests {
         let id = world.marbles.insert(good).unwrap();
         let before = world.clone();
         let nan = f32::NAN;
-        let material = |restitution, friction| Some(Material { restitution, friction });
+        let material =
+            |restitution, friction| Some(Material { restitution, friction, ..Material::default() });
         let bad = [
             (Marble { position: Point3::new(nan, 0.0, 0.0), ..good }, "position.x"),
             (Marble { radius: 0.0, ..good }, "radius"),

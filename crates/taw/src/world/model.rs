@@ -23,6 +23,9 @@ pub struct Model {
     /// Into how many equal parts each step is cut, from 1 to 1,000. Costs as many
     /// times as much.
     pub substeps: u32,
+    /// How many times [`Response::Impulse`] goes over all contacts in a substep, from
+    /// 1 to 1,000. It stops sooner when nothing changes any more.
+    pub iterations: u32,
 }
 
 impl Default for Model {
@@ -32,6 +35,7 @@ impl Default for Model {
             response: Response::Displacement,
             rotation: Rotation::None,
             substeps: 1,
+            iterations: 8,
         }
     }
 }
@@ -39,10 +43,14 @@ impl Default for Model {
 impl Model {
     /// The largest number of [substeps](Model::substeps).
     pub const MAX_SUBSTEPS: u32 = 1000;
+    /// The largest number of [iterations](Model::iterations).
+    pub const MAX_ITERATIONS: u32 = 1000;
 
     /// This model, if a world can step with it.
     pub(super) fn checked(self) -> Result<Self, Error> {
-        let most = f64::from(Self::MAX_SUBSTEPS);
-        within("substeps", f64::from(self.substeps), 1.0, most).map(|_| self)
+        let check = |field, count, most| within(field, f64::from(count), 1.0, f64::from(most));
+        check("substeps", self.substeps, Self::MAX_SUBSTEPS)?;
+        check("iterations", self.iterations, Self::MAX_ITERATIONS)?;
+        Ok(self)
     }
 }

@@ -1,0 +1,290 @@
+use cgmath::{InnerSpace, Zero};
+
+use crate::contact::Contacts;
+use crate::math::{Point3, Scalar, Vec3, direction_and_length, is_finite, is_finite_point};
+use crate::response::impact::at_most;
+use crate::response::{BallSpin, Columns, Material, Mobility};
+
+/// How often overlap that is left after the velocities are solved is pushed out.
+const POSITION_SWEEPS: u32 = 3;
+
+/// What the solver is told, besides columns and contacts.
+pub(crate) struct Settings<S> {
+    /// The most sweeps over all contacts.
+    pub iterations: u32,
+    /// Whether friction sets marbles spinning.
+    pub spin: BallSpin,
+    /// The length of the substep, in seconds.
+    pub dt: S,
+    /// Slower than this, in m/s, nothing bounces: what gravity does in two substeps.
+    pub bounce_speed: S,
+}
+
+/// The first thing of a contact, by row.
+#[derive(Clone, Copy, Debug)]
+enum First {
+    Wall(usize),
+    Marble(usize),
+}
+
+impl First {
+    fn marble(self) -> Option<usize> {
+        match self {
+            Self::Wall(_) => None,
+            Self::Marble(row) => Some(row),
+        }
+    }
+}
+
+/// A contact while it is solved.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Constraint<S> {
+    a: First,
+    b: usize,
+    /// From a to b.
+    normal: Vec3<S>,
+    /// The velocity of the wall's surface, in m/s; zero between marbles.
+    surface: Vec3<S>,
+    mobility: Mobility<S>,
+    friction: S,
+    /// The relative velocity of the two points that is asked for: along the normal at
+    /// least this, across it this if friction suffices.
+    rebound: S,
+    slide: Vec3<S>,
+    /// What was applied so far, in N s.
+    pressure: S,
+    grip: Vec3<S>,
+}
+
+/// What a contact needed in the last substep, which is a good guess for this one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Warm<S> {
+    key: (bool, usize, usize),
+    pressure: S,
+    grip: Vec3<S>,
+}
+
+impl<S: Scalar> Constraint<S> {
+    /// Names the contact: walls first, then by rows.
+    fn key(&self) -> (bool, usize, usize) {
+        match self.a {
+            First::Wall(wall) => (false, wall, self.b),
+            First::Marble(a) => (true, a, self.b),
+        }
+    }
+}
+
+/// [`Response::Impulse`](super::Response::Impulse): sequential impulses (Catto,
+/// *Iterative dynamics with temporal coherence*, 2005) with the friction of a cone,
+/// not of a pyramid, bounded by the accumulated normal impulse, restitution included.
+///
+/// `material` gives that of a marble, `follow` how far its position follows a change of
+/// velocity in its step. The contacts' rows exist. Rows that end up infinite or NaN lose their velocity and are
+/// added to `stopped`.
+pub(crate) fn impulse<S: Scalar>(
+    marbles: &mut Columns<S>,
+    contacts: &mut Contacts<S>,
+    walls: &impl Walls<S>,
+    material: impl Fn(usize) -> Material<S>,
+    follow: impl Fn(usize) -> S,
+    settings: &Settings<S>,
+    before: &mut Vec<Vec3<S>>,
+    constraints: &mut Vec<Constraint<S>>,
+    warm: &mut Vec<Warm<S>>,
+    stopped: &mut Vec<u32>,
+) {
+    contacts.sort();
+    constraints.clear();
+    before.clear();
+    before.extend_from_slice(marbles.velocity);
+    let prepare = |a: First, b: usize| {
+        let (normal, gap) = marbles.normal_and_gap(a, b, walls)?;
+        let own = material(b);
+        let (surface, inverse_mass, material) = match a {
+            First::Wall(wall) => {
+                let touch = marbles.position[b] - normal * marbles.radius[b];
+                (walls.surface_velocity(wall, touch), S::zero(), own)
+            }
+            First::Marble(a) => (Vec3::zero(), marbles.inverse_mass[a], own.against(material(a))),
+        };
+        let mobility = Mobility::of_balls(inverse_mass, marbles.inverse_mass[b], settings.spin);
+        let closing = marbles.closing(a, b, normal, surface);
+        let approach = -closing.dot(normal);
+        // The positions have moved on already, and will follow what changes now. So
+        // this speed is just enough to keep the gap from closing.
+        let follow = match a {
+            First::Wall(_) => follow(b),
+            First::Marble(a) => (follow(a) + follow(b)) * S::constant(0.5),
+        } * settings.dt;
+        let closed = if follow > S::zero() { -approach - gap / follow } else { -gap / settings.dt };
+        let bounces = approach > settings.bounce_speed && closed > -approach;
+        let (rebound, slide) = if bounces {
+            let sliding = closing + normal * approach;
+            (material.restitution * approach, sliding * -material.tangential_restitution)
+        } else {
+            (closed.min(S::zero()), Vec3::zero())
+        };
+        let mut constraint = Constraint {
+            a,
+            b,
+            normal,
+            surface,
+            mobility,
+            friction: material.friction,
+            rebound,
+            slide,
+            pressure: S::zero(),
+            grip: Vec3::zero(),
+        };
+        // What bounces had nothing to bear before.
+        let guess = warm.binary_search_by_key(&constraint.key(), |warm| warm.key);
+        if let (Ok(at), false) = (guess, bounces) {
+            let Warm { pressure, grip, .. } = warm[at];
+            constraint.pressure = pressure;
+            constraint.grip = grip - normal * grip.dot(normal);
+        }
+        (mobility.normal > S::zero()).then_some(constraint)
+    };
+    let wm = contacts.wm.iter().map(|c| (First::Wall(c.a as usize), c.b as usize));
+    let mm = contacts.mm.iter().map(|c| (First::Marble(c.a as usize), c.b as usize));
+    constraints.extend(wm.chain(mm).filter_map(|(a, b)| prepare(a, b)));
+
+    for c in constraints.iter() {
+        marbles.hit_both(c, c.normal * c.pressure + c.grip, settings.spin);
+    }
+    for _ in 0..settings.iterations {
+        let mut largest_change = S::zero();
+        for constraint in constraints.iter_mut() {
+            largest_change = largest_change.max(marbles.solve(constraint, settings.spin));
+        }
+        // What is left is beyond what the next sweep could still see.
+        if largest_change <= settings.bounce_speed * S::epsilon() {
+            break;
+        }
+    }
+    for (row, before) in before.iter().enumerate() {
+        let moved = (marbles.velocity[row] - before) * (follow(row) * settings.dt);
+        let position = marbles.position[row] + moved;
+        if is_finite_point(position) {
+            marbles.position[row] = position;
+        }
+    }
+    for _ in 0..POSITION_SWEEPS {
+        for constraint in constraints.iter() {
+            marbles.push_apart(constraint, walls, settings);
+        }
+    }
+    warm.clear();
+    warm.extend(constraints.iter().map(|c| Warm {
+        key: c.key(),
+        pressure: c.pressure,
+        grip: c.grip,
+    }));
+    warm.sort_unstable_by_key(|warm| warm.key);
+    for row in constraints.iter().flat_map(|c| [Some(c.b), c.a.marble()]).flatten() {
+        if !is_finite(marbles.velocity[row]) {
+            marbles.velocity[row] = Vec3::zero();
+            stopped.push(row as u32);
+        }
+    }
+}
+
+/// What the solver asks of walls, by row.
+pub(crate) trait Walls<S> {
+    /// The normal of the wall, and how far a point is in front of it.
+    fn normal_and_distance(&self, wall: usize, point: Point3<S>) -> (Vec3<S>, S);
+    /// How its surface moves at a point, in m/s.
+    fn surface_velocity(&self, wall: usize, point: Point3<S>) -> Vec3<S>;
+}
+
+impl<S: Scalar> Columns<'_, S> {
+    /// The unit vector from the first to the second of a contact, and how far their
+    /// surfaces are apart (negative for an overlap). Coincident centers part along +x.
+    fn normal_and_gap(&self, a: First, b: usize, walls: &impl Walls<S>) -> Option<(Vec3<S>, S)> {
+        let (normal, distance) = match a {
+            First::Wall(wall) => walls.normal_and_distance(wall, self.position[b]),
+            First::Marble(a) => {
+                let apart = direction_and_length(self.position[b] - self.position[a]);
+                let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
+                (normal, distance - self.radius[a])
+            }
+        };
+        let gap = distance - self.radius[b];
+        gap.is_finite().then_some((normal, gap))
+    }
+
+    /// The velocity of the second's touching point relative to the first's, in m/s.
+    fn closing(&self, a: First, b: usize, normal: Vec3<S>, surface: Vec3<S>) -> Vec3<S> {
+        let mut velocity = self.velocity[b] - surface;
+        let mut rim = self.rim(b);
+        if let First::Marble(a) = a {
+            velocity -= self.velocity[a];
+            rim += self.rim(a);
+        }
+        velocity + normal.cross(rim)
+    }
+
+    /// Radius times spin, in m/s; zero where spin is not modelled.
+    fn rim(&self, row: usize) -> Vec3<S> {
+        self.spin.get(row).map_or_else(Vec3::zero, |spin| *spin * self.radius[row])
+    }
+
+    /// One step toward what a contact asks for. Gives the change of velocity.
+    fn solve(&mut self, c: &mut Constraint<S>, spin: BallSpin) -> S {
+        let closing = self.closing(c.a, c.b, c.normal, c.surface);
+        let along = closing.dot(c.normal);
+        let wanted = c.pressure + (c.rebound - along) / c.mobility.normal;
+        let pressure = wanted.max(S::zero());
+        let sliding = closing - c.normal * along;
+        let grip = c.grip + (c.slide - sliding) / c.mobility.tangent;
+        let grip = at_most(grip, c.friction * pressure);
+        let change = c.normal * (pressure - c.pressure) + (grip - c.grip);
+        (c.pressure, c.grip) = (pressure, grip);
+        self.hit_both(c, change, spin);
+        change.magnitude() * c.mobility.normal
+    }
+
+    /// Applies an impulse to the second of a contact, and its opposite to the first.
+    fn hit_both(&mut self, c: &Constraint<S>, impulse: Vec3<S>, spin: BallSpin) {
+        if let First::Marble(a) = c.a {
+            self.hit(a, -impulse, -c.normal, spin);
+        }
+        self.hit(c.b, impulse, c.normal, spin);
+    }
+
+    /// Applies an impulse where a marble is touched; `normal` points to its center.
+    fn hit(&mut self, row: usize, impulse: Vec3<S>, normal: Vec3<S>, spin: BallSpin) {
+        let inverse_mass = self.inverse_mass[row];
+        self.velocity[row] += impulse * inverse_mass;
+        if spin == BallSpin::Free
+            && let Some(spin) = self.spin.get_mut(row)
+        {
+            // r / I = 5/2 / (m r) for a solid ball.
+            let twist = S::constant(2.5) * inverse_mass / self.radius[row];
+            *spin -= normal.cross(impulse) * twist;
+        }
+    }
+
+    /// Moves what overlaps too deep half of the way apart, the lighter one further.
+    ///
+    /// A little overlap stays, at most a two-hundredth of the smaller radius: what
+    /// rests then keeps touching, and need not fall back in every substep.
+    fn push_apart(&mut self, c: &Constraint<S>, walls: &impl Walls<S>, settings: &Settings<S>) {
+        let Some((normal, gap)) = self.normal_and_gap(c.a, c.b, walls) else { return };
+        let smaller =
+            c.a.marble().map_or(self.radius[c.b], |a| self.radius[a].min(self.radius[c.b]));
+        let fall = settings.bounce_speed * settings.dt * S::constant(0.5);
+        let excess = -gap - fall.min(smaller * S::constant(0.005));
+        if excess <= S::zero() {
+            return;
+        }
+        let push = normal * (excess * S::constant(0.5) / c.mobility.normal);
+        for (row, by) in [(Some(c.b), push), (c.a.marble(), -push)] {
+            let Some(row) = row else { continue };
+            let position = self.position[row] + by * self.inverse_mass[row];
+            if is_finite_point(position) {
+                self.position[row] = position;
+            }
+        }
+    }
+}
