@@ -2,7 +2,7 @@
 //!
 //! What is on the screen lies between the last two steps, so it lags by up to one:
 //! outside the fixed schedules, read a marble's true place from the
-//! [`TawWorld`](crate::resources::TawWorld), or leave this plugin out.
+//! [`TawWorld`], or leave this plugin out.
 //! Marbles get it by themselves; give moving walls a
 //! [`TransformInterpolation`].
 
