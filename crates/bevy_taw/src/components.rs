@@ -78,9 +78,9 @@ impl Default for GravityScale {
     }
 }
 
-/// What a marble is made of, as far as its contacts can tell; between two marbles the
-/// mean counts. The response [`Displacement`](taw::response::Response::Displacement) does
-/// not read it.
+/// What a marble is made of, as far as its contacts can tell. Against a wall its own
+/// counts, between two marbles the mean; the response
+/// [`Displacement`](taw::response::Response::Displacement) does not read it.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct MarbleMaterial {

@@ -113,6 +113,39 @@ fn without_rotation_friction_holds_what_does_not_slide() {
 }
 
 #[test]
+fn a_marble_rests_under_every_integrator() {
+    for integrator in Integrator::ALL {
+        for radius in [0.008, 0.5, 100.0] {
+            let (mut world, up, _) = slope::<f32>(0.0, Rotation::Dynamic);
+            world.set_model(Model { integrator, ..world.model() }).unwrap();
+            let id = world.marbles.insert(on(up, radius, surface(0.5, 0.3))).unwrap();
+            for step in 0..600 {
+                world.step(1.0 / 60.0).unwrap();
+                let Marble { position, velocity, .. } = world.marbles.get(id).unwrap();
+                let height = f64::from(position.y) / radius - 1.0;
+                let at = format!("{integrator:?}, radius {radius}, step {step}");
+                assert!((-0.006..0.001).contains(&height), "{at}: off by {height} of its radius");
+                assert!(velocity.magnitude() < 1e-3 * radius.sqrt() as f32, "{at}: {velocity:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn rolling_is_only_for_show() {
+    let end = [Rotation::None, Rotation::Rolling].map(|rotation| {
+        let (mut world, up, _) = slope::<f64>(0.0, rotation);
+        let velocity = Vec3::new(3.0, 0.0, 0.0);
+        let marble = Marble { velocity, ..on(up, 0.5, surface(0.0, 0.2)) };
+        let id = world.marbles.insert(marble).unwrap();
+        run(&mut world, 1.0 / 60.0, 1.0);
+        world.marbles.get(id).unwrap().velocity
+    });
+    assert!((end[0].x - (3.0 - 0.2 * G)).abs() < 1e-9, "{:?}", end[0]);
+    assert_eq!(end[0], end[1]);
+}
+
+#[test]
 fn balls_of_any_mass_exchange_momentum_as_they_should() {
     for (masses, e) in [([1.0, 1.0], 1.0), ([1.0, 3.0], 1.0), ([2.0, 1.0], 0.5), ([1.0, 1e6], 0.0)]
     {

@@ -1,6 +1,6 @@
 use cgmath::{InnerSpace, Zero};
 
-use crate::math::{Scalar, Vec3};
+use crate::math::{Scalar, Vec3, length};
 use crate::response::Material;
 
 /// How easily a contact's two points come apart: the change of their relative
@@ -63,10 +63,11 @@ pub fn impact<S: Scalar>(
     normal * pressure + at_most(stop, material.friction * pressure)
 }
 
-/// The vector, shortened to this length if it is longer.
-pub(super) fn at_most<S: Scalar>(v: Vec3<S>, length: S) -> Vec3<S> {
-    let squared = v.magnitude2();
-    if squared > length * length { v * (length / squared.sqrt()) } else { v }
+/// The vector, shortened to this length if it is longer. Impulses of small marbles are
+/// so small that their squares vanish.
+pub(super) fn at_most<S: Scalar>(v: Vec3<S>, most: S) -> Vec3<S> {
+    let length = length(v);
+    if length > most { v * (most / length) } else { v }
 }
 
 #[cfg(test)]

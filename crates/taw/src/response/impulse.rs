@@ -51,7 +51,8 @@ pub(crate) struct Constraint<S> {
     /// least this, across it this if friction suffices.
     rebound: S,
     slide: Vec3<S>,
-    /// What was applied so far, in N s.
+    /// The impulse that was applied so far, times the mobility along the normal: in
+    /// m/s, which a pebble and a boulder have in common.
     pressure: S,
     grip: Vec3<S>,
 }
@@ -233,19 +234,23 @@ impl<S: Scalar> Columns<'_, S> {
     fn solve(&mut self, c: &mut Constraint<S>, spin: BallSpin) -> S {
         let closing = self.closing(c.a, c.b, c.normal, c.surface);
         let along = closing.dot(c.normal);
-        let wanted = c.pressure + (c.rebound - along) / c.mobility.normal;
-        let pressure = wanted.max(S::zero());
+        let pressure = (c.pressure + c.rebound - along).max(S::zero());
         let sliding = closing - c.normal * along;
-        let grip = c.grip + (c.slide - sliding) / c.mobility.tangent;
+        let grip = c.grip + (c.slide - sliding) * (c.mobility.normal / c.mobility.tangent);
         let grip = at_most(grip, c.friction * pressure);
         let change = c.normal * (pressure - c.pressure) + (grip - c.grip);
+        if !is_finite(change) {
+            return S::zero(); // an overflow here must not reach the other one
+        }
         (c.pressure, c.grip) = (pressure, grip);
         self.hit_both(c, change, spin);
-        change.magnitude() * c.mobility.normal
+        change.magnitude()
     }
 
-    /// Applies an impulse to the second of a contact, and its opposite to the first.
-    fn hit_both(&mut self, c: &Constraint<S>, impulse: Vec3<S>, spin: BallSpin) {
+    /// Applies an impulse to the second of a contact, and its opposite to the first;
+    /// `change` is the impulse times the mobility along the normal.
+    fn hit_both(&mut self, c: &Constraint<S>, change: Vec3<S>, spin: BallSpin) {
+        let impulse = change / c.mobility.normal;
         if let First::Marble(a) = c.a {
             self.hit(a, -impulse, -c.normal, spin);
         }

@@ -2,7 +2,8 @@ use crate::Error;
 use crate::error::within;
 use crate::math::Scalar;
 
-/// What a surface is made of, as far as a contact can tell.
+/// What a marble's surface is made of, as far as a contact can tell. Against a wall its
+/// own counts, between two marbles what [`Material::against`] says.
 ///
 /// [`Response::Displacement`] knows neither bounce nor friction and does not read it.
 ///

@@ -200,7 +200,8 @@ impl<S: Scalar> World<S> {
         for (a, plane) in self.walls.planes().iter().enumerate() {
             for b in 0..self.marbles.len() {
                 let sphere = self.marbles.sphere(b);
-                let near = || plane.signed_distance(sphere.center) - sphere.radius <= reach;
+                let gap = || plane.signed_distance(sphere.center) - sphere.radius;
+                let near = || reach > S::zero() && gap() <= reach;
                 let mtv = mtv_sphere_plane(&sphere, plane);
                 if let Some(mtv) = mtv.or_else(|| near().then_some(nothing)) {
                     let (a, b) = (a as u32, b as u32);
@@ -254,12 +255,16 @@ impl<S: Scalar> World<S> {
                     self.warm.clear();
                     self.warm_removals = removals;
                 }
+                let spin = match self.model.rotation {
+                    Rotation::Dynamic => BallSpin::Free,
+                    Rotation::None | Rotation::Rolling => BallSpin::Ignored,
+                };
+                if spin == BallSpin::Ignored {
+                    columns.spin = &mut []; // what is only shown is not felt
+                }
                 let settings = Settings {
                     iterations: self.model.iterations,
-                    spin: match self.model.rotation {
-                        Rotation::Dynamic => BallSpin::Free,
-                        Rotation::None | Rotation::Rolling => BallSpin::Ignored,
-                    },
+                    spin,
                     dt,
                     bounce_speed: length(self.gravity) * dt * S::constant(2.0),
                 };
