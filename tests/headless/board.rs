@@ -36,9 +36,10 @@ fn marbles_stay_on_the_board_while_it_tilts_for_60_seconds() {
     assert!(deepest < 0.2, "a marble was {deepest} m deep in a wall");
     let impulse =
         Model { response: Response::Impulse, rotation: Rotation::Dynamic, ..displacement };
-    // The way of a marble in a substep: up to 10 m/s for 1/256 s.
+    // For a few steps, a small one may be pinched between a rail and one that weighs up
+    // to 27 times as much; its center stays well in front of the wall.
     let deepest = deepest_while_tilting(impulse);
-    assert!(deepest < 0.04, "a marble was {deepest} m deep in a wall");
+    assert!(deepest < 0.1, "a marble was {deepest} m deep in a wall");
 }
 
 /// How deep, in metres, any of 60 marbles ever was in a wall of a tilting board.

@@ -67,6 +67,33 @@ fn a_start_says_how_hard_and_where_from() {
 }
 
 #[test]
+fn a_fall_is_heard_at_its_speed_by_every_response() {
+    for response in [Response::Displacement, Response::Impulse] {
+        for tenths in 5..25_u8 {
+            let mut app = scene::app();
+            app.add_message::<ContactStarted>();
+            app.world_mut().resource_mut::<TawModel>().response = response;
+            scene::floor(&mut app);
+            let height = f32::from(tenths) / 10.0;
+            scene::drop_marble(&mut app, 0.2, Vec3::Y * (0.2 + height));
+            let mut heard = None;
+            for _ in 0..64 {
+                app.update();
+                let messages = app.world().resource::<Messages<ContactStarted>>();
+                heard = heard.or(messages.iter_current_update_messages().next().copied());
+            }
+            let heard = heard.expect("it fell for a second");
+            let exact = (2.0 * 9.81 * height).sqrt();
+            // Semi-implicit Euler is slower by g h / 2 at the same height, and it is heard
+            // at the end of the step, which adds up to g h.
+            let off = heard.approach_speed - exact;
+            assert!(off.abs() < 0.51 * 9.81 * scene::STEP, "{response:?}, {height} m: {off}");
+            assert_eq!(heard.normal, Vec3::Y);
+        }
+    }
+}
+
+#[test]
 fn a_despawned_marble_ends_its_contacts() {
     let mut app = listening_app();
     let floor = scene::floor(&mut app);

@@ -54,7 +54,7 @@ impl ContactPair {
 pub struct ContactStarted {
     /// Who.
     pub pair: ContactPair,
-    /// The unit vector from `a` toward `b`; zero if they just touch without overlap.
+    /// The unit vector from `a` toward `b`.
     pub normal: Vec3,
     /// How fast the two marbles, or the marble and a wall thought at rest, came
     /// together along the normal, in m/s. Negative if they were already parting.
@@ -105,17 +105,18 @@ pub(crate) fn are_read(
     started.is_some() || ongoing.is_some() || ended.is_some()
 }
 
-/// Notes who touches in this substep, before anything is restituted.
+/// Notes who overlaps in this substep, before anything is restituted. What only comes
+/// near has no normal yet, and hits nothing.
 pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
     let velocity = |row: u32| world.marbles.velocity()[row as usize];
     let started = |pair: ContactPair, contact: &Contact<f32>, closing: TawVec3<f32>| {
-        let normal = direction_and_length(contact.mtv).map_or(Vec3::ZERO, |(n, _)| from_vector(n));
+        let normal = from_vector(direction_and_length(contact.mtv)?.0);
         let approach_speed = -from_vector(closing).dot(normal);
-        ContactStarted { pair, normal, approach_speed }
+        Some(ContactStarted { pair, normal, approach_speed })
     };
     for contact in &world.contacts.wm {
         if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
-            touches.now.push(started(ContactPair { a, b }, contact, velocity(contact.b)));
+            touches.now.extend(started(ContactPair { a, b }, contact, velocity(contact.b)));
         }
     }
     for contact in &world.contacts.mm {
@@ -125,10 +126,13 @@ pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
             let mut touch = started(ContactPair { a, b }, contact, closing);
             if b < a {
                 // Rows move about; the order of entities does not.
-                touch.pair = ContactPair { a: b, b: a };
-                touch.normal = -touch.normal;
+                touch = touch.map(|touch| ContactStarted {
+                    pair: ContactPair { a: b, b: a },
+                    normal: -touch.normal,
+                    ..touch
+                });
             }
-            touches.now.push(touch);
+            touches.now.extend(touch);
         }
     }
 }
