@@ -114,7 +114,7 @@ impl<S: Scalar> World<S> {
     /// Changes how the next step is done.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for the substeps.
+    /// [`Error::OutOfRange`] for the substeps or the iterations.
     pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
         self.model = model.checked()?;
         self.warm.clear();
@@ -193,6 +193,9 @@ impl<S: Scalar> World<S> {
     }
 
     /// The second verb: finds who touches whom, and by how much.
+    ///
+    /// For [`Response::Impulse`], that is also who is so near that gravity closes the
+    /// gap within two substeps; the displacement of these is zero.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
         let reach = self.reach;
