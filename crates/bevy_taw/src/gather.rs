@@ -2,6 +2,7 @@
 
 use bevy::math::Isometry3d;
 use bevy::prelude::*;
+use taw::motion::Rotation;
 use taw::shape::Plane;
 use taw::world::{self as core, WallMotion};
 
@@ -117,8 +118,16 @@ pub fn marbles(
     mut marbles: Query<MarbleComponents>,
     transforms: TransformHelper,
     mut refused: MessageWriter<InputRefused>,
+    mut last_rotation: Local<Rotation>,
 ) {
+    // The world's own columns for it begin unturned; the components know better.
+    let rotation = world.model().rotation;
+    let begins_to_turn = *last_rotation == Rotation::None && rotation != Rotation::None;
+    *last_rotation = rotation;
     for (entity, marble, transform, optional, is_child, mut state) in &mut marbles {
+        if begins_to_turn {
+            (state.seen.rotation, state.seen.spin) = ([0; 4], None); // no rotation's bits
+        }
         let (velocity, spin, mass, gravity_scale, material, integrator) = optional;
         let seen = SeenMarble {
             translation: bits(transform.translation),
