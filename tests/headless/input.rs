@@ -113,7 +113,7 @@ fn settings_and_components_are_open_to_reflection() {
         "bevy_taw::components::Spin",
         "bevy_taw::components::MarbleMass",
         "bevy_taw::components::GravityScale",
-        "bevy_taw::components::MarbleMaterial",
+        "bevy_taw::components::SurfaceMaterial",
         "bevy_taw::components::MarbleIntegrator",
         "bevy_taw::resources::TawModel",
         "bevy_taw::resources::Gravity",

@@ -136,7 +136,7 @@ fn a_material_says_how_high_a_marble_bounces() {
         app.world_mut().resource_mut::<TawModel>().substeps = 16;
         scene::floor(&mut app);
         let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 1.5);
-        let material = MarbleMaterial { restitution, ..default() };
+        let material = SurfaceMaterial { restitution, ..default() };
         app.world_mut().entity_mut(marble).insert(material);
         scene::frames(&mut app, 32);
         let mut highest = 0.5_f32;

@@ -94,7 +94,7 @@ fn optional_components_are_taken_over_and_taken_back() {
     };
     app.world_mut().entity_mut(marble).insert((
         Velocity(Vec3::X * 3.0),
-        MarbleMaterial { friction: 0.25, ..default() },
+        SurfaceMaterial { friction: 0.25, ..default() },
         MarbleIntegrator(Integrator::ExplicitEuler),
     ));
     app.update();
@@ -103,7 +103,7 @@ fn optional_components_are_taken_over_and_taken_back() {
     assert_eq!(app.world().get::<Velocity>(marble).unwrap().y, -30.0 * scene::STEP);
     assert_eq!(core(&app).material.unwrap().friction, 0.25);
     app.world_mut().get_mut::<Velocity>(marble).unwrap().0 = Vec3::ZERO;
-    app.world_mut().entity_mut(marble).remove::<(MarbleMaterial, MarbleIntegrator)>();
+    app.world_mut().entity_mut(marble).remove::<(SurfaceMaterial, MarbleIntegrator)>();
     app.update();
     assert_eq!((core(&app).material, core(&app).integrator), (None, None));
     assert_eq!(scene::position(&app, marble).x, 3.0 * scene::STEP, "it was stopped");

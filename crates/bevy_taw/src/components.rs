@@ -4,10 +4,10 @@
 use bevy::math::Isometry3d;
 use bevy::prelude::*;
 use taw::motion::Integrator;
-use taw::response::Material;
+use taw::response::{Combine, Elasticity, Material};
 use taw::world::{MarbleId, Mass, WallId};
 
-use crate::reflect::IntegratorReflect;
+use crate::reflect::{CombineReflect, IntegratorReflect};
 
 /// A marble: a ball that moves and collides.
 ///
@@ -78,12 +78,12 @@ impl Default for GravityScale {
     }
 }
 
-/// What a marble is made of, as far as its contacts can tell. Against a wall its own
-/// counts, between two marbles the mean; the response
-/// [`Displacement`](taw::response::Response::Displacement) does not read it.
+/// What a marble or a wall is made of, as far as its contacts can tell. A wall without
+/// one leaves it to the marble; else both count, as [`combine`](Self::combine) says. The
+/// response [`Displacement`](taw::response::Response::Displacement) does not read it.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
-pub struct MarbleMaterial {
+pub struct SurfaceMaterial {
     /// The part of the approach speed that a bounce gives back, in `[0, 1]`.
     pub restitution: f32,
     /// The largest friction force over the normal force (Coulomb), at least zero.
@@ -92,20 +92,94 @@ pub struct MarbleMaterial {
     /// in `[-1, 1]`, as far as friction can: 0 stops them, 1 is a superball, −1 slides
     /// freely.
     pub tangential_restitution: f32,
+    /// The torque that resists rolling, over normal force times radius, at least zero.
+    pub rolling_resistance: f32,
+    /// The torque that resists spinning on the spot, over normal force times radius, at
+    /// least zero.
+    pub spinning_resistance: f32,
+    /// Young's modulus in pascals, above zero, and Poisson's ratio in `[0, 0.5]`, for the
+    /// response of Hertz and Mindlin.
+    pub elasticity: [f32; 2],
+    /// What counts against another material.
+    #[reflect(remote = CombineReflect)]
+    pub combine: Combine,
 }
 
-impl Default for MarbleMaterial {
-    /// Somewhat bouncy, somewhat rough: 0.5 and 0.3.
+impl Default for SurfaceMaterial {
+    /// Somewhat bouncy, somewhat rough: 0.5 and 0.3. Nothing resists rolling.
     fn default() -> Self {
-        let Material { restitution, friction, tangential_restitution } = Material::default();
-        Self { restitution, friction, tangential_restitution }
+        let material = Material::default();
+        let Elasticity { youngs_modulus, poissons_ratio } = material.elasticity;
+        Self {
+            restitution: material.restitution,
+            friction: material.friction,
+            tangential_restitution: material.tangential_restitution,
+            rolling_resistance: material.rolling_resistance,
+            spinning_resistance: material.spinning_resistance,
+            elasticity: [youngs_modulus, poissons_ratio],
+            combine: material.combine,
+        }
     }
 }
 
-impl From<MarbleMaterial> for Material<f32> {
-    fn from(material: MarbleMaterial) -> Self {
-        let MarbleMaterial { restitution, friction, tangential_restitution } = material;
-        Self { restitution, friction, tangential_restitution }
+impl From<SurfaceMaterial> for Material<f32> {
+    fn from(material: SurfaceMaterial) -> Self {
+        let [youngs_modulus, poissons_ratio] = material.elasticity;
+        Self {
+            restitution: material.restitution,
+            friction: material.friction,
+            tangential_restitution: material.tangential_restitution,
+            rolling_resistance: material.rolling_resistance,
+            spinning_resistance: material.spinning_resistance,
+            elasticity: Elasticity { youngs_modulus, poissons_ratio },
+            combine: material.combine,
+        }
+    }
+}
+
+/// Slows a marble wherever it is: each second takes `1 − e^−rate` of its speed.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct MarbleDamping {
+    /// Of the velocity, in 1/s, at least zero.
+    pub linear: f32,
+    /// Of the spin, in 1/s, at least zero; counts if the model's rotation is dynamic.
+    pub angular: f32,
+}
+
+/// Pushes and turns a marble in every step for as long as it has this.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct ExternalForce {
+    /// At the center, in newtons, in world space.
+    pub force: Vec3,
+    /// In N m, an axial vector in world space; counts if the model's rotation is dynamic.
+    pub torque: Vec3,
+}
+
+impl ExternalForce {
+    /// A force at a point relative to the marble's center, in metres.
+    #[must_use]
+    pub fn at(force: Vec3, lever: Vec3) -> Self {
+        Self { force, torque: lever.cross(force) }
+    }
+}
+
+/// Hits a marble in the next step, which sets it back to zero.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct ExternalImpulse {
+    /// At the center, in N s, in world space.
+    pub impulse: Vec3,
+    /// In kg m²/s, an axial vector in world space; counts in a model with rotation.
+    pub angular: Vec3,
+}
+
+impl ExternalImpulse {
+    /// A hit at a point relative to the marble's center, in metres.
+    #[must_use]
+    pub fn at(impulse: Vec3, lever: Vec3) -> Self {
+        Self { impulse, angular: lever.cross(impulse) }
     }
 }
 
@@ -156,7 +230,8 @@ pub(crate) struct SeenMarble {
     /// Which kind of mass, and its number.
     pub mass: Option<(u8, u32)>,
     pub gravity_scale: Option<u32>,
-    pub material: Option<[u32; 3]>,
+    pub damping: Option<[u32; 2]>,
+    pub material: Option<([u32; 7], Combine)>,
     pub integrator: Option<Integrator>,
 }
 
@@ -169,6 +244,24 @@ pub(crate) struct WallState {
     pub id: Option<WallId>,
     /// Point and direction in world space as last gathered, to the bit.
     pub seen: Option<[[u32; 3]; 2]>,
+    /// Its material as last gathered, to the bit.
+    pub material: Option<([u32; 7], Combine)>,
+}
+
+impl SurfaceMaterial {
+    /// The bits of its numbers, and its rule.
+    pub(crate) fn bits(&self) -> ([u32; 7], Combine) {
+        let numbers = [
+            self.restitution,
+            self.friction,
+            self.tangential_restitution,
+            self.rolling_resistance,
+            self.spinning_resistance,
+            self.elasticity[0],
+            self.elasticity[1],
+        ];
+        (numbers.map(f32::to_bits), self.combine)
+    }
 }
 
 impl MarbleMass {

@@ -21,7 +21,8 @@ use bevy::prelude::*;
 use bevy_egui::egui::{self, Ui};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 use taw::motion::{Integrator, Rotation};
-use taw::response::Response;
+use taw::response::{ContactLaw, Response};
+use taw::world::Precision;
 
 use crate::diagnostics as paths;
 use crate::resources::{Gravity, TawModel};
@@ -32,15 +33,23 @@ pub fn model(ui: &mut Ui, model: &mut ResMut<TawModel>) {
     let mut chosen = ***model;
     egui::Grid::new("taw model").num_columns(2).show(ui, |ui| {
         choice(ui, "Integrator", &mut chosen.integrator, &Integrator::ALL, integrator_name);
-        let responses = [Response::Displacement, Response::Impulse];
+        let responses = [
+            Response::Displacement,
+            Response::Impulse,
+            Response::Penalty(ContactLaw::SpringDashpot),
+            Response::Penalty(ContactLaw::HertzMindlin),
+            Response::EventDriven,
+        ];
         choice(ui, "Response", &mut chosen.response, &responses, response_name);
         let rotations = [Rotation::None, Rotation::Rolling, Rotation::Dynamic];
         choice(ui, "Rotation", &mut chosen.rotation, &rotations, rotation_name);
+        let precisions = [Precision::Plain, Precision::Compensated];
+        choice(ui, "Precision", &mut chosen.precision, &precisions, precision_name);
         ui.label("Substeps");
         ui.add(egui::Slider::new(&mut chosen.substeps, 1..=16));
         ui.end_row();
         ui.label("Iterations");
-        let used = chosen.response == Response::Impulse;
+        let used = matches!(chosen.response, Response::Impulse | Response::EventDriven);
         ui.add_enabled(used, egui::Slider::new(&mut chosen.iterations, 1..=64));
         ui.end_row();
     });
@@ -165,5 +174,15 @@ fn response_name(response: Response) -> &'static str {
     match response {
         Response::Displacement => "Displacement",
         Response::Impulse => "Impulse",
+        Response::Penalty(ContactLaw::SpringDashpot) => "Penalty: spring–dashpot",
+        Response::Penalty(ContactLaw::HertzMindlin) => "Penalty: Hertz–Mindlin",
+        Response::EventDriven => "Event-driven",
+    }
+}
+
+fn precision_name(precision: Precision) -> &'static str {
+    match precision {
+        Precision::Plain => "Plain",
+        Precision::Compensated => "Compensated",
     }
 }

@@ -7,8 +7,9 @@ use taw::shape::Plane;
 use taw::world::{self as core, WallMotion};
 
 use crate::components::{
-    GravityScale, Marble, MarbleIntegrator, MarbleMass, MarbleMaterial, MarbleState, SeenMarble,
-    Spin, Velocity, Wall, WallState, bits, rotation_bits,
+    ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
+    MarbleMass, MarbleState, SeenMarble, Spin, SurfaceMaterial, Velocity, Wall, WallState, bits,
+    rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
@@ -25,7 +26,7 @@ pub fn settings(
     mut refused: MessageWriter<InputRefused>,
 ) {
     times.begin_step();
-    world.clear_stopped();
+    world.begin_step();
     let mut check = |result: Result<(), taw::Error>| {
         if let Err(error) = result {
             InputRefused::write(&mut refused, None, error);
@@ -45,12 +46,12 @@ pub fn settings(
 /// Puts new walls in and moves those that moved.
 pub fn walls(
     mut world: ResMut<TawWorld>,
-    mut walls: Query<(Entity, &Wall, &mut WallState)>,
+    mut walls: Query<(Entity, &Wall, Option<&SurfaceMaterial>, &mut WallState)>,
     transforms: TransformHelper,
     time: Res<Time>,
     mut refused: MessageWriter<InputRefused>,
 ) {
-    for (entity, wall, mut state) in &mut walls {
+    for (entity, wall, material, mut state) in &mut walls {
         let Ok(transform) = transforms.compute_global_transform(entity) else {
             continue; // a parent without a Transform: nobody can say where this is
         };
@@ -65,21 +66,29 @@ pub fn walls(
         }
         state.last = Some(now);
         let seen = Some([bits(transform.translation()), bits(normal)]);
-        if state.seen == seen {
-            continue;
-        }
+        let moved = state.seen != seen;
         state.seen = seen;
-        let result = Plane::through(to_point(transform.translation()), to_vector(normal)).and_then(
-            |plane| match state.id {
+        let mut check = |result: Result<(), taw::Error>| {
+            if let Err(error) = result {
+                InputRefused::write(&mut refused, Some(entity), error);
+            }
+        };
+        if moved {
+            let plane = Plane::through(to_point(transform.translation()), to_vector(normal));
+            check(plane.and_then(|plane| match state.id {
                 Some(id) => world.walls.set(id, plane),
                 None => world.walls.insert(plane).map(|id| {
                     world.wall_entities.insert(id, entity);
                     state.id = Some(id);
                 }),
-            },
-        );
-        if let Err(error) = result {
-            InputRefused::write(&mut refused, Some(entity), error);
+            }));
+        }
+        let made_of = material.map(SurfaceMaterial::bits);
+        if let Some(id) = state.id
+            && state.material != made_of
+        {
+            state.material = made_of;
+            check(world.walls.set_material(id, material.map(|material| (*material).into())));
         }
     }
 }
@@ -104,7 +113,8 @@ type MarbleComponents<'a> = (
         Option<&'a Spin>,
         Option<&'a MarbleMass>,
         Option<&'a GravityScale>,
-        Option<&'a MarbleMaterial>,
+        Option<&'a MarbleDamping>,
+        Option<&'a SurfaceMaterial>,
         Option<&'a MarbleIntegrator>,
     ),
     Has<ChildOf>,
@@ -128,7 +138,7 @@ pub fn marbles(
         if begins_to_turn {
             (state.seen.rotation, state.seen.spin) = ([0; 4], None); // no rotation's bits
         }
-        let (velocity, spin, mass, gravity_scale, material, integrator) = optional;
+        let (velocity, spin, mass, gravity_scale, damping, material, integrator) = optional;
         let seen = SeenMarble {
             translation: bits(transform.translation),
             rotation: rotation_bits(transform.rotation),
@@ -137,8 +147,8 @@ pub fn marbles(
             spin: spin.map(|s| bits(**s)),
             mass: mass.map(|m| m.bits()),
             gravity_scale: gravity_scale.map(|g| g.to_bits()),
-            material: material
-                .map(|m| [m.restitution, m.friction, m.tangential_restitution].map(f32::to_bits)),
+            damping: damping.map(|d| [d.linear, d.angular].map(f32::to_bits)),
+            material: material.map(SurfaceMaterial::bits),
             integrator: integrator.map(|i| **i),
         };
         if state.seen == seen && state.id.is_some() {
@@ -161,6 +171,10 @@ pub fn marbles(
             spin: to_vector(spin.map_or(Vec3::ZERO, |s| **s)),
             mass: mass.copied().unwrap_or_default().into(),
             gravity_scale: *gravity_scale.copied().unwrap_or_default(),
+            damping: damping.map_or_else(core::Damping::default, |d| core::Damping {
+                linear: d.linear,
+                angular: d.angular,
+            }),
             integrator: seen.integrator,
             material: material.map(|m| (*m).into()),
         };
@@ -216,11 +230,44 @@ fn update(
     if seen.gravity_scale != last.gravity_scale {
         check(marbles.set_gravity_scale(id, now.gravity_scale));
     }
+    if seen.damping != last.damping {
+        check(marbles.set_damping(id, now.damping));
+    }
     if seen.material != last.material {
         check(marbles.set_material(id, now.material));
     }
     if seen.integrator != last.integrator {
         check(marbles.set_integrator(id, now.integrator));
+    }
+}
+
+/// Applies what pushes and hits single marbles.
+pub fn forces(
+    mut world: ResMut<TawWorld>,
+    forces: Query<(Entity, &ExternalForce, &MarbleState)>,
+    mut impulses: Query<(Entity, &mut ExternalImpulse, &MarbleState)>,
+    mut refused: MessageWriter<InputRefused>,
+) {
+    let mut check = |entity, result: Result<(), taw::Error>| {
+        if let Err(error) = result {
+            InputRefused::write(&mut refused, Some(entity), error);
+        }
+    };
+    for (entity, ExternalForce { force, torque }, state) in &forces {
+        if let Some(id) = state.id {
+            check(entity, world.marbles.apply_force(id, to_vector(*force)));
+            check(entity, world.marbles.apply_torque(id, to_vector(*torque)));
+        }
+    }
+    for (entity, mut hit, state) in &mut impulses {
+        let ExternalImpulse { impulse, angular } = *hit;
+        if let Some(id) = state.id
+            && *hit != ExternalImpulse::default()
+        {
+            check(entity, world.marbles.apply_impulse(id, to_vector(impulse)));
+            check(entity, world.marbles.apply_angular_impulse(id, to_vector(angular)));
+            *hit = ExternalImpulse::default();
+        }
     }
 }
 

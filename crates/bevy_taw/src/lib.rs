@@ -78,7 +78,8 @@ pub use taw;
 /// What nearly every game needs.
 pub mod prelude {
     pub use crate::components::{
-        GravityScale, Marble, MarbleIntegrator, MarbleMass, MarbleMaterial, Spin, Velocity, Wall,
+        ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
+        MarbleMass, Spin, SurfaceMaterial, Velocity, Wall,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;
@@ -87,8 +88,8 @@ pub mod prelude {
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
     pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
     pub use taw::motion::{Force, Integrator, Medium, Rotation};
-    pub use taw::response::Response;
-    pub use taw::world::Model;
+    pub use taw::response::{Combine, ContactLaw, Response};
+    pub use taw::world::{Model, Precision};
 }
 
 /// Compiles what the README shows.

@@ -88,6 +88,8 @@ pub(crate) struct Touches {
     now: Vec<ContactStarted>,
     /// Sorted, one to a pair.
     before: Vec<ContactPair>,
+    /// How many of this step's impacts were noted.
+    impacts: usize,
 }
 
 type Readers<'w> = (
@@ -137,6 +139,25 @@ pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
     }
 }
 
+/// Notes the collisions that the response went through by itself.
+pub(crate) fn collect_impacts(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
+    // The list grows from substep to substep.
+    for impact in world.impacts().iter().skip(touches.impacts) {
+        let first = if impact.on_wall { TawWorld::wall_entity } else { TawWorld::marble_entity };
+        let (Some(a), Some(b)) = (first(&world, impact.a), world.marble_entity(impact.b)) else {
+            continue;
+        };
+        let normal = from_vector(impact.normal);
+        let swap = !impact.on_wall && b < a;
+        touches.now.push(ContactStarted {
+            pair: if swap { ContactPair { a: b, b: a } } else { ContactPair { a, b } },
+            normal: if swap { -normal } else { normal },
+            approach_speed: impact.approach_speed,
+        });
+    }
+    touches.impacts = world.impacts().len();
+}
+
 /// Compares this step's touches with the last one's.
 pub(crate) fn write(
     mut touches: ResMut<Touches>,
@@ -146,7 +167,8 @@ pub(crate) fn write(
     marbles: Query<&MarbleState>,
     walls: Query<&WallState>,
 ) {
-    let Touches { now, before } = &mut *touches;
+    let Touches { now, before, impacts } = &mut *touches;
+    *impacts = 0;
     let fall = from_vector(world.gravity()).length() * delta.0 * delta.0;
     now.extend(before.iter().filter_map(|&pair| {
         let gap = gap(pair, &world, &marbles, &walls)?;

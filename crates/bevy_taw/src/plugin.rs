@@ -3,7 +3,8 @@ use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
 
 use crate::components::{
-    GravityScale, Marble, MarbleIntegrator, MarbleMass, MarbleMaterial, Spin, Velocity, Wall,
+    ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
+    MarbleMass, Spin, SurfaceMaterial, Velocity, Wall,
 };
 use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
@@ -86,7 +87,8 @@ impl Plugin for TawPlugin {
             .add_message::<InputRefused>()
             .add_message::<MarbleStopped>();
         app.register_type::<(Marble, Velocity, Spin, MarbleMass, GravityScale)>()
-            .register_type::<(MarbleMaterial, MarbleIntegrator, Wall)>()
+            .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
+            .register_type::<(SurfaceMaterial, MarbleIntegrator, Wall)>()
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
 
@@ -98,7 +100,7 @@ impl Plugin for TawPlugin {
         .add_systems(
             FixedUpdate,
             (
-                (gather::settings, gather::walls, gather::marbles, gather::finish)
+                (gather::settings, gather::walls, gather::marbles, gather::forces, gather::finish)
                     .chain()
                     .in_set(TawSystems::Gather),
                 run_substeps.in_set(TawSystems::Step),
@@ -125,6 +127,7 @@ impl Plugin for TawPlugin {
                     .after(TawSystems::GenerateContacts)
                     .before(TawSystems::Restitute),
                 restitute.in_set(TawSystems::Restitute),
+                messages::collect_impacts.run_if(messages::are_read).after(TawSystems::Restitute),
             ),
         )
         // One verb after the other: threads would only have to be woken for each.
@@ -144,6 +147,7 @@ fn run_substeps(world: &mut World) {
             schedule.run(world);
         }
     });
+    world.resource_mut::<TawWorld>().marbles.clear_forces();
 }
 
 fn integrate(mut world: ResMut<TawWorld>, delta: Res<SubstepDelta>, mut times: ResMut<StepTimes>) {

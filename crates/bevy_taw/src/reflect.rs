@@ -34,6 +34,37 @@ pub enum RotationReflect {
 pub enum ResponseReflect {
     Displacement,
     Impulse,
+    Penalty(#[reflect(remote = ContactLawReflect)] taw::response::ContactLaw),
+    EventDriven,
+}
+
+/// Mirrors [`taw::response::ContactLaw`].
+#[reflect_remote(taw::response::ContactLaw)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub enum ContactLawReflect {
+    SpringDashpot,
+    HertzMindlin,
+}
+
+/// Mirrors [`taw::response::Combine`].
+#[reflect_remote(taw::response::Combine)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub enum CombineReflect {
+    Mean,
+    Smallest,
+    Product,
+    Largest,
+}
+
+/// Mirrors [`taw::world::Precision`].
+#[reflect_remote(taw::world::Precision)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub enum PrecisionReflect {
+    Plain,
+    Compensated,
 }
 
 /// Mirrors [`taw::world::Model`].
@@ -47,6 +78,8 @@ pub struct ModelReflect {
     pub response: taw::response::Response,
     #[reflect(remote = RotationReflect)]
     pub rotation: taw::motion::Rotation,
+    #[reflect(remote = PrecisionReflect)]
+    pub precision: taw::world::Precision,
     pub substeps: u32,
     pub iterations: u32,
 }

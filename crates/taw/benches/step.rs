@@ -7,7 +7,6 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
-use taw::motion::Rotation;
 use taw::prelude::*;
 
 const DT: f32 = 1.0 / 60.0;

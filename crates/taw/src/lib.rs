@@ -28,6 +28,7 @@
 //! | room | what for |
 //! |---|---|
 //! | [`math`] | names for cgmath's types, the [`Scalar`](math::Scalar), lengths that neither overflow nor vanish |
+//! | [`frame`] | where a thing is and how it is turned: bivectors, motors |
 //! | [`shape`] | what a thing is: sphere, plane |
 //! | [`contact`] | when things touch, and the shortest way apart |
 //! | [`broad`] | who might touch: a grid for marbles |
@@ -51,6 +52,7 @@
 pub mod broad;
 pub mod contact;
 mod error;
+pub mod frame;
 pub mod math;
 pub mod motion;
 pub mod response;
@@ -63,9 +65,9 @@ pub use error::Error;
 pub mod prelude {
     pub use crate::contact::{Contact, Contacts};
     pub use crate::math::{Point3, Scalar, Vec3};
-    pub use crate::motion::{Force, Integrator};
-    pub use crate::response::{Material, Response};
+    pub use crate::motion::{Force, Integrator, Rotation};
+    pub use crate::response::{Combine, ContactLaw, Material, Response};
     pub use crate::shape::{Plane, Sphere};
-    pub use crate::world::{Marble, MarbleId, Mass, Model, WallId, World};
+    pub use crate::world::{Marble, MarbleId, Mass, Model, Precision, WallId, World};
     pub use cgmath::prelude::*;
 }

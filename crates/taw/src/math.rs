@@ -34,11 +34,27 @@ pub trait Scalar: BaseFloat + Default + Send + Sync + 'static {
     /// on every machine, which the platform's own cannot promise.
     #[must_use]
     fn sin_cos_portable(self) -> (Self, Self);
+
+    /// e to the power of this, likewise.
+    #[must_use]
+    fn exp_portable(self) -> Self;
+
+    /// The natural logarithm, likewise.
+    #[must_use]
+    fn ln_portable(self) -> Self;
 }
 
 impl Scalar for f32 {
     fn sin_cos_portable(self) -> (Self, Self) {
         libm::sincosf(self)
+    }
+
+    fn exp_portable(self) -> Self {
+        libm::expf(self)
+    }
+
+    fn ln_portable(self) -> Self {
+        libm::logf(self)
     }
 }
 
@@ -46,6 +62,28 @@ impl Scalar for f64 {
     fn sin_cos_portable(self) -> (Self, Self) {
         libm::sincos(self)
     }
+
+    fn exp_portable(self) -> Self {
+        libm::exp(self)
+    }
+
+    fn ln_portable(self) -> Self {
+        libm::log(self)
+    }
+}
+
+/// The same vector in another scalar.
+#[must_use]
+#[inline]
+pub fn cast_vector<S: Scalar, T: Scalar>(v: Vec3<S>) -> Vec3<T> {
+    v.map(|x| T::constant(x.as_f64()))
+}
+
+/// The same point in another scalar.
+#[must_use]
+#[inline]
+pub fn cast_point<S: Scalar, T: Scalar>(p: Point3<S>) -> Point3<T> {
+    p.map(|x| T::constant(x.as_f64()))
 }
 
 /// The length of `v`, right also where squares of its components would overflow

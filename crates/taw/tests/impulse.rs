@@ -1,6 +1,5 @@
 //! Scenes with a known outcome, under `Response::Impulse`.
 
-use taw::motion::Rotation;
 use taw::prelude::*;
 use taw::world::WallMotion;
 
@@ -25,7 +24,7 @@ fn slope<S: Scalar>(degrees: f64, rotation: Rotation) -> (World<S>, Vec3<S>, Wal
 
 fn surface<S: Scalar>(restitution: f64, friction: f64) -> Material<S> {
     let (restitution, friction) = (S::constant(restitution), S::constant(friction));
-    Material { restitution, friction, tangential_restitution: S::zero() }
+    Material { restitution, friction, ..Material::default() }
 }
 
 /// A marble that touches a wall through the origin.

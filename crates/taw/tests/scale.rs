@@ -1,7 +1,6 @@
 //! No tolerance, slop or threshold is in metres: a scene and its model are the same
 //! scene at every size.
 
-use taw::motion::Rotation;
 use taw::prelude::*;
 
 /// A small heap, dropped into a box, after two seconds of its own time: lengths are

@@ -3,7 +3,9 @@
 mod force;
 mod integrator;
 mod rotation;
+mod wall;
 
 pub use force::{Force, Medium};
 pub use integrator::{Integrator, Motion};
 pub use rotation::{FreeRotation, Rotation, turned};
+pub use wall::WallMotion;

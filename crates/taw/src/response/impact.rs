@@ -93,6 +93,7 @@ mod tests {
             restitution: S::constant(e),
             friction: S::constant(mu),
             tangential_restitution: S::constant(beta),
+            ..Material::default()
         }
     }
 

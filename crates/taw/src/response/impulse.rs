@@ -55,6 +55,20 @@ pub(crate) struct Constraint<S> {
     /// m/s, which a pebble and a boulder have in common.
     pressure: S,
     grip: Vec3<S>,
+    resistance: Option<Resistance<S>>,
+}
+
+/// What resists rolling and spinning in a contact.
+#[derive(Clone, Copy, Debug)]
+struct Resistance<S> {
+    /// The largest torque over the normal force, about the touching plane and about the
+    /// normal, in metres.
+    rolling: S,
+    spinning: S,
+    /// The change of the relative spin per angular impulse, in 1/(kg m²).
+    give: S,
+    /// The angular impulse that was applied so far, in kg m²/s.
+    twist: Vec3<S>,
 }
 
 /// What a contact needed in the last substep, which is a good guess for this one.
@@ -63,6 +77,7 @@ pub(crate) struct Warm<S> {
     key: (bool, usize, usize),
     pressure: S,
     grip: Vec3<S>,
+    twist: Vec3<S>,
 }
 
 impl<S: Scalar> Constraint<S> {
@@ -80,8 +95,8 @@ impl<S: Scalar> Constraint<S> {
 /// not of a pyramid, bounded by the accumulated normal impulse, restitution included.
 ///
 /// `material` gives that of a marble, `follow` how far its position follows a change of
-/// velocity in its step. The contacts' rows exist. Rows that end up infinite or NaN lose their velocity and are
-/// added to `stopped`.
+/// velocity in its step. The contacts' rows exist. Rows that end up infinite or NaN lose
+/// their velocity and are added to `stopped`.
 pub(crate) fn impulse<S: Scalar>(
     marbles: &mut Columns<S>,
     contacts: &mut Contacts<S>,
@@ -104,7 +119,8 @@ pub(crate) fn impulse<S: Scalar>(
         let (surface, inverse_mass, material) = match a {
             First::Wall(wall) => {
                 let touch = marbles.position[b] - normal * marbles.radius[b];
-                (walls.surface_velocity(wall, touch), S::zero(), own)
+                let material = walls.material(wall).map_or(own, |its| own.against(its));
+                (walls.surface_velocity(wall, touch), S::zero(), material)
             }
             First::Marble(a) => (Vec3::zero(), marbles.inverse_mass[a], own.against(material(a))),
         };
@@ -136,13 +152,17 @@ pub(crate) fn impulse<S: Scalar>(
             slide,
             pressure: S::zero(),
             grip: Vec3::zero(),
+            resistance: marbles.resistance(a, b, material, settings.spin),
         };
         // What bounces had nothing to bear before.
         let guess = warm.binary_search_by_key(&constraint.key(), |warm| warm.key);
         if let (Ok(at), false) = (guess, bounces) {
-            let Warm { pressure, grip, .. } = warm[at];
+            let Warm { pressure, grip, twist, .. } = warm[at];
             constraint.pressure = pressure;
             constraint.grip = grip - normal * grip.dot(normal);
+            if let Some(resistance) = &mut constraint.resistance {
+                resistance.twist = twist;
+            }
         }
         (mobility.normal > S::zero()).then_some(constraint)
     };
@@ -152,6 +172,9 @@ pub(crate) fn impulse<S: Scalar>(
 
     for c in constraints.iter() {
         marbles.hit_both(c, c.normal * c.pressure + c.grip, settings.spin);
+        if let Some(resistance) = c.resistance {
+            marbles.twist_both(c, resistance.twist);
+        }
     }
     for _ in 0..settings.iterations {
         let mut largest_change = S::zero();
@@ -180,6 +203,7 @@ pub(crate) fn impulse<S: Scalar>(
         key: c.key(),
         pressure: c.pressure,
         grip: c.grip,
+        twist: c.resistance.map_or_else(Vec3::zero, |resistance| resistance.twist),
     }));
     warm.sort_unstable_by_key(|warm| warm.key);
     for row in constraints.iter().flat_map(|c| [Some(c.b), c.a.marble()]).flatten() {
@@ -196,6 +220,8 @@ pub(crate) trait Walls<S> {
     fn normal_and_distance(&self, wall: usize, point: Point3<S>) -> (Vec3<S>, S);
     /// How its surface moves at a point, in m/s.
     fn surface_velocity(&self, wall: usize, point: Point3<S>) -> Vec3<S>;
+    /// Its own material, if it has one.
+    fn material(&self, wall: usize) -> Option<Material<S>>;
 }
 
 impl<S: Scalar> Columns<'_, S> {
@@ -225,11 +251,6 @@ impl<S: Scalar> Columns<'_, S> {
         velocity + normal.cross(rim)
     }
 
-    /// Radius times spin, in m/s; zero where spin is not modelled.
-    fn rim(&self, row: usize) -> Vec3<S> {
-        self.spin.get(row).map_or_else(Vec3::zero, |spin| *spin * self.radius[row])
-    }
-
     /// One step toward what a contact asks for. Gives the change of velocity.
     fn solve(&mut self, c: &mut Constraint<S>, spin: BallSpin) -> S {
         let closing = self.closing(c.a, c.b, c.normal, c.surface);
@@ -244,7 +265,69 @@ impl<S: Scalar> Columns<'_, S> {
         }
         (c.pressure, c.grip) = (pressure, grip);
         self.hit_both(c, change, spin);
+        self.resist(c);
         change.magnitude()
+    }
+
+    /// What resists rolling and spinning between two, or a wall and one, if anything does.
+    fn resistance(
+        &self,
+        a: First,
+        b: usize,
+        material: Material<S>,
+        spin: BallSpin,
+    ) -> Option<Resistance<S>> {
+        let Material { rolling_resistance, spinning_resistance, .. } = material;
+        let none = rolling_resistance == S::zero() && spinning_resistance == S::zero();
+        if none || spin == BallSpin::Ignored || self.spin.is_empty() {
+            return None;
+        }
+        // 1 / I of a solid ball.
+        let give = |row: usize| {
+            S::constant(2.5) * self.inverse_mass[row] / (self.radius[row] * self.radius[row])
+        };
+        let (radius, give) = match a {
+            First::Wall(_) => (self.radius[b], give(b)),
+            First::Marble(a) => {
+                let (r, s) = (self.radius[a], self.radius[b]);
+                (r * s / (r + s), give(a) + give(b))
+            }
+        };
+        (give > S::zero()).then(|| Resistance {
+            rolling: rolling_resistance * radius,
+            spinning: spinning_resistance * radius,
+            give,
+            twist: Vec3::zero(),
+        })
+    }
+
+    /// One step toward no relative spin, as far as the resistances can.
+    fn resist(&mut self, c: &mut Constraint<S>) {
+        let Some(resistance) = &mut c.resistance else { return };
+        let spin_of_a = c.a.marble().map_or_else(Vec3::zero, |a| self.spin[a]);
+        let relative = self.spin[c.b] - spin_of_a;
+        let wanted = resistance.twist - relative / resistance.give;
+        let force = c.pressure / c.mobility.normal;
+        let about = c.normal * wanted.dot(c.normal);
+        let twist = at_most(wanted - about, resistance.rolling * force)
+            + at_most(about, resistance.spinning * force);
+        let change = twist - resistance.twist;
+        if is_finite(change) {
+            resistance.twist = twist;
+            self.twist_both(c, change);
+        }
+    }
+
+    /// Applies an angular impulse to the second of a contact, its opposite to the first.
+    fn twist_both(&mut self, c: &Constraint<S>, twist: Vec3<S>) {
+        let per_twist = |row: usize| {
+            S::constant(2.5) * self.inverse_mass[row] / (self.radius[row] * self.radius[row])
+        };
+        let (a, b) = (c.a.marble().map(|a| (a, per_twist(a))), per_twist(c.b));
+        self.spin[c.b] += twist * b;
+        if let Some((a, by)) = a {
+            self.spin[a] -= twist * by;
+        }
     }
 
     /// Applies an impulse to the second of a contact, and its opposite to the first;

@@ -2,16 +2,23 @@
 //! same columns and the same contacts.
 
 mod displacement;
+pub(crate) mod event;
 mod impact;
-mod impulse;
+pub(crate) mod impulse;
 mod material;
+mod penalty;
 
 pub(crate) use displacement::displacement;
+pub use event::Impact;
 pub use impact::{BallSpin, Mobility, impact};
-pub(crate) use impulse::{Constraint, Settings, Walls, Warm, impulse};
-pub use material::Material;
+pub(crate) use impulse::{Walls, impulse};
+pub use material::{Combine, Elasticity, Material};
+pub use penalty::ContactLaw;
+pub(crate) use penalty::{Shear, penalty};
 
-use crate::math::{Point3, Vec3};
+use cgmath::Zero;
+
+use crate::math::{Point3, Scalar, Vec3};
 
 /// The method that restitutes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -35,6 +42,29 @@ pub enum Response {
     /// in two substeps nothing bounces. What overlaps is pushed apart by the masses
     /// without a change of velocity.
     Impulse,
+    /// Forces that grow with the overlap: touches take time, many marbles can push at
+    /// once, and what a contact bears is a force in newtons.
+    ///
+    /// For engineers (with [`ContactLaw::HertzMindlin`]), and to see why games do without:
+    /// a marble sinks in by what the stiffness gives, and a stiffer contact needs shorter
+    /// substeps.
+    Penalty(ContactLaw),
+    /// Collision after collision in the order of time: each with its own normal, at its
+    /// own moment, thousands in one substep if need be. Nothing tunnels at any speed, and
+    /// bounces lose no height that restitution does not take.
+    ///
+    /// In between marbles fly along parabolas, with the mean acceleration of the substep
+    /// by the integrator; exact for gravity. What lies on one wall rests, rolls or slides
+    /// as the equations of a rolling ball say, and changes over at its moment. What lies
+    /// on other marbles is held as by [`Response::Impulse`], so heaps are as right and as
+    /// costly as there. Bounces end when the rest of them would take less than a few
+    /// thousandths of a substep.
+    ///
+    /// Counts in `f64` also in a world of `f32`; see
+    /// [`Precision`](crate::world::Precision) for what such a world remembers of it. It
+    /// finds its collisions by itself, so taking contacts out of the world's lists does
+    /// not keep marbles apart.
+    EventDriven,
 }
 
 /// The columns that a response works on; all of one length.
@@ -51,4 +81,11 @@ pub(crate) struct Columns<'a, S> {
     pub inverse_mass: &'a [S],
     /// In rad/s; empty in a model without rotation.
     pub spin: &'a mut [Vec3<S>],
+}
+
+impl<S: Scalar> Columns<'_, S> {
+    /// Radius times spin, in m/s; zero where spin is not modelled.
+    fn rim(&self, row: usize) -> Vec3<S> {
+        self.spin.get(row).map_or_else(Vec3::zero, |spin| *spin * self.radius[row])
+    }
 }

@@ -3,9 +3,10 @@ use cgmath::{InnerSpace, One, Zero};
 use super::handles::{Handle, Handles};
 use super::optional::Optional;
 use crate::Error;
-use crate::error::{finite, finite_point, finite_vector, positive};
-use crate::math::{Point3, Quat, Scalar, Vec3, is_finite, is_finite_point};
-use crate::motion::{Force, Integrator, Motion, turned};
+use crate::error::{finite, finite_point, finite_vector, positive, within};
+use crate::frame::Bivector;
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite};
+use crate::motion::{Integrator, Motion};
 use crate::response::{Columns, Material};
 use crate::shape::Sphere;
 
@@ -26,6 +27,8 @@ pub struct Marble<S> {
     pub mass: Mass<S>,
     /// How many times the world's gravity it feels: 0 floats, −1 rises.
     pub gravity_scale: S,
+    /// What slows it wherever it is.
+    pub damping: Damping<S>,
     /// How it is turned. Kept only by a model with rotation.
     pub rotation: Quat<S>,
     /// Its angular velocity in rad/s, an axial vector in world space. Kept only by a
@@ -49,9 +52,54 @@ impl<S: Scalar> Marble<S> {
             spin: Vec3::zero(),
             mass: Mass::default(),
             gravity_scale: S::one(),
+            damping: Damping::default(),
             integrator: None,
             material: None,
         }
+    }
+}
+
+/// What takes a part of a marble's speed in every second, wherever it is: `1 − e^−rate`.
+/// A convenience of games; what a medium does is [`Force::Drag`](crate::motion::Force).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Damping<S> {
+    /// Of the velocity, in 1/s, at least zero.
+    pub linear: S,
+    /// Of the spin, in 1/s, at least zero. Counts if the model's rotation is dynamic.
+    pub angular: S,
+}
+
+impl<S: Scalar> Default for Damping<S> {
+    /// None.
+    fn default() -> Self {
+        Self { linear: S::zero(), angular: S::zero() }
+    }
+}
+
+impl<S: Scalar> Damping<S> {
+    fn cast<T: Scalar>(self) -> Damping<T> {
+        let number = |x: S| T::constant(x.as_f64());
+        Damping { linear: number(self.linear), angular: number(self.angular) }
+    }
+
+    fn checked(self) -> Result<Self, Error> {
+        within("damping.linear", self.linear, S::zero(), S::max_value())?;
+        within("damping.angular", self.angular, S::zero(), S::max_value())?;
+        Ok(self)
+    }
+}
+
+/// What the scalar cuts off a row's numbers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Rest<S> {
+    pub position: Vec3<S>,
+    pub velocity: Vec3<S>,
+    pub spin: Vec3<S>,
+}
+
+impl<S: Scalar> Default for Rest<S> {
+    fn default() -> Self {
+        Self { position: Vec3::zero(), velocity: Vec3::zero(), spin: Vec3::zero() }
     }
 }
 
@@ -74,6 +122,15 @@ impl<S: Scalar> Default for Mass<S> {
 }
 
 impl<S: Scalar> Mass<S> {
+    fn cast<T: Scalar>(self) -> Mass<T> {
+        let number = |x: S| T::constant(x.as_f64());
+        match self {
+            Self::Density(density) => Mass::Density(number(density)),
+            Self::Kilograms(mass) => Mass::Kilograms(number(mass)),
+            Self::Infinite => Mass::Infinite,
+        }
+    }
+
     fn checked(self) -> Result<Self, Error> {
         match self {
             Self::Density(density) => positive("density", density).map(Self::Density),
@@ -102,20 +159,29 @@ impl<S: Scalar> Mass<S> {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Marbles<S> {
     handles: Handles,
-    /// Whether there are columns for rotation.
+    /// Whether there are columns for rotation, and for what the scalar cuts off.
     turn: bool,
-    position: Vec<Point3<S>>,
-    radius: Vec<S>,
-    velocity: Vec<Vec3<S>>,
+    pub(super) compensated: bool,
+    pub(super) position: Vec<Point3<S>>,
+    pub(super) radius: Vec<S>,
+    pub(super) velocity: Vec<Vec3<S>>,
     /// Empty in a model without rotation, as is `spin`.
-    rotation: Vec<Quat<S>>,
-    spin: Vec<Vec3<S>>,
+    pub(super) rotation: Vec<Quat<S>>,
+    pub(super) spin: Vec<Vec3<S>>,
+    /// Empty in a model of plain precision.
+    pub(super) rest: Vec<Rest<S>>,
     /// Only what is not the default.
-    mass: Optional<Mass<S>>,
+    pub(super) mass: Optional<Mass<S>>,
     /// Only what is not one.
-    gravity_scale: Optional<S>,
-    integrator: Optional<Integrator>,
-    material: Optional<Material<S>>,
+    pub(super) gravity_scale: Optional<S>,
+    /// Only what is not none.
+    pub(super) damping: Optional<Damping<S>>,
+    /// Only of this step.
+    pub(super) force: Optional<Vec3<S>>,
+    /// Only of this step.
+    pub(super) torque: Optional<Bivector<S>>,
+    pub(super) integrator: Optional<Integrator>,
+    pub(super) material: Optional<Material<S>>,
 }
 
 impl<S> Default for Marbles<S> {
@@ -123,13 +189,18 @@ impl<S> Default for Marbles<S> {
         Self {
             handles: Handles::default(),
             turn: false,
+            compensated: false,
             position: Vec::new(),
             radius: Vec::new(),
             velocity: Vec::new(),
             rotation: Vec::new(),
             spin: Vec::new(),
+            rest: Vec::new(),
             mass: Optional::default(),
             gravity_scale: Optional::default(),
+            damping: Optional::default(),
+            force: Optional::default(),
+            torque: Optional::default(),
             integrator: Optional::default(),
             material: Optional::default(),
         }
@@ -137,8 +208,8 @@ impl<S> Default for Marbles<S> {
 }
 
 const POSITION: [&str; 3] = ["position.x", "position.y", "position.z"];
-const SPIN: [&str; 3] = ["spin.x", "spin.y", "spin.z"];
-const VELOCITY: [&str; 3] = ["velocity.x", "velocity.y", "velocity.z"];
+pub(super) const SPIN: [&str; 3] = ["spin.x", "spin.y", "spin.z"];
+pub(super) const VELOCITY: [&str; 3] = ["velocity.x", "velocity.y", "velocity.z"];
 
 impl<S: Scalar> Marbles<S> {
     /// Adds a marble.
@@ -154,6 +225,7 @@ impl<S: Scalar> Marbles<S> {
         let spin = finite_vector(SPIN, marble.spin)?;
         let mass = marble.mass.checked()?;
         let gravity_scale = finite("gravity_scale", marble.gravity_scale)?;
+        let damping = marble.damping.checked()?;
         let material = marble.material.map(Material::checked).transpose()?;
         let handle = self.handles.push()?;
         self.position.push(position);
@@ -163,9 +235,15 @@ impl<S: Scalar> Marbles<S> {
             self.rotation.push(rotation);
             self.spin.push(spin);
         }
+        if self.compensated {
+            self.rest.push(Rest::default());
+        }
         let rows = self.position.len();
         self.mass.set(rows - 1, but(mass, Mass::default()), rows);
         self.gravity_scale.set(rows - 1, but(gravity_scale, S::one()), rows);
+        self.damping.set(rows - 1, but(damping, Damping::default()), rows);
+        self.force.set(rows - 1, None, rows);
+        self.torque.set(rows - 1, None, rows);
         self.integrator.set(rows - 1, marble.integrator, rows);
         self.material.set(rows - 1, material, rows);
         Ok(MarbleId(handle))
@@ -185,8 +263,14 @@ impl<S: Scalar> Marbles<S> {
                 self.rotation.swap_remove(row);
                 self.spin.swap_remove(row);
             }
+            if self.compensated {
+                self.rest.swap_remove(row);
+            }
             self.mass.swap_remove(row);
             self.gravity_scale.swap_remove(row);
+            self.damping.swap_remove(row);
+            self.force.swap_remove(row);
+            self.torque.swap_remove(row);
             self.integrator.swap_remove(row);
             self.material.swap_remove(row);
         }
@@ -207,8 +291,34 @@ impl<S: Scalar> Marbles<S> {
             spin: self.spin.get(row).copied().unwrap_or_else(Vec3::zero),
             mass: self.mass.get(row).unwrap_or_default(),
             gravity_scale: self.gravity_scale.get(row).unwrap_or(S::one()),
+            damping: self.damping.get(row).unwrap_or_default(),
             integrator: self.integrator.get(row),
             material: self.material.get(row),
+        })
+    }
+
+    /// The marble as it is now, in `f64`, with what [`Precision::Compensated`] remembers
+    /// beyond the world's scalar.
+    ///
+    /// [`Precision::Compensated`]: super::Precision::Compensated
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn get_exact(&self, id: MarbleId) -> Result<Marble<f64>, Error> {
+        let (row, marble) = (self.row(id)?, self.get(id)?);
+        let Motion { position, velocity } = self.exact(row);
+        let rotation = marble.rotation;
+        Ok(Marble {
+            position,
+            velocity,
+            spin: self.exact_spin(row),
+            radius: marble.radius.as_f64(),
+            mass: marble.mass.cast(),
+            gravity_scale: marble.gravity_scale.as_f64(),
+            damping: marble.damping.cast(),
+            rotation: Quat::from_sv(rotation.s.as_f64(), cast_vector(rotation.v)),
+            integrator: marble.integrator,
+            material: marble.material.map(Material::cast),
         })
     }
 
@@ -219,6 +329,9 @@ impl<S: Scalar> Marbles<S> {
     pub fn set_position(&mut self, id: MarbleId, position: Point3<S>) -> Result<(), Error> {
         let row = self.row(id)?;
         self.position[row] = finite_point(POSITION, position)?;
+        if let Some(rest) = self.rest.get_mut(row) {
+            rest.position = Vec3::zero();
+        }
         Ok(())
     }
 
@@ -229,6 +342,9 @@ impl<S: Scalar> Marbles<S> {
     pub fn set_velocity(&mut self, id: MarbleId, velocity: Vec3<S>) -> Result<(), Error> {
         let row = self.row(id)?;
         self.velocity[row] = finite_vector(VELOCITY, velocity)?;
+        if let Some(rest) = self.rest.get_mut(row) {
+            rest.velocity = Vec3::zero();
+        }
         Ok(())
     }
 
@@ -265,6 +381,9 @@ impl<S: Scalar> Marbles<S> {
         if let Some(slot) = self.spin.get_mut(row) {
             *slot = spin;
         }
+        if let Some(rest) = self.rest.get_mut(row) {
+            rest.spin = Vec3::zero();
+        }
         Ok(())
     }
 
@@ -290,17 +409,14 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// Changes a marble's velocity at once, as a hit does: by `impulse` (in N s) over
-    /// its mass.
+    /// Says what slows a marble wherever it is.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] if the impulse or the velocity
-    /// after it is not finite.
-    pub fn apply_impulse(&mut self, id: MarbleId, impulse: Vec3<S>) -> Result<(), Error> {
+    /// [`Error::NoSuchMarble`], [`Error::OutOfRange`].
+    pub fn set_damping(&mut self, id: MarbleId, damping: Damping<S>) -> Result<(), Error> {
         let row = self.row(id)?;
-        finite_vector(["impulse.x", "impulse.y", "impulse.z"], impulse)?;
-        let velocity = self.velocity[row] + impulse / self.mass(row);
-        self.velocity[row] = finite_vector(VELOCITY, velocity)?;
+        let damping = but(damping.checked()?, Damping::default());
+        self.damping.set(row, damping, self.handles.len());
         Ok(())
     }
 
@@ -409,13 +525,6 @@ impl<S: Scalar> Marbles<S> {
         }
     }
 
-    /// Turns every row on by its spin for `dt` seconds.
-    pub(super) fn turn(&mut self, dt: S) {
-        for (rotation, spin) in self.rotation.iter_mut().zip(&self.spin) {
-            *rotation = turned(*rotation, *spin, dt);
-        }
-    }
-
     /// Makes a row spin as if it rolled over a surface at rest with this normal.
     pub(super) fn roll(&mut self, row: usize, normal: Vec3<S>) {
         let spin = normal.cross(self.velocity[row]) / self.radius[row];
@@ -445,47 +554,6 @@ impl<S: Scalar> Marbles<S> {
     pub(super) fn mass(&self, row: usize) -> S {
         self.mass.get(row).unwrap_or_default().of(self.radius[row])
     }
-
-    /// Moves every row on by `dt`. A row that would become infinite or NaN keeps
-    /// its place, loses its velocity, and is added to `stopped`.
-    pub(super) fn integrate(
-        &mut self,
-        integrator: Integrator,
-        gravity: Vec3<S>,
-        forces: &[Force<S>],
-        dt: S,
-        stopped: &mut Vec<u32>,
-    ) {
-        // The columns leave while they are written, so that the rest can be read.
-        let mut position = std::mem::take(&mut self.position);
-        let mut velocity = std::mem::take(&mut self.velocity);
-        let mut rows = Rows { position: &mut position, velocity: &mut velocity, stopped };
-        let only_gravity =
-            forces.is_empty() && self.gravity_scale.is_empty() && self.mass.is_empty();
-        if only_gravity && self.integrator.is_empty() {
-            rows.integrate(integrator, dt, |_, _| gravity);
-        } else {
-            let all = |row: usize, motion: Motion<S>| {
-                let mass = self.mass(row);
-                if mass.is_infinite() {
-                    return Vec3::zero();
-                }
-                let scale = self.gravity_scale.get(row).unwrap_or(S::one());
-                forces
-                    .iter()
-                    .fold(gravity * scale, |sum, force| sum + force.acceleration(motion, mass))
-            };
-            if self.integrator.is_empty() {
-                rows.integrate(integrator, dt, all);
-            } else {
-                rows.each(|row, motion| {
-                    let integrator = self.integrator.get(row).unwrap_or(integrator);
-                    motion.after(integrator, dt, |motion| all(row, motion))
-                });
-            }
-        }
-        (self.position, self.velocity) = (position, velocity);
-    }
 }
 
 /// The quaternion as a rotation, if its length is about one.
@@ -502,47 +570,4 @@ fn checked_rotation<S: Scalar>(rotation: Quat<S>) -> Result<Quat<S>, Error> {
 /// A value, but `None` for the one that goes without saying.
 fn but<T: PartialEq>(value: T, usual: T) -> Option<T> {
     (value != usual).then_some(value)
-}
-
-/// The columns that an integrator writes.
-struct Rows<'a, S> {
-    position: &'a mut [Point3<S>],
-    velocity: &'a mut [Vec3<S>],
-    stopped: &'a mut Vec<u32>,
-}
-
-impl<S: Scalar> Rows<'_, S> {
-    /// Moves every row on, by a kernel that is chosen once for all of them.
-    fn integrate(
-        &mut self,
-        integrator: Integrator,
-        dt: S,
-        acceleration: impl Fn(usize, Motion<S>) -> Vec3<S>,
-    ) {
-        let at = |row: usize| {
-            let acceleration = &acceleration;
-            move |motion| acceleration(row, motion)
-        };
-        match integrator {
-            Integrator::ExplicitEuler => self.each(|row, m| m.explicit_euler(dt, at(row))),
-            Integrator::SemiImplicitEuler => self.each(|row, m| m.semi_implicit_euler(dt, at(row))),
-            Integrator::VelocityVerlet => self.each(|row, m| m.velocity_verlet(dt, at(row))),
-            Integrator::Leapfrog => self.each(|row, m| m.leapfrog(dt, at(row))),
-            Integrator::Rk4 => self.each(|row, m| m.rk4(dt, at(row))),
-        }
-    }
-
-    #[inline]
-    fn each(&mut self, kernel: impl Fn(usize, Motion<S>) -> Motion<S>) {
-        let columns = self.position.iter_mut().zip(self.velocity.iter_mut());
-        for (row, (position, velocity)) in columns.enumerate() {
-            let next = kernel(row, Motion { position: *position, velocity: *velocity });
-            if is_finite_point(next.position) && is_finite(next.velocity) {
-                (*position, *velocity) = (next.position, next.velocity);
-            } else {
-                *velocity = Vec3::zero();
-                self.stopped.push(row as u32);
-            }
-        }
-    }
 }

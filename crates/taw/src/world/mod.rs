@@ -1,14 +1,20 @@
 //! The state as columns, the choice of methods, and the step.
 
+mod apply;
+mod event;
 mod handles;
+mod integrate;
+mod limits;
 mod marbles;
 mod model;
 mod optional;
 mod walls;
 
-pub use marbles::{Marble, MarbleId, Marbles, Mass};
-pub use model::Model;
-pub use walls::{WallId, WallMotion, Walls};
+pub use crate::motion::WallMotion;
+pub use limits::SpeedLimits;
+pub use marbles::{Damping, Marble, MarbleId, Marbles, Mass};
+pub use model::{Model, Precision};
+pub use walls::{WallId, Walls};
 
 use cgmath::Zero;
 
@@ -18,7 +24,10 @@ use crate::contact::{Contact, Contacts, mtv_sphere_plane, mtv_sphere_sphere};
 use crate::error::{finite_vector, positive};
 use crate::math::{Scalar, Vec3, length};
 use crate::motion::{Force, Rotation};
-use crate::response::{BallSpin, Constraint, Response, Settings, Warm, displacement, impulse};
+use crate::response::event::EventDriven;
+use crate::response::impulse::{Constraint, Settings, Warm};
+use crate::response::{BallSpin, Impact, Response, Shear, displacement, impulse, penalty};
+use integrate::Drive;
 
 /// Everything that moves and everything that it can touch.
 ///
@@ -30,6 +39,7 @@ pub struct World<S> {
     model: Model,
     gravity: Vec3<S>,
     forces: Vec<Force<S>>,
+    limits: SpeedLimits<S>,
     /// What moves.
     pub marbles: Marbles<S>,
     /// What nothing can move.
@@ -38,6 +48,8 @@ pub struct World<S> {
     /// [`World::restitute`] they may be changed: what is taken out is not
     /// restituted, and a row that does not exist is passed over.
     pub contacts: Contacts<S>,
+    /// The collisions of the last step, if the response is event-driven.
+    impacts: Vec<Impact<S>>,
     grid: Grid,
     stopped: Vec<u32>,
     /// How wide a gap still makes a contact, in metres: what gravity closes in two
@@ -49,7 +61,11 @@ pub struct World<S> {
     /// What the contacts of the last substep bore, and the removals until then: they
     /// move rows, after which nothing here has the right name any more.
     warm: Vec<Warm<S>>,
+    shear: Vec<Shear<S>>,
     warm_removals: [u64; 2],
+    /// For a response that moves marbles by itself: how each is to be accelerated.
+    accelerations: Vec<Vec3<f64>>,
+    events: EventDriven,
 }
 
 impl<S: Scalar> Default for World<S> {
@@ -59,9 +75,11 @@ impl<S: Scalar> Default for World<S> {
             model: Model::default(),
             gravity: Vec3::unit_y() * S::constant(-9.81),
             forces: Vec::new(),
+            limits: SpeedLimits::default(),
             marbles: Marbles::default(),
             walls: Walls::default(),
             contacts: Contacts::default(),
+            impacts: Vec::new(),
             grid: Grid::default(),
             stopped: Vec::new(),
             reach: S::zero(),
@@ -69,7 +87,10 @@ impl<S: Scalar> Default for World<S> {
             before: Vec::new(),
             constraints: Vec::new(),
             warm: Vec::new(),
+            shear: Vec::new(),
             warm_removals: [0; 2],
+            accelerations: Vec::new(),
+            events: EventDriven::default(),
         }
     }
 }
@@ -80,9 +101,11 @@ impl<S: Scalar> PartialEq for World<S> {
             model,
             gravity,
             forces,
+            limits,
             marbles,
             walls,
             contacts,
+            impacts,
             stopped,
             grid: _,
             reach: _,
@@ -90,16 +113,23 @@ impl<S: Scalar> PartialEq for World<S> {
             before: _,
             constraints: _,
             warm,
+            shear,
             warm_removals,
+            accelerations: _,
+            events,
         } = self;
         *model == other.model
             && *gravity == other.gravity
             && *forces == other.forces
+            && *limits == other.limits
+            && *impacts == other.impacts
+            && events.warm == other.events.warm
             && *marbles == other.marbles
             && *walls == other.walls
             && *contacts == other.contacts
             && *stopped == other.stopped
             && *warm == other.warm
+            && *shear == other.shear
             && *warm_removals == other.warm_removals
     }
 }
@@ -117,8 +147,9 @@ impl<S: Scalar> World<S> {
     /// [`Error::OutOfRange`] for the substeps or the iterations.
     pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
         self.model = model.checked()?;
-        self.warm.clear();
+        self.forget_contacts();
         self.marbles.set_turn(model.rotation != Rotation::None);
+        self.marbles.set_compensated(model.precision == Precision::Compensated);
         Ok(())
     }
 
@@ -152,6 +183,21 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
+    /// How fast marbles may be at most.
+    #[must_use]
+    pub fn speed_limits(&self) -> SpeedLimits<S> {
+        self.limits
+    }
+
+    /// Changes how fast marbles may be at most, from the end of the next substep on.
+    ///
+    /// # Errors
+    /// [`Error::NotPositive`].
+    pub fn set_speed_limits(&mut self, limits: SpeedLimits<S>) -> Result<(), Error> {
+        self.limits = limits.checked()?;
+        Ok(())
+    }
+
     /// Moves the world on by `dt` seconds, in [`Model::substeps`] equal parts.
     ///
     /// A marble whose motion overflows keeps its last place, loses its velocity,
@@ -161,33 +207,47 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`; then nothing has moved.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
         let dt = positive("dt", dt / S::constant(f64::from(self.model.substeps)))?;
-        self.clear_stopped();
+        self.begin_step();
         for _ in 0..self.model.substeps {
             self.integrate(dt)?;
             self.generate_contacts();
             self.restitute(dt)?;
         }
+        self.marbles.clear_forces();
         Ok(())
     }
 
     /// The first verb: forces change velocities, velocities change positions, over
-    /// `dt` seconds.
+    /// `dt` seconds. For [`Response::EventDriven`], forces become accelerations only: what
+    /// moves when is decided by the third verb.
     ///
     /// # Errors
     /// [`Error::NotPositive`] for `dt`.
     pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
         let dt = positive("dt", dt)?;
-        self.marbles.integrate(
-            self.model.integrator,
-            self.gravity,
-            &self.forces,
+        let drive = Drive {
+            integrator: self.model.integrator,
+            gravity: self.gravity,
+            forces: &self.forces,
             dt,
-            &mut self.stopped,
-        );
-        self.marbles.turn(dt);
+        };
+        if self.model.rotation == Rotation::Dynamic {
+            self.marbles.spin_up(dt);
+        }
+        if self.model.response == Response::EventDriven {
+            self.marbles.mean_accelerations(drive, &mut self.accelerations);
+        } else {
+            self.marbles.integrate(drive, &mut self.stopped);
+        }
+        if !(self.model.response == Response::EventDriven
+            && self.model.rotation == Rotation::Dynamic)
+        {
+            self.marbles.turn(dt);
+        }
         self.reach = match self.model.response {
-            Response::Displacement => S::zero(),
+            Response::Displacement | Response::Penalty(_) => S::zero(),
             Response::Impulse => length(self.gravity) * dt * dt * S::constant(2.0),
+            Response::EventDriven => self.reach_at_rest(dt),
         };
         Ok(())
     }
@@ -195,7 +255,9 @@ impl<S: Scalar> World<S> {
     /// The second verb: finds who touches whom, and by how much.
     ///
     /// For [`Response::Impulse`], that is also who is so near that gravity closes the
-    /// gap within two substeps; the displacement of these is zero.
+    /// gap within two substeps; the displacement of these is zero. For
+    /// [`Response::EventDriven`] it is who may rest on each other at the start; who comes
+    /// together later is found later.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
         let reach = self.reach;
@@ -239,12 +301,23 @@ impl<S: Scalar> World<S> {
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
         self.inverse_mass.clear();
-        if self.model.response == Response::Impulse {
+        if matches!(self.model.response, Response::Impulse | Response::Penalty(_)) {
             let masses = (0..self.marbles.len()).map(|row| self.marbles.mass(row));
             self.inverse_mass.extend(masses.map(|mass| S::one() / mass));
         }
         let removals = [self.walls.removals(), self.marbles.removals()];
+        if self.warm_removals != removals {
+            self.forget_contacts();
+            self.warm_removals = removals;
+        }
+        let spin = match self.model.rotation {
+            Rotation::Dynamic => BallSpin::Free,
+            Rotation::None | Rotation::Rolling => BallSpin::Ignored,
+        };
         let (mut columns, material, integrator) = self.marbles.columns(&self.inverse_mass);
+        if spin == BallSpin::Ignored {
+            columns.spin = &mut []; // what is only shown is not felt
+        }
         match self.model.response {
             Response::Displacement => displacement(
                 self.walls.planes(),
@@ -254,17 +327,6 @@ impl<S: Scalar> World<S> {
                 &mut self.stopped,
             ),
             Response::Impulse => {
-                if self.warm_removals != removals {
-                    self.warm.clear();
-                    self.warm_removals = removals;
-                }
-                let spin = match self.model.rotation {
-                    Rotation::Dynamic => BallSpin::Free,
-                    Rotation::None | Rotation::Rolling => BallSpin::Ignored,
-                };
-                if spin == BallSpin::Ignored {
-                    columns.spin = &mut []; // what is only shown is not felt
-                }
                 let settings = Settings {
                     iterations: self.model.iterations,
                     spin,
@@ -284,6 +346,18 @@ impl<S: Scalar> World<S> {
                     &mut self.stopped,
                 );
             }
+            Response::Penalty(law) => penalty(
+                law,
+                &mut columns,
+                &mut self.contacts,
+                &self.walls,
+                |row| material.get(row).unwrap_or_default(),
+                spin,
+                dt,
+                &mut self.shear,
+                &mut self.stopped,
+            ),
+            Response::EventDriven => self.go_through_events(dt, spin),
         }
         if self.model.rotation == Rotation::Rolling {
             // The deepest contact comes first in the list, so it has the last word.
@@ -292,18 +366,34 @@ impl<S: Scalar> World<S> {
                 self.marbles.roll(contact.b as usize, normal);
             }
         }
+        self.limits.apply(&mut self.marbles);
         Ok(())
     }
 
+    /// Forgets what contacts remember from substep to substep.
+    fn forget_contacts(&mut self) {
+        self.warm.clear();
+        self.shear.clear();
+        self.events.warm.clear();
+    }
+
     /// The marbles that the last step stopped because their motion overflowed.
-    /// Whoever calls the stages one by one has to [clear](World::clear_stopped) it.
     pub fn stopped(&self) -> impl Iterator<Item = MarbleId> + '_ {
         self.stopped.iter().filter_map(|row| self.marbles.id(*row as usize))
     }
 
-    /// Forgets who was [stopped](World::stopped). A step begins with this.
-    pub fn clear_stopped(&mut self) {
+    /// The collisions of the last step, in the order of time within each substep. Only
+    /// [`Response::EventDriven`] goes through them one by one.
+    #[must_use]
+    pub fn impacts(&self) -> &[Impact<S>] {
+        &self.impacts
+    }
+
+    /// Forgets who was [stopped](World::stopped), and the [impacts](World::impacts). A
+    /// step begins with this; whoever calls the verbs one by one begins so too.
+    pub fn begin_step(&mut self) {
         self.stopped.clear();
+        self.impacts.clear();
     }
 
     /// The grid of the last substep, for drawing it.

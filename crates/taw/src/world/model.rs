@@ -20,6 +20,8 @@ pub struct Model {
     pub response: Response,
     /// Whether marbles turn.
     pub rotation: Rotation,
+    /// Whether marbles keep what the scalar cuts off.
+    pub precision: Precision,
     /// Into how many equal parts each step is cut, from 1 to 1,000. Costs as many
     /// times as much.
     pub substeps: u32,
@@ -28,12 +30,26 @@ pub struct Model {
     pub iterations: u32,
 }
 
+/// How exactly marbles remember where they are and how they move.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Precision {
+    /// As the world's scalar can.
+    #[default]
+    Plain,
+    /// Nearly as `f64` can, also in a world of `f32`, which keeps what it cuts off in
+    /// columns of its own (36 bytes a marble). Far from the origin, and in steps so short
+    /// that a plain sum would not change, marbles then move as they should. In a world of
+    /// `f64` it changes nothing.
+    Compensated,
+}
+
 impl Default for Model {
     fn default() -> Self {
         Self {
             integrator: Integrator::SemiImplicitEuler,
             response: Response::Displacement,
             rotation: Rotation::None,
+            precision: Precision::Plain,
             substeps: 1,
             iterations: 8,
         }

@@ -35,6 +35,12 @@ impl<T: Copy> Optional<T> {
         }
     }
 
+    /// Takes the value of every row.
+    pub fn clear(&mut self) {
+        self.values.clear();
+        self.present = 0;
+    }
+
     pub fn swap_remove(&mut self, row: usize) {
         if !self.values.is_empty() {
             let last = self.values.swap_remove(row);

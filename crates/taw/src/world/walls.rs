@@ -5,34 +5,13 @@ use super::optional::Optional;
 use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::math::{Point3, Scalar, Vec3};
-use crate::response;
+use crate::motion::WallMotion;
+use crate::response::{self, Material};
 use crate::shape::Plane;
 
 /// Names a wall for as long as it is in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct WallId(Handle);
-
-/// How a wall moves, as one rigid thing: a velocity, and a spin about a pivot.
-///
-/// It says how fast the wall's surface carries along what lies on it, and nothing
-/// about where the wall is. So a conveyor is a wall that stays where it is and has one.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct WallMotion<S> {
-    /// Of the pivot, in m/s.
-    pub velocity: Vec3<S>,
-    /// In rad/s, an axial vector in world space.
-    pub spin: Vec3<S>,
-    /// A point that the spin is about.
-    pub pivot: Point3<S>,
-}
-
-impl<S: Scalar> WallMotion<S> {
-    /// The velocity of a point that moves along, in m/s.
-    #[must_use]
-    pub fn velocity_at(&self, point: Point3<S>) -> Vec3<S> {
-        self.velocity + self.spin.cross(point - self.pivot)
-    }
-}
 
 /// What no contact can move: half-spaces, fixed or moved by the user.
 #[derive(Clone, Debug, PartialEq)]
@@ -41,11 +20,18 @@ pub struct Walls<S> {
     planes: Vec<Plane<S>>,
     /// Only of those that move.
     motion: Optional<WallMotion<S>>,
+    /// Only of those that have one of their own.
+    material: Optional<Material<S>>,
 }
 
 impl<S> Default for Walls<S> {
     fn default() -> Self {
-        Self { handles: Handles::default(), planes: Vec::new(), motion: Optional::default() }
+        Self {
+            handles: Handles::default(),
+            planes: Vec::new(),
+            motion: Optional::default(),
+            material: Optional::default(),
+        }
     }
 }
 
@@ -57,7 +43,9 @@ impl<S: Scalar> Walls<S> {
     pub fn insert(&mut self, plane: Plane<S>) -> Result<WallId, Error> {
         let handle = self.handles.push()?;
         self.planes.push(plane);
-        self.motion.set(self.planes.len() - 1, None, self.planes.len());
+        let rows = self.planes.len();
+        self.motion.set(rows - 1, None, rows);
+        self.material.set(rows - 1, None, rows);
         Ok(WallId(handle))
     }
 
@@ -69,6 +57,7 @@ impl<S: Scalar> Walls<S> {
         let row = self.handles.swap_remove(id.0);
         let row = row.ok_or(Error::NoSuchWall(id))?;
         self.motion.swap_remove(row);
+        self.material.swap_remove(row);
         Ok(self.planes.swap_remove(row))
     }
 
@@ -113,6 +102,26 @@ impl<S: Scalar> Walls<S> {
         self.row(id).map(|row| self.motion.get(row))
     }
 
+    /// Gives a wall a material of its own, which counts together with the marble's, or
+    /// with `None` leaves it to the marble's alone.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchWall`], [`Error::OutOfRange`].
+    pub fn set_material(&mut self, id: WallId, material: Option<Material<S>>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let material = material.map(Material::checked).transpose()?;
+        self.material.set(row, material, self.planes.len());
+        Ok(())
+    }
+
+    /// The material of a wall, if it has one of its own.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchWall`].
+    pub fn material(&self, id: WallId) -> Result<Option<Material<S>>, Error> {
+        self.row(id).map(|row| self.material.get(row))
+    }
+
     /// All walls, by row.
     #[must_use]
     pub fn planes(&self) -> &[Plane<S>] {
@@ -131,6 +140,16 @@ impl<S: Scalar> Walls<S> {
     #[must_use]
     pub fn id(&self, row: usize) -> Option<WallId> {
         self.handles.handle(row).map(WallId)
+    }
+
+    /// How the wall in a row moves.
+    pub(super) fn motion_of_row(&self, row: usize) -> Option<WallMotion<S>> {
+        self.motion.get(row)
+    }
+
+    /// The own material of the wall in a row.
+    pub(super) fn material_of_row(&self, row: usize) -> Option<Material<S>> {
+        self.material.get(row)
     }
 
     /// How many walls were taken out so far.
@@ -159,5 +178,9 @@ impl<S: Scalar> response::Walls<S> for Walls<S> {
 
     fn surface_velocity(&self, wall: usize, point: Point3<S>) -> Vec3<S> {
         self.motion.get(wall).map_or_else(Vec3::zero, |motion| motion.velocity_at(point))
+    }
+
+    fn material(&self, wall: usize) -> Option<Material<S>> {
+        self.material.get(wall)
     }
 }

@@ -1,0 +1,32 @@
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+
+/// How a wall moves, as one rigid thing: a velocity, and a spin about a pivot.
+///
+/// It says how fast the wall's surface carries along what lies on it, and nothing
+/// about where the wall is. So a conveyor is a wall that stays where it is and has one.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct WallMotion<S> {
+    /// Of the pivot, in m/s.
+    pub velocity: Vec3<S>,
+    /// In rad/s, an axial vector in world space.
+    pub spin: Vec3<S>,
+    /// A point that the spin is about.
+    pub pivot: Point3<S>,
+}
+
+impl<S: Scalar> WallMotion<S> {
+    /// The velocity of a point that moves along, in m/s.
+    #[must_use]
+    pub fn velocity_at(&self, point: Point3<S>) -> Vec3<S> {
+        self.velocity + self.spin.cross(point - self.pivot)
+    }
+
+    /// The same motion in another scalar.
+    pub(crate) fn cast<T: Scalar>(self) -> WallMotion<T> {
+        WallMotion {
+            velocity: cast_vector(self.velocity),
+            spin: cast_vector(self.spin),
+            pivot: cast_point(self.pivot),
+        }
+    }
+}

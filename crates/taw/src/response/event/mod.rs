@@ -1,0 +1,764 @@
+//! [`Response::EventDriven`](super::Response::EventDriven): what happens within a
+//! substep happens one after the other, each at its time (Alder and Wainwright 1959;
+//! Lubachevsky, *How to simulate billiards and similar systems*, 1991).
+//!
+//! Between two events a ball moves on a parabola. Its next event is the first of: it
+//! meets a wall or a ball, it leaves its cell of the grid, or what it lies on makes it
+//! roll instead of slide. All of it is counted in `f64`, whatever the world counts in.
+
+mod cells;
+mod support;
+mod time;
+
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+
+use cgmath::{InnerSpace, Zero};
+
+use crate::contact::{Contact, Contacts};
+use crate::math::{
+    Point3, Scalar, Vec3, cast_vector, direction_and_length, is_finite, is_finite_point,
+};
+use crate::motion::WallMotion;
+use crate::response::impulse::{self, Constraint, Warm, impulse};
+use crate::response::{BallSpin, Columns, Material, Mobility, Walls, impact};
+use cells::{Cell, Cells};
+use support::Support;
+use time::{Gap, closing_time, meeting_time};
+
+/// A wall is left or met again only faster than this part of what gravity does to a
+/// speed in a substep. Slower, a ball rests on it: the bounces that it still had ahead
+/// would have taken a few thousandths of a substep.
+const REST: f64 = 1e-3;
+/// The same for balls that press each other, which touch anew each time that they have
+/// gained so much. Ten times a substep, until the next one knows that they rest.
+const PRESS: f64 = 0.1;
+/// Balls that cross more cells than this in a substep are looked for everywhere.
+const FAR: f64 = 1000.0;
+/// So many events in one substep that something must be wrong; the rest of it passes
+/// without any.
+const MOST_EVENTS: u64 = 100_000_000;
+
+/// A collision that a substep went through.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Impact<S> {
+    /// The row of the first: a marble, or of a wall if `on_wall`.
+    pub a: u32,
+    /// Whether the first is a wall.
+    pub on_wall: bool,
+    /// The row of the second, a marble.
+    pub b: u32,
+    /// The unit vector from the first to the second.
+    pub normal: Vec3<S>,
+    /// How fast they came together along it, in m/s.
+    pub approach_speed: S,
+}
+
+impl Impact<f64> {
+    /// The same in another scalar.
+    pub(crate) fn cast<S: Scalar>(self) -> Impact<S> {
+        Impact {
+            a: self.a,
+            on_wall: self.on_wall,
+            b: self.b,
+            normal: cast_vector(self.normal),
+            approach_speed: S::constant(self.approach_speed),
+        }
+    }
+}
+
+/// A half-space, and how it moves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Wall {
+    pub normal: Vec3<f64>,
+    pub offset: f64,
+    pub motion: Option<WallMotion<f64>>,
+    pub material: Option<Material<f64>>,
+}
+
+impl Wall {
+    /// What counts between this wall and a ball of that material.
+    fn against(&self, ball: Material<f64>) -> Material<f64> {
+        self.material.map_or(ball, |its| ball.against(its))
+    }
+}
+
+impl Walls<f64> for Vec<Wall> {
+    fn normal_and_distance(&self, wall: usize, point: Point3<f64>) -> (Vec3<f64>, f64) {
+        let Wall { normal, offset, .. } = self[wall];
+        (normal, normal.dot(Vec3::new(point.x, point.y, point.z)) - offset)
+    }
+
+    fn surface_velocity(&self, wall: usize, point: Point3<f64>) -> Vec3<f64> {
+        self[wall].motion.map_or_else(Vec3::zero, |motion| motion.velocity_at(point))
+    }
+
+    fn material(&self, wall: usize) -> Option<Material<f64>> {
+        self[wall].material
+    }
+}
+
+/// A ball: what the world tells of it, and how it moves just now.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Ball {
+    /// In metres, when its path began.
+    pub position: Point3<f64>,
+    /// In m/s, when its path began.
+    pub velocity: Vec3<f64>,
+    /// In rad/s, when its path began.
+    pub spin: Vec3<f64>,
+    /// The acceleration by all forces, in m/s².
+    pub pull: Vec3<f64>,
+    /// In metres.
+    pub radius: f64,
+    /// In 1/kg.
+    pub inverse_mass: f64,
+    pub material: Material<f64>,
+    /// How much of a gap may be due to the rounding of the position, in metres.
+    pub rounding: f64,
+    /// How far it has turned in this substep, as an axial vector in radians.
+    pub turned: Vec3<f64>,
+    pub path: Path,
+}
+
+/// How a ball goes on.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Path {
+    /// When it began, in seconds from the start of the substep.
+    begin: f64,
+    acceleration: Vec3<f64>,
+    spin_acceleration: Vec3<f64>,
+    /// The wall that it lies on.
+    support: Option<usize>,
+    /// The velocity that it shares with a wall that rises under it, which is not part
+    /// of the ball's own while it lies there.
+    carry: Vec3<f64>,
+    /// Whether its acceleration holds it in a heap.
+    heaped: bool,
+    /// When its acceleration changes by itself.
+    change: f64,
+    /// Counts its paths, so that what was foreseen of an old one is known to be void.
+    stamp: u32,
+    home: Home,
+}
+
+/// Where others find a ball.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Home {
+    Cell(Cell),
+    Anywhere,
+}
+
+impl Default for Path {
+    fn default() -> Self {
+        Self {
+            begin: 0.0,
+            acceleration: Vec3::zero(),
+            spin_acceleration: Vec3::zero(),
+            support: None,
+            carry: Vec3::zero(),
+            heaped: false,
+            change: f64::INFINITY,
+            stamp: 0,
+            home: Home::Anywhere,
+        }
+    }
+}
+
+impl Ball {
+    fn position_at(&self, time: f64) -> Point3<f64> {
+        let t = time - self.path.begin;
+        self.position + (self.velocity + self.path.acceleration * (0.5 * t)) * t
+    }
+
+    fn velocity_at(&self, time: f64) -> Vec3<f64> {
+        self.velocity + self.path.acceleration * (time - self.path.begin)
+    }
+
+    /// Lets its path begin at a later time.
+    fn advance(&mut self, time: f64) {
+        let t = time - self.path.begin;
+        self.position = self.position_at(time);
+        self.velocity = self.velocity_at(time);
+        self.turned += (self.spin + self.path.spin_acceleration * (0.5 * t)) * t;
+        self.spin += self.path.spin_acceleration * t;
+        self.path.begin = time;
+    }
+
+    /// Lets go of whatever held it.
+    fn release(&mut self) {
+        self.velocity += self.path.carry;
+        self.path = Path {
+            begin: self.path.begin,
+            acceleration: self.pull,
+            stamp: self.path.stamp + 1,
+            home: self.path.home,
+            ..Path::default()
+        };
+    }
+
+    /// Applies an impulse at the point where `normal` comes from to the center.
+    fn hit(&mut self, impulse: Vec3<f64>, normal: Vec3<f64>, spin: BallSpin) {
+        self.velocity += impulse * self.inverse_mass;
+        if spin == BallSpin::Free {
+            self.spin -= normal.cross(impulse) * (2.5 * self.inverse_mass / self.radius);
+        }
+    }
+
+    /// The velocity of its point toward `-normal` by its spin alone.
+    fn rim(&self, normal: Vec3<f64>, spin: BallSpin) -> Vec3<f64> {
+        match spin {
+            BallSpin::Free => normal.cross(self.spin) * self.radius,
+            BallSpin::Ignored => Vec3::zero(),
+        }
+    }
+}
+
+/// What may happen to a ball.
+#[derive(Clone, Copy, Debug)]
+enum What {
+    Hits(usize),
+    SettlesOn(usize),
+    Meets(usize, u32),
+    LeavesCell { axis: usize, to: i64 },
+    Changes,
+}
+
+/// Something that will happen, unless something else happens first.
+#[derive(Clone, Copy, Debug)]
+struct Event {
+    time: f64,
+    row: usize,
+    stamp: u32,
+    what: What,
+}
+
+impl Ord for Event {
+    fn cmp(&self, other: &Self) -> Ordering {
+        self.time.total_cmp(&other.time).then(self.row.cmp(&other.row))
+    }
+}
+
+impl PartialOrd for Event {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl PartialEq for Event {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl Eq for Event {}
+
+/// What the method is told, besides balls and walls.
+pub(crate) struct Settings {
+    /// The length of the substep, in seconds.
+    pub dt: f64,
+    pub spin: BallSpin,
+    /// For what rests in heaps.
+    pub iterations: u32,
+}
+
+/// The method, with what it scribbles on.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct EventDriven {
+    /// To be filled by the caller, who finds them there afterwards.
+    pub balls: Vec<Ball>,
+    /// To be filled by the caller.
+    pub walls: Vec<Wall>,
+    /// Pairs that may touch at the start: wall and ball, ball and ball.
+    pub near: Contacts<f64>,
+    /// What the heaps' contacts bore in the last substep.
+    pub warm: Vec<Warm<f64>>,
+    cells: Cells,
+    anywhere: Vec<usize>,
+    queue: BinaryHeap<Reverse<Event>>,
+    touches: Vec<u32>,
+    heap: Heap,
+}
+
+/// What rests on each other, as the impulse method sees it.
+#[derive(Clone, Debug, Default)]
+struct Heap {
+    position: Vec<Point3<f64>>,
+    velocity: Vec<Vec3<f64>>,
+    spin: Vec<Vec3<f64>>,
+    radius: Vec<f64>,
+    inverse_mass: Vec<f64>,
+    before: Vec<Vec3<f64>>,
+    constraints: Vec<Constraint<f64>>,
+}
+
+impl EventDriven {
+    /// Goes through a substep. Adds to `impacts` in the order of time, and gives the
+    /// rows that became infinite or NaN, which are as they were.
+    pub fn run(&mut self, settings: &Settings, impacts: &mut Vec<Impact<f64>>) -> Vec<u32> {
+        let dt = settings.dt;
+        let before: Vec<_> = self.balls.iter().map(|b| b.position).collect();
+        for ball in &mut self.balls {
+            ball.path = Path { acceleration: ball.pull, ..Path::default() };
+            ball.turned = Vec3::zero();
+        }
+        self.begin_at_rest(settings);
+        self.find_homes(dt);
+        self.queue.clear();
+        for row in 0..self.balls.len() {
+            self.foresee(row, 0.0, settings);
+        }
+        for _ in 0..MOST_EVENTS {
+            let Some(Reverse(event)) = self.queue.pop() else { break };
+            if self.balls[event.row].path.stamp == event.stamp {
+                self.happen(event, settings, impacts);
+            }
+        }
+        let mut stopped = Vec::new();
+        for (row, (ball, before)) in self.balls.iter_mut().zip(before).enumerate() {
+            ball.advance(dt);
+            ball.velocity += ball.path.carry;
+            if !is_finite_point(ball.position) || !is_finite(ball.velocity) || !is_finite(ball.spin)
+            {
+                ball.position = before;
+                (ball.velocity, ball.spin, ball.turned) =
+                    (Vec3::zero(), Vec3::zero(), Vec3::zero());
+                stopped.push(row as u32);
+            }
+        }
+        stopped
+    }
+
+    fn happen(&mut self, event: Event, settings: &Settings, impacts: &mut Vec<Impact<f64>>) {
+        let Event { time, row, what, .. } = event;
+        match what {
+            What::Meets(other, stamp) if self.balls[other].path.stamp != stamp => {
+                self.foresee(row, time, settings);
+            }
+            What::Meets(other, _) => {
+                let (a, b) = (row.min(other), row.max(other));
+                self.balls[a].advance(time);
+                self.balls[b].advance(time);
+                impacts.extend(self.meet(a, b, settings));
+                self.foresee(a, time, settings);
+                self.foresee(b, time, settings);
+            }
+            What::Hits(wall) => {
+                self.balls[row].advance(time);
+                impacts.push(self.hit_wall(row, wall, settings));
+                self.foresee(row, time, settings);
+            }
+            What::SettlesOn(wall) => {
+                self.balls[row].advance(time);
+                self.settle(row, wall, settings);
+                self.foresee(row, time, settings);
+            }
+            What::Changes => {
+                self.balls[row].advance(time);
+                self.stretch(row, settings);
+                self.foresee(row, time, settings);
+            }
+            What::LeavesCell { axis, to } => {
+                if let Home::Cell(mut cell) = self.balls[row].path.home {
+                    self.cells.remove(row as u32);
+                    cell[axis] = to;
+                    self.cells.insert(row as u32, cell);
+                    self.balls[row].path.home = Home::Cell(cell);
+                }
+                self.foresee(row, time, settings);
+            }
+        }
+    }
+
+    /// Lets two balls that touch bounce off each other.
+    fn meet(&mut self, a: usize, b: usize, settings: &Settings) -> Option<Impact<f64>> {
+        let press = self.press_speed(a, b, settings);
+        let [first, second] = self.balls.get_disjoint_mut([a, b]).ok()?;
+        first.release();
+        second.release();
+        let (normal, _) =
+            direction_and_length(second.position - first.position).unwrap_or((Vec3::unit_x(), 0.0));
+        let rims = first.rim(normal, settings.spin) + second.rim(normal, settings.spin);
+        let closing = second.velocity - first.velocity + rims;
+        let approach_speed = -closing.dot(normal);
+        let mut material = first.material.against(second.material);
+        if approach_speed <= 2.0 * press {
+            material.restitution = 0.0;
+        }
+        let mobility = Mobility::of_balls(first.inverse_mass, second.inverse_mass, settings.spin);
+        let impulse = impact(normal, closing, mobility, material);
+        first.hit(-impulse, -normal, settings.spin);
+        second.hit(impulse, normal, settings.spin);
+        Some(Impact { a: a as u32, on_wall: false, b: b as u32, normal, approach_speed })
+    }
+
+    /// Lets a ball that touches a wall bounce off it.
+    fn hit_wall(&mut self, row: usize, wall: usize, settings: &Settings) -> Impact<f64> {
+        let normal = self.walls[wall].normal;
+        let ball = &mut self.balls[row];
+        ball.release();
+        let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
+        let closing = ball.velocity - surface + ball.rim(normal, settings.spin);
+        let approach_speed = -closing.dot(normal);
+        let mobility = Mobility::of_balls(0.0, ball.inverse_mass, settings.spin);
+        let impulse = impact(normal, closing, mobility, self.walls[wall].against(ball.material));
+        ball.hit(impulse, normal, settings.spin);
+        Impact { a: wall as u32, on_wall: true, b: row as u32, normal, approach_speed }
+    }
+
+    /// Lets a ball that touches a wall lie on it from now on.
+    fn settle(&mut self, row: usize, wall: usize, settings: &Settings) {
+        let (normal, distance) = self.walls.normal_and_distance(wall, self.balls[row].position);
+        let ball = &mut self.balls[row];
+        ball.release();
+        let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
+        // The rounding of the place goes too, lest it add up.
+        ball.position += normal * (ball.radius - distance);
+        ball.velocity -= normal * ball.velocity.dot(normal);
+        ball.path.carry = normal * surface.dot(normal);
+        ball.path.support = Some(wall);
+        self.stretch(row, settings);
+    }
+
+    /// Finds out how a ball moves on that lies on a wall.
+    fn stretch(&mut self, row: usize, settings: &Settings) {
+        let ball = &mut self.balls[row];
+        let Some(wall) = ball.path.support else { return };
+        let Wall { normal, motion, .. } = self.walls[wall];
+        let material = self.walls[wall].against(ball.material);
+        let pressure = -ball.pull.dot(normal);
+        let touch = ball.position - normal * ball.radius;
+        let support = Support {
+            normal,
+            surface: motion.map_or_else(Vec3::zero, |m| m.velocity_at(touch)),
+            turning: motion.map_or_else(Vec3::zero, |m| m.spin),
+            pull: ball.pull + normal * pressure,
+            pressure,
+            radius: ball.radius,
+            friction: material.friction,
+            rolling_resistance: material.rolling_resistance,
+            spinning_resistance: material.spinning_resistance,
+            spins: settings.spin == BallSpin::Free,
+        };
+        let stretch = support.stretch(ball.velocity, ball.spin, settings.dt);
+        ball.path.acceleration = stretch.acceleration;
+        ball.path.spin_acceleration = stretch.spin_acceleration;
+        ball.path.change = if stretch.duration < settings.dt {
+            ball.path.begin + stretch.duration
+        } else {
+            f64::INFINITY
+        };
+        ball.path.stamp += 1;
+    }
+
+    /// Finds the next event of a ball and puts it in the queue.
+    fn foresee(&mut self, row: usize, now: f64, settings: &Settings) {
+        self.go_home(row, now, settings.dt);
+        let ball = &self.balls[row];
+        let left = settings.dt - now;
+        let mut first = (ball.path.change.max(now), What::Changes);
+        let mut offer = |after: Option<f64>, what: What| {
+            // What lies behind by rounding is now.
+            if let Some(after) = after
+                && now + after.max(0.0) < first.0
+            {
+                first = (now + after.max(0.0), what);
+            }
+        };
+        for wall in 0..self.walls.len() {
+            if ball.path.support != Some(wall)
+                && let Some((after, what)) = self.foresee_wall(row, wall, now, settings)
+            {
+                offer(Some(after), what);
+            }
+        }
+        let mut other = |other: usize| {
+            if other != row {
+                let stamp = self.balls[other].path.stamp;
+                let after = self.foresee_meeting(row, other, now, settings);
+                offer(after, What::Meets(other, stamp));
+            }
+        };
+        match ball.path.home {
+            Home::Cell(cell) => {
+                self.cells.near(cell, &mut other);
+                self.anywhere.iter().copied().for_each(&mut other);
+                let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
+                for axis in 0..3 {
+                    let low = cell[axis] as f64 * self.cells.width();
+                    let (x, v, a) = (position[axis], velocity[axis], ball.path.acceleration[axis]);
+                    let above =
+                        Gap { now: low + self.cells.width() - x, speed: -v, acceleration: -a };
+                    let below = Gap { now: x - low, speed: v, acceleration: a };
+                    for (gap, step) in [(above, 1), (below, -1)] {
+                        let to = cell[axis] + step;
+                        offer(crossing_time(gap), What::LeavesCell { axis, to });
+                    }
+                }
+            }
+            Home::Anywhere => (0..self.balls.len()).for_each(&mut other),
+        }
+        let (time, what) = first;
+        if time <= now + left && time.is_finite() {
+            let stamp = ball.path.stamp;
+            self.queue.push(Reverse(Event { time, row, stamp, what }));
+        }
+    }
+
+    /// When and how a ball meets a wall next, in seconds from now.
+    fn foresee_wall(
+        &self,
+        row: usize,
+        wall: usize,
+        now: f64,
+        settings: &Settings,
+    ) -> Option<(f64, What)> {
+        let ball = &self.balls[row];
+        let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
+        let (normal, distance) = self.walls.normal_and_distance(wall, position);
+        let moving = self.walls[wall].motion.is_some();
+        let touch = position - normal * ball.radius;
+        let surface = if moving { self.walls.surface_velocity(wall, touch) } else { Vec3::zero() };
+        let gap = Gap {
+            now: distance - ball.radius,
+            speed: (velocity + ball.path.carry - surface).dot(normal),
+            acceleration: ball.path.acceleration.dot(normal),
+        };
+        let size = ball.radius + distance.abs() + self.walls[wall].offset.abs();
+        let fall = ball.pull.magnitude() * settings.dt;
+        let least = f64::EPSILON * 16.0 * size;
+        if gap.now > least {
+            // A wall counts as where it will be, so one that comes nearer is there.
+            let seen = Gap { speed: velocity.dot(normal), ..gap };
+            return closing_time(seen).map(|after| (after, What::Hits(wall)));
+        }
+        let held = ball.path.support.is_some() || ball.path.heaped;
+        let press = gap.acceleration < 0.0;
+        let slow = if held { PRESS * fall } else { REST * fall };
+        let slow = slow.max(1e-14 * velocity.magnitude());
+        if gap.speed < -slow {
+            Some((0.0, What::Hits(wall)))
+        } else if !press {
+            None
+        } else if gap.speed > slow {
+            Some((-2.0 * gap.speed / gap.acceleration, What::Hits(wall)))
+        } else if held {
+            Some(((-slow * 1.01 - gap.speed) / gap.acceleration, What::Hits(wall)))
+        } else {
+            Some((0.0, What::SettlesOn(wall)))
+        }
+    }
+
+    /// When two balls meet next, in seconds from now.
+    fn foresee_meeting(&self, a: usize, b: usize, now: f64, settings: &Settings) -> Option<f64> {
+        let (first, second) = (&self.balls[a], &self.balls[b]);
+        let left = settings.dt - now;
+        let apart = second.position_at(now) - first.position_at(now);
+        let velocity = second.velocity_at(now) - first.velocity_at(now);
+        let acceleration = second.path.acceleration - first.path.acceleration;
+        let reach = first.radius + second.radius;
+        let (normal, distance) = direction_and_length(apart).unwrap_or((Vec3::unit_x(), 0.0));
+        let gap = distance - reach;
+        let growth = acceleration.magnitude();
+        if gap > (velocity.magnitude() + 0.5 * growth * left) * left {
+            return None;
+        }
+        let size = reach + first.position_at(now).x.abs().max(first.position_at(now).y.abs());
+        if gap > f64::EPSILON * 8.0 * size {
+            return meeting_time(apart, velocity, acceleration, reach, [0.0, left]);
+        }
+        let speed = velocity.dot(normal);
+        let pull = acceleration.dot(normal);
+        let press = self.press_speed(a, b, settings);
+        if speed < -press {
+            Some(0.0)
+        } else if pull >= 0.0 {
+            None
+        } else if speed <= press {
+            Some((-press * 1.01 - speed) / pull)
+        } else {
+            // They part, and come back later.
+            meeting_time(apart, velocity, acceleration, reach, [-speed / pull, left])
+        }
+    }
+
+    /// The speed that two balls that press each other gain before they touch anew.
+    fn press_speed(&self, a: usize, b: usize, settings: &Settings) -> f64 {
+        let (first, second) = (&self.balls[a], &self.balls[b]);
+        let apart = (second.path.acceleration - first.path.acceleration).magnitude();
+        let speeds = first.velocity.magnitude() + second.velocity.magnitude();
+        (PRESS * apart * settings.dt).max(1e-13 * speeds)
+    }
+
+    /// Puts every ball where others find it.
+    fn find_homes(&mut self, dt: f64) {
+        let largest = self.balls.iter().fold(0.0_f64, |max, ball| max.max(ball.radius));
+        // Rounding must not take a ball that touches out of the neighbouring cell.
+        self.cells.reset(self.balls.len(), 2.001 * largest);
+        self.anywhere.clear();
+        for row in 0..self.balls.len() {
+            if self.crosses_too_many(row, dt) {
+                self.anywhere.push(row);
+            } else {
+                let cell = self.cells.cell(self.balls[row].position);
+                self.cells.insert(row as u32, cell);
+                self.balls[row].path.home = Home::Cell(cell);
+            }
+        }
+    }
+
+    fn crosses_too_many(&self, row: usize, left: f64) -> bool {
+        let Ball { velocity, path, .. } = &self.balls[row];
+        let fastest = velocity.magnitude() + path.acceleration.magnitude() * left;
+        // Also what has no finite cell at all.
+        let cells = fastest * left / self.cells.width();
+        let far = self.balls[row].position;
+        let far = [far.x, far.y, far.z].iter().fold(0.0_f64, |max, x| max.max(x.abs()));
+        !(cells <= FAR && far / self.cells.width() < 1e15)
+    }
+
+    /// Has a ball that became too fast looked for everywhere.
+    fn go_home(&mut self, row: usize, now: f64, dt: f64) {
+        if self.balls[row].path.home != Home::Anywhere && self.crosses_too_many(row, dt - now) {
+            self.cells.remove(row as u32);
+            self.anywhere.push(row);
+            self.balls[row].path.home = Home::Anywhere;
+        }
+    }
+
+    /// Finds what rests at the start: single balls settle on their wall, and heaps are
+    /// held by the accelerations that the impulse method finds for them.
+    fn begin_at_rest(&mut self, settings: &Settings) {
+        let dt = settings.dt;
+        for contact in &self.near.wm {
+            // What a wall overlaps is moved out at once.
+            let ball = &mut self.balls[contact.b as usize];
+            let (normal, distance) =
+                self.walls.normal_and_distance(contact.a as usize, ball.position);
+            ball.position += normal * (ball.radius - distance).max(0.0);
+        }
+        let mut near = std::mem::take(&mut self.near);
+        let slow = |row: u32| PRESS * self.balls[row as usize].pull.magnitude() * dt;
+        // A fall from this height gives that speed.
+        let low = |row: u32| 0.5 * PRESS * slow(row) * dt + self.balls[row as usize].rounding;
+        near.wm.retain(|c| {
+            let (gap, speed) = self.wall_gap(c);
+            gap <= low(c.b) && speed.abs() <= slow(c.b)
+        });
+        near.mm.retain(|c| {
+            let (first, second) = (&self.balls[c.a as usize], &self.balls[c.b as usize]);
+            let apart = direction_and_length(second.position - first.position);
+            let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), 0.0));
+            let speed = (second.velocity - first.velocity).dot(normal);
+            distance - first.radius - second.radius <= low(c.a).max(low(c.b))
+                && speed.abs() <= slow(c.a).max(slow(c.b))
+        });
+        self.touches.clear();
+        self.touches.resize(self.balls.len(), 0);
+        near.wm.iter().for_each(|c| self.touches[c.b as usize] += 1);
+        near.mm.iter().flat_map(|c| [c.a, c.b]).for_each(|row| self.touches[row as usize] += 2);
+        near.wm.retain(|c| {
+            let alone = self.touches[c.b as usize] == 1;
+            if alone {
+                let (gap, speed) = self.wall_gap(c);
+                let ball = &self.balls[c.b as usize];
+                let strength = ball.pull.magnitude();
+                let rest = REST * strength * dt;
+                let falls = ball.pull.dot(self.walls[c.a as usize].normal) < 0.0;
+                let lies = gap <= 0.5 * REST * rest * dt + ball.rounding && speed.abs() <= rest;
+                if falls && lies {
+                    self.settle(c.b as usize, c.a as usize, settings);
+                }
+            }
+            !alone
+        });
+        if !near.is_empty() {
+            self.hold_heaps(&mut near, settings);
+        }
+        self.near = near;
+    }
+
+    /// The gap between a wall and a ball, and how fast it grows.
+    fn wall_gap(&self, contact: &Contact<f64>) -> (f64, f64) {
+        let ball = &self.balls[contact.b as usize];
+        let wall = contact.a as usize;
+        let (normal, distance) = self.walls.normal_and_distance(wall, ball.position);
+        let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
+        (distance - ball.radius, (ball.velocity - surface).dot(normal))
+    }
+
+    fn hold_heaps(&mut self, contacts: &mut Contacts<f64>, settings: &Settings) {
+        let dt = settings.dt;
+        let Heap { position, velocity, spin, radius, inverse_mass, before, constraints } =
+            &mut self.heap;
+        // Where each would be at the end of the substep if nothing held it.
+        let balls = &self.balls;
+        fill(position, balls, |b| b.position + (b.velocity + b.pull * (0.5 * dt)) * dt);
+        fill(velocity, balls, |b| b.velocity + b.pull * dt);
+        fill(spin, balls, |b| b.spin);
+        fill(radius, balls, |b| b.radius);
+        fill(inverse_mass, balls, |b| b.inverse_mass);
+        let mut none = Vec::new();
+        let mut columns = Columns {
+            position,
+            velocity,
+            radius,
+            inverse_mass,
+            spin: if settings.spin == BallSpin::Free { spin } else { &mut none },
+        };
+        let told = impulse::Settings {
+            iterations: settings.iterations,
+            spin: settings.spin,
+            dt,
+            bounce_speed: 2.0 * balls.iter().map(|b| b.pull.magnitude()).fold(0.0, f64::max) * dt,
+        };
+        let material = |row: usize| balls[row].material;
+        let mut stopped = Vec::new(); // whoever it is will be stopped at the end, too
+        impulse(
+            &mut columns,
+            contacts,
+            &self.walls,
+            material,
+            |_| 0.5,
+            &told,
+            before,
+            constraints,
+            &mut self.warm,
+            &mut stopped,
+        );
+        let rows = contacts.wm.iter().map(|c| c.b);
+        let rows = rows.chain(contacts.mm.iter().flat_map(|c| [c.a, c.b]));
+        for row in rows {
+            let row = row as usize;
+            let ball = &mut self.balls[row];
+            if ball.path.heaped {
+                continue;
+            }
+            let end = ball.position + (ball.velocity + self.heap.velocity[row]) * (0.5 * dt);
+            ball.path.acceleration = (self.heap.velocity[row] - ball.velocity) / dt;
+            ball.path.spin_acceleration = (self.heap.spin[row] - ball.spin) / dt;
+            ball.path.heaped = true;
+            // What the method pushed apart, besides.
+            ball.position += self.heap.position[row] - end;
+        }
+    }
+}
+
+/// Sets a column to what each ball gives.
+fn fill<T>(column: &mut Vec<T>, balls: &[Ball], value: impl Fn(&Ball) -> T) {
+    column.clear();
+    column.extend(balls.iter().map(value));
+}
+
+/// When something passes a border between cells outward, which it may lie on.
+fn crossing_time(gap: Gap) -> Option<f64> {
+    if gap.now > 0.0 {
+        closing_time(gap)
+    } else if gap.speed < 0.0 || (gap.speed == 0.0 && gap.acceleration < 0.0) {
+        Some(0.0)
+    } else if gap.acceleration < 0.0 {
+        Some(-2.0 * gap.speed / gap.acceleration)
+    } else {
+        None
+    }
+}

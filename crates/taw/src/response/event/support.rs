@@ -1,0 +1,214 @@
+//! A ball that lies on one surface: it rests, rolls or slides, and its acceleration is
+//! known in closed form until that changes.
+//!
+//! With `u` the velocity of the touching point, `p` the part of it that comes from the
+//! spin (`radius · normal × spin`), `f` the friction and `N` the pressure, both per mass:
+//! `v' = pull + f` and `p' = 5/2 (f − c N p/|p|)`, where `c` is the rolling resistance.
+//! Sliding, `f = −µ N u/|u|`; rolling, `f` is what keeps `u` at zero.
+
+use cgmath::{InnerSpace, Zero};
+
+use crate::math::{Vec3, direction_and_length};
+
+/// What a ball lies on, how it is pulled there, and what it is made of.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Support {
+    pub normal: Vec3<f64>,
+    /// Of the surface where the ball touches it, in m/s.
+    pub surface: Vec3<f64>,
+    /// Of the surface, in rad/s.
+    pub turning: Vec3<f64>,
+    /// By all forces, along the surface, in m/s².
+    pub pull: Vec3<f64>,
+    /// The normal force per mass, in m/s².
+    pub pressure: f64,
+    pub radius: f64,
+    pub friction: f64,
+    pub rolling_resistance: f64,
+    pub spinning_resistance: f64,
+    /// Whether friction sets the ball spinning.
+    pub spins: bool,
+}
+
+/// Accelerations that last for a while.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stretch {
+    /// In m/s².
+    pub acceleration: Vec3<f64>,
+    /// In rad/s².
+    pub spin_acceleration: Vec3<f64>,
+    /// In seconds.
+    pub duration: f64,
+}
+
+/// The velocities along the surface that a stretch is about: of the center, and of the
+/// touching point by the spin alone.
+#[derive(Clone, Copy, Debug)]
+struct Rolling {
+    v: Vec3<f64>,
+    p: Vec3<f64>,
+}
+
+impl Rolling {
+    fn after(self, rate: Self, dt: f64) -> Self {
+        Self { v: self.v + rate.v * dt, p: self.p + rate.p * dt }
+    }
+}
+
+/// What the touching point does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Regime {
+    Slides,
+    Rolls,
+    Rests,
+}
+
+impl Support {
+    /// How a ball with this velocity and spin goes on, for `dt` seconds at most.
+    pub fn stretch(&self, velocity: Vec3<f64>, spin: Vec3<f64>, dt: f64) -> Stretch {
+        let n = self.normal;
+        let along = |x: Vec3<f64>| x - n * x.dot(n);
+        let v = along(velocity);
+        // Speeds that the forces here change within a billionth of the step are zero,
+        // and so is what rounding leaves.
+        let zero = 1e-9 * (self.pressure + self.pull.magnitude()) * dt
+            + 1e-14 * (v.magnitude() + self.surface.magnitude());
+        let p = n.cross(spin) * self.radius;
+        let p = if self.spins && p.magnitude() > zero { p } else { Vec3::zero() };
+        let now = Rolling { v, p };
+        let regime = self.regime(now, zero);
+        let rate = self.rate(now, regime);
+        let (rate, mut duration) = if self.is_steady(now, rate, regime) {
+            (rate, dt.min(self.until_it_changes(now, rate, regime)))
+        } else {
+            let duration = self.short_step(now, regime, dt);
+            (self.mean_rate(now, regime, duration), duration)
+        };
+        let mut spin_acceleration = Vec3::zero();
+        if self.spins {
+            spin_acceleration = rate.p.cross(n) / self.radius;
+            let about = spin.dot(n);
+            let slowing = 2.5 * self.spinning_resistance * self.pressure / self.radius;
+            if slowing > 0.0 && about.abs() > slowing * dt * 1e-12 {
+                spin_acceleration -= n * (slowing * about.signum());
+                duration = duration.min(about.abs() / slowing);
+            }
+        }
+        Stretch { acceleration: rate.v, spin_acceleration, duration }
+    }
+
+    /// By how much a friction of one changes the touching point's velocity.
+    fn give(&self) -> f64 {
+        if self.spins { 3.5 } else { 1.0 }
+    }
+
+    fn slip(&self, at: Rolling) -> Vec3<f64> {
+        let surface = self.surface - self.normal * self.surface.dot(self.normal);
+        at.v + at.p - surface
+    }
+
+    /// How the velocity of the surface changes under a ball that moves over it.
+    fn surface_rate(&self, at: Rolling) -> Vec3<f64> {
+        let rate = self.turning.cross(at.v);
+        rate - self.normal * rate.dot(self.normal)
+    }
+
+    fn regime(&self, now: Rolling, zero: f64) -> Regime {
+        if self.slip(now).magnitude() > zero {
+            return Regime::Slides;
+        }
+        let needed = self.surface_rate(now) - self.pull;
+        let holds = self.rolling_resistance.min(self.friction) * self.pressure;
+        if (now.p.is_zero() && needed.magnitude() <= holds) || !self.spins {
+            return if needed.magnitude() <= self.friction * self.pressure {
+                Regime::Rests
+            } else {
+                Regime::Slides
+            };
+        }
+        let friction = self.rolling_friction(now).magnitude();
+        if friction <= self.friction * self.pressure { Regime::Rolls } else { Regime::Slides }
+    }
+
+    /// What resists the rolling, as a change of `p`.
+    fn resistance(&self, at: Rolling) -> Vec3<f64> {
+        // A ball that just begins will roll down the pull, against which `p` turns.
+        let against = direction_and_length(at.p)
+            .or_else(|| direction_and_length(self.surface_rate(at) - self.pull))
+            .map_or_else(Vec3::zero, |(direction, _)| direction);
+        against * (-2.5 * self.rolling_resistance * self.pressure)
+    }
+
+    /// The friction that keeps the touching point at rest while the ball rolls.
+    fn rolling_friction(&self, at: Rolling) -> Vec3<f64> {
+        let resistance = if self.spins { self.resistance(at) } else { Vec3::zero() };
+        (self.surface_rate(at) - self.pull - resistance) / self.give()
+    }
+
+    fn rate(&self, at: Rolling, regime: Regime) -> Rolling {
+        let limit = self.friction * self.pressure;
+        let friction = match regime {
+            Regime::Rests => {
+                return Rolling { v: self.surface_rate(at), p: Vec3::zero() };
+            }
+            Regime::Rolls => self.rolling_friction(at),
+            Regime::Slides => {
+                let slip = self.slip(at);
+                // At the moment of slipping, against what would have kept it.
+                let against =
+                    if slip.magnitude2() > 0.0 { -slip } else { self.rolling_friction(at) };
+                direction_and_length(against).map_or_else(Vec3::zero, |(d, _)| d * limit)
+            }
+        };
+        let p = if self.spins { friction * 2.5 + self.resistance(at) } else { Vec3::zero() };
+        Rolling { v: self.pull + friction, p }
+    }
+
+    /// Whether the rate stays the same until the regime changes: nothing turns.
+    fn is_steady(&self, now: Rolling, rate: Rolling, regime: Regime) -> bool {
+        let straight = |x: Vec3<f64>, rate: Vec3<f64>| {
+            x.cross(rate).magnitude() <= 1e-13 * x.magnitude() * rate.magnitude()
+        };
+        self.turning.is_zero()
+            && (regime != Regime::Slides || straight(self.slip(now), rate.v + rate.p))
+            && (self.rolling_resistance == 0.0 || straight(now.p, rate.p))
+    }
+
+    /// The time until the slip, or the rolling that is resisted, comes to its end.
+    fn until_it_changes(&self, now: Rolling, rate: Rolling, regime: Regime) -> f64 {
+        let end = |x: Vec3<f64>, rate: Vec3<f64>| {
+            if x.dot(rate) < 0.0 { x.magnitude() / rate.magnitude() } else { f64::INFINITY }
+        };
+        let slip = match regime {
+            Regime::Slides => end(self.slip(now), rate.v + rate.p),
+            _ => f64::INFINITY,
+        };
+        let roll = if self.rolling_resistance > 0.0 { end(now.p, rate.p) } else { f64::INFINITY };
+        slip.min(roll)
+    }
+
+    /// A step so short that the directions of slip and spin change little within it.
+    fn short_step(&self, now: Rolling, regime: Regime, dt: f64) -> f64 {
+        let mut step = dt / 8.0;
+        if regime == Regime::Slides {
+            let rate = self.give() * self.friction * self.pressure;
+            step = step.min(self.slip(now).magnitude() / (4.0 * rate));
+        }
+        if self.rolling_resistance > 0.0 && !now.p.is_zero() {
+            let rate = 10.0 * self.rolling_resistance * self.pressure;
+            step = step.min(now.p.magnitude() / rate);
+        }
+        // Never so short that a step takes more than a thousand of them.
+        step.max(dt / 1024.0)
+    }
+
+    /// The mean over a short step (Kutta 1901).
+    fn mean_rate(&self, now: Rolling, regime: Regime, dt: f64) -> Rolling {
+        let k1 = self.rate(now, regime);
+        let k2 = self.rate(now.after(k1, 0.5 * dt), regime);
+        let k3 = self.rate(now.after(k2, 0.5 * dt), regime);
+        let k4 = self.rate(now.after(k3, dt), regime);
+        let mean = |a: Vec3<f64>, b, c, d| (a + (b + c) * 2.0 + d) / 6.0;
+        Rolling { v: mean(k1.v, k2.v, k3.v, k4.v), p: mean(k1.p, k2.p, k3.p, k4.p) }
+    }
+}

@@ -1,0 +1,173 @@
+//! Forces, impulses and momentum of single marbles.
+
+use cgmath::Zero;
+
+use super::marbles::{MarbleId, Marbles, SPIN, VELOCITY};
+use crate::Error;
+use crate::error::{finite_point, finite_vector};
+use crate::frame::Bivector;
+use crate::math::{Point3, Scalar, Vec3};
+
+const FORCE: [&str; 3] = ["force.x", "force.y", "force.z"];
+const IMPULSE: [&str; 3] = ["impulse.x", "impulse.y", "impulse.z"];
+const POINT: [&str; 3] = ["point.x", "point.y", "point.z"];
+const TORQUE: [&str; 3] = ["torque.yz", "torque.zx", "torque.xy"];
+
+/// Forces and torques last for one [`World::step`](super::World::step), all of its
+/// substeps, and add up. Torques count only in a model whose rotation is dynamic.
+/// Impulses change velocities at once.
+impl<S: Scalar> Marbles<S> {
+    /// Pushes a marble at its center, in newtons.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for the force, or for the sum of all
+    /// so far.
+    pub fn apply_force(&mut self, id: MarbleId, force: Vec3<S>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        finite_vector(FORCE, force)?;
+        let sum = self.force.get(row).unwrap_or_else(Vec3::zero) + force;
+        self.force.set(row, Some(finite_vector(FORCE, sum)?), self.len());
+        Ok(())
+    }
+
+    /// Pushes a marble at a point (in world space, of its surface or not), which turns it
+    /// too.
+    ///
+    /// # Errors
+    /// As [`Marbles::apply_force`], and [`Error::NotFinite`] for the point.
+    pub fn apply_force_at(
+        &mut self,
+        id: MarbleId,
+        force: Vec3<S>,
+        point: Point3<S>,
+    ) -> Result<(), Error> {
+        let row = self.row(id)?;
+        finite_vector(FORCE, force)?;
+        let lever = finite_point(POINT, point)? - self.position[row];
+        let torque = finite_vector(TORQUE, Bivector::wedge(lever, force).dual())?;
+        self.apply_force(id, force)?;
+        self.apply_torque(id, torque)
+    }
+
+    /// Turns a marble, in N m: a [`Bivector`], or the axial vector that is its dual.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for the torque, or for the sum of all
+    /// so far.
+    pub fn apply_torque(
+        &mut self,
+        id: MarbleId,
+        torque: impl Into<Bivector<S>>,
+    ) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let torque = finite_vector(TORQUE, torque.into().dual())?;
+        let sum = self.torque.get(row).unwrap_or_else(Bivector::zero).dual() + torque;
+        let sum = finite_vector(TORQUE, sum)?.into();
+        self.torque.set(row, Some(sum), self.len());
+        Ok(())
+    }
+
+    /// Forgets all forces and torques that were applied. A step ends with this.
+    pub fn clear_forces(&mut self) {
+        self.force.clear();
+        self.torque.clear();
+    }
+
+    /// Changes a marble's velocity at once, as a hit at its center does: by `impulse` (in
+    /// N s) over its mass.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] if the impulse or the velocity
+    /// after it is not finite.
+    pub fn apply_impulse(&mut self, id: MarbleId, impulse: Vec3<S>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        finite_vector(IMPULSE, impulse)?;
+        let velocity = self.velocity[row] + impulse / self.mass(row);
+        self.velocity[row] = finite_vector(VELOCITY, velocity)?;
+        Ok(())
+    }
+
+    /// Hits a marble at a point, as a cue does: velocity and, in a model with rotation,
+    /// spin change.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for impulse or point, or for what
+    /// comes of them; then nothing has changed.
+    pub fn apply_impulse_at(
+        &mut self,
+        id: MarbleId,
+        impulse: Vec3<S>,
+        point: Point3<S>,
+    ) -> Result<(), Error> {
+        let row = self.row(id)?;
+        finite_vector(IMPULSE, impulse)?;
+        let lever = finite_point(POINT, point)? - self.position[row];
+        let before = self.spin.get(row).copied();
+        self.apply_angular_impulse(id, Bivector::wedge(lever, impulse))?;
+        self.apply_impulse(id, impulse).inspect_err(|_| {
+            if let (Some(slot), Some(before)) = (self.spin.get_mut(row), before) {
+                *slot = before;
+            }
+        })
+    }
+
+    /// Changes a marble's spin at once: by an angular impulse (in kg m²/s) over its moment
+    /// of inertia. Does nothing in a model without rotation.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] if the impulse or the spin after it
+    /// is not finite.
+    pub fn apply_angular_impulse(
+        &mut self,
+        id: MarbleId,
+        impulse: impl Into<Bivector<S>>,
+    ) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let impulse =
+            finite_vector(["impulse.yz", "impulse.zx", "impulse.xy"], impulse.into().dual())?;
+        let change = impulse * self.inverse_inertia(row);
+        if let Some(spin) = self.spin.get_mut(row) {
+            *spin = finite_vector(SPIN, *spin + change)?;
+        }
+        Ok(())
+    }
+
+    /// Mass times velocity, in kg m/s; infinite for a moving marble of infinite mass.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn momentum(&self, id: MarbleId) -> Result<Vec3<S>, Error> {
+        let row = self.row(id)?;
+        let (velocity, mass) = (self.velocity[row], self.mass(row));
+        Ok(if velocity.is_zero() { velocity } else { velocity * mass })
+    }
+
+    /// Gives a marble the velocity that this momentum (in kg m/s) means for its mass.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for the momentum or the velocity.
+    pub fn set_momentum(&mut self, id: MarbleId, momentum: Vec3<S>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        finite_vector(["momentum.x", "momentum.y", "momentum.z"], momentum)?;
+        self.set_velocity(id, momentum / self.mass(row))
+    }
+
+    /// Moment of inertia times spin, about the marble's center, in kg m²/s; zero in a
+    /// model without rotation.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn angular_momentum(&self, id: MarbleId) -> Result<Bivector<S>, Error> {
+        let row = self.row(id)?;
+        let spin = self.spin.get(row).copied().unwrap_or_else(Vec3::zero);
+        let inverse = self.inverse_inertia(row);
+        Ok(if spin.is_zero() { spin } else { spin / inverse }.into())
+    }
+
+    /// Of a solid ball of even density, `5/2 / (m r²)`, in 1/(kg m²). Zero for infinite
+    /// mass.
+    pub(super) fn inverse_inertia(&self, row: usize) -> S {
+        let radius = self.radius[row];
+        S::constant(2.5) / self.mass(row) / radius / radius
+    }
+}

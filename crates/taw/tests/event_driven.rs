@@ -1,0 +1,155 @@
+//! Scenes with a known outcome, under `Response::EventDriven`.
+
+use taw::prelude::*;
+
+const G: f64 = 9.81;
+
+fn world<S: Scalar>(rotation: Rotation) -> World<S> {
+    let mut world = World::default();
+    let model = Model {
+        response: Response::EventDriven,
+        precision: Precision::Compensated,
+        rotation,
+        ..Model::default()
+    };
+    world.set_model(model).unwrap();
+    world
+}
+
+fn floor<S: Scalar>(rotation: Rotation) -> World<S> {
+    let mut world = world(rotation);
+    world.walls.insert(Plane::new(Vec3::unit_y(), S::zero()).unwrap()).unwrap();
+    world
+}
+
+fn surface<S: Scalar>(restitution: f64, friction: f64) -> Material<S> {
+    let (restitution, friction) = (S::constant(restitution), S::constant(friction));
+    Material { restitution, friction, ..Material::default() }
+}
+
+fn run<S: Scalar>(world: &mut World<S>, dt: f64, seconds: f64) {
+    for _ in 0..(seconds / dt).round() as u32 {
+        world.step(S::constant(dt)).unwrap();
+    }
+}
+
+#[test]
+fn elastic_bounces_keep_their_height_at_every_step() {
+    for dt in [1.0 / 30.0, 1.0 / 60.0, 1.0 / 240.0, 1e-3, 1e-4] {
+        let mut world = floor::<f32>(Rotation::None);
+        let marble = Marble {
+            material: Some(surface(1.0, 0.0)),
+            ..Marble::new(Point3::new(0.0, 5.0, 0.0), 0.1)
+        };
+        let id = world.marbles.insert(marble).unwrap();
+        let energy = |world: &World<f32>| {
+            let marble = world.marbles.get(id).unwrap();
+            let v = f64::from(marble.velocity.y);
+            f64::from(9.81_f32) * f64::from(marble.position.y) + 0.5 * v * v
+        };
+        let start = energy(&world);
+        for step in 0..(20.0 / dt) as u32 {
+            world.step(dt as f32).unwrap();
+            let off = energy(&world) / start - 1.0;
+            assert!(off.abs() < 1e-6, "off by {off} after {step} steps of {dt}");
+        }
+    }
+}
+
+#[test]
+fn a_zeno_ball_comes_to_rest_at_its_time() {
+    for e in [0.5, 0.8_f64] {
+        for dt in [1.0 / 60.0, 1e-3] {
+            let mut world = floor::<f32>(Rotation::None);
+            let marble = Marble {
+                material: Some(surface(e, 0.0)),
+                ..Marble::new(Point3::new(0.0, 1.5, 0.0), 0.5)
+            };
+            let id = world.marbles.insert(marble).unwrap();
+            let stop = (2.0 / G).sqrt() * (1.0 + e) / (1.0 - e);
+            let mut rested = 0.0;
+            for step in 1..(6.0 / dt) as u32 {
+                world.step(dt as f32).unwrap();
+                let marble = world.marbles.get(id).unwrap();
+                if marble.velocity.y != 0.0 {
+                    rested = f64::from(step) * dt;
+                }
+            }
+            assert!((rested - stop).abs() < dt + 1e-3 * stop, "{rested} s, not {stop} s");
+            assert_eq!(world.marbles.get(id).unwrap().position.y, 0.5);
+        }
+    }
+}
+
+#[test]
+fn galperin_counts_the_digits_of_pi() {
+    for (n, count) in [(0, 3), (1, 31), (2, 314), (3, 3141), (4, 31415)] {
+        let mut world = world::<f32>(Rotation::None);
+        world.set_gravity(Vec3::new(0.0, 0.0, 0.0)).unwrap();
+        world.walls.insert(Plane::new(Vec3::unit_x(), 0.0).unwrap()).unwrap();
+        for (x, mass, v) in [(1.0, 1.0, 0.0), (3.0, 100_f32.powi(n), -1.0)] {
+            let marble = Marble {
+                velocity: Vec3::new(v, 0.0, 0.0),
+                mass: Mass::Kilograms(mass),
+                material: Some(surface(1.0, 0.0)),
+                ..Marble::new(Point3::new(x, 0.0, 0.0), 0.5)
+            };
+            world.marbles.insert(marble).unwrap();
+        }
+        let mut impacts = 0;
+        for _ in 0..600 {
+            world.step(1.0 / 60.0).unwrap();
+            impacts += world.impacts().len();
+        }
+        assert_eq!(impacts, count, "100^{n}");
+    }
+}
+
+#[test]
+fn a_cradle_passes_the_speed_on_whatever_the_gaps() {
+    for gap in [0.0, 1e-4, 1e-2] {
+        let mut world = world::<f32>(Rotation::None);
+        world.set_gravity(Vec3::new(0.0, 0.0, 0.0)).unwrap();
+        let ids = [0, 1, 2, 3, 4].map(|i| {
+            let marble = Marble {
+                velocity: Vec3::new(if i == 0 { 1.0 } else { 0.0 }, 0.0, 0.0),
+                material: Some(surface(1.0, 0.0)),
+                ..Marble::new(Point3::new(i as f32 * (1.0 + gap), 0.0, 0.0), 0.5)
+            };
+            world.marbles.insert(marble).unwrap()
+        });
+        run(&mut world, 1.0 / 60.0, 1.0);
+        let speeds = ids.map(|id| world.marbles.get(id).unwrap().velocity.x);
+        for (speed, exact) in speeds.into_iter().zip([0.0, 0.0, 0.0, 0.0, 1.0]) {
+            assert!((speed - exact).abs() < 1e-6, "{speeds:?}");
+        }
+    }
+}
+
+#[test]
+fn a_sliding_ball_rolls_at_its_moment() {
+    for dt in [1.0 / 30.0, 1.0 / 60.0, 1.0 / 240.0, 1e-3] {
+        for heading in [0.0_f64, 0.3, 0.8, 2.0] {
+            let mut world = floor::<f32>(Rotation::Dynamic);
+            let toward = Vec3::new(heading.cos(), 0.0, heading.sin());
+            let velocity = (toward * 5.0).map(|x| x as f32);
+            let marble = Marble {
+                velocity,
+                material: Some(surface(0.0, 0.3)),
+                ..Marble::new(Point3::new(0.0, 0.5, 0.0), 0.5)
+            };
+            let id = world.marbles.insert(marble).unwrap();
+            run(&mut world, dt, 2.0);
+            let steps = (2.0 / dt).round();
+            let time = steps * f64::from(dt as f32);
+            let marble = world.marbles.get(id).unwrap();
+            let (v, x) = (marble.velocity.map(f64::from), marble.position.to_vec().map(f64::from));
+            let (mu, g) = (f64::from(0.3_f32), f64::from(9.81_f32));
+            let stop = 2.0 * 5.0 / (7.0 * mu * g);
+            let way = 5.0 * stop - 0.5 * mu * g * stop * stop + 25.0 / 7.0 * (time - stop);
+            assert!((v - toward * (25.0 / 7.0)).magnitude() < 1e-6, "{v:?} in steps of {dt}");
+            assert!((x.dot(toward) / way - 1.0).abs() < 2e-7, "{x:?}, not {way}, steps of {dt}");
+            assert!(v.cross(toward).magnitude() / 5.0 < 1e-7);
+        }
+    }
+}
