@@ -1,0 +1,118 @@
+//! Hard spheres that collide and nothing else.
+
+use taw::prelude::*;
+
+use super::{Effort, Row};
+use crate::scene::{Ball, EXACT, Meter, box_around, energy, surface, wall, weightless};
+
+/// A box of elastic balls of diameter one without gravity that fill this part of it, on a
+/// lattice, with random velocities whose components have this deviation; and half of the
+/// box's width.
+fn gas(count: u32, filling: f64, speed: f64) -> (World<f32>, f64) {
+    let mut world = weightless::<f32>(Model { rotation: Rotation::None, ..EXACT });
+    let volume = f64::from(count) * std::f64::consts::PI / 6.0 / filling;
+    let half = 0.5 * volume.cbrt();
+    box_around(&mut world, half);
+    wall(&mut world, [0.0, 1.0, 0.0], -half);
+    wall(&mut world, [0.0, -1.0, 0.0], -half);
+    let side = f64::from(count).cbrt().round() as u32;
+    let pitch = 2.0 * half / f64::from(side);
+    let mut random = fastrand::Rng::with_seed(1);
+    // The sum of twelve has a deviation of one.
+    let mut normal = || (0..12).map(|_| random.f64()).sum::<f64>() - 6.0;
+    for i in 0..count {
+        let at = [i % side, i / side % side, i / side / side];
+        let at = at.map(|n| (f64::from(n) + 0.5) * pitch - half);
+        let velocity = [normal(), normal(), normal()].map(|v| v * speed);
+        Ball { at, velocity, material: surface(1.0, 0.0), ..Ball::default() }.insert(&mut world);
+    }
+    (world, half)
+}
+
+/// The energy after 60,000 collisions or more.
+fn energy_kept(meter: &mut Meter) -> f64 {
+    let (mut world, _) = gas(216, 0.22, 10.0);
+    let start = energy(&world);
+    let mut collisions = 0;
+    let mut seconds = 0.0;
+    while collisions < 60_000 || seconds < 10.0 {
+        meter.step(&mut world, 1.0 / 60.0);
+        collisions += world.impacts().len();
+        seconds += 1.0 / 60.0;
+    }
+    (energy(&world) / start - 1.0).abs()
+}
+
+/// How far the pressure in the middle of the box is off the hard-sphere fluid's at the
+/// density there (Boublik and Nezbeda 1986), relatively. `margin` is what counts as wall.
+fn pressure(meter: &mut Meter, count: u32, filling: f64, margin: f64, seconds: f64) -> f64 {
+    let (mut world, half) = gas(count, filling, 1.0);
+    let inner = half - margin;
+    let dt = 0.02;
+    meter.run(&mut world, dt, 0.1 * seconds + 5.0); // until the lattice is forgotten
+    let temperature = 2.0 * energy(&world) / (3.0 * f64::from(count));
+    let inside = |p: &Point3<f32>| [p.x, p.y, p.z].iter().all(|x| f64::from(x.abs()) < inner);
+    let (mut virial, mut balls) = (0.0, 0.0);
+    let steps = (seconds / dt).round() as u32;
+    for _ in 0..steps {
+        meter.step(&mut world, dt);
+        let position = world.marbles.position();
+        for impact in world.impacts().iter().filter(|impact| !impact.on_wall) {
+            // Half of it belongs to each ball.
+            for row in [impact.a, impact.b] {
+                if inside(&position[row as usize]) {
+                    virial += 0.5 * f64::from(impact.approach_speed);
+                }
+            }
+        }
+        balls += position.iter().filter(|p| inside(p)).count() as f64;
+    }
+    let mean = balls / f64::from(steps);
+    let compressibility = 1.0 + virial / (3.0 * mean * temperature * f64::from(steps) * dt);
+    let y = mean * std::f64::consts::PI / 6.0 / (2.0 * inner).powi(3);
+    let numerator = 1.0 + y + y * y - 2.0 / 3.0 * y.powi(3) * (1.0 + y);
+    (compressibility / (numerator / (1.0 - y).powi(3)) - 1.0).abs()
+}
+
+pub const ROWS: &[Row] = &[
+    Row {
+        name: "gas/energy",
+        setup: "216 balls fill 0.22 of a box, over 60,000 collisions in 10 s at 1/60 s",
+        metric: "relative error of the energy",
+        model: "event-driven",
+        target: 1e-5,
+        best: "0.74 Box3D, 0.79 Rapier lost",
+        source: "references 4.22",
+        effort: Effort::Quick,
+        measure: energy_kept,
+    },
+    Row {
+        name: "gas/pressure/1000",
+        setup: "1,000 balls fill 0.1 and 0.3: PV/NkT in the middle",
+        metric: "worst relative error",
+        model: "event-driven",
+        target: 1e-2,
+        best: "none published; our prototype 0.7e-2",
+        source: "Boublik and Nezbeda 1986; references 4.24",
+        effort: Effort::Quick,
+        measure: |meter| {
+            pressure(meter, 1000, 0.1, 2.0, 150.0).max(pressure(meter, 1000, 0.3, 2.0, 60.0))
+        },
+    },
+    Row {
+        name: "gas/pressure/4096",
+        setup: "4,096 balls fill 0.1, 0.3 and 0.45",
+        metric: "worst relative error",
+        model: "event-driven",
+        target: 2e-3,
+        best: "none published",
+        source: "Boublik and Nezbeda 1986; references 4.24",
+        effort: Effort::Long,
+        measure: |meter| {
+            [(0.1, 2.0, 200.0), (0.3, 3.0, 100.0), (0.45, 4.0, 80.0)]
+                .map(|(filling, margin, seconds)| pressure(meter, 4096, filling, margin, seconds))
+                .into_iter()
+                .fold(0.0, f64::max)
+        },
+    },
+];

@@ -1,0 +1,666 @@
+//! Single collisions, and chains of a few.
+
+use taw::prelude::*;
+use taw::response::{ContactLaw, Elasticity};
+
+use super::{Effort, Row};
+use crate::scene::{Ball, EXACT, Meter, slope, state, surface, vector, wall, weightless, world};
+
+/// How a ball leaves a wall whose normal is +y that it met with this velocity and spin
+/// about z: velocity along x and y, and spin.
+fn bounce(
+    meter: &mut Meter,
+    model: Model,
+    v: [f64; 2],
+    spin: f64,
+    radius: f64,
+    material: Material<f64>,
+    dt: f64,
+) -> [f64; 3] {
+    let mut world = weightless::<f32>(model);
+    wall(&mut world, [0.0, 1.0, 0.0], 0.0);
+    // It meets the wall in the middle of the second step.
+    let at = [0.0, radius - 1.5 * v[1] * dt, 0.0];
+    let ball = Ball {
+        at,
+        radius,
+        velocity: [v[0], v[1], 0.0],
+        spin: [0.0, 0.0, spin],
+        material,
+        ..Ball::default()
+    };
+    let id = ball.insert(&mut world);
+    for _ in 0..4 {
+        meter.step(&mut world, dt);
+    }
+    let [_, v, w] = state(&world, id);
+    [v.x, v.y, w.z]
+}
+
+/// The same for a rigid ball (Chung and Ooi 2011): its point sticks, or slides with all
+/// the friction that the whole impact allows.
+fn rigid(v: [f64; 2], spin: f64, radius: f64, material: Material<f64>) -> [f64; 3] {
+    let pressure = (1.0 + material.restitution) * -v[1];
+    let slip = v[0] + radius * spin;
+    let stop = -(1.0 + material.tangential_restitution) * slip / 3.5;
+    let limit = material.friction * pressure;
+    let grip = stop.clamp(-limit, limit);
+    [v[0] + grip, -material.restitution * v[1], spin + 2.5 * grip / radius]
+}
+
+/// The worst of velocity and rim speed over the speed, over all cases, steps and radii.
+fn oblique(
+    meter: &mut Meter,
+    cases: &[([f64; 2], f64)],
+    rim: bool,
+    material: Material<f64>,
+) -> f64 {
+    let mut worst: f64 = 0.0;
+    for (v, spin) in cases {
+        for radius in [1e-5, 2.5e-3, 0.1, 1.0, 1e3] {
+            // A second's flight must not be longer than f32 can place a ball of that size.
+            let spin = if rim { spin / radius } else { *spin };
+            for dt in [1.0 / 30.0, 1.0 / 60.0, 1e-3, 1e-4] {
+                let found = bounce(meter, EXACT, *v, spin, radius, material, dt);
+                let exact = rigid(*v, spin, radius, material);
+                let speed = v[0].hypot(v[1]).max((radius * spin).abs());
+                let off =
+                    [found[0] - exact[0], found[1] - exact[1], radius * (found[2] - exact[2])];
+                worst = off.iter().fold(worst, |worst, off| worst.max(off.abs() / speed));
+            }
+        }
+    }
+    worst
+}
+
+fn angles() -> Vec<([f64; 2], f64)> {
+    (1..=17_u32)
+        .map(|i| {
+            let (sin, cos) = (5.0 * f64::from(i)).to_radians().sin_cos();
+            ([3.9 * sin, -3.9 * cos], 0.0)
+        })
+        .collect()
+}
+
+/// Collisions of elastic spheres by Hertz: contact time, largest overlap and force of two
+/// materials, worst relative error.
+fn hertz(meter: &mut Meter, with_wall: bool) -> f64 {
+    let cases = if with_wall {
+        [
+            (7.0e10, 0.30, 2699.0, 0.1, 0.2, [731.59e-6, 49.717e-6, 11_369.9]),
+            (4.0e10, 0.35, 1800.0, 0.1, 0.2, [766.99e-6, 52.123e-6, 7232.7]),
+        ]
+    } else {
+        [
+            (4.8e10, 0.20, 2800.0, 0.01, 10.0, [40.336e-6, 274.11e-6, 10_696.9]),
+            (2.0e10, 0.25, 2500.0, 0.01, 10.0, [54.196e-6, 368.30e-6, 7108.2]),
+        ]
+    };
+    let mut worst: f64 = 0.0;
+    for (youngs_modulus, poissons_ratio, density, radius, speed, exact) in cases {
+        let model = Model {
+            response: Response::Penalty(ContactLaw::HertzMindlin),
+            rotation: Rotation::None,
+            integrator: Integrator::SemiImplicitEuler,
+            ..EXACT
+        };
+        let mut world = weightless::<f64>(model);
+        let mass = 4.0 / 3.0 * std::f64::consts::PI * radius * radius * radius * density;
+        let shear = youngs_modulus / (2.0 + 2.0 * poissons_ratio);
+        let dt = 0.01 * std::f64::consts::PI * radius * (density / shear).sqrt()
+            / (0.1631 * poissons_ratio + 0.8766);
+        let material = Material {
+            elasticity: Elasticity { youngs_modulus, poissons_ratio },
+            ..surface(1.0, 0.35)
+        };
+        let ball = |x: f64, v: f64| Ball {
+            at: [x, 0.0, 0.0],
+            radius,
+            velocity: [v, 0.0, 0.0],
+            mass,
+            material,
+            ..Ball::default()
+        };
+        let id = if with_wall {
+            wall(&mut world, [1.0, 0.0, 0.0], 0.0);
+            ball(radius, -speed).insert(&mut world)
+        } else {
+            ball(-radius, speed).insert(&mut world);
+            ball(radius, -speed).insert(&mut world)
+        };
+        let (mut time, mut overlap, mut force): (f64, f64, f64) = (0.0, 0.0, 0.0);
+        loop {
+            let before = state(&world, id)[1].x;
+            meter.step(&mut world, dt);
+            let [x, v, _] = state(&world, id);
+            let apart = x.x - radius; // half of it, for two balls
+            if apart > 0.0 || time > 1.0 {
+                // They parted within this step, at this speed.
+                time += dt - apart / v.x;
+                break;
+            }
+            time += dt;
+            overlap = overlap.max(if with_wall { -apart } else { -2.0 * apart });
+            force = force.max((v.x - before) * mass / dt);
+        }
+        let found = [time, overlap, force];
+        worst = found
+            .iter()
+            .zip(exact)
+            .fold(worst, |worst, (found, exact)| worst.max((found / exact - 1.0).abs()));
+    }
+    worst
+}
+
+/// Five balls in a row, the first at 1 m/s: the largest error of a speed.
+fn cradle(meter: &mut Meter, gap: f64) -> f64 {
+    let mut world = weightless::<f32>(EXACT);
+    let ids = [0, 1, 2, 3, 4].map(|i| {
+        let first = if i == 0 { 1.0 } else { 0.0 };
+        let at = [f64::from(i) * (1.0 + gap), 0.0, 0.0];
+        Ball { at, velocity: [first, 0.0, 0.0], material: surface(1.0, 0.0), ..Ball::default() }
+            .insert(&mut world)
+    });
+    meter.run(&mut world, 1.0 / 60.0, 1.0);
+    let exact = [0.0, 0.0, 0.0, 0.0, 1.0];
+    ids.iter()
+        .zip(exact)
+        .map(|(id, exact)| (state(&world, *id)[1].x - exact).abs())
+        .fold(0.0, f64::max)
+}
+
+/// Counts the collisions of Galperin's billiard with masses 1 and 100^n; gives by how many
+/// it is off the digits of π.
+fn galperin<S: Scalar>(meter: &mut Meter, n: i32) -> f64 {
+    let mut world = weightless::<S>(Model { rotation: Rotation::None, ..EXACT });
+    wall(&mut world, [1.0, 0.0, 0.0], 0.0);
+    let elastic = surface(1.0, 0.0);
+    Ball { at: [1.0, 0.0, 0.0], material: elastic, ..Ball::default() }.insert(&mut world);
+    Ball {
+        at: [3.0, 0.0, 0.0],
+        velocity: [-1.0, 0.0, 0.0],
+        mass: 100_f64.powi(n),
+        material: elastic,
+        ..Ball::default()
+    }
+    .insert(&mut world);
+    let mut count = 0.0;
+    for _ in 0..600 {
+        meter.step(&mut world, 1.0 / 60.0);
+        count += world.impacts().len() as f64;
+    }
+    let digits = (std::f64::consts::PI * 10_f64.powi(n)).floor();
+    (count - digits).abs()
+}
+
+/// Garwin's superball under a table, and 10,000 bounces between floor and ceiling for the
+/// energy.
+fn superball(meter: &mut Meter) -> f64 {
+    let rubber = Material { tangential_restitution: 1.0, ..surface(1.0, 1e6) };
+    let mut world = weightless::<f32>(EXACT);
+    wall(&mut world, [0.0, 1.0, 0.0], 0.0);
+    wall(&mut world, [0.0, -1.0, 0.0], -2.0);
+    let id = Ball {
+        at: [0.0, 1.0, 0.0],
+        velocity: [1.0, -2.0, 0.0],
+        material: rubber,
+        ..Ball::default()
+    }
+    .insert(&mut world);
+    let mut bounces = 0;
+    let mut worst: f64 = 0.0;
+    let start = 0.5 * (1.0 + 4.0);
+    while bounces < 10_000 {
+        meter.step(&mut world, 1.0 / 60.0);
+        let [_, v, w] = state(&world, id);
+        if !world.impacts().is_empty() {
+            bounces += world.impacts().len();
+            let exact = match bounces {
+                1 => Some((147.0, -490.0)),
+                2 => Some((-217.0, 420.0)),
+                3 => Some((-333.0, 130.0)),
+                _ => None,
+            };
+            if let Some((speed, rim)) = exact {
+                worst = worst.max((v.x - speed / 343.0).abs()).max((0.5 * w.z - rim / 343.0).abs());
+            }
+        }
+    }
+    let [_, v, w] = state(&world, id);
+    let end = 0.5 * v.magnitude2() + 0.2 * (0.5 * w.z).powi(2);
+    worst.max((end / start - 1.0).abs())
+}
+
+/// A ball passes one at rest and grazes it: the largest error of a velocity over the
+/// speed, for impact parameters of a diameter less this part.
+fn graze(meter: &mut Meter, parts: &[f64]) -> f64 {
+    let mut worst: f64 = 0.0;
+    for part in parts {
+        // A power of two of speed and radius, so that the set-up itself rounds nothing.
+        let mut world = weightless::<f32>(Model { rotation: Rotation::None, ..EXACT });
+        let b = f64::from((1.0 - part) as f32);
+        let moving = Ball {
+            at: [-2.0, b, 0.0],
+            velocity: [10.0, 0.0, 0.0],
+            material: surface(1.0, 0.0),
+            ..Ball::default()
+        };
+        let first = moving.insert(&mut world);
+        let second = Ball { at: [0.0; 3], material: surface(1.0, 0.0), ..Ball::default() }
+            .insert(&mut world);
+        meter.run(&mut world, 1.0 / 60.0, 1.0);
+        let normal = Vec3::new((1.0 - b * b).sqrt(), -b, 0.0);
+        let given = normal * (10.0 * normal.x);
+        let off = (state(&world, second)[1] - given)
+            .magnitude()
+            .max((state(&world, first)[1] - (Vec3::new(10.0, 0.0, 0.0) - given)).magnitude());
+        worst = worst.max(off / 10.0);
+    }
+    worst
+}
+
+/// Two balls at 300 m/s head on; a ball at 300 m/s against one of a tenth of its radius;
+/// and a thousand grazing passes at 300 m/s: the largest error of velocity over the speed
+/// and of the place a second later over the way.
+fn fast(meter: &mut Meter) -> f64 {
+    let mut worst: f64 = 0.0;
+    let elastic = surface(1.0, 0.0);
+    let model = Model { rotation: Rotation::None, ..EXACT };
+    for (radius, mass) in [(0.5, 1.0), (0.05, 1e-3)] {
+        let mut world = weightless::<f32>(model);
+        let ball = Ball {
+            velocity: [300.0, 0.0, 0.0],
+            at: [-10.0, 0.0, 0.0],
+            material: elastic,
+            ..Ball::default()
+        };
+        let first = ball.insert(&mut world);
+        let second =
+            Ball { radius, mass, velocity: [-300.0, 0.0, 0.0], at: [10.0, 0.0, 0.0], ..ball }
+                .insert(&mut world);
+        let t = meter.run(&mut world, 1.0 / 60.0, 1.0);
+        let meet = (20.0 - 0.5 - radius) / 600.0;
+        let common = 300.0 * (1.0 - mass) / (1.0 + mass);
+        for (id, start, v) in [(first, -10.0, 300.0), (second, 10.0, -300.0)] {
+            let after = 2.0 * common - v;
+            let place = start + v * meet + after * (t - meet);
+            let [x, v, _] = state(&world, id);
+            worst = worst.max((v.x - after).abs() / 300.0).max((x.x - place).abs() / (300.0 * t));
+        }
+    }
+    let mut random = fastrand::Rng::with_seed(7);
+    for _ in 0..1000 {
+        let mut world = weightless::<f32>(model);
+        let b = f64::from((1.0 - 10_f64.powf(-1.0 - 2.0 * random.f64())) as f32);
+        let x = -2.0 - random.f64();
+        let first = Ball {
+            at: [x, b, 0.0],
+            velocity: [300.0, 0.0, 0.0],
+            material: elastic,
+            ..Ball::default()
+        }
+        .insert(&mut world);
+        Ball { at: [0.0; 3], material: elastic, ..Ball::default() }.insert(&mut world);
+        meter.run(&mut world, 1.0 / 60.0, 0.1);
+        let normal = Vec3::new((1.0 - b * b).sqrt(), -b, 0.0);
+        let exact = Vec3::new(300.0, 0.0, 0.0) - normal * (300.0 * normal.x);
+        worst = worst.max((state(&world, first)[1] - exact).magnitude() / 300.0);
+    }
+    worst
+}
+
+/// A rack of fifteen, mirrored about the cue ball's way: the largest deviation of a ball
+/// from its mirror image after the break, in metres.
+fn rack(meter: &mut Meter) -> f64 {
+    let mut world = slope::<f32>(EXACT, 0.0);
+    let r = 0.028_575;
+    let material = surface(0.95, 0.06);
+    let mut ids = Vec::new();
+    for row in 0..5_u32 {
+        for i in 0..=row {
+            let x = f64::from(row) * r * 3.0_f64.sqrt() * 1.0001;
+            let z = (f64::from(2 * i) - f64::from(row)) * r * 1.0001;
+            let ball = Ball { at: [x, r, z], radius: r, mass: 0.17, material, ..Ball::default() };
+            ids.push((row, i, ball.insert(&mut world)));
+        }
+    }
+    let cue = Ball {
+        at: [-0.5, r, 0.0],
+        radius: r,
+        mass: 0.17,
+        velocity: [8.0, 0.0, 0.0],
+        material,
+        ..Ball::default()
+    };
+    cue.insert(&mut world);
+    meter.run(&mut world, 1.0 / 60.0, 2.0);
+    let at = |row: u32, i: u32| {
+        let id = ids.iter().find(|(r, j, _)| *r == row && *j == i).expect("a ball").2;
+        state(&world, id)[0]
+    };
+    ids.iter()
+        .map(|(row, i, _)| {
+            let (ball, image) = (at(*row, *i), at(*row, row - i));
+            (ball - Vec3::new(image.x, image.y, -image.z)).magnitude()
+        })
+        .fold(0.0, f64::max)
+}
+
+/// Flight under gravity for four seconds in steps of every length: relative error of way
+/// and velocity.
+fn flight(meter: &mut Meter, model: Model) -> f64 {
+    let mut worst: f64 = 0.0;
+    for dt in [0.5, 1.0 / 30.0, 1.0 / 60.0, 1e-3, 1e-4] {
+        let mut world = world::<f32>(model);
+        let start = Vec3::new(1.0, 2.0, -3.0);
+        let id = Ball { at: start.into(), velocity: [3.0, 4.0, 5.0], ..Ball::default() }
+            .insert(&mut world);
+        let t = meter.run(&mut world, dt, 4.0);
+        let v0 = Vec3::new(3.0, 4.0, 5.0);
+        let g = vector::<f64>([0.0, -crate::scene::G, 0.0]);
+        let [x, v, _] = state(&world, id);
+        let way = v0 * t + g * (0.5 * t * t);
+        worst = worst.max((x - start - way).magnitude() / way.magnitude());
+        worst = worst.max((v - v0 - g * t).magnitude() / v.magnitude());
+    }
+    worst
+}
+
+/// Restitution of 0 to 1 head on, two materials' worth of density: the largest error of e.
+fn restitution_sweep(meter: &mut Meter) -> f64 {
+    let mut worst: f64 = 0.0;
+    for e in [0.0, 0.2, 0.4, 0.6, 0.8, 1.0] {
+        for dt in [1.0 / 30.0, 1.0 / 60.0, 1e-3] {
+            let [_, v, _] = bounce(meter, EXACT, [0.0, -3.9], 0.0, 2.5e-3, surface(e, 0.0), dt);
+            worst = worst.max((v / 3.9 - e).abs());
+        }
+    }
+    worst
+}
+
+/// A million impacts of two balls: what must be conserved is, and what must not grow does
+/// not; the largest relative violation.
+fn fuzz(_: &mut Meter) -> f64 {
+    use taw::response::{BallSpin, Mobility, impact};
+    let mut random = fastrand::Rng::with_seed(12);
+    let mut worst: f64 = 0.0;
+    for _ in 0..1_000_000 {
+        let mut number = |low: f64, high: f64| low + (high - low) * random.f64();
+        let inverse =
+            [10_f64.powf(number(-3.0, 3.0)), 10_f64.powf(number(-3.0, 3.0))].map(|x| x as f32);
+        let (Some(normal), closing) = (
+            taw::math::direction_and_length(Vec3::new(
+                number(-1.0, 1.0),
+                number(-1.0, 1.0),
+                number(-1.0, 1.0),
+            ))
+            .map(|(d, _)| d.map(|x| x as f32)),
+            Vec3::new(number(-1.0, 1.0), number(-1.0, 1.0), number(-1.0, 1.0)).map(|x| x as f32),
+        ) else {
+            continue;
+        };
+        let material = Material {
+            restitution: number(0.0, 1.0) as f32,
+            friction: number(0.0, 2.0) as f32,
+            tangential_restitution: number(-1.0, 1.0) as f32,
+            ..Material::default()
+        };
+        let mobility = Mobility::of_balls(inverse[0], inverse[1], BallSpin::Free);
+        let j = impact(normal, closing, mobility, material).map(f64::from);
+        // In f64, with the f32 numbers that it was given.
+        let (n, c) = (normal.map(f64::from), closing.map(f64::from));
+        let approach = -c.dot(n);
+        if approach < 1e-3 {
+            continue;
+        }
+        let give = f64::from(inverse[0]) + f64::from(inverse[1]);
+        let pressure = j.dot(n);
+        let grip = j - n * pressure;
+        let restored = (c + n * (pressure * give)).dot(n);
+        let e = f64::from(material.restitution);
+        worst = worst.max((restored - e * approach).abs() / c.magnitude());
+        worst = worst.max(grip.magnitude() / pressure - f64::from(material.friction));
+        let before = (c.dot(n).powi(2) + (c + n * approach).magnitude2() / 3.5) / give;
+        let slide = c + n * approach + grip * (3.5 * give);
+        let after = (restored * restored + slide.magnitude2() / 3.5) / give;
+        worst = worst.max((after - before) / before);
+    }
+    worst
+}
+
+pub const ROWS: &[Row] = &[
+    Row {
+        name: "impact/hertz/balls",
+        setup: "Chung & Ooi 1: glass and limestone balls head on, 10 m/s, step 1 % of Rayleigh's",
+        metric: "worst relative error of time, overlap and force",
+        model: "penalty, Hertz–Mindlin",
+        target: 1e-3,
+        best: "1e-3 EDEM, PFC3D",
+        source: "Chung and Ooi 2011; references §2",
+        effort: Effort::Quick,
+        measure: |meter| hertz(meter, false),
+    },
+    Row {
+        name: "impact/hertz/wall",
+        setup: "Chung & Ooi 2: aluminium and magnesium alloy balls on a plane, 0.2 m/s",
+        metric: "worst relative error of time, overlap and force",
+        model: "penalty, Hertz–Mindlin",
+        target: 1e-3,
+        best: "1e-3 EDEM, PFC3D",
+        source: "Chung and Ooi 2011; references §2",
+        effort: Effort::Quick,
+        measure: |meter| hertz(meter, true),
+    },
+    Row {
+        name: "impact/restitution-sweep",
+        setup: "Chung & Ooi 3: e 0 to 1 at 3.9 m/s, r 2.5 mm, three steps",
+        metric: "error of e",
+        model: "event-driven",
+        target: 2e-6,
+        best: "5e-5 Rapier, Box3D",
+        source: "Chung and Ooi 2011; references §2",
+        effort: Effort::Quick,
+        measure: restitution_sweep,
+    },
+    Row {
+        name: "impact/oblique",
+        setup: "Chung & Ooi 4: 17 angles at 3.9 m/s, µ 0.092, e 0.98; r 1e-5 to 1e3, 1/30 s to 0.1 ms",
+        metric: "worst of velocity and rim speed over the speed",
+        model: "event-driven",
+        target: 2e-6,
+        best: "0.18 Rapier and Box3D",
+        source: "Chung and Ooi 2011; references §2",
+        effort: Effort::Quick,
+        measure: |meter| oblique(meter, &angles(), false, surface(0.98, 0.092)),
+    },
+    Row {
+        name: "impact/oblique/speeds",
+        setup: "Chung & Ooi 5: 5 m/s onto it, 0.1 to 70 along, µ 0.3, e 1",
+        metric: "worst of velocity and rim speed over the speed",
+        model: "event-driven",
+        target: 2e-6,
+        best: "the same defect",
+        source: "Chung and Ooi 2011; references §2",
+        effort: Effort::Quick,
+        measure: |meter| {
+            let cases = [0.1, 0.5, 1.0, 2.0, 5.0, 8.0, 10.0, 12.0, 20.0, 40.0, 70.0]
+                .map(|vt| ([vt, -5.0], 0.0));
+            oblique(meter, &cases, false, surface(1.0, 0.3))
+        },
+    },
+    Row {
+        name: "impact/spin",
+        setup: "Chung & Ooi 6: 0.2 m/s onto it, spin 0.175 to 22.86 rad/s at r 0.1, µ 0.4, e 0.5",
+        metric: "worst of velocity and rim speed over the speed",
+        model: "event-driven",
+        target: 2e-6,
+        best: "the same defect",
+        source: "Chung and Ooi 2011; references §2",
+        effort: Effort::Quick,
+        measure: |meter| {
+            let cases = [0.175, 0.5, 1.0, 2.0, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 10.0, 22.86]
+                .map(|w| ([0.0, -0.2], 0.1 * w));
+            oblique(meter, &cases, true, surface(0.5, 0.4))
+        },
+    },
+    Row {
+        name: "impact/superball",
+        setup: "Garwin: three bounces under a table, and the energy after 10,000",
+        metric: "worst error of speed and rim speed, and relative of the energy",
+        model: "event-driven",
+        target: 1e-6,
+        best: "no engine has the material",
+        source: "Garwin 1969; references 4.16",
+        effort: Effort::Quick,
+        measure: superball,
+    },
+    Row {
+        name: "impact/spin-bounce",
+        setup: "Cross: 17 angles with spin, tangential restitution −1 to 1",
+        metric: "worst of velocity and rim speed over the speed",
+        model: "event-driven",
+        target: 2e-6,
+        best: "0.18 Rapier and Box3D at 0",
+        source: "Cross 2002; references 4.17",
+        effort: Effort::Quick,
+        measure: |meter| {
+            let cases: Vec<_> = angles()
+                .into_iter()
+                .zip([3.0, -5.0, 0.5].into_iter().cycle())
+                .map(|((v, _), spin)| (v, spin))
+                .collect();
+            [-1.0, -0.4, 0.3, 1.0]
+                .map(|beta| {
+                    oblique(
+                        meter,
+                        &cases,
+                        true,
+                        Material { tangential_restitution: beta, ..surface(0.7, 0.4) },
+                    )
+                })
+                .into_iter()
+                .fold(0.0, f64::max)
+        },
+    },
+    Row {
+        name: "impact/conservation",
+        setup: "a million impacts, masses 1e-3 to 1e3, all e, µ and β",
+        metric: "worst relative violation of restitution, Coulomb and energy",
+        model: "closed form, f32",
+        target: 1e-6,
+        best: "–",
+        source: "references §6.4, family 12",
+        effort: Effort::Quick,
+        measure: fuzz,
+    },
+    Row {
+        name: "impact/cradle/0",
+        setup: "five balls that touch, the first at 1 m/s, 1/60 s: 0 0 0 0 1",
+        metric: "largest error of a speed, m/s",
+        model: "event-driven",
+        target: 1e-5,
+        best: "0.48 Rapier, 0.57 Box3D",
+        source: "references 4.10",
+        effort: Effort::Quick,
+        measure: |meter| cradle(meter, 0.0),
+    },
+    Row {
+        name: "impact/cradle/gaps",
+        setup: "the same with gaps of 0.1 mm and 1 cm",
+        metric: "largest error of a speed, m/s",
+        model: "event-driven",
+        target: 1e-5,
+        best: "6e-2 Box3D (0.1 mm), exact (1 cm)",
+        source: "references 4.10",
+        effort: Effort::Quick,
+        measure: |meter| cradle(meter, 1e-4).max(cradle(meter, 1e-2)),
+    },
+    Row {
+        name: "impact/galperin/f32",
+        setup: "masses 1 and 100^n, n 0 to 4: 3, 31, 314, 3141, 31415 collisions",
+        metric: "collisions off",
+        model: "event-driven",
+        target: 0.0,
+        best: "n = 1",
+        source: "Galperin 2003; references 4.11",
+        effort: Effort::Quick,
+        measure: |meter| (0..=4).map(|n| galperin::<f32>(meter, n)).sum(),
+    },
+    Row {
+        name: "impact/galperin/f64",
+        setup: "the same in f64, n = 5 and 6: 314159, 3141592",
+        metric: "collisions off",
+        model: "event-driven, f64",
+        target: 0.0,
+        best: "n = 1",
+        source: "Galperin 2003; references 4.11",
+        effort: Effort::Quick,
+        measure: |meter| galperin::<f64>(meter, 5) + galperin::<f64>(meter, 6),
+    },
+    Row {
+        name: "impact/graze",
+        setup: "10 m/s past a ball at rest, by a diameter less 0.5 to 1e-3 of it",
+        metric: "error of velocity over the speed",
+        model: "event-driven",
+        target: 1e-4,
+        best: "1.4e-3 to 0.15 Rapier",
+        source: "references §6.3",
+        effort: Effort::Quick,
+        measure: |meter| graze(meter, &[0.5, 0.1, 0.01, 1e-3]),
+    },
+    Row {
+        name: "impact/graze/1e-4",
+        setup: "the same by a diameter less 1e-4 of it",
+        metric: "error of velocity over the speed",
+        model: "event-driven",
+        target: 1e-3,
+        best: "0.18 Rapier; Bullet misses",
+        source: "references §6.3",
+        effort: Effort::Quick,
+        measure: |meter| graze(meter, &[1e-4]),
+    },
+    Row {
+        name: "impact/fast",
+        setup: "300 m/s head on, against a ball of a tenth, and 1,000 grazing passes, 1/60 s",
+        metric: "error of velocity over the speed, and of the place over the way",
+        model: "event-driven",
+        target: 1e-4,
+        best: "–",
+        source: "issue 4",
+        effort: Effort::Quick,
+        measure: fast,
+    },
+    Row {
+        name: "impact/rack",
+        setup: "fifteen balls and a cue ball at 8 m/s, mirrored about its way, 2 s",
+        metric: "deviation from the mirror image, m",
+        model: "event-driven",
+        target: 0.0,
+        best: "depends on the order of solving",
+        source: "references 4.20",
+        effort: Effort::Quick,
+        measure: rack,
+    },
+    Row {
+        name: "impact/flight",
+        setup: "4 s in steps of 0.5 s to 0.1 ms: x0 + v0 t + g t²/2",
+        metric: "worst relative error of way and velocity",
+        model: "event-driven",
+        target: 1e-6,
+        best: "g dt t / 2 off: semi-implicit Euler",
+        source: "references 4.32",
+        effort: Effort::Quick,
+        measure: |meter| flight(meter, EXACT),
+    },
+    Row {
+        name: "impact/flight",
+        setup: "4 s in steps of 0.5 s to 0.1 ms: x0 + v0 t + g t²/2",
+        metric: "worst relative error of way and velocity",
+        model: "impulse, Verlet, compensated",
+        target: 1e-6,
+        best: "g dt t / 2 off: semi-implicit Euler",
+        source: "references 4.32",
+        effort: Effort::Quick,
+        measure: |meter| flight(meter, Model { response: Response::Impulse, ..EXACT }),
+    },
+];
