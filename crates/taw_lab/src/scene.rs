@@ -14,7 +14,7 @@ pub const EXACT: Model = Model {
     rotation: Rotation::Dynamic,
     precision: Precision::Compensated,
     substeps: 1,
-    iterations: 32,
+    iterations: 200,
 };
 
 /// The model of games: [`Response::Impulse`] with angular momentum.

@@ -11,7 +11,7 @@ mod penalty;
 pub(crate) use displacement::displacement;
 pub use event::Impact;
 pub use impact::{BallSpin, Mobility, impact};
-pub(crate) use impulse::{Walls, impulse};
+pub(crate) use impulse::Walls;
 pub use material::{Combine, Elasticity, Material};
 pub use penalty::ContactLaw;
 pub(crate) use penalty::{Shear, penalty};

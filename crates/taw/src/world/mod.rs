@@ -25,8 +25,8 @@ use crate::error::{finite_vector, positive};
 use crate::math::{Scalar, Vec3, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
-use crate::response::impulse::{Constraint, Settings, Warm};
-use crate::response::{BallSpin, Impact, Response, Shear, displacement, impulse, penalty};
+use crate::response::impulse::{self, Settings, Warm, impulse};
+use crate::response::{BallSpin, Impact, Response, Shear, displacement, penalty};
 use integrate::Drive;
 
 /// Everything that moves and everything that it can touch.
@@ -56,8 +56,7 @@ pub struct World<S> {
     /// substeps, for a response that looks ahead.
     reach: S,
     inverse_mass: Vec<S>,
-    before: Vec<Vec3<S>>,
-    constraints: Vec<Constraint<S>>,
+    impulse: impulse::Scratch<S>,
     /// What the contacts of the last substep bore, and the removals until then: they
     /// move rows, after which nothing here has the right name any more.
     warm: Vec<Warm<S>>,
@@ -84,8 +83,7 @@ impl<S: Scalar> Default for World<S> {
             stopped: Vec::new(),
             reach: S::zero(),
             inverse_mass: Vec::new(),
-            before: Vec::new(),
-            constraints: Vec::new(),
+            impulse: impulse::Scratch::default(),
             warm: Vec::new(),
             shear: Vec::new(),
             warm_removals: [0; 2],
@@ -110,8 +108,7 @@ impl<S: Scalar> PartialEq for World<S> {
             grid: _,
             reach: _,
             inverse_mass: _,
-            before: _,
-            constraints: _,
+            impulse: _,
             warm,
             shear,
             warm_removals,
@@ -332,6 +329,8 @@ impl<S: Scalar> World<S> {
                     spin,
                     dt,
                     bounce_speed: length(self.gravity) * dt * S::constant(2.0),
+                    slop: length(self.gravity) * dt * dt,
+                    largest_slop: S::constant(0.001),
                 };
                 impulse(
                     &mut columns,
@@ -339,9 +338,9 @@ impl<S: Scalar> World<S> {
                     &self.walls,
                     |row| material.get(row).unwrap_or_default(),
                     |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
+                    &[],
                     &settings,
-                    &mut self.before,
-                    &mut self.constraints,
+                    &mut self.impulse,
                     &mut self.warm,
                     &mut self.stopped,
                 );

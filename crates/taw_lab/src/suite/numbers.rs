@@ -110,6 +110,9 @@ fn extremes(meter: &mut Meter) -> f64 {
                             || !before.is_finite()
                             || after <= before * (1.0 + 1e-5);
                         if !finite || !keeps {
+                            eprintln!(
+                                "{model:?} mass {mass} spin {spin} dt {dt} e {e} mu {mu} finite {finite} before {before} after {after}"
+                            );
                             failures += 1.0;
                         }
                     }

@@ -7,6 +7,8 @@
 //! roll instead of slide. All of it is counted in `f64`, whatever the world counts in.
 
 mod cells;
+mod foresee;
+mod rest;
 mod support;
 mod time;
 
@@ -15,16 +17,16 @@ use std::collections::BinaryHeap;
 
 use cgmath::{InnerSpace, Zero};
 
-use crate::contact::{Contact, Contacts};
+use crate::contact::Contacts;
 use crate::math::{
     Point3, Scalar, Vec3, cast_vector, direction_and_length, is_finite, is_finite_point,
 };
 use crate::motion::WallMotion;
-use crate::response::impulse::{self, Constraint, Warm, impulse};
-use crate::response::{BallSpin, Columns, Material, Mobility, Walls, impact};
+use crate::response::impulse::Warm;
+use crate::response::{BallSpin, Material, Mobility, Walls, impact};
 use cells::{Cell, Cells};
+use rest::Heap;
 use support::Support;
-use time::{Gap, closing_time, meeting_time};
 
 /// A wall is left or met again only faster than this part of what gravity does to a
 /// speed in a substep. Slower, a ball rests on it: the bounces that it still had ahead
@@ -35,6 +37,9 @@ const REST: f64 = 1e-3;
 const PRESS: f64 = 0.1;
 /// Balls that cross more cells than this in a substep are looked for everywhere.
 const FAR: f64 = 1000.0;
+/// After so many collisions that take energy, in one substep, a ball is at rest among
+/// those that it touches: what is left would take endlessly many.
+const MOST_LOSSES: u32 = 1000;
 /// So many events in one substep that something must be wrong; the rest of it passes
 /// without any.
 const MOST_EVENTS: u64 = 100_000_000;
@@ -135,6 +140,8 @@ pub(crate) struct Path {
     carry: Vec3<f64>,
     /// Whether its acceleration holds it in a heap.
     heaped: bool,
+    /// In how many collisions of this substep it took part that took energy.
+    losses: u32,
     /// When its acceleration changes by itself.
     change: f64,
     /// Counts its paths, so that what was foreseen of an old one is known to be void.
@@ -158,6 +165,7 @@ impl Default for Path {
             support: None,
             carry: Vec3::zero(),
             heaped: false,
+            losses: 0,
             change: f64::INFINITY,
             stamp: 0,
             home: Home::Anywhere,
@@ -192,6 +200,7 @@ impl Ball {
             begin: self.path.begin,
             acceleration: self.pull,
             stamp: self.path.stamp + 1,
+            losses: self.path.losses,
             home: self.path.home,
             ..Path::default()
         };
@@ -220,7 +229,12 @@ enum What {
     Hits(usize),
     SettlesOn(usize),
     Meets(usize, u32),
-    LeavesCell { axis: usize, to: i64 },
+    /// It begins to rest on another, whose path has that stamp.
+    Leans(usize, u32),
+    LeavesCell {
+        axis: usize,
+        to: i64,
+    },
     Changes,
 }
 
@@ -276,20 +290,7 @@ pub(crate) struct EventDriven {
     cells: Cells,
     anywhere: Vec<usize>,
     queue: BinaryHeap<Reverse<Event>>,
-    touches: Vec<u32>,
     heap: Heap,
-}
-
-/// What rests on each other, as the impulse method sees it.
-#[derive(Clone, Debug, Default)]
-struct Heap {
-    position: Vec<Point3<f64>>,
-    velocity: Vec<Vec3<f64>>,
-    spin: Vec<Vec3<f64>>,
-    radius: Vec<f64>,
-    inverse_mass: Vec<f64>,
-    before: Vec<Vec3<f64>>,
-    constraints: Vec<Constraint<f64>>,
 }
 
 impl EventDriven {
@@ -332,8 +333,13 @@ impl EventDriven {
     fn happen(&mut self, event: Event, settings: &Settings, impacts: &mut Vec<Impact<f64>>) {
         let Event { time, row, what, .. } = event;
         match what {
-            What::Meets(other, stamp) if self.balls[other].path.stamp != stamp => {
+            What::Meets(other, stamp) | What::Leans(other, stamp)
+                if self.balls[other].path.stamp != stamp =>
+            {
                 self.foresee(row, time, settings);
+            }
+            What::Meets(other, _) if self.loses(row) && self.loses(other) => {
+                self.hold_from_now_on([row, other], time, settings);
             }
             What::Meets(other, _) => {
                 let (a, b) = (row.min(other), row.max(other));
@@ -342,6 +348,10 @@ impl EventDriven {
                 impacts.extend(self.meet(a, b, settings));
                 self.foresee(a, time, settings);
                 self.foresee(b, time, settings);
+            }
+            What::Leans(other, _) => self.hold_from_now_on([row, other], time, settings),
+            What::Hits(_) if self.loses(row) => {
+                self.hold_from_now_on([row, row], time, settings);
             }
             What::Hits(wall) => {
                 self.balls[row].advance(time);
@@ -370,6 +380,11 @@ impl EventDriven {
         }
     }
 
+    /// Whether a ball has had so many collisions that took energy that they will not end.
+    fn loses(&self, row: usize) -> bool {
+        self.balls[row].path.losses >= MOST_LOSSES
+    }
+
     /// Lets two balls that touch bounce off each other.
     fn meet(&mut self, a: usize, b: usize, settings: &Settings) -> Option<Impact<f64>> {
         let press = self.press_speed(a, b, settings);
@@ -385,6 +400,9 @@ impl EventDriven {
         if approach_speed <= 2.0 * press {
             material.restitution = 0.0;
         }
+        let losses = u32::from(material.restitution < 1.0);
+        first.path.losses += losses;
+        second.path.losses += losses;
         let mobility = Mobility::of_balls(first.inverse_mass, second.inverse_mass, settings.spin);
         let impulse = impact(normal, closing, mobility, material);
         first.hit(-impulse, -normal, settings.spin);
@@ -401,7 +419,9 @@ impl EventDriven {
         let closing = ball.velocity - surface + ball.rim(normal, settings.spin);
         let approach_speed = -closing.dot(normal);
         let mobility = Mobility::of_balls(0.0, ball.inverse_mass, settings.spin);
-        let impulse = impact(normal, closing, mobility, self.walls[wall].against(ball.material));
+        let material = self.walls[wall].against(ball.material);
+        ball.path.losses += u32::from(material.restitution < 1.0);
+        let impulse = impact(normal, closing, mobility, material);
         ball.hit(impulse, normal, settings.spin);
         Impact { a: wall as u32, on_wall: true, b: row as u32, normal, approach_speed }
     }
@@ -413,7 +433,11 @@ impl EventDriven {
         ball.release();
         let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
         // The rounding of the place goes too, lest it add up.
-        ball.position += normal * (ball.radius - distance);
+        let overlap = ball.radius - distance;
+        let fall = ball.pull.magnitude() * settings.dt * settings.dt;
+        if overlap.abs() <= REST * fall + ball.rounding {
+            ball.position += normal * overlap;
+        }
         ball.velocity -= normal * ball.velocity.dot(normal);
         ball.path.carry = normal * surface.dot(normal);
         ball.path.support = Some(wall);
@@ -453,151 +477,6 @@ impl EventDriven {
         ball.path.stamp += 1;
     }
 
-    /// Finds the next event of a ball and puts it in the queue.
-    fn foresee(&mut self, row: usize, now: f64, settings: &Settings) {
-        self.go_home(row, now, settings.dt);
-        let ball = &self.balls[row];
-        let left = settings.dt - now;
-        let mut first = (ball.path.change.max(now), What::Changes);
-        let mut offer = |after: Option<f64>, what: What| {
-            // What lies behind by rounding is now.
-            if let Some(after) = after
-                && now + after.max(0.0) < first.0
-            {
-                first = (now + after.max(0.0), what);
-            }
-        };
-        for wall in 0..self.walls.len() {
-            if ball.path.support != Some(wall)
-                && let Some((after, what)) = self.foresee_wall(row, wall, now, settings)
-            {
-                offer(Some(after), what);
-            }
-        }
-        let mut other = |other: usize| {
-            if other != row {
-                let stamp = self.balls[other].path.stamp;
-                let after = self.foresee_meeting(row, other, now, settings);
-                offer(after, What::Meets(other, stamp));
-            }
-        };
-        match ball.path.home {
-            Home::Cell(cell) => {
-                self.cells.near(cell, &mut other);
-                self.anywhere.iter().copied().for_each(&mut other);
-                let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
-                for axis in 0..3 {
-                    let low = cell[axis] as f64 * self.cells.width();
-                    let (x, v, a) = (position[axis], velocity[axis], ball.path.acceleration[axis]);
-                    let above =
-                        Gap { now: low + self.cells.width() - x, speed: -v, acceleration: -a };
-                    let below = Gap { now: x - low, speed: v, acceleration: a };
-                    for (gap, step) in [(above, 1), (below, -1)] {
-                        let to = cell[axis] + step;
-                        offer(crossing_time(gap), What::LeavesCell { axis, to });
-                    }
-                }
-            }
-            Home::Anywhere => (0..self.balls.len()).for_each(&mut other),
-        }
-        let (time, what) = first;
-        if time <= now + left && time.is_finite() {
-            let stamp = ball.path.stamp;
-            self.queue.push(Reverse(Event { time, row, stamp, what }));
-        }
-    }
-
-    /// When and how a ball meets a wall next, in seconds from now.
-    fn foresee_wall(
-        &self,
-        row: usize,
-        wall: usize,
-        now: f64,
-        settings: &Settings,
-    ) -> Option<(f64, What)> {
-        let ball = &self.balls[row];
-        let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
-        let (normal, distance) = self.walls.normal_and_distance(wall, position);
-        let moving = self.walls[wall].motion.is_some();
-        let touch = position - normal * ball.radius;
-        let surface = if moving { self.walls.surface_velocity(wall, touch) } else { Vec3::zero() };
-        let gap = Gap {
-            now: distance - ball.radius,
-            speed: (velocity + ball.path.carry - surface).dot(normal),
-            acceleration: ball.path.acceleration.dot(normal),
-        };
-        let size = ball.radius + distance.abs() + self.walls[wall].offset.abs();
-        let fall = ball.pull.magnitude() * settings.dt;
-        let least = f64::EPSILON * 16.0 * size;
-        if gap.now > least {
-            // A wall counts as where it will be, so one that comes nearer is there.
-            let seen = Gap { speed: velocity.dot(normal), ..gap };
-            return closing_time(seen).map(|after| (after, What::Hits(wall)));
-        }
-        let held = ball.path.support.is_some() || ball.path.heaped;
-        let press = gap.acceleration < 0.0;
-        let slow = if held { PRESS * fall } else { REST * fall };
-        let slow = slow.max(1e-14 * velocity.magnitude());
-        if gap.speed < -slow {
-            Some((0.0, What::Hits(wall)))
-        } else if !press {
-            None
-        } else if gap.speed > slow {
-            Some((-2.0 * gap.speed / gap.acceleration, What::Hits(wall)))
-        } else if held {
-            Some(((-slow * 1.01 - gap.speed) / gap.acceleration, What::Hits(wall)))
-        } else {
-            Some((0.0, What::SettlesOn(wall)))
-        }
-    }
-
-    /// When two balls meet next, in seconds from now.
-    fn foresee_meeting(&self, a: usize, b: usize, now: f64, settings: &Settings) -> Option<f64> {
-        let (first, second) = (&self.balls[a], &self.balls[b]);
-        let left = settings.dt - now;
-        let apart = second.position_at(now) - first.position_at(now);
-        let velocity = second.velocity_at(now) - first.velocity_at(now);
-        let acceleration = second.path.acceleration - first.path.acceleration;
-        let reach = first.radius + second.radius;
-        let (normal, distance) = direction_and_length(apart).unwrap_or((Vec3::unit_x(), 0.0));
-        let gap = distance - reach;
-        let growth = acceleration.magnitude();
-        if gap > (velocity.magnitude() + 0.5 * growth * left) * left {
-            return None;
-        }
-        let size = reach + first.position_at(now).x.abs().max(first.position_at(now).y.abs());
-        if gap > f64::EPSILON * 8.0 * size {
-            return meeting_time(apart, velocity, acceleration, reach, [0.0, left]);
-        }
-        let speed = velocity.dot(normal);
-        let pull = acceleration.dot(normal);
-        let press = self.press_speed(a, b, settings);
-        if speed < -press {
-            Some(0.0)
-        } else if pull >= 0.0 {
-            None
-        } else if speed <= press {
-            Some((-press * 1.01 - speed) / pull)
-        } else {
-            // They part, and come back later.
-            meeting_time(apart, velocity, acceleration, reach, [-speed / pull, left])
-        }
-    }
-
-    /// The speed that two balls that press each other gain before they touch anew.
-    ///
-    /// Where collisions take energy, chains of touching balls would come to rest among
-    /// themselves only after endlessly many (inelastic collapse; McNamara and Young
-    /// 1992), so there it is also what counts as rest.
-    fn press_speed(&self, a: usize, b: usize, settings: &Settings) -> f64 {
-        let (first, second) = (&self.balls[a], &self.balls[b]);
-        let apart = (second.path.acceleration - first.path.acceleration).magnitude();
-        let pull = first.pull.magnitude().max(second.pull.magnitude());
-        let taken = 1.0 - first.material.against(second.material).restitution;
-        let speeds = first.velocity.magnitude() + second.velocity.magnitude();
-        (PRESS * settings.dt * apart.max(taken * pull)).max((1e-13 + 1e-6 * taken) * speeds)
-    }
-
     /// Puts every ball where others find it.
     fn find_homes(&mut self, dt: f64) {
         let largest = self.balls.iter().fold(0.0_f64, |max, ball| max.max(ball.radius));
@@ -632,141 +511,5 @@ impl EventDriven {
             self.anywhere.push(row);
             self.balls[row].path.home = Home::Anywhere;
         }
-    }
-
-    /// Finds what rests at the start: single balls settle on their wall, and heaps are
-    /// held by the accelerations that the impulse method finds for them.
-    fn begin_at_rest(&mut self, settings: &Settings) {
-        let dt = settings.dt;
-        for contact in &self.near.wm {
-            // What a wall overlaps is moved out at once.
-            let ball = &mut self.balls[contact.b as usize];
-            let (normal, distance) =
-                self.walls.normal_and_distance(contact.a as usize, ball.position);
-            ball.position += normal * (ball.radius - distance).max(0.0);
-        }
-        let mut near = std::mem::take(&mut self.near);
-        let slow = |row: u32| PRESS * self.balls[row as usize].pull.magnitude() * dt;
-        // A fall from this height gives that speed.
-        let low = |row: u32| 0.5 * PRESS * slow(row) * dt + self.balls[row as usize].rounding;
-        near.wm.retain(|c| {
-            let (gap, speed) = self.wall_gap(c);
-            gap <= low(c.b) && speed.abs() <= slow(c.b)
-        });
-        near.mm.retain(|c| {
-            let (first, second) = (&self.balls[c.a as usize], &self.balls[c.b as usize]);
-            let apart = direction_and_length(second.position - first.position);
-            let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), 0.0));
-            let speed = (second.velocity - first.velocity).dot(normal);
-            distance - first.radius - second.radius <= low(c.a).max(low(c.b))
-                && speed.abs() <= slow(c.a).max(slow(c.b))
-        });
-        self.touches.clear();
-        self.touches.resize(self.balls.len(), 0);
-        near.wm.iter().for_each(|c| self.touches[c.b as usize] += 1);
-        near.mm.iter().flat_map(|c| [c.a, c.b]).for_each(|row| self.touches[row as usize] += 2);
-        near.wm.retain(|c| {
-            let alone = self.touches[c.b as usize] == 1;
-            if alone {
-                let (gap, speed) = self.wall_gap(c);
-                let ball = &self.balls[c.b as usize];
-                let strength = ball.pull.magnitude();
-                let rest = REST * strength * dt;
-                let falls = ball.pull.dot(self.walls[c.a as usize].normal) < 0.0;
-                let lies = gap <= 0.5 * REST * rest * dt + ball.rounding && speed.abs() <= rest;
-                if falls && lies {
-                    self.settle(c.b as usize, c.a as usize, settings);
-                }
-            }
-            !alone
-        });
-        if !near.is_empty() {
-            self.hold_heaps(&mut near, settings);
-        }
-        self.near = near;
-    }
-
-    /// The gap between a wall and a ball, and how fast it grows.
-    fn wall_gap(&self, contact: &Contact<f64>) -> (f64, f64) {
-        let ball = &self.balls[contact.b as usize];
-        let wall = contact.a as usize;
-        let (normal, distance) = self.walls.normal_and_distance(wall, ball.position);
-        let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
-        (distance - ball.radius, (ball.velocity - surface).dot(normal))
-    }
-
-    fn hold_heaps(&mut self, contacts: &mut Contacts<f64>, settings: &Settings) {
-        let dt = settings.dt;
-        let Heap { position, velocity, spin, radius, inverse_mass, before, constraints } =
-            &mut self.heap;
-        // Where each would be at the end of the substep if nothing held it.
-        let balls = &self.balls;
-        fill(position, balls, |b| b.position + (b.velocity + b.pull * (0.5 * dt)) * dt);
-        fill(velocity, balls, |b| b.velocity + b.pull * dt);
-        fill(spin, balls, |b| b.spin);
-        fill(radius, balls, |b| b.radius);
-        fill(inverse_mass, balls, |b| b.inverse_mass);
-        let mut none = Vec::new();
-        let mut columns = Columns {
-            position,
-            velocity,
-            radius,
-            inverse_mass,
-            spin: if settings.spin == BallSpin::Free { spin } else { &mut none },
-        };
-        let told = impulse::Settings {
-            iterations: settings.iterations,
-            spin: settings.spin,
-            dt,
-            bounce_speed: 2.0 * balls.iter().map(|b| b.pull.magnitude()).fold(0.0, f64::max) * dt,
-        };
-        let material = |row: usize| balls[row].material;
-        let mut stopped = Vec::new(); // whoever it is will be stopped at the end, too
-        impulse(
-            &mut columns,
-            contacts,
-            &self.walls,
-            material,
-            |_| 0.5,
-            &told,
-            before,
-            constraints,
-            &mut self.warm,
-            &mut stopped,
-        );
-        let rows = contacts.wm.iter().map(|c| c.b);
-        let rows = rows.chain(contacts.mm.iter().flat_map(|c| [c.a, c.b]));
-        for row in rows {
-            let row = row as usize;
-            let ball = &mut self.balls[row];
-            if ball.path.heaped {
-                continue;
-            }
-            let end = ball.position + (ball.velocity + self.heap.velocity[row]) * (0.5 * dt);
-            ball.path.acceleration = (self.heap.velocity[row] - ball.velocity) / dt;
-            ball.path.spin_acceleration = (self.heap.spin[row] - ball.spin) / dt;
-            ball.path.heaped = true;
-            // What the method pushed apart, besides.
-            ball.position += self.heap.position[row] - end;
-        }
-    }
-}
-
-/// Sets a column to what each ball gives.
-fn fill<T>(column: &mut Vec<T>, balls: &[Ball], value: impl Fn(&Ball) -> T) {
-    column.clear();
-    column.extend(balls.iter().map(value));
-}
-
-/// When something passes a border between cells outward, which it may lie on.
-fn crossing_time(gap: Gap) -> Option<f64> {
-    if gap.now > 0.0 {
-        closing_time(gap)
-    } else if gap.speed < 0.0 || (gap.speed == 0.0 && gap.acceleration < 0.0) {
-        Some(0.0)
-    } else if gap.acceleration < 0.0 {
-        Some(-2.0 * gap.speed / gap.acceleration)
-    } else {
-        None
     }
 }

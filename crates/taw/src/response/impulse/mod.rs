@@ -1,9 +1,11 @@
+mod solve;
+
 use cgmath::{InnerSpace, Zero};
 
 use crate::contact::Contacts;
 use crate::math::{Point3, Scalar, Vec3, direction_and_length, is_finite, is_finite_point};
-use crate::response::impact::at_most;
 use crate::response::{BallSpin, Columns, Material, Mobility};
+use solve::{Islands, solve};
 
 /// How often overlap that is left after the velocities are solved is pushed out.
 const POSITION_SWEEPS: u32 = 3;
@@ -14,10 +16,14 @@ pub(crate) struct Settings<S> {
     pub iterations: u32,
     /// Whether friction sets marbles spinning.
     pub spin: BallSpin,
-    /// The length of the substep, in seconds.
+    /// The length of the substep, in seconds; zero for a collision that takes no time.
     pub dt: S,
     /// Slower than this, in m/s, nothing bounces: what gravity does in two substeps.
     pub bounce_speed: S,
+    /// The overlap that may stay, in metres, so that what rests keeps touching.
+    pub slop: S,
+    /// The same as a part of the smaller radius, at most.
+    pub largest_slop: S,
 }
 
 /// The first thing of a contact, by row.
@@ -36,11 +42,21 @@ impl First {
     }
 }
 
+/// What the method only scribbles on.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Scratch<S> {
+    before: Vec<Vec3<S>>,
+    constraints: Vec<Constraint<S>>,
+    islands: Islands<S>,
+}
+
 /// A contact while it is solved.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Constraint<S> {
+pub(super) struct Constraint<S> {
     a: First,
     b: usize,
+    /// Which island it is of.
+    island: usize,
     /// From a to b.
     normal: Vec3<S>,
     /// The velocity of the wall's surface, in m/s; zero between marbles.
@@ -55,6 +71,9 @@ pub(crate) struct Constraint<S> {
     /// m/s, which a pebble and a boulder have in common.
     pressure: S,
     grip: Vec3<S>,
+    /// What the last sweep changed of them, and the way on which the solver searches.
+    step: Vec3<S>,
+    way: Vec3<S>,
     resistance: Option<Resistance<S>>,
 }
 
@@ -80,6 +99,17 @@ pub(crate) struct Warm<S> {
     twist: Vec3<S>,
 }
 
+impl<S> Warm<S> {
+    /// Calls its marbles by other names. False if one of them has none.
+    pub fn rename(&mut self, name: impl Fn(usize) -> Option<usize>) -> bool {
+        let (two_marbles, a, b) = self.key;
+        let a = if two_marbles { name(a) } else { Some(a) };
+        let (Some(a), Some(b)) = (a, name(b)) else { return false };
+        self.key = (two_marbles, a, b);
+        true
+    }
+}
+
 impl<S: Scalar> Constraint<S> {
     /// Names the contact: walls first, then by rows.
     fn key(&self) -> (bool, usize, usize) {
@@ -95,7 +125,8 @@ impl<S: Scalar> Constraint<S> {
 /// not of a pyramid, bounded by the accumulated normal impulse, restitution included.
 ///
 /// `material` gives that of a marble, `follow` how far its position follows a change of
-/// velocity in its step. The contacts' rows exist. Rows that end up infinite or NaN lose
+/// velocity in its step, `start` where they were before it (empty, if nobody knows).
+/// The contacts' rows exist. Rows that end up infinite or NaN lose
 /// their velocity and are added to `stopped`.
 pub(crate) fn impulse<S: Scalar>(
     marbles: &mut Columns<S>,
@@ -103,18 +134,25 @@ pub(crate) fn impulse<S: Scalar>(
     walls: &impl Walls<S>,
     material: impl Fn(usize) -> Material<S>,
     follow: impl Fn(usize) -> S,
+    start: &[Point3<S>],
     settings: &Settings<S>,
-    before: &mut Vec<Vec3<S>>,
-    constraints: &mut Vec<Constraint<S>>,
+    scratch: &mut Scratch<S>,
     warm: &mut Vec<Warm<S>>,
     stopped: &mut Vec<u32>,
 ) {
     contacts.sort();
+    let Scratch { before, constraints, islands } = scratch;
     constraints.clear();
     before.clear();
     before.extend_from_slice(marbles.velocity);
     let prepare = |a: First, b: usize| {
-        let (normal, gap) = marbles.normal_and_gap(a, b, walls)?;
+        let (mut normal, mut gap) = marbles.normal_and_gap(marbles.position, a, b, walls)?;
+        if let Some((earlier, overlap)) = marbles.normal_and_gap(start, a, b, walls) {
+            // What pushes along the mean normal of a step does no work, and neither does
+            // an overlap that stays what it was.
+            let mean = direction_and_length(normal + earlier);
+            (normal, gap) = (mean.map_or(normal, |(mean, _)| mean), gap - overlap.min(S::zero()));
+        }
         let own = material(b);
         let (surface, inverse_mass, material) = match a {
             First::Wall(wall) => {
@@ -133,7 +171,13 @@ pub(crate) fn impulse<S: Scalar>(
             First::Wall(_) => follow(b),
             First::Marble(a) => (follow(a) + follow(b)) * S::constant(0.5),
         } * settings.dt;
-        let closed = if follow > S::zero() { -approach - gap / follow } else { -gap / settings.dt };
+        let closed = if settings.dt == S::zero() {
+            S::zero()
+        } else if follow > S::zero() {
+            -approach - gap / follow
+        } else {
+            -gap / settings.dt
+        };
         let bounces = approach > settings.bounce_speed && closed > -approach;
         let (rebound, slide) = if bounces {
             let sliding = closing + normal * approach;
@@ -144,6 +188,7 @@ pub(crate) fn impulse<S: Scalar>(
         let mut constraint = Constraint {
             a,
             b,
+            island: 0,
             normal,
             surface,
             mobility,
@@ -152,6 +197,8 @@ pub(crate) fn impulse<S: Scalar>(
             slide,
             pressure: S::zero(),
             grip: Vec3::zero(),
+            step: Vec3::zero(),
+            way: Vec3::zero(),
             resistance: marbles.resistance(a, b, material, settings.spin),
         };
         // What bounces had nothing to bear before.
@@ -176,16 +223,7 @@ pub(crate) fn impulse<S: Scalar>(
             marbles.twist_both(c, resistance.twist);
         }
     }
-    for _ in 0..settings.iterations {
-        let mut largest_change = S::zero();
-        for constraint in constraints.iter_mut() {
-            largest_change = largest_change.max(marbles.solve(constraint, settings.spin));
-        }
-        // What is left is beyond what the next sweep could still see.
-        if largest_change <= settings.bounce_speed * S::epsilon() {
-            break;
-        }
-    }
+    solve(marbles, constraints, islands, settings);
     for (row, before) in before.iter().enumerate() {
         let moved = (marbles.velocity[row] - before) * (follow(row) * settings.dt);
         let position = marbles.position[row] + moved;
@@ -227,11 +265,19 @@ pub(crate) trait Walls<S> {
 impl<S: Scalar> Columns<'_, S> {
     /// The unit vector from the first to the second of a contact, and how far their
     /// surfaces are apart (negative for an overlap). Coincident centers part along +x.
-    fn normal_and_gap(&self, a: First, b: usize, walls: &impl Walls<S>) -> Option<(Vec3<S>, S)> {
+    /// None where the column of positions is empty, or for a gap that is not finite.
+    fn normal_and_gap(
+        &self,
+        position: &[Point3<S>],
+        a: First,
+        b: usize,
+        walls: &impl Walls<S>,
+    ) -> Option<(Vec3<S>, S)> {
+        let second = *position.get(b)?;
         let (normal, distance) = match a {
-            First::Wall(wall) => walls.normal_and_distance(wall, self.position[b]),
+            First::Wall(wall) => walls.normal_and_distance(wall, second),
             First::Marble(a) => {
-                let apart = direction_and_length(self.position[b] - self.position[a]);
+                let apart = direction_and_length(second - *position.get(a)?);
                 let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
                 (normal, distance - self.radius[a])
             }
@@ -249,24 +295,6 @@ impl<S: Scalar> Columns<'_, S> {
             rim += self.rim(a);
         }
         velocity + normal.cross(rim)
-    }
-
-    /// One step toward what a contact asks for. Gives the change of velocity.
-    fn solve(&mut self, c: &mut Constraint<S>, spin: BallSpin) -> S {
-        let closing = self.closing(c.a, c.b, c.normal, c.surface);
-        let along = closing.dot(c.normal);
-        let pressure = (c.pressure + c.rebound - along).max(S::zero());
-        let sliding = closing - c.normal * along;
-        let grip = c.grip + (c.slide - sliding) * (c.mobility.normal / c.mobility.tangent);
-        let grip = at_most(grip, c.friction * pressure);
-        let change = c.normal * (pressure - c.pressure) + (grip - c.grip);
-        if !is_finite(change) {
-            return S::zero(); // an overflow here must not reach the other one
-        }
-        (c.pressure, c.grip) = (pressure, grip);
-        self.hit_both(c, change, spin);
-        self.resist(c);
-        change.magnitude()
     }
 
     /// What resists rolling and spinning between two, or a wall and one, if anything does.
@@ -301,23 +329,6 @@ impl<S: Scalar> Columns<'_, S> {
         })
     }
 
-    /// One step toward no relative spin, as far as the resistances can.
-    fn resist(&mut self, c: &mut Constraint<S>) {
-        let Some(resistance) = &mut c.resistance else { return };
-        let spin_of_a = c.a.marble().map_or_else(Vec3::zero, |a| self.spin[a]);
-        let relative = self.spin[c.b] - spin_of_a;
-        let wanted = resistance.twist - relative / resistance.give;
-        let force = c.pressure / c.mobility.normal;
-        let about = c.normal * wanted.dot(c.normal);
-        let twist = at_most(wanted - about, resistance.rolling * force)
-            + at_most(about, resistance.spinning * force);
-        let change = twist - resistance.twist;
-        if is_finite(change) {
-            resistance.twist = twist;
-            self.twist_both(c, change);
-        }
-    }
-
     /// Applies an angular impulse to the second of a contact, its opposite to the first.
     fn twist_both(&mut self, c: &Constraint<S>, twist: Vec3<S>) {
         let per_twist = |row: usize| {
@@ -333,36 +344,38 @@ impl<S: Scalar> Columns<'_, S> {
     /// Applies an impulse to the second of a contact, and its opposite to the first;
     /// `change` is the impulse times the mobility along the normal.
     fn hit_both(&mut self, c: &Constraint<S>, change: Vec3<S>, spin: BallSpin) {
-        let impulse = change / c.mobility.normal;
+        // The impulse itself, of a pebble, may be too small for the scalar.
+        let part = |row: usize| self.inverse_mass[row] / c.mobility.normal;
+        let second = change * part(c.b);
         if let First::Marble(a) = c.a {
-            self.hit(a, -impulse, -c.normal, spin);
+            let first = -change * part(a);
+            self.hit(a, first, -c.normal, spin);
         }
-        self.hit(c.b, impulse, c.normal, spin);
+        self.hit(c.b, second, c.normal, spin);
     }
 
-    /// Applies an impulse where a marble is touched; `normal` points to its center.
-    fn hit(&mut self, row: usize, impulse: Vec3<S>, normal: Vec3<S>, spin: BallSpin) {
-        let inverse_mass = self.inverse_mass[row];
-        self.velocity[row] += impulse * inverse_mass;
+    /// Changes a velocity by an impulse where a marble is touched, and its spin with it;
+    /// `normal` points to its center.
+    fn hit(&mut self, row: usize, change: Vec3<S>, normal: Vec3<S>, spin: BallSpin) {
+        self.velocity[row] += change;
         if spin == BallSpin::Free
             && let Some(spin) = self.spin.get_mut(row)
         {
-            // r / I = 5/2 / (m r) for a solid ball.
-            let twist = S::constant(2.5) * inverse_mass / self.radius[row];
-            *spin -= normal.cross(impulse) * twist;
+            // m r / I = 5/2 / r for a solid ball.
+            *spin -= normal.cross(change) * (S::constant(2.5) / self.radius[row]);
         }
     }
 
     /// Moves what overlaps too deep half of the way apart, the lighter one further.
     ///
-    /// A little overlap stays, at most a two-hundredth of the smaller radius: what
-    /// rests then keeps touching, and need not fall back in every substep.
+    /// A little overlap stays: what rests then need not fall back in every substep.
     fn push_apart(&mut self, c: &Constraint<S>, walls: &impl Walls<S>, settings: &Settings<S>) {
-        let Some((normal, gap)) = self.normal_and_gap(c.a, c.b, walls) else { return };
+        let Some((normal, gap)) = self.normal_and_gap(self.position, c.a, c.b, walls) else {
+            return;
+        };
         let smaller =
             c.a.marble().map_or(self.radius[c.b], |a| self.radius[a].min(self.radius[c.b]));
-        let fall = settings.bounce_speed * settings.dt * S::constant(0.5);
-        let excess = -gap - fall.min(smaller * S::constant(0.005));
+        let excess = -gap - settings.slop.min(smaller * settings.largest_slop);
         if excess <= S::zero() {
             return;
         }

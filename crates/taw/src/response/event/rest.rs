@@ -1,0 +1,325 @@
+//! What rests: on one wall, which [`support`](super::support) knows in closed form, or in
+//! heaps, for which the impulse method finds the accelerations that keep them at rest.
+
+use cgmath::{InnerSpace, Zero};
+
+use super::{Ball, EventDriven, PRESS, Path, REST, Settings};
+use crate::contact::{Contact, Contacts};
+use crate::math::{Point3, Vec3, direction_and_length};
+use crate::response::impulse::{self, Warm, impulse};
+use crate::response::{BallSpin, Columns, Material, Walls as _};
+
+/// Overlap that may stay, over the radius: pushing it out would lift what lies on it, and
+/// create energy.
+const SLOP: f64 = 4e-3;
+
+/// What rests on each other, as the impulse method sees it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Heap {
+    /// Whose turn it is: the balls' rows, in order.
+    rows: Vec<u32>,
+    /// Where in `rows` a ball is.
+    label: Vec<u32>,
+    /// How many things each ball touches.
+    touches: Vec<u32>,
+    position: Vec<Point3<f64>>,
+    /// Where each was before the step.
+    start: Vec<Point3<f64>>,
+    velocity: Vec<Vec3<f64>>,
+    spin: Vec<Vec3<f64>>,
+    radius: Vec<f64>,
+    inverse_mass: Vec<f64>,
+    material: Vec<Material<f64>>,
+    scratch: impulse::Scratch<f64>,
+}
+
+impl Heap {
+    /// Takes over those balls that the contacts are about, and names them by their place
+    /// here.
+    fn take(&mut self, contacts: &mut Contacts<f64>, balls: &[Ball]) {
+        self.rows.clear();
+        self.rows.extend(contacts.wm.iter().map(|c| c.b));
+        self.rows.extend(contacts.mm.iter().flat_map(|c| [c.a, c.b]));
+        self.rows.sort_unstable();
+        self.rows.dedup();
+        self.label.resize(balls.len(), 0);
+        for (label, row) in self.rows.iter().enumerate() {
+            self.label[*row as usize] = label as u32;
+        }
+        contacts.wm.iter_mut().for_each(|c| c.b = self.label[c.b as usize]);
+        for c in &mut contacts.mm {
+            (c.a, c.b) = (self.label[c.a as usize], self.label[c.b as usize]);
+        }
+        let rows = &self.rows;
+        let each = || rows.iter().map(|row| &balls[*row as usize]);
+        fill(&mut self.position, each().map(|b| b.position));
+        fill(&mut self.start, each().map(|b| b.position));
+        fill(&mut self.velocity, each().map(|b| b.velocity));
+        fill(&mut self.spin, each().map(|b| b.spin));
+        fill(&mut self.radius, each().map(|b| b.radius));
+        fill(&mut self.inverse_mass, each().map(|b| b.inverse_mass));
+        fill(&mut self.material, each().map(|b| b.material));
+    }
+
+    /// Solves the contacts over `dt` seconds, or with zero what happens at once.
+    fn solve(
+        &mut self,
+        contacts: &mut Contacts<f64>,
+        walls: &Vec<super::Wall>,
+        pull: f64,
+        dt: f64,
+        settings: &Settings,
+        warm: &mut Vec<Warm<f64>>,
+    ) {
+        let mut columns = Columns {
+            position: &mut self.position,
+            velocity: &mut self.velocity,
+            radius: &self.radius,
+            inverse_mass: &self.inverse_mass,
+            spin: if settings.spin == BallSpin::Free { &mut self.spin } else { &mut [] },
+        };
+        let told = impulse::Settings {
+            iterations: settings.iterations,
+            spin: settings.spin,
+            dt,
+            bounce_speed: 2.0 * pull * settings.dt,
+            slop: f64::INFINITY,
+            largest_slop: SLOP,
+        };
+        let mut stopped = Vec::new(); // whoever it is will be stopped at the end, too
+        let material = |label: usize| self.material[label];
+        impulse(
+            &mut columns,
+            contacts,
+            walls,
+            material,
+            |_| 0.5,
+            &self.start,
+            &told,
+            &mut self.scratch,
+            warm,
+            &mut stopped,
+        );
+    }
+}
+
+/// Sets a column.
+fn fill<T>(column: &mut Vec<T>, values: impl Iterator<Item = T>) {
+    column.clear();
+    column.extend(values);
+}
+
+impl EventDriven {
+    /// Finds what rests at the start of a substep.
+    pub(super) fn begin_at_rest(&mut self, settings: &Settings) {
+        for contact in &self.near.wm {
+            // What a wall overlaps too deep is moved out at once.
+            let ball = &mut self.balls[contact.b as usize];
+            let (normal, distance) =
+                self.walls.normal_and_distance(contact.a as usize, ball.position);
+            let overlap = ball.radius - distance;
+            if overlap > SLOP * ball.radius {
+                ball.position += normal * overlap;
+            }
+        }
+        let mut near = std::mem::take(&mut self.near);
+        near.wm.retain(|c| self.touches_wall(c, settings).is_some_and(|speed| speed >= 0.0));
+        near.mm.retain(|c| self.touches_ball(c, settings).is_some_and(|speed| speed >= 0.0));
+        let mut touches = std::mem::take(&mut self.heap.touches);
+        touches.clear();
+        touches.resize(self.balls.len(), 0);
+        near.wm.iter().for_each(|c| touches[c.b as usize] += 1);
+        near.mm.iter().flat_map(|c| [c.a, c.b]).for_each(|row| touches[row as usize] += 2);
+        near.wm.retain(|c| {
+            let alone = touches[c.b as usize] == 1;
+            if alone && self.lies_on(c, settings) {
+                self.settle(c.b as usize, c.a as usize, settings);
+            }
+            !alone
+        });
+        self.heap.touches = touches;
+        if !near.is_empty() {
+            let mut warm = std::mem::take(&mut self.warm);
+            self.hold(&mut near, 0.0, settings, &mut warm);
+            self.warm = warm;
+        }
+        self.near = near;
+    }
+
+    /// Whether a ball that touches one wall and nothing else rests on it.
+    fn lies_on(&self, contact: &Contact<f64>, settings: &Settings) -> bool {
+        let (gap, speed) = self.wall_gap(contact);
+        let ball = &self.balls[contact.b as usize];
+        let rest = REST * ball.pull.magnitude() * settings.dt;
+        let falls = ball.pull.dot(self.walls[contact.a as usize].normal) < 0.0;
+        falls && gap <= 0.5 * REST * rest * settings.dt + ball.rounding && speed.abs() <= rest
+    }
+
+    /// How much slower than what counts as rest a ball and a wall come together, or
+    /// nothing if they do not touch.
+    fn touches_wall(&self, contact: &Contact<f64>, settings: &Settings) -> Option<f64> {
+        let (gap, speed) = self.wall_gap(contact);
+        let slow = PRESS * self.balls[contact.b as usize].pull.magnitude() * settings.dt;
+        (gap <= self.low(contact.b, settings) && speed <= slow).then_some(slow + speed)
+    }
+
+    /// The same of two balls.
+    fn touches_ball(&self, contact: &Contact<f64>, settings: &Settings) -> Option<f64> {
+        let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
+        let apart = direction_and_length(second.position - first.position);
+        let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), 0.0));
+        let speed = (second.velocity - first.velocity).dot(normal);
+        let pull = first.pull.magnitude().max(second.pull.magnitude());
+        let slow = PRESS * pull * settings.dt;
+        let low = self.low(contact.a, settings).max(self.low(contact.b, settings));
+        (distance - first.radius - second.radius <= low && speed <= slow).then_some(slow + speed)
+    }
+
+    /// The widest gap that still counts as touching, in metres: a fall from this height
+    /// gives the speed that counts as rest.
+    fn low(&self, row: u32, settings: &Settings) -> f64 {
+        let ball = &self.balls[row as usize];
+        0.5 * PRESS * PRESS * ball.pull.magnitude() * settings.dt * settings.dt + ball.rounding
+    }
+
+    /// The gap between a wall and a ball, and how fast it grows.
+    fn wall_gap(&self, contact: &Contact<f64>) -> (f64, f64) {
+        let ball = &self.balls[contact.b as usize];
+        let wall = contact.a as usize;
+        let (normal, distance) = self.walls.normal_and_distance(wall, ball.position);
+        let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
+        (distance - ball.radius, (ball.velocity - surface).dot(normal))
+    }
+
+    /// Lets balls, and all that touch them and each other, rest together from now on.
+    pub(super) fn hold_from_now_on(&mut self, first: [usize; 2], now: f64, settings: &Settings) {
+        let (found, mut contacts) = self.all_that_touch(first, now, settings);
+        let pull = found.iter().map(|row| self.balls[*row].pull.magnitude()).fold(0.0, f64::max);
+        // First what the collision does, all of it at once and without rebound.
+        self.heap.take(&mut contacts, &self.balls);
+        for material in &mut self.heap.material {
+            (material.restitution, material.tangential_restitution) = (0.0, 0.0);
+        }
+        let left = settings.dt - now;
+        self.heap.solve(&mut contacts, &self.walls, pull, 0.0, settings, &mut Vec::new());
+        for (label, row) in self.heap.rows.iter().enumerate() {
+            let ball = &mut self.balls[*row as usize];
+            (ball.velocity, ball.spin) = (self.heap.velocity[label], self.heap.spin[label]);
+        }
+        let name = |label: u32| self.heap.rows[label as usize];
+        contacts.wm.iter_mut().for_each(|c| c.b = name(c.b));
+        contacts.mm.iter_mut().for_each(|c| (c.a, c.b) = (name(c.a), name(c.b)));
+        // Then what holds it from there on, if that is any time at all.
+        if left > 1e-6 * settings.dt && !contacts.is_empty() {
+            self.hold(&mut contacts, now, settings, &mut Vec::new());
+        }
+        for row in found {
+            self.balls[row].path.losses = 0;
+            self.foresee(row, now, settings);
+        }
+    }
+
+    /// These balls, those that they touch, and so on, all of them released at this time;
+    /// and the contacts between them.
+    fn all_that_touch(
+        &mut self,
+        first: [usize; 2],
+        now: f64,
+        settings: &Settings,
+    ) -> (Vec<usize>, Contacts<f64>) {
+        let mut contacts = Contacts::default();
+        // The place of each ball in `found`, plus one.
+        let mut place = std::mem::take(&mut self.heap.touches);
+        place.clear();
+        place.resize(self.balls.len(), 0);
+        let mut found = Vec::new();
+        let find = |row: usize, place: &mut Vec<u32>, found: &mut Vec<usize>| {
+            if place[row] == 0 {
+                found.push(row);
+                place[row] = found.len() as u32;
+            }
+        };
+        first.into_iter().for_each(|row| find(row, &mut place, &mut found));
+        let mut turn = 0;
+        let mut near = Vec::new();
+        let mtv = Vec3::zero();
+        while let Some(row) = found.get(turn).copied() {
+            turn += 1;
+            self.balls[row].advance(now);
+            self.balls[row].release();
+            for wall in 0..self.walls.len() {
+                let contact = Contact { a: wall as u32, b: row as u32, mtv };
+                if self.touches_wall(&contact, settings).is_some() {
+                    contacts.wm.push(contact);
+                }
+            }
+            near.clear();
+            self.name_near(row, |other| near.push(other));
+            near.sort_unstable();
+            near.dedup();
+            for other in near.iter().copied().filter(|other| *other != row) {
+                // What had its turn has named this one already.
+                if place[other] != 0 && place[other] <= turn as u32 {
+                    continue;
+                }
+                let before = self.balls[other];
+                self.balls[other].advance(now);
+                let (a, b) = (row.min(other) as u32, row.max(other) as u32);
+                let contact = Contact { a, b, mtv };
+                // The two that it is about touch, whatever rounding says.
+                let known = first.contains(&row) && first.contains(&other);
+                if known || self.touches_ball(&contact, settings).is_some() {
+                    contacts.mm.push(contact);
+                    find(other, &mut place, &mut found);
+                }
+                self.balls[other] = before;
+            }
+        }
+        self.heap.touches = place;
+        (found, contacts)
+    }
+
+    /// Finds the accelerations that hold these contacts from `now` to the end of the
+    /// substep.
+    fn hold(
+        &mut self,
+        contacts: &mut Contacts<f64>,
+        now: f64,
+        settings: &Settings,
+        warm: &mut Vec<Warm<f64>>,
+    ) {
+        let left = settings.dt - now;
+        self.heap.take(contacts, &self.balls);
+        let Heap { rows, label, position, velocity, .. } = &mut self.heap;
+        let mut strongest: f64 = 0.0;
+        // Where each would be at the end of the substep if nothing held it.
+        for (at, row) in rows.iter().enumerate() {
+            let ball = &self.balls[*row as usize];
+            position[at] += (ball.velocity + ball.pull * (0.5 * left)) * left;
+            velocity[at] += ball.pull * left;
+            strongest = strongest.max(ball.pull.magnitude());
+        }
+        warm.retain_mut(|warm| {
+            warm.rename(|row| {
+                let at = *label.get(row)? as usize;
+                (rows.get(at).copied() == Some(row as u32)).then_some(at)
+            })
+        });
+        self.heap.solve(contacts, &self.walls, strongest, left, settings, warm);
+        let Heap { rows, position, velocity, spin, .. } = &self.heap;
+        warm.retain_mut(|warm| warm.rename(|at| rows.get(at).map(|row| *row as usize)));
+        for (at, row) in rows.iter().enumerate() {
+            let ball = &mut self.balls[*row as usize];
+            let end = ball.position + (ball.velocity + velocity[at]) * (0.5 * left);
+            ball.path = Path {
+                acceleration: (velocity[at] - ball.velocity) / left,
+                spin_acceleration: (spin[at] - ball.spin) / left,
+                heaped: true,
+                stamp: ball.path.stamp + 1,
+                ..ball.path
+            };
+            // What the method pushed apart, besides.
+            ball.position += position[at] - end;
+        }
+    }
+}
