@@ -16,12 +16,16 @@ impl EventDriven {
         let ball = &self.balls[row];
         let left = settings.dt - now;
         let mut first = (ball.path.change.max(now), What::Changes);
+        let mut tied = false;
         let mut offer = |after: Option<f64>, what: What| {
             // What lies behind by rounding is now.
-            if let Some(after) = after
-                && now + after.max(0.0) < first.0
-            {
-                first = (now + after.max(0.0), what);
+            let Some(after) = after else { return };
+            let time = now + after.max(0.0);
+            match (first.1, what) {
+                // Some are named twice.
+                (What::Meets(a, _), What::Meets(b, _)) if a != b && time == first.0 => tied = true,
+                _ if time < first.0 => (first, tied) = ((time, what), false),
+                _ => {}
             }
         };
         for wall in 0..self.walls.len() {
@@ -59,7 +63,7 @@ impl EventDriven {
         let (time, what) = first;
         if time <= now + left && time.is_finite() {
             let stamp = ball.path.stamp;
-            self.queue.push(Reverse(Event { time, row, stamp, what }));
+            self.queue.push(Reverse(Event { time, row, stamp, what, tied }));
         }
     }
 
@@ -127,7 +131,7 @@ impl EventDriven {
     }
 
     /// When and how two balls meet next, in seconds from now.
-    fn foresee_meeting(
+    pub(super) fn foresee_meeting(
         &self,
         a: usize,
         b: usize,

@@ -7,6 +7,7 @@
 //! roll instead of slide. All of it is counted in `f64`, whatever the world counts in.
 
 mod cells;
+mod collide;
 mod foresee;
 mod rest;
 mod support;
@@ -18,13 +19,12 @@ use std::collections::BinaryHeap;
 use cgmath::{InnerSpace, Zero};
 
 use crate::contact::Contacts;
-use crate::math::{
-    Point3, Scalar, Vec3, cast_vector, direction_and_length, is_finite, is_finite_point,
-};
+use crate::math::{Point3, Scalar, Vec3, cast_vector, is_finite, is_finite_point};
 use crate::motion::WallMotion;
 use crate::response::impulse::Warm;
-use crate::response::{BallSpin, Material, Mobility, Walls, impact};
+use crate::response::{BallSpin, Material, Walls};
 use cells::{Cell, Cells};
+use collide::Moment;
 use rest::Heap;
 use support::Support;
 
@@ -245,6 +245,8 @@ struct Event {
     row: usize,
     stamp: u32,
     what: What,
+    /// Whether it meets another one at the very same time.
+    tied: bool,
 }
 
 impl Ord for Event {
@@ -290,6 +292,7 @@ pub(crate) struct EventDriven {
     cells: Cells,
     anywhere: Vec<usize>,
     queue: BinaryHeap<Reverse<Event>>,
+    moment: Moment,
     heap: Heap,
 }
 
@@ -341,14 +344,7 @@ impl EventDriven {
             What::Meets(other, _) if self.loses(row) && self.loses(other) => {
                 self.hold_from_now_on([row, other], time, settings);
             }
-            What::Meets(other, _) => {
-                let (a, b) = (row.min(other), row.max(other));
-                self.balls[a].advance(time);
-                self.balls[b].advance(time);
-                impacts.extend(self.meet(a, b, settings));
-                self.foresee(a, time, settings);
-                self.foresee(b, time, settings);
-            }
+            What::Meets(other, _) => self.meet(event, other, settings, impacts),
             What::Leans(other, _) => self.hold_from_now_on([row, other], time, settings),
             What::Hits(_) if self.loses(row) => {
                 self.hold_from_now_on([row, row], time, settings);
@@ -378,52 +374,6 @@ impl EventDriven {
                 self.foresee(row, time, settings);
             }
         }
-    }
-
-    /// Whether a ball has had so many collisions that took energy that they will not end.
-    fn loses(&self, row: usize) -> bool {
-        self.balls[row].path.losses >= MOST_LOSSES
-    }
-
-    /// Lets two balls that touch bounce off each other.
-    fn meet(&mut self, a: usize, b: usize, settings: &Settings) -> Option<Impact<f64>> {
-        let press = self.press_speed(a, b, settings);
-        let [first, second] = self.balls.get_disjoint_mut([a, b]).ok()?;
-        first.release();
-        second.release();
-        let (normal, _) =
-            direction_and_length(second.position - first.position).unwrap_or((Vec3::unit_x(), 0.0));
-        let rims = first.rim(normal, settings.spin) + second.rim(normal, settings.spin);
-        let closing = second.velocity - first.velocity + rims;
-        let approach_speed = -closing.dot(normal);
-        let mut material = first.material.against(second.material);
-        if approach_speed <= 2.0 * press {
-            material.restitution = 0.0;
-        }
-        let losses = u32::from(material.restitution < 1.0);
-        first.path.losses += losses;
-        second.path.losses += losses;
-        let mobility = Mobility::of_balls(first.inverse_mass, second.inverse_mass, settings.spin);
-        let impulse = impact(normal, closing, mobility, material);
-        first.hit(-impulse, -normal, settings.spin);
-        second.hit(impulse, normal, settings.spin);
-        Some(Impact { a: a as u32, on_wall: false, b: b as u32, normal, approach_speed })
-    }
-
-    /// Lets a ball that touches a wall bounce off it.
-    fn hit_wall(&mut self, row: usize, wall: usize, settings: &Settings) -> Impact<f64> {
-        let normal = self.walls[wall].normal;
-        let ball = &mut self.balls[row];
-        ball.release();
-        let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
-        let closing = ball.velocity - surface + ball.rim(normal, settings.spin);
-        let approach_speed = -closing.dot(normal);
-        let mobility = Mobility::of_balls(0.0, ball.inverse_mass, settings.spin);
-        let material = self.walls[wall].against(ball.material);
-        ball.path.losses += u32::from(material.restitution < 1.0);
-        let impulse = impact(normal, closing, mobility, material);
-        ball.hit(impulse, normal, settings.spin);
-        Impact { a: wall as u32, on_wall: true, b: row as u32, normal, approach_speed }
     }
 
     /// Lets a ball that touches a wall lie on it from now on.
