@@ -76,45 +76,40 @@ fn scale_free(meter: &mut Meter, model: Model) -> f64 {
 /// something that is not finite, or with energy that was gained.
 fn extremes(meter: &mut Meter, model: Model) -> f64 {
     let mut failures = 0.0;
-    {
-        for mass in [1e-30, 1.0, 1e30, f64::INFINITY] {
-            for spin in [0.0, 1e5] {
-                for dt in [1e-9, 1e-3, 1.0] {
-                    for (e, mu) in [(0.0, 0.0), (1.0, 0.0), (0.5, 1e30), (1.0, 1.0)] {
-                        let mut world = weightless::<f32>(model);
-                        wall(&mut world, [0.0, 1.0, 0.0], 0.0);
-                        let material = surface(e, mu);
-                        let ball = Ball {
-                            at: [0.0, 0.5, 0.0],
-                            velocity: [1.0, -1.0, 0.0],
-                            spin: [0.0, 0.0, spin],
-                            material,
-                            ..Ball::default()
-                        };
-                        let first = ball.insert(&mut world);
-                        let second =
-                            Ball { at: [1.0, 0.5, 0.0], velocity: [-1.0, 0.0, 0.0], mass, ..ball }
-                                .insert(&mut world);
-                        let before = energy(&world);
-                        for _ in 0..20 {
-                            meter.step(&mut world, dt);
-                        }
-                        let finite = [first, second].iter().all(|id| {
-                            state(&world, *id)
-                                .iter()
-                                .all(|v| v.x.is_finite() && v.y.is_finite() && v.z.is_finite())
-                        });
-                        let after = energy(&world);
-                        // Displacements turn overlap into speed; that is their nature.
-                        let keeps = model.response == Response::Displacement
-                            || !before.is_finite()
-                            || after <= before * (1.0 + 1e-5);
-                        if !finite || !keeps {
-                            eprintln!(
-                                "{model:?} mass {mass} spin {spin} dt {dt} e {e} mu {mu} finite {finite} before {before} after {after}"
-                            );
-                            failures += 1.0;
-                        }
+    for mass in [1e-30, 1.0, 1e30, f64::INFINITY] {
+        for spin in [0.0, 1e5] {
+            for dt in [1e-9, 1e-3, 1.0] {
+                for (e, mu) in [(0.0, 0.0), (1.0, 0.0), (0.5, 1e30), (1.0, 1.0)] {
+                    let mut world = weightless::<f32>(model);
+                    wall(&mut world, [0.0, 1.0, 0.0], 0.0);
+                    let material = surface(e, mu);
+                    let ball = Ball {
+                        at: [0.0, 0.5, 0.0],
+                        velocity: [1.0, -1.0, 0.0],
+                        spin: [0.0, 0.0, spin],
+                        material,
+                        ..Ball::default()
+                    };
+                    let first = ball.insert(&mut world);
+                    let second =
+                        Ball { at: [1.0, 0.5, 0.0], velocity: [-1.0, 0.0, 0.0], mass, ..ball }
+                            .insert(&mut world);
+                    let before = energy(&world);
+                    for _ in 0..20 {
+                        meter.step(&mut world, dt);
+                    }
+                    let finite = [first, second].iter().all(|id| {
+                        state(&world, *id)
+                            .iter()
+                            .all(|v| v.x.is_finite() && v.y.is_finite() && v.z.is_finite())
+                    });
+                    let after = energy(&world);
+                    // Displacements turn overlap into speed; that is their nature.
+                    let keeps = model.response == Response::Displacement
+                        || !before.is_finite()
+                        || after <= before * (1.0 + 1e-5);
+                    if !finite || !keeps {
+                        failures += 1.0;
                     }
                 }
             }

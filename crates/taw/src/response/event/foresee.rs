@@ -6,7 +6,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::time::{Gap, closing_time, meeting_time};
 use super::{Event, EventDriven, Home, PRESS, REST, Settings, What};
-use crate::math::{Vec3, direction_and_length};
+use crate::math::{Vec3, direction_and_length, is_finite};
 use crate::response::Walls as _;
 
 impl EventDriven {
@@ -143,6 +143,9 @@ impl EventDriven {
         let (from, to) = (first.position_at(now), second.position_at(now));
         let velocity = second.velocity_at(now) - first.velocity_at(now);
         let acceleration = second.path.acceleration - first.path.acceleration;
+        if !is_finite(to - from) || !is_finite(velocity) || !is_finite(acceleration) {
+            return None; // what is nowhere is nobody's concern
+        }
         let reach = first.radius + second.radius;
         let (normal, distance) = direction_and_length(to - from).unwrap_or((Vec3::unit_x(), 0.0));
         let gap = distance - reach;
