@@ -55,7 +55,7 @@ fn panels(
     mut orders: MessageWriter<Order>,
     mut steps: MessageWriter<SingleStep>,
     mut gizmos: ResMut<GizmoConfigStore>,
-    diagnostics: Res<DiagnosticsStore>,
+    mut diagnostics: ResMut<DiagnosticsStore>,
 ) -> Result {
     if !open.panels {
         return Ok(());
@@ -81,6 +81,7 @@ fn panels(
             debug_ui::counts(ui, &diagnostics);
             debug_ui::step_time(ui, &diagnostics);
         });
+        section(ui, "Energy", |ui| debug_ui::energy(ui, &mut diagnostics));
         section(ui, "Draw", |ui| debug_ui::gizmos(ui, &mut gizmos));
         ui.separator();
         ui.weak("F1 lists all keys, Tab hides the panels");
@@ -89,7 +90,9 @@ fn panels(
 }
 
 fn section(ui: &mut Ui, title: &str, content: impl FnOnce(&mut Ui)) {
-    egui::CollapsingHeader::new(title).default_open(title != "Draw").show(ui, content);
+    egui::CollapsingHeader::new(title)
+        .default_open(!matches!(title, "Draw" | "Energy"))
+        .show(ui, content);
 }
 
 fn marbles(ui: &mut Ui, open: &mut Open, bag: &mut Bag, orders: &mut MessageWriter<Order>) {

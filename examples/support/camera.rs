@@ -17,6 +17,12 @@ impl Plugin for OrbitCameraPlugin {
 /// mouse button to turn, middle to move, wheel to zoom.
 #[must_use]
 pub fn orbit_camera(focus: Vec3, distance: f32) -> impl Bundle {
+    orbit_camera_at(focus, distance, 0.95)
+}
+
+/// The same, looking down by `pitch` radians at first.
+#[must_use]
+pub fn orbit_camera_at(focus: Vec3, distance: f32, pitch: f32) -> impl Bundle {
     (
         Camera3d::default(),
         // The default needs a look-up table, which Bevy is built without here.
@@ -25,7 +31,7 @@ pub fn orbit_camera(focus: Vec3, distance: f32) -> impl Bundle {
             focus,
             radius: Some(distance),
             yaw: Some(0.0),
-            pitch: Some(0.95),
+            pitch: Some(pitch),
             pitch_lower_limit: Some(0.1),
             zoom_lower_limit: 2.0,
             zoom_upper_limit: Some(6.0 * distance),

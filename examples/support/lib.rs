@@ -6,5 +6,5 @@
 mod camera;
 mod window;
 
-pub use camera::{OrbitCameraPlugin, orbit_camera};
+pub use camera::{OrbitCameraPlugin, orbit_camera, orbit_camera_at};
 pub use window::{ExamplePlugins, Picture};

@@ -174,3 +174,119 @@ fn a_moving_wall_carries_what_lies_on_it_and_a_moving_parent_does_too() {
         assert!((scene::position(&app, marble).y - 1.5).abs() < 3e-3);
     }
 }
+
+#[test]
+fn an_external_force_lasts_as_long_as_its_component() {
+    let mut app = scene::app();
+    dynamic(&mut app);
+    app.insert_resource(Gravity(Vec3::ZERO));
+    // At the top of the ball: it pushes and turns.
+    let force = ExternalForce::at(Vec3::X * 64.0, Vec3::Y * 0.5);
+    let ball = (Marble::new(0.5), MarbleMass::Kilograms(2.0), Velocity::default(), Spin::default());
+    let marble = app.world_mut().spawn((ball, force)).id();
+    scene::frames(&mut app, 2);
+    let velocity = |app: &App| **app.world().get::<Velocity>(marble).unwrap();
+    assert_eq!(velocity(&app), Vec3::X);
+    // τ / I = 32 / (2/5 · 2 · 0.25) = 160 rad/s², clockwise.
+    assert!((app.world().get::<Spin>(marble).unwrap().z + 5.0).abs() < 1e-5);
+    app.world_mut().entity_mut(marble).remove::<ExternalForce>();
+    scene::frames(&mut app, 8);
+    assert_eq!(velocity(&app), Vec3::X);
+}
+
+#[test]
+fn an_external_impulse_hits_once() {
+    let mut app = scene::app();
+    dynamic(&mut app);
+    app.insert_resource(Gravity(Vec3::ZERO));
+    let hit = ExternalImpulse::at(Vec3::X * 2.0, Vec3::Y * 0.2);
+    let ball = (Marble::new(0.5), MarbleMass::Kilograms(2.0), Velocity::default(), Spin::default());
+    let marble = app.world_mut().spawn((ball, hit)).id();
+    scene::frames(&mut app, 8);
+    assert_eq!(**app.world().get::<Velocity>(marble).unwrap(), Vec3::X);
+    assert!(
+        (app.world().get::<Spin>(marble).unwrap().z + 2.0).abs() < 1e-6,
+        "0.4 / (2/5 · 2 · 0.25)"
+    );
+    assert_eq!(*app.world().get::<ExternalImpulse>(marble).unwrap(), ExternalImpulse::default());
+}
+
+#[test]
+fn damping_takes_its_part_each_second() {
+    let mut app = scene::app();
+    dynamic(&mut app);
+    app.insert_resource(Gravity(Vec3::ZERO));
+    let damping = MarbleDamping { linear: 0.5, angular: 2.0 };
+    let bundle = (Marble::default(), Velocity(Vec3::X), Spin(Vec3::Y), damping);
+    let marble = app.world_mut().spawn(bundle).id();
+    scene::frames(&mut app, 64);
+    assert!((app.world().get::<Velocity>(marble).unwrap().x - (-0.5_f32).exp()).abs() < 1e-5);
+    assert!((app.world().get::<Spin>(marble).unwrap().y - (-2.0_f32).exp()).abs() < 1e-5);
+}
+
+#[test]
+fn a_wall_may_have_a_material_of_its_own() {
+    let bounced = |of_wall: Option<SurfaceMaterial>| {
+        let mut app = scene::app();
+        app.world_mut().resource_mut::<TawModel>().response = Response::EventDriven;
+        let floor = scene::floor(&mut app);
+        if let Some(material) = of_wall {
+            app.world_mut().entity_mut(floor).insert(material);
+        }
+        let steel = SurfaceMaterial { restitution: 0.8, ..default() };
+        let start = Transform::from_xyz(0.0, 1.0, 0.0);
+        let falling = (Marble::new(0.5), start, Velocity(Vec3::NEG_Y * 4.0), steel);
+        let marble = app.world_mut().spawn(falling).id();
+        app.insert_resource(Gravity(Vec3::ZERO));
+        scene::frames(&mut app, 16);
+        app.world().get::<Velocity>(marble).unwrap().y
+    };
+    assert!((bounced(None) - 3.2).abs() < 1e-6);
+    let dead = SurfaceMaterial { restitution: 0.0, ..default() };
+    assert!((bounced(Some(dead)) - 1.6).abs() < 1e-6, "the mean of the two");
+    let deadest = SurfaceMaterial { combine: Combine::Smallest, ..dead };
+    assert_eq!(bounced(Some(deadest)), 0.0);
+}
+
+#[test]
+fn every_response_holds_a_heap() {
+    for response in [
+        Response::Displacement,
+        Response::Impulse,
+        Response::Penalty(ContactLaw::SpringDashpot),
+        Response::EventDriven,
+    ] {
+        let mut app = scene::app();
+        let mut model = app.world_mut().resource_mut::<TawModel>();
+        (model.response, model.rotation, model.substeps) = (response, Rotation::Dynamic, 8);
+        scene::floor(&mut app);
+        for i in 0..20_u8 {
+            let at =
+                Vec3::new(f32::from(i % 3) * 0.9, 0.6 + f32::from(i / 3), f32::from(i % 2) * 0.4);
+            scene::drop_marble(&mut app, 0.5, at);
+        }
+        scene::frames(&mut app, 640);
+        let world = app.world().resource::<TawWorld>();
+        for position in world.marbles.position() {
+            assert!(position.y > 0.45 && position.y < 4.0, "{response:?}: {position:?}");
+        }
+    }
+}
+
+#[test]
+fn energy_is_measured_only_when_asked() {
+    use bevy::diagnostic::DiagnosticsStore;
+    use bevy_taw::diagnostics::{KINETIC_ENERGY, enable_energy};
+    let mut app = scene::app();
+    let bundle = (Marble::default(), MarbleMass::Kilograms(2.0), Velocity(Vec3::X * 3.0));
+    app.insert_resource(Gravity(Vec3::ZERO));
+    app.world_mut().spawn(bundle);
+    let kinetic = |app: &App| {
+        app.world().resource::<DiagnosticsStore>().get_measurement(&KINETIC_ENERGY).map(|m| m.value)
+    };
+    scene::frames(&mut app, 4);
+    assert_eq!(kinetic(&app), None);
+    enable_energy(&mut app.world_mut().resource_mut::<DiagnosticsStore>(), true);
+    scene::frames(&mut app, 4);
+    assert_eq!(kinetic(&app), Some(9.0));
+}

@@ -22,7 +22,7 @@ use bevy_egui::egui::{self, Ui};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 use taw::motion::{Integrator, Rotation};
 use taw::response::{ContactLaw, Response};
-use taw::world::Precision;
+use taw::world::{Detection, Precision};
 
 use crate::diagnostics as paths;
 use crate::resources::{Gravity, TawModel};
@@ -45,6 +45,8 @@ pub fn model(ui: &mut Ui, model: &mut ResMut<TawModel>) {
         choice(ui, "Rotation", &mut chosen.rotation, &rotations, rotation_name);
         let precisions = [Precision::Plain, Precision::Compensated];
         choice(ui, "Precision", &mut chosen.precision, &precisions, precision_name);
+        let detections = [Detection::Discrete, Detection::Swept];
+        choice(ui, "Detection", &mut chosen.detection, &detections, detection_name);
         ui.label("Substeps");
         ui.add(egui::Slider::new(&mut chosen.substeps, 1..=16));
         ui.end_row();
@@ -116,26 +118,61 @@ pub fn step_time(ui: &mut Ui, diagnostics: &DiagnosticsStore) {
             ui.end_row();
         }
     });
-    Plot::new("taw step time")
+    time_plot(ui, "taw step time", "ms", |plot| {
+        for (name, path) in [("Step", paths::STEP_TIME), ("Contacts", paths::CONTACTS_TIME)] {
+            if let Some(diagnostic) = diagnostics.get(&path) {
+                plot.line(Line::new(name, points(diagnostic.values())));
+            }
+        }
+    });
+}
+
+/// Energy and momentum over the last ten seconds. Measures them while it is shown.
+pub fn energy(ui: &mut Ui, diagnostics: &mut DiagnosticsStore) {
+    paths::enable_energy(diagnostics, true);
+    let lines = [
+        ("Potential", paths::POTENTIAL_ENERGY),
+        ("Kinetic", paths::KINETIC_ENERGY),
+        ("Spin", paths::SPIN_ENERGY),
+    ];
+    time_plot(ui, "taw energy", "J", |plot| {
+        let history = |path| diagnostics.get(path).map(Diagnostic::values);
+        for (name, path) in &lines {
+            if let Some(values) = history(path) {
+                plot.line(Line::new(*name, points(values)));
+            }
+        }
+        let [potential, kinetic, spin] = lines.each_ref().map(|(_, path)| history(path));
+        if let (Some(potential), Some(kinetic), Some(spin)) = (potential, kinetic, spin) {
+            let sums = potential.zip(kinetic).zip(spin).map(|((p, k), s)| p + k + s);
+            let sums: Vec<f64> = sums.collect();
+            plot.line(Line::new("Total", points(sums.iter())));
+        }
+    });
+    time_plot(ui, "taw momentum", "kg m/s", |plot| {
+        if let Some(momentum) = diagnostics.get(&paths::MOMENTUM) {
+            plot.line(Line::new("Momentum", points(momentum.values())));
+        }
+    });
+}
+
+/// Values one after the other.
+fn points<'a>(values: impl Iterator<Item = &'a f64>) -> PlotPoints<'static> {
+    (0_u32..).zip(values).map(|(i, value)| [f64::from(i), *value]).collect()
+}
+
+/// A plot over the last steps.
+fn time_plot(ui: &mut Ui, id: &str, unit: &str, draw: impl FnOnce(&mut egui_plot::PlotUi)) {
+    Plot::new(id)
         .height(120.0)
         .include_y(0.0)
         .allow_drag(false)
         .allow_zoom(false)
         .allow_scroll(false)
-        .y_axis_label("ms")
+        .y_axis_label(unit)
         .show_x(false)
         .legend(Legend::default())
-        .show(ui, |plot| {
-            for (name, path) in [("Step", paths::STEP_TIME), ("Contacts", paths::CONTACTS_TIME)] {
-                if let Some(diagnostic) = diagnostics.get(&path) {
-                    let points: PlotPoints = (0_u32..)
-                        .zip(diagnostic.values())
-                        .map(|(i, ms)| [f64::from(i), *ms])
-                        .collect();
-                    plot.line(Line::new(name, points));
-                }
-            }
-        });
+        .show(ui, draw);
 }
 
 /// What to draw of the physics.
@@ -177,6 +214,13 @@ fn response_name(response: Response) -> &'static str {
         Response::Penalty(ContactLaw::SpringDashpot) => "Penalty: spring–dashpot",
         Response::Penalty(ContactLaw::HertzMindlin) => "Penalty: Hertz–Mindlin",
         Response::EventDriven => "Event-driven",
+    }
+}
+
+fn detection_name(detection: Detection) -> &'static str {
+    match detection {
+        Detection::Discrete => "Discrete",
+        Detection::Swept => "Swept",
     }
 }
 

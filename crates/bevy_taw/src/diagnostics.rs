@@ -2,10 +2,13 @@
 
 use std::time::Duration;
 
-use bevy::diagnostic::{Diagnostic, DiagnosticPath, Diagnostics, RegisterDiagnostic};
+use bevy::diagnostic::{
+    Diagnostic, DiagnosticPath, Diagnostics, DiagnosticsStore, RegisterDiagnostic,
+};
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
+use crate::convert::from_vector;
 use crate::resources::TawWorld;
 
 /// A whole step, from gather to scatter, in milliseconds.
@@ -25,6 +28,25 @@ pub const WALL_CONTACTS: DiagnosticPath = DiagnosticPath::const_new("taw/wall_co
 /// The marble–marble contacts of the last substep.
 pub const MARBLE_CONTACTS: DiagnosticPath = DiagnosticPath::const_new("taw/marble_contacts");
 
+/// The energy of the marbles' velocities, in joules. This and the next three are off
+/// until [`enable_energy`].
+pub const KINETIC_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/energy/kinetic");
+/// The energy of their spins, in joules.
+pub const SPIN_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/energy/spin");
+/// Their energy in gravity, against the origin, in joules.
+pub const POTENTIAL_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/energy/potential");
+/// How large the sum of their momenta is, in kg m/s.
+pub const MOMENTUM: DiagnosticPath = DiagnosticPath::const_new("taw/momentum");
+
+/// Has energy and momentum measured in every step, or no longer. Off, they cost nothing.
+pub fn enable_energy(store: &mut DiagnosticsStore, enabled: bool) {
+    for path in [&KINETIC_ENERGY, &SPIN_ENERGY, &POTENTIAL_ENERGY, &MOMENTUM] {
+        if let Some(diagnostic) = store.get_mut(path) {
+            diagnostic.is_enabled = enabled;
+        }
+    }
+}
+
 pub(crate) fn register(app: &mut App) {
     let times = [STEP_TIME, GATHER_TIME, INTEGRATE_TIME, CONTACTS_TIME, RESTITUTE_TIME];
     for path in times {
@@ -32,6 +54,16 @@ pub(crate) fn register(app: &mut App) {
     }
     for path in [MARBLES, WALL_CONTACTS, MARBLE_CONTACTS] {
         app.register_diagnostic(Diagnostic::new(path).with_smoothing_factor(0.0));
+    }
+    for (path, unit) in [
+        (KINETIC_ENERGY, " J"),
+        (SPIN_ENERGY, " J"),
+        (POTENTIAL_ENERGY, " J"),
+        (MOMENTUM, " kg m/s"),
+    ] {
+        let mut diagnostic = Diagnostic::new(path).with_suffix(unit).with_max_history_length(600);
+        diagnostic.is_enabled = false;
+        app.register_diagnostic(diagnostic);
     }
 }
 
@@ -82,4 +114,10 @@ pub(crate) fn measure(times: Res<StepTimes>, world: Res<TawWorld>, mut diagnosti
     diagnostics.add_measurement(&MARBLES, || world.marbles.len() as f64);
     diagnostics.add_measurement(&WALL_CONTACTS, || world.contacts.wm.len() as f64);
     diagnostics.add_measurement(&MARBLE_CONTACTS, || world.contacts.mm.len() as f64);
+    diagnostics.add_measurement(&KINETIC_ENERGY, || world.energy().kinetic);
+    diagnostics.add_measurement(&SPIN_ENERGY, || world.energy().spin);
+    diagnostics.add_measurement(&POTENTIAL_ENERGY, || world.energy().potential);
+    diagnostics.add_measurement(&MOMENTUM, || {
+        from_vector(world.momentum().map(|p| p as f32)).length().into()
+    });
 }

@@ -89,7 +89,7 @@ pub mod prelude {
     pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
     pub use taw::motion::{Force, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};
-    pub use taw::world::{Model, Precision};
+    pub use taw::world::{Detection, Model, Precision};
 }
 
 /// Compiles what the README shows.

@@ -58,6 +58,15 @@ pub enum CombineReflect {
     Largest,
 }
 
+/// Mirrors [`taw::world::Detection`].
+#[reflect_remote(taw::world::Detection)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[reflect(Debug, PartialEq)]
+pub enum DetectionReflect {
+    Discrete,
+    Swept,
+}
+
 /// Mirrors [`taw::world::Precision`].
 #[reflect_remote(taw::world::Precision)]
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +89,8 @@ pub struct ModelReflect {
     pub rotation: taw::motion::Rotation,
     #[reflect(remote = PrecisionReflect)]
     pub precision: taw::world::Precision,
+    #[reflect(remote = DetectionReflect)]
+    pub detection: taw::world::Detection,
     pub substeps: u32,
     pub iterations: u32,
 }

@@ -13,6 +13,7 @@ pub const EXACT: Model = Model {
     response: Response::EventDriven,
     rotation: Rotation::Dynamic,
     precision: Precision::Compensated,
+    detection: Detection::Discrete,
     substeps: 1,
     iterations: 200,
 };
@@ -189,15 +190,7 @@ pub fn state<S: Scalar>(world: &World<S>, id: MarbleId) -> [Vec3<f64>; 3] {
 /// Kinetic (with spin) and potential energy of all balls, in joules.
 #[must_use]
 pub fn energy<S: Scalar>(world: &World<S>) -> f64 {
-    let gravity = world.gravity().map(Scalar::as_f64);
-    let ids = (0..world.marbles.len()).filter_map(|row| world.marbles.id(row));
-    ids.filter_map(|id| world.marbles.get_exact(id).ok())
-        .map(|m| {
-            let rim = m.spin.magnitude2() * m.radius.powi(2);
-            let potential = -gravity.dot(m.position.to_vec());
-            m.mass.of(m.radius) * (0.5 * m.velocity.magnitude2() + 0.2 * rim + potential)
-        })
-        .sum()
+    world.energy().total()
 }
 
 /// How deep pairs of balls, and balls and walls, overlap: each one's, in metres.

@@ -13,7 +13,7 @@ mod sphere_sphere;
 
 pub use list::{Contact, Contacts};
 pub use sphere_plane::{mtv_sphere_plane, touching_sphere_plane};
-pub use sphere_sphere::{mtv_sphere_sphere, touching_sphere_sphere};
+pub use sphere_sphere::{mtv_sphere_sphere, time_of_impact_sphere_sphere, touching_sphere_sphere};
 
 #[cfg(test)]
 mod tests {

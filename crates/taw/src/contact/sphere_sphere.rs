@@ -1,3 +1,5 @@
+use cgmath::InnerSpace;
+
 use crate::math::{Scalar, Vec3, direction_and_length, length};
 use crate::shape::Sphere;
 
@@ -24,6 +26,30 @@ pub fn mtv_sphere_sphere<S: Scalar>(a: &Sphere<S>, b: &Sphere<S>) -> Option<Vec3
         None if touching_sphere_sphere(a, b) => Some(Vec3::unit_x() * reach),
         _ => None,
     }
+}
+
+/// When two spheres that move along straight lines first touch, as a part of their
+/// motion in `[0, 1]`; `a_moves` and `b_moves` are all of it. None if they do not, or
+/// touch at the start already.
+#[must_use]
+pub fn time_of_impact_sphere_sphere<S: Scalar>(
+    a: &Sphere<S>,
+    a_moves: Vec3<S>,
+    b: &Sphere<S>,
+    b_moves: Vec3<S>,
+) -> Option<S> {
+    let (apart, motion) = (b.center - a.center, b_moves - a_moves);
+    let reach = a.radius + b.radius;
+    let distance = length(apart);
+    // In units of the reach, so that no square vanishes or overflows.
+    let (d, m) = (apart / reach, motion / reach);
+    let open = (distance / reach - S::one()) * (distance / reach + S::one());
+    let (slope, squared) = (d.dot(m), m.magnitude2());
+    let discriminant = slope * slope - squared * open;
+    let meets = open > S::zero() && slope < S::zero() && discriminant >= S::zero();
+    // The smaller zero of the quadratic, in the form that subtracts nothing.
+    let time = open / (discriminant.sqrt() - slope);
+    (meets && time <= S::one()).then_some(time)
 }
 
 #[cfg(test)]
@@ -86,6 +112,32 @@ mod tests {
             assert!((depth - 0.5).abs() < 1e-6, "{scale}: {depth}");
             assert_eq!(mtv_sphere_sphere(&a, &far), None);
         }
+    }
+
+    #[test]
+    fn spheres_that_cross_meet_where_they_first_touch() {
+        for scale in [1e-30_f32, 1e-3, 1.0, 1e30] {
+            let a = sphere(-4.0 * scale, 0.0, 0.0, 0.5 * scale);
+            let b = sphere(0.0, 0.6 * scale, 0.0, 0.5 * scale);
+            let still = Vec3::new(0.0, 0.0, 0.0);
+            let through = Vec3::new(100.0 * scale, 0.0, 0.0);
+            let time = time_of_impact_sphere_sphere(&a, through, &b, still).unwrap();
+            // They touch where the first has 0.8 to go to the second's height: 3.2 of 100.
+            assert!((time - 0.032).abs() < 1e-8, "{scale}: {time}");
+            // The same, seen by somebody who moves along.
+            let along = time_of_impact_sphere_sphere(&a, still, &b, -through).unwrap();
+            assert!((along - 0.032).abs() < 1e-8, "{scale}: {along}");
+            assert_eq!(time_of_impact_sphere_sphere(&a, -through, &b, still), None);
+            let short = Vec3::new(3.1 * scale, 0.0, 0.0);
+            assert_eq!(time_of_impact_sphere_sphere(&a, short, &b, still), None);
+            let past = Vec3::new(100.0 * scale, 100.0 * scale, 0.0);
+            assert_eq!(time_of_impact_sphere_sphere(&a, past, &b, still), None);
+            assert_eq!(time_of_impact_sphere_sphere(&b, through, &b, still), None, "inside");
+        }
+        let nan = sphere(f32::NAN, 0.0, 0.0, 1.0);
+        let b = sphere(5.0, 0.0, 0.0, 1.0);
+        let v = Vec3::new(9.0, 0.0, 0.0);
+        assert_eq!(time_of_impact_sphere_sphere(&nan, v, &b, v), None);
     }
 
     #[test]

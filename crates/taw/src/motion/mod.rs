@@ -2,10 +2,12 @@
 
 mod force;
 mod integrator;
+mod rigid;
 mod rotation;
 mod wall;
 
 pub use force::{Force, Medium};
 pub use integrator::{Integrator, Motion};
+pub use rigid::{move_free, world_velocity};
 pub use rotation::{FreeRotation, Rotation, turned};
 pub use wall::WallMotion;

@@ -1,6 +1,7 @@
 //! The state as columns, the choice of methods, and the step.
 
 mod apply;
+mod energy;
 mod event;
 mod handles;
 mod integrate;
@@ -8,12 +9,14 @@ mod limits;
 mod marbles;
 mod model;
 mod optional;
+mod sweep;
 mod walls;
 
 pub use crate::motion::WallMotion;
+pub use energy::Energy;
 pub use limits::SpeedLimits;
 pub use marbles::{Damping, Marble, MarbleId, Marbles, Mass};
-pub use model::{Model, Precision};
+pub use model::{Detection, Model, Precision};
 pub use walls::{WallId, Walls};
 
 use cgmath::Zero;
@@ -28,6 +31,7 @@ use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Settings, Warm, impulse};
 use crate::response::{BallSpin, Impact, Response, Shear, displacement, penalty};
 use integrate::Drive;
+use sweep::Sweep;
 
 /// Everything that moves and everything that it can touch.
 ///
@@ -65,6 +69,7 @@ pub struct World<S> {
     /// For a response that moves marbles by itself: how each is to be accelerated.
     accelerations: Vec<Vec3<f64>>,
     events: EventDriven,
+    sweep: Sweep<S>,
 }
 
 impl<S: Scalar> Default for World<S> {
@@ -89,6 +94,7 @@ impl<S: Scalar> Default for World<S> {
             warm_removals: [0; 2],
             accelerations: Vec::new(),
             events: EventDriven::default(),
+            sweep: Sweep::default(),
         }
     }
 }
@@ -114,6 +120,7 @@ impl<S: Scalar> PartialEq for World<S> {
             warm_removals,
             accelerations: _,
             events,
+            sweep: _,
         } = self;
         *model == other.model
             && *gravity == other.gravity
@@ -234,6 +241,10 @@ impl<S: Scalar> World<S> {
         if self.model.response == Response::EventDriven {
             self.marbles.mean_accelerations(drive, &mut self.accelerations);
         } else {
+            self.sweep.start.clear();
+            if self.model.detection == Detection::Swept {
+                self.sweep.start.extend_from_slice(self.marbles.position());
+            }
             self.marbles.integrate(drive, &mut self.stopped);
         }
         if !(self.model.response == Response::EventDriven
@@ -257,6 +268,9 @@ impl<S: Scalar> World<S> {
     /// together later is found later.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
+        if self.model.response == Response::Impulse && self.model.detection == Detection::Swept {
+            self.stop_where_they_meet();
+        }
         let reach = self.reach;
         let nothing = Vec3::zero();
         for (a, plane) in self.walls.planes().iter().enumerate() {

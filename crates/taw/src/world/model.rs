@@ -22,12 +22,28 @@ pub struct Model {
     pub rotation: Rotation,
     /// Whether marbles keep what the scalar cuts off.
     pub precision: Precision,
+    /// Whether touches are looked for on the way, too.
+    pub detection: Detection,
     /// Into how many equal parts each step is cut, from 1 to 1,000. Costs as many
     /// times as much.
     pub substeps: u32,
     /// How many times [`Response::Impulse`] goes over all contacts in a substep, from
     /// 1 to 1,000. It stops sooner when nothing changes any more.
     pub iterations: u32,
+}
+
+/// When touches are looked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+pub enum Detection {
+    /// At the end of each substep. Marbles that move by more than their radii in it may
+    /// pass through each other. (Through a wall nothing passes: it is solid behind.)
+    #[default]
+    Discrete,
+    /// On the way through the substep, for [`Response::Impulse`]: marbles that meet stop
+    /// where they first touch, with the normal that they have there, and lose what was
+    /// left of their way. [`Response::EventDriven`] always does, and loses nothing; the
+    /// other responses take no notice.
+    Swept,
 }
 
 /// How exactly marbles remember where they are and how they move.
@@ -50,6 +66,7 @@ impl Default for Model {
             response: Response::Displacement,
             rotation: Rotation::None,
             precision: Precision::Plain,
+            detection: Detection::Discrete,
             substeps: 1,
             iterations: 8,
         }

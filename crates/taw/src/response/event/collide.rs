@@ -93,10 +93,14 @@ impl EventDriven {
         rows.extend(pairs.iter().flat_map(|(a, b)| [*a, *b]));
         rows.sort_unstable();
         rows.dedup();
-        rows.iter().for_each(|row| self.balls[*row].advance(time));
+        for row in &rows {
+            self.balls[*row].advance(time);
+        }
         collisions.clear();
         collisions.extend(pairs.iter().map(|(a, b)| self.collision(*a, *b, settings)));
-        rows.iter().for_each(|row| self.balls[*row].release());
+        for row in &rows {
+            self.balls[*row].release();
+        }
         impacts.extend(collisions.iter().map(|c| c.impact));
         if rows.len() == 2 * pairs.len() {
             for c in &collisions {
@@ -108,7 +112,9 @@ impl EventDriven {
         } else {
             self.collide_at_once(&mut collisions, &rows, settings.spin);
         }
-        rows.iter().for_each(|row| self.foresee(*row, time, settings));
+        for row in &rows {
+            self.foresee(*row, time, settings);
+        }
         self.moment = Moment { pairs, rest, rows, collisions };
     }
 

@@ -36,10 +36,10 @@ impl EventDriven {
             }
         }
         let mut other = |other: usize| {
-            if other != row {
-                if let Some((after, what)) = self.foresee_meeting(row, other, now, settings) {
-                    offer(Some(after), what);
-                }
+            if other != row
+                && let Some((after, what)) = self.foresee_meeting(row, other, now, settings)
+            {
+                offer(Some(after), what);
             }
         };
         self.name_near(row, &mut other);
@@ -193,7 +193,7 @@ impl EventDriven {
     /// The speed that two balls that press each other gain before they touch anew.
     ///
     /// Where collisions take energy, chains of touching balls would come to rest among
-    /// themselves only after endlessly many (inelastic collapse; McNamara and Young
+    /// themselves only after endlessly many (inelastic collapse; `McNamara` and Young
     /// 1992), so there it is also what counts as rest.
     pub(super) fn press_speed(&self, a: usize, b: usize, settings: &Settings) -> f64 {
         let (first, second) = (&self.balls[a], &self.balls[b]);

@@ -239,7 +239,9 @@ impl EventDriven {
                 place[row] = found.len() as u32;
             }
         };
-        first.into_iter().for_each(|row| find(row, &mut place, &mut found));
+        for row in first {
+            find(row, &mut place, &mut found);
+        }
         let mut turn = 0;
         let mut near = Vec::new();
         let mtv = Vec3::zero();

@@ -236,6 +236,17 @@ pub(crate) fn impulse<S: Scalar>(
             marbles.push_apart(constraint, walls, settings);
         }
     }
+    remember(constraints, warm);
+    for row in constraints.iter().flat_map(|c| [Some(c.b), c.a.marble()]).flatten() {
+        if !is_finite(marbles.velocity[row]) {
+            marbles.velocity[row] = Vec3::zero();
+            stopped.push(row as u32);
+        }
+    }
+}
+
+/// Keeps what the contacts bore for the next substep.
+fn remember<S: Scalar>(constraints: &[Constraint<S>], warm: &mut Vec<Warm<S>>) {
     warm.clear();
     warm.extend(constraints.iter().map(|c| Warm {
         key: c.key(),
@@ -244,12 +255,6 @@ pub(crate) fn impulse<S: Scalar>(
         twist: c.resistance.map_or_else(Vec3::zero, |resistance| resistance.twist),
     }));
     warm.sort_unstable_by_key(|warm| warm.key);
-    for row in constraints.iter().flat_map(|c| [Some(c.b), c.a.marble()]).flatten() {
-        if !is_finite(marbles.velocity[row]) {
-            marbles.velocity[row] = Vec3::zero();
-            stopped.push(row as u32);
-        }
-    }
 }
 
 /// What the solver asks of walls, by row.
