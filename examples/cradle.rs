@@ -5,8 +5,8 @@
 //!
 //! What to look at: the five balls touch, with no gap at all. Collisions are gone
 //! through one by one, so the middle ones pass on what they get; the energy below
-//! stays what it is. The threads are forces: each pulls its ball back to a circle
-//! about its hook. Space lets two balls swing in, R one.
+//! stays what it is. The threads are forces: each holds its ball on a circle about its
+//! hook. Space lets two balls swing in, R one.
 
 use bevy::color::palettes::tailwind;
 use bevy::diagnostic::DiagnosticsStore;
@@ -40,7 +40,6 @@ fn main() -> AppExit {
             integrator: Integrator::Rk4,
             response: Response::EventDriven,
             precision: Precision::Compensated,
-            substeps: 8,
             ..default()
         }))
         .insert_resource(ClearColor(tailwind::SLATE_900.into()))
@@ -100,18 +99,22 @@ fn spawn(
     commands.spawn(orbit_camera_at(Vec3::Y * 2.2, 12.0, 0.15));
 }
 
-/// A thread bears what gravity and the circle ask of it, and pulls what has strayed
-/// from the circle back.
+/// A thread pulls with just the force that has its ball on the circle about its hook
+/// again at the end of the step.
 fn pull(
     mut balls: Query<(&Transform, &Velocity, &Hook, &mut ExternalForce)>,
     gravity: Res<Gravity>,
+    time: Res<Time>,
 ) {
+    let dt = time.delta_secs();
     for (at, velocity, Hook(i), mut force) in &mut balls {
-        let thread = hook(*i) - at.translation;
-        let (toward, length) = (thread.normalize(), thread.length());
-        let around = velocity.length_squared() / LENGTH;
-        let astray = 4e3 * (length - LENGTH) - 60.0 * velocity.dot(toward);
-        force.force = toward * (around - gravity.dot(toward) + astray);
+        let toward = (hook(*i) - at.translation).normalize();
+        // From the hook to where the ball would be without a thread.
+        let free = at.translation - hook(*i) + (**velocity + **gravity * (0.5 * dt)) * dt;
+        // The thread's way s along `toward`: |free + s toward| = LENGTH.
+        let along = free.dot(toward);
+        let root = (along * along - free.length_squared() + LENGTH * LENGTH).max(0.0).sqrt();
+        force.force = toward * (2.0 * (-along - root) / (dt * dt));
     }
 }
 

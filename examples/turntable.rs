@@ -20,7 +20,7 @@ const RADIUS: f32 = 0.25;
 /// Start of each ball and its velocity along z, and its colour.
 const BALLS: [(f32, f32, Srgba); 3] = [
     (2.0, 0.5, tailwind::ROSE_500),
-    (3.2, -0.4, tailwind::AMBER_400),
+    (-3.4, 0.4, tailwind::AMBER_400),
     (-1.0, 0.7, tailwind::SKY_400),
 ];
 

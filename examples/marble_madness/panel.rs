@@ -81,7 +81,8 @@ fn panels(
             debug_ui::counts(ui, &diagnostics);
             debug_ui::step_time(ui, &diagnostics);
         });
-        section(ui, "Energy", |ui| debug_ui::energy(ui, &mut diagnostics));
+        let energy = section(ui, "Energy", |ui| debug_ui::energy(ui, &mut diagnostics));
+        bevy_taw::diagnostics::enable_energy(&mut diagnostics, energy);
         section(ui, "Draw", |ui| debug_ui::gizmos(ui, &mut gizmos));
         ui.separator();
         ui.weak("F1 lists all keys, Tab hides the panels");
@@ -89,10 +90,13 @@ fn panels(
     Ok(())
 }
 
-fn section(ui: &mut Ui, title: &str, content: impl FnOnce(&mut Ui)) {
+/// A part of the panel that can be folded; gives whether it is open.
+fn section(ui: &mut Ui, title: &str, content: impl FnOnce(&mut Ui)) -> bool {
     egui::CollapsingHeader::new(title)
         .default_open(!matches!(title, "Draw" | "Energy"))
-        .show(ui, content);
+        .show(ui, content)
+        .body_returned
+        .is_some()
 }
 
 fn marbles(ui: &mut Ui, open: &mut Open, bag: &mut Bag, orders: &mut MessageWriter<Order>) {

@@ -87,6 +87,21 @@ fn step_settled_impulse(bencher: Bencher, count: u32) {
     bench(bencher, settled_by(model, count), step);
 }
 
+/// The same heap, event by event.
+#[divan::bench(args = [100, 1_000])]
+fn step_settled_event_driven(bencher: Bencher, count: u32) {
+    let (response, rotation) = (Response::Impulse, Rotation::Dynamic);
+    let model = Model { response, rotation, ..Model::default() };
+    let mut world = settled_by(model, count);
+    let precision = Precision::Compensated;
+    let exact = Model { response: Response::EventDriven, precision, iterations: 64, ..model };
+    world.set_model(exact).expect("a model");
+    for _ in 0..120 {
+        world.step(DT).expect("a step");
+    }
+    bench(bencher, world, step);
+}
+
 #[divan::bench(args = COUNTS)]
 fn verb_1_integrate(bencher: Bencher, count: u32) {
     bench(bencher, settled(count), |world| world.integrate(DT).expect("a step"));

@@ -35,7 +35,9 @@ pub enum Response {
     /// Impulses, contact by contact and round after round
     /// ([`Model::iterations`](crate::world::Model::iterations)): masses, restitution
     /// and friction as the [`Material`] says, spin if the model's rotation is dynamic,
-    /// walls that carry along what lies on them.
+    /// walls that carry along what lies on them; rolling and spinning resistance. Sweeps
+    /// that go on along their way until the contacts agree
+    /// ([`World::residual`](crate::world::World::residual)).
     ///
     /// A bounce happens at the end of the substep in which it falls due, so its height
     /// is right only to the first order in the substep; slower than what gravity does
@@ -56,9 +58,10 @@ pub enum Response {
     /// In between marbles fly along parabolas, with the mean acceleration of the substep
     /// by the integrator; exact for gravity. What lies on one wall rests, rolls or slides
     /// as the equations of a rolling ball say, and changes over at its moment. What lies
-    /// on other marbles is held as by [`Response::Impulse`], so heaps are as right and as
-    /// costly as there. Bounces end when the rest of them would take less than a few
-    /// thousandths of a substep.
+    /// on other marbles is held as by [`Response::Impulse`]. Give it 50
+    /// [iterations](crate::world::Model::iterations) or more where there are heaps: a
+    /// contact that they leave undecided is one more event, which costs more. Bounces end
+    /// when the rest of them would take less than a few thousandths of a substep.
     ///
     /// Counts in `f64` also in a world of `f32`; see
     /// [`Precision`](crate::world::Precision) for what such a world remembers of it. It

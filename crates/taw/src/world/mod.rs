@@ -402,6 +402,15 @@ impl<S: Scalar> World<S> {
         &self.impacts
     }
 
+    /// How far the contacts of the last substep were from agreeing when
+    /// [`Response::Impulse`] let them be: by how much a velocity still changed in its last
+    /// sweep, at most, in m/s. It ends at the [iterations](Model::iterations), or where
+    /// the change is below the rounding of what gravity does in two substeps.
+    #[must_use]
+    pub fn residual(&self) -> S {
+        self.impulse.residual()
+    }
+
     /// Forgets who was [stopped](World::stopped), and the [impacts](World::impacts). A
     /// step begins with this; whoever calls the verbs one by one begins so too.
     pub fn begin_step(&mut self) {

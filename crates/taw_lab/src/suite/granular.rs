@@ -127,6 +127,81 @@ fn pour(meter: &mut Meter, seed: u64, rolling_resistance: f64) -> f64 {
     (-xy / xx).atan().to_degrees()
 }
 
+/// How many balls a second fall through a round hole of this diameter in the bottom of a
+/// bin (balls of diameter one), in the first and in the second half of the time: the
+/// bottom is made of small glued balls.
+fn discharge(meter: &mut Meter, diameter: f64) -> [f64; 2] {
+    const WIDTH: f64 = 16.0;
+    let mut bin = world::<f32>(Model { rotation: Rotation::Dynamic, substeps: 2, ..FINE });
+    box_around(&mut bin, WIDTH / 2.0);
+    let material = surface(0.1, 0.5);
+    let grain = 0.25;
+    let half = (WIDTH / 4.0 / grain) as i32;
+    for (i, k) in (-half..=half).flat_map(|i| (-half..=half).map(move |k| (i, k))) {
+        let (x, z) = (f64::from(i) * 2.0 * grain, f64::from(k) * 2.0 * grain);
+        if x.hypot(z) >= diameter / 2.0 + grain {
+            let at = [x, 0.0, z];
+            Ball { at, radius: grain, mass: f64::INFINITY, material, ..Ball::default() }
+                .insert(&mut bin);
+        }
+    }
+    // Its rim is a circle, not a part of the lattice.
+    let rim = diameter / 2.0 + grain;
+    let grains = (std::f64::consts::PI * rim / grain) as u32;
+    for i in 0..grains {
+        let (z, x) = (std::f64::consts::TAU * f64::from(i) / f64::from(grains)).sin_cos();
+        let at = [x * rim, 0.0, z * rim];
+        Ball { at, radius: grain, mass: f64::INFINITY, material, ..Ball::default() }
+            .insert(&mut bin);
+    }
+    let plug = wall(&mut bin, [0.0, 1.0, 0.0], 0.0);
+    let glued = bin.marbles.len();
+    let mut random = fastrand::Rng::with_seed(5);
+    for i in 0..6000_u32 {
+        let mut jitter = || (random.f64() - 0.5) * 0.1;
+        let [x, y, z] = [i % 13, i / 169, i / 13 % 13].map(f64::from);
+        let at = [(x - 6.0) * 1.15 + jitter(), 1.0 + y * 1.1, (z - 6.0) * 1.15 + jitter()];
+        Ball { at, material, ..Ball::default() }.insert(&mut bin);
+    }
+    meter.run(&mut bin, 1.0 / 60.0, 2.5);
+    bin.walls.remove(plug).expect("it is there");
+    let mut fallen = 0_u32;
+    let mut run = |meter: &mut Meter, seconds: f64| {
+        let before = fallen;
+        for _ in 0..(seconds * 60.0) as u32 {
+            meter.step(&mut bin, 1.0 / 60.0);
+            // What fell is taken out from the end of the rows.
+            for row in (glued..bin.marbles.len()).rev() {
+                if bin.marbles.position()[row].y < -2.0 {
+                    let id = bin.marbles.id(row).expect("a row");
+                    bin.marbles.remove(id).expect("a marble");
+                    fallen += 1;
+                }
+            }
+        }
+        f64::from(fallen - before) / seconds
+    };
+    run(meter, 1.5); // until it flows
+    [run(meter, 2.5), run(meter, 2.5)]
+}
+
+/// The exponent by which the rate grows with the hole less 1.4 balls, off 2.5; and the
+/// largest change of a rate from the first half to the second, relatively.
+fn beverloo(meter: &mut Meter) -> [f64; 2] {
+    static FLOWED: OnceLock<[f64; 2]> = OnceLock::new();
+    once(&FLOWED, || {
+        let rates = [5.0, 6.5, 8.0].map(|d| (f64::ln(d - 1.4), discharge(meter, d)));
+        let n = rates.len() as f64;
+        let log = |[a, b]: [f64; 2]| (0.5 * (a + b)).ln();
+        let mx = rates.iter().map(|(x, _)| x / n).sum::<f64>();
+        let my = rates.iter().map(|(_, w)| log(*w) / n).sum::<f64>();
+        let xy: f64 = rates.iter().map(|(x, w)| (x - mx) * (log(*w) - my)).sum();
+        let xx: f64 = rates.iter().map(|(x, _)| (x - mx).powi(2)).sum();
+        let change = rates.iter().map(|(_, [a, b])| (b / a - 1.0).abs()).fold(0.0, f64::max);
+        [(xy / xx - 2.5).abs(), change]
+    })
+}
+
 /// The time by which everything in one spot came apart again: the smallest distance left
 /// over the diameter, as a part missing from one; NaN if something is not finite.
 fn all_in_one_spot(meter: &mut Meter, model: Model, count: u32, seconds: f64) -> f64 {
@@ -223,6 +298,28 @@ pub const ROWS: &[Row] = &[
             let [none, some, more] = [0.0, 0.1, 0.3].map(|c| repose(meter, 1, c));
             (1.0 - (some - none)).max(1.0 - (more - some)).max(0.0)
         },
+    },
+    Row {
+        name: "granular/beverloo/exponent",
+        setup: "6,000 balls flow out of a bin through holes of 5, 6.5 and 8 balls: W ~ (D − 1.4 d)^2.5",
+        metric: "off 2.5",
+        model: "impulse, 2 substeps",
+        target: 5e-2,
+        best: "–",
+        source: "Beverloo 1961; references 4.31",
+        effort: Effort::Long,
+        measure: |meter| beverloo(meter)[0],
+    },
+    Row {
+        name: "granular/beverloo/steady",
+        setup: "the same: the rate does not change while the bin empties",
+        metric: "largest relative change",
+        model: "impulse, 2 substeps",
+        target: 2e-2,
+        best: "–",
+        source: "Beverloo 1961; references 4.31",
+        effort: Effort::Long,
+        measure: |meter| beverloo(meter)[1],
     },
     Row {
         name: "granular/one-spot/20",

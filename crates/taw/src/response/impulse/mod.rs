@@ -50,6 +50,13 @@ pub(crate) struct Scratch<S> {
     islands: Islands<S>,
 }
 
+impl<S: Scalar> Scratch<S> {
+    /// By how much a velocity still changed in the last sweep, at most, in m/s.
+    pub fn residual(&self) -> S {
+        self.islands.residual()
+    }
+}
+
 /// A contact while it is solved.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Constraint<S> {

@@ -41,6 +41,10 @@ pub(super) fn solve<S: Scalar>(
     }
 }
 
+/// Where a sweep has less than this part of the energy of the one before, sweeps alone
+/// are quick enough.
+const SLOW: f64 = 0.6;
+
 /// Groups of marbles that touch each other. What happens in one is nothing to the others,
 /// to the bit.
 #[derive(Clone, Debug, Default)]
@@ -60,6 +64,7 @@ struct Island<S> {
     /// The largest change of a velocity in this sweep, and the energy of all changes in
     /// this sweep and in the last.
     change: S,
+    residual: S,
     squared: S,
     last: S,
     /// Whether the contacts have what they ask for.
@@ -73,6 +78,11 @@ struct Island<S> {
 }
 
 impl<S: Scalar> Islands<S> {
+    /// By how much a velocity still changed in the last sweep, at most, in m/s.
+    pub fn residual(&self) -> S {
+        self.list.iter().fold(S::zero(), |most, island| most.max(island.residual))
+    }
+
     /// Finds who touches whom, over how many others (Tarjan 1975).
     fn find(&mut self, constraints: &mut [Constraint<S>], rows: usize, speed: S) {
         self.parent.clear();
@@ -94,6 +104,7 @@ impl<S: Scalar> Islands<S> {
                     mobility: c.mobility.normal,
                     speed: if speed > S::zero() { speed } else { S::one() },
                     change: S::zero(),
+                    residual: S::zero(),
                     squared: S::zero(),
                     last: S::zero(),
                     agrees: false,
@@ -124,11 +135,14 @@ impl<S: Scalar> Islands<S> {
             // What is left is beyond what the next sweep could still see.
             island.agrees = island.change <= bounce_speed * S::epsilon();
             // Near the end the sweeps alone come to rest, which the search does not quite.
-            island.searches = !island.agrees && island.change > bounce_speed * S::constant(1e-5);
-            // Where the steps grow, it starts anew.
             let ratio = island.squared / island.last;
+            let slow = !(ratio < S::constant(SLOW));
+            island.searches =
+                slow && !island.agrees && island.change > bounce_speed * S::constant(1e-5);
+            // Where the steps grow, it starts anew.
             island.kept = if ratio < S::one() { ratio } else { S::zero() };
             island.last = island.squared;
+            island.residual = island.change;
             (island.change, island.squared) = (S::zero(), S::zero());
             (island.wish, island.cost) = (S::zero(), S::zero());
         }
