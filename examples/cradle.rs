@@ -108,7 +108,8 @@ fn pull(
 ) {
     let dt = time.delta_secs();
     for (at, velocity, Hook(i), mut force) in &mut balls {
-        let toward = (hook(*i) - at.translation).normalize();
+        // As the ball hangs in the middle of the step: along there, a pull does no work.
+        let toward = (hook(*i) - at.translation - **velocity * (0.5 * dt)).normalize();
         // From the hook to where the ball would be without a thread.
         let free = at.translation - hook(*i) + (**velocity + **gravity * (0.5 * dt)) * dt;
         // The thread's way s along `toward`: |free + s toward| = LENGTH.

@@ -15,7 +15,7 @@ pub enum ContactLaw {
     SpringDashpot,
     /// That of elastic balls: Hertz (1882) along the normal, Mindlin (1949) across it,
     /// with the damping of Tsuji, Tanaka and Ishida (1992). The materials'
-    /// [`Elasticity`] says how stiff they are; substeps must be a small part of the
+    /// [`Elasticity`](super::Elasticity) says how stiff they are; substeps must be a small part of the
     /// Rayleigh time, or the forces throw marbles about.
     HertzMindlin,
 }

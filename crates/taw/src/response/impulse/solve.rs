@@ -136,7 +136,7 @@ impl<S: Scalar> Islands<S> {
             island.agrees = island.change <= bounce_speed * S::epsilon();
             // Near the end the sweeps alone come to rest, which the search does not quite.
             let ratio = island.squared / island.last;
-            let slow = !(ratio < S::constant(SLOW));
+            let slow = ratio >= S::constant(SLOW) || ratio.is_nan();
             island.searches =
                 slow && !island.agrees && island.change > bounce_speed * S::constant(1e-5);
             // Where the steps grow, it starts anew.
