@@ -290,3 +290,25 @@ fn energy_is_measured_only_when_asked() {
     scene::frames(&mut app, 4);
     assert_eq!(kinetic(&app), Some(9.0));
 }
+
+#[test]
+fn a_marble_may_turn_less_than_the_model_says() {
+    let mut app = scene::app();
+    dynamic(&mut app);
+    scene::floor(&mut app);
+    let mut slide = |z: f32| {
+        let start = Transform::from_xyz(0.0, 0.5, z);
+        app.world_mut()
+            .spawn((Marble::new(0.5), start, Velocity(Vec3::X * 5.0), Spin::default()))
+            .id()
+    };
+    let (free, held) = (slide(0.0), slide(3.0));
+    app.world_mut().entity_mut(held).insert(MarbleRotation(Rotation::None));
+    scene::frames(&mut app, 64);
+    let rotation = |marble| app.world().get::<Transform>(marble).unwrap().rotation;
+    assert_eq!(rotation(held), Quat::IDENTITY);
+    assert_ne!(rotation(free), Quat::IDENTITY);
+    let speed = |marble| app.world().get::<Velocity>(marble).unwrap().x;
+    assert!((speed(held) - (5.0 - 0.3 * 9.81)).abs() < 1e-3, "it slides: {}", speed(held));
+    assert!((speed(free) - 25.0 / 7.0).abs() < 1e-3, "it rolls: {}", speed(free));
+}

@@ -3,11 +3,11 @@
 
 use bevy::math::Isometry3d;
 use bevy::prelude::*;
-use taw::motion::Integrator;
+use taw::motion::{Integrator, Rotation};
 use taw::response::{Combine, Elasticity, Material};
 use taw::world::{MarbleId, Mass, WallId};
 
-use crate::reflect::{CombineReflect, IntegratorReflect};
+use crate::reflect::{CombineReflect, IntegratorReflect, RotationReflect};
 
 /// A marble: a ball that moves and collides.
 ///
@@ -188,6 +188,12 @@ impl ExternalImpulse {
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct MarbleIntegrator(#[reflect(remote = IntegratorReflect)] pub Integrator);
 
+/// Lets this marble turn less than the model's rotation has others turn: only for show,
+/// or not at all.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
+
 /// A wall: a half-space that no contact can move. Everything behind its surface is
 /// solid.
 ///
@@ -233,6 +239,7 @@ pub(crate) struct SeenMarble {
     pub damping: Option<[u32; 2]>,
     pub material: Option<([u32; 7], Combine)>,
     pub integrator: Option<Integrator>,
+    pub rotation_model: Option<Rotation>,
 }
 
 /// What the physics knows of a wall entity.

@@ -8,8 +8,8 @@ use taw::world::{self as core, WallMotion};
 
 use crate::components::{
     ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
-    MarbleMass, MarbleState, SeenMarble, Spin, SurfaceMaterial, Velocity, Wall, WallState, bits,
-    rotation_bits,
+    MarbleMass, MarbleRotation, MarbleState, SeenMarble, Spin, SurfaceMaterial, Velocity, Wall,
+    WallState, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
@@ -116,6 +116,7 @@ type MarbleComponents<'a> = (
         Option<&'a MarbleDamping>,
         Option<&'a SurfaceMaterial>,
         Option<&'a MarbleIntegrator>,
+        Option<&'a MarbleRotation>,
     ),
     Has<ChildOf>,
     &'a mut MarbleState,
@@ -138,7 +139,8 @@ pub fn marbles(
         if begins_to_turn {
             (state.seen.rotation, state.seen.spin) = ([0; 4], None); // no rotation's bits
         }
-        let (velocity, spin, mass, gravity_scale, damping, material, integrator) = optional;
+        let (velocity, spin, mass, gravity_scale, damping, material, integrator, rotation_model) =
+            optional;
         let seen = SeenMarble {
             translation: bits(transform.translation),
             rotation: rotation_bits(transform.rotation),
@@ -150,6 +152,7 @@ pub fn marbles(
             damping: damping.map(|d| [d.linear, d.angular].map(f32::to_bits)),
             material: material.map(SurfaceMaterial::bits),
             integrator: integrator.map(|i| **i),
+            rotation_model: rotation_model.map(|r| **r),
         };
         if state.seen == seen && state.id.is_some() {
             continue;
@@ -176,6 +179,7 @@ pub fn marbles(
                 angular: d.angular,
             }),
             integrator: seen.integrator,
+            rotation_model: seen.rotation_model,
             material: material.map(|m| (*m).into()),
         };
         let refuse = |error| InputRefused::write(&mut refused, Some(entity), error);
@@ -235,6 +239,9 @@ fn update(
     }
     if seen.material != last.material {
         check(marbles.set_material(id, now.material));
+    }
+    if seen.rotation_model != last.rotation_model {
+        check(marbles.set_rotation_model(id, now.rotation_model));
     }
     if seen.integrator != last.integrator {
         check(marbles.set_integrator(id, now.integrator));

@@ -79,7 +79,7 @@ pub use taw;
 pub mod prelude {
     pub use crate::components::{
         ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
-        MarbleMass, Spin, SurfaceMaterial, Velocity, Wall,
+        MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity, Wall,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;

@@ -4,7 +4,7 @@ use bevy::prelude::*;
 
 use crate::components::{
     ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
-    MarbleMass, Spin, SurfaceMaterial, Velocity, Wall,
+    MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity, Wall,
 };
 use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
@@ -88,7 +88,7 @@ impl Plugin for TawPlugin {
             .add_message::<MarbleStopped>();
         app.register_type::<(Marble, Velocity, Spin, MarbleMass, GravityScale)>()
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
-            .register_type::<(SurfaceMaterial, MarbleIntegrator, Wall)>()
+            .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, Wall)>()
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
 

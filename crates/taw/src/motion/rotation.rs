@@ -4,8 +4,8 @@ use cgmath::{InnerSpace, Rotation as _};
 
 use crate::math::{Quat, Scalar, Vec3, cast_vector, direction_and_length};
 
-/// How much of turning a world models.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+/// How much of turning a world models. In the order of how much that is.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Rotation {
     /// None. Takes no memory and no time.
     #[default]

@@ -78,6 +78,7 @@ mod tests {
             radius: &radius,
             inverse_mass: &[],
             spin: &mut [],
+            held: &[],
         };
         displacement(&[floor], &mut columns, &mut contacts, 0.5, &mut stopped);
         assert_eq!(stopped, []);
@@ -139,6 +140,7 @@ mod tests {
             radius: &[1.0, 1.0],
             inverse_mass: &[],
             spin: &mut [],
+            held: &[],
         };
         // 1 m in 1e-33 s is 1e33 m/s, more than the gap below f32::MAX.
         displacement(&[floor], &mut columns, &mut contacts, 1e-33, &mut stopped);

@@ -20,12 +20,16 @@ impl<S: Scalar> Mobility<S> {
     /// ball's point gives way by `1/m + r²/I = 7/2 · 1/m`.
     #[must_use]
     pub fn of_balls(inverse_mass_a: S, inverse_mass_b: S, spin: BallSpin) -> Self {
-        let normal = inverse_mass_a + inverse_mass_b;
-        let tangent = match spin {
-            BallSpin::Ignored => normal,
-            BallSpin::Free => normal * S::constant(3.5),
+        Self::of([(inverse_mass_a, spin), (inverse_mass_b, spin)])
+    }
+
+    /// The same of balls of which one may spin and the other not.
+    pub(super) fn of(balls: [(S, BallSpin); 2]) -> Self {
+        let tangent = |(inverse_mass, spin): (S, BallSpin)| {
+            inverse_mass * (S::one() + spin.of_solid_ball::<S>())
         };
-        Self { normal, tangent }
+        let [a, b] = balls;
+        Self { normal: a.0 + b.0, tangent: tangent(a) + tangent(b) }
     }
 }
 
@@ -36,6 +40,17 @@ pub enum BallSpin {
     Ignored,
     /// Yes, as solid balls of even density.
     Free,
+}
+
+impl BallSpin {
+    /// `m r² / I`: how easily the rim gives way by spinning, over how easily the center
+    /// does.
+    pub(super) fn of_solid_ball<S: Scalar>(self) -> S {
+        match self {
+            Self::Ignored => S::zero(),
+            Self::Free => S::constant(2.5),
+        }
+    }
 }
 
 /// The impulse (N s) that ends the approach of a contact's two points, as the second

@@ -82,13 +82,53 @@ pub(crate) struct Columns<'a, S> {
     /// In 1/kg; zero for what cannot be moved. Empty for a response that has no use
     /// for it.
     pub inverse_mass: &'a [S],
-    /// In rad/s; empty in a model without rotation.
+    /// In rad/s; empty where contacts neither feel nor change it.
     pub spin: &'a mut [Vec3<S>],
+    /// Which rows contacts cannot set spinning; empty if there are none.
+    pub held: &'a [bool],
 }
 
 impl<S: Scalar> Columns<'_, S> {
-    /// Radius times spin, in m/s; zero where spin is not modelled.
+    /// Whether an impulse can set the marble in a row spinning.
+    fn ball_spin(&self, row: usize) -> BallSpin {
+        let held = self.held.get(row).copied().unwrap_or(false);
+        if held || self.spin.is_empty() { BallSpin::Ignored } else { BallSpin::Free }
+    }
+
+    /// The spin in a row, in rad/s, as far as contacts feel it.
+    fn felt_spin(&self, row: usize) -> Vec3<S> {
+        match self.ball_spin(row) {
+            BallSpin::Free => self.spin[row],
+            BallSpin::Ignored => Vec3::zero(),
+        }
+    }
+
+    /// Radius times spin, in m/s.
     fn rim(&self, row: usize) -> Vec3<S> {
-        self.spin.get(row).map_or_else(Vec3::zero, |spin| *spin * self.radius[row])
+        self.felt_spin(row) * self.radius[row]
+    }
+
+    /// In 1/(kg m²); zero for what cannot be turned.
+    fn inverse_inertia(&self, row: usize) -> S {
+        let whirl = self.ball_spin(row).of_solid_ball::<S>();
+        whirl * self.inverse_mass[row] / (self.radius[row] * self.radius[row])
+    }
+
+    /// Changes a velocity by a hit where a marble is touched, and its spin with it;
+    /// `normal` points to its center.
+    fn hit(&mut self, row: usize, change: Vec3<S>, normal: Vec3<S>) {
+        self.velocity[row] += change;
+        let whirl = self.ball_spin(row).of_solid_ball::<S>();
+        if let Some(spin) = self.spin.get_mut(row) {
+            *spin -= normal.cross(change) * (whirl / self.radius[row]);
+        }
+    }
+
+    /// Changes a spin by an angular impulse, in kg m²/s.
+    fn twist(&mut self, row: usize, twist: Vec3<S>) {
+        let inverse = self.inverse_inertia(row);
+        if let Some(spin) = self.spin.get_mut(row) {
+            *spin += twist * inverse;
+        }
     }
 }

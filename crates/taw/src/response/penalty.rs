@@ -43,8 +43,7 @@ struct Touch<S> {
     overlap: S,
     /// Of b's point relative to a's, in m/s.
     closing: Vec3<S>,
-    /// The sum of the inverse masses, in 1/kg.
-    inverse_mass: S,
+    mobility: Mobility<S>,
     /// The sum of the curvatures, in 1/m.
     curvature: S,
     material: Material<S>,
@@ -72,7 +71,6 @@ pub(crate) fn penalty<S: Scalar>(
     contacts: &mut Contacts<S>,
     walls: &impl Walls<S>,
     material: impl Fn(usize) -> Material<S>,
-    spin: BallSpin,
     dt: S,
     shear: &mut Vec<Shear<S>>,
     stopped: &mut Vec<u32>,
@@ -85,7 +83,7 @@ pub(crate) fn penalty<S: Scalar>(
     // All forces are those of the same moment, whatever the order.
     for key in wm.chain(mm) {
         let Some(touch) = touch(marbles, walls, &material, key) else { continue };
-        let springs = springs(law, &touch, spin, dt);
+        let springs = springs(law, &touch, dt);
         let normal = touch.normal;
         let approach = -touch.closing.dot(normal);
         let pressure = (springs.push + springs.normal_damping * approach).max(S::zero());
@@ -111,17 +109,9 @@ pub(crate) fn penalty<S: Scalar>(
             [(Some(touch.b), impulse, touch.normal), (touch.a, -impulse, -touch.normal)]
         {
             let Some(row) = row else { continue };
-            marbles.velocity[row] += impulse * marbles.inverse_mass[row];
-            if spin == BallSpin::Free
-                && let Some(spin) = marbles.spin.get_mut(row)
-            {
-                let per_twist = S::constant(2.5) * marbles.inverse_mass[row] / marbles.radius[row];
-                *spin -= normal.cross(impulse) * per_twist;
-            }
+            marbles.hit(row, impulse * marbles.inverse_mass[row], normal);
         }
-        if spin == BallSpin::Free {
-            resist(marbles, &touch, pressure * dt);
-        }
+        resist(marbles, &touch, pressure * dt);
     }
     shear.sort_unstable_by_key(|shear| shear.key);
     for contact in contacts.wm.iter().chain(&contacts.mm) {
@@ -148,7 +138,8 @@ fn touch<S: Scalar>(
     let own = material(b);
     let mut closing = marbles.velocity[b];
     let mut rim = marbles.rim(b);
-    let mut inverse_mass = marbles.inverse_mass[b];
+    let second = (marbles.inverse_mass[b], marbles.ball_spin(b));
+    let mut first = (S::zero(), BallSpin::Ignored);
     let mut curvature = S::one() / marbles.radius[b];
     let mut compliance = own.elasticity.compliance();
     let (normal, distance, both);
@@ -159,7 +150,7 @@ fn touch<S: Scalar>(
         (normal, distance) = (direction, centers - marbles.radius[a]);
         closing -= marbles.velocity[a];
         rim += marbles.rim(a);
-        inverse_mass += marbles.inverse_mass[a];
+        first = (marbles.inverse_mass[a], marbles.ball_spin(a));
         curvature += S::one() / marbles.radius[a];
         compliance = compliance.and(other.elasticity.compliance());
         both = own.against(other);
@@ -174,24 +165,24 @@ fn touch<S: Scalar>(
         }
     }
     let overlap = marbles.radius[b] - distance;
-    let touches = overlap > S::zero() && overlap.is_finite() && inverse_mass > S::zero();
+    let mobility = Mobility::of([first, second]);
+    let touches = overlap > S::zero() && overlap.is_finite() && mobility.normal > S::zero();
     touches.then(|| Touch {
         a: two_marbles.then_some(a),
         b,
         normal,
         overlap,
         closing: closing + normal.cross(rim),
-        inverse_mass,
+        mobility,
         curvature,
         material: both,
         compliance,
     })
 }
 
-fn springs<S: Scalar>(law: ContactLaw, touch: &Touch<S>, spin: BallSpin, dt: S) -> Springs<S> {
-    let mass = S::one() / touch.inverse_mass;
-    // The rim of a ball gives way 7/2 times as easily as its center.
-    let rim_mass = Mobility::of_balls(S::zero(), touch.inverse_mass, spin).tangent.recip();
+fn springs<S: Scalar>(law: ContactLaw, touch: &Touch<S>, dt: S) -> Springs<S> {
+    let mass = touch.mobility.normal.recip();
+    let rim_mass = touch.mobility.tangent.recip();
     let number = S::constant;
     // What is lost in a collision, as a part of critical damping. Nothing at all would
     // take endless damping to lose; a thousandth of the speed is as good.
@@ -234,20 +225,20 @@ fn resist<S: Scalar>(marbles: &mut Columns<S>, touch: &Touch<S>, pressure: S) {
     if rolling_resistance == S::zero() && spinning_resistance == S::zero() {
         return;
     }
-    let per_twist = |row: usize| {
-        S::constant(2.5) * marbles.inverse_mass[row] / (marbles.radius[row] * marbles.radius[row])
-    };
-    let (b, by_b) = (touch.b, per_twist(touch.b));
-    let first = touch.a.map(|a| (a, per_twist(a)));
-    let relative = marbles.spin[b] - first.map_or_else(Vec3::zero, |(a, _)| marbles.spin[a]);
-    let give = by_b + first.map_or(S::zero(), |(_, by)| by);
+    let give = |row: usize| marbles.inverse_inertia(row);
+    let (b, a) = (touch.b, touch.a);
+    let relative = marbles.felt_spin(b) - a.map_or_else(Vec3::zero, |a| marbles.felt_spin(a));
+    let give = give(b) + a.map_or(S::zero(), give);
+    if give <= S::zero() {
+        return;
+    }
     let about = touch.normal * relative.dot(touch.normal);
     let lever = pressure / touch.curvature;
     let twist = at_most((relative - about) / give, rolling_resistance * lever)
         + at_most(about / give, spinning_resistance * lever);
-    marbles.spin[b] -= twist * by_b;
-    if let Some((a, by)) = first {
-        marbles.spin[a] += twist * by;
+    marbles.twist(b, -twist);
+    if let Some(a) = a {
+        marbles.twist(a, twist);
     }
 }
 
@@ -290,9 +281,9 @@ mod tests {
                 radius: &[radius, radius],
                 inverse_mass: &[1.0 / mass, 1.0 / mass],
                 spin: &mut [],
+                held: &[],
             };
             let law = ContactLaw::HertzMindlin;
-            let none = BallSpin::Ignored;
             let mut stopped = vec![];
             penalty(
                 law,
@@ -300,7 +291,6 @@ mod tests {
                 &mut contacts,
                 &walls,
                 |_| own,
-                none,
                 dt,
                 &mut shear,
                 &mut stopped,

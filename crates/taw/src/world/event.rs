@@ -12,7 +12,7 @@ use crate::response::{BallSpin, Impact, Material};
 
 impl<S: Scalar> World<S> {
     /// Goes through a substep of `dt` seconds, event by event.
-    pub(super) fn go_through_events(&mut self, dt: S, spin: BallSpin) {
+    pub(super) fn go_through_events(&mut self, dt: S) {
         let exact = self.model.precision == Precision::Compensated;
         let marbles = &self.marbles;
         let events = &mut self.events;
@@ -42,6 +42,10 @@ impl<S: Scalar> World<S> {
                 radius,
                 inverse_mass: 1.0 / marbles.mass(row).as_f64(),
                 material: marbles.material.get(row).unwrap_or_default().cast(),
+                spins: match self.model.rotation {
+                    Rotation::Dynamic if !marbles.is_held(row) => BallSpin::Free,
+                    _ => BallSpin::Ignored,
+                },
                 rounding: 4.0 * digit * (largest + radius),
                 turned: Vec3::new(0.0, 0.0, 0.0),
                 path: Path::default(),
@@ -55,7 +59,7 @@ impl<S: Scalar> World<S> {
         events.near.clear();
         events.near.wm.extend(self.contacts.wm.iter().map(cast));
         events.near.mm.extend(self.contacts.mm.iter().map(cast));
-        let settings = Settings { dt: dt.as_f64(), spin, iterations: self.model.iterations };
+        let settings = Settings { dt: dt.as_f64(), iterations: self.model.iterations };
         let mut impacts = Vec::new();
         self.stopped.extend(events.run(&settings, &mut impacts));
         self.impacts.extend(impacts.into_iter().map(Impact::cast));

@@ -154,6 +154,9 @@ impl<S: Scalar> Marbles<S> {
             return;
         }
         for row in 0..self.spin.len() {
+            if self.is_held(row) {
+                continue;
+            }
             let mut spin = self.spin[row];
             if let Some(torque) = self.torque.get(row) {
                 spin += torque.dual() * (self.inverse_inertia(row) * dt);

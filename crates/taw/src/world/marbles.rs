@@ -6,7 +6,7 @@ use crate::Error;
 use crate::error::{finite, finite_point, finite_vector, positive, within};
 use crate::frame::Bivector;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite};
-use crate::motion::{Integrator, Motion};
+use crate::motion::{Integrator, Motion, Rotation};
 use crate::response::{Columns, Material};
 use crate::shape::Sphere;
 
@@ -36,6 +36,9 @@ pub struct Marble<S> {
     pub spin: Vec3<S>,
     /// This marble's own integrator instead of the model's.
     pub integrator: Option<Integrator>,
+    /// This marble's own rotation model, where the world's models no less: a marble may
+    /// roll for show, or not turn at all, among others that have angular momentum.
+    pub rotation_model: Option<Rotation>,
     /// This marble's own material instead of the default one.
     pub material: Option<Material<S>>,
 }
@@ -54,6 +57,7 @@ impl<S: Scalar> Marble<S> {
             gravity_scale: S::one(),
             damping: Damping::default(),
             integrator: None,
+            rotation_model: None,
             material: None,
         }
     }
@@ -181,6 +185,7 @@ pub struct Marbles<S> {
     /// Only of this step.
     pub(super) torque: Optional<Bivector<S>>,
     pub(super) integrator: Optional<Integrator>,
+    rotation_model: Optional<Rotation>,
     pub(super) material: Optional<Material<S>>,
 }
 
@@ -202,6 +207,7 @@ impl<S> Default for Marbles<S> {
             force: Optional::default(),
             torque: Optional::default(),
             integrator: Optional::default(),
+            rotation_model: Optional::default(),
             material: Optional::default(),
         }
     }
@@ -233,7 +239,8 @@ impl<S: Scalar> Marbles<S> {
         self.velocity.push(velocity);
         if self.turn {
             self.rotation.push(rotation);
-            self.spin.push(spin);
+            let turns = marble.rotation_model != Some(Rotation::None);
+            self.spin.push(if turns { spin } else { Vec3::zero() });
         }
         if self.compensated {
             self.rest.push(Rest::default());
@@ -245,6 +252,7 @@ impl<S: Scalar> Marbles<S> {
         self.force.set(rows - 1, None, rows);
         self.torque.set(rows - 1, None, rows);
         self.integrator.set(rows - 1, marble.integrator, rows);
+        self.rotation_model.set(rows - 1, marble.rotation_model, rows);
         self.material.set(rows - 1, material, rows);
         Ok(MarbleId(handle))
     }
@@ -272,6 +280,7 @@ impl<S: Scalar> Marbles<S> {
             self.force.swap_remove(row);
             self.torque.swap_remove(row);
             self.integrator.swap_remove(row);
+            self.rotation_model.swap_remove(row);
             self.material.swap_remove(row);
         }
         Ok(marble)
@@ -293,6 +302,7 @@ impl<S: Scalar> Marbles<S> {
             gravity_scale: self.gravity_scale.get(row).unwrap_or(S::one()),
             damping: self.damping.get(row).unwrap_or_default(),
             integrator: self.integrator.get(row),
+            rotation_model: self.rotation_model.get(row),
             material: self.material.get(row),
         })
     }
@@ -318,6 +328,7 @@ impl<S: Scalar> Marbles<S> {
             damping: marble.damping.cast(),
             rotation: Quat::from_sv(rotation.s.as_f64(), cast_vector(rotation.v)),
             integrator: marble.integrator,
+            rotation_model: marble.rotation_model,
             material: marble.material.map(Material::cast),
         })
     }
@@ -434,6 +445,39 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
+    /// Gives a marble its own rotation model, or with `None` the world's. One that does not
+    /// spin as the world's model would begins at rest.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn set_rotation_model(
+        &mut self,
+        id: MarbleId,
+        model: Option<Rotation>,
+    ) -> Result<(), Error> {
+        let row = self.row(id)?;
+        self.rotation_model.set(row, model, self.handles.len());
+        if model == Some(Rotation::None) {
+            self.set_spin(id, Vec3::zero())?;
+        }
+        Ok(())
+    }
+
+    /// How the marble in a row turns in a world of this model.
+    pub(super) fn rotation_of(&self, row: usize, world: Rotation) -> Rotation {
+        self.rotation_model.get(row).map_or(world, |own| own.min(world))
+    }
+
+    /// Whether contacts and torques cannot set the marble in a row spinning.
+    pub(super) fn is_held(&self, row: usize) -> bool {
+        self.rotation_of(row, Rotation::Dynamic) != Rotation::Dynamic
+    }
+
+    /// Whether there is one like that.
+    pub(super) fn has_held(&self) -> bool {
+        !self.rotation_model.is_empty()
+    }
+
     /// Gives a marble its own material, or with `None` the default one.
     ///
     /// # Errors
@@ -539,6 +583,7 @@ impl<S: Scalar> Marbles<S> {
     pub(super) fn columns<'a>(
         &'a mut self,
         inverse_mass: &'a [S],
+        held: &'a [bool],
     ) -> (Columns<'a, S>, &'a Optional<Material<S>>, &'a Optional<Integrator>) {
         let columns = Columns {
             position: &mut self.position,
@@ -546,6 +591,7 @@ impl<S: Scalar> Marbles<S> {
             radius: &self.radius,
             inverse_mass,
             spin: &mut self.spin,
+            held,
         };
         (columns, &self.material, &self.integrator)
     }

@@ -29,7 +29,7 @@ use crate::math::{Scalar, Vec3, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Settings, Warm, impulse};
-use crate::response::{BallSpin, Impact, Response, Shear, displacement, penalty};
+use crate::response::{Impact, Response, Shear, displacement, penalty};
 use integrate::Drive;
 use sweep::Sweep;
 
@@ -60,6 +60,7 @@ pub struct World<S> {
     /// substeps, for a response that looks ahead.
     reach: S,
     inverse_mass: Vec<S>,
+    held: Vec<bool>,
     impulse: impulse::Scratch<S>,
     /// What the contacts of the last substep bore, and the removals until then: they
     /// move rows, after which nothing here has the right name any more.
@@ -88,6 +89,7 @@ impl<S: Scalar> Default for World<S> {
             stopped: Vec::new(),
             reach: S::zero(),
             inverse_mass: Vec::new(),
+            held: Vec::new(),
             impulse: impulse::Scratch::default(),
             warm: Vec::new(),
             shear: Vec::new(),
@@ -114,6 +116,7 @@ impl<S: Scalar> PartialEq for World<S> {
             grid: _,
             reach: _,
             inverse_mass: _,
+            held: _,
             impulse: _,
             warm,
             shear,
@@ -321,12 +324,13 @@ impl<S: Scalar> World<S> {
             self.forget_contacts();
             self.warm_removals = removals;
         }
-        let spin = match self.model.rotation {
-            Rotation::Dynamic => BallSpin::Free,
-            Rotation::None | Rotation::Rolling => BallSpin::Ignored,
-        };
-        let (mut columns, material, integrator) = self.marbles.columns(&self.inverse_mass);
-        if spin == BallSpin::Ignored {
+        self.held.clear();
+        if self.model.rotation == Rotation::Dynamic && self.marbles.has_held() {
+            self.held.extend((0..self.marbles.len()).map(|row| self.marbles.is_held(row)));
+        }
+        let (mut columns, material, integrator) =
+            self.marbles.columns(&self.inverse_mass, &self.held);
+        if self.model.rotation != Rotation::Dynamic {
             columns.spin = &mut []; // what is only shown is not felt
         }
         match self.model.response {
@@ -340,7 +344,6 @@ impl<S: Scalar> World<S> {
             Response::Impulse => {
                 let settings = Settings {
                     iterations: self.model.iterations,
-                    spin,
                     dt,
                     bounce_speed: length(self.gravity) * dt * S::constant(2.0),
                     slop: length(self.gravity) * dt * dt,
@@ -365,18 +368,20 @@ impl<S: Scalar> World<S> {
                 &mut self.contacts,
                 &self.walls,
                 |row| material.get(row).unwrap_or_default(),
-                spin,
                 dt,
                 &mut self.shear,
                 &mut self.stopped,
             ),
-            Response::EventDriven => self.go_through_events(dt, spin),
+            Response::EventDriven => self.go_through_events(dt),
         }
-        if self.model.rotation == Rotation::Rolling {
+        if self.model.rotation != Rotation::None {
             // The deepest contact comes first in the list, so it has the last word.
             for contact in self.contacts.wm.iter().rev() {
                 let normal = self.walls.planes()[contact.a as usize].normal();
-                self.marbles.roll(contact.b as usize, normal);
+                let row = contact.b as usize;
+                if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Rolling {
+                    self.marbles.roll(row, normal);
+                }
             }
         }
         self.limits.apply(&mut self.marbles);

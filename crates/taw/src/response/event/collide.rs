@@ -7,7 +7,7 @@ use cgmath::{InnerSpace, Zero};
 use super::{Ball, Event, EventDriven, Impact, MOST_LOSSES, Settings, What};
 use crate::math::{Vec3, direction_and_length};
 use crate::response::impact::at_most;
-use crate::response::{BallSpin, Material, Mobility, Walls as _, impact};
+use crate::response::{Material, Mobility, Walls as _, impact};
 
 /// How many rounds collisions at one moment have to agree.
 const MOST_ROUNDS: u32 = 1000;
@@ -104,13 +104,13 @@ impl EventDriven {
         impacts.extend(collisions.iter().map(|c| c.impact));
         if rows.len() == 2 * pairs.len() {
             for c in &collisions {
-                let approach = self.closing(c, settings.spin);
+                let approach = self.closing(c);
                 let impulse = impact(c.impact.normal, approach, c.mobility, c.material);
-                self.balls[c.a].hit(-impulse, -c.impact.normal, settings.spin);
-                self.balls[c.b].hit(impulse, c.impact.normal, settings.spin);
+                self.balls[c.a].hit(-impulse, -c.impact.normal);
+                self.balls[c.b].hit(impulse, c.impact.normal);
             }
         } else {
-            self.collide_at_once(&mut collisions, &rows, settings.spin);
+            self.collide_at_once(&mut collisions, &rows);
         }
         for row in &rows {
             self.foresee(*row, time, settings);
@@ -130,7 +130,7 @@ impl EventDriven {
         if approach_speed <= 2.0 * press {
             material.restitution = 0.0;
         }
-        let mobility = Mobility::of_balls(first.inverse_mass, second.inverse_mass, settings.spin);
+        let mobility = Mobility::of([first, second].map(|ball| (ball.inverse_mass, ball.spins)));
         let losses = u32::from(material.restitution < 1.0);
         self.balls[a].path.losses += losses;
         self.balls[b].path.losses += losses;
@@ -140,17 +140,17 @@ impl EventDriven {
     }
 
     /// The velocity of the second's touching point relative to the first's, in m/s.
-    fn closing(&self, c: &Collision, spin: BallSpin) -> Vec3<f64> {
+    fn closing(&self, c: &Collision) -> Vec3<f64> {
         let (first, second) = (&self.balls[c.a], &self.balls[c.b]);
-        let rims = first.rim(c.impact.normal, spin) + second.rim(c.impact.normal, spin);
+        let rims = first.rim(c.impact.normal) + second.rim(c.impact.normal);
         second.velocity - first.velocity + rims
     }
 
     /// Finds the impulses of collisions that share balls: each has the restitution and
     /// friction of its own, with all others going on (Newton's law, simultaneously). All
     /// change together, round by round (Jacobi), so that their order is nothing to them.
-    fn collide_at_once(&mut self, collisions: &mut [Collision], rows: &[usize], spin: BallSpin) {
-        let begin: Vec<_> = collisions.iter().map(|c| self.closing(c, spin)).collect();
+    fn collide_at_once(&mut self, collisions: &mut [Collision], rows: &[usize]) {
+        let begin: Vec<_> = collisions.iter().map(|c| self.closing(c)).collect();
         let shared = |row: usize| collisions.iter().filter(|c| c.a == row || c.b == row).count();
         let shares: Vec<_> =
             collisions.iter().map(|c| 1.0 / shared(c.a).max(shared(c.b)) as f64).collect();
@@ -159,7 +159,7 @@ impl EventDriven {
         for _ in 0..MOST_ROUNDS {
             let mut largest: f64 = 0.0;
             let mut changes = vec![[Vec3::zero(); 2]; rows.len()];
-            let closing: Vec<_> = collisions.iter().map(|c| self.closing(c, spin)).collect();
+            let closing: Vec<_> = collisions.iter().map(|c| self.closing(c)).collect();
             for ((c, closing), begin) in collisions.iter_mut().zip(closing).zip(&begin) {
                 let normal = c.impact.normal;
                 let (Material { restitution, friction, tangential_restitution, .. }, before) =
@@ -186,9 +186,8 @@ impl EventDriven {
             for (row, [impulse, twist]) in rows.iter().zip(changes) {
                 let ball = &mut self.balls[*row];
                 ball.velocity += impulse * ball.inverse_mass;
-                if spin == BallSpin::Free {
-                    ball.spin -= twist * (2.5 * ball.inverse_mass / ball.radius);
-                }
+                let whirl: f64 = ball.spins.of_solid_ball();
+                ball.spin -= twist * (whirl * ball.inverse_mass / ball.radius);
             }
             if largest <= 1e-15 * fastest {
                 break;
@@ -197,18 +196,18 @@ impl EventDriven {
     }
 
     /// Lets a ball that touches a wall bounce off it.
-    pub(super) fn hit_wall(&mut self, row: usize, wall: usize, settings: &Settings) -> Impact<f64> {
+    pub(super) fn hit_wall(&mut self, row: usize, wall: usize) -> Impact<f64> {
         let normal = self.walls[wall].normal;
         let ball = &mut self.balls[row];
         ball.release();
         let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
-        let closing = ball.velocity - surface + ball.rim(normal, settings.spin);
+        let closing = ball.velocity - surface + ball.rim(normal);
         let approach_speed = -closing.dot(normal);
-        let mobility = Mobility::of_balls(0.0, ball.inverse_mass, settings.spin);
+        let mobility = Mobility::of_balls(0.0, ball.inverse_mass, ball.spins);
         let material = self.walls[wall].against(ball.material);
         ball.path.losses += u32::from(material.restitution < 1.0);
         let impulse = impact(normal, closing, mobility, material);
-        ball.hit(impulse, normal, settings.spin);
+        ball.hit(impulse, normal);
         Impact { a: wall as u32, on_wall: true, b: row as u32, normal, approach_speed }
     }
 }

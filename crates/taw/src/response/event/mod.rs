@@ -119,6 +119,8 @@ pub(crate) struct Ball {
     /// In 1/kg.
     pub inverse_mass: f64,
     pub material: Material<f64>,
+    /// Whether friction sets it spinning.
+    pub spins: BallSpin,
     /// How much of a gap may be due to the rounding of the position, in metres.
     pub rounding: f64,
     /// How far it has turned in this substep, as an axial vector in radians.
@@ -207,16 +209,15 @@ impl Ball {
     }
 
     /// Applies an impulse at the point where `normal` comes from to the center.
-    fn hit(&mut self, impulse: Vec3<f64>, normal: Vec3<f64>, spin: BallSpin) {
+    fn hit(&mut self, impulse: Vec3<f64>, normal: Vec3<f64>) {
         self.velocity += impulse * self.inverse_mass;
-        if spin == BallSpin::Free {
-            self.spin -= normal.cross(impulse) * (2.5 * self.inverse_mass / self.radius);
-        }
+        let whirl: f64 = self.spins.of_solid_ball();
+        self.spin -= normal.cross(impulse) * (whirl * self.inverse_mass / self.radius);
     }
 
     /// The velocity of its point toward `-normal` by its spin alone.
-    fn rim(&self, normal: Vec3<f64>, spin: BallSpin) -> Vec3<f64> {
-        match spin {
+    fn rim(&self, normal: Vec3<f64>) -> Vec3<f64> {
+        match self.spins {
             BallSpin::Free => normal.cross(self.spin) * self.radius,
             BallSpin::Ignored => Vec3::zero(),
         }
@@ -273,7 +274,6 @@ impl Eq for Event {}
 pub(crate) struct Settings {
     /// The length of the substep, in seconds.
     pub dt: f64,
-    pub spin: BallSpin,
     /// For what rests in heaps.
     pub iterations: u32,
 }
@@ -351,7 +351,7 @@ impl EventDriven {
             }
             What::Hits(wall) => {
                 self.balls[row].advance(time);
-                impacts.push(self.hit_wall(row, wall, settings));
+                impacts.push(self.hit_wall(row, wall));
                 self.foresee(row, time, settings);
             }
             What::SettlesOn(wall) => {
@@ -412,7 +412,7 @@ impl EventDriven {
             friction: material.friction,
             rolling_resistance: material.rolling_resistance,
             spinning_resistance: material.spinning_resistance,
-            spins: settings.spin == BallSpin::Free,
+            spins: ball.spins == BallSpin::Free,
         };
         let stretch = support.stretch(ball.velocity, ball.spin, settings.dt);
         ball.velocity += stretch.velocity_change;

@@ -30,6 +30,7 @@ pub(super) struct Heap {
     radius: Vec<f64>,
     inverse_mass: Vec<f64>,
     material: Vec<Material<f64>>,
+    held: Vec<bool>,
     scratch: impulse::Scratch<f64>,
 }
 
@@ -59,6 +60,7 @@ impl Heap {
         fill(&mut self.radius, each().map(|b| b.radius));
         fill(&mut self.inverse_mass, each().map(|b| b.inverse_mass));
         fill(&mut self.material, each().map(|b| b.material));
+        fill(&mut self.held, each().map(|b| b.spins == BallSpin::Ignored));
     }
 
     /// Solves the contacts over `dt` seconds, or with zero what happens at once.
@@ -76,11 +78,11 @@ impl Heap {
             velocity: &mut self.velocity,
             radius: &self.radius,
             inverse_mass: &self.inverse_mass,
-            spin: if settings.spin == BallSpin::Free { &mut self.spin } else { &mut [] },
+            spin: &mut self.spin,
+            held: &self.held,
         };
         let told = impulse::Settings {
             iterations: settings.iterations,
-            spin: settings.spin,
             dt,
             bounce_speed: 2.0 * pull * settings.dt,
             slop: f64::INFINITY,

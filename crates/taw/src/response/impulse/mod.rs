@@ -14,8 +14,6 @@ const POSITION_SWEEPS: u32 = 3;
 pub(crate) struct Settings<S> {
     /// The most sweeps over all contacts.
     pub iterations: u32,
-    /// Whether friction sets marbles spinning.
-    pub spin: BallSpin,
     /// The length of the substep, in seconds; zero for a collision that takes no time.
     pub dt: S,
     /// Slower than this, in m/s, nothing bounces: what gravity does in two substeps.
@@ -169,7 +167,9 @@ pub(crate) fn impulse<S: Scalar>(
             }
             First::Marble(a) => (Vec3::zero(), marbles.inverse_mass[a], own.against(material(a))),
         };
-        let mobility = Mobility::of_balls(inverse_mass, marbles.inverse_mass[b], settings.spin);
+        let spin_of_a = a.marble().map_or(BallSpin::Ignored, |a| marbles.ball_spin(a));
+        let second = (marbles.inverse_mass[b], marbles.ball_spin(b));
+        let mobility = Mobility::of([(inverse_mass, spin_of_a), second]);
         let closing = marbles.closing(a, b, normal, surface);
         let approach = -closing.dot(normal);
         // The positions have moved on already, and will follow what changes now. So
@@ -206,7 +206,7 @@ pub(crate) fn impulse<S: Scalar>(
             grip: Vec3::zero(),
             step: Vec3::zero(),
             way: Vec3::zero(),
-            resistance: marbles.resistance(a, b, material, settings.spin),
+            resistance: marbles.resistance(a, b, material),
         };
         // What bounces had nothing to bear before.
         let guess = warm.binary_search_by_key(&constraint.key(), |warm| warm.key);
@@ -225,7 +225,7 @@ pub(crate) fn impulse<S: Scalar>(
     constraints.extend(wm.chain(mm).filter_map(|(a, b)| prepare(a, b)));
 
     for c in constraints.iter() {
-        marbles.hit_both(c, c.normal * c.pressure + c.grip, settings.spin);
+        marbles.hit_both(c, c.normal * c.pressure + c.grip);
         if let Some(resistance) = c.resistance {
             marbles.twist_both(c, resistance.twist);
         }
@@ -310,22 +310,13 @@ impl<S: Scalar> Columns<'_, S> {
     }
 
     /// What resists rolling and spinning between two, or a wall and one, if anything does.
-    fn resistance(
-        &self,
-        a: First,
-        b: usize,
-        material: Material<S>,
-        spin: BallSpin,
-    ) -> Option<Resistance<S>> {
+    fn resistance(&self, a: First, b: usize, material: Material<S>) -> Option<Resistance<S>> {
         let Material { rolling_resistance, spinning_resistance, .. } = material;
         let none = rolling_resistance == S::zero() && spinning_resistance == S::zero();
-        if none || spin == BallSpin::Ignored || self.spin.is_empty() {
+        if none {
             return None;
         }
-        // 1 / I of a solid ball.
-        let give = |row: usize| {
-            S::constant(2.5) * self.inverse_mass[row] / (self.radius[row] * self.radius[row])
-        };
+        let give = |row: usize| self.inverse_inertia(row);
         let (radius, give) = match a {
             First::Wall(_) => (self.radius[b], give(b)),
             First::Marble(a) => {
@@ -343,39 +334,23 @@ impl<S: Scalar> Columns<'_, S> {
 
     /// Applies an angular impulse to the second of a contact, its opposite to the first.
     fn twist_both(&mut self, c: &Constraint<S>, twist: Vec3<S>) {
-        let per_twist = |row: usize| {
-            S::constant(2.5) * self.inverse_mass[row] / (self.radius[row] * self.radius[row])
-        };
-        let (a, b) = (c.a.marble().map(|a| (a, per_twist(a))), per_twist(c.b));
-        self.spin[c.b] += twist * b;
-        if let Some((a, by)) = a {
-            self.spin[a] -= twist * by;
+        self.twist(c.b, twist);
+        if let First::Marble(a) = c.a {
+            self.twist(a, -twist);
         }
     }
 
     /// Applies an impulse to the second of a contact, and its opposite to the first;
     /// `change` is the impulse times the mobility along the normal.
-    fn hit_both(&mut self, c: &Constraint<S>, change: Vec3<S>, spin: BallSpin) {
+    fn hit_both(&mut self, c: &Constraint<S>, change: Vec3<S>) {
         // The impulse itself, of a pebble, may be too small for the scalar.
         let part = |row: usize| self.inverse_mass[row] / c.mobility.normal;
         let second = change * part(c.b);
         if let First::Marble(a) = c.a {
             let first = -change * part(a);
-            self.hit(a, first, -c.normal, spin);
+            self.hit(a, first, -c.normal);
         }
-        self.hit(c.b, second, c.normal, spin);
-    }
-
-    /// Changes a velocity by an impulse where a marble is touched, and its spin with it;
-    /// `normal` points to its center.
-    fn hit(&mut self, row: usize, change: Vec3<S>, normal: Vec3<S>, spin: BallSpin) {
-        self.velocity[row] += change;
-        if spin == BallSpin::Free
-            && let Some(spin) = self.spin.get_mut(row)
-        {
-            // m r / I = 5/2 / r for a solid ball.
-            *spin -= normal.cross(change) * (S::constant(2.5) / self.radius[row]);
-        }
+        self.hit(c.b, second, c.normal);
     }
 
     /// Moves what overlaps too deep half of the way apart, the lighter one further.

@@ -4,8 +4,8 @@ use cgmath::{InnerSpace, Zero};
 
 use super::{Constraint, Settings};
 use crate::math::{Scalar, Vec3, is_finite, length};
+use crate::response::Columns;
 use crate::response::impact::at_most;
-use crate::response::{BallSpin, Columns};
 
 /// Sweeps over the contacts until they agree, or as often as the settings allow.
 ///
@@ -27,7 +27,7 @@ pub(super) fn solve<S: Scalar>(
                 continue;
             }
             let before = c.normal * c.pressure + c.grip;
-            let change = marbles.solve(c, settings.spin);
+            let change = marbles.solve(c);
             c.step = c.normal * c.pressure + c.grip - before;
             let island = &mut islands.list[c.island];
             island.change = island.change.max(change);
@@ -37,7 +37,7 @@ pub(super) fn solve<S: Scalar>(
         if islands.end_sweep(settings.bounce_speed) || last {
             break;
         }
-        marbles.go_on(constraints, islands, settings.spin);
+        marbles.go_on(constraints, islands);
     }
 }
 
@@ -165,7 +165,7 @@ impl<S: Scalar> Island<S> {
 
 impl<S: Scalar> Columns<'_, S> {
     /// One step toward what a contact asks for. Gives the change of velocity.
-    fn solve(&mut self, c: &mut Constraint<S>, spin: BallSpin) -> S {
+    fn solve(&mut self, c: &mut Constraint<S>) -> S {
         let closing = self.closing(c.a, c.b, c.normal, c.surface);
         let along = closing.dot(c.normal);
         let pressure = (c.pressure + c.rebound - along).max(S::zero());
@@ -177,19 +177,14 @@ impl<S: Scalar> Columns<'_, S> {
             return S::zero(); // an overflow here must not reach the other one
         }
         (c.pressure, c.grip) = (pressure, grip);
-        self.hit_both(c, change, spin);
+        self.hit_both(c, change);
         self.resist(c);
         change.magnitude()
     }
 
     /// Goes on along the last step and a part of the way before, to where that brings the
     /// contacts of each island nearest to what they ask for.
-    fn go_on(
-        &mut self,
-        constraints: &mut [Constraint<S>],
-        islands: &mut Islands<S>,
-        spin: BallSpin,
-    ) {
+    fn go_on(&mut self, constraints: &mut [Constraint<S>], islands: &mut Islands<S>) {
         for c in constraints.iter_mut() {
             let Some(island) = islands.searching(c) else { continue };
             c.way = c.way * island.kept + c.step;
@@ -202,7 +197,7 @@ impl<S: Scalar> Columns<'_, S> {
             island.wish += island.energy(c, c.way, c.normal * c.rebound + c.slide - closing);
         }
         for c in constraints.iter().filter(|c| islands.list[c.island].searches) {
-            self.hit_both(c, c.way, spin);
+            self.hit_both(c, c.way);
         }
         for c in constraints.iter() {
             let Some(island) = islands.searching(c) else { continue };
@@ -215,7 +210,7 @@ impl<S: Scalar> Columns<'_, S> {
             let far = island.wish / (island.cost + island.wish);
             let far = if far > S::zero() && far.is_finite() { far } else { S::zero() };
             let further = c.way * far;
-            self.hit_both(c, further - c.way, spin);
+            self.hit_both(c, further - c.way);
             c.pressure += further.dot(c.normal);
             c.grip += further - c.normal * further.dot(c.normal);
             c.way = further;
@@ -225,8 +220,8 @@ impl<S: Scalar> Columns<'_, S> {
     /// One step toward no relative spin, as far as the resistances can.
     fn resist(&mut self, c: &mut Constraint<S>) {
         let Some(resistance) = &mut c.resistance else { return };
-        let spin_of_a = c.a.marble().map_or_else(Vec3::zero, |a| self.spin[a]);
-        let relative = self.spin[c.b] - spin_of_a;
+        let spin_of_a = c.a.marble().map_or_else(Vec3::zero, |a| self.felt_spin(a));
+        let relative = self.felt_spin(c.b) - spin_of_a;
         let wanted = resistance.twist - relative / resistance.give;
         let force = c.pressure / c.mobility.normal;
         let about = c.normal * wanted.dot(c.normal);
