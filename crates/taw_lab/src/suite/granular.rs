@@ -224,6 +224,33 @@ fn all_in_one_spot(meter: &mut Meter, model: Model, count: u32, seconds: f64) ->
     overlaps(&world).into_iter().fold(0.0, f64::max)
 }
 
+/// A face-centred lattice of 108 balls at rest, each touching twelve, without gravity, for
+/// five seconds: the farthest that one moves if they just touch (`overlap` 0), else the
+/// deepest overlap that is left of this part of a diameter; in diameters. NaN if the
+/// recovery throws one faster than a diameter a step.
+fn lattice(meter: &mut Meter, model: Model, overlap: f64) -> f64 {
+    let mut packed = crate::scene::weightless::<f32>(model);
+    let pitch = (1.0 - overlap) * 2.0_f64.sqrt();
+    for i in 0..27_u32 {
+        let cell = [i % 3, i / 3 % 3, i / 9].map(f64::from);
+        for offset in [[0.0, 0.0, 0.0], [0.5, 0.5, 0.0], [0.5, 0.0, 0.5], [0.0, 0.5, 0.5]] {
+            let at = [0, 1, 2].map(|k| (cell[k] + offset[k]) * pitch);
+            Ball { at, ..Ball::default() }.insert(&mut packed);
+        }
+    }
+    let start = packed.marbles.position().to_vec();
+    meter.run(&mut packed, 1.0 / 60.0, 5.0);
+    let fastest = packed.marbles.velocity().iter().map(|v| v.magnitude()).fold(0.0, f32::max);
+    if fastest.is_nan() || fastest > 60.0 {
+        return f64::NAN;
+    }
+    if overlap > 0.0 {
+        return overlaps(&packed).into_iter().fold(0.0, f64::max);
+    }
+    let moved = packed.marbles.position().iter().zip(&start).map(|(x, s)| (x - s).magnitude());
+    f64::from(moved.fold(0.0, f32::max))
+}
+
 pub const ROWS: &[Row] = &[
     Row {
         name: "granular/packing/density",
@@ -355,5 +382,49 @@ pub const ROWS: &[Row] = &[
         measure: |meter| {
             if all_in_one_spot(meter, IMPULSE, 1000, 0.5).is_nan() { 1.0 } else { 0.0 }
         },
+    },
+    Row {
+        name: "granular/lattice/touching",
+        setup: "108 balls in a face-centred lattice, each touches twelve, 5 s without gravity: nothing moves",
+        metric: "farthest moved, diameters",
+        model: "event-driven",
+        target: 1e-6,
+        best: "–",
+        source: "references §6.4, family 10",
+        effort: Effort::Quick,
+        measure: |meter| lattice(meter, crate::scene::EXACT, 0.0),
+    },
+    Row {
+        name: "granular/lattice/touching",
+        setup: "the same",
+        metric: "farthest moved, diameters",
+        model: "impulse",
+        target: 1e-6,
+        best: "–",
+        source: "references §6.4, family 10",
+        effort: Effort::Quick,
+        measure: |meter| lattice(meter, IMPULSE, 0.0),
+    },
+    Row {
+        name: "granular/lattice/overlapping",
+        setup: "the same with each overlapping twelve by a tenth: they part",
+        metric: "deepest overlap left, diameters",
+        model: "event-driven",
+        target: 1e-2,
+        best: "–",
+        source: "references §6.4, family 10",
+        effort: Effort::Quick,
+        measure: |meter| lattice(meter, crate::scene::EXACT, 0.1),
+    },
+    Row {
+        name: "granular/lattice/overlapping",
+        setup: "the same",
+        metric: "deepest overlap left, diameters",
+        model: "impulse",
+        target: 1e-2,
+        best: "–",
+        source: "references §6.4, family 10",
+        effort: Effort::Quick,
+        measure: |meter| lattice(meter, IMPULSE, 0.1),
     },
 ];

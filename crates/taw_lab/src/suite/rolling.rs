@@ -313,6 +313,26 @@ fn carried(meter: &mut Meter, model: Model) -> f64 {
     off_belt.max(off_lift)
 }
 
+/// By how much a shorter step is worse, at most, than a longer one: errors of slip to
+/// roll, incline and far roll over steps of 1/30 s to 1 ms, where they are above `floor`.
+fn never_worse(meter: &mut Meter, model: Model, floor: f64) -> f64 {
+    let mut worst: f64 = 0.0;
+    let curves: [&mut dyn FnMut(&mut Meter, f64) -> f64; 4] = [
+        &mut |meter, dt| slip_to_roll(meter, model, dt)[0],
+        &mut |meter, dt| slip_to_roll(meter, model, dt)[1],
+        &mut |meter, dt| incline(meter, model, dt, 20.0, 0.5),
+        &mut |meter, dt| incline(meter, model, dt, 60.0, 0.45),
+    ];
+    for curve in curves {
+        let errors = STEPS.map(|dt| curve(meter, dt).max(floor));
+        for (i, longer) in errors.iter().enumerate() {
+            worst =
+                errors[i..].iter().fold(worst, |worst, shorter| worst.max(shorter / longer - 1.0));
+        }
+    }
+    worst
+}
+
 pub const ROWS: &[Row] = &[
     Row {
         name: "rolling/box/1ms",
@@ -577,5 +597,27 @@ pub const ROWS: &[Row] = &[
         measure: |meter| {
             far_roll(meter, Model { precision: Precision::Compensated, ..IMPULSE }, 1e4)
         },
+    },
+    Row {
+        name: "rolling/never-worse",
+        setup: "speed and way of slip to roll and inclines, 1/30 s to 1 ms: shorter steps are no worse above a floor of 1e-7",
+        metric: "how much worse a shorter step is, relatively",
+        model: "event-driven",
+        target: 0.0,
+        best: "non-monotone: Rapier, Box3D",
+        source: "design, rule 3",
+        effort: Effort::Quick,
+        measure: |meter| never_worse(meter, EXACT, 1e-7),
+    },
+    Row {
+        name: "rolling/never-worse",
+        setup: "the same above a floor of 5e-5, which plain f32 has",
+        metric: "how much worse a shorter step is, relatively",
+        model: "impulse",
+        target: 0.0,
+        best: "non-monotone: Rapier, Box3D",
+        source: "design, rule 3",
+        effort: Effort::Quick,
+        measure: |meter| never_worse(meter, IMPULSE, 5e-5),
     },
 ];
