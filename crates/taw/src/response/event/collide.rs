@@ -42,6 +42,17 @@ impl EventDriven {
         self.balls[row].path.losses >= MOST_LOSSES
     }
 
+    /// Brings balls to rest that collide without end.
+    pub(super) fn surrender(&mut self, rows: [usize; 2], time: f64, settings: &Settings) {
+        for row in rows {
+            self.balls[row].path.surrenders += 1;
+        }
+        self.hold_from_now_on(rows, time, settings);
+        for row in rows {
+            self.balls[row].path.losses = 0;
+        }
+    }
+
     /// Lets two balls bounce off each other, and whoever else meets at the same moment.
     ///
     /// What happens at one moment happens to all at once, so that no order is preferred:
@@ -131,9 +142,8 @@ impl EventDriven {
             material.restitution = 0.0;
         }
         let mobility = Mobility::of([first, second].map(|ball| (ball.inverse_mass, ball.spins)));
-        let losses = u32::from(material.restitution < 1.0);
-        self.balls[a].path.losses += losses;
-        self.balls[b].path.losses += losses;
+        self.balls[a].collide(material, settings);
+        self.balls[b].collide(material, settings);
         let (first, second) = (a as u32, b as u32);
         let impact = Impact { a: first, on_wall: false, b: second, normal, approach_speed };
         Collision { a, b, impact, mobility, material, share: 1.0, impulse: Vec3::zero() }
@@ -196,7 +206,7 @@ impl EventDriven {
     }
 
     /// Lets a ball that touches a wall bounce off it.
-    pub(super) fn hit_wall(&mut self, row: usize, wall: usize) -> Impact<f64> {
+    pub(super) fn hit_wall(&mut self, row: usize, wall: usize, settings: &Settings) -> Impact<f64> {
         let normal = self.walls[wall].normal;
         let ball = &mut self.balls[row];
         ball.release();
@@ -205,7 +215,7 @@ impl EventDriven {
         let approach_speed = -closing.dot(normal);
         let mobility = Mobility::of_balls(0.0, ball.inverse_mass, ball.spins);
         let material = self.walls[wall].against(ball.material);
-        ball.path.losses += u32::from(material.restitution < 1.0);
+        ball.collide(material, settings);
         let impulse = impact(normal, closing, mobility, material);
         ball.hit(impulse, normal);
         Impact { a: wall as u32, on_wall: true, b: row as u32, normal, approach_speed }

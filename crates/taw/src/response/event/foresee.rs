@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use cgmath::{InnerSpace, Zero};
 
 use super::time::{Gap, closing_time, meeting_time};
-use super::{Event, EventDriven, Home, PRESS, REST, Settings, What};
+use super::{Ball, Event, EventDriven, Home, MOST_SURRENDERS, PRESS, REST, Settings, What};
 use crate::math::{Vec3, direction_and_length, is_finite};
 use crate::response::Walls as _;
 
@@ -87,6 +87,9 @@ impl EventDriven {
         settings: &Settings,
     ) -> Option<(f64, What)> {
         let ball = &self.balls[row];
+        if ball.inverse_mass <= 0.0 || ball.path.surrenders >= MOST_SURRENDERS {
+            return None; // no wall holds it
+        }
         let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
         let (normal, distance) = self.walls.normal_and_distance(wall, position);
         let moving = self.walls[wall].motion.is_some();
@@ -143,6 +146,10 @@ impl EventDriven {
         let (from, to) = (first.position_at(now), second.position_at(now));
         let velocity = second.velocity_at(now) - first.velocity_at(now);
         let acceleration = second.path.acceleration - first.path.acceleration;
+        let passes = |ball: &Ball| ball.path.surrenders >= MOST_SURRENDERS;
+        if first.inverse_mass + second.inverse_mass <= 0.0 || passes(first) || passes(second) {
+            return None; // nothing could come of it
+        }
         if !is_finite(to - from) || !is_finite(velocity) || !is_finite(acceleration) {
             return None; // what is nowhere is nobody's concern
         }

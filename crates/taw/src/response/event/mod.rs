@@ -37,9 +37,17 @@ const REST: f64 = 1e-3;
 const PRESS: f64 = 0.1;
 /// Balls that cross more cells than this in a substep are looked for everywhere.
 const FAR: f64 = 1000.0;
-/// After so many collisions that take energy, in one substep, a ball is at rest among
-/// those that it touches: what is left would take endlessly many.
+/// After so many collisions that take energy, or no time, in one substep, a ball is at rest
+/// among those that it touches: what is left would take endlessly many.
 const MOST_LOSSES: u32 = 1000;
+/// How many collisions it counts for that a ball begins to rest on another, which takes
+/// about as long.
+const LEAN: u32 = 100;
+/// After so many times at rest and out of it again, something presses a ball that nothing
+/// can stop. For the rest of the substep it passes through; the next one pushes it out.
+const MOST_SURRENDERS: u32 = 10;
+/// What is no time between two collisions, over the substep.
+const NO_TIME: f64 = 1e-13;
 /// So many events in one substep that something must be wrong; the rest of it passes
 /// without any.
 const MOST_EVENTS: u64 = 100_000_000;
@@ -142,8 +150,13 @@ pub(crate) struct Path {
     carry: Vec3<f64>,
     /// Whether its acceleration holds it in a heap.
     heaped: bool,
-    /// In how many collisions of this substep it took part that took energy.
+    /// In how many collisions of this substep it took part that took energy, or no time
+    /// since the one before.
     losses: u32,
+    /// When the last one was.
+    collided: f64,
+    /// How often it was brought to rest because it had too many.
+    surrenders: u32,
     /// When its acceleration changes by itself.
     change: f64,
     /// Counts its paths, so that what was foreseen of an old one is known to be void.
@@ -168,6 +181,8 @@ impl Default for Path {
             carry: Vec3::zero(),
             heaped: false,
             losses: 0,
+            collided: f64::NEG_INFINITY,
+            surrenders: 0,
             change: f64::INFINITY,
             stamp: 0,
             home: Home::Anywhere,
@@ -203,9 +218,18 @@ impl Ball {
             acceleration: self.pull,
             stamp: self.path.stamp + 1,
             losses: self.path.losses,
+            collided: self.path.collided,
+            surrenders: self.path.surrenders,
             home: self.path.home,
             ..Path::default()
         };
+    }
+
+    /// Notes a collision, now.
+    fn collide(&mut self, material: Material<f64>, settings: &Settings) {
+        let at_once = self.path.begin - self.path.collided <= NO_TIME * settings.dt;
+        self.path.losses += u32::from(material.restitution < 1.0 || at_once);
+        self.path.collided = self.path.begin;
     }
 
     /// Applies an impulse at the point where `normal` comes from to the center.
@@ -342,16 +366,21 @@ impl EventDriven {
                 self.foresee(row, time, settings);
             }
             What::Meets(other, _) if self.loses(row) && self.loses(other) => {
-                self.hold_from_now_on([row, other], time, settings);
+                self.surrender([row, other], time, settings);
             }
             What::Meets(other, _) => self.meet(event, other, settings, impacts),
-            What::Leans(other, _) => self.hold_from_now_on([row, other], time, settings),
+            What::Leans(other, _) => {
+                for row in [row, other] {
+                    self.balls[row].path.losses += LEAN;
+                }
+                self.hold_from_now_on([row, other], time, settings);
+            }
             What::Hits(_) if self.loses(row) => {
-                self.hold_from_now_on([row, row], time, settings);
+                self.surrender([row, row], time, settings);
             }
             What::Hits(wall) => {
                 self.balls[row].advance(time);
-                impacts.push(self.hit_wall(row, wall));
+                impacts.push(self.hit_wall(row, wall, settings));
                 self.foresee(row, time, settings);
             }
             What::SettlesOn(wall) => {

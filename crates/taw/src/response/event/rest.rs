@@ -216,7 +216,6 @@ impl EventDriven {
             self.hold(&mut contacts, now, settings, &mut Vec::new());
         }
         for row in found {
-            self.balls[row].path.losses = 0;
             self.foresee(row, now, settings);
         }
     }
