@@ -187,7 +187,7 @@ fn any_marble(draw: &mut Draw) -> Marble<f32> {
     };
     let kinds = [Mass::default(), Mass::Kilograms(number(1e-6, 1e6)), Mass::Infinite];
     Marble {
-        velocity: velocity.map(|x| x as f32),
+        velocity,
         mass: kinds[(number(0.0, 10.0) as usize).saturating_sub(7).min(2)],
         material: Some(material),
         ..Marble::new(position, number(0.05, 0.3))
