@@ -39,10 +39,10 @@ const PRESS: f64 = 0.1;
 const FAR: f64 = 1000.0;
 /// After so many collisions that take energy, or no time, in one substep, a ball is at rest
 /// among those that it touches: what is left would take endlessly many.
-const MOST_LOSSES: u32 = 1000;
+const MOST_LOSSES: u32 = 64;
 /// How many collisions it counts for that a ball begins to rest on another, which takes
 /// about as long.
-const LEAN: u32 = 100;
+const LEAN: u32 = 8;
 /// After so many times at rest and out of it again, something presses a ball that nothing
 /// can stop. For the rest of the substep it passes through; the next one pushes it out.
 const MOST_SURRENDERS: u32 = 10;
