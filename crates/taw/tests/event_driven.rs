@@ -154,6 +154,37 @@ fn a_sliding_ball_rolls_at_its_moment() {
     }
 }
 
+#[test]
+fn a_fast_ball_between_two_walls_bounces_as_often_as_it_must() {
+    let mut world = world::<f64>(Rotation::None);
+    world.set_gravity(Vec3::new(0.0, 0.0, 0.0)).unwrap();
+    for (normal, offset) in [(Vec3::unit_x(), 0.0), (-Vec3::unit_x(), -1.01)] {
+        world.walls.insert(Plane::new(normal, offset).unwrap()).unwrap();
+    }
+    let marble = Marble {
+        velocity: Vec3::new(100.0, 0.0, 0.0),
+        material: Some(surface(0.99, 0.0)),
+        ..Marble::new(Point3::new(0.505, 0.0, 0.0), 0.5)
+    };
+    let id = world.marbles.insert(marble).unwrap();
+    world.step(1.0 / 60.0).unwrap();
+    // A centimetre at 100 m/s, and each time a hundredth slower.
+    let bounces = world.impacts().len() as i32;
+    assert!((95..=101).contains(&bounces), "{bounces} bounces");
+    let speed = world.marbles.get(id).unwrap().velocity.x.abs();
+    assert!((speed / (100.0 * 0.99_f64.powi(bounces)) - 1.0).abs() < 1e-12, "{speed} m/s");
+}
+
+#[test]
+fn no_wall_moves_a_marble_of_infinite_mass() {
+    let mut world = floor::<f32>(Rotation::None);
+    let at = Point3::new(0.0, 0.1, 0.0);
+    let peg = Marble { mass: Mass::Infinite, ..Marble::new(at, 0.5) };
+    let id = world.marbles.insert(peg).unwrap();
+    run(&mut world, 1.0 / 60.0, 1.0);
+    assert_eq!(world.marbles.get(id).unwrap().position, at);
+}
+
 /// Numbers in [0, 1) that depend on nothing but how many were drawn.
 struct Draw(u64);
 

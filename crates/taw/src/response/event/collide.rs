@@ -49,7 +49,7 @@ impl EventDriven {
         }
         self.hold_from_now_on(rows, time, settings);
         for row in rows {
-            self.balls[row].path.losses = 0;
+            self.balls[row].path.losses = 0.0;
         }
     }
 

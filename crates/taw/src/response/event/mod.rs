@@ -37,12 +37,13 @@ const REST: f64 = 1e-3;
 const PRESS: f64 = 0.1;
 /// Balls that cross more cells than this in a substep are looked for everywhere.
 const FAR: f64 = 1000.0;
-/// After so many collisions that take energy, or no time, in one substep, a ball is at rest
-/// among those that it touches: what is left would take endlessly many.
-const MOST_LOSSES: u32 = 64;
+/// After collisions in one substep that took the whole of an approach so many times over (two
+/// of restitution a half count as one, and so does one that took no time), a ball is at
+/// rest among those that it touches: what is left would take endlessly many.
+const MOST_LOSSES: f64 = 64.0;
 /// How many collisions it counts for that a ball begins to rest on another, which takes
 /// about as long.
-const LEAN: u32 = 8;
+const LEAN: f64 = 8.0;
 /// After so many times at rest and out of it again, something presses a ball that nothing
 /// can stop. For the rest of the substep it passes through; the next one pushes it out.
 const MOST_SURRENDERS: u32 = 10;
@@ -150,9 +151,9 @@ pub(crate) struct Path {
     carry: Vec3<f64>,
     /// Whether its acceleration holds it in a heap.
     heaped: bool,
-    /// In how many collisions of this substep it took part that took energy, or no time
-    /// since the one before.
-    losses: u32,
+    /// What the collisions of this substep took from it, as parts of their approach; all of
+    /// it where no time went by since the one before.
+    losses: f64,
     /// When the last one was.
     collided: f64,
     /// How often it was brought to rest because it had too many.
@@ -180,7 +181,7 @@ impl Default for Path {
             support: None,
             carry: Vec3::zero(),
             heaped: false,
-            losses: 0,
+            losses: 0.0,
             collided: f64::NEG_INFINITY,
             surrenders: 0,
             change: f64::INFINITY,
@@ -228,7 +229,7 @@ impl Ball {
     /// Notes a collision, now.
     fn collide(&mut self, material: Material<f64>, settings: &Settings) {
         let at_once = self.path.begin - self.path.collided <= NO_TIME * settings.dt;
-        self.path.losses += u32::from(material.restitution < 1.0 || at_once);
+        self.path.losses += if at_once { 1.0 } else { 1.0 - material.restitution };
         self.path.collided = self.path.begin;
     }
 

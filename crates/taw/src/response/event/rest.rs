@@ -120,7 +120,8 @@ impl EventDriven {
             let (normal, distance) =
                 self.walls.normal_and_distance(contact.a as usize, ball.position);
             let overlap = ball.radius - distance;
-            if overlap > SLOP * ball.radius {
+            // No wall holds what has infinite mass.
+            if overlap > SLOP * ball.radius && ball.inverse_mass > 0.0 {
                 ball.position += normal * overlap;
             }
         }
