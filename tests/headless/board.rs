@@ -40,6 +40,9 @@ fn marbles_stay_on_the_board_while_it_tilts_for_60_seconds() {
     // to 27 times as much; its center stays well in front of the wall.
     let deepest = deepest_while_tilting(impulse);
     assert!(deepest < 0.1, "a marble was {deepest} m deep in a wall");
+    let events = Model { response: Response::EventDriven, substeps: 1, ..impulse };
+    let deepest = deepest_while_tilting(events);
+    assert!(deepest < 0.05, "a marble was {deepest} m deep in a wall");
 }
 
 /// How deep, in metres, any of 60 marbles ever was in a wall of a tilting board.
@@ -82,7 +85,7 @@ fn two_runs_give_the_same_bits() {
         }
         marbles.iter().map(|m| scene::position(&app, *m).to_array().map(f32::to_bits)).collect()
     };
-    for response in [Response::Displacement, Response::Impulse] {
+    for response in [Response::Displacement, Response::Impulse, Response::EventDriven] {
         let (first, second): (Vec<_>, Vec<_>) = (run(response), run(response));
         assert_eq!(first, second);
     }

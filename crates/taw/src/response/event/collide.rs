@@ -42,14 +42,12 @@ impl EventDriven {
         self.balls[row].path.losses >= MOST_LOSSES
     }
 
-    /// Brings balls to rest that collide without end.
+    /// Brings balls to rest that collide without end, and all that touch them.
     pub(super) fn surrender(&mut self, rows: [usize; 2], time: f64, settings: &Settings) {
-        for row in rows {
-            self.balls[row].path.surrenders += 1;
-        }
-        self.hold_from_now_on(rows, time, settings);
-        for row in rows {
-            self.balls[row].path.losses = 0.0;
+        for row in self.hold_from_now_on(rows, time, settings) {
+            let path = &mut self.balls[row].path;
+            (path.losses, path.surrenders) = (0.0, path.surrenders + 1);
+            self.foresee(row, time, settings);
         }
     }
 

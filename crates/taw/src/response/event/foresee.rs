@@ -1,6 +1,7 @@
 //! What happens to a ball next.
 
 use std::cmp::Reverse;
+use std::f64::consts::SQRT_2;
 
 use cgmath::{InnerSpace, Zero};
 
@@ -154,12 +155,14 @@ impl EventDriven {
             return None; // what is nowhere is nobody's concern
         }
         let reach = first.radius + second.radius;
-        let (normal, distance) = direction_and_length(to - from).unwrap_or((Vec3::unit_x(), 0.0));
-        let gap = distance - reach;
-        let growth = acceleration.magnitude();
-        if gap > (velocity.magnitude() + 0.5 * growth * left) * left {
+        // Most are too far away, which needs no exact distance.
+        let way = (velocity.magnitude() + 0.5 * acceleration.magnitude() * left) * left;
+        let farthest = (reach + way) * (1.0 + 1e-12);
+        if (to - from).magnitude2() > farthest * farthest {
             return None;
         }
+        let (normal, distance) = direction_and_length(to - from).unwrap_or((Vec3::unit_x(), 0.0));
+        let gap = distance - reach;
         let stamp = second.path.stamp;
         let press = self.press_speed(a, b, settings);
         let meets = |after: f64| (after, What::Meets(b, stamp));
@@ -208,7 +211,9 @@ impl EventDriven {
         let pull = first.pull.magnitude().max(second.pull.magnitude());
         let taken = 1.0 - first.material.against(second.material).restitution;
         let speeds = first.velocity.magnitude() + second.velocity.magnitude();
-        (PRESS * settings.dt * apart.max(taken * pull)).max((1e-13 + 1e-6 * taken) * speeds)
+        let surrenders = first.path.surrenders.max(second.path.surrenders);
+        let press = PRESS * SQRT_2.powi(surrenders) * settings.dt;
+        (press * apart.max(taken * pull)).max((1e-13 + 1e-6 * taken) * speeds)
     }
 }
 

@@ -46,12 +46,12 @@ const MOST_LOSSES: f64 = 64.0;
 const LEAN: f64 = 8.0;
 /// After so many times at rest and out of it again, something presses a ball that nothing
 /// can stop. For the rest of the substep it passes through; the next one pushes it out.
-const MOST_SURRENDERS: u32 = 10;
+const MOST_SURRENDERS: i32 = 10;
 /// What is no time between two collisions, over the substep.
 const NO_TIME: f64 = 1e-13;
-/// So many events in one substep that something must be wrong; the rest of it passes
-/// without any.
-const MOST_EVENTS: u64 = 100_000_000;
+/// So many events in one substep, and a thousand more for each ball, that something must
+/// be wrong; the rest of it passes without any.
+const MOST_EVENTS: usize = 10_000_000;
 
 /// A collision that a substep went through.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -156,8 +156,9 @@ pub(crate) struct Path {
     losses: f64,
     /// When the last one was.
     collided: f64,
-    /// How often it was brought to rest because it had too many.
-    surrenders: u32,
+    /// How often it was brought to rest because it had too many. Each time it takes twice
+    /// the energy to wake it.
+    surrenders: i32,
     /// When its acceleration changes by itself.
     change: f64,
     /// Counts its paths, so that what was foreseen of an old one is known to be void.
@@ -337,7 +338,7 @@ impl EventDriven {
         for row in 0..self.balls.len() {
             self.foresee(row, 0.0, settings);
         }
-        for _ in 0..MOST_EVENTS {
+        for _ in 0..MOST_EVENTS + 1000 * self.balls.len() {
             let Some(Reverse(event)) = self.queue.pop() else { break };
             if self.balls[event.row].path.stamp == event.stamp {
                 self.happen(event, settings, impacts);
@@ -374,7 +375,9 @@ impl EventDriven {
                 for row in [row, other] {
                     self.balls[row].path.losses += LEAN;
                 }
-                self.hold_from_now_on([row, other], time, settings);
+                for row in self.hold_from_now_on([row, other], time, settings) {
+                    self.foresee(row, time, settings);
+                }
             }
             What::Hits(_) if self.loses(row) => {
                 self.surrender([row, row], time, settings);

@@ -195,7 +195,13 @@ impl EventDriven {
     }
 
     /// Lets balls, and all that touch them and each other, rest together from now on.
-    pub(super) fn hold_from_now_on(&mut self, first: [usize; 2], now: f64, settings: &Settings) {
+    /// Gives their rows, whose events are to be foreseen anew.
+    pub(super) fn hold_from_now_on(
+        &mut self,
+        first: [usize; 2],
+        now: f64,
+        settings: &Settings,
+    ) -> Vec<usize> {
         let (found, mut contacts) = self.all_that_touch(first, now, settings);
         let pull = found.iter().map(|row| self.balls[*row].pull.magnitude()).fold(0.0, f64::max);
         // First what the collision does, all of it at once and without rebound.
@@ -216,9 +222,7 @@ impl EventDriven {
         if left > 1e-6 * settings.dt && !contacts.is_empty() {
             self.hold(&mut contacts, now, settings, &mut Vec::new());
         }
-        for row in found {
-            self.foresee(row, now, settings);
-        }
+        found
     }
 
     /// These balls, those that they touch, and so on, all of them released at this time;

@@ -10,6 +10,11 @@ use cgmath::{InnerSpace, Zero};
 
 use crate::math::{Vec3, direction_and_length};
 
+/// By what angle a surface may turn in one go, in radians.
+const BEND: f64 = 4e-3;
+/// What is left of a slide that bends, over the substep, when its end goes straight.
+const LAST: f64 = 1.0 / 256.0;
+
 /// What a ball lies on, how it is pulled there, and what it is made of.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Support {
@@ -91,12 +96,13 @@ impl Support {
         }
         let regime = self.regime(now, slip);
         let rate = self.rate(now, regime);
-        let (rate, mut duration) = if self.is_steady(now, rate, regime) {
-            (rate, dt.min(self.until_it_changes(now, rate, regime)))
-        } else {
-            let duration = self.short_step(now, regime, dt);
-            (self.mean_rate(now, regime, duration), duration)
-        };
+        let (rate, mut duration) =
+            if self.is_steady(now, rate, regime) || self.is_nearly_over(now, rate, regime, dt) {
+                (rate, dt.min(self.until_it_changes(now, rate, regime)))
+            } else {
+                let duration = self.short_step(now, regime, dt);
+                (self.mean_rate(now, regime, duration), duration)
+            };
         let mut spin_acceleration = Vec3::zero();
         if self.spins {
             spin_acceleration = rate.p.cross(n) / self.radius;
@@ -119,7 +125,10 @@ impl Support {
 
     fn slip(&self, at: Rolling) -> Vec3<f64> {
         let surface = self.surface - self.normal * self.surface.dot(self.normal);
-        at.v + at.p - surface
+        let slip = at.v + at.p - surface;
+        // A difference of speeds has the rounding of the speeds.
+        let rounding = 1e-15 * (at.v.magnitude() + at.p.magnitude() + surface.magnitude());
+        if slip.magnitude() <= rounding { Vec3::zero() } else { slip }
     }
 
     /// How the velocity of the surface changes under a ball that moves over it.
@@ -192,6 +201,15 @@ impl Support {
             && (self.rolling_resistance == 0.0 || straight(now.p, rate.p))
     }
 
+    /// Whether what is left of a slide is so little that it may go straight. What that
+    /// neglects is left over, as a slide that is shorter still.
+    fn is_nearly_over(&self, now: Rolling, rate: Rolling, regime: Regime, dt: f64) -> bool {
+        let (slip, rate) = (self.slip(now), rate.v + rate.p);
+        regime == Regime::Slides
+            && slip.magnitude() < LAST * dt * rate.magnitude()
+            && slip.dot(rate) < -0.9 * slip.magnitude() * rate.magnitude()
+    }
+
     /// The time until the slip, or the rolling that is resisted, comes to its end.
     fn until_it_changes(&self, now: Rolling, rate: Rolling, regime: Regime) -> f64 {
         let end = |x: Vec3<f64>, rate: Vec3<f64>| {
@@ -207,7 +225,8 @@ impl Support {
 
     /// A step so short that the directions of slip and spin change little within it.
     fn short_step(&self, now: Rolling, regime: Regime, dt: f64) -> f64 {
-        let mut step = dt / 8.0;
+        // The surface must not turn by much meanwhile.
+        let mut step = (BEND / self.turning.magnitude()).clamp(dt / 8.0, dt);
         if regime == Regime::Slides {
             let rate = self.give() * self.friction * self.pressure;
             step = step.min(self.slip(now).magnitude() / (4.0 * rate));
@@ -216,8 +235,8 @@ impl Support {
             let rate = 10.0 * self.rolling_resistance * self.pressure;
             step = step.min(now.p.magnitude() / rate);
         }
-        // Never so short that a step takes more than a thousand of them.
-        step.max(dt / 1024.0)
+        // Never so short that a substep takes more than a thousand of them.
+        step.max(0.25 * LAST * dt)
     }
 
     /// The mean over a short step (Kutta 1901).
