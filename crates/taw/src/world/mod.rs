@@ -245,10 +245,12 @@ impl<S: Scalar> World<S> {
             self.marbles.mean_accelerations(drive, &mut self.accelerations);
         } else {
             self.sweep.start.clear();
-            if self.model.detection == Detection::Swept {
+            let sweeps = matches!(self.model.response, Response::Displacement | Response::Impulse);
+            if sweeps && self.model.detection == Detection::Swept {
                 self.sweep.start.extend_from_slice(self.marbles.position());
             }
             self.marbles.integrate(drive, &mut self.stopped);
+            self.stop_where_they_meet(dt);
         }
         if !(self.model.response == Response::EventDriven
             && self.model.rotation == Rotation::Dynamic)
@@ -271,9 +273,6 @@ impl<S: Scalar> World<S> {
     /// together later is found later.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
-        if self.model.response == Response::Impulse && self.model.detection == Detection::Swept {
-            self.stop_where_they_meet();
-        }
         let reach = self.reach;
         let nothing = Vec3::zero();
         for (a, plane) in self.walls.planes().iter().enumerate() {

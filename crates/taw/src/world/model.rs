@@ -39,10 +39,11 @@ pub enum Detection {
     /// pass through each other. (Through a wall nothing passes: it is solid behind.)
     #[default]
     Discrete,
-    /// On the way through the substep, for [`Response::Impulse`]: marbles that meet stop
-    /// where they first touch, with the normal that they have there, and lose what was
-    /// left of their way. [`Response::EventDriven`] always does, and loses nothing; the
-    /// other responses take no notice.
+    /// On the way through the substep, for [`Response::Displacement`] and
+    /// [`Response::Impulse`]: marbles that meet stop where they first touch, with the
+    /// normal that they have there, and lose what was left of their way.
+    /// [`Response::EventDriven`] always does, and loses nothing; [`Response::Penalty`],
+    /// whose forces need time, takes no notice.
     Swept,
 }
 

@@ -1,9 +1,15 @@
 //! Swept detection: what would pass through each other within a substep is stopped
 //! where it first touches.
 
+use std::cmp::{Ordering, Reverse};
+use std::collections::BinaryHeap;
+
+use cgmath::{InnerSpace, Zero};
+
 use super::World;
 use crate::contact::time_of_impact_sphere_sphere;
-use crate::math::{Point3, Scalar, length};
+use crate::math::{Point3, Scalar, Vec3, direction_and_length, length};
+use crate::response::Response;
 use crate::shape::Sphere;
 
 /// How far into each other marbles are put that meet, over the sum of their radii: what
@@ -17,21 +23,68 @@ pub(super) struct Sweep<S> {
     pub start: Vec<Point3<S>>,
     middle: Vec<Point3<S>>,
     reach: Vec<S>,
-    hits: Vec<(S, u32, u32)>,
-    stopped: Vec<bool>,
+    /// Who may meet whom, both ways round, in order.
+    near: Vec<(u32, u32)>,
+    hits: BinaryHeap<Reverse<Hit<S>>>,
+    /// At which part of its way each marble was stopped, if at all.
+    stopped: Vec<Option<S>>,
+}
+
+/// Two marbles that will meet, unless one of them is stopped before.
+#[derive(Clone, Copy, Debug)]
+struct Hit<S> {
+    /// As a part of the substep.
+    time: S,
+    pair: (u32, u32),
+    /// Whether each of them had been stopped when this was foreseen.
+    stopped: (bool, bool),
+}
+
+impl<S: Scalar> Ord for Hit<S> {
+    fn cmp(&self, other: &Self) -> Ordering {
+        let time = self.time.partial_cmp(&other.time).unwrap_or(Ordering::Equal);
+        time.then(self.pair.cmp(&other.pair))
+    }
+}
+
+impl<S: Scalar> PartialOrd for Hit<S> {
+    fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
+        Some(self.cmp(other))
+    }
+}
+
+impl<S: Scalar> PartialEq for Hit<S> {
+    fn eq(&self, other: &Self) -> bool {
+        self.cmp(other).is_eq()
+    }
+}
+
+impl<S: Scalar> Eq for Hit<S> {}
+
+/// A marble on its way through a substep.
+#[derive(Clone, Copy)]
+struct Way<S> {
+    sphere: Sphere<S>,
+    /// What it moves from here to the end.
+    motion: Vec3<S>,
+    stopped: bool,
 }
 
 impl<S: Scalar> World<S> {
-    /// Puts marbles that met on their way back to where they touched, the earliest first.
-    /// What was left of their way is lost.
-    pub(super) fn stop_where_they_meet(&mut self) {
+    /// Puts marbles that meet on their way to where they touch, the earliest first. What
+    /// is left of their way is lost. [`Response::Displacement`] takes its part along the
+    /// normal for the displacement, half of it for each, and changes the velocities by it.
+    pub(super) fn stop_where_they_meet(&mut self, dt: S) {
         let marbles = &mut self.marbles;
-        let Sweep { start, middle, reach, hits, stopped } = &mut self.sweep;
+        let Sweep { start, middle, reach, near, hits, stopped } = &mut self.sweep;
         let half = S::constant(0.5);
+        let displaces = self.model.response == Response::Displacement;
+        // Whose way past each other is less than this part of a radius have their normal right
+        // as it is; the displacement changes by itself with the way, and is content with less.
+        let slow = if displaces { half } else { S::constant(0.02) };
         let moved = |row: usize| marbles.position[row] - start[row];
-        // What moves by less than a fiftieth of its radius has its normal right as it is.
-        let slow = S::constant(0.02);
-        let fast = |row: usize| length(moved(row)) > marbles.radius[row] * slow;
+        let smallest = marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
+        let fast = |row: usize| length(moved(row)) > smallest * slow * half;
         if start.len() != marbles.len() || !(0..start.len()).any(fast) {
             return;
         }
@@ -40,35 +93,84 @@ impl<S: Scalar> World<S> {
         reach.clear();
         reach.extend((0..start.len()).map(|row| marbles.radius[row] + length(moved(row)) * half));
         self.grid.rebuild(middle, reach, S::zero());
-        hits.clear();
+        near.clear();
         self.grid.pairs(middle, |a, b| {
             let (first, second) = (a as usize, b as usize);
-            if fast(first) || fast(second) {
-                let into = S::one() - S::constant(INTO);
-                let sphere =
-                    |row: usize| Sphere { center: start[row], radius: marbles.radius[row] * into };
-                let (a_moves, b_moves) = (moved(first), moved(second));
-                let (x, y) = (sphere(first), sphere(second));
-                let time = time_of_impact_sphere_sphere(&x, a_moves, &y, b_moves);
-                hits.extend(time.map(|time| (time, a, b)));
+            let radius = marbles.radius[first].min(marbles.radius[second]);
+            if length(moved(second) - moved(first)) > radius * slow {
+                near.extend([(a, b), (b, a)]);
             }
         });
-        hits.sort_unstable_by(|x, y| {
-            let time = x.0.partial_cmp(&y.0).unwrap_or(std::cmp::Ordering::Equal);
-            time.then((x.1, x.2).cmp(&(y.1, y.2)))
-        });
+        near.sort_unstable();
         stopped.clear();
-        stopped.resize(start.len(), false);
-        for &(time, a, b) in hits.iter() {
-            let rows = [a as usize, b as usize];
-            // Whoever was stopped before did not get there.
-            if rows.iter().any(|row| stopped[*row]) {
-                continue;
+        stopped.resize(start.len(), None);
+        hits.clear();
+        let ahead = near.iter().filter(|(a, b)| a < b);
+        let way = |row: u32, now: S, stopped: &[Option<S>]| {
+            let index = row as usize;
+            let (from, motion) = (start[index], marbles.position[index] - start[index]);
+            let into = S::one() - S::constant(INTO);
+            let stop = stopped[index];
+            let center = from + motion * stop.unwrap_or(now);
+            let motion = if stop.is_some() { Vec3::zero() } else { motion * (S::one() - now) };
+            let sphere = Sphere { center, radius: marbles.radius[index] * into };
+            Way { sphere, motion, stopped: stop.is_some() }
+        };
+        hits.extend(ahead.filter_map(|pair| {
+            let ways = (way(pair.0, S::zero(), stopped), way(pair.1, S::zero(), stopped));
+            Hit::foresee(*pair, ways, S::zero()).map(Reverse)
+        }));
+        while let Some(Reverse(Hit { time, pair, stopped: before })) = hits.pop() {
+            let (a, b) = (way(pair.0, time, stopped), way(pair.1, time, stopped));
+            if before != (a.stopped, b.stopped) {
+                continue; // it was foreseen anew
             }
-            for row in rows {
-                stopped[row] = true;
-                marbles.position[row] = start[row] + (marbles.position[row] - start[row]) * time;
+            let apart = direction_and_length(b.sphere.center - a.sphere.center);
+            if displaces && let Some((normal, _)) = apart {
+                let depth = (a.motion - b.motion).dot(normal).max(S::zero());
+                let change = normal * (half * depth / dt);
+                marbles.velocity[pair.0 as usize] -= change;
+                marbles.velocity[pair.1 as usize] += change;
+            }
+            let now = [(pair.0, a), (pair.1, b)].into_iter().filter(|(_, way)| !way.stopped);
+            now.clone().for_each(|(row, _)| stopped[row as usize] = Some(time));
+            for (row, _) in now {
+                // Who was to meet it elsewhere, or not at all, may meet it here.
+                let first = near.partition_point(|pair| pair.0 < row);
+                let others = near[first..].iter().take_while(|pair| pair.0 == row);
+                hits.extend(others.filter_map(|(_, other)| {
+                    let pair = (row.min(*other), row.max(*other));
+                    let ways = (way(pair.0, time, stopped), way(pair.1, time, stopped));
+                    Hit::foresee(pair, ways, time).map(Reverse)
+                }));
             }
         }
+        for (row, stop) in stopped.iter().enumerate() {
+            if let Some(time) = stop {
+                let moved = marbles.position[row] - start[row];
+                marbles.position[row] = start[row] + moved * *time;
+            }
+        }
+    }
+}
+
+impl<S: Scalar> Hit<S> {
+    /// When two marbles meet, of which not both were stopped, from `now` on.
+    fn foresee(pair: (u32, u32), (a, b): (Way<S>, Way<S>), now: S) -> Option<Self> {
+        if a.stopped && b.stopped {
+            return None;
+        }
+        let (x, y) = (&a.sphere, &b.sphere);
+        let apart = direction_and_length(y.center - x.center);
+        let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
+        let after = if distance > x.radius + y.radius {
+            time_of_impact_sphere_sphere(x, a.motion, y, b.motion)
+        } else {
+            // They touch. Only what would pass right through is stopped there.
+            let depth = (a.motion - b.motion).dot(normal);
+            (depth > x.radius.min(y.radius)).then_some(S::zero())
+        }?;
+        let time = now + after * (S::one() - now);
+        Some(Self { time, pair, stopped: (a.stopped, b.stopped) })
     }
 }

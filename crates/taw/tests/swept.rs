@@ -1,0 +1,107 @@
+//! Swept detection: what is fast does not pass through what it meets.
+
+use proptest::prelude::*;
+use taw::prelude::*;
+
+const DT: f32 = 1.0 / 60.0;
+
+/// A world without gravity, which sweeps, with these balls of 0.1 m: place and velocity.
+fn world(response: Response, balls: &[([f32; 3], [f32; 3])]) -> (World<f32>, Vec<MarbleId>) {
+    let mut world = World::default();
+    let model = Model { response, detection: Detection::Swept, ..Model::default() };
+    world.set_model(model).unwrap();
+    world.set_gravity(Vec3::zero()).unwrap();
+    let insert = |(at, velocity): &([f32; 3], [f32; 3])| {
+        let marble = Marble::new(Point3::from(*at), 0.1);
+        world.marbles.insert(Marble { velocity: Vec3::from(*velocity), ..marble }).unwrap()
+    };
+    let ids = balls.iter().map(insert).collect();
+    (world, ids)
+}
+
+const RESPONSES: [Response; 2] = [Response::Displacement, Response::Impulse];
+
+#[test]
+fn a_fast_ball_pushes_what_it_meets_and_does_not_pass() {
+    for response in RESPONSES {
+        // From afar, and from where they touch.
+        for at in [-3.0, -0.2] {
+            let still = ([0.0; 3], [0.0; 3]);
+            let (mut world, ids) = world(response, &[([at, 0.0, 0.0], [300.0, 0.0, 0.0]), still]);
+            for _ in 0..4 {
+                world.step(DT).unwrap();
+            }
+            let [a, b] = [ids[0], ids[1]].map(|id| world.marbles.get(id).unwrap());
+            assert!(b.position.x - a.position.x > 0.199, "{response:?}, from {at}");
+            assert!(b.velocity.x >= a.velocity.x && b.velocity.x > 149.0, "{response:?}: {b:?}");
+            assert!((a.velocity.x + b.velocity.x - 300.0).abs() < 1e-3, "{response:?}");
+        }
+    }
+}
+
+#[test]
+fn what_was_stopped_is_in_the_way_of_others() {
+    for response in RESPONSES {
+        // The first two meet at the origin; the third comes by later, and would not have
+        // met the first on its whole way.
+        let balls = [
+            ([-0.6, 0.0, 0.0], [60.0, 0.0, 0.0]),
+            ([0.6, 0.0, 0.0], [-60.0, 0.0, 0.0]),
+            ([-0.1, 3.0, 0.0], [0.0, -300.0, 0.0]),
+        ];
+        let (mut world, ids) = world(response, &balls);
+        world.integrate(DT).unwrap();
+        let third = world.marbles.get(ids[2]).unwrap();
+        assert!((third.position.y - 0.2).abs() < 1e-4, "{response:?}: {third:?}");
+    }
+}
+
+#[test]
+fn slow_piles_are_left_alone() {
+    let balls = [([-0.1, 0.0, 0.0], [0.05, 1.0, 0.0]), ([0.1, 0.0, 0.0], [-0.05, 1.0, 0.0])];
+    for response in RESPONSES {
+        let (mut world, ids) = world(response, &balls);
+        world.integrate(DT).unwrap();
+        let first = world.marbles.get(ids[0]).unwrap();
+        assert!((first.position.y - DT).abs() < 1e-6, "{response:?}: it slides along, {first:?}");
+    }
+}
+
+proptest! {
+    /// On straight ways up to where they were stopped, no two come closer than they may.
+    #[test]
+    fn nothing_passes_through_anything(
+        places in prop::collection::vec(([-1.0..1.0_f32, -1.0..1.0, -1.0..1.0], [-200.0..200.0_f32, -200.0..200.0, -200.0..200.0]), 2..12)
+    ) {
+        let mut balls: Vec<([f32; 3], [f32; 3])> = Vec::new();
+        let apart = |a: [f32; 3], b: [f32; 3]| (Vec3::from(a) - Vec3::from(b)).magnitude();
+        for ball in places {
+            if balls.iter().all(|other| apart(other.0, ball.0) > 0.21) {
+                balls.push(ball);
+            }
+        }
+        for response in RESPONSES {
+            let (mut world, _) = world(response, &balls);
+            world.integrate(DT).unwrap();
+            let stop = |row: usize| {
+                let (from, velocity) = (Vec3::from(balls[row].0), Vec3::from(balls[row].1));
+                let moved = world.marbles.position()[row].to_vec() - from;
+                moved.magnitude() / (velocity.magnitude() * DT).max(1e-9)
+            };
+            let stops: Vec<_> = (0..balls.len()).map(stop).collect();
+            let at = |row: usize, time: f32| {
+                let (from, velocity) = (Vec3::from(balls[row].0), Vec3::from(balls[row].1));
+                from + velocity * (DT * time.min(stops[row]))
+            };
+            for step in 0_u16..=1000 {
+                let time = f32::from(step) / 1000.0;
+                for a in 0..balls.len() {
+                    for b in 0..a {
+                        let distance = (at(a, time) - at(b, time)).magnitude();
+                        prop_assert!(distance > 0.199, "{response:?}: {distance} m");
+                    }
+                }
+            }
+        }
+    }
+}
