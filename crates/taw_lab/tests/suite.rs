@@ -4,10 +4,6 @@ use taw_lab::suite::{Effort, rows};
 
 /// What is known to be missed, as name and model, with what stops it.
 const MISSED: &[(&str, &str)] = &[
-    // Newton's restitution, friction and two contacts at once can add up to more energy
-    // than there was (Kane and Levinson 1985). The event-driven response goes through
-    // them one by one.
-    ("numbers/extremes", "impulse"),
     // The accelerations that hold a heap are constant over a step, while its balls roll
     // over each other: an error of the third order in the step.
     ("bouncing/666/10ms/gain", "event-driven"),

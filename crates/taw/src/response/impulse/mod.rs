@@ -1,3 +1,4 @@
+mod gain;
 mod solve;
 
 use cgmath::{InnerSpace, Zero};
@@ -5,6 +6,7 @@ use cgmath::{InnerSpace, Zero};
 use crate::contact::Contacts;
 use crate::math::{Point3, Scalar, Vec3, direction_and_length, is_finite, is_finite_point};
 use crate::response::{BallSpin, Columns, Material, Mobility};
+use gain::{Ledger, Rebound};
 use solve::{Islands, solve};
 
 /// How often overlap that is left after the velocities are solved is pushed out.
@@ -46,6 +48,8 @@ pub(crate) struct Scratch<S> {
     before: Vec<Vec3<S>>,
     constraints: Vec<Constraint<S>>,
     islands: Islands<S>,
+    ledgers: Vec<Ledger<S>>,
+    rebounds: Vec<Rebound<S>>,
 }
 
 impl<S: Scalar> Scratch<S> {
@@ -68,6 +72,9 @@ pub(super) struct Constraint<S> {
     surface: Vec3<S>,
     mobility: Mobility<S>,
     friction: S,
+    /// The relative velocity of the two points before, in m/s.
+    begin: Vec3<S>,
+    bounces: bool,
     /// The relative velocity of the two points that is asked for: along the normal at
     /// least this, across it this if friction suffices.
     rebound: S,
@@ -123,6 +130,16 @@ impl<S: Scalar> Constraint<S> {
             First::Marble(a) => (true, a, self.b),
         }
     }
+
+    /// All that it applied, times the mobility along the normal, in m/s.
+    fn impulse(&self) -> Vec3<S> {
+        self.normal * self.pressure + self.grip
+    }
+
+    /// The angular impulse that it applied besides, in kg m²/s.
+    fn twist(&self) -> Vec3<S> {
+        self.resistance.map_or_else(Vec3::zero, |resistance| resistance.twist)
+    }
 }
 
 /// [`Response::Impulse`](super::Response::Impulse): sequential impulses (Catto,
@@ -146,7 +163,7 @@ pub(crate) fn impulse<S: Scalar>(
     stopped: &mut Vec<u32>,
 ) {
     contacts.sort();
-    let Scratch { before, constraints, islands } = scratch;
+    let Scratch { before, constraints, islands, ledgers, rebounds } = scratch;
     constraints.clear();
     before.clear();
     before.extend_from_slice(marbles.velocity);
@@ -200,6 +217,8 @@ pub(crate) fn impulse<S: Scalar>(
             surface,
             mobility,
             friction: material.friction,
+            begin: closing,
+            bounces,
             rebound,
             slide,
             pressure: S::zero(),
@@ -225,12 +244,13 @@ pub(crate) fn impulse<S: Scalar>(
     constraints.extend(wm.chain(mm).filter_map(|(a, b)| prepare(a, b)));
 
     for c in constraints.iter() {
-        marbles.hit_both(c, c.normal * c.pressure + c.grip);
+        marbles.hit_both(c, c.impulse());
         if let Some(resistance) = c.resistance {
             marbles.twist_both(c, resistance.twist);
         }
     }
     solve(marbles, constraints, islands, settings);
+    marbles.gain_nothing(constraints, islands, ledgers, rebounds, settings);
     for (row, before) in before.iter().enumerate() {
         let moved = (marbles.velocity[row] - before) * (follow(row) * settings.dt);
         let position = marbles.position[row] + moved;
@@ -244,12 +264,7 @@ pub(crate) fn impulse<S: Scalar>(
         }
     }
     remember(constraints, warm);
-    for row in constraints.iter().flat_map(|c| [Some(c.b), c.a.marble()]).flatten() {
-        if !is_finite(marbles.velocity[row]) {
-            marbles.velocity[row] = Vec3::zero();
-            stopped.push(row as u32);
-        }
-    }
+    marbles.stop_what_overflowed(constraints, stopped);
 }
 
 /// Keeps what the contacts bore for the next substep.
@@ -259,7 +274,7 @@ fn remember<S: Scalar>(constraints: &[Constraint<S>], warm: &mut Vec<Warm<S>>) {
         key: c.key(),
         pressure: c.pressure,
         grip: c.grip,
-        twist: c.resistance.map_or_else(Vec3::zero, |resistance| resistance.twist),
+        twist: c.twist(),
     }));
     warm.sort_unstable_by_key(|warm| warm.key);
 }
@@ -330,6 +345,16 @@ impl<S: Scalar> Columns<'_, S> {
             give,
             twist: Vec3::zero(),
         })
+    }
+
+    /// Takes the velocity of what became infinite or NaN, and names it.
+    fn stop_what_overflowed(&mut self, constraints: &[Constraint<S>], stopped: &mut Vec<u32>) {
+        for row in constraints.iter().flat_map(|c| [Some(c.b), c.a.marble()]).flatten() {
+            if !is_finite(self.velocity[row]) {
+                self.velocity[row] = Vec3::zero();
+                stopped.push(row as u32);
+            }
+        }
     }
 
     /// Applies an angular impulse to the second of a contact, its opposite to the first.

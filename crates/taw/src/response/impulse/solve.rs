@@ -21,14 +21,24 @@ pub(super) fn solve<S: Scalar>(
     settings: &Settings<S>,
 ) {
     islands.find(constraints, marbles.velocity.len(), settings.bounce_speed);
+    sweep(marbles, constraints, islands, settings);
+}
+
+/// The sweeps alone, in those islands that do not agree yet.
+pub(super) fn sweep<S: Scalar>(
+    marbles: &mut Columns<S>,
+    constraints: &mut [Constraint<S>],
+    islands: &mut Islands<S>,
+    settings: &Settings<S>,
+) {
     for sweep in 0..settings.iterations {
         for c in constraints.iter_mut() {
             if islands.list[c.island].agrees {
                 continue;
             }
-            let before = c.normal * c.pressure + c.grip;
+            let before = c.impulse();
             let change = marbles.solve(c);
-            c.step = c.normal * c.pressure + c.grip - before;
+            c.step = c.impulse() - before;
             let island = &mut islands.list[c.island];
             island.change = island.change.max(change);
             island.squared += island.energy(c, c.step, c.step);
@@ -81,6 +91,25 @@ impl<S: Scalar> Islands<S> {
     /// By how much a velocity still changed in the last sweep, at most, in m/s.
     pub fn residual(&self) -> S {
         self.list.iter().fold(S::zero(), |most, island| most.max(island.residual))
+    }
+
+    /// How many there are.
+    pub fn len(&self) -> usize {
+        self.list.len()
+    }
+
+    /// An impulse (as a speed, times the mobility) on a contact times a velocity there, in
+    /// units of its island.
+    pub fn energy(&self, c: &Constraint<S>, impulse: Vec3<S>, velocity: Vec3<S>) -> S {
+        self.list[c.island].energy(c, impulse, velocity)
+    }
+
+    /// Sets some islands back to where the sweeps begin, and none of the others.
+    pub fn begin_again(&mut self, which: impl Fn(usize) -> bool) {
+        for (number, island) in self.list.iter_mut().enumerate() {
+            island.agrees = !which(number);
+            (island.last, island.searches, island.kept) = (S::zero(), false, S::zero());
+        }
     }
 
     /// Finds who touches whom, over how many others (Tarjan 1975).
