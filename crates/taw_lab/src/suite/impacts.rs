@@ -637,7 +637,7 @@ pub const ROWS: &[Row] = &[
         metric: "error of velocity over the speed, and of the place over the way",
         model: "event-driven",
         target: 1e-4,
-        best: "2.0 and 4.0 Rapier, ccd on or off: through (`peers`)",
+        best: "1.8e-3 Avian; 2.0 and 4.0 Rapier, ccd on or off: through (`peers`)",
         source: "issue 4",
         effort: Effort::Quick,
         measure: |meter| fast(meter, EXACT, Places::Compared),
@@ -648,7 +648,7 @@ pub const ROWS: &[Row] = &[
         metric: "error of velocity over the speed",
         model: "impulse, swept",
         target: 1e-3,
-        best: "2.0 and 4.0 Rapier, ccd on or off: through (`peers`)",
+        best: "1.8e-3 Avian; 2.0 and 4.0 Rapier, ccd on or off: through (`peers`)",
         source: "issue 4",
         effort: Effort::Quick,
         measure: |meter| {
