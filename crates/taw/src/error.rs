@@ -1,3 +1,4 @@
+use crate::frame::NodeId;
 use crate::math::{Point3, Scalar, Vec3};
 use crate::world::{MarbleId, WallId};
 
@@ -49,6 +50,12 @@ pub enum Error {
     /// No wall has this handle: it was removed, or is another world's.
     #[error("no wall has the handle {0:?}")]
     NoSuchWall(WallId),
+    /// No node has this handle: it was removed, or is another tree's.
+    #[error("no node has the handle {0:?}")]
+    NoSuchNode(NodeId),
+    /// A node would carry itself.
+    #[error("the node {0:?} carries its new parent")]
+    CarriesItself(NodeId),
     /// Handles count rows in 32 bits, and all of them are taken.
     #[error("the world holds {0} rows already, which is all that a handle can name")]
     Full(usize),

@@ -35,6 +35,10 @@ pub trait Scalar: BaseFloat + Default + Send + Sync + 'static {
     #[must_use]
     fn sin_cos_portable(self) -> (Self, Self);
 
+    /// The angle of the point (`x`, this) in radians, in [−π, π], likewise.
+    #[must_use]
+    fn atan2_portable(self, x: Self) -> Self;
+
     /// e to the power of this, likewise.
     #[must_use]
     fn exp_portable(self) -> Self;
@@ -49,6 +53,10 @@ impl Scalar for f32 {
         libm::sincosf(self)
     }
 
+    fn atan2_portable(self, x: Self) -> Self {
+        libm::atan2f(self, x)
+    }
+
     fn exp_portable(self) -> Self {
         libm::expf(self)
     }
@@ -61,6 +69,10 @@ impl Scalar for f32 {
 impl Scalar for f64 {
     fn sin_cos_portable(self) -> (Self, Self) {
         libm::sincos(self)
+    }
+
+    fn atan2_portable(self, x: Self) -> Self {
+        libm::atan2(self, x)
     }
 
     fn exp_portable(self) -> Self {

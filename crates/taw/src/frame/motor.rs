@@ -1,4 +1,4 @@
-use cgmath::{InnerSpace, One, Rotation as _, Zero};
+use cgmath::{EuclideanSpace, InnerSpace, One, Rotation as _, Zero};
 
 use crate::frame::Bivector;
 use crate::math::{Point3, Quat, Scalar, Vec3};
@@ -25,6 +25,24 @@ pub struct Twist<S> {
     pub turning: Bivector<S>,
     /// In m/s, along the body's own axes.
     pub velocity: Vec3<S>,
+}
+
+/// A line in space, in both directions at once as Plücker (1865) has it; in projective
+/// geometric algebra, a bivector.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Line<S> {
+    /// Along it.
+    pub direction: Vec3<S>,
+    /// The moment of that about the origin: any point of the line × the direction.
+    pub moment: Vec3<S>,
+}
+
+impl<S: Scalar> Line<S> {
+    /// The line through a point along a direction.
+    #[must_use]
+    pub fn through(point: Point3<S>, direction: Vec3<S>) -> Self {
+        Self { direction, moment: point.to_vec().cross(direction) }
+    }
 }
 
 impl<S: Scalar> Motor<S> {
@@ -71,31 +89,47 @@ impl<S: Scalar> Motor<S> {
         self.real.rotate_point(point) + self.translation()
     }
 
+    /// Where it takes the plane `normal · x = offset`: its normal and offset.
+    #[must_use]
+    pub fn plane(self, normal: Vec3<S>, offset: S) -> (Vec3<S>, S) {
+        let normal = self.real * normal;
+        (normal, offset + normal.dot(self.translation()))
+    }
+
+    /// Where it takes a line.
+    #[must_use]
+    pub fn line(self, line: Line<S>) -> Line<S> {
+        let direction = self.real * line.direction;
+        let moment = self.real * line.moment + self.translation().cross(direction);
+        Line { direction, moment }
+    }
+
+    /// The twist that makes this motion in one second, the short way round: the logarithm,
+    /// of which [`Motor::exp`] is the inverse.
+    #[must_use]
+    pub fn log(self) -> Twist<S> {
+        let Self { real, dual } = if self.real.s < S::zero() {
+            Self { real: -self.real, dual: -self.dual }
+        } else {
+            self
+        };
+        let (half, two) = (S::constant(0.5), S::constant(2.0));
+        let sin = real.v.magnitude();
+        let angle = sin.atan2_portable(real.s);
+        let Screw { sinc, slope, .. } = Screw::of(angle * two, angle, half);
+        let turning = real.v / sinc;
+        let along = -dual.s * two / sinc;
+        let velocity = (dual.v - turning * (along * slope)) / sinc;
+        Twist { turning: turning.into(), velocity }
+    }
+
     /// The screw that a steady twist makes in `seconds`: the exponential. Exact for any
     /// length of time.
     #[must_use]
     pub fn exp(twist: Twist<S>, seconds: S) -> Self {
         let turning = twist.turning.dual();
-        let half = S::constant(0.5);
-        let angle = turning.magnitude() * seconds * half;
-        let (sin, cos) = angle.sin_cos_portable();
-        // sin(angle) / |turning| and its derivative, whose series begin like this.
-        let time = seconds * half;
-        let small = angle.abs() < S::constant(1e-2);
-        let squared = angle * angle;
-        let sinc = if small {
-            time * (S::one()
-                - squared / S::constant(6.0) * (S::one() - squared / S::constant(20.0)))
-        } else {
-            sin / turning.magnitude()
-        };
-        let slope = if small {
-            -time * time * time / S::constant(3.0)
-                * (S::one()
-                    - squared / S::constant(10.0) * (S::one() - squared / S::constant(28.0)))
-        } else {
-            (time * cos - sinc) / turning.magnitude2()
-        };
+        let (rate, time) = (turning.magnitude(), seconds * S::constant(0.5));
+        let Screw { cos, sinc, slope } = Screw::of(rate, rate * time, time);
         let along = turning.dot(twist.velocity);
         Self {
             real: Quat::from_sv(cos, turning * sinc),
@@ -117,10 +151,41 @@ impl<S: Scalar> Motor<S> {
     }
 }
 
+/// What the exponential and the logarithm share.
+struct Screw<S> {
+    /// Of the angle.
+    cos: S,
+    /// sin(angle) / rate.
+    sinc: S,
+    /// The derivative of that, over the rate.
+    slope: S,
+}
+
+impl<S: Scalar> Screw<S> {
+    /// That of an angle, which is the rate times the time.
+    fn of(rate: S, angle: S, time: S) -> Self {
+        let (sin, cos) = angle.sin_cos_portable();
+        let squared = angle * angle;
+        // Where both would be differences of nearly equal numbers, how their series begin.
+        if angle.abs() < S::constant(1e-2) {
+            let one = S::one();
+            let [six, ten, twenty, twenty_eight] = [6.0, 10.0, 20.0, 28.0].map(S::constant);
+            return Self {
+                cos,
+                sinc: time * (one - squared / six * (one - squared / twenty)),
+                slope: -time * time * time / S::constant(3.0)
+                    * (one - squared / ten * (one - squared / twenty_eight)),
+            };
+        }
+        let sinc = sin / rate;
+        Self { cos, sinc, slope: (time * cos - sinc) / (rate * rate) }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
-    use cgmath::{EuclideanSpace, Rotation3};
+    use cgmath::Rotation3;
 
     fn quarter_about_z() -> Quat<f64> {
         Quat::from_axis_angle(Vec3::unit_z(), cgmath::Deg(90.0))
@@ -149,6 +214,20 @@ mod tests {
             assert!((once.real - many.real).magnitude() < 1e-12);
             let Motor { real, dual } = many.normalized();
             assert!(real.dot(dual).abs() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_logarithm_undoes_the_exponential() {
+        for rate in [0.0, 1e-12, 1e-5, 0.01, 0.021, 0.5, 2.0, 3.1] {
+            let turning = Vec3::new(0.48, -0.64, 0.6_f64) * rate;
+            let twist = Twist { turning: turning.into(), velocity: Vec3::new(1.0, 0.5, -2.0) };
+            let motor = Motor::exp(twist, 1.0);
+            for motor in [motor, Motor { real: -motor.real, dual: -motor.dual }] {
+                let Twist { turning, velocity } = motor.log();
+                assert!((turning - twist.turning).dual().magnitude() < 1e-14, "{rate}");
+                assert!((velocity - twist.velocity).magnitude() < 1e-12, "{rate}: {velocity:?}");
+            }
         }
     }
 

@@ -1,0 +1,59 @@
+use cgmath::Zero;
+
+use crate::Error;
+use crate::error::{finite, finite_vector};
+use crate::math::{Quat, Scalar, Vec3, direction_and_length};
+
+/// A rotation by an angle about an axis, by the right hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct AxisAngle<S> {
+    axis: Vec3<S>,
+    angle: S,
+}
+
+impl<S: Scalar> AxisAngle<S> {
+    /// The rotation by `angle` radians about a direction of any length but zero.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`], or [`Error::NotUnit`] if the axis is zero.
+    pub fn new(axis: Vec3<S>, angle: S) -> Result<Self, Error> {
+        finite_vector(["axis.x", "axis.y", "axis.z"], axis)?;
+        finite("angle", angle)?;
+        let Some((axis, _)) = direction_and_length(axis) else {
+            return Err(Error::NotUnit { field: "axis", value: 0.0 });
+        };
+        Ok(Self { axis, angle })
+    }
+
+    /// A unit vector.
+    #[must_use]
+    pub fn axis(self) -> Vec3<S> {
+        self.axis
+    }
+
+    /// In radians.
+    #[must_use]
+    pub fn angle(self) -> S {
+        self.angle
+    }
+}
+
+impl<S: Scalar> From<AxisAngle<S>> for Quat<S> {
+    fn from(AxisAngle { axis, angle }: AxisAngle<S>) -> Self {
+        let (sin, cos) = (angle * S::constant(0.5)).sin_cos_portable();
+        Self::from_sv(cos, axis * sin)
+    }
+}
+
+impl<S: Scalar> From<Quat<S>> for AxisAngle<S> {
+    /// The short way: an angle in [0, π]. No rotation at all is one about x.
+    fn from(rotation: Quat<S>) -> Self {
+        let short = if rotation.s < S::zero() { -rotation } else { rotation };
+        match direction_and_length(short.v) {
+            Some((axis, sin)) => {
+                Self { axis, angle: sin.atan2_portable(short.s) * S::constant(2.0) }
+            }
+            None => Self { axis: Vec3::unit_x(), angle: Zero::zero() },
+        }
+    }
+}
