@@ -1,3 +1,5 @@
+use cgmath::Array;
+
 use crate::frame::NodeId;
 use crate::math::{Point3, Scalar, Vec3};
 use crate::world::{MarbleId, WallId};
@@ -43,6 +45,12 @@ pub enum Error {
         field: &'static str,
         /// The length that was given.
         value: f64,
+    },
+    /// Points lie in a plane, where something solid is needed.
+    #[error("{field} lie in a plane")]
+    Flat {
+        /// The field, as the caller knows it.
+        field: &'static str,
     },
     /// No marble has this handle: it was removed, or is another world's.
     #[error("no marble has the handle {0:?}")]
@@ -102,6 +110,15 @@ pub(crate) fn finite_vector<S: Scalar>(
     finite(field[1], v.y)?;
     finite(field[2], v.z)?;
     Ok(v)
+}
+
+/// Nothing, if all coordinates of a point of two or three dimensions are finite.
+pub(crate) fn coordinates<P>(field: [&'static str; 3], point: P) -> Result<(), Error>
+where
+    P: Array + Copy,
+    P::Element: Scalar,
+{
+    (0..P::len()).zip(field).try_for_each(|(axis, field)| finite(field, point[axis]).map(|_| ()))
 }
 
 /// The point, if all of its coordinates are finite.

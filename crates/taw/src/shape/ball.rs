@@ -1,0 +1,100 @@
+use cgmath::{Array, Point2};
+
+use super::{Aabb, Box3, Nearest, Solid};
+use crate::Error;
+use crate::error::{coordinates, positive};
+use crate::math::{Point3, Scalar, Vec3, direction_and_length};
+
+/// All points within `radius` of `center`, in a space of two or three dimensions.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball<P, S> {
+    /// The middle, in metres.
+    pub center: P,
+    /// In metres, finite and above zero.
+    pub radius: S,
+}
+
+/// A ball in three dimensions.
+pub type Sphere<S> = Ball<Point3<S>, S>;
+
+/// A ball in two dimensions.
+pub type Circle<S> = Ball<Point2<S>, S>;
+
+impl<P, S: Scalar> Ball<P, S>
+where
+    P: Array<Element = S> + Copy,
+{
+    /// A ball, checked.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] for the center, [`Error::NotPositive`] for the radius.
+    pub fn new(center: P, radius: S) -> Result<Self, Error> {
+        coordinates(["center.x", "center.y", "center.z"], center)?;
+        Ok(Self { center, radius: positive("radius", radius)? })
+    }
+
+    /// Whether a point is in it or on its surface.
+    #[must_use]
+    pub fn has(&self, point: P) -> bool {
+        let along = (0..P::len()).map(|axis| point[axis] - self.center[axis]);
+        along.fold(S::zero(), S::hypot) <= self.radius
+    }
+
+    /// The smallest box that it is in.
+    #[must_use]
+    pub fn bounds(&self) -> Aabb<P> {
+        let mut bounds = Aabb { min: self.center, max: self.center };
+        for axis in 0..P::len() {
+            bounds.min[axis] -= self.radius;
+            bounds.max[axis] += self.radius;
+        }
+        bounds
+    }
+}
+
+impl<S: Scalar> Solid<S> for Sphere<S> {
+    fn support(&self, direction: Vec3<S>) -> Point3<S> {
+        let (unit, _) = direction_and_length(direction).unwrap_or((Vec3::unit_x(), S::zero()));
+        self.center + unit * self.radius
+    }
+
+    fn bounding_box(&self) -> Box3<S> {
+        self.bounds()
+    }
+
+    fn volume(&self) -> S {
+        let factor = S::constant(4.0 / 3.0 * std::f64::consts::PI);
+        factor * self.radius * self.radius * self.radius
+    }
+
+    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
+        let apart = direction_and_length(point - self.center);
+        let (normal, length) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
+        let distance = length - self.radius;
+        Nearest { point: self.center + normal * self.radius, normal, distance }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bad_input_is_refused_by_name() {
+        let origin = Point3::new(0.0, 0.0, 0.0);
+        for radius in [0.0, -1.0, f64::INFINITY] {
+            let error = Sphere::new(origin, radius).unwrap_err();
+            assert_eq!(error, Error::NotPositive { field: "radius", value: radius });
+        }
+        let error = Sphere::new(Point3::new(0.0, f64::NEG_INFINITY, 0.0), 1.0).unwrap_err();
+        assert_eq!(error.to_string(), "center.y must be finite, but is -inf");
+        assert!(Circle::new(Point2::new(f32::NAN, 0.0), 1.0).is_err());
+    }
+
+    #[test]
+    fn circles_are_balls_too() {
+        let circle = Circle::new(Point2::new(1.0, 2.0), 0.5).unwrap();
+        assert!(circle.has(Point2::new(1.5, 2.0)) && !circle.has(Point2::new(1.4, 2.4)));
+        assert_eq!(circle.bounds().max, Point2::new(1.5, 2.5));
+    }
+}

@@ -1,0 +1,124 @@
+use super::{Box3, Capsule, Hull, Nearest, Obb, Solid, Sphere};
+use crate::Error;
+use crate::error::within;
+use crate::frame::Pose;
+use crate::math::{Point3, Scalar, Vec3};
+
+/// Several parts that are one thing. Of one kind, `Compound<Obb<f32>>` say, nothing needs
+/// to be matched; of mixed kinds it is a `Compound<Shape<f32>>`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Compound<T> {
+    parts: Vec<T>,
+}
+
+/// Any bounded convex shape, or a compound of such.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Shape<S> {
+    /// All points near one.
+    Sphere(Sphere<S>),
+    /// A box along the axes.
+    Aabb(Box3<S>),
+    /// A box.
+    Obb(Obb<S>),
+    /// All points near a line.
+    Capsule(Capsule<S>),
+    /// What is around some points.
+    Hull(Hull<S>),
+    /// Several of these.
+    Compound(Compound<Shape<S>>),
+}
+
+impl<T> Compound<T> {
+    /// A compound, checked.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for no parts at all.
+    pub fn new(parts: Vec<T>) -> Result<Self, Error> {
+        let count = u32::try_from(parts.len()).unwrap_or(u32::MAX);
+        within("parts.len()", f64::from(count), 1.0, f64::from(u32::MAX - 1))?;
+        Ok(Self { parts })
+    }
+
+    /// What it is made of; never nothing.
+    #[must_use]
+    pub fn parts(&self) -> &[T] {
+        &self.parts
+    }
+}
+
+impl<S: Scalar, T: Solid<S>> Solid<S> for Compound<T> {
+    fn support(&self, direction: Vec3<S>) -> Point3<S> {
+        let along =
+            |point: Point3<S>| cgmath::dot(point - self.parts[0].support(direction), direction);
+        let points = self.parts.iter().map(|part| part.support(direction));
+        let first = self.parts[0].support(direction);
+        points.fold(first, |best, point| if along(point) > along(best) { point } else { best })
+    }
+
+    fn bounding_box(&self) -> Box3<S> {
+        let first = self.parts[0].bounding_box();
+        self.parts.iter().fold(first, |all, part| all.union(&part.bounding_box()))
+    }
+
+    fn volume(&self) -> S {
+        self.parts.iter().fold(S::zero(), |sum, part| sum + part.volume())
+    }
+
+    /// That of the part that the point is deepest in, or nearest to.
+    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
+        let first = self.parts[0].nearest(point);
+        self.parts[1..]
+            .iter()
+            .map(|part| part.nearest(point))
+            .fold(first, |best, next| if next.distance < best.distance { next } else { best })
+    }
+}
+
+impl<S: Scalar> Shape<S> {
+    /// The same shape elsewhere. A box along the axes becomes one that may be turned.
+    #[must_use]
+    pub fn moved(&self, pose: Pose<S>) -> Self {
+        match self {
+            Self::Sphere(sphere) => {
+                Self::Sphere(Sphere { center: pose.point(sphere.center), ..*sphere })
+            }
+            Self::Aabb(aabb) => Self::Obb(aabb.obb().moved(pose)),
+            Self::Obb(obb) => Self::Obb(obb.moved(pose)),
+            Self::Capsule(capsule) => Self::Capsule(capsule.moved(pose)),
+            Self::Hull(hull) => Self::Hull(hull.moved(pose)),
+            Self::Compound(compound) => {
+                let parts = compound.parts.iter().map(|part| part.moved(pose)).collect();
+                Self::Compound(Compound { parts })
+            }
+        }
+    }
+
+    fn solid(&self) -> &dyn Solid<S> {
+        match self {
+            Self::Sphere(sphere) => sphere,
+            Self::Aabb(aabb) => aabb,
+            Self::Obb(obb) => obb,
+            Self::Capsule(capsule) => capsule,
+            Self::Hull(hull) => hull,
+            Self::Compound(compound) => compound,
+        }
+    }
+}
+
+impl<S: Scalar> Solid<S> for Shape<S> {
+    fn support(&self, direction: Vec3<S>) -> Point3<S> {
+        self.solid().support(direction)
+    }
+
+    fn bounding_box(&self) -> Box3<S> {
+        self.solid().bounding_box()
+    }
+
+    fn volume(&self) -> S {
+        self.solid().volume()
+    }
+
+    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
+        self.solid().nearest(point)
+    }
+}

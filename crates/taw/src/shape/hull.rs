@@ -1,0 +1,297 @@
+use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
+
+use super::polygon::{closest_of_polygon, normal_of_polygon};
+use super::wrap::wrap;
+use super::{Aabb, Box3, Nearest, Solid};
+use crate::Error;
+use crate::error::{finite_point, within};
+use crate::frame::Pose;
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
+use cgmath::{EuclideanSpace, InnerSpace};
+
+/// The smallest convex shape around some points. Copies that are elsewhere share them.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Hull<S> {
+    pose: Pose<S>,
+    polyhedron: Arc<Polyhedron<S>>,
+}
+
+/// Corners, edges and faces, about the middle of the corners.
+#[derive(Debug, PartialEq)]
+struct Polyhedron<S> {
+    points: Vec<Point3<S>>,
+    edges: Vec<[u32; 2]>,
+    faces: Vec<Face<S>>,
+}
+
+/// A flat side of a hull.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Face<S> {
+    /// Out of the hull, a unit vector in the hull's own frame.
+    pub normal: Vec3<S>,
+    /// Which of the hull's points are its corners, counterclockwise as seen from outside.
+    pub corners: Vec<u32>,
+}
+
+/// Into how many parts the size of the points is cut, to find who is a corner with
+/// integers, exactly.
+const PARTS: f64 = (1_u64 << 38) as f64;
+/// Triangles lie in one face if their corners are within this part of the size of it.
+const FLAT: f64 = 1e-7;
+
+impl<S: Scalar> Hull<S> {
+    /// The hull of these points. Those inside are left out.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for fewer than four points, [`Error::NotFinite`] for a
+    /// coordinate, [`Error::Flat`] if they lie in a plane, but for 1e-7 of their size.
+    pub fn new(points: &[Point3<S>]) -> Result<Self, Error> {
+        let count = f64::from(u32::try_from(points.len()).unwrap_or(u32::MAX));
+        within("points.len()", count, 4.0, f64::from(u32::MAX - 1))?;
+        for point in points {
+            finite_point(["points.x", "points.y", "points.z"], *point)?;
+        }
+        let exact = points.iter().map(|p| cast_point::<S, f64>(*p));
+        let first = cast_point::<S, f64>(points[0]);
+        let bounds = exact.fold(Aabb { min: first, max: first }, |all, point| {
+            all.union(&Aabb { min: point, max: point })
+        });
+        let (center, size) = (bounds.center(), bounds.max - bounds.min);
+        let size = size.x.max(size.y).max(size.z);
+        let flat = Error::Flat { field: "points" };
+        if size.is_nan() || size <= 0.0 {
+            return Err(flat);
+        }
+        let (corners, triangles) = corners_and_triangles(points, center, size).ok_or(flat)?;
+        let local = |row: &usize| cast_vector(cast_point::<S, f64>(points[*row]) - center);
+        let points: Vec<_> = corners.iter().map(|row| Point3::from_vec(local(row))).collect();
+        let mut faces = merge(&points, &triangles, FLAT * size);
+        let points = drop_what_is_no_corner(&points, &mut faces);
+        let polyhedron = Polyhedron { edges: edges_of(&faces), points, faces };
+        let solid = polyhedron.faces.len() >= 4
+            && polyhedron.faces.iter().all(|face| face.corners.len() >= 3);
+        if !solid {
+            return Err(flat);
+        }
+        let thinnest = polyhedron.faces.iter().map(|face| polyhedron.depth_behind(face));
+        if thinnest.fold(f64::INFINITY, f64::min) <= FLAT * size {
+            return Err(flat);
+        }
+        let translation = cast_point::<f64, S>(center).to_vec();
+        let pose = Pose { translation, ..Pose::identity() };
+        Ok(Self { pose, polyhedron: Arc::new(polyhedron) })
+    }
+
+    /// The same hull elsewhere.
+    #[must_use]
+    pub fn moved(&self, pose: Pose<S>) -> Self {
+        Self { pose: pose * self.pose, polyhedron: Arc::clone(&self.polyhedron) }
+    }
+
+    /// Where its own frame is.
+    #[must_use]
+    pub fn pose(&self) -> Pose<S> {
+        self.pose
+    }
+
+    /// Its corners, where they are now.
+    pub fn points(&self) -> impl ExactSizeIterator<Item = Point3<S>> + '_ {
+        self.polyhedron.points.iter().map(|point| self.pose.point(*point))
+    }
+
+    /// Its edges, as pairs of corners.
+    #[must_use]
+    pub fn edges(&self) -> &[[u32; 2]] {
+        &self.polyhedron.edges
+    }
+
+    /// Its faces.
+    #[must_use]
+    pub fn faces(&self) -> &[Face<S>] {
+        &self.polyhedron.faces
+    }
+
+    fn local(&self, corner: u32) -> Point3<S> {
+        self.polyhedron.points[corner as usize]
+    }
+}
+
+impl<S: Scalar> Polyhedron<S> {
+    /// How far behind a face the farthest corner is.
+    fn depth_behind(&self, face: &Face<S>) -> f64 {
+        let on = self.points[face.corners[0] as usize];
+        let depth = |point: &Point3<S>| (on - *point).dot(face.normal).as_f64();
+        self.points.iter().map(depth).fold(0.0, f64::max)
+    }
+}
+
+impl<S: Scalar> Solid<S> for Hull<S> {
+    fn support(&self, direction: Vec3<S>) -> Point3<S> {
+        let local = self.pose.vector_back(direction);
+        let points = &self.polyhedron.points;
+        let along = |point: &Point3<S>| point.to_vec().dot(local);
+        let first = (S::neg_infinity(), Point3::from_vec(self.pose.translation));
+        let farther = |best: (S, Point3<S>), point: &Point3<S>| {
+            if along(point) > best.0 { (along(point), *point) } else { best }
+        };
+        self.pose.point(points.iter().fold(first, farther).1)
+    }
+
+    fn bounding_box(&self) -> Box3<S> {
+        let first = self.pose.point(self.local(0));
+        self.points().fold(Aabb { min: first, max: first }, |all, point| {
+            all.union(&Aabb { min: point, max: point })
+        })
+    }
+
+    fn volume(&self) -> S {
+        // Tetrahedra from the middle to the triangles of each face.
+        let mut six = S::zero();
+        for face in self.faces() {
+            let first = self.local(face.corners[0]).to_vec();
+            for pair in face.corners[1..].windows(2) {
+                let [a, b] = [pair[0], pair[1]].map(|corner| self.local(corner).to_vec());
+                six += first.dot(a.cross(b));
+            }
+        }
+        six / S::constant(6.0)
+    }
+
+    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
+        let local = self.pose.point_back(point);
+        let height = |face: &Face<S>| (local - self.local(face.corners[0])).dot(face.normal);
+        let mut best: Option<(S, &Face<S>)> = None;
+        for face in self.faces() {
+            if best.is_none_or(|(highest, _)| height(face) > highest) {
+                best = Some((height(face), face));
+            }
+        }
+        let Some((highest, face)) = best else {
+            return Nearest { point, normal: Vec3::unit_x(), distance: S::zero() };
+        };
+        // Just outside, by no more than rounding can tell, counts as on the face.
+        let largest = self.polyhedron.points.iter().flat_map(|p| [p.x.abs(), p.y.abs(), p.z.abs()]);
+        let largest = largest.fold(S::zero(), S::max);
+        if highest <= largest * S::epsilon() * S::constant(64.0) {
+            let surface = local - face.normal * highest;
+            let normal = self.pose.vector(face.normal);
+            return Nearest { point: self.pose.point(surface), normal, distance: highest };
+        }
+        // Outside: of the nearest points of all faces that it is in front of, the nearest.
+        let mut nearest = (S::infinity(), face.normal, local);
+        let mut corners = Vec::new();
+        for face in self.faces().iter().filter(|face| height(face) > S::zero()) {
+            corners.clear();
+            corners.extend(face.corners.iter().map(|corner| self.local(*corner)));
+            let there = closest_of_polygon(&corners, face.normal, local);
+            let out = direction_and_length(local - there);
+            let (normal, distance) = out.unwrap_or((face.normal, S::zero()));
+            if distance < nearest.0 {
+                nearest = (distance, normal, there);
+            }
+        }
+        let (distance, normal, surface) = nearest;
+        Nearest { point: self.pose.point(surface), normal: self.pose.vector(normal), distance }
+    }
+}
+
+/// Which points are corners, and the triangles between them, as numbers of corners; none
+/// if the points lie in a plane.
+fn corners_and_triangles<S: Scalar>(
+    points: &[Point3<S>],
+    center: Point3<f64>,
+    size: f64,
+) -> Option<(Vec<usize>, Vec<[u32; 3]>)> {
+    let mut rows = Vec::new();
+    let mut lattice = Vec::new();
+    let mut seen = BTreeSet::new();
+    for (row, point) in points.iter().enumerate() {
+        let apart = (cast_point::<S, f64>(*point) - center) / size * PARTS;
+        let at = apart.map(|x| x.round() as i128);
+        if seen.insert([at.x, at.y, at.z]) {
+            rows.push(row);
+            lattice.push(at);
+        }
+    }
+    let mut triangles = wrap(&lattice)?;
+    let mut corners: Vec<_> = triangles.iter().flatten().copied().collect();
+    corners.sort_unstable();
+    corners.dedup();
+    for corner in triangles.iter_mut().flatten() {
+        *corner = corners.binary_search(corner).map_or(0, |name| name as u32);
+    }
+    Some((corners.into_iter().map(|corner| rows[corner as usize]).collect(), triangles))
+}
+
+/// Puts triangles that lie in one plane together.
+fn merge<S: Scalar>(points: &[Point3<S>], triangles: &[[u32; 3]], flat: f64) -> Vec<Face<S>> {
+    let at = |corner: u32| points[corner as usize];
+    let mut faces = Vec::new();
+    let mut left: Vec<[u32; 3]> = triangles.to_vec();
+    // From the largest, whose plane is known best.
+    let area = |[a, b, c]: &[u32; 3]| (at(*b) - at(*a)).cross(at(*c) - at(*a)).magnitude();
+    left.sort_by(|s, t| area(t).partial_cmp(&area(s)).unwrap_or(std::cmp::Ordering::Equal));
+    while let Some(first) = left.first().copied() {
+        let triangle: Vec<_> = first.iter().map(|corner| at(*corner)).collect();
+        let normal = normal_of_polygon(&triangle);
+        let lies = |corner: &u32| (at(*corner) - at(first[0])).dot(normal).as_f64().abs() <= flat;
+        let (within, others): (Vec<_>, Vec<_>) =
+            left.into_iter().partition(|t| *t == first || t.iter().all(lies));
+        left = others;
+        faces.push(Face { normal, corners: outline(&within) });
+    }
+    faces
+}
+
+/// Keeps those points where at least three faces meet, and renames them in the faces.
+/// Others lie on an edge.
+fn drop_what_is_no_corner<S: Scalar>(
+    points: &[Point3<S>],
+    faces: &mut [Face<S>],
+) -> Vec<Point3<S>> {
+    let mut meet = vec![0_u32; points.len()];
+    faces.iter().flat_map(|face| &face.corners).for_each(|corner| meet[*corner as usize] += 1);
+    let mut kept = Vec::new();
+    let mut name = vec![0_u32; points.len()];
+    for (point, (name, meet)) in points.iter().zip(name.iter_mut().zip(&meet)) {
+        if *meet >= 3 {
+            *name = kept.len() as u32;
+            kept.push(*point);
+        }
+    }
+    for face in faces {
+        face.corners.retain(|corner| meet[*corner as usize] >= 3);
+        face.corners.iter_mut().for_each(|corner| *corner = name[*corner as usize]);
+    }
+    kept
+}
+
+/// The corners around triangles that lie in one plane, in order: along those sides that
+/// only one of them has.
+fn outline(triangles: &[[u32; 3]]) -> Vec<u32> {
+    let sides = triangles.iter().flat_map(|[a, b, c]| [(*a, *b), (*b, *c), (*c, *a)]);
+    let sides: BTreeSet<_> = sides.collect();
+    let outer = sides.iter().filter(|(a, b)| !sides.contains(&(*b, *a)));
+    let mut next: BTreeMap<u32, u32> = outer.copied().collect();
+    let mut corners = Vec::new();
+    if let Some((first, _)) = next.first_key_value() {
+        let mut corner = *first;
+        while let Some(then) = next.remove(&corner) {
+            corners.push(corner);
+            corner = then;
+        }
+    }
+    corners
+}
+
+fn edges_of<S>(faces: &[Face<S>]) -> Vec<[u32; 2]> {
+    let sides = faces.iter().flat_map(|Face { corners, .. }| {
+        let ends = corners.iter().skip(1).chain(corners.first());
+        corners.iter().zip(ends).map(|(a, b)| [*a.min(b), *a.max(b)])
+    });
+    let mut edges: Vec<_> = sides.collect();
+    edges.sort_unstable();
+    edges.dedup();
+    edges
+}

@@ -1,0 +1,63 @@
+//! Flat convex polygons: what faces of hulls are.
+
+use cgmath::{EuclideanSpace, InnerSpace};
+
+use crate::math::{Point3, Scalar, Vec3, direction_and_length};
+
+/// The unit normal of a polygon, counterclockwise about it (Newell; Sutherland, Sproull and
+/// Schumacker 1974): right for any number of corners, however many lie on a line.
+pub(crate) fn normal_of_polygon<S: Scalar>(corners: &[Point3<S>]) -> Vec3<S> {
+    let first = corners.first().copied().unwrap_or_else(Point3::origin);
+    let ends = corners.iter().skip(1).chain(corners.first());
+    let twice =
+        corners.iter().zip(ends).fold(Vec3::new(S::zero(), S::zero(), S::zero()), |n, (a, b)| {
+            n + (*a - first).cross(*b - first)
+        });
+    direction_and_length(twice).map_or_else(Vec3::unit_x, |(normal, _)| normal)
+}
+
+/// The point of a polygon that is nearest to another one.
+pub(crate) fn closest_of_polygon<S: Scalar>(
+    corners: &[Point3<S>],
+    normal: Vec3<S>,
+    point: Point3<S>,
+) -> Point3<S> {
+    let ends = || corners.iter().skip(1).chain(corners.first());
+    let outside =
+        |(a, b): (&Point3<S>, &Point3<S>)| (*b - *a).cross(normal).dot(point - *a) > S::zero();
+    if let Some(first) = corners.first()
+        && !corners.iter().zip(ends()).any(outside)
+    {
+        return point - normal * (point - *first).dot(normal);
+    }
+    let mut best = (S::infinity(), point);
+    for (a, b) in corners.iter().zip(ends()) {
+        let there = closest_of_segment(*a, *b, point);
+        let squared = (there - point).magnitude2();
+        if squared < best.0 {
+            best = (squared, there);
+        }
+    }
+    best.1
+}
+
+/// The point between two others that is nearest to a third one.
+pub(crate) fn closest_of_segment<S: Scalar>(
+    a: Point3<S>,
+    b: Point3<S>,
+    point: Point3<S>,
+) -> Point3<S> {
+    let along = b - a;
+    let squared = along.magnitude2();
+    if squared <= S::zero() {
+        return a;
+    }
+    let part = (point - a).dot(along) / squared;
+    if part <= S::zero() {
+        a
+    } else if part >= S::one() {
+        b
+    } else {
+        a + along * part
+    }
+}
