@@ -143,7 +143,7 @@ fn hulls_of_nothing_solid_are_refused() {
     };
     let few = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
     assert_eq!(refused(&few), "points.len() must be in [4, 4294967294], but is 3");
-    let flat = [few[0], few[1], few[2], [1.0, 1.0, 0.0], [0.3, 0.2, 1e-9]];
+    let flat = [few[0], few[1], few[2], [1.0, 1.0, 0.0], [0.3, 0.2, 1e-12]];
     assert_eq!(refused(&flat), "points lie in a plane");
     assert_eq!(refused(&[few[1]; 7]), "points lie in a plane");
     assert_eq!(

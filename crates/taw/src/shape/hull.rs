@@ -7,29 +7,30 @@ use super::{Aabb, Box3, Nearest, Solid};
 use crate::Error;
 use crate::error::{finite_point, within};
 use crate::frame::Pose;
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
 use cgmath::{EuclideanSpace, InnerSpace};
 
 /// The smallest convex shape around some points. Copies that are elsewhere share them.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hull<S> {
     pose: Pose<S>,
-    polyhedron: Arc<Polyhedron<S>>,
+    polyhedron: Arc<Polyhedron>,
 }
 
-/// Corners, edges and faces, about the middle of the corners.
+/// Corners, edges and faces, about the middle of the corners; in `f64`, whatever the
+/// scalar, since a hull is asked many things and rounded once.
 #[derive(Debug, PartialEq)]
-struct Polyhedron<S> {
-    points: Vec<Point3<S>>,
+struct Polyhedron {
+    points: Vec<Point3<f64>>,
     edges: Vec<[u32; 2]>,
-    faces: Vec<Face<S>>,
+    faces: Vec<Face>,
 }
 
 /// A flat side of a hull.
 #[derive(Clone, Debug, PartialEq)]
-pub struct Face<S> {
+pub struct Face {
     /// Out of the hull, a unit vector in the hull's own frame.
-    pub normal: Vec3<S>,
+    pub normal: Vec3<f64>,
     /// Which of the hull's points are its corners, counterclockwise as seen from outside.
     pub corners: Vec<u32>,
 }
@@ -37,15 +38,17 @@ pub struct Face<S> {
 /// Into how many parts the size of the points is cut, to find who is a corner with
 /// integers, exactly.
 const PARTS: f64 = (1_u64 << 38) as f64;
-/// Triangles lie in one face if their corners are within this part of the size of it.
-const FLAT: f64 = 1e-7;
+/// Triangles lie in one face if their corners are within this part of the size of it, or
+/// within twice the scalar's epsilon, by which the points themselves are rounded.
+const FLAT: f64 = 1e-11;
 
 impl<S: Scalar> Hull<S> {
     /// The hull of these points. Those inside are left out.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for fewer than four points, [`Error::NotFinite`] for a
-    /// coordinate, [`Error::Flat`] if they lie in a plane, but for 1e-7 of their size.
+    /// coordinate, [`Error::Flat`] if they lie in a plane, but for
+    /// 1e-11 of their size or two epsilons.
     pub fn new(points: &[Point3<S>]) -> Result<Self, Error> {
         let count = f64::from(u32::try_from(points.len()).unwrap_or(u32::MAX));
         within("points.len()", count, 4.0, f64::from(u32::MAX - 1))?;
@@ -64,9 +67,12 @@ impl<S: Scalar> Hull<S> {
             return Err(flat);
         }
         let (corners, triangles) = corners_and_triangles(points, center, size).ok_or(flat)?;
-        let local = |row: &usize| cast_vector(cast_point::<S, f64>(points[*row]) - center);
-        let points: Vec<_> = corners.iter().map(|row| Point3::from_vec(local(row))).collect();
-        let mut faces = merge(&points, &triangles, FLAT * size);
+        // About the middle as the scalar has it.
+        let middle = cast_point::<S, f64>(cast_point(center)).to_vec();
+        let local = |row: &usize| cast_point::<S, f64>(points[*row]) - middle;
+        let points: Vec<_> = corners.iter().map(local).collect();
+        let thin = size * FLAT.max(2.0 * S::epsilon().as_f64());
+        let mut faces = merge(&points, &triangles, thin);
         let points = drop_what_is_no_corner(&points, &mut faces);
         let polyhedron = Polyhedron { edges: edges_of(&faces), points, faces };
         let solid = polyhedron.faces.len() >= 4
@@ -75,7 +81,7 @@ impl<S: Scalar> Hull<S> {
             return Err(flat);
         }
         let thinnest = polyhedron.faces.iter().map(|face| polyhedron.depth_behind(face));
-        if thinnest.fold(f64::INFINITY, f64::min) <= FLAT * size {
+        if thinnest.fold(f64::INFINITY, f64::min) <= thin {
             return Err(flat);
         }
         let translation = cast_point::<f64, S>(center).to_vec();
@@ -97,7 +103,8 @@ impl<S: Scalar> Hull<S> {
 
     /// Its corners, where they are now.
     pub fn points(&self) -> impl ExactSizeIterator<Item = Point3<S>> + '_ {
-        self.polyhedron.points.iter().map(|point| self.pose.point(*point))
+        let pose = self.exact_pose();
+        self.polyhedron.points.iter().map(move |point| cast_point(pose.point(*point)))
     }
 
     /// Its edges, as pairs of corners.
@@ -108,46 +115,57 @@ impl<S: Scalar> Hull<S> {
 
     /// Its faces.
     #[must_use]
-    pub fn faces(&self) -> &[Face<S>] {
+    pub fn faces(&self) -> &[Face] {
         &self.polyhedron.faces
     }
 
-    fn local(&self, corner: u32) -> Point3<S> {
+    /// Its corners in its own frame, in metres.
+    #[must_use]
+    pub fn local_points(&self) -> &[Point3<f64>] {
+        &self.polyhedron.points
+    }
+
+    /// Where its own frame is, with the rotation made as long as it should be.
+    pub(crate) fn exact_pose(&self) -> Pose<f64> {
+        let Pose { rotation, translation } = self.pose;
+        let rotation = Quat::from_sv(rotation.s.as_f64(), cast_vector(rotation.v)).normalize();
+        Pose { rotation, translation: cast_vector(translation) }
+    }
+
+    fn local(&self, corner: u32) -> Point3<f64> {
         self.polyhedron.points[corner as usize]
     }
 }
 
-impl<S: Scalar> Polyhedron<S> {
+impl Polyhedron {
     /// How far behind a face the farthest corner is.
-    fn depth_behind(&self, face: &Face<S>) -> f64 {
+    fn depth_behind(&self, face: &Face) -> f64 {
         let on = self.points[face.corners[0] as usize];
-        let depth = |point: &Point3<S>| (on - *point).dot(face.normal).as_f64();
+        let depth = |point: &Point3<f64>| (on - *point).dot(face.normal);
         self.points.iter().map(depth).fold(0.0, f64::max)
     }
 }
 
 impl<S: Scalar> Solid<S> for Hull<S> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
-        let local = self.pose.vector_back(direction);
+        let pose = self.exact_pose();
+        let local = pose.vector_back(cast_vector(direction));
         let points = &self.polyhedron.points;
-        let along = |point: &Point3<S>| point.to_vec().dot(local);
-        let first = (S::neg_infinity(), Point3::from_vec(self.pose.translation));
-        let farther = |best: (S, Point3<S>), point: &Point3<S>| {
-            if along(point) > best.0 { (along(point), *point) } else { best }
+        let farther = |best: Point3<f64>, point: &Point3<f64>| {
+            if (*point - best).dot(local) > 0.0 { *point } else { best }
         };
-        self.pose.point(points.iter().fold(first, farther).1)
+        cast_point(pose.point(points.iter().fold(self.local(0), farther)))
     }
 
     fn bounding_box(&self) -> Box3<S> {
-        let first = self.pose.point(self.local(0));
-        self.points().fold(Aabb { min: first, max: first }, |all, point| {
-            all.union(&Aabb { min: point, max: point })
-        })
+        let corner = |point: Point3<S>| Aabb { min: point, max: point };
+        let first = corner(cast_point(self.exact_pose().point(self.local(0))));
+        self.points().fold(first, |all, point| all.union(&corner(point)))
     }
 
     fn volume(&self) -> S {
         // Tetrahedra from the middle to the triangles of each face.
-        let mut six = S::zero();
+        let mut six = 0.0;
         for face in self.faces() {
             let first = self.local(face.corners[0]).to_vec();
             for pair in face.corners[1..].windows(2) {
@@ -155,44 +173,43 @@ impl<S: Scalar> Solid<S> for Hull<S> {
                 six += first.dot(a.cross(b));
             }
         }
-        six / S::constant(6.0)
+        S::constant(six / 6.0)
     }
 
     fn nearest(&self, point: Point3<S>) -> Nearest<S> {
-        let local = self.pose.point_back(point);
-        let height = |face: &Face<S>| (local - self.local(face.corners[0])).dot(face.normal);
-        let mut best: Option<(S, &Face<S>)> = None;
-        for face in self.faces() {
-            if best.is_none_or(|(highest, _)| height(face) > highest) {
-                best = Some((height(face), face));
-            }
-        }
-        let Some((highest, face)) = best else {
-            return Nearest { point, normal: Vec3::unit_x(), distance: S::zero() };
+        let pose = self.exact_pose();
+        let local = pose.point_back(cast_point(point));
+        let height = |face: &Face| (local - self.local(face.corners[0])).dot(face.normal);
+        let answer = |surface: Point3<f64>, normal: Vec3<f64>, distance: f64| Nearest {
+            point: cast_point(pose.point(surface)),
+            normal: cast_vector(pose.vector(normal)),
+            distance: S::constant(distance),
         };
+        let first = &self.faces()[0];
+        let (highest, face) = self.faces().iter().fold((height(first), first), |best, face| {
+            if height(face) > best.0 { (height(face), face) } else { best }
+        });
         // Just outside, by no more than rounding can tell, counts as on the face.
-        let largest = self.polyhedron.points.iter().flat_map(|p| [p.x.abs(), p.y.abs(), p.z.abs()]);
-        let largest = largest.fold(S::zero(), S::max);
-        if highest <= largest * S::epsilon() * S::constant(64.0) {
-            let surface = local - face.normal * highest;
-            let normal = self.pose.vector(face.normal);
-            return Nearest { point: self.pose.point(surface), normal, distance: highest };
+        let corners = self.polyhedron.points.iter().flat_map(|p| [p.x.abs(), p.y.abs(), p.z.abs()]);
+        let largest = corners.fold(0.0, f64::max);
+        if highest <= largest * f64::EPSILON * 64.0 {
+            return answer(local - face.normal * highest, face.normal, highest);
         }
         // Outside: of the nearest points of all faces that it is in front of, the nearest.
-        let mut nearest = (S::infinity(), face.normal, local);
+        let mut nearest = (f64::INFINITY, face.normal, local);
         let mut corners = Vec::new();
-        for face in self.faces().iter().filter(|face| height(face) > S::zero()) {
+        for face in self.faces().iter().filter(|face| height(face) > 0.0) {
             corners.clear();
             corners.extend(face.corners.iter().map(|corner| self.local(*corner)));
             let there = closest_of_polygon(&corners, face.normal, local);
             let out = direction_and_length(local - there);
-            let (normal, distance) = out.unwrap_or((face.normal, S::zero()));
+            let (normal, distance) = out.unwrap_or((face.normal, 0.0));
             if distance < nearest.0 {
                 nearest = (distance, normal, there);
             }
         }
         let (distance, normal, surface) = nearest;
-        Nearest { point: self.pose.point(surface), normal: self.pose.vector(normal), distance }
+        answer(surface, normal, distance)
     }
 }
 
@@ -225,7 +242,7 @@ fn corners_and_triangles<S: Scalar>(
 }
 
 /// Puts triangles that lie in one plane together.
-fn merge<S: Scalar>(points: &[Point3<S>], triangles: &[[u32; 3]], flat: f64) -> Vec<Face<S>> {
+fn merge(points: &[Point3<f64>], triangles: &[[u32; 3]], flat: f64) -> Vec<Face> {
     let at = |corner: u32| points[corner as usize];
     let mut faces = Vec::new();
     let mut left: Vec<[u32; 3]> = triangles.to_vec();
@@ -235,7 +252,7 @@ fn merge<S: Scalar>(points: &[Point3<S>], triangles: &[[u32; 3]], flat: f64) -> 
     while let Some(first) = left.first().copied() {
         let triangle: Vec<_> = first.iter().map(|corner| at(*corner)).collect();
         let normal = normal_of_polygon(&triangle);
-        let lies = |corner: &u32| (at(*corner) - at(first[0])).dot(normal).as_f64().abs() <= flat;
+        let lies = |corner: &u32| (at(*corner) - at(first[0])).dot(normal).abs() <= flat;
         let (within, others): (Vec<_>, Vec<_>) =
             left.into_iter().partition(|t| *t == first || t.iter().all(lies));
         left = others;
@@ -246,10 +263,7 @@ fn merge<S: Scalar>(points: &[Point3<S>], triangles: &[[u32; 3]], flat: f64) -> 
 
 /// Keeps those points where at least three faces meet, and renames them in the faces.
 /// Others lie on an edge.
-fn drop_what_is_no_corner<S: Scalar>(
-    points: &[Point3<S>],
-    faces: &mut [Face<S>],
-) -> Vec<Point3<S>> {
+fn drop_what_is_no_corner(points: &[Point3<f64>], faces: &mut [Face]) -> Vec<Point3<f64>> {
     let mut meet = vec![0_u32; points.len()];
     faces.iter().flat_map(|face| &face.corners).for_each(|corner| meet[*corner as usize] += 1);
     let mut kept = Vec::new();
@@ -285,7 +299,7 @@ fn outline(triangles: &[[u32; 3]]) -> Vec<u32> {
     corners
 }
 
-fn edges_of<S>(faces: &[Face<S>]) -> Vec<[u32; 2]> {
+fn edges_of(faces: &[Face]) -> Vec<[u32; 2]> {
     let sides = faces.iter().flat_map(|Face { corners, .. }| {
         let ends = corners.iter().skip(1).chain(corners.first());
         corners.iter().zip(ends).map(|(a, b)| [*a.min(b), *a.max(b)])

@@ -15,6 +15,7 @@ mod wrap;
 pub use aabb::{Aabb, Box3, Rectangle};
 pub use ball::{Ball, Circle, Sphere};
 pub use capsule::Capsule;
+pub(crate) use capsule::across;
 pub use compound::{Compound, Shape};
 pub use hull::{Face, Hull};
 pub use obb::Obb;

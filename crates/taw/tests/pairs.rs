@@ -1,0 +1,258 @@
+//! Every pair of convex shapes: distance, way out, manifold.
+
+use cgmath::MetricSpace;
+use proptest::prelude::*;
+use taw::contact::{Closest, Convex, Manifold, closest, closest_plane, manifold};
+use taw::frame::{AxisAngle, Pose};
+use taw::math::cast_point;
+use taw::prelude::*;
+use taw::shape::{Aabb, Capsule, Hull, Obb, Solid};
+
+/// One of each kind, of about this size, about here; its size beside it.
+#[derive(Clone, Debug)]
+enum Thing<S> {
+    Sphere(Sphere<S>),
+    Aabb(Aabb<Point3<S>>),
+    Obb(Obb<S>),
+    Capsule(Capsule<S>),
+    Hull(Hull<S>),
+}
+
+macro_rules! each {
+    ($thing:expr, $name:ident => $value:expr) => {
+        match $thing {
+            Thing::Sphere($name) => $value,
+            Thing::Aabb($name) => $value,
+            Thing::Obb($name) => $value,
+            Thing::Capsule($name) => $value,
+            Thing::Hull($name) => $value,
+        }
+    };
+}
+
+fn near<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> Closest<S> {
+    each!(a, a => each!(b, b => closest(a, b)))
+}
+
+fn touch<S: Scalar>(a: &Thing<S>, b: &Thing<S>, margin: S) -> Manifold<S> {
+    each!(a, a => each!(b, b => manifold(a, b, margin)))
+}
+
+fn support<S: Scalar>(thing: &Thing<S>, direction: Vec3<f64>) -> Point3<f64> {
+    cast_point(each!(thing, it => it.support(direction.map(S::constant))))
+}
+
+fn surface<S: Scalar>(thing: &Thing<S>, point: Point3<S>) -> f64 {
+    each!(thing, it => it.nearest(point)).distance.as_f64()
+}
+
+fn radius<S: Scalar>(thing: &Thing<S>) -> f64 {
+    each!(thing, it => it.skeleton(Point3::origin())).radius
+}
+
+/// The largest angle between edges that are parallel but for 1e-7 rad.
+fn nearly_parallel<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> f64 {
+    let [first, second] =
+        [a, b].map(|thing| each!(thing, it => it.skeleton(Point3::origin())).directions);
+    let pairs = first.iter().flat_map(|d| second.iter().map(move |e| d.cross(*e).magnitude()));
+    pairs.filter(|sin| *sin < 1e-7).fold(0.0, f64::max)
+}
+
+fn middle<S: Scalar>(thing: &Thing<S>) -> Point3<S> {
+    each!(thing, it => it.middle())
+}
+
+type Numbers = ([f64; 3], [f64; 3], f64, Vec<[f64; 3]>);
+
+/// The five kinds, from the same numbers, at a scale and an offset.
+fn things<S: Scalar>(
+    (at, axis, angle, points): &Numbers,
+    scale: f64,
+    offset: f64,
+) -> Vec<Thing<S>> {
+    let point = |p: [f64; 3]| {
+        Point3::from([0, 1, 2].map(|i| S::constant((p[i] + at[i]) * scale + offset * scale)))
+    };
+    let size = |x: f64| S::constant(x.abs() * scale + 0.01 * scale);
+    let turn = AxisAngle::new(Vec3::from(*axis), *angle).unwrap();
+    let AxisAngleIn { axis, angle } = AxisAngleIn::of(turn);
+    let rotation = AxisAngle::new(axis.map(S::constant), S::constant(angle)).unwrap().into();
+    let half_widths = Vec3::from([0, 1, 2].map(|i| size(points[0][i])));
+    let obb = Obb::new(point([0.0; 3]), rotation, half_widths).unwrap();
+    let corners: Vec<_> = points.iter().map(|p| point(*p)).collect();
+    let mut all = vec![
+        Thing::Sphere(Sphere::new(point([0.0; 3]), size(points[0][0])).unwrap()),
+        Thing::Aabb(obb.bounding_box()),
+        Thing::Obb(obb),
+        Thing::Capsule(Capsule::new(point(points[1]), point(points[2]), size(0.3)).unwrap()),
+    ];
+    all.extend(Hull::new(&corners).ok().map(Thing::Hull));
+    all
+}
+
+struct AxisAngleIn {
+    axis: Vec3<f64>,
+    angle: f64,
+}
+
+impl AxisAngleIn {
+    fn of(turn: AxisAngle<f64>) -> Self {
+        Self { axis: turn.axis(), angle: turn.angle() }
+    }
+}
+
+fn numbers() -> impl Strategy<Value = Numbers> {
+    let part = || prop_oneof![4 => -1.5..1.5_f64, 1 => Just(0.0), 1 => Just(1.0)];
+    let three = move || [part(), part(), part()];
+    let axis = [-1.0..1.0_f64, -1.0..1.0, 0.1..1.0];
+    let angle = prop_oneof![3 => -3.0..3.0_f64, 2 => Just(0.0), 1 => Just(1e-9)];
+    (three(), axis, angle, prop::collection::vec(three(), 6..10))
+}
+
+/// Asserts that an answer is right: both points are on the surfaces, a plane across the
+/// normal keeps the shapes as far apart as it says, and in no other direction is the way
+/// out shorter.
+fn check<S: Scalar>(a: &Thing<S>, b: &Thing<S>, size: f64) -> Result<(), TestCaseError> {
+    let found = near(a, b);
+    // Axes that are as good but for 1e-12 of the size count as equal.
+    // Edges that are nearly parallel may be taken for such.
+    let rounding =
+        (S::epsilon().as_f64() * 64.0).max(4e-12).max(2.0 * nearly_parallel(a, b)) * size;
+    let Closest { distance, normal, on_a, on_b } = found;
+    let (distance, normal) = (distance.as_f64(), normal.map(Scalar::as_f64));
+    prop_assert!((normal.magnitude() - 1.0).abs() < 1e-5, "{found:?}");
+    let width = |d: Vec3<f64>| (support(a, d) - support(b, -d)).dot(d);
+    // A normal is a difference of points, over the distance of what is inside the radii.
+    let core = distance + radius(a) + radius(b);
+    let slack = rounding * (1.0 + if core > 0.0 { size / core.max(size * 1e-7) } else { 0.0 });
+    prop_assert!((width(normal) + distance).abs() <= slack, "{a:?}\n{b:?}\n{found:?}");
+    let apart: Point3<f64> = cast_point(on_b);
+    let apart = (apart - cast_point::<S, f64>(on_a)).dot(normal);
+    prop_assert!((apart - distance).abs() <= slack, "{found:?}");
+    prop_assert!(surface(a, on_a).abs() <= slack, "{a:?}\n{b:?}\n{found:?}");
+    prop_assert!(surface(b, on_b).abs() <= slack, "{a:?}\n{b:?}\n{found:?}");
+    if distance < 0.0 {
+        for i in 0..200 {
+            let z = 1.0 - (2.0 * f64::from(i) + 1.0) / 200.0;
+            let around = f64::from(i) * 2.399_963_229_728_653;
+            let r = (1.0_f64 - z * z).sqrt();
+            let direction = Vec3::new(r * around.cos(), r * around.sin(), z);
+            prop_assert!(width(direction) >= -distance - slack, "{a:?}\n{b:?}\n{found:?}");
+        }
+    }
+    if middle(a) != middle(b) {
+        prop_assert_eq!(near(b, a), found.swapped(), "{:?}\n{:?}", a, b);
+    }
+    Ok(())
+}
+
+fn check_manifold<S: Scalar>(a: &Thing<S>, b: &Thing<S>, size: f64) -> Result<(), TestCaseError> {
+    let (found, nearest) = (touch(a, b, S::constant(0.01 * size)), near(a, b));
+    if nearest.distance.as_f64() > 0.0101 * size {
+        prop_assert!(found.points.is_empty());
+        return Ok(());
+    }
+    let rounding = S::epsilon().as_f64() * 64.0 * size;
+    if nearest.distance.as_f64() < 0.0099 * size {
+        prop_assert!((1..=4).contains(&found.points.len()), "{a:?}\n{b:?}\n{found:?}");
+    }
+    let mut deepest = f64::INFINITY;
+    for (i, point) in found.points.iter().enumerate() {
+        let apart = (cast_point::<S, f64>(point.on_b) - cast_point(point.on_a))
+            .dot(found.normal.map(Scalar::as_f64));
+        // On a face that is up to the allowed angle off the normal.
+        prop_assert!((apart - point.distance.as_f64()).abs() <= 2e-2 * size, "{found:?}");
+        deepest = deepest.min(point.distance.as_f64());
+        let others = &found.points[i + 1..];
+        prop_assert!(others.iter().all(|other| other.feature != point.feature), "{found:?}");
+    }
+    if !found.points.is_empty() {
+        let off = (deepest - nearest.distance.as_f64()).abs();
+        prop_assert!(off <= rounding + 1e-2 * size, "{off} {a:?}\n{b:?}\n{found:?} {nearest:?}");
+    }
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(1_000))]
+
+    #[test]
+    fn every_pair_knows_its_distance_and_its_way_out(
+        first in numbers(), second in numbers(),
+        scale in prop::sample::select(vec![1e-6, 1e-3, 1.0, 1e3, 1e6]),
+        offset in prop::sample::select(vec![0.0, 0.0, 1e3]),
+    ) {
+        for a in things::<f64>(&first, scale, offset) {
+            for b in things::<f64>(&second, scale, offset) {
+                check(&a, &b, scale * (4.0 + offset))?;
+            }
+        }
+        for a in things::<f32>(&first, scale, offset) {
+            for b in things::<f32>(&second, scale, offset) {
+                check(&a, &b, scale * (4.0 + offset))?;
+            }
+        }
+    }
+
+    #[test]
+    fn a_manifold_has_one_to_four_points_with_names_of_their_own(
+        first in numbers(), second in numbers(),
+    ) {
+        for a in things::<f64>(&first, 1.0, 0.0) {
+            for b in things::<f64>(&second, 1.0, 0.0) {
+                check_manifold(&a, &b, 4.0)?;
+            }
+        }
+    }
+
+    #[test]
+    fn a_plane_touches_what_reaches_it(first in numbers(), offset in -2.0..2.0_f64) {
+        let plane = Plane::through(Point3::new(0.0, offset, 0.0), Vec3::new(0.3, 1.0, -0.2)).unwrap();
+        for thing in things::<f64>(&first, 1.0, 0.0) {
+            let found = each!(&thing, it => closest_plane(&plane, it));
+            let lowest = support(&thing, -plane.normal());
+            prop_assert!((found.distance - plane.signed_distance(lowest)).abs() < 1e-14);
+            prop_assert!(plane.signed_distance(found.on_a).abs() < 1e-14);
+            prop_assert!(found.on_b.distance(lowest) < 1e-14);
+        }
+    }
+}
+
+/// A box on a box, a capsule on a box, and so on: how many points, and where.
+#[test]
+fn what_lies_flat_touches_in_as_many_points_as_it_should() {
+    let identity = Pose::<f64>::identity().rotation;
+    let slab = Obb::new(Point3::new(0.0, -1.0, 0.0), identity, Vec3::new(5.0, 1.0, 5.0)).unwrap();
+    let turned = |angle: f64| AxisAngle::new(Vec3::unit_y(), angle).unwrap().into();
+    for angle in [0.0, 0.3, std::f64::consts::FRAC_PI_4] {
+        let cube =
+            Obb::new(Point3::new(0.5, 0.49, 0.2), turned(angle), Vec3::new(0.5, 0.5, 0.5)).unwrap();
+        let Manifold { normal, points } = manifold(&slab, &cube, 0.0);
+        assert_eq!((normal, points.len()), (Vec3::unit_y(), 4), "at {angle}");
+        for point in &points {
+            assert!((point.distance + 0.01).abs() < 1e-14, "{point:?}");
+            assert!(cube.corners().iter().any(|corner| corner.distance(point.on_b) < 1e-14));
+        }
+    }
+    let lying = Capsule::new(Point3::new(-1.0, 0.5, 0.0), Point3::new(7.0, 0.5, 0.0), 0.5).unwrap();
+    let Manifold { normal, points } = manifold(&slab, &lying, 1e-9);
+    assert_eq!((normal, points.len()), (Vec3::unit_y(), 2));
+    let ends: Vec<_> = points.iter().map(|point| point.on_b.x).collect();
+    assert!(ends.contains(&-1.0) && ends.contains(&5.0), "cut at the edge: {ends:?}");
+    let beside = Capsule { a: lying.a + Vec3::unit_z(), b: lying.b + Vec3::unit_z(), ..lying };
+    assert_eq!(manifold(&lying, &beside, 1e-9).points.len(), 2, "side by side");
+    let across =
+        Capsule::new(Point3::new(0.0, 1.5, -1.0), Point3::new(0.0, 1.5, 3.0), 0.5).unwrap();
+    assert_eq!(manifold(&lying, &across, 1e-9).points.len(), 1, "crosswise");
+    // The same features have the same names while the box slides.
+    let names = |x: f64| {
+        let cube =
+            Obb::new(Point3::new(x, 0.49, 0.2), turned(0.3), Vec3::new(0.5, 0.5, 0.5)).unwrap();
+        let mut names: Vec<_> =
+            manifold(&slab, &cube, 0.0).points.iter().map(|point| point.feature).collect();
+        names.sort_unstable();
+        names
+    };
+    assert_eq!(names(0.5), names(0.51));
+    assert_eq!(names(0.5), names(-2.0));
+}
