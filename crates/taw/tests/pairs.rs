@@ -1,34 +1,16 @@
 //! Every pair of convex shapes: distance, way out, manifold.
 
+#[path = "common/things.rs"]
+mod things;
+
 use cgmath::MetricSpace;
 use proptest::prelude::*;
 use taw::contact::{Closest, Convex, Manifold, closest, closest_plane, manifold};
 use taw::frame::{AxisAngle, Pose};
 use taw::math::cast_point;
 use taw::prelude::*;
-use taw::shape::{Aabb, Capsule, Hull, Obb, Solid};
-
-/// One of each kind, of about this size, about here; its size beside it.
-#[derive(Clone, Debug)]
-enum Thing<S> {
-    Sphere(Sphere<S>),
-    Aabb(Aabb<Point3<S>>),
-    Obb(Obb<S>),
-    Capsule(Capsule<S>),
-    Hull(Hull<S>),
-}
-
-macro_rules! each {
-    ($thing:expr, $name:ident => $value:expr) => {
-        match $thing {
-            Thing::Sphere($name) => $value,
-            Thing::Aabb($name) => $value,
-            Thing::Obb($name) => $value,
-            Thing::Capsule($name) => $value,
-            Thing::Hull($name) => $value,
-        }
-    };
-}
+use taw::shape::{Capsule, Obb, Solid};
+use things::{Thing, numbers, things};
 
 fn near<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> Closest<S> {
     each!(a, a => each!(b, b => closest(a, b)))
@@ -60,53 +42,6 @@ fn nearly_parallel<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> f64 {
 
 fn middle<S: Scalar>(thing: &Thing<S>) -> Point3<S> {
     each!(thing, it => it.middle())
-}
-
-type Numbers = ([f64; 3], [f64; 3], f64, Vec<[f64; 3]>);
-
-/// The five kinds, from the same numbers, at a scale and an offset.
-fn things<S: Scalar>(
-    (at, axis, angle, points): &Numbers,
-    scale: f64,
-    offset: f64,
-) -> Vec<Thing<S>> {
-    let point = |p: [f64; 3]| {
-        Point3::from([0, 1, 2].map(|i| S::constant((p[i] + at[i]) * scale + offset * scale)))
-    };
-    let size = |x: f64| S::constant(x.abs() * scale + 0.01 * scale);
-    let turn = AxisAngle::new(Vec3::from(*axis), *angle).unwrap();
-    let AxisAngleIn { axis, angle } = AxisAngleIn::of(turn);
-    let rotation = AxisAngle::new(axis.map(S::constant), S::constant(angle)).unwrap().into();
-    let half_widths = Vec3::from([0, 1, 2].map(|i| size(points[0][i])));
-    let obb = Obb::new(point([0.0; 3]), rotation, half_widths).unwrap();
-    let corners: Vec<_> = points.iter().map(|p| point(*p)).collect();
-    let mut all = vec![
-        Thing::Sphere(Sphere::new(point([0.0; 3]), size(points[0][0])).unwrap()),
-        Thing::Aabb(obb.bounding_box()),
-        Thing::Obb(obb),
-        Thing::Capsule(Capsule::new(point(points[1]), point(points[2]), size(0.3)).unwrap()),
-    ];
-    all.extend(Hull::new(&corners).ok().map(Thing::Hull));
-    all
-}
-
-struct AxisAngleIn {
-    axis: Vec3<f64>,
-    angle: f64,
-}
-
-impl AxisAngleIn {
-    fn of(turn: AxisAngle<f64>) -> Self {
-        Self { axis: turn.axis(), angle: turn.angle() }
-    }
-}
-
-fn numbers() -> impl Strategy<Value = Numbers> {
-    let part = || prop_oneof![4 => -1.5..1.5_f64, 1 => Just(0.0), 1 => Just(1.0)];
-    let three = move || [part(), part(), part()];
-    let axis = [-1.0..1.0_f64, -1.0..1.0, 0.1..1.0];
-    let angle = prop_oneof![3 => -3.0..3.0_f64, 2 => Just(0.0), 1 => Just(1e-9)];
-    (three(), axis, angle, prop::collection::vec(three(), 6..10))
 }
 
 /// Asserts that an answer is right: both points are on the surfaces, a plane across the

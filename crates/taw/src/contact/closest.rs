@@ -67,13 +67,14 @@ pub fn closest<S: Scalar>(a: &impl Convex<S>, b: &impl Convex<S>) -> Closest<S> 
     if a.as_sphere().is_some() {
         return closest(b, a).swapped();
     }
+    if swaps(a, b) { closest_in_order(b, a).swapped() } else { closest_in_order(a, b) }
+}
+
+/// Whether two shapes are asked about the other way round, so that where several answers are
+/// as good it is always the same one.
+pub(super) fn swaps<S: Scalar>(a: &impl Convex<S>, b: &impl Convex<S>) -> bool {
     let (first, second) = (a.middle(), b.middle());
-    if [second.x, second.y, second.z].map(Scalar::as_f64)
-        < [first.x, first.y, first.z].map(Scalar::as_f64)
-    {
-        return closest_in_order(b, a).swapped();
-    }
-    closest_in_order(a, b)
+    [second.x, second.y, second.z] < [first.x, first.y, first.z]
 }
 
 fn closest_in_order<S: Scalar>(a: &impl Convex<S>, b: &impl Convex<S>) -> Closest<S> {

@@ -9,7 +9,8 @@
 //! | two spheres | [`touching_sphere_sphere`] | [`mtv_sphere_sphere`], [`closest`] | [`manifold`] | [`time_of_impact_sphere_sphere`] |
 //! | sphere and half-space | [`touching_sphere_plane`] | [`mtv_sphere_plane`], [`closest_plane`] | | |
 //! | any bounded shape and half-space | [`Closest::touching`] | [`closest_plane`] | | |
-//! | any two of sphere, box, capsule and hull | [`Closest::touching`] | [`closest`] | [`manifold`] | |
+//! | any two of sphere, box, capsule and hull | [`Closest::touching`] | [`closest`] | [`manifold`] | [`sweep`] |
+//! | ray and any shape | [`Cast::cast`] | | | |
 //!
 //! With a sphere, a distance is right to a few epsilons of the scalar. Of two other shapes
 //! it is found in `f64` about the middle of one of them, right to 4e-12 of their size, and
@@ -24,16 +25,20 @@ mod axes;
 mod closest;
 mod list;
 mod manifold;
+mod ray;
 mod skeleton;
 mod sphere_plane;
 mod sphere_sphere;
+mod sweep;
 
 pub use closest::{Closest, closest, closest_plane};
 pub use list::{Contact, Contacts};
 pub use manifold::{Manifold, ManifoldPoint, manifold};
+pub use ray::{Cast, RayHit};
 pub use skeleton::{Convex, Skeleton};
 pub use sphere_plane::{mtv_sphere_plane, touching_sphere_plane};
 pub use sphere_sphere::{mtv_sphere_sphere, time_of_impact_sphere_sphere, touching_sphere_sphere};
+pub use sweep::{Touch, sweep};
 
 #[cfg(test)]
 mod tests {

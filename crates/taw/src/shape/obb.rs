@@ -4,7 +4,7 @@ use super::{Aabb, Box3, Nearest, Solid};
 use crate::Error;
 use crate::error::{finite_point, within};
 use crate::frame::Pose;
-use crate::math::{Point3, Quat, Scalar, Vec3, length};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, length};
 
 /// A box that may be turned. It may be flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +63,13 @@ impl<S: Scalar> Obb<S> {
     #[must_use]
     pub fn axes(&self) -> [Vec3<S>; 3] {
         [Vec3::unit_x(), Vec3::unit_y(), Vec3::unit_z()].map(|axis| self.rotation * axis)
+    }
+
+    /// The same in `f64`, with the rotation made as long as it should be.
+    pub(crate) fn exact_axes(&self) -> [Vec3<f64>; 3] {
+        let (s, v) = (self.rotation.s.as_f64(), cast_vector(self.rotation.v));
+        let rotation = Quat::from_sv(s, v).normalize();
+        [Vec3::unit_x(), Vec3::unit_y(), Vec3::unit_z()].map(|axis| rotation * axis)
     }
 
     /// The eight corners: x changes first, then y, then z, from the negative side.
