@@ -28,9 +28,9 @@
 //! | room | what for |
 //! |---|---|
 //! | [`math`] | names for cgmath's types, the [`Scalar`](math::Scalar), lengths that neither overflow nor vanish |
-//! | [`frame`] | where a thing is and how it is turned: bivectors, motors |
-//! | [`shape`] | what a thing is: sphere, plane |
-//! | [`contact`] | when things touch, and the shortest way apart |
+//! | [`frame`] | where a thing is and how it is turned: poses, every form of a rotation, motors, cameras |
+//! | [`shape`] | what a thing is: sphere, plane, boxes, capsule, hull, compound |
+//! | [`contact`] | when things touch, where, and the shortest way apart; rays and sweeps |
 //! | [`broad`] | who might touch: a grid for marbles |
 //! | [`motion`] | how a thing moves: integrators, forces, rotation |
 //! | [`response`] | what a touch does |
