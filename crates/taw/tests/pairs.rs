@@ -5,7 +5,7 @@ mod things;
 
 use cgmath::MetricSpace;
 use proptest::prelude::*;
-use taw::contact::{Closest, Convex, Manifold, closest, closest_plane, manifold};
+use taw::contact::{Closest, Convex, Manifold, Skeleton, closest, closest_plane, manifold};
 use taw::frame::{AxisAngle, Pose};
 use taw::math::cast_point;
 use taw::prelude::*;
@@ -32,12 +32,25 @@ fn radius<S: Scalar>(thing: &Thing<S>) -> f64 {
     each!(thing, it => it.skeleton(Point3::origin())).radius
 }
 
-/// The largest angle between edges that are parallel but for 1e-7 rad.
+/// The largest angle between edges and faces that are parallel but for 1e-7 rad.
 fn nearly_parallel<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> f64 {
-    let [first, second] =
-        [a, b].map(|thing| each!(thing, it => it.skeleton(Point3::origin())).directions);
-    let pairs = first.iter().flat_map(|d| second.iter().map(move |e| d.cross(*e).magnitude()));
-    pairs.filter(|sin| *sin < 1e-7).fold(0.0, f64::max)
+    let [first, second] = [a, b].map(|thing| each!(thing, it => it.skeleton(Point3::origin())));
+    let normals = |of: &Skeleton| of.faces.iter().map(|face| face.0).collect::<Vec<_>>();
+    let (m, n) = (normals(&first), normals(&second));
+    let mut worst: f64 = 0.0;
+    let mut note = |sin: f64| worst = if sin < 1e-7 { worst.max(sin) } else { worst };
+    let (d, e) = (&first.directions, &second.directions);
+    for (x, y) in d.iter().flat_map(|x| e.iter().map(move |y| (x, y))) {
+        note(x.cross(*y).magnitude());
+    }
+    for (x, y) in m.iter().flat_map(|x| n.iter().map(move |y| (x, y))) {
+        note(x.cross(*y).magnitude());
+    }
+    let across = d.iter().flat_map(|x| n.iter().map(move |y| (x, y)));
+    for (x, y) in across.chain(e.iter().flat_map(|x| m.iter().map(move |y| (x, y)))) {
+        note(x.dot(*y).abs());
+    }
+    worst
 }
 
 fn middle<S: Scalar>(thing: &Thing<S>) -> Point3<S> {
@@ -50,7 +63,7 @@ fn middle<S: Scalar>(thing: &Thing<S>) -> Point3<S> {
 fn check<S: Scalar>(a: &Thing<S>, b: &Thing<S>, size: f64) -> Result<(), TestCaseError> {
     let found = near(a, b);
     // Axes that are as good but for 1e-12 of the size count as equal.
-    // Edges that are nearly parallel may be taken for such.
+    // Edges and faces that are nearly parallel may be taken for such.
     let rounding =
         (S::epsilon().as_f64() * 64.0).max(4e-12).max(2.0 * nearly_parallel(a, b)) * size;
     let Closest { distance, normal, on_a, on_b } = found;

@@ -51,7 +51,14 @@ pub(super) fn widest_axis(a: &Skeleton, b: &Skeleton) -> Option<Axis> {
     };
     let best = of_a.chain(of_b).fold(None, wider)?;
     let pairs = a.directions.iter().flat_map(|d| b.directions.iter().map(move |e| (*d, *e)));
-    let of_edges = pairs.filter_map(|(d, e)| at_right_angles(d, e)).flat_map(|normal| {
+    // Beside something flat, also those across its plane and an edge.
+    let flat = |x: &Skeleton| (x.faces.len() == 2).then(|| x.faces[0].0);
+    let across = [flat(a), flat(b)].into_iter().flatten().flat_map(|plane| {
+        let directions = a.directions.iter().chain(&b.directions);
+        directions.filter_map(move |along| at_right_angles(plane, *along))
+    });
+    let normals = pairs.filter_map(|(d, e)| at_right_angles(d, e)).chain(across);
+    let of_edges = normals.flat_map(|normal| {
         [normal, -normal].map(|normal| Axis {
             normal,
             separation: -b.reach(-normal) - a.reach(normal),

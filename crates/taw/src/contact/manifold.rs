@@ -223,9 +223,10 @@ fn along_edges(a: &Skeleton, b: &Skeleton, axis: &Axis) -> Vec<ContactPoint> {
     let far = |of: &Skeleton, edge: &[u32; 2], normal: Vec3<f64>| {
         (of.points[edge[0] as usize] + of.points[edge[1] as usize]).dot(normal)
     };
-    // Those that are farthest out, and that are nearest to each other across it.
+    // Those that are farthest out, and of those that are as far the two that cross: nearly
+    // parallel edges of others may be farther out by a little, and elsewhere.
     let ends = |of: &Skeleton, edge: &[u32; 2]| edge.map(|i| of.points[i as usize]);
-    let near = 1e-12 * (a.size() + b.size());
+    let near = 1e-9 * (a.size() + b.size());
     let mut best: Option<(f64, f64, ContactPoint)> = None;
     for (i, first) in a.edges.iter().enumerate() {
         for (j, second) in b.edges.iter().enumerate() {

@@ -10,11 +10,12 @@
 //! | sphere and half-space | [`touching_sphere_plane`] | [`mtv_sphere_plane`], [`closest_plane`] | | |
 //! | any bounded shape and half-space | [`Closest::touching`] | [`closest_plane`] | | |
 //! | any two of sphere, box, capsule and hull | [`Closest::touching`] | [`closest`] | [`manifold`] | [`sweep`] |
-//! | ray and any shape | [`Cast::cast`] | | | |
+//! | a mesh or height field and any of these | [`Closest::touching`] | [`closest_of_surface`] | [`manifolds_of_surface`] | [`sweep_against_surface`] |
+//! | ray and any shape | [`Cast::cast`], [`cast_on_surface`] | | | |
 //!
 //! With a sphere, a distance is right to a few epsilons of the scalar. Of two other shapes
 //! it is found in `f64` about the middle of one of them, right to 4e-12 of their size, and
-//! rounded once; where edges are parallel but for less than 1e-7 rad, to that angle.
+//! rounded once; where edges or faces are parallel but for less than 1e-7 rad, to that angle.
 //!
 //! # The displacement
 //! Every test gives the *minimum translation vector*: the shortest displacement
@@ -29,6 +30,7 @@ mod ray;
 mod skeleton;
 mod sphere_plane;
 mod sphere_sphere;
+mod surface;
 mod sweep;
 
 pub use closest::{Closest, closest, closest_plane};
@@ -38,6 +40,9 @@ pub use ray::{Cast, RayHit};
 pub use skeleton::{Convex, Skeleton};
 pub use sphere_plane::{mtv_sphere_plane, touching_sphere_plane};
 pub use sphere_sphere::{mtv_sphere_sphere, time_of_impact_sphere_sphere, touching_sphere_sphere};
+pub use surface::{
+    OfTriangle, cast_on_surface, closest_of_surface, manifolds_of_surface, sweep_against_surface,
+};
 pub use sweep::{Touch, sweep};
 
 #[cfg(test)]

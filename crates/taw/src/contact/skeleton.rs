@@ -1,7 +1,7 @@
 use cgmath::{EuclideanSpace, InnerSpace};
 
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
-use crate::shape::{Box3, Capsule, Hull, Obb, Solid, Sphere};
+use crate::shape::{Box3, Capsule, Hull, Obb, Solid, Sphere, Triangle};
 
 /// A convex shape as all points within `radius` of a polyhedron, which may also be a
 /// point, a line, or flat. All in `f64`, about some origin that is near, so that nothing
@@ -160,6 +160,26 @@ impl<S: Scalar> Convex<S> for Box3<S> {
 
     fn middle(&self) -> Point3<S> {
         self.center()
+    }
+}
+
+impl<S: Scalar> Convex<S> for Triangle<S> {
+    fn skeleton(&self, origin: Point3<f64>) -> Skeleton {
+        let points = self.corners.map(|corner| local(corner, origin)).to_vec();
+        let exact = Triangle { corners: [0, 1, 2].map(|i| Point3::from_vec(points[i])) };
+        let edges = vec![[0, 1], [1, 2], [2, 0]];
+        let side = |[a, b]: &[u32; 2]| points[*b as usize] - points[*a as usize];
+        let directions = edges.iter().filter_map(|edge| direction_and_length(side(edge)));
+        let directions = directions.map(|(unit, _)| unit).collect();
+        // A line has none. Both sides are alike.
+        let both = |normal: Vec3<f64>| vec![(normal, vec![0, 1, 2]), (-normal, vec![2, 1, 0])];
+        let faces = exact.normal().map_or_else(Vec::new, both);
+        Skeleton { points, edges, directions, faces, radius: 0.0 }
+    }
+
+    fn middle(&self) -> Point3<S> {
+        let [a, b, c] = self.corners;
+        a + ((b - a) + (c - a)) / S::constant(3.0)
     }
 }
 

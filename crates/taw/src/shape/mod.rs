@@ -4,22 +4,28 @@
 
 mod aabb;
 mod ball;
+mod box_tree;
 mod capsule;
 mod compound;
 mod hull;
 mod obb;
 mod plane;
 pub(crate) mod polygon;
+mod surface;
+mod triangle;
 mod wrap;
 
 pub use aabb::{Aabb, Box3, Rectangle};
 pub use ball::{Ball, Circle, Sphere};
+pub use box_tree::BoxTree;
 pub use capsule::Capsule;
 pub(crate) use capsule::across;
 pub use compound::{Compound, Shape};
 pub use hull::{Face, Hull};
 pub use obb::Obb;
 pub use plane::Plane;
+pub use surface::{HeightField, Mesh, Surface};
+pub use triangle::Triangle;
 
 use crate::math::{Point3, Scalar, Vec3};
 

@@ -1,9 +1,9 @@
-//! Shapes of five kinds from the same numbers, for the tests of pairs and queries.
+//! Shapes of six kinds from the same numbers, for the tests of pairs and queries.
 
 use proptest::prelude::*;
 use taw::frame::AxisAngle;
 use taw::prelude::*;
-use taw::shape::{Aabb, Capsule, Hull, Obb, Solid};
+use taw::shape::{Aabb, Capsule, Hull, Obb, Solid, Triangle};
 
 /// One of each kind, of about this size, about here; its size beside it.
 #[derive(Clone, Debug)]
@@ -13,6 +13,7 @@ pub enum Thing<S> {
     Obb(Obb<S>),
     Capsule(Capsule<S>),
     Hull(Hull<S>),
+    Triangle(Triangle<S>),
 }
 
 /// The same expression for whichever kind it is.
@@ -25,13 +26,14 @@ macro_rules! each {
             $crate::things::Thing::Obb($name) => $value,
             $crate::things::Thing::Capsule($name) => $value,
             $crate::things::Thing::Hull($name) => $value,
+            $crate::things::Thing::Triangle($name) => $value,
         }
     };
 }
 
 pub type Numbers = ([f64; 3], [f64; 3], f64, Vec<[f64; 3]>);
 
-/// The five kinds, from the same numbers, at a scale and an offset.
+/// The six kinds, from the same numbers, at a scale and an offset.
 pub fn things<S: Scalar>(
     (at, axis, angle, points): &Numbers,
     scale: f64,
@@ -53,6 +55,7 @@ pub fn things<S: Scalar>(
         Thing::Obb(obb),
         Thing::Capsule(Capsule::new(point(points[1]), point(points[2]), size(0.3)).unwrap()),
     ];
+    all.push(Thing::Triangle(Triangle { corners: [corners[3], corners[4], corners[5]] }));
     all.extend(Hull::new(&corners).ok().map(Thing::Hull));
     all
 }

@@ -1,0 +1,115 @@
+use super::{Aabb, Box3};
+use crate::math::{Point3, Scalar};
+
+/// Things by their bounding boxes, halved again and again, so that few are looked at to
+/// find those in one place.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct BoxTree<S> {
+    nodes: Vec<Node<S>>,
+    /// The things, leaf by leaf.
+    items: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Node<S> {
+    bounds: Box3<S>,
+    /// Of a leaf, where its things begin; else the number of its second child. The first
+    /// one follows it.
+    next: u32,
+    /// How many things; zero if it has children.
+    count: u32,
+}
+
+/// A leaf has no more things than this.
+const LEAF: usize = 4;
+
+impl<S: Scalar> BoxTree<S> {
+    /// A tree of things that are named by their places in this list.
+    #[must_use]
+    pub fn new(boxes: &[Box3<S>]) -> Self {
+        let mut tree = Self { nodes: Vec::new(), items: (0..boxes.len() as u32).collect() };
+        if !boxes.is_empty() {
+            tree.build(boxes, 0, boxes.len());
+        }
+        tree
+    }
+
+    fn build(&mut self, boxes: &[Box3<S>], from: usize, to: usize) {
+        let of = |item: u32| boxes[item as usize];
+        let first = of(self.items[from]);
+        let bounds = self.items[from..to].iter().fold(first, |all, i| all.union(&of(*i)));
+        let node = self.nodes.len();
+        let leaf = Node { bounds, next: from as u32, count: (to - from) as u32 };
+        self.nodes.push(leaf);
+        if to - from <= LEAF {
+            return;
+        }
+        // Halved across the axis along which the middles are spread most.
+        let point = |item: u32| of(item).center();
+        let start = Aabb { min: point(self.items[from]), max: point(self.items[from]) };
+        let spread = self.items[from..to]
+            .iter()
+            .fold(start, |all, i| all.union(&Aabb { min: point(*i), max: point(*i) }));
+        let size = spread.max - spread.min;
+        let axis = (1..3).fold(0, |most, i| if size[i] > size[most] { i } else { most });
+        let middle = usize::midpoint(from, to);
+        self.items[from..to].select_nth_unstable_by(middle - from, |s, t| {
+            let (x, y) = (point(*s)[axis], point(*t)[axis]);
+            x.partial_cmp(&y).unwrap_or(std::cmp::Ordering::Equal).then(s.cmp(t))
+        });
+        self.build(boxes, from, middle);
+        self.nodes[node].next = self.nodes.len() as u32;
+        self.nodes[node].count = 0;
+        self.build(boxes, middle, to);
+    }
+
+    /// Names all things whose boxes may have a point in common with this one, and some more.
+    pub fn near(&self, bounds: &Box3<S>, name: impl FnMut(u32)) {
+        self.visit(|node| node.overlaps(bounds), name);
+    }
+
+    /// Names all things whose boxes a line may go through, between these parts of the way
+    /// from a point along a motion, and some more.
+    pub fn along(&self, from: Point3<S>, motion: cgmath::Vector3<S>, name: impl FnMut(u32)) {
+        let crosses = |bounds: &Box3<S>| {
+            let (mut into, mut out) = (S::zero(), S::one());
+            for axis in 0..3 {
+                let (low, high) = (bounds.min[axis] - from[axis], bounds.max[axis] - from[axis]);
+                if motion[axis] == S::zero() {
+                    if low > S::zero() || high < S::zero() {
+                        return false;
+                    }
+                } else {
+                    let (s, t) = (low / motion[axis], high / motion[axis]);
+                    into = into.max(s.min(t));
+                    out = out.min(s.max(t));
+                }
+            }
+            // With room for rounding.
+            into <= out * (S::one() + S::epsilon() * S::constant(8.0))
+        };
+        self.visit(crosses, name);
+    }
+
+    fn visit(&self, enters: impl Fn(&Box3<S>) -> bool, mut name: impl FnMut(u32)) {
+        let mut open = vec![0];
+        while let Some(number) = open.pop() {
+            let Some(node) = self.nodes.get(number as usize) else { continue };
+            if !enters(&node.bounds) {
+                continue;
+            }
+            if node.count > 0 {
+                let from = node.next as usize;
+                self.items[from..from + node.count as usize].iter().for_each(|i| name(*i));
+            } else {
+                open.extend([node.next, number + 1]);
+            }
+        }
+    }
+
+    /// The box around all.
+    #[must_use]
+    pub fn bounds(&self) -> Option<Box3<S>> {
+        self.nodes.first().map(|node| node.bounds)
+    }
+}

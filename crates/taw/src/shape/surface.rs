@@ -1,0 +1,226 @@
+use cgmath::EuclideanSpace;
+
+use super::{Aabb, Box3, BoxTree, Solid, Triangle};
+use crate::Error;
+use crate::error::{finite_point, positive, within};
+use crate::math::{Point3, Scalar, Vec3, is_finite_point};
+
+/// What is made of triangles and carries others: a landscape, a track. It has no inside.
+pub trait Surface<S: Scalar> {
+    /// One of its triangles, by its number.
+    #[must_use]
+    fn triangle(&self, number: u32) -> Option<Triangle<S>>;
+
+    /// Names all triangles that may have a point in common with a box, and some more.
+    fn near(&self, bounds: &Box3<S>, name: impl FnMut(u32));
+
+    /// The box around all of it.
+    #[must_use]
+    fn bounds(&self) -> Box3<S>;
+
+    /// Names all triangles that may be met on the way from a point along a motion, and
+    /// some more.
+    fn along(&self, from: Point3<S>, motion: Vec3<S>, name: impl FnMut(u32));
+}
+
+/// Triangles that share their corners.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Mesh<S> {
+    points: Vec<Point3<S>>,
+    triangles: Vec<[u32; 3]>,
+    tree: BoxTree<S>,
+}
+
+impl<S: Scalar> Mesh<S> {
+    /// A mesh, checked. Triangles may be slivers, or have no area at all.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] for a point, [`Error::OutOfRange`] for no triangles, or for the
+    /// number of a corner that there is not.
+    pub fn new(points: Vec<Point3<S>>, triangles: Vec<[u32; 3]>) -> Result<Self, Error> {
+        for point in &points {
+            finite_point(["points.x", "points.y", "points.z"], *point)?;
+        }
+        let count = |length: usize| f64::from(u32::try_from(length).unwrap_or(u32::MAX));
+        within("triangles.len()", count(triangles.len()), 1.0, f64::from(u32::MAX - 1))?;
+        for corner in triangles.iter().flatten() {
+            within("triangles", f64::from(*corner), 0.0, count(points.len()) - 1.0)?;
+        }
+        let mut mesh = Self { points, triangles, tree: BoxTree::default() };
+        let boxes: Vec<_> = (0..mesh.triangles.len() as u32)
+            .filter_map(|number| mesh.triangle(number))
+            .map(|triangle| triangle.bounding_box())
+            .collect();
+        mesh.tree = BoxTree::new(&boxes);
+        Ok(mesh)
+    }
+
+    /// The corners.
+    #[must_use]
+    pub fn points(&self) -> &[Point3<S>] {
+        &self.points
+    }
+
+    /// Three corners each.
+    #[must_use]
+    pub fn triangles(&self) -> &[[u32; 3]] {
+        &self.triangles
+    }
+}
+
+impl<S: Scalar> Surface<S> for Mesh<S> {
+    fn triangle(&self, number: u32) -> Option<Triangle<S>> {
+        let corners = self.triangles.get(number as usize)?;
+        Some(Triangle { corners: corners.map(|corner| self.points[corner as usize]) })
+    }
+
+    fn near(&self, bounds: &Box3<S>, name: impl FnMut(u32)) {
+        self.tree.near(bounds, name);
+    }
+
+    fn bounds(&self) -> Box3<S> {
+        self.tree.bounds().unwrap_or(Aabb { min: Point3::origin(), max: Point3::origin() })
+    }
+
+    fn along(&self, from: Point3<S>, motion: Vec3<S>, name: impl FnMut(u32)) {
+        self.tree.along(from, motion, name);
+    }
+}
+
+/// Heights over a grid of points in the plane of x and z, with two triangles in each cell.
+#[derive(Clone, Debug, PartialEq)]
+pub struct HeightField<S> {
+    corner: Point3<S>,
+    cell: [S; 2],
+    columns: u32,
+    rows: u32,
+    heights: Vec<S>,
+    lowest: S,
+    highest: S,
+}
+
+impl<S: Scalar> HeightField<S> {
+    /// Heights in metres above `corner`: `columns` of them along x, `cell[0]` metres apart,
+    /// then the next row, `cell[1]` metres further along z.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] for the corner or a height, [`Error::NotPositive`] for a cell,
+    /// [`Error::OutOfRange`] for fewer than two columns, or heights that are not two or
+    /// more full rows.
+    pub fn new(
+        corner: Point3<S>,
+        cell: [S; 2],
+        columns: u32,
+        heights: Vec<S>,
+    ) -> Result<Self, Error> {
+        finite_point(["corner.x", "corner.y", "corner.z"], corner)?;
+        positive("cell[0]", cell[0])?;
+        positive("cell[1]", cell[1])?;
+        within("columns", f64::from(columns), 2.0, f64::from(u32::MAX))?;
+        let count = u32::try_from(heights.len()).unwrap_or(u32::MAX);
+        let rows = count / columns;
+        // Two triangles a cell have numbers of 32 bits.
+        let whole = f64::from(rows.max(2)) * f64::from(columns);
+        within("heights.len()", f64::from(count), whole, whole.min(f64::from(u32::MAX / 2)))?;
+        for height in &heights {
+            crate::error::finite("heights", *height)?;
+        }
+        let lowest = heights.iter().fold(S::infinity(), |low, height| low.min(*height));
+        let highest = heights.iter().fold(S::neg_infinity(), |high, height| high.max(*height));
+        Ok(Self { corner, cell, columns, rows, heights, lowest, highest })
+    }
+
+    fn point(&self, column: u32, row: u32) -> Point3<S> {
+        let along = |cells: u32, width: S| S::constant(f64::from(cells)) * width;
+        let height = self.heights[row as usize * self.columns as usize + column as usize];
+        self.corner + Vec3::new(along(column, self.cell[0]), height, along(row, self.cell[1]))
+    }
+
+    /// Names the triangles of the cells that a box is over, if it is as low and as high.
+    fn cells(&self, bounds: &Box3<S>, mut name: impl FnMut(u32)) {
+        let (low, high) = (bounds.min - self.corner, bounds.max - self.corner);
+        if !is_finite_point(bounds.min) || !is_finite_point(bounds.max) {
+            return;
+        }
+        if low.y > self.highest || high.y < self.lowest {
+            return;
+        }
+        let range = |from: S, to: S, width: S, count: u32| {
+            let cells = f64::from(count - 1);
+            // One more on both sides, for rounding.
+            let first = ((from / width).as_f64().floor() - 1.0).clamp(0.0, cells);
+            let end = ((to / width).as_f64().floor() + 2.0).clamp(0.0, cells);
+            first as u32..end as u32
+        };
+        let columns = range(low.x, high.x, self.cell[0], self.columns);
+        for row in range(low.z, high.z, self.cell[1], self.rows) {
+            for column in columns.clone() {
+                let cell = row * (self.columns - 1) + column;
+                name(2 * cell);
+                name(2 * cell + 1);
+            }
+        }
+    }
+}
+
+impl<S: Scalar> Surface<S> for HeightField<S> {
+    fn triangle(&self, number: u32) -> Option<Triangle<S>> {
+        let cell = number / 2;
+        let (row, column) = (cell / (self.columns - 1), cell % (self.columns - 1));
+        if row + 1 >= self.rows {
+            return None;
+        }
+        let near = self.point(column, row);
+        let far = self.point(column + 1, row + 1);
+        // Counterclockwise as seen from above.
+        let corners = if number.is_multiple_of(2) {
+            [near, far, self.point(column + 1, row)]
+        } else {
+            [near, self.point(column, row + 1), far]
+        };
+        Some(Triangle { corners })
+    }
+
+    fn near(&self, bounds: &Box3<S>, name: impl FnMut(u32)) {
+        self.cells(bounds, name);
+    }
+
+    fn bounds(&self) -> Box3<S> {
+        let far = self.point(self.columns - 1, self.rows - 1);
+        let low = Vec3::new(self.corner.x, self.corner.y + self.lowest, self.corner.z);
+        let high = Vec3::new(far.x, self.corner.y + self.highest, far.z);
+        Aabb { min: Point3::from_vec(low), max: Point3::from_vec(high) }
+    }
+
+    fn along(&self, from: Point3<S>, motion: Vec3<S>, mut name: impl FnMut(u32)) {
+        // Cell by cell along x, those along z that the way is over meanwhile.
+        let to = from + motion;
+        let whole = Aabb { min: from, max: from }.union(&Aabb { min: to, max: to });
+        let width = self.cell[0];
+        let first = ((whole.min.x - self.corner.x) / width).as_f64().floor().max(-1.0);
+        let last = ((whole.max.x - self.corner.x) / width).as_f64().floor();
+        let last = last.min(f64::from(self.columns));
+        let mut seen = None;
+        let mut column = first;
+        while column <= last {
+            let left = self.corner.x + S::constant(column) * width;
+            let part = |x: S| {
+                let part = if motion.x == S::zero() { S::zero() } else { (x - from.x) / motion.x };
+                part.max(S::zero()).min(S::one())
+            };
+            let (s, t) = (part(left), part(left + width));
+            let (s, t) = if motion.x == S::zero() { (S::zero(), S::one()) } else { (s, t) };
+            let (p, q) = (from + motion * s, from + motion * t);
+            let mut slab = Aabb { min: p, max: p }.union(&Aabb { min: q, max: q });
+            (slab.min.x, slab.max.x) = (left, left);
+            self.cells(&slab, |number| {
+                // Neighbouring slabs name some again.
+                if seen != Some(number) {
+                    name(number);
+                }
+                seen = Some(number);
+            });
+            column += 1.0;
+        }
+    }
+}
