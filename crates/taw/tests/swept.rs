@@ -57,6 +57,20 @@ fn what_was_stopped_is_in_the_way_of_others() {
 }
 
 #[test]
+fn who_comes_along_stops_behind_whom_is_stopped() {
+    for response in RESPONSES {
+        let along = |x| ([x, 0.0, 0.0], [300.0, 0.0, 0.0]);
+        let (mut world, ids) =
+            world(response, &[along(0.0), along(-0.3), along(-0.6), ([2.0, 0.0, 0.0], [0.0; 3])]);
+        world.integrate(DT).unwrap();
+        let at = |row: usize| world.marbles.get(ids[row]).unwrap().position.x;
+        for (row, expected) in [(0, 1.8), (1, 1.6), (2, 1.4), (3, 2.0)] {
+            assert!((at(row) - expected).abs() < 1e-4, "{response:?}: {row} is at {}", at(row));
+        }
+    }
+}
+
+#[test]
 fn slow_piles_are_left_alone() {
     let balls = [([-0.1, 0.0, 0.0], [0.05, 1.0, 0.0]), ([0.1, 0.0, 0.0], [-0.05, 1.0, 0.0])];
     for response in RESPONSES {

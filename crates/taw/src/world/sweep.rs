@@ -95,9 +95,7 @@ impl<S: Scalar> World<S> {
         self.grid.rebuild(middle, reach, S::zero());
         near.clear();
         self.grid.pairs(middle, |a, b| {
-            let (first, second) = (a as usize, b as usize);
-            let radius = marbles.radius[first].min(marbles.radius[second]);
-            if length(moved(second) - moved(first)) > radius * slow {
+            if fast(a as usize) || fast(b as usize) {
                 near.extend([(a, b), (b, a)]);
             }
         });
@@ -118,7 +116,7 @@ impl<S: Scalar> World<S> {
         };
         hits.extend(ahead.filter_map(|pair| {
             let ways = (way(pair.0, S::zero(), stopped), way(pair.1, S::zero(), stopped));
-            Hit::foresee(*pair, ways, S::zero()).map(Reverse)
+            Hit::foresee(*pair, ways, S::zero(), slow).map(Reverse)
         }));
         while let Some(Reverse(Hit { time, pair, stopped: before })) = hits.pop() {
             let (a, b) = (way(pair.0, time, stopped), way(pair.1, time, stopped));
@@ -141,7 +139,7 @@ impl<S: Scalar> World<S> {
                 hits.extend(others.filter_map(|(_, other)| {
                     let pair = (row.min(*other), row.max(*other));
                     let ways = (way(pair.0, time, stopped), way(pair.1, time, stopped));
-                    Hit::foresee(pair, ways, time).map(Reverse)
+                    Hit::foresee(pair, ways, time, slow).map(Reverse)
                 }));
             }
         }
@@ -155,12 +153,13 @@ impl<S: Scalar> World<S> {
 }
 
 impl<S: Scalar> Hit<S> {
-    /// When two marbles meet, of which not both were stopped, from `now` on.
-    fn foresee(pair: (u32, u32), (a, b): (Way<S>, Way<S>), now: S) -> Option<Self> {
-        if a.stopped && b.stopped {
+    /// When two marbles meet, of which not both were stopped, from `now` on, if they pass by
+    /// more than a part of a radius.
+    fn foresee(pair: (u32, u32), (a, b): (Way<S>, Way<S>), now: S, slow: S) -> Option<Self> {
+        let (x, y) = (&a.sphere, &b.sphere);
+        if length(a.motion - b.motion) <= x.radius.min(y.radius) * slow {
             return None;
         }
-        let (x, y) = (&a.sphere, &b.sphere);
         let apart = direction_and_length(y.center - x.center);
         let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
         let after = if distance > x.radius + y.radius {
