@@ -7,6 +7,8 @@
 
 use divan::Bencher;
 use divan::counter::ItemsCount;
+use taw::math::Quat;
+use taw::motion::WallMotion;
 use taw::prelude::*;
 
 const DT: f32 = 1.0 / 60.0;
@@ -100,6 +102,62 @@ fn step_settled_event_driven(bencher: Bencher, count: u32) {
         world.step(DT).expect("a step");
     }
     bench(bencher, world, step);
+}
+
+/// A second in which a board tilts to and fro, and the marbles on it crowd at its rails:
+/// sixty steps, event by event.
+#[divan::bench(args = [60, 150], sample_count = 20)]
+fn second_on_a_board_event_driven(bencher: Bencher, count: u32) {
+    const FACES: [([f32; 3], f32); 5] = [
+        ([0.0, 1.0, 0.0], 0.0),
+        ([1.0, 0.0, 0.0], -5.0),
+        ([-1.0, 0.0, 0.0], -5.0),
+        ([0.0, 0.0, 1.0], -5.0),
+        ([0.0, 0.0, -1.0], -5.0),
+    ];
+    let turned = |step: u16| {
+        let seconds = f32::from(step) * DT;
+        let about = |axis, speed: f32| {
+            Quat::from_axis_angle(axis, cgmath::Rad((speed * seconds).sin() * 0.26))
+        };
+        about(Vec3::unit_x(), 0.7) * about(Vec3::unit_z(), 1.1)
+    };
+    let mut world = World::default();
+    let model = Model {
+        response: Response::EventDriven,
+        rotation: Rotation::Dynamic,
+        iterations: 50,
+        ..Model::default()
+    };
+    world.set_model(model).expect("a model");
+    let walls = FACES.map(|(normal, offset)| {
+        let plane = Plane::new(Vec3::from(normal), offset).expect("a unit vector");
+        world.walls.insert(plane).expect("few walls")
+    });
+    for i in 0..count {
+        let random = |n: u32| (i * 3 + n) as f32 * 0.618_034 % 1.0;
+        let at = |cell: u32| cell as f32 * 0.9 - 4.0;
+        let height = 0.5 + (i / 100) as f32 * 0.7 + random(0);
+        let position = Point3::new(at(i % 10), height, at(i / 10 % 10));
+        world.marbles.insert(Marble::new(position, 0.1 + 0.2 * random(2))).expect("a marble");
+    }
+    let run = |world: &mut World<f32>, from: u16, to: u16| {
+        for step in from..to {
+            let (before, after) = (turned(step), turned(step + 1));
+            let spin = (after * before.conjugate()).v * (2.0 / DT);
+            let pivot = Point3::origin();
+            let motion = WallMotion { velocity: Vec3::zero(), spin, pivot };
+            for (wall, (normal, offset)) in walls.iter().zip(FACES) {
+                let normal = (after * Vec3::from(normal)).normalize();
+                let plane = Plane::new(normal, offset).expect("a unit vector");
+                world.walls.set(*wall, plane).expect("a wall");
+                world.walls.set_motion(*wall, Some(motion)).expect("a wall");
+            }
+            world.step(DT).expect("a step");
+        }
+    };
+    run(&mut world, 0, 120);
+    bench(bencher, world, |world| run(world, 120, 180));
 }
 
 #[divan::bench(args = COUNTS)]
