@@ -51,7 +51,10 @@ impl<S: Scalar> Closest<S> {
 /// shortest (separating axes; Gottschalk, Lin and Manocha 1996). This is the readable
 /// version, exact but for rounding, without iterations.
 #[must_use]
-pub fn closest<S: Scalar>(a: &impl Convex<S>, b: &impl Convex<S>) -> Closest<S> {
+pub fn closest<S: Scalar>(
+    a: &(impl Convex<S> + ?Sized),
+    b: &(impl Convex<S> + ?Sized),
+) -> Closest<S> {
     if let (Some(a), Some(b)) = (a.as_sphere(), b.as_sphere()) {
         let apart = direction_and_length(b.center - a.center);
         let (normal, far) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
@@ -72,12 +75,18 @@ pub fn closest<S: Scalar>(a: &impl Convex<S>, b: &impl Convex<S>) -> Closest<S> 
 
 /// Whether two shapes are asked about the other way round, so that where several answers are
 /// as good it is always the same one.
-pub(super) fn swaps<S: Scalar>(a: &impl Convex<S>, b: &impl Convex<S>) -> bool {
+pub(super) fn swaps<S: Scalar>(
+    a: &(impl Convex<S> + ?Sized),
+    b: &(impl Convex<S> + ?Sized),
+) -> bool {
     let (first, second) = (a.middle(), b.middle());
     [second.x, second.y, second.z] < [first.x, first.y, first.z]
 }
 
-fn closest_in_order<S: Scalar>(a: &impl Convex<S>, b: &impl Convex<S>) -> Closest<S> {
+fn closest_in_order<S: Scalar>(
+    a: &(impl Convex<S> + ?Sized),
+    b: &(impl Convex<S> + ?Sized),
+) -> Closest<S> {
     let origin = cast_point::<S, f64>(a.middle());
     let (x, y) = (a.skeleton(origin), b.skeleton(origin));
     let Between { distance, normal, on_a, on_b } = between(&x, &y);

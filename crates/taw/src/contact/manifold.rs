@@ -42,7 +42,11 @@ const FLAT: f64 = 6e-3;
 
 /// Where two convex shapes touch, or are at most `margin` metres apart.
 #[must_use]
-pub fn manifold<S: Scalar>(a: &impl Convex<S>, b: &impl Convex<S>, margin: S) -> Manifold<S> {
+pub fn manifold<S: Scalar>(
+    a: &(impl Convex<S> + ?Sized),
+    b: &(impl Convex<S> + ?Sized),
+    margin: S,
+) -> Manifold<S> {
     let origin = cast_point::<S, f64>(a.middle());
     let (x, y) = (a.skeleton(origin), b.skeleton(origin));
     let nearest = between(&x, &y);

@@ -10,6 +10,7 @@
 //! | sphere and half-space | [`touching_sphere_plane`] | [`mtv_sphere_plane`], [`closest_plane`] | | |
 //! | any bounded shape and half-space | [`Closest::touching`] | [`closest_plane`] | | |
 //! | any two of sphere, box, capsule and hull | [`Closest::touching`] | [`closest`] | [`manifold`] | [`sweep`] |
+//! | any two shapes, compounds too | [`Closest::touching`] | [`closest_shapes`] | [`manifolds_of_shapes`] | [`sweep_shapes`] |
 //! | a mesh or height field and any of these | [`Closest::touching`] | [`closest_of_surface`] | [`manifolds_of_surface`] | [`sweep_against_surface`] |
 //! | ray and any shape | [`Cast::cast`], [`cast_on_surface`] | | | |
 //!
@@ -24,6 +25,7 @@
 
 mod axes;
 mod closest;
+mod compound;
 mod list;
 mod manifold;
 mod ray;
@@ -34,6 +36,7 @@ mod surface;
 mod sweep;
 
 pub use closest::{Closest, closest, closest_plane};
+pub use compound::{OfParts, closest_shapes, manifolds_of_shapes, sweep_shapes};
 pub use list::{Contact, Contacts};
 pub use manifold::{Manifold, ManifoldPoint, manifold};
 pub use ray::{Cast, RayHit};

@@ -26,9 +26,9 @@ const STEPS: u32 = 200;
 /// (conservative advancement; Mirtich 1996). They touch where 1e-10 of their size is left.
 #[must_use]
 pub fn sweep<S: Scalar>(
-    a: &impl Convex<S>,
+    a: &(impl Convex<S> + ?Sized),
     a_moves: Vec3<S>,
-    b: &impl Convex<S>,
+    b: &(impl Convex<S> + ?Sized),
     b_moves: Vec3<S>,
 ) -> Option<Touch<S>> {
     if swaps(a, b) {
