@@ -25,6 +25,7 @@ pub struct ManifoldPoint<S> {
     /// How far they are apart here, in metres; negative where they overlap.
     pub distance: S,
     /// Names the corners, edges and faces that meet here: the same as long as these do.
+    /// Among hulls of more than 511 corners, two points may have one name.
     pub feature: u32,
 }
 

@@ -136,30 +136,30 @@ impl<S: Scalar> HeightField<S> {
         self.corner + Vec3::new(along(column, self.cell[0]), height, along(row, self.cell[1]))
     }
 
-    /// Names the triangles of the cells that a box is over, if it is as low and as high.
-    fn cells(&self, bounds: &Box3<S>, mut name: impl FnMut(u32)) {
+    /// Which cells of `count` points, this wide, are between two places; with one more on
+    /// both sides, for rounding.
+    fn range([from, to]: [S; 2], width: S, count: u32) -> std::ops::Range<u32> {
+        let cells = f64::from(count - 1);
+        let first = ((from / width).as_f64().floor() - 1.0).clamp(0.0, cells);
+        let end = ((to / width).as_f64().floor() + 2.0).clamp(0.0, cells);
+        first as u32..end as u32
+    }
+
+    /// Names the triangles of cells in these columns that a box is over or under.
+    fn cells(&self, columns: std::ops::Range<u32>, bounds: &Box3<S>, mut name: impl FnMut(u32)) {
         let (low, high) = (bounds.min - self.corner, bounds.max - self.corner);
-        if !is_finite_point(bounds.min) || !is_finite_point(bounds.max) {
-            return;
-        }
-        if low.y > self.highest || high.y < self.lowest {
-            return;
-        }
-        let range = |from: S, to: S, width: S, count: u32| {
-            let cells = f64::from(count - 1);
-            // One more on both sides, for rounding.
-            let first = ((from / width).as_f64().floor() - 1.0).clamp(0.0, cells);
-            let end = ((to / width).as_f64().floor() + 2.0).clamp(0.0, cells);
-            first as u32..end as u32
-        };
-        let columns = range(low.x, high.x, self.cell[0], self.columns);
-        for row in range(low.z, high.z, self.cell[1], self.rows) {
+        for row in Self::range([low.z, high.z], self.cell[1], self.rows) {
             for column in columns.clone() {
                 let cell = row * (self.columns - 1) + column;
                 name(2 * cell);
                 name(2 * cell + 1);
             }
         }
+    }
+
+    /// The columns between two places along x.
+    fn columns(&self, [from, to]: [S; 2]) -> std::ops::Range<u32> {
+        Self::range([from - self.corner.x, to - self.corner.x], self.cell[0], self.columns)
     }
 }
 
@@ -182,7 +182,11 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
     }
 
     fn near(&self, bounds: &Box3<S>, name: impl FnMut(u32)) {
-        self.cells(bounds, name);
+        let (low, high) = (bounds.min - self.corner, bounds.max - self.corner);
+        let as_high = low.y <= self.highest && high.y >= self.lowest;
+        if as_high && is_finite_point(bounds.min) && is_finite_point(bounds.max) {
+            self.cells(self.columns([bounds.min.x, bounds.max.x]), bounds, name);
+        }
     }
 
     fn bounds(&self) -> Box3<S> {
@@ -193,34 +197,21 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
     }
 
     fn along(&self, from: Point3<S>, motion: Vec3<S>, mut name: impl FnMut(u32)) {
-        // Cell by cell along x, those along z that the way is over meanwhile.
         let to = from + motion;
-        let whole = Aabb { min: from, max: from }.union(&Aabb { min: to, max: to });
-        let width = self.cell[0];
-        let first = ((whole.min.x - self.corner.x) / width).as_f64().floor().max(-1.0);
-        let last = ((whole.max.x - self.corner.x) / width).as_f64().floor();
-        let last = last.min(f64::from(self.columns));
-        let mut seen = None;
-        let mut column = first;
-        while column <= last {
-            let left = self.corner.x + S::constant(column) * width;
-            let part = |x: S| {
-                let part = if motion.x == S::zero() { S::zero() } else { (x - from.x) / motion.x };
+        if !is_finite_point(from) || !is_finite_point(to) {
+            return;
+        }
+        // Column by column, the rows that it is over meanwhile.
+        for column in self.columns([from.x.min(to.x), from.x.max(to.x)]) {
+            let left = self.corner.x + S::constant(f64::from(column)) * self.cell[0];
+            let part = |x: S, straight: S| {
+                let part = if motion.x == S::zero() { straight } else { (x - from.x) / motion.x };
                 part.max(S::zero()).min(S::one())
             };
-            let (s, t) = (part(left), part(left + width));
-            let (s, t) = if motion.x == S::zero() { (S::zero(), S::one()) } else { (s, t) };
-            let (p, q) = (from + motion * s, from + motion * t);
-            let mut slab = Aabb { min: p, max: p }.union(&Aabb { min: q, max: q });
-            (slab.min.x, slab.max.x) = (left, left);
-            self.cells(&slab, |number| {
-                // Neighbouring slabs name some again.
-                if seen != Some(number) {
-                    name(number);
-                }
-                seen = Some(number);
-            });
-            column += 1.0;
+            let ends = [part(left, S::zero()), part(left + self.cell[0], S::one())];
+            let [p, q] = ends.map(|part| from + motion * part);
+            let meanwhile = Aabb { min: p, max: p }.union(&Aabb { min: q, max: q });
+            self.cells(column..column + 1, &meanwhile, &mut name);
         }
     }
 }

@@ -77,6 +77,9 @@ impl<S: Scalar> World<S> {
     pub(super) fn stop_where_they_meet(&mut self, dt: S) {
         let marbles = &mut self.marbles;
         let Sweep { start, middle, reach, near, hits, stopped } = &mut self.sweep;
+        if start.len() != marbles.len() {
+            return; // this model does not sweep
+        }
         let half = S::constant(0.5);
         let displaces = self.model.response == Response::Displacement;
         // Whose way past each other is less than this part of a radius have their normal right
@@ -85,7 +88,7 @@ impl<S: Scalar> World<S> {
         let moved = |row: usize| marbles.position[row] - start[row];
         let smallest = marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
         let fast = |row: usize| length(moved(row)) > smallest * slow * half;
-        if start.len() != marbles.len() || !(0..start.len()).any(fast) {
+        if !(0..start.len()).any(fast) {
             return;
         }
         middle.clear();
