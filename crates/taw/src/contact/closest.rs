@@ -1,11 +1,11 @@
-use cgmath::{EuclideanSpace, InnerSpace};
+use cgmath::InnerSpace;
 
-use super::axes::{Axis, PARALLEL, widest_axis};
-use super::manifold::contact_points;
-use super::skeleton::{Convex, Skeleton};
+use super::boxes::{BoxAxis, boxes};
+use super::core::{Convex, Core, Kind};
+use super::exhaustive;
+use super::gjk::{Gjk, gjk};
+use super::polytope::way_out;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
-use crate::shape::across;
-use crate::shape::polygon::{closest_of_polygon, closest_of_segment};
 use crate::shape::{Plane, Solid};
 
 /// Where two things are nearest to each other, or deepest in each other.
@@ -45,11 +45,13 @@ impl<S: Scalar> Closest<S> {
 /// Where two convex shapes are nearest to each other, or deepest in each other. Swapping
 /// them swaps the answer, to the bit, unless both have the very same middle.
 ///
-/// A sphere is asked for the nearest point of the other shape. Of others that are apart,
-/// all corners are compared with all faces and all edges with each other; of those that
-/// overlap, the directions of faces and of pairs of edges say where the way out is
-/// shortest (separating axes; Gottschalk, Lin and Manocha 1996). This is the readable
-/// version, exact but for rounding, without iterations.
+/// A sphere is asked for the nearest point of the other shape, and two capsules for the
+/// nearest points of two lines. Of boxes that overlap, fifteen directions say where the way
+/// out is shortest (separating axes; Gottschalk, Lin and Manocha 1996). All others go by the
+/// corners that are farthest in some directions: the distance by Gilbert, Johnson and
+/// Keerthi (1988), the way out by an expanding polytope (van den Bergen 2001). Both give a
+/// bound from below and one from above, and end when these agree; where they do not, all
+/// corners, edges and faces are compared with each other.
 #[must_use]
 pub fn closest<S: Scalar>(
     a: &(impl Convex<S> + ?Sized),
@@ -83,20 +85,24 @@ pub(super) fn swaps<S: Scalar>(
     [second.x, second.y, second.z] < [first.x, first.y, first.z]
 }
 
+
 fn closest_in_order<S: Scalar>(
     a: &(impl Convex<S> + ?Sized),
     b: &(impl Convex<S> + ?Sized),
 ) -> Closest<S> {
     let origin = cast_point::<S, f64>(a.middle());
-    let (x, y) = (a.skeleton(origin), b.skeleton(origin));
-    let Between { distance, normal, on_a, on_b } = between(&x, &y);
-    let point = |local: Vec3<f64>| cast_point(origin + local);
-    Closest {
-        distance: S::constant(distance),
-        normal: cast_vector(normal),
-        on_a: point(on_a),
-        on_b: point(on_b),
-    }
+    between(&a.core(origin), &b.core(origin)).about(origin)
+}
+
+/// What [`closest`] would say without its short cuts: the readable version, for comparison.
+#[must_use]
+pub fn closest_exhaustive<S: Scalar>(
+    a: &(impl Convex<S> + ?Sized),
+    b: &(impl Convex<S> + ?Sized),
+) -> Closest<S> {
+    let origin = cast_point::<S, f64>(a.middle());
+    let (a, b) = (a.core(origin), b.core(origin));
+    exhaustive::between(&a, &b).with_radii(a.radius, b.radius).about(origin)
 }
 
 /// Where a half-space and a bounded shape are nearest to each other, or deepest in each
@@ -118,126 +124,118 @@ pub(super) struct Between {
     pub on_b: Vec3<f64>,
 }
 
-/// Where two skeletons, with their radii, are nearest or deepest.
-pub(super) fn between(a: &Skeleton, b: &Skeleton) -> Between {
-    // What is nearer than this is told by the axis, not by a difference that is rounding.
-    let near = 1e-12 * (a.size() + b.size());
-    let axis = widest_axis(a, b);
-    let lines = match axis {
-        Some(axis) if axis.separation <= near => {
-            let (on_a, on_b) = deepest(a, b, axis);
-            Between { distance: axis.separation, normal: axis.normal, on_a, on_b }
+impl Between {
+    fn with_radii(self, a: f64, b: f64) -> Self {
+        Self {
+            distance: self.distance - a - b,
+            on_a: self.on_a + self.normal * a,
+            on_b: self.on_b - self.normal * b,
+            ..self
         }
-        axis => {
-            let (on_a, on_b) = nearest_features(a, b);
-            let out = direction_and_length(on_b - on_a).filter(|(_, far)| *far > near);
-            let (normal, distance) =
-                out.unwrap_or_else(|| (axis.map_or_else(|| beside(a, b), |axis| axis.normal), 0.0));
-            Between { distance, normal, on_a, on_b }
+    }
+
+    fn about<S: Scalar>(self, origin: Point3<f64>) -> Closest<S> {
+        Closest {
+            distance: S::constant(self.distance),
+            normal: cast_vector(self.normal),
+            on_a: cast_point(origin + self.on_a),
+            on_b: cast_point(origin + self.on_b),
         }
-    };
-    Between {
-        distance: lines.distance - a.radius - b.radius,
-        on_a: lines.on_a + lines.normal * a.radius,
-        on_b: lines.on_b - lines.normal * b.radius,
-        ..lines
     }
 }
 
-/// A direction between two lines that cross or lie in each other: every one at right angles
-/// to both is as short a way out.
-fn beside(a: &Skeleton, b: &Skeleton) -> Vec3<f64> {
-    let [first, second] = [a, b].map(|x| x.directions.first().copied());
-    let both = first.zip(second).map(|(first, second)| first.cross(second));
-    both.filter(|both| both.magnitude() > PARALLEL)
-        .and_then(direction_and_length)
-        .map_or_else(|| across(first.or(second).unwrap_or_else(Vec3::unit_x)), |(unit, _)| unit)
+/// So far from each other, as a part of their size, may the bounds of a distance be.
+pub(super) const CERTAIN: f64 = 1e-12;
+
+/// Where two cores, with their radii, are nearest or deepest.
+pub(super) fn between(a: &Core<'_>, b: &Core<'_>) -> Between {
+    let found = within(a, b, f64::INFINITY);
+    let found = found.map_or_else(|| exhaustive::between(a, b), |found| found.between(a, b));
+    found.with_radii(a.radius, b.radius)
 }
 
-/// The points of two skeletons that are nearest to each other: of all corners with all
-/// faces, and all edges with all edges.
-fn nearest_features(a: &Skeleton, b: &Skeleton) -> (Vec3<f64>, Vec3<f64>) {
-    // A distance changes so little about the nearest points that many are as near, but for
-    // rounding. Of those, the pair across which most of the shapes is kept apart is right.
-    let mut least = f64::INFINITY;
-    let mut as_near: Vec<(f64, (Vec3<f64>, Vec3<f64>))> = Vec::new();
-    let mut offer = |pair: (Vec3<f64>, Vec3<f64>)| {
-        let squared = (pair.1 - pair.0).magnitude2();
-        least = least.min(squared);
-        if squared <= least * (1.0 + 1e-12) {
-            as_near.push((squared, pair));
-        }
-    };
-    let mut corners = Vec::new();
-    for (one, other, swap) in [(a, b, false), (b, a, true)] {
-        for (normal, face) in &one.faces {
-            corners.clear();
-            corners.extend(face.iter().map(|i| Point3::from_vec(one.points[*i as usize])));
-            for point in &other.points {
-                let point = Point3::from_vec(*point);
-                let there = closest_of_polygon(&corners, *normal, point).to_vec();
-                offer(if swap { (point.to_vec(), there) } else { (there, point.to_vec()) });
+/// Where two cores, without their radii, are nearest or deepest, unless they, with their
+/// radii, are farther apart than a limit.
+pub(super) fn within(a: &Core<'_>, b: &Core<'_>, limit: f64) -> Option<Found> {
+    let (size, limit) = (a.size() + b.size(), limit + a.radius + b.radius);
+    let found = match (&a.kind, &b.kind) {
+        (Kind::Segment(a), Kind::Segment(b)) => segments(*a, *b, size, limit),
+        (Kind::Cuboid(x), Kind::Cuboid(y)) => {
+            let axis = boxes(x, y, size);
+            if axis.distance > limit {
+                return None;
             }
+            if axis.distance <= CERTAIN * size {
+                return Some(Found::Overlap(axis));
+            }
+            gjk(a, b, -axis.normal, size, limit)
         }
-        for (point, segment) in
-            one.points.iter().flat_map(|p| other.edges.iter().map(move |e| (p, e)))
-        {
-            let [from, to] = segment.map(|i| Point3::from_vec(other.points[i as usize]));
-            let there = closest_of_segment(from, to, Point3::from_vec(*point)).to_vec();
-            offer(if swap { (there, *point) } else { (*point, there) });
-        }
-    }
-    for (first, second) in a.edges.iter().flat_map(|e| b.edges.iter().map(move |f| (e, f))) {
-        let [p, q] = first.map(|i| a.points[i as usize]);
-        let [r, s] = second.map(|i| b.points[i as usize]);
-        if let Some(pair) = crossing([p, q], [r, s]) {
-            offer(pair);
-        }
-    }
-    as_near.retain(|(squared, _)| *squared <= least * (1.0 + 1e-12));
-    let kept_apart = |(on_a, on_b): (Vec3<f64>, Vec3<f64>)| {
-        let out = direction_and_length(on_b - on_a);
-        out.map_or(f64::NEG_INFINITY, |(normal, _)| -b.reach(-normal) - a.reach(normal))
+        _ => gjk(a, b, a.inside() - b.inside(), size, limit),
     };
-    let first = (f64::NEG_INFINITY, (a.points[0], b.points[0]));
-    let best = as_near.into_iter().enumerate().fold(first, |best, (i, (_, pair))| {
-        let apart = kept_apart(pair);
-        if i == 0 || apart > best.0 { (apart, pair) } else { best }
-    });
-    best.1
+    let between = match found {
+        Gjk::Beyond => return None,
+        Gjk::Apart(between) => Some(between),
+        Gjk::Together(simplex) => way_out(a, b, simplex, size),
+        Gjk::Unsure => None,
+    };
+    let between = between.unwrap_or_else(|| exhaustive::between(a, b));
+    (between.distance <= limit).then_some(Found::Between(between))
 }
 
-/// Where two segments are nearest to each other if that is at no end of either; else, near
-/// there. None if they are parallel (Ericson, *Real-Time Collision Detection*, 2005, §5.1.9).
-pub(super) fn crossing(
+/// Where two cores are nearest or deepest; of boxes that overlap, without the points.
+pub(super) enum Found {
+    Between(Between),
+    Overlap(BoxAxis),
+}
+
+impl Found {
+    pub fn normal(&self) -> Vec3<f64> {
+        match self {
+            Self::Between(between) => between.normal,
+            Self::Overlap(axis) => axis.normal,
+        }
+    }
+
+    pub fn distance(&self) -> f64 {
+        match self {
+            Self::Between(between) => between.distance,
+            Self::Overlap(axis) => axis.distance,
+        }
+    }
+
+    pub fn between(&self, a: &Core<'_>, b: &Core<'_>) -> Between {
+        match self {
+            Self::Between(between) => *between,
+            Self::Overlap(axis) => axis.with_points(a, b),
+        }
+    }
+}
+
+/// Where two segments are nearest, unless they cross (Ericson, *Real-Time Collision
+/// Detection*, 2005, §5.1.9).
+fn segments(
     [p, q]: [Vec3<f64>; 2],
     [r, s]: [Vec3<f64>; 2],
-) -> Option<(Vec3<f64>, Vec3<f64>)> {
-    let (along_a, long_a) = direction_and_length(q - p)?;
-    let (along_b, long_b) = direction_and_length(s - r)?;
-    let cos = along_a.dot(along_b);
-    let sin = along_a.cross(along_b).magnitude();
-    if sin < PARALLEL {
-        return None;
+    size: f64,
+    limit: f64,
+) -> Gjk {
+    let (first, second, apart) = (q - p, s - r, p - r);
+    let (long_a, long_b) = (first.magnitude2(), second.magnitude2());
+    let part = |x: f64, of: f64| if of > 0.0 { (x / of).clamp(0.0, 1.0) } else { 0.0 };
+    let (c, f, both) = (first.dot(apart), second.dot(apart), first.dot(second));
+    let mut on_first = part(both * f - c * long_b, long_a * long_b - both * both);
+    let wanted = both * on_first + f;
+    let on_second = part(wanted, long_b);
+    if wanted < 0.0 || wanted > long_b {
+        on_first = part(both * on_second - c, long_a);
     }
-    let apart = r - p;
-    let (on_a, on_b) = (apart.dot(along_a), apart.dot(along_b));
-    let first = (on_a - cos * on_b) / (sin * sin);
-    let second = (cos * on_a - on_b) / (sin * sin);
-    Some((p + along_a * first.clamp(0.0, long_a), r + along_b * second.clamp(0.0, long_b)))
-}
-
-/// The middle of where two skeletons are deepest in each other along an axis.
-fn deepest(a: &Skeleton, b: &Skeleton, axis: Axis) -> (Vec3<f64>, Vec3<f64>) {
-    let points = contact_points(a, b, &axis);
-    let bottom = points.iter().map(|p| p.distance).fold(f64::INFINITY, f64::min);
-    let near = 1e-14 * (a.size() + b.size());
-    let (mut sum, mut count) = (Vec3::new(0.0, 0.0, 0.0), 0.0);
-    for point in points.iter().filter(|point| point.distance <= bottom + near) {
-        sum += point.on_b;
-        count += 1.0;
+    let (on_a, on_b) = (p + first * on_first, r + second * on_second);
+    if (on_b - on_a).magnitude2() > limit * limit * (1.0 + 1e-12) {
+        return Gjk::Beyond;
     }
-    // What rounding cut away is at the farthest corner.
-    let on_b = if count > 0.0 { sum / count } else { b.farthest(-axis.normal) };
-    (on_b - axis.normal * axis.separation, on_b)
+    let Some((normal, distance)) = direction_and_length(on_b - on_a) else { return Gjk::Unsure };
+    // What a plane across says is a bound from below.
+    let below = r.dot(normal).min(s.dot(normal)) - p.dot(normal).max(q.dot(normal));
+    let certain = distance - below <= CERTAIN * size && distance > 1e-6 * size;
+    if certain { Gjk::Apart(Between { distance, normal, on_a, on_b }) } else { Gjk::Unsure }
 }

@@ -1,6 +1,6 @@
 use super::closest::{Closest, closest};
 use super::manifold::{Manifold, manifold};
-use super::skeleton::Convex;
+use super::core::Convex;
 use super::sweep::{Touch, sweep};
 use crate::math::{Scalar, Vec3};
 use crate::shape::Shape;

@@ -23,24 +23,28 @@
 //! of the second thing that takes it out of the first. Touching without overlap
 //! is a touch, with a displacement of zero.
 
-mod axes;
+mod boxes;
 mod closest;
 mod compound;
+mod core;
+mod exhaustive;
+mod gjk;
 mod list;
 mod manifold;
+mod polytope;
 mod ray;
-mod skeleton;
 mod sphere_plane;
 mod sphere_sphere;
 mod surface;
 mod sweep;
 
-pub use closest::{Closest, closest, closest_plane};
+pub use closest::{Closest, closest, closest_exhaustive, closest_plane};
 pub use compound::{OfParts, closest_shapes, manifolds_of_shapes, sweep_shapes};
 pub use list::{Contact, Contacts};
-pub use manifold::{Manifold, ManifoldPoint, manifold};
+pub use core::{Convex, Core};
+pub use exhaustive::Skeleton;
+pub use manifold::{Manifold, ManifoldPoint, Points, manifold};
 pub use ray::{Cast, RayHit};
-pub use skeleton::{Convex, Skeleton};
 pub use sphere_plane::{mtv_sphere_plane, touching_sphere_plane};
 pub use sphere_sphere::{mtv_sphere_sphere, time_of_impact_sphere_sphere, touching_sphere_sphere};
 pub use surface::{

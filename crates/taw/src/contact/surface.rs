@@ -3,7 +3,7 @@ use cgmath::InnerSpace;
 use super::closest::{Closest, closest};
 use super::manifold::{Manifold, manifold};
 use super::ray::RayHit;
-use super::skeleton::Convex;
+use super::core::Convex;
 use super::sweep::{Touch, sweep};
 use crate::frame::Ray;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};

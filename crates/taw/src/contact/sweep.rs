@@ -1,7 +1,7 @@
 use cgmath::InnerSpace;
 
 use super::closest::{Between, between, swaps};
-use super::skeleton::Convex;
+use super::core::Convex;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 
 /// When and where two moving things first touch.
@@ -36,17 +36,14 @@ pub fn sweep<S: Scalar>(
         return Some(Touch { normal: -touch.normal, ..touch });
     }
     let origin = cast_point::<S, f64>(a.middle());
-    let (x, start) = (a.skeleton(origin), b.skeleton(origin));
+    let (x, start) = (a.core(origin), b.core(origin));
     let (first, second) = (cast_vector::<S, f64>(a_moves), cast_vector::<S, f64>(b_moves));
     // As the first sees it.
     let motion = second - first;
     let near = 1e-10 * (x.size() + start.size());
-    let mut y = start.clone();
     let mut time = 0.0;
     for _ in 0..STEPS {
-        for (point, from) in y.points.iter_mut().zip(&start.points) {
-            *point = from + motion * time;
-        }
+        let y = start.moved(motion * time);
         let Between { distance, normal, on_a, .. } = between(&x, &y);
         let closing = -motion.dot(normal);
         if closing.is_nan() || closing <= 0.0 {

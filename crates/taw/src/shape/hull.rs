@@ -1,7 +1,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::polygon::{closest_of_polygon, normal_of_polygon};
+use super::polygon::{closest_of_segment, normal_of_polygon};
 use super::wrap::wrap;
 use super::{Aabb, Box3, Nearest, Solid};
 use crate::Error;
@@ -24,6 +24,12 @@ struct Polyhedron {
     points: Vec<Point3<f64>>,
     edges: Vec<[u32; 2]>,
     faces: Vec<Face>,
+    /// Of the planes of the faces, from the origin.
+    offsets: Vec<f64>,
+    /// The greatest distance of a corner from the first one.
+    size: f64,
+    /// The greatest coordinate of a corner.
+    largest: f64,
 }
 
 /// A flat side of a hull.
@@ -75,12 +81,21 @@ impl<S: Scalar> Hull<S> {
         let thin = size * FLAT.max(2.0 * S::epsilon().as_f64());
         let mut faces = merge(&points, &triangles, thin);
         let points = drop_what_is_no_corner(&points, &mut faces);
-        let polyhedron = Polyhedron { edges: edges_of(&faces), points, faces };
-        let solid = polyhedron.faces.len() >= 4
-            && polyhedron.faces.iter().all(|face| face.corners.len() >= 3);
-        if !solid {
+        if faces.len() < 4 || faces.iter().any(|face| face.corners.len() < 3) {
             return Err(flat);
         }
+        let far = |point: &Point3<f64>| (*point - points[0]).magnitude();
+        let size = points.iter().map(far).fold(0.0, f64::max);
+        let on = |face: &Face| points[face.corners[0] as usize].to_vec().dot(face.normal);
+        let coordinates = points.iter().flat_map(|p| [p.x.abs(), p.y.abs(), p.z.abs()]);
+        let polyhedron = Polyhedron {
+            edges: edges_of(&faces),
+            offsets: faces.iter().map(on).collect(),
+            size,
+            largest: coordinates.fold(0.0, f64::max),
+            points,
+            faces,
+        };
         let thinnest = polyhedron.faces.iter().map(|face| polyhedron.depth_behind(face));
         if thinnest.fold(f64::INFINITY, f64::min) <= thin {
             return Err(flat);
@@ -126,6 +141,11 @@ impl<S: Scalar> Hull<S> {
         &self.polyhedron.points
     }
 
+    /// The greatest distance of a corner from the first one, in metres.
+    pub(crate) fn size(&self) -> f64 {
+        self.polyhedron.size
+    }
+
     /// Where its own frame is, with the rotation made as long as it should be.
     pub(crate) fn exact_pose(&self) -> Pose<f64> {
         let Pose { rotation, translation } = self.pose;
@@ -151,11 +171,8 @@ impl<S: Scalar> Solid<S> for Hull<S> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
         let pose = self.exact_pose();
         let local = pose.vector_back(cast_vector(direction));
-        let points = &self.polyhedron.points;
-        let farther = |best: Point3<f64>, point: &Point3<f64>| {
-            if (*point - best).dot(local) > 0.0 { *point } else { best }
-        };
-        cast_point(pose.point(points.iter().fold(self.local(0), farther)))
+        let farthest = farthest_of(&self.polyhedron.points, local);
+        cast_point(pose.point(self.polyhedron.points[farthest]))
     }
 
     fn bounding_box(&self) -> Box3<S> {
@@ -180,38 +197,80 @@ impl<S: Scalar> Solid<S> for Hull<S> {
     fn nearest(&self, point: Point3<S>) -> Nearest<S> {
         let pose = self.exact_pose();
         let local = pose.point_back(cast_point(point));
-        let height = |face: &Face| (local - self.local(face.corners[0])).dot(face.normal);
         let answer = |surface: Point3<f64>, normal: Vec3<f64>, distance: f64| Nearest {
             point: cast_point(pose.point(surface)),
             normal: cast_vector(pose.vector(normal)),
             distance: S::constant(distance),
         };
-        let first = &self.faces()[0];
-        let (highest, face) = self.faces().iter().fold((height(first), first), |best, face| {
-            if height(face) > best.0 { (height(face), face) } else { best }
-        });
-        // Just outside, by no more than rounding can tell, counts as on the face.
-        let corners = self.polyhedron.points.iter().flat_map(|p| [p.x.abs(), p.y.abs(), p.z.abs()]);
-        let largest = corners.fold(0.0, f64::max);
-        if highest <= largest * f64::EPSILON * 64.0 {
-            return answer(local - face.normal * highest, face.normal, highest);
-        }
-        // Outside: of the nearest points of all faces that it is in front of, the nearest.
-        let mut nearest = (f64::INFINITY, face.normal, local);
-        let mut corners = Vec::new();
-        for face in self.faces().iter().filter(|face| height(face) > 0.0) {
-            corners.clear();
-            corners.extend(face.corners.iter().map(|corner| self.local(*corner)));
-            let there = closest_of_polygon(&corners, face.normal, local);
-            let out = direction_and_length(local - there);
-            let (normal, distance) = out.unwrap_or((face.normal, 0.0));
-            if distance < nearest.0 {
-                nearest = (distance, normal, there);
+        let Polyhedron { points, faces, offsets, largest, .. } = &*self.polyhedron;
+        let height = |(face, offset): (&Face, &f64)| local.to_vec().dot(face.normal) - offset;
+        let (mut highest, mut face) = (f64::NEG_INFINITY, &faces[0]);
+        for next in faces.iter().zip(offsets) {
+            let above = height(next);
+            if above > highest {
+                (highest, face) = (above, next.0);
             }
         }
-        let (distance, normal, surface) = nearest;
-        answer(surface, normal, distance)
+        let below = local - face.normal * highest;
+        // Just outside, by no more than rounding can tell, counts as on the face.
+        if highest <= largest * f64::EPSILON * 64.0 || side_of(points, face, local, |_, _| ()) {
+            return answer(below, face.normal, highest);
+        }
+        // Beside it: on the sides of the faces that it is in front of, the nearest point.
+        let mut nearest = (f64::INFINITY, local);
+        for next in faces.iter().zip(offsets).filter(|next| height(*next) > 0.0) {
+            let over = side_of(points, next.0, local, |from, to| {
+                let there = closest_of_segment(from, to, local);
+                let squared = (local - there).magnitude2();
+                if squared < nearest.0 {
+                    nearest = (squared, there);
+                }
+            });
+            if over {
+                let above = height(next);
+                let there = local - next.0.normal * above;
+                if above * above < nearest.0 {
+                    nearest = (above * above, there);
+                }
+            }
+        }
+        let out = direction_and_length(local - nearest.1);
+        let (normal, distance) = out.unwrap_or((face.normal, 0.0));
+        answer(nearest.1, normal, distance)
     }
+}
+
+/// The point that is farthest along a direction; of several, the first.
+pub(crate) fn farthest_of(points: &[Point3<f64>], direction: Vec3<f64>) -> usize {
+    let (mut best, mut reach) = (0, f64::NEG_INFINITY);
+    for (i, point) in points.iter().enumerate() {
+        let next = point.to_vec().dot(direction);
+        if next > reach {
+            (best, reach) = (i, next);
+        }
+    }
+    best
+}
+
+/// Whether a point is over or under a face; if not, names the sides of it that the point is
+/// beside.
+fn side_of(
+    points: &[Point3<f64>],
+    face: &Face,
+    point: Point3<f64>,
+    mut beside: impl FnMut(Point3<f64>, Point3<f64>),
+) -> bool {
+    let mut over = true;
+    let mut from = points[face.corners[face.corners.len() - 1] as usize];
+    for corner in &face.corners {
+        let to = points[*corner as usize];
+        if (to - from).cross(face.normal).dot(point - from) > 0.0 {
+            over = false;
+            beside(from, to);
+        }
+        from = to;
+    }
+    over
 }
 
 /// Which points are corners, and the triangles between them, as numbers of corners; none

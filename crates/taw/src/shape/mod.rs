@@ -21,6 +21,7 @@ pub use box_tree::BoxTree;
 pub use capsule::Capsule;
 pub(crate) use capsule::across;
 pub use compound::{Compound, Shape};
+pub(crate) use hull::farthest_of;
 pub use hull::{Face, Hull};
 pub use obb::Obb;
 pub use plane::Plane;

@@ -117,26 +117,23 @@ impl<S: Scalar> Solid<S> for Obb<S> {
             let half = self.half_widths[axis];
             inside[axis] = num_clamp(local[axis], half);
         }
-        let out = local - inside;
-        let (surface, normal, distance) =
-            if let Some((normal, distance)) = crate::math::direction_and_length(out) {
-                (inside, normal, distance)
-            } else {
-                // Inside: the nearest face. Of faces as near, the first axis, and the side
-                // on which the point is, or the positive one.
-                let gap = |axis: usize| self.half_widths[axis] - local[axis].abs();
-                let axis = (1..3).fold(0, |best, i| if gap(i) < gap(best) { i } else { best });
-                let side = if local[axis] < S::zero() { -S::one() } else { S::one() };
-                let mut normal = Vec3::new(S::zero(), S::zero(), S::zero());
-                normal[axis] = side;
-                let mut surface = local;
-                surface[axis] = side * self.half_widths[axis];
-                (surface, normal, -gap(axis))
-            };
+        let out = self.rotation * (local - inside);
+        if let Some((normal, distance)) = crate::math::direction_and_length(out) {
+            return Nearest { point: self.center + self.rotation * inside, normal, distance };
+        }
+        // Inside: the nearest face. Of faces as near, the first axis, and the side on which
+        // the point is, or the positive one.
+        let gap = |axis: usize| self.half_widths[axis] - local[axis].abs();
+        let axis = (1..3).fold(0, |best, i| if gap(i) < gap(best) { i } else { best });
+        let side = if local[axis] < S::zero() { -S::one() } else { S::one() };
+        let mut normal = Vec3::new(S::zero(), S::zero(), S::zero());
+        normal[axis] = side;
+        let mut surface = local;
+        surface[axis] = side * self.half_widths[axis];
         Nearest {
             point: self.center + self.rotation * surface,
             normal: (self.rotation * normal).normalize(),
-            distance,
+            distance: -gap(axis),
         }
     }
 }

@@ -7,11 +7,11 @@ use super::skeleton::Skeleton;
 use crate::math::{Vec3, direction_and_length, is_finite};
 
 /// Two directions whose sine is below this are parallel.
-pub(super) const PARALLEL: f64 = 1e-12;
+pub(in crate::contact) const PARALLEL: f64 = 1e-12;
 
 /// A direction from one to the other, and how far it keeps them apart.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Axis {
+pub(in crate::contact) struct Axis {
     /// From the first to the second, a unit vector.
     pub normal: Vec3<f64>,
     /// How far they are apart along it, without their radii.
@@ -21,7 +21,7 @@ pub(super) struct Axis {
 
 /// What an axis is at right angles to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Of {
+pub(in crate::contact) enum Of {
     /// A face of the first.
     FaceOfA(usize),
     FaceOfB(usize),
@@ -32,7 +32,7 @@ pub(super) enum Of {
 /// The axis that keeps two polyhedra apart most, or along which they overlap least; none if
 /// neither has a face. Of axes that are as good, the first, and that of a face rather than
 /// that of edges.
-pub(super) fn widest_axis(a: &Skeleton, b: &Skeleton) -> Option<Axis> {
+pub(in crate::contact) fn widest_axis(a: &Skeleton, b: &Skeleton) -> Option<Axis> {
     let of_a = a.faces.iter().enumerate().map(|(face, (normal, corners))| Axis {
         normal: *normal,
         separation: -b.reach(-*normal) - a.points[corners[0] as usize].dot(*normal),
@@ -72,7 +72,7 @@ pub(super) fn widest_axis(a: &Skeleton, b: &Skeleton) -> Option<Axis> {
 ///
 /// Of nearly parallel ones the cross product has few digits left, so it is turned until
 /// it is at right angles as exactly as a product can tell.
-fn at_right_angles(d: Vec3<f64>, e: Vec3<f64>) -> Option<Vec3<f64>> {
+pub(in crate::contact) fn at_right_angles(d: Vec3<f64>, e: Vec3<f64>) -> Option<Vec3<f64>> {
     let cross = d.cross(e);
     let sin = cross.magnitude();
     if sin < PARALLEL {

@@ -1,0 +1,380 @@
+use cgmath::{EuclideanSpace, InnerSpace, Matrix3};
+use smallvec::SmallVec;
+
+use crate::math::{Mat3, Point3, Scalar, Vec3, cast_point, cast_vector};
+use crate::shape::{Box3, Capsule, Face, Hull, Obb, Solid, Sphere, Triangle, farthest_of};
+
+/// A convex shape as all points within `radius` of a polyhedron, which may also be a
+/// point, a line, or flat. All in `f64`, about some origin that is near, so that nothing
+/// is lost far from that of the world.
+#[derive(Clone, Copy, Debug)]
+pub struct Core<'a> {
+    pub(super) kind: Kind<'a>,
+    /// In metres.
+    pub(super) radius: f64,
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Kind<'a> {
+    Point(Vec3<f64>),
+    Segment([Vec3<f64>; 2]),
+    Triangle([Vec3<f64>; 3]),
+    Cuboid(Cuboid),
+    Hull {
+        points: &'a [Point3<f64>],
+        edges: &'a [[u32; 2]],
+        faces: &'a [Face],
+        turn: Mat3<f64>,
+        at: Vec3<f64>,
+        size: f64,
+    },
+}
+
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Cuboid {
+    pub center: Vec3<f64>,
+    pub axes: [Vec3<f64>; 3],
+    pub half: [f64; 3],
+}
+
+/// A corner and its number.
+pub(super) type Corner = (Vec3<f64>, u32);
+/// Corners around a face, or the ends of a line, or a point.
+pub(super) type Outline = SmallVec<[Corner; 8]>;
+
+/// What has a [`Core`].
+pub trait Convex<S: Scalar>: Solid<S> {
+    /// The core about an origin.
+    #[must_use]
+    fn core(&self, origin: Point3<f64>) -> Core<'_>;
+
+    /// A point in the middle of it.
+    #[must_use]
+    fn middle(&self) -> Point3<S>;
+
+    /// Itself, if it is nothing but a sphere, for which all questions have short answers.
+    #[must_use]
+    fn as_sphere(&self) -> Option<Sphere<S>> {
+        None
+    }
+}
+
+/// What is nearly parallel to a face lies on it: the sine of a thousandth of a turn.
+pub(super) const FLAT: f64 = 6e-3;
+
+/// The faces of a box, by the bits of its corners: along −x, x, −y, y, −z, z.
+pub(super) const BOX_FACES: [[u32; 4]; 6] =
+    [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
+
+impl Cuboid {
+    pub fn corner(&self, number: u32) -> Vec3<f64> {
+        (0..3).fold(self.center, |at, i| {
+            let half = if number >> i & 1 == 0 { -self.half[i] } else { self.half[i] };
+            at + self.axes[i] * half
+        })
+    }
+
+    /// The number of the corner that is farthest along a direction.
+    pub fn farthest(&self, direction: Vec3<f64>) -> u32 {
+        (0..3).fold(0, |corner, i| {
+            corner | u32::from(self.axes[i].dot(direction) > 0.0) << i
+        })
+    }
+
+    /// How far it reaches along a direction, from its middle.
+    pub fn reach(&self, direction: Vec3<f64>) -> f64 {
+        (0..3).map(|i| self.half[i] * self.axes[i].dot(direction).abs()).sum()
+    }
+
+    /// The face that looks most along a direction.
+    fn facing(&self, direction: Vec3<f64>) -> usize {
+        let along = self.axes.map(|axis| axis.dot(direction));
+        let axis =
+            (1..3).fold(0, |most, i| if along[i].abs() > along[most].abs() { i } else { most });
+        2 * axis + usize::from(along[axis] > 0.0)
+    }
+
+    fn normal(&self, face: usize) -> Vec3<f64> {
+        if face.is_multiple_of(2) { -self.axes[face / 2] } else { self.axes[face / 2] }
+    }
+}
+
+/// The unit normal of a triangle, unless it is as good as a line.
+fn normal_of(corners: [Vec3<f64>; 3]) -> Option<Vec3<f64>> {
+    Triangle { corners: corners.map(Point3::from_vec) }.normal()
+}
+
+impl Core<'_> {
+    /// How far around its polyhedron it reaches, in metres.
+    #[must_use]
+    pub fn radius(&self) -> f64 {
+        self.radius
+    }
+
+    /// Its corner that is farthest along a direction, and the number of it.
+    pub(super) fn support(&self, direction: Vec3<f64>) -> Corner {
+        let farthest = |corners: &[Vec3<f64>]| {
+            let mut best = (corners[0], 0);
+            for (i, corner) in (1..).zip(&corners[1..]) {
+                if (corner - best.0).dot(direction) > 0.0 {
+                    best = (*corner, i);
+                }
+            }
+            best
+        };
+        match &self.kind {
+            Kind::Point(point) => (*point, 0),
+            Kind::Segment(ends) => farthest(ends),
+            Kind::Triangle(corners) => farthest(corners),
+            Kind::Cuboid(cuboid) => {
+                let corner = cuboid.farthest(direction);
+                (cuboid.corner(corner), corner)
+            }
+            Kind::Hull { points, turn, at, .. } => {
+                let local =
+                    Vec3::new(turn.x.dot(direction), turn.y.dot(direction), turn.z.dot(direction));
+                let best = farthest_of(points, local);
+                (turn * points[best].to_vec() + at, best as u32)
+            }
+        }
+    }
+
+    /// About how far its corners are from each other; and the radius, if that is greater.
+    pub(super) fn size(&self) -> f64 {
+        let largest = |v: Vec3<f64>| v.x.abs().max(v.y.abs()).max(v.z.abs());
+        let far = match &self.kind {
+            Kind::Point(_) => 0.0,
+            Kind::Segment([a, b]) => largest(b - a),
+            Kind::Triangle([a, b, c]) => largest(b - a).max(largest(c - a)),
+            Kind::Cuboid(cuboid) => 2.0 * largest(cuboid.half.into()),
+            Kind::Hull { size, .. } => *size,
+        };
+        far.max(self.radius)
+    }
+
+    /// Whether it is a triangle that is no line.
+    pub(super) fn is_flat(&self) -> bool {
+        matches!(&self.kind, Kind::Triangle(corners) if normal_of(*corners).is_some())
+    }
+
+    /// A point in it.
+    pub(super) fn inside(&self) -> Vec3<f64> {
+        match &self.kind {
+            Kind::Point(point) => *point,
+            Kind::Segment([a, b]) => (a + b) * 0.5,
+            Kind::Triangle([a, b, c]) => (a + b + c) / 3.0,
+            Kind::Cuboid(cuboid) => cuboid.center,
+            Kind::Hull { at, .. } => *at,
+        }
+    }
+
+    /// The same, a way off.
+    pub(super) fn moved(mut self, by: Vec3<f64>) -> Self {
+        match &mut self.kind {
+            Kind::Point(point) => *point += by,
+            Kind::Segment(ends) => ends.iter_mut().for_each(|end| *end += by),
+            Kind::Triangle(corners) => corners.iter_mut().for_each(|corner| *corner += by),
+            Kind::Cuboid(cuboid) => cuboid.center += by,
+            Kind::Hull { at, .. } => *at += by,
+        }
+        self
+    }
+
+    /// The same, turned about the origin.
+    pub(super) fn turned(mut self, by: Mat3<f64>) -> Self {
+        match &mut self.kind {
+            Kind::Point(point) => *point = by * *point,
+            Kind::Segment(ends) => ends.iter_mut().for_each(|end| *end = by * *end),
+            Kind::Triangle(corners) => corners.iter_mut().for_each(|corner| *corner = by * *corner),
+            Kind::Cuboid(cuboid) => {
+                cuboid.center = by * cuboid.center;
+                cuboid.axes.iter_mut().for_each(|axis| *axis = by * *axis);
+            }
+            Kind::Hull { turn, at, .. } => (*turn, *at) = (by * *turn, by * *at),
+        }
+        self
+    }
+
+    /// The number of the face whose normal is a direction, but for [`FLAT`].
+    pub(super) fn face_along(&self, direction: Vec3<f64>) -> Option<usize> {
+        let face = match &self.kind {
+            Kind::Point(_) | Kind::Segment(_) => None,
+            Kind::Triangle(corners) => normal_of(*corners)
+                .map(|normal| usize::from(normal.dot(direction) < 0.0)),
+            Kind::Cuboid(cuboid) => Some(cuboid.facing(direction)),
+            Kind::Hull { faces, turn, .. } => {
+                let local =
+                    Vec3::new(turn.x.dot(direction), turn.y.dot(direction), turn.z.dot(direction));
+                let (mut best, mut most) = (0, f64::NEG_INFINITY);
+                for (i, face) in faces.iter().enumerate() {
+                    let next = face.normal.dot(local);
+                    if next > most {
+                        (best, most) = (i, next);
+                    }
+                }
+                Some(best)
+            }
+        }?;
+        (self.normal(face).cross(direction).magnitude2() < FLAT * FLAT).then_some(face)
+    }
+
+    /// The normal of a face.
+    pub(super) fn normal(&self, face: usize) -> Vec3<f64> {
+        match &self.kind {
+            Kind::Cuboid(cuboid) => cuboid.normal(face),
+            Kind::Hull { faces, turn, .. } => turn * faces[face].normal,
+            Kind::Triangle(corners) => {
+                let normal = normal_of(*corners).unwrap_or_else(Vec3::unit_x);
+                if face == 0 { normal } else { -normal }
+            }
+            Kind::Point(_) | Kind::Segment(_) => Vec3::unit_x(),
+        }
+    }
+
+    /// The corners of a face, counterclockwise.
+    pub(super) fn face(&self, face: usize) -> Outline {
+        match &self.kind {
+            Kind::Cuboid(cuboid) => {
+                BOX_FACES[face].iter().map(|corner| (cuboid.corner(*corner), *corner)).collect()
+            }
+            Kind::Hull { points, faces, turn, at, .. } => {
+                let corner =
+                    |i: &u32| (turn * points[*i as usize].to_vec() + at, *i);
+                faces[face].corners.iter().map(corner).collect()
+            }
+            Kind::Triangle([a, b, c]) => {
+                let corners = if face == 0 {
+                    [(*a, 0), (*b, 1), (*c, 2)]
+                } else {
+                    [(*c, 2), (*b, 1), (*a, 0)]
+                };
+                corners.into_iter().collect()
+            }
+            Kind::Point(point) => std::iter::once((*point, 0)).collect(),
+            Kind::Segment([a, b]) => [(*a, 0), (*b, 1)].into_iter().collect(),
+        }
+    }
+
+    /// Of the faces with the most of the farthest corners along a direction, the one that
+    /// looks most that way; else the line or the point.
+    pub(super) fn facing(&self, direction: Vec3<f64>) -> Outline {
+        let face = match &self.kind {
+            Kind::Point(_) | Kind::Segment(_) => 0,
+            Kind::Triangle(corners) => {
+                usize::from(normal_of(*corners).is_some_and(|normal| normal.dot(direction) < 0.0))
+            }
+            Kind::Cuboid(cuboid) => cuboid.facing(direction),
+            Kind::Hull { points, faces, turn, size, .. } => {
+                let local =
+                    Vec3::new(turn.x.dot(direction), turn.y.dot(direction), turn.z.dot(direction));
+                let along: SmallVec<[f64; 32]> =
+                    points.iter().map(|point| point.to_vec().dot(local)).collect();
+                let reach = along.iter().copied().fold(f64::NEG_INFINITY, f64::max) - 1e-12 * size;
+                let mut best = (0, 0, f64::NEG_INFINITY);
+                for (i, face) in faces.iter().enumerate() {
+                    let out = face.corners.iter().filter(|i| along[**i as usize] >= reach).count();
+                    let looks = face.normal.dot(local);
+                    if (out, looks) > (best.1, best.2) {
+                        best = (i, out, looks);
+                    }
+                }
+                best.0
+            }
+        };
+        self.face(face)
+    }
+}
+
+fn local<S: Scalar>(point: Point3<S>, origin: Point3<f64>) -> Vec3<f64> {
+    cast_point::<S, f64>(point) - origin
+}
+
+impl<S: Scalar> Convex<S> for Sphere<S> {
+    fn core(&self, origin: Point3<f64>) -> Core<'_> {
+        Core { kind: Kind::Point(local(self.center, origin)), radius: self.radius.as_f64() }
+    }
+
+    fn middle(&self) -> Point3<S> {
+        self.center
+    }
+
+    fn as_sphere(&self) -> Option<Sphere<S>> {
+        Some(*self)
+    }
+}
+
+impl<S: Scalar> Convex<S> for Capsule<S> {
+    fn core(&self, origin: Point3<f64>) -> Core<'_> {
+        let ends = [self.a, self.b].map(|end| local(end, origin));
+        Core { kind: Kind::Segment(ends), radius: self.radius.as_f64() }
+    }
+
+    fn middle(&self) -> Point3<S> {
+        self.a + (self.b - self.a) * S::constant(0.5)
+    }
+
+    fn as_sphere(&self) -> Option<Sphere<S>> {
+        (self.a == self.b).then_some(Sphere { center: self.a, radius: self.radius })
+    }
+}
+
+impl<S: Scalar> Convex<S> for Obb<S> {
+    fn core(&self, origin: Point3<f64>) -> Core<'_> {
+        let cuboid = Cuboid {
+            center: local(self.center, origin),
+            // In f64 from the start, or the corners would be rounded.
+            axes: self.exact_axes(),
+            half: cast_vector(self.half_widths).into(),
+        };
+        Core { kind: Kind::Cuboid(cuboid), radius: 0.0 }
+    }
+
+    fn middle(&self) -> Point3<S> {
+        self.center
+    }
+}
+
+impl<S: Scalar> Convex<S> for Box3<S> {
+    fn core(&self, origin: Point3<f64>) -> Core<'_> {
+        let (low, high) = (local(self.min, origin), local(self.max, origin));
+        let half = (high - low) * 0.5;
+        let axes = [Vec3::unit_x(), Vec3::unit_y(), Vec3::unit_z()];
+        let cuboid = Cuboid { center: low + half, axes, half: half.into() };
+        Core { kind: Kind::Cuboid(cuboid), radius: 0.0 }
+    }
+
+    fn middle(&self) -> Point3<S> {
+        self.center()
+    }
+}
+
+impl<S: Scalar> Convex<S> for Triangle<S> {
+    fn core(&self, origin: Point3<f64>) -> Core<'_> {
+        let corners = self.corners.map(|corner| local(corner, origin));
+        Core { kind: Kind::Triangle(corners), radius: 0.0 }
+    }
+
+    fn middle(&self) -> Point3<S> {
+        let [a, b, c] = self.corners;
+        a + ((b - a) + (c - a)) / S::constant(3.0)
+    }
+}
+
+impl<S: Scalar> Convex<S> for Hull<S> {
+    fn core(&self, origin: Point3<f64>) -> Core<'_> {
+        let pose = self.exact_pose();
+        let kind = Kind::Hull {
+            points: self.local_points(),
+            edges: self.edges(),
+            faces: self.faces(),
+            turn: Matrix3::from(pose.rotation),
+            at: pose.translation - origin.to_vec(),
+            size: self.size(),
+        };
+        Core { kind, radius: 0.0 }
+    }
+
+    fn middle(&self) -> Point3<S> {
+        Point3::from_vec(cast_vector(self.exact_pose().translation))
+    }
+}

@@ -1,0 +1,83 @@
+use cgmath::{EuclideanSpace, InnerSpace};
+
+use crate::contact::core::{BOX_FACES, Core, Kind};
+use crate::math::{Vec3, direction_and_length};
+
+/// A [`Core`] as lists of all that it is made of.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Skeleton {
+    /// The corners, in metres.
+    pub points: Vec<Vec3<f64>>,
+    /// Pairs of corners.
+    pub edges: Vec<[u32; 2]>,
+    /// The directions that edges have, as unit vectors, each of them once.
+    pub directions: Vec<Vec3<f64>>,
+    /// The normals of faces, as unit vectors, with their corners, counterclockwise.
+    pub faces: Vec<(Vec3<f64>, Vec<u32>)>,
+}
+
+/// The edges of a box: four along each axis.
+const BOX_EDGES: [[u32; 2]; 12] = [
+    [0, 1],
+    [2, 3],
+    [4, 5],
+    [6, 7],
+    [0, 2],
+    [1, 3],
+    [4, 6],
+    [5, 7],
+    [0, 4],
+    [1, 5],
+    [2, 6],
+    [3, 7],
+];
+
+impl Skeleton {
+    /// All parts of a core.
+    #[must_use]
+    pub fn of(core: &Core<'_>) -> Self {
+        let (points, edges, faces): (Vec<_>, Vec<_>, _) = match &core.kind {
+            Kind::Point(point) => (vec![*point], Vec::new(), 0),
+            Kind::Segment(ends) => (ends.to_vec(), vec![[0, 1]], 0),
+            // Both sides are alike. A line has none.
+            Kind::Triangle(corners) => {
+                let edges = vec![[0, 1], [1, 2], [2, 0]];
+                (corners.to_vec(), edges, 2 * usize::from(core.is_flat()))
+            }
+            Kind::Cuboid(cuboid) => {
+                ((0..8).map(|i| cuboid.corner(i)).collect(), BOX_EDGES.to_vec(), BOX_FACES.len())
+            }
+            Kind::Hull { points, edges, faces, turn, at, .. } => {
+                let there = points.iter().map(|point| turn * point.to_vec() + at);
+                (there.collect(), edges.to_vec(), faces.len())
+            }
+        };
+        let face = |face: usize| {
+            (core.normal(face), core.face(face).into_iter().map(|(_, number)| number).collect())
+        };
+        let mut directions: Vec<Vec3<f64>> = match &core.kind {
+            Kind::Cuboid(cuboid) => cuboid.axes.to_vec(), // a flat one has them, too
+            _ => Vec::new(),
+        };
+        for [a, b] in &edges {
+            let along = direction_and_length(points[*b as usize] - points[*a as usize]);
+            if let Some((unit, _)) = along
+                && !directions.iter().any(|other| other.cross(unit).magnitude2() < 1e-20)
+            {
+                directions.push(unit);
+            }
+        }
+        Self { faces: (0..faces).map(face).collect(), points, edges, directions }
+    }
+
+    /// The greatest distance of a corner from the first one.
+    pub(super) fn size(&self) -> f64 {
+        let far = self.points.iter().map(|point| (point - self.points[0]).magnitude());
+        far.fold(0.0, f64::max)
+    }
+
+    /// How far it reaches along a direction, from its origin.
+    pub(super) fn reach(&self, direction: Vec3<f64>) -> f64 {
+        self.points.iter().map(|point| point.dot(direction)).fold(f64::NEG_INFINITY, f64::max)
+    }
+}
