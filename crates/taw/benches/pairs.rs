@@ -1,8 +1,8 @@
 //! What a question about two shapes costs, beside the same question to parry3d:
 //! `cargo bench -p taw --bench pairs`.
 //!
-//! Every line is [`COUNT`] pairs of random shapes of about a metre, about half of which
-//! overlap, in `f32`. `distance` is how far apart two shapes are, and where, or the way out
+//! Every line is [`COUNT`] pairs of random shapes of about a metre, some of which overlap,
+//! in `f32`; few enough to stay in the cache. `distance` is how far apart two shapes are, and where, or the way out
 //! (`parry3d::query::contact`); `manifold` is all points where they touch
 //! (`PersistentQueryDispatcher::contact_manifolds`, which is always asked anew here).
 
@@ -11,12 +11,12 @@ use divan::counter::ItemsCount;
 use parry3d::glamx::{Pose3, Quat as ParryQuat, Vec3 as ParryVec3};
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, contact};
 use parry3d::shape as parry;
-use taw::contact::{Closest, closest, closest_plane, manifold};
+use taw::contact::{Closest, Convex, closest, closest_of_surface, closest_plane, manifold};
 use taw::math::{Point3, Quat, Vec3};
-use taw::shape::{Box3, Capsule, Hull, Obb, Plane, Sphere};
+use taw::shape::{Box3, Capsule, HeightField, Hull, Mesh, Obb, Plane, Sphere, Surface};
 
 /// Pairs in a line.
-const COUNT: usize = 1_000;
+const COUNT: usize = 100;
 /// How far apart two shapes may be and still be answered, in metres.
 const MARGIN: f32 = 100.0;
 
@@ -255,4 +255,119 @@ manifolds! {
     touch_obb_capsule: ObbKind, CapsuleKind;
     touch_capsule_capsule: CapsuleKind, CapsuleKind;
     touch_hull_hull: HullKind, HullKind;
+}
+
+/// Points along each side of the hills, and how wide these are, in metres.
+const POINTS: usize = 33;
+const WIDE: f32 = 8.0;
+
+fn height(column: usize, row: usize) -> f32 {
+    (column as f32 * 0.7).sin() * (row as f32 * 0.5).cos() * 0.3
+}
+
+/// The same hills as a height field and as a mesh, in both libraries.
+struct Hills {
+    field: HeightField<f32>,
+    mesh: Mesh<f32>,
+    parry_field: parry::HeightField,
+    parry_mesh: parry::TriMesh,
+}
+
+fn hills() -> Hills {
+    let cell = WIDE / (POINTS - 1) as f32;
+    let corner = Point3::new(-WIDE / 2.0, 0.0, -WIDE / 2.0);
+    let places = || (0..POINTS).flat_map(|row| (0..POINTS).map(move |column| (column, row)));
+    let heights = places().map(|(column, row)| height(column, row)).collect();
+    let field = HeightField::new(corner, [cell; 2], POINTS as u32, heights).expect("a grid");
+    let points: Vec<_> = places()
+        .map(|(x, z)| corner + Vec3::new(x as f32 * cell, height(x, z), z as f32 * cell))
+        .collect();
+    let number = |column: usize, row: usize| (row * POINTS + column) as u32;
+    let triangles: Vec<_> = places()
+        .filter(|(column, row)| column + 1 < POINTS && row + 1 < POINTS)
+        .flat_map(|(x, z)| {
+            let (near, far) = (number(x, z), number(x + 1, z + 1));
+            [[near, far, number(x + 1, z)], [near, number(x, z + 1), far]]
+        })
+        .collect();
+    let along_columns = (0..POINTS).flat_map(|x| (0..POINTS).map(move |z| height(x, z)));
+    let heights = parry3d::utils::Array2::new(POINTS, POINTS, along_columns.collect());
+    let theirs = points.iter().map(|p| ParryVec3::new(p.x, p.y, p.z)).collect();
+    Hills {
+        field,
+        mesh: Mesh::new(points, triangles.clone()).expect("a grid"),
+        parry_field: parry::HeightField::new(heights, ParryVec3::new(WIDE, 1.0, WIDE)),
+        parry_mesh: parry::TriMesh::new(theirs, triangles).expect("a grid"),
+    }
+}
+
+/// How near a shape must come to a surface to be answered, in metres.
+const NEAR: f32 = 0.1;
+
+/// Shapes half as large, at about the height of the hills.
+fn over_hills() -> Vec<Numbers> {
+    let lifted = |mut numbers: Numbers| {
+        let [x, y, z] = numbers.at;
+        numbers.at = [x * 3.5, 0.4 + y * 0.4, z * 3.5];
+        numbers.sizes = numbers.sizes.map(|size| size * 0.5);
+        numbers.points.iter_mut().for_each(|point| *point = point.map(|x| x * 0.5));
+        numbers
+    };
+    numbers(3).into_iter().map(lifted).collect()
+}
+
+fn on_taw<A: Kind>(bencher: Bencher, surface: &impl Surface<f32>)
+where
+    A::Taw: Convex<f32>,
+{
+    let shapes: Vec<_> = over_hills().iter().map(A::taw).collect();
+    let ask = |shape: &A::Taw| {
+        closest_of_surface(surface, shape, NEAR).map_or(0.0, |found| found.answer.distance)
+    };
+    bencher
+        .counter(ItemsCount::new(COUNT))
+        .bench_local(|| shapes.iter().map(ask).fold(0.0, f32::max));
+}
+
+fn on_parry<A: Kind>(bencher: Bencher, surface: &impl parry::Shape) {
+    let shapes: Vec<_> =
+        over_hills().iter().map(|of| (pose(of, A::TURNS), A::parry(of))).collect();
+    let ask = |(place, shape): &(Pose3, A::Parry)| {
+        let found = contact(&Pose3::IDENTITY, surface, place, shape, NEAR);
+        found.ok().flatten().map_or(0.0, |found| found.dist)
+    };
+    bencher
+        .counter(ItemsCount::new(COUNT))
+        .bench_local(|| shapes.iter().map(ask).fold(0.0, f32::max));
+}
+
+/// A shape on a mesh and on a height field, in taw and in parry.
+macro_rules! surfaces {
+    ($($name:ident: $a:ty, $taw:ident, $parry:ident;)*) => { $(
+        #[divan::bench_group]
+        mod $name {
+            use super::*;
+
+            #[divan::bench]
+            fn distance_taw(bencher: Bencher) {
+                on_taw::<$a>(bencher, &hills().$taw);
+            }
+
+            #[divan::bench]
+            fn distance_parry(bencher: Bencher) {
+                on_parry::<$a>(bencher, &hills().$parry);
+            }
+        }
+    )* };
+}
+
+surfaces! {
+    mesh_sphere: SphereKind, mesh, parry_mesh;
+    mesh_obb: ObbKind, mesh, parry_mesh;
+    mesh_capsule: CapsuleKind, mesh, parry_mesh;
+    mesh_hull: HullKind, mesh, parry_mesh;
+    field_sphere: SphereKind, field, parry_field;
+    field_obb: ObbKind, field, parry_field;
+    field_capsule: CapsuleKind, field, parry_field;
+    field_hull: HullKind, field, parry_field;
 }

@@ -4,9 +4,9 @@
 mod things;
 
 use proptest::prelude::*;
-use taw::contact::{Cast, Closest, RayHit, Touch, closest, sweep};
-use taw::frame::Ray;
-use taw::math::cast_point;
+use taw::contact::{Cast, Closest, Convex, Course, RayHit, Touch, closest, sweep, sweep_turning};
+use taw::frame::{AxisAngle, Pose, Ray};
+use taw::math::{cast_point, direction_and_length};
 use taw::prelude::*;
 use taw::shape::{Capsule, Obb, Solid, Triangle};
 use things::{Thing, numbers, things};
@@ -20,6 +20,13 @@ fn cast<S: Scalar>(thing: &Thing<S>, ray: &Ray<S>, longest: S) -> Option<RayHit<
         Thing::Hull(it) => it.cast(ray, longest),
         Thing::Triangle(_) => None,
     }
+}
+
+/// Steps of the march that a sweep is compared with.
+const MARCHED: u32 = 20;
+
+fn middle(thing: &Thing<f64>) -> Point3<f64> {
+    each!(thing, it => it.middle())
 }
 
 fn distance(thing: &Thing<f64>, point: Point3<f64>) -> f64 {
@@ -39,9 +46,26 @@ fn moved(thing: &Thing<f64>, by: Vec3<f64>) -> Thing<f64> {
             Thing::Triangle(Triangle { corners: it.corners.map(|corner| corner + by) })
         }
         Thing::Hull(it) => {
-            let pose = taw::frame::Pose { translation: by, ..taw::frame::Pose::identity() };
+            let pose = Pose { translation: by, ..Pose::identity() };
             Thing::Hull(it.moved(pose))
         }
+    }
+}
+
+fn turned(thing: &Thing<f64>, course: &Course<f64>, time: f64) -> Thing<f64> {
+    let (axis, angle) = direction_and_length(course.turns).unwrap_or((Vec3::unit_x(), 0.0));
+    let rotation = AxisAngle::new(axis, angle * time).unwrap().into();
+    let pivot = course.pivot.to_vec();
+    let turn = Pose { rotation, translation: pivot + course.moves * time - rotation * pivot };
+    match thing.clone() {
+        Thing::Sphere(it) => Thing::Sphere(Sphere { center: turn.point(it.center), ..it }),
+        Thing::Aabb(it) => Thing::Obb(it.obb().moved(turn)),
+        Thing::Obb(it) => Thing::Obb(it.moved(turn)),
+        Thing::Capsule(it) => Thing::Capsule(it.moved(turn)),
+        Thing::Triangle(it) => Thing::Triangle(Triangle {
+            corners: it.corners.map(|corner| turn.point(corner)),
+        }),
+        Thing::Hull(it) => Thing::Hull(it.moved(turn)),
     }
 }
 
@@ -114,6 +138,49 @@ proptest! {
                 prop_assert_eq!(back.is_some(), touch.is_some(), "{:?} {:?}\n{:?}\n{:?} {:?}", back, touch, a, b, apart(end));
                 if let (Some(back), Some(touch)) = (back, touch) {
                     prop_assert!((back.time - touch.time).abs() < 1e-8);
+                }
+            }
+        }
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(100))]
+
+    #[test]
+    fn a_turning_sweep_ends_at_the_first_touch(
+        first in numbers(), second in numbers(),
+        moves in [[-6.0..6.0_f64, -6.0..6.0, -6.0..6.0], [-6.0..6.0_f64, -6.0..6.0, -6.0..6.0]],
+        turns in [[-4.0..4.0_f64, -4.0..4.0, -4.0..4.0], [-4.0..4.0_f64, 0.0..0.1, 0.0..0.1]],
+        pivot in [-1.0..1.0_f64, -1.0..1.0, -1.0..1.0],
+    ) {
+        let course = |i: usize, pivot| {
+            Course { moves: Vec3::from(moves[i]), turns: Vec3::from(turns[i]), pivot }
+        };
+        for a in things::<f64>(&first, 1.0, 0.0) {
+            for b in things::<f64>(&second, 1.0, 0.0) {
+                let b = moved(&b, Vec3::new(3.0, 0.0, 0.0));
+                let (x, y) = (course(0, Point3::from(pivot)), course(1, middle(&b)));
+                let touch = each!(&a, a => each!(&b, b => sweep_turning(a, &x, b, &y)));
+                let apart = |time: f64| near(&turned(&a, &x, time), &turned(&b, &y, time));
+                let end = touch.map_or(1.0, |touch| touch.time);
+                if apart(0.0).distance > 0.0 {
+                    for part in 0..MARCHED {
+                        let before = apart(end * f64::from(part) / f64::from(MARCHED)).distance;
+                        prop_assert!(before > -1e-8, "{a:?} {b:?} {touch:?} {before}");
+                    }
+                    if let Some(Touch { time, .. }) = touch {
+                        let there = apart(time);
+                        prop_assert!(there.distance < 6e-7, "{touch:?} {there:?}"); // 6 m
+                    }
+                }
+                let still = Course { turns: Vec3::new(0.0, 0.0, 0.0), ..x };
+                let straight = Course { turns: Vec3::new(0.0, 0.0, 0.0), ..y };
+                let one = each!(&a, a => each!(&b, b => sweep_turning(a, &still, b, &straight)));
+                let other = swept(&a, x.moves, &b, y.moves);
+                prop_assert_eq!(one.is_some(), other.is_some(), "{:?} {:?}", a, b);
+                if let (Some(one), Some(other)) = (one, other) {
+                    prop_assert!((one.time - other.time).abs() < 1e-8, "{one:?} {other:?}");
                 }
             }
         }

@@ -50,8 +50,13 @@ proptest! {
                 let key = |of: &OfTriangle<Closest<f64>>| (of.answer.distance, of.triangle);
                 let best = all.reduce(|s, t| if key(&t) < key(&s) { t } else { s });
                 let near = best.filter(|best| best.answer.distance <= 0.2);
-                prop_assert_eq!(closest_of_surface(&field, thing, 0.2), near);
-                prop_assert_eq!(closest_of_surface(&mesh, thing, 0.2), near);
+                let found = closest_of_surface(&field, thing, 0.2);
+                prop_assert_eq!(found, closest_of_surface(&mesh, thing, 0.2));
+                prop_assert_eq!(found.is_some(), near.is_some());
+                if let (Some(found), Some(near)) = (found, near) {
+                    let off = (found.answer.distance - near.answer.distance).abs();
+                    prop_assert!(off < 1e-11, "{found:?} {near:?}"); // of shapes of two metres
+                }
                 let touches = manifolds_of_surface(&field, thing, 0.01);
                 prop_assert_eq!(&touches, &manifolds_of_surface(&mesh, thing, 0.01));
                 prop_assert_eq!(

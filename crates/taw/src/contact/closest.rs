@@ -1,4 +1,4 @@
-use cgmath::InnerSpace;
+use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::boxes::{BoxAxis, boxes};
 use super::core::{Convex, Core, Kind};
@@ -6,7 +6,7 @@ use super::exhaustive;
 use super::gjk::{Gjk, gjk};
 use super::polytope::way_out;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
-use crate::shape::{Plane, Solid};
+use crate::shape::{Plane, Solid, Triangle};
 
 /// Where two things are nearest to each other, or deepest in each other.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -134,7 +134,7 @@ impl Between {
         }
     }
 
-    fn about<S: Scalar>(self, origin: Point3<f64>) -> Closest<S> {
+    pub fn about<S: Scalar>(self, origin: Point3<f64>) -> Closest<S> {
         Closest {
             distance: S::constant(self.distance),
             normal: cast_vector(self.normal),
@@ -149,9 +149,14 @@ pub(super) const CERTAIN: f64 = 1e-12;
 
 /// Where two cores, with their radii, are nearest or deepest.
 pub(super) fn between(a: &Core<'_>, b: &Core<'_>) -> Between {
-    let found = within(a, b, f64::INFINITY);
-    let found = found.map_or_else(|| exhaustive::between(a, b), |found| found.between(a, b));
-    found.with_radii(a.radius, b.radius)
+    between_within(a, b, f64::INFINITY)
+        .unwrap_or_else(|| exhaustive::between(a, b).with_radii(a.radius, b.radius))
+}
+
+/// The same, unless they are farther apart than a limit.
+pub(super) fn between_within(a: &Core<'_>, b: &Core<'_>, limit: f64) -> Option<Between> {
+    let found = within(a, b, limit)?.between(a, b);
+    Some(found.with_radii(a.radius, b.radius))
 }
 
 /// Where two cores, without their radii, are nearest or deepest, unless they, with their
@@ -160,6 +165,7 @@ pub(super) fn within(a: &Core<'_>, b: &Core<'_>, limit: f64) -> Option<Found> {
     let (size, limit) = (a.size() + b.size(), limit + a.radius + b.radius);
     let found = match (&a.kind, &b.kind) {
         (Kind::Segment(a), Kind::Segment(b)) => segments(*a, *b, size, limit),
+        (Kind::Triangle(corners), Kind::Point(point)) => over_triangle(*corners, *point),
         (Kind::Cuboid(x), Kind::Cuboid(y)) => {
             let axis = boxes(x, y, size);
             if axis.distance > limit {
@@ -209,6 +215,12 @@ impl Found {
             Self::Overlap(axis) => axis.with_points(a, b),
         }
     }
+}
+
+fn over_triangle(corners: [Vec3<f64>; 3], point: Vec3<f64>) -> Gjk {
+    let near = Triangle { corners: corners.map(Point3::from_vec) }.nearest(Point3::from_vec(point));
+    let (normal, on_a) = (near.normal, near.point.to_vec());
+    Gjk::Apart(Between { distance: near.distance, normal, on_a, on_b: point })
 }
 
 /// Where two segments are nearest, unless they cross (Ericson, *Real-Time Collision

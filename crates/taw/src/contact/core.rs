@@ -99,6 +99,11 @@ impl Cuboid {
     }
 }
 
+/// Where a corner of a hull is.
+fn placed(turn: &Mat3<f64>, at: Vec3<f64>, point: Point3<f64>) -> Vec3<f64> {
+    turn.x * point.x + turn.y * point.y + turn.z * point.z + at
+}
+
 /// The unit normal of a triangle, unless it is as good as a line.
 fn normal_of(corners: [Vec3<f64>; 3]) -> Option<Vec3<f64>> {
     Triangle { corners: corners.map(Point3::from_vec) }.normal()
@@ -134,7 +139,7 @@ impl Core<'_> {
                 let local =
                     Vec3::new(turn.x.dot(direction), turn.y.dot(direction), turn.z.dot(direction));
                 let best = farthest_of(points, local);
-                (turn * points[best].to_vec() + at, best as u32)
+                (placed(turn, *at, points[best]), best as u32)
             }
         }
     }
@@ -238,8 +243,7 @@ impl Core<'_> {
                 BOX_FACES[face].iter().map(|corner| (cuboid.corner(*corner), *corner)).collect()
             }
             Kind::Hull { points, faces, turn, at, .. } => {
-                let corner =
-                    |i: &u32| (turn * points[*i as usize].to_vec() + at, *i);
+                let corner = |i: &u32| (placed(turn, *at, points[*i as usize]), *i);
                 faces[face].corners.iter().map(corner).collect()
             }
             Kind::Triangle([a, b, c]) => {

@@ -16,6 +16,7 @@ pub(super) struct Vertex {
 }
 
 /// The corner of the difference that is farthest along a direction.
+#[inline]
 pub(super) fn vertex(a: &Core<'_>, b: &Core<'_>, direction: Vec3<f64>) -> Vertex {
     let (on_a, on_b) = (a.support(-direction).0, b.support(direction).0);
     Vertex { difference: on_b - on_a, on_a }
@@ -88,7 +89,7 @@ pub(super) fn gjk(a: &Core<'_>, b: &Core<'_>, start: Vec3<f64>, size: f64, limit
         simplex = match simplex.count {
             1 => of_segment([p, next]),
             2 => of_triangle([p, q, next]),
-            _ => match of_tetrahedron([p, q, r, next]) {
+            _ => match of_tetrahedron(&[p, q, r, next]) {
                 Some(simplex) => simplex,
                 None => return Gjk::Together([p, q, r, next]),
             },
@@ -97,6 +98,7 @@ pub(super) fn gjk(a: &Core<'_>, b: &Core<'_>, start: Vec3<f64>, size: f64, limit
     Gjk::Unsure
 }
 
+#[inline]
 fn of_segment([p, q]: [Vertex; 2]) -> Simplex {
     let along = q.difference - p.difference;
     let part = -p.difference.dot(along) / along.magnitude2();
@@ -108,6 +110,7 @@ fn of_segment([p, q]: [Vertex; 2]) -> Simplex {
 }
 
 /// By the region that the origin is in.
+#[inline]
 fn of_triangle([p, q, r]: [Vertex; 3]) -> Simplex {
     let (a, b, c) = (p.difference, q.difference, r.difference);
     let (ab, ac) = (b - a, c - a);
@@ -140,9 +143,10 @@ fn of_triangle([p, q, r]: [Vertex; 3]) -> Simplex {
 }
 
 /// None if the origin is inside.
-fn of_tetrahedron([p, q, r, s]: [Vertex; 4]) -> Option<Simplex> {
+fn of_tetrahedron(vertices: &[Vertex; 4]) -> Option<Simplex> {
     let mut best: Option<(f64, Simplex)> = None;
-    for [x, y, z, other] in [[p, q, r, s], [p, r, s, q], [p, s, q, r], [q, s, r, p]] {
+    for [i, j, k, l] in [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 3, 2, 0]] {
+        let [x, y, z, other] = [i, j, k, l].map(|i: usize| &vertices[i]);
         let normal = (y.difference - x.difference).cross(z.difference - x.difference);
         let inner = (other.difference - x.difference).dot(normal);
         let origin = -x.difference.dot(normal);
@@ -150,7 +154,7 @@ fn of_tetrahedron([p, q, r, s]: [Vertex; 4]) -> Option<Simplex> {
         if origin * inner > 0.0 {
             continue;
         }
-        let simplex = of_triangle([x, y, z]);
+        let simplex = of_triangle([*x, *y, *z]);
         let squared = simplex.sum(|vertex| vertex.difference).magnitude2();
         if best.as_ref().is_none_or(|(least, _)| squared < *least) {
             best = Some((squared, simplex));

@@ -10,6 +10,7 @@
 //! | sphere and half-space | [`touching_sphere_plane`] | [`mtv_sphere_plane`], [`closest_plane`] | | |
 //! | any bounded shape and half-space | [`Closest::touching`] | [`closest_plane`] | | |
 //! | any two of sphere, box, capsule and hull | [`Closest::touching`] | [`closest`] | [`manifold`] | [`sweep`] |
+//! | two of these that turn as they move | | | | [`sweep_turning`] |
 //! | any two shapes, compounds too | [`Closest::touching`] | [`closest_shapes`] | [`manifolds_of_shapes`] | [`sweep_shapes`] |
 //! | a mesh or height field and any of these | [`Closest::touching`] | [`closest_of_surface`] | [`manifolds_of_surface`] | [`sweep_against_surface`] |
 //! | ray and any shape | [`Cast::cast`], [`cast_on_surface`] | | | |
@@ -37,6 +38,7 @@ mod sphere_plane;
 mod sphere_sphere;
 mod surface;
 mod sweep;
+mod turning;
 
 pub use closest::{Closest, closest, closest_exhaustive, closest_plane};
 pub use compound::{OfParts, closest_shapes, manifolds_of_shapes, sweep_shapes};
@@ -51,6 +53,7 @@ pub use surface::{
     OfTriangle, cast_on_surface, closest_of_surface, manifolds_of_surface, sweep_against_surface,
 };
 pub use sweep::{Touch, sweep};
+pub use turning::{Course, sweep_turning};
 
 #[cfg(test)]
 mod tests {

@@ -1,13 +1,13 @@
-use cgmath::InnerSpace;
+use cgmath::{EuclideanSpace, InnerSpace};
 
-use super::closest::{Closest, closest};
+use super::closest::{Between, Closest, between_within, closest};
+use super::core::{Convex, Core, Kind};
 use super::manifold::{Manifold, manifold};
 use super::ray::RayHit;
-use super::core::Convex;
 use super::sweep::{Touch, sweep};
 use crate::frame::Ray;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
-use crate::shape::{Aabb, Box3, Surface};
+use crate::shape::{Aabb, Box3, Sphere, Surface, Triangle};
 
 /// What one triangle of a surface says.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,19 +32,70 @@ pub fn closest_of_surface<S: Scalar>(
     shape: &impl Convex<S>,
     margin: S,
 ) -> Option<OfTriangle<Closest<S>>> {
-    let mut best: Option<OfTriangle<Closest<S>>> = None;
+    if let Some(sphere) = shape.as_sphere() {
+        return closest_of_sphere(surface, &sphere, margin);
+    }
+    let origin = cast_point::<S, f64>(shape.middle());
+    let core = shape.core(origin);
+    // Rounding must not hide who is as near.
+    let rounding = 1e-9 * core.size();
+    let mut best: Option<(f64, u32, Between)> = None;
     surface.near(&around(shape.bounding_box(), margin), |number| {
-        if let Some(triangle) = surface.triangle(number) {
-            let answer = closest(&triangle, shape);
-            let key = |of: &OfTriangle<Closest<S>>| (of.answer.distance, of.triangle);
-            let next = OfTriangle { triangle: number, answer };
-            if answer.distance <= margin && best.as_ref().is_none_or(|best| key(&next) < key(best))
-            {
-                best = Some(next);
-            }
+        let Some(triangle) = surface.triangle(number) else { return };
+        let limit = best.map_or(margin.as_f64(), |(distance, ..)| distance + rounding);
+        let triangle = triangle.core(origin);
+        if at_least(&triangle, &core) > limit {
+            return;
+        }
+        if let Some(found) = between_within(&triangle, &core, limit)
+            && best.is_none_or(|(distance, other, _)| (found.distance, number) < (distance, other))
+        {
+            best = Some((found.distance, number, found));
         }
     });
-    best
+    best.map(|(_, triangle, found)| OfTriangle { triangle, answer: found.about(origin) })
+}
+
+fn closest_of_sphere<S: Scalar>(
+    surface: &impl Surface<S>,
+    sphere: &Sphere<S>,
+    margin: S,
+) -> Option<OfTriangle<Closest<S>>> {
+    let origin = cast_point::<S, f64>(sphere.center);
+    let mut best: Option<(f64, u32)> = None;
+    let mut reach = sphere.radius + margin;
+    surface.around(sphere.center, reach, |number| {
+        let Some(triangle) = surface.triangle(number) else { return reach };
+        let corners = triangle.corners.map(|corner| cast_point::<S, f64>(corner) - origin);
+        let limit = best.map_or(f64::MAX, |(squared, _)| squared);
+        // Its plane may be too far already; with room for rounding.
+        let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+        let height = corners[0].dot(normal);
+        if height * height <= limit * normal.magnitude2() * (1.0 + 1e-9) {
+            let corners = corners.map(EuclideanSpace::from_vec);
+            let squared = Triangle { corners }.closest_to_origin().to_vec().magnitude2();
+            if best.is_none_or(|best| (squared, number) < best) {
+                best = Some((squared, number));
+                reach = S::constant(squared.sqrt());
+            }
+        }
+        reach
+    });
+    let (_, triangle) = best?;
+    let answer = closest(&surface.triangle(triangle)?, sphere);
+    (answer.distance <= margin).then_some(OfTriangle { triangle, answer })
+}
+
+/// How far a triangle and a shape are apart at least: along the normal of the triangle.
+fn at_least(triangle: &Core<'_>, core: &Core<'_>) -> f64 {
+    let Kind::Triangle([a, b, c]) = &triangle.kind else { return f64::NEG_INFINITY };
+    let Some((normal, _)) = direction_and_length((b - a).cross(c - a)) else {
+        return f64::NEG_INFINITY;
+    };
+    let height = |of: Vec3<f64>| (of - a).dot(normal);
+    let above = height(core.support(-normal).0);
+    let below = -height(core.support(normal).0);
+    above.max(below) - core.radius
 }
 
 /// Where a convex shape touches a surface, or is at most `margin` metres from it: triangle

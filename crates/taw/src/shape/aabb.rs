@@ -3,7 +3,7 @@ use cgmath::{Array, Point2};
 use super::{Nearest, Obb, Solid};
 use crate::Error;
 use crate::error::{coordinates, within};
-use crate::math::{Point3, Scalar, Vec3};
+use crate::math::{Point3, Scalar, Vec3, length};
 
 /// A box along the axes, in a space of two or three dimensions. It may be flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -80,6 +80,12 @@ impl<S: Scalar> Box3<S> {
     #[must_use]
     pub fn obb(&self) -> Obb<S> {
         Obb::along_axes(self)
+    }
+
+    /// How far a point is outside, in metres; zero inside.
+    #[must_use]
+    pub fn gap(&self, point: Point3<S>) -> S {
+        length(point - self.clamp(point))
     }
 
     /// The middle.

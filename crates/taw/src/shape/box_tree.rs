@@ -1,3 +1,5 @@
+use smallvec::SmallVec;
+
 use super::{Aabb, Box3};
 use crate::math::{Point3, Scalar};
 
@@ -91,8 +93,37 @@ impl<S: Scalar> BoxTree<S> {
         self.visit(crosses, name);
     }
 
+    /// Names all things whose boxes may be within `reach` metres of a point, and some more,
+    /// the nearer ones about first. The answer to each is how far is still of interest.
+    pub fn around(&self, point: Point3<S>, mut reach: S, mut name: impl FnMut(u32) -> S) {
+        let gap = |number: u32| {
+            let bounds = self.nodes.get(number as usize).map(|node| node.bounds);
+            bounds.map_or(S::infinity(), |bounds| bounds.gap(point))
+        };
+        // With room for rounding.
+        let room = S::one() + S::epsilon() * S::constant(64.0);
+        let mut open = SmallVec::<[(S, u32); 64]>::new();
+        open.push((gap(0), 0));
+        while let Some((far, number)) = open.pop() {
+            if far.is_nan() || far > reach * room {
+                continue;
+            }
+            let Some(node) = self.nodes.get(number as usize) else { continue };
+            if node.count > 0 {
+                let from = node.next as usize;
+                for item in &self.items[from..from + node.count as usize] {
+                    reach = name(*item).min(reach);
+                }
+            } else {
+                let (first, second) = ((gap(number + 1), number + 1), (gap(node.next), node.next));
+                // The nearer one is opened first.
+                open.extend(if first.0 <= second.0 { [second, first] } else { [first, second] });
+            }
+        }
+    }
+
     fn visit(&self, enters: impl Fn(&Box3<S>) -> bool, mut name: impl FnMut(u32)) {
-        let mut open = vec![0];
+        let mut open = SmallVec::<[u32; 64]>::from_slice(&[0]);
         while let Some(number) = open.pop() {
             let Some(node) = self.nodes.get(number as usize) else { continue };
             if !enters(&node.bounds) {

@@ -244,10 +244,11 @@ impl<S: Scalar> Solid<S> for Hull<S> {
 pub(crate) fn farthest_of(points: &[Point3<f64>], direction: Vec3<f64>) -> usize {
     let (mut best, mut reach) = (0, f64::NEG_INFINITY);
     for (i, point) in points.iter().enumerate() {
-        let next = point.to_vec().dot(direction);
-        if next > reach {
-            (best, reach) = (i, next);
-        }
+        let next = point.x * direction.x + point.y * direction.y + point.z * direction.z;
+        // Without a jump, which would be guessed wrongly too often.
+        let farther = next > reach;
+        best = if farther { i } else { best };
+        reach = if farther { next } else { reach };
     }
     best
 }

@@ -14,6 +14,10 @@ pub trait Surface<S: Scalar> {
     /// Names all triangles that may have a point in common with a box, and some more.
     fn near(&self, bounds: &Box3<S>, name: impl FnMut(u32));
 
+    /// Names all triangles that may be within `reach` metres of a point, and some more, the
+    /// nearer ones about first. The answer to each is how far is still of interest.
+    fn around(&self, point: Point3<S>, reach: S, name: impl FnMut(u32) -> S);
+
     /// The box around all of it.
     #[must_use]
     fn bounds(&self) -> Box3<S>;
@@ -78,6 +82,10 @@ impl<S: Scalar> Surface<S> for Mesh<S> {
         self.tree.near(bounds, name);
     }
 
+    fn around(&self, point: Point3<S>, reach: S, name: impl FnMut(u32) -> S) {
+        self.tree.around(point, reach, name);
+    }
+
     fn bounds(&self) -> Box3<S> {
         self.tree.bounds().unwrap_or(Aabb { min: Point3::origin(), max: Point3::origin() })
     }
@@ -132,23 +140,35 @@ impl<S: Scalar> HeightField<S> {
 
     fn point(&self, column: u32, row: u32) -> Point3<S> {
         let along = |cells: u32, width: S| S::constant(f64::from(cells)) * width;
-        let height = self.heights[row as usize * self.columns as usize + column as usize];
-        self.corner + Vec3::new(along(column, self.cell[0]), height, along(row, self.cell[1]))
+        let (x, z) = (along(column, self.cell[0]), along(row, self.cell[1]));
+        Point3::new(self.corner.x + x, self.height(column, row), self.corner.z + z)
     }
 
-    /// Which cells of `count` points, this wide, are between two places; with one more on
-    /// both sides, for rounding.
-    fn range([from, to]: [S; 2], width: S, count: u32) -> std::ops::Range<u32> {
+    fn height(&self, column: u32, row: u32) -> S {
+        self.corner.y + self.heights[row as usize * self.columns as usize + column as usize]
+    }
+
+    /// Which cells of `count` points, this wide, from a place on, are between two others; and
+    /// those that rounding might take for them.
+    fn range([from, to]: [S; 2], start: S, width: S, count: u32) -> std::ops::Range<u32> {
         let cells = f64::from(count - 1);
-        let first = ((from / width).as_f64().floor() - 1.0).clamp(0.0, cells);
-        let end = ((to / width).as_f64().floor() + 2.0).clamp(0.0, cells);
+        let largest = from.abs().max(to.abs()).max(start.abs()) / width;
+        let rounding = 8.0 * (S::epsilon() * largest).as_f64();
+        let place = |x: S| ((x - start) / width).as_f64();
+        let first = (place(from) - rounding).floor().clamp(0.0, cells);
+        let end = ((place(to) + rounding).floor() + 1.0).clamp(0.0, cells);
         first as u32..end as u32
+    }
+
+    /// The row and the column of the cell that a triangle is in.
+    fn place(&self, number: u32) -> (u32, u32) {
+        let cell = number / 2;
+        (cell / (self.columns - 1), cell % (self.columns - 1))
     }
 
     /// Names the triangles of cells in these columns that a box is over or under.
     fn cells(&self, columns: std::ops::Range<u32>, bounds: &Box3<S>, mut name: impl FnMut(u32)) {
-        let (low, high) = (bounds.min - self.corner, bounds.max - self.corner);
-        for row in Self::range([low.z, high.z], self.cell[1], self.rows) {
+        for row in self.rows([bounds.min.z, bounds.max.z]) {
             for column in columns.clone() {
                 let cell = row * (self.columns - 1) + column;
                 name(2 * cell);
@@ -157,16 +177,20 @@ impl<S: Scalar> HeightField<S> {
         }
     }
 
+    /// The rows between two places along z.
+    fn rows(&self, [from, to]: [S; 2]) -> std::ops::Range<u32> {
+        Self::range([from, to], self.corner.z, self.cell[1], self.rows)
+    }
+
     /// The columns between two places along x.
     fn columns(&self, [from, to]: [S; 2]) -> std::ops::Range<u32> {
-        Self::range([from - self.corner.x, to - self.corner.x], self.cell[0], self.columns)
+        Self::range([from, to], self.corner.x, self.cell[0], self.columns)
     }
 }
 
 impl<S: Scalar> Surface<S> for HeightField<S> {
     fn triangle(&self, number: u32) -> Option<Triangle<S>> {
-        let cell = number / 2;
-        let (row, column) = (cell / (self.columns - 1), cell % (self.columns - 1));
+        let (row, column) = self.place(number);
         if row + 1 >= self.rows {
             return None;
         }
@@ -181,11 +205,52 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
         Some(Triangle { corners })
     }
 
-    fn near(&self, bounds: &Box3<S>, name: impl FnMut(u32)) {
-        let (low, high) = (bounds.min - self.corner, bounds.max - self.corner);
-        let as_high = low.y <= self.highest && high.y >= self.lowest;
-        if as_high && is_finite_point(bounds.min) && is_finite_point(bounds.max) {
-            self.cells(self.columns([bounds.min.x, bounds.max.x]), bounds, name);
+    fn near(&self, bounds: &Box3<S>, mut name: impl FnMut(u32)) {
+        if !is_finite_point(bounds.min) || !is_finite_point(bounds.max) {
+            return;
+        }
+        self.cells(self.columns([bounds.min.x, bounds.max.x]), bounds, |number| {
+            let (row, column) = self.place(number);
+            let height = |right: u32, down: u32| self.height(column + right, row + down);
+            let one = if number.is_multiple_of(2) { height(1, 0) } else { height(0, 1) };
+            let (near, far) = (height(0, 0), height(1, 1));
+            let (lowest, highest) = (near.min(far).min(one), near.max(far).max(one));
+            if lowest <= bounds.max.y && highest >= bounds.min.y {
+                name(number);
+            }
+        });
+    }
+
+    fn around(&self, point: Point3<S>, mut reach: S, mut name: impl FnMut(u32) -> S) {
+        let here = self.columns([point.x, point.x]).zip(self.rows([point.z, point.z])).next();
+        let mut cell = |column: u32, row: u32, reach: S| {
+            let number = 2 * (row * (self.columns - 1) + column);
+            let reach = name(number).min(reach);
+            name(number + 1).min(reach)
+        };
+        if let Some((column, row)) = here {
+            reach = cell(column, row, reach);
+        }
+        // How far from the point a cell is at least, along one axis.
+        let gap = |cell: u32, start: S, width: S, at: S| {
+            let left = start + S::constant(f64::from(cell)) * width;
+            (left - at).max(at - (left + width)).max(S::zero())
+        };
+        let columns = self.columns([point.x - reach, point.x + reach]);
+        let more = S::one() + S::epsilon() * S::constant(64.0);
+        for row in self.rows([point.z - reach, point.z + reach]) {
+            let across = gap(row, self.corner.z, self.cell[1], point.z);
+            for column in columns.clone() {
+                let along = gap(column, self.corner.x, self.cell[0], point.x);
+                let corners = [[0, 0], [1, 0], [0, 1], [1, 1]]
+                    .map(|[right, down]| self.height(column + right, row + down));
+                let [low, high] = [S::min, S::max].map(|f| corners.into_iter().fold(corners[0], f));
+                let up = (low - point.y).max(point.y - high).max(S::zero());
+                let squared = along * along + across * across + up * up;
+                if squared <= reach * reach * more && here != Some((column, row)) {
+                    reach = cell(column, row, reach);
+                }
+            }
         }
     }
 

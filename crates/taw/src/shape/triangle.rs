@@ -1,6 +1,6 @@
 use cgmath::{EuclideanSpace, InnerSpace};
 
-use super::polygon::{closest_of_polygon, closest_of_segment};
+use super::polygon::closest_of_segment;
 use super::{Aabb, Box3, Nearest, Solid};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
 
@@ -22,6 +22,24 @@ impl<S: Scalar> Triangle<S> {
         let (normal, twice) = direction_and_length((b - a).cross(c - a))?;
         // Thinner than this, rounding would choose the normal.
         (twice > longest * S::epsilon()).then_some(normal)
+    }
+
+    /// Its point that is nearest to the origin: on a side that the origin is beside, or below
+    /// or above it.
+    pub(crate) fn closest_to_origin(&self) -> Point3<S> {
+        let [a, b, c] = self.corners.map(EuclideanSpace::to_vec);
+        let (ab, ac) = (b - a, c - a);
+        let normal = ab.cross(ac);
+        let squared = normal.magnitude2();
+        let longest = ab.magnitude2().max(ac.magnitude2());
+        // Thinner than this, rounding would choose the normal.
+        if squared > longest * longest * S::epsilon() {
+            let beside = |p: Vec3<S>, along: Vec3<S>| along.cross(normal).dot(p) < S::zero();
+            if !beside(a, ab) && !beside(b, c - b) && !beside(a, -ac) {
+                return Point3::from_vec(normal * (a.dot(normal) / squared));
+            }
+        }
+        self.closest_of_sides(Point3::origin())
     }
 
     fn closest_of_sides(&self, point: Point3<S>) -> Point3<S> {
@@ -56,10 +74,7 @@ impl<S: Scalar> Solid<S> for Triangle<S> {
         let origin = cast_point::<S, f64>(point);
         let local = |corner| Point3::from_vec(cast_point::<S, f64>(corner) - origin);
         let exact = Triangle { corners: self.corners.map(local) };
-        let there = exact.normal().map_or_else(
-            || exact.closest_of_sides(Point3::origin()),
-            |normal| closest_of_polygon(&exact.corners, normal, Point3::origin()),
-        );
+        let there = exact.closest_to_origin();
         let out = direction_and_length(-there.to_vec());
         let (normal, distance) =
             out.unwrap_or_else(|| (exact.normal().unwrap_or_else(Vec3::unit_y), 0.0));
