@@ -68,6 +68,9 @@ pub mod prelude {
     pub use crate::motion::{Force, Integrator, Rotation};
     pub use crate::response::{Combine, ContactLaw, Material, Response};
     pub use crate::shape::{Plane, Sphere};
-    pub use crate::world::{Detection, Marble, MarbleId, Mass, Model, Precision, WallId, World};
+    pub use crate::world::{
+        Detection, Found, Marble, MarbleId, Mass, Model, Precision, QueryTree, Thing, WallId,
+        WallShape, World,
+    };
     pub use cgmath::prelude::*;
 }

@@ -40,7 +40,8 @@ fn radius<S: Scalar>(thing: &Thing<S>) -> f64 {
 
 /// The largest angle between edges and faces that are parallel but for 1e-7 rad.
 fn nearly_parallel<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> f64 {
-    let [first, second] = [a, b].map(|thing| each!(thing, it => Skeleton::of(&it.core(Point3::origin()))));
+    let [first, second] =
+        [a, b].map(|thing| each!(thing, it => Skeleton::of(&it.core(Point3::origin()))));
     let normals = |of: &Skeleton| of.faces.iter().map(|face| face.0).collect::<Vec<_>>();
     let (m, n) = (normals(&first), normals(&second));
     let mut worst: f64 = 0.0;

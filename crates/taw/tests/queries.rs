@@ -62,9 +62,9 @@ fn turned(thing: &Thing<f64>, course: &Course<f64>, time: f64) -> Thing<f64> {
         Thing::Aabb(it) => Thing::Obb(it.obb().moved(turn)),
         Thing::Obb(it) => Thing::Obb(it.moved(turn)),
         Thing::Capsule(it) => Thing::Capsule(it.moved(turn)),
-        Thing::Triangle(it) => Thing::Triangle(Triangle {
-            corners: it.corners.map(|corner| turn.point(corner)),
-        }),
+        Thing::Triangle(it) => {
+            Thing::Triangle(Triangle { corners: it.corners.map(|corner| turn.point(corner)) })
+        }
         Thing::Hull(it) => Thing::Hull(it.moved(turn)),
     }
 }

@@ -85,7 +85,6 @@ pub(super) fn swaps<S: Scalar>(
     [second.x, second.y, second.z] < [first.x, first.y, first.z]
 }
 
-
 fn closest_in_order<S: Scalar>(
     a: &(impl Convex<S> + ?Sized),
     b: &(impl Convex<S> + ?Sized),
@@ -225,12 +224,7 @@ fn over_triangle(corners: [Vec3<f64>; 3], point: Vec3<f64>) -> Gjk {
 
 /// Where two segments are nearest, unless they cross (Ericson, *Real-Time Collision
 /// Detection*, 2005, §5.1.9).
-fn segments(
-    [p, q]: [Vec3<f64>; 2],
-    [r, s]: [Vec3<f64>; 2],
-    size: f64,
-    limit: f64,
-) -> Gjk {
+fn segments([p, q]: [Vec3<f64>; 2], [r, s]: [Vec3<f64>; 2], size: f64, limit: f64) -> Gjk {
     let (first, second, apart) = (q - p, s - r, p - r);
     let (long_a, long_b) = (first.magnitude2(), second.magnitude2());
     let part = |x: f64, of: f64| if of > 0.0 { (x / of).clamp(0.0, 1.0) } else { 0.0 };

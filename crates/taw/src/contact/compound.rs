@@ -1,6 +1,6 @@
 use super::closest::{Closest, closest};
-use super::manifold::{Manifold, manifold};
 use super::core::Convex;
+use super::manifold::{Manifold, manifold};
 use super::sweep::{Touch, sweep};
 use crate::math::{Scalar, Vec3};
 use crate::shape::Shape;
@@ -16,14 +16,14 @@ pub struct OfParts<T> {
 }
 
 /// All convex parts of a shape, those of compounds in compounds, too.
-fn parts<S: Scalar>(shape: &Shape<S>) -> Vec<&dyn Convex<S>> {
+pub(crate) fn parts_of<S: Scalar>(shape: &Shape<S>) -> Vec<&dyn Convex<S>> {
     match shape {
         Shape::Sphere(sphere) => vec![sphere],
         Shape::Aabb(aabb) => vec![aabb],
         Shape::Obb(obb) => vec![obb],
         Shape::Capsule(capsule) => vec![capsule],
         Shape::Hull(hull) => vec![hull],
-        Shape::Compound(compound) => compound.parts().iter().flat_map(parts).collect(),
+        Shape::Compound(compound) => compound.parts().iter().flat_map(parts_of).collect(),
     }
 }
 
@@ -33,7 +33,7 @@ fn each<S: Scalar, T>(
     b: &Shape<S>,
     ask: impl Fn(&dyn Convex<S>, &dyn Convex<S>) -> Option<T>,
 ) -> Vec<OfParts<T>> {
-    let (first, second) = (parts(a), parts(b));
+    let (first, second) = (parts_of(a), parts_of(b));
     let mut answers = Vec::new();
     for (i, x) in (0..).zip(&first) {
         for (j, y) in (0..).zip(&second) {

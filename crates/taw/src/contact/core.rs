@@ -76,9 +76,7 @@ impl Cuboid {
 
     /// The number of the corner that is farthest along a direction.
     pub fn farthest(&self, direction: Vec3<f64>) -> u32 {
-        (0..3).fold(0, |corner, i| {
-            corner | u32::from(self.axes[i].dot(direction) > 0.0) << i
-        })
+        (0..3).fold(0, |corner, i| corner | u32::from(self.axes[i].dot(direction) > 0.0) << i)
     }
 
     /// How far it reaches along a direction, from its middle.
@@ -204,8 +202,9 @@ impl Core<'_> {
     pub(super) fn face_along(&self, direction: Vec3<f64>) -> Option<usize> {
         let face = match &self.kind {
             Kind::Point(_) | Kind::Segment(_) => None,
-            Kind::Triangle(corners) => normal_of(*corners)
-                .map(|normal| usize::from(normal.dot(direction) < 0.0)),
+            Kind::Triangle(corners) => {
+                normal_of(*corners).map(|normal| usize::from(normal.dot(direction) < 0.0))
+            }
             Kind::Cuboid(cuboid) => Some(cuboid.facing(direction)),
             Kind::Hull { faces, turn, .. } => {
                 let local =

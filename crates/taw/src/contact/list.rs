@@ -12,6 +12,9 @@ pub struct Contact<S> {
     pub a: u32,
     /// The row of the second: always a marble.
     pub b: u32,
+    /// Which part of the wall: of a compound, or which triangle of a surface. Zero for what
+    /// has only one, and between marbles.
+    pub part: u32,
     /// The displacement of `b` that parts it from `a`, in metres.
     pub mtv: Vec3<S>,
 }
@@ -66,7 +69,7 @@ fn deeper_first<S: Scalar>(x: &Contact<S>, y: &Contact<S>) -> Ordering {
         .then(descending(squared_x, squared_y))
         // Squares of the tiny and the huge vanish and overflow alike.
         .then_with(|| descending(length(x.mtv), length(y.mtv)))
-        .then((x.a, x.b).cmp(&(y.a, y.b)))
+        .then((x.a, x.b, x.part).cmp(&(y.a, y.b, y.part)))
 }
 
 #[cfg(test)]
@@ -75,7 +78,7 @@ mod tests {
 
     fn contact(a: u32, b: u32, depth: f32) -> Contact<f32> {
         let mtv = Vec3::new(0.0, depth, 0.0);
-        Contact { a, b, mtv }
+        Contact { a, b, part: 0, mtv }
     }
 
     #[test]

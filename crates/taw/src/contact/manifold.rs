@@ -162,11 +162,7 @@ fn over_face(one: &Core<'_>, face: usize, other: &Core<'_>, normal: Vec3<f64>) -
 const CUT: u32 = 512;
 
 /// What of a polygon is not above a side. Each corner has the name of the edge after it.
-fn cut(
-    outline: &[Corner],
-    side: u32,
-    height: impl Fn(Vec3<f64>) -> f64,
-) -> Outline {
+fn cut(outline: &[Corner], side: u32, height: impl Fn(Vec3<f64>) -> f64) -> Outline {
     let mut left = Outline::new();
     for (i, here) in outline.iter().enumerate() {
         let next = outline[(i + 1) % outline.len()];
@@ -185,11 +181,7 @@ fn cut(
 }
 
 /// What of a segment is not above a side. Each end has its own name.
-fn cut_segment(
-    [here, next]: [Corner; 2],
-    side: u32,
-    height: impl Fn(Vec3<f64>) -> f64,
-) -> Outline {
+fn cut_segment([here, next]: [Corner; 2], side: u32, height: impl Fn(Vec3<f64>) -> f64) -> Outline {
     let (h, k) = (height(here.0), height(next.0));
     let crossing = (here.0 + (next.0 - here.0) * (h / (h - k)), CUT + side);
     match (h <= 0.0, k <= 0.0) {

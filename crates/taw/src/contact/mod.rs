@@ -41,10 +41,11 @@ mod sweep;
 mod turning;
 
 pub use closest::{Closest, closest, closest_exhaustive, closest_plane};
+pub(crate) use compound::parts_of;
 pub use compound::{OfParts, closest_shapes, manifolds_of_shapes, sweep_shapes};
-pub use list::{Contact, Contacts};
 pub use core::{Convex, Core};
 pub use exhaustive::Skeleton;
+pub use list::{Contact, Contacts};
 pub use manifold::{Manifold, ManifoldPoint, Points, manifold};
 pub use ray::{Cast, RayHit};
 pub use sphere_plane::{mtv_sphere_plane, touching_sphere_plane};

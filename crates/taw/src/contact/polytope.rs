@@ -80,8 +80,11 @@ fn face(vertices: &[Vertex], corners: [usize; 3]) -> Option<Triangle> {
     let (normal, twice) = direction_and_length((q - p).cross(r - p))?;
     let longest = (q - p).magnitude2().max((r - q).magnitude2()).max((p - r).magnitude2());
     let height = (p + q + r).dot(normal) / 3.0;
-    (twice > 1e-10 * longest && height > -1e-13 * longest.sqrt())
-        .then_some(Triangle { corners, normal, height })
+    (twice > 1e-10 * longest && height > -1e-13 * longest.sqrt()).then_some(Triangle {
+        corners,
+        normal,
+        height,
+    })
 }
 
 /// What the nearest face says: of those in its plane, the one that the origin is below.

@@ -29,7 +29,7 @@ fn around<S: Scalar>(bounds: Box3<S>, margin: S) -> Box3<S> {
 #[must_use]
 pub fn closest_of_surface<S: Scalar>(
     surface: &impl Surface<S>,
-    shape: &impl Convex<S>,
+    shape: &(impl Convex<S> + ?Sized),
     margin: S,
 ) -> Option<OfTriangle<Closest<S>>> {
     if let Some(sphere) = shape.as_sphere() {
@@ -103,7 +103,7 @@ fn at_least(triangle: &Core<'_>, core: &Core<'_>) -> f64 {
 #[must_use]
 pub fn manifolds_of_surface<S: Scalar>(
     surface: &impl Surface<S>,
-    shape: &impl Convex<S>,
+    shape: &(impl Convex<S> + ?Sized),
     margin: S,
 ) -> Vec<OfTriangle<Manifold<S>>> {
     let mut numbers = Vec::new();
@@ -122,7 +122,7 @@ pub fn manifolds_of_surface<S: Scalar>(
 #[must_use]
 pub fn sweep_against_surface<S: Scalar>(
     surface: &impl Surface<S>,
-    shape: &impl Convex<S>,
+    shape: &(impl Convex<S> + ?Sized),
     moves: Vec3<S>,
 ) -> Option<OfTriangle<Touch<S>>> {
     let (mut best, start): (Option<OfTriangle<Touch<S>>>, _) = (None, shape.bounding_box());

@@ -1,7 +1,7 @@
-use crate::contact::{Contacts, mtv_sphere_plane, mtv_sphere_sphere};
+use crate::contact::{Contacts, mtv_sphere_sphere};
 use crate::math::{Scalar, Vec3, is_finite, is_finite_point};
-use crate::response::Columns;
-use crate::shape::{Plane, Sphere};
+use crate::response::{Columns, Walls};
+use crate::shape::Sphere;
 
 /// [`Response::Displacement`](super::Response::Displacement), exactly as taught in the
 /// lecture: the readable reference for the rest. The lab counts velocity in units per
@@ -11,7 +11,7 @@ use crate::shape::{Plane, Sphere};
 /// loses its velocity, and is added to `stopped`; the other half of its contact is not
 /// affected.
 pub(crate) fn displacement<S: Scalar>(
-    walls: &[Plane<S>],
+    walls: &impl Walls<S>,
     marbles: &mut Columns<S>,
     contacts: &mut Contacts<S>,
     dt: S,
@@ -19,9 +19,11 @@ pub(crate) fn displacement<S: Scalar>(
 ) {
     contacts.sort();
     for contact in &contacts.wm {
-        let wall = &walls[contact.a as usize];
-        if let Some(mtv) = mtv_sphere_plane(&marbles.sphere(contact.b), wall) {
-            marbles.displace(contact.b, mtv, dt, stopped);
+        let Sphere { center, radius } = marbles.sphere(contact.b);
+        let (wall, part) = (contact.a as usize, contact.part);
+        let (normal, distance) = walls.normal_and_distance(wall, part, center);
+        if distance <= radius {
+            marbles.displace(contact.b, normal * (radius - distance), dt, stopped);
         }
     }
     let half = S::constant(0.5);
@@ -58,6 +60,22 @@ mod tests {
     use super::*;
     use crate::contact::Contact;
     use crate::math::Point3;
+    use crate::response::Material;
+    use crate::shape::Plane;
+
+    impl<S: Scalar> Walls<S> for Vec<Plane<S>> {
+        fn normal_and_distance(&self, wall: usize, _: u32, point: Point3<S>) -> (Vec3<S>, S) {
+            (self[wall].normal(), self[wall].signed_distance(point))
+        }
+
+        fn surface_velocity(&self, _: usize, _: Point3<S>) -> Vec3<S> {
+            Vec3::new(S::zero(), S::zero(), S::zero())
+        }
+
+        fn material(&self, _: usize) -> Option<Material<S>> {
+            None
+        }
+    }
 
     /// Runs one restitution over all contacts among `spheres` (center, radius,
     /// velocity) and a floor at zero, and gives positions and velocities.
@@ -69,8 +87,10 @@ mod tests {
         let mut contacts = Contacts::default();
         let all = Vec3::new(9.0, 9.0, 9.0); // only the order depends on it
         let count = spheres.len() as u32;
-        contacts.wm = (0..count).map(|b| Contact { a: 0, b, mtv: all }).collect();
-        crate::broad::all_pairs(count, |a, b| contacts.mm.push(Contact { a, b, mtv: all }));
+        contacts.wm = (0..count).map(|b| Contact { a: 0, b, part: 0, mtv: all }).collect();
+        crate::broad::all_pairs(count, |a, b| {
+            contacts.mm.push(Contact { a, b, part: 0, mtv: all })
+        });
         let mut stopped = Vec::new();
         let mut columns = Columns {
             position: &mut position,
@@ -80,7 +100,7 @@ mod tests {
             spin: &mut [],
             held: &[],
         };
-        displacement(&[floor], &mut columns, &mut contacts, 0.5, &mut stopped);
+        displacement(&vec![floor], &mut columns, &mut contacts, 0.5, &mut stopped);
         assert_eq!(stopped, []);
         (position, velocity)
     }
@@ -131,7 +151,7 @@ mod tests {
         let floor = Plane::new(Vec3::unit_y(), 0.0_f32).unwrap();
         let mut position = [Point3::new(0.0, 0.0, 0.0), Point3::new(0.0, 0.5, 0.0)];
         let mut velocity = [Vec3::new(7.0, f32::MAX, 0.0), Vec3::new(0.0, 0.0, 0.0)];
-        let wm = [0, 1].map(|b| Contact { a: 0, b, mtv: Vec3::unit_y() }).to_vec();
+        let wm = [0, 1].map(|b| Contact { a: 0, b, part: 0, mtv: Vec3::unit_y() }).to_vec();
         let mut contacts = Contacts { wm, mm: vec![] };
         let mut stopped = Vec::new();
         let mut columns = Columns {
@@ -143,7 +163,7 @@ mod tests {
             held: &[],
         };
         // 1 m in 1e-33 s is 1e33 m/s, more than the gap below f32::MAX.
-        displacement(&[floor], &mut columns, &mut contacts, 1e-33, &mut stopped);
+        displacement(&vec![floor], &mut columns, &mut contacts, 1e-33, &mut stopped);
         assert_eq!(stopped, [0]);
         assert_eq!((position[0].y, velocity[0]), (0.0, Vec3::new(0.0, 0.0, 0.0)));
         assert_eq!(position[1].y, 1.0, "the other one is restituted as ever");

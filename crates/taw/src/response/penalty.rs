@@ -29,7 +29,7 @@ impl ContactLaw {
 /// across the normal while they held, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shear<S> {
-    key: (bool, u32, u32),
+    key: (bool, u32, u32, u32),
     stretch: Vec3<S>,
 }
 
@@ -78,8 +78,8 @@ pub(crate) fn penalty<S: Scalar>(
     contacts.sort();
     let before = std::mem::take(shear);
     let mut pushes = Vec::with_capacity(contacts.len());
-    let wm = contacts.wm.iter().map(|c| (false, c.a, c.b));
-    let mm = contacts.mm.iter().map(|c| (true, c.a, c.b));
+    let wm = contacts.wm.iter().map(|c| (false, c.a, c.b, c.part));
+    let mm = contacts.mm.iter().map(|c| (true, c.a, c.b, 0));
     // All forces are those of the same moment, whatever the order.
     for key in wm.chain(mm) {
         let Some(touch) = touch(marbles, walls, &material, key) else { continue };
@@ -132,7 +132,7 @@ fn touch<S: Scalar>(
     marbles: &Columns<S>,
     walls: &impl Walls<S>,
     material: &impl Fn(usize) -> Material<S>,
-    (two_marbles, a, b): (bool, u32, u32),
+    (two_marbles, a, b, part): (bool, u32, u32, u32),
 ) -> Option<Touch<S>> {
     let (a, b) = (a as usize, b as usize);
     let own = material(b);
@@ -155,7 +155,7 @@ fn touch<S: Scalar>(
         compliance = compliance.and(other.elasticity.compliance());
         both = own.against(other);
     } else {
-        (normal, distance) = walls.normal_and_distance(a, marbles.position[b]);
+        (normal, distance) = walls.normal_and_distance(a, part, marbles.position[b]);
         closing -= walls.surface_velocity(a, marbles.position[b] - normal * marbles.radius[b]);
         let its = walls.material(a);
         both = its.map_or(own, |its| own.against(its));
@@ -273,7 +273,7 @@ mod tests {
                 return [time, overlap, force];
             }
             let mut contacts = Contacts::default();
-            contacts.mm.push(crate::contact::Contact { a: 0, b: 1, mtv: Vec3::zero() });
+            contacts.mm.push(crate::contact::Contact { a: 0, b: 1, part: 0, mtv: Vec3::zero() });
             let before = velocity[1].x;
             let mut columns = Columns {
                 position: &mut position,

@@ -5,7 +5,7 @@ use crate::math::{Point3, Scalar};
 
 /// Things by their bounding boxes, halved again and again, so that few are looked at to
 /// find those in one place.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct BoxTree<S> {
     nodes: Vec<Node<S>>,
     /// The things, leaf by leaf.
@@ -20,6 +20,12 @@ struct Node<S> {
     next: u32,
     /// How many things; zero if it has children.
     count: u32,
+}
+
+impl<S> Default for BoxTree<S> {
+    fn default() -> Self {
+        Self { nodes: Vec::new(), items: Vec::new() }
+    }
 }
 
 /// A leaf has no more things than this.
@@ -63,6 +69,26 @@ impl<S: Scalar> BoxTree<S> {
         self.nodes[node].next = self.nodes.len() as u32;
         self.nodes[node].count = 0;
         self.build(boxes, middle, to);
+    }
+
+    /// Takes new boxes for the same things: the tree keeps its form, which is good as long as
+    /// they stay about where they were.
+    pub fn refit(&mut self, boxes: &[Box3<S>]) {
+        // Children come after their parents.
+        for number in (0..self.nodes.len()).rev() {
+            let Node { next, count, .. } = self.nodes[number];
+            let around = if count > 0 {
+                let from = next as usize;
+                let items = self.items[from..from + count as usize].iter();
+                let bounds = items.filter_map(|item| boxes.get(*item as usize).copied());
+                bounds.reduce(|all, next| all.union(&next))
+            } else {
+                Some(self.nodes[number + 1].bounds.union(&self.nodes[next as usize].bounds))
+            };
+            if let Some(around) = around {
+                self.nodes[number].bounds = around;
+            }
+        }
     }
 
     /// Names all things whose boxes may have a point in common with this one, and some more.

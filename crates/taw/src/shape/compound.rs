@@ -1,8 +1,10 @@
+use cgmath::InnerSpace;
+
 use super::{Box3, Capsule, Hull, Nearest, Obb, Solid, Sphere};
 use crate::Error;
 use crate::error::within;
 use crate::frame::Pose;
-use crate::math::{Point3, Scalar, Vec3};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
 
 /// Several parts that are one thing. Of one kind, `Compound<Obb<f32>>` say, nothing needs
 /// to be matched; of mixed kinds it is a `Compound<Shape<f32>>`.
@@ -89,6 +91,38 @@ impl<S: Scalar> Shape<S> {
             Self::Compound(compound) => {
                 let parts = compound.parts.iter().map(|part| part.moved(pose)).collect();
                 Self::Compound(Compound { parts })
+            }
+        }
+    }
+
+    /// The same in another scalar.
+    pub(crate) fn in_scalar<T: Scalar>(&self) -> Shape<T> {
+        match self {
+            Self::Sphere(Sphere { center, radius }) => Shape::Sphere(Sphere {
+                center: cast_point(*center),
+                radius: T::constant(radius.as_f64()),
+            }),
+            Self::Aabb(Box3 { min, max }) => {
+                Shape::Aabb(Box3 { min: cast_point(*min), max: cast_point(*max) })
+            }
+            Self::Obb(Obb { center, rotation, half_widths }) => {
+                let (s, v) = (T::constant(rotation.s.as_f64()), cast_vector(rotation.v));
+                Shape::Obb(Obb {
+                    center: cast_point(*center),
+                    // As long as it should be in that scalar.
+                    rotation: Quat::from_sv(s, v).normalize(),
+                    half_widths: cast_vector(*half_widths),
+                })
+            }
+            Self::Capsule(Capsule { a, b, radius }) => Shape::Capsule(Capsule {
+                a: cast_point(*a),
+                b: cast_point(*b),
+                radius: T::constant(radius.as_f64()),
+            }),
+            Self::Hull(hull) => Shape::Hull(hull.in_scalar()),
+            Self::Compound(compound) => {
+                let parts = compound.parts.iter().map(Self::in_scalar).collect();
+                Shape::Compound(Compound { parts })
             }
         }
     }

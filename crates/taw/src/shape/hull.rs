@@ -111,6 +111,14 @@ impl<S: Scalar> Hull<S> {
         Self { pose: pose * self.pose, polyhedron: Arc::clone(&self.polyhedron) }
     }
 
+    /// The same in another scalar.
+    pub(crate) fn in_scalar<T: Scalar>(&self) -> Hull<T> {
+        let Pose { rotation, translation } = self.pose;
+        let (s, v) = (T::constant(rotation.s.as_f64()), cast_vector(rotation.v));
+        let pose = Pose { rotation: Quat::from_sv(s, v), translation: cast_vector(translation) };
+        Hull { pose, polyhedron: Arc::clone(&self.polyhedron) }
+    }
+
     /// Where its own frame is.
     #[must_use]
     pub fn pose(&self) -> Pose<S> {

@@ -42,6 +42,13 @@ pub struct Nearest<S> {
     pub distance: S,
 }
 
+impl<S: Scalar> Nearest<S> {
+    /// The same of a surface whose inside is where the point is.
+    pub(crate) fn inside_out(self) -> Self {
+        Self { normal: -self.normal, distance: -self.distance, ..self }
+    }
+}
+
 /// What every bounded shape can say of itself.
 pub trait Solid<S: Scalar> {
     /// Its point that is farthest along a direction (of any length but zero). Of several,

@@ -144,6 +144,31 @@ impl<S: Scalar> HeightField<S> {
         Point3::new(self.corner.x + x, self.height(column, row), self.corner.z + z)
     }
 
+    /// How high the surface is above or below a point, in metres along y; none beside it.
+    #[must_use]
+    pub fn height_over(&self, point: Point3<S>) -> Option<S> {
+        let place = |x: S, start: S, width: S, cells: u32| {
+            let place = (x - start) / width;
+            let cell = place.as_f64().floor().clamp(0.0, f64::from(cells - 1));
+            let part = place - S::constant(cell);
+            let inside = place >= S::zero() && place <= S::constant(f64::from(cells));
+            inside.then_some((cell as u32, part))
+        };
+        let (column, x) = place(point.x, self.corner.x, self.cell[0], self.columns - 1)?;
+        let (row, z) = place(point.z, self.corner.z, self.cell[1], self.rows - 1)?;
+        let near = self.height(column, row);
+        let far = self.height(column + 1, row + 1);
+        // The two triangles of a cell meet along the diagonal from near to far.
+        let surface = if x >= z {
+            let right = self.height(column + 1, row);
+            near + (right - near) * x + (far - right) * z
+        } else {
+            let left = self.height(column, row + 1);
+            near + (left - near) * z + (far - left) * x
+        };
+        Some(surface - point.y)
+    }
+
     fn height(&self, column: u32, row: u32) -> S {
         self.corner.y + self.heights[row as usize * self.columns as usize + column as usize]
     }

@@ -24,6 +24,26 @@ impl<S: Scalar> Triangle<S> {
         (twice > longest * S::epsilon()).then_some(normal)
     }
 
+    /// Where it is nearest to a point, if what is below it, against y, is solid: a point
+    /// straight behind it, by no more than it is wide, is inside.
+    pub(crate) fn nearest_if_solid_below(&self, point: Point3<S>) -> Nearest<S> {
+        let [a, b, c] = self.corners;
+        let deepest = (b - a).magnitude().min((c - a).magnitude());
+        let near = self.nearest(point);
+        let up = self.normal().map(|n| if n.y < S::zero() { -n } else { n });
+        match up {
+            // But for rounding.
+            Some(up)
+                if near.distance > S::zero()
+                    && near.distance <= deepest
+                    && (near.normal + up).magnitude() < S::constant(1e-3) =>
+            {
+                near.inside_out()
+            }
+            _ => near,
+        }
+    }
+
     /// Its point that is nearest to the origin: on a side that the origin is beside, or below
     /// or above it.
     pub(crate) fn closest_to_origin(&self) -> Point3<S> {

@@ -9,9 +9,12 @@ mod limits;
 mod marbles;
 mod model;
 mod optional;
+mod query;
 mod sweep;
 #[cfg(test)]
 mod tests;
+mod touch;
+mod wall_shape;
 mod walls;
 
 pub use crate::motion::WallMotion;
@@ -19,13 +22,13 @@ pub use energy::Energy;
 pub use limits::SpeedLimits;
 pub use marbles::{Damping, Marble, MarbleId, Marbles, Mass};
 pub use model::{Detection, Model, Precision};
+pub use query::{Found, Queries, QueryTree, Thing};
+pub use wall_shape::WallShape;
 pub use walls::{WallId, Walls};
-
-use cgmath::Zero;
 
 use crate::Error;
 use crate::broad::Grid;
-use crate::contact::{Contact, Contacts, mtv_sphere_plane, mtv_sphere_sphere};
+use crate::contact::Contacts;
 use crate::error::{finite_vector, positive};
 use crate::math::{Scalar, Vec3, length};
 use crate::motion::{Force, Rotation};
@@ -34,6 +37,8 @@ use crate::response::impulse::{self, Settings, Warm, impulse};
 use crate::response::{Impact, Response, Shear, displacement, penalty};
 use integrate::Drive;
 use sweep::Sweep;
+use touch::Near;
+use walls::Part;
 
 /// Everything that moves and everything that it can touch.
 ///
@@ -73,6 +78,7 @@ pub struct World<S> {
     accelerations: Vec<Vec3<f64>>,
     events: EventDriven,
     sweep: Sweep<S>,
+    near_walls: Vec<Near<S>>,
 }
 
 impl<S: Scalar> Default for World<S> {
@@ -99,6 +105,7 @@ impl<S: Scalar> Default for World<S> {
             accelerations: Vec::new(),
             events: EventDriven::default(),
             sweep: Sweep::default(),
+            near_walls: Vec::new(),
         }
     }
 }
@@ -126,6 +133,7 @@ impl<S: Scalar> PartialEq for World<S> {
             accelerations: _,
             events,
             sweep: _,
+            near_walls: _,
         } = self;
         *model == other.model
             && *gravity == other.gravity
@@ -275,34 +283,8 @@ impl<S: Scalar> World<S> {
     /// together later is found later.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
-        let reach = self.reach;
-        let nothing = Vec3::zero();
-        for (a, plane) in self.walls.planes().iter().enumerate() {
-            for b in 0..self.marbles.len() {
-                let sphere = self.marbles.sphere(b);
-                let gap = || plane.signed_distance(sphere.center) - sphere.radius;
-                let near = || reach > S::zero() && gap() <= reach;
-                let mtv = mtv_sphere_plane(&sphere, plane);
-                if let Some(mtv) = mtv.or_else(|| near().then_some(nothing)) {
-                    let (a, b) = (a as u32, b as u32);
-                    self.contacts.wm.push(Contact { a, b, mtv });
-                }
-            }
-        }
-        let center = self.marbles.position();
-        self.grid.rebuild(center, self.marbles.radius(), reach);
-        self.grid.pairs(center, |a, b| {
-            let (first, second) = (a as usize, b as usize);
-            let (first, second) = (self.marbles.sphere(first), self.marbles.sphere(second));
-            let near = || {
-                let gap = length(second.center - first.center) - first.radius - second.radius;
-                reach > S::zero() && gap <= reach
-            };
-            let mtv = mtv_sphere_sphere(&first, &second);
-            if let Some(mtv) = mtv.or_else(|| near().then_some(nothing)) {
-                self.contacts.mm.push(Contact { a, b, mtv });
-            }
-        });
+        self.touch_walls(self.reach);
+        self.touch_marbles(self.reach);
     }
 
     /// The third verb: contacts change positions and velocities back to what the
@@ -335,13 +317,9 @@ impl<S: Scalar> World<S> {
             columns.spin = &mut []; // what is only shown is not felt
         }
         match self.model.response {
-            Response::Displacement => displacement(
-                self.walls.planes(),
-                &mut columns,
-                &mut self.contacts,
-                dt,
-                &mut self.stopped,
-            ),
+            Response::Displacement => {
+                displacement(&self.walls, &mut columns, &mut self.contacts, dt, &mut self.stopped)
+            }
             Response::Impulse => {
                 let settings = Settings {
                     iterations: self.model.iterations,
@@ -378,8 +356,9 @@ impl<S: Scalar> World<S> {
         if self.model.rotation != Rotation::None {
             // The deepest contact comes first in the list, so it has the last word.
             for contact in self.contacts.wm.iter().rev() {
-                let normal = self.walls.planes()[contact.a as usize].normal();
+                let part = Part { wall: contact.a, part: contact.part };
                 let row = contact.b as usize;
+                let normal = self.walls.nearest(part, self.marbles.position()[row]).normal;
                 if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Rolling {
                     self.marbles.roll(row, normal);
                 }

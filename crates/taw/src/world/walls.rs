@@ -2,48 +2,88 @@ use cgmath::Zero;
 
 use super::handles::{Handle, Handles};
 use super::optional::Optional;
+use super::wall_shape::WallShape;
 use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::math::{Point3, Scalar, Vec3};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};
-use crate::shape::Plane;
+use crate::shape::{Box3, BoxTree, Nearest, Plane};
 
 /// Names a wall for as long as it is in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct WallId(Handle);
 
-/// What no contact can move: half-spaces, fixed or moved by the user.
-#[derive(Clone, Debug, PartialEq)]
+/// A wall, and one of its parts: of a compound, or a triangle of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub(super) struct Part {
+    pub wall: u32,
+    pub part: u32,
+}
+
+/// What no contact can move: half-spaces and shapes, fixed or moved by the user.
+#[derive(Clone, Debug)]
 pub struct Walls<S> {
     handles: Handles,
-    planes: Vec<Plane<S>>,
+    shapes: Vec<WallShape<S>>,
     /// Only of those that move.
     motion: Optional<WallMotion<S>>,
     /// Only of those that have one of their own.
     material: Optional<Material<S>>,
+    /// The boxes of those that are no half-spaces, and what is in them.
+    boxes: Vec<Box3<S>>,
+    parts: Vec<Part>,
+    tree: BoxTree<S>,
+    stale: Stale,
+}
+
+/// What changed since the tree was built.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+enum Stale {
+    #[default]
+    Nothing,
+    Places,
+    All,
 }
 
 impl<S> Default for Walls<S> {
     fn default() -> Self {
         Self {
             handles: Handles::default(),
-            planes: Vec::new(),
+            shapes: Vec::new(),
             motion: Optional::default(),
             material: Optional::default(),
+            boxes: Vec::new(),
+            parts: Vec::new(),
+            tree: BoxTree::default(),
+            stale: Stale::Nothing,
         }
     }
 }
 
+impl<S: Scalar> PartialEq for Walls<S> {
+    fn eq(&self, other: &Self) -> bool {
+        // The tree follows from the shapes.
+        let Self { handles, shapes, motion, material, boxes: _, parts: _, tree: _, stale: _ } =
+            self;
+        *handles == other.handles
+            && *shapes == other.shapes
+            && *motion == other.motion
+            && *material == other.material
+    }
+}
+
 impl<S: Scalar> Walls<S> {
-    /// Adds a wall.
+    /// Adds a wall: a half-space, any shape, a mesh or a height field.
     ///
     /// # Errors
-    /// [`Error::Full`] at 2³² walls.
-    pub fn insert(&mut self, plane: Plane<S>) -> Result<WallId, Error> {
+    /// [`Error::Full`] at 2³² walls, [`Error::NotFinite`] for a shape that is not.
+    pub fn insert(&mut self, wall: impl Into<WallShape<S>>) -> Result<WallId, Error> {
+        let shape = wall.into().checked()?;
         let handle = self.handles.push()?;
-        self.planes.push(plane);
-        let rows = self.planes.len();
+        self.change(&shape, Stale::All);
+        self.shapes.push(shape);
+        let rows = self.shapes.len();
         self.motion.set(rows - 1, None, rows);
         self.material.set(rows - 1, None, rows);
         Ok(WallId(handle))
@@ -53,29 +93,96 @@ impl<S: Scalar> Walls<S> {
     ///
     /// # Errors
     /// [`Error::NoSuchWall`].
-    pub fn remove(&mut self, id: WallId) -> Result<Plane<S>, Error> {
+    pub fn remove(&mut self, id: WallId) -> Result<WallShape<S>, Error> {
         let row = self.handles.swap_remove(id.0);
         let row = row.ok_or(Error::NoSuchWall(id))?;
         self.motion.swap_remove(row);
         self.material.swap_remove(row);
-        Ok(self.planes.swap_remove(row))
+        // Another wall has this row now.
+        self.stale = Stale::All;
+        Ok(self.shapes.swap_remove(row))
     }
 
     /// The wall.
     ///
     /// # Errors
     /// [`Error::NoSuchWall`].
-    pub fn get(&self, id: WallId) -> Result<Plane<S>, Error> {
-        self.row(id).map(|row| self.planes[row])
+    pub fn get(&self, id: WallId) -> Result<&WallShape<S>, Error> {
+        self.row(id).map(|row| &self.shapes[row])
     }
 
-    /// Moves a wall to a new place. Marbles that are then inside are pushed out by
-    /// the next step.
+    /// Moves a wall to a new place, or makes another one of it. Marbles that are then inside
+    /// are pushed out by the next step.
     ///
     /// # Errors
-    /// [`Error::NoSuchWall`].
-    pub fn set(&mut self, id: WallId, plane: Plane<S>) -> Result<(), Error> {
-        self.row(id).map(|row| self.planes[row] = plane)
+    /// [`Error::NoSuchWall`], [`Error::NotFinite`].
+    pub fn set(&mut self, id: WallId, wall: impl Into<WallShape<S>>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let shape = wall.into().checked()?;
+        let parts = |shape: &WallShape<S>| {
+            let mut count = 0;
+            shape.boxes(|_, _| count += 1);
+            count
+        };
+        let same = parts(&shape) == parts(&self.shapes[row]);
+        self.change(&shape, if same { Stale::Places } else { Stale::All });
+        self.shapes[row] = shape;
+        Ok(())
+    }
+
+    /// Notes that a wall is new or elsewhere.
+    fn change(&mut self, shape: &WallShape<S>, stale: Stale) {
+        if stale == Stale::All || !matches!(shape, WallShape::Plane(_)) {
+            self.stale = self.stale.max(stale);
+        }
+    }
+
+    /// Brings the tree up to date. Walls that only moved are refitted.
+    pub(super) fn prepare(&mut self) {
+        if self.stale == Stale::Nothing {
+            return;
+        }
+        self.boxes.clear();
+        self.parts.clear();
+        for (wall, shape) in (0..).zip(&self.shapes) {
+            shape.boxes(|part, bounds| {
+                self.parts.push(Part { wall, part });
+                self.boxes.push(bounds);
+            });
+        }
+        if self.stale == Stale::Places {
+            self.tree.refit(&self.boxes);
+        } else {
+            self.tree = BoxTree::new(&self.boxes);
+        }
+        self.stale = Stale::Nothing;
+    }
+
+    /// Whether all walls are half-spaces.
+    pub(super) fn are_planes(&self) -> bool {
+        self.parts.is_empty()
+    }
+
+    /// Names the parts of walls, but for half-spaces, that may have a point in common with a
+    /// box.
+    pub(super) fn near(&self, bounds: &Box3<S>, mut name: impl FnMut(Part)) {
+        self.tree.near(bounds, |item| {
+            let Part { wall, part } = self.parts[item as usize];
+            self.shapes[wall as usize].near(part, bounds, |part| name(Part { wall, part }));
+        });
+    }
+
+    /// Where a part is nearest to a point.
+    pub(super) fn nearest(&self, Part { wall, part }: Part, point: Point3<S>) -> Nearest<S> {
+        self.shapes[wall as usize].nearest_of(part, point)
+    }
+
+    /// All half-spaces, with their rows.
+    pub(super) fn planes(&self) -> impl Iterator<Item = (u32, &Plane<S>)> {
+        (0..).zip(&self.shapes).filter_map(|(row, shape)| match shape {
+            WallShape::Plane(plane) => Some((row, plane)),
+            _ => None,
+        })
     }
 
     /// Says how a wall moves, or with `None` that it is at rest. It is up to the
@@ -90,7 +197,7 @@ impl<S: Scalar> Walls<S> {
             finite_vector(["spin.x", "spin.y", "spin.z"], motion.spin)?;
             finite_point(["pivot.x", "pivot.y", "pivot.z"], motion.pivot)?;
         }
-        self.motion.set(row, motion, self.planes.len());
+        self.motion.set(row, motion, self.shapes.len());
         Ok(())
     }
 
@@ -110,7 +217,7 @@ impl<S: Scalar> Walls<S> {
     pub fn set_material(&mut self, id: WallId, material: Option<Material<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
         let material = material.map(Material::checked).transpose()?;
-        self.material.set(row, material, self.planes.len());
+        self.material.set(row, material, self.shapes.len());
         Ok(())
     }
 
@@ -124,8 +231,8 @@ impl<S: Scalar> Walls<S> {
 
     /// All walls, by row.
     #[must_use]
-    pub fn planes(&self) -> &[Plane<S>] {
-        &self.planes
+    pub fn shapes(&self) -> &[WallShape<S>] {
+        &self.shapes
     }
 
     /// The row of a wall, until the next removal.
@@ -160,20 +267,20 @@ impl<S: Scalar> Walls<S> {
     /// The number of walls.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.planes.len()
+        self.shapes.len()
     }
 
     /// Whether there are no walls.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.planes.is_empty()
+        self.shapes.is_empty()
     }
 }
 
 impl<S: Scalar> response::Walls<S> for Walls<S> {
-    fn normal_and_distance(&self, wall: usize, point: Point3<S>) -> (Vec3<S>, S) {
-        let plane = &self.planes[wall];
-        (plane.normal(), plane.signed_distance(point))
+    fn normal_and_distance(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S) {
+        let Nearest { normal, distance, .. } = self.shapes[wall].nearest_of(part, point);
+        (normal, distance)
     }
 
     fn surface_velocity(&self, wall: usize, point: Point3<S>) -> Vec3<S> {

@@ -16,8 +16,8 @@ use super::manifold::deepest;
 use crate::math::{Point3, Vec3, direction_and_length};
 use crate::shape::across;
 use crate::shape::polygon::{closest_of_polygon, closest_of_segment};
-pub(super) use axes::{Axis, Of, PARALLEL, at_right_angles};
 use axes::widest_axis;
+pub(super) use axes::{Axis, Of, PARALLEL, at_right_angles};
 
 /// Where two cores, without their radii, are nearest or deepest.
 ///

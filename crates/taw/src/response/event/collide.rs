@@ -205,7 +205,7 @@ impl EventDriven {
 
     /// Lets a ball that touches a wall bounce off it.
     pub(super) fn hit_wall(&mut self, row: usize, wall: usize, settings: &Settings) -> Impact<f64> {
-        let normal = self.walls[wall].normal;
+        let normal = self.walls[wall].form.nearest(self.balls[row].position).normal;
         let ball = &mut self.balls[row];
         ball.release();
         let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
@@ -216,6 +216,6 @@ impl EventDriven {
         ball.collide(material, settings);
         let impulse = impact(normal, closing, mobility, material);
         ball.hit(impulse, normal);
-        Impact { a: wall as u32, on_wall: true, b: row as u32, normal, approach_speed }
+        Impact { a: self.walls[wall].row, on_wall: true, b: row as u32, normal, approach_speed }
     }
 }

@@ -6,9 +6,12 @@ use std::f64::consts::SQRT_2;
 use cgmath::{InnerSpace, Zero};
 
 use super::time::{Gap, closing_time, meeting_time};
-use super::{Ball, Event, EventDriven, Home, MOST_SURRENDERS, PRESS, REST, Settings, What};
+use super::{Ball, Event, EventDriven, Form, Home, MOST_SURRENDERS, PRESS, REST, Settings, What};
 use crate::math::{Vec3, direction_and_length, is_finite};
 use crate::response::Walls as _;
+
+/// Steps enough for a ball to come to any wall but one that it only grazes.
+const MOST_STEPS: u32 = 64;
 
 impl EventDriven {
     /// Finds the next event of a ball and puts it in the queue.
@@ -29,13 +32,13 @@ impl EventDriven {
                 _ => {}
             }
         };
-        for wall in 0..self.walls.len() {
+        self.name_walls(row, |wall| {
             if ball.path.support != Some(wall)
                 && let Some((after, what)) = self.foresee_wall(row, wall, now, settings)
             {
                 offer(Some(after), what);
             }
-        }
+        });
         let mut other = |other: usize| {
             if other != row
                 && let Some((after, what)) = self.foresee_meeting(row, other, now, settings)
@@ -91,8 +94,11 @@ impl EventDriven {
         if ball.inverse_mass <= 0.0 || ball.path.surrenders >= MOST_SURRENDERS {
             return None; // no wall holds it
         }
+        let Form::Plane { offset, .. } = self.walls[wall].form else {
+            return self.foresee_part(row, wall, now, settings);
+        };
         let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
-        let (normal, distance) = self.walls.normal_and_distance(wall, position);
+        let (normal, distance) = self.walls.normal_and_distance(wall, 0, position);
         let moving = self.walls[wall].motion.is_some();
         let touch = position - normal * ball.radius;
         let surface = if moving { self.walls.surface_velocity(wall, touch) } else { Vec3::zero() };
@@ -101,7 +107,7 @@ impl EventDriven {
             speed: (velocity + ball.path.carry - surface).dot(normal),
             acceleration: ball.path.acceleration.dot(normal),
         };
-        let size = ball.radius + distance.abs() + self.walls[wall].offset.abs();
+        let size = ball.radius + distance.abs() + offset.abs();
         let fall = ball.pull.magnitude() * settings.dt;
         let least = f64::EPSILON * 16.0 * size;
         let held = ball.path.support.is_some() || ball.path.heaped;
@@ -132,6 +138,65 @@ impl EventDriven {
         } else {
             Some((0.0, What::SettlesOn(wall)))
         }
+    }
+
+    /// The same of a wall that is no half-space: for as long as the plane across the nearest
+    /// point keeps them apart, they do not meet; then there is another one (conservative
+    /// advancement; Mirtich 1996).
+    fn foresee_part(
+        &self,
+        row: usize,
+        wall: usize,
+        now: f64,
+        settings: &Settings,
+    ) -> Option<(f64, What)> {
+        let ball = &self.balls[row];
+        let (mut time, mut step) = (now, 0);
+        let acceleration = ball.path.acceleration;
+        let moving = self.walls[wall].motion.is_some();
+        let fall = ball.pull.magnitude() * settings.dt;
+        let held = ball.path.support.is_some() || ball.path.heaped;
+        let (normal, gap, seen) = loop {
+            let (position, velocity) = (ball.position_at(time), ball.velocity_at(time));
+            let (normal, distance) = self.walls.normal_and_distance(wall, 0, position);
+            let touch = position - normal * ball.radius;
+            let surface =
+                if moving { self.walls.surface_velocity(wall, touch) } else { Vec3::zero() };
+            let gap = Gap {
+                now: distance - ball.radius,
+                speed: (velocity + ball.path.carry - surface).dot(normal),
+                acceleration: acceleration.dot(normal),
+            };
+            let seen = Gap { speed: velocity.dot(normal), ..gap };
+            let least = f64::EPSILON * 16.0 * (ball.radius + distance.abs()) + ball.rounding;
+            let leaves = step == 0 && gap.speed > 0.0 && gap.now <= least;
+            let after = if leaves {
+                // It comes back to this plane, or never.
+                (gap.acceleration < 0.0).then(|| -2.0 * gap.speed / gap.acceleration)?
+            } else if gap.now <= least || step == MOST_STEPS {
+                break (normal, gap, seen);
+            } else {
+                closing_time(seen)?
+            };
+            step += 1;
+            time += after;
+            if !time.is_finite() || time > settings.dt {
+                return None;
+            }
+        };
+        let slow = if held { PRESS * fall } else { REST * fall };
+        let slow = slow.max(1e-14 * ball.velocity_at(time).magnitude());
+        let press = ball.path.acceleration.dot(normal) < 0.0;
+        // What met it on the way is there; what touched it at once goes by what it sees.
+        let speed = if step > 0 { seen.speed } else { gap.speed };
+        if speed >= -slow && (!press || speed > slow || held) {
+            return None;
+        }
+        if self.is_seam(row, wall, ball.position_at(time)) {
+            return None;
+        }
+        let what = if speed < -slow { What::Hits(wall) } else { What::SettlesOn(wall) };
+        Some((time - now, what))
     }
 
     /// When and how two balls meet next, in seconds from now.

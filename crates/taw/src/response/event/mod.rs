@@ -23,6 +23,7 @@ use crate::math::{Point3, Scalar, Vec3, cast_vector, is_finite, is_finite_point}
 use crate::motion::WallMotion;
 use crate::response::impulse::Warm;
 use crate::response::{BallSpin, Material, Walls};
+use crate::shape::{Box3, BoxTree, Nearest, Shape, Solid, Triangle};
 use cells::{Cell, Cells};
 use collide::Moment;
 use rest::Heap;
@@ -49,6 +50,11 @@ const LEAN: f64 = 8.0;
 const MOST_SURRENDERS: i32 = 10;
 /// What is no time between two collisions, over the substep.
 const NO_TIME: f64 = 1e-13;
+/// What lies this part of a radius outside of another wall is still on it; see `world::touch`.
+const FLUSH: f64 = 5e-6;
+/// What lies on a wall that is no half-space looks where it is after this part of its
+/// radius, though not more often than after this part of a substep.
+const LOOK: f64 = 0.05;
 /// So many events in one substep, and a thousand more for each ball, that something must
 /// be wrong; the rest of it passes without any.
 const MOST_EVENTS: usize = 10_000_000;
@@ -81,13 +87,51 @@ impl Impact<f64> {
     }
 }
 
-/// A half-space, and how it moves.
-#[derive(Clone, Copy, Debug)]
+/// A wall, or a part of one, and how it moves.
+#[derive(Clone, Debug)]
 pub(crate) struct Wall {
-    pub normal: Vec3<f64>,
-    pub offset: f64,
+    pub form: Form,
+    /// What the world calls it.
+    pub row: u32,
+    pub part: u32,
     pub motion: Option<WallMotion<f64>>,
     pub material: Option<Material<f64>>,
+}
+
+/// What a [`Wall`] is.
+#[derive(Clone, Debug)]
+pub(crate) enum Form {
+    Plane {
+        normal: Vec3<f64>,
+        offset: f64,
+    },
+    Solid(Shape<f64>),
+    Triangle(Triangle<f64>),
+    /// Of a height field.
+    SolidBelow(Triangle<f64>),
+}
+
+impl Form {
+    pub fn nearest(&self, point: Point3<f64>) -> Nearest<f64> {
+        match self {
+            Self::Plane { normal, offset } => {
+                let distance = normal.dot(Vec3::new(point.x, point.y, point.z)) - offset;
+                Nearest { point: point - normal * distance, normal: *normal, distance }
+            }
+            Self::Solid(shape) => shape.nearest(point),
+            Self::Triangle(triangle) => triangle.nearest(point),
+            Self::SolidBelow(triangle) => triangle.nearest_if_solid_below(point),
+        }
+    }
+
+    /// The box around it, of a plane none.
+    fn bounds(&self) -> Option<Box3<f64>> {
+        match self {
+            Self::Plane { .. } => None,
+            Self::Solid(shape) => Some(shape.bounding_box()),
+            Self::Triangle(triangle) | Self::SolidBelow(triangle) => Some(triangle.bounding_box()),
+        }
+    }
 }
 
 impl Wall {
@@ -98,9 +142,9 @@ impl Wall {
 }
 
 impl Walls<f64> for Vec<Wall> {
-    fn normal_and_distance(&self, wall: usize, point: Point3<f64>) -> (Vec3<f64>, f64) {
-        let Wall { normal, offset, .. } = self[wall];
-        (normal, normal.dot(Vec3::new(point.x, point.y, point.z)) - offset)
+    fn normal_and_distance(&self, wall: usize, _: u32, point: Point3<f64>) -> (Vec3<f64>, f64) {
+        let Nearest { normal, distance, .. } = self[wall].form.nearest(point);
+        (normal, distance)
     }
 
     fn surface_velocity(&self, wall: usize, point: Point3<f64>) -> Vec3<f64> {
@@ -315,6 +359,10 @@ pub(crate) struct EventDriven {
     pub near: Contacts<f64>,
     /// What the heaps' contacts bore in the last substep.
     pub warm: Vec<Warm<f64>>,
+    /// Which walls are half-spaces; and the others, by their boxes.
+    planes: Vec<usize>,
+    parts: Vec<usize>,
+    tree: BoxTree<f64>,
     cells: Cells,
     anywhere: Vec<usize>,
     queue: BinaryHeap<Reverse<Event>>,
@@ -332,6 +380,7 @@ impl EventDriven {
             ball.path = Path { acceleration: ball.pull, ..Path::default() };
             ball.turned = Vec3::zero();
         }
+        self.sort_walls();
         self.begin_at_rest(settings);
         self.find_homes(dt);
         self.queue.clear();
@@ -394,6 +443,7 @@ impl EventDriven {
             }
             What::Changes => {
                 self.balls[row].advance(time);
+                self.look_what_it_lies_on(row, settings);
                 self.stretch(row, settings);
                 self.foresee(row, time, settings);
             }
@@ -411,7 +461,7 @@ impl EventDriven {
 
     /// Lets a ball that touches a wall lie on it from now on.
     fn settle(&mut self, row: usize, wall: usize, settings: &Settings) {
-        let (normal, distance) = self.walls.normal_and_distance(wall, self.balls[row].position);
+        let (normal, distance) = self.walls.normal_and_distance(wall, 0, self.balls[row].position);
         let ball = &mut self.balls[row];
         ball.release();
         let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
@@ -427,11 +477,95 @@ impl EventDriven {
         self.stretch(row, settings);
     }
 
+    /// Takes note of which walls are where.
+    fn sort_walls(&mut self) {
+        self.planes.clear();
+        self.parts.clear();
+        let mut boxes = Vec::new();
+        for (number, wall) in self.walls.iter().enumerate() {
+            match wall.form.bounds() {
+                None => self.planes.push(number),
+                Some(bounds) => {
+                    self.parts.push(number);
+                    boxes.push(bounds);
+                }
+            }
+        }
+        self.tree = BoxTree::new(&boxes);
+    }
+
+    /// Names the walls that a ball may touch before it leaves its cell.
+    fn name_walls(&self, row: usize, mut name: impl FnMut(usize)) {
+        self.planes.iter().for_each(|wall| name(*wall));
+        if self.parts.is_empty() {
+            return;
+        }
+        let ball = &self.balls[row];
+        match ball.path.home {
+            Home::Cell(cell) => {
+                let width = self.cells.width();
+                let corner = cell.map(|i| i as f64 * width);
+                let more = ball.radius + ball.rounding + 1e-3 * width;
+                let bounds = Box3 {
+                    min: Point3::from(corner.map(|x| x - more)),
+                    max: Point3::from(corner.map(|x| x + width + more)),
+                };
+                self.tree.near(&bounds, |item| name(self.parts[item as usize]));
+            }
+            Home::Anywhere => self.parts.iter().for_each(|wall| name(*wall)),
+        }
+    }
+
+    /// Whether the point where a wall is nearest to a ball is on another wall that is as
+    /// near, which is then the one that counts.
+    fn is_seam(&self, row: usize, wall: usize, at: Point3<f64>) -> bool {
+        let ball = &self.balls[row];
+        let flush = (FLUSH * ball.radius).max(ball.rounding);
+        let nearest = |wall: usize, point: Point3<f64>| self.walls[wall].form.nearest(point);
+        let its = nearest(wall, at);
+        let mut covered = false;
+        self.name_walls(row, |other| {
+            if !covered && other != wall && nearest(other, its.point).distance <= flush {
+                let theirs = nearest(other, at);
+                let before = (theirs.distance, other) < (its.distance, wall);
+                covered = before || nearest(wall, theirs.point).distance > flush;
+            }
+        });
+        covered
+    }
+
+    /// A ball on a wall that is no half-space may have come to where another goes on, or
+    /// none: then it flies.
+    fn look_what_it_lies_on(&mut self, row: usize, settings: &Settings) {
+        let Some(support) = self.balls[row].path.support else { return };
+        if matches!(self.walls[support].form, Form::Plane { .. }) {
+            return;
+        }
+        let ball = &self.balls[row];
+        let at = ball.position;
+        let mut best = (f64::INFINITY, support);
+        self.name_walls(row, |wall| {
+            let distance = self.walls[wall].form.nearest(at).distance;
+            if (distance, wall) < best {
+                best = (distance, wall);
+            }
+        });
+        let fall = ball.pull.magnitude() * settings.dt * settings.dt;
+        let touching = best.0 - ball.radius <= REST * fall + ball.rounding + FLUSH * ball.radius;
+        if touching && ball.pull.dot(self.walls[best.1].form.nearest(at).normal) < 0.0 {
+            self.settle(row, best.1, settings);
+        } else {
+            self.balls[row].release();
+        }
+    }
+
     /// Finds out how a ball moves on that lies on a wall.
     fn stretch(&mut self, row: usize, settings: &Settings) {
         let ball = &mut self.balls[row];
         let Some(wall) = ball.path.support else { return };
-        let Wall { normal, motion, .. } = self.walls[wall];
+        let Wall { form, motion, .. } = &self.walls[wall];
+        let Nearest { normal, .. } = form.nearest(ball.position);
+        let curved = !matches!(form, Form::Plane { .. });
         let material = self.walls[wall].against(ball.material);
         let pressure = -ball.pull.dot(normal);
         let touch = ball.position - normal * ball.radius;
@@ -452,11 +586,12 @@ impl EventDriven {
         ball.spin += stretch.spin_change;
         ball.path.acceleration = stretch.acceleration;
         ball.path.spin_acceleration = stretch.spin_acceleration;
-        ball.path.change = if stretch.duration < settings.dt {
-            ball.path.begin + stretch.duration
-        } else {
-            f64::INFINITY
-        };
+        // Before it is far, it must be seen whether what it lies on goes on like this.
+        let way = LOOK * ball.radius;
+        let look = if curved { way / ball.velocity.magnitude() } else { f64::INFINITY };
+        let duration = stretch.duration.min(look.max(LOOK * settings.dt));
+        ball.path.change =
+            if duration < settings.dt { ball.path.begin + duration } else { f64::INFINITY };
         ball.path.stamp += 1;
     }
 

@@ -118,7 +118,7 @@ impl EventDriven {
             // What a wall overlaps too deep is moved out at once.
             let ball = &mut self.balls[contact.b as usize];
             let (normal, distance) =
-                self.walls.normal_and_distance(contact.a as usize, ball.position);
+                self.walls.normal_and_distance(contact.a as usize, 0, ball.position);
             let overlap = ball.radius - distance;
             // No wall holds what has infinite mass.
             if overlap > SLOP * ball.radius && ball.inverse_mass > 0.0 {
@@ -154,7 +154,8 @@ impl EventDriven {
         let (gap, speed) = self.wall_gap(contact);
         let ball = &self.balls[contact.b as usize];
         let rest = REST * ball.pull.magnitude() * settings.dt;
-        let falls = ball.pull.dot(self.walls[contact.a as usize].normal) < 0.0;
+        let wall = &self.walls[contact.a as usize];
+        let falls = ball.pull.dot(wall.form.nearest(ball.position).normal) < 0.0;
         falls && gap <= 0.5 * REST * rest * settings.dt + ball.rounding && speed.abs() <= rest
     }
 
@@ -189,7 +190,7 @@ impl EventDriven {
     fn wall_gap(&self, contact: &Contact<f64>) -> (f64, f64) {
         let ball = &self.balls[contact.b as usize];
         let wall = contact.a as usize;
-        let (normal, distance) = self.walls.normal_and_distance(wall, ball.position);
+        let (normal, distance) = self.walls.normal_and_distance(wall, 0, ball.position);
         let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
         (distance - ball.radius, (ball.velocity - surface).dot(normal))
     }
@@ -255,12 +256,15 @@ impl EventDriven {
             turn += 1;
             self.balls[row].advance(now);
             self.balls[row].release();
-            for wall in 0..self.walls.len() {
-                let contact = Contact { a: wall as u32, b: row as u32, mtv };
-                if self.touches_wall(&contact, settings).is_some() {
+            let at = self.balls[row].position;
+            self.name_walls(row, |wall| {
+                let contact = Contact { a: wall as u32, b: row as u32, part: 0, mtv };
+                if self.touches_wall(&contact, settings).is_some()
+                    && (self.parts.is_empty() || !self.is_seam(row, wall, at))
+                {
                     contacts.wm.push(contact);
                 }
-            }
+            });
             near.clear();
             self.name_near(row, |other| near.push(other));
             near.sort_unstable();
@@ -273,7 +277,7 @@ impl EventDriven {
                 let before = self.balls[other];
                 self.balls[other].advance(now);
                 let (a, b) = (row.min(other) as u32, row.max(other) as u32);
-                let contact = Contact { a, b, mtv };
+                let contact = Contact { a, b, part: 0, mtv };
                 // The two that it is about touch, whatever rounding says.
                 let known = first.contains(&row) && first.contains(&other);
                 if known || self.touches_ball(&contact, settings).is_some() {

@@ -29,14 +29,15 @@ pub(crate) struct Settings<S> {
 /// The first thing of a contact, by row.
 #[derive(Clone, Copy, Debug)]
 enum First {
-    Wall(usize),
+    /// And a part of it.
+    Wall(usize, u32),
     Marble(usize),
 }
 
 impl First {
     fn marble(self) -> Option<usize> {
         match self {
-            Self::Wall(_) => None,
+            Self::Wall(..) => None,
             Self::Marble(row) => Some(row),
         }
     }
@@ -105,7 +106,7 @@ struct Resistance<S> {
 /// What a contact needed in the last substep, which is a good guess for this one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Warm<S> {
-    key: (bool, usize, usize),
+    key: (bool, usize, usize, u32),
     pressure: S,
     grip: Vec3<S>,
     twist: Vec3<S>,
@@ -114,20 +115,20 @@ pub(crate) struct Warm<S> {
 impl<S> Warm<S> {
     /// Calls its marbles by other names. False if one of them has none.
     pub fn rename(&mut self, name: impl Fn(usize) -> Option<usize>) -> bool {
-        let (two_marbles, a, b) = self.key;
+        let (two_marbles, a, b, part) = self.key;
         let a = if two_marbles { name(a) } else { Some(a) };
         let (Some(a), Some(b)) = (a, name(b)) else { return false };
-        self.key = (two_marbles, a, b);
+        self.key = (two_marbles, a, b, part);
         true
     }
 }
 
 impl<S: Scalar> Constraint<S> {
     /// Names the contact: walls first, then by rows.
-    fn key(&self) -> (bool, usize, usize) {
+    fn key(&self) -> (bool, usize, usize, u32) {
         match self.a {
-            First::Wall(wall) => (false, wall, self.b),
-            First::Marble(a) => (true, a, self.b),
+            First::Wall(wall, part) => (false, wall, self.b, part),
+            First::Marble(a) => (true, a, self.b, 0),
         }
     }
 
@@ -177,7 +178,7 @@ pub(crate) fn impulse<S: Scalar>(
         }
         let own = material(b);
         let (surface, inverse_mass, material) = match a {
-            First::Wall(wall) => {
+            First::Wall(wall, _) => {
                 let touch = marbles.position[b] - normal * marbles.radius[b];
                 let material = walls.material(wall).map_or(own, |its| own.against(its));
                 (walls.surface_velocity(wall, touch), S::zero(), material)
@@ -192,7 +193,7 @@ pub(crate) fn impulse<S: Scalar>(
         // The positions have moved on already, and will follow what changes now. So
         // this speed is just enough to keep the gap from closing.
         let follow = match a {
-            First::Wall(_) => follow(b),
+            First::Wall(..) => follow(b),
             First::Marble(a) => (follow(a) + follow(b)) * S::constant(0.5),
         } * settings.dt;
         let closed = if settings.dt == S::zero() {
@@ -239,7 +240,7 @@ pub(crate) fn impulse<S: Scalar>(
         }
         (mobility.normal > S::zero()).then_some(constraint)
     };
-    let wm = contacts.wm.iter().map(|c| (First::Wall(c.a as usize), c.b as usize));
+    let wm = contacts.wm.iter().map(|c| (First::Wall(c.a as usize, c.part), c.b as usize));
     let mm = contacts.mm.iter().map(|c| (First::Marble(c.a as usize), c.b as usize));
     constraints.extend(wm.chain(mm).filter_map(|(a, b)| prepare(a, b)));
 
@@ -281,8 +282,8 @@ fn remember<S: Scalar>(constraints: &[Constraint<S>], warm: &mut Vec<Warm<S>>) {
 
 /// What the solver asks of walls, by row.
 pub(crate) trait Walls<S> {
-    /// The normal of the wall, and how far a point is in front of it.
-    fn normal_and_distance(&self, wall: usize, point: Point3<S>) -> (Vec3<S>, S);
+    /// The normal of a part of the wall, and how far a point is in front of it.
+    fn normal_and_distance(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S);
     /// How its surface moves at a point, in m/s.
     fn surface_velocity(&self, wall: usize, point: Point3<S>) -> Vec3<S>;
     /// Its own material, if it has one.
@@ -302,7 +303,7 @@ impl<S: Scalar> Columns<'_, S> {
     ) -> Option<(Vec3<S>, S)> {
         let second = *position.get(b)?;
         let (normal, distance) = match a {
-            First::Wall(wall) => walls.normal_and_distance(wall, second),
+            First::Wall(wall, part) => walls.normal_and_distance(wall, part, second),
             First::Marble(a) => {
                 let apart = direction_and_length(second - *position.get(a)?);
                 let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
@@ -333,7 +334,7 @@ impl<S: Scalar> Columns<'_, S> {
         }
         let give = |row: usize| self.inverse_inertia(row);
         let (radius, give) = match a {
-            First::Wall(_) => (self.radius[b], give(b)),
+            First::Wall(..) => (self.radius[b], give(b)),
             First::Marble(a) => {
                 let (r, s) = (self.radius[a], self.radius[b]);
                 (r * s / (r + s), give(a) + give(b))

@@ -1,5 +1,5 @@
 //! What a question about two shapes costs, beside the same question to parry3d:
-//! `cargo bench -p taw --bench pairs`.
+//! `cargo bench` in `peers/parry`.
 //!
 //! Every line is [`COUNT`] pairs of random shapes of about a metre, some of which overlap,
 //! in `f32`; few enough to stay in the cache. `distance` is how far apart two shapes are, and where, or the way out

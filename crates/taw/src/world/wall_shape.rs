@@ -1,0 +1,273 @@
+use std::sync::Arc;
+
+use cgmath::{EuclideanSpace, InnerSpace};
+
+use crate::Error;
+use crate::error::{finite_point, finite_vector};
+use crate::frame::Pose;
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+use crate::response::event::Form;
+use crate::shape::{
+    Box3, Capsule, Compound, HeightField, Hull, Mesh, Nearest, Obb, Plane, Shape, Solid, Sphere,
+    Surface, Triangle,
+};
+
+/// What a wall may be.
+#[derive(Clone, Debug, PartialEq)]
+pub enum WallShape<S> {
+    /// A half-space.
+    Plane(Plane<S>),
+    /// Any bounded shape, or a compound of such.
+    Solid(Shape<S>),
+    /// Triangles, solid from both sides and hollow between. Copies share them.
+    Mesh(Arc<Mesh<S>>, Pose<S>),
+    /// A landscape, solid below. Copies share it.
+    HeightField(Arc<HeightField<S>>, Pose<S>),
+}
+
+impl<S: Scalar> WallShape<S> {
+    /// The same, with the compounds in compounds laid out flat, or why it cannot be a wall.
+    pub(super) fn checked(self) -> Result<Self, Error> {
+        match &self {
+            Self::Plane(_) => {}
+            Self::Solid(shape) => {
+                let bounds = shape.bounding_box();
+                for corner in [bounds.min, bounds.max] {
+                    finite_point(["shape.x", "shape.y", "shape.z"], corner)?;
+                }
+            }
+            Self::Mesh(_, pose) | Self::HeightField(_, pose) => {
+                finite_vector(["pose.x", "pose.y", "pose.z"], pose.translation)?;
+                finite_vector(["rotation.x", "rotation.y", "rotation.z"], pose.rotation.v)?;
+            }
+        }
+        match self {
+            Self::Solid(Shape::Compound(compound)) => {
+                let mut parts = Vec::new();
+                flatten(&compound, &mut parts);
+                Ok(Self::Solid(Shape::Compound(Compound::new(parts)?)))
+            }
+            other => Ok(other),
+        }
+    }
+
+    /// The boxes around it: of a compound one for each part, of a plane none.
+    pub(super) fn boxes(&self, mut name: impl FnMut(u32, Box3<S>)) {
+        match self {
+            Self::Plane(_) => {}
+            Self::Solid(Shape::Compound(compound)) => {
+                for (part, shape) in (0..).zip(compound.parts()) {
+                    name(part, shape.bounding_box());
+                }
+            }
+            Self::Solid(shape) => name(0, shape.bounding_box()),
+            Self::Mesh(mesh, pose) => name(0, moved(&mesh.bounds(), *pose)),
+            Self::HeightField(field, pose) => name(0, moved(&field.bounds(), *pose)),
+        }
+    }
+
+    /// Names the parts near a box, of which one of its own boxes is.
+    pub(super) fn near(&self, part: u32, bounds: &Box3<S>, name: impl FnMut(u32)) {
+        let mut name = name;
+        match self {
+            Self::Plane(_) | Self::Solid(_) => name(part),
+            Self::Mesh(mesh, pose) => mesh.near(&moved(bounds, pose.inverse()), name),
+            Self::HeightField(field, pose) => field.near(&moved(bounds, pose.inverse()), name),
+        }
+    }
+
+    /// The same wall elsewhere.
+    #[must_use]
+    pub fn moved(&self, pose: Pose<S>) -> Self {
+        match self {
+            Self::Plane(plane) => {
+                let normal = pose.vector(plane.normal()).normalize();
+                let on = pose.point(Point3::from_vec(plane.normal() * plane.offset()));
+                // A unit vector that was turned is one, so this cannot be refused.
+                Plane::through(on, normal).map_or_else(|_| self.clone(), Self::Plane)
+            }
+            Self::Solid(shape) => Self::Solid(shape.moved(pose)),
+            Self::Mesh(mesh, before) => Self::Mesh(Arc::clone(mesh), pose * *before),
+            Self::HeightField(field, before) => {
+                Self::HeightField(Arc::clone(field), pose * *before)
+            }
+        }
+    }
+
+    /// Where its surface is nearest to a point.
+    #[must_use]
+    pub fn nearest(&self, point: Point3<S>) -> Nearest<S> {
+        let on = |surface: &dyn Fn(&mut dyn FnMut(u32) -> S)| {
+            let mut best = nowhere(point);
+            surface(&mut |part| {
+                let next = self.nearest_of(part, point);
+                if next.distance.abs() < best.distance.abs() {
+                    best = next;
+                }
+                best.distance.abs()
+            });
+            best
+        };
+        match self {
+            Self::Plane(_) => self.nearest_of(0, point),
+            Self::Solid(shape) => shape.nearest(point),
+            Self::Mesh(mesh, pose) => {
+                on(&|name| mesh.around(pose.point_back(point), S::infinity(), name))
+            }
+            Self::HeightField(field, pose) => {
+                on(&|name| field.around(pose.point_back(point), S::infinity(), name))
+            }
+        }
+    }
+
+    /// Where a part of it is nearest to a point.
+    pub(super) fn nearest_of(&self, part: u32, point: Point3<S>) -> Nearest<S> {
+        match self {
+            Self::Plane(plane) => {
+                let (normal, distance) = (plane.normal(), plane.signed_distance(point));
+                Nearest { point: point - normal * distance, normal, distance }
+            }
+            Self::Solid(_) => match self.part(part) {
+                Some(shape) => shape.nearest(point),
+                None => nowhere(point),
+            },
+            Self::Mesh(mesh, pose) => placed(*pose, point, |point| {
+                mesh.triangle(part).map(|triangle| triangle.nearest(point))
+            }),
+            Self::HeightField(field, pose) => placed(*pose, point, |point| {
+                let near = field.triangle(part)?.nearest(point);
+                let below = field.height_over(point).is_some_and(|height| height > S::zero());
+                Some(if below { near.inside_out() } else { near })
+            }),
+        }
+    }
+
+    /// A part in `f64`, for a response that counts so.
+    pub(super) fn exact(&self, part: u32) -> Option<Form> {
+        let triangle = |triangle: Option<Triangle<S>>, pose: &Pose<S>| {
+            let corners = triangle?.corners;
+            Some(Triangle { corners: corners.map(|corner| cast_point(pose.point(corner))) })
+        };
+        match self {
+            Self::Plane(plane) => {
+                // What rounding leaves of a unit vector's length would add energy.
+                let normal = cast_vector::<S, f64>(plane.normal());
+                let length = normal.magnitude();
+                let (normal, offset) = (normal / length, plane.offset().as_f64() / length);
+                Some(Form::Plane { normal, offset })
+            }
+            Self::Solid(_) => self.part(part).map(|shape| Form::Solid(shape.in_scalar())),
+            Self::Mesh(mesh, pose) => triangle(mesh.triangle(part), pose).map(Form::Triangle),
+            Self::HeightField(field, pose) => {
+                triangle(field.triangle(part), pose).map(Form::SolidBelow)
+            }
+        }
+    }
+
+    /// A convex part.
+    pub(super) fn part(&self, part: u32) -> Option<&Shape<S>> {
+        match self {
+            Self::Solid(Shape::Compound(compound)) => compound.parts().get(part as usize),
+            Self::Solid(shape) => Some(shape),
+            Self::Plane(_) | Self::Mesh(..) | Self::HeightField(..) => None,
+        }
+    }
+}
+
+fn flatten<S: Scalar>(compound: &Compound<Shape<S>>, parts: &mut Vec<Shape<S>>) {
+    for part in compound.parts() {
+        match part {
+            Shape::Compound(inner) => flatten(inner, parts),
+            other => parts.push(other.clone()),
+        }
+    }
+}
+
+/// The box around a box that was moved.
+fn moved<S: Scalar>(bounds: &Box3<S>, pose: Pose<S>) -> Box3<S> {
+    if pose == Pose::identity() { *bounds } else { bounds.obb().moved(pose).bounding_box() }
+}
+
+/// What is nowhere is nearest to nothing.
+fn nowhere<S: Scalar>(point: Point3<S>) -> Nearest<S> {
+    Nearest { point, normal: Vec3::unit_y(), distance: S::infinity() }
+}
+
+/// The answer of a surface that was moved.
+fn placed<S: Scalar>(
+    pose: Pose<S>,
+    point: Point3<S>,
+    nearest: impl FnOnce(Point3<S>) -> Option<Nearest<S>>,
+) -> Nearest<S> {
+    if pose == Pose::identity() {
+        return nearest(point).unwrap_or_else(|| nowhere(point));
+    }
+    nearest(pose.point_back(point)).map_or_else(
+        || nowhere(point),
+        |near| Nearest {
+            point: pose.point(near.point),
+            normal: pose.vector(near.normal).normalize(),
+            ..near
+        },
+    )
+}
+
+impl<S> From<Plane<S>> for WallShape<S> {
+    fn from(plane: Plane<S>) -> Self {
+        Self::Plane(plane)
+    }
+}
+
+impl<S> From<Shape<S>> for WallShape<S> {
+    fn from(shape: Shape<S>) -> Self {
+        Self::Solid(shape)
+    }
+}
+
+impl<S> From<Sphere<S>> for WallShape<S> {
+    fn from(sphere: Sphere<S>) -> Self {
+        Self::Solid(Shape::Sphere(sphere))
+    }
+}
+
+impl<S> From<Box3<S>> for WallShape<S> {
+    fn from(aabb: Box3<S>) -> Self {
+        Self::Solid(Shape::Aabb(aabb))
+    }
+}
+
+impl<S> From<Obb<S>> for WallShape<S> {
+    fn from(obb: Obb<S>) -> Self {
+        Self::Solid(Shape::Obb(obb))
+    }
+}
+
+impl<S> From<Capsule<S>> for WallShape<S> {
+    fn from(capsule: Capsule<S>) -> Self {
+        Self::Solid(Shape::Capsule(capsule))
+    }
+}
+
+impl<S> From<Hull<S>> for WallShape<S> {
+    fn from(hull: Hull<S>) -> Self {
+        Self::Solid(Shape::Hull(hull))
+    }
+}
+
+impl<S> From<Compound<Shape<S>>> for WallShape<S> {
+    fn from(compound: Compound<Shape<S>>) -> Self {
+        Self::Solid(Shape::Compound(compound))
+    }
+}
+
+impl<S: Scalar> From<Mesh<S>> for WallShape<S> {
+    fn from(mesh: Mesh<S>) -> Self {
+        Self::Mesh(Arc::new(mesh), Pose::identity())
+    }
+}
+
+impl<S: Scalar> From<HeightField<S>> for WallShape<S> {
+    fn from(field: HeightField<S>) -> Self {
+        Self::HeightField(Arc::new(field), Pose::identity())
+    }
+}

@@ -1,0 +1,284 @@
+//! Walls of every shape: what lies on them, what bounces off them, and their seams.
+
+use std::sync::Arc;
+
+use taw::frame::{AxisAngle, Pose};
+use taw::prelude::*;
+use taw::shape::{Aabb, Capsule, Compound, HeightField, Hull, Mesh, Obb, Shape};
+
+const DT: f64 = 1.0 / 60.0;
+
+/// The four ways to answer a touch; the third needs short substeps.
+fn models() -> [Model; 4] {
+    let with = |response, substeps| Model { response, substeps, ..Model::default() };
+    [
+        with(Response::Displacement, 1),
+        with(Response::Impulse, 1),
+        with(Response::Penalty(ContactLaw::SpringDashpot), 20),
+        with(Response::EventDriven, 1),
+    ]
+}
+
+fn slab(y: f64) -> Shape<f64> {
+    let (min, max) = (Point3::new(-5.0, y - 1.0, -5.0), Point3::new(5.0, y, 5.0));
+    Shape::Aabb(Aabb::new(min, max).unwrap())
+}
+
+/// Floors at zero, each of another kind.
+fn floors() -> Vec<(&'static str, WallShape<f64>)> {
+    let square = [[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]];
+    let corners: Vec<_> = square.iter().map(|[x, z]| Point3::new(*x, 0.0, *z)).collect();
+    let below = corners.iter().map(|p| p + Vec3::unit_y() * -1.0);
+    let all: Vec<_> = corners.iter().copied().chain(below).collect();
+    let Shape::Aabb(aabb) = slab(0.0) else { unreachable!() };
+    let mesh = Mesh::new(corners, vec![[0, 2, 1], [0, 3, 2]]).unwrap();
+    let field =
+        HeightField::new(Point3::new(-5.0, 0.0, -5.0), [1.0, 1.0], 11, vec![0.0; 121]).unwrap();
+    let big = Sphere::new(Point3::new(0.0, -1e4, 0.0), 1e4).unwrap();
+    let long = Capsule::new(Point3::new(-5.0, -1e4, 0.0), Point3::new(5.0, -1e4, 0.0), 1e4);
+    let half = [-2.5, 2.5].map(|x| {
+        let center = Point3::new(x, -0.5, 0.0);
+        let (turn, sizes) = (aabb.obb().rotation, Vec3::new(2.5, 0.5, 5.0));
+        Shape::Obb(Obb::new(center, turn, sizes).unwrap())
+    });
+    // A mesh that lies elsewhere, and is turned to where it should be.
+    let aside = mesh.points().iter().map(|p| Point3::new(p.y, -p.x, p.z)).collect();
+    let aside = Mesh::new(aside, mesh.triangles().to_vec()).unwrap();
+    let turn = AxisAngle::new(Vec3::unit_z(), std::f64::consts::FRAC_PI_2).unwrap();
+    let pose = Pose { rotation: turn.into(), ..Pose::identity() };
+    vec![
+        ("plane", Plane::new(Vec3::unit_y(), 0.0).unwrap().into()),
+        ("box", aabb.into()),
+        ("turned box", aabb.obb().into()),
+        ("hull", Hull::new(&all).unwrap().into()),
+        ("sphere", big.into()),
+        ("capsule", long.unwrap().into()),
+        ("compound", Compound::new(half.to_vec()).unwrap().into()),
+        ("mesh", mesh.into()),
+        ("turned mesh", WallShape::Mesh(Arc::new(aside), pose)),
+        ("height field", field.into()),
+    ]
+}
+
+fn ball_at(position: [f64; 3], velocity: [f64; 3]) -> Marble<f64> {
+    Marble { velocity: Vec3::from(velocity), ..Marble::new(Point3::from(position), 0.5) }
+}
+
+/// What nothing slows down.
+fn smooth() -> Material<f64> {
+    Material { friction: 0.0, ..Material::default() }
+}
+
+#[test]
+fn a_marble_comes_to_rest_on_a_floor_of_any_kind() {
+    for model in models() {
+        for (name, floor) in floors() {
+            let mut world = World::<f64>::default();
+            world.set_model(model).unwrap();
+            world.walls.insert(floor).unwrap();
+            let id = world.marbles.insert(ball_at([0.3, 1.0, 0.2], [0.0; 3])).unwrap();
+            for _ in 0..600 {
+                world.step(DT).unwrap();
+            }
+            let marble = world.marbles.get(id).unwrap();
+            let (height, speed) = (marble.position.y, marble.velocity.magnitude());
+            // The displacement keeps hopping by what gravity does in a step or two.
+            let (low, fast) = match model.response {
+                Response::Displacement => (0.02, 0.4),
+                _ => (0.005, 0.02),
+            };
+            assert!((height - 0.5).abs() < low, "{name} {:?}: {height}", model.response);
+            assert!(speed < fast, "{name} {:?}: {speed}", model.response);
+        }
+    }
+}
+
+#[test]
+fn a_marble_bounces_off_a_floor_of_any_kind_as_off_a_plane() {
+    for model in models() {
+        let bounced = |floor: WallShape<f64>| {
+            let mut world = World::<f64>::default();
+            world.set_model(Model { rotation: Rotation::Dynamic, ..model }).unwrap();
+            world.walls.insert(floor).unwrap();
+            let id = world.marbles.insert(ball_at([-2.0, 1.5, 0.2], [2.0, -1.0, 0.5])).unwrap();
+            let material = Material { restitution: 0.8, friction: 0.3, ..Material::default() };
+            world.marbles.set_material(id, Some(material)).unwrap();
+            for _ in 0..60 {
+                world.step(DT).unwrap();
+            }
+            world.marbles.get(id).unwrap().position
+        };
+        let [(_, plane), others @ ..] = &floors()[..] else { unreachable!() };
+        let exact = bounced(plane.clone());
+        for (name, floor) in others {
+            let off = (bounced(floor.clone()) - exact).magnitude();
+            // A sphere of 10 km drops by 0.2 mm over two metres.
+            let allowed = if matches!(*name, "sphere" | "capsule") { 3e-3 } else { 1e-9 };
+            assert!(off < allowed, "{name} {:?}: {off}", model.response);
+        }
+    }
+}
+
+/// The largest angle between up and the normal of any touch, while a ball crosses a floor at
+/// 5 m/s; and how far it got.
+fn roll(walls: Vec<WallShape<f64>>, model: Model, heading: f64, way: f64) -> (f64, f64) {
+    let mut world = World::<f64>::default();
+    world.set_model(model).unwrap();
+    for wall in walls {
+        world.walls.insert(wall).unwrap();
+    }
+    let along = Vec3::new(heading.cos(), 0.0, heading.sin());
+    let velocity = along * 5.0;
+    let start = Point3::new(0.37, 0.5, 0.21);
+    let id = world.marbles.insert(ball_at(start.into(), velocity.into())).unwrap();
+    world.marbles.set_material(id, Some(smooth())).unwrap();
+    let mut worst: f64 = 0.0;
+    for _ in 0..(way / 5.0 / DT) as u32 {
+        world.step(DT).unwrap();
+        for contact in &world.contacts.wm {
+            if contact.mtv.magnitude() > 0.0 {
+                worst = worst.max(contact.mtv.angle(Vec3::unit_y()).0);
+            }
+        }
+        for impact in world.impacts() {
+            worst = worst.max(impact.normal.angle(Vec3::unit_y()).0);
+        }
+        let velocity = world.marbles.get(id).unwrap().velocity;
+        worst = worst.max((velocity - along * velocity.dot(along)).x.abs() / 5.0);
+    }
+    let end = world.marbles.get(id).unwrap().position;
+    (worst, (end - start).dot(along))
+}
+
+/// Flat floors of many pieces, wide enough to go `way` metres in any direction.
+fn pieces(way: f64) -> Vec<(&'static str, Vec<WallShape<f64>>)> {
+    let tile = |x: f64, z: f64, half: [f64; 2]| {
+        let center = Point3::new(x, -0.5, z);
+        let turn = AxisAngle::new(Vec3::unit_x(), 0.0).unwrap().into();
+        WallShape::from(Obb::new(center, turn, Vec3::new(half[0], 0.5, half[1])).unwrap())
+    };
+    let count = way as i32 + 2;
+    let grid = |count: i32| (-count..count).flat_map(move |x| (-count..count).map(move |z| (x, z)));
+    let near = |x: i32, z: i32| (x.abs().max(z.abs()) < 12, f64::from(x) + 0.5, f64::from(z) + 0.5);
+    let tiles: Vec<_> = grid(count).map(|(x, z)| near(x, z)).collect();
+    let tiles: Vec<_> = tiles.iter().map(|(_, x, z)| tile(*x, *z, [0.5, 0.5])).collect();
+    // Rows that are shifted by half a tile, so that edges meet in the middle of others.
+    let shifted = grid(count).map(|(x, z)| {
+        let shift = if z % 2 == 0 { 0.0 } else { 0.5 };
+        tile(f64::from(x) + shift, f64::from(z) + 0.5, [0.5, 0.5])
+    });
+    let shifted: Vec<_> = shifted.collect();
+    let side = 2 * count as u32 + 1;
+    let corner = Point3::new(-f64::from(count), 0.0, -f64::from(count));
+    let flat = vec![0.0; (side * side) as usize];
+    let field = HeightField::new(corner, [1.0, 1.0], side, flat).unwrap();
+    // The same triangles as a mesh, all of whose corners are moved along the plane.
+    let mut points = Vec::new();
+    let mut random = 1_u64;
+    let mut next = || {
+        random = random.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        f64::from((random >> 40) as u32) / f64::from(1 << 24) - 0.5
+    };
+    for z in 0..side {
+        for x in 0..side {
+            let (dx, dz) = (0.6 * next(), 0.6 * next());
+            points.push(corner + Vec3::new(f64::from(x) + dx, 0.0, f64::from(z) + dz));
+        }
+    }
+    let mut triangles = Vec::new();
+    for (x, z) in (0..side - 1).flat_map(|x| (0..side - 1).map(move |z| (x, z))) {
+        let at = |x: u32, z: u32| z * side + x;
+        let [a, b, c, d] = [at(x, z), at(x + 1, z), at(x + 1, z + 1), at(x, z + 1)];
+        triangles.extend([[a, c, b], [a, d, c]]);
+    }
+    let mesh = Mesh::new(points, triangles).unwrap();
+    // One half of tiles, the other of triangles, on a half-space.
+    let half = f64::from(count);
+    let mut mixed = vec![tile(-half / 2.0, 0.0, [half / 2.0, half]), mesh.clone().into()];
+    mixed.push(Plane::new(Vec3::unit_y(), -0.1).unwrap().into());
+    let overlap = grid(count).map(|(x, z)| tile(f64::from(x), f64::from(z), [0.7, 0.8]));
+    vec![
+        ("tiles", tiles),
+        ("shifted tiles", shifted),
+        ("tiles that overlap", overlap.collect()),
+        ("mesh", vec![mesh.into()]),
+        ("height field", vec![field.into()]),
+        ("a box beside a mesh over a plane", mixed),
+    ]
+}
+
+#[test]
+fn a_floor_of_many_pieces_feels_as_one() {
+    for (name, walls) in pieces(10.0) {
+        for model in models() {
+            for heading in 0..16 {
+                let heading = f64::from(heading) * std::f64::consts::TAU / 16.0 + 0.01;
+                let (worst, way) = roll(walls.clone(), model, heading, 9.0);
+                let what = format!("{name} {:?} at {heading}", model.response);
+                assert!(worst < 1e-5, "{what}: off by {worst} rad");
+                assert!((way - 9.0).abs() < 0.1, "{what}: {way} m");
+            }
+        }
+    }
+}
+
+#[test]
+fn a_thousand_flush_boxes_are_one_floor() {
+    let tile = |i: u32| {
+        let x = f64::from(i) * 0.3;
+        let (min, max) = (Point3::new(x, -1.0, -1.0), Point3::new(x + 0.3, 0.0, 1.0));
+        WallShape::from(Aabb::new(min, max).unwrap())
+    };
+    for model in models() {
+        let (worst, way) = roll((0..1000).map(tile).collect(), model, 0.0, 290.0);
+        assert!(worst < 1e-5, "{:?}: off by {worst} rad", model.response);
+        assert!((way - 290.0).abs() < 0.1, "{:?}: {way} m", model.response);
+    }
+}
+
+#[test]
+fn what_is_no_seam_is_felt() {
+    for model in models() {
+        // A step of a tenth of the radius stops what comes slowly; a wall stops all.
+        for high in [0.05, 2.0] {
+            let mut world = World::<f64>::default();
+            world.set_model(model).unwrap();
+            world.walls.insert(slab(0.0)).unwrap();
+            let (min, max) = (Point3::new(1.0, -1.0, -5.0), Point3::new(9.0, high, 5.0));
+            world.walls.insert(Aabb::new(min, max).unwrap()).unwrap();
+            let id = world.marbles.insert(ball_at([0.0, 0.5, 0.0], [0.3, 0.0, 0.0])).unwrap();
+            world.marbles.set_material(id, Some(smooth())).unwrap();
+            let mut farthest: f64 = 0.0;
+            for _ in 0..300 {
+                world.step(DT).unwrap();
+                farthest = farthest.max(world.marbles.get(id).unwrap().position.x);
+            }
+            let edge = 1.0 - (0.25 - (0.5 - high.min(0.5)) * (0.5 - high.min(0.5))).sqrt();
+            let off = farthest - edge;
+            assert!(off.abs() < 0.02, "{:?} {high} m high: {off}", model.response);
+        }
+    }
+}
+
+#[test]
+fn walls_can_be_moved_and_taken_out() {
+    let mut world = World::<f64>::default();
+    let floor = world.walls.insert(slab(0.0)).unwrap();
+    let id = world.marbles.insert(ball_at([0.0, 0.5, 0.0], [0.0; 3])).unwrap();
+    world.step(DT).unwrap();
+    assert_eq!(world.contacts.wm.len(), 1);
+    world.walls.set(floor, slab(-3.0)).unwrap();
+    world.step(DT).unwrap();
+    assert_eq!(world.contacts.wm.len(), 0, "it is three metres below");
+    world.walls.set(floor, slab(0.2)).unwrap();
+    world.step(DT).unwrap();
+    let y = world.marbles.get(id).unwrap().position.y;
+    assert!((y - 0.7).abs() < 1e-12, "pushed out: {y}");
+    assert_eq!(world.walls.remove(floor).unwrap(), slab(0.2).into());
+    world.step(DT).unwrap();
+    assert_eq!(world.contacts.wm.len(), 0);
+    let nan = Sphere { center: Point3::new(0.0, f64::NAN, 0.0), radius: 1.0 };
+    let error = world.walls.insert(nan).unwrap_err();
+    assert_eq!(error.to_string(), "shape.y must be finite, but is NaN");
+    assert!(world.walls.is_empty());
+}
