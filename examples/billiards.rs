@@ -110,7 +110,7 @@ fn spawn_table(
     ] {
         let at = -normal * Vec3::new(HALF.x, 0.0, HALF.y);
         commands.spawn((
-            Wall { normal: Dir3::new(normal).expect("an axis") },
+            Wall::HalfSpace(Dir3::new(normal).expect("an axis")),
             cushion,
             Transform::from_translation(at),
             Visibility::default(),

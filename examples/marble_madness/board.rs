@@ -179,7 +179,7 @@ pub fn spawn_board(
         let turn = Quat::from_rotation_y(f32::from(quarter) * TAU / 4.0);
         commands.spawn((
             ChildOf(board),
-            Wall { normal: Dir3::Z },
+            Wall::HalfSpace(Dir3::Z),
             Transform::from_translation(turn * Vec3::NEG_Z * half).with_rotation(turn),
             Visibility::default(),
             children![(

@@ -108,7 +108,7 @@ fn settings_and_components_are_open_to_reflection() {
     let registry = registry.read();
     for name in [
         "bevy_taw::components::Marble",
-        "bevy_taw::components::Wall",
+        "bevy_taw::wall::Wall",
         "bevy_taw::components::Velocity",
         "bevy_taw::components::Spin",
         "bevy_taw::components::MarbleMass",

@@ -9,3 +9,4 @@ mod motion;
 mod scene;
 mod spawning;
 mod transforms;
+mod walls;

@@ -60,7 +60,7 @@ pub const HALF: f32 = 5.0;
 pub fn board(app: &mut App) -> Entity {
     let side = |x: f32, z: f32| {
         let normal = Dir3::new(Vec3::new(-x, 0.0, -z)).unwrap();
-        (Wall { normal }, Transform::from_xyz(x * HALF, 0.0, z * HALF))
+        (Wall::HalfSpace(normal), Transform::from_xyz(x * HALF, 0.0, z * HALF))
     };
     let board = app.world_mut().spawn(Transform::default()).id();
     app.world_mut().entity_mut(board).with_children(|children| {

@@ -5,7 +5,7 @@ use bevy::math::Isometry3d;
 use bevy::prelude::*;
 use taw::motion::{Integrator, Rotation};
 use taw::response::{Combine, Elasticity, Material};
-use taw::world::{MarbleId, Mass, WallId};
+use taw::world::{MarbleId, Mass, WallId, WallShape};
 
 use crate::reflect::{CombineReflect, IntegratorReflect, RotationReflect};
 
@@ -194,27 +194,6 @@ pub struct MarbleIntegrator(#[reflect(remote = IntegratorReflect)] pub Integrato
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
 
-/// A wall: a half-space that no contact can move. Everything behind its surface is
-/// solid.
-///
-/// The surface goes through the entity's [`Transform`]. Move or turn that (or a
-/// parent's) and the wall follows, pushing marbles before it; how far it came since
-/// the last step is how fast it is.
-#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
-#[reflect(Component, Debug, Default, PartialEq)]
-#[require(Transform, WallState)]
-pub struct Wall {
-    /// Where the free side is, in the entity's own frame.
-    pub normal: Dir3,
-}
-
-impl Default for Wall {
-    /// A floor: free above, like Bevy's `Plane3d`.
-    fn default() -> Self {
-        Self { normal: Dir3::Y }
-    }
-}
-
 /// What the physics knows of a marble entity.
 #[derive(Component, Clone, Copy, Debug, Default)]
 pub(crate) struct MarbleState {
@@ -243,14 +222,16 @@ pub(crate) struct SeenMarble {
 }
 
 /// What the physics knows of a wall entity.
-#[derive(Component, Clone, Copy, Debug, Default)]
+#[derive(Component, Clone, Debug, Default)]
 pub(crate) struct WallState {
     /// Where it was at the last gather, for how fast it moves.
     pub last: Option<Isometry3d>,
     /// `None` before the first gather, and when the input was refused.
     pub id: Option<WallId>,
-    /// Point and direction in world space as last gathered, to the bit.
-    pub seen: Option<[[u32; 3]; 2]>,
+    /// Its place in world space as last gathered, to the bit: translation, rotation and scale.
+    pub seen: Option<([u32; 3], [u32; 4], [u32; 3])>,
+    /// What it is in its own frame, at the scale that was seen.
+    pub shape: Option<WallShape<f32>>,
     /// Its material as last gathered, to the bit.
     pub material: Option<([u32; 7], Combine)>,
 }

@@ -2,19 +2,20 @@
 
 use bevy::math::Isometry3d;
 use bevy::prelude::*;
+use taw::frame::Pose;
 use taw::motion::Rotation;
-use taw::shape::Plane;
 use taw::world::{self as core, WallMotion};
 
 use crate::components::{
     ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
-    MarbleMass, MarbleRotation, MarbleState, SeenMarble, Spin, SurfaceMaterial, Velocity, Wall,
+    MarbleMass, MarbleRotation, MarbleState, SeenMarble, Spin, SurfaceMaterial, Velocity,
     WallState, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
 use crate::refusal::InputRefused;
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
+use crate::wall::Wall;
 
 /// Takes the model, gravity and forces over, if they can be stepped with.
 pub fn settings(
@@ -46,7 +47,7 @@ pub fn settings(
 /// Puts new walls in and moves those that moved.
 pub fn walls(
     mut world: ResMut<TawWorld>,
-    mut walls: Query<(Entity, &Wall, Option<&SurfaceMaterial>, &mut WallState)>,
+    mut walls: Query<(Entity, Ref<Wall>, Option<&SurfaceMaterial>, &mut WallState)>,
     transforms: TransformHelper,
     time: Res<Time>,
     mut refused: MessageWriter<InputRefused>,
@@ -55,9 +56,6 @@ pub fn walls(
         let Ok(transform) = transforms.compute_global_transform(entity) else {
             continue; // a parent without a Transform: nobody can say where this is
         };
-        // A normal is perpendicular to its surface also where the scale is uneven.
-        let to_world = transform.affine().matrix3.inverse().transpose();
-        let normal = Vec3::from(to_world * bevy::math::Vec3A::from(*wall.normal));
         let now = transform.to_isometry();
         if let Some(id) = state.id {
             let motion = motion_between(state.last.unwrap_or(now), now, time.delta_secs());
@@ -65,19 +63,29 @@ pub fn walls(
             let _ = world.walls.set_motion(id, motion);
         }
         state.last = Some(now);
-        let seen = Some([bits(transform.translation()), bits(normal)]);
-        let moved = state.seen != seen;
-        state.seen = seen;
+        let (scale, rotation, translation) = transform.to_scale_rotation_translation();
+        let seen = (bits(translation), rotation_bits(rotation), bits(scale));
+        let made_anew = wall.is_changed() || state.seen.is_none_or(|before| before.2 != seen.2);
+        let moved = state.seen != Some(seen);
+        state.seen = Some(seen);
         let mut check = |result: Result<(), taw::Error>| {
             if let Err(error) = result {
                 InputRefused::write(&mut refused, Some(entity), error);
             }
         };
-        if moved {
-            let plane = Plane::through(to_point(transform.translation()), to_vector(normal));
-            check(plane.and_then(|plane| match state.id {
-                Some(id) => world.walls.set(id, plane),
-                None => world.walls.insert(plane).map(|id| {
+        if made_anew {
+            let shape = wall.shape(scale);
+            state.shape = shape.as_ref().ok().cloned();
+            check(shape.map(|_| ()));
+        }
+        if (made_anew || moved)
+            && let Some(shape) = &state.shape
+        {
+            let rotation = to_rotation(rotation);
+            let shape = shape.moved(Pose { rotation, translation: to_vector(translation) });
+            check(shape.and_then(|shape| match state.id {
+                Some(id) => world.walls.set(id, shape),
+                None => world.walls.insert(shape).map(|id| {
                     world.wall_entities.insert(id, entity);
                     state.id = Some(id);
                 }),

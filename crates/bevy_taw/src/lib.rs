@@ -71,6 +71,7 @@ mod reflect;
 pub mod refusal;
 pub mod resources;
 mod scatter;
+pub mod wall;
 
 pub use plugin::{Substep, SubstepDelta, TawPlugin, TawPlugins, TawSystems};
 pub use taw;
@@ -79,13 +80,14 @@ pub use taw;
 pub mod prelude {
     pub use crate::components::{
         ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
-        MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity, Wall,
+        MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;
     pub use crate::messages::{ContactEnded, ContactOngoing, ContactPair, ContactStarted};
     pub use crate::refusal::{InputRefused, MarbleStopped};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
+    pub use crate::wall::Wall;
     pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
     pub use taw::motion::{Force, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};

@@ -4,13 +4,14 @@ use bevy::prelude::*;
 
 use crate::components::{
     ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
-    MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity, Wall,
+    MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity,
 };
 use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::messages::{self, Touches};
 use crate::refusal::{self, InputRefused, MarbleStopped, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
+use crate::wall::Wall;
 use crate::{gather, scatter};
 
 /// Everything: the physics, interpolation between its steps, and with the feature

@@ -282,3 +282,41 @@ fn walls_can_be_moved_and_taken_out() {
     assert_eq!(error.to_string(), "shape.y must be finite, but is NaN");
     assert!(world.walls.is_empty());
 }
+
+#[test]
+fn nothing_fast_passes_through_a_thin_wall() {
+    for model in models() {
+        if matches!(model.response, Response::Penalty(_)) {
+            continue; // its forces need time
+        }
+        let swept = Model { detection: Detection::Swept, substeps: 1, ..model };
+        for (name, wall) in floors() {
+            // A floor a tenth of a radius thick, and what is thin already.
+            let thin = match wall {
+                WallShape::Solid(Shape::Aabb(aabb)) => {
+                    let min = Point3::new(aabb.min.x, -0.05, aabb.min.z);
+                    Aabb::new(min, aabb.max).unwrap().into()
+                }
+                other => other,
+            };
+            for speed in [30.0, 300.0, 3_000.0] {
+                let mut world = World::<f64>::default();
+                world.set_model(swept).unwrap();
+                world.walls.insert(thin.clone()).unwrap();
+                let velocity = [0.3 * speed, -speed, 0.1 * speed];
+                let start = [-0.3 * 1.7, 2.3, -0.17];
+                let id = world.marbles.insert(ball_at(start, velocity)).unwrap();
+                for _ in 0..3 {
+                    world.step(DT).unwrap();
+                    let at = world.marbles.get(id).unwrap().position;
+                    let over = at.x.abs() < 5.0 && at.z.abs() < 5.0;
+                    let what = format!("{name} {:?} at {speed} m/s", model.response);
+                    assert!(!over || at.y > 0.45, "{what}: {at:?}");
+                    if !over {
+                        break;
+                    }
+                }
+            }
+        }
+    }
+}

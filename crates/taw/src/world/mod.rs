@@ -260,6 +260,7 @@ impl<S: Scalar> World<S> {
                 self.sweep.start.extend_from_slice(self.marbles.position());
             }
             self.marbles.integrate(drive, &mut self.stopped);
+            self.stop_at_walls(dt);
             self.stop_where_they_meet(dt);
         }
         if !(self.model.response == Response::EventDriven

@@ -7,14 +7,18 @@ use std::collections::BinaryHeap;
 use cgmath::{InnerSpace, Zero};
 
 use super::World;
+use super::walls::Part;
 use crate::contact::time_of_impact_sphere_sphere;
 use crate::math::{Point3, Scalar, Vec3, direction_and_length, length};
 use crate::response::Response;
-use crate::shape::Sphere;
+use crate::shape::{Aabb, Nearest, Sphere};
 
 /// How far into each other marbles are put that meet, over the sum of their radii: what
 /// only just touches would not be held by a response that looks at overlap.
 const INTO: f64 = 1e-5;
+
+/// Steps enough for a marble to come to any wall but one that it only grazes.
+const MOST_STEPS: u32 = 32;
 
 /// What a sweep remembers, and scribbles on.
 #[derive(Clone, Debug, Default)]
@@ -70,7 +74,84 @@ struct Way<S> {
     stopped: bool,
 }
 
+/// What a marble meets on its way.
+struct Stop<S> {
+    /// As a part of the way.
+    time: S,
+    normal: Vec3<S>,
+}
+
 impl<S: Scalar> World<S> {
+    /// Puts marbles that would pass into walls by more than half of their radius to where
+    /// they touch them. Walls count as they are now, and half-spaces need none of this.
+    pub(super) fn stop_at_walls(&mut self, dt: S) {
+        self.walls.prepare();
+        if self.sweep.start.len() != self.marbles.len() || self.walls.are_planes() {
+            return;
+        }
+        let displaces = self.model.response == Response::Displacement;
+        for row in 0..self.marbles.len() {
+            let sphere = Sphere { center: self.sweep.start[row], ..self.marbles.sphere(row) };
+            let motion = self.marbles.position[row] - sphere.center;
+            if length(motion) <= sphere.radius * S::constant(0.5) {
+                continue;
+            }
+            let Some(Stop { time, normal }) = self.first_wall(&sphere, motion) else { continue };
+            self.marbles.position[row] = sphere.center + motion * time;
+            if displaces {
+                let depth = (motion.dot(-normal) * (S::one() - time)).max(S::zero());
+                self.marbles.velocity[row] += normal * (depth / dt);
+            }
+        }
+    }
+
+    /// Where a sphere first touches a wall that it would pass into.
+    fn first_wall(&self, sphere: &Sphere<S>, motion: Vec3<S>) -> Option<Stop<S>> {
+        let (half, into) = (S::constant(0.5), S::one() - S::constant(INTO));
+        let (start, more) = (sphere.center, sphere.radius);
+        let more = Vec3::new(more, more, more);
+        let way = Aabb { min: start, max: start }
+            .union(&Aabb { min: start + motion, max: start + motion });
+        let bounds = Aabb { min: way.min - more, max: way.max + more };
+        let mut best: Option<Stop<S>> = None;
+        self.walls.near(&bounds, |part| {
+            // Its core says whether it passes into the wall, its surface when it is there.
+            let core = Sphere { radius: sphere.radius * half, ..*sphere };
+            if self.meets(part, &core, motion).is_none() {
+                return;
+            }
+            let all = Sphere { radius: sphere.radius * into, ..*sphere };
+            let Some(stop) = self.meets(part, &all, motion) else { return };
+            if best.as_ref().is_none_or(|best| stop.time < best.time) {
+                best = Some(stop);
+            }
+        });
+        best
+    }
+
+    /// When a sphere on its way touches a part of a wall: for as long as the plane across the
+    /// nearest point keeps them apart, it does not (conservative advancement; Mirtich 1996).
+    fn meets(&self, part: Part, sphere: &Sphere<S>, motion: Vec3<S>) -> Option<Stop<S>> {
+        let near = sphere.radius * S::constant(INTO);
+        let mut time = S::zero();
+        for _ in 0..MOST_STEPS {
+            let Nearest { normal, distance, .. } =
+                self.walls.nearest(part, sphere.center + motion * time);
+            let (gap, closing) = (distance - sphere.radius, -motion.dot(normal));
+            if closing.is_nan() || closing <= S::zero() {
+                return None;
+            }
+            if gap <= near {
+                return Some(Stop { time, normal });
+            }
+            time += gap / closing;
+            if time > S::one() {
+                return None;
+            }
+        }
+        None // it grazes
+    }
+
     /// Puts marbles that meet on their way to where they touch, the earliest first. What
     /// is left of their way is lost. [`Response::Displacement`] takes its part along the
     /// normal for the displacement, half of it for each, and changes the velocities by it.

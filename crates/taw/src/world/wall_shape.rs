@@ -77,21 +77,23 @@ impl<S: Scalar> WallShape<S> {
     }
 
     /// The same wall elsewhere.
-    #[must_use]
-    pub fn moved(&self, pose: Pose<S>) -> Self {
-        match self {
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] for a place that a half-space cannot have. Others are refused
+    /// when they become a wall.
+    pub fn moved(&self, pose: Pose<S>) -> Result<Self, Error> {
+        Ok(match self {
             Self::Plane(plane) => {
                 let normal = pose.vector(plane.normal()).normalize();
                 let on = pose.point(Point3::from_vec(plane.normal() * plane.offset()));
-                // A unit vector that was turned is one, so this cannot be refused.
-                Plane::through(on, normal).map_or_else(|_| self.clone(), Self::Plane)
+                Self::Plane(Plane::through(on, normal)?)
             }
             Self::Solid(shape) => Self::Solid(shape.moved(pose)),
             Self::Mesh(mesh, before) => Self::Mesh(Arc::clone(mesh), pose * *before),
             Self::HeightField(field, before) => {
                 Self::HeightField(Arc::clone(field), pose * *before)
             }
-        }
+        })
     }
 
     /// Where its surface is nearest to a point.
