@@ -4,12 +4,13 @@
 mod things;
 
 use proptest::prelude::*;
+use proptest::test_runner::TestRunner;
 use taw::contact::{Cast, Closest, Convex, Course, RayHit, Touch, closest, sweep, sweep_turning};
 use taw::frame::{AxisAngle, Pose, Ray};
 use taw::math::{cast_point, direction_and_length};
 use taw::prelude::*;
-use taw::shape::{Capsule, Obb, Solid, Triangle};
-use things::{Thing, numbers, things};
+use taw::shape::{Capsule, Obb, Solid};
+use things::{Numbers, Thing, numbers, things};
 
 fn cast<S: Scalar>(thing: &Thing<S>, ray: &Ray<S>, longest: S) -> Option<RayHit<S>> {
     match thing {
@@ -22,9 +23,6 @@ fn cast<S: Scalar>(thing: &Thing<S>, ray: &Ray<S>, longest: S) -> Option<RayHit<
     }
 }
 
-/// Steps of the march that a sweep is compared with.
-const MARCHED: u32 = 20;
-
 fn middle(thing: &Thing<f64>) -> Point3<f64> {
     each!(thing, it => it.middle())
 }
@@ -34,22 +32,7 @@ fn distance(thing: &Thing<f64>, point: Point3<f64>) -> f64 {
 }
 
 fn moved(thing: &Thing<f64>, by: Vec3<f64>) -> Thing<f64> {
-    match thing.clone() {
-        Thing::Sphere(it) => Thing::Sphere(Sphere { center: it.center + by, ..it }),
-        Thing::Aabb(mut it) => {
-            (it.min, it.max) = (it.min + by, it.max + by);
-            Thing::Aabb(it)
-        }
-        Thing::Obb(it) => Thing::Obb(Obb { center: it.center + by, ..it }),
-        Thing::Capsule(it) => Thing::Capsule(Capsule { a: it.a + by, b: it.b + by, ..it }),
-        Thing::Triangle(it) => {
-            Thing::Triangle(Triangle { corners: it.corners.map(|corner| corner + by) })
-        }
-        Thing::Hull(it) => {
-            let pose = Pose { translation: by, ..Pose::identity() };
-            Thing::Hull(it.moved(pose))
-        }
-    }
+    thing.moved(Pose { translation: by, ..Pose::identity() })
 }
 
 fn turned(thing: &Thing<f64>, course: &Course<f64>, time: f64) -> Thing<f64> {
@@ -57,16 +40,7 @@ fn turned(thing: &Thing<f64>, course: &Course<f64>, time: f64) -> Thing<f64> {
     let rotation = AxisAngle::new(axis, angle * time).unwrap().into();
     let pivot = course.pivot.to_vec();
     let turn = Pose { rotation, translation: pivot + course.moves * time - rotation * pivot };
-    match thing.clone() {
-        Thing::Sphere(it) => Thing::Sphere(Sphere { center: turn.point(it.center), ..it }),
-        Thing::Aabb(it) => Thing::Obb(it.obb().moved(turn)),
-        Thing::Obb(it) => Thing::Obb(it.moved(turn)),
-        Thing::Capsule(it) => Thing::Capsule(it.moved(turn)),
-        Thing::Triangle(it) => {
-            Thing::Triangle(Triangle { corners: it.corners.map(|corner| turn.point(corner)) })
-        }
-        Thing::Hull(it) => Thing::Hull(it.moved(turn)),
-    }
+    thing.moved(turn)
 }
 
 fn near(a: &Thing<f64>, b: &Thing<f64>) -> Closest<f64> {
@@ -108,82 +82,131 @@ proptest! {
             }
         }
     }
+}
 
-    #[test]
-    fn a_sweep_ends_at_the_first_touch(
-        first in numbers(), second in numbers(),
-        moves in [[-6.0..6.0_f64, -6.0..6.0, -6.0..6.0], [-6.0..6.0_f64, -6.0..6.0, -6.0..6.0]],
-    ) {
-        let [by, other] = moves.map(Vec3::from);
-        for a in things::<f64>(&first, 1.0, 0.0) {
-            for b in things::<f64>(&second, 1.0, 0.0) {
-                let b = moved(&b, Vec3::new(3.0, 0.0, 0.0));
-                let touch = swept(&a, by, &b, other);
-                let apart = |time: f64| near(&moved(&a, by * time), &moved(&b, other * time));
-                let end = touch.map_or(1.0, |touch| touch.time);
-                if apart(0.0).distance > 0.0 {
-                    for part in 0..20 {
-                        let before = apart(end * f64::from(part) / 20.0).distance;
-                        prop_assert!(before > -1e-8, "{a:?} {b:?} {touch:?} {before}");
-                    }
-                }
-                if let Some(Touch { time, normal, point }) = touch {
-                    let there = apart(time);
-                    prop_assert!(there.distance < 1e-8, "{touch:?} {there:?}");
-                    prop_assert!((other - by).dot(normal) < 0.0, "they come together");
-                    let off = distance(&moved(&a, by * time), point).abs();
-                    prop_assert!(time == 0.0 || off < 1e-8, "{touch:?} {off}");
-                }
-                let back = swept(&b, other, &a, by);
-                prop_assert_eq!(back.is_some(), touch.is_some(), "{:?} {:?}\n{:?}\n{:?} {:?}", back, touch, a, b, apart(end));
-                if let (Some(back), Some(touch)) = (back, touch) {
-                    prop_assert!((back.time - touch.time).abs() < 1e-8);
-                }
-            }
+/// Where two things go, and how they turn: `a` about a point beside it, `b` about its middle.
+#[derive(Clone, Debug)]
+struct Courses {
+    moves: [[f64; 3]; 2],
+    turns: [[f64; 3]; 2],
+    pivot: [f64; 3],
+}
+
+fn courses() -> impl Strategy<Value = Courses> {
+    let way = || [-6.0..6.0_f64, -6.0..6.0, -6.0..6.0];
+    let turns = ([-4.0..4.0_f64, -4.0..4.0, -4.0..4.0], [-4.0..4.0_f64, 0.0..0.1, 0.0..0.1]);
+    let pivot = [-1.0..1.0_f64, -1.0..1.0, -1.0..1.0];
+    (way(), way(), turns, pivot).prop_map(|(first, second, turns, pivot)| Courses {
+        moves: [first, second],
+        turns: [turns.0, turns.1],
+        pivot,
+    })
+}
+
+/// Compares a sweep with marching along it in so many steps.
+fn check_sweep(
+    a: &Thing<f64>,
+    b: &Thing<f64>,
+    courses: &Courses,
+    steps: u32,
+) -> Result<(), TestCaseError> {
+    let [by, other] = courses.moves.map(Vec3::from);
+    let touch = swept(a, by, b, other);
+    let apart = |time: f64| near(&moved(a, by * time), &moved(b, other * time));
+    let end = touch.map_or(1.0, |touch| touch.time);
+    if apart(0.0).distance > 0.0 {
+        for part in 0..steps {
+            let before = apart(end * f64::from(part) / f64::from(steps)).distance;
+            prop_assert!(before > -1e-8, "{a:?} {b:?} {touch:?} {before}");
         }
     }
+    if let Some(Touch { time, normal, point }) = touch {
+        let there = apart(time);
+        prop_assert!(there.distance < 1e-8, "{touch:?} {there:?}");
+        prop_assert!((other - by).dot(normal) < 0.0, "they come together");
+        let off = distance(&moved(a, by * time), point).abs();
+        prop_assert!(time == 0.0 || off < 1e-8, "{touch:?} {off}");
+    }
+    let back = swept(b, other, a, by);
+    prop_assert_eq!(back.is_some(), touch.is_some(), "{:?} {:?} {:?}", a, b, apart(end));
+    if let (Some(back), Some(touch)) = (back, touch) {
+        prop_assert!((back.time - touch.time).abs() < 1e-8);
+    }
+    Ok(())
+}
+
+/// The same of a sweep that turns; and that one that does not turn is as any other.
+fn check_turning_sweep(
+    a: &Thing<f64>,
+    b: &Thing<f64>,
+    courses: &Courses,
+    steps: u32,
+) -> Result<(), TestCaseError> {
+    let course = |i: usize, pivot| Course {
+        moves: Vec3::from(courses.moves[i]),
+        turns: Vec3::from(courses.turns[i]),
+        pivot,
+    };
+    let (x, y) = (course(0, Point3::from(courses.pivot)), course(1, middle(b)));
+    let touch = each!(a, a => each!(b, b => sweep_turning(a, &x, b, &y)));
+    let apart = |time: f64| near(&turned(a, &x, time), &turned(b, &y, time));
+    let end = touch.map_or(1.0, |touch| touch.time);
+    if apart(0.0).distance > 0.0 {
+        for part in 0..steps {
+            let before = apart(end * f64::from(part) / f64::from(steps)).distance;
+            prop_assert!(before > -1e-8, "{a:?} {b:?} {touch:?} {before}");
+        }
+        if let Some(Touch { time, .. }) = touch {
+            let there = apart(time);
+            prop_assert!(there.distance < 6e-7, "{touch:?} {there:?}"); // of six metres
+        }
+    }
+    let still = Course { turns: Vec3::new(0.0, 0.0, 0.0), ..x };
+    let straight = Course { turns: Vec3::new(0.0, 0.0, 0.0), ..y };
+    let one = each!(a, a => each!(b, b => sweep_turning(a, &still, b, &straight)));
+    let other = swept(a, x.moves, b, y.moves);
+    prop_assert_eq!(one.is_some(), other.is_some(), "{:?} {:?}", a, b);
+    if let (Some(one), Some(other)) = (one, other) {
+        prop_assert!((one.time - other.time).abs() < 1e-7, "{one:?} {other:?}");
+    }
+    Ok(())
+}
+
+fn check_sweeps(
+    first: &Numbers,
+    second: &Numbers,
+    courses: &Courses,
+    steps: u32,
+) -> Result<(), TestCaseError> {
+    for a in things::<f64>(first, 1.0, 0.0) {
+        for b in things::<f64>(second, 1.0, 0.0) {
+            let b = moved(&b, Vec3::new(3.0, 0.0, 0.0));
+            check_sweep(&a, &b, courses, steps)?;
+            check_turning_sweep(&a, &b, courses, steps)?;
+        }
+    }
+    Ok(())
+}
+
+/// The same as the next test, against marching in a thousand steps: `.ci/run` does it.
+#[test]
+#[ignore = "takes minutes"]
+fn sweeps_agree_with_marching_in_a_thousand_steps() {
+    const CASES: u32 = 1_500;
+    let mut runner = TestRunner::new(ProptestConfig::with_cases(CASES));
+    let check = |(first, second, courses)| check_sweeps(&first, &second, &courses, 1_000);
+    runner.run(&(numbers(), numbers(), courses()), check).unwrap();
+    println!("{CASES} cases of up to 36 pairs, straight and turning, 1,000 steps each");
 }
 
 proptest! {
-    #![proptest_config(ProptestConfig::with_cases(100))]
+    #![proptest_config(ProptestConfig::with_cases(200))]
 
     #[test]
-    fn a_turning_sweep_ends_at_the_first_touch(
-        first in numbers(), second in numbers(),
-        moves in [[-6.0..6.0_f64, -6.0..6.0, -6.0..6.0], [-6.0..6.0_f64, -6.0..6.0, -6.0..6.0]],
-        turns in [[-4.0..4.0_f64, -4.0..4.0, -4.0..4.0], [-4.0..4.0_f64, 0.0..0.1, 0.0..0.1]],
-        pivot in [-1.0..1.0_f64, -1.0..1.0, -1.0..1.0],
+    fn sweeps_end_at_the_first_touch(
+        first in numbers(), second in numbers(), courses in courses(),
     ) {
-        let course = |i: usize, pivot| {
-            Course { moves: Vec3::from(moves[i]), turns: Vec3::from(turns[i]), pivot }
-        };
-        for a in things::<f64>(&first, 1.0, 0.0) {
-            for b in things::<f64>(&second, 1.0, 0.0) {
-                let b = moved(&b, Vec3::new(3.0, 0.0, 0.0));
-                let (x, y) = (course(0, Point3::from(pivot)), course(1, middle(&b)));
-                let touch = each!(&a, a => each!(&b, b => sweep_turning(a, &x, b, &y)));
-                let apart = |time: f64| near(&turned(&a, &x, time), &turned(&b, &y, time));
-                let end = touch.map_or(1.0, |touch| touch.time);
-                if apart(0.0).distance > 0.0 {
-                    for part in 0..MARCHED {
-                        let before = apart(end * f64::from(part) / f64::from(MARCHED)).distance;
-                        prop_assert!(before > -1e-8, "{a:?} {b:?} {touch:?} {before}");
-                    }
-                    if let Some(Touch { time, .. }) = touch {
-                        let there = apart(time);
-                        prop_assert!(there.distance < 6e-7, "{touch:?} {there:?}"); // 6 m
-                    }
-                }
-                let still = Course { turns: Vec3::new(0.0, 0.0, 0.0), ..x };
-                let straight = Course { turns: Vec3::new(0.0, 0.0, 0.0), ..y };
-                let one = each!(&a, a => each!(&b, b => sweep_turning(a, &still, b, &straight)));
-                let other = swept(&a, x.moves, &b, y.moves);
-                prop_assert_eq!(one.is_some(), other.is_some(), "{:?} {:?}", a, b);
-                if let (Some(one), Some(other)) = (one, other) {
-                    prop_assert!((one.time - other.time).abs() < 1e-8, "{one:?} {other:?}");
-                }
-            }
-        }
+        check_sweeps(&first, &second, &courses, 20)?;
     }
 }
 

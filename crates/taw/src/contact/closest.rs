@@ -43,7 +43,7 @@ impl<S: Scalar> Closest<S> {
 }
 
 /// Where two convex shapes are nearest to each other, or deepest in each other. Swapping
-/// them swaps the answer, to the bit, unless both have the very same middle.
+/// them swaps the answer, to the bit, unless both have the very same middle and bounds.
 ///
 /// A sphere is asked for the nearest point of the other shape, and two capsules for the
 /// nearest points of two lines. Of boxes that overlap, fifteen directions say where the way
@@ -59,7 +59,8 @@ pub fn closest<S: Scalar>(
 ) -> Closest<S> {
     if let (Some(a), Some(b)) = (a.as_sphere(), b.as_sphere()) {
         let apart = direction_and_length(b.center - a.center);
-        let (normal, far) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
+        let some = if b.radius < a.radius { -Vec3::unit_x() } else { Vec3::unit_x() };
+        let (normal, far) = apart.unwrap_or((some, S::zero()));
         let (on_a, on_b) = (a.center + normal * a.radius, b.center - normal * b.radius);
         return Closest { distance: far - (a.radius + b.radius), normal, on_a, on_b };
     }
@@ -81,8 +82,13 @@ pub(super) fn swaps<S: Scalar>(
     a: &(impl Convex<S> + ?Sized),
     b: &(impl Convex<S> + ?Sized),
 ) -> bool {
-    let (first, second) = (a.middle(), b.middle());
-    [second.x, second.y, second.z] < [first.x, first.y, first.z]
+    let list = |p: Point3<S>| [p.x, p.y, p.z];
+    let (first, second) = (list(a.middle()), list(b.middle()));
+    if first != second {
+        return second < first;
+    }
+    let (first, second) = (a.bounding_box(), b.bounding_box());
+    [list(second.min), list(second.max)] < [list(first.min), list(first.max)]
 }
 
 fn closest_in_order<S: Scalar>(

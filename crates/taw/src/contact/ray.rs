@@ -27,13 +27,19 @@ pub trait Cast<S: Scalar> {
 struct Local {
     from: Vec3<f64>,
     along: Vec3<f64>,
+    /// What begins on a surface may be this far inside by rounding, in metres.
+    rounding: f64,
 }
 
 impl Local {
     fn about<S: Scalar>(ray: &Ray<S>, origin: Point3<f64>) -> Option<Self> {
         // As long as it should be.
         let (along, _) = direction_and_length(cast_vector::<S, f64>(ray.direction))?;
-        Some(Self { from: cast_point::<S, f64>(ray.origin) - origin, along })
+        let start = cast_point::<S, f64>(ray.origin);
+        let from = start - origin;
+        let largest = start.to_vec().map(f64::abs) + from.map(f64::abs);
+        let rounding = S::epsilon().as_f64() * 8.0 * (largest.x + largest.y + largest.z);
+        Some(Self { from, along, rounding })
     }
 
     /// The hit at a distance, if it is neither behind nor too far.
@@ -43,7 +49,9 @@ impl Local {
         longest: S,
         (distance, normal): (f64, Vec3<f64>),
     ) -> Option<RayHit<S>> {
-        (distance >= 0.0 && distance <= longest.as_f64()).then(|| RayHit {
+        let ahead = distance >= -self.rounding;
+        let distance = distance.max(0.0);
+        (ahead && distance <= longest.as_f64()).then(|| RayHit {
             distance: S::constant(distance),
             point: cast_point(origin + self.from + self.along * distance),
             normal: cast_vector(normal),
@@ -135,7 +143,8 @@ impl<S: Scalar> Cast<S> for Capsule<S> {
             let ends = [Vec3::new(0.0, 0.0, 0.0), end].map(|end| local.enter_ball(end, radius));
             let side = direction_and_length(end)
                 .and_then(|(axis, long)| enter_side(&local, axis, long, radius));
-            let ahead = ends.into_iter().chain([side]).flatten().filter(|(t, _)| *t >= 0.0);
+            let ahead =
+                ends.into_iter().chain([side]).flatten().filter(|(t, _)| *t >= -local.rounding);
             let first = ahead.min_by(|x, y| x.0.total_cmp(&y.0))?;
             local.hit(origin, longest, first)
         })

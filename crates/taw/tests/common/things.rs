@@ -1,7 +1,8 @@
+#![allow(dead_code, reason = "not every test needs all of it")]
 //! Shapes of six kinds from the same numbers, for the tests of pairs and queries.
 
 use proptest::prelude::*;
-use taw::frame::AxisAngle;
+use taw::frame::{AxisAngle, Pose};
 use taw::prelude::*;
 use taw::shape::{Aabb, Capsule, Hull, Obb, Solid, Triangle};
 
@@ -29,6 +30,26 @@ macro_rules! each {
             $crate::things::Thing::Triangle($name) => $value,
         }
     };
+}
+
+impl Thing<f64> {
+    /// The same elsewhere. A box along the axes stays one unless it is turned.
+    pub fn moved(&self, pose: Pose<f64>) -> Self {
+        let by = pose.translation;
+        match self.clone() {
+            Self::Sphere(it) => Self::Sphere(Sphere { center: pose.point(it.center), ..it }),
+            Self::Aabb(it) if pose == (Pose { translation: by, ..Pose::identity() }) => {
+                Self::Aabb(Aabb { min: it.min + by, max: it.max + by })
+            }
+            Self::Aabb(it) => Self::Obb(it.obb().moved(pose)),
+            Self::Obb(it) => Self::Obb(it.moved(pose)),
+            Self::Capsule(it) => Self::Capsule(it.moved(pose)),
+            Self::Triangle(it) => {
+                Self::Triangle(Triangle { corners: it.corners.map(|corner| pose.point(corner)) })
+            }
+            Self::Hull(it) => Self::Hull(it.moved(pose)),
+        }
+    }
 }
 
 pub type Numbers = ([f64; 3], [f64; 3], f64, Vec<[f64; 3]>);

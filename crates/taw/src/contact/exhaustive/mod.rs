@@ -75,6 +75,9 @@ fn nearest_features(a: &Skeleton, b: &Skeleton) -> (Vec3<f64>, Vec3<f64>) {
         for (normal, face) in &one.faces {
             corners.clear();
             corners.extend(face.iter().map(|i| Point3::from_vec(one.points[*i as usize])));
+            if is_line(&corners) {
+                continue; // its edges say all
+            }
             for point in &other.points {
                 let point = Point3::from_vec(*point);
                 let there = closest_of_polygon(&corners, *normal, point).to_vec();
@@ -107,6 +110,13 @@ fn nearest_features(a: &Skeleton, b: &Skeleton) -> (Vec3<f64>, Vec3<f64>) {
         if i == 0 || apart > best.0 { (apart, pair) } else { best }
     });
     best.1
+}
+
+/// Whether a face of something flat has no area of its own.
+fn is_line(corners: &[Point3<f64>]) -> bool {
+    let ends = corners.iter().skip(1).chain(corners.first());
+    let shortest = corners.iter().zip(ends).map(|(a, b)| (b - a).magnitude2());
+    shortest.fold(f64::INFINITY, f64::min) <= 0.0
 }
 
 /// Where two segments are nearest to each other if that is at no end of either; else, near
