@@ -52,6 +52,9 @@ pub enum Error {
         /// The field, as the caller knows it.
         field: &'static str,
     },
+    /// A marble is a capsule, where the model knows balls only.
+    #[error("{0:?} is a capsule, and the model knows balls only")]
+    BallsOnly(MarbleId),
     /// No marble has this handle: it was removed, or is another world's.
     #[error("no marble has the handle {0:?}")]
     NoSuchMarble(MarbleId),

@@ -83,23 +83,20 @@ impl BoxAxis {
     /// With the points where two boxes are deepest.
     pub fn with_points(self, a: &Core<'_>, b: &Core<'_>) -> Between {
         let Self { normal, distance, of } = self;
-        let on_b = match (&a.kind, &b.kind, of) {
-            (Kind::Cuboid(x), Kind::Cuboid(y), Rows::Edges(i, j)) => {
+        let on_b =
+            if let (Kind::Cuboid(x), Kind::Cuboid(y), Rows::Edges(i, j)) = (&a.kind, &b.kind, of) {
                 // The edges that are farthest out.
                 let edge = |of: &Cuboid, row: usize, out: Vec3<f64>| {
                     let corner = of.farthest(out);
                     [of.corner(corner & !(1 << row)), of.corner(corner | 1 << row)]
                 };
-                let pair = crossing(edge(x, i, normal), edge(y, j, -normal));
-                pair.map(|(_, on_b)| on_b)
-            }
-            _ => {
+                crossing(edge(x, i, normal), edge(y, j, -normal)).map(|(_, on_b)| on_b)
+            } else {
                 let of_a = || a.face_along(normal).map(Of::FaceOfA);
                 let of_b = || b.face_along(-normal).map(Of::FaceOfB);
                 let of = if matches!(of, Rows::FaceOfB) { of_b() } else { of_a() };
                 of.map(|of| deepest(a, b, &Axis { normal, separation: distance, of }).1)
-            }
-        };
+            };
         let on_b = on_b.unwrap_or_else(|| b.support(-normal).0);
         Between { distance, normal, on_a: on_b - normal * distance, on_b }
     }

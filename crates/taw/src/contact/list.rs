@@ -15,6 +15,9 @@ pub struct Contact<S> {
     /// Which part of the wall: of a compound, or which triangle of a surface. Zero for what
     /// has only one, and between marbles.
     pub part: u32,
+    /// How far from the middle of each, along its own axis, it is touched, in metres: zero but
+    /// for capsules.
+    pub along: [S; 2],
     /// The displacement of `b` that parts it from `a`, in metres.
     pub mtv: Vec3<S>,
 }
@@ -70,6 +73,8 @@ fn deeper_first<S: Scalar>(x: &Contact<S>, y: &Contact<S>) -> Ordering {
         // Squares of the tiny and the huge vanish and overflow alike.
         .then_with(|| descending(length(x.mtv), length(y.mtv)))
         .then((x.a, x.b, x.part).cmp(&(y.a, y.b, y.part)))
+        .then_with(|| descending(x.along[0], y.along[0]))
+        .then_with(|| descending(x.along[1], y.along[1]))
 }
 
 #[cfg(test)]
@@ -78,7 +83,7 @@ mod tests {
 
     fn contact(a: u32, b: u32, depth: f32) -> Contact<f32> {
         let mtv = Vec3::new(0.0, depth, 0.0);
-        Contact { a, b, part: 0, mtv }
+        Contact { a, b, part: 0, along: [0.0; 2], mtv }
     }
 
     #[test]

@@ -19,7 +19,7 @@ pub(crate) fn displacement<S: Scalar>(
 ) {
     contacts.sort();
     for contact in &contacts.wm {
-        let Sphere { center, radius } = marbles.sphere(contact.b);
+        let Sphere { center, radius } = marbles.sphere(contact.b, contact.along[1]);
         let (wall, part) = (contact.a as usize, contact.part);
         let (normal, distance) = walls.normal_and_distance(wall, part, center);
         if distance <= radius {
@@ -28,7 +28,10 @@ pub(crate) fn displacement<S: Scalar>(
     }
     let half = S::constant(0.5);
     for contact in &contacts.mm {
-        let (a, b) = (marbles.sphere(contact.a), marbles.sphere(contact.b));
+        let (a, b) = (
+            marbles.sphere(contact.a, contact.along[0]),
+            marbles.sphere(contact.b, contact.along[1]),
+        );
         if let Some(mtv) = mtv_sphere_sphere(&a, &b) {
             marbles.displace(contact.a, mtv * -half, dt, stopped);
             marbles.displace(contact.b, mtv * half, dt, stopped);
@@ -37,8 +40,10 @@ pub(crate) fn displacement<S: Scalar>(
 }
 
 impl<S: Scalar> Columns<'_, S> {
-    fn sphere(&self, row: u32) -> Sphere<S> {
-        Sphere { center: self.position[row as usize], radius: self.radius[row as usize] }
+    /// The part of a marble that a contact is about.
+    fn sphere(&self, row: u32, along: S) -> Sphere<S> {
+        let row = row as usize;
+        Sphere { center: self.position[row] + self.offset(row, along), radius: self.radius[row] }
     }
 
     fn displace(&mut self, row: u32, by: Vec3<S>, dt: S, stopped: &mut Vec<u32>) {
@@ -87,9 +92,10 @@ mod tests {
         let mut contacts = Contacts::default();
         let all = Vec3::new(9.0, 9.0, 9.0); // only the order depends on it
         let count = spheres.len() as u32;
-        contacts.wm = (0..count).map(|b| Contact { a: 0, b, part: 0, mtv: all }).collect();
+        contacts.wm =
+            (0..count).map(|b| Contact { a: 0, b, part: 0, along: [0.0; 2], mtv: all }).collect();
         crate::broad::all_pairs(count, |a, b| {
-            contacts.mm.push(Contact { a, b, part: 0, mtv: all })
+            contacts.mm.push(Contact { a, b, part: 0, along: [0.0; 2], mtv: all })
         });
         let mut stopped = Vec::new();
         let mut columns = Columns {
@@ -99,6 +105,7 @@ mod tests {
             inverse_mass: &[],
             spin: &mut [],
             held: &[],
+            rods: &[],
         };
         displacement(&vec![floor], &mut columns, &mut contacts, 0.5, &mut stopped);
         assert_eq!(stopped, []);
@@ -151,7 +158,9 @@ mod tests {
         let floor = Plane::new(Vec3::unit_y(), 0.0_f32).unwrap();
         let mut position = [Point3::new(0.0, 0.0, 0.0), Point3::new(0.0, 0.5, 0.0)];
         let mut velocity = [Vec3::new(7.0, f32::MAX, 0.0), Vec3::new(0.0, 0.0, 0.0)];
-        let wm = [0, 1].map(|b| Contact { a: 0, b, part: 0, mtv: Vec3::unit_y() }).to_vec();
+        let wm = [0, 1]
+            .map(|b| Contact { a: 0, b, part: 0, along: [0.0; 2], mtv: Vec3::unit_y() })
+            .to_vec();
         let mut contacts = Contacts { wm, mm: vec![] };
         let mut stopped = Vec::new();
         let mut columns = Columns {
@@ -161,6 +170,7 @@ mod tests {
             inverse_mass: &[],
             spin: &mut [],
             held: &[],
+            rods: &[],
         };
         // 1 m in 1e-33 s is 1e33 m/s, more than the gap below f32::MAX.
         displacement(&vec![floor], &mut columns, &mut contacts, 1e-33, &mut stopped);

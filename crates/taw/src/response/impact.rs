@@ -23,6 +23,11 @@ impl<S: Scalar> Mobility<S> {
         Self::of([(inverse_mass_a, spin), (inverse_mass_b, spin)])
     }
 
+    /// That of two ends together.
+    pub(super) fn and(self, other: Self) -> Self {
+        Self { normal: self.normal + other.normal, tangent: self.tangent + other.tangent }
+    }
+
     /// The same of balls of which one may spin and the other not.
     pub(super) fn of(balls: [(S, BallSpin); 2]) -> Self {
         let tangent = |(inverse_mass, spin): (S, BallSpin)| {

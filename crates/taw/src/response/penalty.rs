@@ -4,7 +4,7 @@ use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, direction_and_length, is_finite};
 use crate::response::impact::at_most;
 use crate::response::material::Compliance;
-use crate::response::{BallSpin, Columns, Material, Mobility, Walls};
+use crate::response::{Columns, Material, Mobility, Walls};
 
 /// How a penalty force grows with the overlap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -29,15 +29,20 @@ impl ContactLaw {
 /// across the normal while they held, in metres.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Shear<S> {
-    key: (bool, u32, u32, u32),
+    key: Key,
     stretch: Vec3<S>,
 }
+
+/// Names a contact: whether of two marbles, who, which part of a wall, which ends of capsules.
+type Key = (bool, u32, u32, u32, [i8; 2]);
 
 /// One touch: who, where, and how the two give way.
 struct Touch<S> {
     /// None for a wall.
     a: Option<usize>,
     b: usize,
+    /// How far along the axis of each.
+    along: [S; 2],
     /// From a to b.
     normal: Vec3<S>,
     overlap: S,
@@ -78,11 +83,15 @@ pub(crate) fn penalty<S: Scalar>(
     contacts.sort();
     let before = std::mem::take(shear);
     let mut pushes = Vec::with_capacity(contacts.len());
-    let wm = contacts.wm.iter().map(|c| (false, c.a, c.b, c.part));
-    let mm = contacts.mm.iter().map(|c| (true, c.a, c.b, 0));
+    let wm = contacts.wm.iter().map(|c| ((false, c.a, c.b, c.part), c.along));
+    let mm = contacts.mm.iter().map(|c| ((true, c.a, c.b, 0), c.along));
     // All forces are those of the same moment, whatever the order.
-    for key in wm.chain(mm) {
-        let Some(touch) = touch(marbles, walls, &material, key) else { continue };
+    for (key, along) in wm.chain(mm) {
+        let Some(touch) = touch(marbles, walls, &material, key, along) else { continue };
+        let (two_marbles, a, b, part) = key;
+        // Which ends of capsules.
+        let side = along.map(|x| if x > S::zero() { 2 } else { i8::from(x < S::zero()) });
+        let key = (two_marbles, a, b, part, side);
         let springs = springs(law, &touch, dt);
         let normal = touch.normal;
         let approach = -touch.closing.dot(normal);
@@ -105,11 +114,13 @@ pub(crate) fn penalty<S: Scalar>(
     }
     for (touch, force, pressure) in pushes {
         let impulse = force * dt;
-        for (row, impulse, normal) in
-            [(Some(touch.b), impulse, touch.normal), (touch.a, -impulse, -touch.normal)]
-        {
+        let [first, second] = touch.along;
+        for (row, impulse, normal, along) in [
+            (Some(touch.b), impulse, touch.normal, second),
+            (touch.a, -impulse, -touch.normal, first),
+        ] {
             let Some(row) = row else { continue };
-            marbles.hit(row, impulse * marbles.inverse_mass[row], normal);
+            marbles.hit(row, impulse * marbles.inverse_mass[row], normal, along);
         }
         resist(marbles, &touch, pressure * dt);
     }
@@ -133,30 +144,30 @@ fn touch<S: Scalar>(
     walls: &impl Walls<S>,
     material: &impl Fn(usize) -> Material<S>,
     (two_marbles, a, b, part): (bool, u32, u32, u32),
+    along: [S; 2],
 ) -> Option<Touch<S>> {
     let (a, b) = (a as usize, b as usize);
     let own = material(b);
-    let mut closing = marbles.velocity[b];
+    let mut closing = marbles.velocity[b] + marbles.swing(b, along[1]);
     let mut rim = marbles.rim(b);
-    let second = (marbles.inverse_mass[b], marbles.ball_spin(b));
-    let mut first = (S::zero(), BallSpin::Ignored);
+    let center = marbles.position[b] + marbles.offset(b, along[1]);
     let mut curvature = S::one() / marbles.radius[b];
     let mut compliance = own.elasticity.compliance();
     let (normal, distance, both);
     if two_marbles {
         let other = material(a);
-        let apart = direction_and_length(marbles.position[b] - marbles.position[a]);
+        let apart =
+            direction_and_length(center - marbles.position[a] - marbles.offset(a, along[0]));
         let (direction, centers) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
         (normal, distance) = (direction, centers - marbles.radius[a]);
-        closing -= marbles.velocity[a];
+        closing -= marbles.velocity[a] + marbles.swing(a, along[0]);
         rim += marbles.rim(a);
-        first = (marbles.inverse_mass[a], marbles.ball_spin(a));
         curvature += S::one() / marbles.radius[a];
         compliance = compliance.and(other.elasticity.compliance());
         both = own.against(other);
     } else {
-        (normal, distance) = walls.normal_and_distance(a, part, marbles.position[b]);
-        closing -= walls.surface_velocity(a, marbles.position[b] - normal * marbles.radius[b]);
+        (normal, distance) = walls.normal_and_distance(a, part, center);
+        closing -= walls.surface_velocity(a, center - normal * marbles.radius[b]);
         let its = walls.material(a);
         both = its.map_or(own, |its| own.against(its));
         // A wall without a material of its own is rigid.
@@ -165,11 +176,15 @@ fn touch<S: Scalar>(
         }
     }
     let overlap = marbles.radius[b] - distance;
-    let mobility = Mobility::of([first, second]);
+    let mut mobility = marbles.mobility(b, along[1], normal);
+    if two_marbles {
+        mobility = mobility.and(marbles.mobility(a, along[0], -normal));
+    }
     let touches = overlap > S::zero() && overlap.is_finite() && mobility.normal > S::zero();
     touches.then(|| Touch {
         a: two_marbles.then_some(a),
         b,
+        along,
         normal,
         overlap,
         closing: closing + normal.cross(rim),
@@ -273,7 +288,13 @@ mod tests {
                 return [time, overlap, force];
             }
             let mut contacts = Contacts::default();
-            contacts.mm.push(crate::contact::Contact { a: 0, b: 1, part: 0, mtv: Vec3::zero() });
+            contacts.mm.push(crate::contact::Contact {
+                a: 0,
+                b: 1,
+                part: 0,
+                along: [0.0; 2],
+                mtv: Vec3::zero(),
+            });
             let before = velocity[1].x;
             let mut columns = Columns {
                 position: &mut position,
@@ -282,6 +303,7 @@ mod tests {
                 inverse_mass: &[1.0 / mass, 1.0 / mass],
                 spin: &mut [],
                 held: &[],
+                rods: &[],
             };
             let law = ContactLaw::HertzMindlin;
             let mut stopped = vec![];

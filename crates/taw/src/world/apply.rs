@@ -1,12 +1,13 @@
 //! Forces, impulses and momentum of single marbles.
 
-use cgmath::Zero;
+use cgmath::{InnerSpace, Zero};
 
 use super::marbles::{MarbleId, Marbles, SPIN, VELOCITY};
 use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Bivector;
-use crate::math::{Point3, Scalar, Vec3};
+use crate::math::{Point3, Scalar, Vec3, cast_vector};
+use crate::response::Rod;
 
 const FORCE: [&str; 3] = ["force.x", "force.y", "force.z"];
 const IMPULSE: [&str; 3] = ["impulse.x", "impulse.y", "impulse.z"];
@@ -125,7 +126,7 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         let impulse =
             finite_vector(["impulse.yz", "impulse.zx", "impulse.xy"], impulse.into().dual())?;
-        let change = impulse * self.inverse_inertia(row);
+        let change = self.spin_by(row, impulse);
         if let Some(spin) = self.spin.get_mut(row) {
             *spin = finite_vector(SPIN, *spin + change)?;
         }
@@ -160,14 +161,40 @@ impl<S: Scalar> Marbles<S> {
     pub fn angular_momentum(&self, id: MarbleId) -> Result<Bivector<S>, Error> {
         let row = self.row(id)?;
         let spin = self.spin.get(row).copied().unwrap_or_else(Vec3::zero);
-        let inverse = self.inverse_inertia(row);
-        Ok(if spin.is_zero() { spin } else { spin / inverse }.into())
+        let mass = self.mass(row);
+        Ok(if spin.is_zero() { spin } else { self.by_moments(row, spin, |moment| moment * mass) }
+            .into())
     }
 
-    /// Of a solid ball of even density, `5/2 / (m r²)`, in 1/(kg m²). Zero for infinite
-    /// mass.
-    pub(super) fn inverse_inertia(&self, row: usize) -> S {
-        let radius = self.radius[row];
-        S::constant(2.5) / self.mass(row) / radius / radius
+    /// Twice the energy of the spin over the mass, in m²/s².
+    pub(super) fn spin_energy(&self, row: usize) -> f64 {
+        let (spin, radius) = (self.exact_spin(row), self.radius[row].as_f64());
+        let half = self.half_length(row).as_f64();
+        if half == 0.0 {
+            return 0.4 * (spin * radius).magnitude2();
+        }
+        let [along, across] = Rod::moments(radius, half);
+        let axis = cast_vector::<S, f64>(self.axis(row)).normalize();
+        let about_axis = spin.dot(axis);
+        about_axis * about_axis * along + (spin - axis * about_axis).magnitude2() * across
+    }
+
+    /// What an angular impulse changes a spin by. Nothing for infinite mass.
+    pub(super) fn spin_by(&self, row: usize, impulse: Vec3<S>) -> Vec3<S> {
+        let mass = self.mass(row);
+        self.by_moments(row, impulse, |moment| S::one() / mass / moment)
+    }
+
+    /// An axial vector, times something of the moments of inertia over the mass: about the
+    /// axis of a capsule, and across it; those of a ball are `2/5 r²`, in m².
+    pub(super) fn by_moments(&self, row: usize, v: Vec3<S>, of: impl Fn(S) -> S) -> Vec3<S> {
+        let (radius, half) = (self.radius[row], self.half_length(row));
+        if half == S::zero() {
+            return v * of(S::constant(0.4) * radius * radius);
+        }
+        let [along, across] = Rod::moments(radius, half).map(of);
+        let axis = self.axis(row);
+        let part = axis * v.dot(axis);
+        part * along + (v - part) * across
     }
 }

@@ -33,10 +33,9 @@ impl<S: Scalar> World<S> {
         for row in self.finite_rows() {
             let mass = self.marbles.mass(row).as_f64();
             let Motion { position, velocity } = self.marbles.exact(row);
-            let rim = self.marbles.exact_spin(row) * self.marbles.radius()[row].as_f64();
             let scale = self.marbles.gravity_scale.get(row).unwrap_or(S::one()).as_f64();
             energy.kinetic += 0.5 * mass * velocity.magnitude2();
-            energy.spin += 0.2 * mass * rim.magnitude2();
+            energy.spin += 0.5 * mass * self.marbles.spin_energy(row);
             energy.potential -= mass * scale * gravity.dot(position.to_vec());
         }
         energy

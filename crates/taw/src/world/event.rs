@@ -65,6 +65,7 @@ impl<S: Scalar> World<S> {
             a: contact.a,
             b: contact.b,
             part: 0,
+            along: [0.0; 2],
             mtv: cast_vector(contact.mtv),
         };
         let place = |contact: &Contact<S>| {

@@ -1,10 +1,11 @@
 //! The first verb on the columns of marbles.
 
-use cgmath::Zero;
+use cgmath::{InnerSpace, Zero};
 
 use super::marbles::{Marbles, Rest};
 use crate::math::{Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
 use crate::motion::{Force, Integrator, Motion, turned};
+use crate::response::Rod;
 
 /// What moves all marbles.
 #[derive(Clone, Copy)]
@@ -159,7 +160,7 @@ impl<S: Scalar> Marbles<S> {
             }
             let mut spin = self.spin[row];
             if let Some(torque) = self.torque.get(row) {
-                spin += torque.dual() * (self.inverse_inertia(row) * dt);
+                spin += self.spin_by(row, torque.dual()) * dt;
             }
             if let Some(damping) = self.damping.get(row) {
                 spin *= (-damping.angular * dt).exp_portable();
@@ -172,9 +173,33 @@ impl<S: Scalar> Marbles<S> {
 
     /// Turns every row on by its spin for `dt` seconds.
     pub(super) fn turn(&mut self, dt: S) {
+        if self.has_capsules() {
+            (0..self.spin.len()).for_each(|row| self.turn_top(row, dt));
+            return;
+        }
         for (rotation, spin) in self.rotation.iter_mut().zip(&self.spin) {
             *rotation = turned(*rotation, *spin, dt);
         }
+    }
+
+    /// Turns a row on as what it is, a symmetric top: it turns evenly about its axis, and the
+    /// axis about the angular momentum, which stays (Landau and Lifshitz, *Mechanics*, §33).
+    fn turn_top(&mut self, row: usize, dt: S) {
+        let (rotation, spin) = (self.rotation[row], self.spin[row]);
+        let half = self.half_length(row);
+        if half == S::zero() || spin.is_zero() {
+            self.rotation[row] = turned(rotation, spin, dt);
+            return;
+        }
+        let axis = self.axis(row);
+        let [along, across] = Rod::moments(self.radius[row], half);
+        // Angular momentum over the moment across: how fast the axis goes around it.
+        let about_axis = spin.dot(axis);
+        let precession = spin + axis * (about_axis * (along / across - S::one()));
+        let own = axis * (about_axis - precession.dot(axis));
+        self.rotation[row] = turned(turned(rotation, own, dt), precession, dt);
+        let axis = self.axis(row);
+        self.spin[row] = precession + axis * (about_axis - precession.dot(axis));
     }
 
     /// Turns a row on by an angle, an axial vector in radians.

@@ -7,8 +7,8 @@ use crate::error::{finite, finite_point, finite_vector, positive, within};
 use crate::frame::Bivector;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite};
 use crate::motion::{Integrator, Motion, Rotation};
-use crate::response::{Columns, Material};
-use crate::shape::Sphere;
+use crate::response::{Columns, Material, Rod};
+use crate::shape::{Capsule, Shape, Sphere};
 
 /// Names a marble for as long as it is in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -21,6 +21,9 @@ pub struct Marble<S> {
     pub position: Point3<S>,
     /// In metres, above zero.
     pub radius: S,
+    /// Above zero, it is a capsule: all points within the radius of a line along its own y
+    /// axis, which goes this far both ways from the center, in metres.
+    pub half_length: S,
     /// In metres per second.
     pub velocity: Vec3<S>,
     /// How heavy it is.
@@ -50,6 +53,7 @@ impl<S: Scalar> Marble<S> {
         Self {
             position,
             radius,
+            half_length: S::zero(),
             velocity: Vec3::zero(),
             rotation: Quat::one(),
             spin: Vec3::zero(),
@@ -110,9 +114,9 @@ impl<S: Scalar> Default for Rest<S> {
 /// How heavy a marble is.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mass<S> {
-    /// As a solid ball of this density, in kg/m³, above zero. Follows the radius.
+    /// Of this density all through, in kg/m³, above zero. Follows the size.
     Density(S),
-    /// This many kilograms, above zero, whatever the radius.
+    /// This many kilograms, above zero, whatever the size.
     Kilograms(S),
     /// So heavy that no force and no gravity changes its velocity.
     Infinite,
@@ -155,6 +159,16 @@ impl<S: Scalar> Mass<S> {
             Self::Infinite => S::infinity(),
         }
     }
+
+    /// The same for a capsule of this half length in metres.
+    #[must_use]
+    pub fn of_capsule(self, radius: S, half_length: S) -> S {
+        let longer = S::one() + S::constant(1.5) * half_length / radius;
+        match self {
+            Self::Density(_) => self.of(radius) * longer,
+            Self::Kilograms(_) | Self::Infinite => self.of(radius),
+        }
+    }
 }
 
 /// Dynamic spheres, in columns: row *i* of each belongs to the same marble.
@@ -168,6 +182,8 @@ pub struct Marbles<S> {
     pub(super) compensated: bool,
     pub(super) position: Vec<Point3<S>>,
     pub(super) radius: Vec<S>,
+    /// Only of capsules.
+    pub(super) half_length: Optional<S>,
     pub(super) velocity: Vec<Vec3<S>>,
     /// Empty in a model without rotation, as is `spin`.
     pub(super) rotation: Vec<Quat<S>>,
@@ -197,6 +213,7 @@ impl<S> Default for Marbles<S> {
             compensated: false,
             position: Vec::new(),
             radius: Vec::new(),
+            half_length: Optional::default(),
             velocity: Vec::new(),
             rotation: Vec::new(),
             spin: Vec::new(),
@@ -226,6 +243,7 @@ impl<S: Scalar> Marbles<S> {
     pub fn insert(&mut self, marble: Marble<S>) -> Result<MarbleId, Error> {
         let position = finite_point(POSITION, marble.position)?;
         let radius = positive("radius", marble.radius)?;
+        let half_length = checked_half_length(marble.half_length)?;
         let velocity = finite_vector(VELOCITY, marble.velocity)?;
         let rotation = checked_rotation(marble.rotation)?;
         let spin = finite_vector(SPIN, marble.spin)?;
@@ -234,6 +252,9 @@ impl<S: Scalar> Marbles<S> {
         let damping = marble.damping.checked()?;
         let material = marble.material.map(Material::checked).transpose()?;
         let handle = self.handles.push()?;
+        if half_length.is_some() {
+            self.set_turn(true); // which way it points counts in any model
+        }
         self.position.push(position);
         self.radius.push(radius);
         self.velocity.push(velocity);
@@ -246,6 +267,7 @@ impl<S: Scalar> Marbles<S> {
             self.rest.push(Rest::default());
         }
         let rows = self.position.len();
+        self.half_length.set(rows - 1, half_length, rows);
         self.mass.set(rows - 1, but(mass, Mass::default()), rows);
         self.gravity_scale.set(rows - 1, but(gravity_scale, S::one()), rows);
         self.damping.set(rows - 1, but(damping, Damping::default()), rows);
@@ -274,6 +296,7 @@ impl<S: Scalar> Marbles<S> {
             if self.compensated {
                 self.rest.swap_remove(row);
             }
+            self.half_length.swap_remove(row);
             self.mass.swap_remove(row);
             self.gravity_scale.swap_remove(row);
             self.damping.swap_remove(row);
@@ -295,6 +318,7 @@ impl<S: Scalar> Marbles<S> {
         Ok(Marble {
             position: self.position[row],
             radius: self.radius[row],
+            half_length: self.half_length(row),
             velocity: self.velocity[row],
             rotation: self.rotation.get(row).copied().unwrap_or_else(Quat::one),
             spin: self.spin.get(row).copied().unwrap_or_else(Vec3::zero),
@@ -323,6 +347,7 @@ impl<S: Scalar> Marbles<S> {
             velocity,
             spin: self.exact_spin(row),
             radius: marble.radius.as_f64(),
+            half_length: marble.half_length.as_f64(),
             mass: marble.mass.cast(),
             gravity_scale: marble.gravity_scale.as_f64(),
             damping: marble.damping.cast(),
@@ -369,7 +394,21 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// Turns a marble at once. Does nothing in a model without rotation.
+    /// Makes a capsule of a marble, of this half length in metres, or with zero a ball.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`], [`Error::OutOfRange`].
+    pub fn set_half_length(&mut self, id: MarbleId, half_length: S) -> Result<(), Error> {
+        let row = self.row(id)?;
+        let half_length = checked_half_length(half_length)?;
+        if half_length.is_some() {
+            self.set_turn(true);
+        }
+        self.half_length.set(row, half_length, self.handles.len());
+        Ok(())
+    }
+
+    /// Turns a marble at once. Does nothing in a model without rotation, but to capsules.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`]; [`Error::NotUnit`] if the length of the quaternion is
@@ -554,7 +593,62 @@ impl<S: Scalar> Marbles<S> {
         self.position.is_empty()
     }
 
-    /// The shape in a row that exists.
+    /// Zero for a ball.
+    pub(super) fn half_length(&self, row: usize) -> S {
+        self.half_length.get(row).unwrap_or_else(S::zero)
+    }
+
+    /// The first marble that is a capsule.
+    pub(super) fn first_capsule(&self) -> Option<MarbleId> {
+        let row = (0..self.len()).find(|row| self.half_length.get(*row).is_some())?;
+        self.id(row)
+    }
+
+    /// Whether there are capsules.
+    #[must_use]
+    pub fn has_capsules(&self) -> bool {
+        !self.half_length.is_empty()
+    }
+
+    /// What a marble is now: a sphere or a capsule.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn shape(&self, id: MarbleId) -> Result<Shape<S>, Error> {
+        self.row(id).map(|row| self.shape_of_row(row))
+    }
+
+    pub(super) fn shape_of_row(&self, row: usize) -> Shape<S> {
+        let Sphere { center, radius } = self.sphere(row);
+        let half = self.axis(row) * self.half_length(row);
+        if self.half_length.get(row).is_some() {
+            Shape::Capsule(Capsule { a: center - half, b: center + half, radius })
+        } else {
+            Shape::Sphere(Sphere { center, radius })
+        }
+    }
+
+    /// Which way a capsule points, as a unit vector of the world.
+    pub(super) fn axis(&self, row: usize) -> Vec3<S> {
+        self.rotation.get(row).map_or_else(Vec3::unit_y, |turn| turn * Vec3::unit_y())
+    }
+
+    /// What is long about every row, if any is a capsule. In a world of this model.
+    pub(super) fn rods(&self, model: Rotation, rods: &mut Vec<Rod<S>>) {
+        rods.clear();
+        if !self.has_capsules() {
+            return;
+        }
+        rods.extend((0..self.len()).map(|row| {
+            let (axis, half) = (self.axis(row), self.half_length(row));
+            let turns = self.rotation_of(row, model) == Rotation::Dynamic;
+            let moments = Rod::moments(self.radius[row], half);
+            let whirl = moments.map(|moment| if turns { moment.recip() } else { S::zero() });
+            Rod { axis, half, whirl }
+        }));
+    }
+
+    /// The ball in the middle of a row that exists.
     pub(super) fn sphere(&self, row: usize) -> Sphere<S> {
         Sphere { center: self.position[row], radius: self.radius[row] }
     }
@@ -572,6 +666,9 @@ impl<S: Scalar> Marbles<S> {
     /// Makes a row spin as if it rolled over a surface at rest with this normal.
     pub(super) fn roll(&mut self, row: usize, normal: Vec3<S>) {
         let spin = normal.cross(self.velocity[row]) / self.radius[row];
+        if self.half_length.get(row).is_some() {
+            return; // it does not roll whichever way it goes
+        }
         if let Some(slot) = self.spin.get_mut(row)
             && is_finite(spin)
         {
@@ -584,6 +681,7 @@ impl<S: Scalar> Marbles<S> {
         &'a mut self,
         inverse_mass: &'a [S],
         held: &'a [bool],
+        rods: &'a [Rod<S>],
     ) -> (Columns<'a, S>, &'a Optional<Material<S>>, &'a Optional<Integrator>) {
         let columns = Columns {
             position: &mut self.position,
@@ -592,14 +690,22 @@ impl<S: Scalar> Marbles<S> {
             inverse_mass,
             spin: &mut self.spin,
             held,
+            rods,
         };
         (columns, &self.material, &self.integrator)
     }
 
     /// In kilograms; infinite for what nothing accelerates.
     pub(super) fn mass(&self, row: usize) -> S {
-        self.mass.get(row).unwrap_or_default().of(self.radius[row])
+        let mass = self.mass.get(row).unwrap_or_default();
+        mass.of_capsule(self.radius[row], self.half_length(row))
     }
+}
+
+/// None for a ball.
+fn checked_half_length<S: Scalar>(half_length: S) -> Result<Option<S>, Error> {
+    let half_length = within("half_length", half_length, S::zero(), S::max_value())?;
+    Ok(but(half_length, S::zero()))
 }
 
 /// The quaternion as a rotation, if its length is about one.

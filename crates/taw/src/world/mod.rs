@@ -34,7 +34,7 @@ use crate::math::{Scalar, Vec3, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Settings, Warm, impulse};
-use crate::response::{Impact, Response, Shear, displacement, penalty};
+use crate::response::{Impact, Response, Rod, Shear, displacement, penalty};
 use integrate::Drive;
 use sweep::Sweep;
 use touch::Near;
@@ -79,6 +79,9 @@ pub struct World<S> {
     events: EventDriven,
     sweep: Sweep<S>,
     near_walls: Vec<Near<S>>,
+    /// What is long about marbles, and how far they reach.
+    rods: Vec<Rod<S>>,
+    reaches: Vec<S>,
 }
 
 impl<S: Scalar> Default for World<S> {
@@ -106,6 +109,8 @@ impl<S: Scalar> Default for World<S> {
             events: EventDriven::default(),
             sweep: Sweep::default(),
             near_walls: Vec::new(),
+            rods: Vec::new(),
+            reaches: Vec::new(),
         }
     }
 }
@@ -134,6 +139,8 @@ impl<S: Scalar> PartialEq for World<S> {
             events,
             sweep: _,
             near_walls: _,
+            rods: _,
+            reaches: _,
         } = self;
         *model == other.model
             && *gravity == other.gravity
@@ -161,11 +168,18 @@ impl<S: Scalar> World<S> {
     /// Changes how the next step is done.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for the substeps or the iterations.
+    /// [`Error::OutOfRange`] for the substeps or the iterations; [`Error::BallsOnly`] for
+    /// [`Response::EventDriven`] if a marble is a capsule.
     pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
-        self.model = model.checked()?;
+        let model = model.checked()?;
+        if model.response == Response::EventDriven
+            && let Some(id) = self.marbles.first_capsule()
+        {
+            return Err(Error::BallsOnly(id));
+        }
+        self.model = model;
         self.forget_contacts();
-        self.marbles.set_turn(model.rotation != Rotation::None);
+        self.marbles.set_turn(model.rotation != Rotation::None || self.marbles.has_capsules());
         self.marbles.set_compensated(model.precision == Precision::Compensated);
         Ok(())
     }
@@ -221,8 +235,14 @@ impl<S: Scalar> World<S> {
     /// and is named by [`World::stopped`]; no other marble is affected.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`; then nothing has moved.
+    /// [`Error::NotPositive`] for `dt`, [`Error::BallsOnly`] for a capsule in a world that is
+    /// event-driven; then nothing has moved.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
+        if self.model.response == Response::EventDriven
+            && let Some(id) = self.marbles.first_capsule()
+        {
+            return Err(Error::BallsOnly(id));
+        }
         let dt = positive("dt", dt / S::constant(f64::from(self.model.substeps)))?;
         self.begin_step();
         for _ in 0..self.model.substeps {
@@ -312,14 +332,15 @@ impl<S: Scalar> World<S> {
         if self.model.rotation == Rotation::Dynamic && self.marbles.has_held() {
             self.held.extend((0..self.marbles.len()).map(|row| self.marbles.is_held(row)));
         }
+        self.marbles.rods(self.model.rotation, &mut self.rods);
         let (mut columns, material, integrator) =
-            self.marbles.columns(&self.inverse_mass, &self.held);
+            self.marbles.columns(&self.inverse_mass, &self.held, &self.rods);
         if self.model.rotation != Rotation::Dynamic {
             columns.spin = &mut []; // what is only shown is not felt
         }
         match self.model.response {
             Response::Displacement => {
-                displacement(&self.walls, &mut columns, &mut self.contacts, dt, &mut self.stopped)
+                displacement(&self.walls, &mut columns, &mut self.contacts, dt, &mut self.stopped);
             }
             Response::Impulse => {
                 let settings = Settings {

@@ -7,8 +7,8 @@ use cgmath::InnerSpace;
 use super::walls::Part;
 use super::{MarbleId, WallId, WallShape, World};
 use crate::contact::{
-    Cast, Convex, OfTriangle, RayHit, Touch, cast_on_surface, closest, closest_of_surface,
-    closest_plane, closest_shapes, parts_of, sweep, sweep_against_surface, sweep_shapes,
+    Cast, Convex, OfTriangle, RayHit, Touch, cast_on_surface, closest_of_surface, closest_plane,
+    closest_shapes, parts_of, sweep_against_surface, sweep_shapes,
 };
 use crate::frame::{Pose, Ray};
 use crate::math::{Point3, Scalar, Vec3, is_finite, is_finite_point, length};
@@ -61,7 +61,7 @@ impl<S: Scalar> QueryTree<S> {
         self.boxes.clear();
         for row in 0..world.marbles.len() {
             self.items.push(Item::Marble(row as u32));
-            self.boxes.push(world.marbles.sphere(row).bounding_box());
+            self.boxes.push(world.marbles.shape_of_row(row).bounding_box());
         }
         for (wall, shape) in (0..).zip(world.walls.shapes()) {
             shape.boxes(|part, bounds| {
@@ -175,7 +175,9 @@ impl<S: Scalar> Queries<'_, S> {
         self.tree.tree.along(ray.origin, motion, |number| {
             let item = self.tree.items[number as usize];
             hits.add(item, || match item {
-                Item::Marble(row) => self.world.marbles.sphere(row as usize).cast(ray, longest),
+                Item::Marble(row) => {
+                    self.world.marbles.shape_of_row(row as usize).cast(ray, longest)
+                }
                 Item::Wall(part) => {
                     cast_on_wall(&self.world.walls.shapes()[part.wall as usize], part, ray, longest)
                 }
@@ -212,8 +214,8 @@ impl<S: Scalar> Queries<'_, S> {
             let item = self.tree.items[number as usize];
             match item {
                 Item::Marble(row) => {
-                    let marble = self.world.marbles.sphere(row as usize);
-                    offer(item, &|| earliest(shape, |part| sweep(&marble, still, part, moves)));
+                    let marble = self.world.marbles.shape_of_row(row as usize);
+                    offer(item, &|| Some(sweep_shapes(&marble, still, shape, moves)?.answer));
                 }
                 Item::Wall(Part { wall, part: number }) => {
                     match &self.world.walls.shapes()[wall as usize] {
@@ -249,9 +251,9 @@ impl<S: Scalar> Queries<'_, S> {
             let item = self.tree.items[number as usize];
             match item {
                 Item::Marble(row) => {
-                    let marble = self.world.marbles.sphere(row as usize);
-                    let any = |part: &dyn Convex<S>| closest(&marble, part).touching();
-                    offer(item, &|| parts_of(shape).into_iter().any(any));
+                    let marble = self.world.marbles.shape_of_row(row as usize);
+                    let near = || closest_shapes(&marble, shape);
+                    offer(item, &|| near().is_some_and(|near| near.answer.touching()));
                 }
                 Item::Wall(Part { wall, part: number }) => {
                     match &self.world.walls.shapes()[wall as usize] {
@@ -304,7 +306,7 @@ impl<S: Scalar> Queries<'_, S> {
         self.tree.tree.around(point, within, |number| {
             let item = self.tree.items[number as usize];
             offer(item, &|| match item {
-                Item::Marble(row) => self.world.marbles.sphere(row as usize).nearest(point),
+                Item::Marble(row) => self.world.marbles.shape_of_row(row as usize).nearest(point),
                 Item::Wall(Part { wall, part }) => match &walls[wall as usize] {
                     solid @ WallShape::Solid(_) => solid.nearest_of(part, point),
                     other => other.nearest(point),

@@ -1,12 +1,13 @@
 //! The second verb: who touches whom, and which of these touches are no more than seams.
 
-use cgmath::Zero;
+use cgmath::{InnerSpace, Zero};
+use smallvec::SmallVec;
 
 use super::walls::{Part, Walls};
 use super::{WallShape, World};
 use crate::contact::{Contact, mtv_sphere_plane, mtv_sphere_sphere};
 use crate::math::{Scalar, Vec3, length};
-use crate::shape::{Aabb, Nearest, Sphere};
+use crate::shape::{Aabb, Nearest, Plane, Shape, Solid, Sphere};
 
 /// A point that lies this part of a radius outside of another wall is still on it: so much
 /// would turn a normal by less than 1e-5 rad, and no more are walls apart or askew that were
@@ -23,17 +24,10 @@ pub(super) struct Near<S> {
 impl<S: Scalar> World<S> {
     /// Finds which walls touch which marbles, or are at most `reach` metres apart.
     pub(super) fn touch_walls(&mut self, reach: S) {
-        let nothing = Vec3::zero();
-        for (a, plane) in self.walls.planes() {
-            for b in 0..self.marbles.len() {
-                let sphere = self.marbles.sphere(b);
-                let gap = || plane.signed_distance(sphere.center) - sphere.radius;
-                let near = || reach > S::zero() && gap() <= reach;
-                let mtv = mtv_sphere_plane(&sphere, plane);
-                if let Some(mtv) = mtv.or_else(|| near().then_some(nothing)) {
-                    self.contacts.wm.push(Contact { a, b: b as u32, part: 0, mtv });
-                }
-            }
+        if self.marbles.has_capsules() {
+            self.touch_half_spaces_at_beads(reach);
+        } else {
+            self.touch_half_spaces(reach);
         }
         self.walls.prepare();
         if self.walls.are_planes() {
@@ -42,37 +36,170 @@ impl<S: Scalar> World<S> {
         let mut near = std::mem::take(&mut self.near_walls);
         for b in 0..self.marbles.len() {
             let sphere = self.marbles.sphere(b);
-            near.clear();
-            parts_near(&self.walls, &sphere, reach, &mut near);
-            if near.len() > 1 {
-                drop_seams(&self.walls, &sphere, &mut near);
+            if self.marbles.half_length(b) == S::zero() {
+                self.touch_parts(b, &sphere, S::zero(), reach, &mut near);
+                continue;
             }
-            for Near { part: Part { wall, part }, nearest } in &near {
-                let depth = (sphere.radius - nearest.distance).max(S::zero());
-                let mtv = nearest.normal * depth;
-                self.contacts.wm.push(Contact { a: *wall, b: b as u32, part: *part, mtv });
+            for along in self.beads(b, reach) {
+                let center = sphere.center + self.marbles.axis(b) * along;
+                self.touch_parts(b, &Sphere { center, ..sphere }, along, reach, &mut near);
             }
         }
         self.near_walls = near;
     }
 
+    fn touch_half_spaces(&mut self, reach: S) {
+        for (a, plane) in self.walls.planes() {
+            for b in 0..self.marbles.len() {
+                if let Some(mtv) = out_of_half_space(plane, &self.marbles.sphere(b), reach) {
+                    let along = [S::zero(); 2];
+                    self.contacts.wm.push(Contact { a, b: b as u32, part: 0, along, mtv });
+                }
+            }
+        }
+    }
+
+    /// The same where some are capsules: each of these touches with its ends.
+    fn touch_half_spaces_at_beads(&mut self, reach: S) {
+        for (a, plane) in self.walls.planes() {
+            for b in 0..self.marbles.len() {
+                let (sphere, half) = (self.marbles.sphere(b), self.marbles.half_length(b));
+                let ends = [-half, half].into_iter().take(if half > S::zero() { 2 } else { 1 });
+                for along in ends {
+                    let center = sphere.center + self.marbles.axis(b) * along;
+                    let mtv = out_of_half_space(plane, &Sphere { center, ..sphere }, reach);
+                    if let Some(mtv) = mtv {
+                        let along = [S::zero(), along];
+                        self.contacts.wm.push(Contact { a, b: b as u32, part: 0, along, mtv });
+                    }
+                }
+            }
+        }
+    }
+
+    /// Finds the parts of walls that a marble touches, or the part of a capsule that is this
+    /// far along its axis.
+    fn touch_parts(
+        &mut self,
+        b: usize,
+        sphere: &Sphere<S>,
+        along: S,
+        reach: S,
+        near: &mut Vec<Near<S>>,
+    ) {
+        near.clear();
+        parts_near(&self.walls, sphere, reach, near);
+        if near.len() > 1 {
+            drop_seams(&self.walls, sphere, near);
+        }
+        for Near { part: Part { wall, part }, nearest } in near.iter() {
+            let depth = (sphere.radius - nearest.distance).max(S::zero());
+            let (mtv, along) = (nearest.normal * depth, [S::zero(), along]);
+            self.contacts.wm.push(Contact { a: *wall, b: b as u32, part: *part, along, mtv });
+        }
+    }
+
+    /// Where along its axis a capsule may touch walls: at both ends, and where it is nearest
+    /// to an edge or a corner between them.
+    fn beads(&self, b: usize, reach: S) -> SmallVec<[S; 4]> {
+        let half = self.marbles.half_length(b);
+        let mut beads = SmallVec::from_slice(&[-half, half]);
+        let shape = self.marbles.shape_of_row(b);
+        let Shape::Capsule(capsule) = &shape else { return beads };
+        let more = Vec3::new(reach, reach, reach);
+        let Aabb { min, max } = capsule.bounding_box();
+        let (center, axis) = (self.marbles.sphere(b).center, self.marbles.axis(b));
+        self.walls.near(&Aabb { min: min - more, max: max + more }, |part| {
+            let Some(touch) = self.walls.closest(part, capsule) else { return };
+            let along = (touch.on_b - center).dot(axis);
+            let inside = along.abs() < half * S::constant(0.999);
+            let new = |other: &S| (along - *other).abs() > capsule.radius * S::constant(0.01);
+            if inside && touch.distance <= reach && beads.iter().all(new) {
+                beads.push(along);
+            }
+        });
+        beads
+    }
+
     /// Finds which marbles touch each other, or are at most `reach` metres apart.
     pub(super) fn touch_marbles(&mut self, reach: S) {
         let center = self.marbles.position();
-        self.grid.rebuild(center, self.marbles.radius(), reach);
+        if !self.marbles.has_capsules() {
+            self.grid.rebuild(center, self.marbles.radius(), reach);
+            self.grid.pairs(center, |a, b| {
+                let (first, second) = (a as usize, b as usize);
+                let (first, second) = (self.marbles.sphere(first), self.marbles.sphere(second));
+                if let Some(mtv) = out_of_sphere(&first, &second, reach) {
+                    let along = [S::zero(); 2];
+                    self.contacts.mm.push(Contact { a, b, part: 0, along, mtv });
+                }
+            });
+            return;
+        }
+        self.reaches.clear();
+        let far = |row: usize| self.marbles.radius()[row] + self.marbles.half_length(row);
+        self.reaches.extend((0..self.marbles.len()).map(far));
+        self.grid.rebuild(center, &self.reaches, reach);
         self.grid.pairs(center, |a, b| {
-            let (first, second) = (a as usize, b as usize);
-            let (first, second) = (self.marbles.sphere(first), self.marbles.sphere(second));
-            let near = || {
-                let gap = length(second.center - first.center) - first.radius - second.radius;
-                reach > S::zero() && gap <= reach
+            let line = |row: u32| {
+                let row = row as usize;
+                (self.marbles.sphere(row), self.marbles.axis(row), self.marbles.half_length(row))
             };
-            let mtv = mtv_sphere_sphere(&first, &second);
-            if let Some(mtv) = mtv.or_else(|| near().then_some(Vec3::zero())) {
-                self.contacts.mm.push(Contact { a, b, part: 0, mtv });
+            let (first, second) = (line(a), line(b));
+            for along in beads_of_lines(first, second) {
+                let bead = |(sphere, axis, _): (Sphere<S>, Vec3<S>, S), along: S| Sphere {
+                    center: sphere.center + axis * along,
+                    ..sphere
+                };
+                let (x, y) = (bead(first, along[0]), bead(second, along[1]));
+                if let Some(mtv) = out_of_sphere(&x, &y, reach) {
+                    self.contacts.mm.push(Contact { a, b, part: 0, along, mtv });
+                }
             }
         });
     }
+}
+
+/// The way of a sphere out of a half-space; none for one that is only so near.
+fn out_of_half_space<S: Scalar>(plane: &Plane<S>, sphere: &Sphere<S>, reach: S) -> Option<Vec3<S>> {
+    let gap = || plane.signed_distance(sphere.center) - sphere.radius;
+    let near = || reach > S::zero() && gap() <= reach;
+    mtv_sphere_plane(sphere, plane).or_else(|| near().then(Vec3::zero))
+}
+
+/// The way of the second out of the first; none if they are only so near.
+fn out_of_sphere<S: Scalar>(first: &Sphere<S>, second: &Sphere<S>, reach: S) -> Option<Vec3<S>> {
+    let near = || {
+        let gap = length(second.center - first.center) - first.radius - second.radius;
+        reach > S::zero() && gap <= reach
+    };
+    mtv_sphere_sphere(first, second).or_else(|| near().then(Vec3::zero))
+}
+
+/// Where along their axes two lines are nearest; of two side by side, both ends of what they
+/// share.
+fn beads_of_lines<S: Scalar>(
+    (first, x, half_x): (Sphere<S>, Vec3<S>, S),
+    (second, y, half_y): (Sphere<S>, Vec3<S>, S),
+) -> SmallVec<[[S; 2]; 2]> {
+    let apart = second.center - first.center;
+    let clamp = |along: S, half: S| along.max(-half).min(half);
+    let (cos, on_x, on_y) = (x.dot(y), apart.dot(x), apart.dot(y));
+    let squared_sin = S::one() - cos * cos;
+    // Nearly parallel lines have no one nearest point that would stay where it is.
+    if half_x > S::zero() && half_y > S::zero() && squared_sin < S::constant(1e-3) {
+        let ends = [-half_y, half_y].map(|end| clamp(on_x + cos * end, half_x));
+        let beads = ends.map(|along| [along, clamp(cos * along - on_y, half_y)]);
+        let mut both = SmallVec::from_slice(&beads[..1]);
+        if beads[1] != beads[0] {
+            both.push(beads[1]);
+        }
+        return both;
+    }
+    let start = if squared_sin > S::zero() { (on_x - cos * on_y) / squared_sin } else { S::zero() };
+    let on_second = clamp(cos * clamp(start, half_x) - on_y, half_y);
+    let on_first = clamp(on_x + cos * on_second, half_x);
+    SmallVec::from_slice(&[[on_first, on_second]])
 }
 
 /// Names the parts of walls, but for half-spaces, that a sphere is at most `reach` metres

@@ -3,6 +3,7 @@ use std::sync::Arc;
 use cgmath::{EuclideanSpace, InnerSpace};
 
 use crate::Error;
+use crate::contact::{Closest, closest, parts_of};
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
@@ -141,6 +142,23 @@ impl<S: Scalar> WallShape<S> {
                 let below = field.height_over(point).is_some_and(|height| height > S::zero());
                 Some(if below { near.inside_out() } else { near })
             }),
+        }
+    }
+
+    /// Where a part is nearest to a capsule, unless it is a half-space.
+    pub(super) fn closest(&self, part: u32, capsule: &Capsule<S>) -> Option<Closest<S>> {
+        let triangle = |triangle: Triangle<S>, pose: &Pose<S>| {
+            let corners = triangle.corners.map(|corner| pose.point(corner));
+            closest(&Triangle { corners }, capsule)
+        };
+        match self {
+            Self::Plane(_) => None,
+            Self::Solid(_) => {
+                let parts = parts_of(self.part(part)?).into_iter();
+                parts.map(|part| closest(part, capsule)).next()
+            }
+            Self::Mesh(mesh, pose) => mesh.triangle(part).map(|it| triangle(it, pose)),
+            Self::HeightField(field, pose) => field.triangle(part).map(|it| triangle(it, pose)),
         }
     }
 

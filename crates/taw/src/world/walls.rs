@@ -4,11 +4,12 @@ use super::handles::{Handle, Handles};
 use super::optional::Optional;
 use super::wall_shape::WallShape;
 use crate::Error;
+use crate::contact::Closest;
 use crate::error::{finite_point, finite_vector};
 use crate::math::{Point3, Scalar, Vec3};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};
-use crate::shape::{Box3, BoxTree, Nearest, Plane};
+use crate::shape::{Box3, BoxTree, Capsule, Nearest, Plane};
 
 /// Names a wall for as long as it is in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -175,6 +176,15 @@ impl<S: Scalar> Walls<S> {
     /// Where a part is nearest to a point.
     pub(super) fn nearest(&self, Part { wall, part }: Part, point: Point3<S>) -> Nearest<S> {
         self.shapes[wall as usize].nearest_of(part, point)
+    }
+
+    /// Where a part is nearest to a capsule, unless it is a half-space.
+    pub(super) fn closest(
+        &self,
+        Part { wall, part }: Part,
+        capsule: &Capsule<S>,
+    ) -> Option<Closest<S>> {
+        self.shapes[wall as usize].closest(part, capsule)
     }
 
     /// All half-spaces, with their rows.

@@ -80,6 +80,7 @@ impl Heap {
             inverse_mass: &self.inverse_mass,
             spin: &mut self.spin,
             held: &self.held,
+            rods: &[],
         };
         let told = impulse::Settings {
             iterations: settings.iterations,
@@ -258,7 +259,8 @@ impl EventDriven {
             self.balls[row].release();
             let at = self.balls[row].position;
             self.name_walls(row, |wall| {
-                let contact = Contact { a: wall as u32, b: row as u32, part: 0, mtv };
+                let contact =
+                    Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
                 if self.touches_wall(&contact, settings).is_some()
                     && (self.parts.is_empty() || !self.is_seam(row, wall, at))
                 {
@@ -277,7 +279,7 @@ impl EventDriven {
                 let before = self.balls[other];
                 self.balls[other].advance(now);
                 let (a, b) = (row.min(other) as u32, row.max(other) as u32);
-                let contact = Contact { a, b, part: 0, mtv };
+                let contact = Contact { a, b, part: 0, along: [0.0; 2], mtv };
                 // The two that it is about touch, whatever rounding says.
                 let known = first.contains(&row) && first.contains(&other);
                 if known || self.touches_ball(&contact, settings).is_some() {

@@ -81,7 +81,7 @@ impl<S: Scalar> Columns<'_, S> {
         rebounds.extend(constraints.iter().map(|c| Rebound {
             impulse: c.impulse(),
             twist: c.twist(),
-            closing: self.closing(c.a, c.b, c.normal, c.surface),
+            closing: self.closing(c.a, c.b, c.along, c.normal, c.surface),
         }));
         for c in constraints.iter_mut().filter(|c| c.bounces) {
             (c.rebound, c.slide) = (S::zero(), Vec3::zero());
@@ -93,7 +93,7 @@ impl<S: Scalar> Columns<'_, S> {
         let half = S::constant(0.5);
         for (c, rebound) in constraints.iter().zip(rebounds.iter()) {
             let ledger = &mut ledgers[c.island];
-            let closing = self.closing(c.a, c.b, c.normal, c.surface);
+            let closing = self.closing(c.a, c.b, c.along, c.normal, c.surface);
             let more = rebound.impulse - c.impulse();
             let faster = rebound.closing - closing;
             ledger.slope += islands.energy(c, more, (c.begin + closing) * half)
@@ -128,7 +128,7 @@ impl<S: Scalar> Columns<'_, S> {
         ledgers.resize(islands.len(), Ledger::new());
         for c in constraints {
             let ledger = &mut ledgers[c.island];
-            let closing = self.closing(c.a, c.b, c.normal, c.surface);
+            let closing = self.closing(c.a, c.b, c.along, c.normal, c.surface);
             ledger.bounces |= c.bounces;
             let mean = (c.begin + closing) * S::constant(0.5);
             ledger.work += islands.energy(c, c.impulse(), mean);

@@ -65,6 +65,8 @@ impl<S: Scalar> Scratch<S> {
 pub(super) struct Constraint<S> {
     a: First,
     b: usize,
+    /// How far along the axis of each it is touched.
+    along: [S; 2],
     /// Which island it is of.
     island: usize,
     /// From a to b.
@@ -103,10 +105,13 @@ struct Resistance<S> {
     twist: Vec3<S>,
 }
 
+/// Names a contact: walls first, then by rows.
+type Key = (bool, usize, usize, u32, [i8; 2]);
+
 /// What a contact needed in the last substep, which is a good guess for this one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Warm<S> {
-    key: (bool, usize, usize, u32),
+    key: Key,
     pressure: S,
     grip: Vec3<S>,
     twist: Vec3<S>,
@@ -115,20 +120,22 @@ pub(crate) struct Warm<S> {
 impl<S> Warm<S> {
     /// Calls its marbles by other names. False if one of them has none.
     pub fn rename(&mut self, name: impl Fn(usize) -> Option<usize>) -> bool {
-        let (two_marbles, a, b, part) = self.key;
+        let (two_marbles, a, b, part, side) = self.key;
         let a = if two_marbles { name(a) } else { Some(a) };
         let (Some(a), Some(b)) = (a, name(b)) else { return false };
-        self.key = (two_marbles, a, b, part);
+        self.key = (two_marbles, a, b, part, side);
         true
     }
 }
 
 impl<S: Scalar> Constraint<S> {
-    /// Names the contact: walls first, then by rows.
-    fn key(&self) -> (bool, usize, usize, u32) {
+    fn key(&self) -> Key {
+        let zero = S::zero();
+        // Which ends of capsules; one of them is often touched twice.
+        let side = self.along.map(|along| if along > zero { 2 } else { i8::from(along < zero) });
         match self.a {
-            First::Wall(wall, part) => (false, wall, self.b, part),
-            First::Marble(a) => (true, a, self.b, 0),
+            First::Wall(wall, part) => (false, wall, self.b, part, side),
+            First::Marble(a) => (true, a, self.b, 0, side),
         }
     }
 
@@ -168,27 +175,26 @@ pub(crate) fn impulse<S: Scalar>(
     constraints.clear();
     before.clear();
     before.extend_from_slice(marbles.velocity);
-    let prepare = |a: First, b: usize| {
-        let (mut normal, mut gap) = marbles.normal_and_gap(marbles.position, a, b, walls)?;
-        if let Some((earlier, overlap)) = marbles.normal_and_gap(start, a, b, walls) {
+    let prepare = |a: First, b: usize, along: [S; 2]| {
+        let (mut normal, mut gap) = marbles.normal_and_gap(marbles.position, a, b, along, walls)?;
+        if let Some((earlier, overlap)) = marbles.normal_and_gap(start, a, b, along, walls) {
             // What pushes along the mean normal of a step does no work, and neither does
             // an overlap that stays what it was.
             let mean = direction_and_length(normal + earlier);
             (normal, gap) = (mean.map_or(normal, |(mean, _)| mean), gap - overlap.min(S::zero()));
         }
         let own = material(b);
-        let (surface, inverse_mass, material) = match a {
+        let (surface, material) = match a {
             First::Wall(wall, _) => {
-                let touch = marbles.position[b] - normal * marbles.radius[b];
+                let touch =
+                    marbles.position[b] + marbles.offset(b, along[1]) - normal * marbles.radius[b];
                 let material = walls.material(wall).map_or(own, |its| own.against(its));
-                (walls.surface_velocity(wall, touch), S::zero(), material)
+                (walls.surface_velocity(wall, touch), material)
             }
-            First::Marble(a) => (Vec3::zero(), marbles.inverse_mass[a], own.against(material(a))),
+            First::Marble(a) => (Vec3::zero(), own.against(material(a))),
         };
-        let spin_of_a = a.marble().map_or(BallSpin::Ignored, |a| marbles.ball_spin(a));
-        let second = (marbles.inverse_mass[b], marbles.ball_spin(b));
-        let mobility = Mobility::of([(inverse_mass, spin_of_a), second]);
-        let closing = marbles.closing(a, b, normal, surface);
+        let mobility = marbles.mobility_of_both(a, b, along, normal);
+        let closing = marbles.closing(a, b, along, normal, surface);
         let approach = -closing.dot(normal);
         // The positions have moved on already, and will follow what changes now. So
         // this speed is just enough to keep the gap from closing.
@@ -213,6 +219,7 @@ pub(crate) fn impulse<S: Scalar>(
         let mut constraint = Constraint {
             a,
             b,
+            along,
             island: 0,
             normal,
             surface,
@@ -240,9 +247,9 @@ pub(crate) fn impulse<S: Scalar>(
         }
         (mobility.normal > S::zero()).then_some(constraint)
     };
-    let wm = contacts.wm.iter().map(|c| (First::Wall(c.a as usize, c.part), c.b as usize));
-    let mm = contacts.mm.iter().map(|c| (First::Marble(c.a as usize), c.b as usize));
-    constraints.extend(wm.chain(mm).filter_map(|(a, b)| prepare(a, b)));
+    let wm = contacts.wm.iter().map(|c| (First::Wall(c.a as usize, c.part), c));
+    let mm = contacts.mm.iter().map(|c| (First::Marble(c.a as usize), c));
+    constraints.extend(wm.chain(mm).filter_map(|(a, c)| prepare(a, c.b as usize, c.along)));
 
     for c in constraints.iter() {
         marbles.hit_both(c, c.impulse());
@@ -299,13 +306,15 @@ impl<S: Scalar> Columns<'_, S> {
         position: &[Point3<S>],
         a: First,
         b: usize,
+        along: [S; 2],
         walls: &impl Walls<S>,
     ) -> Option<(Vec3<S>, S)> {
-        let second = *position.get(b)?;
+        let second = *position.get(b)? + self.offset(b, along[1]);
         let (normal, distance) = match a {
             First::Wall(wall, part) => walls.normal_and_distance(wall, part, second),
             First::Marble(a) => {
-                let apart = direction_and_length(second - *position.get(a)?);
+                let first = *position.get(a)? + self.offset(a, along[0]);
+                let apart = direction_and_length(second - first);
                 let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
                 (normal, distance - self.radius[a])
             }
@@ -314,13 +323,38 @@ impl<S: Scalar> Columns<'_, S> {
         gap.is_finite().then_some((normal, gap))
     }
 
+    /// How easily the two of a contact give way.
+    fn mobility_of_both(&self, a: First, b: usize, along: [S; 2], normal: Vec3<S>) -> Mobility<S> {
+        if self.rods.is_empty() {
+            let first = a.marble().map_or((S::zero(), BallSpin::Ignored), |a| {
+                (self.inverse_mass[a], self.ball_spin(a))
+            });
+            return Mobility::of([first, (self.inverse_mass[b], self.ball_spin(b))]);
+        }
+        let second = self.mobility(b, along[1], normal);
+        a.marble().map_or(second, |a| second.and(self.mobility(a, along[0], -normal)))
+    }
+
     /// The velocity of the second's touching point relative to the first's, in m/s.
-    fn closing(&self, a: First, b: usize, normal: Vec3<S>, surface: Vec3<S>) -> Vec3<S> {
+    fn closing(
+        &self,
+        a: First,
+        b: usize,
+        along: [S; 2],
+        normal: Vec3<S>,
+        surface: Vec3<S>,
+    ) -> Vec3<S> {
         let mut velocity = self.velocity[b] - surface;
         let mut rim = self.rim(b);
         if let First::Marble(a) = a {
             velocity -= self.velocity[a];
             rim += self.rim(a);
+        }
+        if !self.rods.is_empty() {
+            velocity += self.swing(b, along[1]);
+            if let First::Marble(a) = a {
+                velocity -= self.swing(a, along[0]);
+            }
         }
         velocity + normal.cross(rim)
     }
@@ -374,16 +408,17 @@ impl<S: Scalar> Columns<'_, S> {
         let second = change * part(c.b);
         if let First::Marble(a) = c.a {
             let first = -change * part(a);
-            self.hit(a, first, -c.normal);
+            self.hit(a, first, -c.normal, c.along[0]);
         }
-        self.hit(c.b, second, c.normal);
+        self.hit(c.b, second, c.normal, c.along[1]);
     }
 
     /// Moves what overlaps too deep half of the way apart, the lighter one further.
     ///
     /// A little overlap stays: what rests then need not fall back in every substep.
     fn push_apart(&mut self, c: &Constraint<S>, walls: &impl Walls<S>, settings: &Settings<S>) {
-        let Some((normal, gap)) = self.normal_and_gap(self.position, c.a, c.b, walls) else {
+        let Some((normal, gap)) = self.normal_and_gap(self.position, c.a, c.b, c.along, walls)
+        else {
             return;
         };
         let smaller =

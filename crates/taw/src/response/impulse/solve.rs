@@ -195,7 +195,7 @@ impl<S: Scalar> Island<S> {
 impl<S: Scalar> Columns<'_, S> {
     /// One step toward what a contact asks for. Gives the change of velocity.
     fn solve(&mut self, c: &mut Constraint<S>) -> S {
-        let closing = self.closing(c.a, c.b, c.normal, c.surface);
+        let closing = self.closing(c.a, c.b, c.along, c.normal, c.surface);
         let along = closing.dot(c.normal);
         let pressure = (c.pressure + c.rebound - along).max(S::zero());
         let sliding = closing - c.normal * along;
@@ -222,7 +222,7 @@ impl<S: Scalar> Columns<'_, S> {
             } else if length(c.grip) >= c.friction * c.pressure * (S::one() - S::epsilon()) {
                 c.way = c.normal * c.way.dot(c.normal); // it slides, whichever way it does
             }
-            let closing = self.closing(c.a, c.b, c.normal, c.surface);
+            let closing = self.closing(c.a, c.b, c.along, c.normal, c.surface);
             island.wish += island.energy(c, c.way, c.normal * c.rebound + c.slide - closing);
         }
         for c in constraints.iter().filter(|c| islands.list[c.island].searches) {
@@ -230,7 +230,7 @@ impl<S: Scalar> Columns<'_, S> {
         }
         for c in constraints.iter() {
             let Some(island) = islands.searching(c) else { continue };
-            let closing = self.closing(c.a, c.b, c.normal, c.surface);
+            let closing = self.closing(c.a, c.b, c.along, c.normal, c.surface);
             // With the wish subtracted, only the change is left.
             island.cost -= island.energy(c, c.way, c.normal * c.rebound + c.slide - closing);
         }
