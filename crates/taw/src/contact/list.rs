@@ -66,13 +66,18 @@ impl<S: Scalar> Contacts<S> {
 }
 
 fn deeper_first<S: Scalar>(x: &Contact<S>, y: &Contact<S>) -> Ordering {
-    let descending = |x: S, y: S| y.partial_cmp(&x).unwrap_or(Ordering::Equal);
     let (squared_x, squared_y) = (x.mtv.magnitude2(), y.mtv.magnitude2());
+    if squared_x > squared_y {
+        return Ordering::Less;
+    }
+    if squared_x < squared_y {
+        return Ordering::Greater;
+    }
+    let descending = |x: S, y: S| y.partial_cmp(&x).unwrap_or(Ordering::Equal);
     (squared_x.is_nan().cmp(&squared_y.is_nan()))
-        .then(descending(squared_x, squared_y))
         // Squares of the tiny and the huge vanish and overflow alike.
         .then_with(|| descending(length(x.mtv), length(y.mtv)))
-        .then((x.a, x.b, x.part).cmp(&(y.a, y.b, y.part)))
+        .then_with(|| (x.a, x.b, x.part).cmp(&(y.a, y.b, y.part)))
         .then_with(|| descending(x.along[0], y.along[0]))
         .then_with(|| descending(x.along[1], y.along[1]))
 }

@@ -95,7 +95,7 @@ mod tests {
         contacts.wm =
             (0..count).map(|b| Contact { a: 0, b, part: 0, along: [0.0; 2], mtv: all }).collect();
         crate::broad::all_pairs(count, |a, b| {
-            contacts.mm.push(Contact { a, b, part: 0, along: [0.0; 2], mtv: all })
+            contacts.mm.push(Contact { a, b, part: 0, along: [0.0; 2], mtv: all });
         });
         let mut stopped = Vec::new();
         let mut columns = Columns {

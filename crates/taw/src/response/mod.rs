@@ -128,12 +128,14 @@ impl<S: Scalar> Rod<S> {
 
 impl<S: Scalar> Columns<'_, S> {
     /// Whether an impulse can set the marble in a row spinning.
+    #[inline]
     fn ball_spin(&self, row: usize) -> BallSpin {
         let held = self.held.get(row).copied().unwrap_or(false);
         if held || self.spin.is_empty() { BallSpin::Ignored } else { BallSpin::Free }
     }
 
     /// The spin in a row, in rad/s, as far as contacts feel it.
+    #[inline]
     fn felt_spin(&self, row: usize) -> Vec3<S> {
         match self.ball_spin(row) {
             BallSpin::Free => self.spin[row],
@@ -142,6 +144,7 @@ impl<S: Scalar> Columns<'_, S> {
     }
 
     /// Radius times spin, in m/s.
+    #[inline]
     fn rim(&self, row: usize) -> Vec3<S> {
         self.felt_spin(row) * self.radius[row]
     }
@@ -156,11 +159,13 @@ impl<S: Scalar> Columns<'_, S> {
     }
 
     /// From the middle of a row to the point of its axis that a contact is about.
+    #[inline]
     fn offset(&self, row: usize, along: S) -> Vec3<S> {
         self.rods.get(row).map_or_else(Vec3::zero, |rod| rod.axis * along)
     }
 
     /// What is long about a row that can be set spinning, if anything is.
+    #[inline]
     fn rod(&self, row: usize) -> Option<&Rod<S>> {
         self.rods.get(row).filter(|rod| rod.half > S::zero())
     }
@@ -186,6 +191,7 @@ impl<S: Scalar> Columns<'_, S> {
     }
 
     /// The velocity that its spin gives to the point of a row's axis that a contact is about.
+    #[inline]
     fn swing(&self, row: usize, along: S) -> Vec3<S> {
         match self.rod(row) {
             Some(rod) => self.felt_spin(row).cross(rod.axis * along),
@@ -195,19 +201,26 @@ impl<S: Scalar> Columns<'_, S> {
 
     /// Changes a velocity by a hit where a marble is touched, and its spin with it;
     /// `normal` points to its center, or to the point `along` its axis.
+    #[inline]
     fn hit(&mut self, row: usize, change: Vec3<S>, normal: Vec3<S>, along: S) {
         self.velocity[row] += change;
-        if let Some(rod) = self.rod(row).copied() {
-            let arm = rod.axis * along - normal * self.radius[row];
-            if let Some(spin) = self.spin.get_mut(row) {
-                *spin += rod.whirl_of(arm.cross(change));
-            }
+        if !self.rods.is_empty() && self.hit_rod(row, change, normal, along) {
             return;
         }
         let whirl = self.ball_spin(row).of_solid_ball::<S>();
         if let Some(spin) = self.spin.get_mut(row) {
             *spin -= normal.cross(change) * (whirl / self.radius[row]);
         }
+    }
+
+    /// Changes the spin of what is long, if it is.
+    fn hit_rod(&mut self, row: usize, change: Vec3<S>, normal: Vec3<S>, along: S) -> bool {
+        let Some(rod) = self.rod(row).copied() else { return false };
+        let arm = rod.axis * along - normal * self.radius[row];
+        if let Some(spin) = self.spin.get_mut(row) {
+            *spin += rod.whirl_of(arm.cross(change));
+        }
+        true
     }
 
     /// Changes a spin by an angular impulse, in kg m²/s.

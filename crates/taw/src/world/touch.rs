@@ -161,6 +161,7 @@ impl<S: Scalar> World<S> {
 }
 
 /// The way of a sphere out of a half-space; none for one that is only so near.
+#[inline]
 fn out_of_half_space<S: Scalar>(plane: &Plane<S>, sphere: &Sphere<S>, reach: S) -> Option<Vec3<S>> {
     let gap = || plane.signed_distance(sphere.center) - sphere.radius;
     let near = || reach > S::zero() && gap() <= reach;
@@ -168,6 +169,7 @@ fn out_of_half_space<S: Scalar>(plane: &Plane<S>, sphere: &Sphere<S>, reach: S) 
 }
 
 /// The way of the second out of the first; none if they are only so near.
+#[inline]
 fn out_of_sphere<S: Scalar>(first: &Sphere<S>, second: &Sphere<S>, reach: S) -> Option<Vec3<S>> {
     let near = || {
         let gap = length(second.center - first.center) - first.radius - second.radius;

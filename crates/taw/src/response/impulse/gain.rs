@@ -92,7 +92,7 @@ impl<S: Scalar> Columns<'_, S> {
         self.count(constraints, islands, ledgers);
         let half = S::constant(0.5);
         for (c, rebound) in constraints.iter().zip(rebounds.iter()) {
-            let ledger = &mut ledgers[c.island];
+            let ledger = &mut ledgers[c.island as usize];
             let closing = self.closing(c.a, c.b, c.along, c.normal, c.surface);
             let more = rebound.impulse - c.impulse();
             let faster = rebound.closing - closing;
@@ -101,8 +101,8 @@ impl<S: Scalar> Columns<'_, S> {
             ledger.curve += islands.energy(c, more, faster * half);
         }
         for (c, rebound) in constraints.iter_mut().zip(rebounds) {
-            if gaining[c.island] {
-                let part = ledgers[c.island].part();
+            if gaining[c.island as usize] {
+                let part = ledgers[c.island as usize].part();
                 let more = (rebound.impulse - c.impulse()) * part;
                 self.hit_both(c, more);
                 c.pressure += more.dot(c.normal);
@@ -127,7 +127,7 @@ impl<S: Scalar> Columns<'_, S> {
         ledgers.clear();
         ledgers.resize(islands.len(), Ledger::new());
         for c in constraints {
-            let ledger = &mut ledgers[c.island];
+            let ledger = &mut ledgers[c.island as usize];
             let closing = self.closing(c.a, c.b, c.along, c.normal, c.surface);
             ledger.bounces |= c.bounces;
             let mean = (c.begin + closing) * S::constant(0.5);

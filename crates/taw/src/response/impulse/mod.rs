@@ -30,15 +30,15 @@ pub(crate) struct Settings<S> {
 #[derive(Clone, Copy, Debug)]
 enum First {
     /// And a part of it.
-    Wall(usize, u32),
-    Marble(usize),
+    Wall(u32, u32),
+    Marble(u32),
 }
 
 impl First {
     fn marble(self) -> Option<usize> {
         match self {
             Self::Wall(..) => None,
-            Self::Marble(row) => Some(row),
+            Self::Marble(row) => Some(row as usize),
         }
     }
 }
@@ -68,7 +68,7 @@ pub(super) struct Constraint<S> {
     /// How far along the axis of each it is touched.
     along: [S; 2],
     /// Which island it is of.
-    island: usize,
+    island: u32,
     /// From a to b.
     normal: Vec3<S>,
     /// The velocity of the wall's surface, in m/s; zero between marbles.
@@ -134,8 +134,8 @@ impl<S: Scalar> Constraint<S> {
         // Which ends of capsules; one of them is often touched twice.
         let side = self.along.map(|along| if along > zero { 2 } else { i8::from(along < zero) });
         match self.a {
-            First::Wall(wall, part) => (false, wall, self.b, part, side),
-            First::Marble(a) => (true, a, self.b, 0, side),
+            First::Wall(wall, part) => (false, wall as usize, self.b, part, side),
+            First::Marble(a) => (true, a as usize, self.b, 0, side),
         }
     }
 
@@ -188,10 +188,11 @@ pub(crate) fn impulse<S: Scalar>(
             First::Wall(wall, _) => {
                 let touch =
                     marbles.position[b] + marbles.offset(b, along[1]) - normal * marbles.radius[b];
+                let wall = wall as usize;
                 let material = walls.material(wall).map_or(own, |its| own.against(its));
                 (walls.surface_velocity(wall, touch), material)
             }
-            First::Marble(a) => (Vec3::zero(), own.against(material(a))),
+            First::Marble(a) => (Vec3::zero(), own.against(material(a as usize))),
         };
         let mobility = marbles.mobility_of_both(a, b, along, normal);
         let closing = marbles.closing(a, b, along, normal, surface);
@@ -200,7 +201,7 @@ pub(crate) fn impulse<S: Scalar>(
         // this speed is just enough to keep the gap from closing.
         let follow = match a {
             First::Wall(..) => follow(b),
-            First::Marble(a) => (follow(a) + follow(b)) * S::constant(0.5),
+            First::Marble(a) => (follow(a as usize) + follow(b)) * S::constant(0.5),
         } * settings.dt;
         let closed = if settings.dt == S::zero() {
             S::zero()
@@ -247,8 +248,8 @@ pub(crate) fn impulse<S: Scalar>(
         }
         (mobility.normal > S::zero()).then_some(constraint)
     };
-    let wm = contacts.wm.iter().map(|c| (First::Wall(c.a as usize, c.part), c));
-    let mm = contacts.mm.iter().map(|c| (First::Marble(c.a as usize), c));
+    let wm = contacts.wm.iter().map(|c| (First::Wall(c.a, c.part), c));
+    let mm = contacts.mm.iter().map(|c| (First::Marble(c.a), c));
     constraints.extend(wm.chain(mm).filter_map(|(a, c)| prepare(a, c.b as usize, c.along)));
 
     for c in constraints.iter() {
@@ -311,8 +312,9 @@ impl<S: Scalar> Columns<'_, S> {
     ) -> Option<(Vec3<S>, S)> {
         let second = *position.get(b)? + self.offset(b, along[1]);
         let (normal, distance) = match a {
-            First::Wall(wall, part) => walls.normal_and_distance(wall, part, second),
+            First::Wall(wall, part) => walls.normal_and_distance(wall as usize, part, second),
             First::Marble(a) => {
+                let a = a as usize;
                 let first = *position.get(a)? + self.offset(a, along[0]);
                 let apart = direction_and_length(second - first);
                 let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
@@ -346,13 +348,13 @@ impl<S: Scalar> Columns<'_, S> {
     ) -> Vec3<S> {
         let mut velocity = self.velocity[b] - surface;
         let mut rim = self.rim(b);
-        if let First::Marble(a) = a {
+        if let Some(a) = a.marble() {
             velocity -= self.velocity[a];
             rim += self.rim(a);
         }
         if !self.rods.is_empty() {
             velocity += self.swing(b, along[1]);
-            if let First::Marble(a) = a {
+            if let Some(a) = a.marble() {
                 velocity -= self.swing(a, along[0]);
             }
         }
@@ -370,6 +372,7 @@ impl<S: Scalar> Columns<'_, S> {
         let (radius, give) = match a {
             First::Wall(..) => (self.radius[b], give(b)),
             First::Marble(a) => {
+                let a = a as usize;
                 let (r, s) = (self.radius[a], self.radius[b]);
                 (r * s / (r + s), give(a) + give(b))
             }
@@ -395,7 +398,7 @@ impl<S: Scalar> Columns<'_, S> {
     /// Applies an angular impulse to the second of a contact, its opposite to the first.
     fn twist_both(&mut self, c: &Constraint<S>, twist: Vec3<S>) {
         self.twist(c.b, twist);
-        if let First::Marble(a) = c.a {
+        if let Some(a) = c.a.marble() {
             self.twist(a, -twist);
         }
     }
@@ -406,7 +409,7 @@ impl<S: Scalar> Columns<'_, S> {
         // The impulse itself, of a pebble, may be too small for the scalar.
         let part = |row: usize| self.inverse_mass[row] / c.mobility.normal;
         let second = change * part(c.b);
-        if let First::Marble(a) = c.a {
+        if let Some(a) = c.a.marble() {
             let first = -change * part(a);
             self.hit(a, first, -c.normal, c.along[0]);
         }

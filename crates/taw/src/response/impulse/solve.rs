@@ -33,13 +33,13 @@ pub(super) fn sweep<S: Scalar>(
 ) {
     for sweep in 0..settings.iterations {
         for c in constraints.iter_mut() {
-            if islands.list[c.island].agrees {
+            if islands.list[c.island as usize].agrees {
                 continue;
             }
             let before = c.impulse();
             let change = marbles.solve(c);
             c.step = c.impulse() - before;
-            let island = &mut islands.list[c.island];
+            let island = &mut islands.list[c.island as usize];
             island.change = island.change.max(change);
             island.squared += island.energy(c, c.step, c.step);
         }
@@ -101,7 +101,7 @@ impl<S: Scalar> Islands<S> {
     /// An impulse (as a speed, times the mobility) on a contact times a velocity there, in
     /// units of its island.
     pub fn energy(&self, c: &Constraint<S>, impulse: Vec3<S>, velocity: Vec3<S>) -> S {
-        self.list[c.island].energy(c, impulse, velocity)
+        self.list[c.island as usize].energy(c, impulse, velocity)
     }
 
     /// Sets some islands back to where the sweeps begin, and none of the others.
@@ -143,7 +143,7 @@ impl<S: Scalar> Islands<S> {
                     cost: S::zero(),
                 });
             }
-            c.island = self.number[first] as usize;
+            c.island = self.number[first];
         }
     }
 
@@ -180,7 +180,7 @@ impl<S: Scalar> Islands<S> {
 
     /// The island of a contact, if it searches.
     fn searching(&mut self, c: &Constraint<S>) -> Option<&mut Island<S>> {
-        Some(&mut self.list[c.island]).filter(|island| island.searches)
+        Some(&mut self.list[c.island as usize]).filter(|island| island.searches)
     }
 }
 
@@ -225,7 +225,7 @@ impl<S: Scalar> Columns<'_, S> {
             let closing = self.closing(c.a, c.b, c.along, c.normal, c.surface);
             island.wish += island.energy(c, c.way, c.normal * c.rebound + c.slide - closing);
         }
-        for c in constraints.iter().filter(|c| islands.list[c.island].searches) {
+        for c in constraints.iter().filter(|c| islands.list[c.island as usize].searches) {
             self.hit_both(c, c.way);
         }
         for c in constraints.iter() {
