@@ -1,5 +1,5 @@
 //! The board: a floor and four rails that turn as one about its middle. How it
-//! looks, and how it tilts.
+//! looks, what it is made of, and how it tilts.
 
 use std::f32::consts::TAU;
 
@@ -27,6 +27,17 @@ const SETTLING_RATE: f32 = 8.0;
 /// Marks the entity that turns. Floor and rails are its children.
 #[derive(Component)]
 pub struct Board;
+
+/// Whether the board is made of boxes, over whose rails marbles can fly, or of half-spaces.
+#[derive(Resource, Clone, Copy, Default, PartialEq, Eq)]
+pub struct MadeOfBoxes(pub bool);
+
+/// What a piece of the board is as a wall while it is one.
+#[derive(Component, Clone)]
+enum Piece {
+    HalfSpace(Dir3),
+    Box(Cuboid),
+}
 
 /// The size of the board: half of its inner width, in metres.
 #[derive(Resource, Clone, Copy, Deref)]
@@ -78,9 +89,11 @@ impl Tilt {
 pub fn plugin(app: &mut App) {
     let options = app.world().resource::<Options>();
     let (half_width, sway) = (HalfWidth::for_marbles(options.marbles), options.sway.then_some(0.0));
+    let boxes = options.boxes;
     let model = model_for(options.marbles);
     app.insert_resource(TawModel(model))
         .insert_resource(half_width)
+        .insert_resource(MadeOfBoxes(boxes))
         .insert_resource(Tilt {
             now: Vec2::ZERO,
             speed: Vec2::ZERO,
@@ -94,7 +107,10 @@ pub fn plugin(app: &mut App) {
             ..default()
         })
         .add_systems(Startup, (spawn_board, spawn_surroundings))
-        .add_systems(FixedUpdate, tilt.before(TawSystems::Gather));
+        .add_systems(
+            FixedUpdate,
+            (tilt, build.run_if(resource_changed::<MadeOfBoxes>)).before(TawSystems::Gather),
+        );
 }
 
 /// All that there is for a handful of marbles; for a crowd, what keeps up with it.
@@ -124,6 +140,20 @@ fn tilt(
     }
     tilt.follow(wanted, **half_width, time.delta_secs());
     board.rotation = tilt.rotation();
+}
+
+/// Makes walls of the half-spaces or of the boxes.
+fn build(mut commands: Commands, boxes: Res<MadeOfBoxes>, pieces: Query<(Entity, &Piece)>) {
+    for (entity, piece) in &pieces {
+        let wall = match piece {
+            Piece::HalfSpace(normal) => (!boxes.0).then_some(Wall::HalfSpace(*normal)),
+            Piece::Box(cuboid) => boxes.0.then_some(Wall::from(*cuboid)),
+        };
+        match wall {
+            Some(wall) => commands.entity(entity).insert(wall),
+            None => commands.entity(entity).remove::<Wall>(),
+        };
+    }
 }
 
 pub fn spawn_board(
@@ -164,25 +194,28 @@ pub fn spawn_board(
     let floor = Cuboid::new(outer, FLOOR_DEPTH, outer);
     commands.spawn((
         ChildOf(board),
-        Wall::default(),
+        Piece::HalfSpace(Dir3::Y),
         Transform::default(),
         Visibility::default(),
         children![(
+            Piece::Box(floor),
             Mesh3d(meshes.add(floor)),
             MeshMaterial3d(floor_look),
             Transform::from_xyz(0.0, -FLOOR_DEPTH / 2.0, 0.0),
         )],
     ));
-    let rail = meshes.add(Cuboid::new(outer, RAIL_HEIGHT, RAIL_WIDTH));
+    let cuboid = Cuboid::new(outer, RAIL_HEIGHT, RAIL_WIDTH);
+    let rail = meshes.add(cuboid);
     for quarter in 0..4_u8 {
         // A wall's surface is at its origin; the rail's box lies behind that.
         let turn = Quat::from_rotation_y(f32::from(quarter) * TAU / 4.0);
         commands.spawn((
             ChildOf(board),
-            Wall::HalfSpace(Dir3::Z),
+            Piece::HalfSpace(Dir3::Z),
             Transform::from_translation(turn * Vec3::NEG_Z * half).with_rotation(turn),
             Visibility::default(),
             children![(
+                Piece::Box(cuboid),
                 Mesh3d(rail.clone()),
                 MeshMaterial3d(rail_look.clone()),
                 Transform::from_xyz(0.0, RAIL_HEIGHT / 2.0, -RAIL_WIDTH / 2.0),

@@ -36,6 +36,12 @@ struct Options {
     /// The board sways by itself until somebody tilts it
     #[arg(long)]
     sway: bool,
+    /// The board is made of boxes, over which marbles can fly
+    #[arg(long)]
+    boxes: bool,
+    /// The marbles are capsules
+    #[arg(long)]
+    capsules: bool,
     #[command(flatten)]
     picture: Picture,
 }

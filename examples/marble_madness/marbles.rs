@@ -25,6 +25,8 @@ pub struct Bag {
     /// The smallest and the largest radius, in metres.
     pub smallest: f32,
     pub largest: f32,
+    /// Whether they are capsules, twice as long as wide.
+    pub capsules: bool,
     random: fastrand::Rng,
 }
 
@@ -38,14 +40,16 @@ pub const COLOURS: [Srgba; 4] =
 
 #[derive(Resource)]
 struct Look {
-    mesh: Handle<Mesh>,
+    ball: Handle<Mesh>,
+    capsule: Handle<Mesh>,
     materials: [Handle<StandardMaterial>; COLOURS.len()],
 }
 
 pub fn plugin(app: &mut App) {
-    let random = fastrand::Rng::with_seed(app.world().resource::<Options>().seed);
+    let options = app.world().resource::<Options>();
+    let (random, capsules) = (fastrand::Rng::with_seed(options.seed), options.capsules);
     app.add_message::<Order>()
-        .insert_resource(Bag { smallest: 0.2, largest: 0.6, random })
+        .insert_resource(Bag { smallest: 0.2, largest: 0.6, capsules, random })
         .add_systems(Startup, (make_look, reset))
         .add_systems(
             Update,
@@ -54,7 +58,10 @@ pub fn plugin(app: &mut App) {
                 drop_more.run_if(just_pressed(Action::DropMore)),
             ),
         )
-        .add_systems(FixedUpdate, obey.before(TawSystems::Gather));
+        .add_systems(
+            FixedUpdate,
+            (obey, shape_marbles, bring_back).chain().before(TawSystems::Gather),
+        );
 }
 
 fn reset(mut orders: MessageWriter<Order>) {
@@ -73,7 +80,8 @@ fn make_look(
 ) {
     let swirl: Handle<Image> = assets.load("textures/marble.png");
     commands.insert_resource(Look {
-        mesh: meshes.add(Sphere::new(1.0).mesh().uv(28, 16)),
+        ball: meshes.add(Sphere::new(1.0).mesh().uv(28, 16)),
+        capsule: meshes.add(Capsule3d::new(1.0, 2.0).mesh().longitudes(28).latitudes(16)),
         materials: COLOURS.map(|colour| {
             materials.add(StandardMaterial {
                 base_color: colour.into(),
@@ -122,6 +130,38 @@ fn obey(
     }
 }
 
+/// Makes capsules of balls and balls of capsules, as the bag says.
+fn shape_marbles(
+    mut commands: Commands,
+    bag: Res<Bag>,
+    look: Res<Look>,
+    marbles: Query<(Entity, &Marble, Has<HalfLength>)>,
+) {
+    for (entity, marble, is_capsule) in &marbles {
+        if bag.capsules && !is_capsule {
+            let half = HalfLength(marble.radius);
+            commands.entity(entity).insert((half, Mesh3d(look.capsule.clone())));
+        } else if !bag.capsules && is_capsule {
+            commands.entity(entity).remove::<HalfLength>().insert(Mesh3d(look.ball.clone()));
+        }
+    }
+}
+
+/// What fell off the board drops onto it again.
+fn bring_back(
+    half_width: Res<HalfWidth>,
+    mut marbles: Query<(&mut Transform, &mut Velocity), With<Marble>>,
+) {
+    for (mut transform, mut velocity) in &mut marbles {
+        if transform.translation.y < -**half_width {
+            let Vec3 { x, z, .. } = transform.translation;
+            let middle = Vec3::new(x, 0.0, z).clamp_length_max(0.6 * **half_width);
+            transform.translation = middle + Vec3::Y * 4.0;
+            **velocity = Vec3::ZERO;
+        }
+    }
+}
+
 /// Cells above the board, each wide enough for the largest marble: as many as
 /// there are marbles, in layers if need be.
 struct Lattice {
@@ -160,8 +200,9 @@ fn marble(i: u32, lattice: &Lattice, bag: &mut Bag, look: &Look) -> impl Bundle 
     let turn = Quat::from_euler(EulerRot::YXZ, angle(), angle(), angle());
     (
         Marble::new(radius),
+        Velocity::default(),
         Colour(colour),
-        Mesh3d(look.mesh.clone()),
+        Mesh3d(look.ball.clone()),
         MeshMaterial3d(look.materials[colour].clone()),
         Transform::from_xyz(x, y, z).with_rotation(turn).with_scale(Vec3::splat(radius)),
     )

@@ -9,7 +9,7 @@ use bevy_taw::debug_ui;
 use bevy_taw::prelude::*;
 
 use crate::Options;
-use crate::board::Tilt;
+use crate::board::{MadeOfBoxes, Tilt};
 use crate::controls::{Action, HELP, just_pressed};
 use crate::goals::Score;
 use crate::marbles::{Bag, Order};
@@ -50,7 +50,7 @@ fn panels(
     mut bag: ResMut<Bag>,
     mut tilt: ResMut<Tilt>,
     mut score: ResMut<Score>,
-    mut physics: (ResMut<TawModel>, ResMut<Gravity>),
+    mut physics: (ResMut<TawModel>, ResMut<Gravity>, ResMut<MadeOfBoxes>),
     mut time: ResMut<Time<Virtual>>,
     mut orders: MessageWriter<Order>,
     mut steps: MessageWriter<SingleStep>,
@@ -71,6 +71,10 @@ fn panels(
             let slider = egui::Slider::new(&mut degrees, 0.0..=45.0).suffix("°").text("Tilt limit");
             if ui.add(slider).changed() {
                 tilt.limit = degrees.to_radians();
+            }
+            let mut boxes = physics.2.0;
+            if ui.checkbox(&mut boxes, "The board is made of boxes").changed() {
+                physics.2.0 = boxes;
             }
             let mut plays = !score.paused;
             if ui.checkbox(&mut plays, "Pads take marbles of their colour").changed() {
@@ -106,6 +110,8 @@ fn marbles(ui: &mut Ui, open: &mut Open, bag: &mut Bag, orders: &mut MessageWrit
     ui.add(egui::Slider::new(&mut bag.smallest, sizes.clone()).suffix(" m").text("smallest"));
     ui.add(egui::Slider::new(&mut bag.largest, sizes).suffix(" m").text("largest"));
     bag.largest = bag.largest.max(bag.smallest);
+    ui.checkbox(&mut bag.capsules, "Capsules")
+        .on_hover_text("Every response but the event-driven one knows them");
     ui.horizontal(|ui| {
         if ui.button("Drop").clicked() {
             orders.write(Order::Drop(open.drop));

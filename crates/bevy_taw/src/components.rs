@@ -194,6 +194,14 @@ pub struct MarbleIntegrator(#[reflect(remote = IntegratorReflect)] pub Integrato
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
 
+/// Makes a capsule of a marble: all points within its radius of a line along the entity's y
+/// axis, which goes this far both ways, in metres; like Bevy's `Capsule3d`. Zero is a ball.
+///
+/// Every response knows capsules but the event-driven one.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct HalfLength(pub f32);
+
 /// What the physics knows of a marble entity.
 #[derive(Component, Clone, Copy, Debug, Default)]
 pub(crate) struct MarbleState {
@@ -210,6 +218,7 @@ pub(crate) struct SeenMarble {
     pub translation: [u32; 3],
     pub rotation: [u32; 4],
     pub radius: u32,
+    pub half_length: Option<u32>,
     pub velocity: Option<[u32; 3]>,
     pub spin: Option<[u32; 3]>,
     /// Which kind of mass, and its number.

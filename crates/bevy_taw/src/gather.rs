@@ -7,9 +7,9 @@ use taw::motion::Rotation;
 use taw::world::{self as core, WallMotion};
 
 use crate::components::{
-    ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
-    MarbleMass, MarbleRotation, MarbleState, SeenMarble, Spin, SurfaceMaterial, Velocity,
-    WallState, bits, rotation_bits,
+    ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble, MarbleDamping,
+    MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, SeenMarble, Spin, SurfaceMaterial,
+    Velocity, WallState, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
@@ -117,6 +117,7 @@ type MarbleComponents<'a> = (
     &'a Marble,
     &'a Transform,
     (
+        Option<&'a HalfLength>,
         Option<&'a Velocity>,
         Option<&'a Spin>,
         Option<&'a MarbleMass>,
@@ -147,12 +148,22 @@ pub fn marbles(
         if begins_to_turn {
             (state.seen.rotation, state.seen.spin) = ([0; 4], None); // no rotation's bits
         }
-        let (velocity, spin, mass, gravity_scale, damping, material, integrator, rotation_model) =
-            optional;
+        let (
+            half_length,
+            velocity,
+            spin,
+            mass,
+            gravity_scale,
+            damping,
+            material,
+            integrator,
+            rotation_model,
+        ) = optional;
         let seen = SeenMarble {
             translation: bits(transform.translation),
             rotation: rotation_bits(transform.rotation),
             radius: marble.radius.to_bits(),
+            half_length: half_length.map(|half| half.to_bits()),
             velocity: velocity.map(|v| bits(**v)),
             spin: spin.map(|s| bits(**s)),
             mass: mass.map(|m| m.bits()),
@@ -177,6 +188,7 @@ pub fn marbles(
         let now = core::Marble {
             position: to_point(place.translation),
             radius: marble.radius,
+            half_length: *half_length.copied().unwrap_or_default(),
             velocity: to_vector(velocity.map_or(Vec3::ZERO, |v| **v)),
             rotation: to_rotation(place.rotation),
             spin: to_vector(spin.map_or(Vec3::ZERO, |s| **s)),
@@ -229,6 +241,11 @@ fn update(
     }
     if seen.radius != last.radius {
         check(marbles.set_radius(id, now.radius));
+    }
+    if seen.half_length != last.half_length {
+        check(marbles.set_half_length(id, now.half_length));
+        // Which way a ball points may not have been kept.
+        check(marbles.set_rotation(id, now.rotation));
     }
     if seen.velocity != last.velocity && seen.velocity.is_some() {
         check(marbles.set_velocity(id, now.velocity));

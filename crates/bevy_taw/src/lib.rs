@@ -79,8 +79,8 @@ pub use taw;
 /// What nearly every game needs.
 pub mod prelude {
     pub use crate::components::{
-        ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
-        MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity,
+        ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble, MarbleDamping,
+        MarbleIntegrator, MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;

@@ -3,8 +3,8 @@ use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
 
 use crate::components::{
-    ExternalForce, ExternalImpulse, GravityScale, Marble, MarbleDamping, MarbleIntegrator,
-    MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity,
+    ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble, MarbleDamping,
+    MarbleIntegrator, MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity,
 };
 use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
@@ -89,7 +89,8 @@ impl Plugin for TawPlugin {
             .add_message::<MarbleStopped>();
         app.register_type::<(Marble, Velocity, Spin, MarbleMass, GravityScale)>()
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
-            .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, Wall)>()
+            .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength, Wall)>(
+            )
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
 

@@ -16,7 +16,8 @@ pub struct OfParts<T> {
 }
 
 /// All convex parts of a shape, those of compounds in compounds, too.
-pub(crate) fn parts_of<S: Scalar>(shape: &Shape<S>) -> Vec<&dyn Convex<S>> {
+#[must_use]
+pub fn parts_of<S: Scalar>(shape: &Shape<S>) -> Vec<&dyn Convex<S>> {
     match shape {
         Shape::Sphere(sphere) => vec![sphere],
         Shape::Aabb(aabb) => vec![aabb],

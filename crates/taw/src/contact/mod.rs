@@ -41,8 +41,7 @@ mod sweep;
 mod turning;
 
 pub use closest::{Closest, closest, closest_exhaustive, closest_plane};
-pub(crate) use compound::parts_of;
-pub use compound::{OfParts, closest_shapes, manifolds_of_shapes, sweep_shapes};
+pub use compound::{OfParts, closest_shapes, manifolds_of_shapes, parts_of, sweep_shapes};
 pub use core::{Convex, Core};
 pub use exhaustive::Skeleton;
 pub use list::{Contact, Contacts};

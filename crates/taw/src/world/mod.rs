@@ -238,11 +238,6 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::BallsOnly`] for a capsule in a world that is
     /// event-driven; then nothing has moved.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
-        if self.model.response == Response::EventDriven
-            && let Some(id) = self.marbles.first_capsule()
-        {
-            return Err(Error::BallsOnly(id));
-        }
         let dt = positive("dt", dt / S::constant(f64::from(self.model.substeps)))?;
         self.begin_step();
         for _ in 0..self.model.substeps {
@@ -259,9 +254,15 @@ impl<S: Scalar> World<S> {
     /// moves when is decided by the third verb.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`.
+    /// [`Error::NotPositive`] for `dt`, [`Error::BallsOnly`] for a capsule in a world that is
+    /// event-driven; then nothing has moved.
     pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
         let dt = positive("dt", dt)?;
+        if self.model.response == Response::EventDriven
+            && let Some(id) = self.marbles.first_capsule()
+        {
+            return Err(Error::BallsOnly(id));
+        }
         let drive = Drive {
             integrator: self.model.integrator,
             gravity: self.gravity,
