@@ -18,6 +18,7 @@ pub enum Action {
     #[actionlike(DualAxis)]
     Orbit,
     DropMore,
+    Flick,
     Reset,
     Pause,
     SingleStep,
@@ -27,11 +28,12 @@ pub enum Action {
 }
 
 /// All keys, as the help panel lists them.
-pub const HELP: [(&str, &str); 9] = [
+pub const HELP: [(&str, &str); 10] = [
     ("Arrows, WASD, left drag, left stick", "tilt the board"),
     ("Right drag, right stick", "turn the view"),
     ("Middle drag · wheel", "move the view · zoom"),
     ("Space · A", "drop ten more marbles"),
+    ("F", "flick the marble under the mouse"),
     ("R · Select", "start over"),
     ("P · Start", "pause"),
     ("N", "one step while paused"),
@@ -49,6 +51,7 @@ fn bindings() -> InputMap<Action> {
         .with_dual_axis(Action::Orbit, GamepadStick::RIGHT.with_circle_deadzone(0.1))
         .with(Action::DropMore, KeyCode::Space)
         .with(Action::DropMore, GamepadButton::South)
+        .with(Action::Flick, KeyCode::KeyF)
         .with(Action::Reset, KeyCode::KeyR)
         .with(Action::Reset, GamepadButton::Select)
         .with(Action::Pause, KeyCode::KeyP)

@@ -9,6 +9,7 @@
 
 mod board;
 mod controls;
+mod flick;
 mod goals;
 mod marbles;
 mod panel;
@@ -23,6 +24,7 @@ use taw_examples::{ExamplePlugins, OrbitCameraPlugin, Picture};
 /// Tilt the board and roll every marble onto the pad of its colour
 #[derive(Parser, Resource, Clone)]
 #[command(version)]
+#[expect(clippy::struct_excessive_bools, reason = "switches are what a command line has")]
 struct Options {
     /// How many marbles to begin with
     #[arg(long, default_value_t = 120, value_name = "N")]
@@ -55,6 +57,7 @@ fn main() -> AppExit {
         .add_plugins((
             board::plugin,
             controls::plugin,
+            flick::plugin,
             goals::plugin,
             marbles::plugin,
             panel::plugin,

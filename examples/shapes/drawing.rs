@@ -83,7 +83,7 @@ fn draw_shape(shape: &Shape<f32>, by: Vec3, gizmos: &mut Gizmos, colour: Srgba) 
                 Quat::from_rotation_arc(Vec3::Y, (b - a).normalize_or(Vec3::Y)),
             );
             let capsule = Capsule3d::new(it.radius, a.distance(b));
-            gizmos.primitive_3d(&capsule, isometry, colour).resolution(32);
+            gizmos.primitive_3d(&capsule, isometry, colour).resolution(12);
         }
         Shape::Hull(it) => {
             let corners: Vec<_> = it.points().map(point).collect();

@@ -31,13 +31,13 @@ pub enum Kind {
 pub struct Scene {
     pub kinds: [Kind; 2],
     pub place: Transform,
-    /// How far in front of the camera it was taken hold of, and at which point of it.
+    /// How far from the eye it was taken hold of, and its place from there.
     pub held: Option<(f32, Vec3)>,
     /// Where it would go.
     pub way: Vec3,
 }
 
-pub fn taw_vector(v: Vec3) -> TawVec3<f32> {
+fn taw_vector(v: Vec3) -> TawVec3<f32> {
     TawVec3::new(v.x, v.y, v.z)
 }
 

@@ -15,12 +15,10 @@ use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
 use bevy_taw::taw::contact::{Cast, Closest};
-use bevy_taw::taw::frame::Ray;
-use bevy_taw::taw::math::Point3;
 use clap::{Parser, ValueEnum};
 use drawing::draw;
-use gallery::{Answers, Kind, Scene, ask, bevy_point, second, shape, taw_vector};
-use taw_examples::{ExamplePlugins, OrbitCameraPlugin, Picture, orbit_camera};
+use gallery::{Answers, Kind, Scene, ask, bevy_point, second, shape};
+use taw_examples::{ExamplePlugins, OrbitCameraPlugin, Picture, Pointer, orbit_camera};
 
 /// Look at any two shapes, and all that the core says of them
 #[derive(Parser)]
@@ -65,28 +63,18 @@ fn drag(
     mut scene: ResMut<Scene>,
     buttons: Res<ButtonInput<MouseButton>>,
     egui: Res<EguiWantsInput>,
-    window: Single<&Window>,
-    camera: Single<(&Camera, &GlobalTransform)>,
+    pointer: Pointer,
 ) {
-    let (camera, eye) = *camera;
-    let pointed = window.cursor_position().and_then(|at| camera.viewport_to_world(eye, at).ok());
-    let Some(ray) = pointed.filter(|_| buttons.pressed(MouseButton::Left)) else {
+    let Some(ray) = pointer.ray().filter(|_| buttons.pressed(MouseButton::Left)) else {
         scene.held = None;
         return;
     };
-    let forward = eye.forward().dot(*ray.direction);
     if buttons.just_pressed(MouseButton::Left) && !egui.wants_any_pointer_input() {
-        let origin = Point3::new(ray.origin.x, ray.origin.y, ray.origin.z);
-        let cast = Ray { origin, direction: taw_vector(*ray.direction) };
-        let hit = second(&scene).and_then(|shape| shape.cast(&cast, f32::INFINITY));
-        let held = hit.map(|hit| {
-            let offset = scene.place.translation - bevy_point(hit.point);
-            (hit.distance * forward, offset)
-        });
-        scene.held = held;
+        let hit = second(&scene).and_then(|shape| shape.cast(&ray, f32::INFINITY));
+        scene.held = hit.map(|hit| (hit.distance, scene.place.translation - bevy_point(hit.point)));
     }
-    if let Some((depth, offset)) = scene.held {
-        scene.place.translation = ray.origin + *ray.direction * (depth / forward) + offset;
+    if let Some((distance, offset)) = scene.held {
+        scene.place.translation = bevy_point(ray.at(distance)) + offset;
     }
 }
 
@@ -132,7 +120,7 @@ fn panel(mut contexts: EguiContexts, mut scene: ResMut<Scene>) -> Result {
             ui.weak(format!("{distance:.6} m, feature {feature:#x}"));
         }
         ui.label(impact.map_or("its way is free".into(), |(time, ..)| {
-            format!("stops after {:.4} of its way", time)
+            format!("stops after {time:.4} of its way")
         }));
         ui.separator();
         ui.weak("Drag the orange one; Q, E and the arrow keys turn it");

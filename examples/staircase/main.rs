@@ -43,7 +43,7 @@ const COLOURS: [Srgba; 4] =
 fn main() -> AppExit {
     let options = Options::parse();
     if options.table {
-        print!("{}", table());
+        println!("{}", table());
         return AppExit::Success;
     }
     App::new()
@@ -76,7 +76,7 @@ fn build(
             ..default()
         })
     };
-    let (stone, ramp) = (look(tailwind::STONE_300), look(tailwind::STONE_400));
+    let (stone, ramp) = (look(tailwind::STONE_500), look(tailwind::AMBER_900));
     for [min, max] in lanes::boxes() {
         let (min, max) = (Vec3::from(min), Vec3::from(max));
         let cuboid = Cuboid::from_corners(min, max);
@@ -109,7 +109,7 @@ fn build(
         Transform::from_xyz(6.0, -0.005, 0.0),
     ));
     commands.spawn((
-        DirectionalLight { illuminance: 9000.0, shadow_maps_enabled: true, ..default() },
+        DirectionalLight { illuminance: 6000.0, shadow_maps_enabled: true, ..default() },
         Transform::from_xyz(4.0, 8.0, 5.0).looking_at(Vec3::ZERO, Vec3::Y),
     ));
     commands.insert_resource(GlobalAmbientLight { brightness: 350.0, ..default() });
@@ -219,10 +219,10 @@ fn panel(mut contexts: EguiContexts, tracks: Query<&Track>) -> Result {
 
 /// What a run shows, as Markdown.
 fn table() -> String {
-    let mut text = String::from(
-        "| response | who, where | arrives | at | flies up to | touches down |\n\
-         |---|---|---|---|---|---|\n",
-    );
+    let mut lines = vec![
+        "| response | who, where | arrives | at | flies up to | touches down |".to_string(),
+        "|---|---|---|---|---|---|".to_string(),
+    ];
     for (name, response) in [
         ("displacement", Response::Displacement),
         ("impulse", Response::Impulse),
@@ -239,8 +239,8 @@ fn table() -> String {
                 }
                 Err(_) => "balls only | – | – | –".into(),
             };
-            text += &format!("| {name} | {} | {cells} |\n", runner.name());
+            lines.push(format!("| {name} | {} | {cells} |", runner.name()));
         }
     }
-    text
+    lines.join("\n")
 }

@@ -1,10 +1,12 @@
 //! What the examples share: the window, a picture of it on request, and a camera
-//! that orbits.
+//! that orbits, with what the mouse points at.
 //!
 //! No physics and no game is in here.
 
 mod camera;
+mod pointer;
 mod window;
 
 pub use camera::{OrbitCameraPlugin, orbit_camera, orbit_camera_at};
+pub use pointer::Pointer;
 pub use window::{ExamplePlugins, Picture};

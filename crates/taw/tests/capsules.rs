@@ -23,8 +23,8 @@ fn world(model: Model) -> World<f64> {
     world
 }
 
-fn material(restitution: f64, friction: f64) -> Option<Material<f64>> {
-    Some(Material { restitution, friction, ..Material::default() })
+fn material(restitution: f64, friction: f64) -> Material<f64> {
+    Material { restitution, friction, ..Material::default() }
 }
 
 fn axis(marble: &Marble<f64>) -> Vec3<f64> {
@@ -90,7 +90,7 @@ fn a_capsule_falls_over_and_lies_still() {
                 let mut world = world(model);
                 world.walls.insert(floor.clone()).unwrap();
                 let id = world.marbles.insert(capsule([0.0, 1.0, 0.0], tilt)).unwrap();
-                world.marbles.set_material(id, material(0.2, 0.5)).unwrap();
+                world.marbles.set_material(id, Some(material(0.2, 0.5))).unwrap();
                 let mut most = world.energy().total();
                 for _ in 0..900 {
                     world.step(DT).unwrap();
@@ -140,7 +140,7 @@ fn a_bounce_turns_back_the_velocity_of_the_point_that_is_touched() {
         world.walls.insert(floors().remove(0)).unwrap();
         let height = 0.5 * f64::cos(tilt) + 0.25 + 0.01;
         let id = world.marbles.insert(capsule([0.0, height, 0.0], tilt)).unwrap();
-        world.marbles.set_material(id, material(restitution, 0.0)).unwrap();
+        world.marbles.set_material(id, Some(material(restitution, 0.0))).unwrap();
         world.marbles.set_velocity(id, Vec3::new(0.0, -2.0, 0.0)).unwrap();
         let energy = world.energy().total();
         world.step(DT).unwrap();
@@ -178,7 +178,7 @@ fn a_collision_keeps_momentum_and_angular_momentum() {
             marble.velocity = Vec3::new(-3.0 * x, 0.3 * next(), 0.3 * next());
             marble.spin = Vec3::new(next(), next(), next());
             marble.half_length = if next() > 0.0 { 0.5 } else { 0.0 };
-            marble.material = material(0.7, 0.0);
+            marble.material = Some(material(0.7, 0.0));
             world.marbles.insert(marble).unwrap()
         });
         // About the origin, with the marbles at these places.
@@ -252,7 +252,7 @@ fn a_heap_of_capsules_and_balls_settles() {
             (f64::from(i % 3) - 1.0, 1.0 + 0.9 * f64::from(i / 9), f64::from(i / 3 % 3) - 1.0);
         let mut marble = capsule([x * 0.9, y, z * 0.9], 0.3 * f64::from(i));
         marble.half_length = if i % 3 == 0 { 0.0 } else { 0.2 };
-        marble.material = material(0.1, 0.5);
+        marble.material = Some(material(0.1, 0.5));
         world.marbles.insert(marble).unwrap();
     }
     for _ in 0..900 {

@@ -15,9 +15,22 @@
 //! | a mesh or height field and any of these | [`Closest::touching`] | [`closest_of_surface`] | [`manifolds_of_surface`] | [`sweep_against_surface`] |
 //! | ray and any shape | [`Cast::cast`], [`cast_on_surface`] | | | |
 //!
-//! With a sphere, a distance is right to a few epsilons of the scalar. Of two other shapes
-//! it is found in `f64` about the middle of one of them, right to 4e-12 of their size, and
-//! rounded once; where edges or faces are parallel but for less than 1e-7 rad, to that angle.
+//! How right a distance is, and by which method it is found:
+//!
+//! | of | method | right to |
+//! |---|---|---|
+//! | sphere and anything | the nearest point, in closed form | 4 epsilons of the scalar, of the largest coordinate |
+//! | half-space and anything | the farthest point behind it | the same |
+//! | two capsules | the nearest points of two lines, in closed form | 4e-12 of their size |
+//! | two boxes | fifteen axes if they overlap, else as all others | 4e-12 |
+//! | all others | corners that are farthest in some directions, until a bound from below and one from above agree | 4e-12 |
+//! | sweeps along lines | planes that keep them apart | 1e-10 of their size, never late |
+//! | sweeps that turn | the same, with bent paths | 1e-7 of their size, never late |
+//!
+//! But for the first two, all is found in `f64` about the middle of one of the two, and rounded
+//! once to the scalar. Where edges or faces are parallel but for less than 1e-7 rad, the
+//! distance is right to that angle. `tests/degenerate.rs` is the table of what breaks such
+//! code elsewhere.
 //!
 //! # The displacement
 //! Every test gives the *minimum translation vector*: the shortest displacement

@@ -1,10 +1,10 @@
-use cgmath::{EuclideanSpace, InnerSpace, One};
+use cgmath::{EuclideanSpace, InnerSpace, Matrix3, One};
 
 use super::{Aabb, Box3, Nearest, Solid};
 use crate::Error;
 use crate::error::{finite_point, within};
 use crate::frame::Pose;
-use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, length};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, direction_and_length, length};
 
 /// A box that may be turned. It may be flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,16 +110,18 @@ impl<S: Scalar> Solid<S> for Obb<S> {
     }
 
     fn nearest(&self, point: Point3<S>) -> Nearest<S> {
-        let pose = self.pose();
-        let local = pose.point_back(point).to_vec();
-        let mut inside = local;
-        for axis in 0..3 {
-            let half = self.half_widths[axis];
-            inside[axis] = num_clamp(local[axis], half);
-        }
-        let out = self.rotation * (local - inside);
-        if let Some((normal, distance)) = crate::math::direction_and_length(out) {
-            return Nearest { point: self.center + self.rotation * inside, normal, distance };
+        let turn = Matrix3::from(self.rotation);
+        let away = point - self.center;
+        let local = Vec3::new(turn.x.dot(away), turn.y.dot(away), turn.z.dot(away));
+        let half = self.half_widths;
+        let inside = Vec3::new(
+            num_clamp(local.x, half.x),
+            num_clamp(local.y, half.y),
+            num_clamp(local.z, half.z),
+        );
+        let there = |v: Vec3<S>| turn.x * v.x + turn.y * v.y + turn.z * v.z;
+        if let Some((normal, distance)) = direction_and_length(there(local - inside)) {
+            return Nearest { point: self.center + there(inside), normal, distance };
         }
         // Inside: the nearest face. Of faces as near, the first axis, and the side on which
         // the point is, or the positive one.
@@ -131,13 +133,14 @@ impl<S: Scalar> Solid<S> for Obb<S> {
         let mut surface = local;
         surface[axis] = side * self.half_widths[axis];
         Nearest {
-            point: self.center + self.rotation * surface,
-            normal: (self.rotation * normal).normalize(),
+            point: self.center + there(surface),
+            normal: there(normal).normalize(),
             distance: -gap(axis),
         }
     }
 }
 
+#[inline]
 fn num_clamp<S: Scalar>(x: S, half: S) -> S {
     if x > half {
         half
