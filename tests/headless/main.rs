@@ -2,6 +2,7 @@
 //! a clock that the test turns.
 
 mod board;
+mod capsules;
 mod contacts;
 mod input;
 mod interpolation;

@@ -200,7 +200,7 @@ fn offsets() -> impl Strategy<Value = f64> {
 #[test]
 #[ignore = "takes minutes"]
 fn millions_of_pairs_know_their_distance_and_their_way_out() {
-    const CASES: u32 = 12_000;
+    const CASES: u32 = 30_000;
     let mut runner = TestRunner::new(ProptestConfig::with_cases(CASES));
     let all = (numbers(), numbers(), scales(), offsets());
     let check = |(first, second, scale, offset)| check_all(&first, &second, scale, offset, 1_000);

@@ -3,6 +3,7 @@
 use std::sync::Arc;
 
 use taw::frame::{AxisAngle, Pose};
+use taw::math::Quat;
 use taw::prelude::*;
 use taw::shape::{Aabb, Capsule, Compound, HeightField, Hull, Mesh, Obb, Shape};
 
@@ -222,6 +223,43 @@ fn a_floor_of_many_pieces_feels_as_one() {
     }
 }
 
+/// Lying across its way, along it, and askew.
+#[test]
+fn a_capsule_feels_one_floor_too() {
+    for (name, walls) in pieces(10.0) {
+        for model in models() {
+            if model.response == Response::EventDriven {
+                continue; // it knows balls only
+            }
+            for turn in [0.0, 0.4, std::f64::consts::FRAC_PI_2] {
+                let mut world = World::<f64>::default();
+                world.set_model(model).unwrap();
+                for wall in walls.clone() {
+                    world.walls.insert(wall).unwrap();
+                }
+                let lying = AxisAngle::new(Vec3::unit_x(), std::f64::consts::FRAC_PI_2).unwrap();
+                let turned = AxisAngle::new(Vec3::unit_y(), turn).unwrap();
+                let (lying, turned): (Quat<f64>, Quat<f64>) = (lying.into(), turned.into());
+                let mut marble = ball_at([0.37, 0.5, 0.21], [5.0, 0.0, 0.3]);
+                (marble.half_length, marble.rotation) = (0.8, turned * lying);
+                let id = world.marbles.insert(marble).unwrap();
+                world.marbles.set_material(id, Some(smooth())).unwrap();
+                let mut worst: f64 = 0.0;
+                for _ in 0..96 {
+                    world.step(DT).unwrap();
+                    for contact in world.contacts.wm.iter().filter(|c| c.mtv.magnitude() > 0.0) {
+                        worst = worst.max(contact.mtv.angle(Vec3::unit_y()).0);
+                    }
+                }
+                let end = world.marbles.get(id).unwrap();
+                let what = format!("{name} {:?} turned by {turn}", model.response);
+                assert!(worst < 1e-5, "{what}: off by {worst} rad");
+                assert!((end.position.x - 8.37).abs() < 0.1, "{what}: {end:?}");
+            }
+        }
+    }
+}
+
 #[test]
 fn a_thousand_flush_boxes_are_one_floor() {
     let tile = |i: u32| {
@@ -233,6 +271,34 @@ fn a_thousand_flush_boxes_are_one_floor() {
         let (worst, way) = roll((0..1000).map(tile).collect(), model, 0.0, 290.0);
         assert!(worst < 1e-5, "{:?}: off by {worst} rad", model.response);
         assert!((way - 290.0).abs() < 0.1, "{:?}: {way} m", model.response);
+    }
+}
+
+/// The same in `f32`, as far as its digits reach.
+#[test]
+fn a_hundred_flush_boxes_are_one_floor_in_single_precision() {
+    for model in models() {
+        let mut world = World::<f32>::default();
+        world.set_model(model).unwrap();
+        for i in 0..100_u8 {
+            let x = f32::from(i) * 0.3;
+            let (min, max) = (Point3::new(x, -1.0, -1.0), Point3::new(x + 0.3, 0.0, 1.0));
+            world.walls.insert(Aabb::new(min, max).unwrap()).unwrap();
+        }
+        let marble = Marble::new(Point3::new(0.37, 0.5, 0.21), 0.5);
+        let velocity = Vec3::new(5.0, 0.0, 0.0);
+        let material = Some(Material { friction: 0.0, ..Material::default() });
+        let id = world.marbles.insert(Marble { velocity, material, ..marble }).unwrap();
+        for _ in 0..330 {
+            world.step(1.0 / 60.0).unwrap();
+            for contact in world.contacts.wm.iter().filter(|c| c.mtv.y > 0.0) {
+                let off = contact.mtv.angle(Vec3::unit_y()).0;
+                assert!(off < 1e-5, "{:?}: off by {off} rad", model.response);
+            }
+        }
+        let end = world.marbles.get(id).unwrap();
+        assert!((end.position.x - 27.87).abs() < 0.01, "{:?}: {end:?}", model.response);
+        assert!(end.velocity.z.abs() < 5e-5, "{:?}: {end:?}", model.response);
     }
 }
 

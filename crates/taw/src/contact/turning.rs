@@ -116,14 +116,19 @@ pub fn sweep_turning<S: Scalar>(
         if gap(left) > 0.0 {
             return None;
         }
-        // The zero of the tangent is after that of the function, the zero of a chord before.
-        let tangent = if closing > 0.0 { (open / closing).min(left) } else { left };
-        let (mut safe, mut far) = ((0.0, open), (tangent, gap(tangent)));
-        if far.1 > 0.0 {
-            (safe, far) = (far, (left, gap(left)));
-        }
-        for _ in 0..LOOKS {
-            let after = safe.0 + (far.0 - safe.0) * (safe.1 / (safe.1 - far.1));
+        // The zero, if the points that are nearest now stay so; in the form that subtracts
+        // nothing. From there on, the zero of a chord is before that of the function.
+        let bend = x.bend + y.bend;
+        let root = (closing * closing + 4.0 * bend * open).sqrt();
+        let guess = if closing > 0.0 {
+            2.0 * open / (root + closing)
+        } else {
+            (root - closing) / (2.0 * bend)
+        };
+        let (mut safe, mut far) = ((0.0, open), (left, gap(left)));
+        for look in 0..LOOKS {
+            let chord = safe.0 + (far.0 - safe.0) * (safe.1 / (safe.1 - far.1));
+            let after = if look == 0 && guess < left { guess } else { chord };
             let there = gap(after);
             // Below zero by rounding only.
             if there >= -0.01 * near {
