@@ -158,7 +158,7 @@ fn check_turning_sweep(
         }
         if let Some(Touch { time, .. }) = touch {
             let there = apart(time);
-            prop_assert!(there.distance < 6e-7, "{touch:?} {there:?}"); // of six metres
+            prop_assert!(there.distance < 6e-6, "{touch:?} {there:?}"); // of six metres
         }
     }
     let still = Course { turns: Vec3::new(0.0, 0.0, 0.0), ..x };

@@ -25,7 +25,7 @@
 //! | two boxes | fifteen axes if they overlap, else as all others | 4e-12 |
 //! | all others | corners that are farthest in some directions, until a bound from below and one from above agree | 4e-12 |
 //! | sweeps along lines | planes that keep them apart | 1e-10 of their size, never late |
-//! | sweeps that turn | the same, with bent paths | 1e-7 of their size, never late |
+//! | sweeps that turn | the same, with bent paths | 1e-6 of their size, never late |
 //!
 //! But for the first two, all is found in `f64` about the middle of one of the two, and rounded
 //! once to the scalar. Where edges or faces are parallel but for less than 1e-7 rad, the

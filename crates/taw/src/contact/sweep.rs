@@ -15,6 +15,9 @@ pub struct Touch<S> {
     pub point: Point3<S>,
 }
 
+/// What comes closer by less than this part of its motion does so by rounding.
+pub(super) const SLIDES: f64 = 1e-12;
+
 /// So many steps are enough for any touch but the slightest.
 const STEPS: u32 = 200;
 
@@ -50,6 +53,9 @@ pub fn sweep<S: Scalar>(
             return None; // a plane between them that they never cross again
         }
         if distance <= near {
+            if closing <= SLIDES * motion.magnitude() {
+                return None; // but for rounding, one slides along the other
+            }
             return Some(Touch {
                 time: S::constant(time),
                 normal: cast_vector(normal),

@@ -2,7 +2,7 @@ use cgmath::{InnerSpace, Matrix3, Quaternion};
 
 use super::closest::{Between, between};
 use super::core::{Convex, Core};
-use super::sweep::Touch;
+use super::sweep::{SLIDES, Touch};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
 
 /// How a rigid thing moves, all of it: evenly along a line, while it turns evenly.
@@ -79,7 +79,8 @@ const LOOKS: u32 = 4;
 /// Each step goes as far as the plane between them keeps them apart (conservative
 /// advancement; Mirtich, *Impulse-based dynamic simulation of rigid body systems*, 1996,
 /// §2.3, with the bend of the paths beside their velocities), so none is too long. They
-/// touch where less than 1e-7 of their size is left: nearer than that, the normal is rounded.
+/// touch where less than 1e-6 of their size is left: nearer than that, the normal between edges
+/// that are nearly parallel is rounded.
 #[must_use]
 pub fn sweep_turning<S: Scalar>(
     a: &(impl Convex<S> + ?Sized),
@@ -102,7 +103,8 @@ pub fn sweep_turning<S: Scalar>(
         // Of what is very near, the normal is rounded, and its plane may part less.
         let open = distance.min(gap(0.0));
         let closing = (x.velocity(time, on_a) - y.velocity(time, on_b)).dot(normal);
-        if open.is_nan() || (open <= near && step == 0 && closing <= 0.0) {
+        let speed = (x.velocity(time, on_a) - y.velocity(time, on_b)).magnitude();
+        if open.is_nan() || (open <= near && step == 0 && closing <= SLIDES * speed) {
             return None;
         }
         if open <= near || step + 1 == STEPS {
