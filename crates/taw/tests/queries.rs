@@ -165,7 +165,9 @@ fn check_turning_sweep(
     let straight = Course { turns: Vec3::new(0.0, 0.0, 0.0), ..y };
     let one = each!(a, a => each!(b, b => sweep_turning(a, &still, b, &straight)));
     let other = swept(a, x.moves, b, y.moves);
-    prop_assert_eq!(one.is_some(), other.is_some(), "{:?} {:?}", a, b);
+    // Out of each other, two ways may be as short; one of them may be where they go.
+    let overlap = apart(0.0).distance <= 0.0;
+    prop_assert!(overlap || one.is_some() == other.is_some(), "{a:?} {b:?}");
     if let (Some(one), Some(other)) = (one, other) {
         prop_assert!((one.time - other.time).abs() < 1e-7, "{one:?} {other:?}");
     }
