@@ -69,7 +69,7 @@ impl<'a> Mover<'a> {
 
 /// More steps than any pair takes that does not slide along the other; then they count as
 /// touching, early rather than late.
-const STEPS: u32 = 1_000;
+const STEPS: u32 = 10_000;
 /// How often the time is looked for until which a plane keeps two things apart.
 const LOOKS: u32 = 4;
 
