@@ -38,7 +38,8 @@ fn a_capsule_falls_over_and_may_become_a_ball_again() {
 fn a_capsule_points_where_its_entity_does_in_a_model_without_rotation() {
     let mut app = scene::app();
     scene::floor(&mut app);
-    let lying = Transform::from_xyz(0.0, 2.0, 0.0).with_rotation(Quat::from_rotation_x(1.5707964));
+    let lying =
+        Transform::from_xyz(0.0, 2.0, 0.0).with_rotation(Quat::from_rotation_x(1.570_796_4));
     let place = Transform::from_xyz(5.0, 2.0, 0.0);
     let [flat, upright] = [lying, place]
         .map(|place| app.world_mut().spawn((Marble::new(0.25), HalfLength(0.75), place)).id());
