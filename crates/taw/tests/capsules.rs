@@ -95,7 +95,7 @@ fn a_capsule_falls_over_and_lies_still() {
                 for _ in 0..900 {
                     world.step(DT).unwrap();
                     let energy = world.energy().total();
-                    // Turning over its end gains 1.7 % in steps of 1/60 s, an eighth with eight
+                    // Turning over its end gains 1.7 % in steps of 1/60 s, 0.1 % with sixteen
                     // substeps: the overlap of each is pushed out.
                     // Springs hold energy that is not counted.
                     let springs = matches!(model.response, Response::Penalty(_));

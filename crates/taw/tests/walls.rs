@@ -340,6 +340,17 @@ fn walls_can_be_moved_and_taken_out() {
     world.step(DT).unwrap();
     let y = world.marbles.get(id).unwrap().position.y;
     assert!((y - 0.7).abs() < 1e-12, "pushed out: {y}");
+    // It may become a half-space, and a box again, beside others.
+    world.marbles.set_velocity(id, Vec3::zero()).unwrap();
+    let below = world.walls.insert(Plane::new(Vec3::unit_y(), -9.0).unwrap()).unwrap();
+    world.walls.set(floor, Plane::new(Vec3::unit_y(), y - 0.4).unwrap()).unwrap();
+    world.step(DT).unwrap();
+    assert_eq!(world.contacts.wm.len(), 1, "the half-space that it is now");
+    world.walls.set(floor, slab(-3.0)).unwrap();
+    world.step(DT).unwrap();
+    assert_eq!(world.contacts.wm.len(), 0);
+    world.walls.set(floor, slab(0.2)).unwrap();
+    world.walls.remove(below).unwrap();
     assert_eq!(world.walls.remove(floor).unwrap(), slab(0.2).into());
     world.step(DT).unwrap();
     assert_eq!(world.contacts.wm.len(), 0);

@@ -27,6 +27,8 @@ pub(super) struct Part {
 pub struct Walls<S> {
     handles: Handles,
     shapes: Vec<WallShape<S>>,
+    /// The rows of half-spaces, in order: every step asks for them, among however many others.
+    planes: Vec<u32>,
     /// Only of those that move.
     motion: Optional<WallMotion<S>>,
     /// Only of those that have one of their own.
@@ -52,6 +54,7 @@ impl<S> Default for Walls<S> {
         Self {
             handles: Handles::default(),
             shapes: Vec::new(),
+            planes: Vec::new(),
             motion: Optional::default(),
             material: Optional::default(),
             boxes: Vec::new(),
@@ -64,9 +67,8 @@ impl<S> Default for Walls<S> {
 
 impl<S: Scalar> PartialEq for Walls<S> {
     fn eq(&self, other: &Self) -> bool {
-        // The tree follows from the shapes.
-        let Self { handles, shapes, motion, material, boxes: _, parts: _, tree: _, stale: _ } =
-            self;
+        // The rest follows from the shapes.
+        let Self { handles, shapes, motion, material, .. } = self;
         *handles == other.handles
             && *shapes == other.shapes
             && *motion == other.motion
@@ -83,6 +85,9 @@ impl<S: Scalar> Walls<S> {
         let shape = wall.into().checked()?;
         let handle = self.handles.push()?;
         self.change(&shape, Stale::All);
+        if matches!(shape, WallShape::Plane(_)) {
+            self.planes.push(self.shapes.len() as u32);
+        }
         self.shapes.push(shape);
         let rows = self.shapes.len();
         self.motion.set(rows - 1, None, rows);
@@ -101,7 +106,9 @@ impl<S: Scalar> Walls<S> {
         self.material.swap_remove(row);
         // Another wall has this row now.
         self.stale = Stale::All;
-        Ok(self.shapes.swap_remove(row))
+        let shape = self.shapes.swap_remove(row);
+        self.list_planes();
+        Ok(shape)
     }
 
     /// The wall.
@@ -127,8 +134,20 @@ impl<S: Scalar> Walls<S> {
         };
         let same = parts(&shape) == parts(&self.shapes[row]);
         self.change(&shape, if same { Stale::Places } else { Stale::All });
+        let is_plane = |shape: &WallShape<S>| matches!(shape, WallShape::Plane(_));
+        let turns = is_plane(&shape) != is_plane(&self.shapes[row]);
         self.shapes[row] = shape;
+        if turns {
+            self.list_planes();
+        }
         Ok(())
+    }
+
+    fn list_planes(&mut self) {
+        self.planes.clear();
+        let rows = (0..).zip(&self.shapes);
+        let planes = rows.filter(|(_, shape)| matches!(shape, WallShape::Plane(_)));
+        self.planes.extend(planes.map(|(row, _)| row));
     }
 
     /// Notes that a wall is new or elsewhere.
@@ -189,8 +208,8 @@ impl<S: Scalar> Walls<S> {
 
     /// All half-spaces, with their rows.
     pub(super) fn planes(&self) -> impl Iterator<Item = (u32, &Plane<S>)> {
-        (0..).zip(&self.shapes).filter_map(|(row, shape)| match shape {
-            WallShape::Plane(plane) => Some((row, plane)),
+        self.planes.iter().filter_map(|row| match &self.shapes[*row as usize] {
+            WallShape::Plane(plane) => Some((*row, plane)),
             _ => None,
         })
     }
