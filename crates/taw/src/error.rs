@@ -2,6 +2,7 @@ use cgmath::Array;
 
 use crate::frame::NodeId;
 use crate::math::{Point3, Scalar, Vec3};
+use crate::swarm::BallId;
 use crate::world::{MarbleId, WallId};
 
 /// Why an input was refused. Whatever returns one has changed nothing.
@@ -55,6 +56,9 @@ pub enum Error {
     /// A marble is a capsule, where the model knows balls only.
     #[error("{0:?} is a capsule, and the model knows balls only")]
     BallsOnly(MarbleId),
+    /// No ball of a swarm has this handle, or it is named twice.
+    #[error("no ball has the handle {0:?}, or it is named twice")]
+    NoSuchBall(BallId),
     /// No marble has this handle: it was removed, or is another world's.
     #[error("no marble has the handle {0:?}")]
     NoSuchMarble(MarbleId),

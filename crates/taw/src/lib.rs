@@ -57,6 +57,7 @@ pub mod math;
 pub mod motion;
 pub mod response;
 pub mod shape;
+pub mod swarm;
 pub mod world;
 
 pub use error::Error;

@@ -10,6 +10,7 @@ mod marbles;
 mod model;
 mod optional;
 mod query;
+mod swarm;
 mod sweep;
 #[cfg(test)]
 mod tests;
@@ -30,11 +31,12 @@ use crate::Error;
 use crate::broad::Grid;
 use crate::contact::Contacts;
 use crate::error::{finite_vector, positive};
-use crate::math::{Scalar, Vec3, length};
+use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Settings, Warm, impulse};
 use crate::response::{Impact, Response, Rod, Shear, displacement, penalty};
+use crate::swarm::{Stage, Swarm};
 use integrate::Drive;
 use sweep::Sweep;
 use touch::Near;
@@ -55,6 +57,8 @@ pub struct World<S> {
     pub marbles: Marbles<S>,
     /// What nothing can move.
     pub walls: Walls<S>,
+    /// Balls in bulk, which touch the walls. (What is touched by whom of them is not listed.)
+    pub swarm: Swarm,
     /// The touches of the last substep. Between [`World::generate_contacts`] and
     /// [`World::restitute`] they may be changed: what is taken out is not
     /// restituted, and a row that does not exist is passed over.
@@ -94,6 +98,7 @@ impl<S: Scalar> Default for World<S> {
             limits: SpeedLimits::default(),
             marbles: Marbles::default(),
             walls: Walls::default(),
+            swarm: Swarm::default(),
             contacts: Contacts::default(),
             impacts: Vec::new(),
             grid: Grid::default(),
@@ -124,6 +129,7 @@ impl<S: Scalar> PartialEq for World<S> {
             limits,
             marbles,
             walls,
+            swarm,
             contacts,
             impacts,
             stopped,
@@ -150,6 +156,7 @@ impl<S: Scalar> PartialEq for World<S> {
             && events.warm == other.events.warm
             && *marbles == other.marbles
             && *walls == other.walls
+            && *swarm == other.swarm
             && *contacts == other.contacts
             && *stopped == other.stopped
             && *warm == other.warm
@@ -238,6 +245,7 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::BallsOnly`] for a capsule in a world that is
     /// event-driven; then nothing has moved.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
+        let whole = dt;
         let dt = positive("dt", dt / S::constant(f64::from(self.model.substeps)))?;
         self.begin_step();
         for _ in 0..self.model.substeps {
@@ -246,6 +254,22 @@ impl<S: Scalar> World<S> {
             self.restitute(dt)?;
         }
         self.marbles.clear_forces();
+        self.step_swarm(whole, &mut |_| ())
+    }
+
+    /// Moves the [swarm](Self::swarm) on, which a step does after the marbles. `observe` is told
+    /// what it goes about, as often as that changes.
+    ///
+    /// # Errors
+    /// [`Error::NotPositive`] for `dt`.
+    pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
+        let dt = positive("dt", dt)?;
+        if self.swarm.is_empty() {
+            return Ok(());
+        }
+        self.walls.prepare();
+        let (dt, gravity) = (dt.as_f64() as f32, cast_vector(self.gravity));
+        self.swarm.step(dt, gravity, &self.walls, self.walls.version(), observe);
         Ok(())
     }
 

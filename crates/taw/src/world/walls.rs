@@ -38,6 +38,8 @@ pub struct Walls<S> {
     parts: Vec<Part>,
     tree: BoxTree<S>,
     stale: Stale,
+    /// How often a wall came, went, or changed.
+    version: u64,
 }
 
 /// What changed since the tree was built.
@@ -61,6 +63,7 @@ impl<S> Default for Walls<S> {
             parts: Vec::new(),
             tree: BoxTree::default(),
             stale: Stale::Nothing,
+            version: 0,
         }
     }
 }
@@ -106,6 +109,7 @@ impl<S: Scalar> Walls<S> {
         self.material.swap_remove(row);
         // Another wall has this row now.
         self.stale = Stale::All;
+        self.version += 1;
         let shape = self.shapes.swap_remove(row);
         self.list_planes();
         Ok(shape)
@@ -152,6 +156,7 @@ impl<S: Scalar> Walls<S> {
 
     /// Notes that a wall is new or elsewhere.
     fn change(&mut self, shape: &WallShape<S>, stale: Stale) {
+        self.version += 1;
         if stale == Stale::All || !matches!(shape, WallShape::Plane(_)) {
             self.stale = self.stale.max(stale);
         }
@@ -226,6 +231,7 @@ impl<S: Scalar> Walls<S> {
             finite_vector(["spin.x", "spin.y", "spin.z"], motion.spin)?;
             finite_point(["pivot.x", "pivot.y", "pivot.z"], motion.pivot)?;
         }
+        self.version += 1;
         self.motion.set(row, motion, self.shapes.len());
         Ok(())
     }
@@ -246,6 +252,7 @@ impl<S: Scalar> Walls<S> {
     pub fn set_material(&mut self, id: WallId, material: Option<Material<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
         let material = material.map(Material::checked).transpose()?;
+        self.version += 1;
         self.material.set(row, material, self.shapes.len());
         Ok(())
     }
@@ -286,6 +293,11 @@ impl<S: Scalar> Walls<S> {
     /// The own material of the wall in a row.
     pub(super) fn material_of_row(&self, row: usize) -> Option<Material<S>> {
         self.material.get(row)
+    }
+
+    /// A number that is another one whenever a wall is.
+    pub(super) fn version(&self) -> u64 {
+        self.version
     }
 
     /// How many walls were taken out so far.

@@ -1,0 +1,172 @@
+//! Putting rows in order, and seeking pairs.
+
+use super::grid::reorder;
+use super::kernels::squared;
+use super::memory::Memory;
+use super::pairs::{FindPairs, Search, find_strays};
+use super::slab::Slab;
+use super::team::{Shared, work};
+use super::{Stage, Surroundings, Swarm, walls};
+
+/// Balls in a slab at least.
+const SLAB: u32 = 1024;
+/// How far a ball may go between two searches: as far as it goes in so many steps at its speed,
+const STEPS: f32 = 12.0;
+/// but this part of its radius at least, and this part of the mean radius at most.
+const LEAST: f32 = 0.02;
+const MOST: f32 = 0.12;
+/// A few faster ones are sought for one by one: one of so many, and besides so many.
+const STRAYS: usize = 500;
+const SOME_STRAYS: usize = 32;
+
+impl Swarm {
+    /// Seeks pairs anew.
+    pub(super) fn build(
+        &mut self,
+        dt: f32,
+        walls: &dyn Surroundings,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        let threads = self.model.threads as usize;
+        self.rebuilds += 1;
+        observe(Stage::Pairs);
+        self.remember();
+        observe(Stage::Order);
+        let cap = MOST * self.mean;
+        self.set_budgets(dt, cap);
+        self.grid.sort(&self.at, 2.0 * cap, threads);
+        self.reorder();
+        observe(Stage::Pairs);
+        self.cut_slabs();
+        self.find_pairs(cap, walls);
+        self.paired = true;
+        self.remembers = false;
+    }
+
+    /// Says how far each ball may go: more than the cap only if it is sought for alone.
+    fn set_budgets(&mut self, dt: f32, cap: f32) {
+        let (threads, lab) = (self.model.threads as usize, !self.rough());
+        let (at, velocity, way) = (&self.at[..], &self.velocity[..], &self.way[..]);
+        let budgets = Shared::new(&mut self.budget);
+        work(threads, |member| {
+            let rows = member.share(at.len());
+            // SAFETY: each thread has its own rows.
+            let budgets = unsafe { budgets.part(rows.clone()) };
+            for (row, budget) in rows.zip(budgets) {
+                let way = if lab { way[row] } else { squared(velocity[row]).sqrt() * dt };
+                *budget = (way * STEPS).max(LEAST * at[row][3]).min(cap * 16.0);
+            }
+        });
+        let strays = self.budget.iter().filter(|budget| **budget > cap).count();
+        if strays > SOME_STRAYS + at.len() / STRAYS {
+            for budget in &mut self.budget {
+                *budget = budget.min(cap);
+            }
+        }
+    }
+
+    fn reorder(&mut self) {
+        let threads = self.model.threads as usize;
+        let order = std::mem::take(&mut self.grid.order);
+        reorder(&mut self.at, &mut self.spare, &order, threads);
+        reorder(&mut self.velocity, &mut self.spare, &order, threads);
+        if self.rough() {
+            reorder(&mut self.spin, &mut self.spare, &order, threads);
+        }
+        let spare = &mut self.spare_numbers;
+        reorder(&mut self.before, spare, &order, threads);
+        let (slots, rows) = self.ids.columns();
+        reorder(slots, spare, &order, threads);
+        let (rows, slots) = (Shared::new(rows), &slots[..]);
+        work(threads, |member| {
+            for row in member.share(slots.len()) {
+                // SAFETY: a slot is that of one row.
+                unsafe { *rows.row(slots[row] as usize) = row as u32 };
+            }
+        });
+        let lab = !self.rough();
+        let spare = &mut self.grid.numbers;
+        reorder(&mut self.budget, spare, &order, threads);
+        if lab {
+            reorder(&mut self.way, spare, &order, threads);
+        }
+        self.grid.order = order;
+    }
+
+    fn cut_slabs(&mut self) {
+        let layers = self.grid.layers();
+        let (mut layer, mut count) = (0, 0);
+        while layer < layers {
+            let begin = layer;
+            let first = self.grid.first_of_layer(begin);
+            while layer < layers && self.grid.first_of_layer(layer) - first < SLAB {
+                layer += 1;
+            }
+            let next = self.grid.first_of_layer(layer);
+            if self.slabs.len() == count {
+                self.slabs.push(Slab::default());
+            }
+            let slab = &mut self.slabs[count];
+            slab.layers = [begin, layer];
+            slab.rows = [first, next, next];
+            slab.slow = 0.0;
+            let asleep = |row: &[f32; 4]| row[3] < 0.0;
+            let velocities = &mut self.velocity[first as usize..next as usize];
+            slab.asleep = !velocities.is_empty() && velocities.iter().all(asleep);
+            if !slab.asleep {
+                for velocity in velocities {
+                    velocity[3] = velocity[3].abs();
+                }
+            }
+            if count > 0 {
+                self.slabs[count - 1].rows[2] = next;
+            }
+            count += 1;
+        }
+        self.slab_count = count;
+    }
+
+    fn find_pairs(&mut self, cap: f32, walls: &dyn Surroundings) {
+        let (threads, rough) = (self.model.threads as usize, self.rough());
+        let instructions = self.instructions;
+        self.searches.resize(threads, Search::default());
+        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        let searches = Shared::new(&mut self.searches);
+        let (grid, at, budget) = (&self.grid, &self.at[..], &self.budget[..]);
+        let (memory, before, planes) = (&self.memory, &self.before[..], &self.planes[..]);
+        let shapes = walls.has_shapes();
+        work(threads, |member| {
+            // SAFETY: its own.
+            let search = unsafe { &mut *searches.row(member.number) };
+            for slab in member.share(slabs.len()) {
+                // SAFETY: its own.
+                let slab = unsafe { &mut *slabs.row(slab) };
+                instructions.run(FindPairs {
+                    grid,
+                    at,
+                    budget,
+                    cap,
+                    layers: slab.layers,
+                    rows: slab.rows,
+                    search,
+                    batches: &mut slab.batches,
+                });
+                slab.pushes.reset(slab.batches.len(), rough);
+                if rough {
+                    memory.recall(&slab.batches, before, &mut slab.pushes);
+                }
+                slab.seek_walls(at, budget, planes, |touch| memory.recall_touch(before, touch));
+                slab.near_shapes.clear();
+                if shapes {
+                    walls::near_shapes(walls, at, budget, slab.own_rows(), &mut slab.near_shapes);
+                }
+            }
+        });
+        let strays = &mut self.strays;
+        find_strays(grid, at, budget, cap, self.largest, &mut self.searches[0], &mut strays.batches);
+        strays.pushes.reset(strays.batches.len(), rough);
+        if rough {
+            Memory::recall(&self.memory, &strays.batches, &self.before, &mut strays.pushes);
+        }
+    }
+}

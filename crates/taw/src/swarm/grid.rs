@@ -1,0 +1,286 @@
+//! The order of the rows: cell by cell, layer by layer.
+//!
+//! Cells of level 0 are as wide as the largest ball and the skin; each further level halves them.
+//! A ball is in the finest level whose cells are as wide as itself and the skin. The layers of
+//! level 0 are cut across the longest side of the scene; each of them holds, level by level, the
+//! cells that lie in it, row by row along the second side, each row along the third. So three
+//! neighbouring cells of a row are one run of balls, and all partners of a ball are in its own
+//! layer and the two beside it.
+
+use super::lanes::Row;
+use super::team::{Shared, work};
+
+/// Cells in all, for each ball.
+const CELLS_PER_BALL: f64 = 2.0;
+/// And besides.
+const CELLS: f64 = 4096.0;
+/// The most cells along a side on level 0, so that rounding stays far below the margin.
+const SIDE: f64 = 4096.0;
+/// Cells are wider than they need be by this part, which is more than rounding takes.
+const MARGIN: f32 = 1.005;
+/// Levels at most.
+pub(super) const LEVELS: usize = 8;
+/// How many balls are asked where the scene is.
+const SAMPLE: usize = 1024;
+
+/// One level of cells.
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Level {
+    /// Cells per metre.
+    per_metre: f32,
+    /// The widest ball that belongs here, in metres.
+    widest: f32,
+    /// How many layers, and cells in them in rows and along a row, without the empty ones around.
+    pub layers: u32,
+    rows: u32,
+    cells: u32,
+    /// The first cell of this level in a layer of level 0.
+    base: u32,
+    /// Its place in the list of levels.
+    pub level: u32,
+    /// Cells in a row and in a layer, with the empty ones around.
+    pub row_stride: u32,
+    pub layer_stride: u32,
+}
+
+/// See the module.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Grid {
+    /// The sides of the scene, the longest first.
+    axes: [usize; 3],
+    low: [f32; 3],
+    pub levels: Vec<Level>,
+    /// How many cells of all levels are in a layer of level 0.
+    per_layer: u32,
+    /// The first row of each cell, one place further, and of the one after the last.
+    start: Vec<u32>,
+    /// The cell of each row.
+    keys: Vec<u32>,
+    /// For each row of the new order, the one that it was.
+    pub order: Vec<u32>,
+    sample: Vec<f32>,
+    /// For those who put columns into the order.
+    pub numbers: Vec<f32>,
+}
+
+impl Level {
+    /// The cell of these coordinates; empty cells lie at both ends of the rows and columns.
+    pub fn cell(&self, grid: &Grid, layer: u32, row: u32, cell: u32) -> u32 {
+        let inner = layer & ((1 << self.level) - 1);
+        (layer >> self.level) * grid.per_layer
+            + self.base
+            + inner * self.layer_stride
+            + row * self.row_stride
+            + cell
+    }
+
+    /// How many rows and cells in a row there are, with the empty ones around.
+    pub fn size(&self) -> [u32; 2] {
+        [self.rows + 2, self.cells + 2]
+    }
+}
+
+impl Grid {
+    pub fn bytes(&self) -> usize {
+        let numbers = [&self.start, &self.keys, &self.order].map(Vec::capacity);
+        let floats = [&self.sample, &self.numbers].map(Vec::capacity);
+        numbers.iter().chain(&floats).map(|capacity| capacity * 4).sum()
+    }
+
+    /// How many layers of level 0 there are.
+    pub fn layers(&self) -> u32 {
+        self.levels.first().map_or(0, |level| level.layers)
+    }
+
+    /// The first row of a layer of level 0.
+    pub fn first_of_layer(&self, layer: u32) -> u32 {
+        self.first(layer * self.per_layer)
+    }
+
+    /// The first row of a cell, or of the one after the last.
+    #[inline(always)]
+    pub fn first(&self, cell: u32) -> u32 {
+        self.start[cell as usize + 1]
+    }
+
+    /// The level of a ball with this radius.
+    pub fn level_of(&self, radius: f32) -> usize {
+        let fits = |level: &Level| 2.0 * radius <= level.widest;
+        self.levels.iter().skip(1).take_while(|level| fits(level)).count()
+    }
+
+    /// Layer, row and cell of a place on a level.
+    pub fn coordinates(&self, level: &Level, at: &Row) -> [u32; 3] {
+        let axis = |i: usize, count: u32| {
+            let axis = self.axes[i];
+            let cell = (at[axis] - self.low[axis]) * level.per_metre;
+            // What is beyond is in the last cell: neighbours stay neighbours.
+            (cell.max(0.0) as u32).min(count - 1)
+        };
+        [axis(0, level.layers), axis(1, level.rows) + 1, axis(2, level.cells) + 1]
+    }
+
+    fn key(&self, at: &Row) -> u32 {
+        let level = if self.levels.len() == 1 { 0 } else { self.level_of(at[3]) };
+        let level = &self.levels[level];
+        let [layer, row, cell] = self.coordinates(level, at);
+        level.cell(self, layer, row, cell)
+    }
+
+    /// Decides where the cells are.
+    fn lay_out(&mut self, at: &[Row], skin: f32) {
+        let (mut least, mut largest) = (f32::MAX, f32::MIN_POSITIVE);
+        for row in at {
+            largest = largest.max(row[3]);
+            least = least.min(row[3]);
+        }
+        // Where the bulk is; a few strays far out cost no cells.
+        let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
+        let every = at.len().div_ceil(SAMPLE).max(1);
+        for axis in 0..3 {
+            self.sample.clear();
+            self.sample.extend(at.iter().step_by(every).map(|row| row[axis]));
+            self.sample.sort_unstable_by(f32::total_cmp);
+            let count = self.sample.len();
+            if count == 0 {
+                continue;
+            }
+            let (a, b) = (self.sample[count / 64], self.sample[count - 1 - count / 64]);
+            let (least, most) = (self.sample[0], self.sample[count - 1]);
+            let room = (b - a) * 0.1 + 4.0 * largest;
+            (low[axis], high[axis]) = ((a - room).max(least - largest), (b + room).min(most + largest));
+        }
+        self.low = low;
+        let mut width = (2.0 * largest + skin) * MARGIN;
+        let budget = at.len() as f64 * CELLS_PER_BALL + CELLS;
+        let sides = |width: f32| {
+            [0, 1, 2].map(|axis| ((high[axis] - low[axis]) / width).ceil().max(1.0))
+        };
+        let cells = |sides: [f32; 3]| sides.iter().map(|n| f64::from(*n) + 2.0).product::<f64>();
+        while cells(sides(width)) > budget || sides(width).iter().any(|n| f64::from(*n) > SIDE) {
+            width *= 1.25;
+        }
+        let sides = sides(width);
+        let mut axes = [0, 1, 2];
+        axes.sort_by(|a, b| sides[*b].total_cmp(&sides[*a]));
+        self.axes = axes;
+        self.levels.clear();
+        self.per_layer = 0;
+        let mut total = 0.0;
+        for level in 0..LEVELS as u32 {
+            let fine = (1_u32 << level) as f32;
+            let widest = width / fine / MARGIN - skin;
+            let count = cells(sides.map(|n| n * fine));
+            total += count;
+            if level > 0 && (2.0 * least > widest || total > 2.0 * budget) {
+                break;
+            }
+            let [layers, rows, cells] = axes.map(|axis| (sides[axis] * fine) as u32);
+            let row_stride = cells + 2;
+            let layer_stride = row_stride * (rows + 2);
+            self.levels.push(Level {
+                per_metre: fine / width,
+                widest,
+                layers,
+                rows,
+                cells,
+                base: self.per_layer,
+                level,
+                row_stride,
+                layer_stride,
+            });
+            self.per_layer += layer_stride << level;
+        }
+    }
+
+    /// Sorts the rows into cells: afterwards `order` says which row comes where.
+    pub fn sort(&mut self, at: &[Row], skin: f32, threads: usize) {
+        self.lay_out(at, skin);
+        let cells = (self.layers() * self.per_layer) as usize;
+        let mut start = std::mem::take(&mut self.start);
+        let mut keys = std::mem::take(&mut self.keys);
+        let mut order = std::mem::take(&mut self.order);
+        start.clear();
+        start.resize(cells + 2, 0);
+        keys.resize(at.len(), 0);
+        order.resize(at.len(), 0);
+        {
+            let grid = &*self;
+            let (all_keys, all_start) = (Shared::new(&mut keys), Shared::new(&mut start));
+            let all_order = Shared::new(&mut order);
+            let mut totals = vec![0_u32; threads];
+            let totals = Shared::new(&mut totals);
+            work(threads, |member| {
+                let rows = member.share(at.len());
+                // SAFETY: each thread has its own rows.
+                let keys = unsafe { all_keys.part(rows.clone()) };
+                for (key, at) in keys.iter_mut().zip(&at[rows]) {
+                    *key = grid.key(at);
+                }
+                member.barrier();
+                // Now by cells. A cell is counted one further, and again one further.
+                let mine = member.share(cells);
+                let (low, count) = (mine.start as u32, mine.len() as u32);
+                // SAFETY: nobody writes keys any more, and each thread has its own cells.
+                let keys = unsafe { all_keys.read(0..at.len()) };
+                let start = unsafe { all_start.part(mine.start + 2..mine.end + 2) };
+                let mut total = 0;
+                for key in keys {
+                    let cell = key.wrapping_sub(low);
+                    if cell < count {
+                        start[cell as usize] += 1;
+                        total += 1;
+                    }
+                }
+                // SAFETY: one for each.
+                unsafe { *totals.row(member.number) = total };
+                member.barrier();
+                // SAFETY: they are written.
+                let mut sum: u32 = unsafe { totals.read(0..member.number) }.iter().sum();
+                for cell in start.iter_mut() {
+                    let count = *cell;
+                    *cell = sum;
+                    sum += count;
+                }
+                member.barrier();
+                // Each cell's count has become the first row of the cell, two further: as rows
+                // are placed, it grows to the first of the next cell, one further.
+                // SAFETY: its own cells, and each row comes to one place.
+                let start = unsafe { all_start.part(mine.start + 2..mine.end + 2) };
+                for (row, key) in keys.iter().enumerate() {
+                    let cell = key.wrapping_sub(low);
+                    if cell < count {
+                        let place = &mut start[cell as usize];
+                        unsafe { *all_order.row(*place as usize) = row as u32 };
+                        *place += 1;
+                    }
+                }
+            });
+        }
+        // start[cell + 2] is now the first row after the cell.
+        (self.start, self.keys, self.order) = (start, keys, order);
+    }
+}
+
+/// Puts a column into the order; `spare` is only scribbled on.
+pub(super) fn reorder<T: Copy + Default + Send + Sync>(
+    column: &mut Vec<T>,
+    spare: &mut Vec<T>,
+    order: &[u32],
+    threads: usize,
+) {
+    spare.resize(order.len(), T::default());
+    {
+        let column = &column[..];
+        let spare = Shared::new(spare);
+        work(threads, |member| {
+            let rows = member.share(order.len());
+            // SAFETY: each thread has its own rows.
+            let to = unsafe { spare.part(rows.clone()) };
+            for (to, from) in to.iter_mut().zip(&order[rows]) {
+                *to = column[*from as usize];
+            }
+        });
+    }
+    std::mem::swap(column, spare);
+}

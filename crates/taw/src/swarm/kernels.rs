@@ -1,0 +1,539 @@
+//! What a step does to rows and to pairs, eight at a time.
+
+use super::lanes::{Kernel, LANES, Lanes, Row};
+use super::pairs::Batch;
+use super::team::Shared;
+
+/// What batches of pairs bear, batch by batch. The last two are empty where nothing is rough.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Pushes {
+    /// The impulses along the normals, in N s.
+    pub pressure: Vec<[f32; LANES]>,
+    /// Those across them.
+    pub grip: Vec<[[f32; LANES]; 3]>,
+    /// How fast they shall part because they bounce, in m/s.
+    pub rebound: Vec<[f32; LANES]>,
+}
+
+impl Pushes {
+    pub fn bytes(&self) -> usize {
+        self.pressure.capacity() * size_of::<[f32; LANES]>()
+            + self.grip.capacity() * size_of::<[[f32; LANES]; 3]>()
+            + self.rebound.capacity() * size_of::<[f32; LANES]>()
+    }
+
+    /// As many as there are batches, and none bears anything.
+    pub fn reset(&mut self, batches: usize, rough: bool) {
+        let rough = if rough { batches } else { 0 };
+        self.pressure.clear();
+        self.pressure.resize(batches, [0.0; LANES]);
+        self.grip.clear();
+        self.grip.resize(rough, [[0.0; LANES]; 3]);
+        self.rebound.clear();
+        self.rebound.resize(rough, [0.0; LANES]);
+    }
+}
+
+/// Three coordinates on eight lanes.
+#[derive(Clone, Copy)]
+struct V<L>([L; 3]);
+
+impl<L: Lanes> V<L> {
+    #[inline(always)]
+    fn of(row: &[L; 4]) -> Self {
+        Self([row[0], row[1], row[2]])
+    }
+
+    #[inline(always)]
+    fn load(from: &[[f32; LANES]; 3]) -> Self {
+        Self([L::load(&from[0]), L::load(&from[1]), L::load(&from[2])])
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [[f32; LANES]; 3]) {
+        let Self([x, y, z]) = self;
+        x.store(&mut to[0]);
+        y.store(&mut to[1]);
+        z.store(&mut to[2]);
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
+        Self([a + x, b + y, c + z])
+    }
+
+    #[inline(always)]
+    fn minus(self, other: Self) -> Self {
+        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
+        Self([a - x, b - y, c - z])
+    }
+
+    #[inline(always)]
+    fn times(self, by: L) -> Self {
+        let Self([x, y, z]) = self;
+        Self([x * by, y * by, z * by])
+    }
+
+    #[inline(always)]
+    fn dot(self, other: Self) -> L {
+        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
+        a * x + b * y + c * z
+    }
+
+    #[inline(always)]
+    fn cross(self, other: Self) -> Self {
+        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
+        Self([b * z - c * y, c * x - a * z, a * y - b * x])
+    }
+
+    #[inline(always)]
+    fn with(self, w: L) -> [L; 4] {
+        let Self([x, y, z]) = self;
+        [x, y, z, w]
+    }
+}
+
+/// The normal from the first to the second ball, and the gap between them.
+#[inline(always)]
+fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> (V<L>, L) {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let way = V::of(b).minus(V::of(a));
+    let distance = way.dot(way).sqrt();
+    let inverse = one / distance.max(L::splat(f32::MIN_POSITIVE));
+    let V([x, y, z]) = way.times(inverse);
+    // Where the centers coincide, any direction is as good as another.
+    let x = distance.pick_above(zero, x, one);
+    (V([x, y, z]), distance - (a[3] + b[3]))
+}
+
+/// The rows of a column that the pairs of a batch are about.
+#[inline(always)]
+fn gather<L: Lanes>(column: Shared<Row>, batch: &Batch) -> [[L; 4]; 2] {
+    let a = column.row(batch.first[0] as usize);
+    let b = column.row(batch.first[1] as usize);
+    // SAFETY: no other thread has these rows (see `Slab`).
+    unsafe { [L::gather(a, &batch.a), L::gather(b, &batch.b)] }
+}
+
+/// Writes back what was gathered.
+#[inline(always)]
+fn scatter<L: Lanes>(column: Shared<Row>, batch: &Batch, [of_a, of_b]: [[L; 4]; 2]) {
+    let a = column.row(batch.first[0] as usize);
+    let b = column.row(batch.first[1] as usize);
+    let count = batch.count as usize;
+    // SAFETY: as in `gather`, and no row is twice in a batch.
+    unsafe {
+        L::scatter(a, &batch.a, count, of_a);
+        L::scatter(b, &batch.b, count, of_b);
+    }
+}
+
+/// Pushes overlapping balls apart, half each.
+pub(super) struct Displace<'a> {
+    pub at: Shared<'a, Row>,
+    pub batches: &'a [Batch],
+    /// How much of an overlap is pushed out at once at most, in metres.
+    pub most: f32,
+}
+
+impl Kernel for Displace<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let (half, most) = (L::splat(0.5), L::splat(self.most));
+        for (i, batch) in self.batches.iter().enumerate() {
+            prefetch(self.at, self.batches, i);
+            let [a, b] = gather::<L>(self.at, batch);
+            let (normal, gap) = normal_and_gap(&a, &b);
+            let overlap = (L::splat(0.0) - gap).max(L::splat(0.0)).min(most);
+            let by = normal.times(overlap * half);
+            let moved = [V::of(&a).minus(by).with(a[3]), V::of(&b).plus(by).with(b[3])];
+            scatter(self.at, batch, moved);
+        }
+    }
+}
+
+/// Asks for rows that will be needed soon.
+#[inline(always)]
+fn prefetch(_column: Shared<Row>, _batches: &[Batch], _now: usize) {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(batch) = _batches.get(_now + 4) {
+        for lane in 0..LANES {
+            for row in batch.pair(lane) {
+                // SAFETY: a hint, which may be about any address.
+                unsafe {
+                    use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
+                    _mm_prefetch::<_MM_HINT_T0>(_column.row(row as usize).cast());
+                }
+            }
+        }
+    }
+}
+
+/// The inverse mass of awake balls: those of balls asleep have a minus sign.
+#[inline(always)]
+fn mobility<L: Lanes>(velocity: &[L; 4]) -> L {
+    velocity[3].max(L::splat(0.0))
+}
+
+/// What both weigh together along their normal; nothing if both are asleep.
+#[inline(always)]
+fn mass<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> L {
+    let sum = mobility(a) + mobility(b);
+    let zero = L::splat(0.0);
+    sum.pick_above(zero, L::splat(1.0) / sum, zero)
+}
+
+/// How stiff a contact is (Catto, *Solver2D*, 2024: soft contacts).
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Soft {
+    /// The part of an overlap that is to go per second.
+    pub rate: f32,
+    /// How fast it goes at most, in m/s.
+    pub fastest: f32,
+    /// The part of the impulse that a hard contact would need, and how much of what it has borne
+    /// so far it gives back.
+    pub mass: f32,
+    pub back: f32,
+}
+
+/// The columns that several threads work on.
+#[derive(Clone, Copy)]
+pub(super) struct Columns<'a> {
+    /// Center and radius.
+    pub at: Shared<'a, Row>,
+    /// Velocity and inverse mass.
+    pub velocity: Shared<'a, Row>,
+    /// Radius times spin, and nothing.
+    pub spin: Shared<'a, Row>,
+}
+
+impl Soft {
+    const NOT: Self = Self { rate: 0.0, fastest: 0.0, mass: 1.0, back: 0.0 };
+}
+
+/// One pass over the pairs for their impulses.
+pub(super) struct Solve<'a> {
+    pub pass: Pass,
+    pub columns: Columns<'a>,
+    pub batches: &'a [Batch],
+    pub pushes: &'a mut Pushes,
+    /// Nothing turns and bounces where there is none.
+    pub friction: Option<f32>,
+}
+
+/// What a pass does.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Pass {
+    /// Sees what comes together faster than this, in m/s, and asks for this part of the speed
+    /// back.
+    Approach { speed: f32, restitution: f32 },
+    /// Applies the impulses of the last substep again.
+    Begin,
+    /// Lets nothing come nearer than the gap, within a substep of which this is the inverse, and
+    /// pushes overlap out.
+    Solve { soft: Soft, per_second: f32 },
+    /// The same but for the overlap.
+    Relax { per_second: f32 },
+    /// What came together bounces.
+    Bounce,
+}
+
+impl Kernel for Solve<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        match (self.pass, self.friction) {
+            (Pass::Approach { speed, restitution }, Some(_)) => {
+                self.approach::<L>(speed, restitution);
+            }
+            (Pass::Bounce, Some(_)) => self.bounce::<L>(),
+            (Pass::Begin, Some(_)) => self.begin::<L, true>(),
+            (Pass::Begin, None) => self.begin::<L, false>(),
+            (Pass::Solve { soft, per_second }, Some(friction)) => {
+                self.solve::<L, true, true>(soft, per_second, friction);
+            }
+            (Pass::Solve { soft, per_second }, None) => {
+                self.solve::<L, false, true>(soft, per_second, 0.0);
+            }
+            (Pass::Relax { per_second }, Some(friction)) => {
+                self.solve::<L, true, false>(Soft::NOT, per_second, friction);
+            }
+            (Pass::Relax { per_second }, None) => {
+                self.solve::<L, false, false>(Soft::NOT, per_second, 0.0);
+            }
+            (Pass::Approach { .. } | Pass::Bounce, None) => (),
+        }
+    }
+}
+
+impl Columns<'_> {
+    /// Applies an impulse to both balls of the pairs; the second gets it as it is.
+    #[inline(always)]
+    fn hit<L: Lanes, const ROUGH: bool>(
+        &self,
+        batch: &Batch,
+        [a, b]: [[L; 4]; 2],
+        [spin_a, spin_b]: [[L; 4]; 2],
+        normal: V<L>,
+        along: L,
+        across: V<L>,
+    ) {
+        let (mass_a, mass_b) = (mobility(&a), mobility(&b));
+        let mut impulse = normal.times(along);
+        if ROUGH {
+            impulse = impulse.plus(across);
+            // A solid ball: mass times radius squared is 2.5 times the moment of inertia. The
+            // column holds radius times spin.
+            let turn = normal.cross(across).times(L::splat(2.5));
+            let spin = [
+                V::of(&spin_a).minus(turn.times(mass_a)).with(spin_a[3]),
+                V::of(&spin_b).minus(turn.times(mass_b)).with(spin_b[3]),
+            ];
+            scatter(self.spin, batch, spin);
+        }
+        let velocity = [
+            V::of(&a).minus(impulse.times(mass_a)).with(a[3]),
+            V::of(&b).plus(impulse.times(mass_b)).with(b[3]),
+        ];
+        scatter(self.velocity, batch, velocity);
+    }
+
+    /// The spins of a batch, where there are any.
+    #[inline(always)]
+    fn spins<L: Lanes, const ROUGH: bool>(&self, batch: &Batch) -> [[L; 4]; 2] {
+        if ROUGH { gather(self.spin, batch) } else { [[L::splat(0.0); 4]; 2] }
+    }
+}
+
+impl Solve<'_> {
+    #[inline(always)]
+    fn approach<L: Lanes>(self, speed: f32, restitution: f32) {
+        let Self { columns, batches, pushes, .. } = self;
+        let zero = L::splat(0.0);
+        for (batch, to) in batches.iter().zip(&mut pushes.rebound) {
+            let [a, b] = gather::<L>(columns.at, batch);
+            let (normal, _) = normal_and_gap(&a, &b);
+            let [a, b] = gather::<L>(columns.velocity, batch);
+            let closing = V::of(&a).minus(V::of(&b)).dot(normal);
+            let rebound =
+                closing.pick_above(L::splat(speed), closing * L::splat(restitution), zero);
+            rebound.store(to);
+        }
+    }
+
+    #[inline(always)]
+    fn begin<L: Lanes, const ROUGH: bool>(self) {
+        let Self { columns, batches, pushes, .. } = self;
+        let Pushes { pressure, grip, .. } = pushes;
+        for (i, batch) in batches.iter().enumerate() {
+            prefetch(columns.at, batches, i);
+            let [a, b] = gather::<L>(columns.at, batch);
+            let (normal, _) = normal_and_gap(&a, &b);
+            let mut across = V([L::splat(0.0); 3]);
+            if ROUGH {
+                // It was across the normal of the last substep.
+                across = V::load(&grip[i]);
+                across = across.minus(normal.times(across.dot(normal)));
+                across.store(&mut grip[i]);
+            }
+            let (velocity, spin) = (gather(columns.velocity, batch), columns.spins::<L, ROUGH>(batch));
+            columns.hit::<L, ROUGH>(batch, velocity, spin, normal, L::load(&pressure[i]), across);
+        }
+    }
+
+    #[inline(always)]
+    fn solve<L: Lanes, const ROUGH: bool, const SOFT: bool>(
+        self,
+        soft: Soft,
+        per_second: f32,
+        friction: f32,
+    ) {
+        let Self { columns, batches, pushes, .. } = self;
+        let Pushes { pressure, grip, .. } = pushes;
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let per_second = L::splat(per_second);
+        for (i, batch) in batches.iter().enumerate() {
+            prefetch(columns.at, batches, i);
+            let [a, b] = gather::<L>(columns.at, batch);
+            let (normal, gap) = normal_and_gap(&a, &b);
+            let [a, b] = gather::<L>(columns.velocity, batch);
+            let [spin_a, spin_b] = columns.spins::<L, ROUGH>(batch);
+            let relative = V::of(&b).minus(V::of(&a));
+            let parting = relative.dot(normal);
+            let mass = mass(&a, &b);
+            let before = L::load(&pressure[i]);
+            let change = if SOFT {
+                let pushed = (gap * L::splat(soft.rate)).max(L::splat(-soft.fastest));
+                let wish = gap.pick_above(zero, gap * per_second, pushed);
+                let part = gap.pick_above(zero, one, L::splat(soft.mass));
+                let back = gap.pick_above(zero, zero, L::splat(soft.back));
+                mass * part * (parting + wish) + before * back
+            } else {
+                mass * (parting + gap.max(zero) * per_second)
+            };
+            let after = (before - change).max(zero);
+            after.store(&mut pressure[i]);
+            let mut across = V([zero; 3]);
+            if ROUGH {
+                // Of the two surfaces, across the normal.
+                let spin = V::of(&spin_a).plus(V::of(&spin_b));
+                let sliding = relative.minus(normal.times(parting)).minus(spin.cross(normal));
+                let old = V::<L>::load(&grip[i]);
+                let held = old.minus(sliding.times(mass * L::splat(2.0 / 7.0)));
+                let most = L::splat(friction) * after;
+                let size = held.dot(held).sqrt();
+                let part = most / size.max(L::splat(f32::MIN_POSITIVE));
+                let held = held.times(size.pick_above(most, part, one));
+                held.store(&mut grip[i]);
+                across = held.minus(old);
+            }
+            let spins = [spin_a, spin_b];
+            columns.hit::<L, ROUGH>(batch, [a, b], spins, normal, after - before, across);
+        }
+    }
+
+    #[inline(always)]
+    fn bounce<L: Lanes>(self) {
+        let Self { columns, batches, pushes, .. } = self;
+        let Pushes { pressure, rebound, .. } = pushes;
+        let zero = L::splat(0.0);
+        for (i, batch) in batches.iter().enumerate() {
+            let rebound = L::load(&rebound[i]);
+            if rebound.above(zero) == 0 {
+                continue;
+            }
+            let [a, b] = gather::<L>(columns.at, batch);
+            let (normal, _) = normal_and_gap(&a, &b);
+            let [a, b] = gather::<L>(columns.velocity, batch);
+            let parting = V::of(&b).minus(V::of(&a)).dot(normal);
+            let before = L::load(&pressure[i]);
+            // Only what has met.
+            let wish = before.pick_above(zero, rebound - parting, zero);
+            let wish = rebound.pick_above(zero, wish, zero);
+            let after = (before + wish * mass(&a, &b)).max(zero);
+            after.store(&mut pressure[i]);
+            let none = [[zero; 4]; 2];
+            columns.hit::<L, false>(batch, [a, b], none, normal, after - before, V([zero; 3]));
+        }
+    }
+}
+
+/// Faster than this, in m/s, or further out, in metres, a ball is no longer a ball: squares of
+/// such numbers and of sums of them are still finite.
+const MOST: f32 = 1e15;
+
+/// Changes velocities, and moves on what has them.
+pub(super) struct Drift<'a> {
+    pub at: &'a mut [Row],
+    pub velocity: &'a mut [Row],
+    pub budget: &'a mut [f32],
+    /// In m/s, and zero.
+    pub change: Row,
+    /// In seconds, thrice, and zero.
+    pub time: Row,
+    /// The rows that were stopped because of where they would have gone.
+    pub stopped: &'a mut Vec<u32>,
+    pub first: u32,
+}
+
+impl Kernel for Drift<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let rows = self.at.iter_mut().zip(self.velocity).zip(self.budget);
+        for (row, ((at, velocity), budget)) in rows.enumerate() {
+            let new = sum(*velocity, self.change);
+            let way = product(new, self.time);
+            let place = sum(*at, way);
+            let ok = largest(new) < MOST && largest(place) < MOST;
+            if ok {
+                (*velocity, *at) = (new, place);
+                *budget -= squared(way).sqrt();
+            } else {
+                *velocity = [0.0, 0.0, 0.0, velocity[3]];
+                self.stopped.push(self.first + row as u32);
+            }
+        }
+    }
+}
+
+#[inline(always)]
+fn sum(a: Row, b: Row) -> Row {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
+}
+
+#[inline(always)]
+fn product(a: Row, b: Row) -> Row {
+    [a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]]
+}
+
+/// Of the three coordinates.
+#[inline(always)]
+pub(super) fn squared(a: Row) -> f32 {
+    a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+}
+
+/// Of the three coordinates; NaN if one of them is.
+#[inline(always)]
+fn largest(a: Row) -> f32 {
+    a[0].abs() + a[1].abs() + a[2].abs()
+}
+
+/// The first part of a step in the lab's tier: balls move on, and their velocities make room for
+/// the places where they were.
+pub(super) struct Predict<'a> {
+    pub at: &'a mut [Row],
+    pub velocity: &'a mut [Row],
+    /// How far each goes.
+    pub way: &'a mut [f32],
+    pub change: Row,
+    pub time: Row,
+    pub stopped: &'a mut Vec<u32>,
+    pub first: u32,
+}
+
+impl Kernel for Predict<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let rows = self.at.iter_mut().zip(self.velocity).zip(self.way);
+        for (row, ((at, velocity), length)) in rows.enumerate() {
+            let new = sum(*velocity, self.change);
+            let way = product(new, self.time);
+            let place = sum(*at, way);
+            let ok = largest(new) < MOST && largest(place) < MOST;
+            let before = [at[0], at[1], at[2], velocity[3]];
+            if ok {
+                *at = place;
+                *length = squared(way).sqrt();
+            } else {
+                *length = 0.0;
+                self.stopped.push(self.first + row as u32);
+            }
+            *velocity = before;
+        }
+    }
+}
+
+/// The last part of it: velocities are what places became, though no ball is faster than it was
+/// before others pushed it. (What is pushed out of a deep overlap would fly off otherwise.)
+pub(super) struct Follow<'a> {
+    pub at: &'a [Row],
+    pub velocity: &'a mut [Row],
+    pub way: &'a [f32],
+    pub budget: &'a mut [f32],
+    pub per_second: Row,
+}
+
+impl Kernel for Follow<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let rows = self.at.iter().zip(self.velocity).zip(self.way).zip(self.budget);
+        for (((at, velocity), expected), budget) in rows {
+            let way = [at[0] - velocity[0], at[1] - velocity[1], at[2] - velocity[2], 0.0];
+            let length = squared(way).sqrt();
+            *budget -= length;
+            let part = if length > *expected { *expected / length } else { 1.0 };
+            let new = product(way, self.per_second);
+            *velocity = [new[0] * part, new[1] * part, new[2] * part, velocity[3]];
+        }
+    }
+}

@@ -1,0 +1,125 @@
+//! What contacts bore, while rows change places and pairs are sought anew.
+
+use super::kernels::Pushes;
+use super::pairs::Batch;
+use super::team::{Shared, work};
+use super::slab::Slab;
+use super::touch::Touch;
+use super::walls::find;
+use crate::math::Vec3;
+
+/// What a pair bore; kept with its first ball.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Kept {
+    /// The row of the second ball.
+    other: u32,
+    pressure: f32,
+    grip: [f32; 3],
+}
+
+/// See the module.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Memory {
+    /// Where each row's pairs begin, and after the last row, one place further.
+    start: Vec<u32>,
+    kept: Vec<Kept>,
+    touches: Vec<Touch>,
+}
+
+impl Memory {
+    /// Keeps what the pairs and touches of all slabs bore. The rows are as they were.
+    pub fn keep(&mut self, slabs: &[Slab], strays: &Slab, rows: usize, threads: usize) {
+        self.touches.clear();
+        self.touches.extend(slabs.iter().flat_map(|slab| &slab.touches));
+        self.start.clear();
+        self.start.resize(rows + 2, 0);
+        {
+            let counts = Shared::new(&mut self.start);
+            // SAFETY: the first ball of a pair is in the slab, so only one thread counts it; and
+            // the strays come alone.
+            let count = |[row, _]: [u32; 2], _: Kept| unsafe { *counts.row(row as usize + 2) += 1 };
+            work(threads, |member| {
+                slabs[member.share(slabs.len())].iter().for_each(|slab| bearing(slab, count));
+            });
+            bearing(strays, count);
+        }
+        let mut sum = 0;
+        for start in &mut self.start {
+            sum += *start;
+            *start = sum;
+        }
+        self.kept.clear();
+        self.kept.resize(sum as usize, Kept::default());
+        // As pairs are placed, each start grows to the one after it.
+        let (start, places) = (Shared::new(&mut self.start), Shared::new(&mut self.kept));
+        // SAFETY: as above, and each place is given out once.
+        let place = |[row, _]: [u32; 2], kept: Kept| unsafe {
+            let place = start.row(row as usize + 1);
+            *places.row(*place as usize) = kept;
+            *place += 1;
+        };
+        work(threads, |member| {
+            slabs[member.share(slabs.len())].iter().for_each(|slab| bearing(slab, place));
+        });
+        bearing(strays, place);
+    }
+
+    /// Remembers nothing of so many rows.
+    pub fn forget(&mut self, rows: usize) {
+        self.touches.clear();
+        self.kept.clear();
+        self.start.clear();
+        self.start.resize(rows + 2, 0);
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.start.capacity() * size_of::<u32>()
+            + self.kept.capacity() * size_of::<Kept>()
+            + self.touches.capacity() * size_of::<Touch>()
+    }
+
+    /// Gives the pairs of a batch what they bore. `before` says which row each row was.
+    pub fn recall(&self, batches: &[Batch], before: &[u32], pushes: &mut Pushes) {
+        for (i, batch) in batches.iter().enumerate() {
+            for lane in 0..batch.count as usize {
+                let [a, b] = batch.pair(lane).map(|row| before[row as usize]);
+                let (first, other) = (a.min(b), a.max(b));
+                if other == u32::MAX {
+                    continue; // one of them is new
+                }
+                let kept = self.start[first as usize]..self.start[first as usize + 1];
+                let kept = &self.kept[kept.start as usize..kept.end as usize];
+                let Some(kept) = kept.iter().find(|kept| kept.other == other) else { continue };
+                pushes.pressure[i][lane] = kept.pressure;
+                if let Some(grip) = pushes.grip.get_mut(i) {
+                    // The impulse is what the second of the two gets.
+                    let sign = if first == a { 1.0 } else { -1.0 };
+                    for (axis, grip) in grip.iter_mut().zip(kept.grip) {
+                        axis[lane] = grip * sign;
+                    }
+                }
+            }
+        }
+    }
+
+    /// What a ball at a wall bore.
+    pub fn recall_touch(&self, before: &[u32], touch: &Touch) -> Option<(f32, Vec3<f32>)> {
+        let then = Touch { row: before[touch.row as usize], ..*touch };
+        find(&self.touches, &then).map(|kept| (kept.pressure, kept.grip))
+    }
+}
+
+/// Names the pairs of a slab that bear something.
+fn bearing(slab: &Slab, name: impl Fn([u32; 2], Kept)) {
+    for (i, batch) in slab.batches.iter().enumerate() {
+        for lane in 0..batch.count as usize {
+            let pressure = slab.pushes.pressure[i][lane];
+            if pressure > 0.0 {
+                let grip = slab.pushes.grip.get(i);
+                let grip = grip.map_or([0.0; 3], |grip| grip.map(|axis| axis[lane]));
+                let rows = batch.pair(lane);
+                name(rows, Kept { other: rows[1], pressure, grip });
+            }
+        }
+    }
+}

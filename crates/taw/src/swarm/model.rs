@@ -1,0 +1,101 @@
+use crate::Error;
+use crate::error::within;
+use crate::math::{Point3, Vec3};
+use crate::response::Material;
+use crate::world::Mass;
+
+/// What is modelled of the balls of a swarm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
+pub enum Tier {
+    /// They move along lines, and overlapping ones are moved apart, half each: the displacement
+    /// of the lecture. No masses, no friction, no bounce, no spin. What lies in a heap never
+    /// quite comes to rest, as nothing holds it but its neighbours.
+    Lab,
+    /// Masses, restitution, Coulomb friction and spin, by soft contacts in small steps.
+    #[default]
+    Full,
+}
+
+/// How a swarm steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SwarmModel {
+    /// What is modelled.
+    pub tier: Tier,
+    /// Into how many equal parts each step is cut, from 1 to 1,000: in the lab's tier, how often
+    /// overlapping balls are moved apart.
+    pub substeps: u32,
+    /// How many threads work on a step at most, from 1 to 64. They change no bit of it.
+    pub threads: u32,
+    /// What the balls are made of. Rolling and spinning resistance and tangential restitution
+    /// are not modelled.
+    pub material: Material<f32>,
+    /// Whether balls that lie still may fall asleep, which the full tier knows.
+    pub sleeps: bool,
+}
+
+impl Default for SwarmModel {
+    /// The full tier in two substeps, on all threads that the machine has, with sleep.
+    fn default() -> Self {
+        let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get() as u32);
+        Self {
+            tier: Tier::Full,
+            substeps: 2,
+            threads: threads.min(Self::MAX_THREADS),
+            material: Material::default(),
+            sleeps: true,
+        }
+    }
+}
+
+impl SwarmModel {
+    /// The largest number of [substeps](Self::substeps).
+    pub const MAX_SUBSTEPS: u32 = 1000;
+    /// The largest number of [threads](Self::threads).
+    pub const MAX_THREADS: u32 = super::team::MOST_THREADS as u32;
+
+    /// This model, if a swarm can step with it.
+    pub(super) fn checked(self) -> Result<Self, Error> {
+        let check = |field, count, most| within(field, f64::from(count), 1.0, f64::from(most));
+        check("substeps", self.substeps, Self::MAX_SUBSTEPS)?;
+        check("threads", self.threads, Self::MAX_THREADS)?;
+        self.material.checked()?;
+        Ok(self)
+    }
+}
+
+/// A ball on its way into a swarm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ball {
+    /// The center, in metres.
+    pub position: Point3<f32>,
+    /// In metres, from 1e-9 to 1e9.
+    pub radius: f32,
+    /// In metres per second.
+    pub velocity: Vec3<f32>,
+    /// How heavy it is.
+    pub mass: Mass<f32>,
+}
+
+impl Ball {
+    /// A ball of glass, at rest.
+    #[must_use]
+    pub fn new(position: Point3<f32>, radius: f32) -> Self {
+        let velocity = Vec3::new(0.0, 0.0, 0.0);
+        Self { position, radius, velocity, mass: Mass::default() }
+    }
+}
+
+/// What a step is doing, for whoever wants to know how long it takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Stage {
+    /// Velocities and places move on.
+    Integrate,
+    /// Rows are put in the order of cells.
+    Order,
+    /// Pairs that might touch are sought, and what they bore is found again.
+    Pairs,
+    /// Balls at walls are sought.
+    Walls,
+    /// Contacts change velocities or places.
+    Restitute,
+}

@@ -1,0 +1,54 @@
+use std::ops::Range;
+
+use super::kernels::Pushes;
+use super::lanes::Row;
+use super::pairs::Batch;
+use super::touch::Touch;
+
+/// Some layers of the grid, as much as one thread works on at a time. Pairs of its balls, among
+/// themselves and with those of the next slab, are its own; so two slabs that are not neighbours
+/// have no ball in common.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Slab {
+    /// The first layer, and the one after the last.
+    pub layers: [u32; 2],
+    /// The first row, of it, of the next one, and after that.
+    pub rows: [u32; 3],
+    pub batches: Vec<Batch>,
+    pub pushes: Pushes,
+    /// By rows.
+    pub touches: Vec<Touch>,
+    pub old_touches: Vec<Touch>,
+    /// The rows near walls that are no half-spaces.
+    pub near_shapes: Vec<u32>,
+    /// How fast a ball is at most, in m/s: any, one in the first layer, one in the last.
+    pub speed: [f32; 3],
+    /// For how long all have been slow, in seconds, and whether they sleep.
+    pub slow: f32,
+    pub asleep: bool,
+    /// Whether a ball has gone further than its budget, and which were stopped.
+    pub over: bool,
+    pub stopped: Vec<u32>,
+}
+
+impl Slab {
+    pub fn wake(&mut self, velocity: &mut [Row]) {
+        if self.asleep {
+            for velocity in &mut velocity[self.own_rows()] {
+                velocity[3] = velocity[3].abs();
+            }
+        }
+        (self.asleep, self.slow) = (false, 0.0);
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.batches.capacity() * size_of::<Batch>()
+            + self.pushes.bytes()
+            + (self.touches.capacity() + self.old_touches.capacity()) * size_of::<Touch>()
+            + (self.near_shapes.capacity() + self.stopped.capacity()) * size_of::<u32>()
+    }
+
+    pub fn own_rows(&self) -> Range<usize> {
+        self.rows[0] as usize..self.rows[1] as usize
+    }
+}

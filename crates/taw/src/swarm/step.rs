@@ -1,0 +1,389 @@
+//! The three verbs of a swarm.
+
+use std::ops::Range;
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::kernels::{Columns, Displace, Drift, Follow, Pass, Predict, Soft, Solve, squared};
+use super::lanes::Row;
+use super::slab::Slab;
+use super::team::{MOST_THREADS, Member, Shared, wait_for, work};
+use super::walls::half_spaces;
+use super::{Stage, Surroundings, Swarm, Tier, lying};
+use crate::math::{Vec3, length};
+
+/// How stiff contacts are: at most so many oscillations a second, and as many times as much
+/// damping as stops them.
+const HERTZ: f32 = 60.0;
+const DAMPING: f32 = 10.0;
+/// How fast an overlap is pushed out at most, in m/s.
+const FASTEST_PUSH: f32 = 3.0;
+/// For how long, in seconds, all balls of a slab lie still before they sleep.
+const FALL_ASLEEP: f32 = 0.5;
+
+impl Swarm {
+    /// Moves the balls on by `dt` seconds. `version` changes whenever a wall does.
+    pub(crate) fn step(
+        &mut self,
+        dt: f32,
+        gravity: Vec3<f32>,
+        walls: &dyn Surroundings,
+        version: u64,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        self.stopped.clear();
+        if self.gravity != Some(gravity) {
+            self.gravity = Some(gravity);
+            self.wake_all();
+        }
+        let walls_changed = self.walled != Some(version);
+        if walls_changed {
+            half_spaces(walls, self.model.material, &mut self.planes);
+            self.wake_all();
+            self.walled = Some(version);
+        }
+        match self.model.tier {
+            Tier::Lab => self.step_lab(dt, gravity, walls, walls_changed, observe),
+            Tier::Full => self.step_full(dt, gravity, walls, walls_changed, observe),
+        }
+        for slab in &mut self.slabs[..self.slab_count] {
+            self.stopped.append(&mut slab.stopped);
+        }
+    }
+
+    fn step_lab(
+        &mut self,
+        dt: f32,
+        gravity: Vec3<f32>,
+        walls: &dyn Surroundings,
+        walls_changed: bool,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        let threads = self.model.threads as usize;
+        observe(Stage::Integrate);
+        let (change, time) = (row(gravity * dt), [dt, dt, dt, 0.0]);
+        let instructions = self.instructions;
+        let over = AtomicUsize::new(usize::from(!self.paired));
+        {
+            let (at, velocity) = (Shared::new(&mut self.at), Shared::new(&mut self.velocity));
+            let (way, budget) = (Shared::new(&mut self.way), &self.budget[..]);
+            let all_stopped = std::sync::Mutex::new(&mut self.stopped);
+            work(threads, |member| {
+                let rows = member.share(at.len());
+                let mut stopped = Vec::new();
+                // SAFETY: each thread has its own rows.
+                let (at, velocity, way) = unsafe {
+                    (at.part(rows.clone()), velocity.part(rows.clone()), way.part(rows.clone()))
+                };
+                let (stop, first) = (&mut stopped, rows.start as u32);
+                instructions.run(Predict { at, velocity, way, change, time, stopped: stop, first });
+                if way.iter().zip(&budget[rows]).any(|(way, budget)| way > budget) {
+                    over.store(1, Ordering::Relaxed);
+                }
+                if !stopped.is_empty()
+                    && let Ok(mut all) = all_stopped.lock()
+                {
+                    all.append(&mut stopped);
+                }
+            });
+            self.stopped.sort_unstable();
+        }
+        if over.into_inner() > 0 {
+            self.stopped = self.stopped.iter().map(|row| self.ids.slots()[*row as usize]).collect();
+            self.build(dt, walls, observe);
+            let rows = self.ids.columns().1;
+            self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
+        } else if walls_changed {
+            observe(Stage::Walls);
+            self.seek_walls();
+        }
+        observe(Stage::Restitute);
+        self.look_at_walls(walls);
+        let most = FASTEST_PUSH * dt;
+        for _ in 0..self.model.substeps {
+            self.each_slab(|_, columns, slab| {
+                for touch in &slab.touches {
+                    // SAFETY: a ball of the slab.
+                    touch.displace(unsafe { &mut *columns.at.row(touch.row as usize) }, most);
+                }
+                instructions.run(Displace { at: columns.at, batches: &slab.batches, most });
+            });
+        }
+        observe(Stage::Integrate);
+        let per_second = [1.0 / dt, 1.0 / dt, 1.0 / dt, 0.0];
+        let (velocity, budget) = (Shared::new(&mut self.velocity), Shared::new(&mut self.budget));
+        let (at, way) = (&self.at[..], &self.way[..]);
+        work(threads, |member| {
+            let rows = member.share(at.len());
+            // SAFETY: each thread has its own rows.
+            let (velocity, budget) =
+                unsafe { (velocity.part(rows.clone()), budget.part(rows.clone())) };
+            let (at, way) = (&at[rows.clone()], &way[rows]);
+            instructions.run(Follow { at, velocity, way, budget, per_second });
+        });
+    }
+
+    fn step_full(
+        &mut self,
+        dt: f32,
+        gravity: Vec3<f32>,
+        walls: &dyn Surroundings,
+        walls_changed: bool,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        observe(Stage::Integrate);
+        let over = self.paired && self.look(dt, gravity);
+        if !self.paired || over {
+            self.build(dt, walls, observe);
+            self.look(dt, gravity);
+        } else if walls_changed {
+            observe(Stage::Walls);
+            self.seek_walls();
+        }
+        if self.slabs[..self.slab_count].iter().all(|slab| slab.asleep) {
+            return;
+        }
+        observe(Stage::Restitute);
+        self.look_at_walls(walls);
+        let substeps = self.model.substeps as f32;
+        let h = dt / substeps;
+        let per_second = 1.0 / h;
+        let soft = soft(h);
+        let bounce = 2.0 * length(gravity) * dt;
+        let restitution = self.model.material.restitution;
+        let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > bounce;
+        self.pass(Pass::Approach { speed: bounce, restitution }, faster);
+        for _ in 0..self.model.substeps {
+            observe(Stage::Integrate);
+            self.drift(row(gravity * h), [0.0; 4]);
+            observe(Stage::Restitute);
+            self.pass(Pass::Begin, |_, _| true);
+            self.pass(Pass::Solve { soft, per_second }, |_, _| true);
+            observe(Stage::Integrate);
+            self.drift([0.0; 4], [h, h, h, 0.0]);
+            observe(Stage::Restitute);
+            self.pass(Pass::Relax { per_second }, |_, _| true);
+        }
+        self.pass(Pass::Bounce, faster);
+    }
+
+    /// Sees who falls asleep and who wakes; says whether a ball may leave its budget in this
+    /// step.
+    fn look(&mut self, dt: f32, gravity: Vec3<f32>) -> bool {
+        let lying = lying(gravity, self.mean);
+        let sleeps = self.model.sleeps;
+        let (grid, budget) = (&self.grid, &self.budget[..]);
+        let velocity = Shared::new(&mut self.velocity);
+        let spin = Shared::new(&mut self.spin);
+        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        work(self.model.threads as usize, |member| {
+            for slab in member.share(slabs.len()) {
+                // SAFETY: each thread has its own slabs, and their rows.
+                let slab = unsafe { &mut *slabs.row(slab) };
+                if slab.asleep {
+                    continue;
+                }
+                let (velocity, spin) =
+                    unsafe { (velocity.part(slab.own_rows()), spin.part(slab.own_rows())) };
+                let budget = &budget[slab.own_rows()];
+                let mut over = 0;
+                for (velocity, budget) in velocity.iter().zip(budget) {
+                    let way = squared(*velocity) * dt * dt;
+                    over |= u32::from(way > budget * budget) | u32::from(*budget < 0.0);
+                }
+                slab.over = over != 0;
+                let fastest = |from: u32, to: u32| {
+                    let rows = (from - slab.rows[0]) as usize..(to - slab.rows[0]) as usize;
+                    let both = velocity[rows.clone()].iter().zip(&spin[rows]);
+                    both.fold(0.0_f32, |most, (v, s)| most.max(squared(*v)).max(squared(*s))).sqrt()
+                };
+                let [first, last] = [slab.layers[0] + 1, slab.layers[1] - 1];
+                slab.speed = [
+                    fastest(slab.rows[0], slab.rows[1]),
+                    fastest(slab.rows[0], grid.first_of_layer(first)),
+                    fastest(grid.first_of_layer(last), slab.rows[1]),
+                ];
+                slab.slow = if slab.speed[0] < lying { slab.slow + dt } else { 0.0 };
+                if sleeps && slab.slow > FALL_ASLEEP {
+                    (slab.asleep, slab.over, slab.speed) = (true, false, [0.0; 3]);
+                    for (velocity, spin) in velocity.iter_mut().zip(spin) {
+                        *velocity = [0.0, 0.0, 0.0, -velocity[3]];
+                        *spin = [0.0; 4];
+                    }
+                }
+            }
+        });
+        let slabs = &mut self.slabs[..self.slab_count];
+        for i in 0..slabs.len() {
+            let before = i.checked_sub(1).map_or(0.0, |i| slabs[i].speed[2]);
+            let after = slabs.get(i + 1).map_or(0.0, |slab| slab.speed[1]);
+            if slabs[i].asleep && before.max(after) > 2.0 * lying {
+                slabs[i].wake(&mut self.velocity);
+            }
+        }
+        slabs.iter().any(|slab| slab.over)
+    }
+
+    /// Changes velocities and moves the balls that are awake.
+    fn drift(&mut self, change: Row, time: Row) {
+        let instructions = self.instructions;
+        let budget = Shared::new(&mut self.budget);
+        let columns = Columns {
+            at: Shared::new(&mut self.at),
+            velocity: Shared::new(&mut self.velocity),
+            spin: Shared::new(&mut self.spin),
+        };
+        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        work(self.model.threads as usize, |member| {
+            for slab in share(slabs, member) {
+                // SAFETY: each thread has its own slabs, and their rows.
+                let slab = unsafe { &mut *slabs.row(slab) };
+                if slab.asleep {
+                    continue;
+                }
+                let (rows, first) = (slab.own_rows(), slab.rows[0]);
+                let (at, velocity, budget) = unsafe {
+                    let at = columns.at.part(rows.clone());
+                    (at, columns.velocity.part(rows.clone()), budget.part(rows))
+                };
+                let stopped = &mut slab.stopped;
+                instructions.run(Drift { at, velocity, budget, change, time, stopped, first });
+            }
+        });
+    }
+
+    /// Goes over all contacts of the slabs that are awake or beside one, and of which the
+    /// condition holds, given how fast a ball of the next one is.
+    fn pass(&mut self, pass: Pass, condition: impl Fn(&Slab, f32) -> bool + Sync) {
+        let instructions = self.instructions;
+        let friction = self.rough().then_some(self.model.material.friction);
+        let mut strays = std::mem::take(&mut self.strays);
+        self.each_slab(|next, columns, slab| {
+            if slab.asleep && next.is_none_or(|(asleep, _)| asleep)
+                || !condition(slab, next.map_or(0.0, |(_, speed)| speed))
+            {
+                return;
+            }
+            if !slab.asleep {
+                for touch in &mut slab.touches {
+                    let row = touch.row as usize;
+                    // SAFETY: a ball of the slab.
+                    unsafe {
+                        let (at, velocity) = (columns.at.row(row), columns.velocity.row(row));
+                        touch.solve(pass, &*at, &mut *velocity, &mut *columns.spin.row(row));
+                    }
+                }
+            }
+            let Slab { batches, pushes, .. } = slab;
+            instructions.run(Solve { pass, columns, batches, pushes, friction });
+        });
+        let columns = Columns {
+            at: Shared::new(&mut self.at),
+            velocity: Shared::new(&mut self.velocity),
+            spin: Shared::new(&mut self.spin),
+        };
+        let Slab { batches, pushes, .. } = &mut strays;
+        instructions.run(Solve { pass, columns, batches, pushes, friction });
+        self.strays = strays;
+    }
+
+    /// Works on all slabs, each with exclusive access to the balls of it and of the next one.
+    /// Says whether the next one sleeps and how fast a ball of it is.
+    fn each_slab(
+        &mut self,
+        job: impl Fn(Option<(bool, f32)>, Columns, &mut Slab) + Sync,
+    ) {
+        let columns = Columns {
+            at: Shared::new(&mut self.at),
+            velocity: Shared::new(&mut self.velocity),
+            spin: Shared::new(&mut self.spin),
+        };
+        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        let begun = [const { AtomicUsize::new(0) }; MOST_THREADS];
+        work(self.model.threads as usize, |member| {
+            let one = |slab: usize| {
+                // SAFETY: a slab belongs to one thread. Of the next one, only what nobody changes
+                // meanwhile is read.
+                unsafe {
+                    let next = (slab + 1 < slabs.len()).then(|| {
+                        let next = slabs.row(slab + 1);
+                        ((*next).asleep, (*next).speed[0])
+                    });
+                    job(next, columns, &mut *slabs.row(slab));
+                }
+            };
+            let mine = share(slabs, member);
+            let begin = || begun[member.number].store(1, Ordering::Release);
+            if mine.is_empty() {
+                begin();
+            }
+            for even in mine.clone().step_by(2) {
+                one(even);
+                if even == mine.start {
+                    begin();
+                } else {
+                    one(even - 1);
+                }
+            }
+            if !mine.is_empty() && mine.len().is_multiple_of(2) {
+                // The last one shares balls with the first one of the next thread.
+                for next in &begun[member.number + 1..member.size] {
+                    wait_for(|| next.load(Ordering::Acquire) > 0);
+                }
+                one(mine.end - 1);
+            }
+        });
+    }
+
+    /// Seeks the balls at walls anew, where pairs are still known.
+    fn seek_walls(&mut self) {
+        let (at, budget, planes) = (&self.at[..], &self.budget[..], &self.planes[..]);
+        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        work(self.model.threads as usize, |member| {
+            for slab in member.share(slabs.len()) {
+                // SAFETY: its own.
+                let slab = unsafe { &mut *slabs.row(slab) };
+                let old = std::mem::take(&mut slab.touches);
+                slab.touches = std::mem::take(&mut slab.old_touches);
+                slab.seek_walls(at, budget, planes, |touch| {
+                    super::walls::find(&old, touch).map(|same| (same.pressure, same.grip))
+                });
+                slab.old_touches = old;
+            }
+        });
+    }
+
+    fn look_at_walls(&mut self, walls: &dyn Surroundings) {
+        let (at, budget, material) = (&self.at[..], &self.budget[..], self.model.material);
+        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        work(self.model.threads as usize, |member| {
+            for slab in member.share(slabs.len()) {
+                // SAFETY: its own.
+                let slab = unsafe { &mut *slabs.row(slab) };
+                if !slab.asleep {
+                    slab.look_at_walls(walls, at, budget, material);
+                }
+            }
+        });
+    }
+}
+
+/// The slabs of a thread: from an even one to an even one.
+fn share(slabs: Shared<Slab>, member: &Member) -> Range<usize> {
+    let even = |number: usize| {
+        if number == member.size { slabs.len() } else { (slabs.len() * number / member.size) & !1 }
+    };
+    even(member.number)..even(member.number + 1)
+}
+
+fn row(vector: Vec3<f32>) -> Row {
+    [vector.x, vector.y, vector.z, 0.0]
+}
+
+/// Springs that are as stiff as so short a step allows (Catto, *Solver2D*, 2024).
+fn soft(h: f32) -> Soft {
+    let omega = 2.0 * std::f32::consts::PI * HERTZ.min(0.25 / h);
+    let a1 = 2.0 * DAMPING + h * omega;
+    let a2 = h * omega * a1;
+    let a3 = 1.0 / (1.0 + a2);
+    Soft { rate: omega / a1, fastest: FASTEST_PUSH, mass: a2 * a3, back: a3 }
+}

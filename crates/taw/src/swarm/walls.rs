@@ -1,0 +1,199 @@
+use std::ops::Range;
+
+use cgmath::{EuclideanSpace, InnerSpace, Zero};
+
+use super::lanes::Row;
+use super::slab::Slab;
+use super::touch::Touch;
+use crate::math::{Point3, Vec3};
+use crate::response::Material;
+
+/// What balls can touch besides each other, as the world has it.
+pub(crate) trait Surroundings: Sync {
+    /// Names all half-spaces: the wall, its normal, and how far along it the surface is.
+    fn planes(&self, name: &mut dyn FnMut(u32, Vec3<f32>, f32));
+    /// Whether there is anything else, and whether some of it may be in a box.
+    fn has_shapes(&self) -> bool;
+    fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;
+    /// Names what else is within `reach` metres of a ball, without the seams: the wall and its
+    /// part, the normal, and the distance of the center.
+    fn shapes_at(&self, ball: &Row, reach: f32, name: &mut dyn FnMut([u32; 2], Vec3<f32>, f32));
+    /// In m/s, and the wall's own material.
+    fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32>;
+    fn material(&self, wall: u32) -> Option<Material<f32>>;
+}
+
+/// A half-space.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HalfSpace {
+    wall: u32,
+    normal: Vec3<f32>,
+    offset: f32,
+    friction: f32,
+    restitution: f32,
+}
+
+/// All half-spaces.
+pub(super) fn half_spaces(
+    walls: &dyn Surroundings,
+    material: Material<f32>,
+    planes: &mut Vec<HalfSpace>,
+) {
+    planes.clear();
+    walls.planes(&mut |wall, normal, offset| {
+        let Material { friction, restitution, .. } = against(walls, wall, material);
+        planes.push(HalfSpace { wall, normal, offset, friction, restitution });
+    });
+}
+
+fn against(walls: &dyn Surroundings, wall: u32, material: Material<f32>) -> Material<f32> {
+    walls.material(wall).map_or(material, |its| material.against(its))
+}
+
+fn center(at: &Row) -> Point3<f32> {
+    Point3::new(at[0], at[1], at[2])
+}
+
+impl Slab {
+    /// Finds the balls at walls anew. `recall` knows what they bore.
+    pub fn seek_walls(
+        &mut self,
+        at: &[Row],
+        budget: &[f32],
+        planes: &[HalfSpace],
+        recall: impl Fn(&Touch) -> Option<(f32, Vec3<f32>)>,
+    ) {
+        self.touches.clear();
+        for row in self.own_rows() {
+            let ball = &at[row];
+            for plane in planes {
+                let HalfSpace { wall, normal, offset, friction, restitution } = *plane;
+                let gap = normal.dot(center(ball).to_vec()) - offset - ball[3];
+                // A wall may also come nearer; who moves it seeks again.
+                if gap < budget[row] {
+                    let (row, part) = (row as u32, 0);
+                    let mut touch =
+                        Touch::new(row, [wall, part], normal, offset, [friction, restitution]);
+                    if let Some((pressure, grip)) = recall(&touch) {
+                        (touch.pressure, touch.grip) = (pressure, grip);
+                    }
+                    self.touches.push(touch);
+                }
+            }
+        }
+    }
+
+    /// Brings the balls at walls up to date: how walls move, and which part of a shape is
+    /// touched.
+    pub fn look_at_walls(
+        &mut self,
+        walls: &dyn Surroundings,
+        at: &[Row],
+        budget: &[f32],
+        material: Material<f32>,
+    ) {
+        if !self.near_shapes.is_empty() {
+            self.touch_shapes(walls, at, budget, material);
+        }
+        for touch in &mut self.touches {
+            let ball = &at[touch.row as usize];
+            let point = center(ball) - touch.normal * ball[3];
+            touch.surface = walls.surface_velocity(touch.wall, point);
+        }
+    }
+
+    fn touch_shapes(
+        &mut self,
+        walls: &dyn Surroundings,
+        at: &[Row],
+        budget: &[f32],
+        material: Material<f32>,
+    ) {
+        std::mem::swap(&mut self.touches, &mut self.old_touches);
+        self.touches.clear();
+        let old = &self.old_touches;
+        self.touches.extend(old.iter().filter(|touch| touch.is_plane));
+        for row in &self.near_shapes {
+            let ball = &at[*row as usize];
+            let reach = budget[*row as usize].max(0.0);
+            walls.shapes_at(ball, reach, &mut |[wall, part], normal, distance| {
+                let Material { friction, restitution, .. } = against(walls, wall, material);
+                let offset = normal.dot(center(ball).to_vec()) - distance;
+                let mut touch =
+                    Touch::new(*row, [wall, part], normal, offset, [friction, restitution]);
+                touch.is_plane = false;
+                if let Some(same) = find(old, &touch) {
+                    (touch.pressure, touch.grip, touch.rebound) =
+                        (same.pressure, same.grip, same.rebound);
+                }
+                self.touches.push(touch);
+            });
+        }
+        self.touches.sort_unstable_by_key(Touch::key);
+    }
+}
+
+/// The one of the same ball and wall, among many in order.
+pub(super) fn find<'a>(touches: &'a [Touch], touch: &Touch) -> Option<&'a Touch> {
+    let at = touches.binary_search_by_key(&touch.key(), Touch::key).ok()?;
+    touches.get(at)
+}
+
+/// The rows among these that are near anything but half-spaces, found by ever smaller boxes.
+pub(super) fn near_shapes(
+    walls: &dyn Surroundings,
+    at: &[Row],
+    budget: &[f32],
+    rows: Range<usize>,
+    found: &mut Vec<u32>,
+) {
+    let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
+    for row in rows.clone() {
+        let (ball, reach) = (&at[row], at[row][3] + budget[row]);
+        for axis in 0..3 {
+            low[axis] = low[axis].min(ball[axis] - reach);
+            high[axis] = high[axis].max(ball[axis] + reach);
+        }
+    }
+    if rows.is_empty() || !walls.near(low, high) {
+        return;
+    }
+    if rows.len() == 1 {
+        found.push(rows.start as u32);
+        return;
+    }
+    // Neighbours in the order are neighbours in space.
+    let middle = rows.start + rows.len() / 2;
+    near_shapes(walls, at, budget, rows.start..middle, found);
+    near_shapes(walls, at, budget, middle..rows.end, found);
+}
+
+impl Touch {
+    fn new(
+        row: u32,
+        [wall, part]: [u32; 2],
+        normal: Vec3<f32>,
+        offset: f32,
+        [friction, restitution]: [f32; 2],
+    ) -> Self {
+        Self {
+            row,
+            wall,
+            part,
+            is_plane: true,
+            normal,
+            offset,
+            surface: Vec3::zero(),
+            friction,
+            restitution,
+            pressure: 0.0,
+            grip: Vec3::zero(),
+            rebound: 0.0,
+        }
+    }
+
+    /// What orders them.
+    pub fn key(&self) -> (u32, u32, u32) {
+        (self.row, self.wall, self.part)
+    }
+}
