@@ -13,8 +13,8 @@ const SLAB: u32 = 1024;
 /// How far a ball may go between two searches: as far as it goes in so many steps at its speed,
 const STEPS: f32 = 12.0;
 /// but this part of its radius at least, and this part of the mean radius at most.
-const LEAST: f32 = 0.02;
-const MOST: f32 = 0.12;
+const LEAST: f32 = 0.06;
+const MOST: f32 = 0.15;
 /// A few faster ones are sought for one by one: one of so many, and besides so many.
 const STRAYS: usize = 500;
 const SOME_STRAYS: usize = 32;
@@ -155,7 +155,7 @@ impl Swarm {
                 if rough {
                     memory.recall(&slab.batches, before, &mut slab.pushes);
                 }
-                slab.seek_walls(at, budget, planes, |touch| memory.recall_touch(before, touch));
+                slab.seek_walls(instructions, at, budget, planes, |touch| memory.recall_touch(before, touch));
                 slab.near_shapes.clear();
                 if shapes {
                     walls::near_shapes(walls, at, budget, slab.own_rows(), &mut slab.near_shapes);

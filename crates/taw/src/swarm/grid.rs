@@ -103,6 +103,11 @@ impl Grid {
         self.start[cell as usize + 1]
     }
 
+    /// The first row of each of so many cells in a line, and of the one after them.
+    pub fn starts(&self, cell: u32, count: u32) -> &[u32] {
+        &self.start[cell as usize + 1..(cell + count) as usize + 2]
+    }
+
     /// The level of a ball with this radius.
     pub fn level_of(&self, radius: f32) -> usize {
         let fits = |level: &Level| 2.0 * radius <= level.widest;

@@ -25,6 +25,8 @@ pub(super) trait Lanes:
     fn above(self, other: Self) -> u32;
     /// `yes` where the first is the greater, else `no`.
     fn pick_above(self, other: Self, yes: Self, no: Self) -> Self;
+    /// Puts those of the numbers first whose bits are set; the rest is anything.
+    fn compress(bits: u32, numbers: &[u32; LANES], to: &mut [u32; LANES]);
     /// The rows at these places after `base`, as columns.
     ///
     /// # Safety
@@ -52,7 +54,7 @@ pub struct Instructions(Set);
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Set {
     Portable,
-    /// Only where the processor has it.
+    /// AVX2, BMI1 and POPCNT; only where the processor has them.
     #[cfg(target_arch = "x86_64")]
     Avx2,
 }
@@ -71,7 +73,10 @@ impl Instructions {
     /// All that this machine has, the fastest first.
     pub fn available() -> impl Iterator<Item = Self> {
         #[cfg(target_arch = "x86_64")]
-        let more = std::is_x86_feature_detected!("avx2").then_some(Self(Set::Avx2));
+        let more = (std::is_x86_feature_detected!("avx2")
+            && std::is_x86_feature_detected!("bmi1")
+            && std::is_x86_feature_detected!("popcnt"))
+        .then_some(Self(Set::Avx2));
         #[cfg(not(target_arch = "x86_64"))]
         let more = None;
         more.into_iter().chain([Self::PORTABLE])
@@ -175,6 +180,16 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
+    fn compress(mut bits: u32, numbers: &[u32; LANES], to: &mut [u32; LANES]) {
+        let mut count = 0;
+        while bits != 0 {
+            to[count] = numbers[bits.trailing_zeros() as usize % LANES];
+            count += 1;
+            bits &= bits - 1;
+        }
+    }
+
+    #[inline(always)]
     unsafe fn gather(base: *const Row, at: &[u16; LANES]) -> [Self; 4] {
         let mut columns = [[0.0; LANES]; 4];
         for lane in 0..LANES {
@@ -204,8 +219,8 @@ mod x86 {
     use super::{Kernel, LANES, Lanes, Row};
 
     /// # Safety
-    /// The processor has AVX2.
-    #[target_feature(enable = "avx2")]
+    /// The processor has these.
+    #[target_feature(enable = "avx2,bmi1,popcnt")]
     pub(super) unsafe fn run(kernel: impl Kernel) {
         kernel.run::<Avx>();
     }
@@ -262,6 +277,16 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn compress(bits: u32, numbers: &[u32; LANES], to: &mut [u32; LANES]) {
+            unsafe {
+                let numbers = _mm256_loadu_si256(numbers.as_ptr().cast());
+                let which = _mm256_loadu_si256(FIRST[bits as usize & 0xff].as_ptr().cast());
+                let first = _mm256_permutevar8x32_epi32(numbers, which);
+                _mm256_storeu_si256(to.as_mut_ptr().cast(), first);
+            }
+        }
+
+        #[inline(always)]
         unsafe fn gather(base: *const Row, at: &[u16; LANES]) -> [Self; 4] {
             // Two rows to a register, then a transposition of two blocks of four by four.
             unsafe {
@@ -300,6 +325,24 @@ mod x86 {
             }
         }
     }
+
+    /// For each set of bits, which lanes are in it.
+    static FIRST: [[u32; LANES]; 256] = {
+        let mut first = [[0; LANES]; 256];
+        let mut bits = 0;
+        while bits < 256 {
+            let (mut lane, mut count) = (0, 0);
+            while lane < LANES {
+                if bits >> lane & 1 == 1 {
+                    first[bits][count] = lane as u32;
+                    count += 1;
+                }
+                lane += 1;
+            }
+            bits += 1;
+        }
+        first
+    };
 
     #[inline(always)]
     unsafe fn two(base: *const Row, low: u16, high: u16) -> __m256 {

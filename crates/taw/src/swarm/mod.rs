@@ -325,7 +325,7 @@ impl Swarm {
 
     /// Keeps what pairs bore, as rows are about to change.
     fn remember(&mut self) {
-        if !self.remembers && self.paired {
+        if !self.remembers && self.paired && self.rough() {
             let threads = self.model.threads as usize;
             let strays = std::mem::take(&mut self.strays);
             let slabs = &self.slabs[..self.slab_count];

@@ -1,5 +1,7 @@
 //! Who might touch whom: pairs of balls, eight to a batch in which no ball is twice.
 
+use std::ops::Range;
+
 use super::grid::{Grid, Level};
 use super::kernels::squared;
 use super::lanes::{Kernel, LANES, Lanes, Row};
@@ -20,12 +22,6 @@ impl Batch {
     pub fn pair(&self, lane: usize) -> [u32; 2] {
         [self.first[0] + u32::from(self.a[lane]), self.first[1] + u32::from(self.b[lane])]
     }
-
-    /// Where a pair would be, if it is near enough to the first rows.
-    fn place(&self, a: u32, b: u32) -> Option<[u16; 2]> {
-        let near = |row: u32, first: u32| u16::try_from(row.checked_sub(first)?).ok();
-        Some([near(a, self.first[0])?, near(b, self.first[1])?])
-    }
 }
 
 /// How many batches are being filled at a time.
@@ -38,72 +34,91 @@ const FAR: f32 = 1e18;
 /// What the search scribbles on; one for each thread.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Search {
-    /// The rows of a slab and of the next one, as columns: center, and radius with budget.
-    columns: [Vec<f32>; 4],
-    /// Which of the open batches a row is in, as bits.
+    columns: Columns,
+    /// In which of the open batches a row has been, as bits.
     busy: Vec<u32>,
-    open: [Option<Batch>; OPEN],
+    open: [Batch; OPEN],
+}
+
+/// See [`Around`].
+#[derive(Clone, Debug, Default)]
+struct Columns {
+    /// Of a slab and the next one: center, and radius with budget.
+    window: [Vec<f32>; 4],
+    added: [Vec<f32>; 4],
+    rows: Vec<u32>,
+    found: Vec<u32>,
 }
 
 impl Search {
     pub fn bytes(&self) -> usize {
-        let columns = self.columns.iter().map(Vec::capacity).sum::<usize>();
-        (columns + self.busy.capacity()) * 4
+        let Columns { window, added, rows, found } = &self.columns;
+        let columns = window.iter().chain(added).map(Vec::capacity).sum::<usize>();
+        (columns + rows.capacity() + found.capacity() + self.busy.capacity()) * 4
     }
 }
 
-/// Puts pairs into batches.
+/// Puts pairs into batches: each pair into the first one in whose line neither ball was yet.
 struct Filler<'a> {
     first: u32,
     busy: &'a mut [u32],
-    open: &'a mut [Option<Batch>; OPEN],
+    open: &'a mut [Batch; OPEN],
     batches: &'a mut Vec<Batch>,
 }
 
 impl Filler<'_> {
-    #[inline]
+    #[inline(always)]
     fn add(&mut self, a: u32, b: u32) {
-        let (local_a, local_b) = ((a - self.first) as usize, (b - self.first) as usize);
-        let busy = self.busy[local_a] | self.busy[local_b];
-        let mut slot = (!busy).trailing_zeros() as usize;
+        let busy = *self.busy(a) | *self.busy(b);
+        let slot = busy.trailing_ones() as usize;
         if slot == OPEN {
-            slot = self.fullest();
-            self.close(slot);
+            // A large ball among many small ones.
+            self.close();
+            return self.add_in(0, a, b);
         }
-        if let Some(batch) = &mut self.open[slot]
-            && let Some([a, b]) = batch.place(a, b)
-        {
-            let lane = batch.count as usize;
-            (batch.a[lane], batch.b[lane]) = (a, b);
-            batch.count += 1;
-        } else {
-            self.close(slot);
-            let first = [a.saturating_sub(BEFORE), b.saturating_sub(BEFORE)];
-            let place = [(a - first[0]) as u16, (b - first[1]) as u16];
-            self.open[slot] =
-                Some(Batch { first, a: [place[0]; LANES], b: [place[1]; LANES], count: 1 });
-        }
-        self.busy[local_a] |= 1 << slot;
-        self.busy[local_b] |= 1 << slot;
-        if self.open[slot].is_some_and(|batch| batch.count as usize == LANES) {
-            self.close(slot);
-        }
+        self.add_in(slot, a, b);
     }
 
-    fn fullest(&self) -> usize {
-        let count = |slot: &usize| self.open[*slot].map_or(0, |batch| batch.count);
-        (0..OPEN).rev().max_by_key(count).unwrap_or(0)
-    }
-
-    /// Takes a batch as it is.
-    fn close(&mut self, slot: usize) {
-        let Some(batch) = self.open[slot].take() else { return };
-        for lane in 0..batch.count as usize {
-            for row in batch.pair(lane) {
-                self.busy[(row - self.first) as usize] &= !(1 << slot);
+    #[inline(always)]
+    fn add_in(&mut self, slot: usize, a: u32, b: u32) {
+        let batch = &mut self.open[slot % OPEN];
+        let mut place = [a.wrapping_sub(batch.first[0]), b.wrapping_sub(batch.first[1])];
+        if batch.count == 0 || (place[0] | place[1]) > u32::from(u16::MAX) {
+            if batch.count > 0 {
+                self.batches.push(*batch);
             }
+            batch.first = [a.saturating_sub(BEFORE), b.saturating_sub(BEFORE)];
+            batch.count = 0;
+            place = [a - batch.first[0], b - batch.first[1]];
+            (batch.a, batch.b) = ([place[0] as u16; LANES], [place[1] as u16; LANES]);
         }
-        self.batches.push(batch);
+        let lane = batch.count as usize % LANES;
+        (batch.a[lane], batch.b[lane]) = (place[0] as u16, place[1] as u16);
+        batch.count += 1;
+        if batch.count as usize == LANES {
+            self.batches.push(*batch);
+            batch.count = 0;
+        }
+        *self.busy(a) |= 1 << slot;
+        *self.busy(b) |= 1 << slot;
+    }
+
+    /// In which open batches a row of the window has been.
+    #[inline(always)]
+    fn busy(&mut self, row: u32) -> &mut u32 {
+        let local = (row - self.first) as usize;
+        debug_assert!(local < self.busy.len());
+        // SAFETY: rows come from the window.
+        unsafe { self.busy.get_unchecked_mut(local) }
+    }
+
+    /// Takes the open batches as they are, and begins anew.
+    fn close(&mut self) {
+        for batch in self.open.iter_mut().filter(|batch| batch.count > 0) {
+            self.batches.push(*batch);
+            batch.count = 0;
+        }
+        self.busy.fill(0);
     }
 }
 
@@ -127,54 +142,43 @@ impl Kernel for FindPairs<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let Self { grid, at, budget, cap, layers, rows, search, batches } = self;
-        let Search { columns, busy, open } = search;
         let [first, _, end] = rows;
-        let window = &at[first as usize..end as usize];
-        let budget = &budget[first as usize..end as usize];
-        let [x, y, z, reach] = columns;
-        for (axis, column) in [&mut *x, y, z].into_iter().enumerate() {
-            column.clear();
-            column.extend(window.iter().map(|row| row[axis]));
-            column.extend([FAR; LANES]);
-        }
-        reach.clear();
-        reach.extend(window.iter().zip(budget).map(|(row, budget)| row[3] + budget));
-        reach.extend([FAR; LANES]);
-        for (x, budget) in x.iter_mut().zip(budget) {
-            if *budget > cap {
-                *x = -FAR;
-            }
-        }
+        let window = first as usize..end as usize;
+        let Search { columns, busy, open } = search;
+        columns.window.fill_with(&at[window.clone()], &budget[window.clone()], cap);
         busy.clear();
         busy.resize(window.len(), 0);
         batches.clear();
         let mut filler = Filler { first, busy, open, batches };
-        let near = Near { columns, first };
+        let mut around = Around::new(columns, first..end);
         for level in &grid.levels {
             let [row_count, cell_count] = level.size();
             let fine = layers.map(|layer| layer << level.level);
             for layer in fine[0]..fine[1] {
                 for row in 1..row_count - 1 {
-                    let begin = level.cell(grid, layer, row, 0);
-                    if grid.first(begin) == grid.first(begin + cell_count) {
+                    let line = level.cell(grid, layer, row, 0);
+                    if grid.first(line) == grid.first(line + cell_count) {
                         continue;
                     }
+                    let starts = grid.starts(line, cell_count);
                     let ahead = ahead(grid, level, layer, row);
-                    for cell in 1..cell_count - 1 {
-                        let (from, to) = (grid.first(begin + cell), grid.first(begin + cell + 1));
+                    for (cell, four) in starts.windows(4).enumerate() {
+                        let [_, from, to, end] = *four else { continue };
                         if from == to {
                             continue;
                         }
-                        let own_end = grid.first(begin + cell + 2);
-                        let run = |line: u32| {
-                            [grid.first(line + cell - 1), grid.first(line + cell + 2)]
-                        };
-                        let runs = ahead.map(|line| line.map_or([0, 0], run));
+                        around.count = 0;
+                        around.add::<L>(from, end);
+                        for starts in &ahead {
+                            if let Some(&[from, _, _, to]) = starts.get(cell..cell + 4) {
+                                around.add::<L>(from, to);
+                            }
+                        }
+                        around.pad::<L>();
                         for a in from..to {
-                            let ball = near.ball::<L>(a);
-                            near.each(&ball, [a + 1, own_end], |b| filler.add(a, b));
-                            for run in runs {
-                                near.each(&ball, run, |b| filler.add(a, b));
+                            // Each with those that come after it.
+                            for b in around.touching::<L>(a, (a - from) as usize + 1) {
+                                filler.add(a, *b);
                             }
                         }
                     }
@@ -182,12 +186,191 @@ impl Kernel for FindPairs<'_> {
             }
         }
         if grid.levels.len() > 1 {
-            across::<L>(grid, at, layers, rows, &near, &mut filler);
+            across::<L>(grid, at, layers, rows, &mut around, &mut filler);
         }
-        for slot in 0..OPEN {
-            filler.close(slot);
+        filler.close();
+    }
+}
+
+trait Fill {
+    /// Takes rows in; those with a budget above the cap are nowhere.
+    fn fill_with(&mut self, at: &[Row], budget: &[f32], cap: f32);
+}
+
+impl Fill for [Vec<f32>; 4] {
+    fn fill_with(&mut self, at: &[Row], budget: &[f32], cap: f32) {
+        let [x, y, z, reach] = self;
+        for column in [&mut *x, y, z, reach] {
+            column.clear();
+            column.resize(at.len() + LANES, FAR);
+        }
+        let columns = x.iter_mut().zip(y).zip(z).zip(reach);
+        for ((at, budget), (((x, y), z), reach)) in at.iter().zip(budget).zip(columns) {
+            [*x, *y, *z, *reach] = [at[0], at[1], at[2], at[3] + budget];
+            if *budget > cap {
+                *x = -FAR;
+            }
         }
     }
+}
+
+/// The lines of cells that come later and are beside one: where the rows of their cells begin.
+fn ahead<'a>(grid: &'a Grid, level: &Level, layer: u32, row: u32) -> [&'a [u32]; 4] {
+    let cells = level.size()[1];
+    let line = |layer, row| grid.starts(level.cell(grid, layer, row, 0), cells);
+    let here = line(layer, row + 1);
+    if layer + 1 == level.layers {
+        return [here, &[], &[], &[]];
+    }
+    [here, line(layer + 1, row - 1), line(layer + 1, row), line(layer + 1, row + 1)]
+}
+
+/// Pairs of a ball with one of a coarser level: there, all 27 cells around it.
+#[inline(always)]
+fn across<L: Lanes>(
+    grid: &Grid,
+    at: &[Row],
+    layers: [u32; 2],
+    [first, next, end]: [u32; 3],
+    around: &mut Around,
+    filler: &mut Filler,
+) {
+    // Also of the next slab's balls, with those of this one.
+    for small in first..end {
+        let place = &at[small as usize];
+        let own = grid.level_of(place[3]);
+        for level in &grid.levels[..own] {
+            let [layer, row, cell] = grid.coordinates(level, place);
+            if small >= next && layer > layers[1] << level.level {
+                continue;
+            }
+            around.count = 0;
+            let last = if small < next { end } else { next };
+            for layer in layer.saturating_sub(1)..(layer + 2).min(level.layers) {
+                for row in row - 1..row + 2 {
+                    let line = level.cell(grid, layer, row, 0);
+                    let [from, to] = [grid.first(line + cell - 1), grid.first(line + cell + 2)];
+                    around.add::<L>(from.max(first), to.min(last));
+                }
+            }
+            around.pad::<L>();
+            for other in around.touching::<L>(small, 0) {
+                filler.add(small.min(*other), small.max(*other));
+            }
+        }
+    }
+}
+
+/// Looks which balls are near one, among some runs of rows.
+struct Around<'a> {
+    /// The first row of the window, and how many there are.
+    first: u32,
+    size: usize,
+    /// The columns of the window, with [`LANES`] places more.
+    columns: [&'a [f32]; 4],
+    /// The same for the runs that were added, and their rows. As no row is added twice, they
+    /// never take more places than the window.
+    added: [&'a mut [f32]; 4],
+    rows: &'a mut [u32],
+    count: usize,
+    /// Those that are near.
+    found: &'a mut [u32],
+}
+
+impl<'a> Around<'a> {
+    fn new(search: &'a mut Columns, window: Range<u32>) -> Self {
+        let size = window.len();
+        let Columns { window: columns, added, rows, found } = search;
+        for column in &mut *added {
+            column.resize(size + LANES, FAR);
+        }
+        rows.resize(size + LANES, 0);
+        found.resize(size + LANES, 0);
+        let columns = columns.each_ref().map(|column| &column[..size + LANES]);
+        let added = added.each_mut().map(|column| &mut column[..size + LANES]);
+        Self { first: window.start, size, columns, added, rows, count: 0, found }
+    }
+
+    /// Adds a run of rows of the window.
+    #[inline(always)]
+    fn add<L: Lanes>(&mut self, from: u32, to: u32) {
+        if from >= to {
+            return;
+        }
+        let count = (to - from) as usize;
+        let local = (from - self.first) as usize;
+        debug_assert!(local + count <= self.size && self.count + count <= self.size);
+        // Eight at a time; what is too much is written over, or padded.
+        let mut at = 0;
+        while at < count {
+            // SAFETY: both begin before the end of the window, which eight places follow.
+            unsafe {
+                let place = self.count + at;
+                put(self.added[0], place, get::<L>(self.columns[0], local + at));
+                put(self.added[1], place, get::<L>(self.columns[1], local + at));
+                put(self.added[2], place, get::<L>(self.columns[2], local + at));
+                put(self.added[3], place, get::<L>(self.columns[3], local + at));
+                let rows = self.rows.as_mut_ptr().add(place);
+                for lane in 0..LANES {
+                    *rows.add(lane) = from + (at + lane) as u32;
+                }
+            }
+            at += LANES;
+        }
+        self.count += count;
+    }
+
+    /// Ends the runs with balls that are nowhere.
+    #[inline(always)]
+    fn pad<L: Lanes>(&mut self) {
+        for column in &mut self.added {
+            // SAFETY: as in `add`.
+            unsafe { put(column, self.count, L::splat(FAR)) };
+        }
+    }
+
+    /// Those from a place on that are near a ball of the window.
+    #[inline(always)]
+    fn touching<L: Lanes>(&mut self, ball: u32, from: usize) -> &[u32] {
+        let local = (ball - self.first) as usize;
+        let [x, y, z, reach] = self.columns;
+        let (x, y) = (L::splat(x[local]), L::splat(y[local]));
+        let (z, reach) = (L::splat(z[local]), L::splat(reach[local]));
+        let (mut count, mut at) = (0, from);
+        while at < self.count {
+            // SAFETY: as in `add`; and no more are found than were added.
+            unsafe {
+                let dx = get::<L>(self.added[0], at) - x;
+                let dy = get::<L>(self.added[1], at) - y;
+                let dz = get::<L>(self.added[2], at) - z;
+                let near = get::<L>(self.added[3], at) + reach;
+                let hits = (near * near).above(dx * dx + dy * dy + dz * dz);
+                let rows = &*self.rows.as_ptr().add(at).cast();
+                L::compress(hits, rows, &mut *self.found.as_mut_ptr().add(count).cast());
+                count += hits.count_ones() as usize;
+            }
+            at += LANES;
+        }
+        &self.found[..count]
+    }
+}
+
+/// # Safety
+/// There are eight from there on.
+#[inline(always)]
+unsafe fn get<L: Lanes>(column: &[f32], at: usize) -> L {
+    debug_assert!(at + LANES <= column.len());
+    // SAFETY: as the caller promises.
+    L::load(unsafe { &*column.as_ptr().add(at).cast() })
+}
+
+/// # Safety
+/// There are eight from there on.
+#[inline(always)]
+unsafe fn put<L: Lanes>(column: &mut [f32], at: usize, eight: L) {
+    debug_assert!(at + LANES <= column.len());
+    // SAFETY: as the caller promises.
+    eight.store(unsafe { &mut *column.as_mut_ptr().add(at).cast() });
 }
 
 /// Finds the pairs of those balls that have a budget above the cap.
@@ -233,91 +416,6 @@ pub(super) fn find_strays(
             }
         }
     }
-    for slot in 0..OPEN {
-        filler.close(slot);
-    }
+    filler.close();
 }
 
-/// The lines of cells that come later and are beside one, by their first cells.
-fn ahead(grid: &Grid, level: &Level, layer: u32, row: u32) -> [Option<u32>; 4] {
-    let next = (layer + 1 < level.layers).then_some(layer + 1);
-    let line = |layer: Option<u32>, row: u32| layer.map(|layer| level.cell(grid, layer, row, 0));
-    [line(Some(layer), row + 1), line(next, row - 1), line(next, row), line(next, row + 1)]
-}
-
-/// Pairs of a ball with one of a coarser level: there, all 27 cells around it.
-#[inline(always)]
-fn across<L: Lanes>(
-    grid: &Grid,
-    at: &[Row],
-    layers: [u32; 2],
-    [first, next, end]: [u32; 3],
-    near: &Near,
-    filler: &mut Filler,
-) {
-    // Also of the next slab's balls, with those of this one.
-    for small in first..end {
-        let place = &at[small as usize];
-        let own = grid.level_of(place[3]);
-        for level in &grid.levels[..own] {
-            let [layer, row, cell] = grid.coordinates(level, place);
-            if small >= next && layer > layers[1] << level.level {
-                continue;
-            }
-            let ball = near.ball::<L>(small);
-            for layer in layer.saturating_sub(1)..(layer + 2).min(level.layers) {
-                for row in row - 1..row + 2 {
-                    let line = level.cell(grid, layer, row, 0);
-                    let run = [grid.first(line + cell - 1), grid.first(line + cell + 2)];
-                    let run = [run[0].max(first), run[1].min(if small < next { end } else { next })];
-                    near.each(&ball, run, |other| filler.add(small.min(other), small.max(other)));
-                }
-            }
-        }
-    }
-}
-
-/// Looks which balls are near one.
-struct Near<'a> {
-    columns: &'a [Vec<f32>; 4],
-    first: u32,
-}
-
-impl Near<'_> {
-    /// Its center and its reach.
-    #[inline(always)]
-    fn ball<L: Lanes>(&self, row: u32) -> [L; 4] {
-        let local = (row - self.first) as usize;
-        let [x, y, z, reach] = self.columns;
-        [L::splat(x[local]), L::splat(y[local]), L::splat(z[local]), L::splat(reach[local])]
-    }
-
-    #[inline(always)]
-    fn each<L: Lanes>(&self, ball: &[L; 4], [from, to]: [u32; 2], mut found: impl FnMut(u32)) {
-        let mut begin = from;
-        while begin < to {
-            let local = (begin - self.first) as usize;
-            let x = eight::<L>(&self.columns[0], local) - ball[0];
-            let y = eight::<L>(&self.columns[1], local) - ball[1];
-            let z = eight::<L>(&self.columns[2], local) - ball[2];
-            let reach = eight::<L>(&self.columns[3], local) + ball[3];
-            let mut hits = (reach * reach).above(x * x + y * y + z * z);
-            if to - begin < LANES as u32 {
-                hits &= (1 << (to - begin)) - 1;
-            }
-            while hits != 0 {
-                found(begin + hits.trailing_zeros());
-                hits &= hits - 1;
-            }
-            begin += LANES as u32;
-        }
-    }
-}
-
-#[inline(always)]
-fn eight<L: Lanes>(column: &[f32], from: usize) -> L {
-    match column[from..].first_chunk() {
-        Some(eight) => L::load(eight),
-        None => L::splat(FAR),
-    }
-}

@@ -19,7 +19,8 @@ pub(super) struct Slab {
     /// By rows.
     pub touches: Vec<Touch>,
     pub old_touches: Vec<Touch>,
-    /// The rows near walls that are no half-spaces.
+    /// The rows near half-spaces, and near other walls.
+    pub near_planes: Vec<u32>,
     pub near_shapes: Vec<u32>,
     /// How fast a ball is at most, in m/s: any, one in the first layer, one in the last.
     pub speed: [f32; 3],
@@ -45,7 +46,9 @@ impl Slab {
         self.batches.capacity() * size_of::<Batch>()
             + self.pushes.bytes()
             + (self.touches.capacity() + self.old_touches.capacity()) * size_of::<Touch>()
-            + (self.near_shapes.capacity() + self.stopped.capacity()) * size_of::<u32>()
+            + (self.near_planes.capacity()
+                + self.near_shapes.capacity()
+                + self.stopped.capacity()) * size_of::<u32>()
     }
 
     pub fn own_rows(&self) -> Range<usize> {

@@ -336,6 +336,7 @@ impl Swarm {
 
     /// Seeks the balls at walls anew, where pairs are still known.
     fn seek_walls(&mut self) {
+        let instructions = self.instructions;
         let (at, budget, planes) = (&self.at[..], &self.budget[..], &self.planes[..]);
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
         work(self.model.threads as usize, |member| {
@@ -344,7 +345,7 @@ impl Swarm {
                 let slab = unsafe { &mut *slabs.row(slab) };
                 let old = std::mem::take(&mut slab.touches);
                 slab.touches = std::mem::take(&mut slab.old_touches);
-                slab.seek_walls(at, budget, planes, |touch| {
+                slab.seek_walls(instructions, at, budget, planes, |touch| {
                     super::walls::find(&old, touch).map(|same| (same.pressure, same.grip))
                 });
                 slab.old_touches = old;

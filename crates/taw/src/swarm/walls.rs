@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
-use super::lanes::Row;
+use super::lanes::{Instructions, Kernel, LANES, Lanes, Row};
 use super::slab::Slab;
 use super::touch::Touch;
 use crate::math::{Point3, Vec3};
@@ -58,13 +58,17 @@ impl Slab {
     /// Finds the balls at walls anew. `recall` knows what they bore.
     pub fn seek_walls(
         &mut self,
+        instructions: Instructions,
         at: &[Row],
         budget: &[f32],
         planes: &[HalfSpace],
         recall: impl Fn(&Touch) -> Option<(f32, Vec3<f32>)>,
     ) {
         self.touches.clear();
-        for row in self.own_rows() {
+        self.near_planes.clear();
+        let (rows, found) = (self.own_rows(), &mut self.near_planes);
+        instructions.run(NearPlanes { at, budget, planes, rows, found });
+        for row in self.near_planes.iter().map(|row| *row as usize) {
             let ball = &at[row];
             for plane in planes {
                 let HalfSpace { wall, normal, offset, friction, restitution } = *plane;
@@ -130,6 +134,45 @@ impl Slab {
             });
         }
         self.touches.sort_unstable_by_key(Touch::key);
+    }
+}
+
+/// Finds the balls that may go as far as to a half-space.
+struct NearPlanes<'a> {
+    at: &'a [Row],
+    budget: &'a [f32],
+    planes: &'a [HalfSpace],
+    rows: Range<usize>,
+    found: &'a mut Vec<u32>,
+}
+
+impl Kernel for NearPlanes<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Self { at, budget, planes, rows, found } = self;
+        let (at, budget) = (&at[rows.clone()], &budget[rows.clone()]);
+        let mut first = rows.start as u32;
+        let mut eights = at.chunks_exact(LANES);
+        let mut budgets = budget.chunks_exact(LANES);
+        for (eight, budget) in (&mut eights).zip(&mut budgets) {
+            // SAFETY: there are eight.
+            let [x, y, z, radius] =
+                unsafe { L::gather(eight.as_ptr(), &[0, 1, 2, 3, 4, 5, 6, 7]) };
+            let budget = budget.first_chunk().map_or(L::splat(0.0), L::load);
+            let reach = radius + budget;
+            let mut near = 0;
+            for HalfSpace { normal, offset, .. } in planes {
+                let along = L::splat(normal.x) * x + L::splat(normal.y) * y + L::splat(normal.z) * z;
+                // Rather one too many: the caller looks more closely.
+                near |= (L::splat(*offset) + reach * L::splat(1.001)).above(along);
+            }
+            while near != 0 {
+                found.push(first + near.trailing_zeros());
+                near &= near - 1;
+            }
+            first += LANES as u32;
+        }
+        found.extend(first..rows.end as u32);
     }
 }
 
