@@ -2,22 +2,17 @@
 
 use super::grid::reorder;
 use super::kernels::squared;
-use super::memory::Memory;
-use super::pairs::{FindPairs, Search, find_strays};
+use super::pairs::{FindPairs, Search};
 use super::slab::Slab;
 use super::team::{Shared, work};
 use super::{Stage, Surroundings, Swarm, walls};
 
 /// Balls in a slab at least.
-const SLAB: u32 = 1024;
+const SLAB: u32 = 512;
 /// How far a ball may go between two searches: as far as it goes in so many steps at its speed,
 const STEPS: f32 = 12.0;
-/// but this part of its radius at least, and this part of the mean radius at most.
-const LEAST: f32 = 0.06;
-const MOST: f32 = 0.15;
-/// A few faster ones are sought for one by one: one of so many, and besides so many.
-const STRAYS: usize = 500;
-const SOME_STRAYS: usize = 32;
+/// or so many times as far as the margin at most if it is sought for alone.
+const FAR: f32 = 16.0;
 
 impl Swarm {
     /// Seeks pairs anew.
@@ -32,7 +27,7 @@ impl Swarm {
         observe(Stage::Pairs);
         self.remember();
         observe(Stage::Order);
-        let cap = MOST * self.mean;
+        let cap = self.margin();
         self.set_budgets(dt, cap);
         self.grid.sort(&self.at, 2.0 * cap, threads);
         self.reorder();
@@ -43,10 +38,17 @@ impl Swarm {
         self.remembers = false;
     }
 
+    /// How far most balls may go at most until pairs are sought again, in metres. In the lab's
+    /// tier a heap is livelier, and a pair more costs less.
+    fn margin(&self) -> f32 {
+        self.mean * if self.rough() { 0.2 } else { 0.3 }
+    }
+
     /// Says how far each ball may go: more than the cap only if it is sought for alone.
     fn set_budgets(&mut self, dt: f32, cap: f32) {
         let (threads, lab) = (self.model.threads as usize, !self.rough());
         let (at, velocity, way) = (&self.at[..], &self.velocity[..], &self.way[..]);
+        let least = if lab { 0.12 } else { 0.08 };
         let budgets = Shared::new(&mut self.budget);
         work(threads, |member| {
             let rows = member.share(at.len());
@@ -54,15 +56,45 @@ impl Swarm {
             let budgets = unsafe { budgets.part(rows.clone()) };
             for (row, budget) in rows.zip(budgets) {
                 let way = if lab { way[row] } else { squared(velocity[row]).sqrt() * dt };
-                *budget = (way * STEPS).max(LEAST * at[row][3]).min(cap * 16.0);
+                *budget = (way * STEPS).clamp(cap.min(least * at[row][3]), cap * FAR);
             }
         });
         let strays = self.budget.iter().filter(|budget| **budget > cap).count();
-        if strays > SOME_STRAYS + at.len() / STRAYS {
+        self.strays.clear(self.at.len());
+        if self.strays.full(strays, self.at.len()) {
             for budget in &mut self.budget {
                 *budget = budget.min(cap);
             }
         }
+    }
+
+    /// Seeks pairs for balls that leave their budget, or for all, if these are too many.
+    pub(super) fn seek_for(
+        &mut self,
+        rows: &[u32],
+        dt: f32,
+        walls: &dyn Surroundings,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        if self.strays.full(rows.len(), self.at.len()) {
+            return self.build(dt, walls, observe);
+        }
+        observe(Stage::Pairs);
+        let cap = self.margin();
+        for row in rows {
+            self.strays.add(*row);
+            let at = *row as usize;
+            let way = if self.rough() { squared(self.velocity[at]).sqrt() * dt } else { self.way[at] };
+            self.budget[at] = (way * STEPS).clamp(cap, cap * FAR);
+        }
+        self.find_strays(cap);
+        self.seek_walls_for(rows, walls);
+    }
+
+    fn find_strays(&mut self, cap: f32) {
+        let (rough, search) = (self.rough(), &mut self.searches[0]);
+        let sizes = [self.largest, cap];
+        self.strays.find(&self.grid, &self.at, &self.budget, sizes, search, rough);
     }
 
     fn reorder(&mut self) {
@@ -162,11 +194,15 @@ impl Swarm {
                 }
             }
         });
-        let strays = &mut self.strays;
-        find_strays(grid, at, budget, cap, self.largest, &mut self.searches[0], &mut strays.batches);
-        strays.pushes.reset(strays.batches.len(), rough);
+        for (row, budget) in (0..).zip(&self.budget) {
+            if *budget > cap {
+                self.strays.add(row);
+            }
+        }
+        self.find_strays(cap);
         if rough {
-            Memory::recall(&self.memory, &strays.batches, &self.before, &mut strays.pushes);
+            let (memory, strays) = (&self.memory, &mut self.strays);
+            memory.recall(&strays.batches, &self.before, &mut strays.pushes);
         }
     }
 }

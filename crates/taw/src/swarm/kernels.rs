@@ -141,31 +141,13 @@ impl Kernel for Displace<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         let (half, most) = (L::splat(0.5), L::splat(self.most));
-        for (i, batch) in self.batches.iter().enumerate() {
-            prefetch(self.at, self.batches, i);
+        for batch in self.batches {
             let [a, b] = gather::<L>(self.at, batch);
             let (normal, gap) = normal_and_gap(&a, &b);
             let overlap = (L::splat(0.0) - gap).max(L::splat(0.0)).min(most);
             let by = normal.times(overlap * half);
             let moved = [V::of(&a).minus(by).with(a[3]), V::of(&b).plus(by).with(b[3])];
             scatter(self.at, batch, moved);
-        }
-    }
-}
-
-/// Asks for rows that will be needed soon.
-#[inline(always)]
-fn prefetch(_column: Shared<Row>, _batches: &[Batch], _now: usize) {
-    #[cfg(target_arch = "x86_64")]
-    if let Some(batch) = _batches.get(_now + 4) {
-        for lane in 0..LANES {
-            for row in batch.pair(lane) {
-                // SAFETY: a hint, which may be about any address.
-                unsafe {
-                    use std::arch::x86_64::{_MM_HINT_T0, _mm_prefetch};
-                    _mm_prefetch::<_MM_HINT_T0>(_column.row(row as usize).cast());
-                }
-            }
         }
     }
 }
@@ -326,7 +308,6 @@ impl Solve<'_> {
         let Self { columns, batches, pushes, .. } = self;
         let Pushes { pressure, grip, .. } = pushes;
         for (i, batch) in batches.iter().enumerate() {
-            prefetch(columns.at, batches, i);
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, _) = normal_and_gap(&a, &b);
             let mut across = V([L::splat(0.0); 3]);
@@ -353,7 +334,6 @@ impl Solve<'_> {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let per_second = L::splat(per_second);
         for (i, batch) in batches.iter().enumerate() {
-            prefetch(columns.at, batches, i);
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, gap) = normal_and_gap(&a, &b);
             let [a, b] = gather::<L>(columns.velocity, batch);

@@ -25,8 +25,8 @@ pub(super) trait Lanes:
     fn above(self, other: Self) -> u32;
     /// `yes` where the first is the greater, else `no`.
     fn pick_above(self, other: Self, yes: Self, no: Self) -> Self;
-    /// Puts those of the numbers first whose bits are set; the rest is anything.
-    fn compress(bits: u32, numbers: &[u32; LANES], to: &mut [u32; LANES]);
+    /// The lanes whose bits are set, counted from a number on; the rest is anything.
+    fn name(bits: u32, from: u32, to: &mut [u32; LANES]);
     /// The rows at these places after `base`, as columns.
     ///
     /// # Safety
@@ -180,10 +180,10 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn compress(mut bits: u32, numbers: &[u32; LANES], to: &mut [u32; LANES]) {
+    fn name(mut bits: u32, from: u32, to: &mut [u32; LANES]) {
         let mut count = 0;
         while bits != 0 {
-            to[count] = numbers[bits.trailing_zeros() as usize % LANES];
+            to[count] = from + bits.trailing_zeros();
             count += 1;
             bits &= bits - 1;
         }
@@ -277,12 +277,11 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn compress(bits: u32, numbers: &[u32; LANES], to: &mut [u32; LANES]) {
+        fn name(bits: u32, from: u32, to: &mut [u32; LANES]) {
             unsafe {
-                let numbers = _mm256_loadu_si256(numbers.as_ptr().cast());
                 let which = _mm256_loadu_si256(FIRST[bits as usize & 0xff].as_ptr().cast());
-                let first = _mm256_permutevar8x32_epi32(numbers, which);
-                _mm256_storeu_si256(to.as_mut_ptr().cast(), first);
+                let from = _mm256_set1_epi32(from.cast_signed());
+                _mm256_storeu_si256(to.as_mut_ptr().cast(), _mm256_add_epi32(which, from));
             }
         }
 

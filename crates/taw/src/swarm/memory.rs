@@ -4,6 +4,7 @@ use super::kernels::Pushes;
 use super::pairs::Batch;
 use super::team::{Shared, work};
 use super::slab::Slab;
+use super::strays::Strays;
 use super::touch::Touch;
 use super::walls::find;
 use crate::math::Vec3;
@@ -28,7 +29,7 @@ pub(super) struct Memory {
 
 impl Memory {
     /// Keeps what the pairs and touches of all slabs bore. The rows are as they were.
-    pub fn keep(&mut self, slabs: &[Slab], strays: &Slab, rows: usize, threads: usize) {
+    pub fn keep(&mut self, slabs: &[Slab], strays: &Strays, rows: usize, threads: usize) {
         self.touches.clear();
         self.touches.extend(slabs.iter().flat_map(|slab| &slab.touches));
         self.start.clear();
@@ -39,9 +40,9 @@ impl Memory {
             // the strays come alone.
             let count = |[row, _]: [u32; 2], _: Kept| unsafe { *counts.row(row as usize + 2) += 1 };
             work(threads, |member| {
-                slabs[member.share(slabs.len())].iter().for_each(|slab| bearing(slab, count));
+                slabs[member.share(slabs.len())].iter().for_each(|slab| bearing(&slab.batches, &slab.pushes, count));
             });
-            bearing(strays, count);
+            bearing(&strays.batches, &strays.pushes, count);
         }
         let mut sum = 0;
         for start in &mut self.start {
@@ -59,9 +60,9 @@ impl Memory {
             *place += 1;
         };
         work(threads, |member| {
-            slabs[member.share(slabs.len())].iter().for_each(|slab| bearing(slab, place));
+            slabs[member.share(slabs.len())].iter().for_each(|slab| bearing(&slab.batches, &slab.pushes, place));
         });
-        bearing(strays, place);
+        bearing(&strays.batches, &strays.pushes, place);
     }
 
     /// Remembers nothing of so many rows.
@@ -89,13 +90,15 @@ impl Memory {
                 }
                 let kept = self.start[first as usize]..self.start[first as usize + 1];
                 let kept = &self.kept[kept.start as usize..kept.end as usize];
-                let Some(kept) = kept.iter().find(|kept| kept.other == other) else { continue };
-                pushes.pressure[i][lane] = kept.pressure;
-                if let Some(grip) = pushes.grip.get_mut(i) {
-                    // The impulse is what the second of the two gets.
-                    let sign = if first == a { 1.0 } else { -1.0 };
-                    for (axis, grip) in grip.iter_mut().zip(kept.grip) {
-                        axis[lane] = grip * sign;
+                // A stray may have had a pair twice.
+                for kept in kept.iter().filter(|kept| kept.other == other) {
+                    pushes.pressure[i][lane] += kept.pressure;
+                    if let Some(grip) = pushes.grip.get_mut(i) {
+                        // The impulse is what the second of the two gets.
+                        let sign = if first == a { 1.0 } else { -1.0 };
+                        for (axis, grip) in grip.iter_mut().zip(kept.grip) {
+                            axis[lane] += grip * sign;
+                        }
                     }
                 }
             }
@@ -109,13 +112,13 @@ impl Memory {
     }
 }
 
-/// Names the pairs of a slab that bear something.
-fn bearing(slab: &Slab, name: impl Fn([u32; 2], Kept)) {
-    for (i, batch) in slab.batches.iter().enumerate() {
+/// Names the pairs that bear something.
+fn bearing(batches: &[Batch], pushes: &Pushes, name: impl Fn([u32; 2], Kept)) {
+    for (i, batch) in batches.iter().enumerate() {
         for lane in 0..batch.count as usize {
-            let pressure = slab.pushes.pressure[i][lane];
+            let pressure = pushes.pressure[i][lane];
             if pressure > 0.0 {
-                let grip = slab.pushes.grip.get(i);
+                let grip = pushes.grip.get(i);
                 let grip = grip.map_or([0.0; 3], |grip| grip.map(|axis| axis[lane]));
                 let rows = batch.pair(lane);
                 name(rows, Kept { other: rows[1], pressure, grip });

@@ -17,6 +17,7 @@
 
 mod build;
 mod grid;
+mod guests;
 mod ids;
 mod kernels;
 mod lanes;
@@ -25,6 +26,7 @@ mod model;
 mod pairs;
 mod slab;
 mod step;
+mod strays;
 mod team;
 mod touch;
 mod walls;
@@ -32,6 +34,7 @@ mod walls;
 pub use ids::BallId;
 pub use lanes::Instructions;
 pub use model::{Ball, Stage, SwarmModel, Tier};
+pub(crate) use guests::Guest;
 pub(crate) use walls::Surroundings;
 
 use cgmath::{EuclideanSpace, Zero};
@@ -45,6 +48,7 @@ use lanes::Row;
 use memory::Memory;
 use pairs::Search;
 use slab::Slab;
+use strays::Strays;
 use walls::HalfSpace;
 
 /// The smallest and the largest radius, in metres: their cubes and squares of squares are
@@ -78,7 +82,9 @@ pub struct Swarm {
     /// How many of them are in use.
     slab_count: usize,
     /// The pairs of the fastest balls.
-    strays: Slab,
+    strays: Strays,
+    /// The rows that would leave their budget in this step.
+    leaving: Vec<u32>,
     memory: Memory,
     /// For each row, the one that it was when the memory was made, if it was then.
     before: Vec<u32>,
@@ -89,6 +95,9 @@ pub struct Swarm {
     gravity: Option<Vec3<f32>>,
     planes: Vec<HalfSpace>,
     stopped: Vec<u32>,
+    guests: Vec<Guest>,
+    /// A bit for each slot.
+    guest_slots: Vec<u64>,
     spare: Vec<Row>,
     spare_numbers: Vec<u32>,
     searches: Vec<Search>,
@@ -137,13 +146,21 @@ impl Swarm {
             within("radius", ball.radius, least, most)?;
             positive("mass", 1.0 / ball.mass.of(ball.radius))?;
         }
+        self.add(balls)
+    }
+
+    /// Puts balls in that are known to be right.
+    fn add(&mut self, balls: &[Ball]) -> Result<Vec<BallId>, Error> {
         let ids = self.ids.push(balls.len())?;
         let rows = balls.iter();
         self.at.extend(rows.clone().map(|ball| with(ball.position.to_vec(), ball.radius)));
         let moving = |ball: &Ball| with(ball.velocity, 1.0 / ball.mass.of(ball.radius));
         self.velocity.extend(rows.map(moving));
         self.budget.resize(self.at.len(), 0.0);
-        self.before_resize();
+        if self.paired || self.remembers {
+            self.remember();
+            self.before.resize(self.at.len(), u32::MAX);
+        }
         self.shape_columns();
         self.measure();
         self.paired = false;
@@ -186,6 +203,13 @@ impl Swarm {
     #[must_use]
     pub fn balls(&self) -> &[[f32; 4]] {
         &self.at
+    }
+
+    /// Whether the ball in a row is a marble of the world, which the swarm pushes but does not
+    /// move.
+    #[must_use]
+    pub fn is_guest(&self, row: usize) -> bool {
+        row < self.len() && Self::has_guest_slot(self.ids.slots()[row], &self.guest_slots)
     }
 
     /// The velocities in m/s, row by row. The last number is the inverse mass in 1/kg, with a
@@ -261,7 +285,8 @@ impl Swarm {
     /// How many pairs of balls are near enough to be looked at.
     #[must_use]
     pub fn pairs(&self) -> usize {
-        let batches = self.all_slabs().flat_map(|slab| &slab.batches);
+        let slabs = self.slabs[..self.slab_count].iter();
+        let batches = slabs.flat_map(|slab| &slab.batches).chain(&self.strays.batches);
         batches.map(|batch| batch.count as usize).sum()
     }
 
@@ -277,7 +302,6 @@ impl Swarm {
         fn of<T>(column: &Vec<T>) -> usize {
             column.capacity() * size_of::<T>()
         }
-        let slabs = self.slabs.iter().chain([&self.strays]);
         of(&self.at)
             + of(&self.velocity)
             + of(&self.spin)
@@ -290,12 +314,10 @@ impl Swarm {
             + self.grid.bytes()
             + self.memory.bytes()
             + self.searches.iter().map(Search::bytes).sum::<usize>()
-            + slabs.map(Slab::bytes).sum::<usize>()
+            + self.slabs.iter().map(Slab::bytes).sum::<usize>()
+            + self.strays.bytes()
+            + of(&self.leaving)
             + of(&self.slabs)
-    }
-
-    fn all_slabs(&self) -> impl Iterator<Item = &Slab> {
-        self.slabs[..self.slab_count].iter().chain([&self.strays])
     }
 
     /// Whether there is friction, bounce and spin.
@@ -314,12 +336,6 @@ impl Swarm {
         }
         if way == 0 {
             self.way.shrink_to_fit();
-        }
-    }
-
-    fn before_resize(&mut self) {
-        if self.remembers {
-            self.before.resize(self.at.len(), u32::MAX);
         }
     }
 

@@ -3,7 +3,6 @@
 use std::ops::Range;
 
 use super::grid::{Grid, Level};
-use super::kernels::squared;
 use super::lanes::{Kernel, LANES, Lanes, Row};
 
 /// Eight pairs, none of which has a ball in common with another. As rows after a first one, so
@@ -45,21 +44,27 @@ pub(super) struct Search {
 struct Columns {
     /// Of a slab and the next one: center, and radius with budget.
     window: [Vec<f32>; 4],
-    added: [Vec<f32>; 4],
-    rows: Vec<u32>,
+    eights: Vec<[u32; 2]>,
     found: Vec<u32>,
 }
 
 impl Search {
+    /// Puts pairs of so many rows into batches.
+    pub fn filler<'a>(&'a mut self, rows: usize, batches: &'a mut Vec<Batch>) -> Filler<'a> {
+        self.busy.clear();
+        self.busy.resize(rows, 0);
+        Filler { first: 0, busy: &mut self.busy, open: &mut self.open, batches }
+    }
+
     pub fn bytes(&self) -> usize {
-        let Columns { window, added, rows, found } = &self.columns;
-        let columns = window.iter().chain(added).map(Vec::capacity).sum::<usize>();
-        (columns + rows.capacity() + found.capacity() + self.busy.capacity()) * 4
+        let Columns { window, eights, found } = &self.columns;
+        let columns = window.iter().map(Vec::capacity).sum::<usize>();
+        (columns + eights.capacity() * 2 + found.capacity() + self.busy.capacity()) * 4
     }
 }
 
 /// Puts pairs into batches: each pair into the first one in whose line neither ball was yet.
-struct Filler<'a> {
+pub(super) struct Filler<'a> {
     first: u32,
     busy: &'a mut [u32],
     open: &'a mut [Batch; OPEN],
@@ -68,7 +73,7 @@ struct Filler<'a> {
 
 impl Filler<'_> {
     #[inline(always)]
-    fn add(&mut self, a: u32, b: u32) {
+    pub fn add(&mut self, a: u32, b: u32) {
         let busy = *self.busy(a) | *self.busy(b);
         let slot = busy.trailing_ones() as usize;
         if slot == OPEN {
@@ -113,7 +118,7 @@ impl Filler<'_> {
     }
 
     /// Takes the open batches as they are, and begins anew.
-    fn close(&mut self) {
+    pub fn close(&mut self) {
         for batch in self.open.iter_mut().filter(|batch| batch.count > 0) {
             self.batches.push(*batch);
             batch.count = 0;
@@ -167,17 +172,16 @@ impl Kernel for FindPairs<'_> {
                         if from == to {
                             continue;
                         }
-                        around.count = 0;
-                        around.add::<L>(from, end);
+                        around.eights.clear();
+                        around.add(from, end);
                         for starts in &ahead {
                             if let Some(&[from, _, _, to]) = starts.get(cell..cell + 4) {
-                                around.add::<L>(from, to);
+                                around.add(from, to);
                             }
                         }
-                        around.pad::<L>();
                         for a in from..to {
                             // Each with those that come after it.
-                            for b in around.touching::<L>(a, (a - from) as usize + 1) {
+                            for b in around.near::<L>(a, a + 1) {
                                 filler.add(a, *b);
                             }
                         }
@@ -244,17 +248,16 @@ fn across<L: Lanes>(
             if small >= next && layer > layers[1] << level.level {
                 continue;
             }
-            around.count = 0;
+            around.eights.clear();
             let last = if small < next { end } else { next };
             for layer in layer.saturating_sub(1)..(layer + 2).min(level.layers) {
                 for row in row - 1..row + 2 {
                     let line = level.cell(grid, layer, row, 0);
                     let [from, to] = [grid.first(line + cell - 1), grid.first(line + cell + 2)];
-                    around.add::<L>(from.max(first), to.min(last));
+                    around.add(from.max(first), to.min(last));
                 }
             }
-            around.pad::<L>();
-            for other in around.touching::<L>(small, 0) {
+            for other in around.near::<L>(small, 0) {
                 filler.add(small.min(*other), small.max(*other));
             }
         }
@@ -263,95 +266,66 @@ fn across<L: Lanes>(
 
 /// Looks which balls are near one, among some runs of rows.
 struct Around<'a> {
-    /// The first row of the window, and how many there are.
+    /// The first row of the window.
     first: u32,
-    size: usize,
     /// The columns of the window, with [`LANES`] places more.
     columns: [&'a [f32]; 4],
-    /// The same for the runs that were added, and their rows. As no row is added twice, they
-    /// never take more places than the window.
-    added: [&'a mut [f32]; 4],
-    rows: &'a mut [u32],
-    count: usize,
+    /// The runs by eights: where each begins in the window, and a bit for each row of the run.
+    eights: &'a mut Vec<[u32; 2]>,
     /// Those that are near.
-    found: &'a mut [u32],
+    found: &'a mut Vec<u32>,
 }
 
 impl<'a> Around<'a> {
     fn new(search: &'a mut Columns, window: Range<u32>) -> Self {
         let size = window.len();
-        let Columns { window: columns, added, rows, found } = search;
-        for column in &mut *added {
-            column.resize(size + LANES, FAR);
-        }
-        rows.resize(size + LANES, 0);
-        found.resize(size + LANES, 0);
+        let Columns { window: columns, eights, found } = search;
         let columns = columns.each_ref().map(|column| &column[..size + LANES]);
-        let added = added.each_mut().map(|column| &mut column[..size + LANES]);
-        Self { first: window.start, size, columns, added, rows, count: 0, found }
+        Self { first: window.start, columns, eights, found }
     }
 
     /// Adds a run of rows of the window.
     #[inline(always)]
-    fn add<L: Lanes>(&mut self, from: u32, to: u32) {
-        if from >= to {
-            return;
-        }
-        let count = (to - from) as usize;
-        let local = (from - self.first) as usize;
-        debug_assert!(local + count <= self.size && self.count + count <= self.size);
-        // Eight at a time; what is too much is written over, or padded.
-        let mut at = 0;
-        while at < count {
-            // SAFETY: both begin before the end of the window, which eight places follow.
-            unsafe {
-                let place = self.count + at;
-                put(self.added[0], place, get::<L>(self.columns[0], local + at));
-                put(self.added[1], place, get::<L>(self.columns[1], local + at));
-                put(self.added[2], place, get::<L>(self.columns[2], local + at));
-                put(self.added[3], place, get::<L>(self.columns[3], local + at));
-                let rows = self.rows.as_mut_ptr().add(place);
-                for lane in 0..LANES {
-                    *rows.add(lane) = from + (at + lane) as u32;
-                }
-            }
-            at += LANES;
-        }
-        self.count += count;
-    }
-
-    /// Ends the runs with balls that are nowhere.
-    #[inline(always)]
-    fn pad<L: Lanes>(&mut self) {
-        for column in &mut self.added {
-            // SAFETY: as in `add`.
-            unsafe { put(column, self.count, L::splat(FAR)) };
+    fn add(&mut self, from: u32, to: u32) {
+        let mut at = from;
+        while at < to {
+            let bits = if to - at < LANES as u32 { (1 << (to - at)) - 1 } else { 0xff };
+            self.eights.push([at - self.first, bits]);
+            at += LANES as u32;
         }
     }
 
-    /// Those from a place on that are near a ball of the window.
+    /// The rows near a ball of the window. Of the first eights, as many rows are left out as come
+    /// before `after`.
     #[inline(always)]
-    fn touching<L: Lanes>(&mut self, ball: u32, from: usize) -> &[u32] {
+    fn near<L: Lanes>(&mut self, ball: u32, after: u32) -> &[u32] {
         let local = (ball - self.first) as usize;
         let [x, y, z, reach] = self.columns;
-        let (x, y) = (L::splat(x[local]), L::splat(y[local]));
-        let (z, reach) = (L::splat(z[local]), L::splat(reach[local]));
-        let (mut count, mut at) = (0, from);
-        while at < self.count {
-            // SAFETY: as in `add`; and no more are found than were added.
+        let (ax, ay) = (L::splat(x[local]), L::splat(y[local]));
+        let (az, a_reach) = (L::splat(z[local]), L::splat(reach[local]));
+        let room = (self.eights.len() + 1) * LANES;
+        if self.found.len() < room {
+            self.found.resize(2 * room, 0);
+        }
+        let mut count = 0;
+        for [at, bits] in &*self.eights {
+            let row = *at as usize;
+            // SAFETY: an eight begins in the window, which eight places follow; and there is
+            // room for eight of each.
             unsafe {
-                let dx = get::<L>(self.added[0], at) - x;
-                let dy = get::<L>(self.added[1], at) - y;
-                let dz = get::<L>(self.added[2], at) - z;
-                let near = get::<L>(self.added[3], at) + reach;
-                let hits = (near * near).above(dx * dx + dy * dy + dz * dz);
-                let rows = &*self.rows.as_ptr().add(at).cast();
-                L::compress(hits, rows, &mut *self.found.as_mut_ptr().add(count).cast());
+                let dx = get::<L>(x, row) - ax;
+                let dy = get::<L>(y, row) - ay;
+                let dz = get::<L>(z, row) - az;
+                let near = get::<L>(reach, row) + a_reach;
+                let hits = (near * near).above(dx * dx + dy * dy + dz * dz) & bits;
+                L::name(hits, self.first + at, &mut *self.found.as_mut_ptr().add(count).cast());
                 count += hits.count_ones() as usize;
             }
-            at += LANES;
         }
-        &self.found[..count]
+        let found = &self.found[..count];
+        // They come in order, those of the ball's own line first.
+        let before = found.iter().take_while(|row| **row < after).count();
+        &found[before..]
     }
 }
 
@@ -372,50 +346,3 @@ unsafe fn put<L: Lanes>(column: &mut [f32], at: usize, eight: L) {
     // SAFETY: as the caller promises.
     eight.store(unsafe { &mut *column.as_mut_ptr().add(at).cast() });
 }
-
-/// Finds the pairs of those balls that have a budget above the cap.
-pub(super) fn find_strays(
-    grid: &Grid,
-    at: &[Row],
-    budget: &[f32],
-    cap: f32,
-    largest: f32,
-    search: &mut Search,
-    batches: &mut Vec<Batch>,
-) {
-    batches.clear();
-    if !budget.iter().any(|budget| *budget > cap) {
-        return;
-    }
-    search.busy.clear();
-    search.busy.resize(at.len(), 0);
-    let mut filler = Filler { first: 0, busy: &mut search.busy, open: &mut search.open, batches };
-    for stray in (0..at.len()).filter(|row| budget[*row] > cap) {
-        let [x, y, z, radius] = at[stray];
-        let reach = radius + budget[stray];
-        let far = reach + largest + cap;
-        for level in &grid.levels {
-            // Also in the empty cells around, where nothing is.
-            let low = grid.coordinates(level, &[x - far, y - far, z - far, 0.0]);
-            let high = grid.coordinates(level, &[x + far, y + far, z + far, 0.0]);
-            for layer in low[0]..=high[0] {
-                for row in low[1]..=high[1] {
-                    let line = level.cell(grid, layer, row, 0);
-                    for other in grid.first(line + low[2])..grid.first(line + high[2] + 1) {
-                        let other = other as usize;
-                        let [a, b, c, r] = at[other];
-                        let apart = [a - x, b - y, c - z, 0.0];
-                        let near = reach + r + budget[other];
-                        // Of two strays, the first one finds the other.
-                        let new = other != stray && (budget[other] <= cap || stray < other);
-                        if new && squared(apart) < near * near {
-                            filler.add(stray.min(other) as u32, stray.max(other) as u32);
-                        }
-                    }
-                }
-            }
-        }
-    }
-    filler.close();
-}
-

@@ -27,8 +27,8 @@ pub(super) struct Slab {
     /// For how long all have been slow, in seconds, and whether they sleep.
     pub slow: f32,
     pub asleep: bool,
-    /// Whether a ball has gone further than its budget, and which were stopped.
-    pub over: bool,
+    /// The rows that would leave their budget in this step, and those that were stopped.
+    pub leaving: Vec<u32>,
     pub stopped: Vec<u32>,
 }
 
@@ -47,6 +47,7 @@ impl Slab {
             + self.pushes.bytes()
             + (self.touches.capacity() + self.old_touches.capacity()) * size_of::<Touch>()
             + (self.near_planes.capacity()
+                + self.leaving.capacity()
                 + self.near_shapes.capacity()
                 + self.stopped.capacity()) * size_of::<u32>()
     }

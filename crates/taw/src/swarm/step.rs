@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicUsize, Ordering};
 use super::kernels::{Columns, Displace, Drift, Follow, Pass, Predict, Soft, Solve, squared};
 use super::lanes::Row;
 use super::slab::Slab;
+use super::strays::Strays;
 use super::team::{MOST_THREADS, Member, Shared, wait_for, work};
 use super::walls::half_spaces;
 use super::{Stage, Surroundings, Swarm, Tier, lying};
@@ -62,7 +63,7 @@ impl Swarm {
         observe(Stage::Integrate);
         let (change, time) = (row(gravity * dt), [dt, dt, dt, 0.0]);
         let instructions = self.instructions;
-        let over = AtomicUsize::new(usize::from(!self.paired));
+        let leaving = AtomicUsize::new(0);
         {
             let (at, velocity) = (Shared::new(&mut self.at), Shared::new(&mut self.velocity));
             let (way, budget) = (Shared::new(&mut self.way), &self.budget[..]);
@@ -77,7 +78,7 @@ impl Swarm {
                 let (stop, first) = (&mut stopped, rows.start as u32);
                 instructions.run(Predict { at, velocity, way, change, time, stopped: stop, first });
                 if way.iter().zip(&budget[rows]).any(|(way, budget)| way > budget) {
-                    over.store(1, Ordering::Relaxed);
+                    leaving.store(1, Ordering::Relaxed);
                 }
                 if !stopped.is_empty()
                     && let Ok(mut all) = all_stopped.lock()
@@ -87,15 +88,28 @@ impl Swarm {
             });
             self.stopped.sort_unstable();
         }
-        if over.into_inner() > 0 {
+        self.hold_guests_in_lab();
+        let mut leaving_rows = std::mem::take(&mut self.leaving);
+        leaving_rows.clear();
+        if leaving.into_inner() > 0 {
+            let both = self.way.iter().zip(&self.budget);
+            let rows = (0..).zip(both).filter(|(_, (way, budget))| way > budget);
+            leaving_rows.extend(rows.map(|(row, _)| row));
+        }
+        if !self.paired || !leaving_rows.is_empty() {
             self.stopped = self.stopped.iter().map(|row| self.ids.slots()[*row as usize]).collect();
-            self.build(dt, walls, observe);
+            if self.paired {
+                self.seek_for(&leaving_rows, dt, walls, observe);
+            } else {
+                self.build(dt, walls, observe);
+            }
             let rows = self.ids.columns().1;
             self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
         } else if walls_changed {
             observe(Stage::Walls);
             self.seek_walls();
         }
+        self.leaving = leaving_rows;
         observe(Stage::Restitute);
         self.look_at_walls(walls);
         let most = FASTEST_PUSH * dt;
@@ -107,6 +121,8 @@ impl Swarm {
                 }
                 instructions.run(Displace { at: columns.at, batches: &slab.batches, most });
             });
+            let (at, batches) = (Shared::new(&mut self.at), &self.strays.batches);
+            instructions.run(Displace { at, batches, most });
         }
         observe(Stage::Integrate);
         let per_second = [1.0 / dt, 1.0 / dt, 1.0 / dt, 0.0];
@@ -120,6 +136,7 @@ impl Swarm {
             let (at, way) = (&at[rows.clone()], &way[rows]);
             instructions.run(Follow { at, velocity, way, budget, per_second });
         });
+        self.part_with_guests_in_lab(dt);
     }
 
     fn step_full(
@@ -131,14 +148,26 @@ impl Swarm {
         observe: &mut dyn FnMut(Stage),
     ) {
         observe(Stage::Integrate);
-        let over = self.paired && self.look(dt, gravity);
-        if !self.paired || over {
+        if self.paired {
+            self.look(dt, gravity);
+        }
+        let mut leaving = std::mem::take(&mut self.leaving);
+        leaving.clear();
+        leaving.extend(self.slabs[..self.slab_count].iter().flat_map(|slab| &slab.leaving));
+        if !self.paired {
             self.build(dt, walls, observe);
             self.look(dt, gravity);
+        } else if !leaving.is_empty() {
+            let rebuilds = self.rebuilds;
+            self.seek_for(&leaving, dt, walls, observe);
+            if self.rebuilds != rebuilds {
+                self.look(dt, gravity);
+            }
         } else if walls_changed {
             observe(Stage::Walls);
             self.seek_walls();
         }
+        self.leaving = leaving;
         if self.slabs[..self.slab_count].iter().all(|slab| slab.asleep) {
             return;
         }
@@ -155,20 +184,21 @@ impl Swarm {
         for _ in 0..self.model.substeps {
             observe(Stage::Integrate);
             self.drift(row(gravity * h), [0.0; 4]);
+            self.hold_guests(row(gravity * h));
             observe(Stage::Restitute);
             self.pass(Pass::Begin, |_, _| true);
             self.pass(Pass::Solve { soft, per_second }, |_, _| true);
             observe(Stage::Integrate);
             self.drift([0.0; 4], [h, h, h, 0.0]);
+            self.hold_guests([0.0; 4]);
             observe(Stage::Restitute);
             self.pass(Pass::Relax { per_second }, |_, _| true);
         }
         self.pass(Pass::Bounce, faster);
     }
 
-    /// Sees who falls asleep and who wakes; says whether a ball may leave its budget in this
-    /// step.
-    fn look(&mut self, dt: f32, gravity: Vec3<f32>) -> bool {
+    /// Sees who falls asleep, who wakes, and who may leave its budget in this step.
+    fn look(&mut self, dt: f32, gravity: Vec3<f32>) {
         let lying = lying(gravity, self.mean);
         let sleeps = self.model.sleeps;
         let (grid, budget) = (&self.grid, &self.budget[..]);
@@ -185,16 +215,17 @@ impl Swarm {
                 let (velocity, spin) =
                     unsafe { (velocity.part(slab.own_rows()), spin.part(slab.own_rows())) };
                 let budget = &budget[slab.own_rows()];
-                let mut over = 0;
-                for (velocity, budget) in velocity.iter().zip(budget) {
-                    let way = squared(*velocity) * dt * dt;
-                    over |= u32::from(way > budget * budget) | u32::from(*budget < 0.0);
-                }
-                slab.over = over != 0;
+                slab.leaving.clear();
+                let rows = (slab.rows[0]..).zip(velocity.iter().zip(budget));
+                let leaves = |velocity: &Row, budget: f32| {
+                    budget < 0.0 || squared(*velocity) * dt * dt > budget * budget
+                };
+                let leaving = rows.filter(|(_, (velocity, budget))| leaves(velocity, **budget));
+                slab.leaving.extend(leaving.map(|(row, _)| row));
                 let fastest = |from: u32, to: u32| {
                     let rows = (from - slab.rows[0]) as usize..(to - slab.rows[0]) as usize;
-                    let both = velocity[rows.clone()].iter().zip(&spin[rows]);
-                    both.fold(0.0_f32, |most, (v, s)| most.max(squared(*v)).max(squared(*s))).sqrt()
+                    // Not its spin: on a single point a ball may spin for ever.
+                    velocity[rows].iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt()
                 };
                 let [first, last] = [slab.layers[0] + 1, slab.layers[1] - 1];
                 slab.speed = [
@@ -204,7 +235,8 @@ impl Swarm {
                 ];
                 slab.slow = if slab.speed[0] < lying { slab.slow + dt } else { 0.0 };
                 if sleeps && slab.slow > FALL_ASLEEP {
-                    (slab.asleep, slab.over, slab.speed) = (true, false, [0.0; 3]);
+                    (slab.asleep, slab.speed) = (true, [0.0; 3]);
+                    slab.leaving.clear();
                     for (velocity, spin) in velocity.iter_mut().zip(spin) {
                         *velocity = [0.0, 0.0, 0.0, -velocity[3]];
                         *spin = [0.0; 4];
@@ -220,7 +252,6 @@ impl Swarm {
                 slabs[i].wake(&mut self.velocity);
             }
         }
-        slabs.iter().any(|slab| slab.over)
     }
 
     /// Changes velocities and moves the balls that are awake.
@@ -281,7 +312,7 @@ impl Swarm {
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
         };
-        let Slab { batches, pushes, .. } = &mut strays;
+        let Strays { batches, pushes, .. } = &mut strays;
         instructions.run(Solve { pass, columns, batches, pushes, friction });
         self.strays = strays;
     }
@@ -353,15 +384,45 @@ impl Swarm {
         });
     }
 
+    /// Seeks the walls of some more balls, in order of their rows.
+    pub(super) fn seek_walls_for(&mut self, rows: &[u32], walls: &dyn Surroundings) {
+        let (at, budget, planes) = (&self.at[..], &self.budget[..], &self.planes[..]);
+        for slab in &mut self.slabs[..self.slab_count] {
+            let mine = slab.own_rows();
+            let mine = rows.partition_point(|row| (*row as usize) < mine.start)
+                ..rows.partition_point(|row| (*row as usize) < mine.end);
+            if mine.is_empty() {
+                continue;
+            }
+            slab.seek_walls_for(&rows[mine.clone()], at, budget, planes);
+            if walls.has_shapes() {
+                for row in &rows[mine] {
+                    let row = *row as usize;
+                    super::walls::near_shapes(walls, at, budget, row..row + 1, &mut slab.near_shapes);
+                }
+                slab.near_shapes.sort_unstable();
+                slab.near_shapes.dedup();
+            }
+        }
+    }
+
     fn look_at_walls(&mut self, walls: &dyn Surroundings) {
         let (at, budget, material) = (&self.at[..], &self.budget[..], self.model.material);
+        let (guests, slots) = (&self.guest_slots[..], self.ids.slots());
+        let any = !self.guests.is_empty();
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
         work(self.model.threads as usize, |member| {
             for slab in member.share(slabs.len()) {
                 // SAFETY: its own.
                 let slab = unsafe { &mut *slabs.row(slab) };
-                if !slab.asleep {
-                    slab.look_at_walls(walls, at, budget, material);
+                if slab.asleep {
+                    continue;
+                }
+                slab.look_at_walls(walls, at, budget, material);
+                if any {
+                    // Walls push them elsewhere.
+                    let guest = |row: u32| Self::has_guest_slot(slots[row as usize], guests);
+                    slab.touches.retain(|touch| !guest(touch.row));
                 }
             }
         });

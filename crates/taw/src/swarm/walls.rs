@@ -68,23 +68,30 @@ impl Slab {
         self.near_planes.clear();
         let (rows, found) = (self.own_rows(), &mut self.near_planes);
         instructions.run(NearPlanes { at, budget, planes, rows, found });
-        for row in self.near_planes.iter().map(|row| *row as usize) {
-            let ball = &at[row];
-            for plane in planes {
-                let HalfSpace { wall, normal, offset, friction, restitution } = *plane;
-                let gap = normal.dot(center(ball).to_vec()) - offset - ball[3];
-                // A wall may also come nearer; who moves it seeks again.
-                if gap < budget[row] {
-                    let (row, part) = (row as u32, 0);
-                    let mut touch =
-                        Touch::new(row, [wall, part], normal, offset, [friction, restitution]);
-                    if let Some((pressure, grip)) = recall(&touch) {
-                        (touch.pressure, touch.grip) = (pressure, grip);
-                    }
-                    self.touches.push(touch);
+        for row in &self.near_planes {
+            let touches = &mut self.touches;
+            touch_planes(*row, &at[*row as usize], budget[*row as usize], planes, |mut touch| {
+                if let Some((pressure, grip)) = recall(&touch) {
+                    (touch.pressure, touch.grip) = (pressure, grip);
                 }
-            }
+                touches.push(touch);
+            });
         }
+    }
+
+    /// Finds the half-spaces near some more balls of the slab.
+    pub fn seek_walls_for(&mut self, rows: &[u32], at: &[Row], budget: &[f32], planes: &[HalfSpace]) {
+        std::mem::swap(&mut self.touches, &mut self.old_touches);
+        self.touches.clear();
+        let old = &self.old_touches;
+        self.touches.extend(old.iter().filter(|touch| rows.binary_search(&touch.row).is_err()));
+        for row in rows {
+            let touches = &mut self.touches;
+            touch_planes(*row, &at[*row as usize], budget[*row as usize], planes, |touch| {
+                touches.push(find(old, &touch).copied().unwrap_or(touch));
+            });
+        }
+        self.touches.sort_unstable_by_key(Touch::key);
     }
 
     /// Brings the balls at walls up to date: how walls move, and which part of a shape is
@@ -134,6 +141,24 @@ impl Slab {
             });
         }
         self.touches.sort_unstable_by_key(Touch::key);
+    }
+}
+
+/// Names the half-spaces as far as to which a ball may go.
+fn touch_planes(
+    row: u32,
+    ball: &Row,
+    budget: f32,
+    planes: &[HalfSpace],
+    mut name: impl FnMut(Touch),
+) {
+    for plane in planes {
+        let HalfSpace { wall, normal, offset, friction, restitution } = *plane;
+        let gap = normal.dot(center(ball).to_vec()) - offset - ball[3];
+        // A wall may also come nearer; who moves it seeks again.
+        if gap < budget {
+            name(Touch::new(row, [wall, 0], normal, offset, [friction, restitution]));
+        }
     }
 }
 

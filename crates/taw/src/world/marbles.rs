@@ -5,7 +5,7 @@ use super::optional::Optional;
 use crate::Error;
 use crate::error::{finite, finite_point, finite_vector, positive, within};
 use crate::frame::Bivector;
-use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite, is_finite_point};
 use crate::motion::{Integrator, Motion, Rotation};
 use crate::response::{Columns, Material, Rod};
 use crate::shape::{Capsule, Shape, Sphere};
@@ -673,6 +673,22 @@ impl<S: Scalar> Marbles<S> {
             && is_finite(spin)
         {
             *slot = spin;
+        }
+    }
+
+    /// Moves a marble and changes its velocity and radius times its spin, where that is finite
+    /// and it is there.
+    pub(super) fn push(&mut self, id: MarbleId, way: Vec3<S>, faster: Vec3<S>, rim: Vec3<S>) {
+        let Ok(row) = self.row(id) else { return };
+        let (position, velocity) = (self.position[row] + way, self.velocity[row] + faster);
+        if is_finite_point(position) && is_finite(velocity) {
+            (self.position[row], self.velocity[row]) = (position, velocity);
+        }
+        let turned = rim / self.radius[row];
+        if let Some(spin) = self.spin.get_mut(row)
+            && is_finite(turned)
+        {
+            *spin += turned;
         }
     }
 

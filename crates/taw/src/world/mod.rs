@@ -31,12 +31,12 @@ use crate::Error;
 use crate::broad::Grid;
 use crate::contact::Contacts;
 use crate::error::{finite_vector, positive};
-use crate::math::{Scalar, Vec3, cast_vector, length};
+use crate::math::{Scalar, Vec3, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Settings, Warm, impulse};
 use crate::response::{Impact, Response, Rod, Shear, displacement, penalty};
-use crate::swarm::{Stage, Swarm};
+use crate::swarm::Swarm;
 use integrate::Drive;
 use sweep::Sweep;
 use touch::Near;
@@ -59,6 +59,7 @@ pub struct World<S> {
     pub walls: Walls<S>,
     /// Balls in bulk, which touch the walls. (What is touched by whom of them is not listed.)
     pub swarm: Swarm,
+    guests: swarm::Guests,
     /// The touches of the last substep. Between [`World::generate_contacts`] and
     /// [`World::restitute`] they may be changed: what is taken out is not
     /// restituted, and a row that does not exist is passed over.
@@ -99,6 +100,7 @@ impl<S: Scalar> Default for World<S> {
             marbles: Marbles::default(),
             walls: Walls::default(),
             swarm: Swarm::default(),
+            guests: swarm::Guests::default(),
             contacts: Contacts::default(),
             impacts: Vec::new(),
             grid: Grid::default(),
@@ -130,6 +132,7 @@ impl<S: Scalar> PartialEq for World<S> {
             marbles,
             walls,
             swarm,
+            guests: _,
             contacts,
             impacts,
             stopped,
@@ -255,22 +258,6 @@ impl<S: Scalar> World<S> {
         }
         self.marbles.clear_forces();
         self.step_swarm(whole, &mut |_| ())
-    }
-
-    /// Moves the [swarm](Self::swarm) on, which a step does after the marbles. `observe` is told
-    /// what it goes about, as often as that changes.
-    ///
-    /// # Errors
-    /// [`Error::NotPositive`] for `dt`.
-    pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
-        let dt = positive("dt", dt)?;
-        if self.swarm.is_empty() {
-            return Ok(());
-        }
-        self.walls.prepare();
-        let (dt, gravity) = (dt.as_f64() as f32, cast_vector(self.gravity));
-        self.swarm.step(dt, gravity, &self.walls, self.walls.version(), observe);
-        Ok(())
     }
 
     /// The first verb: forces change velocities, velocities change positions, over
