@@ -378,8 +378,8 @@ impl Solve<'_> {
         let Pushes { pressure, rebound, .. } = pushes;
         let zero = L::splat(0.0);
         for (i, batch) in batches.iter().enumerate() {
-            let rebound = L::load(&rebound[i]);
-            if rebound.above(zero) == 0 {
+            let speed = L::load(&rebound[i]);
+            if speed.above(zero) == 0 {
                 continue;
             }
             let [a, b] = gather::<L>(columns.at, batch);
@@ -387,9 +387,10 @@ impl Solve<'_> {
             let [a, b] = gather::<L>(columns.velocity, batch);
             let parting = V::of(&b).minus(V::of(&a)).dot(normal);
             let before = L::load(&pressure[i]);
-            // Only what has met.
-            let wish = before.pick_above(zero, rebound - parting, zero);
-            let wish = rebound.pick_above(zero, wish, zero);
+            // Only what has met, and once.
+            let wish = before.pick_above(zero, speed - parting, zero);
+            let wish = speed.pick_above(zero, wish, zero);
+            before.pick_above(zero, zero, speed).store(&mut rebound[i]);
             let after = (before + wish * mass(&a, &b)).max(zero);
             after.store(&mut pressure[i]);
             let none = [[zero; 4]; 2];

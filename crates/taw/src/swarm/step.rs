@@ -111,7 +111,7 @@ impl Swarm {
         }
         self.leaving = leaving_rows;
         observe(Stage::Restitute);
-        self.look_at_walls(walls);
+        self.look_at_walls(walls, 0.0);
         let most = FASTEST_PUSH * dt;
         for _ in 0..self.model.substeps {
             self.each_slab(|_, columns, slab| {
@@ -172,7 +172,7 @@ impl Swarm {
             return;
         }
         observe(Stage::Restitute);
-        self.look_at_walls(walls);
+        self.look_at_walls(walls, dt);
         let substeps = self.model.substeps as f32;
         let h = dt / substeps;
         let per_second = 1.0 / h;
@@ -193,8 +193,8 @@ impl Swarm {
             self.hold_guests([0.0; 4]);
             observe(Stage::Restitute);
             self.pass(Pass::Relax { per_second }, |_, _| true);
+            self.pass(Pass::Bounce, faster);
         }
-        self.pass(Pass::Bounce, faster);
     }
 
     /// Sees who falls asleep, who wakes, and who may leave its budget in this step.
@@ -276,6 +276,9 @@ impl Swarm {
                     let at = columns.at.part(rows.clone());
                     (at, columns.velocity.part(rows.clone()), budget.part(rows))
                 };
+                for touch in &mut slab.touches {
+                    touch.drift(time[0]);
+                }
                 let stopped = &mut slab.stopped;
                 instructions.run(Drift { at, velocity, budget, change, time, stopped, first });
             }
@@ -406,7 +409,8 @@ impl Swarm {
         }
     }
 
-    fn look_at_walls(&mut self, walls: &dyn Surroundings) {
+    /// Walls are where they will be at the end; so long before, in seconds, they were elsewhere.
+    fn look_at_walls(&mut self, walls: &dyn Surroundings, before: f32) {
         let (at, budget, material) = (&self.at[..], &self.budget[..], self.model.material);
         let (guests, slots) = (&self.guest_slots[..], self.ids.slots());
         let any = !self.guests.is_empty();
@@ -418,7 +422,7 @@ impl Swarm {
                 if slab.asleep {
                     continue;
                 }
-                slab.look_at_walls(walls, at, budget, material);
+                slab.look_at_walls(walls, at, budget, material, before);
                 if any {
                     // Walls push them elsewhere.
                     let guest = |row: u32| Self::has_guest_slot(slots[row as usize], guests);

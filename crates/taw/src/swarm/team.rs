@@ -196,7 +196,7 @@ pub(super) fn wait_for(ready: impl Fn() -> bool) {
     let mut looked = 0_u32;
     while !ready() {
         looked += 1;
-        if looked.is_multiple_of(1 << 8) {
+        if looked.is_multiple_of(1 << 6) {
             std::thread::yield_now();
         } else {
             std::hint::spin_loop();

@@ -40,6 +40,11 @@ impl Touch {
         self.normal.dot(xyz(at)) - self.offset - at[3]
     }
 
+    /// The wall moves on for so long, in seconds.
+    pub fn drift(&mut self, time: f32) {
+        self.offset += self.surface.dot(self.normal) * time;
+    }
+
     /// Pushes the ball out, by so much at most.
     pub fn displace(&self, at: &mut Row, most: f32) {
         let overlap = (-self.gap(at)).clamp(0.0, most);
@@ -67,7 +72,7 @@ impl Touch {
                     let change = (self.rebound - parting) / velocity[3];
                     let pressure = (self.pressure + change).max(0.0);
                     let change = pressure - self.pressure;
-                    self.pressure = pressure;
+                    (self.pressure, self.rebound) = (pressure, 0.0);
                     self.hit(velocity, spin, change, Vec3::new(0.0, 0.0, 0.0));
                 }
             }

@@ -102,6 +102,7 @@ impl Slab {
         at: &[Row],
         budget: &[f32],
         material: Material<f32>,
+        before: f32,
     ) {
         if !self.near_shapes.is_empty() {
             self.touch_shapes(walls, at, budget, material);
@@ -110,6 +111,7 @@ impl Slab {
             let ball = &at[touch.row as usize];
             let point = center(ball) - touch.normal * ball[3];
             touch.surface = walls.surface_velocity(touch.wall, point);
+            touch.drift(-before);
         }
     }
 
