@@ -22,10 +22,12 @@ use bevy_egui::egui::{self, Ui};
 use egui_plot::{Legend, Line, Plot, PlotPoints};
 use taw::motion::{Integrator, Rotation};
 use taw::response::{ContactLaw, Response};
+use taw::swarm::{SwarmModel, Tier};
 use taw::world::{Detection, Precision};
 
 use crate::diagnostics as paths;
 use crate::resources::{Gravity, TawModel};
+use crate::swarm::TawSwarmModel;
 
 /// The choice of methods. Marks the resource as changed only if the user changes
 /// something.
@@ -173,6 +175,52 @@ fn time_plot(ui: &mut Ui, id: &str, unit: &str, draw: impl FnOnce(&mut egui_plot
         .show_x(false)
         .legend(Legend::default())
         .show(ui, draw);
+}
+
+/// How a swarm steps.
+pub fn swarm_model(ui: &mut Ui, model: &mut ResMut<TawSwarmModel>) {
+    let mut chosen = model.0;
+    ui.horizontal(|ui| {
+        ui.label("Tier");
+        let lab = "Lines and displacement only";
+        ui.selectable_value(&mut chosen.tier, Tier::Lab, "Lab").on_hover_text(lab);
+        let full = "Masses, friction, restitution and spin";
+        ui.selectable_value(&mut chosen.tier, Tier::Full, "Full").on_hover_text(full);
+    });
+    ui.add(egui::Slider::new(&mut chosen.substeps, 1..=8).text("substeps"));
+    let most = SwarmModel::default().threads.max(chosen.threads);
+    ui.add(egui::Slider::new(&mut chosen.threads, 1..=most).text("threads"));
+    if chosen.tier == Tier::Full {
+        ui.add(egui::Slider::new(&mut chosen.material.friction, 0.0..=1.0).text("friction"));
+        let restitution = egui::Slider::new(&mut chosen.material.restitution, 0.0..=1.0);
+        ui.add(restitution.text("restitution"));
+        ui.checkbox(&mut chosen.sleeps, "What lies still falls asleep");
+    }
+    if chosen != model.0 {
+        model.0 = chosen;
+    }
+}
+
+/// What a swarm's step costs, part by part.
+pub fn swarm_time(ui: &mut Ui, diagnostics: &DiagnosticsStore) {
+    let marbles = value(diagnostics, &paths::SWARM_MARBLES);
+    let step = diagnostics.get(&paths::SWARM_TIME).and_then(Diagnostic::average).unwrap_or(0.0);
+    ui.label(format!("{marbles} marbles, {} asleep", value(diagnostics, &paths::SWARM_ASLEEP)));
+    let each = step * 1e6 / marbles.max(1.0);
+    ui.label(format!("a step takes {step:.2} ms, {each:.0} ns for each"));
+    time_plot(ui, "taw swarm time", "ms", |plot| {
+        for (name, path) in [
+            ("Step", &paths::SWARM_TIME),
+            ("Restitute", &paths::SWARM_RESTITUTE_TIME),
+            ("Pairs", &paths::SWARM_PAIRS_TIME),
+            ("Order", &paths::SWARM_ORDER_TIME),
+            ("Integrate", &paths::SWARM_INTEGRATE_TIME),
+        ] {
+            if let Some(time) = diagnostics.get(path) {
+                plot.line(Line::new(name, points(time.values())));
+            }
+        }
+    });
 }
 
 /// What to draw of the physics.

@@ -8,6 +8,8 @@ use bevy::diagnostic::{
 use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
+use taw::swarm::Stage;
+
 use crate::convert::from_vector;
 use crate::resources::TawWorld;
 
@@ -21,6 +23,20 @@ pub const INTEGRATE_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/integr
 pub const CONTACTS_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/generate_contacts");
 /// The third verb, all substeps together, in milliseconds.
 pub const RESTITUTE_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/restitute");
+/// The swarm's step, in milliseconds, and its parts: see [`Stage`].
+pub const SWARM_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/swarm");
+/// Its velocities and places, in milliseconds.
+pub const SWARM_INTEGRATE_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/swarm/integrate");
+/// Putting its rows in order, in milliseconds.
+pub const SWARM_ORDER_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/swarm/order");
+/// Seeking its pairs, in milliseconds.
+pub const SWARM_PAIRS_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/swarm/pairs");
+/// Its contacts, in milliseconds.
+pub const SWARM_RESTITUTE_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/swarm/restitute");
+/// The number of marbles in swarms, with guests.
+pub const SWARM_MARBLES: DiagnosticPath = DiagnosticPath::const_new("taw/swarm/marbles");
+/// How many of them sleep.
+pub const SWARM_ASLEEP: DiagnosticPath = DiagnosticPath::const_new("taw/swarm/asleep");
 /// The number of marbles.
 pub const MARBLES: DiagnosticPath = DiagnosticPath::const_new("taw/marbles");
 /// The wall–marble contacts of the last substep.
@@ -49,10 +65,10 @@ pub fn enable_energy(store: &mut DiagnosticsStore, enabled: bool) {
 
 pub(crate) fn register(app: &mut App) {
     let times = [STEP_TIME, GATHER_TIME, INTEGRATE_TIME, CONTACTS_TIME, RESTITUTE_TIME];
-    for path in times {
+    for path in times.into_iter().chain(swarm_times().map(|(path, _)| path)).chain([SWARM_TIME]) {
         app.register_diagnostic(Diagnostic::new(path).with_suffix(" ms"));
     }
-    for path in [MARBLES, WALL_CONTACTS, MARBLE_CONTACTS] {
+    for path in [MARBLES, WALL_CONTACTS, MARBLE_CONTACTS, SWARM_MARBLES, SWARM_ASLEEP] {
         app.register_diagnostic(Diagnostic::new(path).with_smoothing_factor(0.0));
     }
     for (path, unit) in [
@@ -67,6 +83,17 @@ pub(crate) fn register(app: &mut App) {
     }
 }
 
+/// The parts of a swarm's step.
+fn swarm_times() -> impl Iterator<Item = (DiagnosticPath, Stage)> {
+    [
+        (SWARM_INTEGRATE_TIME, Stage::Integrate),
+        (SWARM_ORDER_TIME, Stage::Order),
+        (SWARM_PAIRS_TIME, Stage::Pairs),
+        (SWARM_RESTITUTE_TIME, Stage::Restitute),
+    ]
+    .into_iter()
+}
+
 /// Where the time of a step went.
 #[derive(Resource, Default)]
 pub(crate) struct StepTimes {
@@ -75,6 +102,34 @@ pub(crate) struct StepTimes {
     pub integrate: Stopwatch,
     pub generate_contacts: Stopwatch,
     pub restitute: Stopwatch,
+    pub swarm: Stages,
+}
+
+/// Adds up, each stage by itself.
+#[derive(Default)]
+pub(crate) struct Stages {
+    now: Option<(Stage, Instant)>,
+    sums: Vec<(Stage, Duration)>,
+}
+
+impl Stages {
+    /// From now on it is this one.
+    pub fn go_on(&mut self, stage: Stage) {
+        self.stop();
+        self.now = Some((stage, Instant::now()));
+    }
+
+    pub fn stop(&mut self) {
+        let Some((stage, since)) = self.now.take() else { return };
+        match self.sums.iter_mut().find(|(of, _)| *of == stage) {
+            Some((_, sum)) => *sum += since.elapsed(),
+            None => self.sums.push((stage, since.elapsed())),
+        }
+    }
+
+    fn sum(&self, stage: Stage) -> Duration {
+        self.sums.iter().filter(|(of, _)| *of == stage).map(|(_, sum)| *sum).sum()
+    }
 }
 
 /// Adds up.
@@ -111,6 +166,14 @@ pub(crate) fn measure(times: Res<StepTimes>, world: Res<TawWorld>, mut diagnosti
     diagnostics.add_measurement(&INTEGRATE_TIME, || ms(times.integrate.0));
     diagnostics.add_measurement(&CONTACTS_TIME, || ms(times.generate_contacts.0));
     diagnostics.add_measurement(&RESTITUTE_TIME, || ms(times.restitute.0));
+    diagnostics.add_measurement(&SWARM_TIME, || {
+        ms(times.swarm.sums.iter().map(|(_, sum)| *sum).sum())
+    });
+    for (path, stage) in swarm_times() {
+        diagnostics.add_measurement(&path, || ms(times.swarm.sum(stage)));
+    }
+    diagnostics.add_measurement(&SWARM_MARBLES, || world.swarm.len() as f64);
+    diagnostics.add_measurement(&SWARM_ASLEEP, || world.swarm.asleep() as f64);
     diagnostics.add_measurement(&MARBLES, || world.marbles.len() as f64);
     diagnostics.add_measurement(&WALL_CONTACTS, || world.contacts.wm.len() as f64);
     diagnostics.add_measurement(&MARBLE_CONTACTS, || world.contacts.mm.len() as f64);

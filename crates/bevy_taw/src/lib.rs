@@ -38,11 +38,13 @@
 //! |---|---|
 //! | [`components`] | marbles, walls, and what they may have |
 //! | [`resources`] | the model, gravity, the world |
+//! | [`swarm`] | marbles in bulk that are no entities |
 //! | [`messages`] | contacts that start, go on and end |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
 //! | [`diagnostics`] | step time and counts |
 //! | [`interpolation`] | smooth motion between fixed steps |
 //! | `gizmos` (feature `render`) | contacts, normals, velocities and the grid, drawn |
+//! | `swarm_render` (feature `render`) | swarms on the screen |
 //! | `debug_ui` (feature `debug_ui`) | egui panels for any game |
 //!
 //! # Units
@@ -71,6 +73,9 @@ mod reflect;
 pub mod refusal;
 pub mod resources;
 mod scatter;
+pub mod swarm;
+#[cfg(feature = "render")]
+pub mod swarm_render;
 pub mod wall;
 
 pub use plugin::{Substep, SubstepDelta, TawPlugin, TawPlugins, TawSystems};
@@ -87,10 +92,12 @@ pub mod prelude {
     pub use crate::messages::{ContactEnded, ContactOngoing, ContactPair, ContactStarted};
     pub use crate::refusal::{InputRefused, MarbleStopped};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
+    pub use crate::swarm::{Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;
     pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
     pub use taw::motion::{Force, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};
+    pub use taw::swarm::{Ball, SwarmModel, Tier};
     pub use taw::world::{Detection, Model, Precision};
 }
 

@@ -11,11 +11,12 @@ use crate::interpolation::TawInterpolationPlugin;
 use crate::messages::{self, Touches};
 use crate::refusal::{self, InputRefused, MarbleStopped, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
+use crate::swarm::{self, TawSwarmModel};
 use crate::wall::Wall;
 use crate::{gather, scatter};
 
 /// Everything: the physics, interpolation between its steps, and with the feature
-/// `render` the gizmos.
+/// `render` the gizmos, and swarms on the screen.
 ///
 /// Leave one out with `TawPlugins.build().disable::<TawInterpolationPlugin>()`.
 #[derive(Debug, Default)]
@@ -25,7 +26,9 @@ impl PluginGroup for TawPlugins {
     fn build(self) -> PluginGroupBuilder {
         let group = PluginGroupBuilder::start::<Self>().add(TawPlugin).add(TawInterpolationPlugin);
         #[cfg(feature = "render")]
-        let group = group.add(crate::gizmos::TawGizmosPlugin);
+        let group = group
+            .add(crate::gizmos::TawGizmosPlugin)
+            .add(crate::swarm_render::TawSwarmRenderPlugin);
         group
     }
 }
@@ -80,6 +83,8 @@ impl Plugin for TawPlugin {
     fn build(&self, app: &mut App) {
         app.init_resource::<TawWorld>()
             .init_resource::<TawModel>()
+            .init_resource::<TawSwarmModel>()
+            .init_resource::<swarm::Owners>()
             .init_resource::<Gravity>()
             .init_resource::<Forces>()
             .init_resource::<SubstepDelta>()
@@ -94,7 +99,9 @@ impl Plugin for TawPlugin {
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
 
-        app.add_observer(gather::forget_marble).add_observer(gather::forget_wall);
+        app.add_observer(gather::forget_marble)
+            .add_observer(gather::forget_wall)
+            .add_observer(swarm::forget);
         app.configure_sets(
             FixedUpdate,
             (TawSystems::Gather, TawSystems::Step, TawSystems::Scatter).chain(),
@@ -102,12 +109,19 @@ impl Plugin for TawPlugin {
         .add_systems(
             FixedUpdate,
             (
-                (gather::settings, gather::walls, gather::marbles, gather::forces, gather::finish)
+                (
+                    gather::settings,
+                    gather::walls,
+                    gather::marbles,
+                    gather::forces,
+                    swarm::gather,
+                    gather::finish,
+                )
                     .chain()
                     .in_set(TawSystems::Gather),
-                run_substeps.in_set(TawSystems::Step),
+                (run_substeps, swarm::step).chain().in_set(TawSystems::Step),
                 (
-                    (scatter::marbles, refusal::report_stopped),
+                    (scatter::marbles, refusal::report_stopped, swarm::report_stopped),
                     messages::write.run_if(messages::are_read),
                     diagnostics::measure,
                 )

@@ -231,7 +231,7 @@ impl<S: Scalar> Walls<S> {
             finite_vector(["spin.x", "spin.y", "spin.z"], motion.spin)?;
             finite_point(["pivot.x", "pivot.y", "pivot.z"], motion.pivot)?;
         }
-        self.version += 1;
+        self.version += u64::from(self.motion.get(row) != motion);
         self.motion.set(row, motion, self.shapes.len());
         Ok(())
     }
@@ -252,7 +252,7 @@ impl<S: Scalar> Walls<S> {
     pub fn set_material(&mut self, id: WallId, material: Option<Material<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
         let material = material.map(Material::checked).transpose()?;
-        self.version += 1;
+        self.version += u64::from(self.material.get(row) != material);
         self.material.set(row, material, self.shapes.len());
         Ok(())
     }

@@ -1,0 +1,275 @@
+//! Marbles in bulk that are no entities: one component holds them.
+
+use bevy::math::bounding::Aabb3d;
+use bevy::prelude::*;
+use taw::swarm::{Ball, BallId, Stage, SwarmModel};
+use taw::world::Mass;
+
+use crate::convert::{from_vector, to_point};
+use crate::diagnostics::StepTimes;
+use crate::refusal::{InputRefused, report};
+use crate::resources::TawWorld;
+
+/// Marbles in bulk, up to millions, which collide with each other, with walls, and with the
+/// marbles that are entities. How they step is in [`TawSwarmModel`].
+///
+/// They live in world space; a `Transform` beside this component says nothing. They go when it
+/// goes. With the feature `render`, a camera sees them.
+///
+/// ```
+/// # use bevy::math::bounding::Aabb3d;
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// # let mut app = App::new();
+/// app.add_systems(Startup, |mut commands: Commands| {
+///     let region = Aabb3d::new(Vec3::Y * 10.0, Vec3::splat(8.0));
+///     commands.spawn(Swarm::filling(region, 1_000, 0.1..=0.2, 1));
+/// });
+/// ```
+#[derive(Component, Clone, Debug, Default)]
+pub struct Swarm {
+    /// What the colour of a marble says.
+    pub tint: Tint,
+    coming: Vec<Ball>,
+    going: Vec<BallId>,
+    balls: Vec<BallId>,
+}
+
+/// What the colour of a marble says.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub enum Tint {
+    /// Which one it is: each has a colour of its own.
+    #[default]
+    Id,
+    /// How fast it is: from blue at rest to red at this speed, in m/s.
+    Speed(f32),
+    /// How large it is: from blue for this radius to red for that, in metres.
+    Size(f32, f32),
+    /// Nothing: all have this one.
+    Plain(Color),
+}
+
+/// How all swarms step. May change at any time; what cannot be right is refused with an
+/// [`InputRefused`], and the last good one stays.
+#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut)]
+pub struct TawSwarmModel(pub SwarmModel);
+
+impl Swarm {
+    /// These marbles.
+    #[must_use]
+    pub fn new(balls: Vec<Ball>) -> Self {
+        Self { coming: balls, ..default() }
+    }
+
+    /// So many marbles of glass on a lattice that fills a region from below, with radii drawn
+    /// evenly from a range, in metres. What does not fit is stacked above.
+    ///
+    /// The same seed gives the same marbles.
+    #[must_use]
+    pub fn filling(
+        region: Aabb3d,
+        count: usize,
+        radii: std::ops::RangeInclusive<f32>,
+        seed: u64,
+    ) -> Self {
+        let (low, high) = (Vec3::from(region.min), Vec3::from(region.max));
+        let pitch = 2.1 * radii.end();
+        let cells = ((high - low) / pitch).floor().max(Vec3::ONE).as_uvec3();
+        let room = (high - low - pitch * cells.as_vec3()) * 0.5;
+        let layer = (cells.x * cells.z) as usize;
+        let balls = (0..count).map(|i| {
+            let (x, z) = (i % layer % cells.x as usize, i % layer / cells.x as usize);
+            let cell = Vec3::new(x as f32, (i / layer) as f32, z as f32) + 0.5;
+            let place = low + room * Vec3::new(1.0, 0.0, 1.0) + cell * pitch;
+            let random = |n| draw(seed, 4 * i as u64 + n);
+            let radius = radii.start() + (radii.end() - radii.start()) * random(0);
+            // Or they would stand on each other's heads for a while.
+            let aside = Vec3::new(random(1) - 0.5, 0.0, random(2) - 0.5) * 0.05 * pitch;
+            Ball::new(to_point(place + aside), radius)
+        });
+        Self::new(balls.collect())
+    }
+
+    /// Another tint.
+    #[must_use]
+    pub fn with_tint(self, tint: Tint) -> Self {
+        Self { tint, ..self }
+    }
+
+    /// Another mass for all that are not in the world yet.
+    #[must_use]
+    pub fn with_mass(mut self, mass: Mass<f32>) -> Self {
+        self.coming.iter_mut().for_each(|ball| ball.mass = mass);
+        self
+    }
+
+    /// Puts more marbles in with the next step.
+    pub fn extend(&mut self, balls: impl IntoIterator<Item = Ball>) {
+        self.coming.extend(balls);
+    }
+
+    /// Takes marbles out with the next step, the last ones first, until so many are left.
+    pub fn truncate(&mut self, count: usize) {
+        let all = self.len();
+        self.coming.truncate(count.saturating_sub(self.balls.len()));
+        if count < all.min(self.balls.len()) {
+            self.going.extend(self.balls.drain(count..));
+        }
+    }
+
+    /// How many there are, with those that come with the next step.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.balls.len() + self.coming.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Those that come with the next step.
+    #[must_use]
+    pub fn coming(&self) -> &[Ball] {
+        &self.coming
+    }
+
+    /// Those that are in the world, in the order in which they came: names for
+    /// `TawWorld::swarm`, which has all else about them.
+    #[must_use]
+    pub fn balls(&self) -> &[BallId] {
+        &self.balls
+    }
+
+    /// Where they are, in the same order.
+    pub fn positions<'a>(&'a self, world: &'a TawWorld) -> impl Iterator<Item = Vec3> + 'a {
+        let rows = self.balls.iter().filter_map(|ball| world.swarm.row(*ball).ok());
+        rows.map(|row| Vec3::from_slice(&world.swarm.balls()[row][..3]))
+    }
+}
+
+/// Numbers in [0, 1) that look random (Steele, Lea and Flood 2014, `SplitMix64`).
+fn draw(seed: u64, n: u64) -> f32 {
+    let mut bits = seed.wrapping_add((n + 1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+    (bits >> 40) as f32 / (1_u32 << 24) as f32
+}
+
+/// Whose the marbles are.
+#[derive(Resource, Debug, Default)]
+pub(crate) struct Owners {
+    /// The entity of each slot of the swarm.
+    pub of_slot: Vec<Option<Entity>>,
+}
+
+/// Puts new marbles in, and takes those out that go.
+pub(crate) fn gather(
+    mut world: ResMut<TawWorld>,
+    mut swarms: Query<(Entity, &mut Swarm)>,
+    mut owners: ResMut<Owners>,
+    model: Res<TawSwarmModel>,
+    mut refused: MessageWriter<InputRefused>,
+) {
+    let mut check = |entity, result: Result<(), taw::Error>| {
+        if let Err(error) = result {
+            InputRefused::write(&mut refused, entity, error);
+        }
+    };
+    if model.is_changed() {
+        check(None, world.swarm.set_model(**model));
+    }
+    for (entity, mut swarm) in &mut swarms {
+        if swarm.coming.is_empty() && swarm.going.is_empty() {
+            continue;
+        }
+        let swarm = &mut *swarm;
+        let going = std::mem::take(&mut swarm.going);
+        check(Some(entity), world.swarm.remove(&going));
+        let coming = std::mem::take(&mut swarm.coming);
+        check(
+            Some(entity),
+            world.swarm.insert(&coming).map(|balls| {
+                for ball in &balls {
+                    let Ok(row) = world.swarm.row(*ball) else { continue };
+                    let slot = world.swarm.slots()[row] as usize;
+                    if owners.of_slot.len() <= slot {
+                        owners.of_slot.resize(slot + 1, None);
+                    }
+                    owners.of_slot[slot] = Some(entity);
+                }
+                swarm.balls.extend(balls);
+            }),
+        );
+    }
+}
+
+/// The marbles of a swarm go when it goes.
+pub(crate) fn forget(
+    removed: On<Remove, Swarm>,
+    swarms: Query<&Swarm>,
+    mut world: ResMut<TawWorld>,
+) {
+    if let Ok(swarm) = swarms.get(removed.entity) {
+        let balls: Vec<_> = swarm.balls.iter().chain(&swarm.going).copied().collect();
+        report("take out a swarm", world.swarm.remove(&balls));
+    }
+}
+
+/// Moves the swarms on, after the marbles.
+pub(crate) fn step(mut world: ResMut<TawWorld>, time: Res<Time>, mut times: ResMut<StepTimes>) {
+    let mut clock = |stage: Stage| times.swarm.go_on(stage);
+    report("step the swarm", world.step_swarm(time.delta_secs(), &mut clock));
+    times.swarm.stop();
+}
+
+/// Tells of the marbles that were stopped in this step.
+pub(crate) fn report_stopped(world: Res<TawWorld>) {
+    for ball in world.swarm.stopped() {
+        log::warn!("taw stopped {ball:?}: its motion is no longer finite");
+    }
+}
+
+/// A colour for what lies between least (0) and most (1): blue, green, yellow, red.
+#[must_use]
+pub fn heat(part: f32) -> [f32; 3] {
+    let part = part.clamp(0.0, 1.0) * 3.0;
+    let colors = [[0.10, 0.20, 0.65], [0.10, 0.60, 0.35], [0.95, 0.75, 0.15], [0.85, 0.12, 0.08]];
+    let first = (part as usize).min(2);
+    let rest = part - first as f32;
+    [0, 1, 2].map(|i| colors[first][i] + (colors[first + 1][i] - colors[first][i]) * rest)
+}
+
+/// Where a row of the swarm is, in metres.
+#[must_use]
+pub(crate) fn place([x, y, z, _]: &[f32; 4]) -> Vec3 {
+    from_vector(taw::math::Vec3::new(*x, *y, *z))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_fills_a_region_lies_in_it_and_apart() {
+        let region = Aabb3d::new(Vec3::ZERO, Vec3::splat(2.0));
+        let swarm = Swarm::filling(region, 500, 0.1..=0.2, 3);
+        assert_eq!(swarm.len(), 500);
+        let at = |ball: &Ball| Vec3::new(ball.position.x, ball.position.y, ball.position.z);
+        for (i, a) in swarm.coming.iter().enumerate() {
+            assert!(a.radius >= 0.1 && a.radius <= 0.2);
+            assert!(at(a).abs().max_element() < 2.0 - 0.9 * a.radius);
+            for b in &swarm.coming[..i] {
+                assert!(at(a).distance(at(b)) > a.radius + b.radius);
+            }
+        }
+    }
+
+    #[test]
+    fn heat_goes_from_blue_to_red() {
+        assert!(heat(0.0)[2] > heat(0.0)[0] && heat(1.0)[0] > heat(1.0)[2]);
+        assert_eq!((heat(-1.0), heat(9.0)), (heat(0.0), heat(1.0)));
+        assert_eq!(heat(f32::NAN).map(f32::is_nan), [true; 3]);
+    }
+}
