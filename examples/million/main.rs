@@ -42,6 +42,9 @@ pub struct Options {
     /// How many steps of 1/60 s without a window
     #[arg(long, default_value_t = 300, value_name = "N")]
     steps: u32,
+    /// How many steps are made before the first frame, as for a picture
+    #[arg(long, default_value_t = 0, value_name = "N")]
+    poured: u32,
     #[command(flatten)]
     picture: Picture,
 }

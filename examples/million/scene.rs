@@ -50,6 +50,7 @@ pub fn plugin(app: &mut App) {
     app.insert_resource(Pour { count, tint, again: true })
         .insert_resource(ClearColor(tailwind::SLATE_300.into()))
         .insert_resource(GlobalAmbientLight { brightness: 500.0, ..default() })
+        .add_systems(FixedUpdate, pour_ahead.after(TawSystems::Gather).before(TawSystems::Step))
         .add_systems(Update, (pour.run_if(|pour: Res<Pour>| pour.again), tilt, recolor).chain());
 }
 
@@ -100,6 +101,19 @@ fn pour(
         Transform::from_xyz(0.5, 1.0, 0.35).looking_at(Vec3::ZERO, Vec3::Y),
     ));
     commands.spawn((Poured, orbit_camera_at(Vec3::Y * 2.0, 2.2 * half + 4.0, 0.5)));
+}
+
+/// Has them lie in the box when the first frame is drawn.
+fn pour_ahead(mut world: ResMut<TawWorld>, options: Res<Options>, mut done: Local<bool>) {
+    if *done || world.swarm.is_empty() {
+        return;
+    }
+    *done = true;
+    for _ in 0..options.poured {
+        if let Err(error) = world.step_swarm(1.0 / 60.0, &mut |_| ()) {
+            error!("{error}");
+        }
+    }
 }
 
 /// Turns gravity while a key is held, and back when none is.
