@@ -46,7 +46,9 @@ fn pour(options: &Options) -> Result<(), taw::Error> {
         options.model().threads,
         inserted.as_millis()
     );
-    println!("| steps | ms a step, median | mean | integrate | order | pairs | walls | restitute | ns a marble | sought anew | asleep | bytes a marble |");
+    println!(
+        "| steps | ms a step, median | mean | integrate | order | pairs | walls | restitute | ns a marble | sought anew | asleep | bytes a marble |"
+    );
     println!("|---|---|---|---|---|---|---|---|---|---|---|---|");
     let mut times = Vec::new();
     let mut stages = [Duration::ZERO; STAGES.len()];

@@ -73,7 +73,10 @@ fn main() -> AppExit {
         return headless::run(&options);
     }
     App::new()
-        .add_plugins(ExamplePlugins { title: "A million marbles", picture: options.picture.clone() })
+        .add_plugins(ExamplePlugins {
+            title: "A million marbles",
+            picture: options.picture.clone(),
+        })
         .add_plugins((EguiPlugin::default(), OrbitCameraPlugin, TawPlugins))
         .add_plugins(FrameTimeDiagnosticsPlugin::default())
         .insert_resource(TawSwarmModel(options.model()))

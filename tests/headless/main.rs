@@ -9,5 +9,6 @@ mod interpolation;
 mod motion;
 mod scene;
 mod spawning;
+mod swarms;
 mod transforms;
 mod walls;

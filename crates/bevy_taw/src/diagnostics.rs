@@ -166,9 +166,8 @@ pub(crate) fn measure(times: Res<StepTimes>, world: Res<TawWorld>, mut diagnosti
     diagnostics.add_measurement(&INTEGRATE_TIME, || ms(times.integrate.0));
     diagnostics.add_measurement(&CONTACTS_TIME, || ms(times.generate_contacts.0));
     diagnostics.add_measurement(&RESTITUTE_TIME, || ms(times.restitute.0));
-    diagnostics.add_measurement(&SWARM_TIME, || {
-        ms(times.swarm.sums.iter().map(|(_, sum)| *sum).sum())
-    });
+    diagnostics
+        .add_measurement(&SWARM_TIME, || ms(times.swarm.sums.iter().map(|(_, sum)| *sum).sum()));
     for (path, stage) in swarm_times() {
         diagnostics.add_measurement(&path, || ms(times.swarm.sum(stage)));
     }

@@ -108,7 +108,8 @@ fn draw(
     if swarm.is_empty() && drawn.blocks.is_empty() {
         return;
     }
-    let still = swarm.asleep() == swarm.len() && !swarms.iter().any(|(_, swarm)| swarm.is_changed());
+    let still =
+        swarm.asleep() == swarm.len() && !swarms.iter().any(|(_, swarm)| swarm.is_changed());
     let now = (swarm.len(), still);
     if *was == now && still {
         return; // as in the last frame
@@ -203,7 +204,9 @@ fn half(x: f32) -> u16 {
         ..-24 => 0,
         // So small that the leading bit is written out.
         -24..-14 => (((bits & 0x7f_ffff) | 0x80_0000) >> (-exponent - 1)) as u16,
-        -14..16 => ((((exponent + 15) as u32) << 10 | (bits >> 13 & 0x3ff)) + (bits >> 12 & 1)) as u16,
+        -14..16 => {
+            ((((exponent + 15) as u32) << 10 | (bits >> 13 & 0x3ff)) + (bits >> 12 & 1)) as u16
+        }
         _ => 0x7bff,
     }
 }

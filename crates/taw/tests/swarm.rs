@@ -69,7 +69,8 @@ fn one(world: &World<f32>, ball: BallId) -> (Vec3<f32>, Vec3<f32>) {
 /// The deepest overlap of any two balls.
 fn deepest(swarm: &Swarm) -> f32 {
     let mut grid = taw::broad::Grid::default();
-    let at: Vec<Point3<f32>> = swarm.balls().iter().map(|b| Point3::new(b[0], b[1], b[2])).collect();
+    let at: Vec<Point3<f32>> =
+        swarm.balls().iter().map(|b| Point3::new(b[0], b[1], b[2])).collect();
     let radius: Vec<f32> = swarm.balls().iter().map(|ball| ball[3]).collect();
     grid.rebuild(&at, &radius, 0.0);
     let mut deepest = 0.0_f32;
@@ -174,10 +175,8 @@ fn a_bounce_gives_back_the_part_of_the_speed_that_it_should() {
 #[test]
 fn what_slides_begins_to_roll_with_five_sevenths() {
     let mut world = world(model(Tier::Full), None);
-    let ball = Ball {
-        velocity: Vec3::new(7.0, 0.0, 0.0),
-        ..Ball::new(Point3::new(0.0, 0.5, 0.0), 0.5)
-    };
+    let ball =
+        Ball { velocity: Vec3::new(7.0, 0.0, 0.0), ..Ball::new(Point3::new(0.0, 0.5, 0.0), 0.5) };
     let id = world.swarm.insert(&[ball]).unwrap()[0];
     steps(&mut world, 120);
     let (place, velocity) = one(&world, id);
@@ -248,7 +247,8 @@ fn balls_come_and_go_by_name() {
     let ids: Vec<_> = (0..swarm.len()).map(|row| swarm.id(row).unwrap()).collect();
     steps(&mut world, 150);
     let (gone, kept): (Vec<_>, Vec<_>) = ids.iter().enumerate().partition(|(i, _)| i % 2 == 0);
-    let [gone, kept] = [gone, kept].map(|ids| ids.into_iter().map(|(_, id)| *id).collect::<Vec<_>>());
+    let [gone, kept] =
+        [gone, kept].map(|ids| ids.into_iter().map(|(_, id)| *id).collect::<Vec<_>>());
     let before: Vec<_> = kept.iter().map(|id| one(&world, *id)).collect();
     world.swarm.remove(&gone).unwrap();
     assert_eq!(world.swarm.len(), kept.len());
@@ -263,6 +263,25 @@ fn balls_come_and_go_by_name() {
     assert_eq!(world.swarm.remove(&[kept[0], kept[0]]), Err(Error::NoSuchBall(kept[0])));
     assert_eq!(world.swarm.remove(&[kept[0], gone[0]]), Err(Error::NoSuchBall(gone[0])));
     assert!(world == snapshot);
+}
+
+#[test]
+fn the_tier_changes_while_balls_come_and_go() {
+    let mut world = pour(1_000, 0.3, model(Tier::Full));
+    for tier in [Tier::Lab, Tier::Full, Tier::Lab, Tier::Full] {
+        steps(&mut world, 20);
+        world.swarm.set_model(model(tier)).unwrap();
+        let count = world.swarm.len();
+        let gone: Vec<_> = (0..100).filter_map(|row| world.swarm.id(row)).collect();
+        world.swarm.remove(&gone).unwrap();
+        steps(&mut world, 20);
+        let new = [Ball::new(Point3::new(0.0, 30.0, 0.0), 0.4); 1];
+        world.swarm.insert(&new).unwrap();
+        world.swarm.remove(&[world.swarm.id(0).unwrap()]).unwrap();
+        steps(&mut world, 1);
+        assert_eq!(world.swarm.len(), count - 100);
+        assert_eq!(world.swarm.rims().len(), if tier == Tier::Full { count - 100 } else { 0 });
+    }
 }
 
 #[test]
@@ -421,7 +440,8 @@ fn marbles_and_swarms_push_each_other() {
         let elastic = Material { restitution: 1.0, friction: 0.0, ..Material::default() };
         world.swarm.set_model(SwarmModel { material: elastic, ..model(tier) }).unwrap();
         world.set_gravity(Vec3::new(0.0, 0.0, 0.0)).unwrap();
-        let ball = Ball { mass: Mass::Kilograms(1.0), ..Ball::new(Point3::new(0.0, 0.0, 0.0), 0.5) };
+        let ball =
+            Ball { mass: Mass::Kilograms(1.0), ..Ball::new(Point3::new(0.0, 0.0, 0.0), 0.5) };
         let id = world.swarm.insert(&[ball]).unwrap()[0];
         let marble = Marble {
             velocity: Vec3::new(2.0, 0.0, 0.0),

@@ -25,7 +25,9 @@ impl Swarm {
         let threads = self.model.threads as usize;
         self.rebuilds += 1;
         observe(Stage::Pairs);
-        self.remember();
+        if self.rough() {
+            self.remember();
+        }
         observe(Stage::Order);
         let cap = self.margin();
         self.set_budgets(dt, cap);
@@ -84,7 +86,8 @@ impl Swarm {
         for row in rows {
             self.strays.add(*row);
             let at = *row as usize;
-            let way = if self.rough() { squared(self.velocity[at]).sqrt() * dt } else { self.way[at] };
+            let way =
+                if self.rough() { squared(self.velocity[at]).sqrt() * dt } else { self.way[at] };
             self.budget[at] = (way * STEPS).clamp(cap, cap * FAR);
         }
         self.find_strays(cap);
@@ -105,8 +108,11 @@ impl Swarm {
         if self.rough() {
             reorder(&mut self.spin, &mut self.spare, &order, threads);
         }
+        let rough = self.rough();
         let spare = &mut self.spare_numbers;
-        reorder(&mut self.before, spare, &order, threads);
+        if rough {
+            reorder(&mut self.before, spare, &order, threads);
+        }
         let (slots, rows) = self.ids.columns();
         reorder(slots, spare, &order, threads);
         let (rows, slots) = (Shared::new(rows), &slots[..]);
@@ -183,11 +189,13 @@ impl Swarm {
                     search,
                     batches: &mut slab.batches,
                 });
-                slab.pushes.reset(slab.batches.len(), rough);
                 if rough {
+                    slab.pushes.reset(slab.batches.len());
                     memory.recall(&slab.batches, before, &mut slab.pushes);
                 }
-                slab.seek_walls(instructions, at, budget, planes, |touch| memory.recall_touch(before, touch));
+                slab.seek_walls(instructions, at, budget, planes, |touch| {
+                    rough.then(|| memory.recall_touch(before, touch)).flatten()
+                });
                 slab.near_shapes.clear();
                 if shapes {
                     walls::near_shapes(walls, at, budget, slab.own_rows(), &mut slab.near_shapes);

@@ -37,7 +37,7 @@ pub(super) struct Level {
     /// The first cell of this level in a layer of level 0.
     base: u32,
     /// Its place in the list of levels.
-    pub level: u32,
+    pub number: u32,
     /// Cells in a row and in a layer, with the empty ones around.
     pub row_stride: u32,
     pub layer_stride: u32,
@@ -66,8 +66,8 @@ pub(super) struct Grid {
 impl Level {
     /// The cell of these coordinates; empty cells lie at both ends of the rows and columns.
     pub fn cell(&self, grid: &Grid, layer: u32, row: u32, cell: u32) -> u32 {
-        let inner = layer & ((1 << self.level) - 1);
-        (layer >> self.level) * grid.per_layer
+        let inner = layer & ((1 << self.number) - 1);
+        (layer >> self.number) * grid.per_layer
             + self.base
             + inner * self.layer_stride
             + row * self.row_stride
@@ -153,14 +153,14 @@ impl Grid {
             let (a, b) = (self.sample[count / 64], self.sample[count - 1 - count / 64]);
             let (least, most) = (self.sample[0], self.sample[count - 1]);
             let room = (b - a) * 0.1 + 4.0 * largest;
-            (low[axis], high[axis]) = ((a - room).max(least - largest), (b + room).min(most + largest));
+            (low[axis], high[axis]) =
+                ((a - room).max(least - largest), (b + room).min(most + largest));
         }
         self.low = low;
         let mut width = (2.0 * largest + skin) * MARGIN;
         let budget = at.len() as f64 * CELLS_PER_BALL + CELLS;
-        let sides = |width: f32| {
-            [0, 1, 2].map(|axis| ((high[axis] - low[axis]) / width).ceil().max(1.0))
-        };
+        let sides =
+            |width: f32| [0, 1, 2].map(|axis| ((high[axis] - low[axis]) / width).ceil().max(1.0));
         let cells = |sides: [f32; 3]| sides.iter().map(|n| f64::from(*n) + 2.0).product::<f64>();
         while cells(sides(width)) > budget || sides(width).iter().any(|n| f64::from(*n) > SIDE) {
             width *= 1.25;
@@ -190,7 +190,7 @@ impl Grid {
                 rows,
                 cells,
                 base: self.per_layer,
-                level,
+                number: level,
                 row_stride,
                 layer_stride,
             });

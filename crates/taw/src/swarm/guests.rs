@@ -73,8 +73,8 @@ impl Swarm {
     pub(super) fn hold_guests(&mut self, change: Row) {
         for guest in &self.guests {
             let Some(row) = self.ids.row(guest.ball) else { continue };
-            for axis in 0..3 {
-                self.velocity[row][axis] -= change[axis];
+            for (velocity, change) in self.velocity[row].iter_mut().zip(change) {
+                *velocity -= change;
             }
             self.at[row] = guest.at;
         }
@@ -102,8 +102,7 @@ impl Swarm {
             let against = -(u * push[0] + v * push[1] + w * push[2]);
             let squared = push[0] * push[0] + push[1] * push[1] + push[2] * push[2];
             let part = if squared > 0.0 { (against / squared).clamp(0.0, 1.0 / dt) } else { 0.0 };
-            self.velocity[row] =
-                [u + push[0] * part, v + push[1] * part, w + push[2] * part, mass];
+            self.velocity[row] = [u + push[0] * part, v + push[1] * part, w + push[2] * part, mass];
         }
     }
 }

@@ -4,7 +4,7 @@ use super::lanes::{Kernel, LANES, Lanes, Row};
 use super::pairs::Batch;
 use super::team::Shared;
 
-/// What batches of pairs bear, batch by batch. The last two are empty where nothing is rough.
+/// What batches of pairs bear, batch by batch; nothing in the lab's tier.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Pushes {
     /// The impulses along the normals, in N s.
@@ -23,14 +23,13 @@ impl Pushes {
     }
 
     /// As many as there are batches, and none bears anything.
-    pub fn reset(&mut self, batches: usize, rough: bool) {
-        let rough = if rough { batches } else { 0 };
+    pub fn reset(&mut self, batches: usize) {
         self.pressure.clear();
         self.pressure.resize(batches, [0.0; LANES]);
         self.grip.clear();
-        self.grip.resize(rough, [[0.0; LANES]; 3]);
+        self.grip.resize(batches, [[0.0; LANES]; 3]);
         self.rebound.clear();
-        self.rebound.resize(rough, [0.0; LANES]);
+        self.rebound.resize(batches, [0.0; LANES]);
     }
 }
 
@@ -166,7 +165,7 @@ fn mass<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> L {
     sum.pick_above(zero, L::splat(1.0) / sum, zero)
 }
 
-/// How stiff a contact is (Catto, *Solver2D*, 2024: soft contacts).
+/// How stiff a contact is (Catto, `Solver2D`, 2024: soft contacts).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Soft {
     /// The part of an overlap that is to go per second.
@@ -317,7 +316,8 @@ impl Solve<'_> {
                 across = across.minus(normal.times(across.dot(normal)));
                 across.store(&mut grip[i]);
             }
-            let (velocity, spin) = (gather(columns.velocity, batch), columns.spins::<L, ROUGH>(batch));
+            let (velocity, spin) =
+                (gather(columns.velocity, batch), columns.spins::<L, ROUGH>(batch));
             columns.hit::<L, ROUGH>(batch, velocity, spin, normal, L::load(&pressure[i]), across);
         }
     }

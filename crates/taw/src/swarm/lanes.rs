@@ -99,9 +99,9 @@ pub(super) struct Plain([f32; LANES]);
 impl Plain {
     #[inline(always)]
     fn both(self, other: Self, of: impl Fn(f32, f32) -> f32) -> Self {
-        let mut out = [0.0; LANES];
-        for lane in 0..LANES {
-            out[lane] = of(self.0[lane], other.0[lane]);
+        let mut out = self.0;
+        for (a, b) in out.iter_mut().zip(other.0) {
+            *a = of(*a, b);
         }
         Self(out)
     }
@@ -171,9 +171,9 @@ impl Lanes for Plain {
     #[inline(always)]
     fn pick_above(self, other: Self, yes: Self, no: Self) -> Self {
         let mut out = no.0;
-        for lane in 0..LANES {
+        for (lane, out) in out.iter_mut().enumerate() {
             if self.0[lane] > other.0[lane] {
-                out[lane] = yes.0[lane];
+                *out = yes.0[lane];
             }
         }
         Self(out)
@@ -204,16 +204,17 @@ impl Lanes for Plain {
 
     #[inline(always)]
     unsafe fn scatter(base: *mut Row, at: &[u16; LANES], count: usize, columns: [Self; 4]) {
-        for lane in 0..count {
+        for (lane, at) in at.iter().enumerate().take(count) {
             let row = columns.map(|column| column.0[lane]);
             // SAFETY: as the caller promises.
-            unsafe { *base.add(usize::from(at[lane])) = row };
+            unsafe { *base.add(usize::from(*at)) = row };
         }
     }
 }
 
 #[cfg(target_arch = "x86_64")]
 mod x86 {
+    #[allow(clippy::wildcard_imports, reason = "they all begin with _mm")]
     use std::arch::x86_64::*;
 
     use super::{Kernel, LANES, Lanes, Row};

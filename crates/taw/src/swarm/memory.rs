@@ -2,9 +2,9 @@
 
 use super::kernels::Pushes;
 use super::pairs::Batch;
-use super::team::{Shared, work};
 use super::slab::Slab;
 use super::strays::Strays;
+use super::team::{Shared, work};
 use super::touch::Touch;
 use super::walls::find;
 use crate::math::Vec3;
@@ -40,7 +40,9 @@ impl Memory {
             // the strays come alone.
             let count = |[row, _]: [u32; 2], _: Kept| unsafe { *counts.row(row as usize + 2) += 1 };
             work(threads, |member| {
-                slabs[member.share(slabs.len())].iter().for_each(|slab| bearing(&slab.batches, &slab.pushes, count));
+                slabs[member.share(slabs.len())]
+                    .iter()
+                    .for_each(|slab| bearing(&slab.batches, &slab.pushes, count));
             });
             bearing(&strays.batches, &strays.pushes, count);
         }
@@ -60,7 +62,9 @@ impl Memory {
             *place += 1;
         };
         work(threads, |member| {
-            slabs[member.share(slabs.len())].iter().for_each(|slab| bearing(&slab.batches, &slab.pushes, place));
+            slabs[member.share(slabs.len())]
+                .iter()
+                .for_each(|slab| bearing(&slab.batches, &slab.pushes, place));
         });
         bearing(&strays.batches, &strays.pushes, place);
     }

@@ -15,6 +15,11 @@
 //! - Each ball has a *budget* of how far it may go until pairs are sought again. What a pair
 //!   bore is remembered across that.
 
+#![expect(
+    clippy::inline_always,
+    reason = "kernels are compiled for the instructions of whoever calls them"
+)]
+
 mod build;
 mod grid;
 mod guests;
@@ -31,10 +36,10 @@ mod team;
 mod touch;
 mod walls;
 
+pub(crate) use guests::Guest;
 pub use ids::BallId;
 pub use lanes::Instructions;
 pub use model::{Ball, Stage, SwarmModel, Tier};
-pub(crate) use guests::Guest;
 pub(crate) use walls::Surroundings;
 
 use cgmath::{EuclideanSpace, Zero};
@@ -118,8 +123,8 @@ impl Swarm {
     pub fn set_model(&mut self, model: SwarmModel) -> Result<(), Error> {
         let model = model.checked()?;
         if model.tier != self.model.tier {
-            self.paired = false;
-            self.remembers = false;
+            (self.paired, self.remembers) = (false, false);
+            self.before.clear();
         }
         self.model = model;
         self.shape_columns();
@@ -157,7 +162,7 @@ impl Swarm {
         let moving = |ball: &Ball| with(ball.velocity, 1.0 / ball.mass.of(ball.radius));
         self.velocity.extend(rows.map(moving));
         self.budget.resize(self.at.len(), 0.0);
-        if self.paired || self.remembers {
+        if self.rough() && (self.paired || self.remembers) {
             self.remember();
             self.before.resize(self.at.len(), u32::MAX);
         }
@@ -339,22 +344,20 @@ impl Swarm {
         }
     }
 
-    /// Keeps what pairs bore, as rows are about to change.
+    /// Keeps what pairs bore, as rows are about to change. The lab's tier has nothing to keep.
     fn remember(&mut self) {
-        if !self.remembers && self.paired && self.rough() {
-            let threads = self.model.threads as usize;
-            let strays = std::mem::take(&mut self.strays);
-            let slabs = &self.slabs[..self.slab_count];
-            self.memory.keep(slabs, &strays, self.at.len(), threads);
-            self.strays = strays;
-        } else if !self.remembers {
+        if self.remembers || !self.rough() {
+            return;
+        }
+        if self.paired {
+            let (slabs, threads) = (&self.slabs[..self.slab_count], self.model.threads as usize);
+            self.memory.keep(slabs, &self.strays, self.at.len(), threads);
+        } else {
             self.memory.forget(self.at.len());
         }
-        if !self.remembers {
-            self.before.clear();
-            self.before.extend(0..self.at.len() as u32);
-            self.remembers = true;
-        }
+        self.before.clear();
+        self.before.extend(0..self.at.len() as u32);
+        self.remembers = true;
     }
 
     fn measure(&mut self) {

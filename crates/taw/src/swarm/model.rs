@@ -36,7 +36,8 @@ pub struct SwarmModel {
 impl Default for SwarmModel {
     /// The full tier in two substeps, on all threads that the machine has, with sleep.
     fn default() -> Self {
-        let threads = std::thread::available_parallelism().map_or(1, |threads| threads.get() as u32);
+        let threads =
+            std::thread::available_parallelism().map_or(1, |threads| threads.get() as u32);
         Self {
             tier: Tier::Full,
             substeps: 2,

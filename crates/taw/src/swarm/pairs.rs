@@ -158,7 +158,7 @@ impl Kernel for FindPairs<'_> {
         let mut around = Around::new(columns, first..end);
         for level in &grid.levels {
             let [row_count, cell_count] = level.size();
-            let fine = layers.map(|layer| layer << level.level);
+            let fine = layers.map(|layer| layer << level.number);
             for layer in fine[0]..fine[1] {
                 for row in 1..row_count - 1 {
                     let line = level.cell(grid, layer, row, 0);
@@ -245,7 +245,7 @@ fn across<L: Lanes>(
         let own = grid.level_of(place[3]);
         for level in &grid.levels[..own] {
             let [layer, row, cell] = grid.coordinates(level, place);
-            if small >= next && layer > layers[1] << level.level {
+            if small >= next && layer > layers[1] << level.number {
                 continue;
             }
             around.eights.clear();
@@ -336,13 +336,4 @@ unsafe fn get<L: Lanes>(column: &[f32], at: usize) -> L {
     debug_assert!(at + LANES <= column.len());
     // SAFETY: as the caller promises.
     L::load(unsafe { &*column.as_ptr().add(at).cast() })
-}
-
-/// # Safety
-/// There are eight from there on.
-#[inline(always)]
-unsafe fn put<L: Lanes>(column: &mut [f32], at: usize, eight: L) {
-    debug_assert!(at + LANES <= column.len());
-    // SAFETY: as the caller promises.
-    eight.store(unsafe { &mut *column.as_mut_ptr().add(at).cast() });
 }

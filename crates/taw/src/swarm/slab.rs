@@ -49,7 +49,8 @@ impl Slab {
             + (self.near_planes.capacity()
                 + self.leaving.capacity()
                 + self.near_shapes.capacity()
-                + self.stopped.capacity()) * size_of::<u32>()
+                + self.stopped.capacity())
+                * size_of::<u32>()
     }
 
     pub fn own_rows(&self) -> Range<usize> {

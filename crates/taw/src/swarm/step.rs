@@ -322,10 +322,7 @@ impl Swarm {
 
     /// Works on all slabs, each with exclusive access to the balls of it and of the next one.
     /// Says whether the next one sleeps and how fast a ball of it is.
-    fn each_slab(
-        &mut self,
-        job: impl Fn(Option<(bool, f32)>, Columns, &mut Slab) + Sync,
-    ) {
+    fn each_slab(&mut self, job: impl Fn(Option<(bool, f32)>, Columns, &mut Slab) + Sync) {
         let columns = Columns {
             at: Shared::new(&mut self.at),
             velocity: Shared::new(&mut self.velocity),
@@ -401,7 +398,13 @@ impl Swarm {
             if walls.has_shapes() {
                 for row in &rows[mine] {
                     let row = *row as usize;
-                    super::walls::near_shapes(walls, at, budget, row..row + 1, &mut slab.near_shapes);
+                    super::walls::near_shapes(
+                        walls,
+                        at,
+                        budget,
+                        row..row + 1,
+                        &mut slab.near_shapes,
+                    );
                 }
                 slab.near_shapes.sort_unstable();
                 slab.near_shapes.dedup();
@@ -445,7 +448,7 @@ fn row(vector: Vec3<f32>) -> Row {
     [vector.x, vector.y, vector.z, 0.0]
 }
 
-/// Springs that are as stiff as so short a step allows (Catto, *Solver2D*, 2024).
+/// Springs that are as stiff as so short a step allows (Catto, `Solver2D`, 2024).
 fn soft(h: f32) -> Soft {
     let omega = 2.0 * std::f32::consts::PI * HERTZ.min(0.25 / h);
     let a1 = 2.0 * DAMPING + h * omega;

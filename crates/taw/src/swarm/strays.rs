@@ -45,7 +45,7 @@ impl Strays {
     pub fn clear(&mut self, balls: usize) {
         self.rows.clear();
         self.batches.clear();
-        self.pushes.reset(0, false);
+        self.pushes.reset(0);
         self.bits.clear();
         self.bits.resize(balls.div_ceil(64), 0);
     }
@@ -73,15 +73,18 @@ impl Strays {
         search: &mut Search,
         rough: bool,
     ) {
-        self.keep();
+        if rough {
+            self.keep();
+        }
         self.rows.sort_unstable();
         let mut batches = std::mem::take(&mut self.batches);
         batches.clear();
         if !self.rows.is_empty() {
             let mut filler = search.filler(at.len(), &mut batches);
-            let widest = self.rows.iter().fold(0.0_f32, |most, row| {
-                most.max(at[*row as usize][3] + budget[*row as usize])
-            });
+            let widest = self
+                .rows
+                .iter()
+                .fold(0.0_f32, |most, row| most.max(at[*row as usize][3] + budget[*row as usize]));
             for stray in &self.rows {
                 self.beside(*stray, grid, at, budget, largest + cap, &mut filler);
             }
@@ -101,8 +104,10 @@ impl Strays {
             filler.close();
         }
         self.batches = batches;
-        self.pushes.reset(self.batches.len(), rough);
-        self.recall();
+        if rough {
+            self.pushes.reset(self.batches.len());
+            self.recall();
+        }
     }
 
     /// The pairs of one with those that are none.

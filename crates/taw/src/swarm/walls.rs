@@ -80,7 +80,13 @@ impl Slab {
     }
 
     /// Finds the half-spaces near some more balls of the slab.
-    pub fn seek_walls_for(&mut self, rows: &[u32], at: &[Row], budget: &[f32], planes: &[HalfSpace]) {
+    pub fn seek_walls_for(
+        &mut self,
+        rows: &[u32],
+        at: &[Row],
+        budget: &[f32],
+        planes: &[HalfSpace],
+    ) {
         std::mem::swap(&mut self.touches, &mut self.old_touches);
         self.touches.clear();
         let old = &self.old_touches;
@@ -183,13 +189,13 @@ impl Kernel for NearPlanes<'_> {
         let mut budgets = budget.chunks_exact(LANES);
         for (eight, budget) in (&mut eights).zip(&mut budgets) {
             // SAFETY: there are eight.
-            let [x, y, z, radius] =
-                unsafe { L::gather(eight.as_ptr(), &[0, 1, 2, 3, 4, 5, 6, 7]) };
+            let [x, y, z, radius] = unsafe { L::gather(eight.as_ptr(), &[0, 1, 2, 3, 4, 5, 6, 7]) };
             let budget = budget.first_chunk().map_or(L::splat(0.0), L::load);
             let reach = radius + budget;
             let mut near = 0;
             for HalfSpace { normal, offset, .. } in planes {
-                let along = L::splat(normal.x) * x + L::splat(normal.y) * y + L::splat(normal.z) * z;
+                let along =
+                    L::splat(normal.x) * x + L::splat(normal.y) * y + L::splat(normal.z) * z;
                 // Rather one too many: the caller looks more closely.
                 near |= (L::splat(*offset) + reach * L::splat(1.001)).above(along);
             }

@@ -6,11 +6,11 @@ use super::World;
 use super::marbles::MarbleId;
 use super::touch::{Near, drop_seams, parts_near};
 use super::walls::{Part, Walls};
+use crate::Error;
+use crate::error::positive;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::response::Material;
 use crate::shape::{Aabb, Sphere};
-use crate::Error;
-use crate::error::positive;
 use crate::swarm::{BallId, Guest, Stage, Surroundings};
 
 /// The marbles that are guests of the swarm.
@@ -104,7 +104,6 @@ impl<S: Scalar> World<S> {
 /// In metres and m/s.
 const FURTHEST: f32 = 1e12;
 
-
 impl<S: Scalar> Surroundings for Walls<S> {
     fn planes(&self, name: &mut dyn FnMut(u32, Vec3<f32>, f32)) {
         for (wall, plane) in Walls::planes(self) {
@@ -145,7 +144,11 @@ impl<S: Scalar> Surroundings for Walls<S> {
     }
 
     fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32> {
-        cast_vector(crate::response::Walls::surface_velocity(self, wall as usize, cast_point(point)))
+        cast_vector(crate::response::Walls::surface_velocity(
+            self,
+            wall as usize,
+            cast_point(point),
+        ))
     }
 
     fn material(&self, wall: u32) -> Option<Material<f32>> {

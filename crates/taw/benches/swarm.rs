@@ -1,0 +1,136 @@
+//! What a swarm costs: `cargo bench -p taw --bench swarm`, or with `-- 1000000` those of a
+//! million alone.
+//!
+//! The scene is the one that the race in `peers/` begins with: balls with radii in [0.3, 0.5] m
+//! and density 1, dropped into a box from a lattice of twelve layers; 60 Hz, no sleep, on one
+//! thread and on two. While they fall and meet, and when they have settled for four seconds.
+
+use divan::Bencher;
+use divan::counter::ItemsCount;
+use taw::prelude::*;
+use taw::swarm::{Ball, BallId, SwarmModel, Tier};
+
+const DT: f32 = 1.0 / 60.0;
+const COUNTS: [usize; 4] = [1_000, 10_000, 100_000, 1_000_000];
+
+fn main() {
+    divan::main();
+}
+
+fn balls(count: usize) -> (Vec<Ball>, f32) {
+    let side = (count as f32 / 12.0).sqrt().ceil() as usize;
+    let half = side as f32 * 1.05 / 2.0;
+    let ball = |i: usize| {
+        // The fractional parts of multiples of the golden ratio spread evenly.
+        let random = |n: usize| ((i * 3 + n) as f64 * 0.618_033_988_75).fract() as f32;
+        let at = |cell: usize| (cell as f32 + 0.5) * 1.05;
+        let aside = |n: usize| (random(n) - 0.5) * 0.04;
+        let (x, z) = (at(i % side) - half + aside(1), at(i / side % side) - half + aside(2));
+        let position = Point3::new(x, at(i / side / side), z);
+        Ball { mass: Mass::Density(1.0), ..Ball::new(position, 0.3 + 0.2 * random(0)) }
+    };
+    ((0..count).map(ball).collect(), half)
+}
+
+fn world(count: usize, tier: Tier, threads: u32) -> World<f32> {
+    let (balls, half) = balls(count);
+    let mut world = World::default();
+    for (direction, offset) in [
+        (Vec3::unit_y(), 0.0),
+        (Vec3::unit_x(), -half),
+        (-Vec3::unit_x(), -half),
+        (Vec3::unit_z(), -half),
+        (-Vec3::unit_z(), -half),
+    ] {
+        let wall = Plane::new(direction, offset).expect("a unit vector");
+        world.walls.insert(wall).expect("few walls");
+    }
+    let material = Material { friction: 0.3, restitution: 0.2, ..Material::default() };
+    let substeps = if tier == Tier::Lab { 1 } else { 2 };
+    let model = SwarmModel { tier, substeps, threads, material, sleeps: false };
+    world.swarm.set_model(model).expect("a model");
+    world.swarm.insert(&balls).expect("balls");
+    world
+}
+
+/// Goes on from step to step: the mean over some steps is what they cost, also that some of
+/// them seek pairs anew and others do not.
+fn bench(bencher: Bencher, count: usize, tier: Tier, threads: u32, after: u32) {
+    let mut world = world(count, tier, threads);
+    for _ in 0..after {
+        world.step(DT).expect("a step");
+    }
+    bencher.counter(ItemsCount::new(count)).bench_local(|| world.step(DT).expect("a step"));
+}
+
+#[divan::bench(args = COUNTS, sample_count = 30, sample_size = 1)]
+fn lab_settled(bencher: Bencher, count: usize) {
+    bench(bencher, count, Tier::Lab, 2, 180);
+}
+
+#[divan::bench(args = COUNTS, sample_count = 30, sample_size = 1)]
+fn lab_settled_one_thread(bencher: Bencher, count: usize) {
+    bench(bencher, count, Tier::Lab, 1, 180);
+}
+
+#[divan::bench(args = COUNTS, sample_count = 30, sample_size = 1)]
+fn lab_moving(bencher: Bencher, count: usize) {
+    bench(bencher, count, Tier::Lab, 2, 60);
+}
+
+#[divan::bench(args = COUNTS, sample_count = 30, sample_size = 1)]
+fn full_settled(bencher: Bencher, count: usize) {
+    bench(bencher, count, Tier::Full, 2, 180);
+}
+
+#[divan::bench(args = COUNTS, sample_count = 30, sample_size = 1)]
+fn full_settled_one_thread(bencher: Bencher, count: usize) {
+    bench(bencher, count, Tier::Full, 1, 180);
+}
+
+#[divan::bench(args = COUNTS, sample_count = 30, sample_size = 1)]
+fn full_moving(bencher: Bencher, count: usize) {
+    bench(bencher, count, Tier::Full, 2, 60);
+}
+
+/// In one call.
+#[divan::bench(args = COUNTS, sample_count = 5, sample_size = 1)]
+fn insert(bencher: Bencher, count: usize) {
+    let (balls, _) = balls(count);
+    bencher.counter(ItemsCount::new(count)).with_inputs(World::<f32>::default).bench_local_refs(
+        |world| {
+            world.swarm.insert(&balls).expect("balls");
+        },
+    );
+}
+
+/// Every other one, in one call, after ten steps.
+#[divan::bench(args = COUNTS, sample_count = 5, sample_size = 1)]
+fn remove_half(bencher: Bencher, count: usize) {
+    let mut world = world(count, Tier::Full, 2);
+    for _ in 0..10 {
+        world.step(DT).expect("a step");
+    }
+    let half: Vec<BallId> = (0..count).step_by(2).filter_map(|row| world.swarm.id(row)).collect();
+    bencher
+        .counter(ItemsCount::new(count / 2))
+        .with_inputs(|| world.clone())
+        .bench_local_refs(|world| world.swarm.remove(&half).expect("they are there"));
+}
+
+/// All asleep.
+#[divan::bench(args = COUNTS, sample_count = 30, sample_size = 1)]
+fn asleep(bencher: Bencher, count: usize) {
+    // Each by itself on the floor, a second after which all sleep.
+    let mut world = World::<f32>::default();
+    world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).expect("a unit vector")).expect("a wall");
+    let side = (count as f32).sqrt().ceil() as usize;
+    let at = |i: usize| i as f32 * 1.1;
+    let ball = |i: usize| Ball::new(Point3::new(at(i % side), 0.5, at(i / side)), 0.5);
+    world.swarm.insert(&(0..count).map(ball).collect::<Vec<_>>()).expect("balls");
+    for _ in 0..60 {
+        world.step(DT).expect("a step");
+    }
+    assert_eq!(world.swarm.asleep(), count);
+    bencher.counter(ItemsCount::new(count)).bench_local(|| world.step(DT).expect("a step"));
+}

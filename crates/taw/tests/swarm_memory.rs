@@ -1,0 +1,72 @@
+//! What a swarm takes from the allocator: columns of a known size, and nothing in a step that
+//! seeks no pairs anew.
+
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use taw::prelude::*;
+use taw::swarm::{Ball, SwarmModel, Tier};
+
+/// Counts what it is asked for.
+struct Counting;
+
+static ASKED: AtomicUsize = AtomicUsize::new(0);
+static HELD: AtomicUsize = AtomicUsize::new(0);
+
+// SAFETY: all is passed on.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ASKED.fetch_add(1, Ordering::Relaxed);
+        HELD.fetch_add(layout.size(), Ordering::Relaxed);
+        unsafe { System.alloc(layout) }
+    }
+
+    unsafe fn dealloc(&self, pointer: *mut u8, layout: Layout) {
+        HELD.fetch_sub(layout.size(), Ordering::Relaxed);
+        unsafe { System.dealloc(pointer, layout) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+// One test, so that no other one allocates meanwhile.
+#[test]
+fn memory_is_counted_and_a_step_asks_for_none() {
+    for tier in [Tier::Lab, Tier::Full] {
+        let before = HELD.load(Ordering::Relaxed);
+        let mut world = World::<f32>::default();
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        for direction in [Vec3::unit_x(), -Vec3::unit_x(), Vec3::unit_z(), -Vec3::unit_z()] {
+            world.walls.insert(Plane::new(direction, -21.0).unwrap()).unwrap();
+        }
+        let model = SwarmModel { tier, threads: 2, sleeps: false, ..SwarmModel::default() };
+        world.swarm.set_model(model).unwrap();
+        let balls: Vec<_> = (0..20_000_u16)
+            .map(|i| {
+                let at = |cell: u16| f32::from(cell) * 1.05 - 20.5;
+                let height = 0.5 + f32::from(i / 1_600) * 1.05;
+                let place = Point3::new(at(i % 40), height, at(i / 40 % 40));
+                Ball::new(place, 0.3 + 0.2 * (f32::from(i) * 0.618).fract())
+            })
+            .collect();
+        world.swarm.insert(&balls).unwrap();
+        drop(balls);
+        let (mut quiet, mut asked) = (0, 0);
+        for step in 0..300 {
+            let (rebuilds, before) = (world.swarm.rebuilds(), ASKED.load(Ordering::Relaxed));
+            world.step(1.0 / 60.0).unwrap();
+            if step >= 200 && world.swarm.rebuilds() == rebuilds {
+                quiet += 1;
+                asked += ASKED.load(Ordering::Relaxed) - before;
+            }
+        }
+        assert!(quiet > 30, "{quiet} steps sought nothing anew");
+        // A list that becomes longer than it ever was doubles.
+        assert!(asked <= 5, "{tier:?}: {asked} times in {quiet} steps");
+        let held = HELD.load(Ordering::Relaxed) - before;
+        let counted = world.swarm.bytes();
+        println!("{tier:?}: {} bytes a ball, {} of them counted", held / 20_000, counted / 20_000);
+        assert!(held.abs_diff(counted) < held / 20, "{held} bytes, {counted} of them counted");
+    }
+}
