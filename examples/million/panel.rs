@@ -1,6 +1,6 @@
 //! What can be changed while it runs, and what it costs.
 
-use bevy::diagnostic::{DiagnosticsStore, FrameTimeDiagnosticsPlugin};
+use bevy::diagnostic::{Diagnostic, DiagnosticsStore, FrameTimeDiagnosticsPlugin};
 use bevy::prelude::*;
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass, egui};
 use bevy_taw::debug_ui;
@@ -43,7 +43,7 @@ fn panel(
         debug_ui::swarm_model(ui, &mut model);
         ui.separator();
         let frames = diagnostics.get(&FrameTimeDiagnosticsPlugin::FPS);
-        let frames = frames.and_then(|frames| frames.smoothed()).unwrap_or(0.0);
+        let frames = frames.and_then(Diagnostic::smoothed).unwrap_or(0.0);
         ui.label(format!("{frames:.0} frames per second"));
         debug_ui::swarm_time(ui, &diagnostics);
         ui.weak("Arrows or WASD tilt, right drag turns the view");

@@ -199,7 +199,7 @@ fn pack([red, green, blue]: [f32; 3]) -> u16 {
 /// The nearest half float of a number above zero.
 fn half(x: f32) -> u16 {
     let bits = x.to_bits();
-    let exponent = (bits >> 23 & 0xff) as i32 - 127;
+    let exponent = (bits >> 23 & 0xff).cast_signed() - 127;
     match exponent {
         ..-24 => 0,
         // So small that the leading bit is written out.
