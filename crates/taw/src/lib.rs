@@ -32,8 +32,9 @@
 //! | [`shape`] | what a thing is: sphere, plane, boxes, capsule, hull, compound |
 //! | [`contact`] | when things touch, where, and the shortest way apart; rays and sweeps |
 //! | [`broad`] | who might touch: a grid for marbles |
-//! | [`motion`] | how a thing moves: integrators, forces, rotation |
+//! | [`motion`] | how a thing moves: integrators, forces, masses, rotation |
 //! | [`response`] | what a touch does |
+//! | [`swarm`] | balls in bulk: few features, a million of them |
 //! | [`world`] | the state in columns, the [`Model`](world::Model), the step |
 //!
 //! Imports point down this table's order only: a room never uses a later one.

@@ -1,8 +1,8 @@
 use crate::Error;
 use crate::error::within;
 use crate::math::{Point3, Vec3};
+use crate::motion::Mass;
 use crate::response::Material;
-use crate::world::Mass;
 
 /// What is modelled of the balls of a swarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]

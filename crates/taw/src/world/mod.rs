@@ -18,10 +18,10 @@ mod touch;
 mod wall_shape;
 mod walls;
 
-pub use crate::motion::WallMotion;
+pub use crate::motion::{Mass, WallMotion};
 pub use energy::Energy;
 pub use limits::SpeedLimits;
-pub use marbles::{Damping, Marble, MarbleId, Marbles, Mass};
+pub use marbles::{Damping, Marble, MarbleId, Marbles};
 pub use model::{Detection, Model, Precision};
 pub use query::{Found, Queries, QueryTree, Thing};
 pub use wall_shape::WallShape;
