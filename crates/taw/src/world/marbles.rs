@@ -6,7 +6,7 @@ use crate::Error;
 use crate::error::{finite, finite_point, finite_vector, positive, within};
 use crate::frame::Bivector;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite, is_finite_point};
-use crate::motion::{Integrator, Motion, Rotation};
+use crate::motion::{Integrator, Mass, Motion, Rotation};
 use crate::response::{Columns, Material, Rod};
 use crate::shape::{Capsule, Shape, Sphere};
 
