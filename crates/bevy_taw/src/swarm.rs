@@ -5,7 +5,7 @@ use bevy::prelude::*;
 use taw::swarm::{Ball, BallId, Stage, SwarmModel};
 use taw::world::Mass;
 
-use crate::convert::{from_vector, to_point};
+use crate::convert::to_point;
 use crate::diagnostics::StepTimes;
 use crate::refusal::{InputRefused, report};
 use crate::resources::TawWorld;
@@ -45,8 +45,8 @@ pub enum Tint {
     Speed(f32),
     /// How large it is: from blue for this radius to red for that, in metres.
     Size(f32, f32),
-    /// Nothing: all have this one.
-    Plain(Color),
+    /// Nothing: all have this one, as linear red, green and blue in [0, 1].
+    Plain([f32; 3]),
 }
 
 /// How all swarms step. May change at any time; what cannot be right is refused with an
@@ -239,12 +239,6 @@ pub fn heat(part: f32) -> [f32; 3] {
     let first = (part as usize).min(2);
     let rest = part - first as f32;
     [0, 1, 2].map(|i| colors[first][i] + (colors[first + 1][i] - colors[first][i]) * rest)
-}
-
-/// Where a row of the swarm is, in metres.
-#[must_use]
-pub(crate) fn place([x, y, z, _]: &[f32; 4]) -> Vec3 {
-    from_vector(taw::math::Vec3::new(*x, *y, *z))
 }
 
 #[cfg(test)]

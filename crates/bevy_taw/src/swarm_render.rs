@@ -11,7 +11,7 @@ use bevy::shader::ShaderRef;
 use bevy::tasks::ComputeTaskPool;
 
 use crate::resources::TawWorld;
-use crate::swarm::{Owners, Swarm, Tint, heat, place};
+use crate::swarm::{Owners, Swarm, Tint, heat};
 
 /// Draws all [swarms](Swarm): lit, shadowed and casting shadows as meshes are.
 ///
@@ -176,6 +176,10 @@ fn draw(
     entities.extend((0..blocks).map(|number| commands.spawn(block(number)).id()));
 }
 
+fn place([x, y, z, _]: &[f32; 4]) -> Vec3 {
+    Vec3::new(*x, *y, *z)
+}
+
 fn color(tint: Tint, slot: u32, radius: f32, speed: impl Fn() -> f32) -> [f32; 3] {
     match tint {
         Tint::Id => {
@@ -186,7 +190,7 @@ fn color(tint: Tint, slot: u32, radius: f32, speed: impl Fn() -> f32) -> [f32; 3
         }
         Tint::Speed(most) => heat(speed() / most),
         Tint::Size(least, most) => heat((radius - least) / (most - least)),
-        Tint::Plain(color) => color.to_linear().to_f32_array_no_alpha(),
+        Tint::Plain(color) => color,
     }
 }
 
