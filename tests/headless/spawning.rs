@@ -109,3 +109,35 @@ fn optional_components_are_taken_over_and_taken_back() {
     assert_eq!(scene::position(&app, marble).x, 3.0 * scene::STEP, "it was stopped");
     assert!(scene::position(&app, marble).y < 0.0, "the model's integrator again");
 }
+
+/// Prints what 100,000 marbles cost on their way into the world and back:
+/// `cargo test --test headless -- --ignored --nocapture hundred`.
+#[test]
+#[ignore = "prints times"]
+fn a_hundred_thousand_entities_go_in_and_out() {
+    use bevy::diagnostic::DiagnosticsStore;
+    use bevy_taw::diagnostics::{GATHER_TIME, SCATTER_TIME};
+
+    let mut app = scene::app();
+    let marbles = (0..100_000_u32).map(|i| {
+        let at = Vec3::new((i % 100) as f32, (i / 100 % 100) as f32, (i / 10_000) as f32) * 3.0;
+        (Marble::new(0.5), Transform::from_translation(at))
+    });
+    let marbles: Vec<_> = marbles.collect();
+    app.world_mut().spawn_batch(marbles);
+    let (mut gather, mut scatter) = (Vec::new(), Vec::new());
+    for step in 0..60 {
+        app.update();
+        let store = app.world().resource::<DiagnosticsStore>();
+        let value = |path| store.get(path).and_then(|d| d.value()).unwrap_or(f64::NAN);
+        if step >= 20 {
+            gather.push(value(&GATHER_TIME));
+            scatter.push(value(&SCATTER_TIME));
+        }
+    }
+    for times in [&mut gather, &mut scatter] {
+        times.sort_by(f64::total_cmp);
+    }
+    let (gather, scatter) = (gather[gather.len() / 2], scatter[scatter.len() / 2]);
+    println!("100,000 marbles that all move: gather {gather:.2} ms, scatter {scatter:.2} ms");
+}

@@ -210,6 +210,8 @@ pub(crate) struct MarbleState {
     /// The components as gather or scatter last left them. What differs was
     /// written by somebody else.
     pub seen: SeenMarble,
+    /// Whether they are to be taken over.
+    pub stale: bool,
 }
 
 /// A marble's components to the bit, so that even a NaN is seen only once.

@@ -23,6 +23,8 @@ pub const INTEGRATE_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/integr
 pub const CONTACTS_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/generate_contacts");
 /// The third verb, all substeps together, in milliseconds.
 pub const RESTITUTE_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/restitute");
+/// The world back to components, in milliseconds.
+pub const SCATTER_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/scatter");
 /// The swarm's step, in milliseconds, and its parts: see [`Stage`].
 pub const SWARM_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/swarm");
 /// Its velocities and places, in milliseconds.
@@ -64,7 +66,8 @@ pub fn enable_energy(store: &mut DiagnosticsStore, enabled: bool) {
 }
 
 pub(crate) fn register(app: &mut App) {
-    let times = [STEP_TIME, GATHER_TIME, INTEGRATE_TIME, CONTACTS_TIME, RESTITUTE_TIME];
+    let times =
+        [STEP_TIME, GATHER_TIME, INTEGRATE_TIME, CONTACTS_TIME, RESTITUTE_TIME, SCATTER_TIME];
     for path in times.into_iter().chain(swarm_times().map(|(path, _)| path)).chain([SWARM_TIME]) {
         app.register_diagnostic(Diagnostic::new(path).with_suffix(" ms"));
     }
@@ -99,6 +102,7 @@ fn swarm_times() -> impl Iterator<Item = (DiagnosticPath, Stage)> {
 pub(crate) struct StepTimes {
     began: Option<Instant>,
     gather: Duration,
+    stepped: Duration,
     pub integrate: Stopwatch,
     pub generate_contacts: Stopwatch,
     pub restitute: Stopwatch,
@@ -154,6 +158,10 @@ impl StepTimes {
         self.gather = self.elapsed();
     }
 
+    pub fn end_step(&mut self) {
+        self.stepped = self.elapsed();
+    }
+
     fn elapsed(&self) -> Duration {
         self.began.map_or(Duration::ZERO, |began| began.elapsed())
     }
@@ -163,6 +171,8 @@ pub(crate) fn measure(times: Res<StepTimes>, world: Res<TawWorld>, mut diagnosti
     let ms = |duration: Duration| duration.as_secs_f64() * 1e3;
     diagnostics.add_measurement(&STEP_TIME, || ms(times.elapsed()));
     diagnostics.add_measurement(&GATHER_TIME, || ms(times.gather));
+    diagnostics
+        .add_measurement(&SCATTER_TIME, || ms(times.elapsed().saturating_sub(times.stepped)));
     diagnostics.add_measurement(&INTEGRATE_TIME, || ms(times.integrate.0));
     diagnostics.add_measurement(&CONTACTS_TIME, || ms(times.generate_contacts.0));
     diagnostics.add_measurement(&RESTITUTE_TIME, || ms(times.restitute.0));

@@ -112,42 +112,23 @@ fn motion_between(last: Isometry3d, now: Isometry3d, dt: f32) -> Option<WallMoti
 }
 
 /// A marble entity's components. The optional ones are read together.
-type MarbleComponents<'a> = (
-    Entity,
-    &'a Marble,
-    &'a Transform,
-    (
-        Option<&'a HalfLength>,
-        Option<&'a Velocity>,
-        Option<&'a Spin>,
-        Option<&'a MarbleMass>,
-        Option<&'a GravityScale>,
-        Option<&'a MarbleDamping>,
-        Option<&'a SurfaceMaterial>,
-        Option<&'a MarbleIntegrator>,
-        Option<&'a MarbleRotation>,
-    ),
-    Has<ChildOf>,
-    &'a mut MarbleState,
+type MarbleComponents<'a> =
+    (Entity, &'a Marble, &'a Transform, OptionalComponents<'a>, Has<ChildOf>, &'a mut MarbleState);
+
+type OptionalComponents<'a> = (
+    Option<&'a HalfLength>,
+    Option<&'a Velocity>,
+    Option<&'a Spin>,
+    Option<&'a MarbleMass>,
+    Option<&'a GravityScale>,
+    Option<&'a MarbleDamping>,
+    Option<&'a SurfaceMaterial>,
+    Option<&'a MarbleIntegrator>,
+    Option<&'a MarbleRotation>,
 );
 
-/// Puts new marbles in and takes over what somebody else wrote since the last
-/// scatter.
-pub fn marbles(
-    mut world: ResMut<TawWorld>,
-    mut marbles: Query<MarbleComponents>,
-    transforms: TransformHelper,
-    mut refused: MessageWriter<InputRefused>,
-    mut last_rotation: Local<Rotation>,
-) {
-    // The world's own columns for it begin unturned; the components know better.
-    let rotation = world.model().rotation;
-    let begins_to_turn = *last_rotation == Rotation::None && rotation != Rotation::None;
-    *last_rotation = rotation;
-    for (entity, marble, transform, optional, is_child, mut state) in &mut marbles {
-        if begins_to_turn {
-            (state.seen.rotation, state.seen.spin) = ([0; 4], None); // no rotation's bits
-        }
+impl SeenMarble {
+    fn of(marble: Marble, transform: &Transform, optional: &OptionalComponents) -> Self {
         let (
             half_length,
             velocity,
@@ -159,7 +140,7 @@ pub fn marbles(
             integrator,
             rotation_model,
         ) = optional;
-        let seen = SeenMarble {
+        Self {
             translation: bits(transform.translation),
             rotation: rotation_bits(transform.rotation),
             radius: marble.radius.to_bits(),
@@ -172,10 +153,46 @@ pub fn marbles(
             material: material.map(SurfaceMaterial::bits),
             integrator: integrator.map(|i| **i),
             rotation_model: rotation_model.map(|r| **r),
-        };
-        if state.seen == seen && state.id.is_some() {
-            continue;
         }
+    }
+}
+
+/// Puts new marbles in and takes over what somebody else wrote since the last
+/// scatter.
+pub fn marbles(
+    mut world: ResMut<TawWorld>,
+    mut queries: ParamSet<(Query<MarbleComponents>, Query<(Entity, &MarbleState)>)>,
+    transforms: TransformHelper,
+    mut refused: MessageWriter<InputRefused>,
+    mut last_rotation: Local<Rotation>,
+    mut stale: Local<Vec<Entity>>,
+) {
+    // The world's own columns for it begin unturned; the components know better.
+    let rotation = world.model().rotation;
+    let begins_to_turn = *last_rotation == Rotation::None && rotation != Rotation::None;
+    *last_rotation = rotation;
+    // Looking at all is for all threads; then there are few, and they go in order.
+    queries.p0().par_iter_mut().for_each(|(_, marble, transform, optional, _, mut state)| {
+        if begins_to_turn {
+            (state.seen.rotation, state.seen.spin) = ([0; 4], None); // no rotation's bits
+        }
+        let seen = SeenMarble::of(*marble, transform, &optional);
+        let stale = state.id.is_none() || state.seen != seen;
+        if state.stale != stale {
+            state.stale = stale;
+        }
+    });
+    stale.clear();
+    let states = queries.p1();
+    stale.extend(states.iter().filter(|(_, state)| state.stale).map(|(entity, _)| entity));
+    let mut marbles = queries.p0();
+    for entity in stale.drain(..) {
+        let Ok((_, marble, transform, optional, is_child, mut state)) = marbles.get_mut(entity)
+        else {
+            continue;
+        };
+        let seen = SeenMarble::of(*marble, transform, &optional);
+        let (half_length, velocity, spin, mass, gravity_scale, damping, material, _, _) = optional;
         let place = if is_child {
             transforms.compute_global_transform(entity).map(|t| t.compute_transform())
         } else {

@@ -21,9 +21,7 @@ pub fn marbles(
     children: Query<(Entity, &ChildOf), With<Marble>>,
     mut parents: Local<Vec<(Entity, GlobalTransform)>>,
 ) {
-    for moved in &mut transforms.p0() {
-        write(&world, moved, None);
-    }
+    transforms.p0().par_iter_mut().for_each(|moved| write(&world, moved, None));
     // A child's Transform is relative to its parents, which have all moved by now.
     let helper = transforms.p1();
     parents.clear();

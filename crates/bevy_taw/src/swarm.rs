@@ -222,6 +222,7 @@ pub(crate) fn step(mut world: ResMut<TawWorld>, time: Res<Time>, mut times: ResM
     let mut clock = |stage: Stage| times.swarm.go_on(stage);
     report("step the swarm", world.step_swarm(time.delta_secs(), &mut clock));
     times.swarm.stop();
+    times.end_step();
 }
 
 /// Tells of the marbles that were stopped in this step.

@@ -17,7 +17,7 @@ fn main() {
     divan::main();
 }
 
-fn balls(count: usize) -> (Vec<Ball>, f32) {
+fn balls(count: usize, radius: impl Fn(f32) -> f32) -> (Vec<Ball>, f32) {
     let side = (count as f32 / 12.0).sqrt().ceil() as usize;
     let half = side as f32 * 1.05 / 2.0;
     let ball = |i: usize| {
@@ -27,13 +27,21 @@ fn balls(count: usize) -> (Vec<Ball>, f32) {
         let aside = |n: usize| (random(n) - 0.5) * 0.04;
         let (x, z) = (at(i % side) - half + aside(1), at(i / side % side) - half + aside(2));
         let position = Point3::new(x, at(i / side / side), z);
-        Ball { mass: Mass::Density(1.0), ..Ball::new(position, 0.3 + 0.2 * random(0)) }
+        Ball { mass: Mass::Density(1.0), ..Ball::new(position, radius(random(0))) }
     };
     ((0..count).map(ball).collect(), half)
 }
 
+/// Evenly from 0.3 to 0.5 m.
+fn alike(random: f32) -> f32 {
+    0.3 + 0.2 * random
+}
+
 fn world(count: usize, tier: Tier, threads: u32) -> World<f32> {
-    let (balls, half) = balls(count);
+    world_of(balls(count, alike), tier, threads)
+}
+
+fn world_of((balls, half): (Vec<Ball>, f32), tier: Tier, threads: u32) -> World<f32> {
     let mut world = World::default();
     for (direction, offset) in [
         (Vec3::unit_y(), 0.0),
@@ -93,10 +101,32 @@ fn full_moving(bencher: Bencher, count: usize) {
     bench(bencher, count, Tier::Full, 2, 60);
 }
 
+/// As many steps later, for each pair of balls that are near each other.
+fn per_pair(bencher: Bencher, mut world: World<f32>) {
+    for _ in 0..300 {
+        world.step(DT).expect("a step");
+    }
+    let pairs = ItemsCount::new(world.swarm.pairs());
+    bencher.counter(pairs).bench_local(|| world.step(DT).expect("a step"));
+}
+
+/// Items are pairs here, to be compared with those of the next one.
+#[divan::bench(sample_count = 60, sample_size = 1)]
+fn pairs_of_sizes_alike(bencher: Bencher) {
+    per_pair(bencher, world(100_000, Tier::Full, 2));
+}
+
+/// Radii from 0.005 to 0.5 m, as many in each octave.
+#[divan::bench(sample_count = 60, sample_size = 1)]
+fn pairs_of_sizes_one_to_a_hundred(bencher: Bencher) {
+    let mixed = balls(100_000, |random| 0.005 * 100_f32.powf(random));
+    per_pair(bencher, world_of(mixed, Tier::Full, 2));
+}
+
 /// In one call.
 #[divan::bench(args = COUNTS, sample_count = 5, sample_size = 1)]
 fn insert(bencher: Bencher, count: usize) {
-    let (balls, _) = balls(count);
+    let (balls, _) = balls(count, alike);
     bencher.counter(ItemsCount::new(count)).with_inputs(World::<f32>::default).bench_local_refs(
         |world| {
             world.swarm.insert(&balls).expect("balls");

@@ -35,7 +35,7 @@ impl Swarm {
         self.reorder();
         observe(Stage::Pairs);
         self.cut_slabs();
-        self.find_pairs(cap, walls);
+        self.find_pairs(cap, dt, walls);
         self.paired = true;
         self.remembers = false;
     }
@@ -91,7 +91,7 @@ impl Swarm {
             self.budget[at] = (way * STEPS).clamp(cap, cap * FAR);
         }
         self.find_strays(cap);
-        self.seek_walls_for(rows, walls);
+        self.seek_walls_for(rows, dt, walls);
     }
 
     fn find_strays(&mut self, cap: f32) {
@@ -164,15 +164,16 @@ impl Swarm {
         self.slab_count = count;
     }
 
-    fn find_pairs(&mut self, cap: f32, walls: &dyn Surroundings) {
+    fn find_pairs(&mut self, cap: f32, dt: f32, walls: &dyn Surroundings) {
         let (threads, rough) = (self.model.threads as usize, self.rough());
-        let instructions = self.instructions;
+        let (instructions, ahead) = (self.instructions, self.ahead(dt));
         self.searches.resize(threads, Search::default());
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
         let searches = Shared::new(&mut self.searches);
         let (grid, at, budget) = (&self.grid, &self.at[..], &self.budget[..]);
         let (memory, before, planes) = (&self.memory, &self.before[..], &self.planes[..]);
         let shapes = walls.has_shapes();
+        let balls = walls::Balls { at, velocity: &self.velocity, budget, ahead };
         work(threads, |member| {
             // SAFETY: its own.
             let search = unsafe { &mut *searches.row(member.number) };
@@ -193,7 +194,7 @@ impl Swarm {
                     slab.pushes.reset(slab.batches.len());
                     memory.recall(&slab.batches, before, &mut slab.pushes);
                 }
-                slab.seek_walls(instructions, at, budget, planes, |touch| {
+                slab.seek_walls(instructions, balls, planes, |touch| {
                     rough.then(|| memory.recall_touch(before, touch)).flatten()
                 });
                 slab.near_shapes.clear();

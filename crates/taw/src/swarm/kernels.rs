@@ -132,18 +132,16 @@ fn scatter<L: Lanes>(column: Shared<Row>, batch: &Batch, [of_a, of_b]: [[L; 4]; 
 pub(super) struct Displace<'a> {
     pub at: Shared<'a, Row>,
     pub batches: &'a [Batch],
-    /// How much of an overlap is pushed out at once at most, in metres.
-    pub most: f32,
 }
 
 impl Kernel for Displace<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let (half, most) = (L::splat(0.5), L::splat(self.most));
+        let (zero, half) = (L::splat(0.0), L::splat(0.5));
         for batch in self.batches {
             let [a, b] = gather::<L>(self.at, batch);
             let (normal, gap) = normal_and_gap(&a, &b);
-            let overlap = (L::splat(0.0) - gap).max(L::splat(0.0)).min(most);
+            let overlap = (zero - gap).max(zero);
             let by = normal.times(overlap * half);
             let moved = [V::of(&a).minus(by).with(a[3]), V::of(&b).plus(by).with(b[3])];
             scatter(self.at, batch, moved);

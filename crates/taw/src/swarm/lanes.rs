@@ -18,8 +18,6 @@ pub(super) trait Lanes:
     fn store(self, to: &mut [f32; LANES]);
     fn sqrt(self) -> Self;
     /// The second one where they do not compare.
-    fn min(self, other: Self) -> Self;
-    /// The second one where they do not compare.
     fn max(self, other: Self) -> Self;
     /// A bit for each lane where the first is the greater, the lowest bit for the first lane.
     fn above(self, other: Self) -> u32;
@@ -154,11 +152,6 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn min(self, other: Self) -> Self {
-        self.both(other, |a, b| if a < b { a } else { b })
-    }
-
-    #[inline(always)]
     fn max(self, other: Self) -> Self {
         self.both(other, |a, b| if a > b { a } else { b })
     }
@@ -250,11 +243,6 @@ mod x86 {
         #[inline(always)]
         fn sqrt(self) -> Self {
             Self(unsafe { _mm256_sqrt_ps(self.0) })
-        }
-
-        #[inline(always)]
-        fn min(self, other: Self) -> Self {
-            Self(unsafe { _mm256_min_ps(self.0, other.0) })
         }
 
         #[inline(always)]

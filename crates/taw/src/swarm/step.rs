@@ -8,7 +8,7 @@ use super::lanes::Row;
 use super::slab::Slab;
 use super::strays::Strays;
 use super::team::{MOST_THREADS, Member, Shared, wait_for, work};
-use super::walls::half_spaces;
+use super::walls::{Balls, half_spaces};
 use super::{Stage, Surroundings, Swarm, Tier, lying};
 use crate::math::{Vec3, length};
 
@@ -107,22 +107,21 @@ impl Swarm {
             self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
         } else if walls_changed {
             observe(Stage::Walls);
-            self.seek_walls();
+            self.seek_walls(dt);
         }
         self.leaving = leaving_rows;
         observe(Stage::Restitute);
         self.look_at_walls(walls, 0.0);
-        let most = FASTEST_PUSH * dt;
         for _ in 0..self.model.substeps {
             self.each_slab(|_, columns, slab| {
                 for touch in &slab.touches {
                     // SAFETY: a ball of the slab.
-                    touch.displace(unsafe { &mut *columns.at.row(touch.row as usize) }, most);
+                    touch.displace(unsafe { &mut *columns.at.row(touch.row as usize) });
                 }
-                instructions.run(Displace { at: columns.at, batches: &slab.batches, most });
+                instructions.run(Displace { at: columns.at, batches: &slab.batches });
             });
             let (at, batches) = (Shared::new(&mut self.at), &self.strays.batches);
-            instructions.run(Displace { at, batches, most });
+            instructions.run(Displace { at, batches });
         }
         observe(Stage::Integrate);
         let per_second = [1.0 / dt, 1.0 / dt, 1.0 / dt, 0.0];
@@ -165,7 +164,7 @@ impl Swarm {
             }
         } else if walls_changed {
             observe(Stage::Walls);
-            self.seek_walls();
+            self.seek_walls(dt);
         }
         self.leaving = leaving;
         if self.slabs[..self.slab_count].iter().all(|slab| slab.asleep) {
@@ -297,6 +296,9 @@ impl Swarm {
             {
                 return;
             }
+            let Slab { batches, pushes, .. } = &mut *slab;
+            instructions.run(Solve { pass, columns, batches, pushes, friction });
+            // Walls come last, so that nothing is pushed into them.
             if !slab.asleep {
                 for touch in &mut slab.touches {
                     let row = touch.row as usize;
@@ -307,8 +309,6 @@ impl Swarm {
                     }
                 }
             }
-            let Slab { batches, pushes, .. } = slab;
-            instructions.run(Solve { pass, columns, batches, pushes, friction });
         });
         let columns = Columns {
             at: Shared::new(&mut self.at),
@@ -365,10 +365,17 @@ impl Swarm {
         });
     }
 
+    /// How long before a ball can be at a half-space it is sought for, in seconds. In the lab's
+    /// tier it may as well be inside.
+    pub(super) fn ahead(&self, dt: f32) -> f32 {
+        if self.rough() { 2.0 * dt } else { 0.0 }
+    }
+
     /// Seeks the balls at walls anew, where pairs are still known.
-    fn seek_walls(&mut self) {
+    fn seek_walls(&mut self, dt: f32) {
         let instructions = self.instructions;
-        let (at, budget, planes) = (&self.at[..], &self.budget[..], &self.planes[..]);
+        let (planes, ahead) = (&self.planes[..], self.ahead(dt));
+        let balls = Balls { at: &self.at, velocity: &self.velocity, budget: &self.budget, ahead };
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
         work(self.model.threads as usize, |member| {
             for slab in member.share(slabs.len()) {
@@ -376,7 +383,7 @@ impl Swarm {
                 let slab = unsafe { &mut *slabs.row(slab) };
                 let old = std::mem::take(&mut slab.touches);
                 slab.touches = std::mem::take(&mut slab.old_touches);
-                slab.seek_walls(instructions, at, budget, planes, |touch| {
+                slab.seek_walls(instructions, balls, planes, |touch| {
                     super::walls::find(&old, touch).map(|same| (same.pressure, same.grip))
                 });
                 slab.old_touches = old;
@@ -385,8 +392,10 @@ impl Swarm {
     }
 
     /// Seeks the walls of some more balls, in order of their rows.
-    pub(super) fn seek_walls_for(&mut self, rows: &[u32], walls: &dyn Surroundings) {
-        let (at, budget, planes) = (&self.at[..], &self.budget[..], &self.planes[..]);
+    pub(super) fn seek_walls_for(&mut self, rows: &[u32], dt: f32, walls: &dyn Surroundings) {
+        let (planes, ahead) = (&self.planes[..], self.ahead(dt));
+        let (at, budget) = (&self.at[..], &self.budget[..]);
+        let balls = Balls { at, velocity: &self.velocity, budget, ahead };
         for slab in &mut self.slabs[..self.slab_count] {
             let mine = slab.own_rows();
             let mine = rows.partition_point(|row| (*row as usize) < mine.start)
@@ -394,7 +403,7 @@ impl Swarm {
             if mine.is_empty() {
                 continue;
             }
-            slab.seek_walls_for(&rows[mine.clone()], at, budget, planes);
+            slab.seek_walls_for(&rows[mine.clone()], balls, planes);
             if walls.has_shapes() {
                 for row in &rows[mine] {
                     let row = *row as usize;

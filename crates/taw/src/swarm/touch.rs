@@ -45,9 +45,9 @@ impl Touch {
         self.offset += self.surface.dot(self.normal) * time;
     }
 
-    /// Pushes the ball out, by so much at most.
-    pub fn displace(&self, at: &mut Row, most: f32) {
-        let overlap = (-self.gap(at)).clamp(0.0, most);
+    /// Pushes the ball out.
+    pub fn displace(&self, at: &mut Row) {
+        let overlap = (-self.gap(at)).max(0.0);
         set(at, xyz(at) + self.normal * overlap);
     }
 

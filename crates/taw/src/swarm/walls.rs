@@ -2,6 +2,7 @@ use std::ops::Range;
 
 use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
+use super::kernels::squared;
 use super::lanes::{Instructions, Kernel, LANES, Lanes, Row};
 use super::slab::Slab;
 use super::touch::Touch;
@@ -33,6 +34,26 @@ pub(super) struct HalfSpace {
     restitution: f32,
 }
 
+/// The columns that say which balls may come to a wall.
+#[derive(Clone, Copy)]
+pub(super) struct Balls<'a> {
+    pub at: &'a [Row],
+    pub velocity: &'a [Row],
+    pub budget: &'a [f32],
+    /// In seconds.
+    pub ahead: f32,
+}
+
+impl Balls<'_> {
+    /// How far a ball may go before walls are sought again: its budget, or more if it is so fast
+    /// that it leaves that in a step.
+    #[inline(always)]
+    fn reach(&self, row: usize) -> f32 {
+        let speed = squared(self.velocity[row]).sqrt();
+        self.budget[row].max(speed * self.ahead)
+    }
+}
+
 /// All half-spaces.
 pub(super) fn half_spaces(
     walls: &dyn Surroundings,
@@ -59,18 +80,17 @@ impl Slab {
     pub fn seek_walls(
         &mut self,
         instructions: Instructions,
-        at: &[Row],
-        budget: &[f32],
+        balls: Balls,
         planes: &[HalfSpace],
         recall: impl Fn(&Touch) -> Option<(f32, Vec3<f32>)>,
     ) {
         self.touches.clear();
         self.near_planes.clear();
         let (rows, found) = (self.own_rows(), &mut self.near_planes);
-        instructions.run(NearPlanes { at, budget, planes, rows, found });
+        instructions.run(NearPlanes { balls, planes, rows, found });
         for row in &self.near_planes {
             let touches = &mut self.touches;
-            touch_planes(*row, &at[*row as usize], budget[*row as usize], planes, |mut touch| {
+            touch_planes(*row, balls, planes, |mut touch| {
                 if let Some((pressure, grip)) = recall(&touch) {
                     (touch.pressure, touch.grip) = (pressure, grip);
                 }
@@ -80,20 +100,14 @@ impl Slab {
     }
 
     /// Finds the half-spaces near some more balls of the slab.
-    pub fn seek_walls_for(
-        &mut self,
-        rows: &[u32],
-        at: &[Row],
-        budget: &[f32],
-        planes: &[HalfSpace],
-    ) {
+    pub fn seek_walls_for(&mut self, rows: &[u32], balls: Balls, planes: &[HalfSpace]) {
         std::mem::swap(&mut self.touches, &mut self.old_touches);
         self.touches.clear();
         let old = &self.old_touches;
         self.touches.extend(old.iter().filter(|touch| rows.binary_search(&touch.row).is_err()));
         for row in rows {
             let touches = &mut self.touches;
-            touch_planes(*row, &at[*row as usize], budget[*row as usize], planes, |touch| {
+            touch_planes(*row, balls, planes, |touch| {
                 touches.push(find(old, &touch).copied().unwrap_or(touch));
             });
         }
@@ -153,18 +167,13 @@ impl Slab {
 }
 
 /// Names the half-spaces as far as to which a ball may go.
-fn touch_planes(
-    row: u32,
-    ball: &Row,
-    budget: f32,
-    planes: &[HalfSpace],
-    mut name: impl FnMut(Touch),
-) {
+fn touch_planes(row: u32, balls: Balls, planes: &[HalfSpace], mut name: impl FnMut(Touch)) {
+    let ball = &balls.at[row as usize];
     for plane in planes {
         let HalfSpace { wall, normal, offset, friction, restitution } = *plane;
         let gap = normal.dot(center(ball).to_vec()) - offset - ball[3];
         // A wall may also come nearer; who moves it seeks again.
-        if gap < budget {
+        if gap < balls.reach(row as usize) {
             name(Touch::new(row, [wall, 0], normal, offset, [friction, restitution]));
         }
     }
@@ -172,8 +181,7 @@ fn touch_planes(
 
 /// Finds the balls that may go as far as to a half-space.
 struct NearPlanes<'a> {
-    at: &'a [Row],
-    budget: &'a [f32],
+    balls: Balls<'a>,
     planes: &'a [HalfSpace],
     rows: Range<usize>,
     found: &'a mut Vec<u32>,
@@ -182,15 +190,17 @@ struct NearPlanes<'a> {
 impl Kernel for NearPlanes<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { at, budget, planes, rows, found } = self;
-        let (at, budget) = (&at[rows.clone()], &budget[rows.clone()]);
-        let mut first = rows.start as u32;
-        let mut eights = at.chunks_exact(LANES);
-        let mut budgets = budget.chunks_exact(LANES);
-        for (eight, budget) in (&mut eights).zip(&mut budgets) {
+        let Self { balls, planes, rows, found } = self;
+        let mut first = rows.start;
+        while first + LANES <= rows.end {
             // SAFETY: there are eight.
-            let [x, y, z, radius] = unsafe { L::gather(eight.as_ptr(), &[0, 1, 2, 3, 4, 5, 6, 7]) };
-            let budget = budget.first_chunk().map_or(L::splat(0.0), L::load);
+            let [x, y, z, radius] =
+                unsafe { L::gather(balls.at[first..].as_ptr(), &[0, 1, 2, 3, 4, 5, 6, 7]) };
+            let mut budget = [0.0; LANES];
+            for (lane, budget) in budget.iter_mut().enumerate() {
+                *budget = balls.reach(first + lane);
+            }
+            let budget = L::load(&budget);
             let reach = radius + budget;
             let mut near = 0;
             for HalfSpace { normal, offset, .. } in planes {
@@ -200,12 +210,12 @@ impl Kernel for NearPlanes<'_> {
                 near |= (L::splat(*offset) + reach * L::splat(1.001)).above(along);
             }
             while near != 0 {
-                found.push(first + near.trailing_zeros());
+                found.push(first as u32 + near.trailing_zeros());
                 near &= near - 1;
             }
-            first += LANES as u32;
+            first += LANES;
         }
-        found.extend(first..rows.end as u32);
+        found.extend(first as u32..rows.end as u32);
     }
 }
 
