@@ -115,7 +115,7 @@ fn optional_components_are_taken_over_and_taken_back() {
 #[test]
 #[ignore = "prints times"]
 fn a_hundred_thousand_entities_go_in_and_out() {
-    use bevy::diagnostic::DiagnosticsStore;
+    use bevy::diagnostic::{Diagnostic, DiagnosticPath, DiagnosticsStore};
     use bevy_taw::diagnostics::{GATHER_TIME, SCATTER_TIME};
 
     let mut app = scene::app();
@@ -129,10 +129,11 @@ fn a_hundred_thousand_entities_go_in_and_out() {
     for step in 0..60 {
         app.update();
         let store = app.world().resource::<DiagnosticsStore>();
-        let value = |path| store.get(path).and_then(|d| d.value()).unwrap_or(f64::NAN);
+        let value =
+            |path: DiagnosticPath| store.get(&path).and_then(Diagnostic::value).unwrap_or(f64::NAN);
         if step >= 20 {
-            gather.push(value(&GATHER_TIME));
-            scatter.push(value(&SCATTER_TIME));
+            gather.push(value(GATHER_TIME));
+            scatter.push(value(SCATTER_TIME));
         }
     }
     for times in [&mut gather, &mut scatter] {
