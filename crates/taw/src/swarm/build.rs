@@ -215,3 +215,67 @@ impl Swarm {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use crate::math::{Point3, Vec3};
+    use crate::swarm::kernels::squared;
+    use crate::swarm::{Ball, Swarm, SwarmModel};
+    use crate::world::World;
+
+    /// Every pair that might touch, by asking each ball about each.
+    fn by_all(swarm: &Swarm) -> BTreeSet<[u32; 2]> {
+        let rows = 0..swarm.at.len() as u32;
+        let near = |[a, b]: &[u32; 2]| {
+            let (a, b) = (*a as usize, *b as usize);
+            let way = [0, 1, 2].map(|axis| swarm.at[b][axis] - swarm.at[a][axis]);
+            let reach = swarm.at[a][3] + swarm.budget[a] + swarm.at[b][3] + swarm.budget[b];
+            // Less what rounding may take.
+            squared([way[0], way[1], way[2], 0.0]) < reach * reach * (1.0 - 1e-5)
+        };
+        rows.clone().flat_map(|b| (0..b).map(move |a| [a, b])).filter(near).collect()
+    }
+
+    #[test]
+    fn no_pair_is_missed_and_no_ball_is_twice_in_a_batch() {
+        for least in [0.5_f32, 0.1, 0.01] {
+            let mut world = World::<f32>::default();
+            let model = SwarmModel { threads: 3, ..SwarmModel::default() };
+            world.swarm.set_model(model).unwrap();
+            let mut seed = 7_u64;
+            let mut random = || {
+                seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+                (seed >> 40) as f32 / (1 << 24) as f32
+            };
+            let mut balls = Vec::new();
+            for i in 0..3_000_u16 {
+                let place = [20.0, 6.0, 9.0].map(|side| side * random());
+                let fast = if i % 200 == 0 { 30.0 } else { 0.02 };
+                let velocity = Vec3::new(random(), random(), random()) * fast;
+                let radius = 0.5 * (least / 0.5).powf(random());
+                balls.push(Ball { velocity, ..Ball::new(Point3::from(place), radius) });
+            }
+            // And one far out.
+            balls.push(Ball::new(Point3::new(1e6, 0.0, 0.0), 0.5));
+            world.swarm.insert(&balls).unwrap();
+            world.swarm.build(1.0 / 60.0, &world.walls, &mut |_| ());
+            let swarm = &world.swarm;
+            assert!(swarm.slab_count > 3 && !swarm.strays.rows.is_empty());
+            let slabs = swarm.slabs[..swarm.slab_count].iter().map(|slab| &slab.batches);
+            let mut found = BTreeSet::new();
+            for batch in slabs.chain([&swarm.strays.batches]).flatten() {
+                let pairs: Vec<_> =
+                    (0..batch.count as usize).map(|lane| batch.pair(lane)).collect();
+                let rows: BTreeSet<_> = pairs.iter().flatten().collect();
+                assert_eq!(rows.len(), 2 * pairs.len());
+                for pair in pairs {
+                    assert!(pair[0] < pair[1] && found.insert(pair), "{pair:?} comes twice");
+                }
+            }
+            let missed: Vec<_> = by_all(swarm).difference(&found).copied().collect();
+            assert_eq!(missed, [[0; 2]; 0], "least radius {least}");
+        }
+    }
+}

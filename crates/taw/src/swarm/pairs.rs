@@ -212,7 +212,7 @@ impl Fill for [Vec<f32>; 4] {
         for ((at, budget), (((x, y), z), reach)) in at.iter().zip(budget).zip(columns) {
             [*x, *y, *z, *reach] = [at[0], at[1], at[2], at[3] + budget];
             if *budget > cap {
-                *x = -FAR;
+                *x = f32::NAN; // near to nothing, also not to another one
             }
         }
     }
