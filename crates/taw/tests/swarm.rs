@@ -472,6 +472,49 @@ fn marbles_and_swarms_push_each_other() {
 }
 
 #[test]
+fn marbles_stay_guests_whatever_is_taken_out() {
+    let mut world = world(model(Tier::Full), None);
+    let place = |i: usize| Point3::new(2.0 * i as f32, 0.5, 0.0);
+    let marbles: Vec<_> =
+        (0..4).map(|i| world.marbles.insert(Marble::new(place(i), 0.5)).unwrap()).collect();
+    let own = world.swarm.insert(&[Ball::new(place(9), 0.5)]).unwrap()[0];
+    let guests = |world: &World<f32>| {
+        let rows = (0..world.swarm.len()).filter(|row| world.swarm.is_guest(*row));
+        let mut places: Vec<_> =
+            rows.map(|row| world.swarm.balls()[row][0].round() as u8).collect();
+        places.sort_unstable();
+        places
+    };
+    steps(&mut world, 2);
+    assert_eq!(guests(&world), [0, 2, 4, 6]);
+    // A game takes a guest's ball out: the marble comes back as another one.
+    let row = (0..5).find(|row| world.swarm.balls()[*row][0] == 2.0).unwrap();
+    let ball = world.swarm.id(row).unwrap();
+    world.swarm.remove(&[ball]).unwrap();
+    steps(&mut world, 2);
+    assert_eq!(guests(&world), [0, 2, 4, 6]);
+    // And the other way round, and both at once.
+    world.marbles.remove(marbles[1]).unwrap();
+    let row = (0..5).find(|row| world.swarm.balls()[*row][0] == 4.0).unwrap();
+    let ball = world.swarm.id(row).unwrap();
+    world.swarm.remove(&[ball]).unwrap();
+    world.marbles.remove(marbles[2]).unwrap();
+    steps(&mut world, 2);
+    assert_eq!(guests(&world), [0, 6]);
+    for (i, marble) in [(0, marbles[0]), (3, marbles[3])] {
+        assert!(world.marbles.get(marble).unwrap().position.distance(place(i)) < 0.02);
+    }
+    assert!(one(&world, own).0.distance(place(9).to_vec()) < 0.02);
+    // Another swarm in its place has guests of its own.
+    world.swarm = Swarm::default();
+    let balls: Vec<_> = (10..14).map(|i| Ball::new(place(i), 0.5)).collect();
+    let balls = world.swarm.insert(&balls).unwrap();
+    steps(&mut world, 2);
+    assert_eq!(guests(&world), [0, 6]);
+    assert!(balls.iter().all(|ball| world.swarm.row(*ball).is_ok()));
+}
+
+#[test]
 fn a_snapshot_goes_on_with_the_same_bits() {
     let mut world = pour(1_000, 0.1, model(Tier::Full));
     steps(&mut world, 60);

@@ -13,13 +13,13 @@ pub(crate) struct Guest {
 }
 
 impl Swarm {
-    /// What became of the guests in the last step.
+    /// What became of the guests in the last step, in the order of [`host`](Self::host).
     pub(crate) fn hosted(&self) -> impl Iterator<Item = (&Guest, Guest)> {
-        self.guests.iter().filter_map(|guest| {
-            let row = self.ids.row(guest.ball)?;
+        self.guests.iter().map(|guest| {
+            let Some(row) = self.ids.row(guest.ball) else { return (guest, *guest) };
             let rim = self.spin.get(row).copied().unwrap_or([0.0; 4]);
             let after = Guest { at: self.at[row], velocity: self.velocity[row], rim, ..*guest };
-            Some((guest, after))
+            (guest, after)
         })
     }
 

@@ -47,6 +47,7 @@ use cgmath::{EuclideanSpace, Zero};
 use crate::Error;
 use crate::error::{finite_point, finite_vector, positive, within};
 use crate::math::{Point3, Vec3};
+use crate::world::MarbleId;
 use grid::Grid;
 use ids::Ids;
 use lanes::Row;
@@ -100,6 +101,8 @@ pub struct Swarm {
     gravity: Option<Vec3<f32>>,
     planes: Vec<HalfSpace>,
     stopped: Vec<u32>,
+    /// The marbles of the world that are balls here, in their order.
+    pub(crate) invited: Vec<(MarbleId, BallId)>,
     guests: Vec<Guest>,
     /// A bit for each slot.
     guest_slots: Vec<u64>,

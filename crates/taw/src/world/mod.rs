@@ -59,7 +59,6 @@ pub struct World<S> {
     pub walls: Walls<S>,
     /// Balls in bulk, which touch the walls. (What is touched by whom of them is not listed.)
     pub swarm: Swarm,
-    guests: swarm::Guests,
     /// The touches of the last substep. Between [`World::generate_contacts`] and
     /// [`World::restitute`] they may be changed: what is taken out is not
     /// restituted, and a row that does not exist is passed over.
@@ -100,7 +99,6 @@ impl<S: Scalar> Default for World<S> {
             marbles: Marbles::default(),
             walls: Walls::default(),
             swarm: Swarm::default(),
-            guests: swarm::Guests::default(),
             contacts: Contacts::default(),
             impacts: Vec::new(),
             grid: Grid::default(),
@@ -132,7 +130,6 @@ impl<S: Scalar> PartialEq for World<S> {
             marbles,
             walls,
             swarm,
-            guests: _,
             contacts,
             impacts,
             stopped,

@@ -13,14 +13,6 @@ use crate::response::Material;
 use crate::shape::{Aabb, Sphere};
 use crate::swarm::{BallId, Guest, Stage, Surroundings};
 
-/// The marbles that are guests of the swarm.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Guests {
-    names: Vec<(MarbleId, BallId)>,
-    /// How many marbles there were, and how many had gone.
-    seen: [u64; 2],
-}
-
 impl<S: Scalar> World<S> {
     /// Moves the [swarm](Self::swarm) on, which a step does after the marbles. `observe` is told
     /// what it goes about, as often as that changes.
@@ -33,7 +25,8 @@ impl<S: Scalar> World<S> {
     pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
         positive("dt", dt)?;
         let dt = positive("dt", dt.as_f64() as f32)?;
-        if self.swarm.len() == self.guests.names.len() {
+        self.see_guests_off()?;
+        if self.swarm.len() == self.swarm.invited.len() {
             return Ok(());
         }
         self.invite_guests()?;
@@ -44,31 +37,35 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
+    /// Forgets guests of which the world lost the marble or the swarm the ball, whoever took
+    /// them out.
+    fn see_guests_off(&mut self) -> Result<(), Error> {
+        let (marbles, swarm) = (&self.marbles, &mut self.swarm);
+        let stays = |(marble, _): &(MarbleId, BallId)| marbles.row(*marble).is_ok();
+        let is_there = |(_, ball): &(MarbleId, BallId)| swarm.row(*ball).is_ok();
+        if swarm.invited.iter().all(|guest| stays(guest) && is_there(guest)) {
+            return Ok(());
+        }
+        let (there, _): (Vec<_>, Vec<_>) = swarm.invited.iter().copied().partition(is_there);
+        let (stay, gone): (Vec<_>, Vec<_>) = there.into_iter().partition(stays);
+        swarm.invited = stay;
+        swarm.remove(&gone.into_iter().map(|(_, ball)| ball).collect::<Vec<_>>())
+    }
+
     /// Tells the swarm where the marbles are.
     fn invite_guests(&mut self) -> Result<(), Error> {
-        let seen = [self.marbles.len() as u64, self.marbles.removals()];
-        if seen != self.guests.seen {
-            let names = &mut self.guests.names;
-            let marbles = &self.marbles;
-            let gone: Vec<_> = names
-                .iter()
-                .filter(|(marble, _)| marbles.row(*marble).is_err())
-                .map(|(_, ball)| *ball)
-                .collect();
-            self.swarm.remove(&gone)?;
-            names.retain(|(marble, _)| marbles.row(*marble).is_ok());
-            // Both are in the order of the marbles' handles.
-            names.sort_unstable();
-            let known = |id: &MarbleId| names.binary_search_by_key(id, |(id, _)| *id).is_ok();
+        if self.swarm.invited.len() != self.marbles.len() {
+            let (marbles, swarm) = (&self.marbles, &mut self.swarm);
+            let known =
+                |id: &MarbleId| swarm.invited.binary_search_by_key(id, |(id, _)| *id).is_ok();
             let ids = (0..marbles.len()).filter_map(|row| marbles.id(row));
             let new: Vec<_> = ids.filter(|id| !known(id)).collect();
-            let balls = self.swarm.invite(new.len())?;
-            names.extend(new.into_iter().zip(balls));
-            names.sort_unstable();
-            self.guests.seen = seen;
+            let balls = swarm.invite(new.len())?;
+            swarm.invited.extend(new.into_iter().zip(balls));
+            swarm.invited.sort_unstable();
         }
-        let marbles = &self.marbles;
-        let guests = self.guests.names.iter().filter_map(|(marble, ball)| {
+        let (marbles, invited) = (&self.marbles, std::mem::take(&mut self.swarm.invited));
+        let guests = invited.iter().filter_map(|(marble, ball)| {
             let row = marbles.row(*marble).ok()?;
             let single = |x: S| (x.as_f64() as f32).clamp(-FURTHEST, FURTHEST);
             let rows = |v: Vec3<S>, last: f32| [single(v.x), single(v.y), single(v.z), last];
@@ -83,12 +80,13 @@ impl<S: Scalar> World<S> {
             })
         });
         self.swarm.host(guests);
+        self.swarm.invited = invited;
         Ok(())
     }
 
     /// Gives the marbles what the swarm did to them.
     fn part_with_guests(&mut self) {
-        for ((marble, _), (before, after)) in self.guests.names.iter().zip(self.swarm.hosted()) {
+        for ((marble, _), (before, after)) in self.swarm.invited.iter().zip(self.swarm.hosted()) {
             let change = |before: &[f32; 4], after: &[f32; 4]| {
                 let [x, y, z] = [0, 1, 2].map(|i| S::constant(f64::from(after[i] - before[i])));
                 Vec3::new(x, y, z)
