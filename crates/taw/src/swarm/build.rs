@@ -4,6 +4,7 @@ use super::grid::reorder;
 use super::kernels::squared;
 use super::pairs::{FindPairs, Search};
 use super::slab::Slab;
+use super::step::listed;
 use super::team::{Shared, work};
 use super::{Stage, Surroundings, Swarm, walls};
 
@@ -171,7 +172,8 @@ impl Swarm {
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
         let searches = Shared::new(&mut self.searches);
         let (grid, at, budget) = (&self.grid, &self.at[..], &self.budget[..]);
-        let (memory, before, planes) = (&self.memory, &self.before[..], &self.planes[..]);
+        let (memory, before, planes) =
+            (&self.memory, &self.before[..], listed(&self.planes, self.model.tier));
         let shapes = walls.has_shapes();
         let balls = walls::Balls { at, velocity: &self.velocity, budget, ahead };
         work(threads, |member| {
@@ -189,6 +191,7 @@ impl Swarm {
                     rows: slab.rows,
                     search,
                     batches: &mut slab.batches,
+                    fans: (!rough).then_some(&mut slab.fans),
                 });
                 if rough {
                     slab.pushes.reset(slab.batches.len());
@@ -222,7 +225,7 @@ mod tests {
 
     use crate::math::{Point3, Vec3};
     use crate::swarm::kernels::squared;
-    use crate::swarm::{Ball, Swarm, SwarmModel};
+    use crate::swarm::{Ball, Swarm, SwarmModel, Tier};
     use crate::world::World;
 
     /// Every pair that might touch, by asking each ball about each.
@@ -240,9 +243,11 @@ mod tests {
 
     #[test]
     fn no_pair_is_missed_and_no_ball_is_twice_in_a_batch() {
-        for least in [0.5_f32, 0.1, 0.01] {
+        let cases =
+            [0.5_f32, 0.1, 0.01].map(|least| [Tier::Full, Tier::Lab].map(|tier| (least, tier)));
+        for (least, tier) in cases.into_iter().flatten() {
             let mut world = World::<f32>::default();
-            let model = SwarmModel { threads: 3, ..SwarmModel::default() };
+            let model = SwarmModel { tier, threads: 3, ..SwarmModel::default() };
             world.swarm.set_model(model).unwrap();
             let mut seed = 7_u64;
             let mut random = || {
@@ -263,8 +268,17 @@ mod tests {
             world.swarm.build(1.0 / 60.0, &world.walls, &mut |_| ());
             let swarm = &world.swarm;
             assert!(swarm.slab_count > 3 && !swarm.strays.rows.is_empty());
-            let slabs = swarm.slabs[..swarm.slab_count].iter().map(|slab| &slab.batches);
+            let all = &swarm.slabs[..swarm.slab_count];
+            let slabs = all.iter().map(|slab| &slab.batches);
             let mut found = BTreeSet::new();
+            for slab in all {
+                for (row, fan) in (slab.rows[0]..).zip(slab.fans.of_rows()) {
+                    for after in fan {
+                        let pair = [row, row + u32::from(*after)];
+                        assert!(found.insert(pair), "{pair:?} comes twice");
+                    }
+                }
+            }
             for batch in slabs.chain([&swarm.strays.batches]).flatten() {
                 let pairs: Vec<_> =
                     (0..batch.count as usize).map(|lane| batch.pair(lane)).collect();
@@ -275,7 +289,7 @@ mod tests {
                 }
             }
             let missed: Vec<_> = by_all(swarm).difference(&found).copied().collect();
-            assert_eq!(missed, [[0; 2]; 0], "least radius {least}");
+            assert_eq!(missed, [[0; 2]; 0], "least radius {least}, {tier:?}");
         }
     }
 }

@@ -58,6 +58,14 @@ impl Swarm {
         self.guests = guests;
     }
 
+    /// Lists the rows of the guests.
+    pub(super) fn find_guests(&mut self) {
+        self.guest_rows.clear();
+        let rows = self.guests.iter().filter_map(|guest| self.ids.row(guest.ball));
+        self.guest_rows.extend(rows.map(|row| row as u32));
+        self.guest_rows.sort_unstable();
+    }
+
     pub(super) fn has_guest_slot(slot: u32, guest_slots: &[u64]) -> bool {
         let bits = guest_slots.get(slot as usize / 64);
         bits.is_some_and(|bits| bits >> (slot % 64) & 1 == 1)

@@ -1,8 +1,9 @@
 //! What a step does to rows and to pairs, eight at a time.
 
 use super::lanes::{Kernel, LANES, Lanes, Row};
-use super::pairs::Batch;
+use super::pairs::{Batch, Fans};
 use super::team::Shared;
+use super::walls::HalfSpace;
 
 /// What batches of pairs bear, batch by batch; nothing in the lab's tier.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -97,12 +98,15 @@ impl<L: Lanes> V<L> {
 #[inline(always)]
 fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> (V<L>, L) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let least = L::splat(f32::MIN_POSITIVE);
     let way = V::of(b).minus(V::of(a));
-    let distance = way.dot(way).sqrt();
-    let inverse = one / distance.max(L::splat(f32::MIN_POSITIVE));
+    let squared = way.dot(way);
+    let distance = squared.sqrt();
+    // Root and quotient do not wait for each other.
+    let inverse = squared.pick_above(least, distance * (one / squared), zero);
     let V([x, y, z]) = way.times(inverse);
     // Where the centers coincide, any direction is as good as another.
-    let x = distance.pick_above(zero, x, one);
+    let x = squared.pick_above(least, x, one);
     (V([x, y, z]), distance - (a[3] + b[3]))
 }
 
@@ -137,14 +141,124 @@ pub(super) struct Displace<'a> {
 impl Kernel for Displace<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let (zero, half) = (L::splat(0.0), L::splat(0.5));
         for batch in self.batches {
             let [a, b] = gather::<L>(self.at, batch);
-            let (normal, gap) = normal_and_gap(&a, &b);
-            let overlap = (zero - gap).max(zero);
-            let by = normal.times(overlap * half);
+            let (normal, overlap) = normal_and_overlap(&a, &b);
+            let by = normal.times(overlap * L::splat(0.5));
             let moved = [V::of(&a).minus(by).with(a[3]), V::of(&b).plus(by).with(b[3])];
             scatter(self.at, batch, moved);
+        }
+    }
+}
+
+/// The normal from the first to the second ball, and how far they overlap.
+#[inline(always)]
+fn normal_and_overlap<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> (V<L>, L) {
+    let (normal, gap) = normal_and_gap(a, b);
+    let zero = L::splat(0.0);
+    (normal, (zero - gap).max(zero))
+}
+
+/// The same for fans: each ball and up to eight others at a time.
+pub(super) struct DisplaceFans<'a> {
+    pub at: Shared<'a, Row>,
+    /// The row of the first fan.
+    pub first: u32,
+    pub fans: &'a Fans,
+}
+
+/// Which part of an overlap each of two balls moves, by how many overlap the first one: where
+/// these are moved together, they would move too far.
+const PART: [f32; LANES + 1] = [0.5, 0.5, 0.42, 0.38, 0.36, 0.36, 0.36, 0.36, 0.36];
+
+/// All bits of the first places, by how many these are.
+static FIRST: [[u16; LANES]; LANES + 1] = {
+    let mut masks = [[0; LANES]; LANES + 1];
+    let mut count = 0;
+    while count <= LANES {
+        let mut place = 0;
+        while place < count {
+            masks[count][place] = u16::MAX;
+            place += 1;
+        }
+        count += 1;
+    }
+    masks
+};
+
+impl Kernel for DisplaceFans<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let mut rest = self.fans.list();
+        let mut row = self.first as usize;
+        while rest.len() > LANES {
+            let mut left = usize::from(rest[0]);
+            rest = &rest[1..];
+            let ball = self.at.row(row);
+            row += 1;
+            if left == 0 {
+                continue;
+            }
+            // SAFETY: no other thread has this row and those of its fan (see `Slab`).
+            let mut own = unsafe { *ball };
+            while let Some(eight) = rest.first_chunk::<LANES>()
+                && left > 0
+            {
+                let count = left.min(LANES);
+                // The places that are left over name the ball itself: what is written there is
+                // written over below.
+                let mut after = FIRST[count];
+                for (after, other) in after.iter_mut().zip(eight) {
+                    *after &= other;
+                }
+                let a = [L::splat(own[0]), L::splat(own[1]), L::splat(own[2]), L::splat(own[3])];
+                // SAFETY: as above; no row but its own is twice in a fan.
+                unsafe {
+                    let b = L::gather(ball, &after);
+                    let (normal, overlap) = normal_and_overlap(&a, &b);
+                    let overlap = overlap.first(count);
+                    let hits = overlap.above(L::splat(0.0)).count_ones();
+                    let by = normal.times(overlap * L::splat(PART[hits as usize]));
+                    L::scatter(ball, &after, LANES, V::of(&b).plus(by).with(b[3]));
+                    let V([x, y, z]) = by;
+                    own = [own[0] - x.sum(), own[1] - y.sum(), own[2] - z.sum(), own[3]];
+                }
+                (left, rest) = (left - count, &rest[count..]);
+            }
+            // SAFETY: as above.
+            unsafe { *ball = own };
+        }
+    }
+}
+
+/// Pushes balls out of half-spaces.
+pub(super) struct DisplaceFromPlanes<'a> {
+    pub at: &'a mut [Row],
+    pub planes: &'a [HalfSpace],
+}
+
+impl Kernel for DisplaceFromPlanes<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let zero = L::splat(0.0);
+        for rows in self.at.chunks_mut(LANES) {
+            let (base, count) = (rows.as_mut_ptr(), rows.len());
+            let places = [0, 1, 2, 3, 4, 5, 6, 7].map(|place: u16| place.min(count as u16 - 1));
+            // SAFETY: these rows are here, and each is named once among the first ones.
+            unsafe {
+                let [mut x, mut y, mut z, radius] = L::gather(base, &places);
+                let mut out = 0;
+                for HalfSpace { normal, offset, .. } in self.planes {
+                    let (nx, ny, nz) = (L::splat(normal.x), L::splat(normal.y), L::splat(normal.z));
+                    let gap = nx * x + ny * y + nz * z - L::splat(*offset) - radius;
+                    out |= zero.above(gap);
+                    let by = (zero - gap).max(zero);
+                    (x, y, z) = (x + nx * by, y + ny * by, z + nz * by);
+                }
+                if out != 0 {
+                    L::scatter(base, &places, count, [x, y, z, radius]);
+                }
+            }
         }
     }
 }

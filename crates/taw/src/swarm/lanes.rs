@@ -23,6 +23,10 @@ pub(super) trait Lanes:
     fn above(self, other: Self) -> u32;
     /// `yes` where the first is the greater, else `no`.
     fn pick_above(self, other: Self, yes: Self, no: Self) -> Self;
+    /// The sum of all: of the lanes that are four apart, then two, then one.
+    fn sum(self) -> f32;
+    /// The lanes before this one; zeros after them.
+    fn first(self, count: usize) -> Self;
     /// The lanes whose bits are set, counted from a number on; the rest is anything.
     fn name(bits: u32, from: u32, to: &mut [u32; LANES]);
     /// The rows at these places after `base`, as columns.
@@ -173,6 +177,19 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
+    fn sum(self) -> f32 {
+        let Self([a, b, c, d, e, f, g, h]) = self;
+        ((a + e) + (c + g)) + ((b + f) + (d + h))
+    }
+
+    #[inline(always)]
+    fn first(self, count: usize) -> Self {
+        let mut out = self.0;
+        out.iter_mut().skip(count).for_each(|lane| *lane = 0.0);
+        Self(out)
+    }
+
+    #[inline(always)]
     fn name(mut bits: u32, from: u32, to: &mut [u32; LANES]) {
         let mut count = 0;
         while bits != 0 {
@@ -266,6 +283,23 @@ mod x86 {
         }
 
         #[inline(always)]
+        fn sum(self) -> f32 {
+            unsafe {
+                let four =
+                    _mm_add_ps(_mm256_castps256_ps128(self.0), _mm256_extractf128_ps::<1>(self.0));
+                let two = _mm_add_ps(four, _mm_movehl_ps(four, four));
+                _mm_cvtss_f32(_mm_add_ss(two, _mm_shuffle_ps::<1>(two, two)))
+            }
+        }
+
+        #[inline(always)]
+        fn first(self, count: usize) -> Self {
+            let mask = &MASK[LANES - count.min(LANES)..];
+            // SAFETY: eight follow.
+            Self(unsafe { _mm256_and_ps(self.0, _mm256_loadu_ps(mask.as_ptr().cast())) })
+        }
+
+        #[inline(always)]
         fn name(bits: u32, from: u32, to: &mut [u32; LANES]) {
             unsafe {
                 let which = _mm256_loadu_si256(FIRST[bits as usize & 0xff].as_ptr().cast());
@@ -313,6 +347,9 @@ mod x86 {
             }
         }
     }
+
+    /// All bits for eight lanes, and none for eight more.
+    static MASK: [u32; 2 * LANES] = [!0, !0, !0, !0, !0, !0, !0, !0, 0, 0, 0, 0, 0, 0, 0, 0];
 
     /// For each set of bits, which lanes are in it.
     static FIRST: [[u32; LANES]; 256] = {

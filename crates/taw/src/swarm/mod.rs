@@ -104,6 +104,8 @@ pub struct Swarm {
     /// The marbles of the world that are balls here, in their order.
     pub(crate) invited: Vec<(MarbleId, BallId)>,
     guests: Vec<Guest>,
+    /// Their rows, in order; only in the lab's tier, while it steps.
+    guest_rows: Vec<u32>,
     /// A bit for each slot.
     guest_slots: Vec<u64>,
     spare: Vec<Row>,
@@ -293,9 +295,10 @@ impl Swarm {
     /// How many pairs of balls are near enough to be looked at.
     #[must_use]
     pub fn pairs(&self) -> usize {
-        let slabs = self.slabs[..self.slab_count].iter();
-        let batches = slabs.flat_map(|slab| &slab.batches).chain(&self.strays.batches);
-        batches.map(|batch| batch.count as usize).sum()
+        let slabs = &self.slabs[..self.slab_count];
+        let batches = slabs.iter().flat_map(|slab| &slab.batches).chain(&self.strays.batches);
+        let fans = slabs.iter().map(|slab| slab.fans.count());
+        batches.map(|batch| batch.count as usize).chain(fans).sum()
     }
 
     /// How often pairs were sought so far.

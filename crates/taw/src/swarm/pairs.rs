@@ -1,4 +1,6 @@
-//! Who might touch whom: pairs of balls, eight to a batch in which no ball is twice.
+//! Who might touch whom. In the full tier: pairs of balls, eight to a batch in which no ball is
+//! twice, so that each pair is solved with what the ones before it left. In the lab's tier: for
+//! each ball those that come after it, a *fan*, which is found faster and takes less room.
 
 use std::ops::Range;
 
@@ -127,6 +129,108 @@ impl Filler<'_> {
     }
 }
 
+/// What becomes of the pairs that are found.
+trait Sink {
+    /// A ball and some that come after it. Balls are named in order; those without any may be
+    /// left out.
+    fn fan(&mut self, ball: u32, near: &[u32]);
+    /// One more pair, in its order.
+    fn pair(&mut self, a: u32, b: u32);
+}
+
+impl Sink for Filler<'_> {
+    #[inline(always)]
+    fn fan(&mut self, ball: u32, near: &[u32]) {
+        for other in near {
+            self.add(ball, *other);
+        }
+    }
+
+    #[inline(always)]
+    fn pair(&mut self, a: u32, b: u32) {
+        self.add(a, b);
+    }
+}
+
+/// For each row of a slab, how many fans of up to eight others it has, and these: how many, and
+/// how far after it each is.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Fans {
+    /// With room for [`LANES`] after the last one, which are read and not used.
+    list: Vec<u16>,
+}
+
+/// Puts fans one after another, and what fits into none of them into batches.
+struct FanFiller<'a> {
+    next: u32,
+    list: &'a mut Vec<u16>,
+    filler: Filler<'a>,
+}
+
+impl FanFiller<'_> {
+    /// All rows before this one have no more fans.
+    #[inline(always)]
+    fn skip_to(&mut self, row: u32) {
+        while self.next < row {
+            self.list.push(0);
+            self.next += 1;
+        }
+    }
+}
+
+impl Sink for FanFiller<'_> {
+    #[inline(always)]
+    fn fan(&mut self, ball: u32, near: &[u32]) {
+        debug_assert!(self.next <= ball);
+        self.skip_to(ball);
+        self.next = ball + 1;
+        // They come in order.
+        let far = |row: &u32| row - ball > u32::from(u16::MAX);
+        let most = near.len().min(u16::MAX.into());
+        let mut count = most;
+        while count > 0 && far(&near[count - 1]) {
+            count -= 1;
+        }
+        let (near, rest) = near.split_at(count);
+        self.list.push(count as u16);
+        self.list.extend(near.iter().map(|other| (other - ball) as u16));
+        for other in rest {
+            self.filler.add(ball, *other);
+        }
+    }
+
+    #[inline(always)]
+    fn pair(&mut self, a: u32, b: u32) {
+        self.filler.add(a, b);
+    }
+}
+
+impl Fans {
+    /// The others of each row.
+    pub fn of_rows(&self) -> impl Iterator<Item = &[u16]> {
+        let mut rest = &self.list[..self.list.len().saturating_sub(LANES)];
+        std::iter::from_fn(move || {
+            let (count, more) = rest.split_first()?;
+            let (fan, more) = more.split_at((*count).into());
+            rest = more;
+            Some(fan)
+        })
+    }
+
+    /// How many pairs there are.
+    pub fn count(&self) -> usize {
+        self.of_rows().map(<[u16]>::len).sum()
+    }
+
+    pub fn list(&self) -> &[u16] {
+        &self.list
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.list.capacity() * size_of::<u16>()
+    }
+}
+
 /// Finds the pairs of a slab: of its own balls, and of these with those of the next one.
 pub(super) struct FindPairs<'a> {
     pub grid: &'a Grid,
@@ -137,62 +241,101 @@ pub(super) struct FindPairs<'a> {
     pub cap: f32,
     /// The layers of level 0 in it.
     pub layers: [u32; 2],
-    /// The first row, of it and of the next one and after that.
+    /// The first row, of it, of the next one and after that.
     pub rows: [u32; 3],
     pub search: &'a mut Search,
+    /// Where pairs go that are part of no fan.
     pub batches: &'a mut Vec<Batch>,
+    /// Where fans go, if there shall be any.
+    pub fans: Option<&'a mut Fans>,
 }
 
 impl Kernel for FindPairs<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { grid, at, budget, cap, layers, rows, search, batches } = self;
-        let [first, _, end] = rows;
+        let Self { grid, at, budget, cap, layers, rows, search, batches, fans } = self;
+        let [first, next, end] = rows;
         let window = first as usize..end as usize;
         let Search { columns, busy, open } = search;
         columns.window.fill_with(&at[window.clone()], &budget[window.clone()], cap);
-        busy.clear();
-        busy.resize(window.len(), 0);
         batches.clear();
+        busy.clear();
+        let crowded =
+            fans.is_none() || grid.levels.len() > 1 || window.len() > usize::from(u16::MAX);
+        busy.resize(if crowded { window.len() } else { 0 }, 0);
         let mut filler = Filler { first, busy, open, batches };
         let mut around = Around::new(columns, first..end);
+        if let Some(Fans { list }) = fans {
+            list.clear();
+            let mut fans = FanFiller { next: first, list, filler };
+            find::<L>(grid, at, layers, rows, &mut around, &mut fans);
+            fans.skip_to(next);
+            fans.list.resize(fans.list.len() + LANES, 0);
+            fans.filler.close();
+        } else {
+            find::<L>(grid, at, layers, rows, &mut around, &mut filler);
+            filler.close();
+        }
+    }
+}
+
+#[inline(always)]
+fn find<L: Lanes>(
+    grid: &Grid,
+    at: &[Row],
+    layers: [u32; 2],
+    rows: [u32; 3],
+    around: &mut Around,
+    sink: &mut impl Sink,
+) {
+    // In the order of the rows.
+    for coarse in layers[0]..layers[1] {
         for level in &grid.levels {
-            let [row_count, cell_count] = level.size();
-            let fine = layers.map(|layer| layer << level.number);
-            for layer in fine[0]..fine[1] {
-                for row in 1..row_count - 1 {
-                    let line = level.cell(grid, layer, row, 0);
-                    if grid.first(line) == grid.first(line + cell_count) {
-                        continue;
-                    }
-                    let starts = grid.starts(line, cell_count);
-                    let ahead = ahead(grid, level, layer, row);
-                    for (cell, four) in starts.windows(4).enumerate() {
-                        let [_, from, to, end] = *four else { continue };
-                        if from == to {
-                            continue;
-                        }
-                        around.eights.clear();
-                        around.add(from, end);
-                        for starts in &ahead {
-                            if let Some(&[from, _, _, to]) = starts.get(cell..cell + 4) {
-                                around.add(from, to);
-                            }
-                        }
-                        for a in from..to {
-                            // Each with those that come after it.
-                            for b in around.near::<L>(a, a + 1) {
-                                filler.add(a, *b);
-                            }
-                        }
-                    }
-                }
+            let fine = coarse << level.number..(coarse + 1) << level.number;
+            for layer in fine {
+                level_layer::<L>(grid, level, layer, around, sink);
             }
         }
-        if grid.levels.len() > 1 {
-            across::<L>(grid, at, layers, rows, &mut around, &mut filler);
+    }
+    if grid.levels.len() > 1 {
+        across::<L>(grid, at, layers, rows, around, sink);
+    }
+}
+
+/// The pairs of the balls of one layer with those of the same level.
+#[inline(always)]
+fn level_layer<L: Lanes>(
+    grid: &Grid,
+    level: &Level,
+    layer: u32,
+    around: &mut Around,
+    sink: &mut impl Sink,
+) {
+    let [row_count, cell_count] = level.size();
+    for row in 1..row_count - 1 {
+        let line = level.cell(grid, layer, row, 0);
+        if grid.first(line) == grid.first(line + cell_count) {
+            continue;
         }
-        filler.close();
+        let starts = grid.starts(line, cell_count);
+        let ahead = ahead(grid, level, layer, row);
+        for (cell, four) in starts.windows(4).enumerate() {
+            let [_, from, to, end] = *four else { continue };
+            if from == to {
+                continue;
+            }
+            around.eights.clear();
+            around.add(from, end);
+            for starts in &ahead {
+                if let Some(&[from, _, _, to]) = starts.get(cell..cell + 4) {
+                    around.add(from, to);
+                }
+            }
+            for ball in from..to {
+                // Each with those that come after it.
+                sink.fan(ball, around.near::<L>(ball, ball + 1));
+            }
+        }
     }
 }
 
@@ -237,7 +380,7 @@ fn across<L: Lanes>(
     layers: [u32; 2],
     [first, next, end]: [u32; 3],
     around: &mut Around,
-    filler: &mut Filler,
+    sink: &mut impl Sink,
 ) {
     // Also of the next slab's balls, with those of this one.
     for small in first..end {
@@ -258,7 +401,7 @@ fn across<L: Lanes>(
                 }
             }
             for other in around.near::<L>(small, 0) {
-                filler.add(small.min(*other), small.max(*other));
+                sink.pair(small.min(*other), small.max(*other));
             }
         }
     }

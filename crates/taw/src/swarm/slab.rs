@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use super::kernels::Pushes;
 use super::lanes::Row;
-use super::pairs::Batch;
+use super::pairs::{Batch, Fans};
 use super::touch::Touch;
 
 /// Some layers of the grid, as much as one thread works on at a time. Pairs of its balls, among
@@ -15,6 +15,8 @@ pub(super) struct Slab {
     /// The first row, of it, of the next one, and after that.
     pub rows: [u32; 3],
     pub batches: Vec<Batch>,
+    /// Only in the lab's tier.
+    pub fans: Fans,
     pub pushes: Pushes,
     /// By rows.
     pub touches: Vec<Touch>,
@@ -44,6 +46,7 @@ impl Slab {
 
     pub fn bytes(&self) -> usize {
         self.batches.capacity() * size_of::<Batch>()
+            + self.fans.bytes()
             + self.pushes.bytes()
             + (self.touches.capacity() + self.old_touches.capacity()) * size_of::<Touch>()
             + (self.near_planes.capacity()

@@ -3,12 +3,15 @@
 use std::ops::Range;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::kernels::{Columns, Displace, Drift, Follow, Pass, Predict, Soft, Solve, squared};
+use super::kernels::{
+    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Pass, Predict, Soft, Solve,
+    squared,
+};
 use super::lanes::Row;
 use super::slab::Slab;
 use super::strays::Strays;
 use super::team::{MOST_THREADS, Member, Shared, wait_for, work};
-use super::walls::{Balls, half_spaces};
+use super::walls::{Balls, HalfSpace, half_spaces};
 use super::{Stage, Surroundings, Swarm, Tier, lying};
 use crate::math::{Vec3, length};
 
@@ -107,22 +110,38 @@ impl Swarm {
             self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
         } else if walls_changed {
             observe(Stage::Walls);
-            self.seek_walls(dt);
+            self.seek_walls(dt, walls);
         }
         self.leaving = leaving_rows;
         observe(Stage::Restitute);
         self.look_at_walls(walls, 0.0);
+        self.find_guests();
+        let (guests, planes) =
+            (std::mem::take(&mut self.guest_rows), std::mem::take(&mut self.planes));
         for _ in 0..self.model.substeps {
             self.each_slab(|_, columns, slab| {
+                // Other walls push the guests.
+                let mut from = slab.rows[0];
+                let its = guests.partition_point(|row| *row < slab.rows[0])
+                    ..guests.partition_point(|row| *row < slab.rows[1]);
+                for to in guests[its].iter().chain([&slab.rows[1]]) {
+                    // SAFETY: balls of the slab.
+                    let at = unsafe { columns.at.part(from as usize..*to as usize) };
+                    instructions.run(DisplaceFromPlanes { at, planes: &planes });
+                    from = to + 1;
+                }
                 for touch in &slab.touches {
                     // SAFETY: a ball of the slab.
                     touch.displace(unsafe { &mut *columns.at.row(touch.row as usize) });
                 }
-                instructions.run(Displace { at: columns.at, batches: &slab.batches });
+                let (at, first) = (columns.at, slab.rows[0]);
+                instructions.run(DisplaceFans { at, first, fans: &slab.fans });
+                instructions.run(Displace { at, batches: &slab.batches });
             });
             let (at, batches) = (Shared::new(&mut self.at), &self.strays.batches);
             instructions.run(Displace { at, batches });
         }
+        (self.guest_rows, self.planes) = (guests, planes);
         observe(Stage::Integrate);
         let per_second = [1.0 / dt, 1.0 / dt, 1.0 / dt, 0.0];
         let (velocity, budget) = (Shared::new(&mut self.velocity), Shared::new(&mut self.budget));
@@ -164,7 +183,7 @@ impl Swarm {
             }
         } else if walls_changed {
             observe(Stage::Walls);
-            self.seek_walls(dt);
+            self.seek_walls(dt, walls);
         }
         self.leaving = leaving;
         if self.slabs[..self.slab_count].iter().all(|slab| slab.asleep) {
@@ -372,9 +391,9 @@ impl Swarm {
     }
 
     /// Seeks the balls at walls anew, where pairs are still known.
-    fn seek_walls(&mut self, dt: f32) {
-        let instructions = self.instructions;
-        let (planes, ahead) = (&self.planes[..], self.ahead(dt));
+    fn seek_walls(&mut self, dt: f32, walls: &dyn Surroundings) {
+        let (instructions, shapes) = (self.instructions, walls.has_shapes());
+        let (planes, ahead) = (listed(&self.planes, self.model.tier), self.ahead(dt));
         let balls = Balls { at: &self.at, velocity: &self.velocity, budget: &self.budget, ahead };
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
         work(self.model.threads as usize, |member| {
@@ -387,13 +406,19 @@ impl Swarm {
                     super::walls::find(&old, touch).map(|same| (same.pressure, same.grip))
                 });
                 slab.old_touches = old;
+                slab.near_shapes.clear();
+                if shapes {
+                    let (rows, found) = (slab.own_rows(), &mut slab.near_shapes);
+                    super::walls::near_shapes(walls, balls.at, balls.budget, rows, found);
+                }
             }
         });
     }
 
     /// Seeks the walls of some more balls, in order of their rows.
     pub(super) fn seek_walls_for(&mut self, rows: &[u32], dt: f32, walls: &dyn Surroundings) {
-        let (planes, ahead) = (&self.planes[..], self.ahead(dt));
+        let ahead = self.ahead(dt);
+        let planes = listed(&self.planes, self.model.tier);
         let (at, budget) = (&self.at[..], &self.budget[..]);
         let balls = Balls { at, velocity: &self.velocity, budget, ahead };
         for slab in &mut self.slabs[..self.slab_count] {
@@ -443,6 +468,11 @@ impl Swarm {
             }
         });
     }
+}
+
+/// The half-spaces of which the balls near them are listed. The lab's tier looks at all balls.
+pub(super) fn listed(planes: &[HalfSpace], tier: Tier) -> &[HalfSpace] {
+    if tier == Tier::Full { planes } else { &[] }
 }
 
 /// The slabs of a thread: from an even one to an even one.

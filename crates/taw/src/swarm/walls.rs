@@ -28,8 +28,8 @@ pub(crate) trait Surroundings: Sync {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct HalfSpace {
     wall: u32,
-    normal: Vec3<f32>,
-    offset: f32,
+    pub normal: Vec3<f32>,
+    pub offset: f32,
     friction: f32,
     restitution: f32,
 }
@@ -86,6 +86,9 @@ impl Slab {
     ) {
         self.touches.clear();
         self.near_planes.clear();
+        if planes.is_empty() {
+            return;
+        }
         let (rows, found) = (self.own_rows(), &mut self.near_planes);
         instructions.run(NearPlanes { balls, planes, rows, found });
         for row in &self.near_planes {
