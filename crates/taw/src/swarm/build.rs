@@ -1,12 +1,12 @@
 //! Putting rows in order, and seeking pairs.
 
-use super::grid::reorder;
+use super::grid::{reorder, reorder_rows};
 use super::kernels::squared;
 use super::pairs::{FindPairs, Search};
 use super::slab::Slab;
 use super::step::listed;
-use super::team::{Shared, work};
-use super::{Stage, Surroundings, Swarm, walls};
+use super::team::{Shared, each, each_rows, list_rows};
+use super::{Stage, Surroundings, Swarm, Tier, walls};
 
 /// Balls in a slab at least.
 const SLAB: u32 = 512;
@@ -31,9 +31,11 @@ impl Swarm {
         }
         observe(Stage::Order);
         let cap = self.margin();
-        self.set_budgets(dt, cap);
-        self.grid.sort(&self.at, 2.0 * cap, threads);
+        // The budgets make room for the order: they are set anew after that.
+        let order = bytemuck::cast_slice_mut(&mut self.budget);
+        self.grid.sort(&self.at, 2.0 * cap, threads, order, &mut self.spare);
         self.reorder();
+        self.set_budgets(dt, cap);
         observe(Stage::Pairs);
         self.cut_slabs();
         self.find_pairs(cap, dt, walls);
@@ -52,23 +54,33 @@ impl Swarm {
         let (threads, lab) = (self.model.threads as usize, !self.rough());
         let (at, velocity, way) = (&self.at[..], &self.velocity[..], &self.way[..]);
         let least = if lab { 0.12 } else { 0.08 };
+        self.strays.clear(self.at.len());
+        // More than this are too many.
+        let most = self.strays.room(self.at.len()) + 1;
         let budgets = Shared::new(&mut self.budget);
-        work(threads, |member| {
-            let rows = member.share(at.len());
-            // SAFETY: each thread has its own rows.
+        let mut fast = std::mem::take(&mut self.leaving);
+        fast.clear();
+        list_rows(threads, at.len(), &mut self.lists, &mut fast, |rows, fast| {
+            // SAFETY: each job has its own rows.
             let budgets = unsafe { budgets.part(rows.clone()) };
             for (row, budget) in rows.zip(budgets) {
                 let way = if lab { way[row] } else { squared(velocity[row]).sqrt() * dt };
                 *budget = (way * STEPS).clamp(cap.min(least * at[row][3]), cap * FAR);
+                if *budget > cap && fast.len() < most {
+                    fast.push(row as u32);
+                }
             }
         });
-        let strays = self.budget.iter().filter(|budget| **budget > cap).count();
-        self.strays.clear(self.at.len());
-        if self.strays.full(strays, self.at.len()) {
-            for budget in &mut self.budget {
-                *budget = budget.min(cap);
-            }
+        if self.strays.full(fast.len(), self.at.len()) {
+            each_rows(threads, self.at.len(), |rows| {
+                // SAFETY: as above.
+                let budgets = unsafe { budgets.part(rows) };
+                budgets.iter_mut().for_each(|budget| *budget = budget.min(cap));
+            });
+        } else {
+            fast.iter().for_each(|row| self.strays.add(*row));
         }
+        self.leaving = fast;
     }
 
     /// Seeks pairs for balls that leave their budget, or for all, if these are too many.
@@ -103,33 +115,24 @@ impl Swarm {
 
     fn reorder(&mut self) {
         let threads = self.model.threads as usize;
-        let order = std::mem::take(&mut self.grid.order);
-        reorder(&mut self.at, &mut self.spare, &order, threads);
-        reorder(&mut self.velocity, &mut self.spare, &order, threads);
-        if self.rough() {
-            reorder(&mut self.spin, &mut self.spare, &order, threads);
-        }
-        let rough = self.rough();
-        let spare = &mut self.spare_numbers;
-        if rough {
-            reorder(&mut self.before, spare, &order, threads);
+        let (order, spare) = (bytemuck::cast_slice(&self.budget), &mut self.spare);
+        reorder_rows(&mut self.at, spare, order, threads);
+        reorder_rows(&mut self.velocity, spare, order, threads);
+        if self.model.tier == Tier::Full {
+            reorder_rows(&mut self.spin, spare, order, threads);
+            reorder(&mut self.before, spare, order, threads);
+        } else {
+            reorder(&mut self.way, spare, order, threads);
         }
         let (slots, rows) = self.ids.columns();
-        reorder(slots, spare, &order, threads);
+        reorder(slots, spare, order, threads);
         let (rows, slots) = (Shared::new(rows), &slots[..]);
-        work(threads, |member| {
-            for row in member.share(slots.len()) {
+        each_rows(threads, slots.len(), |part| {
+            for row in part {
                 // SAFETY: a slot is that of one row.
                 unsafe { *rows.row(slots[row] as usize) = row as u32 };
             }
         });
-        let lab = !self.rough();
-        let spare = &mut self.grid.numbers;
-        reorder(&mut self.budget, spare, &order, threads);
-        if lab {
-            reorder(&mut self.way, spare, &order, threads);
-        }
-        self.grid.order = order;
     }
 
     fn cut_slabs(&mut self) {
@@ -175,42 +178,36 @@ impl Swarm {
         let (memory, before, planes) =
             (&self.memory, &self.before[..], listed(&self.planes, self.model.tier));
         let shapes = walls.has_shapes();
+        let fans = Shared::new(bytemuck::cast_slice_mut(&mut self.spare));
         let balls = walls::Balls { at, velocity: &self.velocity, budget, ahead };
-        work(threads, |member| {
-            // SAFETY: its own.
-            let search = unsafe { &mut *searches.row(member.number) };
-            for slab in member.share(slabs.len()) {
-                // SAFETY: its own.
-                let slab = unsafe { &mut *slabs.row(slab) };
-                instructions.run(FindPairs {
-                    grid,
-                    at,
-                    budget,
-                    cap,
-                    layers: slab.layers,
-                    rows: slab.rows,
-                    search,
-                    batches: &mut slab.batches,
-                    fans: (!rough).then_some(&mut slab.fans),
-                });
-                if rough {
-                    slab.pushes.reset(slab.batches.len());
-                    memory.recall(&slab.batches, before, &mut slab.pushes);
-                }
-                slab.seek_walls(instructions, balls, planes, |touch| {
-                    rough.then(|| memory.recall_touch(before, touch)).flatten()
-                });
-                slab.near_shapes.clear();
-                if shapes {
-                    walls::near_shapes(walls, at, budget, slab.own_rows(), &mut slab.near_shapes);
-                }
+        each(threads, slabs.len(), |thread, slab| {
+            // SAFETY: its thread's, and its own.
+            let (search, slab) = unsafe { (&mut *searches.row(thread), &mut *slabs.row(slab)) };
+            // SAFETY: those of its rows.
+            let fans = (!rough).then(|| unsafe { fans.part(slab.fans_of_all()) });
+            instructions.run(FindPairs {
+                grid,
+                at,
+                budget,
+                cap,
+                layers: slab.layers,
+                rows: slab.rows,
+                search,
+                batches: &mut slab.batches,
+                fans,
+            });
+            if rough {
+                slab.pushes.reset(slab.batches.len());
+                memory.recall(&slab.batches, before, &mut slab.pushes);
+            }
+            slab.seek_walls(instructions, balls, planes, |touch| {
+                rough.then(|| memory.recall_touch(before, touch)).flatten()
+            });
+            slab.near_shapes.clear();
+            if shapes {
+                walls::near_shapes(walls, at, budget, slab.own_rows(), &mut slab.near_shapes);
             }
         });
-        for (row, budget) in (0..).zip(&self.budget) {
-            if *budget > cap {
-                self.strays.add(row);
-            }
-        }
         self.find_strays(cap);
         if rough {
             let (memory, strays) = (&self.memory, &mut self.strays);
@@ -265,6 +262,10 @@ mod tests {
             // And one far out.
             balls.push(Ball::new(Point3::new(1e6, 0.0, 0.0), 0.5));
             world.swarm.insert(&balls).unwrap();
+            if tier == Tier::Lab {
+                let ways = balls.iter().map(|ball| crate::math::length(ball.velocity) / 60.0);
+                world.swarm.way = ways.collect();
+            }
             world.swarm.build(1.0 / 60.0, &world.walls, &mut |_| ());
             let swarm = &world.swarm;
             assert!(swarm.slab_count > 3 && !swarm.strays.rows.is_empty());
@@ -272,7 +273,7 @@ mod tests {
             let slabs = all.iter().map(|slab| &slab.batches);
             let mut found = BTreeSet::new();
             for slab in all {
-                for (row, fan) in (slab.rows[0]..).zip(slab.fans.of_rows()) {
+                for (row, fan) in (slab.rows[0]..).zip(slab.fans(swarm.fans()).of_rows()) {
                     for after in fan {
                         let pair = [row, row + u32::from(*after)];
                         assert!(found.insert(pair), "{pair:?} comes twice");

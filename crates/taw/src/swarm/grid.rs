@@ -7,8 +7,12 @@
 //! neighbouring cells of a row are one run of balls, and all partners of a ball are in its own
 //! layer and the two beside it.
 
+use std::ops::Range;
+
+use bytemuck::{Pod, cast_slice_mut};
+
 use super::lanes::Row;
-use super::team::{Shared, work};
+use super::team::{ROWS, Shared, each, each_rows};
 
 /// Cells in all, for each ball.
 const CELLS_PER_BALL: f64 = 2.0;
@@ -54,17 +58,21 @@ pub(super) struct Grid {
     per_layer: u32,
     /// The first row of each cell, one place further, and of the one after the last.
     start: Vec<u32>,
-    /// The cell of each row.
-    keys: Vec<u32>,
-    /// For each row of the new order, the one that it was.
-    pub order: Vec<u32>,
+    parts: Vec<Part>,
     sample: Vec<f32>,
-    /// For those who put columns into the order.
-    pub numbers: Vec<f32>,
+}
+
+/// Some rows that follow each other, before they are in order.
+#[derive(Clone, Copy, Debug, Default)]
+struct Part {
+    first: u32,
+    /// The first cell that one of them is in, and the last one.
+    cells: [u32; 2],
 }
 
 impl Level {
     /// The cell of these coordinates; empty cells lie at both ends of the rows and columns.
+    #[inline(always)]
     pub fn cell(&self, grid: &Grid, layer: u32, row: u32, cell: u32) -> u32 {
         let inner = layer & ((1 << self.number) - 1);
         (layer >> self.number) * grid.per_layer
@@ -82,9 +90,8 @@ impl Level {
 
 impl Grid {
     pub fn bytes(&self) -> usize {
-        let numbers = [&self.start, &self.keys, &self.order].map(Vec::capacity);
-        let floats = [&self.sample, &self.numbers].map(Vec::capacity);
-        numbers.iter().chain(&floats).map(|capacity| capacity * 4).sum()
+        let numbers = self.start.capacity() + self.sample.capacity();
+        numbers * size_of::<u32>() + self.parts.capacity() * size_of::<Part>()
     }
 
     /// How many layers of level 0 there are.
@@ -109,12 +116,14 @@ impl Grid {
     }
 
     /// The level of a ball with this radius.
+    #[inline(always)]
     pub fn level_of(&self, radius: f32) -> usize {
         let fits = |level: &Level| 2.0 * radius <= level.widest;
         self.levels.iter().skip(1).take_while(|level| fits(level)).count()
     }
 
     /// Layer, row and cell of a place on a level.
+    #[inline(always)]
     pub fn coordinates(&self, level: &Level, at: &Row) -> [u32; 3] {
         let axis = |i: usize, count: u32| {
             let axis = self.axes[i];
@@ -125,6 +134,7 @@ impl Grid {
         [axis(0, level.layers), axis(1, level.rows) + 1, axis(2, level.cells) + 1]
     }
 
+    #[inline(always)]
     fn key(&self, at: &Row) -> u32 {
         let level = if self.levels.len() == 1 { 0 } else { self.level_of(at[3]) };
         let level = &self.levels[level];
@@ -198,94 +208,133 @@ impl Grid {
         }
     }
 
-    /// Sorts the rows into cells: afterwards `order` says which row comes where.
-    pub fn sort(&mut self, at: &[Row], skin: f32, threads: usize) {
+    /// Sorts the rows into cells: `order` is, for each row of the new order, the one that it was.
+    /// `spare` is only scribbled on.
+    pub fn sort(
+        &mut self,
+        at: &[Row],
+        skin: f32,
+        threads: usize,
+        order: &mut [u32],
+        spare: &mut Vec<Row>,
+    ) {
         self.lay_out(at, skin);
         let cells = (self.layers() * self.per_layer) as usize;
         let mut start = std::mem::take(&mut self.start);
-        let mut keys = std::mem::take(&mut self.keys);
-        let mut order = std::mem::take(&mut self.order);
-        start.clear();
+        let mut parts = std::mem::take(&mut self.parts);
         start.resize(cells + 2, 0);
-        keys.resize(at.len(), 0);
-        order.resize(at.len(), 0);
+        parts.resize(at.len().div_ceil(ROWS), Part::default());
+        spare.resize(at.len(), [0.0; 4]);
+        let keys = Shared::new(cast_slice_mut(spare));
         {
-            let grid = &*self;
-            let (all_keys, all_start) = (Shared::new(&mut keys), Shared::new(&mut start));
-            let all_order = Shared::new(&mut order);
-            let mut totals = vec![0_u32; threads];
-            let totals = Shared::new(&mut totals);
-            work(threads, |member| {
-                let rows = member.share(at.len());
-                // SAFETY: each thread has its own rows.
-                let keys = unsafe { all_keys.part(rows.clone()) };
-                for (key, at) in keys.iter_mut().zip(&at[rows]) {
+            let (grid, parts) = (&*self, Shared::new(&mut parts));
+            each_rows(threads, at.len(), |rows| {
+                // SAFETY: each job has its own rows and its own part.
+                let keys = unsafe { keys.part(rows.clone()) };
+                let mut cells = [u32::MAX, 0];
+                for (key, at) in keys.iter_mut().zip(&at[rows.clone()]) {
                     *key = grid.key(at);
+                    cells = [cells[0].min(*key), cells[1].max(*key)];
                 }
-                member.barrier();
-                // Now by cells. A cell is counted one further, and again one further.
-                let mine = member.share(cells);
-                let (low, count) = (mine.start as u32, mine.len() as u32);
-                // SAFETY: nobody writes keys any more, and each thread has its own cells.
-                let keys = unsafe { all_keys.read(0..at.len()) };
-                let start = unsafe { all_start.part(mine.start + 2..mine.end + 2) };
-                let mut total = 0;
-                for key in keys {
-                    let cell = key.wrapping_sub(low);
-                    if cell < count {
-                        start[cell as usize] += 1;
-                        total += 1;
-                    }
-                }
-                // SAFETY: one for each.
-                unsafe { *totals.row(member.number) = total };
-                member.barrier();
-                // SAFETY: they are written.
-                let mut sum: u32 = unsafe { totals.read(0..member.number) }.iter().sum();
-                for cell in start.iter_mut() {
-                    let count = *cell;
-                    *cell = sum;
-                    sum += count;
-                }
-                member.barrier();
-                // Each cell's count has become the first row of the cell, two further: as rows
-                // are placed, it grows to the first of the next cell, one further.
-                // SAFETY: its own cells, and each row comes to one place.
-                let start = unsafe { all_start.part(mine.start + 2..mine.end + 2) };
-                for (row, key) in keys.iter().enumerate() {
-                    let cell = key.wrapping_sub(low);
-                    if cell < count {
-                        let place = &mut start[cell as usize];
-                        unsafe { *all_order.row(*place as usize) = row as u32 };
-                        *place += 1;
-                    }
-                }
+                unsafe { *parts.row(rows.start / ROWS) = Part { first: rows.start as u32, cells } };
             });
         }
+        // Now by cells. A cell is counted one further, and again one further.
+        let share = |share: usize| cells * share / threads..cells * (share + 1) / threads;
+        let mut totals = vec![0; threads];
+        let (all_start, totals) = (Shared::new(&mut start), Shared::new(&mut totals));
+        // SAFETY: nobody writes keys any more.
+        let keys = unsafe { keys.read(0..at.len()) };
+        // The rows of the parts that have any in these cells, which are few: most rows are still
+        // about where they belong. Each is named with its cell, counted from the first one.
+        let rows_in = |cells: &Range<usize>, name: &mut dyn FnMut(u32, usize)| {
+            let (low, count) = (cells.start as u32, cells.len() as u32);
+            for Part { first, cells } in &parts {
+                if cells[0] < low + count && cells[1] >= low {
+                    let rows = *first as usize..at.len().min(*first as usize + ROWS);
+                    for (row, key) in (*first..).zip(&keys[rows]) {
+                        let cell = key.wrapping_sub(low);
+                        if cell < count {
+                            name(row, cell as usize);
+                        }
+                    }
+                }
+            }
+        };
+        each(threads, threads, |_, number| {
+            let mine = share(number);
+            // SAFETY: each job has its own cells and its own total.
+            let start = unsafe { all_start.part(mine.start + 2..mine.end + 2) };
+            start.fill(0);
+            let mut total = 0;
+            rows_in(&mine, &mut |_, cell| {
+                start[cell] += 1;
+                total += 1;
+            });
+            unsafe { *totals.row(number) = total };
+        });
+        let all_order = Shared::new(order);
+        each(threads, threads, |_, number| {
+            let mine = share(number);
+            // SAFETY: as above, and the totals are written.
+            let start = unsafe { all_start.part(mine.start + 2..mine.end + 2) };
+            let mut sum: u32 = unsafe { totals.read(0..number) }.iter().sum();
+            for cell in start.iter_mut() {
+                let count = *cell;
+                *cell = sum;
+                sum += count;
+            }
+            // Each cell's count has become the first row of the cell, two further: as rows are
+            // placed, it grows to the first of the next cell, one further.
+            rows_in(&mine, &mut |row, cell| {
+                let place = &mut start[cell];
+                // SAFETY: each row comes to one place.
+                unsafe { *all_order.row(*place as usize) = row };
+                *place += 1;
+            });
+        });
         // start[cell + 2] is now the first row after the cell.
-        (self.start, self.keys, self.order) = (start, keys, order);
+        start[..2].fill(0);
+        (self.start, self.parts) = (start, parts);
     }
 }
 
-/// Puts a column into the order; `spare` is only scribbled on.
-pub(super) fn reorder<T: Copy + Default + Send + Sync>(
-    column: &mut Vec<T>,
-    spare: &mut Vec<T>,
+/// Puts a column of rows into the order.
+pub(super) fn reorder_rows(
+    column: &mut Vec<Row>,
+    spare: &mut Vec<Row>,
     order: &[u32],
     threads: usize,
 ) {
-    spare.resize(order.len(), T::default());
-    {
-        let column = &column[..];
-        let spare = Shared::new(spare);
-        work(threads, |member| {
-            let rows = member.share(order.len());
-            // SAFETY: each thread has its own rows.
-            let to = unsafe { spare.part(rows.clone()) };
-            for (to, from) in to.iter_mut().zip(&order[rows]) {
-                *to = column[*from as usize];
-            }
-        });
-    }
+    spare.resize(order.len(), [0.0; 4]);
+    take_in_order(column, Shared::new(spare), order, threads);
     std::mem::swap(column, spare);
+}
+
+/// Puts a column of numbers into the order.
+pub(super) fn reorder<T: Pod + Send + Sync>(
+    column: &mut [T],
+    spare: &mut Vec<Row>,
+    order: &[u32],
+    threads: usize,
+) {
+    spare.resize(order.len(), [0.0; 4]);
+    let spare = Shared::new(cast_slice_mut(spare));
+    take_in_order(column, spare, order, threads);
+    let column = Shared::new(column);
+    each_rows(threads, order.len(), |rows| {
+        // SAFETY: each job has its own rows.
+        let (to, from) = unsafe { (column.part(rows.clone()), spare.read(rows)) };
+        to.copy_from_slice(from);
+    });
+}
+
+fn take_in_order<T: Copy + Send + Sync>(from: &[T], to: Shared<T>, order: &[u32], threads: usize) {
+    each_rows(threads, order.len(), |rows| {
+        // SAFETY: each job has its own rows.
+        let to = unsafe { to.part(rows.clone()) };
+        for (to, row) in to.iter_mut().zip(&order[rows]) {
+            *to = from[*row as usize];
+        }
+    });
 }

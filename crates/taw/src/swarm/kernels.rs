@@ -162,9 +162,7 @@ fn normal_and_overlap<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> (V<L>, L) {
 /// The same for fans: each ball and up to eight others at a time.
 pub(super) struct DisplaceFans<'a> {
     pub at: Shared<'a, Row>,
-    /// The row of the first fan.
-    pub first: u32,
-    pub fans: &'a Fans,
+    pub fans: Fans<'a>,
 }
 
 /// Which part of an overlap each of two balls moves, by how many overlap the first one: where
@@ -189,22 +187,23 @@ static FIRST: [[u16; LANES]; LANES + 1] = {
 impl Kernel for DisplaceFans<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let mut rest = self.fans.list();
-        let mut row = self.first as usize;
-        while rest.len() > LANES {
+        let Fans { first, rows, list: mut rest } = self.fans;
+        for row in first..first + rows {
             let mut left = usize::from(rest[0]);
             rest = &rest[1..];
-            let ball = self.at.row(row);
-            row += 1;
             if left == 0 {
                 continue;
             }
+            let ball = self.at.row(row as usize);
             // SAFETY: no other thread has this row and those of its fan (see `Slab`).
             let mut own = unsafe { *ball };
-            while let Some(eight) = rest.first_chunk::<LANES>()
-                && left > 0
-            {
+            while left > 0 {
                 let count = left.min(LANES);
+                let mut end = [0; LANES];
+                let eight = rest.first_chunk().unwrap_or_else(|| {
+                    end[..count].copy_from_slice(&rest[..count]);
+                    &end
+                });
                 // The places that are left over name the ball itself: what is written there is
                 // written over below.
                 let mut after = FIRST[count];

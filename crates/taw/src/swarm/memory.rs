@@ -4,7 +4,7 @@ use super::kernels::Pushes;
 use super::pairs::Batch;
 use super::slab::Slab;
 use super::strays::Strays;
-use super::team::{Shared, work};
+use super::team::{Shared, each};
 use super::touch::Touch;
 use super::walls::find;
 use crate::math::Vec3;
@@ -39,10 +39,8 @@ impl Memory {
             // SAFETY: the first ball of a pair is in the slab, so only one thread counts it; and
             // the strays come alone.
             let count = |[row, _]: [u32; 2], _: Kept| unsafe { *counts.row(row as usize + 2) += 1 };
-            work(threads, |member| {
-                slabs[member.share(slabs.len())]
-                    .iter()
-                    .for_each(|slab| bearing(&slab.batches, &slab.pushes, count));
+            each(threads, slabs.len(), |_, slab| {
+                bearing(&slabs[slab].batches, &slabs[slab].pushes, count);
             });
             bearing(&strays.batches, &strays.pushes, count);
         }
@@ -61,10 +59,8 @@ impl Memory {
             *places.row(*place as usize) = kept;
             *place += 1;
         };
-        work(threads, |member| {
-            slabs[member.share(slabs.len())]
-                .iter()
-                .for_each(|slab| bearing(&slab.batches, &slab.pushes, place));
+        each(threads, slabs.len(), |_, slab| {
+            bearing(&slabs[slab].batches, &slabs[slab].pushes, place);
         });
         bearing(&strays.batches, &strays.pushes, place);
     }

@@ -108,8 +108,11 @@ pub struct Swarm {
     guest_rows: Vec<u32>,
     /// A bit for each slot.
     guest_slots: Vec<u64>,
+    /// What a column is put in order with; then, in the lab's tier, the fans of all slabs.
     spare: Vec<Row>,
-    spare_numbers: Vec<u32>,
+    lists: Vec<Vec<u32>>,
+    /// How far each slab is, while they are worked on.
+    slab_states: Vec<u32>,
     searches: Vec<Search>,
     rebuilds: u64,
 }
@@ -297,8 +300,8 @@ impl Swarm {
     pub fn pairs(&self) -> usize {
         let slabs = &self.slabs[..self.slab_count];
         let batches = slabs.iter().flat_map(|slab| &slab.batches).chain(&self.strays.batches);
-        let fans = slabs.iter().map(|slab| slab.fans.count());
-        batches.map(|batch| batch.count as usize).chain(fans).sum()
+        let lists = slabs.iter().flat_map(|slab| slab.fans(self.fans()).of_rows());
+        batches.map(|batch| batch.count as usize).chain(lists.map(<[u16]>::len)).sum()
     }
 
     /// How often pairs were sought so far.
@@ -320,7 +323,9 @@ impl Swarm {
             + of(&self.way)
             + of(&self.before)
             + of(&self.spare)
-            + of(&self.spare_numbers)
+            + self.lists.iter().map(of).sum::<usize>()
+            + of(&self.lists)
+            + of(&self.slab_states)
             + self.ids.bytes()
             + self.grid.bytes()
             + self.memory.bytes()
@@ -329,6 +334,12 @@ impl Swarm {
             + self.strays.bytes()
             + of(&self.leaving)
             + of(&self.slabs)
+    }
+
+    /// The fans of all slabs, [`FAN`](pairs::FAN) numbers for each row; none in the full tier.
+    fn fans(&self) -> &[u16] {
+        let has_fans = !self.rough() && self.paired;
+        if has_fans { bytemuck::cast_slice(&self.spare) } else { &[] }
     }
 
     /// Whether there is friction, bounce and spin.

@@ -152,18 +152,40 @@ impl Sink for Filler<'_> {
     }
 }
 
-/// For each row of a slab, how many fans of up to eight others it has, and these: how many, and
-/// how far after it each is.
-#[derive(Clone, Debug, Default)]
-pub(super) struct Fans {
-    /// With room for [`LANES`] after the last one, which are read and not used.
-    list: Vec<u16>,
+/// How many numbers the fans of a row may take, on average over a slab: as many as fit into a
+/// row of a column that is not in use meanwhile.
+pub(super) const FAN: usize = size_of::<Row>() / size_of::<u16>();
+
+/// For each row of a slab, how many others its fan has, and how far after it each of them is.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Fans<'a> {
+    /// The first row.
+    pub first: u32,
+    pub rows: u32,
+    /// Only a part of it, at the beginning, means anything.
+    pub list: &'a [u16],
+}
+
+impl<'a> Fans<'a> {
+    /// The others of each row.
+    pub fn of_rows(self) -> impl Iterator<Item = &'a [u16]> {
+        let mut rest = self.list;
+        (0..self.rows).map_while(move |_| {
+            let (count, more) = rest.split_first()?;
+            let (fan, more) = more.split_at_checked((*count).into())?;
+            rest = more;
+            Some(fan)
+        })
+    }
 }
 
 /// Puts fans one after another, and what fits into none of them into batches.
 struct FanFiller<'a> {
+    /// The next row, and the one after the last.
     next: u32,
-    list: &'a mut Vec<u16>,
+    end: u32,
+    list: &'a mut [u16],
+    filled: usize,
     filler: Filler<'a>,
 }
 
@@ -172,7 +194,8 @@ impl FanFiller<'_> {
     #[inline(always)]
     fn skip_to(&mut self, row: u32) {
         while self.next < row {
-            self.list.push(0);
+            self.list[self.filled] = 0;
+            self.filled += 1;
             self.next += 1;
         }
     }
@@ -183,17 +206,19 @@ impl Sink for FanFiller<'_> {
     fn fan(&mut self, ball: u32, near: &[u32]) {
         debug_assert!(self.next <= ball);
         self.skip_to(ball);
-        self.next = ball + 1;
-        // They come in order.
-        let far = |row: &u32| row - ball > u32::from(u16::MAX);
-        let most = near.len().min(u16::MAX.into());
-        let mut count = most;
-        while count > 0 && far(&near[count - 1]) {
+        // The rows from this one on need a number each. The others come in order.
+        let room = self.list.len() - self.filled - (self.end - ball) as usize;
+        let mut count = near.len().min(room);
+        while count > 0 && near[count - 1] - ball > u32::from(u16::MAX) {
             count -= 1;
         }
         let (near, rest) = near.split_at(count);
-        self.list.push(count as u16);
-        self.list.extend(near.iter().map(|other| (other - ball) as u16));
+        let (number, others) = (self.filled, self.filled + 1..self.filled + 1 + count);
+        (self.next, self.filled) = (ball + 1, others.end);
+        self.list[number] = count as u16;
+        for (after, other) in self.list[others].iter_mut().zip(near) {
+            *after = (other - ball) as u16;
+        }
         for other in rest {
             self.filler.add(ball, *other);
         }
@@ -202,32 +227,6 @@ impl Sink for FanFiller<'_> {
     #[inline(always)]
     fn pair(&mut self, a: u32, b: u32) {
         self.filler.add(a, b);
-    }
-}
-
-impl Fans {
-    /// The others of each row.
-    pub fn of_rows(&self) -> impl Iterator<Item = &[u16]> {
-        let mut rest = &self.list[..self.list.len().saturating_sub(LANES)];
-        std::iter::from_fn(move || {
-            let (count, more) = rest.split_first()?;
-            let (fan, more) = more.split_at((*count).into());
-            rest = more;
-            Some(fan)
-        })
-    }
-
-    /// How many pairs there are.
-    pub fn count(&self) -> usize {
-        self.of_rows().map(<[u16]>::len).sum()
-    }
-
-    pub fn list(&self) -> &[u16] {
-        &self.list
-    }
-
-    pub fn bytes(&self) -> usize {
-        self.list.capacity() * size_of::<u16>()
     }
 }
 
@@ -246,8 +245,8 @@ pub(super) struct FindPairs<'a> {
     pub search: &'a mut Search,
     /// Where pairs go that are part of no fan.
     pub batches: &'a mut Vec<Batch>,
-    /// Where fans go, if there shall be any.
-    pub fans: Option<&'a mut Fans>,
+    /// Where fans go, if there shall be any: [`FAN`] for each row of the slab.
+    pub fans: Option<&'a mut [u16]>,
 }
 
 impl Kernel for FindPairs<'_> {
@@ -260,17 +259,13 @@ impl Kernel for FindPairs<'_> {
         columns.window.fill_with(&at[window.clone()], &budget[window.clone()], cap);
         batches.clear();
         busy.clear();
-        let crowded =
-            fans.is_none() || grid.levels.len() > 1 || window.len() > usize::from(u16::MAX);
-        busy.resize(if crowded { window.len() } else { 0 }, 0);
+        busy.resize(window.len(), 0);
         let mut filler = Filler { first, busy, open, batches };
         let mut around = Around::new(columns, first..end);
-        if let Some(Fans { list }) = fans {
-            list.clear();
-            let mut fans = FanFiller { next: first, list, filler };
+        if let Some(list) = fans {
+            let mut fans = FanFiller { next: first, end: next, list, filled: 0, filler };
             find::<L>(grid, at, layers, rows, &mut around, &mut fans);
             fans.skip_to(next);
-            fans.list.resize(fans.list.len() + LANES, 0);
             fans.filler.close();
         } else {
             find::<L>(grid, at, layers, rows, &mut around, &mut filler);

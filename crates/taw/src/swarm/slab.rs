@@ -2,7 +2,7 @@ use std::ops::Range;
 
 use super::kernels::Pushes;
 use super::lanes::Row;
-use super::pairs::{Batch, Fans};
+use super::pairs::{Batch, FAN, Fans};
 use super::touch::Touch;
 
 /// Some layers of the grid, as much as one thread works on at a time. Pairs of its balls, among
@@ -15,8 +15,6 @@ pub(super) struct Slab {
     /// The first row, of it, of the next one, and after that.
     pub rows: [u32; 3],
     pub batches: Vec<Batch>,
-    /// Only in the lab's tier.
-    pub fans: Fans,
     pub pushes: Pushes,
     /// By rows.
     pub touches: Vec<Touch>,
@@ -46,7 +44,6 @@ impl Slab {
 
     pub fn bytes(&self) -> usize {
         self.batches.capacity() * size_of::<Batch>()
-            + self.fans.bytes()
             + self.pushes.bytes()
             + (self.touches.capacity() + self.old_touches.capacity()) * size_of::<Touch>()
             + (self.near_planes.capacity()
@@ -54,6 +51,19 @@ impl Slab {
                 + self.near_shapes.capacity()
                 + self.stopped.capacity())
                 * size_of::<u32>()
+    }
+
+    /// Where its fans are in the list of all.
+    pub fn fans_of_all(&self) -> Range<usize> {
+        let rows = self.own_rows();
+        rows.start * FAN..rows.end * FAN
+    }
+
+    /// Its fans, in the list of all.
+    pub fn fans<'a>(&self, all: &'a [u16]) -> Fans<'a> {
+        let [first, next, _] = self.rows;
+        let list = all.get(self.fans_of_all().start..).unwrap_or_default();
+        Fans { first, rows: next - first, list }
     }
 
     pub fn own_rows(&self) -> Range<usize> {

@@ -1,8 +1,5 @@
 //! The three verbs of a swarm.
 
-use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
-
 use super::kernels::{
     Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Pass, Predict, Soft, Solve,
     squared,
@@ -10,7 +7,7 @@ use super::kernels::{
 use super::lanes::Row;
 use super::slab::Slab;
 use super::strays::Strays;
-use super::team::{MOST_THREADS, Member, Shared, wait_for, work};
+use super::team::{Shared, each, each_beside, each_rows, list_rows};
 use super::walls::{Balls, HalfSpace, half_spaces};
 use super::{Stage, Surroundings, Swarm, Tier, lying};
 use crate::math::{Vec3, length};
@@ -66,23 +63,25 @@ impl Swarm {
         observe(Stage::Integrate);
         let (change, time) = (row(gravity * dt), [dt, dt, dt, 0.0]);
         let instructions = self.instructions;
-        let leaving = AtomicUsize::new(0);
+        let mut leaving = std::mem::take(&mut self.leaving);
+        leaving.clear();
+        // More than this are too many.
+        let most = self.strays.room(self.at.len()) + 1;
         {
             let (at, velocity) = (Shared::new(&mut self.at), Shared::new(&mut self.velocity));
             let (way, budget) = (Shared::new(&mut self.way), &self.budget[..]);
             let all_stopped = std::sync::Mutex::new(&mut self.stopped);
-            work(threads, |member| {
-                let rows = member.share(at.len());
+            list_rows(threads, at.len(), &mut self.lists, &mut leaving, |rows, leaving| {
                 let mut stopped = Vec::new();
-                // SAFETY: each thread has its own rows.
+                // SAFETY: each job has its own rows.
                 let (at, velocity, way) = unsafe {
                     (at.part(rows.clone()), velocity.part(rows.clone()), way.part(rows.clone()))
                 };
                 let (stop, first) = (&mut stopped, rows.start as u32);
                 instructions.run(Predict { at, velocity, way, change, time, stopped: stop, first });
-                if way.iter().zip(&budget[rows]).any(|(way, budget)| way > budget) {
-                    leaving.store(1, Ordering::Relaxed);
-                }
+                let both = way.iter().zip(&budget[rows]);
+                let leaves = (first..).zip(both).filter(|(_, (way, budget))| way > budget);
+                leaving.extend(leaves.map(|(row, _)| row).take(most));
                 if !stopped.is_empty()
                     && let Ok(mut all) = all_stopped.lock()
                 {
@@ -92,17 +91,11 @@ impl Swarm {
             self.stopped.sort_unstable();
         }
         self.hold_guests_in_lab();
-        let mut leaving_rows = std::mem::take(&mut self.leaving);
-        leaving_rows.clear();
-        if leaving.into_inner() > 0 {
-            let both = self.way.iter().zip(&self.budget);
-            let rows = (0..).zip(both).filter(|(_, (way, budget))| way > budget);
-            leaving_rows.extend(rows.map(|(row, _)| row));
-        }
-        if !self.paired || !leaving_rows.is_empty() {
+        leaving.retain(|row| self.way[*row as usize] > self.budget[*row as usize]);
+        if !self.paired || !leaving.is_empty() {
             self.stopped = self.stopped.iter().map(|row| self.ids.slots()[*row as usize]).collect();
             if self.paired {
-                self.seek_for(&leaving_rows, dt, walls, observe);
+                self.seek_for(&leaving, dt, walls, observe);
             } else {
                 self.build(dt, walls, observe);
             }
@@ -112,12 +105,14 @@ impl Swarm {
             observe(Stage::Walls);
             self.seek_walls(dt, walls);
         }
-        self.leaving = leaving_rows;
+        self.leaving = leaving;
         observe(Stage::Restitute);
         self.look_at_walls(walls, 0.0);
         self.find_guests();
         let (guests, planes) =
             (std::mem::take(&mut self.guest_rows), std::mem::take(&mut self.planes));
+        let spare = std::mem::take(&mut self.spare);
+        let fans: &[u16] = bytemuck::cast_slice(&spare);
         for _ in 0..self.model.substeps {
             self.each_slab(|_, columns, slab| {
                 // Other walls push the guests.
@@ -134,21 +129,20 @@ impl Swarm {
                     // SAFETY: a ball of the slab.
                     touch.displace(unsafe { &mut *columns.at.row(touch.row as usize) });
                 }
-                let (at, first) = (columns.at, slab.rows[0]);
-                instructions.run(DisplaceFans { at, first, fans: &slab.fans });
+                let (at, fans) = (columns.at, slab.fans(fans));
+                instructions.run(DisplaceFans { at, fans });
                 instructions.run(Displace { at, batches: &slab.batches });
             });
             let (at, batches) = (Shared::new(&mut self.at), &self.strays.batches);
             instructions.run(Displace { at, batches });
         }
-        (self.guest_rows, self.planes) = (guests, planes);
+        (self.guest_rows, self.planes, self.spare) = (guests, planes, spare);
         observe(Stage::Integrate);
         let per_second = [1.0 / dt, 1.0 / dt, 1.0 / dt, 0.0];
         let (velocity, budget) = (Shared::new(&mut self.velocity), Shared::new(&mut self.budget));
         let (at, way) = (&self.at[..], &self.way[..]);
-        work(threads, |member| {
-            let rows = member.share(at.len());
-            // SAFETY: each thread has its own rows.
+        each_rows(threads, at.len(), |rows| {
+            // SAFETY: each job has its own rows.
             let (velocity, budget) =
                 unsafe { (velocity.part(rows.clone()), budget.part(rows.clone())) };
             let (at, way) = (&at[rows.clone()], &way[rows]);
@@ -223,42 +217,40 @@ impl Swarm {
         let velocity = Shared::new(&mut self.velocity);
         let spin = Shared::new(&mut self.spin);
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
-        work(self.model.threads as usize, |member| {
-            for slab in member.share(slabs.len()) {
-                // SAFETY: each thread has its own slabs, and their rows.
-                let slab = unsafe { &mut *slabs.row(slab) };
-                if slab.asleep {
-                    continue;
-                }
-                let (velocity, spin) =
-                    unsafe { (velocity.part(slab.own_rows()), spin.part(slab.own_rows())) };
-                let budget = &budget[slab.own_rows()];
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            // SAFETY: each thread has its own slabs, and their rows.
+            let slab = unsafe { &mut *slabs.row(slab) };
+            if slab.asleep {
+                return;
+            }
+            let (velocity, spin) =
+                unsafe { (velocity.part(slab.own_rows()), spin.part(slab.own_rows())) };
+            let budget = &budget[slab.own_rows()];
+            slab.leaving.clear();
+            let rows = (slab.rows[0]..).zip(velocity.iter().zip(budget));
+            let leaves = |velocity: &Row, budget: f32| {
+                budget < 0.0 || squared(*velocity) * dt * dt > budget * budget
+            };
+            let leaving = rows.filter(|(_, (velocity, budget))| leaves(velocity, **budget));
+            slab.leaving.extend(leaving.map(|(row, _)| row));
+            let fastest = |from: u32, to: u32| {
+                let rows = (from - slab.rows[0]) as usize..(to - slab.rows[0]) as usize;
+                // Not its spin: on a single point a ball may spin for ever.
+                velocity[rows].iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt()
+            };
+            let [first, last] = [slab.layers[0] + 1, slab.layers[1] - 1];
+            slab.speed = [
+                fastest(slab.rows[0], slab.rows[1]),
+                fastest(slab.rows[0], grid.first_of_layer(first)),
+                fastest(grid.first_of_layer(last), slab.rows[1]),
+            ];
+            slab.slow = if slab.speed[0] < lying { slab.slow + dt } else { 0.0 };
+            if sleeps && slab.slow > FALL_ASLEEP {
+                (slab.asleep, slab.speed) = (true, [0.0; 3]);
                 slab.leaving.clear();
-                let rows = (slab.rows[0]..).zip(velocity.iter().zip(budget));
-                let leaves = |velocity: &Row, budget: f32| {
-                    budget < 0.0 || squared(*velocity) * dt * dt > budget * budget
-                };
-                let leaving = rows.filter(|(_, (velocity, budget))| leaves(velocity, **budget));
-                slab.leaving.extend(leaving.map(|(row, _)| row));
-                let fastest = |from: u32, to: u32| {
-                    let rows = (from - slab.rows[0]) as usize..(to - slab.rows[0]) as usize;
-                    // Not its spin: on a single point a ball may spin for ever.
-                    velocity[rows].iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt()
-                };
-                let [first, last] = [slab.layers[0] + 1, slab.layers[1] - 1];
-                slab.speed = [
-                    fastest(slab.rows[0], slab.rows[1]),
-                    fastest(slab.rows[0], grid.first_of_layer(first)),
-                    fastest(grid.first_of_layer(last), slab.rows[1]),
-                ];
-                slab.slow = if slab.speed[0] < lying { slab.slow + dt } else { 0.0 };
-                if sleeps && slab.slow > FALL_ASLEEP {
-                    (slab.asleep, slab.speed) = (true, [0.0; 3]);
-                    slab.leaving.clear();
-                    for (velocity, spin) in velocity.iter_mut().zip(spin) {
-                        *velocity = [0.0, 0.0, 0.0, -velocity[3]];
-                        *spin = [0.0; 4];
-                    }
+                for (velocity, spin) in velocity.iter_mut().zip(spin) {
+                    *velocity = [0.0, 0.0, 0.0, -velocity[3]];
+                    *spin = [0.0; 4];
                 }
             }
         });
@@ -282,24 +274,22 @@ impl Swarm {
             spin: Shared::new(&mut self.spin),
         };
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
-        work(self.model.threads as usize, |member| {
-            for slab in share(slabs, member) {
-                // SAFETY: each thread has its own slabs, and their rows.
-                let slab = unsafe { &mut *slabs.row(slab) };
-                if slab.asleep {
-                    continue;
-                }
-                let (rows, first) = (slab.own_rows(), slab.rows[0]);
-                let (at, velocity, budget) = unsafe {
-                    let at = columns.at.part(rows.clone());
-                    (at, columns.velocity.part(rows.clone()), budget.part(rows))
-                };
-                for touch in &mut slab.touches {
-                    touch.drift(time[0]);
-                }
-                let stopped = &mut slab.stopped;
-                instructions.run(Drift { at, velocity, budget, change, time, stopped, first });
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            // SAFETY: each thread has its own slabs, and their rows.
+            let slab = unsafe { &mut *slabs.row(slab) };
+            if slab.asleep {
+                return;
             }
+            let (rows, first) = (slab.own_rows(), slab.rows[0]);
+            let (at, velocity, budget) = unsafe {
+                let at = columns.at.part(rows.clone());
+                (at, columns.velocity.part(rows.clone()), budget.part(rows))
+            };
+            for touch in &mut slab.touches {
+                touch.drift(time[0]);
+            }
+            let stopped = &mut slab.stopped;
+            instructions.run(Drift { at, velocity, budget, change, time, stopped, first });
         });
     }
 
@@ -348,38 +338,16 @@ impl Swarm {
             spin: Shared::new(&mut self.spin),
         };
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
-        let begun = [const { AtomicUsize::new(0) }; MOST_THREADS];
-        work(self.model.threads as usize, |member| {
-            let one = |slab: usize| {
-                // SAFETY: a slab belongs to one thread. Of the next one, only what nobody changes
-                // meanwhile is read.
-                unsafe {
-                    let next = (slab + 1 < slabs.len()).then(|| {
-                        let next = slabs.row(slab + 1);
-                        ((*next).asleep, (*next).speed[0])
-                    });
-                    job(next, columns, &mut *slabs.row(slab));
-                }
-            };
-            let mine = share(slabs, member);
-            let begin = || begun[member.number].store(1, Ordering::Release);
-            if mine.is_empty() {
-                begin();
-            }
-            for even in mine.clone().step_by(2) {
-                one(even);
-                if even == mine.start {
-                    begin();
-                } else {
-                    one(even - 1);
-                }
-            }
-            if !mine.is_empty() && mine.len().is_multiple_of(2) {
-                // The last one shares balls with the first one of the next thread.
-                for next in &begun[member.number + 1..member.size] {
-                    wait_for(|| next.load(Ordering::Acquire) > 0);
-                }
-                one(mine.end - 1);
+        let (threads, states) = (self.model.threads as usize, &mut self.slab_states);
+        each_beside(threads, slabs.len(), states, |slab| {
+            // SAFETY: nobody works on a neighbour meanwhile. Of the next one, only what nobody
+            // changes is read.
+            unsafe {
+                let next = (slab + 1 < slabs.len()).then(|| {
+                    let next = slabs.row(slab + 1);
+                    ((*next).asleep, (*next).speed[0])
+                });
+                job(next, columns, &mut *slabs.row(slab));
             }
         });
     }
@@ -396,21 +364,19 @@ impl Swarm {
         let (planes, ahead) = (listed(&self.planes, self.model.tier), self.ahead(dt));
         let balls = Balls { at: &self.at, velocity: &self.velocity, budget: &self.budget, ahead };
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
-        work(self.model.threads as usize, |member| {
-            for slab in member.share(slabs.len()) {
-                // SAFETY: its own.
-                let slab = unsafe { &mut *slabs.row(slab) };
-                let old = std::mem::take(&mut slab.touches);
-                slab.touches = std::mem::take(&mut slab.old_touches);
-                slab.seek_walls(instructions, balls, planes, |touch| {
-                    super::walls::find(&old, touch).map(|same| (same.pressure, same.grip))
-                });
-                slab.old_touches = old;
-                slab.near_shapes.clear();
-                if shapes {
-                    let (rows, found) = (slab.own_rows(), &mut slab.near_shapes);
-                    super::walls::near_shapes(walls, balls.at, balls.budget, rows, found);
-                }
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            // SAFETY: its own.
+            let slab = unsafe { &mut *slabs.row(slab) };
+            let old = std::mem::take(&mut slab.touches);
+            slab.touches = std::mem::take(&mut slab.old_touches);
+            slab.seek_walls(instructions, balls, planes, |touch| {
+                super::walls::find(&old, touch).map(|same| (same.pressure, same.grip))
+            });
+            slab.old_touches = old;
+            slab.near_shapes.clear();
+            if shapes {
+                let (rows, found) = (slab.own_rows(), &mut slab.near_shapes);
+                super::walls::near_shapes(walls, balls.at, balls.budget, rows, found);
             }
         });
     }
@@ -452,19 +418,17 @@ impl Swarm {
         let (guests, slots) = (&self.guest_slots[..], self.ids.slots());
         let any = !self.guests.is_empty();
         let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
-        work(self.model.threads as usize, |member| {
-            for slab in member.share(slabs.len()) {
-                // SAFETY: its own.
-                let slab = unsafe { &mut *slabs.row(slab) };
-                if slab.asleep {
-                    continue;
-                }
-                slab.look_at_walls(walls, at, budget, material, before);
-                if any {
-                    // Walls push them elsewhere.
-                    let guest = |row: u32| Self::has_guest_slot(slots[row as usize], guests);
-                    slab.touches.retain(|touch| !guest(touch.row));
-                }
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            // SAFETY: its own.
+            let slab = unsafe { &mut *slabs.row(slab) };
+            if slab.asleep {
+                return;
+            }
+            slab.look_at_walls(walls, at, budget, material, before);
+            if any {
+                // Walls push them elsewhere.
+                let guest = |row: u32| Self::has_guest_slot(slots[row as usize], guests);
+                slab.touches.retain(|touch| !guest(touch.row));
             }
         });
     }
@@ -473,14 +437,6 @@ impl Swarm {
 /// The half-spaces of which the balls near them are listed. The lab's tier looks at all balls.
 pub(super) fn listed(planes: &[HalfSpace], tier: Tier) -> &[HalfSpace] {
     if tier == Tier::Full { planes } else { &[] }
-}
-
-/// The slabs of a thread: from an even one to an even one.
-fn share(slabs: Shared<Slab>, member: &Member) -> Range<usize> {
-    let even = |number: usize| {
-        if number == member.size { slabs.len() } else { (slabs.len() * number / member.size) & !1 }
-    };
-    even(member.number)..even(member.number + 1)
 }
 
 fn row(vector: Vec3<f32>) -> Row {

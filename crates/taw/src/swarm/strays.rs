@@ -38,7 +38,12 @@ struct Bore {
 impl Strays {
     /// Whether so many more would be too many.
     pub fn full(&self, more: usize, balls: usize) -> bool {
-        self.rows.len() + more > SOME + balls / PART
+        more > self.room(balls)
+    }
+
+    /// How many more there may be, among so many balls.
+    pub fn room(&self, balls: usize) -> usize {
+        (SOME + balls / PART).saturating_sub(self.rows.len())
     }
 
     /// Forgets all, in a swarm of so many.

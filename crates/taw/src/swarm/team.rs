@@ -1,54 +1,50 @@
-//! Threads that walk through a step together.
+//! Threads that help with a step.
 //!
 //! They live as long as the process, wait for work without a pause for a moment and then asleep,
-//! and serve one step at a time: whoever finds them busy works alone, to the same bits.
+//! and help with one thing at a time. Work is cut into jobs, and each thread takes the next one
+//! that nobody has: so a helper that the system gives no time holds up nobody, and it does not
+//! matter to the result how many there are.
 
 use std::cell::UnsafeCell;
 use std::ops::Range;
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// The most threads of a team.
 pub(super) const MOST_THREADS: usize = 64;
 /// How often a thread looks for work before it goes to sleep: some tenths of a millisecond.
 const PATIENCE: u32 = 1 << 14;
+/// How many rows make a job.
+pub(super) const ROWS: usize = 1 << 13;
 
-/// What the members of a team have in common while they work.
-#[derive(Debug, Default)]
-struct Common {
-    /// How many came to the barrier, and how many are done.
-    arrived: AtomicUsize,
-    done: AtomicUsize,
-}
-
-/// One thread of a team.
-#[derive(Debug)]
-pub(super) struct Member<'a> {
-    common: &'a Common,
-    /// Which one it is, and of how many.
-    pub number: usize,
-    pub size: usize,
-    barriers: usize,
-}
-
-/// The work of a team: a reference to a closure on the stack of the one who asked for it.
+/// Work that is going on: a reference to a closure on the stack of the one who asked for it,
+/// which is told the number of a helper.
 #[derive(Clone, Copy)]
-struct Job {
-    work: *const (dyn Fn(&mut Member) + Sync),
-    common: *const Common,
-    size: usize,
+struct Work {
+    work: *const (dyn Fn(usize) + Sync),
+    /// How many helpers there may be.
+    helpers: usize,
 }
 
-// SAFETY: what it points to is shared between threads, and outlives the work: see `Team::work`.
-unsafe impl Send for Job {}
+// SAFETY: what it points to is shared between threads, and outlives the work: see `together`.
+unsafe impl Send for Work {}
 
 /// Where the helpers find their work.
 #[derive(Default)]
 struct Board {
-    /// How many jobs were put up so far.
+    /// How much work was put up so far.
     count: AtomicUsize,
-    job: Mutex<Option<Job>>,
+    /// How many helpers have done their part of the last one.
+    done: AtomicUsize,
+    now: Mutex<Now>,
     wake: Condvar,
+}
+
+#[derive(Default)]
+struct Now {
+    work: Option<Work>,
+    /// How many helpers have taken part.
+    joined: usize,
 }
 
 /// The threads that help.
@@ -60,111 +56,108 @@ struct Helpers {
 
 static HELPERS: Mutex<Option<Helpers>> = Mutex::new(None);
 
-/// Does the work on as many threads as asked for, or on as many as can be had: the work must
-/// come out the same.
-pub(super) fn work(threads: usize, work: impl Fn(&mut Member) + Sync) {
-    let common = Common::default();
-    let alone = || work(&mut Member { common: &common, number: 0, size: 1, barriers: 0 });
+/// Calls this on the current thread, as number 0, and meanwhile on up to so many in all: the ones
+/// that come in time.
+fn together(threads: usize, work: impl Fn(usize) + Sync) {
     if threads <= 1 {
-        return alone();
+        return work(0);
     }
     let mut helpers = match HELPERS.try_lock() {
         Ok(helpers) => helpers,
         Err(TryLockError::Poisoned(helpers)) => helpers.into_inner(),
-        Err(TryLockError::WouldBlock) => return alone(),
+        Err(TryLockError::WouldBlock) => return work(0),
     };
     let helpers = helpers.get_or_insert_with(Helpers::default);
-    let size = 1 + helpers.at_least(threads.min(MOST_THREADS) - 1);
-    if size == 1 {
-        return alone();
-    }
-    let closure: &(dyn Fn(&mut Member) + Sync) = &work;
-    // SAFETY: only the lifetime changes. Below, this thread waits until all helpers are done,
-    // also if its own part panics; nobody looks at a job after that.
-    let closure: *const (dyn Fn(&mut Member) + Sync) = unsafe { std::mem::transmute(closure) };
-    helpers.board.put_up(Job { work: closure, common: &raw const common, size });
-    let wait = WaitForAll { common: &common, helpers: size - 1 };
-    work(&mut Member { common: &common, number: 0, size, barriers: 0 });
-    drop(wait);
+    let count = helpers.at_least(threads.min(MOST_THREADS) - 1);
+    let closure: &(dyn Fn(usize) + Sync) = &work;
+    // SAFETY: only the lifetime changes. `Open` takes the work off the board again and waits for
+    // those who took part, also if this thread panics.
+    let closure: *const (dyn Fn(usize) + Sync) = unsafe { std::mem::transmute(closure) };
+    helpers.board.put_up(Work { work: closure, helpers: count });
+    let open = Open { board: &helpers.board };
+    work(0);
+    drop(open);
 }
 
-/// Waits until the helpers have done their part.
-struct WaitForAll<'a> {
-    common: &'a Common,
-    helpers: usize,
+/// Work that is on the board.
+struct Open<'a> {
+    board: &'a Board,
 }
 
-impl Drop for WaitForAll<'_> {
+impl Drop for Open<'_> {
     fn drop(&mut self) {
-        if std::thread::panicking() {
-            // The others may wait at a barrier for what will never come.
-            std::process::abort();
-        }
-        wait_for(|| self.common.done.load(Ordering::Acquire) == self.helpers);
+        let joined = {
+            let mut now = self.board.lock();
+            now.work = None;
+            now.joined
+        };
+        wait_for(|| self.board.done.load(Ordering::Acquire) == joined);
     }
 }
 
 impl Helpers {
-    /// Makes so many, if the system gives them; says how many take part.
+    /// Makes so many, if the system gives them; says how many may take part.
     fn at_least(&mut self, count: usize) -> usize {
         while self.count < count {
-            let (board, number) = (self.board.clone(), self.count + 1);
-            let seen = board.count.load(Ordering::Acquire);
-            let thread = std::thread::Builder::new().name(format!("taw {number}"));
-            if thread.spawn(move || help(&board, number, seen)).is_err() {
+            let board = self.board.clone();
+            let thread = std::thread::Builder::new().name(format!("taw {}", self.count + 1));
+            if thread.spawn(move || help(&board)).is_err() {
                 break;
             }
             self.count += 1;
         }
-        self.count.min(count)
+        count
     }
 }
 
 impl Board {
-    fn lock(&self) -> MutexGuard<'_, Option<Job>> {
-        self.job.lock().unwrap_or_else(PoisonError::into_inner)
+    fn lock(&self) -> MutexGuard<'_, Now> {
+        self.now.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn put_up(&self, job: Job) {
-        *self.lock() = Some(job);
-        self.count.fetch_add(1, Ordering::Release);
+    fn put_up(&self, work: Work) {
+        {
+            let mut now = self.lock();
+            self.done.store(0, Ordering::Relaxed);
+            *now = Now { work: Some(work), joined: 0 };
+            self.count.fetch_add(1, Ordering::Release);
+        }
         self.wake.notify_all();
     }
 
-    /// Waits for a job that is not yet seen.
-    fn next(&self, seen: &mut usize) -> Option<Job> {
+    /// Waits for work that is not yet seen, and joins it if there is room.
+    fn next(&self, seen: &mut usize) -> Option<(Work, usize)> {
         let news = |seen: usize| self.count.load(Ordering::Acquire) != seen;
         let mut looked = 0;
         while !news(*seen) && looked < PATIENCE {
             std::hint::spin_loop();
             looked += 1;
         }
-        let mut job = self.lock();
+        let mut now = self.lock();
         while !news(*seen) {
-            job = self.wake.wait(job).unwrap_or_else(PoisonError::into_inner);
+            now = self.wake.wait(now).unwrap_or_else(PoisonError::into_inner);
         }
         *seen = self.count.load(Ordering::Acquire);
-        *job
+        let work = now.work.filter(|work| now.joined < work.helpers)?;
+        now.joined += 1;
+        Some((work, now.joined))
     }
 }
 
 /// The life of a helper.
-fn help(board: &Board, number: usize, mut seen: usize) {
+fn help(board: &Board) {
+    let mut seen = 0;
     loop {
-        let Some(job) = board.next(&mut seen) else { continue };
-        if number >= job.size {
-            continue;
-        }
+        let Some((work, number)) = board.next(&mut seen) else { continue };
         let guard = AbortOnPanic;
-        // SAFETY: whoever put up the job waits until this part of it is done.
-        let (work, common) = unsafe { (&*job.work, &*job.common) };
-        work(&mut Member { common, number, size: job.size, barriers: 0 });
-        common.done.fetch_add(1, Ordering::Release);
+        // SAFETY: whoever put it up waits for those who joined.
+        unsafe { (*work.work)(number) };
+        board.done.fetch_add(1, Ordering::Release);
         std::mem::forget(guard);
     }
 }
 
-/// The others would wait for ever for one that is no more.
+/// Others would wait for ever for a job that nobody ends.
 struct AbortOnPanic;
 
 impl Drop for AbortOnPanic {
@@ -173,26 +166,110 @@ impl Drop for AbortOnPanic {
     }
 }
 
-impl Member<'_> {
-    /// Waits until all have come here; what they wrote before, all can read after.
-    pub fn barrier(&mut self) {
-        if self.size == 1 {
-            return;
+/// Does so many jobs, in any order. Each is told the number of its thread, which is less than
+/// `threads`, and its own.
+pub(super) fn each(threads: usize, count: usize, job: impl Fn(usize, usize) + Sync) {
+    let size = threads.clamp(1, MOST_THREADS).min(count);
+    // Everybody has a share, so that memory stays with the same threads, and helps with the next
+    // one then.
+    let begin = |share: usize| count * share / size;
+    let taken = [const { AtomicUsize::new(0) }; MOST_THREADS];
+    together(size, |number| {
+        for share in (number..size).chain(0..number) {
+            loop {
+                let at = begin(share) + taken[share].fetch_add(1, Ordering::Relaxed);
+                if at >= begin(share + 1) {
+                    break;
+                }
+                job(number, at);
+            }
         }
-        self.barriers += 1;
-        self.common.arrived.fetch_add(1, Ordering::AcqRel);
-        let all = self.barriers * self.size;
-        wait_for(|| self.common.arrived.load(Ordering::Acquire) >= all);
-    }
+    });
+}
 
-    /// Its share of so many things.
-    pub fn share(&self, count: usize) -> Range<usize> {
-        count * self.number / self.size..count * (self.number + 1) / self.size
-    }
+/// Does something with so many rows, some at a time.
+pub(super) fn each_rows(threads: usize, rows: usize, job: impl Fn(Range<usize>) + Sync) {
+    each(threads, rows.div_ceil(ROWS), |_, part| job(part * ROWS..rows.min((part + 1) * ROWS)));
+}
+
+/// The same, and lists rows: those that each part names, in the order of the rows. `lists` is
+/// only scribbled on.
+pub(super) fn list_rows(
+    threads: usize,
+    rows: usize,
+    lists: &mut Vec<Vec<u32>>,
+    listed: &mut Vec<u32>,
+    job: impl Fn(Range<usize>, &mut Vec<u32>) + Sync,
+) {
+    lists.resize_with(rows.div_ceil(ROWS), Vec::new);
+    let lists = Shared::new(lists);
+    each_rows(threads, rows, |rows| {
+        // SAFETY: one for each part.
+        let list = unsafe { &mut *lists.row(rows.start / ROWS) };
+        list.clear();
+        job(rows, list);
+    });
+    // SAFETY: nobody works any more.
+    unsafe { lists.read(0..lists.len()) }.iter().for_each(|list| listed.extend(list));
+}
+
+/// How far along each of a row of neighbours is; see [`each_beside`].
+const TAKEN: u32 = 1;
+const DONE: u32 = 2;
+
+/// Does so many jobs, of which neighbours must not be done at a time: even ones come before the
+/// odd ones beside them. `state` is only scribbled on.
+pub(super) fn each_beside(
+    threads: usize,
+    count: usize,
+    state: &mut Vec<u32>,
+    job: impl Fn(usize) + Sync,
+) {
+    state.clear();
+    state.resize(count, 0);
+    let state = Shared::new(state);
+    // SAFETY: while they are shared they are only used as atomics.
+    let state = |at: usize| unsafe { AtomicU32::from_ptr(state.row(at)) };
+    let take = |at: usize| {
+        state(at).load(Ordering::Relaxed) == 0
+            && state(at).compare_exchange(0, TAKEN, Ordering::Relaxed, Ordering::Relaxed).is_ok()
+    };
+    let one = |at: usize| {
+        let guard = AbortOnPanic;
+        job(at);
+        std::mem::forget(guard);
+        state(at).store(DONE, Ordering::Release);
+    };
+    let free = |odd: usize| {
+        let done = |at: usize| state(at).load(Ordering::Acquire) == DONE;
+        done(odd - 1) && (odd + 1 == count || done(odd + 1))
+    };
+    let (evens, size) = (count.div_ceil(2), threads.clamp(1, MOST_THREADS).min(count));
+    together(size, |number| {
+        let begin = evens * number / size;
+        let order = || (begin..evens).chain(0..begin).map(|half| 2 * half);
+        for even in order() {
+            if take(even) {
+                one(even);
+            }
+            // The one before it, while its balls are at hand.
+            if even > 0 && free(even - 1) && take(even - 1) {
+                one(even - 1);
+            }
+        }
+        for odd in order().map(|even| even + 1).filter(|odd| *odd < count) {
+            if state(odd).load(Ordering::Relaxed) == 0 {
+                wait_for(|| free(odd));
+                if take(odd) {
+                    one(odd);
+                }
+            }
+        }
+    });
 }
 
 /// Waits for what takes long to come only if another thread was put to sleep.
-pub(super) fn wait_for(ready: impl Fn() -> bool) {
+fn wait_for(ready: impl Fn() -> bool) {
     let mut looked = 0_u32;
     while !ready() {
         looked += 1;
