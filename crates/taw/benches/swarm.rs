@@ -101,26 +101,26 @@ fn full_moving(bencher: Bencher, count: usize) {
     bench(bencher, count, Tier::Full, 2, 60);
 }
 
-/// As many steps later, for each pair of balls that are near each other.
-fn per_pair(bencher: Bencher, mut world: World<f32>) {
+/// As many steps later, for each contact: balls that are near each other or near a wall.
+fn per_contact(bencher: Bencher, mut world: World<f32>) {
     for _ in 0..300 {
         world.step(DT).expect("a step");
     }
-    let pairs = ItemsCount::new(world.swarm.pairs());
-    bencher.counter(pairs).bench_local(|| world.step(DT).expect("a step"));
+    let contacts = ItemsCount::new(world.swarm.pairs() + world.swarm.near_walls());
+    bencher.counter(contacts).bench_local(|| world.step(DT).expect("a step"));
 }
 
-/// Items are pairs here, to be compared with those of the next one.
+/// Items are contacts here, to be compared with those of the next one.
 #[divan::bench(sample_count = 60, sample_size = 1)]
-fn pairs_of_sizes_alike(bencher: Bencher) {
-    per_pair(bencher, world(100_000, Tier::Full, 2));
+fn contacts_of_sizes_alike(bencher: Bencher) {
+    per_contact(bencher, world(100_000, Tier::Full, 2));
 }
 
 /// Radii from 0.005 to 0.5 m, as many in each octave.
 #[divan::bench(sample_count = 60, sample_size = 1)]
-fn pairs_of_sizes_one_to_a_hundred(bencher: Bencher) {
+fn contacts_of_sizes_one_to_a_hundred(bencher: Bencher) {
     let mixed = balls(100_000, |random| 0.005 * 100_f32.powf(random));
-    per_pair(bencher, world_of(mixed, Tier::Full, 2));
+    per_contact(bencher, world_of(mixed, Tier::Full, 2));
 }
 
 /// In one call.

@@ -2,6 +2,7 @@
 
 use super::grid::{reorder, reorder_rows};
 use super::kernels::squared;
+use super::memory::fit;
 use super::pairs::{FindPairs, Search};
 use super::slab::Slab;
 use super::step::listed;
@@ -14,6 +15,12 @@ const SLAB: u32 = 512;
 const STEPS: f32 = 12.0;
 /// or so many times as far as the margin at most if it is sought for alone.
 const FAR: f32 = 16.0;
+
+/// Where a ball has fewer pairs than this and they are sought again after fewer steps than this,
+/// the margin becomes up to so much wider.
+const SPARSE: f32 = 2.0;
+const SOON: u32 = 6;
+const WIDEST: f32 = 6.0;
 
 impl Swarm {
     /// Seeks pairs anew.
@@ -30,6 +37,9 @@ impl Swarm {
             self.remember();
         }
         observe(Stage::Order);
+        if self.paired {
+            self.adapt_margin();
+        }
         let cap = self.margin();
         // The budgets make room for the order: they are set anew after that.
         let order = bytemuck::cast_slice_mut(&mut self.budget);
@@ -39,6 +49,7 @@ impl Swarm {
         observe(Stage::Pairs);
         self.cut_slabs();
         self.find_pairs(cap, dt, walls);
+        self.memory.fit();
         self.paired = true;
         self.remembers = false;
     }
@@ -46,7 +57,15 @@ impl Swarm {
     /// How far most balls may go at most until pairs are sought again, in metres. In the lab's
     /// tier a heap is livelier, and a pair more costs less.
     fn margin(&self) -> f32 {
-        self.mean * if self.rough() { 0.2 } else { 0.3 }
+        self.mean * (1.0 + self.spread) * if self.rough() { 0.2 } else { 0.3 }
+    }
+
+    /// Widens the margin where balls leave it soon although few are beside each other.
+    fn adapt_margin(&mut self) {
+        let sparse = (self.pairs() as f32) < SPARSE * self.len() as f32;
+        let wish = if sparse && self.steps_since_build < SOON { WIDEST } else { 0.0 };
+        self.spread += (wish - self.spread) * 0.3;
+        self.steps_since_build = 0;
     }
 
     /// Says how far each ball may go: more than the cap only if it is sought for alone.
@@ -75,10 +94,14 @@ impl Swarm {
             each_rows(threads, self.at.len(), |rows| {
                 // SAFETY: as above.
                 let budgets = unsafe { budgets.part(rows) };
-                budgets.iter_mut().for_each(|budget| *budget = budget.min(cap));
+                for budget in budgets {
+                    *budget = budget.min(cap);
+                }
             });
         } else {
-            fast.iter().for_each(|row| self.strays.add(*row));
+            for row in &fast {
+                self.strays.add(*row);
+            }
         }
         self.leaving = fast;
     }
@@ -165,14 +188,14 @@ impl Swarm {
             }
             count += 1;
         }
-        self.slab_count = count;
+        self.slabs.truncate(count);
     }
 
     fn find_pairs(&mut self, cap: f32, dt: f32, walls: &dyn Surroundings) {
         let (threads, rough) = (self.model.threads as usize, self.rough());
         let (instructions, ahead) = (self.instructions, self.ahead(dt));
         self.searches.resize(threads, Search::default());
-        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        let slabs = Shared::new(&mut self.slabs);
         let searches = Shared::new(&mut self.searches);
         let (grid, at, budget) = (&self.grid, &self.at[..], &self.budget[..]);
         let (memory, before, planes) =
@@ -196,6 +219,7 @@ impl Swarm {
                 batches: &mut slab.batches,
                 fans,
             });
+            fit(&mut slab.batches);
             if rough {
                 slab.pushes.reset(slab.batches.len());
                 memory.recall(&slab.batches, before, &mut slab.pushes);
@@ -203,6 +227,7 @@ impl Swarm {
             slab.seek_walls(instructions, balls, planes, |touch| {
                 rough.then(|| memory.recall_touch(before, touch)).flatten()
             });
+            fit(&mut slab.touches);
             slab.near_shapes.clear();
             if shapes {
                 walls::near_shapes(walls, at, budget, slab.own_rows(), &mut slab.near_shapes);
@@ -268,8 +293,8 @@ mod tests {
             }
             world.swarm.build(1.0 / 60.0, &world.walls, &mut |_| ());
             let swarm = &world.swarm;
-            assert!(swarm.slab_count > 3 && !swarm.strays.rows.is_empty());
-            let all = &swarm.slabs[..swarm.slab_count];
+            assert!(swarm.slabs.len() > 3 && !swarm.strays.rows.is_empty());
+            let all = &swarm.slabs[..];
             let slabs = all.iter().map(|slab| &slab.batches);
             let mut found = BTreeSet::new();
             for slab in all {

@@ -1,6 +1,6 @@
 //! The order of the rows: cell by cell, layer by layer.
 //!
-//! Cells of level 0 are as wide as the largest ball and the skin; each further level halves them.
+//! Cells of level 0 are as wide as the largest ball and the skin; each further level quarters them.
 //! A ball is in the finest level whose cells are as wide as itself and the skin. The layers of
 //! level 0 are cut across the longest side of the scene; each of them holds, level by level, the
 //! cells that lie in it, row by row along the second side, each row along the third. So three
@@ -12,6 +12,7 @@ use std::ops::Range;
 use bytemuck::{Pod, cast_slice_mut};
 
 use super::lanes::Row;
+use super::memory::fit;
 use super::team::{ROWS, Shared, each, each_rows};
 
 /// Cells in all, for each ball.
@@ -22,8 +23,10 @@ const CELLS: f64 = 4096.0;
 const SIDE: f64 = 4096.0;
 /// Cells are wider than they need be by this part, which is more than rounding takes.
 const MARGIN: f32 = 1.005;
-/// Levels at most.
-pub(super) const LEVELS: usize = 8;
+/// How often cells are halved at most, and how often from one level to the next: with a level for
+/// each halving, most time goes into looking up empty cells.
+const HALVINGS: usize = 6;
+const HALVINGS_PER_LEVEL: usize = 2;
 /// How many balls are asked where the scene is.
 const SAMPLE: usize = 1024;
 
@@ -40,7 +43,7 @@ pub(super) struct Level {
     cells: u32,
     /// The first cell of this level in a layer of level 0.
     base: u32,
-    /// Its place in the list of levels.
+    /// How often cells were halved.
     pub number: u32,
     /// Cells in a row and in a layer, with the empty ones around.
     pub row_stride: u32,
@@ -182,7 +185,7 @@ impl Grid {
         self.levels.clear();
         self.per_layer = 0;
         let mut total = 0.0;
-        for level in 0..LEVELS as u32 {
+        for level in (0..=HALVINGS as u32).step_by(HALVINGS_PER_LEVEL) {
             let fine = (1_u32 << level) as f32;
             let widest = width / fine / MARGIN - skin;
             let count = cells(sides.map(|n| n * fine));
@@ -223,6 +226,7 @@ impl Grid {
         let mut start = std::mem::take(&mut self.start);
         let mut parts = std::mem::take(&mut self.parts);
         start.resize(cells + 2, 0);
+        fit(&mut start);
         parts.resize(at.len().div_ceil(ROWS), Part::default());
         spare.resize(at.len(), [0.0; 4]);
         let keys = Shared::new(cast_slice_mut(spare));

@@ -1,6 +1,7 @@
 //! What a step does to rows and to pairs, eight at a time.
 
 use super::lanes::{Kernel, LANES, Lanes, Row};
+use super::memory::{fit, make_room};
 use super::pairs::{Batch, Fans};
 use super::team::Shared;
 use super::walls::HalfSpace;
@@ -12,25 +13,31 @@ pub(super) struct Pushes {
     pub pressure: Vec<[f32; LANES]>,
     /// Those across them.
     pub grip: Vec<[[f32; LANES]; 3]>,
-    /// How fast they shall part because they bounce, in m/s.
-    pub rebound: Vec<[f32; LANES]>,
+    /// Of the batches in which some bounce: which one, and how fast they shall part, in m/s.
+    pub rebound: Vec<(u32, [f32; LANES])>,
 }
 
 impl Pushes {
     pub fn bytes(&self) -> usize {
         self.pressure.capacity() * size_of::<[f32; LANES]>()
             + self.grip.capacity() * size_of::<[[f32; LANES]; 3]>()
-            + self.rebound.capacity() * size_of::<[f32; LANES]>()
+            + self.rebound.capacity() * size_of::<(u32, [f32; LANES])>()
     }
 
     /// As many as there are batches, and none bears anything.
     pub fn reset(&mut self, batches: usize) {
-        self.pressure.clear();
-        self.pressure.resize(batches, [0.0; LANES]);
-        self.grip.clear();
-        self.grip.resize(batches, [[0.0; LANES]; 3]);
+        fn reset<T: Clone>(column: &mut Vec<T>, batches: usize, none: T) {
+            column.clear();
+            make_room(column, batches);
+            column.resize(batches, none);
+            fit(column);
+        }
+        reset(&mut self.pressure, batches, [0.0; LANES]);
+        reset(&mut self.grip, batches, [[0.0; LANES]; 3]);
+        // In a heap at rest few bounce.
         self.rebound.clear();
-        self.rebound.resize(batches, [0.0; LANES]);
+        self.rebound.shrink_to(batches / 16);
+        self.rebound.reserve_exact(batches / 16);
     }
 }
 
@@ -402,14 +409,19 @@ impl Solve<'_> {
     fn approach<L: Lanes>(self, speed: f32, restitution: f32) {
         let Self { columns, batches, pushes, .. } = self;
         let zero = L::splat(0.0);
-        for (batch, to) in batches.iter().zip(&mut pushes.rebound) {
+        pushes.rebound.clear();
+        for (batch, number) in batches.iter().zip(0..) {
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, _) = normal_and_gap(&a, &b);
             let [a, b] = gather::<L>(columns.velocity, batch);
             let closing = V::of(&a).minus(V::of(&b)).dot(normal);
             let rebound =
                 closing.pick_above(L::splat(speed), closing * L::splat(restitution), zero);
-            rebound.store(to);
+            if rebound.above(zero) != 0 {
+                let mut speeds = [0.0; LANES];
+                rebound.store(&mut speeds);
+                pushes.rebound.push((number, speeds));
+            }
         }
     }
 
@@ -488,11 +500,9 @@ impl Solve<'_> {
         let Self { columns, batches, pushes, .. } = self;
         let Pushes { pressure, rebound, .. } = pushes;
         let zero = L::splat(0.0);
-        for (i, batch) in batches.iter().enumerate() {
-            let speed = L::load(&rebound[i]);
-            if speed.above(zero) == 0 {
-                continue;
-            }
+        for (number, rebound) in rebound {
+            let i = *number as usize;
+            let (batch, speed) = (&batches[i], L::load(rebound));
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, _) = normal_and_gap(&a, &b);
             let [a, b] = gather::<L>(columns.velocity, batch);
@@ -501,7 +511,7 @@ impl Solve<'_> {
             // Only what has met, and once.
             let wish = before.pick_above(zero, speed - parting, zero);
             let wish = speed.pick_above(zero, wish, zero);
-            before.pick_above(zero, zero, speed).store(&mut rebound[i]);
+            before.pick_above(zero, zero, speed).store(rebound);
             let after = (before + wish * mass(&a, &b)).max(zero);
             after.store(&mut pressure[i]);
             let none = [[zero; 4]; 2];

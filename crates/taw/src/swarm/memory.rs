@@ -50,6 +50,7 @@ impl Memory {
             *start = sum;
         }
         self.kept.clear();
+        make_room(&mut self.kept, sum as usize);
         self.kept.resize(sum as usize, Kept::default());
         // As pairs are placed, each start grows to the one after it.
         let (start, places) = (Shared::new(&mut self.start), Shared::new(&mut self.kept));
@@ -63,6 +64,12 @@ impl Memory {
             bearing(&slabs[slab].batches, &slabs[slab].pushes, place);
         });
         bearing(&strays.batches, &strays.pushes, place);
+    }
+
+    /// Gives room back.
+    pub fn fit(&mut self) {
+        self.touches = Vec::new();
+        fit(&mut self.kept);
     }
 
     /// Remembers nothing of so many rows.
@@ -109,6 +116,22 @@ impl Memory {
     pub fn recall_touch(&self, before: &[u32], touch: &Touch) -> Option<(f32, Vec3<f32>)> {
         let then = Touch { row: before[touch.row as usize], ..*touch };
         find(&self.touches, &then).map(|kept| (kept.pressure, kept.grip))
+    }
+}
+
+/// Makes room for so many, and a few more. (A list that doubles is half empty for a long time.)
+#[inline(always)]
+pub(super) fn make_room<T>(list: &mut Vec<T>, count: usize) {
+    if list.capacity() < count {
+        list.reserve_exact(count + count / 16 + 8 - list.len());
+    }
+}
+
+/// Gives room back that is no longer needed.
+pub(super) fn fit<T>(list: &mut Vec<T>) {
+    let count = list.len() + list.len() / 16 + 8;
+    if list.capacity() > count + count / 4 {
+        list.shrink_to(count);
     }
 }
 

@@ -85,8 +85,6 @@ pub struct Swarm {
     mean: f32,
     grid: Grid,
     slabs: Vec<Slab>,
-    /// How many of them are in use.
-    slab_count: usize,
     /// The pairs of the fastest balls.
     strays: Strays,
     /// The rows that would leave their budget in this step.
@@ -115,6 +113,9 @@ pub struct Swarm {
     slab_states: Vec<u32>,
     searches: Vec<Search>,
     rebuilds: u64,
+    steps_since_build: u32,
+    /// How much wider than usual the margin is, as a part of it.
+    spread: f32,
 }
 
 impl Swarm {
@@ -291,17 +292,24 @@ impl Swarm {
     /// How many balls sleep.
     #[must_use]
     pub fn asleep(&self) -> usize {
-        let slabs = self.slabs[..self.slab_count].iter().filter(|slab| slab.asleep);
+        let slabs = self.slabs.iter().filter(|slab| slab.asleep);
         if self.paired { slabs.map(|slab| slab.own_rows().len()).sum() } else { 0 }
     }
 
     /// How many pairs of balls are near enough to be looked at.
     #[must_use]
     pub fn pairs(&self) -> usize {
-        let slabs = &self.slabs[..self.slab_count];
+        let slabs = &self.slabs[..];
         let batches = slabs.iter().flat_map(|slab| &slab.batches).chain(&self.strays.batches);
         let lists = slabs.iter().flat_map(|slab| slab.fans(self.fans()).of_rows());
         batches.map(|batch| batch.count as usize).chain(lists.map(<[u16]>::len)).sum()
+    }
+
+    /// How many times a ball is near enough to a wall to be looked at. (The lab's tier looks at
+    /// all balls for each half-space, and does not count these.)
+    #[must_use]
+    pub fn near_walls(&self) -> usize {
+        self.slabs.iter().map(|slab| slab.touches.len()).sum()
     }
 
     /// How often pairs were sought so far.
@@ -367,7 +375,7 @@ impl Swarm {
             return;
         }
         if self.paired {
-            let (slabs, threads) = (&self.slabs[..self.slab_count], self.model.threads as usize);
+            let (slabs, threads) = (&self.slabs[..], self.model.threads as usize);
             self.memory.keep(slabs, &self.strays, self.at.len(), threads);
         } else {
             self.memory.forget(self.at.len());
@@ -386,7 +394,7 @@ impl Swarm {
 
     fn wake(&mut self, row: usize) {
         if self.paired {
-            let slabs = &mut self.slabs[..self.slab_count];
+            let slabs = &mut self.slabs;
             let slab = slabs.partition_point(|slab| slab.rows[1] as usize <= row);
             if let Some(slab) = slabs.get_mut(slab) {
                 slab.wake(&mut self.velocity);
@@ -396,7 +404,7 @@ impl Swarm {
     }
 
     fn wake_all(&mut self) {
-        for slab in &mut self.slabs[..self.slab_count] {
+        for slab in &mut self.slabs {
             (slab.asleep, slab.slow) = (false, 0.0);
         }
         for velocity in &mut self.velocity {

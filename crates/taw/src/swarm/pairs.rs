@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use super::grid::{Grid, Level};
 use super::lanes::{Kernel, LANES, Lanes, Row};
+use super::memory::make_room;
 
 /// Eight pairs, none of which has a ball in common with another. As rows after a first one, so
 /// that two bytes suffice.
@@ -51,11 +52,9 @@ struct Columns {
 }
 
 impl Search {
-    /// Puts pairs of so many rows into batches.
-    pub fn filler<'a>(&'a mut self, rows: usize, batches: &'a mut Vec<Batch>) -> Filler<'a> {
-        self.busy.clear();
-        self.busy.resize(rows, 0);
-        Filler { first: 0, busy: &mut self.busy, open: &mut self.open, batches }
+    /// Puts pairs of about so many balls into batches.
+    pub fn filler<'a>(&'a mut self, balls: usize, batches: &'a mut Vec<Batch>) -> Filler<'a> {
+        filler(&mut self.busy, &mut self.open, balls, batches)
     }
 
     pub fn bytes(&self) -> usize {
@@ -65,68 +64,98 @@ impl Search {
     }
 }
 
-/// Puts pairs into batches: each pair into the first one in whose line neither ball was yet.
+/// Puts pairs into batches: each pair into the first open one in which neither ball is.
 pub(super) struct Filler<'a> {
-    first: u32,
+    /// A power of two of them. Balls whose rows end in the same bits share one, which costs at
+    /// most a place in a batch.
     busy: &'a mut [u32],
     open: &'a mut [Batch; OPEN],
     batches: &'a mut Vec<Batch>,
+}
+
+fn filler<'a>(
+    busy: &'a mut Vec<u32>,
+    open: &'a mut [Batch; OPEN],
+    balls: usize,
+    batches: &'a mut Vec<Batch>,
+) -> Filler<'a> {
+    busy.clear();
+    busy.resize(balls.next_power_of_two(), 0);
+    Filler { busy, open, batches }
 }
 
 impl Filler<'_> {
     #[inline(always)]
     pub fn add(&mut self, a: u32, b: u32) {
         let busy = *self.busy(a) | *self.busy(b);
-        let slot = busy.trailing_ones() as usize;
+        let mut slot = busy.trailing_ones() as usize;
         if slot == OPEN {
             // A large ball among many small ones.
-            self.close();
-            return self.add_in(0, a, b);
+            slot = self.fullest();
+            self.close(slot);
         }
-        self.add_in(slot, a, b);
-    }
-
-    #[inline(always)]
-    fn add_in(&mut self, slot: usize, a: u32, b: u32) {
-        let batch = &mut self.open[slot % OPEN];
+        let batch = &mut self.open[slot];
         let mut place = [a.wrapping_sub(batch.first[0]), b.wrapping_sub(batch.first[1])];
         if batch.count == 0 || (place[0] | place[1]) > u32::from(u16::MAX) {
-            if batch.count > 0 {
-                self.batches.push(*batch);
-            }
+            self.close(slot);
+            let batch = &mut self.open[slot];
             batch.first = [a.saturating_sub(BEFORE), b.saturating_sub(BEFORE)];
-            batch.count = 0;
             place = [a - batch.first[0], b - batch.first[1]];
             (batch.a, batch.b) = ([place[0] as u16; LANES], [place[1] as u16; LANES]);
         }
+        let batch = &mut self.open[slot];
         let lane = batch.count as usize % LANES;
         (batch.a[lane], batch.b[lane]) = (place[0] as u16, place[1] as u16);
         batch.count += 1;
-        if batch.count as usize == LANES {
-            self.batches.push(*batch);
-            batch.count = 0;
-        }
         *self.busy(a) |= 1 << slot;
         *self.busy(b) |= 1 << slot;
+        if self.open[slot].count as usize == LANES {
+            self.close(slot);
+        }
     }
 
-    /// In which open batches a row of the window has been.
+    /// The open batches in which a row is.
     #[inline(always)]
     fn busy(&mut self, row: u32) -> &mut u32 {
-        let local = (row - self.first) as usize;
-        debug_assert!(local < self.busy.len());
-        // SAFETY: rows come from the window.
-        unsafe { self.busy.get_unchecked_mut(local) }
+        let at = row as usize & (self.busy.len() - 1);
+        // SAFETY: the length is a power of two.
+        unsafe { self.busy.get_unchecked_mut(at) }
     }
 
-    /// Takes the open batches as they are, and begins anew.
-    pub fn close(&mut self) {
-        for batch in self.open.iter_mut().filter(|batch| batch.count > 0) {
-            self.batches.push(*batch);
-            batch.count = 0;
-        }
-        self.busy.fill(0);
+    #[cold]
+    fn fullest(&self) -> usize {
+        let counts = self.open.iter().map(|batch| batch.count);
+        counts
+            .enumerate()
+            .max_by_key(|(slot, count)| (*count, OPEN - slot))
+            .map_or(0, |(slot, _)| slot)
     }
+
+    /// Takes an open batch as it is, and begins another one.
+    #[inline(always)]
+    fn close(&mut self, slot: usize) {
+        let batch = self.open[slot];
+        if batch.count > 0 {
+            for lane in 0..batch.count as usize {
+                for row in batch.pair(lane) {
+                    *self.busy(row) &= !(1 << slot);
+                }
+            }
+            push(self.batches, batch);
+            self.open[slot].count = 0;
+        }
+    }
+
+    /// Takes the open batches as they are.
+    pub fn close_all(&mut self) {
+        (0..OPEN).for_each(|slot| self.close(slot));
+    }
+}
+
+#[inline(always)]
+fn push(batches: &mut Vec<Batch>, batch: Batch) {
+    make_room(batches, batches.len() + 1);
+    batches.push(batch);
 }
 
 /// What becomes of the pairs that are found.
@@ -258,18 +287,16 @@ impl Kernel for FindPairs<'_> {
         let Search { columns, busy, open } = search;
         columns.window.fill_with(&at[window.clone()], &budget[window.clone()], cap);
         batches.clear();
-        busy.clear();
-        busy.resize(window.len(), 0);
-        let mut filler = Filler { first, busy, open, batches };
+        let mut filler = filler(busy, open, window.len(), batches);
         let mut around = Around::new(columns, first..end);
         if let Some(list) = fans {
             let mut fans = FanFiller { next: first, end: next, list, filled: 0, filler };
             find::<L>(grid, at, layers, rows, &mut around, &mut fans);
             fans.skip_to(next);
-            fans.filler.close();
+            fans.filler.close_all();
         } else {
             find::<L>(grid, at, layers, rows, &mut around, &mut filler);
-            filler.close();
+            filler.close_all();
         }
     }
 }

@@ -32,6 +32,7 @@ impl Swarm {
         observe: &mut dyn FnMut(Stage),
     ) {
         self.stopped.clear();
+        self.steps_since_build = self.steps_since_build.saturating_add(1);
         if self.gravity != Some(gravity) {
             self.gravity = Some(gravity);
             self.wake_all();
@@ -46,7 +47,7 @@ impl Swarm {
             Tier::Lab => self.step_lab(dt, gravity, walls, walls_changed, observe),
             Tier::Full => self.step_full(dt, gravity, walls, walls_changed, observe),
         }
-        for slab in &mut self.slabs[..self.slab_count] {
+        for slab in &mut self.slabs {
             self.stopped.append(&mut slab.stopped);
         }
     }
@@ -165,7 +166,7 @@ impl Swarm {
         }
         let mut leaving = std::mem::take(&mut self.leaving);
         leaving.clear();
-        leaving.extend(self.slabs[..self.slab_count].iter().flat_map(|slab| &slab.leaving));
+        leaving.extend(self.slabs.iter().flat_map(|slab| &slab.leaving));
         if !self.paired {
             self.build(dt, walls, observe);
             self.look(dt, gravity);
@@ -180,7 +181,7 @@ impl Swarm {
             self.seek_walls(dt, walls);
         }
         self.leaving = leaving;
-        if self.slabs[..self.slab_count].iter().all(|slab| slab.asleep) {
+        if self.slabs.iter().all(|slab| slab.asleep) {
             return;
         }
         observe(Stage::Restitute);
@@ -214,9 +215,11 @@ impl Swarm {
         let lying = lying(gravity, self.mean);
         let sleeps = self.model.sleeps;
         let (grid, budget) = (&self.grid, &self.budget[..]);
+        // More than this are too many.
+        let most = self.strays.room(self.at.len()) + 1;
         let velocity = Shared::new(&mut self.velocity);
         let spin = Shared::new(&mut self.spin);
-        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        let slabs = Shared::new(&mut self.slabs);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // SAFETY: each thread has its own slabs, and their rows.
             let slab = unsafe { &mut *slabs.row(slab) };
@@ -232,7 +235,7 @@ impl Swarm {
                 budget < 0.0 || squared(*velocity) * dt * dt > budget * budget
             };
             let leaving = rows.filter(|(_, (velocity, budget))| leaves(velocity, **budget));
-            slab.leaving.extend(leaving.map(|(row, _)| row));
+            slab.leaving.extend(leaving.map(|(row, _)| row).take(most));
             let fastest = |from: u32, to: u32| {
                 let rows = (from - slab.rows[0]) as usize..(to - slab.rows[0]) as usize;
                 // Not its spin: on a single point a ball may spin for ever.
@@ -254,7 +257,7 @@ impl Swarm {
                 }
             }
         });
-        let slabs = &mut self.slabs[..self.slab_count];
+        let slabs = &mut self.slabs;
         for i in 0..slabs.len() {
             let before = i.checked_sub(1).map_or(0.0, |i| slabs[i].speed[2]);
             let after = slabs.get(i + 1).map_or(0.0, |slab| slab.speed[1]);
@@ -273,7 +276,7 @@ impl Swarm {
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
         };
-        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        let slabs = Shared::new(&mut self.slabs);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // SAFETY: each thread has its own slabs, and their rows.
             let slab = unsafe { &mut *slabs.row(slab) };
@@ -337,7 +340,7 @@ impl Swarm {
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
         };
-        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        let slabs = Shared::new(&mut self.slabs);
         let (threads, states) = (self.model.threads as usize, &mut self.slab_states);
         each_beside(threads, slabs.len(), states, |slab| {
             // SAFETY: nobody works on a neighbour meanwhile. Of the next one, only what nobody
@@ -363,7 +366,7 @@ impl Swarm {
         let (instructions, shapes) = (self.instructions, walls.has_shapes());
         let (planes, ahead) = (listed(&self.planes, self.model.tier), self.ahead(dt));
         let balls = Balls { at: &self.at, velocity: &self.velocity, budget: &self.budget, ahead };
-        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        let slabs = Shared::new(&mut self.slabs);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // SAFETY: its own.
             let slab = unsafe { &mut *slabs.row(slab) };
@@ -387,7 +390,7 @@ impl Swarm {
         let planes = listed(&self.planes, self.model.tier);
         let (at, budget) = (&self.at[..], &self.budget[..]);
         let balls = Balls { at, velocity: &self.velocity, budget, ahead };
-        for slab in &mut self.slabs[..self.slab_count] {
+        for slab in &mut self.slabs {
             let mine = slab.own_rows();
             let mine = rows.partition_point(|row| (*row as usize) < mine.start)
                 ..rows.partition_point(|row| (*row as usize) < mine.end);
@@ -417,7 +420,7 @@ impl Swarm {
         let (at, budget, material) = (&self.at[..], &self.budget[..], self.model.material);
         let (guests, slots) = (&self.guest_slots[..], self.ids.slots());
         let any = !self.guests.is_empty();
-        let slabs = Shared::new(&mut self.slabs[..self.slab_count]);
+        let slabs = Shared::new(&mut self.slabs);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // SAFETY: its own.
             let slab = unsafe { &mut *slabs.row(slab) };

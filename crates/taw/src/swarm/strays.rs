@@ -85,7 +85,7 @@ impl Strays {
         let mut batches = std::mem::take(&mut self.batches);
         batches.clear();
         if !self.rows.is_empty() {
-            let mut filler = search.filler(at.len(), &mut batches);
+            let mut filler = search.filler(64 * self.rows.len(), &mut batches);
             let widest = self
                 .rows
                 .iter()
@@ -106,7 +106,7 @@ impl Strays {
                     }
                 }
             }
-            filler.close();
+            filler.close_all();
         }
         self.batches = batches;
         if rough {

@@ -4,6 +4,7 @@ use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
 use super::kernels::squared;
 use super::lanes::{Instructions, Kernel, LANES, Lanes, Row};
+use super::memory::make_room;
 use super::slab::Slab;
 use super::touch::Touch;
 use crate::math::{Point3, Vec3};
@@ -97,6 +98,7 @@ impl Slab {
                 if let Some((pressure, grip)) = recall(&touch) {
                     (touch.pressure, touch.grip) = (pressure, grip);
                 }
+                make_room(touches, touches.len() + 1);
                 touches.push(touch);
             });
         }
@@ -171,12 +173,12 @@ impl Slab {
 
 /// Names the half-spaces as far as to which a ball may go.
 fn touch_planes(row: u32, balls: Balls, planes: &[HalfSpace], mut name: impl FnMut(Touch)) {
-    let ball = &balls.at[row as usize];
+    let (ball, reach) = (&balls.at[row as usize], balls.reach(row as usize));
     for plane in planes {
         let HalfSpace { wall, normal, offset, friction, restitution } = *plane;
         let gap = normal.dot(center(ball).to_vec()) - offset - ball[3];
         // A wall may also come nearer; who moves it seeks again.
-        if gap < balls.reach(row as usize) {
+        if gap < reach {
             name(Touch::new(row, [wall, 0], normal, offset, [friction, restitution]));
         }
     }
