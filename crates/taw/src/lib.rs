@@ -36,10 +36,12 @@
 //! | [`response`] | what a touch does |
 //! | [`swarm`] | balls in bulk: few features, a million of them |
 //! | [`world`] | the state in columns, the [`Model`](world::Model), the step |
+//! | [`scene`] | a scene as a plain value, to be read from a file and run by any model |
 //!
 //! Imports point down this table's order only: a room never uses a later one.
 //!
-//! With the feature `mint`, cgmath's types convert to and from those of any other
+//! With the feature `serde`, scenes and models are read from files and written. With the
+//! feature `mint`, cgmath's types convert to and from those of any other
 //! mathematics library.
 //!
 //! # Units and bad input
@@ -57,6 +59,7 @@ pub mod frame;
 pub mod math;
 pub mod motion;
 pub mod response;
+pub mod scene;
 pub mod shape;
 pub mod swarm;
 pub mod world;

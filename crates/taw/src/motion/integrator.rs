@@ -6,6 +6,7 @@ use crate::math::{Point3, Scalar, Vec3};
 /// half the length divides it by 2 to the power of the order, until the rounding of
 /// the scalar type takes over.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Integrator {
     /// Position by the old velocity, then velocity. Order 1. Under constant
     /// acceleration it lags by `a t dt / 2`, and it feeds oscillations.

@@ -6,6 +6,7 @@ use crate::math::{Quat, Scalar, Vec3, cast_vector, direction_and_length};
 
 /// How much of turning a world models. In the order of how much that is.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Rotation {
     /// None. Takes no memory and no time.
     #[default]

@@ -22,6 +22,7 @@ use crate::math::{Point3, Scalar, Vec3};
 
 /// The method that restitutes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Response {
     /// The lab's method: largest displacement first, each contact is tested again;
     /// what still touches is moved apart (a wall stays, marbles take half each), and

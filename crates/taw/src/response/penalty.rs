@@ -8,6 +8,7 @@ use crate::response::{Columns, Material, Mobility, Walls};
 
 /// How a penalty force grows with the overlap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ContactLaw {
     /// A spring and a dashpot (Cundall and Strack 1979), as stiff as the step can bear: a
     /// collision takes [16](ContactLaw::STEPS) substeps, whatever the masses.

@@ -13,6 +13,7 @@ use crate::response::Response;
 /// assert_eq!(finer.response, Response::Displacement);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Model {
     /// How things move. A marble may have its own.
     pub integrator: Integrator,
@@ -34,6 +35,7 @@ pub struct Model {
 
 /// When touches are looked for.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Detection {
     /// At the end of each substep. Marbles that move by more than their radii in it may
     /// pass through each other. (Through a wall nothing passes: it is solid behind.)
@@ -49,6 +51,7 @@ pub enum Detection {
 
 /// How exactly marbles remember where they are and how they move.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Precision {
     /// As the world's scalar can.
     #[default]

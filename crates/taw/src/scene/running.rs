@@ -1,0 +1,246 @@
+use std::f64::consts::TAU;
+
+use cgmath::{EuclideanSpace, Zero};
+
+use super::{Ball, Field, Form, Movement, Scene, Surface, Turn, Wall};
+use crate::Error;
+use crate::error::{finite_vector, positive};
+use crate::frame::{AxisAngle, Pose};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, direction_and_length};
+use crate::motion::{Force, Mass, Medium, WallMotion};
+use crate::response::{Elasticity, Material};
+use crate::shape::{Capsule, Obb, Plane, Sphere};
+use crate::world::{Marble, Model, WallId, WallShape, World};
+
+/// A [`Scene`] that goes on: its world, and what moves in it by itself.
+#[derive(Clone, Debug)]
+pub struct Running<S> {
+    /// The world. Marbles have the order of the scene.
+    pub world: World<S>,
+    scene: Scene,
+    moving: Vec<(WallId, Form, Movement)>,
+    time: f64,
+}
+
+impl Scene {
+    /// The scene at its beginning, to be stepped by this model.
+    ///
+    /// # Errors
+    /// What the world refuses: [`Error::NotFinite`], [`Error::NotPositive`],
+    /// [`Error::OutOfRange`], [`Error::NotUnit`].
+    pub fn run<S: Scalar>(&self, model: Model) -> Result<Running<S>, Error> {
+        positive("seconds", self.seconds)?;
+        let mut world = World::default();
+        world.set_model(model)?;
+        world.set_gravity(vector(gravity_at(self, 0.0)))?;
+        world.set_forces(self.fields.iter().map(|field| field.force()).collect())?;
+        let mut moving = Vec::new();
+        for Wall { shape, surface, moves } in &self.walls {
+            let id = world.walls.insert(shape.wall(Pose::identity())?)?;
+            let surface = surface.unwrap_or(self.surface);
+            world.walls.set_material(id, Some(surface.material()))?;
+            if let Some(movement) = moves {
+                let motion = movement.at(0.0, 0.0)?.1;
+                world.walls.set_motion(id, Some(motion))?;
+                moving.push((id, *shape, *movement));
+            }
+        }
+        for ball in self.balls() {
+            world.marbles.insert(ball.marble(self.surface))?;
+        }
+        Ok(Running { world, scene: self.clone(), moving, time: 0.0 })
+    }
+
+    /// All its marbles: those one by one first.
+    pub fn balls(&self) -> impl Iterator<Item = Ball> + '_ {
+        let lattices = self.lattices.iter().flat_map(super::Lattice::balls);
+        self.marbles.iter().copied().chain(lattices)
+    }
+}
+
+impl<S: Scalar> Running<S> {
+    /// Goes on by `dt` seconds: gravity as it is halfway, walls where they are at the end.
+    ///
+    /// # Errors
+    /// [`Error::NotPositive`] for `dt`.
+    pub fn step(&mut self, dt: S) -> Result<(), Error> {
+        let seconds = positive("dt", dt)?.as_f64();
+        if !self.scene.tilts.is_empty() {
+            let gravity = gravity_at(&self.scene, self.time + 0.5 * seconds);
+            self.world.set_gravity(vector(gravity))?;
+        }
+        for (id, form, movement) in &self.moving {
+            let (pose, motion) = movement.at(self.time, self.time + seconds)?;
+            self.world.walls.set(*id, form.wall(pose)?)?;
+            self.world.walls.set_motion(*id, Some(motion))?;
+        }
+        self.time += seconds;
+        self.world.step(dt)
+    }
+
+    /// How far it is, in seconds.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.time
+    }
+
+    /// What it began with.
+    #[must_use]
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+}
+
+fn gravity_at(scene: &Scene, time: f64) -> [f64; 3] {
+    let (Some(first), Some(last)) = (scene.tilts.first(), scene.tilts.last()) else {
+        return scene.gravity;
+    };
+    if time <= first.at {
+        return first.gravity;
+    }
+    for pair in scene.tilts.windows(2) {
+        if let [before, after] = pair
+            && time < after.at
+        {
+            let part = (time - before.at) / (after.at - before.at);
+            let axis = |i: usize| before.gravity[i] + (after.gravity[i] - before.gravity[i]) * part;
+            return [axis(0), axis(1), axis(2)];
+        }
+    }
+    last.gravity
+}
+
+impl Field {
+    fn force<S: Scalar>(self) -> Force<S> {
+        match self {
+            Self::Drag { velocity, linear, quadratic } => Force::Drag(Medium {
+                velocity: vector(velocity),
+                linear: S::constant(linear),
+                quadratic: S::constant(quadratic),
+            }),
+            Self::Spring { anchor, rest_length, stiffness } => Force::Spring {
+                anchor: point(anchor),
+                rest_length: S::constant(rest_length),
+                stiffness: S::constant(stiffness),
+            },
+            Self::Attraction { center, strength } => {
+                Force::Attraction { center: point(center), strength: S::constant(strength) }
+            }
+        }
+    }
+}
+
+impl Surface {
+    /// The material that it stands for.
+    #[must_use]
+    pub fn material<S: Scalar>(self) -> Material<S> {
+        Material {
+            restitution: S::constant(self.restitution),
+            friction: S::constant(self.friction),
+            tangential_restitution: S::constant(self.tangential_restitution),
+            rolling_resistance: S::constant(self.rolling_resistance),
+            spinning_resistance: S::constant(self.spinning_resistance),
+            elasticity: Elasticity {
+                youngs_modulus: S::constant(self.youngs_modulus),
+                poissons_ratio: S::constant(self.poissons_ratio),
+            },
+            ..Material::default()
+        }
+    }
+}
+
+impl Ball {
+    fn marble<S: Scalar>(self, surface: Surface) -> Marble<S> {
+        Marble {
+            velocity: vector(self.velocity),
+            spin: vector(self.spin),
+            mass: Mass::Density(S::constant(self.density)),
+            material: Some(self.surface.unwrap_or(surface).material()),
+            ..Marble::new(point(self.position), S::constant(self.radius))
+        }
+    }
+}
+
+impl Form {
+    /// The wall, moved by a pose.
+    fn wall<S: Scalar>(self, pose: Pose<f64>) -> Result<WallShape<S>, Error> {
+        let place = |at: [f64; 3]| point(pose.point(Point3::from(at)).into());
+        Ok(match self {
+            Self::HalfSpace { normal, through } => {
+                Plane::through(place(through), vector(pose.vector(normal.into()).into()))?.into()
+            }
+            Self::Box { center, size, turned } => {
+                let turn = pose.rotation * turned.rotation()?;
+                let rotation = Quat::from_sv(S::constant(turn.s), cast_vector(turn.v));
+                Obb::new(place(center), rotation, vector(size.map(|side| 0.5 * side)))?.into()
+            }
+            Self::Ball { center, radius } => {
+                Sphere::new(place(center), S::constant(radius))?.into()
+            }
+            Self::Capsule { from, to, radius } => {
+                Capsule::new(place(from), place(to), S::constant(radius))?.into()
+            }
+        })
+    }
+}
+
+impl Turn {
+    fn rotation(self) -> Result<Quat<f64>, Error> {
+        turned(self.axis, self.degrees.to_radians())
+    }
+}
+
+fn turned(axis: [f64; 3], radians: f64) -> Result<Quat<f64>, Error> {
+    Ok(AxisAngle::new(Vec3::from(axis), radians)?.into())
+}
+
+impl Movement {
+    /// Where a wall is at a time, seen from where it began, and how it moves from an earlier one
+    /// until then.
+    fn at<S: Scalar>(self, from: f64, to: f64) -> Result<(Pose<f64>, WallMotion<S>), Error> {
+        let middle = 0.5 * (from + to);
+        let (way, velocity, pivot, axis, angle, rate) = match self {
+            Self::Conveys { velocity } => {
+                let motion = WallMotion {
+                    velocity: vector(velocity),
+                    spin: Vec3::zero(),
+                    pivot: Point3::origin(),
+                };
+                return Ok((Pose::identity(), motion));
+            }
+            Self::Turns { pivot, axis, degrees_per_second } => {
+                let rate = degrees_per_second.to_radians();
+                (Vec3::zero(), Vec3::zero(), pivot, axis, rate * to, rate)
+            }
+            Self::Swings { way, pivot, axis, degrees, period } => {
+                let (part, _) = (TAU * (to / period)).sin_cos_portable();
+                let (_, rate) = (TAU * (middle / period)).sin_cos_portable();
+                let (way, rate) = (Vec3::from(way), rate * TAU / period);
+                let angle = degrees.to_radians();
+                (way * part, way * rate, pivot, axis, angle * part, angle * rate)
+            }
+        };
+        let pivot = Point3::from(pivot);
+        let (direction, _) =
+            direction_and_length(finite_vector(["axis.x", "axis.y", "axis.z"], Vec3::from(axis))?)
+                .ok_or(Error::NotUnit { field: "axis", value: 0.0 })?;
+        let rotation = turned(axis, angle)?;
+        // About the pivot, then on the way.
+        let turned_pivot = Pose { rotation, translation: Vec3::zero() }.point(pivot);
+        let pose = Pose { rotation, translation: pivot - turned_pivot + way };
+        let motion = WallMotion {
+            velocity: cast_vector(velocity),
+            spin: cast_vector(direction * rate),
+            pivot: point((pivot + way).into()),
+        };
+        Ok((pose, motion))
+    }
+}
+
+fn vector<S: Scalar>(v: [f64; 3]) -> Vec3<S> {
+    cast_vector(Vec3::from(v))
+}
+
+fn point<S: Scalar>(p: [f64; 3]) -> Point3<S> {
+    Point3::from_vec(vector(p))
+}
