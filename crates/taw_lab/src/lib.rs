@@ -6,3 +6,4 @@
 
 pub mod scene;
 pub mod suite;
+pub mod trade;

@@ -1,7 +1,14 @@
 //! `taw-lab`: what every choice costs and buys.
 
+use std::error::Error;
+use std::path::{Path, PathBuf};
+use std::process::ExitCode;
+
 use clap::{Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
 use taw_lab::suite::{self, Effort};
+use taw_lab::trade::sweep::{Job, Plan, by_the_clock, in_order, read_points, sweep, write_points};
+use taw_lab::trade::{Point, write_report};
 
 #[derive(Parser)]
 #[command(about = "Measures what taw's models cost and how exact they are")]
@@ -24,12 +31,115 @@ enum Command {
         #[arg(long)]
         explain: bool,
     },
+    /// Sweeps models, scalars, steps, substeps and iterations over the scenes, and draws error
+    /// against cost. What was measured is kept: interrupted, it goes on where it was.
+    Trade {
+        /// Where points, charts and report go.
+        #[arg(long, default_value = "target/trade")]
+        out: PathBuf,
+        /// Only some settings: less than two minutes.
+        #[arg(long)]
+        quick: bool,
+        /// Only scenes whose name contains this.
+        #[arg(long, default_value = "")]
+        scene: String,
+        /// Only models whose name contains this.
+        #[arg(long, default_value = "")]
+        model: String,
+        /// Only part K of N, counted from 1, and no report: see `merge`.
+        #[arg(long, value_name = "K/N", value_parser = shard)]
+        shard: Option<[usize; 2]>,
+        /// More points to draw and report, of other engines for example.
+        #[arg(long, value_name = "FILE")]
+        with: Vec<PathBuf>,
+    },
+    /// Joins the parts of a sweep into one report.
+    Merge {
+        /// Where points, charts and report go.
+        #[arg(long, default_value = "target/trade")]
+        out: PathBuf,
+        /// The parts: `points-K-of-N.jsonl`.
+        #[arg(required = true)]
+        files: Vec<PathBuf>,
+    },
 }
 
-fn main() -> std::process::ExitCode {
-    let Command::Suite { filter, quick, explain } = Options::parse().command;
+fn shard(text: &str) -> Result<[usize; 2], String> {
+    let parts = text.split_once('/').map(|(k, n)| (k.parse(), n.parse()));
+    match parts {
+        Some((Ok(number), Ok(of))) if (1..=of).contains(&number) => Ok([number, of]),
+        _ => Err("not K/N with K from 1 to N".into()),
+    }
+}
+
+fn main() -> ExitCode {
+    let outcome = match Options::parse().command {
+        Command::Suite { filter, quick, explain } => Ok(run_suite(&filter, quick, explain)),
+        Command::Trade { out, quick, scene, model, shard, with } => {
+            trade(&out, &Plan { quick, scene, model }, shard, &with)
+        }
+        Command::Merge { out, files } => merge(&out, &files),
+    };
+    outcome.unwrap_or_else(|error| {
+        eprintln!("{error}");
+        ExitCode::FAILURE
+    })
+}
+
+fn trade(
+    out: &Path,
+    plan: &Plan,
+    shard: Option<[usize; 2]>,
+    with: &[PathBuf],
+) -> Result<ExitCode, Box<dyn Error>> {
+    std::fs::create_dir_all(out)?;
+    let file = match shard {
+        None => out.join("points.jsonl"),
+        Some([number, of]) => out.join(format!("points-{number}-of-{of}.jsonl")),
+    };
+    let bar = ProgressBar::new(0);
+    let style = "{bar:40} {pos} of {len}, {eta} left  {msg}";
+    bar.set_style(ProgressStyle::with_template(style)?);
+    let points = sweep(plan, shard.unwrap_or([1, 1]), &file, by_the_clock, |done, all, job| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+        bar.set_message(format!("{}: {}", job.scene.name, job.model.name));
+    })?;
+    bar.finish_and_clear();
+    if shard.is_some() {
+        println!("{} points in {}", points.len(), file.display());
+        return Ok(ExitCode::SUCCESS);
+    }
+    let wanted: std::collections::BTreeSet<_> = plan.jobs().iter().map(Job::key).collect();
+    let mut points: Vec<_> =
+        points.into_iter().filter(|point| wanted.contains(&point.key())).collect();
+    for file in with {
+        points.extend(read_points(file)?);
+    }
+    report(out, points)
+}
+
+fn merge(out: &Path, files: &[PathBuf]) -> Result<ExitCode, Box<dyn Error>> {
+    std::fs::create_dir_all(out)?;
+    let mut points = Vec::new();
+    for file in files {
+        points.extend(read_points(file)?);
+    }
+    let points = in_order(points);
+    write_points(&out.join("points.jsonl"), &points)?;
+    report(out, points)
+}
+
+fn report(out: &Path, points: Vec<Point>) -> Result<ExitCode, Box<dyn Error>> {
+    let points = in_order(points);
+    write_report(&points, out)?;
+    println!("{} points; see {}", points.len(), out.join("report.md").display());
+    Ok(ExitCode::SUCCESS)
+}
+
+fn run_suite(filter: &str, quick: bool, explain: bool) -> ExitCode {
     let chosen = suite::rows()
-        .filter(|row| row.name.contains(&filter) || row.model.contains(&filter))
+        .filter(|row| row.name.contains(filter) || row.model.contains(filter))
         .filter(|row| !quick || row.effort == Effort::Quick);
     println!(
         "| row | model | figure | target | | best of today's engines | ns per ball and step |"
@@ -54,5 +164,5 @@ fn main() -> std::process::ExitCode {
         }
     }
     println!("\n{reached} of {count} rows reached");
-    if reached == count { std::process::ExitCode::SUCCESS } else { std::process::ExitCode::FAILURE }
+    if reached == count { ExitCode::SUCCESS } else { ExitCode::FAILURE }
 }

@@ -8,10 +8,11 @@
 //! How a step goes:
 //! - Rows lie in the order of cells, so that neighbours in space are neighbours in memory.
 //! - Layers of cells are grouped into *slabs*. Slabs that are not neighbours have no ball in
-//!   common, so threads work on the even ones first and then on the odd ones, and the result
-//!   does not depend on how many threads there are.
+//!   common, so threads work on the even ones first and on each odd one after those beside it, and
+//!   the result does not depend on how many threads there are.
 //! - Pairs that might touch are put into batches of eight in which no ball is twice: a batch is
-//!   solved by vector instructions, the batches of a slab one after another (Gauss and Seidel).
+//!   solved by vector instructions, the batches of a slab one after another (Gauss and Seidel). In
+//!   the lab's tier each ball and those near it after it in the order, its *fan*, are a batch.
 //! - Each ball has a *budget* of how far it may go until pairs are sought again. What a pair
 //!   bore is remembered across that.
 

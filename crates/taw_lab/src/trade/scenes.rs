@@ -1,0 +1,265 @@
+//! The scenes that models are compared on, and what each of them should come to.
+
+use std::sync::OnceLock;
+
+use taw::prelude::*;
+use taw::scene::Scene;
+
+use super::trace::{Frame, Number, Setting, trace};
+use crate::scene::{EXACT, G};
+
+/// A scene with a judge.
+#[derive(Debug)]
+pub struct Judged {
+    /// Its name, that of its file.
+    pub name: &'static str,
+    /// What its error is.
+    pub metric: &'static str,
+    /// Whether marbles touch anything in it.
+    pub touches: bool,
+    text: &'static str,
+    judge: Judge,
+    scene: OnceLock<Scene>,
+    reference: OnceLock<Vec<Frame>>,
+}
+
+/// How wrong frames are, as a part of what the scene is about.
+#[derive(Clone, Copy, Debug)]
+enum Judge {
+    /// Where marbles should be is known: their mean square distance from it, over this length in
+    /// metres.
+    Known(fn(f64) -> Vec<Vec3<f64>>, f64),
+    /// As the most exact model has it in fine steps.
+    Compared(fn(&[Frame], &[Frame]) -> f64),
+}
+
+/// All of them.
+pub static SCENES: [Judged; 10] = [
+    judged(
+        "throw",
+        "place, over 4 m",
+        include_str!("../../scenes/throw.ron"),
+        false,
+        Judge::Known(thrown, 4.0),
+    ),
+    judged(
+        "orbit",
+        "place, over the larger half axis",
+        include_str!("../../scenes/orbit.ron"),
+        false,
+        Judge::Known(orbited, 1.0),
+    ),
+    judged(
+        "bounce",
+        "place, over the height of the fall",
+        include_str!("../../scenes/bounce.ron"),
+        true,
+        Judge::Known(bounced, 1.0),
+    ),
+    judged(
+        "skid",
+        "place, over 2 m",
+        include_str!("../../scenes/skid.ron"),
+        true,
+        Judge::Known(skidded, 2.0),
+    ),
+    judged(
+        "ramp",
+        "place, over 2 m",
+        include_str!("../../scenes/ramp.ron"),
+        true,
+        Judge::Known(rolled, 2.0),
+    ),
+    judged(
+        "carom",
+        "place, over 1 m",
+        include_str!("../../scenes/carom.ron"),
+        true,
+        Judge::Known(parted, 1.0),
+    ),
+    judged(
+        "cradle",
+        "place, over 0.3 m",
+        include_str!("../../scenes/cradle.ron"),
+        true,
+        Judge::Known(passed_on, 0.3),
+    ),
+    judged(
+        "tower",
+        "place, over the radius",
+        include_str!("../../scenes/tower.ron"),
+        true,
+        Judge::Known(stood, 0.05),
+    ),
+    judged(
+        "maze",
+        "place, over the side of the box",
+        include_str!("../../scenes/maze.ron"),
+        true,
+        Judge::Compared(places_in_maze),
+    ),
+    judged(
+        "pit",
+        "mean height and mean overlap, over the radius",
+        include_str!("../../scenes/pit.ron"),
+        true,
+        Judge::Compared(heap),
+    ),
+];
+
+const fn judged(
+    name: &'static str,
+    metric: &'static str,
+    text: &'static str,
+    touches: bool,
+    judge: Judge,
+) -> Judged {
+    Judged {
+        name,
+        metric,
+        touches,
+        text,
+        judge,
+        scene: OnceLock::new(),
+        reference: OnceLock::new(),
+    }
+}
+
+impl Judged {
+    /// The scene.
+    ///
+    /// # Panics
+    /// If its file is wrong, which a test rules out.
+    pub fn scene(&self) -> &Scene {
+        self.scene.get_or_init(|| ron::from_str(self.text).expect("a shipped scene"))
+    }
+
+    /// How wrong frames of it are: 0 is right, 1 is as wrong as the scene is large.
+    pub fn error(&self, frames: &[Frame]) -> f64 {
+        match self.judge {
+            Judge::Known(known, size) => {
+                let squares = frames.iter().flat_map(|frame| {
+                    let should = known(frame.time).into_iter();
+                    frame.at.iter().zip(should).map(|(at, should)| (at - should).magnitude2())
+                });
+                mean(squares).sqrt() / size
+            }
+            Judge::Compared(compare) => compare(frames, self.reference()),
+        }
+    }
+
+    /// Its gravity at the beginning, in m/s².
+    pub fn scene_gravity(&self) -> Vec3<f64> {
+        Vec3::from(self.scene().gravity)
+    }
+
+    fn reference(&self) -> &[Frame] {
+        self.reference.get_or_init(|| {
+            let setting = Setting { model: EXACT, number: Number::F64, step: 1.0 / 480.0 };
+            trace(self.scene(), setting).unwrap_or_default()
+        })
+    }
+}
+
+fn mean(numbers: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = numbers.fold((0.0, 0_u32), |(sum, count), x| (sum + x, count + 1));
+    sum / f64::from(count.max(1))
+}
+
+/// Linear drag: the speed relative to the terminal one falls exponentially.
+fn thrown(time: f64) -> Vec<Vec3<f64>> {
+    let mass = 2500.0 * 4.0 / 3.0 * std::f64::consts::PI * 0.008_f64.powi(3);
+    let rate = 0.004 / mass;
+    let terminal = Vec3::new(0.0, -G / rate, 0.0);
+    let way = (Vec3::new(3.0, 4.0, 0.0) - terminal) * (-(-rate * time).exp_m1() / rate);
+    vec![Vec3::new(0.0, 1.0, 0.0) + terminal * time + way]
+}
+
+/// Kepler's equation for eccentricity 0.5 and a period of 2π, by Newton's method.
+fn orbited(time: f64) -> Vec<Vec3<f64>> {
+    let eccentricity = 0.5_f64;
+    let mut anomaly = time;
+    for _ in 0..50 {
+        let miss = anomaly - eccentricity * anomaly.sin() - time;
+        anomaly -= miss / (1.0 - eccentricity * anomaly.cos());
+    }
+    let across = (1.0 - eccentricity * eccentricity).sqrt();
+    vec![Vec3::new(anomaly.cos() - eccentricity, across * anomaly.sin(), 0.0)]
+}
+
+/// A fall of a metre, then bounces of 0.8 times the speed.
+fn bounced(time: f64) -> Vec<Vec3<f64>> {
+    let mut speed = (2.0 * G).sqrt();
+    let fall = speed / G;
+    let mut left = time - fall;
+    let height = if left < 0.0 {
+        1.0 - 0.5 * G * time * time
+    } else {
+        loop {
+            speed *= 0.8;
+            let flight = 2.0 * speed / G;
+            if left < flight || flight < 1e-12 {
+                break speed * left.min(flight) - 0.5 * G * left.min(flight).powi(2);
+            }
+            left -= flight;
+        }
+    };
+    vec![Vec3::new(0.0, 0.05 + height, 0.0)]
+}
+
+/// Friction takes 0.2 g until five sevenths of the speed are left (Coriolis 1835).
+fn skidded(time: f64) -> Vec<Vec3<f64>> {
+    let (speed, slowing) = (2.0, 0.2 * G);
+    let slides = 2.0 / 7.0 * speed / slowing;
+    let sliding = time.min(slides);
+    let x =
+        speed * sliding - 0.5 * slowing * sliding * sliding + 5.0 / 7.0 * speed * (time - sliding);
+    vec![Vec3::new(x, 0.0286, 0.0)]
+}
+
+/// Five sevenths of what a frictionless slide would gain.
+fn rolled(time: f64) -> Vec<Vec3<f64>> {
+    let way = 0.5 * 5.0 / 7.0 * G * 0.6 * time * time;
+    vec![Vec3::new(0.006 + 0.8 * way, 0.008 - 0.6 * way, 0.0)]
+}
+
+/// At the touch, the resting ball takes what is along the normal, and the other one the rest.
+fn parted(time: f64) -> Vec<Vec3<f64>> {
+    let (start, velocity) = (Vec3::new(-0.6, 0.05, 0.0), Vec3::new(1.5, 0.0, 0.0));
+    let touch = (0.6 - (0.1_f64.powi(2) - 0.05_f64.powi(2)).sqrt()) / 1.5;
+    let there = start + velocity * touch;
+    let normal = -there / 0.1;
+    let taken = normal * velocity.dot(normal);
+    let after = (time - touch).max(0.0);
+    vec![start + velocity * time.min(touch) + (velocity - taken) * after, taken * after]
+}
+
+/// The first one stops where it touches, and the last one goes on with its speed.
+fn passed_on(time: f64) -> Vec<Vec3<f64>> {
+    let touch = 0.2;
+    let x = [-0.3 + time.min(touch), 0.0, 0.1, 0.2, 0.3 + (time - touch).max(0.0)];
+    x.map(|x| Vec3::new(x, 0.0, 0.0)).to_vec()
+}
+
+fn stood(_: f64) -> Vec<Vec3<f64>> {
+    (0..6).map(|i| Vec3::new(0.0, 0.05 + 0.1 * f64::from(i), 0.0)).collect()
+}
+
+fn places_in_maze(frames: &[Frame], should: &[Frame]) -> f64 {
+    let squares = frames.iter().zip(should).flat_map(|(frame, should)| {
+        frame.at.iter().zip(&should.at).map(|(at, should)| (at - should).magnitude2())
+    });
+    mean(squares).sqrt() / 0.4
+}
+
+/// Which marble lies where is chance; how high the heap is and how deep they overlap is not.
+fn heap(frames: &[Frame], should: &[Frame]) -> f64 {
+    let end = |frames: &[Frame]| {
+        let last: Vec<_> = frames.iter().rev().take(5).collect();
+        let heights = last.iter().flat_map(|frame| frame.at.iter().map(|at| at.y));
+        let overlap = last.iter().map(|frame| frame.overlap / frame.at.len().max(1) as f64);
+        (mean(heights), mean(overlap))
+    };
+    let ((height, overlap), (right, _)) = (end(frames), end(should));
+    ((height - right).abs() + overlap) / 0.01
+}
