@@ -4,6 +4,7 @@
 #![allow(clippy::missing_panics_doc, reason = "a bench that cannot set up its scene has a bug")]
 #![allow(clippy::doc_markdown, reason = "it cites people and programs on every page")]
 
+pub mod advise;
 pub mod scene;
 pub mod suite;
 pub mod trade;

@@ -6,6 +6,7 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
+use taw_lab::advise::{Wish, advise, quantity, read_scene};
 use taw_lab::suite::{self, Effort};
 use taw_lab::trade::sweep::{Job, Plan, by_the_clock, in_order, read_points, sweep, write_points};
 use taw_lab::trade::{Point, write_report};
@@ -53,6 +54,21 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         with: Vec<PathBuf>,
     },
+    /// Says which model suits a scene: the cheapest that is right enough, the most exact that is
+    /// cheap enough, or, asked for neither, those that no other one beats in both.
+    Advise {
+        /// A scene in RON (see `crates/taw_lab/scenes`).
+        scene: PathBuf,
+        /// How wrong places may be: 1mm.
+        #[arg(long, value_parser = length)]
+        max_error: Option<f64>,
+        /// How long a step may take: 2ms.
+        #[arg(long, value_parser = duration)]
+        budget: Option<f64>,
+        /// The step of the game.
+        #[arg(long, value_parser = duration, default_value = "16.666667ms")]
+        step: f64,
+    },
     /// Joins the parts of a sweep into one report.
     Merge {
         /// Where points, charts and report go.
@@ -72,11 +88,22 @@ fn shard(text: &str) -> Result<[usize; 2], String> {
     }
 }
 
+fn length(text: &str) -> Result<f64, String> {
+    quantity(text, &[("m", 1.0), ("cm", 1e-2), ("mm", 1e-3), ("µm", 1e-6), ("um", 1e-6)])
+}
+
+fn duration(text: &str) -> Result<f64, String> {
+    quantity(text, &[("s", 1.0), ("ms", 1e-3), ("µs", 1e-6), ("us", 1e-6)])
+}
+
 fn main() -> ExitCode {
     let outcome = match Options::parse().command {
         Command::Suite { filter, quick, explain } => Ok(run_suite(&filter, quick, explain)),
         Command::Trade { out, quick, scene, model, shard, with } => {
             trade(&out, &Plan { quick, scene, model }, shard, &with)
+        }
+        Command::Advise { scene, max_error: most, budget, step } => {
+            print_advice(&scene, Wish { most, budget, step })
         }
         Command::Merge { out, files } => merge(&out, &files),
     };
@@ -117,6 +144,22 @@ fn trade(
         points.extend(read_points(file)?);
     }
     report(out, points)
+}
+
+fn print_advice(file: &Path, wish: Wish) -> Result<ExitCode, Box<dyn Error>> {
+    let name = file.display();
+    let text = std::fs::read_to_string(file).map_err(|error| format!("{name}: {error}"))?;
+    let scene = read_scene(&text).map_err(|error| format!("{name}:{error}"))?;
+    let bar = ProgressBar::new(0);
+    let advice = advise(&scene, wish, |done, all| {
+        bar.set_length(all as u64);
+        bar.set_position(done as u64);
+    });
+    bar.finish_and_clear();
+    print!("{}", advice.text(&scene, wish));
+    let asked = wish.most.is_some() || wish.budget.is_some();
+    let found = !asked || advice.best(wish).is_some();
+    Ok(if found { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn merge(out: &Path, files: &[PathBuf]) -> Result<ExitCode, Box<dyn Error>> {

@@ -131,7 +131,7 @@ impl Judged {
     /// # Panics
     /// If its file is wrong, which a test rules out.
     pub fn scene(&self) -> &Scene {
-        self.scene.get_or_init(|| ron::from_str(self.text).expect("a shipped scene"))
+        self.scene.get_or_init(|| crate::advise::read_scene(self.text).expect("a shipped scene"))
     }
 
     /// How wrong frames of it are: 0 is right, 1 is as wrong as the scene is large.

@@ -1,0 +1,114 @@
+//! Advice: what it says about shipped scenes, and what it refuses.
+
+use taw::prelude::*;
+use taw_lab::advise::{Advice, Wish, advise, literal, quantity, read_scene};
+
+const BOUNCE: &str = include_str!("../scenes/bounce.ron");
+const MAZE: &str = include_str!("../scenes/maze.ron");
+const CRADLE: &str = include_str!("../scenes/cradle.ron");
+const NOTHING: Wish = Wish { most: None, budget: None, step: 1.0 / 60.0 };
+
+fn on(text: &str, wish: Wish) -> (taw::scene::Scene, Advice) {
+    let scene = read_scene(text).unwrap();
+    let advice = advise(&scene, wish, |_, _| ());
+    (scene, advice)
+}
+
+/// As the README says: what bounces, is tilted or passes on a push wants the event-driven model,
+/// which one substep suffices for.
+#[test]
+fn the_documented_model_is_picked_on_three_scenes() {
+    for text in [BOUNCE, MAZE, CRADLE] {
+        let wish = Wish { most: Some(1e-3), ..NOTHING };
+        let (scene, advice) = on(text, wish);
+        let best = advice.best(wish).unwrap();
+        assert_eq!(best.setting.model.response, Response::EventDriven, "{}", scene.about);
+        assert_eq!(best.setting.model.substeps, 1);
+        assert!(best.wrong() <= 1e-3);
+        let cheaper = advice.choices.iter().take_while(|choice| choice.cost < best.cost);
+        assert!(cheaper.into_iter().all(|choice| choice.wrong() > 1e-3));
+        assert!((advice.told - scene.seconds).abs() < 1e-9, "{} s", advice.told);
+        let said = advice.text(&scene, wish);
+        assert!(said.contains("response: Response::EventDriven"), "{said}");
+    }
+}
+
+#[test]
+fn a_budget_is_kept_and_the_impossible_is_said() {
+    let (scene, advice) = on(BOUNCE, NOTHING);
+    let front = advice.front();
+    assert!(front.len() >= 3);
+    assert!(
+        front.windows(2).all(|two| two[0].cost <= two[1].cost && two[0].wrong() > two[1].wrong())
+    );
+    // Between two of the front, the cheaper one is the best that fits.
+    let budget = 0.5 * (front[0].cost + front[1].cost);
+    let wish = Wish { budget: Some(budget), ..NOTHING };
+    let best = advice.best(wish).unwrap();
+    assert!(best.cost <= budget && best.wrong() <= front[0].wrong());
+    let wish = Wish { budget: Some(1e-12), ..NOTHING };
+    assert!(advice.best(wish).is_none());
+    assert!(advice.text(&scene, wish).contains("none of"));
+}
+
+/// Balls that hit balls that hit balls: soon nothing can be told of one of them.
+#[test]
+fn chaos_is_noticed() {
+    let text = "(
+        seconds: 8,
+        gravity: (0, 0, 0),
+        surface: (restitution: 1, friction: 0),
+        walls: [
+            (shape: HalfSpace(normal: (1, 0, 0), through: (-1, 0, 0))),
+            (shape: HalfSpace(normal: (-1, 0, 0), through: (1, 0, 0))),
+            (shape: HalfSpace(normal: (0, 1, 0), through: (0, -1, 0))),
+            (shape: HalfSpace(normal: (0, -1, 0), through: (0, 1, 0))),
+            (shape: HalfSpace(normal: (0, 0, 1), through: (0, 0, -0.2))),
+            (shape: HalfSpace(normal: (0, 0, -1), through: (0, 0, 0.2))),
+        ],
+        marbles: [(position: (-0.9, 0.31, 0), radius: 0.05, velocity: (40, 3, 0))],
+        lattices: [(
+            first: (position: (-0.5, -0.5, 0), radius: 0.1),
+            count: (4, 4, 1),
+            pitch: (0.3, 0.3, 1),
+            disorder: 0.2,
+        )],
+    )";
+    let (scene, advice) = on(text, NOTHING);
+    assert!(advice.told > 0.05 && advice.told < 7.0, "{} s", advice.told);
+    assert!(advice.text(&scene, NOTHING).contains("chaotic"));
+}
+
+#[test]
+fn bad_scenes_are_refused_with_line_and_field() {
+    let refused = |from: &str, to: &str, say: &[&str]| {
+        assert!(MAZE.contains(from));
+        let error = read_scene(&MAZE.replacen(from, to, 1)).unwrap_err();
+        assert!(say.iter().all(|word| error.contains(word)), "{error}");
+    };
+    refused("seconds: 3", "seconds: 0", &["4:", "seconds", "above zero", "is 0"]);
+    refused("restitution: 0.4", "restitution: 1.4", &["5:", "surface.restitution", "[0, 1]"]);
+    refused("at: 1.5", "at: NaN", &["9:", "tilts[2].at", "NaN"]);
+    refused("radius: 0.03", "radius: -0.03", &["18:", "walls[5].shape.Capsule.radius", "-0.03"]);
+    refused("radius: 0.01", "radius: 0.01, mass: 3", &["20:", "mass"]);
+    refused("marbles: [", "marbles: ", &["20:"]);
+    refused(",\n)", ",\n) and more", &["21:"]);
+}
+
+#[test]
+fn quantities_have_units() {
+    let units = [("m", 1.0), ("mm", 1e-3)];
+    assert_eq!(quantity("2mm", &units), Ok(0.002));
+    assert_eq!(quantity("1.5e-2 m", &units), Ok(0.015));
+    for bad in ["2", "mm", "-1mm", "0m", "2ms", "NaNm", "1e999m"] {
+        assert!(quantity(bad, &units).is_err(), "{bad}");
+    }
+}
+
+#[test]
+fn a_model_is_written_as_rust_reads_it() {
+    let response = Response::Penalty(ContactLaw::HertzMindlin);
+    let text = literal(Model { response, ..Model::default() });
+    assert!(text.contains("response: Response::Penalty(ContactLaw::HertzMindlin),"), "{text}");
+    assert_eq!(text.matches(',').count(), 7);
+}
