@@ -1,5 +1,7 @@
 //! From components and resources into the world, where they changed.
 
+use std::sync::atomic::{AtomicBool, Ordering};
+
 use bevy::math::Isometry3d;
 use bevy::prelude::*;
 use taw::frame::Pose;
@@ -171,7 +173,8 @@ pub fn marbles(
     let rotation = world.model().rotation;
     let begins_to_turn = *last_rotation == Rotation::None && rotation != Rotation::None;
     *last_rotation = rotation;
-    // Looking at all is for all threads; then there are few, and they go in order.
+    // Looking at all is for all threads; then there are few or none, and they go in order.
+    let any = AtomicBool::new(false);
     queries.p0().par_iter_mut().for_each(|(_, marble, transform, optional, _, mut state)| {
         if begins_to_turn {
             (state.seen.rotation, state.seen.spin) = ([0; 4], None); // no rotation's bits
@@ -181,7 +184,13 @@ pub fn marbles(
         if state.stale != stale {
             state.stale = stale;
         }
+        if stale {
+            any.store(true, Ordering::Relaxed);
+        }
     });
+    if !any.into_inner() {
+        return;
+    }
     stale.clear();
     let states = queries.p1();
     stale.extend(states.iter().filter(|(_, state)| state.stale).map(|(entity, _)| entity));
