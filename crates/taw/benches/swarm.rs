@@ -1,20 +1,60 @@
 //! What a swarm costs: `cargo bench -p taw --bench swarm`, or with `-- 1000000` those of a
-//! million alone.
+//! million alone; with `-- stages` what each stage of a step takes.
 //!
 //! The scene is the one that the race in `peers/` begins with: balls with radii in [0.3, 0.5] m
 //! and density 1, dropped into a box from a lattice of twelve layers; 60 Hz, no sleep, on one
 //! thread and on two. While they fall and meet, and when they have settled for four seconds.
 
+use std::time::{Duration, Instant};
+
 use divan::Bencher;
 use divan::counter::ItemsCount;
 use taw::prelude::*;
-use taw::swarm::{Ball, BallId, SwarmModel, Tier};
+use taw::swarm::{Ball, BallId, Stage, SwarmModel, Tier};
 
 const DT: f32 = 1.0 / 60.0;
 const COUNTS: [usize; 4] = [1_000, 10_000, 100_000, 1_000_000];
 
 fn main() {
-    divan::main();
+    if std::env::args().any(|word| word == "stages") {
+        stages();
+    } else {
+        divan::main();
+    }
+}
+
+/// Prints the mean milliseconds of each stage over steps 181 to 240.
+fn stages() {
+    const STAGES: [Stage; 5] =
+        [Stage::Integrate, Stage::Order, Stage::Pairs, Stage::Walls, Stage::Restitute];
+    println!(
+        "| tier | balls | {} | a step |",
+        STAGES.map(|stage| format!("{stage:?}")).join(" | ")
+    );
+    println!("|---|---|---|---|---|---|---|---|");
+    for tier in [Tier::Full, Tier::Lab] {
+        for count in COUNTS {
+            let mut world = world(count, tier, 2);
+            let mut taken = [Duration::ZERO; STAGES.len()];
+            for step in 0..240 {
+                let (mut stage, mut begun) = (None, Instant::now());
+                let mut end = |next: Option<Stage>| {
+                    let place = STAGES.iter().position(|known| Some(*known) == stage);
+                    if let Some(place) = place
+                        && step >= 180
+                    {
+                        taken[place] += begun.elapsed();
+                    }
+                    (stage, begun) = (next, Instant::now());
+                };
+                world.step_swarm(DT, &mut |stage| end(Some(stage))).expect("a step");
+                end(None);
+            }
+            let ms = |time: Duration| format!("{:.3}", time.as_secs_f64() * 1e3 / 60.0);
+            let all = taken.iter().sum();
+            println!("| {tier:?} | {count} | {} | {} |", taken.map(ms).join(" | "), ms(all));
+        }
+    }
 }
 
 fn balls(count: usize, radius: impl Fn(f32) -> f32) -> (Vec<Ball>, f32) {

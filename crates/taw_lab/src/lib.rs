@@ -6,5 +6,6 @@
 
 pub mod advise;
 pub mod scene;
+pub mod stages;
 pub mod suite;
 pub mod trade;

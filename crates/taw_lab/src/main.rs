@@ -6,10 +6,19 @@ use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
 use indicatif::{ProgressBar, ProgressStyle};
+use peak_alloc::PeakAlloc;
+use taw::scene::Scene;
+use taw::world::Model;
 use taw_lab::advise::{Wish, advise, quantity, read_scene};
-use taw_lab::suite::{self, Effort};
+use taw_lab::stages::{self, Stages};
+use taw_lab::suite::{self, Effort, Row};
 use taw_lab::trade::sweep::{Job, Plan, by_the_clock, in_order, read_points, sweep, write_points};
+use taw_lab::trade::trace::{Number, Setting};
 use taw_lab::trade::{Point, write_report};
+
+/// Counts what is allocated.
+#[global_allocator]
+static MEMORY: PeakAlloc = PeakAlloc;
 
 #[derive(Parser)]
 #[command(about = "Measures what taw's models cost and how exact they are")]
@@ -22,15 +31,24 @@ struct Options {
 enum Command {
     /// Measures every row of the reference suite. Exit status 1 if one is not reached.
     Suite {
-        /// Only rows whose name or model contains this.
+        /// Only rows whose name contains this.
         #[arg(long, default_value = "")]
         filter: String,
+        /// Only rows of models whose name contains this.
+        #[arg(long, default_value = "")]
+        model: String,
         /// Leaves out what takes longer than a few seconds.
         #[arg(long)]
         quick: bool,
-        /// Prints set-up, metric and source of each row too.
+        /// Leaves out set-up, metric and source.
         #[arg(long)]
-        explain: bool,
+        short: bool,
+        /// Where all of it goes besides, as JSON.
+        #[arg(long, value_name = "FILE")]
+        json: Option<PathBuf>,
+        /// How many rows are measured at a time. (Rows that measure time are measured alone.)
+        #[arg(long, default_value_t = std::thread::available_parallelism().map_or(1, usize::from))]
+        jobs: usize,
     },
     /// Sweeps models, scalars, steps, substeps and iterations over the scenes, and draws error
     /// against cost. What was measured is kept: interrupted, it goes on where it was.
@@ -69,6 +87,20 @@ enum Command {
         #[arg(long, value_parser = duration, default_value = "16.666667ms")]
         step: f64,
     },
+    /// Prints what each stage of a scene's steps takes, and how much memory its world has.
+    Bench {
+        /// A scene in RON (see `crates/taw_lab/scenes`).
+        scene: PathBuf,
+        /// The model in RON; what is left out is as by default.
+        #[arg(long, default_value = "(response: Impulse, rotation: Dynamic)")]
+        model: String,
+        /// In which numbers.
+        #[arg(long, value_enum, default_value = "f32")]
+        number: Number,
+        /// The step of the game.
+        #[arg(long, value_parser = duration, default_value = "16.666667ms")]
+        step: f64,
+    },
     /// Joins the parts of a sweep into one report.
     Merge {
         /// Where points, charts and report go.
@@ -98,13 +130,21 @@ fn duration(text: &str) -> Result<f64, String> {
 
 fn main() -> ExitCode {
     let outcome = match Options::parse().command {
-        Command::Suite { filter, quick, explain } => Ok(run_suite(&filter, quick, explain)),
+        Command::Suite { filter, model, quick, short, json, jobs } => {
+            let wanted = |row: &&Row| {
+                row.name.contains(&filter)
+                    && row.model.contains(&model)
+                    && (!quick || row.effort == Effort::Quick)
+            };
+            run_suite(&suite::rows().filter(wanted).collect::<Vec<_>>(), short, json, jobs)
+        }
         Command::Trade { out, quick, scene, model, shard, with } => {
             trade(&out, &Plan { quick, scene, model }, shard, &with)
         }
         Command::Advise { scene, max_error: most, budget, step } => {
             print_advice(&scene, Wish { most, budget, step })
         }
+        Command::Bench { scene, model, number, step } => bench(&scene, &model, number, step),
         Command::Merge { out, files } => merge(&out, &files),
     };
     outcome.unwrap_or_else(|error| {
@@ -146,10 +186,36 @@ fn trade(
     report(out, points)
 }
 
-fn print_advice(file: &Path, wish: Wish) -> Result<ExitCode, Box<dyn Error>> {
+fn read(file: &Path) -> Result<Scene, Box<dyn Error>> {
     let name = file.display();
     let text = std::fs::read_to_string(file).map_err(|error| format!("{name}: {error}"))?;
-    let scene = read_scene(&text).map_err(|error| format!("{name}:{error}"))?;
+    Ok(read_scene(&text).map_err(|error| format!("{name}:{error}"))?)
+}
+
+fn bench(file: &Path, model: &str, number: Number, step: f64) -> Result<ExitCode, Box<dyn Error>> {
+    let scene = read(file)?;
+    let model: Model = ron::from_str(model).map_err(|error| format!("--model: {error}"))?;
+    let setting = Setting { model, number, step };
+    let Stages { integrate, generate_contacts, restitute, contacts, bytes } =
+        stages::measure(&scene, setting, || MEMORY.current_usage())?;
+    let all = integrate + generate_contacts + restitute;
+    println!("| stage | µs a step | part |\n|---|---|---|");
+    for (name, time) in [
+        ("integrate", integrate),
+        ("generate contacts", generate_contacts),
+        ("restitute", restitute),
+        ("all", all),
+    ] {
+        println!("| {name} | {:.1} | {:.0} % |", time * 1e6, 100.0 * time / all);
+    }
+    let marbles = scene.balls().count();
+    println!("\n{marbles} marbles, {contacts:.1} contacts in the mean");
+    println!("{bytes} bytes, {:.0} for each marble", bytes as f64 / marbles.max(1) as f64);
+    Ok(ExitCode::SUCCESS)
+}
+
+fn print_advice(file: &Path, wish: Wish) -> Result<ExitCode, Box<dyn Error>> {
+    let scene = read(file)?;
     let bar = ProgressBar::new(0);
     let advice = advise(&scene, wish, |done, all| {
         bar.set_length(all as u64);
@@ -180,32 +246,35 @@ fn report(out: &Path, points: Vec<Point>) -> Result<ExitCode, Box<dyn Error>> {
     Ok(ExitCode::SUCCESS)
 }
 
-fn run_suite(filter: &str, quick: bool, explain: bool) -> ExitCode {
-    let chosen = suite::rows()
-        .filter(|row| row.name.contains(filter) || row.model.contains(filter))
-        .filter(|row| !quick || row.effort == Effort::Quick);
+fn run_suite(
+    rows: &[&'static Row],
+    short: bool,
+    json: Option<PathBuf>,
+    jobs: usize,
+) -> Result<ExitCode, Box<dyn Error>> {
+    let more = if short { "" } else { " set-up | metric | source |" };
     println!(
-        "| row | model | figure | target | | best of today's engines | ns per ball and step |"
+        "| row | model | figure | target | | best of today's engines | ns per ball and step |{more}"
     );
-    println!("|---|---|---|---|---|---|---|");
-    let (mut reached, mut count) = (0, 0);
-    for row in chosen {
-        let outcome = row.run();
-        count += 1;
-        reached += u32::from(outcome.reached);
+    println!("|---|---|---|---|---|---|---|{}", if short { "" } else { "---|---|---|" });
+    let mut reports = Vec::new();
+    suite::measure(rows, jobs, |row, outcome| {
         let verdict = if outcome.reached { "reached" } else { "**missed**" };
         let (figure, cost) = (outcome.figure, outcome.cost);
-        let suite::Row { name, model, target, best, .. } = row;
-        println!(
+        let Row { name, model, target, best, setup, metric, source, .. } = row;
+        print!(
             "| {name} | {model} | {figure:.2e} | {target:.0e} | {verdict} | {best} | {cost:.0} |"
         );
-        if explain {
-            println!(
-                "| | {} | {} | | | {} | {:.1} s |",
-                row.setup, row.metric, row.source, outcome.seconds
-            );
-        }
-    }
+        println!(
+            "{}",
+            if short { String::new() } else { format!(" {setup} | {metric} | {source} |") }
+        );
+        reports.push(suite::Report::new(row, &outcome));
+    });
+    let (reached, count) = (reports.iter().filter(|report| report.reached).count(), reports.len());
     println!("\n{reached} of {count} rows reached");
-    if reached == count { ExitCode::SUCCESS } else { ExitCode::FAILURE }
+    if let Some(file) = json {
+        std::fs::write(file, serde_json::to_string_pretty(&reports)?)?;
+    }
+    Ok(if reached == count { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }

@@ -1,6 +1,6 @@
 //! The quick rows of the reference suite, as tests.
 
-use taw_lab::suite::{Effort, rows};
+use taw_lab::suite::{Effort, Report, measure, rows};
 
 /// What is known to be missed, as name and model, with what stops it.
 const MISSED: &[(&str, &str)] = &[
@@ -13,7 +13,7 @@ const MISSED: &[(&str, &str)] = &[
 fn quick_rows_are_reached_but_those_that_are_known_not_to_be() {
     let mut wrong = Vec::new();
     for row in rows().filter(|row| row.effort == Effort::Quick) {
-        if row.name.ends_with("/time") {
+        if row.is_time() {
             continue; // how fast this machine is, is not for a test to say
         }
         let outcome = row.run();
@@ -34,4 +34,19 @@ fn every_row_says_what_it_is() {
         }
         assert!(row.target >= 0.0, "{}", row.name);
     }
+}
+
+#[test]
+fn rows_measured_at_a_time_come_in_order_and_are_the_same() {
+    let some: Vec<_> =
+        rows().filter(|row| row.effort == Effort::Quick && !row.is_time()).take(7).collect();
+    let figures = |jobs| {
+        let mut reports = Vec::new();
+        measure(&some, jobs, |row, outcome| reports.push(Report::new(row, &outcome)));
+        reports.iter().map(|report| (report.name, report.figure)).collect::<Vec<_>>()
+    };
+    let one = figures(1);
+    assert_eq!(one.len(), 7);
+    assert!(some.iter().zip(&one).all(|(row, (name, _))| row.name == *name));
+    assert_eq!(figures(3), one);
 }

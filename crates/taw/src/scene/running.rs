@@ -64,6 +64,16 @@ impl<S: Scalar> Running<S> {
     /// # Errors
     /// [`Error::NotPositive`] for `dt`.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
+        self.move_walls(dt)?;
+        self.world.step(dt)
+    }
+
+    /// The first part of a [step](Self::step): gravity and walls. For those who step the
+    /// [world](Self::world) by themselves.
+    ///
+    /// # Errors
+    /// [`Error::NotPositive`] for `dt`.
+    pub fn move_walls(&mut self, dt: S) -> Result<(), Error> {
         let seconds = positive("dt", dt)?.as_f64();
         if !self.scene.tilts.is_empty() {
             let gravity = gravity_at(&self.scene, self.time + 0.5 * seconds);
@@ -75,7 +85,7 @@ impl<S: Scalar> Running<S> {
             self.world.walls.set_motion(*id, Some(motion))?;
         }
         self.time += seconds;
-        self.world.step(dt)
+        Ok(())
     }
 
     /// How far it is, in seconds.

@@ -14,6 +14,7 @@ use crate::response::Response;
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Model {
     /// How things move. A marble may have its own.
     pub integrator: Integrator,

@@ -11,6 +11,9 @@ mod impacts;
 mod numbers;
 mod rolling;
 
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::mpsc::channel;
+
 use crate::scene::Meter;
 
 /// One thing to measure.
@@ -67,6 +70,91 @@ impl Row {
         let reached = figure <= self.target;
         Outcome { figure, reached, cost: meter.cost(), seconds: meter.seconds() }
     }
+}
+
+/// A row and its outcome, for other programs.
+#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+pub struct Report {
+    /// See [`Row`].
+    pub name: &'static str,
+    /// What is set up and what is the answer.
+    pub setup: &'static str,
+    /// What the figure is, with its unit.
+    pub metric: &'static str,
+    /// The model that is measured.
+    pub model: &'static str,
+    /// How far off the answer is; nothing if that is no number.
+    pub figure: Option<f64>,
+    /// The most that it may be.
+    pub target: f64,
+    /// Whether it is no more.
+    pub reached: bool,
+    /// The same of today's best engine.
+    pub best: &'static str,
+    /// Where the answer is from.
+    pub source: &'static str,
+    /// Nanoseconds per ball and step.
+    pub cost: f64,
+    /// Seconds that stepping took.
+    pub seconds: f64,
+}
+
+impl Report {
+    /// What there is to say of a row.
+    #[must_use]
+    pub fn new(row: &Row, outcome: &Outcome) -> Self {
+        let Row { name, setup, metric, model, target, best, source, .. } = *row;
+        let Outcome { figure, reached, cost, seconds } = *outcome;
+        let figure = figure.is_finite().then_some(figure);
+        Self { name, setup, metric, model, figure, target, reached, best, source, cost, seconds }
+    }
+}
+
+impl Row {
+    /// Whether it measures time, and so wants no others beside it.
+    #[must_use]
+    pub fn is_time(&self) -> bool {
+        self.name.ends_with("/time")
+    }
+}
+
+/// Measures rows, some at a time, and tells the outcomes in the order of the rows.
+pub fn measure(rows: &[&'static Row], jobs: usize, mut tell: impl FnMut(&'static Row, Outcome)) {
+    let mut outcomes: Vec<Option<Outcome>> = Vec::new();
+    outcomes.resize_with(rows.len(), || None);
+    for (i, row) in rows.iter().enumerate().filter(|(_, row)| row.is_time()) {
+        outcomes[i] = Some(row.run());
+    }
+    let next = AtomicUsize::new(0);
+    let (send, receive) = channel();
+    std::thread::scope(|scope| {
+        for _ in 0..jobs.max(1) {
+            let (send, next) = (send.clone(), &next);
+            scope.spawn(move || {
+                loop {
+                    let i = next.fetch_add(1, Ordering::Relaxed);
+                    let Some(row) = rows.get(i) else { break };
+                    // Nobody listens any more only if the other side panicked.
+                    if !row.is_time() && send.send((i, row.run())).is_err() {
+                        break;
+                    }
+                }
+            });
+        }
+        drop(send);
+        let mut told = 0;
+        let mut tell_ready = |outcomes: &mut [Option<Outcome>]| {
+            while let Some(outcome) = outcomes.get_mut(told).and_then(Option::take) {
+                tell(rows[told], outcome);
+                told += 1;
+            }
+        };
+        tell_ready(&mut outcomes);
+        for (i, outcome) in receive {
+            outcomes[i] = Some(outcome);
+            tell_ready(&mut outcomes);
+        }
+    });
 }
 
 /// Every row, in the order of `references.md`.

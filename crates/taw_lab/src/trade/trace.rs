@@ -4,9 +4,7 @@ use taw::prelude::*;
 use taw::scene::Scene;
 
 /// In which numbers a world counts.
-#[derive(
-    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
-)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
 pub enum Number {
     /// Single precision, as games do.
     F32,
