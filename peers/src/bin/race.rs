@@ -115,7 +115,8 @@ fn hopper() -> Scene {
         let about = Quat::from_rotation_y(f32::from(i) * std::f32::consts::FRAC_PI_2);
         let tilt = about * Quat::from_rotation_z(0.8);
         // Its inner edge leaves a hole of 3 m.
-        let center = about * (Vec3::new(1.5, 6.0, 0.0) + Quat::from_rotation_z(0.8) * Vec3::X * 8.0);
+        let center =
+            about * (Vec3::new(1.5, 6.0, 0.0) + Quat::from_rotation_z(0.8) * Vec3::X * 8.0);
         boxes.push((center, Vec3::new(8.0, 0.5, 14.0), tilt));
     }
     Scene {
@@ -267,7 +268,8 @@ impl Engine for Rapier {
         }
         let mut balls = Vec::new();
         for (at, radius) in &scene.balls {
-            let body = rapier::RigidBodyBuilder::dynamic().translation(theirs(*at)).can_sleep(false);
+            let body =
+                rapier::RigidBodyBuilder::dynamic().translation(theirs(*at)).can_sleep(false);
             let collider = with(rapier::ColliderBuilder::ball(*radius).density(1.0));
             balls.push(world.insert(body, collider).0);
         }
@@ -376,8 +378,7 @@ fn run(scene: &Scene, mut engine: impl Engine) -> Result {
     }
     let state = engine.state();
     let radius: Vec<f32> = scene.balls.iter().map(|ball| ball.1).collect();
-    let at: Vec<_> =
-        state.iter().map(|[at, _]| taw::math::Point3::new(at.x, at.y, at.z)).collect();
+    let at: Vec<_> = state.iter().map(|[at, _]| taw::math::Point3::new(at.x, at.y, at.z)).collect();
     let mut grid = taw::broad::Grid::default();
     grid.rebuild(&at, &radius, 0.0);
     let (mut deepest, mut sum, mut count) = (0.0_f32, 0.0, 0_u32);
@@ -391,9 +392,8 @@ fn run(scene: &Scene, mut engine: impl Engine) -> Result {
         }
     });
     let mass = |r: &f32| 4.0 / 3.0 * std::f64::consts::PI * f64::from(*r).powi(3);
-    let energy = state.iter().zip(&radius).map(|([_, v], r)| {
-        0.5 * mass(r) * f64::from(v.length_squared())
-    });
+    let energy =
+        state.iter().zip(&radius).map(|([_, v], r)| 0.5 * mass(r) * f64::from(v.length_squared()));
     let ms = |time: Duration| time.as_secs_f64() * 1e3 / f64::from(MEASURED);
     Result {
         ms: ms(time),
@@ -439,9 +439,7 @@ fn main() {
         if scene.balls.len() <= 10_000 {
             row(scene, "Avian 0.7.0", &run(scene, Avian::new(scene)), Some(rapier.ms));
         }
-        for (name, tier, substeps) in
-            [("taw, full", Tier::Full, 2), ("taw, lab", Tier::Lab, 1)]
-        {
+        for (name, tier, substeps) in [("taw, full", Tier::Full, 2), ("taw, lab", Tier::Lab, 1)] {
             let result = run(scene, Taw::with(scene, tier, substeps, THREADS as u32));
             row(scene, name, &result, Some(rapier.ms));
         }

@@ -32,7 +32,7 @@ impl Scene {
         positive("seconds", self.seconds)?;
         let mut world = World::default();
         world.set_model(model)?;
-        world.set_gravity(vector(gravity_at(self, 0.0)))?;
+        world.set_gravity(vector(self.gravity_at(0.0)))?;
         world.set_forces(self.fields.iter().map(|field| field.force()).collect())?;
         let mut moving = Vec::new();
         for Wall { shape, surface, moves } in &self.walls {
@@ -49,6 +49,28 @@ impl Scene {
             world.marbles.insert(ball.marble(self.surface))?;
         }
         Ok(Running { world, scene: self.clone(), moving, time: 0.0 })
+    }
+
+    /// Gravity at a time, in m/s².
+    #[must_use]
+    pub fn gravity_at(&self, time: f64) -> [f64; 3] {
+        let (Some(first), Some(last)) = (self.tilts.first(), self.tilts.last()) else {
+            return self.gravity;
+        };
+        if time <= first.at {
+            return first.gravity;
+        }
+        for pair in self.tilts.windows(2) {
+            if let [before, after] = pair
+                && time < after.at
+            {
+                let part = (time - before.at) / (after.at - before.at);
+                let axis =
+                    |i: usize| before.gravity[i] + (after.gravity[i] - before.gravity[i]) * part;
+                return [axis(0), axis(1), axis(2)];
+            }
+        }
+        last.gravity
     }
 
     /// All its marbles: those one by one first.
@@ -76,7 +98,7 @@ impl<S: Scalar> Running<S> {
     pub fn move_walls(&mut self, dt: S) -> Result<(), Error> {
         let seconds = positive("dt", dt)?.as_f64();
         if !self.scene.tilts.is_empty() {
-            let gravity = gravity_at(&self.scene, self.time + 0.5 * seconds);
+            let gravity = self.scene.gravity_at(self.time + 0.5 * seconds);
             self.world.set_gravity(vector(gravity))?;
         }
         for (id, form, movement) in &self.moving {
@@ -99,25 +121,6 @@ impl<S: Scalar> Running<S> {
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
-}
-
-fn gravity_at(scene: &Scene, time: f64) -> [f64; 3] {
-    let (Some(first), Some(last)) = (scene.tilts.first(), scene.tilts.last()) else {
-        return scene.gravity;
-    };
-    if time <= first.at {
-        return first.gravity;
-    }
-    for pair in scene.tilts.windows(2) {
-        if let [before, after] = pair
-            && time < after.at
-        {
-            let part = (time - before.at) / (after.at - before.at);
-            let axis = |i: usize| before.gravity[i] + (after.gravity[i] - before.gravity[i]) * part;
-            return [axis(0), axis(1), axis(2)];
-        }
-    }
-    last.gravity
 }
 
 impl Field {

@@ -1,5 +1,6 @@
 //! What the points say.
 
+use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -127,6 +128,13 @@ pub fn write_report(points: &[Point], folder: &Path) -> Result<(), Box<dyn std::
         chart::draw(scene, &curves, folder)?;
         describe(&mut text, scene, &curves)?;
     }
+    let noted = points.iter().filter(|point| !point.note.is_empty());
+    let notes: BTreeSet<_> =
+        noted.map(|point| format!("- {}: {}.\n", point.engine, point.note)).collect();
+    if !notes.is_empty() {
+        text += "\n## Other engines\n\n";
+        text.extend(notes);
+    }
     std::fs::write(folder.join("report.md"), text)?;
     Ok(())
 }
@@ -177,17 +185,6 @@ fn describe(text: &mut String, scene: &str, curves: &[Curve]) -> std::fmt::Resul
         let Point { cost, error, model, number, .. } = point;
         let (error, setting) = (error.unwrap_or(f64::NAN), point.setting());
         writeln!(text, "| {cost:.0} | {error:.1e} | {model}, {number} | {setting} |")?;
-    }
-    let mut notes: Vec<_> = curves
-        .iter()
-        .flat_map(|curve| &curve.points)
-        .filter(|point| !point.note.is_empty())
-        .map(|point| format!("{}: {}.", point.engine, point.note))
-        .collect();
-    notes.sort();
-    notes.dedup();
-    if !notes.is_empty() {
-        writeln!(text, "\n{}", notes.join(" "))?;
     }
     Ok(())
 }

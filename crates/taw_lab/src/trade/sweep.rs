@@ -142,7 +142,8 @@ impl Job {
 }
 
 /// Six digits of a number: more are noise, and these come back from a file as they were.
-fn digits(number: f64) -> f64 {
+#[must_use]
+pub fn digits(number: f64) -> f64 {
     format!("{number:.5e}").parse().unwrap_or(number)
 }
 

@@ -1,0 +1,331 @@
+//! The scenes of `taw-lab trade` in Rapier and Avian: the same files, judged by the same code,
+//! written as the same points.
+//!
+//! `cargo run --release --bin trade -- FILE` in this folder, then `taw-lab trade --with FILE`.
+//! `--quick` runs the settings of a quick sweep. Both engines by default but for what is swept:
+//! steps, and solver iterations (Rapier) or substeps (Avian). Nothing sleeps. Fields are forces
+//! that are set before each step.
+
+use std::time::{Duration, Instant};
+
+use avian3d::prelude as avian;
+use bevy::prelude::*;
+use bevy::time::TimeUpdateStrategy;
+use rapier3d::prelude as rapier;
+use taw::math::Vec3 as Exact;
+use taw::scene::{Ball, Field, Form, Scene, Surface};
+use taw_lab::trade::scenes::{Judged, SCENES};
+use taw_lab::trade::sweep::{COUNTS, STEPS, digits, write_points};
+use taw_lab::trade::trace::{FRAME, Frame};
+use taw_lab::trade::{Failure, Point};
+
+/// A scene in an engine.
+trait Engine {
+    const NAME: &'static str;
+
+    fn new(scene: &Scene, step: f32, count: u32) -> Self;
+
+    /// Goes on by a step. Of each ball, the force on it.
+    fn step(&mut self, gravity: Vec3, forces: &[Vec3]);
+
+    /// Center and velocity of each ball.
+    fn state(&self) -> Vec<[Vec3; 2]>;
+
+    /// What it does by default.
+    fn defaults() -> String;
+}
+
+fn vec(v: [f64; 3]) -> Vec3 {
+    Vec3::from_array(v.map(|x| x as f32))
+}
+
+fn surface_of(ball: &Ball, scene: &Scene) -> Surface {
+    ball.surface.unwrap_or(scene.surface)
+}
+
+struct Rapier {
+    world: rapier::PhysicsWorld,
+    balls: Vec<rapier::RigidBodyHandle>,
+}
+
+fn theirs(v: Vec3) -> rapier::Vector {
+    rapier::Vector::new(v.x, v.y, v.z)
+}
+
+impl Engine for Rapier {
+    const NAME: &'static str = "Rapier 0.36.1";
+
+    fn new(scene: &Scene, step: f32, count: u32) -> Self {
+        let mut world = rapier::PhysicsWorld::default();
+        world.integration_parameters.dt = step;
+        world.integration_parameters.num_solver_iterations = count as usize;
+        let with = |collider: rapier::ColliderBuilder, surface: Surface| {
+            let (friction, restitution) = (surface.friction as f32, surface.restitution as f32);
+            collider.friction(friction).restitution(restitution).build()
+        };
+        for wall in &scene.walls {
+            let collider = match wall.shape {
+                Form::HalfSpace { normal, through } => {
+                    let shape = rapier::SharedShape::halfspace(theirs(vec(normal).normalize()));
+                    rapier::ColliderBuilder::new(shape).translation(theirs(vec(through)))
+                }
+                Form::Capsule { from, to, radius } => {
+                    rapier::ColliderBuilder::capsule_from_endpoints(
+                        theirs(vec(from)),
+                        theirs(vec(to)),
+                        radius as f32,
+                    )
+                }
+                Form::Ball { center, radius } => {
+                    rapier::ColliderBuilder::ball(radius as f32).translation(theirs(vec(center)))
+                }
+                Form::Box { .. } => panic!("no scene of the sweep has a box"),
+            };
+            let surface = wall.surface.unwrap_or(scene.surface);
+            world.colliders.insert(with(collider, surface));
+        }
+        let mut balls = Vec::new();
+        for ball in scene.balls() {
+            let body = rapier::RigidBodyBuilder::dynamic()
+                .translation(theirs(vec(ball.position)))
+                .linvel(theirs(vec(ball.velocity)))
+                .can_sleep(false);
+            let shape = rapier::ColliderBuilder::ball(ball.radius as f32);
+            let shape = shape.density(ball.density as f32);
+            balls.push(world.insert(body, with(shape, surface_of(&ball, scene))).0);
+        }
+        Self { world, balls }
+    }
+
+    fn step(&mut self, gravity: Vec3, forces: &[Vec3]) {
+        self.world.gravity = theirs(gravity);
+        for (ball, force) in self.balls.iter().zip(forces) {
+            let body = &mut self.world.bodies[*ball];
+            body.reset_forces(true);
+            body.add_force(theirs(*force), true);
+        }
+        self.world.step();
+    }
+
+    fn state(&self) -> Vec<[Vec3; 2]> {
+        let of = |ball: &rapier::RigidBodyHandle| {
+            let body = &self.world.bodies[*ball];
+            [body.translation(), body.linvel()].map(|v| Vec3::new(v.x, v.y, v.z))
+        };
+        self.balls.iter().map(of).collect()
+    }
+
+    fn defaults() -> String {
+        let parameters = format!("{:?}", rapier::IntegrationParameters::default());
+        format!("its defaults but for step and `num_solver_iterations`: `{parameters}`")
+    }
+}
+
+struct Avian {
+    app: App,
+    balls: Vec<Entity>,
+}
+
+impl Engine for Avian {
+    const NAME: &'static str = "Avian 0.7.0";
+
+    fn new(scene: &Scene, step: f32, count: u32) -> Self {
+        let mut app = App::new();
+        app.add_plugins((
+            MinimalPlugins
+                .set(TaskPoolPlugin { task_pool_options: TaskPoolOptions::with_num_threads(1) }),
+            TransformPlugin,
+            avian::PhysicsPlugins::new(Update),
+        ));
+        app.insert_resource(avian::SubstepCount(count));
+        let step = Duration::from_secs_f32(step);
+        app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
+        app.finish();
+        app.update();
+        let world = app.world_mut();
+        let made_of = |surface: Surface| {
+            let (friction, restitution) = (surface.friction as f32, surface.restitution as f32);
+            (avian::Friction::new(friction), avian::Restitution::new(restitution))
+        };
+        for wall in &scene.walls {
+            let (shape, place) = match wall.shape {
+                Form::HalfSpace { normal, through } => {
+                    (avian::Collider::half_space(vec(normal).normalize()), vec(through))
+                }
+                Form::Capsule { from, to, radius } => {
+                    let (from, to) = (vec(from), vec(to));
+                    (avian::Collider::capsule_endpoints(radius as f32, from, to), Vec3::ZERO)
+                }
+                Form::Ball { center, radius } => {
+                    (avian::Collider::sphere(radius as f32), vec(center))
+                }
+                Form::Box { .. } => panic!("no scene of the sweep has a box"),
+            };
+            let surface = made_of(wall.surface.unwrap_or(scene.surface));
+            let place = Transform::from_translation(place);
+            world.spawn((avian::RigidBody::Static, shape, place, surface));
+        }
+        let balls = scene.balls().map(|ball| {
+            let shape = avian::Collider::sphere(ball.radius as f32);
+            let density = avian::ColliderDensity(ball.density as f32);
+            let place = Transform::from_translation(vec(ball.position));
+            let body = (
+                avian::RigidBody::Dynamic,
+                avian::SleepingDisabled,
+                avian::LinearVelocity(vec(ball.velocity)),
+                avian::ConstantForce::default(),
+            );
+            world.spawn((body, shape, density, place, made_of(surface_of(&ball, scene)))).id()
+        });
+        let balls = balls.collect();
+        Self { app, balls }
+    }
+
+    fn step(&mut self, gravity: Vec3, forces: &[Vec3]) {
+        self.app.insert_resource(avian::Gravity(gravity));
+        for (ball, force) in self.balls.iter().zip(forces) {
+            let mut ball = self.app.world_mut().entity_mut(*ball);
+            if let Some(mut to) = ball.get_mut::<avian::ConstantForce>() {
+                to.0 = *force;
+            }
+        }
+        self.app.update();
+    }
+
+    fn state(&self) -> Vec<[Vec3; 2]> {
+        let of = |ball: &Entity| {
+            let ball = self.app.world().entity(*ball);
+            let at = ball.get::<avian::Position>().map_or(Vec3::NAN, |at| at.0);
+            [at, ball.get::<avian::LinearVelocity>().map_or(Vec3::NAN, |v| v.0)]
+        };
+        self.balls.iter().map(of).collect()
+    }
+
+    fn defaults() -> String {
+        "its defaults but for step and `SubstepCount` (6)".into()
+    }
+}
+
+/// The forces of the scene's fields.
+fn forces(scene: &Scene, balls: &[Ball], state: &[[Vec3; 2]]) -> Vec<Vec3> {
+    let of = |(ball, [at, velocity]): (&Ball, &[Vec3; 2])| {
+        let mass = ball.density * 4.0 / 3.0 * std::f64::consts::PI * ball.radius.powi(3);
+        let force = |field: &Field| match *field {
+            Field::Drag { velocity: wind, linear, quadratic } => {
+                let relative = vec(wind) - *velocity;
+                relative * (linear as f32 + quadratic as f32 * relative.length())
+            }
+            Field::Attraction { center, strength } => {
+                let way = vec(center) - *at;
+                way * ((strength * mass) as f32 / way.length().powi(3))
+            }
+            Field::Spring { anchor, rest_length, stiffness } => {
+                let way = vec(anchor) - *at;
+                way.normalize_or_zero() * (stiffness as f32 * (way.length() - rest_length as f32))
+            }
+        };
+        scene.fields.iter().map(force).sum()
+    };
+    balls.iter().zip(state).map(of).collect()
+}
+
+fn frame(time: f64, state: &[[Vec3; 2]]) -> Frame {
+    let exact = |v: Vec3| Exact::new(v.x, v.y, v.z).map(f64::from);
+    let at = state.iter().map(|[at, _]| exact(*at)).collect::<Vec<_>>();
+    let velocity = state.iter().map(|[_, velocity]| exact(*velocity)).collect();
+    Frame { time, at, velocity, overlap: 0.0 }
+}
+
+/// How deep balls are in each other and in walls, all together.
+fn overlap(scene: &Scene, balls: &[Ball], state: &[[Vec3; 2]]) -> f64 {
+    let mut there = scene.clone();
+    there.lattices.clear();
+    let place = |(ball, [at, _]): (&Ball, &[Vec3; 2])| Ball {
+        position: at.to_array().map(f64::from),
+        ..*ball
+    };
+    there.marbles = balls.iter().zip(state).map(place).collect();
+    there
+        .run::<f64>(taw::world::Model::default())
+        .map_or(f64::NAN, |running| taw_lab::scene::overlaps(&running.world).iter().sum())
+}
+
+fn run<E: Engine>(judged: &Judged, step: (&str, f64), count: u32) -> Point {
+    let scene = judged.scene();
+    let balls: Vec<_> = scene.balls().collect();
+    let steps = (scene.seconds / step.1).round() as u64;
+    let every = (FRAME / step.1).round() as u64;
+    let go = |mut watch: Option<&mut Vec<Frame>>| {
+        let mut engine = E::new(scene, step.1 as f32, count);
+        let still = |ball: &Ball| [vec(ball.position), vec(ball.velocity)];
+        let mut state: Vec<_> = balls.iter().map(still).collect();
+        let mut taken = Duration::ZERO;
+        for i in 0..=steps {
+            if let Some(frames) = &mut watch
+                && (i % every == 0 || i == steps)
+            {
+                let mut frame = frame(i as f64 * step.1, &state);
+                frame.overlap = overlap(scene, &balls, &state);
+                frames.push(frame);
+            }
+            if i < steps {
+                let now = (i as f64 + 0.5) * step.1;
+                let gravity = vec(scene.gravity_at(now));
+                let begin = Instant::now();
+                let forces =
+                    if scene.fields.is_empty() { vec![] } else { forces(scene, &balls, &state) };
+                engine.step(gravity, &forces);
+                taken += begin.elapsed();
+                state = engine.state();
+            }
+        }
+        taken.as_secs_f64()
+    };
+    let mut frames = Vec::new();
+    go(Some(&mut frames));
+    let mut times = [0; 3].map(|_| go(None));
+    times.sort_by(f64::total_cmp);
+    let error = judged.error(&frames);
+    let failure = match error {
+        error if !error.is_finite() => Some(Failure::Overflow),
+        1.0.. => Some(Failure::Wrong),
+        _ => None,
+    };
+    let (substeps, iterations) = if E::NAME.starts_with("Avian") { (count, 1) } else { (1, count) };
+    Point {
+        engine: E::NAME.into(),
+        scene: judged.name.into(),
+        model: "default".into(),
+        number: "f32".into(),
+        step: step.0.into(),
+        seconds: digits(step.1),
+        substeps,
+        iterations,
+        error: error.is_finite().then_some(digits(error.max(1e-16))),
+        failure,
+        cost: digits(times[1] * 1e9 / scene.seconds / balls.len() as f64),
+        real_time: digits(scene.seconds / times[1]),
+        note: E::defaults(),
+    }
+}
+
+fn main() -> std::io::Result<()> {
+    let arguments: Vec<_> = std::env::args().skip(1).collect();
+    let quick = arguments.iter().any(|word| word == "--quick");
+    let file = arguments.iter().find(|word| !word.starts_with("--"));
+    let file = file.map_or("peers.jsonl", String::as_str);
+    let mut points = Vec::new();
+    for judged in &SCENES {
+        for (i, step) in STEPS.into_iter().enumerate() {
+            for count in COUNTS {
+                if quick && !([1, 3].contains(&i) && [1, 4, 8].contains(&count)) {
+                    continue;
+                }
+                points.push(run::<Rapier>(judged, step, count));
+                points.push(run::<Avian>(judged, step, count));
+            }
+            eprintln!("{} at {}", judged.name, step.0);
+        }
+    }
+    write_points(file.as_ref(), &points)
+}
