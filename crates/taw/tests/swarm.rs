@@ -433,6 +433,37 @@ fn a_wall_that_moves_takes_balls_along() {
     assert!((velocity.y - 2.0).abs() < 0.05, "{} m/s", velocity.y);
 }
 
+/// A box that comes from afar pushes a ball that nothing else moves.
+#[test]
+fn a_box_that_moves_is_noticed_by_balls_at_rest() {
+    for tier in [Tier::Full, Tier::Lab] {
+        let mut world = world(SwarmModel { sleeps: true, ..model(tier) }, None);
+        let id = world.swarm.insert(&[Ball::new(Point3::new(0.0, 0.5, 0.0), 0.5)]).unwrap()[0];
+        let at = |x: f32| taw::shape::Box3 {
+            min: Point3::new(x - 1.0, 0.1, -2.0),
+            max: Point3::new(x, 2.0, 2.0),
+        };
+        let wall = world.walls.insert(at(-5.0)).unwrap();
+        steps(&mut world, 60);
+        let rebuilds = world.swarm.rebuilds();
+        for step in 1..=300_u16 {
+            let motion = taw::motion::WallMotion {
+                velocity: Vec3::new(1.2, 0.0, 0.0),
+                spin: Vec3::new(0.0, 0.0, 0.0),
+                pivot: Point3::new(0.0, 0.0, 0.0),
+            };
+            world.walls.set(wall, at(-5.0 + 1.2 * f32::from(step) * DT)).unwrap();
+            world.walls.set_motion(wall, Some(motion)).unwrap();
+            steps(&mut world, 1);
+            if step == 200 {
+                assert_eq!(world.swarm.rebuilds(), rebuilds, "nothing was sought anew by chance");
+            }
+        }
+        let place = one(&world, id).0;
+        assert!(place.x > 1.45 && place.x < 2.5, "{tier:?}: {} m", place.x);
+    }
+}
+
 #[test]
 fn marbles_and_swarms_push_each_other() {
     for tier in [Tier::Full, Tier::Lab] {
