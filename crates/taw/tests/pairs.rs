@@ -208,6 +208,29 @@ fn millions_of_pairs_know_their_distance_and_their_way_out() {
     println!("{CASES} cases of up to 36 pairs in each scalar, 1,000 directions each");
 }
 
+/// Found by the test above: a capsule over the edge of a face that is nearly across its way, so
+/// that what is over the face is not the deepest.
+#[test]
+fn the_deepest_point_may_lie_beyond_the_edge_of_a_face() {
+    let zero = [0.0; 3];
+    let flat = vec![
+        [-1.124_694_395_930_751_6, 0.029_045_801_143_924_07, 0.0],
+        [1.0, 0.0, 0.580_968_853_658_375_4],
+        zero,
+        [-1.145_100_036_421_305_8, 0.376_253_235_307_233_26, 0.0],
+        zero,
+        zero,
+    ];
+    let first =
+        ([0.361_162_761_948_844_2, 1.0, 0.652_811_751_996_324_4], [0.0, 0.0, 0.1], 0.0, flat);
+    let tall = vec![zero, [0.0, 0.0, 0.905_929_036_482_534_5], zero, zero, zero, zero];
+    let place = [-0.693_783_802_417_236_1, 1.021_564_635_562_464_8, 0.948_842_970_291_483];
+    let second = (place, [0.0, 0.0, 0.1], 0.0, tall);
+    for scale in [1e-6, 1.0, 1e6] {
+        check_all(&first, &second, scale, 0.0, 200).unwrap();
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(500))]
 

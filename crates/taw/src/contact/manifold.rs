@@ -45,6 +45,11 @@ struct ContactPoint {
 
 type Touches = SmallVec<[ContactPoint; 8]>;
 
+/// How much deeper the nearest points may be than all others, as a part of the sizes, until they
+/// are one of the points, too; and what tells its name from theirs.
+const BEYOND: f64 = 1e-3;
+const NEAREST: u32 = 1 << 30;
+
 /// Where two convex shapes touch, or are at most `margin` metres apart.
 #[must_use]
 pub fn manifold<S: Scalar>(
@@ -73,9 +78,11 @@ pub fn manifold<S: Scalar>(
     let of = x.face_along(normal).map(Of::FaceOfA).or_else(face_of_b).unwrap_or(Of::Edges);
     let mut points = contact_points(&x, &y, &Axis { normal, separation: distance, of });
     points.retain(|point| point.distance - x.radius - y.radius <= margin);
-    if points.is_empty() {
+    // Where the face is a little off the normal, the deepest point may lie beyond its edge.
+    let bottom = points.iter().map(|point| point.distance).fold(f64::INFINITY, f64::min);
+    if bottom - distance > BEYOND * (x.size() + y.size()) {
         let Between { on_a, on_b, .. } = nearest.between(&x, &y);
-        let feature = x.support(normal).1 << 10 | y.support(-normal).1;
+        let feature = NEAREST | x.support(normal).1 << 10 | y.support(-normal).1;
         points.push(ContactPoint { on_a, on_b, distance, feature });
     }
     reduce(&mut points, normal);

@@ -3,7 +3,7 @@
 use super::grid::{reorder, reorder_rows};
 use super::kernels::squared;
 use super::memory::fit;
-use super::pairs::{FindPairs, Search};
+use super::pairs::{Fans, FindPairs, Search, pairs_in};
 use super::slab::Slab;
 use super::step::listed;
 use super::team::{Shared, each, each_rows, list_rows};
@@ -207,7 +207,7 @@ impl Swarm {
             // SAFETY: its thread's, and its own.
             let (search, slab) = unsafe { (&mut *searches.row(thread), &mut *slabs.row(slab)) };
             // SAFETY: those of its rows.
-            let fans = (!rough).then(|| unsafe { fans.part(slab.fans_of_all()) });
+            let mut fans = (!rough).then(|| unsafe { fans.part(slab.fans_of_all()) });
             instructions.run(FindPairs {
                 grid,
                 at,
@@ -217,8 +217,12 @@ impl Swarm {
                 rows: slab.rows,
                 search,
                 batches: &mut slab.batches,
-                fans,
+                fans: fans.as_deref_mut(),
             });
+            let (first, rows) = (slab.rows[0], slab.rows[1] - slab.rows[0]);
+            let fans = fans.map(|list| Fans { first, rows, list });
+            let in_fans = fans.map_or(0, |fans| fans.of_rows().map(<[u16]>::len).sum());
+            slab.pairs = in_fans + pairs_in(&slab.batches);
             fit(&mut slab.batches);
             if rough {
                 slab.pushes.reset(slab.batches.len());
@@ -297,8 +301,10 @@ mod tests {
             let all = &swarm.slabs[..];
             let slabs = all.iter().map(|slab| &slab.batches);
             let mut found = BTreeSet::new();
+            let lab = tier == Tier::Lab;
+            let fans = if lab { bytemuck::cast_slice(&swarm.spare) } else { &[] };
             for slab in all {
-                for (row, fan) in (slab.rows[0]..).zip(slab.fans(swarm.fans()).of_rows()) {
+                for (row, fan) in (slab.rows[0]..).zip(slab.fans(fans).of_rows()) {
                     for after in fan {
                         let pair = [row, row + u32::from(*after)];
                         assert!(found.insert(pair), "{pair:?} comes twice");
@@ -314,6 +320,7 @@ mod tests {
                     assert!(pair[0] < pair[1] && found.insert(pair), "{pair:?} comes twice");
                 }
             }
+            assert_eq!(swarm.pairs(), found.len());
             let missed: Vec<_> = by_all(swarm).difference(&found).copied().collect();
             assert_eq!(missed, [[0; 2]; 0], "least radius {least}, {tier:?}");
         }

@@ -53,7 +53,7 @@ use grid::Grid;
 use ids::Ids;
 use lanes::Row;
 use memory::Memory;
-use pairs::Search;
+use pairs::{Search, pairs_in};
 use slab::Slab;
 use strays::Strays;
 use walls::HalfSpace;
@@ -300,10 +300,7 @@ impl Swarm {
     /// How many pairs of balls are near enough to be looked at.
     #[must_use]
     pub fn pairs(&self) -> usize {
-        let slabs = &self.slabs[..];
-        let batches = slabs.iter().flat_map(|slab| &slab.batches).chain(&self.strays.batches);
-        let lists = slabs.iter().flat_map(|slab| slab.fans(self.fans()).of_rows());
-        batches.map(|batch| batch.count as usize).chain(lists.map(<[u16]>::len)).sum()
+        self.slabs.iter().map(|slab| slab.pairs).sum::<usize>() + pairs_in(&self.strays.batches)
     }
 
     /// How many times a ball is near enough to a wall to be looked at. (The lab's tier looks at
@@ -343,12 +340,6 @@ impl Swarm {
             + self.strays.bytes()
             + of(&self.leaving)
             + of(&self.slabs)
-    }
-
-    /// The fans of all slabs, [`FAN`](pairs::FAN) numbers for each row; none in the full tier.
-    fn fans(&self) -> &[u16] {
-        let has_fans = !self.rough() && self.paired;
-        if has_fans { bytemuck::cast_slice(&self.spare) } else { &[] }
     }
 
     /// Whether there is friction, bounce and spin.

@@ -26,6 +26,11 @@ impl Batch {
     }
 }
 
+/// How many pairs there are.
+pub(super) fn pairs_in(batches: &[Batch]) -> usize {
+    batches.iter().map(|batch| batch.count as usize).sum()
+}
+
 /// How many batches are being filled at a time.
 const OPEN: usize = 32;
 /// How far before the first pair of a batch a later one may lie.

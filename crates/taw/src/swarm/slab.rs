@@ -15,6 +15,8 @@ pub(super) struct Slab {
     /// The first row, of it, of the next one, and after that.
     pub rows: [u32; 3],
     pub batches: Vec<Batch>,
+    /// How many pairs it has, in batches and fans.
+    pub pairs: usize,
     pub pushes: Pushes,
     /// By rows.
     pub touches: Vec<Touch>,
