@@ -2,9 +2,9 @@
 //!
 //! It says nothing about how it is stepped: the same scene becomes a world of any
 //! [`Scalar`](crate::math::Scalar) and [`Model`](crate::world::Model), which is what makes models
-//! comparable. With the feature `serde` it is read from files; `scenes/*.ron` of the lab are such,
-//! and so are the demo's levels. Numbers out of their range are refused where they stand, with
-//! line and field (see [`Scene`] for an example).
+//! comparable. With the feature `serde` it is read from files; `scenes/*.ron` of the lab are such.
+//! Numbers out of their range are refused where they stand, with line and field (see [`Scene`] for
+//! an example).
 
 #[cfg(feature = "serde")]
 mod number;
