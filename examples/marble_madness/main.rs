@@ -18,6 +18,7 @@ mod time;
 use bevy::prelude::*;
 use bevy_egui::EguiPlugin;
 use bevy_taw::prelude::*;
+use bevy_taw::trade::TawTradePlugin;
 use clap::Parser;
 use taw_examples::{ExamplePlugins, OrbitCameraPlugin, Picture};
 
@@ -44,6 +45,9 @@ struct Options {
     /// The marbles are capsules
     #[arg(long)]
     capsules: bool,
+    /// Open the panel that shows what each model costs and buys, and measure after a second
+    #[arg(long)]
+    trade: bool,
     #[command(flatten)]
     picture: Picture,
 }
@@ -52,7 +56,7 @@ fn main() -> AppExit {
     let options = Options::parse();
     App::new()
         .add_plugins(ExamplePlugins { title: "Marble Madness", picture: options.picture.clone() })
-        .add_plugins((EguiPlugin::default(), OrbitCameraPlugin, TawPlugins))
+        .add_plugins((EguiPlugin::default(), OrbitCameraPlugin, TawPlugins, TawTradePlugin))
         .insert_resource(options)
         .add_plugins((
             board::plugin,

@@ -6,7 +6,9 @@ use bevy::prelude::*;
 use bevy_egui::egui::{self, Align2, Context, Ui};
 use bevy_egui::{EguiContexts, EguiPrimaryContextPass};
 use bevy_taw::debug_ui;
+use bevy_taw::governor::Governor;
 use bevy_taw::prelude::*;
+use bevy_taw::trade::TawTrade;
 
 use crate::Options;
 use crate::board::{MadeOfBoxes, Tilt};
@@ -22,6 +24,7 @@ struct Open {
     help: bool,
     /// How many marbles the button drops.
     drop: u32,
+    trade: bool,
 }
 
 pub fn plugin(app: &mut App) {
@@ -31,7 +34,11 @@ pub fn plugin(app: &mut App) {
             (draw.contacts, draw.normals, draw.velocities, draw.grid) = (true, true, true, true);
         });
     }
-    app.insert_resource(Open { panels: true, help: false, drop: 100 })
+    let measures = app.world().resource::<Options>().trade;
+    if measures {
+        app.add_systems(Update, measure.run_if(once_after(1.0)));
+    }
+    app.insert_resource(Open { panels: true, help: false, drop: 100, trade: measures })
         .add_systems(
             Update,
             (
@@ -41,7 +48,23 @@ pub fn plugin(app: &mut App) {
                     .run_if(just_pressed(Action::Help)),
             ),
         )
-        .add_systems(EguiPrimaryContextPass, (panels, scoreboard, help, give_back_keys).chain());
+        .add_systems(
+            EguiPrimaryContextPass,
+            (panels, trade, scoreboard, help, give_back_keys).chain(),
+        );
+}
+
+/// Once, when the game has gone on for so many seconds.
+fn once_after(seconds: f32) -> impl FnMut(Res<Time<Virtual>>, Local<bool>) -> bool + Clone {
+    move |time, mut done| {
+        let now = !*done && time.elapsed_secs() >= seconds;
+        *done |= now;
+        now
+    }
+}
+
+fn measure(mut trade: ResMut<TawTrade>, mut world: ResMut<TawWorld>, fixed: Res<Time<Fixed>>) {
+    trade.measure(&mut world, fixed.timestep());
 }
 
 fn panels(
@@ -62,9 +85,9 @@ fn panels(
     }
     let window = egui::Window::new("Marble Madness").default_pos([10.0, 10.0]).default_width(270.0);
     window.vscroll(true).default_height(660.0).show(contexts.ctx_mut()?, |ui| {
-        section(ui, "Marbles", |ui| marbles(ui, &mut open, &mut bag, &mut orders));
-        section(ui, "Time", |ui| game_time(ui, &mut time, &mut orders, &mut steps));
-        section(ui, "Physics", |ui| {
+        section(ui, "Marbles", true, |ui| marbles(ui, &mut open, &mut bag, &mut orders));
+        section(ui, "Time", true, |ui| game_time(ui, &mut time, &mut orders, &mut steps));
+        section(ui, "Physics", true, |ui| {
             debug_ui::model(ui, &mut physics.0);
             debug_ui::gravity(ui, &mut physics.1);
             let mut degrees = tilt.limit.to_degrees();
@@ -81,26 +104,46 @@ fn panels(
                 score.paused = !plays;
             }
         });
-        section(ui, "Step", |ui| {
+        ui.toggle_value(&mut open.trade, "What each model costs and buys…");
+        section(ui, "Step", true, |ui| {
             debug_ui::counts(ui, &diagnostics);
             debug_ui::step_time(ui, &diagnostics);
         });
-        let energy = section(ui, "Energy", |ui| debug_ui::energy(ui, &mut diagnostics));
+        let energy = section(ui, "Energy", false, |ui| debug_ui::energy(ui, &mut diagnostics));
         bevy_taw::diagnostics::enable_energy(&mut diagnostics, energy);
-        section(ui, "Draw", |ui| debug_ui::gizmos(ui, &mut gizmos));
+        section(ui, "Draw", false, |ui| debug_ui::gizmos(ui, &mut gizmos));
         ui.separator();
         ui.weak("F1 lists all keys, Tab hides the panels");
     });
     Ok(())
 }
 
-/// A part of the panel that can be folded; gives whether it is open.
-fn section(ui: &mut Ui, title: &str, content: impl FnOnce(&mut Ui)) -> bool {
-    egui::CollapsingHeader::new(title)
-        .default_open(!matches!(title, "Draw" | "Energy"))
-        .show(ui, content)
-        .body_returned
-        .is_some()
+fn trade(
+    mut contexts: EguiContexts,
+    mut open: ResMut<Open>,
+    mut trade: ResMut<TawTrade>,
+    mut world: ResMut<TawWorld>,
+    mut model: ResMut<TawModel>,
+    mut governor: ResMut<Governor>,
+    fixed: Res<Time<Fixed>>,
+) -> Result {
+    let mut shown = open.trade;
+    egui::Window::new("Trade")
+        .open(&mut shown)
+        .default_pos([860.0, 60.0])
+        .default_width(390.0)
+        .show(contexts.ctx_mut()?, |ui| {
+            let step = fixed.timestep();
+            debug_ui::trade(ui, &mut trade, &mut world, &mut model, &mut governor, step);
+        });
+    open.trade = shown;
+    Ok(())
+}
+
+/// A part of the panel that can be folded, and whether it is open at first; gives whether it is
+/// now.
+fn section(ui: &mut Ui, title: &str, open: bool, content: impl FnOnce(&mut Ui)) -> bool {
+    egui::CollapsingHeader::new(title).default_open(open).show(ui, content).body_returned.is_some()
 }
 
 fn marbles(ui: &mut Ui, open: &mut Open, bag: &mut Bag, orders: &mut MessageWriter<Order>) {

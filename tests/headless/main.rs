@@ -10,5 +10,6 @@ mod motion;
 mod scene;
 mod spawning;
 mod swarms;
+mod trade;
 mod transforms;
 mod walls;

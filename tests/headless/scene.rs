@@ -19,7 +19,7 @@ pub fn smooth_app() -> App {
     app_with(TawPlugins)
 }
 
-fn app_with<M>(physics: impl Plugins<M>) -> App {
+pub fn app_with<M>(physics: impl Plugins<M>) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, TransformPlugin));
     app.add_plugins(physics);

@@ -103,6 +103,7 @@ pub(crate) struct StepTimes {
     began: Option<Instant>,
     gather: Duration,
     stepped: Duration,
+    whole: Duration,
     pub integrate: Stopwatch,
     pub generate_contacts: Stopwatch,
     pub restitute: Stopwatch,
@@ -167,12 +168,29 @@ impl StepTimes {
     }
 }
 
-pub(crate) fn measure(times: Res<StepTimes>, world: Res<TawWorld>, mut diagnostics: Diagnostics) {
+#[cfg(feature = "trade")]
+impl StepTimes {
+    /// From gather to scatter.
+    pub fn whole(&self) -> Duration {
+        self.whole
+    }
+
+    /// The three verbs together.
+    pub fn verbs(&self) -> Duration {
+        self.integrate.0 + self.generate_contacts.0 + self.restitute.0
+    }
+}
+
+pub(crate) fn measure(
+    mut times: ResMut<StepTimes>,
+    world: Res<TawWorld>,
+    mut diagnostics: Diagnostics,
+) {
     let ms = |duration: Duration| duration.as_secs_f64() * 1e3;
-    diagnostics.add_measurement(&STEP_TIME, || ms(times.elapsed()));
+    times.whole = times.elapsed();
+    diagnostics.add_measurement(&STEP_TIME, || ms(times.whole));
     diagnostics.add_measurement(&GATHER_TIME, || ms(times.gather));
-    diagnostics
-        .add_measurement(&SCATTER_TIME, || ms(times.elapsed().saturating_sub(times.stepped)));
+    diagnostics.add_measurement(&SCATTER_TIME, || ms(times.whole.saturating_sub(times.stepped)));
     diagnostics.add_measurement(&INTEGRATE_TIME, || ms(times.integrate.0));
     diagnostics.add_measurement(&CONTACTS_TIME, || ms(times.generate_contacts.0));
     diagnostics.add_measurement(&RESTITUTE_TIME, || ms(times.restitute.0));

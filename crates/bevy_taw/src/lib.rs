@@ -46,6 +46,8 @@
 //! | `gizmos` (feature `render`) | contacts, normals, velocities and the grid, drawn |
 //! | `swarm_render` (feature `render`) | swarms on the screen |
 //! | `debug_ui` (feature `debug_ui`) | egui panels for any game |
+//! | `trade` (feature `trade`) | what every model would cost and buy, measured beside the game |
+//! | `governor` (feature `trade`) | keeps steps within a budget |
 //!
 //! # Units
 //! Metres, seconds. `Transform::scale` does not change a marble's radius.
@@ -66,6 +68,8 @@ pub mod diagnostics;
 mod gather;
 #[cfg(feature = "render")]
 pub mod gizmos;
+#[cfg(feature = "trade")]
+pub mod governor;
 pub mod interpolation;
 pub mod messages;
 mod plugin;
@@ -76,6 +80,8 @@ mod scatter;
 pub mod swarm;
 #[cfg(feature = "render")]
 pub mod swarm_render;
+#[cfg(feature = "trade")]
+pub mod trade;
 pub mod wall;
 
 pub use plugin::{Substep, SubstepDelta, TawPlugin, TawPlugins, TawSystems};

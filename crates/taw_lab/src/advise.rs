@@ -1,20 +1,21 @@
-//! Which model for a scene of one's own.
+//! Which model for a scene of one's own, from a file or as it is in a game.
 //!
-//! The reference is the scene in `f64` by the most exact model, in steps that are halved until
-//! two runs agree. How long places can be told beforehand is measured too: by two references that
+//! The reference is the scene by the most exact model (in `f64`, if it is from a file), in steps
+//! that are halved until two runs agree. How long places can be told beforehand is measured too: by two references that
 //! differ in the last bit. Until then places are compared, marble by marble; after it what
 //! remains meaningful: heights and speeds of all together, the energy, how deep things overlap.
 
 use std::fmt::Write;
-use std::time::{Duration, Instant};
+use std::future::Future;
 
 use taw::prelude::*;
-use taw::scene::Scene;
+use taw::scene::{Running, Scene};
+use web_time::Instant;
 
-use crate::scene::EXACT;
-use crate::trade::models::MODELS;
-use crate::trade::sweep::COUNTS;
-use crate::trade::trace::{Frame, Number, Setting, time, trace};
+use crate::scene::{EXACT, IMPULSE};
+use crate::trade::COUNTS;
+use crate::trade::models::{MODELS, Named};
+use crate::trade::trace::{FRAME, Film, Frame, Number, Setting, film, film_of};
 
 /// Reads a scene.
 ///
@@ -37,6 +38,120 @@ pub fn read_scene(text: &str) -> Result<Scene, String> {
     Ok(scene)
 }
 
+/// What can be run again and again from the same beginning.
+pub trait Source: Sync {
+    /// For how long, in seconds.
+    fn seconds(&self) -> f64;
+    /// The radius of the smallest marble, in metres.
+    fn smallest(&self) -> f64;
+    /// In which numbers it can be run, the most exact ones last.
+    fn numbers(&self) -> &'static [Number];
+    /// The models that are worth a try.
+    fn models(&self) -> impl Iterator<Item = &'static Named> + Send;
+    /// Runs it, with a frame in every `every` seconds; if `nudged`, after every marble was moved
+    /// by the last bit of its place. `None` if that cannot be done, or a marble left all numbers
+    /// behind.
+    fn film(
+        &self,
+        setting: Setting,
+        nudged: bool,
+        every: f64,
+    ) -> impl Future<Output = Option<Film>> + Send;
+}
+
+impl Source for Scene {
+    fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    fn smallest(&self) -> f64 {
+        self.balls().map(|ball| ball.radius).fold(f64::MAX, f64::min)
+    }
+
+    fn numbers(&self) -> &'static [Number] {
+        &[Number::F32, Number::F64]
+    }
+
+    fn models(&self) -> impl Iterator<Item = &'static Named> + Send {
+        MODELS.iter()
+    }
+
+    async fn film(&self, setting: Setting, nudged: bool, every: f64) -> Option<Film> {
+        if nudged {
+            let marbles = self.balls().map(|mut ball| {
+                ball.position = ball.position.map(up);
+                ball
+            });
+            let scene = Scene { marbles: marbles.collect(), lattices: Vec::new(), ..self.clone() };
+            film_of(&scene, setting, every).await
+        } else {
+            film_of(self, setting, every).await
+        }
+    }
+}
+
+/// The next number.
+fn up(x: f64) -> f64 {
+    if x == 0.0 { 1e-17 } else { x.next_up() }
+}
+
+/// A world of a game, as it is now. Whatever moves walls does not move them in it: they stand
+/// still.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    world: World<f32>,
+    seconds: f64,
+}
+
+impl Snapshot {
+    /// Of this world, to be run for so many seconds. Balls in bulk are left out. (The world is
+    /// as before afterwards.)
+    #[must_use]
+    pub fn new(of: &mut World<f32>, seconds: f64) -> Self {
+        let swarm = std::mem::take(&mut of.swarm);
+        let mut world = of.clone();
+        of.swarm = swarm;
+        for row in 0..world.walls.len() {
+            if let Some(id) = world.walls.id(row) {
+                // A wall that is there can be told to stand still.
+                let _ = world.walls.set_motion(id, None);
+            }
+        }
+        Self { world, seconds }
+    }
+}
+
+impl Source for Snapshot {
+    fn seconds(&self) -> f64 {
+        self.seconds
+    }
+
+    fn smallest(&self) -> f64 {
+        self.world.marbles.radius().iter().map(|radius| f64::from(*radius)).fold(f64::MAX, f64::min)
+    }
+
+    fn numbers(&self) -> &'static [Number] {
+        &[Number::F32]
+    }
+
+    fn models(&self) -> impl Iterator<Item = &'static Named> + Send {
+        MODELS.iter().filter(|named| named.touches)
+    }
+
+    async fn film(&self, setting: Setting, nudged: bool, every: f64) -> Option<Film> {
+        let mut world = self.world.clone();
+        world.set_model(setting.model).ok()?;
+        if nudged {
+            for row in 0..world.marbles.len() {
+                let id = world.marbles.id(row)?;
+                let position = world.marbles.position()[row].map(f32::next_up);
+                world.marbles.set_position(id, position).ok()?;
+            }
+        }
+        film(Running::from(world), [self.seconds, setting.step, every]).await
+    }
+}
+
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Wish {
@@ -46,6 +161,15 @@ pub struct Wish {
     pub budget: Option<f64>,
     /// The step of the game, in seconds.
     pub step: f64,
+    /// A model that takes longer for the scene, in seconds, is not tried with more substeps.
+    pub patience: f64,
+}
+
+impl Default for Wish {
+    /// Nothing but to know what there is, at 60 steps a second and with a second's patience.
+    fn default() -> Self {
+        Self { most: None, budget: None, step: 1.0 / 60.0, patience: 1.0 }
+    }
 }
 
 /// How a setting did.
@@ -75,84 +199,94 @@ pub struct Whole {
 }
 
 /// What came out.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Advice {
     /// Until when places can be told, in seconds; the scene's length if always.
     pub told: f64,
+    /// For how long it was run, in seconds.
+    pub seconds: f64,
     /// Up to how much the references agree until then, in metres.
     pub sure: f64,
-    /// The step of the reference, in seconds.
-    pub reference: f64,
+    /// How the reference was run, if it could be.
+    pub reference: Option<Setting>,
     /// All settings, the cheapest first.
     pub choices: Vec<Choice>,
 }
 
-/// Steps of the reference, the longest first.
-const REFINED: [f64; 4] = [1.0 / 240.0, 1.0 / 480.0, 1.0 / 960.0, 1.0 / 1920.0];
-/// A model that takes so long for a scene is not tried with more substeps.
-const LONG: Duration = Duration::from_secs(1);
+/// Steps of the reference, as parts of the game's, the longest first.
+const REFINED: [f64; 4] = [1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0];
 /// What counts as the same place, as a part of the smallest radius.
 const SAME: f64 = 0.01;
 
-/// Measures all models on a scene.
-#[must_use]
-pub fn advise(scene: &Scene, wish: Wish, mut tell: impl FnMut(usize, usize)) -> Advice {
-    let radius = scene.balls().map(|ball| ball.radius).fold(f64::MAX, f64::min);
-    let same = wish.most.map_or(SAME * radius, |most| (0.25 * most).min(SAME * radius));
-    let run = |scene: &Scene, step| {
-        trace(scene, Setting { model: EXACT, number: Number::F64, step }).unwrap_or_default()
-    };
-    let mut reference = run(scene, REFINED[0]);
-    let (mut told, mut sure, mut used) = (0.0, 0.0, REFINED[0]);
-    for step in &REFINED[1..] {
-        let (finer, before) = (run(scene, *step), told);
-        (told, sure) = agreement(&reference, &finer, same);
-        (reference, used) = (finer, *step);
-        // What is chaotic does not become less so.
-        if told >= scene.seconds || told > 0.0 && told < 1.2 * before {
+/// Measures all models on a scene. `tell` hears how many groups of settings are done, how many
+/// there are, and what is known so far.
+pub async fn advise(
+    source: &impl Source,
+    wish: Wish,
+    mut tell: impl FnMut(usize, usize, &Advice),
+) -> Advice {
+    let seconds = source.seconds();
+    let same = wish.most.map_or(f64::MAX, |most| 0.25 * most).min(SAME * source.smallest());
+    // Frames of all steps are of the same moments.
+    let every = (FRAME / wish.step).round().max(1.0) * wish.step;
+    let number = source.numbers().last().copied().unwrap_or(Number::F32);
+    let mut advice = Advice { seconds, ..Advice::default() };
+    let mut reference = Vec::new();
+    // Not every scene can be run by events.
+    for model in [EXACT, Model { detection: Detection::Swept, substeps: 4, ..IMPULSE }] {
+        for part in REFINED {
+            let setting = Setting { model, number, step: part * wish.step };
+            let Some(finer) = source.film(setting, false, every).await else { break };
+            let before = advice.told;
+            if !reference.is_empty() {
+                (advice.told, advice.sure) = agreement(&reference, &finer.frames, same);
+            }
+            (reference, advice.reference) = (finer.frames, Some(setting));
+            // What is chaotic does not become less so.
+            let told = advice.told;
+            if told >= seconds || told > 0.0 && told < 1.2 * before {
+                break;
+            }
+        }
+        if let Some(setting) = advice.reference {
+            let nudged = source.film(setting, true, every).await.unwrap_or_default();
+            advice.told = advice.told.min(agreement(&reference, &nudged.frames, same).0);
             break;
         }
     }
-    let (other, _) = agreement(&reference, &run(&nudged(scene), used), same);
-    told = told.min(other);
-    let groups = settings(wish);
+    let groups = settings(source, wish);
     let count = groups.len();
-    let mut choices = Vec::new();
     for (i, (name, settings)) in groups.into_iter().enumerate() {
-        tell(i, count);
+        tell(i, count, &advice);
         for setting in settings {
             let begin = Instant::now();
-            let Some(frames) = trace(scene, setting) else { continue };
-            let until = frames.iter().take_while(|frame| frame.time <= told + 1e-9).count();
+            let Some(Film { frames, cost }) = source.film(setting, false, every).await else {
+                continue;
+            };
+            let until = frames.iter().take_while(|frame| frame.time <= advice.told + 1e-9).count();
             let error = distances(&frames[..until], &reference).fold(0.0, f64::max);
             let whole = Whole::between(&frames, &reference);
-            let long = begin.elapsed();
-            let mut times: Vec<_> = (0..3)
-                .take_while(|i| *i == 0 || long < LONG / 10)
-                .map(|_| time(scene, setting) / (scene.seconds / setting.step).round())
-                .collect();
-            times.sort_unstable_by(f64::total_cmp);
-            choices.push(Choice { name, setting, error, whole, cost: times[times.len() / 2] });
-            if long > LONG {
+            advice.choices.push(Choice { name, setting, error, whole, cost });
+            if begin.elapsed().as_secs_f64() > wish.patience {
                 break;
             }
         }
     }
-    choices.sort_by(|a, b| a.cost.total_cmp(&b.cost));
-    Advice { told, sure, reference: used, choices }
+    advice.choices.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    advice
 }
 
 /// For each model, number and count of iterations, its settings from the cheapest on.
-fn settings(wish: Wish) -> Vec<(&'static str, Vec<Setting>)> {
+fn settings(source: &impl Source, wish: Wish) -> Vec<(&'static str, Vec<Setting>)> {
     let mut groups = Vec::new();
-    for named in &MODELS {
+    for named in source.models() {
         let iterations: &[u32] =
-            if named.iterates { &[4, 8, 32] } else { &[named.model.iterations] };
-        for number in [Number::F32, Number::F64] {
+            if named.iterates { &[1, 2, 4, 8, 32] } else { &[named.model.iterations] };
+        for number in source.numbers() {
             for iterations in iterations {
                 let setting = |substeps| {
                     let model = Model { substeps, iterations: *iterations, ..named.model };
-                    Setting { model, number, step: wish.step }
+                    Setting { model, number: *number, step: wish.step }
                 };
                 groups.push((named.name, COUNTS.map(setting).to_vec()));
             }
@@ -176,15 +310,6 @@ fn agreement(a: &[Frame], b: &[Frame], same: f64) -> (f64, f64) {
 
 fn distances<'a>(a: &'a [Frame], b: &'a [Frame]) -> impl Iterator<Item = f64> + 'a {
     a.iter().zip(b).flat_map(|(a, b)| a.at.iter().zip(&b.at).map(|(a, b)| a.distance(*b)))
-}
-
-/// The scene with every marble moved by the last bit of its place.
-fn nudged(scene: &Scene) -> Scene {
-    let marbles = scene.balls().map(|mut ball| {
-        ball.position = ball.position.map(|x| if x == 0.0 { 1e-17 } else { x.next_up() });
-        ball
-    });
-    Scene { marbles: marbles.collect(), lattices: Vec::new(), ..scene.clone() }
 }
 
 impl Whole {
@@ -247,23 +372,26 @@ impl Advice {
 
     /// All of it in words.
     #[must_use]
-    pub fn text(&self, scene: &Scene, wish: Wish) -> String {
+    pub fn text(&self, wish: Wish) -> String {
         let mut text = String::new();
-        let _ = self.write(&mut text, scene, wish);
+        let _ = self.write(&mut text, wish);
         text
     }
 
-    fn write(&self, text: &mut String, scene: &Scene, wish: Wish) -> std::fmt::Result {
-        let Self { told, sure, reference, choices } = self;
-        writeln!(text, "reference: event-driven, f64, {:.2} ms a step", reference * 1e3)?;
-        if *told >= scene.seconds - 1e-9 {
+    fn write(&self, text: &mut String, wish: Wish) -> std::fmt::Result {
+        let Self { told, seconds, sure, reference, choices } = self;
+        let Some(Setting { model, number, step }) = reference else {
+            return writeln!(text, "no reference: the scene runs out of all numbers");
+        };
+        let by = if model.response == EXACT.response { "event-driven" } else { "impulse, swept" };
+        writeln!(text, "reference: {by}, {number}, {:.2} ms a step", step * 1e3)?;
+        if *told >= seconds - 1e-9 {
             writeln!(text, "places can be told to the end; references agree to {sure:.1e} m")?;
         } else {
             writeln!(
                 text,
-                "chaotic: places can be told for {told:.1} of {:.1} s (to {sure:.1e} m); after that \
-                 heights, speeds and overlaps of all marbles are compared",
-                scene.seconds
+                "chaotic: places can be told for {told:.1} of {seconds:.1} s (to {sure:.1e} m); \
+                 after that heights, speeds and overlaps of all marbles are compared"
             )?;
         }
         writeln!(

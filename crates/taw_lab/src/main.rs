@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use futures_lite::future::block_on;
 use indicatif::{ProgressBar, ProgressStyle};
 use peak_alloc::PeakAlloc;
 use taw::scene::Scene;
@@ -142,7 +143,7 @@ fn main() -> ExitCode {
             trade(&out, &Plan { quick, scene, model }, shard, &with)
         }
         Command::Advise { scene, max_error: most, budget, step } => {
-            print_advice(&scene, Wish { most, budget, step })
+            print_advice(&scene, Wish { most, budget, step, ..Wish::default() })
         }
         Command::Bench { scene, model, number, step } => bench(&scene, &model, number, step),
         Command::Merge { out, files } => merge(&out, &files),
@@ -217,12 +218,12 @@ fn bench(file: &Path, model: &str, number: Number, step: f64) -> Result<ExitCode
 fn print_advice(file: &Path, wish: Wish) -> Result<ExitCode, Box<dyn Error>> {
     let scene = read(file)?;
     let bar = ProgressBar::new(0);
-    let advice = advise(&scene, wish, |done, all| {
+    let advice = block_on(advise(&scene, wish, |done, all, _| {
         bar.set_length(all as u64);
         bar.set_position(done as u64);
-    });
+    }));
     bar.finish_and_clear();
-    print!("{}", advice.text(&scene, wish));
+    print!("{}", advice.text(wish));
     let asked = wish.most.is_some() || wish.budget.is_some();
     let found = !asked || advice.best(wish).is_some();
     Ok(if found { ExitCode::SUCCESS } else { ExitCode::FAILURE })

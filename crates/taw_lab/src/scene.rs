@@ -1,8 +1,9 @@
 //! What the suite's scenes are made of.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use taw::prelude::*;
+use web_time::Instant;
 
 /// Earth's, in m/s².
 pub const G: f64 = 9.81;

@@ -237,10 +237,13 @@ pub enum Movement {
     /// It turns for ever.
     Turns {
         /// A point of the axis.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
         pivot: [f64; 3],
         /// Of any length but zero.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::direction"))]
+        #[cfg_attr(
+            feature = "serde",
+            serde(default = "up", deserialize_with = "number::direction")
+        )]
         axis: [f64; 3],
         /// How fast.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::any"))]

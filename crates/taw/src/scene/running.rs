@@ -80,6 +80,13 @@ impl Scene {
     }
 }
 
+impl<S> From<World<S>> for Running<S> {
+    /// A world that is there already: nothing moves in it by itself but what its model moves.
+    fn from(world: World<S>) -> Self {
+        Self { world, scene: Scene::default(), moving: Vec::new(), time: 0.0 }
+    }
+}
+
 impl<S: Scalar> Running<S> {
     /// Goes on by `dt` seconds: gravity as it is halfway, walls where they are at the end.
     ///

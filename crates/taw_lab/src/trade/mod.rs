@@ -1,14 +1,21 @@
 //! Error against cost: every model, in both scalars, by many settings, on scenes whose outcome is
 //! known.
 
+#[cfg(feature = "cli")]
 mod chart;
 pub mod models;
+#[cfg(feature = "cli")]
 mod report;
 pub mod scenes;
+#[cfg(feature = "cli")]
 pub mod sweep;
 pub mod trace;
 
+#[cfg(feature = "cli")]
 pub use report::{Curve, curves, front, write_report};
+
+/// Substeps, and iterations where they count.
+pub const COUNTS: [u32; 6] = [1, 2, 4, 8, 16, 32];
 
 /// What one setting came to on one scene.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]

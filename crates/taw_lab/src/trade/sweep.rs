@@ -10,7 +10,7 @@ use taw::world::Model;
 use super::models::{MODELS, Named};
 use super::scenes::{Judged, SCENES};
 use super::trace::{Number, Setting, time, trace};
-use super::{Failure, Point};
+use super::{COUNTS, Failure, Point};
 
 /// The steps, with their names.
 pub const STEPS: [(&str, f64); 5] = [
@@ -20,8 +20,6 @@ pub const STEPS: [(&str, f64); 5] = [
     ("1/240", 1.0 / 240.0),
     ("1 ms", 0.001),
 ];
-/// Substeps, and iterations where they count.
-pub const COUNTS: [u32; 6] = [1, 2, 4, 8, 16, 32];
 /// Those of a quick sweep.
 const QUICK_STEPS: [usize; 2] = [1, 3];
 const QUICK_COUNTS: [u32; 2] = [1, 8];

@@ -1,10 +1,15 @@
 //! What happened in a scene, whatever stepped it.
 
+use std::time::Duration;
+
+use futures_lite::future::{block_on, yield_now};
 use taw::prelude::*;
-use taw::scene::Scene;
+use taw::scene::{Running, Scene};
+use web_time::Instant;
 
 /// In which numbers a world counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, clap::ValueEnum)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Number {
     /// Single precision, as games do.
     F32,
@@ -46,30 +51,38 @@ pub struct Frame {
 /// of a sweep.
 pub const FRAME: f64 = 0.1;
 
-/// Runs a scene to its end and keeps its frames, the first one at the beginning. `None` if a
-/// marble left all numbers behind.
-///
-/// # Panics
-/// If the scene cannot be run.
-#[must_use]
-pub fn trace(scene: &Scene, setting: Setting) -> Option<Vec<Frame>> {
-    match setting.number {
-        Number::F32 => trace_in::<f32>(scene, setting),
-        Number::F64 => trace_in::<f64>(scene, setting),
-    }
+/// A run: what there was to see, and what it cost.
+#[derive(Clone, Debug, Default)]
+pub struct Film {
+    /// The first one at the beginning, the last one at the end.
+    pub frames: Vec<Frame>,
+    /// The median time of a step, in seconds.
+    pub cost: f64,
 }
 
-fn trace_in<S: Scalar>(scene: &Scene, Setting { model, step, .. }: Setting) -> Option<Vec<Frame>> {
-    let mut running = scene.run::<S>(model).expect("scenes are checked before");
+/// What a run does not go on for, without a look at what else is to be done.
+const TURN: Duration = Duration::from_millis(1);
+
+/// Runs something for so many seconds, with a frame in every `every` of them. `None` if a marble
+/// left all numbers behind, or a step is refused. Pauses every millisecond, so that it can share
+/// a thread.
+pub async fn film<S: Scalar>(
+    mut running: Running<S>,
+    [seconds, step, every]: [f64; 3],
+) -> Option<Film> {
     let ids: Vec<MarbleId> =
         (0..running.world.marbles.len()).filter_map(|row| running.world.marbles.id(row)).collect();
-    let steps = (scene.seconds / step).round() as u64;
-    let every = (FRAME / step).round().max(1.0) as u64;
+    let steps = (seconds / step).round() as u64;
+    let every = (every / step).round().max(1.0) as u64;
     let dt = S::constant(step);
-    let mut frames = Vec::new();
+    let mut film = Film::default();
+    let mut times = Vec::new();
+    let mut turn = Instant::now();
     for i in 0..=steps {
         if i > 0 {
-            running.step(dt).expect("steps are above zero");
+            let begin = Instant::now();
+            running.step(dt).ok()?;
+            times.push(begin.elapsed());
             if running.world.stopped().next().is_some() {
                 return None;
             }
@@ -77,16 +90,38 @@ fn trace_in<S: Scalar>(scene: &Scene, Setting { model, step, .. }: Setting) -> O
         if i % every == 0 || i == steps {
             let mut frame = Frame { time: i as f64 * step, ..Frame::default() };
             for id in &ids {
-                let marble =
-                    running.world.marbles.get_exact(*id).expect("nobody takes marbles out");
+                let marble = running.world.marbles.get_exact(*id).ok()?;
                 frame.at.push(marble.position.to_vec());
                 frame.velocity.push(marble.velocity);
             }
             frame.overlap = crate::scene::overlaps(&running.world).iter().sum();
-            frames.push(frame);
+            film.frames.push(frame);
+        }
+        if turn.elapsed() > TURN {
+            yield_now().await;
+            turn = Instant::now();
         }
     }
-    Some(frames)
+    times.sort_unstable();
+    film.cost = times.get(times.len() / 2).map_or(0.0, Duration::as_secs_f64);
+    Some(film)
+}
+
+/// Runs a scene to its end and keeps its frames, the first one at the beginning. `None` if a
+/// marble left all numbers behind.
+#[must_use]
+pub fn trace(scene: &Scene, setting: Setting) -> Option<Vec<Frame>> {
+    block_on(film_of(scene, setting, FRAME)).map(|film| film.frames)
+}
+
+/// [Films](film) a scene to its end. `None` also if the scene cannot be run.
+pub async fn film_of(scene: &Scene, setting: Setting, every: f64) -> Option<Film> {
+    let Setting { model, number, step } = setting;
+    let times = [scene.seconds, step, every];
+    match number {
+        Number::F32 => film(scene.run::<f32>(model).ok()?, times).await,
+        Number::F64 => film(scene.run::<f64>(model).ok()?, times).await,
+    }
 }
 
 /// How many seconds of the wall's clock a scene takes, from the first step to the last one.
@@ -104,7 +139,7 @@ pub fn time(scene: &Scene, setting: Setting) -> f64 {
 fn time_in<S: Scalar>(scene: &Scene, Setting { model, step, .. }: Setting) -> f64 {
     let mut running = scene.run::<S>(model).expect("scenes are checked before");
     let (dt, steps) = (S::constant(step), (scene.seconds / step).round() as u64);
-    let begin = std::time::Instant::now();
+    let begin = Instant::now();
     for _ in 0..steps {
         running.step(dt).expect("steps are above zero");
     }

@@ -16,6 +16,12 @@
 //! # }
 //! ```
 
+#[cfg(feature = "trade")]
+mod trade;
+
+#[cfg(feature = "trade")]
+pub use trade::trade;
+
 use bevy::diagnostic::{Diagnostic, DiagnosticPath, DiagnosticsStore};
 use bevy::prelude::*;
 use bevy_egui::egui::{self, Ui};
