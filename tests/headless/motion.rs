@@ -292,6 +292,45 @@ fn energy_is_measured_only_when_asked() {
 }
 
 #[test]
+fn where_the_energy_goes_is_told_only_when_asked() {
+    use bevy::diagnostic::{DiagnosticPath, DiagnosticsStore};
+    use bevy_taw::diagnostics::{
+        COLLISIONS, DEEPEST, FRICTION_LOSS, RESTITUTION_LOSS, SOLVER_LOSS, enable_accuracy,
+    };
+    let mut app = scene::app();
+    app.insert_resource(TawModel(Model { response: Response::EventDriven, ..default() }));
+    scene::floor(&mut app);
+    // Falls half a metre, and comes back with 3/5 of its speed.
+    app.world_mut().spawn((
+        Marble::new(0.5),
+        MarbleMass::Kilograms(2.0),
+        SurfaceMaterial { restitution: 0.6, ..default() },
+        Transform::from_xyz(0.0, 1.0, 0.0),
+    ));
+    let sum = |app: &App, path: &DiagnosticPath| {
+        let store = app.world().resource::<DiagnosticsStore>();
+        store.get(path).unwrap().values().sum::<f64>()
+    };
+    let enable = |app: &mut App, on| {
+        enable_accuracy(&mut app.world_mut().resource_mut::<DiagnosticsStore>(), on);
+    };
+    scene::frames(&mut app, 4);
+    assert_eq!(app.world().resource::<TawWorld>().account(), None);
+    assert_eq!(sum(&app, &COLLISIONS), 0.0);
+    enable(&mut app, true);
+    scene::frames(&mut app, 36);
+    let taken = 2.0 * 9.81 * 0.5 * (1.0 - 0.36);
+    let restitution = sum(&app, &RESTITUTION_LOSS);
+    assert!((restitution - taken).abs() < 1e-4, "{restitution} is not {taken}");
+    assert!(sum(&app, &SOLVER_LOSS).abs() < 1e-4, "{}", sum(&app, &SOLVER_LOSS));
+    assert_eq!((sum(&app, &FRICTION_LOSS), sum(&app, &DEEPEST)), (0.0, 0.0));
+    assert_eq!(sum(&app, &COLLISIONS), 1.0);
+    enable(&mut app, false);
+    scene::frames(&mut app, 4);
+    assert_eq!(app.world().resource::<TawWorld>().account(), None);
+}
+
+#[test]
 fn a_marble_may_turn_less_than_the_model_says() {
     let mut app = scene::app();
     dynamic(&mut app);

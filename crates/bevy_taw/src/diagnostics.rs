@@ -9,6 +9,7 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use taw::swarm::Stage;
+use taw::world::Account;
 
 use crate::convert::from_vector;
 use crate::resources::TawWorld;
@@ -56,6 +57,64 @@ pub const POTENTIAL_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/ener
 /// How large the sum of their momenta is, in kg m/s.
 pub const MOMENTUM: DiagnosticPath = DiagnosticPath::const_new("taw/momentum");
 
+/// What sliding took in a step, in joules. This and the next eight are off until
+/// [`enable_accuracy`]; each is the field of an [`Account`] by that name. Marbles count, swarms do
+/// not.
+pub const FRICTION_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/account/friction");
+/// What collisions took along their normals, in joules.
+pub const RESTITUTION_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/account/restitution");
+/// What rolling and spinning resistance took, in joules.
+pub const RESISTANCE_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/account/resistance");
+/// What the method took that no law of physics asked for, in joules; negative if it gave.
+pub const SOLVER_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/account/solver");
+/// What moving walls brought in, in joules.
+pub const WALL_WORK: DiagnosticPath = DiagnosticPath::const_new("taw/account/walls");
+/// What force fields, pushes and damping brought in, in joules.
+pub const FORCE_WORK: DiagnosticPath = DiagnosticPath::const_new("taw/account/forces");
+/// The momentum that came from nowhere, in kg m/s.
+pub const MOMENTUM_RESIDUAL: DiagnosticPath = DiagnosticPath::const_new("taw/account/momentum");
+/// How deep the deepest contact was when it was found, in metres.
+pub const DEEPEST: DiagnosticPath = DiagnosticPath::const_new("taw/account/deepest");
+/// How many collisions a step had.
+pub const COLLISIONS: DiagnosticPath = DiagnosticPath::const_new("taw/account/collisions");
+
+/// A figure of an account: where it is found, its unit, how it is read.
+type Figure = (DiagnosticPath, &'static str, fn(&Account) -> f64);
+
+/// All of them.
+fn figures() -> [Figure; 9] {
+    [
+        (FRICTION_LOSS, " J", |account| account.friction),
+        (RESTITUTION_LOSS, " J", |account| account.restitution),
+        (RESISTANCE_LOSS, " J", |account| account.resistance),
+        (SOLVER_LOSS, " J", |account| account.solver),
+        (WALL_WORK, " J", |account| account.walls),
+        (FORCE_WORK, " J", |account| account.forces),
+        (MOMENTUM_RESIDUAL, " kg m/s", |account| account.momentum),
+        (DEEPEST, " m", |account| account.deepest),
+        (COLLISIONS, "", |account| account.collisions.into()),
+    ]
+}
+
+/// Has an account kept of where the energy of every step goes, or no longer. Off, it costs
+/// nothing; on, about as much as a second look at every contact.
+pub fn enable_accuracy(store: &mut DiagnosticsStore, enabled: bool) {
+    for (path, ..) in figures() {
+        if let Some(diagnostic) = store.get_mut(&path) {
+            diagnostic.is_enabled = enabled;
+        }
+    }
+}
+
+/// Keeps an account if one of its figures is asked for.
+pub(crate) fn keep_account(mut world: ResMut<TawWorld>, store: Option<Res<DiagnosticsStore>>) {
+    let asked = |path: &DiagnosticPath| {
+        store.as_ref().and_then(|store| store.get(path)).is_some_and(|figure| figure.is_enabled)
+    };
+    let keep = figures().iter().any(|(path, ..)| asked(path));
+    world.bypass_change_detection().keep_account(keep);
+}
+
 /// Has energy and momentum measured in every step, or no longer. Off, they cost nothing.
 pub fn enable_energy(store: &mut DiagnosticsStore, enabled: bool) {
     for path in [&KINETIC_ENERGY, &SPIN_ENERGY, &POTENTIAL_ENERGY, &MOMENTUM] {
@@ -80,6 +139,11 @@ pub(crate) fn register(app: &mut App) {
         (POTENTIAL_ENERGY, " J"),
         (MOMENTUM, " kg m/s"),
     ] {
+        let mut diagnostic = Diagnostic::new(path).with_suffix(unit).with_max_history_length(600);
+        diagnostic.is_enabled = false;
+        app.register_diagnostic(diagnostic);
+    }
+    for (path, unit, _) in figures() {
         let mut diagnostic = Diagnostic::new(path).with_suffix(unit).with_max_history_length(600);
         diagnostic.is_enabled = false;
         app.register_diagnostic(diagnostic);
@@ -207,6 +271,11 @@ pub(crate) fn measure(
     diagnostics.add_measurement(&KINETIC_ENERGY, || world.energy().kinetic);
     diagnostics.add_measurement(&SPIN_ENERGY, || world.energy().spin);
     diagnostics.add_measurement(&POTENTIAL_ENERGY, || world.energy().potential);
+    if let Some(account) = world.account() {
+        for (path, _, read) in figures() {
+            diagnostics.add_measurement(&path, || read(&account));
+        }
+    }
     diagnostics.add_measurement(&MOMENTUM, || {
         from_vector(world.momentum().map(|p| p as f32)).length().into()
     });

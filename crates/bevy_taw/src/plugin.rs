@@ -110,6 +110,7 @@ impl Plugin for TawPlugin {
             FixedUpdate,
             (
                 (
+                    diagnostics::keep_account,
                     gather::settings,
                     gather::walls,
                     gather::marbles,

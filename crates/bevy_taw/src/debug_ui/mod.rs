@@ -164,6 +164,57 @@ pub fn energy(ui: &mut Ui, diagnostics: &mut DiagnosticsStore) {
     });
 }
 
+/// Where the energy of the last steps went, and how far the method was from what it should do.
+/// Measures it while it is shown.
+pub fn accuracy(ui: &mut Ui, diagnostics: &mut DiagnosticsStore) {
+    paths::enable_accuracy(diagnostics, true);
+    // Of a second at the usual sixty steps, for one step shows next to nothing.
+    let sum = |path: &DiagnosticPath| {
+        let recent = diagnostics.get(path).map(|figure| {
+            let skipped = figure.values().count().saturating_sub(60);
+            figure.values().skip(skipped).copied()
+        });
+        recent.into_iter().flatten()
+    };
+    egui::Grid::new("taw accuracy").num_columns(2).show(ui, |ui| {
+        for (name, path, help) in [
+            ("Friction took", paths::FRICTION_LOSS, "What sliding turned into heat"),
+            ("Restitution took", paths::RESTITUTION_LOSS, "What collisions took"),
+            ("Resistance took", paths::RESISTANCE_LOSS, "Rolling and spinning resistance"),
+            ("The solver took", paths::SOLVER_LOSS, "What no law of physics asked for"),
+            ("Walls brought", paths::WALL_WORK, "What moving walls did"),
+            ("Forces brought", paths::FORCE_WORK, "Force fields, pushes and damping"),
+        ] {
+            ui.label(name).on_hover_text(help);
+            ui.monospace(format!("{:+.2e} J", sum(&path).sum::<f64>()));
+            ui.end_row();
+        }
+        for (name, path, unit) in [
+            ("Momentum from nowhere", paths::MOMENTUM_RESIDUAL, " kg m/s"),
+            ("Deepest contact", paths::DEEPEST, " m"),
+        ] {
+            ui.label(name);
+            ui.monospace(format!("{:.2e}{unit}", sum(&path).fold(0.0, f64::max)));
+            ui.end_row();
+        }
+        ui.label("Collisions");
+        ui.monospace(format!("{:.0}", sum(&paths::COLLISIONS).sum::<f64>()));
+        ui.end_row();
+    });
+    ui.weak("Over the last 60 steps");
+    time_plot(ui, "taw losses", "J a step", |plot| {
+        for (name, path) in [
+            ("Friction", &paths::FRICTION_LOSS),
+            ("Restitution", &paths::RESTITUTION_LOSS),
+            ("Solver", &paths::SOLVER_LOSS),
+        ] {
+            if let Some(figure) = diagnostics.get(path) {
+                plot.line(Line::new(name, points(figure.values())));
+            }
+        }
+    });
+}
+
 /// Values one after the other.
 fn points<'a>(values: impl Iterator<Item = &'a f64>) -> PlotPoints<'static> {
     (0_u32..).zip(values).map(|(i, value)| [f64::from(i), *value]).collect()

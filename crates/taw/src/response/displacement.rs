@@ -9,13 +9,14 @@ use crate::shape::Sphere;
 ///
 /// The contacts' rows exist. A row that would become infinite or NaN keeps its place,
 /// loses its velocity, and is added to `stopped`; the other half of its contact is not
-/// affected.
+/// affected. `by_walls` hears by how much a wall changed a velocity.
 pub(crate) fn displacement<S: Scalar>(
     walls: &impl Walls<S>,
     marbles: &mut Columns<S>,
     contacts: &mut Contacts<S>,
     dt: S,
     stopped: &mut Vec<u32>,
+    mut by_walls: impl FnMut(u32, Vec3<S>),
 ) {
     contacts.sort();
     for contact in &contacts.wm {
@@ -23,7 +24,9 @@ pub(crate) fn displacement<S: Scalar>(
         let (wall, part) = (contact.a as usize, contact.part);
         let (normal, distance) = walls.normal_and_distance(wall, part, center);
         if distance <= radius {
-            marbles.displace(contact.b, normal * (radius - distance), dt, stopped);
+            let by = normal * (radius - distance);
+            marbles.displace(contact.b, by, dt, stopped);
+            by_walls(contact.b, by / dt);
         }
     }
     let half = S::constant(0.5);
@@ -107,7 +110,7 @@ mod tests {
             held: &[],
             rods: &[],
         };
-        displacement(&vec![floor], &mut columns, &mut contacts, 0.5, &mut stopped);
+        displacement(&vec![floor], &mut columns, &mut contacts, 0.5, &mut stopped, |_, _| ());
         assert_eq!(stopped, []);
         (position, velocity)
     }
@@ -173,7 +176,7 @@ mod tests {
             rods: &[],
         };
         // 1 m in 1e-33 s is 1e33 m/s, more than the gap below f32::MAX.
-        displacement(&vec![floor], &mut columns, &mut contacts, 1e-33, &mut stopped);
+        displacement(&vec![floor], &mut columns, &mut contacts, 1e-33, &mut stopped, |_, _| ());
         assert_eq!(stopped, [0]);
         assert_eq!((position[0].y, velocity[0]), (0.0, Vec3::new(0.0, 0.0, 0.0)));
         assert_eq!(position[1].y, 1.0, "the other one is restituted as ever");

@@ -7,6 +7,7 @@ mod impact;
 pub(crate) mod impulse;
 mod material;
 mod penalty;
+mod work;
 
 pub(crate) use displacement::displacement;
 pub use event::Impact;
@@ -15,6 +16,7 @@ pub(crate) use impulse::Walls;
 pub use material::{Combine, Elasticity, Material};
 pub use penalty::ContactLaw;
 pub(crate) use penalty::{Shear, penalty};
+pub(crate) use work::{Push, Work};
 
 use cgmath::{InnerSpace, Zero};
 

@@ -1,10 +1,11 @@
 use cgmath::{InnerSpace, Zero};
 
 use crate::contact::Contacts;
-use crate::math::{Scalar, Vec3, direction_and_length, is_finite};
+use crate::math::{Scalar, Vec3, cast_vector, direction_and_length, is_finite};
 use crate::response::impact::at_most;
+use crate::response::impulse::First;
 use crate::response::material::Compliance;
-use crate::response::{Columns, Material, Mobility, Walls};
+use crate::response::{Columns, Material, Mobility, Push, Walls, Work};
 
 /// How a penalty force grows with the overlap.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -47,8 +48,9 @@ struct Touch<S> {
     /// From a to b.
     normal: Vec3<S>,
     overlap: S,
-    /// Of b's point relative to a's, in m/s.
+    /// Of b's point relative to a's, and of the wall's surface, in m/s.
     closing: Vec3<S>,
+    surface: Vec3<S>,
     mobility: Mobility<S>,
     /// The sum of the curvatures, in 1/m.
     curvature: S,
@@ -80,6 +82,7 @@ pub(crate) fn penalty<S: Scalar>(
     dt: S,
     shear: &mut Vec<Shear<S>>,
     stopped: &mut Vec<u32>,
+    mut work: Option<&mut Work>,
 ) {
     contacts.sort();
     let before = std::mem::take(shear);
@@ -113,8 +116,8 @@ pub(crate) fn penalty<S: Scalar>(
         shear.push(Shear { key, stretch });
         pushes.push((touch, normal * pressure + held, pressure));
     }
-    for (touch, force, pressure) in pushes {
-        let impulse = force * dt;
+    for (touch, force, pressure) in &pushes {
+        let (touch, impulse) = (touch, *force * dt);
         let [first, second] = touch.along;
         for (row, impulse, normal, along) in [
             (Some(touch.b), impulse, touch.normal, second),
@@ -123,7 +126,12 @@ pub(crate) fn penalty<S: Scalar>(
             let Some(row) = row else { continue };
             marbles.hit(row, impulse * marbles.inverse_mass[row], normal, along);
         }
-        resist(marbles, &touch, pressure * dt);
+        resist(marbles, touch, *pressure * dt, work.as_deref_mut());
+    }
+    if let Some(work) = work {
+        for (touch, force, _) in pushes {
+            touch.count(marbles, force * dt, work);
+        }
     }
     shear.sort_unstable_by_key(|shear| shear.key);
     for contact in contacts.wm.iter().chain(&contacts.mm) {
@@ -154,6 +162,7 @@ fn touch<S: Scalar>(
     let center = marbles.position[b] + marbles.offset(b, along[1]);
     let mut curvature = S::one() / marbles.radius[b];
     let mut compliance = own.elasticity.compliance();
+    let mut surface = Vec3::zero();
     let (normal, distance, both);
     if two_marbles {
         let other = material(a);
@@ -168,7 +177,8 @@ fn touch<S: Scalar>(
         both = own.against(other);
     } else {
         (normal, distance) = walls.normal_and_distance(a, part, center);
-        closing -= walls.surface_velocity(a, center - normal * marbles.radius[b]);
+        surface = walls.surface_velocity(a, center - normal * marbles.radius[b]);
+        closing -= surface;
         let its = walls.material(a);
         both = its.map_or(own, |its| own.against(its));
         // A wall without a material of its own is rigid.
@@ -189,11 +199,31 @@ fn touch<S: Scalar>(
         normal,
         overlap,
         closing: closing + normal.cross(rim),
+        surface,
         mobility,
         curvature,
         material: both,
         compliance,
     })
+}
+
+impl<S: Scalar> Touch<S> {
+    /// Counts what an impulse did, after all have.
+    fn count(&self, marbles: &Columns<S>, impulse: Vec3<S>, work: &mut Work) {
+        let Self { b, along, normal, closing, surface, .. } = *self;
+        let first = self.a.map_or(First::Wall(0, 0), |a| First::Marble(a as u32));
+        let after = marbles.closing(first, b, along, normal, surface);
+        work.push(Push {
+            impulse: cast_vector(impulse),
+            normal: cast_vector(normal),
+            mean: cast_vector::<S, f64>(closing + after) * 0.5,
+            fixed: [
+                self.a.map_or(Some(cast_vector(surface)), |a| marbles.fixed(a)),
+                marbles.fixed(b),
+            ],
+        });
+        work.collisions += 1;
+    }
 }
 
 fn springs<S: Scalar>(law: ContactLaw, touch: &Touch<S>, dt: S) -> Springs<S> {
@@ -236,7 +266,12 @@ fn springs<S: Scalar>(law: ContactLaw, touch: &Touch<S>, dt: S) -> Springs<S> {
 
 /// Lets rolling and spinning resistance act with this normal impulse, at most so that the
 /// two no longer turn against each other.
-fn resist<S: Scalar>(marbles: &mut Columns<S>, touch: &Touch<S>, pressure: S) {
+fn resist<S: Scalar>(
+    marbles: &mut Columns<S>,
+    touch: &Touch<S>,
+    pressure: S,
+    work: Option<&mut Work>,
+) {
     let Material { rolling_resistance, spinning_resistance, .. } = touch.material;
     if rolling_resistance == S::zero() && spinning_resistance == S::zero() {
         return;
@@ -255,6 +290,10 @@ fn resist<S: Scalar>(marbles: &mut Columns<S>, touch: &Touch<S>, pressure: S) {
     marbles.twist(b, -twist);
     if let Some(a) = a {
         marbles.twist(a, twist);
+    }
+    if let Some(work) = work {
+        let after = relative - twist * give;
+        work.twist(cast_vector(-twist), cast_vector(relative), cast_vector(after));
     }
 }
 
@@ -317,6 +356,7 @@ mod tests {
                 dt,
                 &mut shear,
                 &mut stopped,
+                None,
             );
             time += dt;
             overlap = overlap.max(-apart);

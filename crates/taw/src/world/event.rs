@@ -9,7 +9,7 @@ use crate::contact::Contact;
 use crate::math::{Scalar, Vec3, cast_point, cast_vector, length};
 use crate::motion::{Motion, Rotation, WallMotion};
 use crate::response::event::{Ball, Path, Settings, Wall};
-use crate::response::{BallSpin, Impact, Material};
+use crate::response::{BallSpin, Impact, Material, Work};
 use crate::shape::Aabb;
 
 impl<S: Scalar> World<S> {
@@ -77,9 +77,13 @@ impl<S: Scalar> World<S> {
         events.near.wm.extend(self.contacts.wm.iter().filter_map(place));
         events.near.mm.extend(self.contacts.mm.iter().map(cast));
         let settings = Settings { dt: dt.as_f64(), iterations: self.model.iterations };
+        events.work = self.accounting.is_some().then(Work::default);
         let mut impacts = Vec::new();
         self.stopped.extend(events.run(&settings, &mut impacts));
         self.impacts.extend(impacts.into_iter().map(Impact::cast));
+        if let (Some(accounting), Some(work)) = (&mut self.accounting, self.events.work) {
+            accounting.work = work;
+        }
         for (row, ball) in self.events.balls.iter().enumerate() {
             let (position, velocity) = (ball.position, ball.velocity);
             self.marbles.set_exact(row, Motion { position, velocity });

@@ -452,6 +452,11 @@ impl<S: Scalar> Marbles<S> {
         self.rotation_of(row, Rotation::Dynamic) != Rotation::Dynamic
     }
 
+    /// Whether anything but gravity moves some of them.
+    pub(super) fn are_pushed(&self) -> bool {
+        !(self.force.is_empty() && self.torque.is_empty() && self.damping.is_empty())
+    }
+
     /// Whether there is one like that.
     pub(super) fn has_held(&self) -> bool {
         !self.rotation_model.is_empty()

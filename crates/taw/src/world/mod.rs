@@ -1,5 +1,6 @@
 //! The state as columns, the choice of methods, and the step.
 
+mod account;
 mod apply;
 mod energy;
 mod event;
@@ -19,6 +20,7 @@ mod wall_shape;
 mod walls;
 
 pub use crate::motion::{Mass, WallMotion};
+pub use account::Account;
 pub use energy::Energy;
 pub use limits::SpeedLimits;
 pub use marbles::{Damping, Marble, MarbleId, Marbles};
@@ -31,12 +33,13 @@ use crate::Error;
 use crate::broad::Grid;
 use crate::contact::Contacts;
 use crate::error::{finite_vector, positive};
-use crate::math::{Scalar, Vec3, length};
+use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Settings, Warm, impulse};
 use crate::response::{Impact, Response, Rod, Shear, displacement, penalty};
 use crate::swarm::Swarm;
+use account::Accounting;
 use integrate::Drive;
 use sweep::Sweep;
 use touch::Near;
@@ -86,6 +89,7 @@ pub struct World<S> {
     /// What is long about marbles, and how far they reach.
     rods: Vec<Rod<S>>,
     reaches: Vec<S>,
+    accounting: Option<Box<Accounting<S>>>,
 }
 
 impl<S: Scalar> Default for World<S> {
@@ -116,6 +120,7 @@ impl<S: Scalar> Default for World<S> {
             near_walls: Vec::new(),
             rods: Vec::new(),
             reaches: Vec::new(),
+            accounting: None,
         }
     }
 }
@@ -147,6 +152,7 @@ impl<S: Scalar> PartialEq for World<S> {
             near_walls: _,
             rods: _,
             reaches: _,
+            accounting: _,
         } = self;
         *model == other.model
             && *gravity == other.gravity
@@ -271,6 +277,7 @@ impl<S: Scalar> World<S> {
         {
             return Err(Error::BallsOnly(id));
         }
+        self.count_before();
         let drive = Drive {
             integrator: self.model.integrator,
             gravity: self.gravity,
@@ -302,6 +309,7 @@ impl<S: Scalar> World<S> {
             Response::Impulse => length(self.gravity) * dt * dt * S::constant(2.0),
             Response::EventDriven => self.reach_at_rest(dt),
         };
+        self.count_forces();
         Ok(())
     }
 
@@ -327,6 +335,7 @@ impl<S: Scalar> World<S> {
         let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
+        self.count_contacts();
         self.inverse_mass.clear();
         if matches!(self.model.response, Response::Impulse | Response::Penalty(_)) {
             let masses = (0..self.marbles.len()).map(|row| self.marbles.mass(row));
@@ -349,7 +358,23 @@ impl<S: Scalar> World<S> {
         }
         match self.model.response {
             Response::Displacement => {
-                displacement(&self.walls, &mut columns, &mut self.contacts, dt, &mut self.stopped);
+                let contacts = self.contacts.len() as u32;
+                let mut pushes = self.accounting.as_ref().map(|_| Vec::new());
+                displacement(
+                    &self.walls,
+                    &mut columns,
+                    &mut self.contacts,
+                    dt,
+                    &mut self.stopped,
+                    |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change))),
+                );
+                if let Some(accounting) = &mut self.accounting {
+                    accounting.work.collisions = contacts;
+                    for (row, change) in pushes.into_iter().flatten() {
+                        let mass = self.marbles.mass(row as usize).as_f64();
+                        accounting.work.momentum += cast_vector::<S, f64>(change) * mass;
+                    }
+                }
             }
             Response::Impulse => {
                 let settings = Settings {
@@ -371,6 +396,10 @@ impl<S: Scalar> World<S> {
                     &mut self.warm,
                     &mut self.stopped,
                 );
+                if let Some(accounting) = &mut self.accounting {
+                    let Accounting { velocity, spin, work, .. } = &mut **accounting;
+                    self.impulse.count(&mut columns, velocity, spin, work);
+                }
             }
             Response::Penalty(law) => penalty(
                 law,
@@ -381,6 +410,7 @@ impl<S: Scalar> World<S> {
                 dt,
                 &mut self.shear,
                 &mut self.stopped,
+                self.accounting.as_mut().map(|accounting| &mut accounting.work),
             ),
             Response::EventDriven => self.go_through_events(dt),
         }
@@ -396,6 +426,7 @@ impl<S: Scalar> World<S> {
             }
         }
         self.limits.apply(&mut self.marbles);
+        self.count_after();
         Ok(())
     }
 
@@ -432,6 +463,7 @@ impl<S: Scalar> World<S> {
     pub fn begin_step(&mut self) {
         self.stopped.clear();
         self.impacts.clear();
+        self.open_account();
     }
 
     /// The grid of the last substep, for drawing it.

@@ -7,7 +7,7 @@ use cgmath::{InnerSpace, Zero};
 use super::{Ball, Event, EventDriven, Impact, MOST_LOSSES, Settings, What};
 use crate::math::{Vec3, direction_and_length};
 use crate::response::impact::at_most;
-use crate::response::{Material, Mobility, Walls as _, impact};
+use crate::response::{Material, Mobility, Push, Walls as _, impact};
 
 /// How many rounds collisions at one moment have to agree.
 const MOST_ROUNDS: u32 = 1000;
@@ -103,7 +103,7 @@ impl EventDriven {
         rows.sort_unstable();
         rows.dedup();
         for row in &rows {
-            self.balls[*row].advance(time);
+            self.advance(*row, time);
         }
         collisions.clear();
         collisions.extend(pairs.iter().map(|(a, b)| self.collision(*a, *b, settings)));
@@ -117,6 +117,7 @@ impl EventDriven {
                 let impulse = impact(c.impact.normal, approach, c.mobility, c.material);
                 self.balls[c.a].hit(-impulse, -c.impact.normal);
                 self.balls[c.b].hit(impulse, c.impact.normal);
+                self.count_meeting(c, impulse, approach);
             }
         } else {
             self.collide_at_once(&mut collisions, &rows);
@@ -201,6 +202,27 @@ impl EventDriven {
                 break;
             }
         }
+        for (c, begin) in collisions.iter().zip(begin) {
+            self.count_meeting(c, c.impulse, begin);
+        }
+    }
+
+    /// Counts what a collision did with this impulse, of points that came together so.
+    fn count_meeting(&mut self, c: &Collision, impulse: Vec3<f64>, before: Vec3<f64>) {
+        if self.work.is_none() {
+            return;
+        }
+        let after = self.closing(c);
+        let fixed = |row: usize| {
+            let ball = &self.balls[row];
+            (ball.inverse_mass == 0.0).then_some(ball.velocity)
+        };
+        let fixed = [fixed(c.a), fixed(c.b)];
+        if let Some(work) = &mut self.work {
+            let (normal, mean) = (c.impact.normal, (before + after) * 0.5);
+            work.push(Push { impulse, normal, mean, fixed });
+            work.collisions += 1;
+        }
     }
 
     /// Lets a ball that touches a wall bounce off it.
@@ -216,6 +238,13 @@ impl EventDriven {
         ball.collide(material, settings);
         let impulse = impact(normal, closing, mobility, material);
         ball.hit(impulse, normal);
+        if let Some(work) = &mut self.work {
+            let after = ball.velocity - surface + ball.rim(normal);
+            let mean = (closing + after) * 0.5;
+            let fixed = [Some(surface), (ball.inverse_mass == 0.0).then_some(ball.velocity)];
+            work.push(Push { impulse, normal, mean, fixed });
+            work.collisions += 1;
+        }
         Impact { a: self.walls[wall].row, on_wall: true, b: row as u32, normal, approach_speed }
     }
 }

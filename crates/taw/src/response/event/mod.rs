@@ -8,6 +8,7 @@
 
 mod cells;
 mod collide;
+mod count;
 mod foresee;
 mod rest;
 mod support;
@@ -22,7 +23,7 @@ use crate::contact::Contacts;
 use crate::math::{Point3, Scalar, Vec3, cast_vector, is_finite, is_finite_point};
 use crate::motion::WallMotion;
 use crate::response::impulse::Warm;
-use crate::response::{BallSpin, Material, Walls};
+use crate::response::{BallSpin, Material, Walls, Work};
 use crate::shape::{Box3, BoxTree, Nearest, Shape, Solid, Triangle};
 use cells::{Cell, Cells};
 use collide::Moment;
@@ -359,6 +360,8 @@ pub(crate) struct EventDriven {
     pub near: Contacts<f64>,
     /// What the heaps' contacts bore in the last substep.
     pub warm: Vec<Warm<f64>>,
+    /// What is done to the balls, if somebody asks.
+    pub work: Option<Work>,
     /// Which walls are half-spaces; and the others, by their boxes.
     planes: Vec<usize>,
     parts: Vec<usize>,
@@ -393,9 +396,9 @@ impl EventDriven {
                 self.happen(event, settings, impacts);
             }
         }
+        (0..self.balls.len()).for_each(|row| self.advance(row, dt));
         let mut stopped = Vec::new();
         for (row, (ball, before)) in self.balls.iter_mut().zip(before).enumerate() {
-            ball.advance(dt);
             ball.velocity += ball.path.carry;
             if !is_finite_point(ball.position) || !is_finite(ball.velocity) || !is_finite(ball.spin)
             {
@@ -432,17 +435,17 @@ impl EventDriven {
                 self.surrender([row, row], time, settings);
             }
             What::Hits(wall) => {
-                self.balls[row].advance(time);
+                self.advance(row, time);
                 impacts.push(self.hit_wall(row, wall, settings));
                 self.foresee(row, time, settings);
             }
             What::SettlesOn(wall) => {
-                self.balls[row].advance(time);
+                self.advance(row, time);
                 self.settle(row, wall, settings);
                 self.foresee(row, time, settings);
             }
             What::Changes => {
-                self.balls[row].advance(time);
+                self.advance(row, time);
                 self.look_what_it_lies_on(row, settings);
                 self.stretch(row, settings);
                 self.foresee(row, time, settings);

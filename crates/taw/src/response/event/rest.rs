@@ -255,7 +255,7 @@ impl EventDriven {
         let mtv = Vec3::zero();
         while let Some(row) = found.get(turn).copied() {
             turn += 1;
-            self.balls[row].advance(now);
+            self.advance(row, now);
             self.balls[row].release();
             let at = self.balls[row].position;
             self.name_walls(row, |wall| {

@@ -4,8 +4,10 @@ mod solve;
 use cgmath::{InnerSpace, Zero};
 
 use crate::contact::Contacts;
-use crate::math::{Point3, Scalar, Vec3, direction_and_length, is_finite, is_finite_point};
-use crate::response::{BallSpin, Columns, Material, Mobility};
+use crate::math::{
+    Point3, Scalar, Vec3, cast_vector, direction_and_length, is_finite, is_finite_point,
+};
+use crate::response::{BallSpin, Columns, Material, Mobility, Push, Work};
 use gain::{Ledger, Rebound};
 use solve::{Islands, solve};
 
@@ -28,7 +30,7 @@ pub(crate) struct Settings<S> {
 
 /// The first thing of a contact, by row.
 #[derive(Clone, Copy, Debug)]
-enum First {
+pub(super) enum First {
     /// And a part of it.
     Wall(u32, u32),
     Marble(u32),
@@ -57,6 +59,47 @@ impl<S: Scalar> Scratch<S> {
     /// By how much a velocity still changed in the last sweep, at most, in m/s.
     pub fn residual(&self) -> S {
         self.islands.residual()
+    }
+
+    /// Counts what the contacts of the last substep did. `velocity` and `spin` are those at its
+    /// beginning: what rests has none there, and then no contact works on it. What bounces does
+    /// so at one moment, when the forces of the substep have done their part.
+    pub fn count(
+        &self,
+        marbles: &mut Columns<S>,
+        velocity: &mut [Vec3<S>],
+        spin: &mut [Vec3<S>],
+        work: &mut Work,
+    ) {
+        if velocity.len() != marbles.velocity.len() || spin.len() < marbles.spin.len() {
+            return; // the first step with an account of it
+        }
+        let spins = marbles.spin.len();
+        let motions = |marbles: &Columns<S>| -> Vec<_> {
+            let motion = |c: &Constraint<S>| marbles.motion(c);
+            self.constraints.iter().map(motion).collect()
+        };
+        let after = motions(marbles);
+        marbles.velocity.swap_with_slice(velocity);
+        marbles.spin.swap_with_slice(&mut spin[..spins]);
+        let before = motions(marbles);
+        marbles.velocity.swap_with_slice(velocity);
+        marbles.spin.swap_with_slice(&mut spin[..spins]);
+        for ((c, after), before) in self.constraints.iter().zip(after).zip(before) {
+            let closing = if c.bounces { cast_vector(c.begin) } else { before[0] };
+            let first = match c.a {
+                First::Wall(..) => Some(cast_vector(c.surface)),
+                First::Marble(a) => marbles.fixed(a as usize),
+            };
+            work.push(Push {
+                impulse: cast_vector::<S, f64>(c.impulse()) / c.mobility.normal.as_f64(),
+                normal: cast_vector(c.normal),
+                mean: (closing + after[0]) * 0.5,
+                fixed: [first, marbles.fixed(c.b)],
+            });
+            work.twist(cast_vector(c.twist()), before[1], after[1]);
+            work.collisions += u32::from(c.bounces && c.pressure > S::zero());
+        }
     }
 }
 
@@ -338,7 +381,7 @@ impl<S: Scalar> Columns<'_, S> {
     }
 
     /// The velocity of the second's touching point relative to the first's, in m/s.
-    fn closing(
+    pub(super) fn closing(
         &self,
         a: First,
         b: usize,
@@ -359,6 +402,19 @@ impl<S: Scalar> Columns<'_, S> {
             }
         }
         velocity + normal.cross(rim)
+    }
+
+    /// How the second of a contact moves and turns against the first, in m/s and rad/s.
+    fn motion(&self, c: &Constraint<S>) -> [Vec3<f64>; 2] {
+        let first = c.a.marble().map_or_else(Vec3::zero, |a| self.felt_spin(a));
+        let closing = self.closing(c.a, c.b, c.along, c.normal, c.surface);
+        [cast_vector(closing), cast_vector(self.felt_spin(c.b) - first)]
+    }
+
+    /// The velocity of what nothing can move.
+    pub(super) fn fixed(&self, row: usize) -> Option<Vec3<f64>> {
+        let fixed = self.inverse_mass[row] == S::zero();
+        fixed.then(|| cast_vector(self.velocity[row]))
     }
 
     /// What resists rolling and spinning between two, or a wall and one, if anything does.
