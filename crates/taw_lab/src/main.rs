@@ -15,7 +15,7 @@ use taw_lab::stages::{self, Stages};
 use taw_lab::suite::{self, Effort, Row};
 use taw_lab::trade::sweep::{Job, Plan, by_the_clock, in_order, read_points, sweep, write_points};
 use taw_lab::trade::trace::{Number, Setting};
-use taw_lab::trade::{Point, write_report};
+use taw_lab::trade::{Point, write_report, write_tables};
 
 /// Counts what is allocated.
 #[global_allocator]
@@ -54,9 +54,12 @@ enum Command {
     /// Sweeps models, scalars, steps, substeps and iterations over the scenes, and draws error
     /// against cost. What was measured is kept: interrupted, it goes on where it was.
     Trade {
-        /// Where points, charts and report go.
+        /// Where points go.
         #[arg(long, default_value = "target/trade")]
         out: PathBuf,
+        /// Where the report goes, with its charts beside it [default: report.md among the points]
+        #[arg(long, value_name = "FILE")]
+        report: Option<PathBuf>,
         /// Only some settings: less than two minutes.
         #[arg(long)]
         quick: bool,
@@ -104,9 +107,12 @@ enum Command {
     },
     /// Joins the parts of a sweep into one report.
     Merge {
-        /// Where points, charts and report go.
+        /// Where points go.
         #[arg(long, default_value = "target/trade")]
         out: PathBuf,
+        /// Where the report goes, with its charts beside it [default: report.md among the points]
+        #[arg(long, value_name = "FILE")]
+        report: Option<PathBuf>,
         /// The parts: `points-K-of-N.jsonl`.
         #[arg(required = true)]
         files: Vec<PathBuf>,
@@ -139,14 +145,14 @@ fn main() -> ExitCode {
             };
             run_suite(&suite::rows().filter(wanted).collect::<Vec<_>>(), short, json, jobs)
         }
-        Command::Trade { out, quick, scene, model, shard, with } => {
-            trade(&out, &Plan { quick, scene, model }, shard, &with)
+        Command::Trade { out, report, quick, scene, model, shard, with } => {
+            trade(&out, report, &Plan { quick, scene, model }, shard, &with)
         }
         Command::Advise { scene, max_error: most, budget, step } => {
             print_advice(&scene, Wish { most, budget, step, ..Wish::default() })
         }
         Command::Bench { scene, model, number, step } => bench(&scene, &model, number, step),
-        Command::Merge { out, files } => merge(&out, &files),
+        Command::Merge { out, report, files } => merge(&out, report, &files),
     };
     outcome.unwrap_or_else(|error| {
         eprintln!("{error}");
@@ -156,6 +162,7 @@ fn main() -> ExitCode {
 
 fn trade(
     out: &Path,
+    to: Option<PathBuf>,
     plan: &Plan,
     shard: Option<[usize; 2]>,
     with: &[PathBuf],
@@ -184,7 +191,7 @@ fn trade(
     for file in with {
         points.extend(read_points(file)?);
     }
-    report(out, points)
+    report(out, to, points)
 }
 
 fn read(file: &Path) -> Result<Scene, Box<dyn Error>> {
@@ -229,7 +236,7 @@ fn print_advice(file: &Path, wish: Wish) -> Result<ExitCode, Box<dyn Error>> {
     Ok(if found { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
-fn merge(out: &Path, files: &[PathBuf]) -> Result<ExitCode, Box<dyn Error>> {
+fn merge(out: &Path, to: Option<PathBuf>, files: &[PathBuf]) -> Result<ExitCode, Box<dyn Error>> {
     std::fs::create_dir_all(out)?;
     let mut points = Vec::new();
     for file in files {
@@ -237,13 +244,15 @@ fn merge(out: &Path, files: &[PathBuf]) -> Result<ExitCode, Box<dyn Error>> {
     }
     let points = in_order(points);
     write_points(&out.join("points.jsonl"), &points)?;
-    report(out, points)
+    report(out, to, points)
 }
 
-fn report(out: &Path, points: Vec<Point>) -> Result<ExitCode, Box<dyn Error>> {
+fn report(out: &Path, to: Option<PathBuf>, points: Vec<Point>) -> Result<ExitCode, Box<dyn Error>> {
     let points = in_order(points);
-    write_report(&points, out)?;
-    println!("{} points; see {}", points.len(), out.join("report.md").display());
+    write_tables(&points, out)?;
+    let to = to.unwrap_or_else(|| out.join("report.md"));
+    write_report(&points, &to)?;
+    println!("{} points; see {}", points.len(), to.display());
     Ok(ExitCode::SUCCESS)
 }
 

@@ -39,8 +39,9 @@ pub fn draw(scene: &str, curves: &[Curve], folder: &Path) -> Result<(), Box<dyn 
 
 /// Where a point is: by powers of ten, better to the right and up.
 fn place(point: &Point) -> Option<(f64, f64)> {
-    let error = point.error.filter(|_| point.failure.is_none())?;
-    Some((point.real_time.log10(), -error.log10()))
+    let error = point.error.filter(|_| point.failure.is_none())?.max(1e-16);
+    let place = (point.real_time.log10(), -error.log10());
+    (place.0.is_finite() && place.1.is_finite()).then_some(place)
 }
 
 fn draw_on<B: DrawingBackend>(
@@ -77,14 +78,14 @@ where
         .x_label_formatter(&|x| {
             let seconds = 10_f64.powf(-x - marbles.log10());
             let (unit, name) = match seconds {
-                1.0.. => (1.0, "s"),
-                1e-3.. => (1e-3, "ms"),
-                1e-6.. => (1e-6, "µs"),
+                0.999.. => (1.0, "s"),
+                0.999e-3.. => (1e-3, "ms"),
+                0.999e-6.. => (1e-6, "µs"),
                 _ => (1e-9, "ns"),
             };
             format!("{:.0} ×, {:.0} {name}", 10_f64.powf(*x), seconds / unit)
         })
-        .y_label_formatter(&|y| format!("10^{:.0}", -y))
+        .y_label_formatter(&|y| if *y == 0.0 { "1".into() } else { format!("10^{:.0}", -y) })
         .x_labels(5)
         .x_desc("times real time, and cost of a marble and simulated second")
         .y_desc("error")
@@ -108,7 +109,7 @@ where
             }
         }
         for point in curve.points.iter().filter(|point| place(point).is_none()) {
-            let at = (point.real_time.log10(), 1.5 * strip);
+            let at = (point.real_time.log10().clamp(left, right), 1.5 * strip);
             chart.draw_series(std::iter::once(Cross::new(at, 3, color.mix(0.5))))?;
         }
     }

@@ -12,7 +12,7 @@ pub mod sweep;
 pub mod trace;
 
 #[cfg(feature = "cli")]
-pub use report::{Curve, curves, front, write_report};
+pub use report::{Curve, curves, front, write_report, write_tables};
 
 /// Substeps, and iterations where they count.
 pub const COUNTS: [u32; 6] = [1, 2, 4, 8, 16, 32];

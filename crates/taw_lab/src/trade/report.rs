@@ -107,12 +107,11 @@ pub fn front<'a>(points: impl IntoIterator<Item = &'a Point>) -> Vec<&'a Point> 
     points
 }
 
-/// Writes `report.md`, `points.csv`, `points.json`, and of each scene a chart as SVG and PNG into
-/// a folder.
+/// Writes `points.csv` and `points.json` into a folder.
 ///
 /// # Errors
-/// What writing and drawing report.
-pub fn write_report(points: &[Point], folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
+/// What writing reports.
+pub fn write_tables(points: &[Point], folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     std::fs::create_dir_all(folder)?;
     let mut csv = csv::Writer::from_path(folder.join("points.csv"))?;
     for point in points {
@@ -120,13 +119,27 @@ pub fn write_report(points: &[Point], folder: &Path) -> Result<(), Box<dyn std::
     }
     csv.flush()?;
     std::fs::write(folder.join("points.json"), serde_json::to_string_pretty(points)?)?;
+    Ok(())
+}
+
+/// Writes a report in Markdown, and beside it, in a folder of its name, a chart of each scene as
+/// SVG and PNG.
+///
+/// # Errors
+/// What writing and drawing report.
+pub fn write_report(points: &[Point], file: &Path) -> Result<(), Box<dyn std::error::Error>> {
+    let folder = file.with_extension("");
+    let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    std::fs::create_dir_all(&folder)?;
     let mut scenes: Vec<&str> = points.iter().map(|point| point.scene.as_str()).collect();
     scenes.dedup();
     let mut text = String::from(HEAD);
+    writeln!(text, "\nMeasured on: {}.\n", machine())?;
+    guide(&mut text, points)?;
     for scene in scenes {
         let curves = curves(points, scene);
-        chart::draw(scene, &curves, folder)?;
-        describe(&mut text, scene, &curves)?;
+        chart::draw(scene, &curves, &folder)?;
+        describe(&mut text, scene, &name, &curves)?;
     }
     let noted = points.iter().filter(|point| !point.note.is_empty());
     let notes: BTreeSet<_> =
@@ -135,8 +148,81 @@ pub fn write_report(points: &[Point], folder: &Path) -> Result<(), Box<dyn std::
         text += "\n## Other engines\n\n";
         text.extend(notes);
     }
-    std::fs::write(folder.join("report.md"), text)?;
+    std::fs::write(file, text)?;
     Ok(())
+}
+
+/// The processor, as far as the system tells.
+fn machine() -> String {
+    let told = std::fs::read_to_string("/proc/cpuinfo").unwrap_or_default();
+    let name = told.lines().find_map(|line| line.strip_prefix("model name")?.split_once(": "));
+    let name = name.map_or(std::env::consts::ARCH, |(_, name)| name);
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    format!("{name}, {cores} cores")
+}
+
+/// Kinds of games, and the scenes that have what counts in them.
+const KINDS: [(&str, &[&str]); 7] = [
+    ("billiards", &["skid", "carom"]),
+    ("pachinko", &["pachinko", "bounce"]),
+    ("marble run", &["ramp", "bounce"]),
+    ("ball pit", &["pit", "tower"]),
+    ("tilting maze", &["maze"]),
+    ("planets", &["orbit"]),
+    ("machines", &["turntable", "cradle"]),
+];
+/// The errors that it asks for: what looks right, what is right.
+const ASKED: [f64; 3] = [5e-2, 1e-2, 1e-3];
+
+/// For each kind of game the cheapest settings that are right enough in all of its scenes, at
+/// sixty steps a second.
+fn guide(text: &mut String, points: &[Point]) -> std::fmt::Result {
+    writeln!(
+        text,
+        "## Which model for my scene?\n\nThe cheapest setting at 60 steps a second in `f32`, as \
+         the plugin counts, whose error is at most this in all scenes of its kind (substeps × \
+         iterations; nanoseconds for each marble and simulated second, the mean of the scenes).\n\n| game | scenes | 5 % | 1 % | \
+         0.1 % |\n|---|---|---|---|---|"
+    )?;
+    for (kind, scenes) in KINDS {
+        write!(text, "| {kind} | {} |", scenes.join(", "))?;
+        for asked in ASKED {
+            match cheapest(points, scenes, asked) {
+                Some((cost, Point { model, substeps, iterations, .. })) => {
+                    write!(text, " {model}, {substeps} × {iterations}: {cost:.0} |")?;
+                }
+                None => write!(text, " – |")?,
+            }
+        }
+        writeln!(text)?;
+    }
+    Ok(())
+}
+
+/// The cheapest setting of ours at 1/60 s in `f32` that errs by so much at most in all of the scenes, with
+/// its mean cost.
+fn cheapest<'a>(points: &'a [Point], scenes: &[&str], most: f64) -> Option<(f64, &'a Point)> {
+    let good = |point: &&Point| {
+        point.engine == "taw"
+            && (point.step == "1/60" && point.number == "f32")
+            && point.failure.is_none()
+            && point.error.is_some_and(|error| error <= most)
+    };
+    let of = |scene: &str| {
+        points.iter().filter(move |point| point.scene == scene).filter(good).collect::<Vec<_>>()
+    };
+    let groups: Vec<_> = scenes.iter().map(|scene| of(scene)).collect();
+    let (first, others) = groups.split_first()?;
+    let all = first.iter().filter_map(|point| {
+        let same = |other: &&&Point| {
+            (&other.model, other.substeps, other.iterations)
+                == (&point.model, point.substeps, point.iterations)
+        };
+        let costs = others.iter().map(|group| group.iter().find(same).map(|other| other.cost));
+        let sum = costs.sum::<Option<f64>>()? + point.cost;
+        Some((sum / scenes.len() as f64, *point))
+    });
+    all.min_by(|a, b| a.0.total_cmp(&b.0))
 }
 
 const HEAD: &str = "\
@@ -149,13 +235,18 @@ iterations; a curve is *monotone* if a shorter substep is never worse by more th
 Each line of a chart joins the settings of a model that no other one of its settings beats.
 ";
 
-fn describe(text: &mut String, scene: &str, curves: &[Curve]) -> std::fmt::Result {
+fn describe(text: &mut String, scene: &str, folder: &str, curves: &[Curve]) -> std::fmt::Result {
     let judged = SCENES.iter().find(|judged| judged.name == scene);
     writeln!(text, "\n## {scene}\n")?;
     if let Some(judged) = judged {
-        writeln!(text, "{}. Error: {}.\n", judged.scene().about, judged.metric)?;
+        write!(text, "{}. Error: {}.", judged.scene().about, judged.metric)?;
+        if judged.chance() > 0.0 {
+            let chance = judged.chance();
+            write!(text, " The last bit of where marbles begin makes {chance:.1e} of it.")?;
+        }
+        writeln!(text, "\n")?;
     }
-    writeln!(text, "![{scene}]({scene}.svg)\n")?;
+    writeln!(text, "![{scene}]({folder}/{scene}.svg)\n")?;
     writeln!(text, "| model | at 1/60 | order | monotone | cost of 1e-2 | of 1e-3 | of 1e-4 |")?;
     writeln!(text, "|---|---|---|---|---|---|---|")?;
     for curve in curves {
