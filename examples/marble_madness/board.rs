@@ -14,6 +14,7 @@ use taw_examples::orbit_camera;
 
 use crate::Options;
 use crate::controls::TiltInput;
+use crate::level::Level;
 
 const RAIL_HEIGHT: f32 = 1.0;
 const RAIL_WIDTH: f32 = 0.6;
@@ -41,11 +42,11 @@ enum Piece {
 
 /// The size of the board: half of its inner width, in metres.
 #[derive(Resource, Clone, Copy, Deref)]
-pub struct HalfWidth(f32);
+pub struct HalfWidth(pub f32);
 
 impl HalfWidth {
     /// A board on which this many marbles lie about five deep at most.
-    fn for_marbles(count: u32) -> Self {
+    pub fn for_marbles(count: u32) -> Self {
         Self(10.0 * (count as f32 / 1500.0).sqrt().max(1.0))
     }
 }
@@ -88,9 +89,10 @@ impl Tilt {
 
 pub fn plugin(app: &mut App) {
     let options = app.world().resource::<Options>();
-    let (half_width, sway) = (HalfWidth::for_marbles(options.marbles), options.sway.then_some(0.0));
-    let boxes = options.boxes;
-    let model = model_for(options.marbles);
+    let (marbles, boxes) = (options.marbles, options.boxes);
+    let sway = options.sway.then_some(0.0);
+    let half_width = crate::level::board_width(app.world().resource::<Level>(), marbles);
+    let model = model_for(marbles);
     app.insert_resource(TawModel(model))
         .insert_resource(half_width)
         .insert_resource(MadeOfBoxes(boxes))

@@ -11,15 +11,19 @@ mod board;
 mod controls;
 mod flick;
 mod goals;
+mod level;
 mod marbles;
 mod panel;
 mod time;
+
+use std::path::PathBuf;
 
 use bevy::prelude::*;
 use bevy_egui::EguiPlugin;
 use bevy_taw::prelude::*;
 use bevy_taw::trade::TawTradePlugin;
-use clap::Parser;
+use clap::{CommandFactory, Parser};
+use level::Level;
 use taw_examples::{ExamplePlugins, OrbitCameraPlugin, Picture};
 
 /// Tilt the board and roll every marble onto the pad of its colour
@@ -48,21 +52,29 @@ struct Options {
     /// Open the panel that shows what each model costs and buys, and measure after a second
     #[arg(long)]
     trade: bool,
+    /// Play a scene in RON: one of assets/levels by its name (maze, mill), or a file
+    #[arg(long, value_name = "FILE")]
+    level: Option<PathBuf>,
     #[command(flatten)]
     picture: Picture,
 }
 
 fn main() -> AppExit {
     let options = Options::parse();
+    let level = Level::read(options.level.as_deref()).unwrap_or_else(|error| {
+        Options::command().error(clap::error::ErrorKind::ValueValidation, error).exit()
+    });
     App::new()
         .add_plugins(ExamplePlugins { title: "Marble Madness", picture: options.picture.clone() })
         .add_plugins((EguiPlugin::default(), OrbitCameraPlugin, TawPlugins, TawTradePlugin))
         .insert_resource(options)
+        .insert_resource(level)
         .add_plugins((
             board::plugin,
             controls::plugin,
             flick::plugin,
             goals::plugin,
+            level::plugin,
             marbles::plugin,
             panel::plugin,
             time::plugin,

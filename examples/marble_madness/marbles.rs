@@ -3,10 +3,12 @@
 use bevy::color::palettes::tailwind;
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
+use taw::scene::Ball;
 
 use crate::Options;
 use crate::board::{HalfWidth, Tilt};
 use crate::controls::{Action, just_pressed};
+use crate::level::Level;
 
 /// What somebody wants done with the marbles.
 #[derive(Message, Clone, Copy, Debug)]
@@ -102,6 +104,7 @@ fn obey(
     options: Res<Options>,
     half_width: Res<HalfWidth>,
     look: Res<Look>,
+    level: Res<Level>,
     world: Res<TawWorld>,
     marbles: Query<Entity, With<Marble>>,
 ) {
@@ -115,6 +118,15 @@ fn obey(
                 options.marbles
             }
         };
+        let balls = level.balls();
+        if matches!(order, Order::Reset) && !balls.is_empty() {
+            marbles.iter().for_each(|marble| commands.entity(marble).despawn());
+            for ball in balls {
+                let made_of = level.material(&ball).unwrap_or_default();
+                commands.spawn((marble_of(&ball, &mut bag, &look), made_of));
+            }
+            continue;
+        }
         let mut highest = 0.0;
         if let Order::Drop(_) = order {
             let heights = world.marbles.position().iter().map(|p| p.y);
@@ -184,6 +196,17 @@ impl Lattice {
     }
 }
 
+/// A marble of a level, of any colour.
+fn marble_of(ball: &Ball, bag: &mut Bag, look: &Look) -> impl Bundle + use<> {
+    let place = |at: [f64; 3]| Vec3::from_array(at.map(|x| x as f32));
+    let (at, radius) = (place(ball.position), ball.radius as f32);
+    let velocity = place(ball.velocity);
+    (
+        MarbleMass::Density(ball.density as f32),
+        colored(Transform::from_translation(at), velocity, radius, bag, look),
+    )
+}
+
 /// The marble in cell number `i`, anywhere in that cell.
 fn marble(i: u32, lattice: &Lattice, bag: &mut Bag, look: &Look) -> impl Bundle + use<> {
     let Lattice { side, pitch, layer, bottom } = *lattice;
@@ -195,15 +218,26 @@ fn marble(i: u32, lattice: &Lattice, bag: &mut Bag, look: &Look) -> impl Bundle 
     };
     let (x, z) = (place(i % side), place(i / side % side));
     let y = bottom + (i / (side * side)) as f32 * layer;
+    colored(Transform::from_xyz(x, y, z), Vec3::ZERO, radius, bag, look)
+}
+
+/// A marble of any colour, turned anyhow.
+fn colored(
+    place: Transform,
+    velocity: Vec3,
+    radius: f32,
+    bag: &mut Bag,
+    look: &Look,
+) -> impl Bundle + use<> {
     let colour = bag.random.usize(..COLOURS.len());
     let mut angle = || bag.random.f32() * std::f32::consts::TAU;
     let turn = Quat::from_euler(EulerRot::YXZ, angle(), angle(), angle());
     (
         Marble::new(radius),
-        Velocity::default(),
+        Velocity(velocity),
         Colour(colour),
         Mesh3d(look.ball.clone()),
         MeshMaterial3d(look.materials[colour].clone()),
-        Transform::from_xyz(x, y, z).with_rotation(turn).with_scale(Vec3::splat(radius)),
+        place.with_rotation(turn).with_scale(Vec3::splat(radius)),
     )
 }

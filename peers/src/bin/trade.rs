@@ -13,11 +13,11 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use rapier3d::prelude as rapier;
 use taw::math::Vec3 as Exact;
-use taw::scene::{Ball, Field, Form, Scene, Surface};
+use taw::scene::{Ball, Field, Form, Movement, Scene, Surface, Wall};
 use taw_lab::trade::scenes::{Judged, SCENES};
-use taw_lab::trade::sweep::{COUNTS, STEPS, digits, write_points};
+use taw_lab::trade::sweep::{STEPS, digits, write_points};
 use taw_lab::trade::trace::{FRAME, Frame};
-use taw_lab::trade::{Failure, Point};
+use taw_lab::trade::{COUNTS, Failure, Point};
 
 /// A scene in an engine.
 trait Engine {
@@ -41,6 +41,18 @@ fn vec(v: [f64; 3]) -> Vec3 {
 
 fn surface_of(ball: &Ball, scene: &Scene) -> Surface {
     ball.surface.unwrap_or(scene.surface)
+}
+
+/// How a wall turns about its place, in rad/s.
+fn turning(wall: &Wall) -> Option<Vec3> {
+    match (wall.moves?, wall.shape) {
+        (Movement::Turns { pivot, axis, degrees_per_second }, Form::HalfSpace { through, .. })
+            if pivot == through =>
+        {
+            Some(vec(axis).normalize() * degrees_per_second.to_radians() as f32)
+        }
+        other => panic!("no scene of the sweep has {other:?}"),
+    }
 }
 
 struct Rapier {
@@ -82,13 +94,23 @@ impl Engine for Rapier {
                 Form::Box { .. } => panic!("no scene of the sweep has a box"),
             };
             let surface = wall.surface.unwrap_or(scene.surface);
-            world.colliders.insert(with(collider, surface));
+            let collider = with(collider, surface);
+            match turning(wall) {
+                None => {
+                    world.colliders.insert(collider);
+                }
+                Some(spin) => {
+                    let body = rapier::RigidBodyBuilder::kinematic_velocity_based();
+                    world.insert(body.angvel(theirs(spin)).can_sleep(false), collider);
+                }
+            }
         }
         let mut balls = Vec::new();
         for ball in scene.balls() {
             let body = rapier::RigidBodyBuilder::dynamic()
                 .translation(theirs(vec(ball.position)))
                 .linvel(theirs(vec(ball.velocity)))
+                .angvel(theirs(vec(ball.spin)))
                 .can_sleep(false);
             let shape = rapier::ColliderBuilder::ball(ball.radius as f32);
             let shape = shape.density(ball.density as f32);
@@ -163,7 +185,15 @@ impl Engine for Avian {
             };
             let surface = made_of(wall.surface.unwrap_or(scene.surface));
             let place = Transform::from_translation(place);
-            world.spawn((avian::RigidBody::Static, shape, place, surface));
+            let mut entity = world.spawn((shape, place, surface));
+            match turning(wall) {
+                None => entity.insert(avian::RigidBody::Static),
+                Some(spin) => entity.insert((
+                    avian::RigidBody::Kinematic,
+                    avian::AngularVelocity(spin),
+                    avian::SleepingDisabled,
+                )),
+            };
         }
         let balls = scene.balls().map(|ball| {
             let shape = avian::Collider::sphere(ball.radius as f32);
@@ -173,6 +203,7 @@ impl Engine for Avian {
                 avian::RigidBody::Dynamic,
                 avian::SleepingDisabled,
                 avian::LinearVelocity(vec(ball.velocity)),
+                avian::AngularVelocity(vec(ball.spin)),
                 avian::ConstantForce::default(),
             );
             world.spawn((body, shape, density, place, made_of(surface_of(&ball, scene)))).id()

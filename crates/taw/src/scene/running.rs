@@ -215,6 +215,14 @@ fn turned(axis: [f64; 3], radians: f64) -> Result<Quat<f64>, Error> {
 }
 
 impl Movement {
+    /// Where a wall that moves like this is after so many seconds, seen from where it began.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] for the axis, [`Error::NotUnit`] for one without a length.
+    pub fn pose(self, time: f64) -> Result<Pose<f64>, Error> {
+        Ok(self.at::<f64>(time, time)?.0)
+    }
+
     /// Where a wall is at a time, seen from where it began, and how it moves from an earlier one
     /// until then.
     fn at<S: Scalar>(self, from: f64, to: f64) -> Result<(Pose<f64>, WallMotion<S>), Error> {
