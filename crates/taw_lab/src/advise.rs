@@ -196,6 +196,12 @@ pub struct Whole {
     pub speeds: f64,
     /// The mean overlap of a marble, in metres.
     pub overlap: f64,
+    /// The mean difference of the energies, in joules.
+    pub energy: f64,
+    /// That of the momenta, in kg m/s.
+    pub momentum: f64,
+    /// That of how many passed the scene's gates.
+    pub passed: f64,
 }
 
 /// What came out.
@@ -322,6 +328,9 @@ impl Whole {
             whole.heights += apart(heights(a), heights(b)) / frames;
             whole.speeds += apart(speeds(a), speeds(b)) / frames;
             whole.overlap += a.overlap / a.at.len().max(1) as f64 / frames;
+            whole.energy += (a.energy - b.energy).abs() / frames;
+            whole.momentum += Vec3::from(a.momentum).distance(b.momentum.into()) / frames;
+            whole.passed += a.passed.abs_diff(b.passed) as f64 / frames;
         }
         whole
     }
@@ -396,21 +405,17 @@ impl Advice {
         }
         writeln!(
             text,
-            "\n| model | number | substeps × iterations | µs a step | place, m | heights, m | speeds, m/s | overlap, m |"
+            "\n| model | number | substeps × iterations | µs a step | place, m | heights, m | \
+             overlap, m | speeds, m/s | energy, J | momentum, kg m/s | passed |"
         )?;
-        writeln!(text, "|---|---|---|---|---|---|---|---|")?;
+        writeln!(text, "|---|---|---|---|---|---|---|---|---|---|---|")?;
         for choice in self.front() {
             let Choice { name, setting, error, whole, cost } = choice;
             let Model { substeps, iterations, .. } = setting.model;
-            writeln!(
-                text,
-                "| {name} | {} | {substeps} × {iterations} | {:.1} | {error:.1e} | {:.1e} | {:.1e} | {:.1e} |",
-                setting.number,
-                cost * 1e6,
-                whole.heights,
-                whole.speeds,
-                whole.overlap
-            )?;
+            let Whole { heights, overlap, speeds, energy, momentum, passed } = whole;
+            write!(text, "| {name} | {} | {substeps} × {iterations} |", setting.number)?;
+            write!(text, " {:.1} | {error:.1e} | {heights:.1e} | {overlap:.1e} |", cost * 1e6)?;
+            writeln!(text, " {speeds:.1e} | {energy:.1e} | {momentum:.1e} | {passed:.1} |")?;
         }
         if wish.most.is_none() && wish.budget.is_none() {
             return Ok(());

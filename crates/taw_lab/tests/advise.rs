@@ -191,3 +191,21 @@ fn what_is_told_on_the_way_grows() {
     let (done, all, choices) = *told.last().unwrap();
     assert!(done + 1 == all && choices < advice.choices.len());
 }
+
+#[test]
+fn what_passes_a_gate_is_counted() {
+    let scene = read_scene(include_str!("../scenes/hopper.ron")).unwrap();
+    let setting =
+        Setting { model: taw_lab::scene::IMPULSE, number: Number::F64, step: 1.0 / 240.0 };
+    let film = block_on(scene.film(setting, false, 0.1)).unwrap();
+    let passed: Vec<_> = film.frames.iter().map(|frame| frame.passed).collect();
+    assert_eq!(passed[0], 0);
+    assert!(passed.windows(2).all(|two| two[0] <= two[1]), "none comes back: {passed:?}");
+    for frame in &film.frames {
+        let below = frame.at.iter().filter(|at| at.y < -0.05).count();
+        assert_eq!(frame.passed, below, "at {} s", frame.time);
+    }
+    assert!(passed[20] >= 20, "{passed:?}");
+    // What falls has less energy in gravity.
+    assert!(film.frames[20].energy < film.frames[0].energy);
+}

@@ -264,7 +264,7 @@ fn frame(time: f64, state: &[[Vec3; 2]]) -> Frame {
     let exact = |v: Vec3| Exact::new(v.x, v.y, v.z).map(f64::from);
     let at = state.iter().map(|[at, _]| exact(*at)).collect::<Vec<_>>();
     let velocity = state.iter().map(|[_, velocity]| exact(*velocity)).collect();
-    Frame { time, at, velocity, overlap: 0.0 }
+    Frame { time, at, velocity, ..Frame::default() }
 }
 
 /// How deep balls are in each other and in walls, all together.

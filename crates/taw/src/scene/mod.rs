@@ -56,6 +56,9 @@ pub struct Scene {
     /// What nothing can move.
     #[cfg_attr(feature = "serde", serde(default))]
     pub walls: Vec<Wall>,
+    /// Where marbles are counted.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub gates: Vec<Gate>,
     /// Marbles one by one.
     #[cfg_attr(feature = "serde", serde(default))]
     pub marbles: Vec<Ball>,
@@ -76,6 +79,20 @@ pub struct Tilt {
     /// In m/s².
     #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
     pub gravity: [f64; 3],
+}
+
+/// A plane that marbles pass: it stops nothing, and whoever looks at a scene counts those behind
+/// it. At the mouth of a hopper, that is its throughput.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
+pub struct Gate {
+    /// Toward the side that they come from; of any length but zero.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::direction"))]
+    pub normal: [f64; 3],
+    /// A point of the plane.
+    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
+    pub through: [f64; 3],
 }
 
 /// A [force field](crate::motion::Force).
@@ -341,6 +358,7 @@ impl Default for Scene {
             fields: Vec::new(),
             surface: Surface::default(),
             walls: Vec::new(),
+            gates: Vec::new(),
             marbles: Vec::new(),
             lattices: Vec::new(),
         }

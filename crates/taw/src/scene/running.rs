@@ -1,8 +1,8 @@
 use std::f64::consts::TAU;
 
-use cgmath::{EuclideanSpace, Zero};
+use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
-use super::{Ball, Field, Form, Movement, Scene, Surface, Turn, Wall};
+use super::{Ball, Field, Form, Gate, Movement, Scene, Surface, Turn, Wall};
 use crate::Error;
 use crate::error::{finite_vector, positive};
 use crate::frame::{AxisAngle, Pose};
@@ -121,6 +121,17 @@ impl<S: Scalar> Running<S> {
     #[must_use]
     pub fn time(&self) -> f64 {
         self.time
+    }
+
+    /// How many marbles are behind a gate by now: those behind several count several times.
+    #[must_use]
+    pub fn passed(&self) -> usize {
+        let behind = |gate: &Gate| {
+            let (normal, through) = (Vec3::from(gate.normal), Vec3::from(gate.through));
+            let at = self.world.marbles.position().iter().map(|at| cast_vector(at.to_vec()));
+            at.filter(|at: &Vec3<f64>| normal.dot(at - through) < 0.0).count()
+        };
+        self.scene.gates.iter().map(behind).sum()
     }
 
     /// What it began with.

@@ -45,6 +45,12 @@ pub struct Frame {
     pub velocity: Vec<Vec3<f64>>,
     /// How deep all contacts overlap together, in metres.
     pub overlap: f64,
+    /// Of all marbles in gravity, in joules.
+    pub energy: f64,
+    /// Of all marbles, in kg m/s.
+    pub momentum: [f64; 3],
+    /// How many marbles are behind the scene's gates.
+    pub passed: usize,
 }
 
 /// Every so many seconds what there is to see. A divisor of it must be a whole number of any step
@@ -94,6 +100,9 @@ pub async fn film<S: Scalar>(
                 frame.at.push(marble.position.to_vec());
                 frame.velocity.push(marble.velocity);
             }
+            frame.energy = running.world.energy().total();
+            frame.momentum = running.world.momentum().into();
+            frame.passed = running.passed();
             frame.overlap = crate::scene::overlaps(&running.world).iter().sum();
             film.frames.push(frame);
         }
