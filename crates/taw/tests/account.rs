@@ -219,7 +219,7 @@ fn off_it_says_nothing_and_on_it_changes_nothing() {
         Response::EventDriven,
     ] {
         let marbles: Vec<_> = (0..20)
-            .map(|i| f64::from(i))
+            .map(f64::from)
             .map(|i| {
                 ([0.15 * (i % 4.0), 0.1 + 0.17 * i, 0.03 * (i % 3.0)], [0.5 - 0.1 * i, 0.0, 0.2])
             })

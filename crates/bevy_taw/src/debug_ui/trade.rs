@@ -26,14 +26,13 @@ pub fn trade(
     governor: &mut ResMut<Governor>,
     step: Duration,
 ) {
-    ui.horizontal(|ui| match trade.progress() {
-        Some(part) => {
+    ui.horizontal(|ui| {
+        if let Some(part) = trade.progress() {
             if ui.button("Stop").clicked() {
                 trade.cancel();
             }
             ui.add(egui::ProgressBar::new(part).show_percentage());
-        }
-        None => {
+        } else {
             let button = ui.button("Measure the models");
             if button.on_hover_text("On the marbles as they are now, beside the game").clicked() {
                 let trade = trade.bypass_change_detection();
