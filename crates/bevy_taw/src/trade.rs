@@ -2,7 +2,7 @@
 //!
 //! [`TawTrade::measure`] takes a snapshot of the marbles and runs it by every model, beside the
 //! game. `debug_ui::trade` shows what comes of it, and lets the player of the game choose;
-//! a [`Governor`](crate::governor::Governor) chooses by itself.
+//! a [`Governor`] chooses by itself.
 //!
 //! ```
 //! # use bevy::prelude::*;

@@ -136,17 +136,17 @@ pub fn write_report(points: &[Point], file: &Path) -> Result<(), Box<dyn std::er
     let mut text = String::from(HEAD);
     writeln!(text, "\nMeasured on: {}.\n", machine())?;
     guide(&mut text, points)?;
-    for scene in scenes {
-        let curves = curves(points, scene);
-        chart::draw(scene, &curves, &folder)?;
-        describe(&mut text, scene, &name, &curves)?;
-    }
     let noted = points.iter().filter(|point| !point.note.is_empty());
     let notes: BTreeSet<_> =
         noted.map(|point| format!("- {}: {}.\n", point.engine, point.note)).collect();
     if !notes.is_empty() {
         text += "\n## Other engines\n\n";
         text.extend(notes);
+    }
+    for scene in scenes {
+        let curves = curves(points, scene);
+        chart::draw(scene, &curves, &folder)?;
+        describe(&mut text, scene, &name, &curves)?;
     }
     std::fs::write(file, text)?;
     Ok(())
@@ -232,7 +232,8 @@ Written by `taw-lab trade`. Cost is nanoseconds for each marble and simulated se
 machine that it was measured on; error is a part of what the scene is about. Settings are step ×
 substeps × iterations. *Order* is the slope of the error over the length of a substep, with most
 iterations; a curve is *monotone* if a shorter substep is never worse by more than a hundredth.
-Each line of a chart joins the settings of a model that no other one of its settings beats.
+Each line of a chart joins the settings of a model that no other one of its settings beats. Compare
+where errors are equal, not where steps are.
 ";
 
 fn describe(text: &mut String, scene: &str, folder: &str, curves: &[Curve]) -> std::fmt::Result {
