@@ -161,7 +161,8 @@ pub struct Wish {
     pub budget: Option<f64>,
     /// The step of the game, in seconds.
     pub step: f64,
-    /// A model that takes longer for the scene, in seconds, is not tried with more substeps.
+    /// A model that takes longer for the scene, in seconds, is not tried with more substeps; a
+    /// reference that takes thirty times as long is not refined any more.
     pub patience: f64,
 }
 
@@ -221,6 +222,8 @@ pub struct Advice {
 
 /// Steps of the reference, as parts of the game's, the longest first.
 const REFINED: [f64; 4] = [1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0];
+/// How much more patience there is with a reference.
+const REFERENCES: f64 = 30.0;
 /// What counts as the same place, as a part of the smallest radius.
 const SAME: f64 = 0.01;
 
@@ -242,6 +245,7 @@ pub async fn advise(
     for model in [EXACT, Model { detection: Detection::Swept, substeps: 4, ..IMPULSE }] {
         for part in REFINED {
             let setting = Setting { model, number, step: part * wish.step };
+            let begin = Instant::now();
             let Some(finer) = source.film(setting, false, every).await else { break };
             let before = advice.told;
             if !reference.is_empty() {
@@ -250,7 +254,8 @@ pub async fn advise(
             (reference, advice.reference) = (finer.frames, Some(setting));
             // What is chaotic does not become less so.
             let told = advice.told;
-            if told >= seconds || told > 0.0 && told < 1.2 * before {
+            let long = begin.elapsed().as_secs_f64() > REFERENCES * wish.patience;
+            if long || told >= seconds || told > 0.0 && told < 1.2 * before {
                 break;
             }
         }

@@ -94,6 +94,21 @@ fn metrics_give_the_known_answer_on_what_is_wrong() {
     let measured = error("ramp", slides, Number::F64, 0.001);
     assert!((measured / expected - 1.0).abs() < 0.01, "{measured}, {expected}");
 
+    // A marble that a turning disc does not turn goes straight on: 0.2 m/s for 4 s, which the
+    // circle has bent by 2/7 of two turns.
+    let expected = {
+        let rate = 2.0 / 7.0 * std::f64::consts::PI;
+        let radius = 0.2 / rate;
+        let apart = |t: f64| {
+            let (sin, cos) = (rate * t).sin_cos();
+            (0.2 * t - radius * sin).powi(2) + (radius * (1.0 - cos)).powi(2)
+        };
+        let squares: f64 = (0..=40).map(|i| apart(f64::from(i) * 0.1)).sum();
+        (squares / 41.0).sqrt() / radius
+    };
+    let measured = error("turntable", slides, Number::F64, 0.001);
+    assert!((measured / expected - 1.0).abs() < 0.01, "{measured}, {expected}");
+
     // Balls that pass through each other, and towers that fall.
     for (name, least) in [("carom", 0.2), ("cradle", 0.2), ("tower", 10.0), ("skid", 0.05)] {
         let judged = scene(name);
