@@ -193,6 +193,58 @@ fn color(name: &str, names: &[&str]) -> Color32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use egui::{Event, PointerButton, Pos2, RawInput, Rect};
+    use taw::response::Response;
+    use taw_lab::advise::Whole;
+    use taw_lab::trade::trace::{Number, Setting};
+
+    /// A player who clicks everywhere, eight points apart.
+    #[test]
+    fn a_click_on_a_point_chooses_its_model_and_one_beside_it_nothing() {
+        let choice = |name, response, cost, error| {
+            let model = Model { response, ..Model::default() };
+            let setting = Setting { model, number: Number::F32, step: 1.0 / 60.0 };
+            Choice { name, setting, error, whole: Whole::default(), cost }
+        };
+        let choices = vec![
+            choice("cheap", Response::Displacement, 1e-5, 0.1),
+            choice("exact", Response::EventDriven, 1e-3, 1e-5),
+        ];
+        let advice = Advice { choices, told: 1.0, seconds: 1.0, ..Advice::default() };
+        let context = egui::Context::default();
+        let click = |at: Pos2| {
+            let mut chosen = None;
+            for pressed in [None, Some(true), Some(false)] {
+                let mut events = vec![Event::PointerMoved(at)];
+                events.extend(pressed.map(|pressed| Event::PointerButton {
+                    pos: at,
+                    button: PointerButton::Primary,
+                    pressed,
+                    modifiers: egui::Modifiers::default(),
+                }));
+                let screen = Rect::from_min_size(Pos2::ZERO, egui::vec2(400.0, 500.0));
+                let input = RawInput { screen_rect: Some(screen), events, ..RawInput::default() };
+                let mut output = context.run_ui(input, |ui| {
+                    chosen = chart(ui, &advice, Model::default()).or(chosen);
+                });
+                output.textures_delta.clear();
+            }
+            chosen
+        };
+        let places = (0..50 * 50).map(|i| Pos2::new((8 * (i % 50)) as f32, (8 * (i / 50)) as f32));
+        let clicks: Vec<_> = places.filter_map(|at| Some((at, click(at)?.response))).collect();
+        let middle = |response| {
+            let hits: Vec<_> = clicks.iter().filter(|(_, hit)| *hit == response).collect();
+            let sum = hits.iter().fold(egui::Vec2::ZERO, |sum, (at, _)| sum + at.to_vec2());
+            let middle = (sum / hits.len() as f32).to_pos2();
+            assert!((4..=12).contains(&hits.len()), "{hits:?}");
+            assert!(hits.iter().all(|(at, _)| at.distance(middle) < 1.5 * REACH), "{hits:?}");
+            middle
+        };
+        // Upper right is better.
+        let (cheap, exact) = (middle(Response::Displacement), middle(Response::EventDriven));
+        assert!(cheap.x > exact.x + 50.0 && exact.y < cheap.y - 50.0, "{cheap}, {exact}");
+    }
 
     #[test]
     fn figures_have_units_that_suit_them() {
