@@ -75,7 +75,12 @@ where
         .bold_line_style(BLACK.mix(0.12))
         .label_style((FONT, 15))
         .axis_desc_style((FONT, 17))
+        .x_labels(5)
         .x_label_formatter(&|x| {
+            // The lines between powers of ten have none.
+            if x.fract() != 0.0 {
+                return String::new();
+            }
             let seconds = 10_f64.powf(-x - marbles.log10());
             let (unit, name) = match seconds {
                 0.999.. => (1.0, "s"),
@@ -83,10 +88,13 @@ where
                 0.999e-6.. => (1e-6, "µs"),
                 _ => (1e-9, "ns"),
             };
-            format!("{:.0} ×, {:.0} {name}", 10_f64.powf(*x), seconds / unit)
+            format!("{} ×, {} {name}", digits(10_f64.powf(*x)), digits(seconds / unit))
         })
-        .y_label_formatter(&|y| if *y == 0.0 { "1".into() } else { format!("10^{:.0}", -y) })
-        .x_labels(5)
+        .y_label_formatter(&|y| match *y {
+            0.0 => "1".into(),
+            y if y.fract() == 0.0 => format!("10^{:.0}", -y),
+            _ => String::new(),
+        })
         .x_desc("times real time, and cost of a marble and simulated second")
         .y_desc("error")
         .draw()?;
@@ -118,6 +126,12 @@ where
     draw_legend::<B>(&legend, curves, &colors)?;
     area.present()?;
     Ok(())
+}
+
+/// Two digits or more, as people write them.
+fn digits(x: f64) -> String {
+    let tenths = (x * 10.0).round() / 10.0;
+    if x < 10.0 { tenths.to_string() } else { format!("{x:.0}") }
 }
 
 /// The name of a curve without its scalar.
