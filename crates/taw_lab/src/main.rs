@@ -172,6 +172,11 @@ fn trade(
         None => out.join("points.jsonl"),
         Some([number, of]) => out.join(format!("points-{number}-of-{of}.jsonl")),
     };
+    let kept = read_points(&file)?.len();
+    if kept > 0 {
+        let name = file.display();
+        eprintln!("Goes on from {kept} points in {name}; to measure them anew, delete it");
+    }
     let bar = ProgressBar::new(0);
     let style = "{bar:40} {pos} of {len}, {eta} left  {msg}";
     bar.set_style(ProgressStyle::with_template(style)?);
