@@ -1,9 +1,10 @@
 //! Which model for a scene of one's own, from a file or as it is in a game.
 //!
 //! The reference is the scene by the most exact model (in `f64`, if it is from a file), in steps
-//! that are halved until two runs agree. How long places can be told beforehand is measured too: by two references that
-//! differ in the last bit. Until then places are compared, marble by marble; after it what
-//! remains meaningful: heights and speeds of all together, the energy, how deep things overlap.
+//! that are halved until two runs agree. How long places can be told beforehand is measured too:
+//! by two references that differ in the last bit. Until then places are compared, marble by
+//! marble; after it what remains meaningful: heights and speeds of all together, the energy, how
+//! deep things overlap.
 
 use std::fmt::Write;
 use std::future::Future;
@@ -159,6 +160,8 @@ pub struct Wish {
     pub most: Option<f64>,
     /// How long a step may take, in seconds.
     pub budget: Option<f64>,
+    /// In which numbers; in all that there are, if it is not said.
+    pub number: Option<Number>,
     /// The step of the game, in seconds.
     pub step: f64,
     /// A model that takes longer for the scene, in seconds, is not tried with more substeps; a
@@ -169,7 +172,7 @@ pub struct Wish {
 impl Default for Wish {
     /// Nothing but to know what there is, at 60 steps a second and with a second's patience.
     fn default() -> Self {
-        Self { most: None, budget: None, step: 1.0 / 60.0, patience: 1.0 }
+        Self { most: None, budget: None, number: None, step: 1.0 / 60.0, patience: 1.0 }
     }
 }
 
@@ -293,7 +296,8 @@ fn settings(source: &impl Source, wish: Wish) -> Vec<(&'static str, Vec<Setting>
     for named in source.models() {
         let iterations: &[u32] =
             if named.iterates { &[1, 2, 4, 8, 32] } else { &[named.model.iterations] };
-        for number in source.numbers() {
+        let wanted = |number: &&Number| wish.number.is_none_or(|wish| wish == **number);
+        for number in source.numbers().iter().filter(wanted) {
             for iterations in iterations {
                 let setting = |substeps| {
                     let model = Model { substeps, iterations: *iterations, ..named.model };

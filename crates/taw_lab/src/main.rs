@@ -87,6 +87,9 @@ enum Command {
         /// How long a step may take: 2ms.
         #[arg(long, value_parser = duration)]
         budget: Option<f64>,
+        /// Only models in these numbers; worlds of Bevy games are f32.
+        #[arg(long, value_enum)]
+        number: Option<Number>,
         /// The step of the game.
         #[arg(long, value_parser = duration, default_value = "16.666667ms")]
         step: f64,
@@ -148,8 +151,8 @@ fn main() -> ExitCode {
         Command::Trade { out, report, quick, scene, model, shard, with } => {
             trade(&out, report, &Plan { quick, scene, model }, shard, &with)
         }
-        Command::Advise { scene, max_error: most, budget, step } => {
-            print_advice(&scene, Wish { most, budget, step, ..Wish::default() })
+        Command::Advise { scene, max_error: most, budget, number, step } => {
+            print_advice(&scene, Wish { most, budget, number, step, ..Wish::default() })
         }
         Command::Bench { scene, model, number, step } => bench(&scene, &model, number, step),
         Command::Merge { out, report, files } => merge(&out, report, &files),

@@ -10,7 +10,8 @@ use taw_lab::trade::trace::{Number, Setting};
 const BOUNCE: &str = include_str!("../scenes/bounce.ron");
 const MAZE: &str = include_str!("../scenes/maze.ron");
 const CRADLE: &str = include_str!("../scenes/cradle.ron");
-const NOTHING: Wish = Wish { most: None, budget: None, step: 1.0 / 60.0, patience: 1.0 };
+const NOTHING: Wish =
+    Wish { most: None, budget: None, number: None, step: 1.0 / 60.0, patience: 1.0 };
 
 fn on(text: &str, wish: Wish) -> (taw::scene::Scene, Advice) {
     let scene = read_scene(text).unwrap();
@@ -53,6 +54,17 @@ fn a_budget_is_kept_and_the_impossible_is_said() {
     let wish = Wish { budget: Some(1e-12), ..NOTHING };
     assert!(advice.best(wish).is_none());
     assert!(advice.text(wish).contains("none of"));
+}
+
+/// Worlds of Bevy games are `f32`: advice for one is not measured in anything else.
+#[test]
+fn advice_is_in_the_numbers_that_were_asked_for() {
+    for number in [Number::F32, Number::F64] {
+        let (_, advice) = on(BOUNCE, Wish { number: Some(number), ..NOTHING });
+        assert!(!advice.choices.is_empty());
+        assert!(advice.choices.iter().all(|choice| choice.setting.number == number));
+        assert_eq!(advice.reference.unwrap().number, Number::F64);
+    }
 }
 
 /// Balls that hit balls that hit balls: soon nothing can be told of one of them.
