@@ -198,7 +198,7 @@ pub struct Whole {
     pub heights: f64,
     /// The same of the speeds, in m/s.
     pub speeds: f64,
-    /// The mean overlap of a marble, in metres.
+    /// The mean overlap of a marble, beyond that of the reference, in metres.
     pub overlap: f64,
     /// The mean difference of the energies, in joules.
     pub energy: f64,
@@ -336,11 +336,12 @@ impl Whole {
             let speeds = |frame: &Frame| frame.velocity.iter().map(|v| v.magnitude()).collect();
             whole.heights += apart(heights(a), heights(b)) / frames;
             whole.speeds += apart(speeds(a), speeds(b)) / frames;
-            whole.overlap += a.overlap / a.at.len().max(1) as f64 / frames;
+            whole.overlap += (a.overlap - b.overlap) / a.at.len().max(1) as f64 / frames;
             whole.energy += (a.energy - b.energy).abs() / frames;
             whole.momentum += Vec3::from(a.momentum).distance(b.momentum.into()) / frames;
             whole.passed += a.passed.abs_diff(b.passed) as f64 / frames;
         }
+        whole.overlap = whole.overlap.max(0.0);
         whole
     }
 }

@@ -192,6 +192,48 @@ fn a_snapshot_stands_still() {
     assert!(last.at[0].y > 0.2, "it has bounced");
 }
 
+/// What a game begins with is no model's fault: a marble that lies a little too deep.
+#[test]
+fn only_overlap_beyond_that_of_the_reference_counts() {
+    let depth = |advice: &Advice| {
+        let still = |c: &&Choice| {
+            let Model { response, rotation, substeps, .. } = c.setting.model;
+            (response, rotation, substeps) == (Response::EventDriven, Rotation::Dynamic, 1)
+        };
+        advice.choices.iter().find(still).unwrap().whole.overlap
+    };
+    let mut world = world(0.0);
+    let id = world.marbles.id(0).unwrap();
+    world.marbles.set_position(id, Point3::new(0.0, 0.0999, 0.0)).unwrap();
+    let mean = |film: &taw_lab::trade::trace::Film| {
+        film.frames.iter().map(|frame| frame.overlap).sum::<f64>() / film.frames.len() as f64
+    };
+    let setting = Setting { model: taw_lab::scene::EXACT, number: Number::F32, step: 1.0 / 64.0 };
+    let film = block_on(Snapshot::new(&mut world, 1.0).film(setting, false, 0.1)).unwrap();
+    assert!(mean(&film) > 5e-6, "there is some: {:.1e}", mean(&film));
+    let advice = of_snapshot(world);
+    assert!(depth(&advice) < 1e-6, "{:.1e}", depth(&advice));
+}
+
+/// Where gravity tilts, energy is that of the moment, whatever the step: no friction here, and no
+/// touch.
+#[test]
+fn energy_is_of_gravity_as_it_is() {
+    let text = "(seconds: 1, marbles: [(position: (1, 2, 3), radius: 0.1, density: 1000)],
+        tilts: [(at: 0, gravity: (0, -9, 0)), (at: 1, gravity: (4, -8, 0))])";
+    let scene = read_scene(text).unwrap();
+    let mass = 4.0 / 3.0 * std::f64::consts::PI;
+    for step in [1.0 / 10.0, 1.0 / 20.0] {
+        let setting = Setting { model: taw_lab::scene::EXACT, number: Number::F64, step };
+        for frame in block_on(scene.film(setting, false, 0.1)).unwrap().frames {
+            let gravity = Vec3::new(4.0 * frame.time, frame.time - 9.0, 0.0);
+            let kinetic = 0.5 * frame.velocity[0].magnitude2();
+            let energy = mass * (kinetic - gravity.dot(frame.at[0]));
+            assert!((frame.energy - energy).abs() < 1e-9, "{} at {} s", frame.energy, frame.time);
+        }
+    }
+}
+
 #[test]
 fn what_is_told_on_the_way_grows() {
     let scene = read_scene(BOUNCE).unwrap();

@@ -100,6 +100,11 @@ pub async fn film<S: Scalar>(
                 frame.at.push(marble.position.to_vec());
                 frame.velocity.push(marble.velocity);
             }
+            if !running.scene().tilts.is_empty() {
+                // Steps have left that of their middle.
+                let gravity = running.scene().gravity_at(frame.time).map(S::constant);
+                running.world.set_gravity(gravity.into()).ok()?;
+            }
             frame.energy = running.world.energy().total();
             frame.momentum = running.world.momentum().into();
             frame.passed = running.passed();
