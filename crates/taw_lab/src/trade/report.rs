@@ -181,8 +181,8 @@ fn guide(text: &mut String, points: &[Point]) -> std::fmt::Result {
         text,
         "## Which model for my scene?\n\nThe cheapest setting at 60 steps a second in `f32`, as \
          the plugin counts, whose error is at most this in all scenes of its kind (substeps × \
-         iterations; nanoseconds for each marble and simulated second, the mean of the scenes).\n\n| game | scenes | 5 % | 1 % | \
-         0.1 % |\n|---|---|---|---|---|"
+         iterations; nanoseconds for each marble and simulated second, the mean of the \
+         scenes).\n\n| game | scenes | 5 % | 1 % | 0.1 % |\n|---|---|---|---|---|"
     )?;
     for (kind, scenes) in KINDS {
         write!(text, "| {kind} | {} |", scenes.join(", "))?;
@@ -199,8 +199,8 @@ fn guide(text: &mut String, points: &[Point]) -> std::fmt::Result {
     Ok(())
 }
 
-/// The cheapest setting of ours at 1/60 s in `f32` that errs by so much at most in all of the scenes, with
-/// its mean cost.
+/// The cheapest setting of ours at 1/60 s in `f32` that errs by so much at most in all of the
+/// scenes, with its mean cost.
 fn cheapest<'a>(points: &'a [Point], scenes: &[&str], most: f64) -> Option<(f64, &'a Point)> {
     let good = |point: &&Point| {
         point.engine == "taw"
