@@ -95,9 +95,9 @@ fn of<'a>(advice: &'a Advice, name: &'a str) -> impl Iterator<Item = &'a Choice>
     advice.choices.iter().filter(move |choice| choice.name == name)
 }
 
-/// Upward and to the right is better.
+/// Upward and to the right is better; what is below a nanometre or a nanosecond is as good as that.
 fn place(choice: &Choice) -> [f64; 2] {
-    [-choice.cost.max(1e-9).log10(), -choice.wrong().max(1e-12).log10()]
+    [-choice.cost.max(1e-9).log10(), -choice.wrong().max(1e-9).log10()]
 }
 
 fn describe(choice: &Choice) -> String {
