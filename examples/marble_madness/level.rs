@@ -39,6 +39,9 @@ impl Level {
         if scene.walls.iter().any(|wall| matches!(wall.moves, Some(Movement::Conveys { .. }))) {
             return Err(" walls that convey cannot be played yet".into());
         }
+        if !scene.fields.is_empty() {
+            return Err(" force fields cannot be played yet".into());
+        }
         Ok(Self(Some(scene)))
     }
 
@@ -203,6 +206,7 @@ mod tests {
             ("normal: (0, 1, 0)", "normal: (1, 1, 0)"),
             ("(shape: HalfSpace(normal: (0, 1, 0))),", ""),
             ("seconds: 1", "seconds: -1"),
+            ("seconds: 1", "seconds: 1, fields: [Drag(linear: 1)]"),
         ] {
             assert!(Level::from_text(&board.replace(from, to)).is_err(), "{to}");
         }

@@ -203,6 +203,7 @@ fn marble_of(ball: &Ball, bag: &mut Bag, look: &Look) -> impl Bundle + use<> {
     let velocity = place(ball.velocity);
     (
         MarbleMass::Density(ball.density as f32),
+        Spin(place(ball.spin)),
         colored(Transform::from_translation(at), velocity, radius, bag, look),
     )
 }

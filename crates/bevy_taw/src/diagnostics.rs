@@ -97,7 +97,7 @@ fn figures() -> [Figure; 9] {
 }
 
 /// Has an account kept of where the energy of every step goes, or no longer. Off, it costs
-/// nothing; on, about as much as a second look at every contact.
+/// nothing; on, some more looks at every marble and contact.
 pub fn enable_accuracy(store: &mut DiagnosticsStore, enabled: bool) {
     for (path, ..) in figures() {
         if let Some(diagnostic) = store.get_mut(&path) {

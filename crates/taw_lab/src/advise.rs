@@ -111,6 +111,8 @@ impl Snapshot {
     pub fn new(of: &mut World<f32>, seconds: f64) -> Self {
         let swarm = std::mem::take(&mut of.swarm);
         let mut world = of.clone();
+        // Costs are those of a game that keeps none.
+        world.keep_account(false);
         of.swarm = swarm;
         for row in 0..world.walls.len() {
             if let Some(id) = world.walls.id(row) {
@@ -478,5 +480,18 @@ pub fn quantity(text: &str, units: &[(&str, f64)]) -> Result<f64, String> {
     match (number.trim().parse::<f64>(), worth) {
         (Ok(number), Some(worth)) if number > 0.0 && number.is_finite() => Ok(number * worth),
         _ => Err(format!("{text:?} is not a number above zero with one of the units {}", names())),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_snapshot_keeps_no_account() {
+        let mut world = World::default();
+        world.keep_account(true);
+        assert_eq!(Snapshot::new(&mut world, 1.0).world.account(), None);
+        assert!(world.account().is_some());
     }
 }

@@ -117,7 +117,7 @@ pub(crate) fn penalty<S: Scalar>(
         pushes.push((touch, normal * pressure + held, pressure));
     }
     for (touch, force, pressure) in &pushes {
-        let (touch, impulse) = (touch, *force * dt);
+        let impulse = *force * dt;
         let [first, second] = touch.along;
         for (row, impulse, normal, along) in [
             (Some(touch.b), impulse, touch.normal, second),
