@@ -36,7 +36,7 @@ use crate::error::{finite_vector, positive};
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
-use crate::response::impulse::{self, Settings, Warm, impulse};
+use crate::response::impulse::{self, Around, Settings, Start, Warm, impulse};
 use crate::response::{Impact, Response, Rod, Shear, displacement, penalty};
 use crate::swarm::Swarm;
 use account::Accounting;
@@ -74,6 +74,9 @@ pub struct World<S> {
     /// substeps, for a response that looks ahead.
     reach: S,
     inverse_mass: Vec<S>,
+    /// Before forces changed them in this substep, in m/s; empty for a response that has no use
+    /// for them.
+    velocity_before: Vec<Vec3<S>>,
     held: Vec<bool>,
     impulse: impulse::Scratch<S>,
     /// What the contacts of the last substep bore, and the removals until then: they
@@ -109,6 +112,7 @@ impl<S: Scalar> Default for World<S> {
             stopped: Vec::new(),
             reach: S::zero(),
             inverse_mass: Vec::new(),
+            velocity_before: Vec::new(),
             held: Vec::new(),
             impulse: impulse::Scratch::default(),
             warm: Vec::new(),
@@ -141,6 +145,7 @@ impl<S: Scalar> PartialEq for World<S> {
             grid: _,
             reach: _,
             inverse_mass: _,
+            velocity_before: _,
             held: _,
             impulse: _,
             warm,
@@ -290,6 +295,10 @@ impl<S: Scalar> World<S> {
         if self.model.response == Response::EventDriven {
             self.marbles.mean_accelerations(drive, &mut self.accelerations);
         } else {
+            self.velocity_before.clear();
+            if self.model.response == Response::Impulse {
+                self.velocity_before.extend_from_slice(self.marbles.velocity());
+            }
             self.sweep.start.clear();
             let sweeps = matches!(self.model.response, Response::Displacement | Response::Impulse);
             if sweeps && self.model.detection == Detection::Swept {
@@ -384,14 +393,17 @@ impl<S: Scalar> World<S> {
                     slop: length(self.gravity) * dt * dt,
                     largest_slop: S::constant(0.001),
                 };
+                let around = Around {
+                    walls: &self.walls,
+                    material: |row| material.get(row).unwrap_or_default(),
+                    follow: |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
+                    start: Start { position: &[], velocity: &self.velocity_before },
+                    settings: &settings,
+                };
                 impulse(
                     &mut columns,
                     &mut self.contacts,
-                    &self.walls,
-                    |row| material.get(row).unwrap_or_default(),
-                    |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
-                    &[],
-                    &settings,
+                    &around,
                     &mut self.impulse,
                     &mut self.warm,
                     &mut self.stopped,

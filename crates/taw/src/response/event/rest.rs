@@ -6,7 +6,7 @@ use cgmath::{InnerSpace, Zero};
 use super::{Ball, EventDriven, PRESS, Path, REST, Settings};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Vec3, direction_and_length};
-use crate::response::impulse::{self, Warm, impulse};
+use crate::response::impulse::{self, Around, Start, Warm, impulse};
 use crate::response::{BallSpin, Columns, Material, Walls as _};
 
 /// Overlap that may stay, over the radius: pushing it out would lift what lies on it, and
@@ -90,19 +90,14 @@ impl Heap {
             largest_slop: SLOP,
         };
         let mut stopped = Vec::new(); // whoever it is will be stopped at the end, too
-        let material = |label: usize| self.material[label];
-        impulse(
-            &mut columns,
-            contacts,
+        let around = Around {
             walls,
-            material,
-            |_| 0.5,
-            &self.start,
-            &told,
-            &mut self.scratch,
-            warm,
-            &mut stopped,
-        );
+            material: |label: usize| self.material[label],
+            follow: |_| 0.5,
+            start: Start { position: &self.start, velocity: &[] },
+            settings: &told,
+        };
+        impulse(&mut columns, contacts, &around, &mut self.scratch, warm, &mut stopped);
     }
 }
 

@@ -1,20 +1,42 @@
+//! The impulse method, which [`Response::Impulse`](super::Response::Impulse) is, and which holds
+//! heaps for [`Response::EventDriven`](super::Response::EventDriven).
+
 mod gain;
+mod islands;
+mod place;
+mod prepare;
 mod solve;
 
 use cgmath::{InnerSpace, Zero};
 
 use crate::contact::Contacts;
-use crate::math::{
-    Point3, Scalar, Vec3, cast_vector, direction_and_length, is_finite, is_finite_point,
-};
+use crate::math::{Point3, Scalar, Vec3, cast_vector, direction_and_length, is_finite};
 use crate::response::{BallSpin, Columns, Material, Mobility, Push, Work};
 use gain::{Ledger, Rebound};
-use solve::{Islands, solve};
-
-/// How often overlap that is left after the velocities are solved is pushed out.
-const POSITION_SWEEPS: u32 = 3;
+use islands::Islands;
+use prepare::prepare;
+use solve::solve;
 
 /// What the solver is told, besides columns and contacts.
+pub(crate) struct Around<'a, S, W, M, F> {
+    pub walls: &'a W,
+    /// Gives the material of a marble, by row.
+    pub material: M,
+    /// How far the position of a row follows a change of its velocity in this substep, in
+    /// substeps.
+    pub follow: F,
+    pub start: Start<'a, S>,
+    pub settings: &'a Settings<S>,
+}
+
+/// Where marbles were before the substep, and how they moved. Empty where nobody knows.
+#[derive(Clone, Copy)]
+pub(crate) struct Start<'a, S> {
+    pub position: &'a [Point3<S>],
+    /// Before forces changed it, in m/s.
+    pub velocity: &'a [Vec3<S>],
+}
+
 pub(crate) struct Settings<S> {
     /// The most sweeps over all contacts.
     pub iterations: u32,
@@ -117,10 +139,21 @@ pub(super) struct Constraint<S> {
     /// The velocity of the wall's surface, in m/s; zero between marbles.
     surface: Vec3<S>,
     mobility: Mobility<S>,
+    restitution: S,
+    /// How friction is bounded: by this part of the pressure, and by so much, in m/s.
     friction: S,
-    /// The relative velocity of the two points before, in m/s.
+    bound: S,
+    /// The relative velocity of the two points before, in m/s, and how they turn against each
+    /// other, in rad/s.
     begin: Vec3<S>,
+    begin_turning: Vec3<S>,
     bounces: bool,
+    /// The time since it bounced, in seconds, for which positions follow; none if that is for
+    /// as long as the integrator says.
+    since: Option<S>,
+    /// The relative velocity that forces have given since the bounce, counted as the integrator
+    /// counts, in m/s.
+    lag: Vec3<S>,
     /// The relative velocity of the two points that is asked for: along the normal at
     /// least this, across it this if friction suffices.
     rebound: S,
@@ -129,9 +162,13 @@ pub(super) struct Constraint<S> {
     /// m/s, which a pebble and a boulder have in common.
     pressure: S,
     grip: Vec3<S>,
-    /// What the last sweep changed of them, and the way on which the solver searches.
+    /// The least that the pressure may be.
+    least: S,
+    /// What the last sweep changed of them, the way on which the solver searches, and the
+    /// change of velocity that was wanted where it began.
     step: Vec3<S>,
     way: Vec3<S>,
+    wanted: Vec3<S>,
     resistance: Option<Resistance<S>>,
 }
 
@@ -197,124 +234,28 @@ impl<S: Scalar> Constraint<S> {
 /// *Iterative dynamics with temporal coherence*, 2005) with the friction of a cone,
 /// not of a pyramid, bounded by the accumulated normal impulse, restitution included.
 ///
-/// `material` gives that of a marble, `follow` how far its position follows a change of
-/// velocity in its step, `start` where they were before it (empty, if nobody knows).
-/// The contacts' rows exist. Rows that end up infinite or NaN lose
-/// their velocity and are added to `stopped`.
+/// The contacts' rows exist. Rows that end up infinite or NaN lose their velocity and are
+/// added to `stopped`.
 pub(crate) fn impulse<S: Scalar>(
     marbles: &mut Columns<S>,
     contacts: &mut Contacts<S>,
-    walls: &impl Walls<S>,
-    material: impl Fn(usize) -> Material<S>,
-    follow: impl Fn(usize) -> S,
-    start: &[Point3<S>],
-    settings: &Settings<S>,
+    around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     scratch: &mut Scratch<S>,
     warm: &mut Vec<Warm<S>>,
     stopped: &mut Vec<u32>,
 ) {
     contacts.sort();
+    let settings = around.settings;
     let Scratch { before, constraints, islands, ledgers, rebounds } = scratch;
-    constraints.clear();
     before.clear();
     before.extend_from_slice(marbles.velocity);
-    let prepare = |a: First, b: usize, along: [S; 2]| {
-        let (mut normal, mut gap) = marbles.normal_and_gap(marbles.position, a, b, along, walls)?;
-        if let Some((earlier, overlap)) = marbles.normal_and_gap(start, a, b, along, walls) {
-            // What pushes along the mean normal of a step does no work, and neither does
-            // an overlap that stays what it was.
-            let mean = direction_and_length(normal + earlier);
-            (normal, gap) = (mean.map_or(normal, |(mean, _)| mean), gap - overlap.min(S::zero()));
-        }
-        let own = material(b);
-        let (surface, material) = match a {
-            First::Wall(wall, _) => {
-                let touch =
-                    marbles.position[b] + marbles.offset(b, along[1]) - normal * marbles.radius[b];
-                let wall = wall as usize;
-                let material = walls.material(wall).map_or(own, |its| own.against(its));
-                (walls.surface_velocity(wall, touch), material)
-            }
-            First::Marble(a) => (Vec3::zero(), own.against(material(a as usize))),
-        };
-        let mobility = marbles.mobility_of_both(a, b, along, normal);
-        let closing = marbles.closing(a, b, along, normal, surface);
-        let approach = -closing.dot(normal);
-        // The positions have moved on already, and will follow what changes now. So
-        // this speed is just enough to keep the gap from closing.
-        let follow = match a {
-            First::Wall(..) => follow(b),
-            First::Marble(a) => (follow(a as usize) + follow(b)) * S::constant(0.5),
-        } * settings.dt;
-        let closed = if settings.dt == S::zero() {
-            S::zero()
-        } else if follow > S::zero() {
-            -approach - gap / follow
-        } else {
-            -gap / settings.dt
-        };
-        let bounces = approach > settings.bounce_speed && closed > -approach;
-        let (rebound, slide) = if bounces {
-            let sliding = closing + normal * approach;
-            (material.restitution * approach, sliding * -material.tangential_restitution)
-        } else {
-            (closed.min(S::zero()), Vec3::zero())
-        };
-        let mut constraint = Constraint {
-            a,
-            b,
-            along,
-            island: 0,
-            normal,
-            surface,
-            mobility,
-            friction: material.friction,
-            begin: closing,
-            bounces,
-            rebound,
-            slide,
-            pressure: S::zero(),
-            grip: Vec3::zero(),
-            step: Vec3::zero(),
-            way: Vec3::zero(),
-            resistance: marbles.resistance(a, b, material),
-        };
-        // What bounces had nothing to bear before.
-        let guess = warm.binary_search_by_key(&constraint.key(), |warm| warm.key);
-        if let (Ok(at), false) = (guess, bounces) {
-            let Warm { pressure, grip, twist, .. } = warm[at];
-            constraint.pressure = pressure;
-            constraint.grip = grip - normal * grip.dot(normal);
-            if let Some(resistance) = &mut constraint.resistance {
-                resistance.twist = twist;
-            }
-        }
-        (mobility.normal > S::zero()).then_some(constraint)
-    };
-    let wm = contacts.wm.iter().map(|c| (First::Wall(c.a, c.part), c));
-    let mm = contacts.mm.iter().map(|c| (First::Marble(c.a), c));
-    constraints.extend(wm.chain(mm).filter_map(|(a, c)| prepare(a, c.b as usize, c.along)));
-
-    for c in constraints.iter() {
-        marbles.hit_both(c, c.impulse());
-        if let Some(resistance) = c.resistance {
-            marbles.twist_both(c, resistance.twist);
-        }
-    }
+    prepare(marbles, contacts, around, constraints, islands);
+    marbles.warm_start(constraints, warm);
+    marbles.take_back(constraints, islands, ledgers);
     solve(marbles, constraints, islands, settings);
     marbles.gain_nothing(constraints, islands, ledgers, rebounds, settings);
-    for (row, before) in before.iter().enumerate() {
-        let moved = (marbles.velocity[row] - before) * (follow(row) * settings.dt);
-        let position = marbles.position[row] + moved;
-        if is_finite_point(position) {
-            marbles.position[row] = position;
-        }
-    }
-    for _ in 0..POSITION_SWEEPS {
-        for constraint in constraints.iter() {
-            marbles.push_apart(constraint, walls, settings);
-        }
-    }
+    marbles.follow(before, constraints, around);
+    marbles.push_apart(constraints, around);
     remember(constraints, warm);
     marbles.stop_what_overflowed(constraints, stopped);
 }
@@ -451,6 +392,22 @@ impl<S: Scalar> Columns<'_, S> {
         }
     }
 
+    /// Begins with what the contacts bore in the last substep. What bounces had nothing to
+    /// bear before.
+    fn warm_start(&mut self, constraints: &mut [Constraint<S>], warm: &[Warm<S>]) {
+        for c in constraints.iter_mut().filter(|c| !c.bounces) {
+            let Ok(at) = warm.binary_search_by_key(&c.key(), |warm| warm.key) else { continue };
+            let Warm { pressure, grip, twist, .. } = warm[at];
+            c.pressure = pressure;
+            c.grip = grip - c.normal * grip.dot(c.normal);
+            self.hit_both(c, c.impulse());
+            if let Some(resistance) = &mut c.resistance {
+                resistance.twist = twist;
+                self.twist_both(c, twist);
+            }
+        }
+    }
+
     /// Applies an angular impulse to the second of a contact, its opposite to the first.
     fn twist_both(&mut self, c: &Constraint<S>, twist: Vec3<S>) {
         self.twist(c.b, twist);
@@ -470,29 +427,5 @@ impl<S: Scalar> Columns<'_, S> {
             self.hit(a, first, -c.normal, c.along[0]);
         }
         self.hit(c.b, second, c.normal, c.along[1]);
-    }
-
-    /// Moves what overlaps too deep half of the way apart, the lighter one further.
-    ///
-    /// A little overlap stays: what rests then need not fall back in every substep.
-    fn push_apart(&mut self, c: &Constraint<S>, walls: &impl Walls<S>, settings: &Settings<S>) {
-        let Some((normal, gap)) = self.normal_and_gap(self.position, c.a, c.b, c.along, walls)
-        else {
-            return;
-        };
-        let smaller =
-            c.a.marble().map_or(self.radius[c.b], |a| self.radius[a].min(self.radius[c.b]));
-        let excess = -gap - settings.slop.min(smaller * settings.largest_slop);
-        if excess <= S::zero() {
-            return;
-        }
-        let push = normal * (excess * S::constant(0.5) / c.mobility.normal);
-        for (row, by) in [(Some(c.b), push), (c.a.marble(), -push)] {
-            let Some(row) = row else { continue };
-            let position = self.position[row] + by * self.inverse_mass[row];
-            if is_finite_point(position) {
-                self.position[row] = position;
-            }
-        }
     }
 }

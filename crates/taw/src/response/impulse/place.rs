@@ -1,0 +1,76 @@
+//! Positions, once velocities are solved.
+
+use super::{Around, Constraint, Walls};
+use crate::math::{Point3, Scalar, Vec3, is_finite_point};
+use crate::response::{Columns, Material};
+
+/// How often overlap that is left after the velocities are solved is pushed out.
+const SWEEPS: u32 = 3;
+
+impl<S: Scalar> Columns<'_, S> {
+    /// Lets positions follow what contacts changed of the velocities `before`: what a bounce
+    /// changed from its moment on, all else for as long as the integrator does.
+    pub(super) fn follow(
+        &mut self,
+        before: &[Vec3<S>],
+        constraints: &[Constraint<S>],
+        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) {
+        let follows = |row: usize| (around.follow)(row) * around.settings.dt;
+        for (row, before) in before.iter().enumerate() {
+            let to = self.position[row] + (self.velocity[row] - before) * follows(row);
+            self.put(row, to);
+        }
+        for c in constraints {
+            let Some(since) = c.since else { continue };
+            let push = c.impulse() / c.mobility.normal;
+            for (row, push) in [(Some(c.b), push), (c.a.marble(), -push)] {
+                let Some(row) = row else { continue };
+                let change = push * self.inverse_mass[row];
+                self.put(row, self.position[row] + change * (since - follows(row)));
+            }
+        }
+    }
+
+    /// Moves what overlaps too deep apart, sweep after sweep half of the way, the lighter one
+    /// further.
+    pub(super) fn push_apart(
+        &mut self,
+        constraints: &[Constraint<S>],
+        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) {
+        for _ in 0..SWEEPS {
+            for c in constraints {
+                self.push_two_apart(c, around);
+            }
+        }
+    }
+
+    /// A little overlap stays: what rests then need not fall back in every substep.
+    fn push_two_apart(
+        &mut self,
+        c: &Constraint<S>,
+        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) {
+        let touch = self.normal_and_gap(self.position, c.a, c.b, c.along, around.walls);
+        let Some((normal, gap)) = touch else { return };
+        let settings = around.settings;
+        let smaller =
+            c.a.marble().map_or(self.radius[c.b], |a| self.radius[a].min(self.radius[c.b]));
+        let excess = -gap - settings.slop.min(smaller * settings.largest_slop);
+        if excess <= S::zero() {
+            return;
+        }
+        let push = normal * (excess * S::constant(0.5) / c.mobility.normal);
+        for (row, by) in [(Some(c.b), push), (c.a.marble(), -push)] {
+            let Some(row) = row else { continue };
+            self.put(row, self.position[row] + by * self.inverse_mass[row]);
+        }
+    }
+
+    fn put(&mut self, row: usize, position: Point3<S>) {
+        if is_finite_point(position) {
+            self.position[row] = position;
+        }
+    }
+}
