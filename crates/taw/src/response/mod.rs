@@ -73,6 +73,13 @@ pub enum Response {
     EventDriven,
 }
 
+impl Response {
+    /// Whether it acts only on what overlaps.
+    pub(crate) fn needs_overlap(self) -> bool {
+        matches!(self, Self::Penalty(_))
+    }
+}
+
 /// The columns that a response works on; all of one length.
 #[derive(Debug)]
 pub(crate) struct Columns<'a, S> {

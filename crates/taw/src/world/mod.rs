@@ -283,6 +283,7 @@ impl<S: Scalar> World<S> {
             return Err(Error::BallsOnly(id));
         }
         self.count_before();
+        self.begin_sweep();
         let drive = Drive {
             integrator: self.model.integrator,
             gravity: self.gravity,
@@ -298,11 +299,6 @@ impl<S: Scalar> World<S> {
             self.velocity_before.clear();
             if self.model.response == Response::Impulse {
                 self.velocity_before.extend_from_slice(self.marbles.velocity());
-            }
-            self.sweep.start.clear();
-            let sweeps = matches!(self.model.response, Response::Displacement | Response::Impulse);
-            if sweeps && self.model.detection == Detection::Swept {
-                self.sweep.start.extend_from_slice(self.marbles.position());
             }
             self.marbles.integrate(drive, &mut self.stopped);
             self.stop_at_walls(dt);
@@ -332,6 +328,7 @@ impl<S: Scalar> World<S> {
         self.contacts.clear();
         self.touch_walls(self.reach);
         self.touch_marbles(self.reach);
+        self.touch_on_the_way();
     }
 
     /// The third verb: contacts change positions and velocities back to what the
@@ -344,6 +341,7 @@ impl<S: Scalar> World<S> {
         let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
+        self.release_what_touches_nothing();
         self.count_contacts();
         self.inverse_mass.clear();
         if matches!(self.model.response, Response::Impulse | Response::Penalty(_)) {
@@ -369,11 +367,14 @@ impl<S: Scalar> World<S> {
             Response::Displacement => {
                 let contacts = self.contacts.len() as u32;
                 let mut pushes = self.accounting.as_ref().map(|_| Vec::new());
+                let follow = |row: u32| {
+                    integrator.get(row as usize).unwrap_or(self.model.integrator).follow::<S>() * dt
+                };
                 displacement(
                     &self.walls,
                     &mut columns,
                     &mut self.contacts,
-                    dt,
+                    follow,
                     &mut self.stopped,
                     |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change))),
                 );
@@ -397,7 +398,11 @@ impl<S: Scalar> World<S> {
                     walls: &self.walls,
                     material: |row| material.get(row).unwrap_or_default(),
                     follow: |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
-                    start: Start { position: &[], velocity: &self.velocity_before },
+                    start: Start {
+                        position: &[],
+                        velocity: &self.velocity_before,
+                        stands: &self.sweep.stands,
+                    },
                     settings: &settings,
                 };
                 impulse(

@@ -1,13 +1,15 @@
 //! Swept detection: what would pass through each other within a substep is stopped
-//! where it first touches.
+//! where it first touches, with the velocity that it has there. Slower ones, which only graze
+//! each other on the way, are named as contacts.
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
 use cgmath::{InnerSpace, Zero};
 
-use super::World;
+use super::marbles::Marbles;
 use super::walls::Part;
+use super::{Detection, World};
 use crate::contact::time_of_impact_sphere_sphere;
 use crate::math::{Point3, Scalar, Vec3, direction_and_length, length};
 use crate::response::Response;
@@ -20,11 +22,26 @@ const INTO: f64 = 1e-5;
 /// Steps enough for a marble to come to any wall but one that it only grazes.
 const MOST_STEPS: u32 = 32;
 
+/// Whose way past each other is longer than this part of the smaller radius may pass through
+/// each other, or be turned back by the wrong side: the end of a step no longer tells where they
+/// met. So they are stopped.
+const FAST: f64 = 0.5;
+
+/// Whose way past each other is shorter than this part of the smaller radius cannot graze each
+/// other by more than a hundredth of that, which is not worth a look.
+const SLOW: f64 = 0.02;
+
 /// What a sweep remembers, and scribbles on.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweep<S> {
-    /// Where marbles were before they moved.
+    /// Where marbles were before they moved, and how fast, in m/s.
     pub start: Vec<Point3<S>>,
+    pub velocity: Vec<Vec3<S>>,
+    /// Who was stopped in this substep; and for every row, if one was, whether it was.
+    stops: Vec<Stopped<S>>,
+    pub stands: Vec<bool>,
+    /// Which marbles meet on the way, though neither was stopped.
+    pub grazes: Vec<(u32, u32)>,
     middle: Vec<Point3<S>>,
     reach: Vec<S>,
     /// Who may meet whom, both ways round, in order.
@@ -79,28 +96,78 @@ struct Stop<S> {
     /// As a part of the way.
     time: S,
     normal: Vec3<S>,
+    wall: u32,
+}
+
+/// A marble that was stopped.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stopped<S> {
+    pub row: u32,
+    /// By what: the row of a wall or of a marble.
+    by: By,
+    /// How far it would still have gone, in metres, and by how much its velocity would still
+    /// have changed, in m/s.
+    way: Vec3<S>,
+    change: Vec3<S>,
+}
+
+#[derive(Clone, Copy, Debug)]
+enum By {
+    Wall(u32),
+    Marble(u32),
 }
 
 impl<S: Scalar> World<S> {
+    /// Remembers where marbles are before they move, if this model sweeps.
+    pub(super) fn begin_sweep(&mut self) {
+        self.sweep.clear();
+        if self.model.detection == Detection::Swept {
+            self.sweep.start.extend_from_slice(&self.marbles.position);
+            self.sweep.velocity.extend_from_slice(&self.marbles.velocity);
+        }
+    }
+
     /// Puts marbles that would pass into walls by more than half of their radius to where
-    /// they touch them. Walls count as they are now, and half-spaces need none of this.
+    /// they touch them, or by [`Response::Penalty`], whose forces need an overlap, to where
+    /// half of the radius does. Walls count as they are now, and half-spaces need none of this.
     pub(super) fn stop_at_walls(&mut self, dt: S) {
         self.walls.prepare();
         if self.sweep.start.len() != self.marbles.len() || self.walls.are_planes() {
             return;
         }
-        let displaces = self.model.response == Response::Displacement;
         for row in 0..self.marbles.len() {
             let sphere = Sphere { center: self.sweep.start[row], ..self.marbles.sphere(row) };
             let motion = self.marbles.position[row] - sphere.center;
-            if length(motion) <= sphere.radius * S::constant(0.5) {
+            if length(motion) <= sphere.radius * S::constant(FAST) {
                 continue;
             }
-            let Some(Stop { time, normal }) = self.first_wall(&sphere, motion) else { continue };
-            self.marbles.position[row] = sphere.center + motion * time;
-            if displaces {
+            let Some(Stop { time, normal, wall }) = self.first_wall(&sphere, motion) else {
+                continue;
+            };
+            self.marbles.stop(&mut self.sweep, row, By::Wall(wall), time);
+            if self.model.response == Response::Displacement {
                 let depth = (motion.dot(-normal) * (S::one() - time)).max(S::zero());
                 self.marbles.velocity[row] += normal * (depth / dt);
+            }
+        }
+    }
+
+    /// Lets marbles go on that were stopped by what the user took out of the contacts.
+    pub(super) fn release_what_touches_nothing(&mut self) {
+        for stop in std::mem::take(&mut self.sweep.stops) {
+            let touches = match stop.by {
+                By::Wall(wall) => self.contacts.wm.iter().any(|c| (c.a, c.b) == (wall, stop.row)),
+                By::Marble(other) => {
+                    let pair = (stop.row.min(other), stop.row.max(other));
+                    self.contacts.mm.iter().any(|c| (c.a, c.b) == pair)
+                }
+            };
+            if touches {
+                self.sweep.stops.push(stop);
+            } else {
+                self.marbles.position[stop.row as usize] += stop.way;
+                self.marbles.velocity[stop.row as usize] += stop.change;
+                self.sweep.stands[stop.row as usize] = false;
             }
         }
     }
@@ -120,7 +187,8 @@ impl<S: Scalar> World<S> {
             if self.meets(part, &core, motion).is_none() {
                 return;
             }
-            let all = Sphere { radius: sphere.radius * into, ..*sphere };
+            let part_of_it = if self.model.response.needs_overlap() { half } else { into };
+            let all = Sphere { radius: sphere.radius * part_of_it, ..*sphere };
             let Some(stop) = self.meets(part, &all, motion) else { return };
             if best.as_ref().is_none_or(|best| stop.time < best.time) {
                 best = Some(stop);
@@ -142,7 +210,7 @@ impl<S: Scalar> World<S> {
                 return None;
             }
             if gap <= near {
-                return Some(Stop { time, normal });
+                return Some(Stop { time, normal, wall: part.wall });
             }
             time += gap / closing;
             if time > S::one() {
@@ -156,16 +224,15 @@ impl<S: Scalar> World<S> {
     /// is left of their way is lost. [`Response::Displacement`] takes its part along the
     /// normal for the displacement, half of it for each, and changes the velocities by it.
     pub(super) fn stop_where_they_meet(&mut self, dt: S) {
-        let marbles = &mut self.marbles;
-        let Sweep { start, middle, reach, near, hits, stopped } = &mut self.sweep;
-        if start.len() != marbles.len() {
+        if self.sweep.start.len() != self.marbles.len() || self.model.response.needs_overlap() {
             return; // this model does not sweep
         }
+        let marbles = &mut self.marbles;
+        let Sweep { start, middle, reach, near, hits, stopped, grazes, .. } = &mut self.sweep;
         let half = S::constant(0.5);
         let displaces = self.model.response == Response::Displacement;
-        // Whose way past each other is less than this part of a radius have their normal right
-        // as it is; the displacement changes by itself with the way, and is content with less.
-        let slow = if displaces { half } else { S::constant(0.02) };
+        // The displacement changes by itself with the way, and has no normals to get right.
+        let slow = S::constant(if displaces { FAST } else { SLOW });
         let moved = |row: usize| marbles.position[row] - start[row];
         let smallest = marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
         let fast = |row: usize| length(moved(row)) > smallest * slow * half;
@@ -186,6 +253,7 @@ impl<S: Scalar> World<S> {
         near.sort_unstable();
         stopped.clear();
         stopped.resize(start.len(), None);
+        let mut by = Vec::new();
         hits.clear();
         let ahead = near.iter().filter(|(a, b)| a < b);
         let way = |row: u32, now: S, stopped: &[Option<S>]| {
@@ -200,7 +268,7 @@ impl<S: Scalar> World<S> {
         };
         hits.extend(ahead.filter_map(|pair| {
             let ways = (way(pair.0, S::zero(), stopped), way(pair.1, S::zero(), stopped));
-            Hit::foresee(*pair, ways, S::zero(), slow).map(Reverse)
+            Hit::foresee(*pair, ways, S::zero()).map(Reverse)
         }));
         while let Some(Reverse(Hit { time, pair, stopped: before })) = hits.pop() {
             let (a, b) = (way(pair.0, time, stopped), way(pair.1, time, stopped));
@@ -215,7 +283,10 @@ impl<S: Scalar> World<S> {
                 marbles.velocity[pair.1 as usize] += change;
             }
             let now = [(pair.0, a), (pair.1, b)].into_iter().filter(|(_, way)| !way.stopped);
-            now.clone().for_each(|(row, _)| stopped[row as usize] = Some(time));
+            now.clone().for_each(|(row, _)| {
+                stopped[row as usize] = Some(time);
+                by.push((row, if row == pair.0 { pair.1 } else { pair.0 }));
+            });
             for (row, _) in now {
                 // Who was to meet it elsewhere, or not at all, may meet it here.
                 let first = near.partition_point(|pair| pair.0 < row);
@@ -223,25 +294,57 @@ impl<S: Scalar> World<S> {
                 hits.extend(others.filter_map(|(_, other)| {
                     let pair = (row.min(*other), row.max(*other));
                     let ways = (way(pair.0, time, stopped), way(pair.1, time, stopped));
-                    Hit::foresee(pair, ways, time, slow).map(Reverse)
+                    Hit::foresee(pair, ways, time).map(Reverse)
                 }));
             }
         }
-        for (row, stop) in stopped.iter().enumerate() {
-            if let Some(time) = stop {
-                let moved = marbles.position[row] - start[row];
-                marbles.position[row] = start[row] + moved * *time;
-            }
+        if !displaces {
+            grazes.extend(near.iter().filter(|(a, b)| a < b).filter(|pair| {
+                let (a, b) = (way(pair.0, S::zero(), stopped), way(pair.1, S::zero(), stopped));
+                let free = stopped[pair.0 as usize].is_none() && stopped[pair.1 as usize].is_none();
+                free && time_of_impact_sphere_sphere(&a.sphere, a.motion, &b.sphere, b.motion)
+                    .is_some()
+            }));
+        }
+        for (row, other) in by {
+            let row = row as usize;
+            let time = self.sweep.stopped[row].unwrap_or(S::one());
+            self.marbles.stop(&mut self.sweep, row, By::Marble(other), time);
         }
     }
 }
 
+impl<S: Scalar> Sweep<S> {
+    /// Forgets the last substep.
+    fn clear(&mut self) {
+        self.start.clear();
+        self.velocity.clear();
+        self.stops.clear();
+        self.stands.clear();
+        self.grazes.clear();
+    }
+}
+
+impl<S: Scalar> Marbles<S> {
+    /// Puts a marble back to a part of its way in this substep, to what its forces had made of
+    /// its velocity by then.
+    fn stop(&mut self, sweep: &mut Sweep<S>, row: usize, by: By, time: S) {
+        let rest = S::one() - time;
+        let way = (self.position[row] - sweep.start[row]) * rest;
+        let change = (self.velocity[row] - sweep.velocity[row]) * rest;
+        self.position[row] -= way;
+        self.velocity[row] -= change;
+        sweep.stops.push(Stopped { row: row as u32, by, way, change });
+        sweep.stands.resize(sweep.start.len(), false);
+        sweep.stands[row] = true;
+    }
+}
+
 impl<S: Scalar> Hit<S> {
-    /// When two marbles meet, of which not both were stopped, from `now` on, if they pass by
-    /// more than a part of a radius.
-    fn foresee(pair: (u32, u32), (a, b): (Way<S>, Way<S>), now: S, slow: S) -> Option<Self> {
+    /// When two marbles meet, of which not both were stopped, from `now` on, if they are fast.
+    fn foresee(pair: (u32, u32), (a, b): (Way<S>, Way<S>), now: S) -> Option<Self> {
         let (x, y) = (&a.sphere, &b.sphere);
-        if length(a.motion - b.motion) <= x.radius.min(y.radius) * slow {
+        if length(a.motion - b.motion) <= x.radius.min(y.radius) * S::constant(FAST) {
             return None;
         }
         let apart = direction_and_length(y.center - x.center);

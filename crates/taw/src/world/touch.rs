@@ -1,5 +1,7 @@
 //! The second verb: who touches whom, and which of these touches are no more than seams.
 
+use std::collections::HashSet;
+
 use cgmath::{InnerSpace, Zero};
 use smallvec::SmallVec;
 
@@ -7,6 +9,7 @@ use super::walls::{Part, Walls};
 use super::{WallShape, World};
 use crate::contact::{Contact, mtv_sphere_plane, mtv_sphere_sphere};
 use crate::math::{Scalar, Vec3, length};
+use crate::response::Response;
 use crate::shape::{Aabb, Nearest, Plane, Shape, Solid, Sphere};
 
 /// A point that lies this part of a radius outside of another wall is still on it: so much
@@ -157,6 +160,20 @@ impl<S: Scalar> World<S> {
                 }
             }
         });
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// Adds the marbles that met within the substep, though they are apart at its end.
+    pub(super) fn touch_on_the_way(&mut self) {
+        if self.sweep.grazes.is_empty() || self.model.response != Response::Impulse {
+            return;
+        }
+        let listed: HashSet<_> = self.contacts.mm.iter().map(|c| (c.a, c.b)).collect();
+        for (a, b) in self.sweep.grazes.drain(..).filter(|pair| !listed.contains(pair)) {
+            let (along, mtv) = ([S::zero(); 2], Vec3::zero());
+            self.contacts.mm.push(Contact { a, b, part: 0, along, mtv });
+        }
     }
 }
 

@@ -94,7 +94,7 @@ impl Heap {
             walls,
             material: |label: usize| self.material[label],
             follow: |_| 0.5,
-            start: Start { position: &self.start, velocity: &[] },
+            start: Start { position: &self.start, velocity: &[], stands: &[] },
             settings: &told,
         };
         impulse(&mut columns, contacts, &around, &mut self.scratch, warm, &mut stopped);

@@ -3,7 +3,7 @@
 //! and applications*, 1985): such collisions rebound less. And what iterations leave undone, or
 //! remember wrongly from the last substep, must not gain either.
 
-use cgmath::{InnerSpace, Zero};
+use cgmath::InnerSpace;
 
 use super::islands::Islands;
 use super::solve::solve;

@@ -35,6 +35,8 @@ pub(crate) struct Start<'a, S> {
     pub position: &'a [Point3<S>],
     /// Before forces changed it, in m/s.
     pub velocity: &'a [Vec3<S>],
+    /// Which rows were stopped within the substep, and no longer follow.
+    pub stands: &'a [bool],
 }
 
 pub(crate) struct Settings<S> {

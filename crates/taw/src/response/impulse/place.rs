@@ -16,7 +16,7 @@ impl<S: Scalar> Columns<'_, S> {
         constraints: &[Constraint<S>],
         around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) {
-        let follows = |row: usize| (around.follow)(row) * around.settings.dt;
+        let follows = |row: usize| around.follows_row(row);
         for (row, before) in before.iter().enumerate() {
             let to = self.position[row] + (self.velocity[row] - before) * follows(row);
             self.put(row, to);
@@ -27,7 +27,9 @@ impl<S: Scalar> Columns<'_, S> {
             for (row, push) in [(Some(c.b), push), (c.a.marble(), -push)] {
                 let Some(row) = row else { continue };
                 let change = push * self.inverse_mass[row];
-                self.put(row, self.position[row] + change * (since - follows(row)));
+                if !around.stands(row) {
+                    self.put(row, self.position[row] + change * (since - follows(row)));
+                }
             }
         }
     }

@@ -126,10 +126,48 @@ impl<S: Scalar> Columns<'_, S> {
         // What pushes along the mean normal of a step does no work, and neither does
         // an overlap that stays what it was.
         let start = self.normal_and_gap(around.start.position, a, b, along, around.walls);
+        if let (None, Some(met)) = (start, self.met(a, b, along, normal, around)) {
+            return Some(met);
+        }
         Some(start.map_or((normal, gap), |(earlier, overlap)| {
             let mean = direction_and_length(normal + earlier);
             (mean.map_or(normal, |(mean, _)| mean), gap - overlap.min(S::zero()))
         }))
+    }
+
+    /// The normal of two marbles where they met on their way through this substep, and how far
+    /// they are past that now, if they come together too fast for their place now to tell.
+    fn met(
+        &self,
+        a: First,
+        b: usize,
+        along: [S; 2],
+        normal: Vec3<S>,
+        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) -> Option<(Vec3<S>, S)> {
+        let a = a.marble()?;
+        let dt = around.settings.dt;
+        let velocity = self.velocity[b] - self.velocity[a];
+        let slow = around.settings.bounce_speed;
+        if around.start.velocity.is_empty() || velocity.magnitude2() <= slow * slow {
+            return None;
+        }
+        let apart = (self.position[b] + self.offset(b, along[1]))
+            - (self.position[a] + self.offset(a, along[0]));
+        let reach = self.radius[a] + self.radius[b];
+        // Back along the way: |apart − velocity t| = reach.
+        let (slope, squared) = (apart.dot(velocity), velocity.magnitude2());
+        let open = (apart.magnitude() - reach) * (apart.magnitude() + reach);
+        let root = slope * slope - squared * open;
+        if root < S::zero() {
+            return None;
+        }
+        let since = (slope + root.sqrt()) / squared;
+        let (there, distance) = direction_and_length(apart - velocity * since)?;
+        let right = since > S::zero() && since <= dt && distance.is_finite();
+        // What pushes one of them otherwise, or rounding, may say that they never came together.
+        (right && there.dot(velocity) < S::zero() && there.dot(normal) > -S::one())
+            .then(|| (there, there.dot(apart) - reach))
     }
 
     /// The time since two met that overlap now, in seconds.
@@ -220,18 +258,30 @@ where
         }
     }
 
+    /// Whether a row was stopped within the substep.
+    pub(super) fn stands(&self, row: usize) -> bool {
+        self.start.stands.get(row).copied().unwrap_or(false)
+    }
+
+    /// The time for which a position follows a change of velocity, in seconds.
+    pub(super) fn follows_row(&self, row: usize) -> S {
+        if self.stands(row) { S::zero() } else { (self.follow)(row) * self.settings.dt }
+    }
+
+    /// The mean over the marbles of a contact.
+    fn mean(&self, a: First, b: usize, of: impl Fn(usize) -> S) -> S {
+        a.marble().map_or_else(|| of(b), |a| (of(a) + of(b)) * S::constant(0.5))
+    }
+
     /// The time for which a gap follows a change of its speed, in seconds.
     fn follows(&self, a: First, b: usize) -> S {
-        let follow = match a {
-            First::Wall(..) => (self.follow)(b),
-            First::Marble(a) => ((self.follow)(a as usize) + (self.follow)(b)) * S::constant(0.5),
-        };
-        follow * self.settings.dt
+        self.mean(a, b, |row| self.follows_row(row))
     }
 
     /// By how much the velocities that the integrator keeps are ahead of those of the path, in
     /// seconds.
     fn ahead(&self, c: &Constraint<S>) -> S {
-        self.follows(c.a, c.b) - self.settings.dt * S::constant(0.5)
+        let follow = self.mean(c.a, c.b, |row| (self.follow)(row));
+        (follow - S::constant(0.5)) * self.settings.dt
     }
 }
