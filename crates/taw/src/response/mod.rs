@@ -6,7 +6,7 @@ pub(crate) mod event;
 mod impact;
 pub(crate) mod impulse;
 mod material;
-mod penalty;
+pub(crate) mod penalty;
 mod work;
 
 pub(crate) use displacement::displacement;
@@ -15,7 +15,7 @@ pub use impact::{BallSpin, Mobility, impact};
 pub(crate) use impulse::Walls;
 pub use material::{Combine, Elasticity, Material};
 pub use penalty::ContactLaw;
-pub(crate) use penalty::{Shear, penalty};
+pub(crate) use penalty::Shear;
 pub(crate) use work::{Push, Work};
 
 use cgmath::{InnerSpace, Zero};
