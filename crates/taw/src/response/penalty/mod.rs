@@ -417,9 +417,11 @@ impl<S: Scalar> Pushing<S> {
     fn along_normal(&self, push: S, parting: S, dt: S) -> [S; 2] {
         let [drag, _] = self.drags;
         let part = self.share / (S::one() + drag);
-        let sprung = (push * dt * part).min(self.most(parting));
         let dashpot = S::constant(2.0) * drag / self.touch.give().normal;
-        [sprung, (sprung - dashpot * parting * part).max(S::zero())]
+        let dashed = -dashpot * parting * part;
+        let slowed = parting + self.shared_give * dashed.max(S::zero());
+        let sprung = (push * dt * part).min(self.most(slowed));
+        [sprung, (sprung + dashed).max(S::zero())]
     }
 
     /// How much the spring may push: no more than it has taken, whatever made it as stiff or

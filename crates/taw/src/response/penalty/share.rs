@@ -13,7 +13,8 @@ use crate::math::Scalar;
 /// contacts ask for less than that limit, none is softened.
 #[derive(Clone, Copy)]
 pub(super) struct Load<S> {
-    /// Of springs and dashpots: (ω dt)² + 4 ζ ω dt of all, where up to 4 is stable.
+    /// Of dashpots: the part of the velocity that all take in a substep; more than one would turn
+    /// it back.
     damped: S,
     /// Of springs alone.
     sprung: S,
@@ -33,13 +34,12 @@ impl<S: Scalar> Load<S> {
     }
 
     /// Of one contact, along the normal and across it.
-    pub fn of(touch: &Touch<S>, springs: &Springs<S>, dt: S, damping_over: [S; 2]) -> Self {
+    pub fn of(touch: &Touch<S>, springs: &Springs<S>, dt: S, drags: [S; 2]) -> Self {
         let number = S::constant;
         let give = touch.give();
         let asked = [(springs.slope, give.normal), (springs.across, give.tangent)];
         let sprung = asked.map(|(stiffness, give)| stiffness * give * dt * dt);
-        let damped = [0, 1]
-            .map(|i| (sprung[i] + number(4.0) * damping_over[i]) / (S::one() + damping_over[i]));
+        let damped = drags.map(|drag| number(2.0) * drag / (S::one() + drag));
         // Of a ball, what is along and what is across are apart.
         let both = |[along, across]: [S; 2]| {
             if touch.is_of_rods { along + across } else { along.max(across) }
@@ -49,10 +49,10 @@ impl<S: Scalar> Load<S> {
 
     /// Into how many marbles one is split, at least one.
     pub fn parts(&self) -> S {
-        // A marble with all its contacts keeps an eighth of a turn of its oscillation for a
+        // Stable is what has (ω dt)² and twice the part that dashpots take below 4. And a marble
+        // with all its contacts goes through an eighth of a turn of its oscillation in a
         // substep at most, so that it is still one.
-        let (stable, resolved) = (S::constant(4.0), S::constant(RESOLVED));
-        S::one().max(self.damped / stable).max(self.sprung / resolved)
+        S::one().max(self.damped).max(self.sprung / S::constant(RESOLVED))
     }
 }
 
