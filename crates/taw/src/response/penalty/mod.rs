@@ -129,10 +129,17 @@ pub(crate) fn penalty<S: Scalar>(
         pushing.iter().for_each(|p| p.touch.count(marbles, p.impulse, work));
     }
     let partings: Vec<_> = pushing.iter().map(|p| p.touch.parting(marbles)).collect();
-    for (pushing, parting) in pushing.iter().zip(partings) {
-        if pushing.ends(setting, marbles, parting) {
+    let ending: Vec<_> = pushing
+        .iter()
+        .zip(&partings)
+        .map(|(pushing, parting)| pushing.ends(setting, marbles, *parting))
+        .collect();
+    for ((pushing, parting), ends) in pushing.iter_mut().zip(partings).zip(ending) {
+        let Some(memory) = pushing.remember(parting) else { continue };
+        if ends {
+            pushing.memory = memory;
             pushing.push_off(setting, marbles, parting, work.as_deref_mut());
-        } else if let Some(memory) = pushing.remember(parting) {
+        } else {
             shear.push(memory);
         }
     }
@@ -210,11 +217,11 @@ fn touch<S: Scalar>(
     let side = along.map(|x| if x > S::zero() { 2 } else { i8::from(x < S::zero()) });
     let key = (two_marbles, a, b, part, side);
     let (a, b) = (a as usize, b as usize);
-    // Where the step's own kick would find it; see this module's head.
-    let place = |row: usize, along: S| {
-        let back = marbles.velocity[row] * (setting.dt * (setting.follow)(row));
-        marbles.position[row] - back + marbles.offset(row, along)
-    };
+    let place = |row: usize, along: S| marbles.position[row] + marbles.offset(row, along);
+    // How far it has been moved since the step's own kick would have found it; see this module's
+    // head. Along the normal of now: that is the one that knows which touches are seams.
+    let moved = |row: usize| marbles.velocity[row] * (setting.dt * (setting.follow)(row));
+    let mut way = moved(b);
     let own = (setting.material)(b);
     let mut closing = marbles.velocity[b] + marbles.swing(b, along[1]);
     let mut rim = marbles.rim(b);
@@ -225,6 +232,7 @@ fn touch<S: Scalar>(
     let (normal, distance, both);
     if two_marbles {
         let other = (setting.material)(a);
+        way -= moved(a);
         let apart = direction_and_length(center - place(a, along[0]));
         let (direction, centers) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
         (normal, distance) = (direction, centers - marbles.radius[a]);
@@ -252,7 +260,7 @@ fn touch<S: Scalar>(
         b,
         along,
         normal,
-        overlap: marbles.radius[b] - distance,
+        overlap: marbles.radius[b] - distance + way.dot(normal),
         closing: closing + normal.cross(rim),
         surface,
         gives: [first, marbles.mobility(b, along[1], normal)],
@@ -262,6 +270,7 @@ fn touch<S: Scalar>(
         compliance,
     };
     let touches = touch.overlap > S::zero() && touch.overlap.is_finite();
+    let touches = touches && marbles.radius[b] > distance;
     (touches && touch.give().normal > S::zero() && is_finite(touch.closing)).then_some(touch)
 }
 
