@@ -18,7 +18,6 @@ fn world<S: Scalar>(law: ContactLaw, integrator: Integrator) -> World<S> {
     world
 }
 
-/// A material so stiff that a head-on collision takes 16 substeps of 1 ms by Hertz's law too.
 fn material(restitution: f64, friction: f64) -> Material<f64> {
     let elasticity = Elasticity { youngs_modulus: 1e7, poissons_ratio: 0.25 };
     Material { restitution, friction, elasticity, ..Material::default() }
@@ -53,9 +52,8 @@ fn a_collision_gives_back_the_restitution_that_is_asked_for() {
                         }
                         let mass = 2.0 * ratio;
                         let id = world.marbles.insert(ball(-radius - apart, speed, mass)).unwrap();
-                        // The stiffest that 16 substeps bear, if that is not enough.
+                        // A wall is two times as stiff as a ball, and softened by that.
                         let shared = if with_wall { mass } else { mass * 2.0 / (mass + 2.0) };
-                        let _ = shared;
                         let dt = match law {
                             ContactLaw::SpringDashpot => 1e-3,
                             ContactLaw::HertzMindlin => {

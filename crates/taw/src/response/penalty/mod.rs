@@ -122,11 +122,17 @@ pub(crate) fn penalty<S: Scalar>(
     share_out(marbles, &mut pushing, setting.dt);
     let start: Vec<_> = pushing.iter().map(|p| p.touch.velocities(marbles)).collect();
     // All forces are those of the same moment, whatever the order.
-    pushing.iter_mut().for_each(|p| p.decide(setting.dt));
-    pushing.iter().for_each(|p| p.apply(marbles, work.as_deref_mut()));
+    for pushing in &mut pushing {
+        pushing.decide(setting.dt);
+    }
+    for pushing in &pushing {
+        pushing.apply(marbles, work.as_deref_mut());
+    }
     follow(setting, marbles, &pushing, &start);
     if let Some(work) = work.as_deref_mut() {
-        pushing.iter().for_each(|p| p.touch.count(marbles, p.impulse, work));
+        for Pushing { touch, impulse, .. } in &pushing {
+            touch.count(marbles, *impulse, work);
+        }
     }
     let partings: Vec<_> = pushing.iter().map(|p| p.touch.parting(marbles)).collect();
     let ending: Vec<_> = pushing
@@ -269,8 +275,8 @@ fn touch<S: Scalar>(
         material: both,
         compliance,
     };
-    let touches = touch.overlap > S::zero() && touch.overlap.is_finite();
-    let touches = touches && marbles.radius[b] > distance;
+    let touches = marbles.radius[b] > distance && touch.overlap > S::zero();
+    let touches = touches && touch.overlap.is_finite();
     (touches && touch.give().normal > S::zero() && is_finite(touch.closing)).then_some(touch)
 }
 
