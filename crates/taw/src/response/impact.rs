@@ -28,6 +28,11 @@ impl<S: Scalar> Mobility<S> {
         Self { normal: self.normal + other.normal, tangent: self.tangent + other.tangent }
     }
 
+    /// That of so many ends in one place.
+    pub(super) fn times(self, count: S) -> Self {
+        Self { normal: self.normal * count, tangent: self.tangent * count }
+    }
+
     /// The same of balls of which one may spin and the other not.
     pub(super) fn of(balls: [(S, BallSpin); 2]) -> Self {
         let tangent = |(inverse_mass, spin): (S, BallSpin)| {

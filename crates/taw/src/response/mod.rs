@@ -6,7 +6,7 @@ pub(crate) mod event;
 mod impact;
 pub(crate) mod impulse;
 mod material;
-mod penalty;
+pub(crate) mod penalty;
 mod work;
 
 pub(crate) use displacement::displacement;
@@ -15,7 +15,7 @@ pub use impact::{BallSpin, Mobility, impact};
 pub(crate) use impulse::Walls;
 pub use material::{Combine, Elasticity, Material};
 pub use penalty::ContactLaw;
-pub(crate) use penalty::{Shear, penalty};
+pub(crate) use penalty::Shear;
 pub(crate) use work::{Push, Work};
 
 use cgmath::{InnerSpace, Zero};
@@ -52,7 +52,9 @@ pub enum Response {
     ///
     /// For engineers (with [`ContactLaw::HertzMindlin`]), and to see why games do without:
     /// a marble sinks in by what the stiffness gives, and a stiffer contact needs shorter
-    /// substeps.
+    /// substeps: what bears m times its own weight by [`ContactLaw::SpringDashpot`] sinks in by
+    /// 26 m g dt², for substeps of dt. No contact gives more energy than it took, and what
+    /// overlaps from the start parts at a radius a second at most.
     Penalty(ContactLaw),
     /// Collision after collision in the order of time: each with its own normal, at its
     /// own moment, thousands in one substep if need be. Nothing tunnels at any speed, and

@@ -3,7 +3,7 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::marbles::{Marbles, Rest};
-use crate::math::{Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
+use crate::math::{Quat, Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
 use crate::motion::{Force, Integrator, Motion, turned};
 use crate::response::Rod;
 
@@ -184,22 +184,33 @@ impl<S: Scalar> Marbles<S> {
 
     /// Turns a row on as what it is, a symmetric top: it turns evenly about its axis, and the
     /// axis about the angular momentum, which stays (Landau and Lifshitz, *Mechanics*, §33).
+    ///
+    /// Counted in `f64` and rounded once. In `f32` a quaternion is a unit only to 1e-7, and its
+    /// axis too: the spin along it would grow by that in every substep, always the same way.
     fn turn_top(&mut self, row: usize, dt: S) {
-        let (rotation, spin) = (self.rotation[row], self.spin[row]);
-        let half = self.half_length(row);
-        if half == S::zero() || spin.is_zero() {
-            self.rotation[row] = turned(rotation, spin, dt);
+        let (rotation, half) = (self.rotation[row], self.half_length(row));
+        if half == S::zero() || self.spin[row].is_zero() {
+            self.rotation[row] = turned(rotation, self.spin[row], dt);
             return;
         }
-        let axis = self.axis(row);
-        let [along, across] = Rod::moments(self.radius[row], half);
+        let exact = |rotation: Quat<S>| {
+            Quat::from_sv(rotation.s.as_f64(), cast_vector(rotation.v)).normalize()
+        };
+        let (spin, dt) = (self.exact_spin(row), dt.as_f64());
+        let rotation = exact(rotation);
+        let axis = (rotation * Vec3::unit_y()).normalize();
+        let [along, across] = Rod::moments(self.radius[row].as_f64(), half.as_f64());
         // Angular momentum over the moment across: how fast the axis goes around it.
         let about_axis = spin.dot(axis);
-        let precession = spin + axis * (about_axis * (along / across - S::one()));
+        let precession = spin + axis * (about_axis * (along / across - 1.0));
         let own = axis * (about_axis - precession.dot(axis));
-        self.rotation[row] = turned(turned(rotation, own, dt), precession, dt);
-        let axis = self.axis(row);
-        self.spin[row] = precession + axis * (about_axis - precession.dot(axis));
+        let rotation = turned(turned(rotation, own, dt), precession, dt);
+        self.rotation[row] = Quat::from_sv(S::constant(rotation.s), cast_vector(rotation.v));
+        // About the axis as it is kept, which rounding has tilted: so the spin along it, and
+        // with it the energy of thin capsules, does not change.
+        let axis = (exact(self.rotation[row]) * Vec3::unit_y()).normalize();
+        let next = precession + axis * (about_axis - precession.dot(axis));
+        self.set_exact_spin(row, next);
     }
 
     /// Turns a row on by an angle, an axial vector in radians.

@@ -37,7 +37,10 @@ use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Around, Settings, Start, Warm, impulse};
-use crate::response::{Impact, Response, Rod, Shear, displacement, penalty};
+use crate::response::{
+    Impact, Response, Rod, Shear, displacement,
+    penalty::{self, penalty},
+};
 use crate::swarm::Swarm;
 use account::Accounting;
 use integrate::Drive;
@@ -419,12 +422,15 @@ impl<S: Scalar> World<S> {
                 }
             }
             Response::Penalty(law) => penalty(
-                law,
+                &penalty::Setting {
+                    law,
+                    dt,
+                    material: |row| material.get(row).unwrap_or_default(),
+                    follow: |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
+                },
                 &mut columns,
                 &mut self.contacts,
                 &self.walls,
-                |row| material.get(row).unwrap_or_default(),
-                dt,
                 &mut self.shear,
                 &mut self.stopped,
                 self.accounting.as_mut().map(|accounting| &mut accounting.work),

@@ -253,7 +253,7 @@ impl<S: Scalar> World<S> {
         near.sort_unstable();
         stopped.clear();
         stopped.resize(start.len(), None);
-        let mut by = Vec::new();
+        let (mut by, mut changes) = (Vec::new(), Vec::new());
         hits.clear();
         let ahead = near.iter().filter(|(a, b)| a < b);
         let way = |row: u32, now: S, stopped: &[Option<S>]| {
@@ -279,8 +279,7 @@ impl<S: Scalar> World<S> {
             if displaces && let Some((normal, _)) = apart {
                 let depth = (a.motion - b.motion).dot(normal).max(S::zero());
                 let change = normal * (half * depth / dt);
-                marbles.velocity[pair.0 as usize] -= change;
-                marbles.velocity[pair.1 as usize] += change;
+                changes.extend([(pair.0, -change), (pair.1, change)]);
             }
             let now = [(pair.0, a), (pair.1, b)].into_iter().filter(|(_, way)| !way.stopped);
             now.clone().for_each(|(row, _)| {
@@ -310,6 +309,9 @@ impl<S: Scalar> World<S> {
             let row = row as usize;
             let time = self.sweep.stopped[row].unwrap_or(S::one());
             self.marbles.stop(&mut self.sweep, row, By::Marble(other), time);
+        }
+        for (row, change) in changes {
+            self.marbles.velocity[row as usize] += change;
         }
     }
 }

@@ -149,11 +149,12 @@ impl<S: Scalar> Columns<'_, S> {
         let dt = around.settings.dt;
         let velocity = self.velocity[b] - self.velocity[a];
         let slow = around.settings.bounce_speed;
-        if around.start.velocity.is_empty() || velocity.magnitude2() <= slow * slow {
+        // A capsule also turns on its way.
+        let round = along == [S::zero(); 2];
+        if around.start.velocity.is_empty() || velocity.magnitude2() <= slow * slow || !round {
             return None;
         }
-        let apart = (self.position[b] + self.offset(b, along[1]))
-            - (self.position[a] + self.offset(a, along[0]));
+        let apart = self.position[b] - self.position[a];
         let reach = self.radius[a] + self.radius[b];
         // Back along the way: |apart − velocity t| = reach.
         let (slope, squared) = (apart.dot(velocity), velocity.magnitude2());

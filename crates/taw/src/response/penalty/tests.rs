@@ -1,0 +1,71 @@
+use super::*;
+use crate::math::Point3;
+use crate::response::Elasticity;
+
+/// Two balls of this elasticity meet head-on at `speed` each, with gravity off:
+/// contact time, largest overlap, largest force (by the change of velocity).
+fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -> [f64; 3] {
+    let mass = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3) * density;
+    let shear = elasticity.youngs_modulus / (2.0 + 2.0 * elasticity.poissons_ratio);
+    let rayleigh = std::f64::consts::PI * radius * (density / shear).sqrt()
+        / (0.1631 * elasticity.poissons_ratio + 0.8766);
+    let dt = 0.01 * rayleigh;
+    let mut position = [Point3::new(-radius, 0.0, 0.0), Point3::new(radius, 0.0, 0.0)];
+    let mut velocity = [Vec3::new(speed, 0.0, 0.0), Vec3::new(-speed, 0.0, 0.0)];
+    let own = Material { restitution: 1.0, elasticity, ..Material::default() };
+    let (mut time, mut overlap, mut force) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut shear = Vec::new();
+    let walls: Vec<crate::response::event::Wall> = Vec::new();
+    loop {
+        for (position, velocity) in position.iter_mut().zip(velocity) {
+            *position += velocity * dt;
+        }
+        let apart = position[1].x - position[0].x - 2.0 * radius;
+        if apart > 0.0 {
+            // They parted within this step.
+            time += dt - apart / (velocity[1].x - velocity[0].x);
+            return [time, overlap, force];
+        }
+        let mut contacts = Contacts::default();
+        contacts.mm.push(crate::contact::Contact {
+            a: 0,
+            b: 1,
+            part: 0,
+            along: [0.0; 2],
+            mtv: Vec3::zero(),
+        });
+        let before = velocity[1].x;
+        let mut columns = Columns {
+            position: &mut position,
+            velocity: &mut velocity,
+            radius: &[radius, radius],
+            inverse_mass: &[1.0 / mass, 1.0 / mass],
+            spin: &mut [],
+            held: &[],
+            rods: &[],
+        };
+        let law = ContactLaw::HertzMindlin;
+        let setting = Setting { law, dt, material: |_| own, follow: |_| 0.0 };
+        let mut stopped = vec![];
+        penalty(&setting, &mut columns, &mut contacts, &walls, &mut shear, &mut stopped, None);
+        time += dt;
+        overlap = overlap.max(-apart);
+        force = force.max((velocity[1].x - before) * mass / dt);
+    }
+}
+
+#[test]
+fn elastic_balls_collide_as_hertz_says() {
+    // Chung and Ooi (2011), test 1: glass and limestone; recomputed by their formulas.
+    for (modulus, ratio, density, exact) in [
+        (4.8e10, 0.2, 2800.0, [40.336e-6, 274.11e-6, 10_696.9]),
+        (2.0e10, 0.25, 2500.0, [54.196e-6, 368.30e-6, 7108.2]),
+    ] {
+        let elasticity = Elasticity { youngs_modulus: modulus, poissons_ratio: ratio };
+        let found = head_on(elasticity, density, 0.01, 10.0);
+        // The end of the contact is seen only at the end of a step, of 1 %.
+        for ((found, exact), tolerance) in found.into_iter().zip(exact).zip([1e-2, 1e-3, 1e-3]) {
+            assert!((found / exact - 1.0).abs() < tolerance, "{found}, not {exact}");
+        }
+    }
+}

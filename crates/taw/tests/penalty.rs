@@ -1,0 +1,218 @@
+//! Forces that grow with the overlap: what they give back, what they bear, and that they make
+//! nothing from nothing.
+
+use cgmath::{EuclideanSpace, InnerSpace, Zero};
+use taw::prelude::*;
+use taw::response::Elasticity;
+
+const BOTH: [ContactLaw; 2] = [ContactLaw::SpringDashpot, ContactLaw::HertzMindlin];
+const INTEGRATORS: [Integrator; 3] =
+    [Integrator::ExplicitEuler, Integrator::SemiImplicitEuler, Integrator::VelocityVerlet];
+
+fn world<S: Scalar>(law: ContactLaw, integrator: Integrator) -> World<S> {
+    let response = Response::Penalty(law);
+    let rotation = Rotation::Dynamic;
+    let mut world = World::default();
+    let model = Model { response, rotation, integrator, ..Model::default() };
+    world.set_model(model).unwrap();
+    world
+}
+
+fn material(restitution: f64, friction: f64) -> Material<f64> {
+    let elasticity = Elasticity { youngs_modulus: 1e7, poissons_ratio: 0.25 };
+    Material { restitution, friction, elasticity, ..Material::default() }
+}
+
+#[test]
+fn a_collision_gives_back_the_restitution_that_is_asked_for() {
+    for law in BOTH {
+        for integrator in INTEGRATORS {
+            for asked in [0.0, 0.05, 0.1, 0.2, 0.3, 0.5, 0.7, 0.9, 1.0] {
+                for (with_wall, ratio) in [(true, 1.0), (false, 1.0), (false, 1e-4), (false, 50.0)]
+                {
+                    for phase in 0..7 {
+                        let mut world = world::<f64>(law, integrator);
+                        world.set_gravity(Vec3::zero()).unwrap();
+                        let radius = 0.1;
+                        let own = material(asked, 0.3);
+                        let ball = |x: f64, v: f64, mass: f64| Marble {
+                            velocity: Vec3::new(v, 0.0, 0.0),
+                            mass: Mass::Kilograms(mass),
+                            material: Some(own),
+                            ..Marble::new(Point3::new(x, 0.0, 0.0), radius)
+                        };
+                        let speed = 1.0;
+                        // Not always at the same moment of a substep.
+                        let apart = 0.01 + f64::from(phase) / 7.0 * 1e-3;
+                        if with_wall {
+                            let wall = Plane::new(-Vec3::unit_x(), 0.0).unwrap();
+                            world.walls.insert(wall).unwrap();
+                        } else {
+                            world.marbles.insert(ball(radius, 0.0, 2.0)).unwrap();
+                        }
+                        let mass = 2.0 * ratio;
+                        let id = world.marbles.insert(ball(-radius - apart, speed, mass)).unwrap();
+                        // A wall is two times as stiff as a ball, and softened by that.
+                        let shared = if with_wall { mass } else { mass * 2.0 / (mass + 2.0) };
+                        let dt = match law {
+                            ContactLaw::SpringDashpot => 1e-3,
+                            ContactLaw::HertzMindlin => {
+                                let longest =
+                                    own.elasticity.longest_substep(2.0 * shared, radius, speed);
+                                longest.min(1e-3)
+                            }
+                        };
+                        for _ in 0..(0.2 / dt) as u32 {
+                            world.step(dt).unwrap();
+                        }
+                        let first = if with_wall { 0.0 } else { world.marbles.velocity()[0].x };
+                        let second = world.marbles.get(id).unwrap().velocity.x;
+                        let found = first - second;
+                        // Which moment of a substep it begins decides the rest.
+                        let tolerance = if asked == 0.0 { 0.02 } else { 0.01 };
+                        assert!(
+                            (found - asked).abs() < tolerance,
+                            "{law:?}, {integrator:?}, wall {with_wall}, masses 1 : {ratio}, phase \
+                             {phase}: {found}, not {asked}"
+                        );
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn floor(world: &mut World<f64>) {
+    world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+}
+
+fn ball(at: [f64; 3], radius: f64, material: Material<f64>) -> Marble<f64> {
+    Marble { material: Some(material), ..Marble::new(Point3::from(at), radius) }
+}
+
+fn fastest(world: &World<f64>) -> f64 {
+    world.marbles.velocity().iter().map(|v| v.magnitude()).fold(0.0, f64::max)
+}
+
+#[test]
+fn what_lies_reports_no_speed_and_does_not_move() {
+    for law in BOTH {
+        for integrator in Integrator::ALL {
+            let mut world = world::<f64>(law, integrator);
+            floor(&mut world);
+            for i in 0..3 {
+                let at = [0.0, 0.1 + 0.2 * f64::from(i), 0.0];
+                world.marbles.insert(ball(at, 0.1, material(0.3, 0.3))).unwrap();
+            }
+            for _ in 0..3_000 {
+                world.step(1e-3).unwrap();
+            }
+            let before = world.marbles.position().to_vec();
+            world.step(1e-3).unwrap();
+            for (before, after) in before.iter().zip(world.marbles.position()) {
+                assert!((after - before).magnitude() < 1e-9, "{law:?}, {integrator:?}");
+            }
+            // Of a swing that dies away; g dt is 1e-2.
+            assert!(fastest(&world) < 1e-6, "{law:?}, {integrator:?}: {} m/s", fastest(&world));
+        }
+    }
+}
+
+#[test]
+fn a_ball_that_touches_many_surfaces_at_once_gains_nothing() {
+    for law in BOTH {
+        for restitution in [0.0, 0.5, 1.0] {
+            for planes in [1, 6, 40] {
+                let mut world = world::<f64>(law, Integrator::VelocityVerlet);
+                for i in 0..planes {
+                    let turn = f64::from(i);
+                    let normal = Vec3::new(0.01 * turn.sin(), 1.0, 0.01 * turn.cos()).normalize();
+                    world.walls.insert(Plane::new(normal, 0.0).unwrap()).unwrap();
+                }
+                let own = material(restitution, 0.0);
+                world.marbles.insert(ball([0.0, 0.4, 0.0], 0.1, own)).unwrap();
+                let start = world.energy().total();
+                for _ in 0..3_000 {
+                    world.step(1e-3).unwrap();
+                    // The phase of a substep in which touches begin: (ω dt)² / 8 of the energy.
+                    let energy = world.energy().total();
+                    assert!(energy < start * 1.01, "{law:?}, {planes}: {energy} J, not {start}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn masses_and_materials_of_any_size_gain_nothing() {
+    for law in BOTH {
+        for (ratio, modulus) in [(1e2, 1e7), (1e-2, 1e7), (1e4, 1e9), (1.0, 1e15), (1e2, 1e15)] {
+            let mut world = world::<f64>(law, Integrator::VelocityVerlet);
+            floor(&mut world);
+            let elasticity = Elasticity { youngs_modulus: modulus, poissons_ratio: 0.25 };
+            let own = Material { elasticity, ..material(0.5, 0.5) };
+            for (i, density) in [1000.0, 1000.0 * ratio, 1000.0].into_iter().enumerate() {
+                let at = [0.01 * i as f64, 0.2 + 0.25 * i as f64, 0.0];
+                let spin = Vec3::new(3.0, 1.0, -5.0);
+                let mass = Mass::Density(density);
+                world.marbles.insert(Marble { mass, spin, ..ball(at, 0.1, own) }).unwrap();
+            }
+            let start = world.energy().total();
+            for _ in 0..2_000 {
+                world.step(1e-3).unwrap();
+                let energy = world.energy().total();
+                assert!(energy < start * 1.01, "{law:?}, 1 : {ratio}, {modulus} Pa: {energy} J");
+                assert!(world.stopped().count() == 0);
+            }
+        }
+    }
+}
+
+#[test]
+fn what_begins_squeezed_parts_slowly() {
+    for law in BOTH {
+        let mut world = world::<f64>(law, Integrator::SemiImplicitEuler);
+        world.set_gravity(Vec3::zero()).unwrap();
+        for i in 0..30 {
+            let turn = f64::from(i);
+            let at = [1e-3 * turn.sin(), 1e-3 * (2.0 * turn).cos(), 1e-3 * (3.0 * turn).sin()];
+            world.marbles.insert(ball(at, 0.1, material(1.0, 0.3))).unwrap();
+        }
+        let mut most = 0.0_f64;
+        for _ in 0..3_000 {
+            world.step(1e-3).unwrap();
+            most = most.max(fastest(&world));
+        }
+        // Two part at half a radius in a second; each is pushed by up to 29.
+        assert!(most < 0.2, "{law:?}: {most} m/s");
+    }
+}
+
+#[test]
+fn a_turning_wall_drives_a_ball_no_faster_than_itself() {
+    for law in BOTH {
+        for dt in [1e-3, 1.0 / 60.0] {
+            let mut world = world::<f64>(law, Integrator::SemiImplicitEuler);
+            floor(&mut world);
+            let spin = Vec3::new(0.0, 7.0, 0.0);
+            let id = world.walls.id(0).unwrap();
+            let motion =
+                taw::motion::WallMotion { velocity: Vec3::zero(), spin, pivot: Point3::origin() };
+            world.walls.set_motion(id, Some(motion)).unwrap();
+            for i in 0..8 {
+                let at = [0.3 * f64::from(i), 0.1, 0.0];
+                world.marbles.insert(ball(at, 0.1, material(0.5, 0.8))).unwrap();
+            }
+            for _ in 0..(2.0 / dt) as u32 {
+                world.step(dt).unwrap();
+                let is_itself = world == world.clone();
+                assert!(is_itself, "nothing remembered is NaN");
+                // The surface goes so fast where the ball is; half as much for what rolls off.
+                for (at, v) in world.marbles.position().iter().zip(world.marbles.velocity()) {
+                    let surface = 7.0 * at.to_vec().magnitude();
+                    assert!(v.magnitude() < 1.5 * surface + 1.0, "{law:?}, {dt}: {v:?} at {at:?}");
+                }
+            }
+        }
+    }
+}
