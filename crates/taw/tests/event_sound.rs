@@ -148,14 +148,14 @@ fn a_ball_on_a_tilting_board_neither_hops_nor_sinks() {
             };
             world.marbles.insert(marble).unwrap();
             for step in 1..=240 {
-                let angle = 0.05 * (std::f64::consts::TAU * 0.25 * DT * f64::from(step)).sin();
+                let angle = 0.025 * (1.0 - (std::f64::consts::TAU * 0.25 * DT * f64::from(step)).cos());
                 board.go(&mut world, 0.0, angle, DT);
                 world.step(DT).unwrap();
                 let gap = board.gap(&world, 0);
-                // The speed of a board that goes from pose to pose jumps by up to 8 mm/s, which
-                // throws a ball by 4 micrometres.
+                // The speed of a board that goes from pose to pose jumps by up to 4 mm/s, which
+                // throws a ball by 1 micrometre.
                 assert!(
-                    gap > -1e-9 && gap < 8e-6,
+                    gap > -1e-9 && gap < 2e-6,
                     "{name}, friction {friction}, {substeps} substeps: {gap} m at step {step}"
                 );
             }
@@ -203,22 +203,20 @@ fn leaves(shape: WallShape<f64>, radius: f64, friction: f64, dt: f64) -> (f64, f
     world.marbles.insert(marble).unwrap();
     let begin = world.energy().total();
     for _ in 0..(20.0 / dt) as u32 {
-        let before = (world.marbles.position()[0], world.marbles.velocity()[0]);
         world.step(dt).unwrap();
         let at = world.marbles.position()[0];
-        if (at - Point3::new(0.0, 0.0, 0.0)).magnitude() - far > 1e-7 {
-            let _ = before;
+        if (at - Point3::new(0.0, 0.0, 0.0)).magnitude() - far > 1e-11 {
             // It flies: back along the parabola to where that touches.
             let v = world.marbles.velocity()[0];
             let back = |t: f64| {
                 at - v * t - Vec3::new(0.0, 0.5 * 9.81 * t * t, 0.0)
             };
-            let (mut lo, mut hi) = (0.0, dt);
-            // The distance has a double zero there: where it is least.
+            // Path and surface bend alike there, so that the gap grows with the third power.
             let gap = |t: f64| (back(t) - Point3::new(0.0, 0.0, 0.0)).magnitude() - far;
-            for _ in 0..200 {
-                let (a, b) = (lo + (hi - lo) / 3.0, hi - (hi - lo) / 3.0);
-                if gap(a) < gap(b) { hi = b } else { lo = a }
+            let (mut lo, mut hi) = (0.0, dt.max(0.03));
+            for _ in 0..100 {
+                let middle = 0.5 * (lo + hi);
+                if gap(middle) > 1e-14 { lo = middle } else { hi = middle }
             }
             let there = back(0.5 * (lo + hi));
             let off = world.energy().total() / begin - 1.0;
@@ -278,7 +276,7 @@ fn a_ball_pivots_over_an_edge_and_a_corner_and_keeps_its_energy() {
                 world.step(dt).unwrap();
                 let at = world.marbles.position()[0];
                 let gap = at.x.hypot(at.y) - 0.1;
-                if gap > 1e-7 && at.x > 0.0 {
+                if gap > 1e-11 && at.x > 0.0 {
                     break;
                 }
                 if at.x > 0.0 {
@@ -288,7 +286,9 @@ fn a_ball_pivots_over_an_edge_and_a_corner_and_keeps_its_energy() {
             // v² = g r cos: 7/10 v² + g r (cos - 1) = 7/10 .1²
             let exact = ((1.0_f64 + 0.7 * 0.01 / 0.981) * 10.0 / 17.0).acos().to_degrees();
             let off = world.energy().total() / begin - 1.0;
-            assert!(turned > exact - 4.0 && turned < exact + 0.1, "{name}: {turned}, not {exact}");
+            // It is seen at the ends of steps only, at less than a metre a second.
+            let seen = exact - (dt / 0.1).to_degrees();
+            assert!(turned > seen && turned < exact + 0.05, "{name}: {turned}, not {exact}");
             assert!(off.abs() < 1e-6, "{name}, steps of {dt}: energy {off}");
         }
     }
@@ -305,7 +305,7 @@ fn a_little_overlap_goes_without_energy() {
             for _ in 0..60 {
                 world.step(DT).unwrap();
                 let speed = world.marbles.velocity()[0].magnitude();
-                assert!(speed < 1e-6, "{name}, {deep}: {speed} m/s");
+                assert!(speed < 1e-6, "{name}, {deep}: gap {speed} m/s");
             }
             let gap = world.marbles.position()[0].y - 0.5;
             assert!(gap.abs() < 1e-9, "{name}, {deep}: {gap} m");
@@ -328,7 +328,8 @@ fn two_balls_that_overlap_a_little_part_without_energy() {
     }
     let at = world.marbles.position();
     let gap = (at[1] - at[0]).magnitude() - 1.0;
-    assert!(gap.abs() < 1e-6, "{gap} m");
+    // As much as a gap that counts as touching.
+    assert!(gap.abs() < 2e-5, "{gap} m");
 }
 
 /// The hopper of the lab, with one wall askew by nothing.

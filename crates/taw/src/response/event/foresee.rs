@@ -23,11 +23,7 @@ impl EventDriven {
     /// Finds the next event of a ball and puts it in the queue.
     pub(super) fn foresee(&mut self, row: usize, now: f64, settings: &Settings) {
         self.go_home(row, now, settings.dt);
-        let mut ends = self.end_of_reach(row, now, settings);
-        if ends.is_some_and(|after| after <= 0.0) {
-            self.look_around(row, now, settings);
-            ends = self.end_of_reach(row, now, settings);
-        }
+        let ends = self.end_of_reach(row, now, settings);
         let mut looks = 1 + self.looks_at_walls(row);
         let ball = &self.balls[row];
         let left = settings.dt - now;

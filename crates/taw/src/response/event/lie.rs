@@ -20,10 +20,11 @@ impl EventDriven {
         let now = ball.path.begin;
         let Nearest { normal, distance, .. } = wall_.nearest(ball.position, now);
         ball.release();
-        // The rounding of the place goes too, lest it add up.
+        // The rounding of the place goes too, lest it add up. Overlap is not energy: it goes
+        // without a change of velocity.
         let overlap = ball.radius - distance;
         let fall = ball.pull.magnitude() * settings.dt * settings.dt;
-        if overlap.abs() <= REST * fall + ball.rounding + wall_.rounding(ball.position) {
+        if -overlap <= REST * fall + ball.rounding + wall_.rounding(ball.position) {
             ball.position += normal * overlap;
         }
         let way = wall_.way(ball.position, now);

@@ -382,12 +382,18 @@ impl EventDriven {
             self.foresee(row, 0.0, settings);
         }
         let most = MOST_LOOKS + LOOKS_A_BALL * self.balls.len() as u64;
+        let mut counts = [0u64; 8];
+        let mut last=0;
         while self.looks < most {
             let Some(Reverse(event)) = self.queue.pop() else { break };
+            let k = match event.what { What::Hits(_) => 0, What::SettlesOn(_) => 1, What::Meets(..) => 2, What::Leans(..) => 3, What::LeavesCell{..} => 4, What::Changes => 5, What::Looks => 6 };
+            counts[k] += 1; counts[7] += 1;
+            if counts[7] > 100000 && std::env::var("DBG").is_ok() && last < 40 { last += 1; let b=&self.balls[event.row]; eprintln!("{:?} pos {:?} v {:?} a {:?} sup {:?} heaped {} losses {} sur {}", event, b.position_at(event.time), b.velocity_at(event.time), b.path.acceleration, b.path.support, b.path.heaped, b.path.losses, b.path.surrenders); }
             if self.balls[event.row].path.stamp == event.stamp {
                 self.happen(event, settings, impacts);
             }
         }
+        if self.looks > 2_000_000 && std::env::var("DBG").is_ok() { eprintln!("looks {} counts {:?} dt {}", self.looks, counts, dt); }
         let mut stopped = self.stop_what_is_left();
         (0..self.balls.len()).for_each(|row| self.advance(row, dt));
         for (row, (ball, before)) in self.balls.iter_mut().zip(before).enumerate() {

@@ -10,6 +10,8 @@ use crate::math::Point3;
 
 /// A ball that knows the walls this many cells around needs to know no more yet.
 const MOST_CELLS: f64 = 4.0;
+/// After this part of how far it may go, a ball looks around anew.
+const NEAR_THE_END: f64 = 0.9;
 /// A part of a radius that is added to how far a ball can go, so that one at rest need not
 /// look again.
 const MORE: f64 = 1e-3;
@@ -118,16 +120,27 @@ impl EventDriven {
         known[row] = Known { center, far, walls: [from, lists.len()] };
     }
 
-    /// When a ball may come to walls that it does not know; none if it cannot in this substep.
-    pub(super) fn end_of_reach(&self, row: usize, now: f64, settings: &Settings) -> Option<f64> {
-        let Known { center, far, .. } = self.reach.known.get(row)?;
-        let gone = (self.balls[row].position_at(now) - center).magnitude();
-        let left = settings.dt - now;
+    /// When a ball may come to walls that it does not know, in seconds from now; none if it
+    /// cannot in this substep. It looks around before.
+    pub(super) fn end_of_reach(
+        &mut self,
+        row: usize,
+        now: f64,
+        settings: &Settings,
+    ) -> Option<f64> {
         let ball = &self.balls[row];
+        let (at, left) = (ball.position_at(now), settings.dt - now);
         let speed = fastest(ball, now, left);
-        let time = (far - gone) / speed;
+        let Known { center, far, .. } = *self.reach.known.get(row)?;
+        let (mut far, mut gone) = (far, (at - center).magnitude());
+        if gone >= NEAR_THE_END * far {
+            self.look_around(row, now, settings);
+            (far, gone) = (self.reach.known.get(row)?.far, 0.0);
+        }
+        // Between the two, so that each look brings it on.
+        let time = (0.5 * (1.0 + NEAR_THE_END) * far - gone) / speed;
         // What is not finite knows what it knows.
-        (time < left).then_some(time.max(0.0))
+        (time < left).then_some(time)
     }
 
     /// From where how far a ball may go in what is left of the substep, in metres.

@@ -93,7 +93,8 @@ impl Heap {
             iterations: settings.iterations,
             dt,
             bounce_speed: 2.0 * pull * settings.dt,
-            slop: f64::INFINITY,
+            // As deep as a gap may be wide that counts as touching.
+            slop: 0.5 * PRESS * PRESS * pull * settings.dt * settings.dt,
             largest_slop: SLOP,
         };
         let mut stopped = Vec::new(); // whoever it is will be stopped at the end, too
