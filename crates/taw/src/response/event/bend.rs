@@ -7,6 +7,8 @@
 //! rest is as on a plane, see [`support`](super::support). Integrated in short steps (Kutta
 //! 1901), which end where the pressure does.
 
+use std::cell::Cell;
+
 use cgmath::{InnerSpace, Zero};
 
 use super::{Ball, Wall};
@@ -18,14 +20,14 @@ use crate::shape::Nearest;
 /// its fifth power.
 const BEND: f64 = 0.02;
 /// A step is not shorter than this part of a substep.
-const SHORTEST: f64 = 1.0 / 4096.0;
+pub(super) const SHORTEST: f64 = 1.0 / 4096.0;
 /// How far beside a point, over the radius, the normal is looked at again to see how it turns.
 /// The rounding of one over the other is a hundred billionth.
 const BESIDE: f64 = 1e-5;
 /// What bends by so much more or less, over a radius, is another face, edge or corner.
 const CORNER: f64 = 0.1;
 /// How often a time is halved to find the moment when something ends.
-const HALVINGS: u32 = 48;
+const HALVINGS: u32 = 24;
 /// What turns by less than this over a radius is flat: that is rounding.
 const FLAT: f64 = 1e-9;
 
@@ -38,6 +40,8 @@ pub(super) struct Ground<'a> {
     pub radius: f64,
     pub spins: BallSpin,
     pub material: Material<f64>,
+    /// What it cost, in looks.
+    pub looks: Cell<u64>,
 }
 
 /// Where a ball is and how it moves.
@@ -107,6 +111,7 @@ pub(super) struct Step {
 impl Ground<'_> {
     /// The wall that a ball there would be on: the nearest, and of several the first.
     fn nearest(&self, at: Point3<f64>, time: f64) -> (usize, Nearest<f64>) {
+        self.looks.set(self.looks.get() + super::PART_LOOKS * self.near.len() as u64);
         let each = self.near.iter().map(|wall| *wall as usize);
         let each = each.map(|wall| (wall, self.walls[wall].nearest(at, time)));
         let nowhere = Nearest { point: at, normal: Vec3::zero(), distance: f64::INFINITY };
@@ -298,15 +303,17 @@ impl Ground<'_> {
             let back = end(length).map_or(0.0, |end| self.curvature(&end, -1.0));
             (back - bends).abs() * self.radius <= CORNER
         };
-        if !same(length) {
-            length = halve(length, same)[1];
+        let shortest = (SHORTEST * dt).min(left);
+        if length > shortest && !same(length) {
+            length = halve(length, same)[1].max(shortest);
         }
         let lasts = |length: f64| {
             end(length).and_then(|end| self.touch(&end)).is_some_and(|t| t.pressure > 0.0)
         };
         let leaves = !lasts(length);
         if leaves {
-            length = halve(length, lasts)[0];
+            // Just after, so that nothing presses it there any more.
+            length = halve(length, lasts)[1];
         }
         Some(Step { end: State { time: start.time + length, ..end(length)? }, leaves })
     }

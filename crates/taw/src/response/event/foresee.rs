@@ -201,12 +201,14 @@ impl EventDriven {
                 return (!seam).then_some((time - now, What::Hits(number)));
             } else {
                 let pressure = self.pressure(row, number, time, ball.path.acceleration);
-                let press = pressure > NO_PRESSURE * ball.pull.magnitude();
+                // What came off just now has nothing that presses it, whatever rounding says.
+                let off = step == 0 && ball.path.off == Some(number);
+                let press = !off && pressure > NO_PRESSURE * ball.pull.magnitude();
                 if press && gap.speed <= slow {
                     if self.is_seam(row, number, position, time) {
                         return None;
                     }
-                    return Some(if held {
+                    return Some(if ball.path.heaped {
                         let after = (slow * 1.01 + gap.speed) / pressure;
                         (time - now + after, What::Hits(number))
                     } else {

@@ -1,8 +1,10 @@
 //! A ball that lies on a wall: how it comes to lie there, how it goes on, and where that ends.
 
+use std::cell::Cell;
+
 use cgmath::{InnerSpace, Zero};
 
-use super::bend::{Ground, State};
+use super::bend::{Ground, SHORTEST, State};
 use super::support::Support;
 use super::{Ball, EventDriven, FLUSH, Form, LOOK, REST, Settings};
 use crate::math::Vec3;
@@ -10,7 +12,10 @@ use crate::response::BallSpin;
 use crate::shape::Nearest;
 
 /// How often a time is halved to find where a face ends.
-const HALVINGS: u32 = 48;
+const HALVINGS: u32 = 24;
+
+/// A wall that rises by less than this angle, in radians, goes on like the one before.
+const IN_FRONT: f64 = 1e-6;
 
 impl EventDriven {
     /// Lets a ball that touches a wall lie on it from now on.
@@ -38,29 +43,26 @@ impl EventDriven {
     pub(super) fn look_what_it_lies_on(&mut self, row: usize, settings: &Settings) {
         let Some(support) = self.balls[row].path.support else { return };
         if self.balls[row].path.leaves {
-            self.balls[row].release();
+            self.balls[row].come_off(support);
             return;
         }
         if self.is_even(support) {
             self.stretch(row, settings);
             return;
         }
+        let near = self.may_lie_on(row, support);
         let ball = &self.balls[row];
         let (at, now) = (ball.position, ball.path.begin);
-        let mut best = (f64::INFINITY, support);
-        self.name_walls(row, |wall| {
-            let distance = self.walls[wall].nearest(at, now).distance;
-            if (distance, wall) < best {
-                best = (distance, wall);
-            }
-        });
+        let distance = |wall: usize| self.walls[wall].nearest(at, now).distance;
+        let best = near.iter().map(|wall| (distance(*wall as usize), *wall as usize));
+        let best = best.fold((f64::INFINITY, support), |x, y| if y < x { y } else { x });
         let fall = ball.pull.magnitude() * settings.dt * settings.dt;
         let rounding = ball.rounding + self.walls[best.1].rounding(at);
         let touching = best.0 - ball.radius <= REST * fall + rounding + FLUSH * ball.radius;
         if touching && self.pressure(row, best.1, now, ball.pull) > 0.0 {
             self.settle(row, best.1, settings);
         } else {
-            self.balls[row].release();
+            self.balls[row].come_off(best.1);
         }
     }
 
@@ -95,21 +97,31 @@ impl EventDriven {
         let ground = ground(walls, &near, &balls[row]);
         let state = State::of(&balls[row]);
         balls[row].path.stamp += 1;
+        let looks = &mut self.looks;
         if even || ground.is_flat(&state) {
             Self::go_straight(&ground, &mut balls[row], support, even, settings);
         } else if !Self::go_round(&ground, &mut balls[row], settings) {
-            balls[row].release();
+            balls[row].come_off(support);
         }
+        *looks += ground.looks.get();
     }
 
-    /// The walls that a ball may be on soon, besides the one that it is on.
+    /// The walls that a ball may be on soon, besides the one that it is on: those that are
+    /// near and not in front of it. (What is in front, it hits.)
     fn may_lie_on(&self, row: usize, support: usize) -> Vec<u32> {
         let ball = &self.balls[row];
-        let far = ball.radius * (1.0 + 4.0 * LOOK) + ball.rounding;
+        let (at, now) = (ball.position, ball.path.begin);
+        let far = ball.radius * (1.0 + 2.0 * LOOK) + ball.rounding;
+        let Nearest { point, normal, .. } = self.walls[support].nearest(at, now);
         let mut near = vec![support as u32];
         self.name_walls(row, |wall| {
-            let distance = || self.walls[wall].nearest(ball.position, ball.path.begin).distance;
-            if wall != support && distance() <= far {
+            if wall == support {
+                return;
+            }
+            let its = self.walls[wall].nearest(at, now);
+            let apart = its.point - point;
+            let in_front = apart.dot(normal) > IN_FRONT * apart.magnitude() + ball.rounding;
+            if its.distance <= far && !in_front {
                 near.push(wall as u32);
             }
         });
@@ -153,7 +165,8 @@ impl EventDriven {
             let far = LOOK * ball.radius;
             let look = (far / over).min((far / stretch.acceleration.magnitude()).sqrt());
             duration = duration.min(look.max(LOOK * settings.dt)).min(settings.dt - now);
-            duration = end_of_face(ground, ball, normal, duration);
+            let shortest = (SHORTEST * settings.dt).min(duration);
+            duration = end_of_face(ground, ball, normal, duration).max(shortest);
         }
         let ends = now + duration;
         ball.path.change = if ends < settings.dt { ends } else { f64::INFINITY };
@@ -182,9 +195,17 @@ impl EventDriven {
     }
 }
 
+impl Ball {
+    /// Lets go of a wall that does not press it any more.
+    fn come_off(&mut self, wall: usize) {
+        self.release();
+        self.path.off = Some(wall);
+    }
+}
+
 fn ground<'a>(walls: &'a [super::Wall], near: &'a [u32], ball: &Ball) -> Ground<'a> {
     let Ball { pull, radius, spins, material, .. } = *ball;
-    Ground { walls, near, pull, radius, spins, material }
+    Ground { walls, near, pull, radius, spins, material, looks: Cell::new(0) }
 }
 
 /// After which part of a time a ball that goes straight comes to the end of the face that it

@@ -64,7 +64,7 @@ const LOOK: f64 = 0.05;
 /// What a substep may cost, and for each ball besides, in looks at one wall or one other
 /// ball, of which a processor does some fifty million in a second. Whatever is not at its end
 /// then stays where it is, and is named.
-const MOST_LOOKS: u64 = 40_000_000;
+const MOST_LOOKS: u64 = 24_000_000;
 const LOOKS_A_BALL: u64 = 20_000;
 /// A look at a part of a wall that is no half-space counts as so many.
 const PART_LOOKS: u64 = 8;
@@ -136,6 +136,8 @@ pub(crate) struct Path {
     arrival: Option<State>,
     /// Whether what it lies on ends there, or bends away from under it.
     leaves: bool,
+    /// The wall that it has just come off.
+    off: Option<usize>,
     /// Whether its acceleration holds it in a heap.
     heaped: bool,
     /// What the collisions of this substep took from it, as parts of their approach; all of
@@ -169,6 +171,7 @@ impl Default for Path {
             support: None,
             arrival: None,
             leaves: false,
+            off: None,
             heaped: false,
             losses: 0.0,
             collided: f64::NEG_INFINITY,
@@ -456,8 +459,15 @@ impl EventDriven {
             }
             What::SettlesOn(wall) => {
                 self.advance(row, time);
-                self.settle(row, wall, settings);
-                self.foresee(row, time, settings);
+                let path = &mut self.balls[row].path;
+                // One that lies on another one may go to and fro between them.
+                path.losses += if path.support.is_some() { LEAN } else { 0.0 };
+                if self.loses(row) {
+                    self.surrender([row, row], time, settings);
+                } else {
+                    self.settle(row, wall, settings);
+                    self.foresee(row, time, settings);
+                }
             }
             What::Changes => {
                 self.advance(row, time);

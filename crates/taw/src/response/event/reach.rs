@@ -168,6 +168,11 @@ impl EventDriven {
         &self.reach.lists[from..to]
     }
 
+    /// All that are.
+    pub(super) fn half_spaces(&self) -> &[u32] {
+        &self.reach.planes
+    }
+
     /// What it costs to look at all walls that a ball knows.
     pub(super) fn looks_at_walls(&self, row: usize) -> u64 {
         self.reach.planes.len() as u64 + super::PART_LOOKS * self.parts_of(row).len() as u64

@@ -154,18 +154,9 @@ impl EventDriven {
     /// others may press it there, it is moved at once: overlap is not energy.
     fn begin_at_walls(&mut self, row: usize, settings: &Settings) {
         let mut near = std::mem::take(&mut self.near.wm);
-        let begin = near.len();
-        let ball = &self.balls[row];
-        // No wall holds what has infinite mass.
-        let mut deepest = (SLOP * ball.radius, Vec3::zero());
-        self.name_walls(row, |wall| {
-            let Nearest { normal, distance, .. } = self.walls[wall].nearest(ball.position, 0.0);
-            let overlap = ball.radius - distance;
-            if overlap > deepest.0 && ball.inverse_mass > 0.0 {
-                deepest = (overlap, normal * overlap);
-            }
-        });
-        self.balls[row].position += deepest.1;
+        self.move_out(row, self.parts_of(row).to_vec());
+        // Half-spaces have the last word: behind them there is nothing.
+        self.move_out(row, self.half_spaces().to_vec());
         let at = self.balls[row].position;
         self.name_walls(row, |wall| {
             let mtv = Vec3::zero();
@@ -178,8 +169,22 @@ impl EventDriven {
             }
         });
         self.looks += 2 * self.looks_at_walls(row);
-        debug_assert!(begin <= near.len());
         self.near.wm = near;
+    }
+
+    /// Moves a ball out of the wall that it is deepest in.
+    fn move_out(&mut self, row: usize, walls: Vec<u32>) {
+        let ball = &self.balls[row];
+        let mut deepest = (SLOP * ball.radius, Vec3::zero());
+        for wall in walls {
+            let near = self.walls[wall as usize].nearest(ball.position, 0.0);
+            let overlap = ball.radius - near.distance;
+            // No wall holds what has infinite mass.
+            if overlap > deepest.0 && ball.inverse_mass > 0.0 {
+                deepest = (overlap, near.normal * overlap);
+            }
+        }
+        self.balls[row].position += deepest.1;
     }
 
     /// Whether the wall of a contact goes through the substep.
