@@ -148,7 +148,8 @@ fn a_ball_on_a_tilting_board_neither_hops_nor_sinks() {
             };
             world.marbles.insert(marble).unwrap();
             for step in 1..=240 {
-                let angle = 0.025 * (1.0 - (std::f64::consts::TAU * 0.25 * DT * f64::from(step)).cos());
+                let angle =
+                    0.025 * (1.0 - (std::f64::consts::TAU * 0.25 * DT * f64::from(step)).cos());
                 board.go(&mut world, 0.0, angle, DT);
                 world.step(DT).unwrap();
                 let gap = board.gap(&world, 0);
@@ -208,9 +209,7 @@ fn leaves(shape: WallShape<f64>, radius: f64, friction: f64, dt: f64) -> (f64, f
         if (at - Point3::new(0.0, 0.0, 0.0)).magnitude() - far > 1e-11 {
             // It flies: back along the parabola to where that touches.
             let v = world.marbles.velocity()[0];
-            let back = |t: f64| {
-                at - v * t - Vec3::new(0.0, 0.5 * 9.81 * t * t, 0.0)
-            };
+            let back = |t: f64| at - v * t - Vec3::new(0.0, 0.5 * 9.81 * t * t, 0.0);
             // Path and surface bend alike there, so that the gap grows with the third power.
             let gap = |t: f64| (back(t) - Point3::new(0.0, 0.0, 0.0)).magnitude() - far;
             let (mut lo, mut hi) = (0.0, dt.max(0.03));
@@ -253,8 +252,14 @@ fn a_ball_pivots_over_an_edge_and_a_corner_and_keeps_its_energy() {
     // A box with its edge along z at the origin, and triangles of the same form.
     let solid: WallShape<f64> =
         Aabb::new(Point3::new(-4.0, -4.0, -4.0), Point3::new(0.0, 0.0, 4.0)).unwrap().into();
-    let points = [[-4.0, 0.0, -4.0], [-4.0, 0.0, 4.0], [0.0, 0.0, 4.0], [0.0, 0.0, -4.0],
-        [0.0, -4.0, 4.0], [0.0, -4.0, -4.0]];
+    let points = [
+        [-4.0, 0.0, -4.0],
+        [-4.0, 0.0, 4.0],
+        [0.0, 0.0, 4.0],
+        [0.0, 0.0, -4.0],
+        [0.0, -4.0, 4.0],
+        [0.0, -4.0, -4.0],
+    ];
     let mesh = Mesh::new(
         points.map(Point3::from).to_vec(),
         vec![[0, 1, 2], [0, 2, 3], [3, 2, 4], [3, 4, 5]],
@@ -352,7 +357,8 @@ fn hopper<S: Scalar>(askew: f64, substeps: u32) -> World<S> {
         let (column, row) = (f64::from(i % 6), f64::from(i / 6));
         let mut off = || draw.between(-0.0008, 0.0008);
         let at = point(-0.055 + 0.022 * column + off(), 0.13 + 0.022 * row + off(), 0.2 * off());
-        let marble = Marble { material: Some(surface(0.3, 0.3)), ..Marble::new(at, S::constant(0.01)) };
+        let marble =
+            Marble { material: Some(surface(0.3, 0.3)), ..Marble::new(at, S::constant(0.01)) };
         world.marbles.insert(marble).unwrap();
     }
     world
@@ -458,16 +464,18 @@ fn a_ball_on_a_large_mesh_costs_little() {
 }
 
 #[test]
-fn thousands_at_one_point_part() {
+fn a_thousand_at_one_point_end_their_step() {
     let mut world = world::<f32>(Rotation::Dynamic, 1);
     world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
-    for _ in 0..2000 {
+    for _ in 0..1000 {
         world.marbles.insert(Marble::new(Point3::new(0.0, 1.0, 0.0), 0.05)).unwrap();
     }
-    for step in 0..3 {
+    for step in 0..2 {
         let begin = Instant::now();
-        let result = world.step(DT as f32);
-        println!("step {step}: {result:?} in {:?}, {} stopped", begin.elapsed(), world.stopped().count());
+        world.step(DT as f32).unwrap();
+        let (took, stopped) = (begin.elapsed(), world.stopped().count());
+        println!("step {step}: {took:?}, {stopped} stopped");
+        assert!(took < Duration::from_secs(60), "{took:?}");
     }
 }
 

@@ -49,7 +49,15 @@ impl<S: Scalar> World<S> {
             mtv: cast_vector(contact.mtv),
         };
         events.near.clear();
-        events.near.mm.extend(self.contacts.mm.iter().map(cast));
+        let mut touches = vec![0; marbles.len()];
+        let wanted = self.contacts.mm.iter().filter(|contact| {
+            let (a, b) = (contact.a as usize, contact.b as usize);
+            let wanted = touches[a].min(touches[b]) < event::MOST_TOUCHES;
+            touches[a] += 1;
+            touches[b] += 1;
+            wanted
+        });
+        events.near.mm.extend(wanted.map(cast));
         let source = &Source::new(&self.walls, [dt.as_f64(), rest.as_f64()]);
         let settings = Settings { dt: dt.as_f64(), iterations: self.model.iterations, source };
         events.work = self.accounting.is_some().then(Work::default);
@@ -124,7 +132,8 @@ impl<S: Scalar> event::Source for Source<'_, S> {
             (motion.velocity.magnitude() + motion.spin.magnitude() * arm) * self.there
         };
         let way = self.going.iter().map(way).fold(0.0, f64::max);
-        let digits = 8.0 * S::epsilon().as_f64() * point.x.abs().max(point.y.abs()).max(point.z.abs());
+        let digits =
+            8.0 * S::epsilon().as_f64() * point.x.abs().max(point.y.abs()).max(point.z.abs());
         let reach = S::constant((reach + way) * (1.0 + 1e-6) + digits);
         self.walls.around(cast_point(point), reach, |Part { wall, part }| name(wall, part));
     }

@@ -79,13 +79,7 @@ impl<S: Scalar> WallShape<S> {
 
     /// Names the parts that may be within `reach` metres of a point, of which one of its own
     /// boxes is.
-    pub(super) fn around(
-        &self,
-        part: u32,
-        point: Point3<S>,
-        reach: S,
-        mut name: impl FnMut(u32),
-    ) {
+    pub(super) fn around(&self, part: u32, point: Point3<S>, reach: S, mut name: impl FnMut(u32)) {
         let mut each = |part| {
             name(part);
             reach

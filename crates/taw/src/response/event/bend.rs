@@ -127,7 +127,9 @@ impl Ground<'_> {
         let beside = BESIDE * self.radius;
         let there = self.nearest(at + along * beside, time).1.normal - normal;
         let there = there - normal * there.dot(normal);
-        if there.magnitude() * self.radius <= FLAT * beside { return Vec3::zero(); }
+        if there.magnitude() * self.radius <= FLAT * beside {
+            return Vec3::zero();
+        }
         there * (speed / beside)
     }
 
@@ -274,7 +276,8 @@ impl Ground<'_> {
     pub fn settled(&self, mut state: State, dt: f64) -> Option<State> {
         let touch = self.touch(&state)?;
         let grip = self.give() * touch.material.friction * touch.pressure.max(0.0);
-        if touch.slip.magnitude() <= 1e-6 * grip * dt {
+        // What friction takes in less than a shortest step: a step more would turn it around.
+        if touch.slip.magnitude() <= 2.0 * SHORTEST * grip * dt {
             let part = touch.slip / self.give();
             state.velocity -= part;
             if self.spins == BallSpin::Free {
@@ -335,7 +338,8 @@ impl Ground<'_> {
         let curved = ways.into_iter().map(at).fold(0.0, f64::max);
         let wall = &self.walls[touch.wall];
         let speed = (start.velocity - wall.way(start.position, start.time)).magnitude();
-        let mut longest = (BEND / (curved * speed)).min((BEND / (curved * rate.acceleration.magnitude())).sqrt());
+        let mut longest =
+            (BEND / (curved * speed)).min((BEND / (curved * rate.acceleration.magnitude())).sqrt());
         if let Some((motion, _)) = wall.going(0.0) {
             longest = longest.min(BEND / motion.spin.magnitude());
         }

@@ -260,7 +260,9 @@ impl EventDriven {
         let (from, to) = (first.position_at(now), second.position_at(now));
         let velocity = second.velocity_at(now) - first.velocity_at(now);
         let acceleration = second.path.acceleration - first.path.acceleration;
-        if first.inverse_mass + second.inverse_mass <= 0.0 || first.is_frozen() || second.is_frozen()
+        if first.inverse_mass + second.inverse_mass <= 0.0
+            || first.is_frozen()
+            || second.is_frozen()
         {
             return None; // nothing could come of it
         }

@@ -64,8 +64,11 @@ const LOOK: f64 = 0.05;
 /// What a substep may cost, and for each ball besides, in looks at one wall or one other
 /// ball, of which a processor does some fifty million in a second. Whatever is not at its end
 /// then stays where it is, and is named.
-const MOST_LOOKS: u64 = 24_000_000;
+const MOST_LOOKS: u64 = 32_000_000;
 const LOOKS_A_BALL: u64 = 20_000;
+/// So many touches are enough to hold a ball, of which one of its size has twelve at most. Of
+/// those between two that both have as many already, no more are taken.
+pub(crate) const MOST_TOUCHES: u32 = 64;
 /// A look at a part of a wall that is no half-space counts as so many.
 const PART_LOOKS: u64 = 8;
 
@@ -385,18 +388,12 @@ impl EventDriven {
             self.foresee(row, 0.0, settings);
         }
         let most = MOST_LOOKS + LOOKS_A_BALL * self.balls.len() as u64;
-        let mut counts = [0u64; 8];
-        let mut last=0;
         while self.looks < most {
             let Some(Reverse(event)) = self.queue.pop() else { break };
-            let k = match event.what { What::Hits(_) => 0, What::SettlesOn(_) => 1, What::Meets(..) => 2, What::Leans(..) => 3, What::LeavesCell{..} => 4, What::Changes => 5, What::Looks => 6 };
-            counts[k] += 1; counts[7] += 1;
-            if counts[7] > 100000 && std::env::var("DBG").is_ok() && last < 40 { last += 1; let b=&self.balls[event.row]; eprintln!("{:?} pos {:?} v {:?} a {:?} sup {:?} heaped {} losses {} sur {}", event, b.position_at(event.time), b.velocity_at(event.time), b.path.acceleration, b.path.support, b.path.heaped, b.path.losses, b.path.surrenders); }
             if self.balls[event.row].path.stamp == event.stamp {
                 self.happen(event, settings, impacts);
             }
         }
-        if self.looks > 2_000_000 && std::env::var("DBG").is_ok() { eprintln!("looks {} counts {:?} dt {}", self.looks, counts, dt); }
         let mut stopped = self.stop_what_is_left();
         (0..self.balls.len()).for_each(|row| self.advance(row, dt));
         for (row, (ball, before)) in self.balls.iter_mut().zip(before).enumerate() {

@@ -89,11 +89,7 @@ impl EventDriven {
         self.reach = reach;
         if self.reach.has_parts {
             for row in 0..self.balls.len() {
-                let nothing = Known {
-                    center: self.balls[row].position,
-                    far: -1.0,
-                    walls: [0; 2],
-                };
+                let nothing = Known { center: self.balls[row].position, far: -1.0, walls: [0; 2] };
                 self.reach.known.push(nothing);
                 self.look_around(row, 0.0, settings);
             }

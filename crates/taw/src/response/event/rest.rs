@@ -4,7 +4,7 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::wall::{Between, Wall};
-use super::{Ball, EventDriven, PRESS, Path, REST, Settings};
+use super::{Ball, EventDriven, MOST_TOUCHES, PRESS, Path, REST, Settings};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Vec3, direction_and_length};
 use crate::response::impulse::{self, Warm, impulse};
@@ -60,7 +60,10 @@ impl Heap {
         fill(&mut self.velocity, each().map(|b| b.velocity));
         fill(&mut self.spin, each().map(|b| b.spin));
         fill(&mut self.radius, each().map(|b| b.radius));
-        fill(&mut self.inverse_mass, each().map(|b| if b.is_frozen() { 0.0 } else { b.inverse_mass }));
+        fill(
+            &mut self.inverse_mass,
+            each().map(|b| if b.is_frozen() { 0.0 } else { b.inverse_mass }),
+        );
         fill(&mut self.material, each().map(|b| b.material));
         fill(&mut self.held, each().map(|b| b.spins == BallSpin::Ignored));
     }
@@ -209,19 +212,14 @@ impl EventDriven {
 
     /// How much slower than what counts as rest a ball and a wall come together, or
     /// nothing if they do not touch.
-    fn touches_wall(
-        &self,
-        contact: &Contact<f64>,
-        now: f64,
-        settings: &Settings,
-    ) -> Option<f64> {
+    fn touches_wall(&self, contact: &Contact<f64>, now: f64, settings: &Settings) -> Option<f64> {
         let (gap, speed) = self.wall_gap(contact, now);
         let ball = &self.balls[contact.b as usize];
         let fall = ball.pull.magnitude() * settings.dt;
         let goes = self.goes(contact) && now == 0.0;
         let slow = if goes { fall } else { PRESS * fall };
-        let low = self.low(contact.b, settings)
-            + self.walls[contact.a as usize].rounding(ball.position);
+        let low =
+            self.low(contact.b, settings) + self.walls[contact.a as usize].rounding(ball.position);
         (gap <= low && speed <= slow).then_some(slow + speed)
     }
 
@@ -312,6 +310,7 @@ impl EventDriven {
             find(row, &mut place, &mut found);
         }
         let mut turn = 0;
+        let mut touches = vec![0_u32; self.balls.len()];
         let mut near = Vec::new();
         let mtv = Vec3::zero();
         while let Some(row) = found.get(turn).copied() {
@@ -349,7 +348,10 @@ impl EventDriven {
                 let contact = Contact { a, b, part: 0, along: [0.0; 2], mtv };
                 // The two that it is about touch, whatever rounding says.
                 let known = first.contains(&row) && first.contains(&other);
-                if known || self.touches_ball(&contact, settings).is_some() {
+                let full = touches[row].min(touches[other]) >= MOST_TOUCHES;
+                if !full && (known || self.touches_ball(&contact, settings).is_some()) {
+                    touches[row] += 1;
+                    touches[other] += 1;
                     contacts.mm.push(contact);
                     find(other, &mut place, &mut found);
                 }

@@ -89,12 +89,7 @@ impl Wall {
 
     /// The velocity of its surface, which points that way, at a point. What stays has none
     /// across its surface.
-    pub fn surface_velocity(
-        &self,
-        normal: Vec3<f64>,
-        point: Point3<f64>,
-        time: f64,
-    ) -> Vec3<f64> {
+    pub fn surface_velocity(&self, normal: Vec3<f64>, point: Point3<f64>, time: f64) -> Vec3<f64> {
         let Some(motion) = self.motion else { return Vec3::zero() };
         if self.there.is_some() {
             return self.way(point, time);

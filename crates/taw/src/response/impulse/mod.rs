@@ -337,12 +337,7 @@ pub(crate) trait Walls<S> {
     /// The normal of a part of the wall, and how far a point is in front of it.
     fn normal_and_distance(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S);
     /// The same when the step began, for walls that were elsewhere then.
-    fn normal_and_distance_before(
-        &self,
-        wall: usize,
-        part: u32,
-        point: Point3<S>,
-    ) -> (Vec3<S>, S) {
+    fn normal_and_distance_before(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S) {
         self.normal_and_distance(wall, part, point)
     }
     /// How its surface moves at a point, in m/s.
