@@ -122,7 +122,7 @@ impl EventDriven {
         let least = f64::EPSILON * 16.0 * size;
         let held = ball.path.support.is_some() || ball.path.heaped;
         let slow = self.slow(row, held, settings).max(1e-14 * velocity.magnitude());
-        self.wall_event(wall, gap, least, held, slow)
+        Self::wall_event(wall, gap, least, held, slow)
     }
 
     /// Slower than this, a ball that meets a wall begins to rest on it, or to be pressed.
@@ -132,14 +132,7 @@ impl EventDriven {
     }
 
     /// What comes of the gap between a ball and a plane.
-    fn wall_event(
-        &self,
-        wall: usize,
-        gap: Gap,
-        least: f64,
-        held: bool,
-        slow: f64,
-    ) -> Option<(f64, What)> {
+    fn wall_event(wall: usize, gap: Gap, least: f64, held: bool, slow: f64) -> Option<(f64, What)> {
         let press = gap.acceleration < 0.0;
         if gap.now > least {
             let after = closing_time(gap)?;

@@ -69,7 +69,7 @@ impl Heap {
     }
 
     /// What it costs to solve contacts, in looks.
-    fn cost(&self, contacts: &Contacts<f64>, settings: &Settings) -> u64 {
+    fn cost(contacts: &Contacts<f64>, settings: &Settings) -> u64 {
         2 * contacts.len() as u64 * u64::from(settings.iterations)
     }
 
@@ -268,7 +268,7 @@ impl EventDriven {
         }
         let left = settings.dt - now;
         let walls = Between { walls: &self.walls, begin: now, end: now };
-        self.looks += self.heap.cost(&contacts, settings);
+        self.looks += Heap::cost(&contacts, settings);
         self.heap.solve(&mut contacts, &walls, pull, 0.0, settings, &mut Vec::new());
         for (label, row) in self.heap.rows.iter().enumerate() {
             let ball = &mut self.balls[*row as usize];
@@ -392,7 +392,7 @@ impl EventDriven {
             })
         });
         let walls = Between { walls: &self.walls, begin: now, end: settings.dt };
-        self.looks += self.heap.cost(contacts, settings);
+        self.looks += Heap::cost(contacts, settings);
         self.heap.solve(contacts, &walls, strongest, left, settings, warm);
         let Heap { rows, position, velocity, spin, .. } = &self.heap;
         warm.retain_mut(|warm| warm.rename(|at| rows.get(at).map(|row| *row as usize)));
