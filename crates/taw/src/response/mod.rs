@@ -61,12 +61,26 @@ pub enum Response {
     /// bounces lose no height that restitution does not take.
     ///
     /// In between marbles fly along parabolas, with the mean acceleration of the substep
-    /// by the integrator; exact for gravity. What lies on one wall rests, rolls or slides
-    /// as the equations of a rolling ball say, and changes over at its moment. What lies
-    /// on other marbles is held as by [`Response::Impulse`]. Give it 50
-    /// [iterations](crate::world::Model::iterations) or more where there are heaps: a
-    /// contact that they leave undecided is one more event, which costs more. Bounces end
-    /// when the rest of them would take less than a few thousandths of a substep.
+    /// by the integrator; exact for gravity. What lies on one wall of whatever form rests,
+    /// rolls or slides as the equations of a rolling ball say, and changes over at its moment.
+    /// On half-spaces and flat faces they are solved in closed form. On what bends (spheres,
+    /// capsules, edges and corners) and on walls that tilt they are integrated in steps by
+    /// which the normal turns by 0.02 rad at most, and a marble leaves where nothing presses it
+    /// any more. What touches several walls, or other marbles, is held as by
+    /// [`Response::Impulse`]: only there do [iterations](crate::world::Model::iterations)
+    /// count. Give it 50 or more where there are heaps: a contact that they leave undecided is
+    /// one more event, which costs more. Bounces end when the rest of them would take less than
+    /// a few thousandths of a substep.
+    ///
+    /// A wall that was [set](crate::world::Walls::set) to another place since the last step,
+    /// and has a [motion](crate::world::WallMotion), goes through the step by that motion, and
+    /// is at its end where it was set to. One that only has a motion stays, and carries along
+    /// its surface what lies on it.
+    ///
+    /// A substep has a budget: 32 million looks at one wall or one other marble, and 20,000 for
+    /// each marble besides, about a second for a few hundred. What is not at the end of the
+    /// substep then stays where it is, loses its velocity, and is named by
+    /// [`World::stopped`](crate::world::World::stopped).
     ///
     /// Counts in `f64` also in a world of `f32`; see
     /// [`Precision`](crate::world::Precision) for what such a world remembers of it. It

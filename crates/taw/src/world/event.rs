@@ -3,41 +3,21 @@
 
 use cgmath::InnerSpace;
 
-use super::walls::Part;
+use super::walls::{Part, Walls};
 use super::{Precision, World};
 use crate::contact::Contact;
-use crate::math::{Scalar, Vec3, cast_point, cast_vector, length};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::motion::{Motion, Rotation, WallMotion};
-use crate::response::event::{Ball, Path, Settings, Wall};
+use crate::response::event::{self, Ball, Path, Settings, Wall};
 use crate::response::{BallSpin, Impact, Material, Work};
-use crate::shape::Aabb;
 
 impl<S: Scalar> World<S> {
-    /// Goes through a substep of `dt` seconds, event by event.
-    pub(super) fn go_through_events(&mut self, dt: S) {
+    /// Goes through a substep of `dt` seconds, event by event, with `rest` seconds of the step
+    /// after it: at its end, walls are where they are.
+    pub(super) fn go_through_events(&mut self, dt: S, rest: S) {
         let exact = self.model.precision == Precision::Compensated;
-        let named: Vec<_> = self.events.walls.iter().map(|wall| (wall.row, wall.part)).collect();
-        let mut names: Vec<_> =
-            self.walls.planes().map(|(wall, _)| Part { wall, part: 0 }).collect();
-        if !self.walls.are_planes() {
-            self.walls_on_the_way(dt, &mut names);
-        }
         let marbles = &self.marbles;
         let events = &mut self.events;
-        events.walls.clear();
-        events.walls.extend(names.iter().filter_map(|Part { wall, part }| {
-            let row = *wall as usize;
-            Some(Wall {
-                form: self.walls.shapes()[row].exact(*part)?,
-                row: *wall,
-                part: *part,
-                motion: self.walls.motion_of_row(row).map(WallMotion::cast),
-                material: self.walls.material_of_row(row).map(Material::cast),
-            })
-        }));
-        if !named.iter().copied().eq(events.walls.iter().map(|wall| (wall.row, wall.part))) {
-            events.warm.clear(); // it knows walls by their places
-        }
         events.balls.clear();
         events.balls.extend((0..marbles.len()).map(|row| {
             let Motion { position, velocity } = marbles.exact(row);
@@ -68,15 +48,18 @@ impl<S: Scalar> World<S> {
             along: [0.0; 2],
             mtv: cast_vector(contact.mtv),
         };
-        let place = |contact: &Contact<S>| {
-            let part = Part { wall: contact.a, part: contact.part };
-            let a = names.binary_search(&part).ok()? as u32;
-            Some(Contact { a, ..cast(contact) })
-        };
         events.near.clear();
-        events.near.wm.extend(self.contacts.wm.iter().filter_map(place));
-        events.near.mm.extend(self.contacts.mm.iter().map(cast));
-        let settings = Settings { dt: dt.as_f64(), iterations: self.model.iterations };
+        let mut touches = vec![0; marbles.len()];
+        let wanted = self.contacts.mm.iter().filter(|contact| {
+            let (a, b) = (contact.a as usize, contact.b as usize);
+            let wanted = touches[a].min(touches[b]) < event::MOST_TOUCHES;
+            touches[a] += 1;
+            touches[b] += 1;
+            wanted
+        });
+        events.near.mm.extend(wanted.map(cast));
+        let source = &Source::new(&self.walls, [dt.as_f64(), rest.as_f64()]);
+        let settings = Settings { dt: dt.as_f64(), iterations: self.model.iterations, source };
         events.work = self.accounting.is_some().then(Work::default);
         let mut impacts = Vec::new();
         self.stopped.extend(events.run(&settings, &mut impacts));
@@ -86,31 +69,18 @@ impl<S: Scalar> World<S> {
         }
         for (row, ball) in self.events.balls.iter().enumerate() {
             let (position, velocity) = (ball.position, ball.velocity);
-            self.marbles.set_exact(row, Motion { position, velocity });
+            let mut whole = self.marbles.set_exact(row, Motion { position, velocity });
             if self.model.rotation == Rotation::Dynamic {
-                self.marbles.set_exact_spin(row, ball.spin);
+                whole &= self.marbles.set_exact_spin(row, ball.spin);
                 self.marbles.turn_by(row, cast_vector(ball.turned));
             }
+            if !whole && !self.stopped.contains(&(row as u32)) {
+                self.stopped.push(row as u32);
+            }
         }
-    }
-
-    /// Adds the parts of walls, besides half-spaces, that a marble may meet in `dt` seconds:
-    /// all that are nearer than twice what the fastest of them goes, since an equal one may
-    /// have its speed, and one much lighter twice that. Leaves all names in order.
-    fn walls_on_the_way(&self, dt: S, names: &mut Vec<Part>) {
-        let two = S::constant(2.0);
-        let velocities = self.marbles.velocity().iter().map(|v| length(*v));
-        let pulls = self.accelerations.iter().map(|a| S::constant(a.magnitude()));
-        let fastest = velocities.fold(S::zero(), S::max) + pulls.fold(S::zero(), S::max) * dt;
-        for row in 0..self.marbles.len() {
-            let sphere = self.marbles.sphere(row);
-            let far = sphere.radius * two + fastest * two * dt;
-            let more = Vec3::new(far, far, far);
-            let bounds = Aabb { min: sphere.center - more, max: sphere.center + more };
-            self.walls.near(&bounds, |part| names.push(part));
+        if rest <= S::zero() {
+            self.walls.arrive();
         }
-        names.sort_unstable();
-        names.dedup();
     }
 
     /// How wide a gap may still be one between marbles at rest: many times what the
@@ -125,5 +95,60 @@ impl<S: Scalar> World<S> {
         let rounding = 16.0 * S::epsilon().as_f64() * far.fold(0.0, f64::max);
         let reach = S::constant(0.02 * fall + rounding);
         if reach.is_finite() { reach } else { S::zero() }
+    }
+}
+
+/// The walls of a world, for a substep.
+struct Source<'a, S> {
+    walls: &'a Walls<S>,
+    /// How many seconds after the begin of the substep walls come to where they are.
+    there: f64,
+    /// The motions of those that go there.
+    going: Vec<WallMotion<f64>>,
+}
+
+impl<'a, S: Scalar> Source<'a, S> {
+    fn new(walls: &'a Walls<S>, [dt, rest]: [f64; 2]) -> Self {
+        let rows = (0..walls.len()).filter(|row| walls.has_moved(*row));
+        let going = rows.filter_map(|row| walls.motion_of_row(row)).map(WallMotion::cast).collect();
+        Self { walls, there: dt + rest, going }
+    }
+}
+
+impl<S: Scalar> event::Source for Source<'_, S> {
+    fn planes(&self, name: &mut dyn FnMut(u32)) {
+        self.walls.planes().for_each(|(row, _)| name(row));
+    }
+
+    fn has_parts(&self) -> bool {
+        !self.walls.are_planes()
+    }
+
+    fn near(&self, point: Point3<f64>, reach: f64, name: &mut dyn FnMut(u32, u32)) {
+        // Walls are at the end of their way, from which they may be as far as they go.
+        let way = |motion: &WallMotion<f64>| {
+            let arm = (point - motion.pivot).magnitude() + reach;
+            let arm = arm + motion.velocity.magnitude() * self.there;
+            (motion.velocity.magnitude() + motion.spin.magnitude() * arm) * self.there
+        };
+        let way = self.going.iter().map(way).fold(0.0, f64::max);
+        let digits =
+            8.0 * S::epsilon().as_f64() * point.x.abs().max(point.y.abs()).max(point.z.abs());
+        let reach = S::constant((reach + way) * (1.0 + 1e-6) + digits);
+        self.walls.around(cast_point(point), reach, |Part { wall, part }| name(wall, part));
+    }
+
+    fn wall(&self, row: u32, part: u32) -> Option<Wall> {
+        let place = row as usize;
+        let motion = self.walls.motion_of_row(place).map(WallMotion::cast);
+        let moved = motion.is_some() && self.walls.has_moved(place);
+        Some(Wall {
+            form: self.walls.shapes().get(place)?.exact(part)?,
+            row,
+            motion,
+            there: moved.then_some(self.there),
+            material: self.walls.material_of_row(place).map(Material::cast),
+            digit: 8.0 * S::epsilon().as_f64(),
+        })
     }
 }

@@ -70,10 +70,11 @@ impl<S: Scalar> Marbles<S> {
         for row in 0..self.len() {
             let start = self.exact(row);
             let next = self.exact_after(row, drive);
-            if is_finite_point(next.position) && is_finite(next.velocity) {
-                self.set_exact(row, next);
-            } else {
+            let overflowed = !(is_finite_point(next.position) && is_finite(next.velocity));
+            if overflowed {
                 self.set_exact(row, Motion { velocity: Vec3::zero(), ..start });
+            }
+            if overflowed || !self.set_exact(row, next) {
                 stopped.push(row as u32);
             }
         }
@@ -115,16 +116,25 @@ impl<S: Scalar> Marbles<S> {
         }
     }
 
-    /// Splits position and velocity into what the scalar holds and the rest.
-    pub(super) fn set_exact(&mut self, row: usize, motion: Motion<f64>) {
+    /// Splits position and velocity into what the scalar holds and the rest. False if they are
+    /// beyond what it holds: then the row keeps its place and loses its velocity.
+    pub(super) fn set_exact(&mut self, row: usize, motion: Motion<f64>) -> bool {
         let position = cast_point(motion.position);
         let velocity = cast_vector(motion.velocity);
+        if !is_finite_point(position) || !is_finite(velocity) {
+            self.velocity[row] = Vec3::zero();
+            if let Some(rest) = self.rest.get_mut(row) {
+                rest.velocity = Vec3::zero();
+            }
+            return false;
+        }
         self.position[row] = position;
         self.velocity[row] = velocity;
         if let Some(rest) = self.rest.get_mut(row) {
             rest.position = cast_vector(motion.position - cast_point(position));
             rest.velocity = cast_vector(motion.velocity - cast_vector(velocity));
         }
+        true
     }
 
     /// The spin with what the scalar cuts off, in rad/s.
@@ -135,13 +145,21 @@ impl<S: Scalar> Marbles<S> {
     }
 
     /// Splits the spin in the same way. Does nothing in a model without rotation.
-    pub(super) fn set_exact_spin(&mut self, row: usize, spin: Vec3<f64>) {
+    pub(super) fn set_exact_spin(&mut self, row: usize, spin: Vec3<f64>) -> bool {
         if let Some(slot) = self.spin.get_mut(row) {
             *slot = cast_vector(spin);
+            if !is_finite(*slot) {
+                *slot = Vec3::zero();
+                if let Some(rest) = self.rest.get_mut(row) {
+                    rest.spin = Vec3::zero();
+                }
+                return false;
+            }
             if let Some(rest) = self.rest.get_mut(row) {
                 rest.spin = cast_vector(spin - cast_vector(*slot));
             }
         }
+        true
     }
 
     /// The part of the velocity that damping leaves after `dt` seconds.

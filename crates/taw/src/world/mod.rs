@@ -89,6 +89,8 @@ pub struct World<S> {
     warm_removals: [u64; 2],
     /// For a response that moves marbles by itself: how each is to be accelerated.
     accelerations: Vec<Vec3<f64>>,
+    /// How much of a step comes after the substep, in seconds; zero unless within one.
+    rest_of_step: S,
     events: EventDriven,
     sweep: Sweep<S>,
     near_walls: Vec<Near<S>>,
@@ -122,6 +124,7 @@ impl<S: Scalar> Default for World<S> {
             shear: Vec::new(),
             warm_removals: [0; 2],
             accelerations: Vec::new(),
+            rest_of_step: S::zero(),
             events: EventDriven::default(),
             sweep: Sweep::default(),
             near_walls: Vec::new(),
@@ -155,6 +158,7 @@ impl<S: Scalar> PartialEq for World<S> {
             shear,
             warm_removals,
             accelerations: _,
+            rest_of_step: _,
             events,
             sweep: _,
             near_walls: _,
@@ -262,11 +266,13 @@ impl<S: Scalar> World<S> {
         let whole = dt;
         let dt = positive("dt", dt / S::constant(f64::from(self.model.substeps)))?;
         self.begin_step();
-        for _ in 0..self.model.substeps {
+        for after in (0..self.model.substeps).rev() {
+            self.rest_of_step = dt * S::constant(f64::from(after));
             self.integrate(dt)?;
             self.generate_contacts();
             self.restitute(dt)?;
         }
+        self.walls.arrive();
         self.marbles.clear_forces();
         self.step_swarm(whole, &mut |_| ())
     }
@@ -435,7 +441,7 @@ impl<S: Scalar> World<S> {
                 &mut self.stopped,
                 self.accounting.as_mut().map(|accounting| &mut accounting.work),
             ),
-            Response::EventDriven => self.go_through_events(dt),
+            Response::EventDriven => self.go_through_events(dt, self.rest_of_step),
         }
         if self.model.rotation != Rotation::None {
             // The deepest contact comes first in the list, so it has the last word.
@@ -484,6 +490,7 @@ impl<S: Scalar> World<S> {
     /// Forgets who was [stopped](World::stopped), and the [impacts](World::impacts). A
     /// step begins with this; whoever calls the verbs one by one begins so too.
     pub fn begin_step(&mut self) {
+        self.rest_of_step = S::zero();
         self.stopped.clear();
         self.impacts.clear();
         self.open_account();

@@ -77,6 +77,42 @@ impl<S: Scalar> WallShape<S> {
         }
     }
 
+    /// Names the parts that may be within `reach` metres of a point, of which one of its own
+    /// boxes is.
+    pub(super) fn around(&self, part: u32, point: Point3<S>, reach: S, mut name: impl FnMut(u32)) {
+        let mut each = |part| {
+            name(part);
+            reach
+        };
+        match self {
+            Self::Plane(_) | Self::Solid(_) => name(part),
+            Self::Mesh(mesh, pose) => mesh.around(pose.point_back(point), reach, &mut each),
+            Self::HeightField(field, pose) => {
+                // Under a landscape it is solid however deep.
+                let local = pose.point_back(point);
+                let bounds = field.bounds();
+                let below = local.y < bounds.max.y;
+                let far = if below { reach.max(bounds.max.y - local.y) } else { reach };
+                field.around(local, far, |part| {
+                    each(part);
+                    far
+                });
+            }
+        }
+    }
+
+    /// Whether another one is at the same place. Of what is shared, copies are one.
+    pub(super) fn is_where(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Mesh(one, pose), Self::Mesh(two, at)) => Arc::ptr_eq(one, two) && pose == at,
+            (Self::HeightField(one, pose), Self::HeightField(two, at)) => {
+                Arc::ptr_eq(one, two) && pose == at
+            }
+            (Self::Mesh(..) | Self::HeightField(..), _) => false,
+            _ => self == other,
+        }
+    }
+
     /// The same wall elsewhere.
     ///
     /// # Errors

@@ -33,6 +33,8 @@ pub struct Walls<S> {
     motion: Optional<WallMotion<S>>,
     /// Only of those that have one of their own.
     material: Optional<Material<S>>,
+    /// Those that were set to another place since the last step.
+    moved: Optional<()>,
     /// The boxes of those that are no half-spaces, and what is in them.
     boxes: Vec<Box3<S>>,
     parts: Vec<Part>,
@@ -59,6 +61,7 @@ impl<S> Default for Walls<S> {
             planes: Vec::new(),
             motion: Optional::default(),
             material: Optional::default(),
+            moved: Optional::default(),
             boxes: Vec::new(),
             parts: Vec::new(),
             tree: BoxTree::default(),
@@ -71,11 +74,12 @@ impl<S> Default for Walls<S> {
 impl<S: Scalar> PartialEq for Walls<S> {
     fn eq(&self, other: &Self) -> bool {
         // The rest follows from the shapes.
-        let Self { handles, shapes, motion, material, .. } = self;
+        let Self { handles, shapes, motion, material, moved, .. } = self;
         *handles == other.handles
             && *shapes == other.shapes
             && *motion == other.motion
             && *material == other.material
+            && *moved == other.moved
     }
 }
 
@@ -95,6 +99,7 @@ impl<S: Scalar> Walls<S> {
         let rows = self.shapes.len();
         self.motion.set(rows - 1, None, rows);
         self.material.set(rows - 1, None, rows);
+        self.moved.set(rows - 1, None, rows);
         Ok(WallId(handle))
     }
 
@@ -107,6 +112,7 @@ impl<S: Scalar> Walls<S> {
         let row = row.ok_or(Error::NoSuchWall(id))?;
         self.motion.swap_remove(row);
         self.material.swap_remove(row);
+        self.moved.swap_remove(row);
         // Another wall has this row now.
         self.stale = Stale::All;
         self.version += 1;
@@ -137,6 +143,9 @@ impl<S: Scalar> Walls<S> {
             count
         };
         let same = parts(&shape) == parts(&self.shapes[row]);
+        if !shape.is_where(&self.shapes[row]) {
+            self.moved.set(row, Some(()), self.shapes.len());
+        }
         self.change(&shape, if same { Stale::Places } else { Stale::All });
         let is_plane = |shape: &WallShape<S>| matches!(shape, WallShape::Plane(_));
         let turns = is_plane(&shape) != is_plane(&self.shapes[row]);
@@ -194,6 +203,16 @@ impl<S: Scalar> Walls<S> {
         self.tree.near(bounds, |item| {
             let Part { wall, part } = self.parts[item as usize];
             self.shapes[wall as usize].near(part, bounds, |part| name(Part { wall, part }));
+        });
+    }
+
+    /// Names the parts of walls, but for half-spaces, that may be within `reach` metres of a
+    /// point.
+    pub(super) fn around(&self, point: Point3<S>, reach: S, mut name: impl FnMut(Part)) {
+        self.tree.around(point, reach, |item| {
+            let Part { wall, part } = self.parts[item as usize];
+            self.shapes[wall as usize].around(part, point, reach, |part| name(Part { wall, part }));
+            reach
         });
     }
 
@@ -288,6 +307,16 @@ impl<S: Scalar> Walls<S> {
     /// How the wall in a row moves.
     pub(super) fn motion_of_row(&self, row: usize) -> Option<WallMotion<S>> {
         self.motion.get(row)
+    }
+
+    /// Whether the wall in a row was set to another place since the last step.
+    pub(super) fn has_moved(&self, row: usize) -> bool {
+        self.moved.get(row).is_some()
+    }
+
+    /// Notes that a step is over: all walls are where they are to stay.
+    pub(super) fn arrive(&mut self) {
+        self.moved.clear();
     }
 
     /// The own material of the wall in a row.

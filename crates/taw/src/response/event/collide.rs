@@ -4,10 +4,10 @@ use std::cmp::Reverse;
 
 use cgmath::{InnerSpace, Zero};
 
-use super::{Ball, Event, EventDriven, Impact, MOST_LOSSES, Settings, What};
+use super::{Event, EventDriven, Impact, MOST_LOSSES, Settings, What};
 use crate::math::{Vec3, direction_and_length};
 use crate::response::impact::at_most;
-use crate::response::{Material, Mobility, Push, Walls as _, impact};
+use crate::response::{Material, Mobility, Push, impact};
 
 /// How many rounds collisions at one moment have to agree.
 const MOST_ROUNDS: u32 = 1000;
@@ -47,6 +47,9 @@ impl EventDriven {
         for row in self.hold_from_now_on(rows, time, settings) {
             let path = &mut self.balls[row].path;
             (path.losses, path.surrenders) = (0.0, path.surrenders + 1);
+            if self.balls[row].is_frozen() {
+                self.balls[row].freeze();
+            }
             self.foresee(row, time, settings);
         }
     }
@@ -134,8 +137,7 @@ impl EventDriven {
         let (first, second) = (&self.balls[a], &self.balls[b]);
         let (normal, _) =
             direction_and_length(second.position - first.position).unwrap_or((Vec3::unit_x(), 0.0));
-        let own = |ball: &Ball| ball.velocity + ball.path.carry;
-        let approach_speed = -(own(second) - own(first)).dot(normal);
+        let approach_speed = -(second.velocity - first.velocity).dot(normal);
         let mut material = first.material.against(second.material);
         if approach_speed <= 2.0 * press {
             material.restitution = 0.0;
@@ -227,10 +229,12 @@ impl EventDriven {
 
     /// Lets a ball that touches a wall bounce off it.
     pub(super) fn hit_wall(&mut self, row: usize, wall: usize, settings: &Settings) -> Impact<f64> {
-        let normal = self.walls[wall].form.nearest(self.balls[row].position).normal;
         let ball = &mut self.balls[row];
         ball.release();
-        let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
+        let now = ball.path.begin;
+        let normal = self.walls[wall].nearest(ball.position, now).normal;
+        let touch = ball.position - normal * ball.radius;
+        let surface = self.walls[wall].surface_velocity(normal, touch, now);
         let closing = ball.velocity - surface + ball.rim(normal);
         let approach_speed = -closing.dot(normal);
         let mobility = Mobility::of_balls(0.0, ball.inverse_mass, ball.spins);

@@ -3,7 +3,7 @@
 use cgmath::InnerSpace;
 
 use super::{Ball, EventDriven};
-use crate::response::{BallSpin, Walls as _, Work};
+use crate::response::{BallSpin, Work};
 
 impl EventDriven {
     /// Lets a ball's path begin at a later time.
@@ -34,10 +34,10 @@ impl EventDriven {
         }
         let Some(wall) = ball.path.support else { return };
         work.momentum += held;
-        let (normal, _) = self.walls.normal_and_distance(wall, 0, ball.position);
+        let (wall, begin) = (&self.walls[wall], ball.path.begin);
+        let normal = wall.nearest(ball.position, begin).normal;
         let touch = ball.position - normal * ball.radius;
-        let surface = self.walls.surface_velocity(wall, touch);
-        let surface = surface - normal * surface.dot(normal);
+        let surface = wall.surface_velocity(normal, touch, begin);
         let mut later = *ball;
         later.advance(time);
         let slip = |ball: &Ball| ball.velocity + ball.rim(normal) - surface;

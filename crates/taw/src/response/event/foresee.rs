@@ -3,20 +3,28 @@
 use std::cmp::Reverse;
 use std::f64::consts::SQRT_2;
 
-use cgmath::{InnerSpace, Zero};
+use cgmath::InnerSpace;
 
 use super::time::{Gap, closing_time, meeting_time};
-use super::{Ball, Event, EventDriven, Form, Home, MOST_SURRENDERS, PRESS, REST, Settings, What};
-use crate::math::{Vec3, direction_and_length, is_finite};
-use crate::response::Walls as _;
+use super::{Event, EventDriven, FLUSH, Form, Home, PRESS, REST, Settings, What};
+use crate::math::{Point3, Vec3, direction_and_length, is_finite};
+use crate::shape::Nearest;
 
-/// Steps enough for a ball to come to any wall but one that it only grazes.
+/// Steps enough for a ball to come to any wall but one that it only grazes; then it looks
+/// again.
 const MOST_STEPS: u32 = 64;
+/// The part of a substep after which a ball that touches a wall, and is neither pressed there
+/// nor comes nearer, looks again.
+const AGAIN: f64 = 1.0 / 64.0;
+/// A pressure below this part of the pull is none but for rounding.
+const NO_PRESSURE: f64 = 1e-9;
 
 impl EventDriven {
     /// Finds the next event of a ball and puts it in the queue.
     pub(super) fn foresee(&mut self, row: usize, now: f64, settings: &Settings) {
         self.go_home(row, now, settings.dt);
+        let ends = self.end_of_reach(row, now, settings);
+        let mut looks = 1 + self.looks_at_walls(row);
         let ball = &self.balls[row];
         let left = settings.dt - now;
         let mut first = (ball.path.change.max(now), What::Changes);
@@ -32,6 +40,7 @@ impl EventDriven {
                 _ => {}
             }
         };
+        offer(ends, What::Looks);
         self.name_walls(row, |wall| {
             if ball.path.support != Some(wall)
                 && let Some((after, what)) = self.foresee_wall(row, wall, now, settings)
@@ -40,6 +49,7 @@ impl EventDriven {
             }
         });
         let mut other = |other: usize| {
+            looks += 1;
             if other != row
                 && let Some((after, what)) = self.foresee_meeting(row, other, now, settings)
             {
@@ -69,6 +79,7 @@ impl EventDriven {
             let stamp = ball.path.stamp;
             self.queue.push(Reverse(Event { time, row, stamp, what, tied }));
         }
+        self.looks += looks;
     }
 
     /// Names those that a ball may touch soon, itself among them, some of them twice.
@@ -91,34 +102,41 @@ impl EventDriven {
         settings: &Settings,
     ) -> Option<(f64, What)> {
         let ball = &self.balls[row];
-        if ball.inverse_mass <= 0.0 || ball.path.surrenders >= MOST_SURRENDERS {
+        if ball.inverse_mass <= 0.0 || ball.is_frozen() {
             return None; // no wall holds it
         }
         let Form::Plane { offset, .. } = self.walls[wall].form else {
             return self.foresee_part(row, wall, now, settings);
         };
+        if !self.is_even(wall) {
+            return self.foresee_part(row, wall, now, settings);
+        }
         let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
-        let (normal, distance) = self.walls.normal_and_distance(wall, 0, position);
-        let moving = self.walls[wall].motion.is_some();
-        let touch = position - normal * ball.radius;
-        let surface = if moving { self.walls.surface_velocity(wall, touch) } else { Vec3::zero() };
+        let Nearest { normal, distance, .. } = self.walls[wall].nearest(position, now);
         let gap = Gap {
             now: distance - ball.radius,
-            speed: (velocity + ball.path.carry - surface).dot(normal),
+            speed: (velocity - self.walls[wall].way(position, now)).dot(normal),
             acceleration: ball.path.acceleration.dot(normal),
         };
         let size = ball.radius + distance.abs() + offset.abs();
-        let fall = ball.pull.magnitude() * settings.dt;
         let least = f64::EPSILON * 16.0 * size;
         let held = ball.path.support.is_some() || ball.path.heaped;
+        let slow = self.slow(row, held, settings).max(1e-14 * velocity.magnitude());
+        Self::wall_event(wall, gap, least, held, slow)
+    }
+
+    /// Slower than this, a ball that meets a wall begins to rest on it, or to be pressed.
+    fn slow(&self, row: usize, held: bool, settings: &Settings) -> f64 {
+        let fall = self.balls[row].pull.magnitude() * settings.dt;
+        if held { PRESS * fall } else { REST * fall }
+    }
+
+    /// What comes of the gap between a ball and a plane.
+    fn wall_event(wall: usize, gap: Gap, least: f64, held: bool, slow: f64) -> Option<(f64, What)> {
         let press = gap.acceleration < 0.0;
-        let slow = if held { PRESS * fall } else { REST * fall };
-        let slow = slow.max(1e-14 * velocity.magnitude());
         if gap.now > least {
-            // A wall counts as where it will be, so one that comes nearer is there.
-            let seen = Gap { speed: velocity.dot(normal), ..gap };
-            let after = closing_time(seen)?;
-            let speed = seen.speed + seen.acceleration * after;
+            let after = closing_time(gap)?;
+            let speed = gap.speed + gap.acceleration * after;
             return Some(if speed < -slow || !press {
                 (after, What::Hits(wall))
             } else if held {
@@ -140,9 +158,9 @@ impl EventDriven {
         }
     }
 
-    /// The same of a wall that is no half-space: for as long as the plane across the nearest
-    /// point keeps them apart, they do not meet; then there is another one (conservative
-    /// advancement; Mirtich 1996).
+    /// The same of a wall that is no half-space, or turns: for as long as the plane across the
+    /// nearest point keeps them apart, they do not meet; then there is another one
+    /// (conservative advancement; Mirtich 1996).
     fn foresee_part(
         &self,
         row: usize,
@@ -150,53 +168,76 @@ impl EventDriven {
         now: f64,
         settings: &Settings,
     ) -> Option<(f64, What)> {
-        let ball = &self.balls[row];
+        let (ball, number, wall) = (&self.balls[row], wall, &self.walls[wall]);
         let (mut time, mut step) = (now, 0);
-        let acceleration = ball.path.acceleration;
-        let moving = self.walls[wall].motion.is_some();
-        let fall = ball.pull.magnitude() * settings.dt;
         let held = ball.path.support.is_some() || ball.path.heaped;
-        let (normal, gap, seen) = loop {
+        let slow = self.slow(row, held, settings);
+        loop {
+            if step == MOST_STEPS {
+                return Some((time - now, What::Looks));
+            }
             let (position, velocity) = (ball.position_at(time), ball.velocity_at(time));
-            let (normal, distance) = self.walls.normal_and_distance(wall, 0, position);
-            let touch = position - normal * ball.radius;
-            let surface =
-                if moving { self.walls.surface_velocity(wall, touch) } else { Vec3::zero() };
+            let Nearest { normal, distance, .. } = wall.nearest(position, time);
+            let over = velocity - wall.way(position, time);
             let gap = Gap {
                 now: distance - ball.radius,
-                speed: (velocity + ball.path.carry - surface).dot(normal),
-                acceleration: acceleration.dot(normal),
+                speed: over.dot(normal),
+                acceleration: ball.path.acceleration.dot(normal)
+                    - self.at_most_turned(row, number, time, settings),
             };
-            let seen = Gap { speed: velocity.dot(normal), ..gap };
             let least = f64::EPSILON * 16.0 * (ball.radius + distance.abs()) + ball.rounding;
-            let leaves = step == 0 && gap.speed > 0.0 && gap.now <= least;
-            let after = if leaves {
-                // It comes back to this plane, or never.
-                (gap.acceleration < 0.0).then(|| -2.0 * gap.speed / gap.acceleration)?
-            } else if gap.now <= least || step == MOST_STEPS {
-                break (normal, gap, seen);
+            let slow = slow.max(1e-14 * velocity.magnitude());
+            let after = if gap.now > least {
+                closing_time(gap)?
+            } else if gap.speed < -slow {
+                let seam = self.is_seam(row, number, position, time);
+                return (!seam).then_some((time - now, What::Hits(number)));
             } else {
-                closing_time(seen)?
+                let pressure = self.pressure(row, number, time, ball.path.acceleration);
+                // What came off just now has nothing that presses it, whatever rounding says.
+                let off = step == 0 && ball.path.off == Some(number);
+                let press = !off && pressure > NO_PRESSURE * ball.pull.magnitude();
+                if press && gap.speed <= slow {
+                    if self.is_seam(row, number, position, time) {
+                        return None;
+                    }
+                    return Some(if ball.path.heaped {
+                        let after = (slow * 1.01 + gap.speed) / pressure;
+                        (time - now + after, What::Hits(number))
+                    } else {
+                        (time - now, What::SettlesOn(number))
+                    });
+                }
+                if gap.speed > 0.0 && gap.acceleration < 0.0 {
+                    // It comes back to this plane, or later.
+                    (-2.0 * gap.speed / gap.acceleration).max(AGAIN * AGAIN * settings.dt)
+                } else {
+                    AGAIN * settings.dt
+                }
             };
             step += 1;
             time += after;
             if !time.is_finite() || time > settings.dt {
                 return None;
             }
-        };
-        let slow = if held { PRESS * fall } else { REST * fall };
-        let slow = slow.max(1e-14 * ball.velocity_at(time).magnitude());
-        let press = ball.path.acceleration.dot(normal) < 0.0;
-        // What met it on the way is there; what touched it at once goes by what it sees.
-        let speed = if step > 0 { seen.speed } else { gap.speed };
-        if speed >= -slow && (!press || speed > slow || held) {
-            return None;
         }
-        if self.is_seam(row, wall, ball.position_at(time)) {
-            return None;
+    }
+
+    /// How fast a ball accelerates toward a wall at most because that turns, in m/s².
+    fn at_most_turned(&self, row: usize, wall: usize, time: f64, settings: &Settings) -> f64 {
+        let Some((motion, left)) = self.walls[wall].going(time) else { return 0.0 };
+        let turning = motion.spin.magnitude();
+        if turning == 0.0 {
+            return 0.0;
         }
-        let what = if speed < -slow { What::Hits(wall) } else { What::SettlesOn(wall) };
-        Some((time - now, what))
+        let ball = &self.balls[row];
+        let rest = settings.dt - time;
+        let pull = ball.path.acceleration.magnitude() * rest;
+        let speed = (ball.velocity_at(time) - motion.velocity).magnitude() + pull;
+        let pivot = motion.pivot - motion.velocity * left;
+        let arm = (ball.position_at(time) - pivot).magnitude() + speed * rest;
+        // Of a plane that turns: what Coriolis and the turn itself do.
+        turning * (2.0 * speed + turning * arm)
     }
 
     /// When and how two balls meet next, in seconds from now.
@@ -212,8 +253,10 @@ impl EventDriven {
         let (from, to) = (first.position_at(now), second.position_at(now));
         let velocity = second.velocity_at(now) - first.velocity_at(now);
         let acceleration = second.path.acceleration - first.path.acceleration;
-        let passes = |ball: &Ball| ball.path.surrenders >= MOST_SURRENDERS;
-        if first.inverse_mass + second.inverse_mass <= 0.0 || passes(first) || passes(second) {
+        if first.inverse_mass + second.inverse_mass <= 0.0
+            || first.is_frozen()
+            || second.is_frozen()
+        {
             return None; // nothing could come of it
         }
         if !is_finite(to - from) || !is_finite(velocity) || !is_finite(acceleration) {
@@ -263,6 +306,24 @@ impl EventDriven {
             return meeting_time(to - from, velocity, acceleration, reach, [apex, left]).map(meets);
         }
         Some(((-press * 1.01 - speed) / pull, What::Leans(b, stamp)))
+    }
+
+    /// Whether the point where a wall is nearest to a ball is on another wall that is as
+    /// near, which is then the one that counts.
+    pub(super) fn is_seam(&self, row: usize, wall: usize, at: Point3<f64>, time: f64) -> bool {
+        let ball = &self.balls[row];
+        let flush = (FLUSH * ball.radius).max(ball.rounding);
+        let nearest = |wall: usize, point: Point3<f64>| self.walls[wall].nearest(point, time);
+        let its = nearest(wall, at);
+        let mut covered = false;
+        self.name_walls(row, |other| {
+            if !covered && other != wall && nearest(other, its.point).distance <= flush {
+                let theirs = nearest(other, at);
+                let before = (theirs.distance, other) < (its.distance, wall);
+                covered = before || nearest(wall, theirs.point).distance > flush;
+            }
+        });
+        covered
     }
 
     /// The speed that two balls that press each other gain before they touch anew.

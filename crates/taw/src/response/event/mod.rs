@@ -6,13 +6,17 @@
 //! meets a wall or a ball, it leaves its cell of the grid, or what it lies on makes it
 //! roll instead of slide. All of it is counted in `f64`, whatever the world counts in.
 
+mod bend;
 mod cells;
 mod collide;
 mod count;
 mod foresee;
+mod lie;
+mod reach;
 mod rest;
 mod support;
 mod time;
+mod wall;
 
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
@@ -21,14 +25,15 @@ use cgmath::{InnerSpace, Zero};
 
 use crate::contact::Contacts;
 use crate::math::{Point3, Scalar, Vec3, cast_vector, is_finite, is_finite_point};
-use crate::motion::WallMotion;
 use crate::response::impulse::Warm;
-use crate::response::{BallSpin, Material, Walls, Work};
-use crate::shape::{Box3, BoxTree, Nearest, Shape, Solid, Triangle};
+use crate::response::{BallSpin, Material, Work};
+use bend::State;
 use cells::{Cell, Cells};
 use collide::Moment;
+use reach::Reach;
+pub(crate) use reach::Source;
 use rest::Heap;
-use support::Support;
+pub(crate) use wall::{Form, Wall};
 
 /// A wall is left or met again only faster than this part of what gravity does to a
 /// speed in a substep. Slower, a ball rests on it: the bounces that it still had ahead
@@ -47,7 +52,7 @@ const MOST_LOSSES: f64 = 64.0;
 /// about as long.
 const LEAN: f64 = 8.0;
 /// After so many times at rest and out of it again, something presses a ball that nothing
-/// can stop. For the rest of the substep it passes through; the next one pushes it out.
+/// can stop. For the rest of the substep it stays where it is; the next one pushes it out.
 const MOST_SURRENDERS: i32 = 10;
 /// What is no time between two collisions, over the substep.
 const NO_TIME: f64 = 1e-13;
@@ -56,9 +61,16 @@ const FLUSH: f64 = 5e-6;
 /// What lies on a wall that is no half-space looks where it is after this part of its
 /// radius, though not more often than after this part of a substep.
 const LOOK: f64 = 0.05;
-/// So many events in one substep, and a thousand more for each ball, that something must
-/// be wrong; the rest of it passes without any.
-const MOST_EVENTS: usize = 10_000_000;
+/// What a substep may cost, and for each ball besides, in looks at one wall or one other
+/// ball, of which a processor does some fifty million in a second. Whatever is not at its end
+/// then stays where it is, and is named.
+const MOST_LOOKS: u64 = 32_000_000;
+const LOOKS_A_BALL: u64 = 20_000;
+/// So many touches are enough to hold a ball, of which one of its size has twelve at most. Of
+/// those between two that both have as many already, no more are taken.
+pub(crate) const MOST_TOUCHES: u32 = 64;
+/// A look at a part of a wall that is no half-space counts as so many.
+const PART_LOOKS: u64 = 8;
 
 /// A collision that a substep went through.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,75 +97,6 @@ impl Impact<f64> {
             normal: cast_vector(self.normal),
             approach_speed: S::constant(self.approach_speed),
         }
-    }
-}
-
-/// A wall, or a part of one, and how it moves.
-#[derive(Clone, Debug)]
-pub(crate) struct Wall {
-    pub form: Form,
-    /// What the world calls it.
-    pub row: u32,
-    pub part: u32,
-    pub motion: Option<WallMotion<f64>>,
-    pub material: Option<Material<f64>>,
-}
-
-/// What a [`Wall`] is.
-#[derive(Clone, Debug)]
-pub(crate) enum Form {
-    Plane {
-        normal: Vec3<f64>,
-        offset: f64,
-    },
-    Solid(Shape<f64>),
-    Triangle(Triangle<f64>),
-    /// Of a height field.
-    SolidBelow(Triangle<f64>),
-}
-
-impl Form {
-    pub fn nearest(&self, point: Point3<f64>) -> Nearest<f64> {
-        match self {
-            Self::Plane { normal, offset } => {
-                let distance = normal.dot(Vec3::new(point.x, point.y, point.z)) - offset;
-                Nearest { point: point - normal * distance, normal: *normal, distance }
-            }
-            Self::Solid(shape) => shape.nearest(point),
-            Self::Triangle(triangle) => triangle.nearest(point),
-            Self::SolidBelow(triangle) => triangle.nearest_if_solid_below(point),
-        }
-    }
-
-    /// The box around it, of a plane none.
-    fn bounds(&self) -> Option<Box3<f64>> {
-        match self {
-            Self::Plane { .. } => None,
-            Self::Solid(shape) => Some(shape.bounding_box()),
-            Self::Triangle(triangle) | Self::SolidBelow(triangle) => Some(triangle.bounding_box()),
-        }
-    }
-}
-
-impl Wall {
-    /// What counts between this wall and a ball of that material.
-    fn against(&self, ball: Material<f64>) -> Material<f64> {
-        self.material.map_or(ball, |its| ball.against(its))
-    }
-}
-
-impl Walls<f64> for Vec<Wall> {
-    fn normal_and_distance(&self, wall: usize, _: u32, point: Point3<f64>) -> (Vec3<f64>, f64) {
-        let Nearest { normal, distance, .. } = self[wall].form.nearest(point);
-        (normal, distance)
-    }
-
-    fn surface_velocity(&self, wall: usize, point: Point3<f64>) -> Vec3<f64> {
-        self[wall].motion.map_or_else(Vec3::zero, |motion| motion.velocity_at(point))
-    }
-
-    fn material(&self, wall: usize) -> Option<Material<f64>> {
-        self[wall].material
     }
 }
 
@@ -191,9 +134,13 @@ pub(crate) struct Path {
     spin_acceleration: Vec3<f64>,
     /// The wall that it lies on.
     support: Option<usize>,
-    /// The velocity that it shares with a wall that rises under it, which is not part
-    /// of the ball's own while it lies there.
-    carry: Vec3<f64>,
+    /// Where it is when its path changes by itself, if that is known better than by the
+    /// acceleration.
+    arrival: Option<State>,
+    /// Whether what it lies on ends there, or bends away from under it.
+    leaves: bool,
+    /// The wall that it has just come off.
+    off: Option<usize>,
     /// Whether its acceleration holds it in a heap.
     heaped: bool,
     /// What the collisions of this substep took from it, as parts of their approach; all of
@@ -225,7 +172,9 @@ impl Default for Path {
             acceleration: Vec3::zero(),
             spin_acceleration: Vec3::zero(),
             support: None,
-            carry: Vec3::zero(),
+            arrival: None,
+            leaves: false,
+            off: None,
             heaped: false,
             losses: 0.0,
             collided: f64::NEG_INFINITY,
@@ -250,16 +199,59 @@ impl Ball {
     /// Lets its path begin at a later time.
     fn advance(&mut self, time: f64) {
         let t = time - self.path.begin;
+        let begin = self.position;
         self.position = self.position_at(time);
+        let Some(end) = self.path.arrival else {
+            self.go_on(time);
+            return;
+        };
+        let whole = end.time - self.path.begin;
+        let part = if whole > 0.0 && time < end.time { t / whole } else { 1.0 };
+        // A velocity that is right at both ends and leads from place to place.
+        let mean = if whole > 0.0 { (end.position - begin) / whole } else { end.velocity };
+        let bow = (mean - (self.velocity + end.velocity) * 0.5) * (6.0 * part * (1.0 - part));
+        let (velocity, spin) = (end.velocity - self.velocity, end.spin - self.spin);
+        self.turned += (self.spin + spin * (0.5 * part)) * t;
+        self.velocity += velocity * part + bow;
+        self.spin += spin * part;
+        if part >= 1.0 {
+            (self.position, self.velocity, self.spin) = (end.position, end.velocity, end.spin);
+            self.path.arrival = None;
+            if time > end.time {
+                self.path.begin = end.time;
+                self.position = self.position_at(time);
+                self.go_on(time);
+            }
+        } else if let Some(left) = &mut self.path.arrival {
+            // The rest of the same path.
+            *left = end;
+        }
+        self.path.begin = time;
+    }
+
+    fn go_on(&mut self, time: f64) {
+        let t = time - self.path.begin;
         self.velocity = self.velocity_at(time);
         self.turned += (self.spin + self.path.spin_acceleration * (0.5 * t)) * t;
         self.spin += self.path.spin_acceleration * t;
         self.path.begin = time;
     }
 
+    /// Lets it stay where it is for the rest of the substep.
+    fn freeze(&mut self) {
+        self.release();
+        self.velocity = Vec3::zero();
+        self.path.acceleration = Vec3::zero();
+        self.path.surrenders = self.path.surrenders.max(MOST_SURRENDERS);
+    }
+
+    /// Whether it stays where it is for the rest of the substep.
+    fn is_frozen(&self) -> bool {
+        self.path.surrenders >= MOST_SURRENDERS
+    }
+
     /// Lets go of whatever held it.
     fn release(&mut self) {
-        self.velocity += self.path.carry;
         self.path = Path {
             begin: self.path.begin,
             acceleration: self.pull,
@@ -308,6 +300,9 @@ enum What {
         to: i64,
     },
     Changes,
+    /// It comes to where walls may be that it does not know yet, or that it looked at as
+    /// often as it may.
+    Looks,
 }
 
 /// Something that will happen, unless something else happens first.
@@ -342,11 +337,13 @@ impl PartialEq for Event {
 impl Eq for Event {}
 
 /// What the method is told, besides balls and walls.
-pub(crate) struct Settings {
+pub(crate) struct Settings<'a> {
     /// The length of the substep, in seconds.
     pub dt: f64,
     /// For what rests in heaps.
     pub iterations: u32,
+    /// The walls.
+    pub source: &'a dyn Source,
 }
 
 /// The method, with what it scribbles on.
@@ -354,18 +351,17 @@ pub(crate) struct Settings {
 pub(crate) struct EventDriven {
     /// To be filled by the caller, who finds them there afterwards.
     pub balls: Vec<Ball>,
-    /// To be filled by the caller.
-    pub walls: Vec<Wall>,
-    /// Pairs that may touch at the start: wall and ball, ball and ball.
+    /// Those that balls may come to.
+    walls: Vec<Wall>,
+    /// Pairs of balls that may touch at the start.
     pub near: Contacts<f64>,
     /// What the heaps' contacts bore in the last substep.
     pub warm: Vec<Warm<f64>>,
     /// What is done to the balls, if somebody asks.
     pub work: Option<Work>,
-    /// Which walls are half-spaces; and the others, by their boxes.
-    planes: Vec<usize>,
-    parts: Vec<usize>,
-    tree: BoxTree<f64>,
+    reach: Reach,
+    /// What it cost so far, in looks.
+    looks: u64,
     cells: Cells,
     anywhere: Vec<usize>,
     queue: BinaryHeap<Reverse<Event>>,
@@ -383,28 +379,47 @@ impl EventDriven {
             ball.path = Path { acceleration: ball.pull, ..Path::default() };
             ball.turned = Vec3::zero();
         }
-        self.sort_walls();
-        self.begin_at_rest(settings);
+        self.looks = 0;
         self.find_homes(dt);
+        self.find_walls(settings);
+        self.begin_at_rest(settings);
         self.queue.clear();
         for row in 0..self.balls.len() {
             self.foresee(row, 0.0, settings);
         }
-        for _ in 0..MOST_EVENTS + 1000 * self.balls.len() {
+        let most = MOST_LOOKS + LOOKS_A_BALL * self.balls.len() as u64;
+        while self.looks < most {
             let Some(Reverse(event)) = self.queue.pop() else { break };
             if self.balls[event.row].path.stamp == event.stamp {
                 self.happen(event, settings, impacts);
             }
         }
+        let mut stopped = self.stop_what_is_left();
         (0..self.balls.len()).for_each(|row| self.advance(row, dt));
-        let mut stopped = Vec::new();
         for (row, (ball, before)) in self.balls.iter_mut().zip(before).enumerate() {
-            ball.velocity += ball.path.carry;
             if !is_finite_point(ball.position) || !is_finite(ball.velocity) || !is_finite(ball.spin)
             {
                 ball.position = before;
                 (ball.velocity, ball.spin, ball.turned) =
                     (Vec3::zero(), Vec3::zero(), Vec3::zero());
+                stopped.push(row as u32);
+            }
+        }
+        stopped.sort_unstable();
+        stopped.dedup();
+        stopped
+    }
+
+    /// Lets every ball that still has something ahead of it stay where it is, if nothing
+    /// else will happen in this substep. Gives their rows.
+    fn stop_what_is_left(&mut self) -> Vec<u32> {
+        let mut stopped = Vec::new();
+        let first = self.queue.peek().map_or(0.0, |Reverse(event)| event.time);
+        for Reverse(Event { row, stamp, .. }) in std::mem::take(&mut self.queue) {
+            if self.balls[row].path.stamp == stamp {
+                self.advance(row, first.max(self.balls[row].path.begin));
+                self.balls[row].freeze();
+                self.balls[row].spin = Vec3::zero();
                 stopped.push(row as u32);
             }
         }
@@ -441,15 +456,22 @@ impl EventDriven {
             }
             What::SettlesOn(wall) => {
                 self.advance(row, time);
-                self.settle(row, wall, settings);
-                self.foresee(row, time, settings);
+                let path = &mut self.balls[row].path;
+                // One that lies on another one may go to and fro between them.
+                path.losses += if path.support.is_some() { LEAN } else { 0.0 };
+                if self.loses(row) {
+                    self.surrender([row, row], time, settings);
+                } else {
+                    self.settle(row, wall, settings);
+                    self.foresee(row, time, settings);
+                }
             }
             What::Changes => {
                 self.advance(row, time);
                 self.look_what_it_lies_on(row, settings);
-                self.stretch(row, settings);
                 self.foresee(row, time, settings);
             }
+            What::Looks => self.foresee(row, time, settings),
             What::LeavesCell { axis, to } => {
                 if let Home::Cell(mut cell) = self.balls[row].path.home {
                     self.cells.remove(row as u32);
@@ -460,142 +482,6 @@ impl EventDriven {
                 self.foresee(row, time, settings);
             }
         }
-    }
-
-    /// Lets a ball that touches a wall lie on it from now on.
-    fn settle(&mut self, row: usize, wall: usize, settings: &Settings) {
-        let (normal, distance) = self.walls.normal_and_distance(wall, 0, self.balls[row].position);
-        let ball = &mut self.balls[row];
-        ball.release();
-        let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
-        // The rounding of the place goes too, lest it add up.
-        let overlap = ball.radius - distance;
-        let fall = ball.pull.magnitude() * settings.dt * settings.dt;
-        if overlap.abs() <= REST * fall + ball.rounding {
-            ball.position += normal * overlap;
-        }
-        ball.velocity -= normal * ball.velocity.dot(normal);
-        ball.path.carry = normal * surface.dot(normal);
-        ball.path.support = Some(wall);
-        self.stretch(row, settings);
-    }
-
-    /// Takes note of which walls are where.
-    fn sort_walls(&mut self) {
-        self.planes.clear();
-        self.parts.clear();
-        let mut boxes = Vec::new();
-        for (number, wall) in self.walls.iter().enumerate() {
-            match wall.form.bounds() {
-                None => self.planes.push(number),
-                Some(bounds) => {
-                    self.parts.push(number);
-                    boxes.push(bounds);
-                }
-            }
-        }
-        self.tree = BoxTree::new(&boxes);
-    }
-
-    /// Names the walls that a ball may touch before it leaves its cell.
-    fn name_walls(&self, row: usize, mut name: impl FnMut(usize)) {
-        self.planes.iter().for_each(|wall| name(*wall));
-        if self.parts.is_empty() {
-            return;
-        }
-        let ball = &self.balls[row];
-        match ball.path.home {
-            Home::Cell(cell) => {
-                let width = self.cells.width();
-                let corner = cell.map(|i| i as f64 * width);
-                let more = ball.radius + ball.rounding + 1e-3 * width;
-                let bounds = Box3 {
-                    min: Point3::from(corner.map(|x| x - more)),
-                    max: Point3::from(corner.map(|x| x + width + more)),
-                };
-                self.tree.near(&bounds, |item| name(self.parts[item as usize]));
-            }
-            Home::Anywhere => self.parts.iter().for_each(|wall| name(*wall)),
-        }
-    }
-
-    /// Whether the point where a wall is nearest to a ball is on another wall that is as
-    /// near, which is then the one that counts.
-    fn is_seam(&self, row: usize, wall: usize, at: Point3<f64>) -> bool {
-        let ball = &self.balls[row];
-        let flush = (FLUSH * ball.radius).max(ball.rounding);
-        let nearest = |wall: usize, point: Point3<f64>| self.walls[wall].form.nearest(point);
-        let its = nearest(wall, at);
-        let mut covered = false;
-        self.name_walls(row, |other| {
-            if !covered && other != wall && nearest(other, its.point).distance <= flush {
-                let theirs = nearest(other, at);
-                let before = (theirs.distance, other) < (its.distance, wall);
-                covered = before || nearest(wall, theirs.point).distance > flush;
-            }
-        });
-        covered
-    }
-
-    /// A ball on a wall that is no half-space may have come to where another goes on, or
-    /// none: then it flies.
-    fn look_what_it_lies_on(&mut self, row: usize, settings: &Settings) {
-        let Some(support) = self.balls[row].path.support else { return };
-        if matches!(self.walls[support].form, Form::Plane { .. }) {
-            return;
-        }
-        let ball = &self.balls[row];
-        let at = ball.position;
-        let mut best = (f64::INFINITY, support);
-        self.name_walls(row, |wall| {
-            let distance = self.walls[wall].form.nearest(at).distance;
-            if (distance, wall) < best {
-                best = (distance, wall);
-            }
-        });
-        let fall = ball.pull.magnitude() * settings.dt * settings.dt;
-        let touching = best.0 - ball.radius <= REST * fall + ball.rounding + FLUSH * ball.radius;
-        if touching && ball.pull.dot(self.walls[best.1].form.nearest(at).normal) < 0.0 {
-            self.settle(row, best.1, settings);
-        } else {
-            self.balls[row].release();
-        }
-    }
-
-    /// Finds out how a ball moves on that lies on a wall.
-    fn stretch(&mut self, row: usize, settings: &Settings) {
-        let ball = &mut self.balls[row];
-        let Some(wall) = ball.path.support else { return };
-        let Wall { form, motion, .. } = &self.walls[wall];
-        let Nearest { normal, .. } = form.nearest(ball.position);
-        let curved = !matches!(form, Form::Plane { .. });
-        let material = self.walls[wall].against(ball.material);
-        let pressure = -ball.pull.dot(normal);
-        let touch = ball.position - normal * ball.radius;
-        let support = Support {
-            normal,
-            surface: motion.map_or_else(Vec3::zero, |m| m.velocity_at(touch)),
-            turning: motion.map_or_else(Vec3::zero, |m| m.spin),
-            pull: ball.pull + normal * pressure,
-            pressure,
-            radius: ball.radius,
-            friction: material.friction,
-            rolling_resistance: material.rolling_resistance,
-            spinning_resistance: material.spinning_resistance,
-            spins: ball.spins == BallSpin::Free,
-        };
-        let stretch = support.stretch(ball.velocity, ball.spin, settings.dt);
-        ball.velocity += stretch.velocity_change;
-        ball.spin += stretch.spin_change;
-        ball.path.acceleration = stretch.acceleration;
-        ball.path.spin_acceleration = stretch.spin_acceleration;
-        // Before it is far, it must be seen whether what it lies on goes on like this.
-        let way = LOOK * ball.radius;
-        let look = if curved { way / ball.velocity.magnitude() } else { f64::INFINITY };
-        let duration = stretch.duration.min(look.max(LOOK * settings.dt));
-        ball.path.change =
-            if duration < settings.dt { ball.path.begin + duration } else { f64::INFINITY };
-        ball.path.stamp += 1;
     }
 
     /// Puts every ball where others find it.

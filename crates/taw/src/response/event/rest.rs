@@ -3,11 +3,13 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::{Ball, EventDriven, PRESS, Path, REST, Settings};
+use super::wall::{Between, Wall};
+use super::{Ball, EventDriven, MOST_TOUCHES, PRESS, Path, REST, Settings};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Vec3, direction_and_length};
 use crate::response::impulse::{self, Around, Start, Warm, impulse};
-use crate::response::{BallSpin, Columns, Material, Walls as _};
+use crate::response::{BallSpin, Columns, Material};
+use crate::shape::Nearest;
 
 /// Overlap that may stay, over the radius: pushing it out would lift what lies on it, and
 /// create energy.
@@ -58,16 +60,24 @@ impl Heap {
         fill(&mut self.velocity, each().map(|b| b.velocity));
         fill(&mut self.spin, each().map(|b| b.spin));
         fill(&mut self.radius, each().map(|b| b.radius));
-        fill(&mut self.inverse_mass, each().map(|b| b.inverse_mass));
+        fill(
+            &mut self.inverse_mass,
+            each().map(|b| if b.is_frozen() { 0.0 } else { b.inverse_mass }),
+        );
         fill(&mut self.material, each().map(|b| b.material));
         fill(&mut self.held, each().map(|b| b.spins == BallSpin::Ignored));
+    }
+
+    /// What it costs to solve contacts, in looks.
+    fn cost(contacts: &Contacts<f64>, settings: &Settings) -> u64 {
+        2 * contacts.len() as u64 * u64::from(settings.iterations)
     }
 
     /// Solves the contacts over `dt` seconds, or with zero what happens at once.
     fn solve(
         &mut self,
         contacts: &mut Contacts<f64>,
-        walls: &Vec<super::Wall>,
+        walls: &Between,
         pull: f64,
         dt: f64,
         settings: &Settings,
@@ -86,7 +96,8 @@ impl Heap {
             iterations: settings.iterations,
             dt,
             bounce_speed: 2.0 * pull * settings.dt,
-            slop: f64::INFINITY,
+            // As deep as a gap may be wide that counts as touching.
+            slop: 0.5 * PRESS * PRESS * pull * settings.dt * settings.dt,
             largest_slop: SLOP,
         };
         let mut stopped = Vec::new(); // whoever it is will be stopped at the end, too
@@ -110,19 +121,11 @@ fn fill<T>(column: &mut Vec<T>, values: impl Iterator<Item = T>) {
 impl EventDriven {
     /// Finds what rests at the start of a substep.
     pub(super) fn begin_at_rest(&mut self, settings: &Settings) {
-        for contact in &self.near.wm {
-            // What a wall overlaps too deep is moved out at once.
-            let ball = &mut self.balls[contact.b as usize];
-            let (normal, distance) =
-                self.walls.normal_and_distance(contact.a as usize, 0, ball.position);
-            let overlap = ball.radius - distance;
-            // No wall holds what has infinite mass.
-            if overlap > SLOP * ball.radius && ball.inverse_mass > 0.0 {
-                ball.position += normal * overlap;
-            }
+        self.near.wm.clear();
+        for row in 0..self.balls.len() {
+            self.begin_at_walls(row, settings);
         }
         let mut near = std::mem::take(&mut self.near);
-        near.wm.retain(|c| self.touches_wall(c, settings).is_some_and(|speed| speed >= 0.0));
         near.mm.retain(|c| self.touches_ball(c, settings).is_some_and(|speed| speed >= 0.0));
         let mut touches = std::mem::take(&mut self.heap.touches);
         touches.clear();
@@ -145,22 +148,74 @@ impl EventDriven {
         self.near = near;
     }
 
+    /// Finds the walls that a ball touches at the start. Out of what it overlaps, but by what
+    /// others may press it there, it is moved at once: overlap is not energy.
+    fn begin_at_walls(&mut self, row: usize, settings: &Settings) {
+        let mut near = std::mem::take(&mut self.near.wm);
+        self.move_out(row, self.parts_of(row).to_vec());
+        // Half-spaces have the last word: behind them there is nothing.
+        self.move_out(row, self.half_spaces().to_vec());
+        let at = self.balls[row].position;
+        self.name_walls(row, |wall| {
+            let mtv = Vec3::zero();
+            let contact = Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
+            let least = if self.goes(&contact) { f64::NEG_INFINITY } else { 0.0 };
+            if self.touches_wall(&contact, 0.0, settings).is_some_and(|speed| speed >= least)
+                && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, 0.0))
+            {
+                near.push(contact);
+            }
+        });
+        self.looks += 2 * self.looks_at_walls(row);
+        self.near.wm = near;
+    }
+
+    /// Moves a ball out of the wall that it is deepest in.
+    fn move_out(&mut self, row: usize, walls: Vec<u32>) {
+        let ball = &self.balls[row];
+        let mut deepest = (SLOP * ball.radius, Vec3::zero());
+        for wall in walls {
+            let near = self.walls[wall as usize].nearest(ball.position, 0.0);
+            let overlap = ball.radius - near.distance;
+            // No wall holds what has infinite mass.
+            if overlap > deepest.0 && ball.inverse_mass > 0.0 {
+                deepest = (overlap, near.normal * overlap);
+            }
+        }
+        self.balls[row].position += deepest.1;
+    }
+
+    /// Whether the wall of a contact goes through the substep.
+    fn goes(&self, contact: &Contact<f64>) -> bool {
+        self.walls[contact.a as usize].there.is_some()
+    }
+
     /// Whether a ball that touches one wall and nothing else rests on it.
     fn lies_on(&self, contact: &Contact<f64>, settings: &Settings) -> bool {
-        let (gap, speed) = self.wall_gap(contact);
+        let (gap, speed) = self.wall_gap(contact, 0.0);
         let ball = &self.balls[contact.b as usize];
-        let rest = REST * ball.pull.magnitude() * settings.dt;
+        let fall = ball.pull.magnitude() * settings.dt;
         let wall = &self.walls[contact.a as usize];
-        let falls = ball.pull.dot(wall.form.nearest(ball.position).normal) < 0.0;
-        falls && gap <= 0.5 * REST * rest * settings.dt + ball.rounding && speed.abs() <= rest
+        // The speed of a wall that is moved from place to place jumps at the start; what lies
+        // on it does not jump with it.
+        let rest = if self.goes(contact) { fall } else { REST * fall };
+        let low = 0.5 * REST * REST * fall * settings.dt;
+        let low = low + ball.rounding + wall.rounding(ball.position);
+        let presses = self.pressure(contact.b as usize, contact.a as usize, 0.0, ball.pull) > 0.0;
+        presses && gap <= low && speed.abs() <= rest
     }
 
     /// How much slower than what counts as rest a ball and a wall come together, or
     /// nothing if they do not touch.
-    fn touches_wall(&self, contact: &Contact<f64>, settings: &Settings) -> Option<f64> {
-        let (gap, speed) = self.wall_gap(contact);
-        let slow = PRESS * self.balls[contact.b as usize].pull.magnitude() * settings.dt;
-        (gap <= self.low(contact.b, settings) && speed <= slow).then_some(slow + speed)
+    fn touches_wall(&self, contact: &Contact<f64>, now: f64, settings: &Settings) -> Option<f64> {
+        let (gap, speed) = self.wall_gap(contact, now);
+        let ball = &self.balls[contact.b as usize];
+        let fall = ball.pull.magnitude() * settings.dt;
+        let goes = self.goes(contact) && now == 0.0;
+        let slow = if goes { fall } else { PRESS * fall };
+        let low =
+            self.low(contact.b, settings) + self.walls[contact.a as usize].rounding(ball.position);
+        (gap <= low && speed <= slow).then_some(slow + speed)
     }
 
     /// The same of two balls.
@@ -183,12 +238,12 @@ impl EventDriven {
     }
 
     /// The gap between a wall and a ball, and how fast it grows.
-    fn wall_gap(&self, contact: &Contact<f64>) -> (f64, f64) {
+    fn wall_gap(&self, contact: &Contact<f64>, now: f64) -> (f64, f64) {
         let ball = &self.balls[contact.b as usize];
-        let wall = contact.a as usize;
-        let (normal, distance) = self.walls.normal_and_distance(wall, 0, ball.position);
-        let surface = self.walls.surface_velocity(wall, ball.position - normal * ball.radius);
-        (distance - ball.radius, (ball.velocity - surface).dot(normal))
+        let wall: &Wall = &self.walls[contact.a as usize];
+        let Nearest { normal, distance, .. } = wall.nearest(ball.position, now);
+        let way = wall.way(ball.position, now);
+        (distance - ball.radius, (ball.velocity - way).dot(normal))
     }
 
     /// Lets balls, and all that touch them and each other, rest together from now on.
@@ -207,10 +262,14 @@ impl EventDriven {
             (material.restitution, material.tangential_restitution) = (0.0, 0.0);
         }
         let left = settings.dt - now;
-        self.heap.solve(&mut contacts, &self.walls, pull, 0.0, settings, &mut Vec::new());
+        let walls = Between { walls: &self.walls, begin: now, end: now };
+        self.looks += Heap::cost(&contacts, settings);
+        self.heap.solve(&mut contacts, &walls, pull, 0.0, settings, &mut Vec::new());
         for (label, row) in self.heap.rows.iter().enumerate() {
             let ball = &mut self.balls[*row as usize];
-            (ball.velocity, ball.spin) = (self.heap.velocity[label], self.heap.spin[label]);
+            if !ball.is_frozen() {
+                (ball.velocity, ball.spin) = (self.heap.velocity[label], self.heap.spin[label]);
+            }
         }
         let name = |label: u32| self.heap.rows[label as usize];
         contacts.wm.iter_mut().for_each(|c| c.b = name(c.b));
@@ -246,24 +305,31 @@ impl EventDriven {
             find(row, &mut place, &mut found);
         }
         let mut turn = 0;
+        let mut touches = vec![0_u32; self.balls.len()];
         let mut near = Vec::new();
         let mtv = Vec3::zero();
         while let Some(row) = found.get(turn).copied() {
             turn += 1;
             self.advance(row, now);
+            let frozen = self.balls[row].is_frozen();
             self.balls[row].release();
+            if frozen {
+                self.balls[row].freeze();
+            }
+            self.looks += 1 + self.looks_at_walls(row);
             let at = self.balls[row].position;
             self.name_walls(row, |wall| {
                 let contact =
                     Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
-                if self.touches_wall(&contact, settings).is_some()
-                    && (self.parts.is_empty() || !self.is_seam(row, wall, at))
+                if self.touches_wall(&contact, now, settings).is_some()
+                    && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, now))
                 {
                     contacts.wm.push(contact);
                 }
             });
             near.clear();
             self.name_near(row, |other| near.push(other));
+            self.looks += near.len() as u64;
             near.sort_unstable();
             near.dedup();
             for other in near.iter().copied().filter(|other| *other != row) {
@@ -277,7 +343,10 @@ impl EventDriven {
                 let contact = Contact { a, b, part: 0, along: [0.0; 2], mtv };
                 // The two that it is about touch, whatever rounding says.
                 let known = first.contains(&row) && first.contains(&other);
-                if known || self.touches_ball(&contact, settings).is_some() {
+                let full = touches[row].min(touches[other]) >= MOST_TOUCHES;
+                if !full && (known || self.touches_ball(&contact, settings).is_some()) {
+                    touches[row] += 1;
+                    touches[other] += 1;
                     contacts.mm.push(contact);
                     find(other, &mut place, &mut found);
                 }
@@ -304,6 +373,9 @@ impl EventDriven {
         // Where each would be at the end of the substep if nothing held it.
         for (at, row) in rows.iter().enumerate() {
             let ball = &self.balls[*row as usize];
+            if ball.is_frozen() {
+                continue;
+            }
             position[at] += (ball.velocity + ball.pull * (0.5 * left)) * left;
             velocity[at] += ball.pull * left;
             strongest = strongest.max(ball.pull.magnitude());
@@ -314,11 +386,16 @@ impl EventDriven {
                 (rows.get(at).copied() == Some(row as u32)).then_some(at)
             })
         });
-        self.heap.solve(contacts, &self.walls, strongest, left, settings, warm);
+        let walls = Between { walls: &self.walls, begin: now, end: settings.dt };
+        self.looks += Heap::cost(contacts, settings);
+        self.heap.solve(contacts, &walls, strongest, left, settings, warm);
         let Heap { rows, position, velocity, spin, .. } = &self.heap;
         warm.retain_mut(|warm| warm.rename(|at| rows.get(at).map(|row| *row as usize)));
         for (at, row) in rows.iter().enumerate() {
             let ball = &mut self.balls[*row as usize];
+            if ball.is_frozen() {
+                continue;
+            }
             let end = ball.position + (ball.velocity + velocity[at]) * (0.5 * left);
             ball.path = Path {
                 acceleration: (velocity[at] - ball.velocity) / left,

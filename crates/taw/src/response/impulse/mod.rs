@@ -278,10 +278,31 @@ fn remember<S: Scalar>(constraints: &[Constraint<S>], warm: &mut Vec<Warm<S>>) {
 pub(crate) trait Walls<S> {
     /// The normal of a part of the wall, and how far a point is in front of it.
     fn normal_and_distance(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S);
+    /// The same when the step began, for walls that were elsewhere then.
+    fn normal_and_distance_before(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S) {
+        self.normal_and_distance(wall, part, point)
+    }
     /// How its surface moves at a point, in m/s.
     fn surface_velocity(&self, wall: usize, point: Point3<S>) -> Vec3<S>;
     /// Its own material, if it has one.
     fn material(&self, wall: usize) -> Option<Material<S>>;
+}
+
+/// Walls as they were when the step began.
+struct Before<'a, W>(&'a W);
+
+impl<S, W: Walls<S>> Walls<S> for Before<'_, W> {
+    fn normal_and_distance(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S) {
+        self.0.normal_and_distance_before(wall, part, point)
+    }
+
+    fn surface_velocity(&self, wall: usize, point: Point3<S>) -> Vec3<S> {
+        self.0.surface_velocity(wall, point)
+    }
+
+    fn material(&self, wall: usize) -> Option<Material<S>> {
+        self.0.material(wall)
+    }
 }
 
 impl<S: Scalar> Columns<'_, S> {

@@ -3,7 +3,7 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::islands::{Island, Islands};
-use super::{Around, Constraint, First, Walls};
+use super::{Around, Before, Constraint, First, Walls};
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, direction_and_length};
 use crate::response::{Columns, Material};
@@ -125,7 +125,8 @@ impl<S: Scalar> Columns<'_, S> {
         let (normal, gap) = self.normal_and_gap(self.position, a, b, along, around.walls)?;
         // What pushes along the mean normal of a step does no work, and neither does
         // an overlap that stays what it was.
-        let start = self.normal_and_gap(around.start.position, a, b, along, around.walls);
+        let before = &Before(around.walls);
+        let start = self.normal_and_gap(around.start.position, a, b, along, before);
         if let (None, Some(met)) = (start, self.met(a, b, along, normal, around)) {
             return Some(met);
         }

@@ -1,0 +1,182 @@
+//! Which walls a ball can come to. Found ball by ball, by how far it can go, so that one on a
+//! large mesh knows some of its triangles only; looked for again when it gets farther.
+
+use std::collections::BTreeMap;
+
+use cgmath::InnerSpace;
+
+use super::{Ball, EventDriven, FLUSH, Settings, Wall};
+use crate::math::Point3;
+
+/// A ball that knows the walls this many cells around needs to know no more yet.
+const MOST_CELLS: f64 = 4.0;
+/// After this part of how far it may go, a ball looks around anew.
+const NEAR_THE_END: f64 = 0.9;
+/// A part of a radius that is added to how far a ball can go, so that one at rest need not
+/// look again.
+const MORE: f64 = 1e-3;
+
+/// Where walls come from.
+pub(crate) trait Source {
+    /// Names all half-spaces.
+    fn planes(&self, name: &mut dyn FnMut(u32));
+    /// Whether there are other walls.
+    fn has_parts(&self) -> bool;
+    /// Names the parts of other walls that may come within `reach` metres of a point in this
+    /// substep.
+    fn near(&self, point: Point3<f64>, reach: f64, name: &mut dyn FnMut(u32, u32));
+    /// A part of a wall.
+    fn wall(&self, row: u32, part: u32) -> Option<Wall>;
+}
+
+/// What balls know of walls.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Reach {
+    /// The places in the list of walls of all that are known, by row and part.
+    index: BTreeMap<(u32, u32), u32>,
+    names: Vec<(u32, u32)>,
+    before: Vec<(u32, u32)>,
+    planes: Vec<u32>,
+    has_parts: bool,
+    /// What each ball knows, one after the other.
+    lists: Vec<u32>,
+    known: Vec<Known>,
+}
+
+/// What a ball knows: all walls that come to within its radius of some place.
+#[derive(Clone, Copy, Debug)]
+struct Known {
+    center: Point3<f64>,
+    /// How far that place may be from the center, in metres.
+    far: f64,
+    /// Where its walls are in the lists.
+    walls: [usize; 2],
+}
+
+impl EventDriven {
+    /// Finds the walls that balls may come to.
+    pub(super) fn find_walls(&mut self, settings: &Settings) {
+        let source = settings.source;
+        let mut reach = std::mem::take(&mut self.reach);
+        std::mem::swap(&mut reach.names, &mut reach.before);
+        reach.names.clear();
+        reach.lists.clear();
+        reach.known.clear();
+        reach.has_parts = source.has_parts();
+        source.planes(&mut |row| reach.names.push((row, 0)));
+        let planes = reach.names.len();
+        if reach.has_parts {
+            for row in 0..self.balls.len() {
+                let (center, far) = self.place(row, 0.0, settings);
+                let name = &mut |row, part| reach.names.push((row, part));
+                source.near(center, far + self.margin(row), name);
+            }
+        }
+        let mut flat = reach.names[..planes].to_vec();
+        flat.sort_unstable();
+        reach.names.sort_unstable();
+        reach.names.dedup();
+        reach.names.retain(|(row, part)| source.wall(*row, *part).is_some());
+        self.walls.clear();
+        self.walls.extend(reach.names.iter().filter_map(|(row, part)| source.wall(*row, *part)));
+        if reach.names != reach.before {
+            self.warm.clear(); // it knows walls by their places
+        }
+        reach.index.clear();
+        reach.index.extend(reach.names.iter().copied().zip(0..));
+        reach.planes.clear();
+        reach.planes.extend(flat.iter().filter_map(|name| reach.index.get(name).copied()));
+        self.reach = reach;
+        if self.reach.has_parts {
+            for row in 0..self.balls.len() {
+                let nothing = Known { center: self.balls[row].position, far: -1.0, walls: [0; 2] };
+                self.reach.known.push(nothing);
+                self.look_around(row, 0.0, settings);
+            }
+        }
+    }
+
+    /// Has a ball know all walls that it may come to from now on.
+    pub(super) fn look_around(&mut self, row: usize, now: f64, settings: &Settings) {
+        let (center, far) = self.place(row, now, settings);
+        let margin = self.margin(row);
+        let Self { reach: Reach { index, lists, known, .. }, walls, .. } = self;
+        let from = lists.len();
+        settings.source.near(center, far + margin, &mut |row, part| {
+            let place = index.get(&(row, part)).copied().or_else(|| {
+                walls.push(settings.source.wall(row, part)?);
+                let place = walls.len() as u32 - 1;
+                index.insert((row, part), place);
+                Some(place)
+            });
+            lists.extend(place);
+        });
+        lists[from..].sort_unstable();
+        self.looks += (lists.len() - from) as u64;
+        known[row] = Known { center, far, walls: [from, lists.len()] };
+    }
+
+    /// When a ball may come to walls that it does not know, in seconds from now; none if it
+    /// cannot in this substep. It looks around before.
+    pub(super) fn end_of_reach(
+        &mut self,
+        row: usize,
+        now: f64,
+        settings: &Settings,
+    ) -> Option<f64> {
+        let ball = &self.balls[row];
+        let (at, left) = (ball.position_at(now), settings.dt - now);
+        let speed = fastest(ball, now, left);
+        let Known { center, far, .. } = *self.reach.known.get(row)?;
+        let (mut far, mut gone) = (far, (at - center).magnitude());
+        if gone >= NEAR_THE_END * far {
+            self.look_around(row, now, settings);
+            (far, gone) = (self.reach.known.get(row)?.far, 0.0);
+        }
+        // Between the two, so that each look brings it on.
+        let time = (0.5 * (1.0 + NEAR_THE_END) * far - gone) / speed;
+        // What is not finite knows what it knows.
+        (time < left).then_some(time)
+    }
+
+    /// From where how far a ball may go in what is left of the substep, in metres.
+    fn place(&self, row: usize, now: f64, settings: &Settings) -> (Point3<f64>, f64) {
+        let ball = &self.balls[row];
+        let left = settings.dt - now;
+        let far = 2.0 * fastest(ball, now, left) * left + MORE * ball.radius;
+        (ball.position_at(now), far.min(MOST_CELLS * self.cells.width()))
+    }
+
+    fn margin(&self, row: usize) -> f64 {
+        let ball = &self.balls[row];
+        ball.radius * (1.0 + FLUSH) + ball.rounding
+    }
+
+    /// Names the walls that a ball may touch before its reach ends.
+    pub(super) fn name_walls(&self, row: usize, mut name: impl FnMut(usize)) {
+        self.reach.planes.iter().for_each(|wall| name(*wall as usize));
+        self.parts_of(row).iter().for_each(|wall| name(*wall as usize));
+    }
+
+    /// Those of them that are no half-spaces.
+    pub(super) fn parts_of(&self, row: usize) -> &[u32] {
+        let [from, to] = self.reach.known.get(row).map_or([0; 2], |known| known.walls);
+        &self.reach.lists[from..to]
+    }
+
+    /// All that are.
+    pub(super) fn half_spaces(&self) -> &[u32] {
+        &self.reach.planes
+    }
+
+    /// What it costs to look at all walls that a ball knows.
+    pub(super) fn looks_at_walls(&self, row: usize) -> u64 {
+        self.reach.planes.len() as u64 + super::PART_LOOKS * self.parts_of(row).len() as u64
+    }
+}
+
+/// How fast a ball may be until the end of a path, unless something else happens, in m/s.
+fn fastest(ball: &Ball, now: f64, left: f64) -> f64 {
+    let pull = ball.pull.magnitude().max(ball.path.acceleration.magnitude());
+    ball.velocity_at(now).magnitude() + pull * left
+}

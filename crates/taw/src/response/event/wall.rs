@@ -1,0 +1,140 @@
+//! A wall within a substep: where it is at each moment, and how it moves there.
+
+use cgmath::{InnerSpace, One, Rotation as _, Zero};
+
+use crate::math::{Point3, Quat, Vec3};
+use crate::motion::{WallMotion, turned};
+use crate::response::{Material, Walls};
+use crate::shape::{Nearest, Shape, Solid, Triangle};
+
+/// A wall, or a part of one, and how it moves.
+#[derive(Clone, Debug)]
+pub(crate) struct Wall {
+    /// As it is at the time that `there` says, or always.
+    pub form: Form,
+    /// What the world calls it.
+    pub row: u32,
+    pub motion: Option<WallMotion<f64>>,
+    /// Of one that was moved to where it is: how many seconds after the begin of the substep
+    /// it comes there. Before, it is where its motion, undone, puts it. None for one that
+    /// stays, and only carries along what lies on it, like a conveyor.
+    pub there: Option<f64>,
+    pub material: Option<Material<f64>>,
+    /// How far a point of it may be from where it should be by the rounding of its place, over
+    /// its coordinates.
+    pub digit: f64,
+}
+
+/// What a [`Wall`] is.
+#[derive(Clone, Debug)]
+pub(crate) enum Form {
+    Plane {
+        normal: Vec3<f64>,
+        offset: f64,
+    },
+    Solid(Shape<f64>),
+    Triangle(Triangle<f64>),
+    /// Of a height field.
+    SolidBelow(Triangle<f64>),
+}
+
+impl Form {
+    fn nearest(&self, point: Point3<f64>) -> Nearest<f64> {
+        match self {
+            Self::Plane { normal, offset } => {
+                let distance = normal.dot(Vec3::new(point.x, point.y, point.z)) - offset;
+                Nearest { point: point - normal * distance, normal: *normal, distance }
+            }
+            Self::Solid(shape) => shape.nearest(point),
+            Self::Triangle(triangle) => triangle.nearest(point),
+            Self::SolidBelow(triangle) => triangle.nearest_if_solid_below(point),
+        }
+    }
+}
+
+impl Wall {
+    /// What counts between this wall and a ball of that material.
+    pub fn against(&self, ball: Material<f64>) -> Material<f64> {
+        self.material.map_or(ball, |its| ball.against(its))
+    }
+
+    /// The motion of one that goes through the substep, and the time that it still has to go.
+    pub fn going(&self, time: f64) -> Option<(WallMotion<f64>, f64)> {
+        Some((self.motion?, self.there? - time))
+    }
+
+    /// Where its surface is nearest to a point at a time.
+    pub fn nearest(&self, point: Point3<f64>, time: f64) -> Nearest<f64> {
+        let Some((WallMotion { velocity, spin, pivot }, left)) = self.going(time) else {
+            return self.form.nearest(point);
+        };
+        let on = point + velocity * left;
+        if spin.is_zero() {
+            let near = self.form.nearest(on);
+            return Nearest { point: near.point - velocity * left, ..near };
+        }
+        let turn = turned(Quat::one(), spin, left);
+        let near = self.form.nearest(pivot + turn.rotate_vector(on - pivot));
+        let back = turn.conjugate();
+        let point = pivot - velocity * left + back.rotate_vector(near.point - pivot);
+        Nearest { point, normal: back.rotate_vector(near.normal), ..near }
+    }
+
+    /// The velocity of a point that goes with the wall through its step; zero for one that
+    /// stays.
+    pub fn way(&self, point: Point3<f64>, time: f64) -> Vec3<f64> {
+        let Some((motion, left)) = self.going(time) else { return Vec3::zero() };
+        motion.velocity_at(point + motion.velocity * left)
+    }
+
+    /// The velocity of its surface, which points that way, at a point. What stays has none
+    /// across its surface.
+    pub fn surface_velocity(&self, normal: Vec3<f64>, point: Point3<f64>, time: f64) -> Vec3<f64> {
+        let Some(motion) = self.motion else { return Vec3::zero() };
+        if self.there.is_some() {
+            return self.way(point, time);
+        }
+        let velocity = motion.velocity_at(point);
+        velocity - normal * velocity.dot(normal)
+    }
+
+    /// How much of a gap to a point may be due to the rounding of the wall's place.
+    pub fn rounding(&self, point: Point3<f64>) -> f64 {
+        let Some((motion, _)) = self.going(0.0) else { return 0.0 };
+        let coordinates = [point, motion.pivot].map(|p| p.x.abs().max(p.y.abs()).max(p.z.abs()));
+        self.digit * (coordinates[0] + coordinates[1])
+    }
+}
+
+/// Walls while things rest on them, from one time to a later one.
+pub(super) struct Between<'a> {
+    pub walls: &'a [Wall],
+    pub begin: f64,
+    pub end: f64,
+}
+
+impl Walls<f64> for Between<'_> {
+    fn normal_and_distance(&self, wall: usize, _: u32, point: Point3<f64>) -> (Vec3<f64>, f64) {
+        let Nearest { normal, distance, .. } = self.walls[wall].nearest(point, self.end);
+        (normal, distance)
+    }
+
+    fn normal_and_distance_before(
+        &self,
+        wall: usize,
+        _: u32,
+        point: Point3<f64>,
+    ) -> (Vec3<f64>, f64) {
+        let Nearest { normal, distance, .. } = self.walls[wall].nearest(point, self.begin);
+        (normal, distance)
+    }
+
+    fn surface_velocity(&self, wall: usize, point: Point3<f64>) -> Vec3<f64> {
+        let wall = &self.walls[wall];
+        wall.surface_velocity(wall.nearest(point, self.end).normal, point, self.end)
+    }
+
+    fn material(&self, wall: usize) -> Option<Material<f64>> {
+        self.walls[wall].material
+    }
+}
