@@ -121,7 +121,10 @@ pub(crate) fn penalty<S: Scalar>(
             stretch = -(held + sliding * springs.damping) / springs.stiffness;
             stretch = at_most(stretch, limit / springs.stiffness);
         }
-        shear.push(Shear { key, stretch });
+        // A memory that is no number would be one for ever.
+        if is_finite(stretch) {
+            shear.push(Shear { key, stretch });
+        }
         pushes.push((touch, normal * pressure + held, pressure));
     }
     for (touch, force, pressure) in &pushes {
