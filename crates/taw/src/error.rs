@@ -1,7 +1,7 @@
-use cgmath::Array;
+use cgmath::{Array, InnerSpace};
 
 use crate::frame::NodeId;
-use crate::math::{Point3, Scalar, Vec3};
+use crate::math::{Point3, Quat, Scalar, Vec3, length};
 use crate::swarm::BallId;
 use crate::world::{MarbleId, WallId};
 
@@ -106,6 +106,19 @@ pub(crate) fn within<S: Scalar>(field: &'static str, value: S, min: S, max: S) -
             max: max.as_f64(),
         })
     }
+}
+
+/// The rotation, if its length is about one; made that long if it drifted.
+///
+/// Within 1e-5 it is taken as it is: so much would shift what is a hundred metres away by a
+/// millimetre. Up to 1e-3 is what a few thousand products in `f32` let it drift.
+pub(crate) fn rotation<S: Scalar>(field: &'static str, q: Quat<S>) -> Result<Quat<S>, Error> {
+    let norm = q.s.as_f64().hypot(length(q.v).as_f64());
+    let off = (norm - 1.0).abs();
+    if off.is_nan() || off > 1e-3 {
+        return Err(Error::NotUnit { field, value: norm });
+    }
+    Ok(if off > 1e-5 { q.normalize() } else { q })
 }
 
 /// The vector, if all of its components are finite.

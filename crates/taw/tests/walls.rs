@@ -356,7 +356,7 @@ fn walls_can_be_moved_and_taken_out() {
     assert_eq!(world.contacts.wm.len(), 0);
     let nan = Sphere { center: Point3::new(0.0, f64::NAN, 0.0), radius: 1.0 };
     let error = world.walls.insert(nan).unwrap_err();
-    assert_eq!(error.to_string(), "shape.y must be finite, but is NaN");
+    assert_eq!(error.to_string(), "center.y must be finite, but is NaN");
     assert!(world.walls.is_empty());
 }
 

@@ -58,7 +58,8 @@ impl Grid {
     /// Sorts the spheres into cells. Spheres with a gap of up to `reach` metres
     /// between them count as touching; zero for those that do.
     pub fn rebuild<S: Scalar>(&mut self, center: &[Point3<S>], radius: &[S], reach: S) {
-        let half_reach = reach * S::constant(0.5);
+        // None, if it is no length.
+        let half_reach = if reach > S::zero() { reach * S::constant(0.5) } else { S::zero() };
         let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r)) + half_reach;
         self.width = (2.0 * largest.as_f64() * CELL_MARGIN).max(LEAST_CELL);
         self.origin = middle(center);
@@ -112,7 +113,9 @@ impl Grid {
         let cells_per_metre = (1_u64 << level) as f64 / self.width;
         let axis = |x: S, origin: f64| {
             let cell = ((x.as_f64() - origin) * cells_per_metre).floor() + AXIS_MIDDLE;
-            // Clamping keeps neighbours neighbours, so nothing is lost out there.
+            // Clamping keeps neighbours neighbours, so nothing is lost out there. What is
+            // nowhere, or among cells without an end, is in the middle; it could be anywhere.
+            let cell = if cell.is_nan() { AXIS_MIDDLE } else { cell };
             cell.clamp(1.0, AXIS_MAX - 1.0) as u64
         };
         let x = axis(center.x, self.origin[0]);
@@ -277,6 +280,27 @@ mod tests {
                 center.push(Point3::new(at(i), at(i / side), at(i / side / side)));
             }
             assert_finds_all(&center, &vec![0.5; center.len()]);
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn what_is_no_number_hides_nobody_else(
+            strays in proptest::collection::vec(
+                ([0..9_usize, 0..9_usize, 0..9_usize], 0..9_usize), 0..9),
+            reach in 0..9_usize,
+        ) {
+            let odd = [f64::NAN, f64::INFINITY, -f64::INFINITY, 0.0, -1.0, 1e-320, 1e300, -1e300, 3.0];
+            let mut center: Vec<_> = [0.0, 0.9, 2.5].map(|x| Point3::new(x, 0.0, 0.0)).to_vec();
+            let mut radius = vec![0.5; 3];
+            center.extend(strays.iter().map(|(at, _)| Point3::from(at.map(|i| odd[i]))));
+            radius.extend(strays.iter().map(|(_, i)| odd[*i]));
+            let mut grid = Grid::default();
+            grid.rebuild(&center, &radius, odd[reach]);
+            let mut named = Vec::new();
+            grid.pairs(&center, |a, b| named.push((a, b)));
+            prop_assert!(named.contains(&(0, 1)), "the two that touch, of {center:?}");
+            prop_assert!(grid.occupied().0.count() <= center.len());
         }
     }
 

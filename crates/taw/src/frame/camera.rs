@@ -40,13 +40,14 @@ impl<S: Scalar> Camera<S> {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a field of view outside of (0, π), or a far that is not
-    /// above near; [`Error::NotPositive`] for the others.
+    /// above near; [`Error::NotPositive`] for the others; for the pose as [`Pose::checked`].
     pub fn new(
         pose: Pose<S>,
         field_of_view: S,
         aspect: S,
         [near, far]: [S; 2],
     ) -> Result<Self, Error> {
+        let pose = pose.checked()?;
         let least = S::min_positive_value();
         let half_turn = S::constant(std::f64::consts::PI) * (S::one() - S::epsilon());
         within("field_of_view", field_of_view, least, half_turn)?;

@@ -3,6 +3,8 @@ use std::ops::Mul;
 use cgmath::{Decomposed, EuclideanSpace, One, Zero};
 
 use super::{Motor, slerp};
+use crate::Error;
+use crate::error::{finite_vector, rotation};
 use crate::math::{Mat4, Point3, Quat, Scalar, Vec3};
 
 /// Where a thing is and how it is turned, in the frame of something else: what takes its
@@ -35,6 +37,17 @@ impl<S: Scalar> Pose<S> {
     #[must_use]
     pub fn identity() -> Self {
         Self { rotation: Quat::one(), translation: Vec3::zero() }
+    }
+
+    /// This pose, if it is one: finite, and with a rotation of length one, from which it may
+    /// have drifted by 1e-3.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`] for the translation, [`Error::NotUnit`] for the rotation.
+    pub fn checked(self) -> Result<Self, Error> {
+        let fields = ["translation.x", "translation.y", "translation.z"];
+        let translation = finite_vector(fields, self.translation)?;
+        Ok(Self { rotation: rotation("rotation", self.rotation)?, translation })
     }
 
     /// The way back.

@@ -27,8 +27,9 @@ impl<S: Scalar> Tree<S> {
     /// Adds a node under another one, or under the world.
     ///
     /// # Errors
-    /// [`Error::NoSuchNode`] for the parent.
+    /// [`Error::NoSuchNode`] for the parent; for the pose as [`Pose::checked`].
     pub fn insert(&mut self, parent: Option<NodeId>, local: Pose<S>) -> Result<NodeId, Error> {
+        let local = local.checked()?;
         if let Some(parent) = parent {
             self.node(parent)?;
         }
@@ -64,10 +65,10 @@ impl<S: Scalar> Tree<S> {
     /// Moves a node, and with it all that it carries.
     ///
     /// # Errors
-    /// [`Error::NoSuchNode`].
+    /// [`Error::NoSuchNode`]; for the pose as [`Pose::checked`].
     pub fn set_local(&mut self, id: NodeId, local: Pose<S>) -> Result<(), Error> {
         self.node(id)?;
-        self.nodes[id].local = local;
+        self.nodes[id].local = local.checked()?;
         Ok(())
     }
 
@@ -104,7 +105,8 @@ impl<S: Scalar> Tree<S> {
     /// Hands a node over to another parent, or to the world, without moving it there.
     ///
     /// # Errors
-    /// [`Error::NoSuchNode`], or [`Error::CarriesItself`] if the node carries that parent.
+    /// [`Error::NoSuchNode`], or [`Error::CarriesItself`] if the node carries that parent;
+    /// [`Error::NotFinite`] if the pose in the frame of the new parent is not finite.
     pub fn set_parent(&mut self, id: NodeId, parent: Option<NodeId>) -> Result<(), Error> {
         let pose = self.world(id)?;
         let mut above = parent;
@@ -117,7 +119,8 @@ impl<S: Scalar> Tree<S> {
         let local = match parent {
             Some(parent) => self.world(parent)?.inverse() * pose,
             None => pose,
-        };
+        }
+        .checked()?;
         self.orphan(id);
         self.adopt(id, parent);
         self.nodes[id].local = local;

@@ -1,5 +1,5 @@
 use crate::Error;
-use crate::error::positive;
+use crate::error::{positive, within};
 use crate::math::Scalar;
 
 /// How heavy a marble is.
@@ -36,6 +36,44 @@ impl<S: Scalar> Mass<S> {
             Self::Kilograms(mass) => positive("mass", mass).map(Self::Kilograms),
             Self::Infinite => Ok(self),
         }
+    }
+
+    /// Nothing, if a marble of this size is neither so light nor so heavy that the scalar has no
+    /// number for it, or for its moment of inertia.
+    ///
+    /// Names what was given, and what else it might be: the number that would do for the mass of
+    /// glass is not to blame.
+    pub(crate) fn of_size(self, radius: S, half_length: S) -> Result<(), Error> {
+        let (least, most) = (S::min_positive_value(), S::max_value());
+        // Of which squares and their reciprocals are numbers.
+        within("radius", radius, least.sqrt(), most.sqrt())?;
+        within("half_length", half_length, S::zero(), most.sqrt())?;
+        let has_number = |mass: Self, half: S| {
+            let kilograms = mass.of_capsule(radius, half);
+            kilograms >= least && kilograms.is_finite()
+        };
+        if self == Self::Infinite || has_number(self, half_length) {
+            return Ok(());
+        }
+        let cubed = |kilograms: S, density: S| {
+            (kilograms.as_f64() / (4.0 / 3.0 * std::f64::consts::PI * density.as_f64())).cbrt()
+        };
+        let volume = Self::Density(S::one()).of_capsule(radius, half_length).as_f64();
+        let (field, value, min, max) = match self {
+            Self::Density(density) if has_number(Self::default(), half_length) => {
+                ("density", density, least.as_f64() / volume, most.as_f64() / volume)
+            }
+            Self::Density(density) if !has_number(self, S::zero()) => {
+                ("radius", radius, cubed(least, density), cubed(most, density))
+            }
+            Self::Density(_) => {
+                let longer = most.as_f64() / self.of(radius).as_f64() - 1.0;
+                ("half_length", half_length, 0.0, longer * radius.as_f64() / 1.5)
+            }
+            Self::Kilograms(mass) => ("mass", mass, least.as_f64(), most.as_f64()),
+            Self::Infinite => return Ok(()),
+        };
+        Err(Error::OutOfRange { field, value: value.as_f64(), min, max })
     }
 
     /// In kilograms, for a ball of this radius in metres.

@@ -6,6 +6,7 @@
 //! Numbers out of their range are refused where they stand, with line and field (see [`Scene`] for
 //! an example).
 
+mod check;
 #[cfg(feature = "serde")]
 mod number;
 mod running;

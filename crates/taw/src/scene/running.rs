@@ -4,7 +4,7 @@ use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
 use super::{Ball, Field, Form, Gate, Movement, Scene, Surface, Turn, Wall};
 use crate::Error;
-use crate::error::{finite_vector, positive};
+use crate::error::finite_vector;
 use crate::frame::{AxisAngle, Pose};
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, direction_and_length};
 use crate::motion::{Force, Mass, Medium, WallMotion};
@@ -26,10 +26,11 @@ impl Scene {
     /// The scene at its beginning, to be stepped by this model.
     ///
     /// # Errors
-    /// What the world refuses: [`Error::NotFinite`], [`Error::NotPositive`],
-    /// [`Error::OutOfRange`], [`Error::NotUnit`].
+    /// What the world refuses, now or later: [`Error::NotFinite`], [`Error::NotPositive`],
+    /// [`Error::OutOfRange`], [`Error::NotUnit`]. Numbers beyond those of `f32` in any world, and
+    /// more than [`MAX_MARBLES`](Self::MAX_MARBLES).
     pub fn run<S: Scalar>(&self, model: Model) -> Result<Running<S>, Error> {
-        positive("seconds", self.seconds)?;
+        self.check()?;
         let mut world = World::default();
         world.set_model(model)?;
         world.set_gravity(vector(self.gravity_at(0.0)))?;
@@ -91,8 +92,9 @@ impl<S: Scalar> Running<S> {
     /// Goes on by `dt` seconds: gravity as it is halfway, walls where they are at the end.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`.
+    /// As [`World::step`]; then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
+        self.world.substep_of(dt)?;
         self.move_walls(dt)?;
         self.world.step(dt)
     }
@@ -101,9 +103,11 @@ impl<S: Scalar> Running<S> {
     /// [world](Self::world) by themselves.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`.
+    /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
+    /// [`Error::NoSuchWall`] if one that moves was taken out; then nothing has changed.
     pub fn move_walls(&mut self, dt: S) -> Result<(), Error> {
-        let seconds = positive("dt", dt)?.as_f64();
+        let seconds = World::checked_dt(dt)?.as_f64();
+        self.moving.iter().try_for_each(|(id, ..)| self.world.walls.row(*id).map(|_| ()))?;
         if !self.scene.tilts.is_empty() {
             let gravity = self.scene.gravity_at(self.time + 0.5 * seconds);
             self.world.set_gravity(vector(gravity))?;

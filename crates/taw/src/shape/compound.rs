@@ -2,7 +2,7 @@ use cgmath::InnerSpace;
 
 use super::{Box3, Capsule, Hull, Nearest, Obb, Solid, Sphere};
 use crate::Error;
-use crate::error::within;
+use crate::error::{self, finite_point, finite_vector, within};
 use crate::frame::Pose;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
 
@@ -31,14 +31,25 @@ pub enum Shape<S> {
 }
 
 impl<T> Compound<T> {
+    /// How many compounds may be inside each other: what walks through them takes some hundred
+    /// bytes of the stack for each.
+    pub const MAX_LEVELS: u32 = 64;
+
     /// A compound, checked.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for no parts at all.
-    pub fn new(parts: Vec<T>) -> Result<Self, Error> {
+    /// [`Error::OutOfRange`] for no parts at all, or for more than
+    /// [`MAX_LEVELS`](Self::MAX_LEVELS) compounds inside each other.
+    pub fn new<S: Scalar>(parts: Vec<T>) -> Result<Self, Error>
+    where
+        T: Solid<S>,
+    {
         let count = u32::try_from(parts.len()).unwrap_or(u32::MAX);
         within("parts.len()", f64::from(count), 1.0, f64::from(u32::MAX - 1))?;
-        Ok(Self { parts })
+        let compound = Self { parts };
+        let levels = f64::from(compound.levels());
+        within("levels of the compound", levels, 1.0, f64::from(Self::MAX_LEVELS))?;
+        Ok(compound)
     }
 
     /// What it is made of; never nothing.
@@ -66,6 +77,10 @@ impl<S: Scalar, T: Solid<S>> Solid<S> for Compound<T> {
         self.parts.iter().fold(S::zero(), |sum, part| sum + part.volume())
     }
 
+    fn levels(&self) -> u32 {
+        1 + self.parts.iter().map(T::levels).max().unwrap_or(0)
+    }
+
     /// That of the part that the point is deepest in, or nearest to.
     fn nearest(&self, point: Point3<S>) -> Nearest<S> {
         let first = self.parts[0].nearest(point);
@@ -73,6 +88,18 @@ impl<S: Scalar, T: Solid<S>> Solid<S> for Compound<T> {
             .iter()
             .map(|part| part.nearest(point))
             .fold(first, |best, next| if next.distance < best.distance { next } else { best })
+    }
+}
+
+impl<S: Scalar> Compound<Shape<S>> {
+    /// Its simple parts, and those of the compounds in it.
+    fn flatten(self, simple: &mut Vec<Shape<S>>) {
+        for part in self.parts {
+            match part {
+                Shape::Compound(inner) => inner.flatten(simple),
+                other => simple.push(other),
+            }
+        }
     }
 }
 
@@ -127,6 +154,33 @@ impl<S: Scalar> Shape<S> {
         }
     }
 
+    /// This shape, if it can be one, whoever put its numbers together; with the compounds in
+    /// compounds laid out flat.
+    pub(crate) fn checked(self) -> Result<Self, Error> {
+        let shape = match self {
+            Self::Sphere(Sphere { center, radius }) => Self::Sphere(Sphere::new(center, radius)?),
+            Self::Aabb(Box3 { min, max }) => Self::Aabb(Box3::new(min, max)?),
+            Self::Obb(Obb { center, rotation, half_widths }) => {
+                Self::Obb(Obb::new(center, error::rotation("rotation", rotation)?, half_widths)?)
+            }
+            Self::Capsule(Capsule { a, b, radius }) => Self::Capsule(Capsule::new(a, b, radius)?),
+            Self::Hull(hull) => Self::Hull(hull.checked()?),
+            Self::Compound(compound) => {
+                let mut parts = Vec::new();
+                compound.flatten(&mut parts);
+                let parts = parts.into_iter().map(Self::checked).collect::<Result<_, _>>()?;
+                Self::Compound(Compound::new(parts)?)
+            }
+        };
+        // Numbers that are right one by one may overflow together.
+        let Box3 { min, max } = shape.bounding_box();
+        for corner in [min, max] {
+            finite_point(["shape.x", "shape.y", "shape.z"], corner)?;
+        }
+        finite_vector(["size.x", "size.y", "size.z"], max - min)?;
+        Ok(shape)
+    }
+
     fn solid(&self) -> &dyn Solid<S> {
         match self {
             Self::Sphere(sphere) => sphere,
@@ -150,6 +204,10 @@ impl<S: Scalar> Solid<S> for Shape<S> {
 
     fn volume(&self) -> S {
         self.solid().volume()
+    }
+
+    fn levels(&self) -> u32 {
+        self.solid().levels()
     }
 
     fn nearest(&self, point: Point3<S>) -> Nearest<S> {

@@ -111,6 +111,11 @@ impl<S: Scalar> Hull<S> {
         Self { pose: pose * self.pose, polyhedron: Arc::clone(&self.polyhedron) }
     }
 
+    /// This hull, if it is where one can be.
+    pub(crate) fn checked(self) -> Result<Self, Error> {
+        Ok(Self { pose: self.pose.checked()?, ..self })
+    }
+
     /// The same in another scalar.
     pub(crate) fn in_scalar<T: Scalar>(&self) -> Hull<T> {
         let Pose { rotation, translation } = self.pose;

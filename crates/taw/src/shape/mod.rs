@@ -68,6 +68,12 @@ pub trait Solid<S: Scalar> {
     #[must_use]
     fn nearest(&self, point: Point3<S>) -> Nearest<S>;
 
+    /// How many compounds are inside each other; none in a simple shape.
+    #[must_use]
+    fn levels(&self) -> u32 {
+        0
+    }
+
     /// Whether a point is in it or on its surface.
     #[must_use]
     fn contains(&self, point: Point3<S>) -> bool {

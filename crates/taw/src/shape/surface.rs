@@ -135,7 +135,12 @@ impl<S: Scalar> HeightField<S> {
         }
         let lowest = heights.iter().fold(S::infinity(), |low, height| low.min(*height));
         let highest = heights.iter().fold(S::neg_infinity(), |high, height| high.max(*height));
-        Ok(Self { corner, cell, columns, rows, heights, lowest, highest })
+        let field = Self { corner, cell, columns, rows, heights, lowest, highest };
+        // Numbers that are right one by one may overflow together.
+        let Aabb { min, max } = field.bounds();
+        finite_point(["corner.x", "corner.y", "corner.z"], min)?;
+        finite_point(["columns * cell[0]", "heights", "rows * cell[1]"], max)?;
+        Ok(field)
     }
 
     fn point(&self, column: u32, row: u32) -> Point3<S> {

@@ -25,17 +25,30 @@ impl<S: Scalar> Marbles<S> {
     /// so far.
     pub fn apply_force(&mut self, id: MarbleId, force: Vec3<S>) -> Result<(), Error> {
         let row = self.row(id)?;
-        finite_vector(FORCE, force)?;
-        let sum = self.force.get(row).unwrap_or_else(Vec3::zero) + force;
-        self.force.set(row, Some(finite_vector(FORCE, sum)?), self.len());
+        let sum = self.force_with(row, force)?;
+        self.force.set(row, Some(sum), self.len());
         Ok(())
+    }
+
+    /// The force on a row with another one.
+    fn force_with(&self, row: usize, force: Vec3<S>) -> Result<Vec3<S>, Error> {
+        finite_vector(FORCE, force)?;
+        finite_vector(FORCE, self.force.get(row).unwrap_or_else(Vec3::zero) + force)
+    }
+
+    /// The torque on a row with another one.
+    fn torque_with(&self, row: usize, torque: Vec3<S>) -> Result<Bivector<S>, Error> {
+        finite_vector(TORQUE, torque)?;
+        let sum = self.torque.get(row).unwrap_or_else(Bivector::zero).dual() + torque;
+        finite_vector(TORQUE, sum).map(Bivector::from)
     }
 
     /// Pushes a marble at a point (in world space, of its surface or not), which turns it
     /// too.
     ///
     /// # Errors
-    /// As [`Marbles::apply_force`], and [`Error::NotFinite`] for the point.
+    /// As [`Marbles::apply_force`] and [`Marbles::apply_torque`], and [`Error::NotFinite`] for
+    /// the point; then nothing has changed.
     pub fn apply_force_at(
         &mut self,
         id: MarbleId,
@@ -43,11 +56,12 @@ impl<S: Scalar> Marbles<S> {
         point: Point3<S>,
     ) -> Result<(), Error> {
         let row = self.row(id)?;
-        finite_vector(FORCE, force)?;
         let lever = finite_point(POINT, point)? - self.position[row];
-        let torque = finite_vector(TORQUE, Bivector::wedge(lever, force).dual())?;
-        self.apply_force(id, force)?;
-        self.apply_torque(id, torque)
+        let sum = self.force_with(row, force)?;
+        let torque = self.torque_with(row, Bivector::wedge(lever, force).dual())?;
+        self.force.set(row, Some(sum), self.len());
+        self.torque.set(row, Some(torque), self.len());
+        Ok(())
     }
 
     /// Turns a marble, in N m: a [`Bivector`], or the axial vector that is its dual.
@@ -61,9 +75,7 @@ impl<S: Scalar> Marbles<S> {
         torque: impl Into<Bivector<S>>,
     ) -> Result<(), Error> {
         let row = self.row(id)?;
-        let torque = finite_vector(TORQUE, torque.into().dual())?;
-        let sum = self.torque.get(row).unwrap_or_else(Bivector::zero).dual() + torque;
-        let sum = finite_vector(TORQUE, sum)?.into();
+        let sum = self.torque_with(row, torque.into().dual())?;
         self.torque.set(row, Some(sum), self.len());
         Ok(())
     }

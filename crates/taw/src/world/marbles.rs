@@ -178,8 +178,9 @@ impl<S: Scalar> Marbles<S> {
     /// Adds a marble.
     ///
     /// # Errors
-    /// [`Error::NotFinite`], [`Error::NotPositive`] or [`Error::OutOfRange`] for
-    /// its fields; [`Error::Full`] at 2³² marbles.
+    /// [`Error::NotFinite`], [`Error::NotPositive`], [`Error::NotUnit`] or [`Error::OutOfRange`]
+    /// for its fields, also where size and density together make a mass that the scalar has no
+    /// number for; [`Error::Full`] at 2³² marbles.
     pub fn insert(&mut self, marble: Marble<S>) -> Result<MarbleId, Error> {
         let position = finite_point(POSITION, marble.position)?;
         let radius = positive("radius", marble.radius)?;
@@ -188,6 +189,7 @@ impl<S: Scalar> Marbles<S> {
         let rotation = checked_rotation(marble.rotation)?;
         let spin = finite_vector(SPIN, marble.spin)?;
         let mass = marble.mass.checked()?;
+        mass.of_size(radius, marble.half_length)?;
         let gravity_scale = finite("gravity_scale", marble.gravity_scale)?;
         let damping = marble.damping.checked()?;
         let material = marble.material.map(Material::checked).transpose()?;
@@ -327,10 +329,12 @@ impl<S: Scalar> Marbles<S> {
     /// Gives a marble a new radius, in metres, about the same center.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`], [`Error::NotPositive`].
+    /// [`Error::NoSuchMarble`], [`Error::NotPositive`]; [`Error::OutOfRange`] if it would then be
+    /// so light or so heavy that the scalar has no number for it.
     pub fn set_radius(&mut self, id: MarbleId, radius: S) -> Result<(), Error> {
-        let row = self.row(id)?;
-        self.radius[row] = positive("radius", radius)?;
+        let (row, radius) = (self.row(id)?, positive("radius", radius)?);
+        self.own_mass(row).of_size(radius, self.half_length(row))?;
+        self.radius[row] = radius;
         Ok(())
     }
 
@@ -340,7 +344,9 @@ impl<S: Scalar> Marbles<S> {
     /// [`Error::NoSuchMarble`], [`Error::OutOfRange`].
     pub fn set_half_length(&mut self, id: MarbleId, half_length: S) -> Result<(), Error> {
         let row = self.row(id)?;
+        let given = half_length;
         let half_length = checked_half_length(half_length)?;
+        self.own_mass(row).of_size(self.radius[row], given)?;
         if half_length.is_some() {
             self.set_turn(true);
         }
@@ -380,11 +386,12 @@ impl<S: Scalar> Marbles<S> {
     /// Gives a marble a new mass.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`], [`Error::NotPositive`].
+    /// [`Error::NoSuchMarble`], [`Error::NotPositive`]; [`Error::OutOfRange`] if it is so light
+    /// or so heavy, for the size of the marble, that the scalar has no number for it.
     pub fn set_mass(&mut self, id: MarbleId, mass: Mass<S>) -> Result<(), Error> {
-        let row = self.row(id)?;
-        let mass = but(mass.checked()?, Mass::default());
-        self.mass.set(row, mass, self.handles.len());
+        let (row, mass) = (self.row(id)?, mass.checked()?);
+        mass.of_size(self.radius[row], self.half_length(row))?;
+        self.mass.set(row, but(mass, Mass::default()), self.handles.len());
         Ok(())
     }
 
@@ -631,7 +638,7 @@ impl<S: Scalar> Marbles<S> {
         }
         let turned = rim / self.radius[row];
         if let Some(spin) = self.spin.get_mut(row)
-            && is_finite(turned)
+            && is_finite(*spin + turned)
         {
             *spin += turned;
         }
@@ -658,8 +665,32 @@ impl<S: Scalar> Marbles<S> {
 
     /// In kilograms; infinite for what nothing accelerates.
     pub(super) fn mass(&self, row: usize) -> S {
-        let mass = self.mass.get(row).unwrap_or_default();
-        mass.of_capsule(self.radius[row], self.half_length(row))
+        self.own_mass(row).of_capsule(self.radius[row], self.half_length(row))
+    }
+
+    fn own_mass(&self, row: usize) -> Mass<S> {
+        self.mass.get(row).unwrap_or_default()
+    }
+
+    /// Whether all that moves of a row is a number.
+    pub(super) fn is_sane(&self, row: usize) -> bool {
+        let turns = |spin: &Vec3<S>| is_finite(*spin);
+        let turned = |q: &Quat<S>| q.s.is_finite() && is_finite(q.v);
+        is_finite_point(self.position[row])
+            && is_finite(self.velocity[row])
+            && self.spin.get(row).is_none_or(turns)
+            && self.rotation.get(row).is_none_or(turned)
+    }
+
+    /// Takes velocity and spin of a row, and what the scalar cut off.
+    pub(super) fn stop(&mut self, row: usize) {
+        self.velocity[row] = Vec3::zero();
+        if let Some(spin) = self.spin.get_mut(row) {
+            *spin = Vec3::zero();
+        }
+        if let Some(rest) = self.rest.get_mut(row) {
+            (rest.velocity, rest.spin) = (Vec3::zero(), Vec3::zero());
+        }
     }
 }
 

@@ -2,6 +2,7 @@
 
 mod account;
 mod apply;
+mod crowd;
 mod energy;
 mod event;
 mod handles;
@@ -10,6 +11,7 @@ mod limits;
 mod marbles;
 mod model;
 mod optional;
+mod quarantine;
 mod query;
 mod swarm;
 mod sweep;
@@ -32,7 +34,7 @@ pub use walls::{WallId, Walls};
 use crate::Error;
 use crate::broad::Grid;
 use crate::contact::Contacts;
-use crate::error::{finite_vector, positive};
+use crate::error::{finite, finite_vector};
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
@@ -43,7 +45,9 @@ use crate::response::{
 };
 use crate::swarm::Swarm;
 use account::Accounting;
+use crowd::Crowd;
 use integrate::Drive;
+use quarantine::Quarantine;
 use sweep::Sweep;
 use touch::Near;
 use walls::Part;
@@ -68,11 +72,17 @@ pub struct World<S> {
     /// The touches of the last substep. Between [`World::generate_contacts`] and
     /// [`World::restitute`] they may be changed: what is taken out is not
     /// restituted, and a row that does not exist is passed over.
+    ///
+    /// Of a marble among many, those with the 32 that are deepest in it or nearest are listed, of
+    /// all that are as large or larger; of a long capsule so many more as it is longer than wide.
     pub contacts: Contacts<S>,
     /// The collisions of the last step, if the response is event-driven.
     impacts: Vec<Impact<S>>,
     grid: Grid,
+    /// The rows that the verb at work has stopped.
     stopped: Vec<u32>,
+    quarantine: Quarantine<S>,
+    crowd: Crowd<S>,
     /// How wide a gap still makes a contact, in metres: what gravity closes in two
     /// substeps, for a response that looks ahead.
     reach: S,
@@ -115,6 +125,8 @@ impl<S: Scalar> Default for World<S> {
             impacts: Vec::new(),
             grid: Grid::default(),
             stopped: Vec::new(),
+            quarantine: Quarantine::default(),
+            crowd: Crowd::default(),
             reach: S::zero(),
             inverse_mass: Vec::new(),
             velocity_before: Vec::new(),
@@ -147,7 +159,9 @@ impl<S: Scalar> PartialEq for World<S> {
             swarm,
             contacts,
             impacts,
-            stopped,
+            quarantine,
+            stopped: _,
+            crowd: _,
             grid: _,
             reach: _,
             inverse_mass: _,
@@ -176,7 +190,7 @@ impl<S: Scalar> PartialEq for World<S> {
             && *walls == other.walls
             && *swarm == other.swarm
             && *contacts == other.contacts
-            && *stopped == other.stopped
+            && quarantine.named == other.quarantine.named
             && *warm == other.warm
             && *shear == other.shear
             && *warm_removals == other.warm_removals
@@ -218,9 +232,11 @@ impl<S: Scalar> World<S> {
     /// Changes the acceleration of every marble, in m/s².
     ///
     /// # Errors
-    /// [`Error::NotFinite`].
+    /// [`Error::NotFinite`], also if it is longer than a number can be.
     pub fn set_gravity(&mut self, gravity: Vec3<S>) -> Result<(), Error> {
-        self.gravity = finite_vector(["gravity.x", "gravity.y", "gravity.z"], gravity)?;
+        finite_vector(["gravity.x", "gravity.y", "gravity.z"], gravity)?;
+        finite("the length of gravity", length(gravity))?;
+        self.gravity = gravity;
         Ok(())
     }
 
@@ -256,25 +272,25 @@ impl<S: Scalar> World<S> {
 
     /// Moves the world on by `dt` seconds, in [`Model::substeps`] equal parts.
     ///
-    /// A marble whose motion overflows keeps its last place, loses its velocity,
-    /// and is named by [`World::stopped`]; no other marble is affected.
+    /// A marble whose motion overflows keeps its last place, loses its velocity and its spin,
+    /// and is named by [`World::stopped`]; no marble that does not touch it is affected.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`, [`Error::BallsOnly`] for a capsule in a world that is
-    /// event-driven; then nothing has moved.
+    /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not
+    /// in [`World::TIMES`]; [`Error::BallsOnly`] for a capsule in a world that is event-driven.
+    /// Then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
-        let whole = dt;
-        let dt = positive("dt", dt / S::constant(f64::from(self.model.substeps)))?;
+        let substep = self.substep_of(dt)?;
         self.begin_step();
         for after in (0..self.model.substeps).rev() {
-            self.rest_of_step = dt * S::constant(f64::from(after));
-            self.integrate(dt)?;
+            self.rest_of_step = substep * S::constant(f64::from(after));
+            self.integrate(substep)?;
             self.generate_contacts();
-            self.restitute(dt)?;
+            self.restitute(substep)?;
         }
         self.walls.arrive();
         self.marbles.clear_forces();
-        self.step_swarm(whole, &mut |_| ())
+        self.step_swarm(dt, &mut |_| ())
     }
 
     /// The first verb: forces change velocities, velocities change positions, over
@@ -282,15 +298,12 @@ impl<S: Scalar> World<S> {
     /// moves when is decided by the third verb.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`, [`Error::BallsOnly`] for a capsule in a world that is
-    /// event-driven; then nothing has moved.
+    /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
+    /// [`Error::BallsOnly`] for a capsule in a world that is event-driven; then nothing has moved.
     pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
-        let dt = positive("dt", dt)?;
-        if self.model.response == Response::EventDriven
-            && let Some(id) = self.marbles.first_capsule()
-        {
-            return Err(Error::BallsOnly(id));
-        }
+        let dt = Self::checked_dt(dt)?;
+        self.takes_all_marbles()?;
+        self.note_places();
         self.count_before();
         self.begin_sweep();
         let drive = Drive {
@@ -318,6 +331,7 @@ impl<S: Scalar> World<S> {
         {
             self.marbles.turn(dt);
         }
+        self.stop_what_is_not_finite();
         self.reach = match self.model.response {
             Response::Displacement | Response::Penalty(_) => S::zero(),
             Response::Impulse => length(self.gravity) * dt * dt * S::constant(2.0),
@@ -344,9 +358,9 @@ impl<S: Scalar> World<S> {
     /// scene allows. `dt` is the time that was integrated, in seconds.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`.
+    /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`].
     pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
-        let dt = positive("dt", dt)?;
+        let dt = Self::checked_dt(dt)?;
         let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
@@ -443,6 +457,7 @@ impl<S: Scalar> World<S> {
             ),
             Response::EventDriven => self.go_through_events(dt, self.rest_of_step),
         }
+        self.stop_what_is_not_finite();
         if self.model.rotation != Rotation::None {
             // The deepest contact comes first in the list, so it has the last word.
             for contact in self.contacts.wm.iter().rev() {
@@ -466,9 +481,9 @@ impl<S: Scalar> World<S> {
         self.events.warm.clear();
     }
 
-    /// The marbles that the last step stopped because their motion overflowed.
+    /// The marbles that the last step stopped because their motion overflowed, each once.
     pub fn stopped(&self) -> impl Iterator<Item = MarbleId> + '_ {
-        self.stopped.iter().filter_map(|row| self.marbles.id(*row as usize))
+        self.quarantine.named.iter().copied()
     }
 
     /// The collisions of the last step, in the order of time within each substep. Only
@@ -492,6 +507,7 @@ impl<S: Scalar> World<S> {
     pub fn begin_step(&mut self) {
         self.rest_of_step = S::zero();
         self.stopped.clear();
+        self.quarantine.named.clear();
         self.impacts.clear();
         self.open_account();
     }

@@ -7,7 +7,6 @@ use super::marbles::MarbleId;
 use super::touch::{Near, drop_seams, parts_near};
 use super::walls::{Part, Walls};
 use crate::Error;
-use crate::error::positive;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::response::Material;
 use crate::shape::{Aabb, Sphere};
@@ -21,10 +20,10 @@ impl<S: Scalar> World<S> {
     /// middle.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`, [`Error::Full`] at 2³² balls.
+    /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
+    /// [`Error::Full`] at 2³² balls.
     pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
-        positive("dt", dt)?;
-        let dt = positive("dt", dt.as_f64() as f32)?;
+        let dt = Self::checked_dt(dt)?.as_f64() as f32;
         self.see_guests_off()?;
         if self.swarm.len() == self.swarm.invited.len() {
             return Ok(());

@@ -144,7 +144,7 @@ impl<S: Scalar> World<S> {
             let Some(Stop { time, normal, wall }) = self.first_wall(&sphere, motion) else {
                 continue;
             };
-            self.marbles.stop(&mut self.sweep, row, By::Wall(wall), time);
+            self.marbles.stop_on_the_way(&mut self.sweep, row, By::Wall(wall), time);
             if self.model.response == Response::Displacement {
                 let depth = (motion.dot(-normal) * (S::one() - time)).max(S::zero());
                 self.marbles.velocity[row] += normal * (depth / dt);
@@ -308,7 +308,7 @@ impl<S: Scalar> World<S> {
         for (row, other) in by {
             let row = row as usize;
             let time = self.sweep.stopped[row].unwrap_or(S::one());
-            self.marbles.stop(&mut self.sweep, row, By::Marble(other), time);
+            self.marbles.stop_on_the_way(&mut self.sweep, row, By::Marble(other), time);
         }
         for (row, change) in changes {
             self.marbles.velocity[row as usize] += change;
@@ -330,7 +330,7 @@ impl<S: Scalar> Sweep<S> {
 impl<S: Scalar> Marbles<S> {
     /// Puts a marble back to a part of its way in this substep, to what its forces had made of
     /// its velocity by then.
-    fn stop(&mut self, sweep: &mut Sweep<S>, row: usize, by: By, time: S) {
+    fn stop_on_the_way(&mut self, sweep: &mut Sweep<S>, row: usize, by: By, time: S) {
         let rest = S::one() - time;
         let way = (self.position[row] - sweep.start[row]) * rest;
         let change = (self.velocity[row] - sweep.velocity[row]) * rest;

@@ -127,6 +127,7 @@ impl<S: Scalar> World<S> {
     /// Finds which marbles touch each other, or are at most `reach` metres apart.
     pub(super) fn touch_marbles(&mut self, reach: S) {
         let center = self.marbles.position();
+        self.crowd.begin(center.len());
         if !self.marbles.has_capsules() {
             self.grid.rebuild(center, self.marbles.radius(), reach);
             self.grid.pairs(center, |a, b| {
@@ -134,9 +135,11 @@ impl<S: Scalar> World<S> {
                 let (first, second) = (self.marbles.sphere(first), self.marbles.sphere(second));
                 if let Some(mtv) = out_of_sphere(&first, &second, reach) {
                     let along = [S::zero(); 2];
-                    self.contacts.mm.push(Contact { a, b, part: 0, along, mtv });
+                    let contact = Contact { a, b, part: 0, along, mtv };
+                    self.crowd.add(&mut self.contacts.mm, &self.marbles, contact);
                 }
             });
+            self.crowd.thin(&mut self.contacts.mm, &self.marbles);
             return;
         }
         self.reaches.clear();
@@ -156,10 +159,12 @@ impl<S: Scalar> World<S> {
                 };
                 let (x, y) = (bead(first, along[0]), bead(second, along[1]));
                 if let Some(mtv) = out_of_sphere(&x, &y, reach) {
-                    self.contacts.mm.push(Contact { a, b, part: 0, along, mtv });
+                    let contact = Contact { a, b, part: 0, along, mtv };
+                    self.crowd.add(&mut self.contacts.mm, &self.marbles, contact);
                 }
             }
         });
+        self.crowd.thin(&mut self.contacts.mm, &self.marbles);
     }
 }
 

@@ -29,27 +29,20 @@ pub enum WallShape<S> {
 impl<S: Scalar> WallShape<S> {
     /// The same, with the compounds in compounds laid out flat, or why it cannot be a wall.
     pub(super) fn checked(self) -> Result<Self, Error> {
-        match &self {
-            Self::Plane(_) => {}
-            Self::Solid(shape) => {
-                let bounds = shape.bounding_box();
-                for corner in [bounds.min, bounds.max] {
-                    finite_point(["shape.x", "shape.y", "shape.z"], corner)?;
-                }
+        Ok(match self {
+            Self::Plane(_) => self,
+            Self::Solid(shape) => Self::Solid(shape.checked()?),
+            Self::Mesh(mesh, pose) => {
+                let pose = pose.checked()?;
+                room_for(&mesh.bounds(), pose)?;
+                Self::Mesh(mesh, pose)
             }
-            Self::Mesh(_, pose) | Self::HeightField(_, pose) => {
-                finite_vector(["pose.x", "pose.y", "pose.z"], pose.translation)?;
-                finite_vector(["rotation.x", "rotation.y", "rotation.z"], pose.rotation.v)?;
+            Self::HeightField(field, pose) => {
+                let pose = pose.checked()?;
+                room_for(&field.bounds(), pose)?;
+                Self::HeightField(field, pose)
             }
-        }
-        match self {
-            Self::Solid(Shape::Compound(compound)) => {
-                let mut parts = Vec::new();
-                flatten(&compound, &mut parts);
-                Ok(Self::Solid(Shape::Compound(Compound::new(parts)?)))
-            }
-            other => Ok(other),
-        }
+        })
     }
 
     /// The boxes around it: of a compound one for each part, of a plane none.
@@ -230,13 +223,12 @@ impl<S: Scalar> WallShape<S> {
     }
 }
 
-fn flatten<S: Scalar>(compound: &Compound<Shape<S>>, parts: &mut Vec<Shape<S>>) {
-    for part in compound.parts() {
-        match part {
-            Shape::Compound(inner) => flatten(inner, parts),
-            other => parts.push(other.clone()),
-        }
-    }
+/// Nothing, if a surface in this box, moved, is still finite.
+fn room_for<S: Scalar>(bounds: &Box3<S>, pose: Pose<S>) -> Result<(), Error> {
+    finite_vector(["size.x", "size.y", "size.z"], bounds.max - bounds.min)?;
+    let Box3 { min, max } = moved(bounds, pose);
+    finite_point(["shape.x", "shape.y", "shape.z"], min)?;
+    finite_point(["shape.x", "shape.y", "shape.z"], max).map(|_| ())
 }
 
 /// The box around a box that was moved.

@@ -87,7 +87,8 @@ impl<S: Scalar> Walls<S> {
     /// Adds a wall: a half-space, any shape, a mesh or a height field.
     ///
     /// # Errors
-    /// [`Error::Full`] at 2³² walls, [`Error::NotFinite`] for a shape that is not.
+    /// [`Error::Full`] at 2³² walls; for a number that a wall cannot have, as the constructor of
+    /// its shape, or [`Pose::checked`](crate::frame::Pose::checked).
     pub fn insert(&mut self, wall: impl Into<WallShape<S>>) -> Result<WallId, Error> {
         let shape = wall.into().checked()?;
         let handle = self.handles.push()?;
@@ -133,7 +134,7 @@ impl<S: Scalar> Walls<S> {
     /// are pushed out by the next step.
     ///
     /// # Errors
-    /// [`Error::NoSuchWall`], [`Error::NotFinite`].
+    /// [`Error::NoSuchWall`]; for a shape as [`Walls::insert`].
     pub fn set(&mut self, id: WallId, wall: impl Into<WallShape<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
         let shape = wall.into().checked()?;

@@ -38,6 +38,14 @@ pub(crate) struct Shear<S> {
     parting: S,
 }
 
+impl<S> Shear<S> {
+    /// The rows of its marbles.
+    pub fn rows(&self) -> [Option<usize>; 2] {
+        let (two_marbles, a, b, ..) = self.key;
+        [two_marbles.then_some(a as usize), Some(b as usize)]
+    }
+}
+
 /// Names a contact: whether of two marbles, who, which part of a wall, which ends of capsules.
 type Key = (bool, u32, u32, u32, [i8; 2]);
 

@@ -15,7 +15,7 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
     let own = Material { restitution: 1.0, elasticity, ..Material::default() };
     let (mut time, mut overlap, mut force) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut shear = Vec::new();
-    let walls: Vec<crate::response::event::Wall> = Vec::new();
+    let walls: Vec<crate::shape::Plane<f64>> = Vec::new();
     loop {
         for (position, velocity) in position.iter_mut().zip(velocity) {
             *position += velocity * dt;

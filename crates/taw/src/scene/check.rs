@@ -1,0 +1,204 @@
+//! Whether the numbers of a scene can be those of a world, of whichever scalar.
+
+use cgmath::InnerSpace;
+
+use super::{Ball, Field, Form, Gate, Lattice, Movement, Scene, Surface, Tilt, Wall};
+use crate::Error;
+use crate::error::{finite, positive, within};
+use crate::math::Vec3;
+
+/// The scene becomes a world of any scalar, so its numbers are such as `f32` can hold.
+const LARGEST: f64 = f32::MAX as f64;
+const LEAST: f64 = f32::MIN_POSITIVE as f64;
+
+fn number(field: &'static str, value: f64) -> Result<f64, Error> {
+    within(field, finite(field, value)?, -LARGEST, LARGEST)
+}
+
+fn above_zero(field: &'static str, value: f64) -> Result<f64, Error> {
+    within(field, positive(field, value)?, LEAST, LARGEST)
+}
+
+fn not_negative(field: &'static str, value: f64) -> Result<f64, Error> {
+    within(field, value, 0.0, LARGEST)
+}
+
+fn vector(fields: [&'static str; 3], v: [f64; 3]) -> Result<Vec3<f64>, Error> {
+    fields.into_iter().zip(v).try_for_each(|(field, x)| number(field, x).map(|_| ()))?;
+    Ok(Vec3::from(v))
+}
+
+fn direction(field: &'static str, fields: [&'static str; 3], v: [f64; 3]) -> Result<(), Error> {
+    if v == [0.0; 3] {
+        return Err(Error::NotUnit { field, value: 0.0 });
+    }
+    // However it is turned: none of it overflows, and no digit of it is lost.
+    let length = vector(fields, v)?.magnitude();
+    within(field, length, LEAST / f64::from(f32::EPSILON), LARGEST / 2.0).map(|_| ())
+}
+
+fn gravity(v: [f64; 3]) -> Result<(), Error> {
+    let gravity = vector(["gravity.x", "gravity.y", "gravity.z"], v)?;
+    number("the length of gravity", gravity.magnitude()).map(|_| ())
+}
+
+impl Scene {
+    /// How many marbles a scene may have: with their contacts they take up to a kilobyte each,
+    /// so a gigabyte together.
+    pub const MAX_MARBLES: u32 = 1_000_000;
+
+    /// Nothing, if all numbers are such as any world can take now and later.
+    ///
+    /// What only one thing can have (a restitution up to one, say) is refused when the world is
+    /// given it.
+    pub(super) fn check(&self) -> Result<(), Error> {
+        above_zero("seconds", self.seconds)?;
+        gravity(self.gravity)?;
+        let mut before = 0.0;
+        for Tilt { at, gravity: tilted } in &self.tilts {
+            before = within("tilts.at", *at, before, LARGEST)?;
+            gravity(*tilted)?;
+        }
+        self.fields.iter().try_for_each(|field| field.check())?;
+        self.surface.check()?;
+        self.walls.iter().try_for_each(Wall::check)?;
+        for Gate { normal, through } in &self.gates {
+            direction("normal", ["normal.x", "normal.y", "normal.z"], *normal)?;
+            vector(["through.x", "through.y", "through.z"], *through)?;
+        }
+        self.marbles.iter().try_for_each(Ball::check)?;
+        self.lattices.iter().try_for_each(Lattice::check)?;
+        let counts = self.lattices.iter().map(|lattice| lattice.count.map(f64::from));
+        let marbles = counts.fold(self.marbles.len() as f64, |sum, [x, y, z]| sum + x * y * z);
+        within("lattices.count", marbles, 0.0, f64::from(Self::MAX_MARBLES)).map(|_| ())
+    }
+}
+
+impl Field {
+    fn check(self) -> Result<(), Error> {
+        match self {
+            Self::Drag { velocity, linear, quadratic } => {
+                vector(["velocity.x", "velocity.y", "velocity.z"], velocity)?;
+                not_negative("linear", linear)?;
+                not_negative("quadratic", quadratic)?;
+            }
+            Self::Spring { anchor, rest_length, stiffness } => {
+                vector(["anchor.x", "anchor.y", "anchor.z"], anchor)?;
+                not_negative("rest_length", rest_length)?;
+                not_negative("stiffness", stiffness)?;
+            }
+            Self::Attraction { center, strength } => {
+                vector(["center.x", "center.y", "center.z"], center)?;
+                number("strength", strength)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+impl Surface {
+    fn check(&self) -> Result<(), Error> {
+        within("restitution", self.restitution, 0.0, 1.0)?;
+        not_negative("friction", self.friction)?;
+        within("tangential_restitution", self.tangential_restitution, -1.0, 1.0)?;
+        not_negative("rolling_resistance", self.rolling_resistance)?;
+        not_negative("spinning_resistance", self.spinning_resistance)?;
+        above_zero("youngs_modulus", self.youngs_modulus)?;
+        within("poissons_ratio", self.poissons_ratio, 0.0, 0.5).map(|_| ())
+    }
+}
+
+impl Wall {
+    fn check(&self) -> Result<(), Error> {
+        let Self { shape, surface, moves } = self;
+        surface.iter().try_for_each(Surface::check)?;
+        let far = shape.check()?;
+        let far = far + moves.map_or(Ok(0.0), Movement::check)?;
+        // Wherever it gets, it is still somewhere. Half, because it turns about a pivot.
+        within("the reach of a wall", far, 0.0, LARGEST / 2.0).map(|_| ())
+    }
+}
+
+impl Form {
+    /// How far from the origin it is at most, in metres; of a half-space, its given point.
+    fn check(self) -> Result<f64, Error> {
+        const CENTER: [&str; 3] = ["center.x", "center.y", "center.z"];
+        Ok(match self {
+            Self::HalfSpace { normal, through } => {
+                direction("normal", ["normal.x", "normal.y", "normal.z"], normal)?;
+                vector(["through.x", "through.y", "through.z"], through)?.magnitude()
+            }
+            Self::Box { center, size, turned } => {
+                for (field, side) in ["size.x", "size.y", "size.z"].into_iter().zip(size) {
+                    above_zero(field, side)?;
+                }
+                direction("axis", ["axis.x", "axis.y", "axis.z"], turned.axis)?;
+                number("degrees", turned.degrees)?;
+                vector(CENTER, center)?.magnitude() + Vec3::from(size).magnitude()
+            }
+            Self::Ball { center, radius } => {
+                vector(CENTER, center)?.magnitude() + above_zero("radius", radius)?
+            }
+            Self::Capsule { from, to, radius } => {
+                let from = vector(["from.x", "from.y", "from.z"], from)?.magnitude();
+                let to = vector(["to.x", "to.y", "to.z"], to)?.magnitude();
+                from + to + above_zero("radius", radius)?
+            }
+        })
+    }
+}
+
+impl Movement {
+    /// How far it takes a wall at most, in metres.
+    fn check(self) -> Result<f64, Error> {
+        const PIVOT: [&str; 3] = ["pivot.x", "pivot.y", "pivot.z"];
+        const AXIS: [&str; 3] = ["axis.x", "axis.y", "axis.z"];
+        Ok(match self {
+            Self::Conveys { velocity } => {
+                vector(["velocity.x", "velocity.y", "velocity.z"], velocity)?;
+                0.0
+            }
+            Self::Turns { pivot, axis, degrees_per_second } => {
+                direction("axis", AXIS, axis)?;
+                number("degrees_per_second", degrees_per_second)?;
+                2.0 * vector(PIVOT, pivot)?.magnitude()
+            }
+            Self::Swings { way, pivot, axis, degrees, period } => {
+                direction("axis", AXIS, axis)?;
+                let way = vector(["way.x", "way.y", "way.z"], way)?.magnitude();
+                let often = std::f64::consts::TAU / above_zero("period", period)?;
+                number("way / period", way * often)?;
+                number("degrees / period", number("degrees", degrees)?.to_radians() * often)?;
+                way + 2.0 * vector(PIVOT, pivot)?.magnitude()
+            }
+        })
+    }
+}
+
+impl Ball {
+    fn check(&self) -> Result<(), Error> {
+        vector(["position.x", "position.y", "position.z"], self.position)?;
+        above_zero("radius", self.radius)?;
+        vector(["velocity.x", "velocity.y", "velocity.z"], self.velocity)?;
+        vector(["spin.x", "spin.y", "spin.z"], self.spin)?;
+        above_zero("density", self.density)?;
+        self.surface.iter().try_for_each(Surface::check)
+    }
+}
+
+impl Lattice {
+    fn check(&self) -> Result<(), Error> {
+        self.first.check()?;
+        within("disorder", self.disorder, 0.0, 1.0)?;
+        vector(["pitch.x", "pitch.y", "pitch.z"], self.pitch)?;
+        for ((field, pitch), (first, count)) in ["pitch.x", "pitch.y", "pitch.z"]
+            .into_iter()
+            .zip(self.pitch)
+            .zip(self.first.position.into_iter().zip(self.count))
+        {
+            let most = (LARGEST - first.abs()) / f64::from(count.max(1));
+            within(field, pitch, -most, most)?;
+        }
+        Ok(())
+    }
+}
