@@ -10,6 +10,8 @@ use crate::scene;
 #[test]
 fn a_disabled_wall_holds_nothing_until_it_comes_back() {
     let mut app = scene::app();
+    let (response, rotation) = (Response::Impulse, Rotation::Dynamic);
+    app.insert_resource(TawModel(Model { response, rotation, ..Model::default() }));
     let floor = scene::floor(&mut app);
     let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
     scene::frames(&mut app, 10);
@@ -19,7 +21,6 @@ fn a_disabled_wall_holds_nothing_until_it_comes_back() {
     assert!(fallen < 0.4, "{fallen}");
     assert!(app.world().resource::<TawWorld>().walls.is_empty());
     app.world_mut().entity_mut(floor).remove::<Disabled>();
-    // Pushed out of the floor, which throws it up by some models; then it lies.
     scene::frames(&mut app, 400);
     let lies = scene::position(&app, marble).y;
     assert!((lies - 0.5).abs() < 1e-3, "{lies}");

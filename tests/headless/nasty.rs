@@ -173,6 +173,7 @@ fn samples() -> Vec<Sample> {
 /// An app with a floor far below and a witness far away, which moves.
 fn app(model: Model) -> (App, Entity) {
     let mut app = scene::smooth_app();
+    app.register_type::<Transform>();
     app.insert_resource(TawModel(model)).insert_resource(Gravity(Vec3::ZERO));
     app.world_mut().spawn((Wall::default(), Transform::from_xyz(0.0, -50.0, 0.0)));
     let witness = (Marble::new(0.5), Velocity(Vec3::X), Transform::from_xyz(900.0, 7.0, 0.0));

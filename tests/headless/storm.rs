@@ -12,12 +12,16 @@ use fastrand::Rng;
 use crate::scene;
 use crate::snapshots::agree;
 
-/// Half of the width of the closed box, in metres.
-const HALF: f32 = 8.0;
+/// Half of the width of the closed box, in metres: so far that no wall that moves comes near
+/// enough to squeeze a marble through the side.
+const HALF: f32 = 10.0;
 
 struct Storm {
     app: App,
     random: Rng,
+    /// Whether this one is of soft contacts, which give way to what is fast or heavy, so that
+    /// the box is not closed; else its models change.
+    soft: bool,
     parents: Vec<(Entity, Vec3, Vec3)>,
     walls: Vec<Entity>,
     marbles: Vec<Entity>,
@@ -35,18 +39,19 @@ impl Storm {
     fn new(seed: u64) -> Self {
         let mut random = Rng::with_seed(seed);
         let mut app = if random.bool() { scene::app() } else { scene::smooth_app() };
-        app.insert_resource(TawModel(model(&mut random)));
+        let soft = random.u32(0..4) == 0;
+        app.insert_resource(TawModel(model(&mut random, soft)));
         // Frame rates from 10 to 1,000, each ratio as likely.
         scene::frame_length(&mut app, 0.1 * 0.01_f32.powf(random.f32()));
         for normal in [Vec3::X, Vec3::Y, Vec3::Z, Vec3::NEG_X, Vec3::NEG_Y, Vec3::NEG_Z] {
             let wall = Wall::HalfSpace(Dir3::new(normal).unwrap());
             app.world_mut().spawn((wall, Transform::from_translation(normal * -HALF)));
         }
-        let mut storm = Self { app, random, parents: vec![], walls: vec![], marbles: vec![] };
+        let mut storm = Self { app, random, soft, parents: vec![], walls: vec![], marbles: vec![] };
         for _ in 0..storm.random.u32(1..4) {
-            let place = Transform::from_translation(point(&mut storm.random, 2.0));
+            let place = Transform::from_translation(point(&mut storm.random, 1.5));
             let parent = storm.app.world_mut().spawn(place).id();
-            let drift = point(&mut storm.random, 1.5);
+            let drift = point(&mut storm.random, 1.0);
             let turn = point(&mut storm.random, 1.0);
             storm.parents.push((parent, drift, turn));
         }
@@ -59,16 +64,16 @@ impl Storm {
     fn spawn_wall(&mut self) {
         let random = &mut self.random;
         let wall = match random.u32(0..5) {
-            0 => Sphere::new(within(random, 0.3, 2.0)).into(),
-            1 => Cuboid::new(2.0, within(random, 0.1, 1.0), 3.0).into(),
-            2 => Capsule3d::new(0.3, 2.0).into(),
+            0 => Sphere::new(within(random, 0.3, 1.5)).into(),
+            1 => Cuboid::new(1.0, within(random, 0.1, 1.0), 2.0).into(),
+            2 => Capsule3d::new(0.3, 1.5).into(),
             3 => Wall::Hull((0..8).map(|_| point(random, 1.0)).collect()),
             _ => Wall::Mesh {
                 points: vec![Vec3::ZERO, Vec3::X * 2.0, Vec3::Z * 2.0, Vec3::new(2.0, 0.5, 2.0)],
                 triangles: vec![[0, 2, 1], [1, 2, 3]],
             },
         };
-        let place = Transform::from_translation(point(random, 3.0))
+        let place = Transform::from_translation(point(random, 1.0))
             .with_rotation(Quat::from_scaled_axis(point(random, 3.0)));
         let parent = random.usize(0..=self.parents.len());
         let wall = self.app.world_mut().spawn((wall, place)).id();
@@ -137,7 +142,7 @@ impl Storm {
                 self.app.world_mut().get_mut::<Transform>(marble).unwrap().translation.y += way;
             }
             2 => {
-                let jump = point(random, 3.0);
+                let jump = point(random, 2.0);
                 if let Some(mut place) = self.app.world_mut().get_mut::<Transform>(parent) {
                     place.translation = jump;
                 }
@@ -180,7 +185,7 @@ impl Storm {
                 self.app.world_mut().entity_mut(marble).insert(force);
             }
             13 => {
-                let model = model(random);
+                let model = model(random, self.soft);
                 self.app.insert_resource(TawModel(model));
             }
             14 => self.app.world_mut().resource_mut::<TawModel>().set_changed(),
@@ -213,7 +218,8 @@ impl Storm {
             let (at, v) = (Vec3::new(at.x, at.y, at.z), Vec3::new(v.x, v.y, v.z));
             assert!(at.is_finite() && v.is_finite(), "{what}: {at}, {v} m/s");
             // Its center, as walls push with force and a crowd pushes back.
-            assert!(at.abs().max_element() < HALF + 0.01, "{what}: {at} is out of the box");
+            let inside = at.abs().max_element() < HALF + 0.01;
+            assert!(self.soft || inside, "{what}: {at} is out of the box");
         }
         for marble in &self.marbles {
             let place = self.app.world().get::<Transform>(*marble).unwrap();
@@ -228,13 +234,10 @@ impl Storm {
     }
 }
 
-fn model(random: &mut Rng) -> Model {
-    let response = [
-        Response::Displacement,
-        Response::Impulse,
-        Response::Penalty(ContactLaw::SpringDashpot),
-        Response::EventDriven,
-    ][random.usize(0..4)];
+fn model(random: &mut Rng, soft: bool) -> Model {
+    let hard = [Response::Displacement, Response::Impulse, Response::EventDriven];
+    let penalty = Response::Penalty(ContactLaw::SpringDashpot);
+    let response = if soft { penalty } else { hard[random.usize(0..3)] };
     let rotation = [Rotation::None, Rotation::Rolling, Rotation::Dynamic][random.usize(0..3)];
     Model { response, rotation, substeps: random.u32(1..4), ..Model::default() }
 }
@@ -256,9 +259,13 @@ fn run(seed: u64) {
         if storm.random.f32() < 20.0 * frame {
             storm.disturb();
         }
+        let before = storm.app.world().resource::<Time<Fixed>>().elapsed();
         storm.app.update();
-        let what = what(&storm, i);
-        storm.judge(&what);
+        // Entities and rows find each other in steps.
+        if storm.app.world().resource::<Time<Fixed>>().elapsed() > before {
+            let what = what(&storm, i);
+            storm.judge(&what);
+        }
     }
 }
 

@@ -280,12 +280,22 @@ pub(crate) struct WallState {
     pub shape: Option<LocalShape>,
     /// The scale that it was last built for, whether or not it could be.
     pub built: Option<Vec3>,
+    /// Whether it could not.
+    pub refused: bool,
     /// Its place in world space as last gathered, to the bit: translation and rotation.
     pub posed: Option<([u32; 3], [u32; 4])>,
     /// Its material as last gathered, to the bit.
     pub material: Option<([u32; 7], Combine)>,
     /// How it came where it is.
     pub way: Way,
+}
+
+impl WallState {
+    /// The same shape, on its way into a world.
+    pub fn without_row(&mut self) -> Self {
+        let (shape, built, refused) = (self.shape.take(), self.built, self.refused);
+        Self { shape, built, refused, ..Self::default() }
+    }
 }
 
 /// A wall in its own frame, built at some scale.

@@ -50,10 +50,18 @@ pub fn note_places(
     }
 }
 
-type WallComponents<'a> =
-    (Entity, Ref<'a, Wall>, Option<&'a SurfaceMaterial>, Has<Marble>, &'a mut WallState);
-type WallItem<'a> =
-    (Entity, Ref<'a, Wall>, Option<&'a SurfaceMaterial>, bool, Mut<'a, WallState>);
+type WallComponents<'a> = (
+    (Entity, &'a Transform, Has<Marble>),
+    Ref<'a, Wall>,
+    Option<&'a SurfaceMaterial>,
+    &'a mut WallState,
+);
+type WallItem<'a> = (
+    (Entity, &'a Transform, bool),
+    Ref<'a, Wall>,
+    Option<&'a SurfaceMaterial>,
+    Mut<'a, WallState>,
+);
 
 /// Who was put elsewhere, and who carries whom.
 type Jumps<'w, 's> = (Query<'w, 's, Entity, With<Teleport>>, Query<'w, 's, &'static ChildOf>);
@@ -69,7 +77,7 @@ pub fn walls(
     (mut refusals, mut removed): (Refusals, MessageWriter<RowRemoved>),
 ) {
     if world.just_restored {
-        snapshot::name_walls(&mut world, walls.iter_mut().map(|it| (it.0, it.4)));
+        snapshot::name_walls(&mut world, walls.iter_mut().map(|it| (it.0.0, it.3)));
     }
     // Somebody else changed walls, or the world is another one.
     let all = world.just_restored || world.walls.version() != world.walls_gathered;
@@ -78,7 +86,7 @@ pub fn walls(
     (frame.seconds, frame.first) = (0.0, false);
     let mut rows = 0;
     for item in &mut walls {
-        let entity = item.0;
+        let entity = item.0.0;
         let jumps = !jumps.is_empty()
             && (jumps.contains(entity) || parents.iter_ancestors(entity).any(|it| jumps.contains(it)));
         let place = transforms.compute_global_transform(entity).ok();
@@ -86,7 +94,7 @@ pub fn walls(
         rows += usize::from(gathering.take_over(item, place, clock));
     }
     if rows != world.walls.len() {
-        snapshot::take_out_walls(&mut world, |wall| walls.get(wall).ok()?.4.id, entities, &mut removed);
+        snapshot::take_out_walls(&mut world, |wall| walls.get(wall).ok()?.3.id, entities, &mut removed);
     }
     world.walls_gathered = world.walls.version();
 }
@@ -118,7 +126,7 @@ impl Gathering<'_, '_> {
     /// Takes over one wall. Gives whether it has a row.
     fn take_over(
         &mut self,
-        (entity, wall, material, is_marble, mut state): WallItem,
+        ((entity, own, is_marble), wall, material, mut state): WallItem,
         place: Option<GlobalTransform>,
         clock: Clock,
     ) -> bool {
@@ -126,7 +134,7 @@ impl Gathering<'_, '_> {
         if let Some(id) = state.id
             && self.world.walls.row(id).is_err()
         {
-            *state = WallState { shape: state.shape.take(), built: state.built, ..default() };
+            *state = state.without_row();
         }
         if is_marble {
             self.refusals.check(Some(entity), Err(Refusal::MarbleAndWall));
@@ -141,23 +149,29 @@ impl Gathering<'_, '_> {
             self.refusals.check(Some(entity), Err(Refusal::NoPlace));
             return self.stop(state);
         };
+        if !self.refusals.check(Some(entity), finite(own)) {
+            return self.stop(state);
+        }
         let (scale, rotation, translation) = place.to_scale_rotation_translation();
+        let no_frame = Refusal::NoFrame(scale.x, scale.y, scale.z);
+        if !(scale.is_finite() && translation.is_finite()) {
+            self.refusals.check(Some(entity), Err(no_frame));
+            return self.stop(state);
+        }
         if wall.is_changed() || !state.built.is_some_and(|built| same_scale(built, scale)) {
             state.built = Some(scale);
             let built = wall.shape(scale).map(|shape| {
                 state.shape = Some(LocalShape { shape, reach: wall.reach(scale) });
                 state.posed = None;
             });
-            if !self.refusals.check(Some(entity), built) {
-                return self.stop(state);
-            }
+            state.refused = !self.refusals.check(Some(entity), built);
+        }
+        if state.refused {
+            return self.stop(state); // as it was before, and where
         }
         let now = Isometry3d::new(translation, rotation);
         if !is_finite(now) {
-            if state.shape.is_some() {
-                let Vec3 { x, y, z } = scale;
-                self.refusals.check(Some(entity), Err(Refusal::NoFrame(x, y, z)));
-            }
+            self.refusals.check(Some(entity), Err(no_frame));
             return self.stop(state);
         }
         self.put(entity, state, now, clock);
@@ -220,6 +234,27 @@ impl Gathering<'_, '_> {
             self.refusals.check(Some(entity), self.world.walls.set_material(id, material));
         }
     }
+}
+
+/// Whether all numbers of a `Transform` are finite.
+fn finite(own: &Transform) -> Result<(), taw::Error> {
+    let Transform { translation, rotation, scale } = own;
+    let fields = [
+        ("translation.x", translation.x),
+        ("translation.y", translation.y),
+        ("translation.z", translation.z),
+        ("rotation.x", rotation.x),
+        ("rotation.y", rotation.y),
+        ("rotation.z", rotation.z),
+        ("rotation.w", rotation.w),
+        ("scale.x", scale.x),
+        ("scale.y", scale.y),
+        ("scale.z", scale.z),
+    ];
+    let bad = fields.into_iter().find(|(_, value)| !value.is_finite());
+    bad.map_or(Ok(()), |(field, value)| {
+        Err(taw::Error::NotFinite { field, value: value.into() })
+    })
 }
 
 /// Whether a shape that was built for one scale does for another.

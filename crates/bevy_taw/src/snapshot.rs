@@ -97,7 +97,7 @@ pub(crate) fn name_walls<'a>(
     let ids: HashMap<_, _> = world.wall_entities.iter().map(|(id, wall)| (*wall, *id)).collect();
     for (entity, mut state) in states {
         let id = ids.get(&entity).copied().filter(|id| world.walls.row(*id).is_ok());
-        *state = WallState { id, shape: state.shape.take(), built: state.built, ..default() };
+        *state = WallState { id, ..state.without_row() };
     }
 }
 
