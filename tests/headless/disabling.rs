@@ -37,10 +37,12 @@ fn a_disabled_marble_is_no_obstacle_and_comes_back_as_fast_as_it_was() {
         let push = ExternalImpulse { impulse: Vec3::X * 8.0, ..default() };
         app.world_mut().entity_mut(flying).insert((MarbleMass::Kilograms(1.0), push));
         scene::frames(&mut app, 4);
-        let x = |app: &App, row: usize| app.world().resource::<TawWorld>().marbles.position()[row].x;
+        let x =
+            |app: &App, row: usize| app.world().resource::<TawWorld>().marbles.position()[row].x;
         let before = x(&app, 0);
         app.world_mut().entity_mut(flying).insert(Disabled);
-        let through = (Marble::new(0.5), Velocity(Vec3::X * 64.0), Transform::from_xyz(-3.0, 0.0, 0.0));
+        let through =
+            (Marble::new(0.5), Velocity(Vec3::X * 64.0), Transform::from_xyz(-3.0, 0.0, 0.0));
         let through = app.world_mut().spawn(through).id();
         scene::frames(&mut app, 60);
         assert_eq!(app.world().resource::<TawWorld>().marbles.len(), 1);

@@ -198,7 +198,9 @@ fn a_child_of_what_moves_in_every_frame_is_drawn_where_it_is() {
         scene::frame_length(&mut app, STEP / 4.0);
         let parent = app.world_mut().spawn(Transform::default()).id();
         let marble = scene::drop_marble(&mut app, 0.5, Vec3::new(0.0, 3.0, 0.0));
-        app.world_mut().entity_mut(marble).insert((ChildOf(parent), Velocity(Vec3::X * speed / STEP)));
+        app.world_mut()
+            .entity_mut(marble)
+            .insert((ChildOf(parent), Velocity(Vec3::X * speed / STEP)));
         let carry = move |mut transforms: Query<&mut Transform>| {
             let mut carrier = transforms.get_mut(parent).unwrap();
             carrier.translation.z += 0.4;

@@ -57,7 +57,11 @@ fn walls_are_where_their_entities_are_after_a_restore() {
         app.world_mut().get_mut::<Transform>(board).unwrap().translation.y = -3.0;
         scene::frames(&mut app, 5);
         let mut world = app.world_mut().resource_mut::<TawWorld>();
-        if raw { **world = clone } else { world.restore(&saved) }
+        if raw {
+            **world = clone
+        } else {
+            world.restore(&saved)
+        }
         scene::frames(&mut app, 300);
         let world = app.world().resource::<TawWorld>();
         let lowest = world.marbles.position().iter().fold(9.0_f32, |low, it| low.min(it.y));
@@ -78,13 +82,18 @@ fn rows_without_entities_go_and_entities_without_rows_come() {
         gone.iter().chain(&walls[..1]).for_each(|it| {
             app.world_mut().despawn(*it);
         });
-        let new = [1.0, 2.0, 3.0].map(|x| scene::drop_marble(&mut app, 0.1, Vec3::new(x, 9.0, 0.0)));
+        let new =
+            [1.0, 2.0, 3.0].map(|x| scene::drop_marble(&mut app, 0.1, Vec3::new(x, 9.0, 0.0)));
         app.world_mut().spawn((Wall::default(), Transform::from_xyz(0.0, -0.5, 0.0)));
         app.world_mut().get_mut::<Marble>(marbles[0]).unwrap().radius = 0.33;
         scene::frames(&mut app, 30);
         let falling = scene::position(&app, new[1]).y;
         let mut world = app.world_mut().resource_mut::<TawWorld>();
-        if raw { **world = clone } else { world.restore(&saved) }
+        if raw {
+            **world = clone
+        } else {
+            world.restore(&saved)
+        }
         app.update();
         let told = app.world().resource::<Messages<RowRemoved>>();
         let told: Vec<_> = told.iter_current_update_messages().collect();
@@ -129,8 +138,8 @@ fn a_swarm_keeps_what_it_had_and_loses_what_is_nobodys() {
     scene::floor(&mut app);
     scene::drop_marble(&mut app, 0.5, Vec3::Y * 9.0);
     let region = |x: f32| Aabb3d::new(Vec3::new(x, 4.0, 0.0), Vec3::splat(2.0));
-    let [stays, goes] = [0.0, 8.0]
-        .map(|x| app.world_mut().spawn(Swarm::filling(region(x), 30, 0.1..=0.2, 7)).id());
+    let [stays, goes] =
+        [0.0, 8.0].map(|x| app.world_mut().spawn(Swarm::filling(region(x), 30, 0.1..=0.2, 7)).id());
     scene::frames(&mut app, 10);
     let saved = app.world().resource::<TawWorld>().snapshot();
     app.world_mut().get_mut::<Swarm>(stays).unwrap().truncate(10);

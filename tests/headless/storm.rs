@@ -173,12 +173,15 @@ impl Storm {
                     entity.insert(Disabled);
                 }
             }
-            10 => self.app.world_mut().get_mut::<Marble>(marble).unwrap().radius = {
-                let good = within(random, 0.1, 0.6);
-                if bad > 0.0 && bad < 1e29 || random.bool() { good } else { bad.min(0.0) }
-            },
+            10 => {
+                self.app.world_mut().get_mut::<Marble>(marble).unwrap().radius = {
+                    let good = within(random, 0.1, 0.6);
+                    if bad > 0.0 && bad < 1e29 || random.bool() { good } else { bad.min(0.0) }
+                }
+            }
             11 => {
-                self.app.world_mut().get_mut::<Transform>(marble).unwrap().translation.x = bad.max(0.0).min(HALF - 1.0) + (bad - bad);
+                self.app.world_mut().get_mut::<Transform>(marble).unwrap().translation.x =
+                    bad.max(0.0).min(HALF - 1.0) + (bad - bad);
             }
             12 => {
                 let force = ExternalForce { force: Vec3::Y * (bad - bad), torque: Vec3::ZERO };
@@ -191,7 +194,11 @@ impl Storm {
             14 => self.app.world_mut().resource_mut::<TawModel>().set_changed(),
             15 => {
                 let mut entity = self.app.world_mut().entity_mut(marble);
-                if random.bool() { entity.insert(ChildOf(parent)) } else { entity.remove::<ChildOf>() };
+                if random.bool() {
+                    entity.insert(ChildOf(parent))
+                } else {
+                    entity.remove::<ChildOf>()
+                };
             }
             _ => {
                 let saved = self.app.world().resource::<TawWorld>().snapshot();

@@ -105,8 +105,7 @@ fn wave(side: u32) -> Wall {
     let points = (0..=side).flat_map(|z| (0..=side).map(move |x| (x as f32, z as f32)));
     let points = points.map(|(x, z)| Vec3::new(x, (x * 0.3).sin() + (z * 0.4).cos(), z) * 0.1);
     let triangles = (0..side).flat_map(|z| (0..side).map(move |x| (x, z))).flat_map(|(x, z)| {
-        let [a, b, c, d] =
-            [corner(x, z), corner(x + 1, z), corner(x, z + 1), corner(x + 1, z + 1)];
+        let [a, b, c, d] = [corner(x, z), corner(x + 1, z), corner(x, z + 1), corner(x + 1, z + 1)];
         [[a, c, b], [b, c, d]]
     });
     Wall::Mesh { points: points.collect(), triangles: triangles.collect() }

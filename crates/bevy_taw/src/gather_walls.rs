@@ -56,12 +56,8 @@ type WallComponents<'a> = (
     Option<&'a SurfaceMaterial>,
     &'a mut WallState,
 );
-type WallItem<'a> = (
-    (Entity, &'a Transform, bool),
-    Ref<'a, Wall>,
-    Option<&'a SurfaceMaterial>,
-    Mut<'a, WallState>,
-);
+type WallItem<'a> =
+    ((Entity, &'a Transform, bool), Ref<'a, Wall>, Option<&'a SurfaceMaterial>, Mut<'a, WallState>);
 
 /// Who was put elsewhere, and who carries whom.
 type Jumps<'w, 's> = (Query<'w, 's, Entity, With<Teleport>>, Query<'w, 's, &'static ChildOf>);
@@ -88,13 +84,19 @@ pub fn walls(
     for item in &mut walls {
         let entity = item.0.0;
         let jumps = !jumps.is_empty()
-            && (jumps.contains(entity) || parents.iter_ancestors(entity).any(|it| jumps.contains(it)));
+            && (jumps.contains(entity)
+                || parents.iter_ancestors(entity).any(|it| jumps.contains(it)));
         let place = transforms.compute_global_transform(entity).ok();
         let mut gathering = Gathering { world: &mut world, refusals: &mut refusals, all, jumps };
         rows += usize::from(gathering.take_over(item, place, clock));
     }
     if rows != world.walls.len() {
-        snapshot::take_out_walls(&mut world, |wall| walls.get(wall).ok()?.3.id, entities, &mut removed);
+        snapshot::take_out_walls(
+            &mut world,
+            |wall| walls.get(wall).ok()?.3.id,
+            entities,
+            &mut removed,
+        );
     }
     world.walls_gathered = world.walls.version();
 }
@@ -252,9 +254,7 @@ fn finite(own: &Transform) -> Result<(), taw::Error> {
         ("scale.z", scale.z),
     ];
     let bad = fields.into_iter().find(|(_, value)| !value.is_finite());
-    bad.map_or(Ok(()), |(field, value)| {
-        Err(taw::Error::NotFinite { field, value: value.into() })
-    })
+    bad.map_or(Ok(()), |(field, value)| Err(taw::Error::NotFinite { field, value: value.into() }))
 }
 
 /// Whether a shape that was built for one scale does for another.

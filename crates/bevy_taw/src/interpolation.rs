@@ -54,9 +54,7 @@ impl Plugin for TawInterpolationPlugin {
         app.add_systems(
             RunFixedMainLoop,
             (
-                (undo, undo_children)
-                    .chain()
-                    .in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
+                (undo, undo_children).chain().in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
                 (ease, ease_children)
                     .chain()
                     .in_set(RunFixedMainLoopSystems::AfterFixedMainLoop)
@@ -65,22 +63,13 @@ impl Plugin for TawInterpolationPlugin {
         )
         // By then, what carries marbles is where its last step took it.
         .add_systems(FixedFirst, undo_children.after(TransformEasingSystems::Reset))
-        .add_systems(
-            FixedUpdate,
-            note_start.after(TawSystems::Gather).before(TawSystems::Step),
-        )
+        .add_systems(FixedUpdate, note_start.after(TawSystems::Gather).before(TawSystems::Step))
         // And by now, where this frame took it.
         .add_systems(PostUpdate, ease_children.before(TransformSystems::Propagate));
     }
 }
 
-type Drawn<'a> = (
-    &'a Marble,
-    &'a mut MarbleState,
-    &'a mut Transform,
-    &'a mut Eased,
-    Has<Teleport>,
-);
+type Drawn<'a> = (&'a Marble, &'a mut MarbleState, &'a mut Transform, &'a mut Eased, Has<Teleport>);
 type Roots<'w, 's> = Query<'w, 's, Drawn<'static>, (Without<ChildOf>, Without<NoTransformEasing>)>;
 type Children<'w, 's> =
     Query<'w, 's, (Drawn<'static>, Entity, &'static ChildOf), Without<NoTransformEasing>>;
@@ -208,8 +197,7 @@ fn go_back(
 ) -> bool {
     let Some((position, rotation)) = place(world, &state) else { return true };
     let moved = bits(transform.translation) != state.seen.translation;
-    let turned =
-        rotation.is_some() && rotation_bits(transform.rotation) != state.seen.rotation;
+    let turned = rotation.is_some() && rotation_bits(transform.rotation) != state.seen.rotation;
     if !moved {
         put(&mut transform, &mut state, frame, Some(position), None);
         if eased.wrote.is_some() {
@@ -222,8 +210,7 @@ fn go_back(
     !(moved || turned)
 }
 
-type DrawnItem<'a> =
-    (&'a Marble, Mut<'a, MarbleState>, Mut<'a, Transform>, Mut<'a, Eased>, bool);
+type DrawnItem<'a> = (&'a Marble, Mut<'a, MarbleState>, Mut<'a, Transform>, Mut<'a, Eased>, bool);
 
 /// Takes over where somebody moved or turned a marble since it was drawn. What cannot be right
 /// is left to gather, which refuses it.

@@ -110,10 +110,7 @@ pub fn marbles(
 /// somebody moved them, too. Those that are eased are drawn elsewhere.
 pub fn stay(
     world: Res<TawWorld>,
-    mut transforms: ParamSet<(
-        TransformHelper,
-        Query<(&mut Transform, &mut MarbleState)>,
-    )>,
+    mut transforms: ParamSet<(TransformHelper, Query<(&mut Transform, &mut MarbleState)>)>,
     children: Query<
         (Entity, &ChildOf),
         (With<Marble>, Or<(Without<Eased>, With<NoTransformEasing>)>),

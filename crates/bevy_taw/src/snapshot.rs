@@ -73,10 +73,7 @@ impl TawWorld {
 }
 
 /// Gives marble entities the rows that they have in a restored world.
-pub(crate) fn name_marbles(
-    world: &mut TawWorld,
-    states: &mut Query<(Entity, &mut MarbleState)>,
-) {
+pub(crate) fn name_marbles(world: &mut TawWorld, states: &mut Query<(Entity, &mut MarbleState)>) {
     for (_, mut state) in states.iter_mut() {
         (state.id, state.refused) = (None, false);
     }
@@ -119,9 +116,9 @@ pub(crate) fn take_out_marbles(
     for id in gone {
         let entity = world.marble_entities.remove(&id);
         let Ok(marble) = world.marbles.remove(id) else { continue };
-        if let Some(entity) = entity.filter(|entity| {
-            entities.contains(*entity) && visible.get(*entity).is_err()
-        }) {
+        if let Some(entity) =
+            entity.filter(|entity| entities.contains(*entity) && visible.get(*entity).is_err())
+        {
             world.away.insert(entity, marble);
         } else {
             log::warn!("taw took out {id:?}: no entity stands behind it");

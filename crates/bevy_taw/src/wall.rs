@@ -135,8 +135,9 @@ impl Wall {
     /// How far from the origin of its frame it goes at this scale, in metres.
     pub(crate) fn reach(&self, scale: Vec3) -> f32 {
         let largest = scale.abs().max_element();
-        let farthest =
-            |points: &[Vec3]| points.iter().map(|point| (*point * scale).length()).fold(0.0, f32::max);
+        let farthest = |points: &[Vec3]| {
+            points.iter().map(|point| (*point * scale).length()).fold(0.0, f32::max)
+        };
         match self {
             Self::HalfSpace(_) => 1.0,
             Self::Sphere(Sphere { radius }) => radius * largest,
@@ -172,7 +173,8 @@ impl Way {
         let Some(last) = last.filter(|_| dt > 0.0) else { return None };
         let framed = framed.unwrap_or(last);
         let frame = if frame > 0.0 { frame } else { dt };
-        let (outside, inside) = (Speed::between(last, framed, frame), Speed::between(framed, now, dt));
+        let (outside, inside) =
+            (Speed::between(last, framed, frame), Speed::between(framed, now, dt));
         let measured = Speed {
             velocity: outside.velocity + inside.velocity,
             spin: outside.spin + inside.spin,
