@@ -2,7 +2,8 @@
 //! with teleports, bad numbers, spawns, despawns and disabled entities, at any frame rate. Each is
 //! a seed, and what it is judged by is true of every one.
 //!
-//! `STORM=first..last cargo test --test headless -- --ignored --nocapture long_storm` runs those.
+//! `STORM=first..last cargo test --test headless -- --ignored --nocapture long_storm` runs those,
+//! with `CALM=1` also the calm after each, in which energy may only fall.
 
 use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
@@ -216,6 +217,11 @@ impl Storm {
         }
     }
 
+    fn what(&self, seed: u64, i: u32, frame: f32) -> String {
+        let model = **self.app.world().resource::<TawModel>();
+        format!("seed {seed}, frame {i} of {frame} s, {:?} {:?}", model.response, model.rotation)
+    }
+
     /// What is true of every app.
     fn judge(&mut self, what: &str) {
         agree(&mut self.app);
@@ -234,6 +240,28 @@ impl Storm {
         }
     }
 
+    /// Ends the storm: nothing moves walls or pushes marbles any more. What was put into each
+    /// other has half a second to part.
+    fn calm_down(&mut self, frame: f32) {
+        for marble in &self.marbles {
+            self.app.world_mut().entity_mut(*marble).remove::<ExternalForce>();
+        }
+        for _ in 0..=(0.5 / frame) as u32 {
+            self.app.update();
+        }
+    }
+
+    /// The energy of a fall of all marbles through the box, in joules.
+    fn most_energy(&self) -> f64 {
+        let world = self.app.world().resource::<TawWorld>();
+        let marbles = (0..world.marbles.len()).filter_map(|row| world.marbles.id(row));
+        let masses = marbles.filter_map(|id| {
+            let marble = world.marbles.get(id).ok()?;
+            Some(f64::from(marble.mass.of_capsule(marble.radius, marble.half_length)))
+        });
+        masses.sum::<f64>() * 9.81 * f64::from(2.0 * HALF)
+    }
+
     /// In joules, of all marbles together.
     fn energy(&self) -> f64 {
         let energy = self.app.world().resource::<TawWorld>().energy();
@@ -249,15 +277,13 @@ fn model(random: &mut Rng, soft: bool) -> Model {
     Model { response, rotation, substeps: random.u32(1..4), ..Model::default() }
 }
 
-/// Some seconds of one app: a storm, then calm.
-fn run(seed: u64) {
+/// Some seconds of one app, and how long its frames are.
+fn run(seed: u64) -> (Storm, f32) {
     let mut storm = Storm::new(seed);
     let frame = storm.app.world().resource::<bevy::time::TimeUpdateStrategy>();
-    let bevy::time::TimeUpdateStrategy::ManualDuration(frame) = *frame else { return };
-    let frame = frame.as_secs_f32();
-    let what = |storm: &Storm, i: u32| {
-        let model = **storm.app.world().resource::<TawModel>();
-        format!("seed {seed}, frame {i} of {frame} s, {:?} {:?}", model.response, model.rotation)
+    let frame = match frame {
+        bevy::time::TimeUpdateStrategy::ManualDuration(frame) => frame.as_secs_f32(),
+        _ => unreachable!("the storm turns its own clock"),
     };
     let frames = (2.0 / frame) as u32;
     for i in 0..frames {
@@ -270,15 +296,43 @@ fn run(seed: u64) {
         storm.app.update();
         // Entities and rows find each other in steps.
         if storm.app.world().resource::<Time<Fixed>>().elapsed() > before {
-            let what = what(&storm, i);
+            let what = storm.what(seed, i, frame);
             storm.judge(&what);
         }
+    }
+    (storm, frame)
+}
+
+/// What comes after a storm: no energy from nothing.
+fn calm(seed: u64, mut storm: Storm, frame: f32) {
+    storm.calm_down(frame);
+    let mut most = storm.energy();
+    for i in 0..(1.0 / frame) as u32 {
+        storm.app.update();
+        let (now, what) = (storm.energy(), storm.what(seed, i, frame));
+        // A thousandth of what there is to fall for all, for rounding and for what the slop of
+        // contacts still has to give; a ball that gains speed from nothing has more at once.
+        let rounding = 1e-3 * storm.most_energy();
+        assert!(storm.soft || now <= most + rounding, "{what}: calm, and {most} J rise to {now} J");
+        most = most.min(now);
     }
 }
 
 #[test]
 fn a_short_storm() {
-    (0..60).for_each(run);
+    for seed in 0..60 {
+        run(seed);
+    }
+}
+
+/// Not yet: what parts after teleports or slides on may gain energy by the core's models.
+#[test]
+#[ignore = "9 of 60 seeds gain energy in the core"]
+fn a_calm_after_a_short_storm() {
+    for seed in 0..60 {
+        let (storm, frame) = run(seed);
+        calm(seed, storm, frame);
+    }
 }
 
 #[test]
@@ -289,7 +343,13 @@ fn long_storm() {
     let seeds = first.parse().unwrap()..last.parse().unwrap();
     let mut failed = Vec::new();
     for seed in seeds.clone() {
-        if std::panic::catch_unwind(|| run(seed)).is_err() {
+        let whole = || {
+            let (storm, frame) = run(seed);
+            if std::env::var("CALM").is_ok() {
+                calm(seed, storm, frame);
+            }
+        };
+        if std::panic::catch_unwind(whole).is_err() {
             failed.push(seed);
         }
     }
