@@ -58,9 +58,9 @@ fn walls_are_where_their_entities_are_after_a_restore() {
         scene::frames(&mut app, 5);
         let mut world = app.world_mut().resource_mut::<TawWorld>();
         if raw {
-            **world = clone
+            **world = clone;
         } else {
-            world.restore(&saved)
+            world.restore(&saved);
         }
         scene::frames(&mut app, 300);
         let world = app.world().resource::<TawWorld>();
@@ -90,9 +90,9 @@ fn rows_without_entities_go_and_entities_without_rows_come() {
         let falling = scene::position(&app, new[1]).y;
         let mut world = app.world_mut().resource_mut::<TawWorld>();
         if raw {
-            **world = clone
+            **world = clone;
         } else {
-            world.restore(&saved)
+            world.restore(&saved);
         }
         app.update();
         let told = app.world().resource::<Messages<RowRemoved>>();

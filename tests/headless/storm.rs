@@ -182,10 +182,13 @@ impl Storm {
             }
             11 => {
                 self.app.world_mut().get_mut::<Transform>(marble).unwrap().translation.x =
-                    bad.max(0.0).min(HALF - 1.0) + (bad - bad);
+                    if bad.is_finite() { bad.clamp(0.0, HALF - 1.0) } else { bad };
             }
             12 => {
-                let force = ExternalForce { force: Vec3::Y * (bad - bad), torque: Vec3::ZERO };
+                let force = ExternalForce {
+                    force: Vec3::Y * if bad.is_finite() { 0.0 } else { bad },
+                    torque: Vec3::ZERO,
+                };
                 self.app.world_mut().entity_mut(marble).insert(force);
             }
             13 => {

@@ -65,8 +65,8 @@ impl TawWorld {
     /// ```
     pub fn restore(&mut self, snapshot: &TawSnapshot) {
         self.world = snapshot.world.clone();
-        self.marble_entities = snapshot.marble_entities.clone();
-        self.wall_entities = snapshot.wall_entities.clone();
+        self.marble_entities.clone_from(&snapshot.marble_entities);
+        self.wall_entities.clone_from(&snapshot.wall_entities);
         self.restored = self.restored.wrapping_add(1);
         self.just_restored = true;
     }

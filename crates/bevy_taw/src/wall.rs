@@ -170,7 +170,7 @@ impl Way {
     ) -> Option<Speed> {
         let last = self.last.replace(now);
         let framed = self.framed.take();
-        let Some(last) = last.filter(|_| dt > 0.0) else { return None };
+        let last = last.filter(|_| dt > 0.0)?;
         let framed = framed.unwrap_or(last);
         let frame = if frame > 0.0 { frame } else { dt };
         let (outside, inside) =
