@@ -64,3 +64,38 @@ fn a_capsule_and_the_event_driven_response_refuse_each_other() {
     assert_eq!(world.model().response, Response::Displacement, "it stays as it was");
     assert!(world.marbles.get(world.marbles.id(0).unwrap()).is_ok(), "{marble}");
 }
+
+#[test]
+fn a_capsule_among_events_is_left_out_and_told_and_the_world_goes_on() {
+    let mut app = scene::app();
+    let response = Response::EventDriven;
+    app.insert_resource(TawModel(Model { response, ..Model::default() }));
+    let ball = scene::drop_marble(&mut app, 0.5, Vec3::ZERO);
+    let other = scene::drop_marble(&mut app, 0.5, Vec3::X * 5.0);
+    scene::frames(&mut app, 4);
+    let place = Transform::from_xyz(9.0, 0.0, 0.0);
+    let capsule = app.world_mut().spawn((Marble::new(0.25), HalfLength(0.75), place)).id();
+    app.world_mut().entity_mut(other).insert(HalfLength(1.0));
+    let mut told = Vec::new();
+    let before = height(&app, ball);
+    for _ in 0..10 {
+        app.update();
+        let refused = app.world().resource::<Messages<InputRefused>>();
+        told.extend(refused.iter_current_update_messages().map(|it| (it.entity, it.error)));
+    }
+    assert_eq!(told.len(), 2, "{told:?}");
+    assert!(told.contains(&(Some(other), Refusal::Capsule(1.0))), "{told:?}");
+    assert!(told.contains(&(Some(capsule), Refusal::Capsule(0.75))), "{told:?}");
+    assert!(height(&app, ball) < before - 0.1, "the others go on");
+    assert!(height(&app, other) < before - 0.1, "as a ball");
+    assert_eq!(height(&app, capsule), 0.0);
+    assert_eq!(app.world().resource::<TawWorld>().marbles.len(), 2);
+    // A model that knows capsules takes them in.
+    app.world_mut().resource_mut::<TawModel>().response = Response::Impulse;
+    scene::frames(&mut app, 10);
+    let world = app.world().resource::<TawWorld>();
+    assert_eq!(world.marbles.len(), 3);
+    let halves = (0..3).map(|row| world.marbles.get(world.marbles.id(row).unwrap()).unwrap());
+    assert_eq!(halves.map(|it| it.half_length).collect::<Vec<_>>(), [0.0, 1.0, 0.75]);
+    assert!(height(&app, capsule) < 0.0);
+}

@@ -127,3 +127,52 @@ fn settings_and_components_are_open_to_reflection() {
     app.update();
     assert_eq!(app.world().resource::<TawWorld>().model().substeps, 7);
 }
+
+#[test]
+fn what_stays_wrong_is_told_once_and_again_when_it_is_wrong_anew() {
+    let mut app = scene::app();
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::ZERO);
+    let push = |x: f32| ExternalForce { force: Vec3::X * x, torque: Vec3::ZERO };
+    let why = |what: &str| (Some(marble), format!("force.x must be finite, but is {what}"));
+    app.world_mut().entity_mut(marble).insert(push(f32::NAN));
+    let told = refused(&mut app, 5);
+    assert_eq!(told.iter().filter(|it| **it == why("NaN")).count(), 1, "{told:?}");
+    *app.world_mut().get_mut::<ExternalForce>(marble).unwrap() = push(1.0);
+    assert_eq!(refused(&mut app, 5), []);
+    *app.world_mut().get_mut::<ExternalForce>(marble).unwrap() = push(f32::INFINITY);
+    assert!(refused(&mut app, 5).contains(&why("inf")));
+}
+
+#[test]
+fn a_bad_setting_that_is_marked_in_every_frame_is_told_once() {
+    let mut app = scene::app();
+    app.world_mut().resource_mut::<TawModel>().substeps = 0;
+    app.world_mut().resource_mut::<Gravity>().x = f32::NAN;
+    let mut told = refused(&mut app, 1);
+    for _ in 0..4 {
+        app.world_mut().resource_mut::<TawModel>().set_changed();
+        app.world_mut().resource_mut::<Gravity>().set_changed();
+        told.extend(refused(&mut app, 1));
+    }
+    assert_eq!(told.len(), 2, "{told:?}");
+}
+
+#[test]
+fn a_model_that_is_marked_as_changed_changes_nothing() {
+    let heap = |marked: bool| {
+        let mut app = scene::app();
+        let (response, rotation) = (Response::Impulse, Rotation::Dynamic);
+        app.insert_resource(TawModel(Model { response, rotation, ..Model::default() }));
+        scene::board(&mut app);
+        let marbles = scene::drop_marbles(&mut app, 60);
+        for _ in 0..300 {
+            if marked {
+                app.world_mut().resource_mut::<TawModel>().set_changed();
+                app.world_mut().resource_mut::<Gravity>().set_changed();
+            }
+            app.update();
+        }
+        marbles.iter().map(|it| scene::position(&app, *it)).collect::<Vec<_>>()
+    };
+    assert_eq!(heap(true), heap(false));
+}

@@ -102,3 +102,120 @@ fn a_refused_place_is_not_drawn_and_not_tried_again() {
     assert_eq!(refused, 1);
     assert!(scene::position(&app, marble).is_finite());
 }
+
+#[test]
+fn a_teleport_within_a_step_is_not_drawn_as_a_way() {
+    let (mut app, marble) = app();
+    let jump = move |mut transforms: Query<&mut Transform>, mut steps: Local<u32>| {
+        *steps += 1;
+        if *steps == 3 {
+            transforms.get_mut(marble).unwrap().translation.x = 100.0;
+        }
+    };
+    app.add_systems(FixedUpdate, jump.before(TawSystems::Gather));
+    for _ in 0..30 {
+        app.update();
+        let x = scene::position(&app, marble).x;
+        assert!(!(6.0..100.0).contains(&x), "drawn at {x}, on the way to 100");
+    }
+    assert!(scene::position(&app, marble).x > 100.0);
+}
+
+#[test]
+fn a_nudge_in_every_frame_moves_the_marble_and_freezes_nothing() {
+    // A lift of 1 mm a frame in y, of a marble that moves 1 m a step along x and falls.
+    for (along, frame) in [(Vec3::Y, STEP / 4.0), (Vec3::Y, STEP * 2.5), (Vec3::ONE, STEP / 4.0)] {
+        let places = [0.0, 1e-3].map(|lift| {
+            let (mut app, marble) = app();
+            app.insert_resource(Gravity(Vec3::NEG_Y * 9.81));
+            scene::frame_length(&mut app, frame);
+            let nudge = move |mut transforms: Query<&mut Transform>| {
+                transforms.get_mut(marble).unwrap().translation += along * lift;
+            };
+            app.add_systems(Update, nudge);
+            scene::frames(&mut app, 64);
+            scene::position(&app, marble)
+        });
+        let moved = places[1] - places[0];
+        assert!((moved - along * 0.064).length() < 2e-3, "{frame} s: moved by {moved}");
+    }
+}
+
+#[test]
+fn a_nudged_marble_is_drawn_evenly() {
+    let (mut app, marble) = app();
+    let nudge = move |mut transforms: Query<&mut Transform>| {
+        transforms.get_mut(marble).unwrap().translation.y += 0.01;
+    };
+    app.add_systems(Update, nudge);
+    scene::frames(&mut app, 4);
+    let mut last = scene::position(&app, marble);
+    for frame in 0..20 {
+        app.update();
+        let now = scene::position(&app, marble);
+        let way = now - last;
+        assert!((way - Vec3::new(0.25, 0.01, 0.0)).length() < 1e-4, "frame {frame}: {way}");
+        last = now;
+    }
+}
+
+#[test]
+fn a_height_that_is_written_in_every_frame_holds() {
+    let (mut app, marble) = app();
+    app.insert_resource(Gravity(Vec3::NEG_Y * 9.81));
+    let pin = move |mut transforms: Query<&mut Transform>| {
+        transforms.get_mut(marble).unwrap().translation.y = 5.0;
+    };
+    app.add_systems(Update, pin);
+    let before = scene::position(&app, marble).x;
+    scene::frames(&mut app, 40);
+    let world = app.world().resource::<TawWorld>().marbles.position()[0];
+    // Gravity moves it by less than that in the last step.
+    assert!((world.y - 5.0).abs() < 0.05, "{world:?}");
+    assert!((world.x - before - 10.0).abs() < 1.5, "{world:?}");
+}
+
+#[test]
+fn a_marked_write_is_a_place_however_near() {
+    let (mut app, marble) = app();
+    scene::frames(&mut app, 2);
+    let drawn = scene::position(&app, marble);
+    let to = drawn + Vec3::new(0.1, 0.2, 0.0);
+    app.world_mut().get_mut::<Transform>(marble).unwrap().translation = to;
+    app.world_mut().entity_mut(marble).insert(Teleport);
+    scene::frames(&mut app, 4);
+    let x = app.world().resource::<TawWorld>().marbles.position()[0];
+    assert_eq!((x.x, x.y), (to.x + 1.0, to.y));
+    assert!(!app.world().entity(marble).contains::<Teleport>());
+}
+
+#[test]
+fn a_child_of_what_moves_in_every_frame_is_drawn_where_it_is() {
+    // One that floats, and one that moves 1 m a step, below a parent that moves and turns.
+    for speed in [0.0, 1.0] {
+        let mut app = scene::smooth_app();
+        app.insert_resource(Gravity(Vec3::ZERO));
+        scene::frame_length(&mut app, STEP / 4.0);
+        let parent = app.world_mut().spawn(Transform::default()).id();
+        let marble = scene::drop_marble(&mut app, 0.5, Vec3::new(0.0, 3.0, 0.0));
+        app.world_mut()
+            .entity_mut(marble)
+            .insert((ChildOf(parent), Velocity(Vec3::X * speed / STEP)));
+        let carry = move |mut transforms: Query<&mut Transform>| {
+            let mut carrier = transforms.get_mut(parent).unwrap();
+            carrier.translation.z += 0.4;
+            carrier.rotate_y(0.03);
+        };
+        scene::frames(&mut app, 8);
+        app.add_systems(Update, carry);
+        let drawn = |app: &App| app.world().get::<GlobalTransform>(marble).unwrap().translation();
+        let mut last = drawn(&app);
+        for frame in 0..40 {
+            app.update();
+            let now = drawn(&app);
+            let way = now - last;
+            assert!((way - Vec3::X * speed / 4.0).length() < 1e-4, "frame {frame}: {way}");
+            last = now;
+        }
+    }
+}

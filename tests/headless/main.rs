@@ -4,12 +4,17 @@
 mod board;
 mod capsules;
 mod contacts;
+mod disabling;
 mod input;
 mod interpolation;
 mod motion;
+mod nasty;
 mod scene;
+mod snapshots;
 mod spawning;
+mod storm;
 mod swarms;
+mod teleports;
 mod trade;
 mod transforms;
 mod walls;

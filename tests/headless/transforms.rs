@@ -76,3 +76,54 @@ fn a_resting_marble_is_not_marked_as_changed() {
     scene::frames(&mut app, 10);
     assert_eq!(app.world().resource::<Changes>().0, 0);
 }
+
+#[test]
+fn a_child_of_what_moves_between_steps_stays_where_it_is() {
+    let mut app = scene::app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    scene::frame_length(&mut app, scene::STEP / 4.0);
+    let parent = app.world_mut().spawn(Transform::default()).id();
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 2.0);
+    app.world_mut().entity_mut(marble).insert(ChildOf(parent));
+    scene::frames(&mut app, 8);
+    for _ in 0..12 {
+        app.world_mut().get_mut::<Transform>(parent).unwrap().translation.x += 1.0;
+        app.update();
+        let at = app.world().get::<GlobalTransform>(marble).unwrap().translation();
+        assert!(at.distance(Vec3::Y * 2.0) < 1e-5, "drawn at {at}");
+    }
+}
+
+#[test]
+fn a_parent_of_scale_zero_leaves_transforms_finite_and_is_told_once() {
+    for app in [scene::app, scene::smooth_app] {
+        for flat in [Vec3::ZERO, Vec3::new(1.0, 0.0, 1.0)] {
+            let mut app = app();
+            let parent = app.world_mut().spawn(Transform::default()).id();
+            let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y);
+            app.world_mut().entity_mut(marble).insert(ChildOf(parent));
+            scene::frames(&mut app, 4);
+            app.world_mut().get_mut::<Transform>(parent).unwrap().scale = flat;
+            let late = (Marble::new(0.2), Transform::default(), ChildOf(parent));
+            let late = app.world_mut().spawn(late).id();
+            let mut told = Vec::new();
+            for _ in 0..8 {
+                app.update();
+                let messages = app.world().resource::<Messages<InputRefused>>();
+                told.extend(messages.iter_current_update_messages().map(|it| it.entity));
+                for entity in [marble, late] {
+                    let place = app.world().get::<Transform>(entity).unwrap();
+                    assert!(place.translation.is_finite() && place.rotation.is_finite());
+                }
+            }
+            assert_eq!(told.len(), 2, "{told:?}");
+            assert!(told.contains(&Some(marble)) && told.contains(&Some(late)), "{told:?}");
+            let before = app.world().resource::<TawWorld>().marbles.position()[0].y;
+            assert!(before < 0.99, "it falls on");
+            app.world_mut().get_mut::<Transform>(parent).unwrap().scale = Vec3::ONE;
+            scene::frames(&mut app, 4);
+            assert_eq!(app.world().resource::<TawWorld>().marbles.len(), 2);
+            assert!(scene::position(&app, marble).y < before);
+        }
+    }
+}

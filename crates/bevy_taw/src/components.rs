@@ -12,8 +12,11 @@ use crate::reflect::{CombineReflect, IntegratorReflect, RotationReflect};
 /// A marble: a ball that moves and collides.
 ///
 /// Its place is its [`Transform`]: whoever writes one moves the marble there at
-/// once, keeping its velocity. As a child of another entity it still moves freely,
-/// in world space. Its scale does not count.
+/// once, keeping its velocity. (How a write between steps counts while motion is
+/// interpolated is told in [`interpolation`](crate::interpolation).) As a child of another
+/// entity it still moves freely, in world space. Its scale does not count. While its entity
+/// is [`Disabled`](bevy::ecs::entity_disabling::Disabled), it is out of the world; it comes
+/// back with the velocity that it had.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 #[require(Transform, MarbleState)]
@@ -197,21 +200,57 @@ pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
 /// Makes a capsule of a marble: all points within its radius of a line along the entity's y
 /// axis, which goes this far both ways, in metres; like Bevy's `Capsule3d`. Zero is a ball.
 ///
-/// Every response knows capsules but the event-driven one.
+/// Every response knows capsules but the event-driven one: there a capsule is refused, and
+/// left out of the world until the model changes.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct HalfLength(pub f32);
 
+/// Says that a new [`Transform`] is a jump: put it on a wall, or on what carries walls, together
+/// with the place, and the next step takes that for where they are and not for how fast they came
+/// there. The step takes this off again.
+///
+/// Without it, what changes the speed of a wall's surface by more than
+/// [`LARGEST_CHANGE_OF_SPEED`](crate::wall::LARGEST_CHANGE_OF_SPEED) within a step is a jump, too.
+/// On a marble it makes a place of what might be a nudge; see
+/// [`interpolation`](crate::interpolation).
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// fn to_the_cellar(mut lift: Single<(Entity, &mut Transform), With<Wall>>, mut commands: Commands) {
+///     let (entity, transform) = &mut *lift;
+///     transform.translation.y = -5.0;
+///     commands.entity(*entity).insert(Teleport);
+/// }
+/// ```
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct Teleport;
+
 /// What the physics knows of a marble entity.
 #[derive(Component, Clone, Copy, Debug, Default)]
 pub(crate) struct MarbleState {
-    /// `None` before the first gather, and when the input was refused.
+    /// `None` before the first gather, while disabled, and when the input was refused.
     pub id: Option<MarbleId>,
-    /// The components as gather or scatter last left them. What differs was
+    /// The components as gather, scatter or easing last left them. What differs was
     /// written by somebody else.
     pub seen: SeenMarble,
     /// Whether they are to be taken over.
     pub stale: bool,
+    /// Whether they could be no marble: that is tried again when they change.
+    pub refused: bool,
+}
+
+/// Between which places a marble is drawn.
+#[derive(Component, Clone, Copy, Debug, Default)]
+pub(crate) struct Eased {
+    /// Its place in world space when the last step began, after all teleports.
+    pub from: Option<(Vec3, Option<Quat>)>,
+    /// How often the world had gone back in time by then.
+    pub restored: u32,
+    /// The place that was written in the last frame.
+    pub wrote: Option<Vec3>,
 }
 
 /// A marble's components to the bit, so that even a NaN is seen only once.
@@ -235,16 +274,55 @@ pub(crate) struct SeenMarble {
 /// What the physics knows of a wall entity.
 #[derive(Component, Clone, Debug, Default)]
 pub(crate) struct WallState {
-    /// Where it was at the last gather, for how fast it moves.
-    pub last: Option<Isometry3d>,
-    /// `None` before the first gather, and when the input was refused.
+    /// `None` before the first gather, while disabled, and when the input was refused.
     pub id: Option<WallId>,
-    /// Its place in world space as last gathered, to the bit: translation, rotation and scale.
-    pub seen: Option<([u32; 3], [u32; 4], [u32; 3])>,
-    /// What it is in its own frame, at the scale that was seen.
-    pub shape: Option<WallShape<f32>>,
+    /// What it is in its own frame.
+    pub shape: Option<LocalShape>,
+    /// The scale that it was last built for, whether or not it could be.
+    pub built: Option<Vec3>,
+    /// Whether it could not.
+    pub refused: bool,
+    /// Its place in world space as last gathered, to the bit: translation and rotation.
+    pub posed: Option<([u32; 3], [u32; 4])>,
     /// Its material as last gathered, to the bit.
     pub material: Option<([u32; 7], Combine)>,
+    /// How it came where it is.
+    pub way: Way,
+}
+
+impl WallState {
+    /// The same shape, on its way into a world.
+    pub fn without_row(&mut self) -> Self {
+        let (shape, built, refused) = (self.shape.take(), self.built, self.refused);
+        Self { shape, built, refused, ..Self::default() }
+    }
+}
+
+/// A wall in its own frame, built at some scale.
+#[derive(Clone, Debug)]
+pub(crate) struct LocalShape {
+    pub shape: WallShape<f32>,
+    /// How far from the origin it goes, in metres.
+    pub reach: f32,
+}
+
+/// How a wall came where it is.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Way {
+    /// Where it was at the last gather.
+    pub last: Option<Isometry3d>,
+    /// Where it was before the first fixed step of this frame.
+    pub framed: Option<Isometry3d>,
+    /// How fast it came there, and how fast it was believed to.
+    pub measured: Speed,
+    pub believed: Speed,
+}
+
+/// A velocity, and a spin about the wall's own place.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Speed {
+    pub velocity: Vec3,
+    pub spin: Vec3,
 }
 
 impl SurfaceMaterial {

@@ -2,11 +2,12 @@
 
 use std::sync::atomic::{AtomicBool, Ordering};
 
-use bevy::math::Isometry3d;
+use bevy::ecs::entity::Entities;
+use bevy::ecs::world::DeferredWorld;
 use bevy::prelude::*;
-use taw::frame::Pose;
 use taw::motion::Rotation;
-use taw::world::{self as core, WallMotion};
+use taw::response::Response;
+use taw::world as core;
 
 use crate::components::{
     ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble, MarbleDamping,
@@ -15,8 +16,9 @@ use crate::components::{
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
-use crate::refusal::InputRefused;
+use crate::refusal::{Refusal, Refusals};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
+use crate::snapshot::{self, RowRemoved};
 use crate::wall::Wall;
 
 /// Takes the model, gravity and forces over, if they can be stepped with.
@@ -26,96 +28,37 @@ pub fn settings(
     gravity: Res<Gravity>,
     forces: Res<Forces>,
     mut times: ResMut<StepTimes>,
-    mut refused: MessageWriter<InputRefused>,
+    mut refusals: Refusals,
 ) {
     times.begin_step();
     world.begin_step();
-    let mut check = |result: Result<(), taw::Error>| {
-        if let Err(error) = result {
-            InputRefused::write(&mut refused, None, error);
-        }
-    };
-    if model.is_changed() {
-        check(world.set_model(**model));
-    }
-    if gravity.is_changed() {
-        check(world.set_gravity(to_vector(**gravity)));
-    }
-    if forces.is_changed() {
-        check(world.set_forces(forces.0.clone()));
-    }
-}
-
-/// Puts new walls in and moves those that moved.
-pub fn walls(
-    mut world: ResMut<TawWorld>,
-    mut walls: Query<(Entity, Ref<Wall>, Option<&SurfaceMaterial>, &mut WallState)>,
-    transforms: TransformHelper,
-    time: Res<Time>,
-    mut refused: MessageWriter<InputRefused>,
-) {
-    for (entity, wall, material, mut state) in &mut walls {
-        let Ok(transform) = transforms.compute_global_transform(entity) else {
-            continue; // a parent without a Transform: nobody can say where this is
+    refusals.begin_step();
+    // Values are compared, and not whether somebody marked them: a slider that is open marks
+    // in every frame, and a world that was restored has others.
+    if **model != world.model()
+        && let Err(error) = world.set_model(**model)
+    {
+        let capsule = match error {
+            taw::Error::BallsOnly(id) => world.marble_entities.get(&id).copied(),
+            _ => None,
         };
-        let now = transform.to_isometry();
-        if let Some(id) = state.id {
-            let motion = motion_between(state.last.unwrap_or(now), now, time.delta_secs());
-            // What cannot be right is refused below, with the place that it led to.
-            let _ = world.walls.set_motion(id, motion);
-        }
-        state.last = Some(now);
-        let (scale, rotation, translation) = transform.to_scale_rotation_translation();
-        let seen = (bits(translation), rotation_bits(rotation), bits(scale));
-        let made_anew = wall.is_changed() || state.seen.is_none_or(|before| before.2 != seen.2);
-        let moved = state.seen != Some(seen);
-        state.seen = Some(seen);
-        let mut check = |result: Result<(), taw::Error>| {
-            if let Err(error) = result {
-                InputRefused::write(&mut refused, Some(entity), error);
-            }
-        };
-        if made_anew {
-            let shape = wall.shape(scale);
-            state.shape = shape.as_ref().ok().cloned();
-            check(shape.map(|_| ()));
-        }
-        if (made_anew || moved)
-            && let Some(shape) = &state.shape
-        {
-            let rotation = to_rotation(rotation);
-            let shape = shape.moved(Pose { rotation, translation: to_vector(translation) });
-            check(shape.and_then(|shape| match state.id {
-                Some(id) => world.walls.set(id, shape),
-                None => world.walls.insert(shape).map(|id| {
-                    world.wall_entities.insert(id, entity);
-                    state.id = Some(id);
-                }),
-            }));
-        }
-        let made_of = material.map(SurfaceMaterial::bits);
-        if let Some(id) = state.id
-            && state.material != made_of
-        {
-            state.material = made_of;
-            check(world.walls.set_material(id, material.map(|material| (*material).into())));
-        }
+        refusals.check(capsule, Err(error));
     }
-}
-
-/// How something moved that was `last` one step of `dt` seconds ago, or `None` if it
-/// did not.
-fn motion_between(last: Isometry3d, now: Isometry3d, dt: f32) -> Option<WallMotion<f32>> {
-    (last != now && dt > 0.0).then(|| WallMotion {
-        velocity: to_vector(Vec3::from(now.translation - last.translation) / dt),
-        spin: to_vector((now.rotation * last.rotation.inverse()).to_scaled_axis() / dt),
-        pivot: to_point(now.translation.into()),
-    })
+    let pull = to_vector(**gravity);
+    if pull != world.gravity() {
+        refusals.check(None, world.set_gravity(pull));
+    }
+    if forces.0 != world.forces() {
+        refusals.check(None, world.set_forces(forces.0.clone()));
+    }
 }
 
 /// A marble entity's components. The optional ones are read together.
 type MarbleComponents<'a> =
     (Entity, &'a Marble, &'a Transform, OptionalComponents<'a>, Has<ChildOf>, &'a mut MarbleState);
+
+type MarbleItem<'a> =
+    (Entity, &'a Marble, &'a Transform, OptionalComponents<'a>, bool, Mut<'a, MarbleState>);
 
 type OptionalComponents<'a> = (
     Option<&'a HalfLength>,
@@ -159,28 +102,49 @@ impl SeenMarble {
     }
 }
 
+/// What the settings were when marbles were last gathered.
+#[derive(Default)]
+pub struct Settings {
+    rotation: Rotation,
+    response: Response,
+}
+
 /// Puts new marbles in and takes over what somebody else wrote since the last
 /// scatter.
 pub fn marbles(
     mut world: ResMut<TawWorld>,
-    mut queries: ParamSet<(Query<MarbleComponents>, Query<(Entity, &MarbleState)>)>,
+    mut queries: ParamSet<(Query<MarbleComponents>, Query<(Entity, &mut MarbleState)>)>,
     transforms: TransformHelper,
-    mut refused: MessageWriter<InputRefused>,
-    mut last_rotation: Local<Rotation>,
+    entities: &Entities,
+    (mut refusals, mut removed): (Refusals, MessageWriter<RowRemoved>),
+    mut last: Local<Settings>,
     mut stale: Local<Vec<Entity>>,
 ) {
+    if world.just_restored {
+        snapshot::name_marbles(&mut world, &mut queries.p1());
+    }
+    let model = world.model();
     // The world's own columns for it begin unturned; the components know better.
-    let rotation = world.model().rotation;
-    let begins_to_turn = *last_rotation == Rotation::None && rotation != Rotation::None;
-    *last_rotation = rotation;
+    let begins_to_turn = last.rotation == Rotation::None && model.rotation != Rotation::None;
+    // What could be no marble may be one now.
+    let knows_capsules =
+        last.response == Response::EventDriven && model.response != Response::EventDriven;
+    *last = Settings { rotation: model.rotation, response: model.response };
     // Looking at all is for all threads; then there are few or none, and they go in order.
     let any = AtomicBool::new(false);
+    let (rows, restored) = (&world.marbles, world.just_restored);
     queries.p0().par_iter_mut().for_each(|(_, marble, transform, optional, _, mut state)| {
         if begins_to_turn {
             (state.seen.rotation, state.seen.spin) = ([0; 4], None); // no rotation's bits
         }
+        if knows_capsules && optional.0.is_some() {
+            (state.seen.half_length, state.refused) = (None, false);
+        }
+        if state.id.is_some_and(|id| rows.row(id).is_err()) {
+            (state.id, state.refused) = (None, false); // it was away, or somebody took it out
+        }
         let seen = SeenMarble::of(*marble, transform, &optional);
-        let stale = state.id.is_none() || state.seen != seen;
+        let stale = state.id.is_none() || state.seen != seen || restored;
         if state.stale != stale {
             state.stale = stale;
         }
@@ -188,114 +152,170 @@ pub fn marbles(
             any.store(true, Ordering::Relaxed);
         }
     });
-    if !any.into_inner() {
-        return;
-    }
-    stale.clear();
-    let states = queries.p1();
-    stale.extend(states.iter().filter(|(_, state)| state.stale).map(|(entity, _)| entity));
-    let mut marbles = queries.p0();
-    for entity in stale.drain(..) {
-        let Ok((_, marble, transform, optional, is_child, mut state)) = marbles.get_mut(entity)
-        else {
-            continue;
-        };
-        let seen = SeenMarble::of(*marble, transform, &optional);
-        let (half_length, velocity, spin, mass, gravity_scale, damping, material, _, _) = optional;
-        let place = if is_child {
-            transforms.compute_global_transform(entity).map(|t| t.compute_transform())
-        } else {
-            Ok(*transform)
-        };
-        let Ok(place) = place else {
-            continue; // a parent without a Transform: nobody can say where this is
-        };
-        let last = std::mem::replace(&mut state.seen, seen);
-        let now = core::Marble {
-            position: to_point(place.translation),
-            radius: marble.radius,
-            half_length: *half_length.copied().unwrap_or_default(),
-            velocity: to_vector(velocity.map_or(Vec3::ZERO, |v| **v)),
-            rotation: to_rotation(place.rotation),
-            spin: to_vector(spin.map_or(Vec3::ZERO, |s| **s)),
-            mass: mass.copied().unwrap_or_default().into(),
-            gravity_scale: *gravity_scale.copied().unwrap_or_default(),
-            damping: damping.map_or_else(core::Damping::default, |d| core::Damping {
-                linear: d.linear,
-                angular: d.angular,
-            }),
-            integrator: seen.integrator,
-            rotation_model: seen.rotation_model,
-            material: material.map(|m| (*m).into()),
-        };
-        let refuse = |error| InputRefused::write(&mut refused, Some(entity), error);
-        match state.id {
-            Some(id) => update(&mut world.marbles, id, &now, &last, &seen, refuse),
-            // What was refused is tried again when it changes.
-            None if last == seen => {}
-            None => match world.marbles.insert(now) {
-                Ok(id) => {
-                    world.marble_entities.insert(id, entity);
-                    state.id = Some(id);
-                }
-                Err(error) => InputRefused::write(&mut refused, Some(entity), error),
-            },
+    let mut without_row = 0;
+    if any.into_inner() {
+        stale.clear();
+        let states = queries.p1();
+        stale.extend(states.iter().filter(|(_, state)| state.stale).map(|(entity, _)| entity));
+        let mut marbles = queries.p0();
+        for entity in stale.drain(..) {
+            let Ok(marble) = marbles.get_mut(entity) else { continue };
+            let has_row = take_over(&mut world, marble, &transforms, &mut refusals);
+            without_row += usize::from(!has_row);
         }
+    }
+    let visible = queries.p1();
+    if visible.iter().len() != world.marbles.len() + without_row {
+        snapshot::take_out_marbles(&mut world, &visible, entities, &mut removed);
+    }
+}
+
+/// Takes over one marble. Gives whether it has a row.
+fn take_over(
+    world: &mut TawWorld,
+    (entity, marble, transform, optional, is_child, mut state): MarbleItem,
+    transforms: &TransformHelper,
+    refusals: &mut Refusals,
+) -> bool {
+    let seen = SeenMarble::of(*marble, transform, &optional);
+    let (half_length, velocity, spin, mass, gravity_scale, damping, material, _, _) = optional;
+    let half_length = *half_length.copied().unwrap_or_default();
+    let place = if is_child {
+        transforms.compute_global_transform(entity).map(|t| t.compute_transform())
+    } else {
+        Ok(*transform)
+    };
+    let Ok(place) = place else {
+        refusals.check(Some(entity), Err(Refusal::NoPlace));
+        return state.id.is_some();
+    };
+    let [x, y, z] = place.scale.to_array();
+    if is_child && !place.rotation.is_finite() && transform.rotation.is_finite() {
+        refusals.check(Some(entity), Err(Refusal::NoFrame(x, y, z)));
+        return state.id.is_some();
+    }
+    let last = std::mem::replace(&mut state.seen, seen);
+    let mut now = core::Marble {
+        position: to_point(place.translation),
+        radius: marble.radius,
+        half_length,
+        velocity: to_vector(velocity.map_or(Vec3::ZERO, |v| **v)),
+        rotation: to_rotation(place.rotation),
+        spin: to_vector(spin.map_or(Vec3::ZERO, |s| **s)),
+        mass: mass.copied().unwrap_or_default().into(),
+        gravity_scale: *gravity_scale.copied().unwrap_or_default(),
+        damping: damping.map_or_else(core::Damping::default, |d| core::Damping {
+            linear: d.linear,
+            angular: d.angular,
+        }),
+        integrator: seen.integrator,
+        rotation_model: seen.rotation_model,
+        material: material.map(|m| (*m).into()),
+    };
+    let balls_only = world.model().response == Response::EventDriven && half_length > 0.0;
+    let check = |result: Result<(), Refusal>| refusals.check(Some(entity), result);
+    if let Some(id) = state.id {
+        let all = world.just_restored;
+        update(&mut world.marbles, id, &now, &last, &seen, (all, balls_only), check);
+        return true;
+    }
+    // What was refused is tried again when it changes.
+    if state.refused && last == seen {
+        return false;
+    }
+    if let Some(away) = world.away.get(&entity) {
+        come_back(&mut now, away, &last, &seen);
+    }
+    let inserted = if balls_only {
+        Err(Refusal::Capsule(half_length))
+    } else {
+        world.marbles.insert(now).map_err(Refusal::from)
+    };
+    let inserted = inserted.map(|id| {
+        world.away.remove(&entity);
+        world.marble_entities.insert(id, entity);
+        state.id = Some(id);
+    });
+    state.refused = !refusals.check(Some(entity), inserted);
+    !state.refused
+}
+
+/// Makes a marble that comes back go on as it was, but for what was written since.
+fn come_back(
+    now: &mut core::Marble<f32>,
+    away: &core::Marble<f32>,
+    last: &SeenMarble,
+    seen: &SeenMarble,
+) {
+    if seen.translation == last.translation {
+        now.position = away.position; // what was drawn may lie between two steps
+    }
+    if seen.rotation == last.rotation {
+        now.rotation = away.rotation;
+    }
+    if seen.velocity.is_none() {
+        now.velocity = away.velocity;
+    }
+    if seen.spin.is_none() {
+        now.spin = away.spin;
     }
 }
 
 /// Takes over the fields that changed from `last` to `seen`, each on its own: one
-/// that is refused does not keep back the rest.
+/// that is refused does not keep back the rest. Of a world that was restored `all`, but for
+/// its motion.
 fn update(
     marbles: &mut core::Marbles<f32>,
     id: core::MarbleId,
     now: &core::Marble<f32>,
     last: &SeenMarble,
     seen: &SeenMarble,
-    mut refuse: impl FnMut(taw::Error),
+    (all, balls_only): (bool, bool),
+    mut check: impl FnMut(Result<(), Refusal>) -> bool,
 ) {
-    let mut check = |result: Result<(), taw::Error>| {
-        if let Err(error) = result {
-            refuse(error);
-        }
-    };
+    let mut set = |result: Result<(), taw::Error>| check(result.map_err(Refusal::from));
     if seen.translation != last.translation {
-        check(marbles.set_position(id, now.position));
+        set(marbles.set_position(id, now.position));
     }
     if seen.rotation != last.rotation {
-        check(marbles.set_rotation(id, now.rotation));
+        set(marbles.set_rotation(id, now.rotation));
     }
-    if seen.radius != last.radius {
-        check(marbles.set_radius(id, now.radius));
+    if all || seen.radius != last.radius {
+        set(marbles.set_radius(id, now.radius));
     }
-    if seen.half_length != last.half_length {
-        check(marbles.set_half_length(id, now.half_length));
+    if !balls_only && (all || seen.half_length != last.half_length) {
+        set(marbles.set_half_length(id, now.half_length));
         // Which way a ball points may not have been kept.
-        check(marbles.set_rotation(id, now.rotation));
+        if seen.half_length != last.half_length {
+            set(marbles.set_rotation(id, now.rotation));
+        }
     }
     if seen.velocity != last.velocity && seen.velocity.is_some() {
-        check(marbles.set_velocity(id, now.velocity));
+        set(marbles.set_velocity(id, now.velocity));
     }
     if seen.spin != last.spin && seen.spin.is_some() {
-        check(marbles.set_spin(id, now.spin));
+        set(marbles.set_spin(id, now.spin));
     }
-    if seen.mass != last.mass {
-        check(marbles.set_mass(id, now.mass));
+    if all || seen.mass != last.mass {
+        set(marbles.set_mass(id, now.mass));
     }
-    if seen.gravity_scale != last.gravity_scale {
-        check(marbles.set_gravity_scale(id, now.gravity_scale));
+    if all || seen.gravity_scale != last.gravity_scale {
+        set(marbles.set_gravity_scale(id, now.gravity_scale));
     }
-    if seen.damping != last.damping {
-        check(marbles.set_damping(id, now.damping));
+    if all || seen.damping != last.damping {
+        set(marbles.set_damping(id, now.damping));
     }
-    if seen.material != last.material {
-        check(marbles.set_material(id, now.material));
+    if all || seen.material != last.material {
+        set(marbles.set_material(id, now.material));
     }
-    if seen.rotation_model != last.rotation_model {
-        check(marbles.set_rotation_model(id, now.rotation_model));
+    if all || seen.rotation_model != last.rotation_model {
+        set(marbles.set_rotation_model(id, now.rotation_model));
     }
-    if seen.integrator != last.integrator {
-        check(marbles.set_integrator(id, now.integrator));
+    if all || seen.integrator != last.integrator {
+        set(marbles.set_integrator(id, now.integrator));
+    }
+    if balls_only && seen.half_length != last.half_length {
+        check(Err(Refusal::Capsule(now.half_length)));
     }
 }
 
@@ -304,17 +324,12 @@ pub fn forces(
     mut world: ResMut<TawWorld>,
     forces: Query<(Entity, &ExternalForce, &MarbleState)>,
     mut impulses: Query<(Entity, &mut ExternalImpulse, &MarbleState)>,
-    mut refused: MessageWriter<InputRefused>,
+    mut refusals: Refusals,
 ) {
-    let mut check = |entity, result: Result<(), taw::Error>| {
-        if let Err(error) = result {
-            InputRefused::write(&mut refused, Some(entity), error);
-        }
-    };
     for (entity, ExternalForce { force, torque }, state) in &forces {
         if let Some(id) = state.id {
-            check(entity, world.marbles.apply_force(id, to_vector(*force)));
-            check(entity, world.marbles.apply_torque(id, to_vector(*torque)));
+            refusals.check(Some(entity), world.marbles.apply_force(id, to_vector(*force)));
+            refusals.check(Some(entity), world.marbles.apply_torque(id, to_vector(*torque)));
         }
     }
     for (entity, mut hit, state) in &mut impulses {
@@ -322,43 +337,46 @@ pub fn forces(
         if let Some(id) = state.id
             && *hit != ExternalImpulse::default()
         {
-            check(entity, world.marbles.apply_impulse(id, to_vector(impulse)));
-            check(entity, world.marbles.apply_angular_impulse(id, to_vector(angular)));
+            refusals.check(Some(entity), world.marbles.apply_impulse(id, to_vector(impulse)));
+            let angular = to_vector(angular);
+            refusals.check(Some(entity), world.marbles.apply_angular_impulse(id, angular));
             *hit = ExternalImpulse::default();
         }
     }
 }
 
 /// Notes how long gathering took.
-pub fn finish(mut times: ResMut<StepTimes>) {
+pub fn finish(mut times: ResMut<StepTimes>, mut world: ResMut<TawWorld>) {
+    world.just_restored = false;
     times.end_gather();
 }
 
-/// Takes a marble out of the world when its component or entity goes.
-pub fn forget_marble(
-    removed: On<Remove, Marble>,
-    states: Query<&MarbleState>,
-    mut world: ResMut<TawWorld>,
-    mut commands: Commands,
-) {
-    if let Ok(MarbleState { id: Some(id), .. }) = states.get(removed.entity) {
+/// Takes a marble out of the world when its component or entity goes, also of an entity that
+/// queries do not see.
+pub fn forget_marble(removed: On<Remove, Marble>, mut app: DeferredWorld) {
+    let id = app.get::<MarbleState>(removed.entity).and_then(|state| state.id);
+    let mut world = app.resource_mut::<TawWorld>();
+    world.away.remove(&removed.entity);
+    if let Some(id) = id
+        && world.marble_entities.get(&id) == Some(&removed.entity)
+    {
         // It can only be gone already if the game took it out by itself.
-        let _ = world.marbles.remove(*id);
-        world.marble_entities.remove(id);
+        let _ = world.marbles.remove(id);
+        world.marble_entities.remove(&id);
     }
-    commands.entity(removed.entity).try_remove::<MarbleState>();
+    app.commands().entity(removed.entity).try_remove::<MarbleState>();
 }
 
-/// Takes a wall out of the world when its component or entity goes.
-pub fn forget_wall(
-    removed: On<Remove, Wall>,
-    states: Query<&WallState>,
-    mut world: ResMut<TawWorld>,
-    mut commands: Commands,
-) {
-    if let Ok(WallState { id: Some(id), .. }) = states.get(removed.entity) {
-        let _ = world.walls.remove(*id);
-        world.wall_entities.remove(id);
+/// Takes a wall out of the world when its component or entity goes, also of an entity that
+/// queries do not see.
+pub fn forget_wall(removed: On<Remove, Wall>, mut app: DeferredWorld) {
+    let id = app.get::<WallState>(removed.entity).and_then(|state| state.id);
+    let mut world = app.resource_mut::<TawWorld>();
+    if let Some(id) = id
+        && world.wall_entities.get(&id) == Some(&removed.entity)
+    {
+        let _ = world.walls.remove(id);
+        world.wall_entities.remove(&id);
     }
-    commands.entity(removed.entity).try_remove::<WallState>();
+    app.commands().entity(removed.entity).try_remove::<WallState>();
 }

@@ -1,22 +1,39 @@
-//! Smooth motion between fixed steps, by [`bevy_transform_interpolation`].
+//! Smooth motion between fixed steps.
 //!
 //! What is on the screen lies between the last two steps, so it lags by up to one:
 //! outside the fixed schedules, read a marble's true place from the
 //! [`TawWorld`], or leave this plugin out.
-//! Marbles get it by themselves; give moving walls a
-//! [`TransformInterpolation`].
+//! Marbles get it by themselves, in world space, whatever carries them; give moving walls,
+//! and what carries marbles, a [`TransformInterpolation`] of
+//! [`bevy_transform_interpolation`]. A marble with `NoTransformEasing` is left out.
+//!
+//! # What is written between steps
+//! A system in `Update` sees the `Transform` that is drawn. If it writes there,
+//!
+//! - coordinates that it leaves alone go on as they were;
+//! - a small change, by no more than the marble's radius (or a radian), moves the marble by so
+//!   much from where it truly is, so that a nudge in every frame takes nothing away from its
+//!   motion;
+//! - a larger one is a place: the marble is exactly there. So is a coordinate that it has or
+//!   had in truth, or that was written in the last frame, too, and whatever comes together with
+//!   a [`Teleport`].
+//!
+//! No jump is drawn as a way. In the fixed schedules a `Transform` is the truth, and what is
+//! written there is a place.
+//!
+//! [`TransformInterpolation`]: bevy_transform_interpolation::prelude::TransformInterpolation
+
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use bevy::prelude::*;
+use bevy_transform_interpolation::TransformEasingSystems;
 use bevy_transform_interpolation::prelude::*;
-use bevy_transform_interpolation::{
-    RotationEasingState, TransformEasingSystems, TranslationEasingState,
-    reset_easing_states_on_transform_change,
-};
-use taw::motion::Rotation;
 
 use crate::TawSystems;
-use crate::components::Marble;
+use crate::components::{Eased, Marble, MarbleState, Teleport, bits, rotation_bits};
+use crate::convert::{from_point, from_rotation, to_point, to_rotation};
 use crate::resources::TawWorld;
+use crate::scatter::{Frame, put};
 
 pub use bevy_transform_interpolation as transform_interpolation;
 
@@ -30,90 +47,255 @@ impl Plugin for TawInterpolationPlugin {
         if !app.is_plugin_added::<TransformInterpolationPlugin>() {
             app.add_plugins(TransformInterpolationPlugin::default());
         }
-        app.register_required_components::<Marble, TranslationInterpolation>();
+        // That crate eases what it is told to in its parent's frame, which may move by itself.
+        app.register_required_components::<Marble, Eased>();
+        app.register_required_components::<Marble, NoTranslationEasing>();
+        app.register_required_components::<Marble, NoRotationEasing>();
         app.add_systems(
-            FixedUpdate,
-            (ease_rotation, forget_refused_places).after(TawSystems::Scatter),
-        );
-        app.init_resource::<EasedAt>().add_systems(
             RunFixedMainLoop,
             (
-                tell_teleports_from_easing
-                    .in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop)
-                    .before(reset_easing_states_on_transform_change),
-                note_easing
+                (undo, undo_children).chain().in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
+                (ease, ease_children)
+                    .chain()
                     .in_set(RunFixedMainLoopSystems::AfterFixedMainLoop)
                     .after(TransformEasingSystems::Ease),
             ),
-        );
+        )
+        // By then, what carries marbles is where its last step took it.
+        .add_systems(FixedFirst, undo_children.after(TransformEasingSystems::Reset))
+        .add_systems(FixedUpdate, note_start.after(TawSystems::Gather).before(TawSystems::Step))
+        // And by now, where this frame took it.
+        .add_systems(PostUpdate, ease_children.before(TransformSystems::Propagate));
     }
 }
 
-/// Where between two steps the `Transform`s of this frame are.
-#[derive(Resource, Default)]
-struct EasedAt(f32);
+type Drawn<'a> = (&'a Marble, &'a mut MarbleState, &'a mut Transform, &'a mut Eased, Has<Teleport>);
+type Roots<'w, 's> = Query<'w, 's, Drawn<'static>, (Without<ChildOf>, Without<NoTransformEasing>)>;
+type Children<'w, 's> =
+    Query<'w, 's, (Drawn<'static>, Entity, &'static ChildOf), Without<NoTransformEasing>>;
 
-fn note_easing(time: Res<Time<Fixed>>, mut eased: ResMut<EasedAt>) {
-    eased.0 = time.overstep_fraction();
+/// Notes where marbles are when a step begins.
+fn note_start(world: Res<TawWorld>, mut marbles: Query<(&MarbleState, &mut Eased)>) {
+    marbles.par_iter_mut().for_each(|(state, mut eased)| {
+        eased.restored = world.restored;
+        eased.from = place(&world, state);
+    });
 }
 
-/// Lets marbles turn smoothly, once they turn.
-fn ease_rotation(
+/// Where a marble truly is, and how it is turned if the model knows that.
+fn place(world: &TawWorld, state: &MarbleState) -> Option<(Vec3, Option<Quat>)> {
+    let row = world.marbles.row(state.id?).ok()?;
+    let rotation = world.marbles.rotation().get(row).copied().map(from_rotation);
+    Some((from_point(world.marbles.position()[row]), rotation))
+}
+
+/// Draws marbles between the last two steps, but for those that somebody moved since.
+fn ease(world: Res<TawWorld>, time: Res<Time<Fixed>>, mut marbles: Roots) {
+    let part = time.overstep_fraction();
+    marbles.par_iter_mut().for_each(|(_, state, transform, eased, _)| {
+        draw(&world, &eased, part, state, transform, &Frame::WORLD);
+    });
+}
+
+/// Draws marbles that are children, wherever their parents are drawn.
+fn ease_children(
     world: Res<TawWorld>,
-    still: Query<Entity, (With<Marble>, Without<RotationInterpolation>)>,
-    turning: Query<Entity, (With<Marble>, With<RotationInterpolation>)>,
-    mut commands: Commands,
+    time: Res<Time<Fixed>>,
+    mut marbles: ParamSet<(Children, TransformHelper)>,
+    mut frames: Local<Vec<(Entity, Frame)>>,
 ) {
-    if world.model().rotation == Rotation::None {
-        for marble in &turning {
-            // By now it may be on its way out.
-            commands.entity(marble).try_remove::<(RotationInterpolation, RotationEasingState)>();
-        }
-    } else {
-        for marble in &still {
-            commands.entity(marble).try_insert(RotationInterpolation);
+    let part = time.overstep_fraction();
+    find_frames(&mut marbles, &mut frames);
+    let mut marbles = marbles.p0();
+    for (entity, frame) in &*frames {
+        if let Ok(((_, state, transform, eased, _), ..)) = marbles.get_mut(*entity) {
+            draw(&world, &eased, part, state, transform, frame);
         }
     }
 }
 
-/// A place that gather refused is no place to move on from.
-fn forget_refused_places(mut marbles: Query<&mut TranslationEasingState, With<Marble>>) {
-    for mut easing in &mut marbles {
-        if easing.start.is_some_and(|start| !start.is_finite()) {
-            easing.start = None;
+fn find_frames(
+    marbles: &mut ParamSet<(Children, TransformHelper)>,
+    frames: &mut Vec<(Entity, Frame)>,
+) {
+    frames.clear();
+    let parents = marbles.p0();
+    let parents: Vec<_> = parents.iter().map(|(_, entity, of)| (entity, of.parent())).collect();
+    let helper = marbles.p1();
+    frames.extend(parents.into_iter().filter_map(|(entity, parent)| {
+        Some((entity, Frame::new(&helper.compute_global_transform(parent).ok()?)?))
+    }));
+}
+
+fn draw(
+    world: &TawWorld,
+    eased: &Eased,
+    part: f32,
+    mut state: Mut<MarbleState>,
+    mut transform: Mut<Transform>,
+    frame: &Frame,
+) {
+    let Some((mut position, mut rotation)) = place(world, &state) else { return };
+    if eased.restored == world.restored
+        && let Some((start, turned)) = eased.from
+    {
+        position = start.lerp(position, part);
+        rotation = rotation.map(|end| turned.map_or(end, |start| start.slerp(end, part)));
+    }
+    let moved = bits(transform.translation) != state.seen.translation;
+    let turned = rotation_bits(transform.rotation) != state.seen.rotation;
+    if !moved {
+        put(&mut transform, &mut state, frame, Some(position), None);
+    }
+    if !turned {
+        put(&mut transform, &mut state, frame, None, rotation);
+    }
+}
+
+/// Takes marbles from where they are drawn to where they truly are, and takes over what was
+/// written in between.
+fn undo(mut world: ResMut<TawWorld>, mut marbles: Roots) {
+    let any = AtomicBool::new(false);
+    marbles.par_iter_mut().for_each(|(_, state, transform, eased, _)| {
+        if !go_back(&world, state, transform, eased, &Frame::WORLD) {
+            any.store(true, Ordering::Relaxed);
+        }
+    });
+    if any.into_inner() {
+        for marble in &mut marbles {
+            take_over(world.bypass_change_detection(), marble, &Frame::WORLD);
         }
     }
 }
 
-/// Puts each marble back to where its last step ended, unless somebody moved it
-/// since it was drawn: then that is where it is now.
-///
-/// The interpolation crate cannot always tell the two apart: to it, touching only
-/// the scale moves the marble to where it was drawn, and a teleport may be undone
-/// by the next step.
-fn tell_teleports_from_easing(
-    mut marbles: Query<
-        (&mut Transform, &mut TranslationEasingState, Option<&mut RotationEasingState>),
-        (With<Marble>, Without<NoTranslationEasing>),
-    >,
-    eased: Res<EasedAt>,
+/// The same for children.
+fn undo_children(
+    mut world: ResMut<TawWorld>,
+    mut marbles: ParamSet<(Children, TransformHelper)>,
+    mut frames: Local<Vec<(Entity, Frame)>>,
 ) {
-    for (mut transform, mut easing, turning) in &mut marbles {
-        if let Some(mut turning) = turning
-            && let (Some(start), Some(end)) = (turning.start, turning.end)
-        {
-            if transform.rotation == start.slerp(end, eased.0) {
-                transform.rotation = end;
-            } else {
-                *turning = RotationEasingState::default();
+    find_frames(&mut marbles, &mut frames);
+    let mut marbles = marbles.p0();
+    for (entity, frame) in &*frames {
+        let Ok((marble, ..)) = marbles.get_mut(*entity) else { continue };
+        let (ball, mut state, mut transform, mut eased, teleport) = marble;
+        let (again, transformed) = (state.reborrow(), transform.reborrow());
+        if !go_back(&world, again, transformed, eased.reborrow(), frame) {
+            let marble = (ball, state, transform, eased, teleport);
+            take_over(world.bypass_change_detection(), marble, frame);
+        }
+    }
+}
+
+/// Takes a marble from where it is drawn to where it truly is. Gives whether nobody moved it.
+fn go_back(
+    world: &TawWorld,
+    mut state: Mut<MarbleState>,
+    mut transform: Mut<Transform>,
+    mut eased: Mut<Eased>,
+    frame: &Frame,
+) -> bool {
+    let Some((position, rotation)) = place(world, &state) else { return true };
+    let moved = bits(transform.translation) != state.seen.translation;
+    let turned = rotation.is_some() && rotation_bits(transform.rotation) != state.seen.rotation;
+    if !moved {
+        put(&mut transform, &mut state, frame, Some(position), None);
+        if eased.wrote.is_some() {
+            eased.wrote = None;
+        }
+    }
+    if !turned {
+        put(&mut transform, &mut state, frame, None, rotation);
+    }
+    !(moved || turned)
+}
+
+type DrawnItem<'a> = (&'a Marble, Mut<'a, MarbleState>, Mut<'a, Transform>, Mut<'a, Eased>, bool);
+
+/// Takes over where somebody moved or turned a marble since it was drawn. What cannot be right
+/// is left to gather, which refuses it.
+fn take_over(
+    world: &mut TawWorld,
+    (marble, mut state, mut transform, mut eased, teleport): DrawnItem,
+    frame: &Frame,
+) {
+    let (Some(id), Some((end, turned))) = (state.id, place(world, &state)) else { return };
+    let (start, turned_before) = eased.from.unwrap_or((end, turned));
+    let exact = teleport || world.just_restored;
+    let mut from = (start, turned_before);
+    if bits(transform.translation) != state.seen.translation {
+        let written = Written {
+            seen: Vec3::from_array(state.seen.translation.map(f32::from_bits)),
+            now: transform.translation,
+            before: eased.wrote,
+            within: if exact { -1.0 } else { marble.radius },
+        };
+        let (end, start) = written.place(frame.local(end), frame.local(start));
+        let position = to_point(frame.world(end));
+        if !end.is_finite() || world.marbles.set_position(id, position).is_err() {
+            eased.from = None;
+            return;
+        }
+        eased.wrote = Some(written.now);
+        from.0 = frame.world(start);
+        transform.translation = end;
+        state.seen.translation = bits(end);
+    }
+    if let Some(end) = turned
+        && rotation_bits(transform.rotation) != state.seen.rotation
+    {
+        let seen = Quat::from_array(state.seen.rotation.map(f32::from_bits));
+        let [mut end, mut start] = [end, turned_before.unwrap_or(end)].map(|q| frame.turned(q));
+        let now = transform.rotation;
+        if !exact && now != start && now != end && seen.angle_between(now) <= 1.0 {
+            let by = now * seen.inverse();
+            (end, start) = ((by * end).normalize(), (by * start).normalize());
+        } else {
+            (end, start) = (now, now);
+        }
+        let rotation = to_rotation(frame.turned_in_world(end));
+        if world.marbles.set_rotation(id, rotation).is_err() {
+            eased.from = None;
+            return;
+        }
+        from.1 = Some(frame.turned_in_world(start));
+        transform.rotation = end;
+        state.seen.rotation = rotation_bits(end);
+    }
+    eased.from = Some(from);
+}
+
+/// A translation that somebody wrote.
+struct Written {
+    /// What there was before, as drawn.
+    seen: Vec3,
+    now: Vec3,
+    /// What was written in the last frame.
+    before: Option<Vec3>,
+    /// So far away it is a nudge.
+    within: f32,
+}
+
+impl Written {
+    /// Where a marble is after it and where it began, that truly was at `end` and began at
+    /// `start`.
+    fn place(&self, end: Vec3, start: Vec3) -> (Vec3, Vec3) {
+        let known = [Some(end), Some(start), self.before];
+        let axes = [0, 1, 2].map(|i| {
+            let touched = self.now[i].to_bits() != self.seen[i].to_bits();
+            (touched, known.iter().flatten().any(|known| known[i] == self.now[i]))
+        });
+        let names_a_place = axes.iter().all(|(touched, is_known)| !touched || *is_known);
+        let change = self.now - self.seen;
+        let nudge = !names_a_place && change.length() <= self.within;
+        let (mut after, mut began) = (end, start);
+        for (i, (touched, _)) in axes.into_iter().enumerate() {
+            if touched && nudge {
+                (after[i], began[i]) = (end[i] + change[i], start[i] + change[i]);
+            } else if touched {
+                (after[i], began[i]) = (self.now[i], self.now[i]);
             }
         }
-        if let (Some(start), Some(end)) = (easing.start, easing.end) {
-            if transform.translation == start.lerp(end, eased.0) {
-                transform.translation = end;
-            } else {
-                *easing = TranslationEasingState::default();
-            }
-        }
+        (after, began)
     }
 }

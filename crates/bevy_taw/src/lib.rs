@@ -40,6 +40,7 @@
 //! | [`resources`] | the model, gravity, the world |
 //! | [`swarm`] | marbles in bulk that are no entities |
 //! | [`messages`] | contacts that start, go on and end |
+//! | [`snapshot`] | back in time, and rows without entities |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
 //! | [`diagnostics`] | step time and counts |
 //! | [`interpolation`] | smooth motion between fixed steps |
@@ -66,6 +67,7 @@ mod convert;
 pub mod debug_ui;
 pub mod diagnostics;
 mod gather;
+mod gather_walls;
 #[cfg(feature = "render")]
 pub mod gizmos;
 #[cfg(feature = "trade")]
@@ -77,6 +79,7 @@ mod reflect;
 pub mod refusal;
 pub mod resources;
 mod scatter;
+pub mod snapshot;
 pub mod swarm;
 #[cfg(feature = "render")]
 pub mod swarm_render;
@@ -91,12 +94,12 @@ pub use taw;
 pub mod prelude {
     pub use crate::components::{
         ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble, MarbleDamping,
-        MarbleIntegrator, MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity,
+        MarbleIntegrator, MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Teleport, Velocity,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;
     pub use crate::messages::{ContactEnded, ContactOngoing, ContactPair, ContactStarted};
-    pub use crate::refusal::{InputRefused, MarbleStopped};
+    pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
     pub use crate::swarm::{Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;

@@ -4,16 +4,17 @@ use bevy::prelude::*;
 
 use crate::components::{
     ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble, MarbleDamping,
-    MarbleIntegrator, MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Velocity,
+    MarbleIntegrator, MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Teleport, Velocity,
 };
 use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::messages::{self, Touches};
-use crate::refusal::{self, InputRefused, MarbleStopped, report};
+use crate::refusal::{self, InputRefused, MarbleStopped, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
+use crate::snapshot::RowRemoved;
 use crate::swarm::{self, TawSwarmModel};
 use crate::wall::Wall;
-use crate::{gather, scatter};
+use crate::{gather, gather_walls, scatter};
 
 /// Everything: the physics, interpolation between its steps, and with the feature
 /// `render` the gizmos, and swarms on the screen.
@@ -90,18 +91,27 @@ impl Plugin for TawPlugin {
             .init_resource::<SubstepDelta>()
             .init_resource::<StepTimes>()
             .init_resource::<Touches>()
+            .init_resource::<Told>()
+            .init_resource::<gather_walls::FrameTime>()
             .add_message::<InputRefused>()
+            .add_message::<RowRemoved>()
             .add_message::<MarbleStopped>();
         app.register_type::<(Marble, Velocity, Spin, MarbleMass, GravityScale)>()
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
-            .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength, Wall)>(
-            )
+            .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
+            .register_type::<(Wall, Teleport)>()
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
 
         app.add_observer(gather::forget_marble)
             .add_observer(gather::forget_wall)
             .add_observer(swarm::forget);
+        app.add_systems(
+            RunFixedMainLoop,
+            gather_walls::count_frame.in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
+        )
+        .add_systems(FixedPreUpdate, gather_walls::note_places)
+        .add_systems(PostUpdate, scatter::stay.before(TransformSystems::Propagate));
         app.configure_sets(
             FixedUpdate,
             (TawSystems::Gather, TawSystems::Step, TawSystems::Scatter).chain(),
@@ -112,10 +122,11 @@ impl Plugin for TawPlugin {
                 (
                     diagnostics::keep_account,
                     gather::settings,
-                    gather::walls,
+                    gather_walls::walls,
                     gather::marbles,
                     gather::forces,
                     swarm::gather,
+                    gather_walls::land,
                     gather::finish,
                 )
                     .chain()

@@ -1,31 +1,86 @@
 //! What the physics could not do: values that it did not take over, marbles that
 //! it had to stop.
 
+use std::collections::HashSet;
+
+use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
 
 use crate::resources::TawWorld;
 
 /// A value that cannot be right was not taken over; what was there before stays.
-/// Also logged as a warning. Told once for each such value.
+/// Also logged as a warning. Told once, and again after it was right or another wrong one.
 #[derive(Message, Clone, Copy, Debug, PartialEq)]
 pub struct InputRefused {
     /// Whose, or `None` for a resource.
     pub entity: Option<Entity>,
     /// Which field, and what was in it.
-    pub error: taw::Error,
+    pub error: Refusal,
 }
 
-impl InputRefused {
-    pub(crate) fn write(
-        writer: &mut MessageWriter<Self>,
+/// Why an input was refused.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Refusal {
+    /// A field and a value that the core refuses.
+    #[error(transparent)]
+    Value(#[from] taw::Error),
+    /// A capsule in a model that knows balls only: a new one is left out of the world until
+    /// the model changes, a ball stays a ball.
+    #[error("HalfLength must be 0 for the event-driven response, but is {0}")]
+    Capsule(f32),
+    /// An entity that would push itself: it is a marble, and no wall.
+    #[error("an entity is both a Marble and a Wall; it is a marble only")]
+    MarbleAndWall,
+    /// A place that nobody can tell, because an ancestor has no `Transform` or is disabled.
+    #[error("an ancestor has no Transform, or is disabled, so nobody can say where this is")]
+    NoPlace,
+    /// A place or rotation that is not finite, as below an ancestor of scale zero.
+    #[error("the place in the world is not finite: the scale along it is {0}, {1}, {2}")]
+    NoFrame(f32, f32, f32),
+}
+
+/// What was refused in this step and in the one before.
+#[derive(Resource, Default)]
+pub(crate) struct Told {
+    now: HashSet<(Option<Entity>, String)>,
+    before: HashSet<(Option<Entity>, String)>,
+}
+
+/// Tells what is refused, but nothing twice while it lasts.
+#[derive(SystemParam)]
+pub(crate) struct Refusals<'w> {
+    messages: MessageWriter<'w, InputRefused>,
+    told: ResMut<'w, Told>,
+}
+
+impl Refusals<'_> {
+    /// Begins a step.
+    pub fn begin_step(&mut self) {
+        let Told { now, before } = &mut *self.told;
+        std::mem::swap(now, before);
+        now.clear();
+    }
+
+    /// Tells of an error. Gives whether there is none.
+    pub fn check<E: Into<Refusal>>(
+        &mut self,
         entity: Option<Entity>,
-        error: taw::Error,
-    ) {
-        match entity {
-            Some(entity) => log::warn!("taw refused a value of {entity}: {error}"),
-            None => log::warn!("taw refused a resource: {error}"),
+        result: Result<(), E>,
+    ) -> bool {
+        let Err(error) = result else { return true };
+        let error = error.into();
+        // As text, because a NaN is not equal to itself.
+        let this = (entity, error.to_string());
+        if !self.told.before.contains(&this) && !self.told.now.contains(&this) {
+            match entity {
+                Some(entity) => log::warn!("taw refused a value of {entity}: {error}"),
+                None => log::warn!("taw refused a resource: {error}"),
+            }
+            self.messages.write(InputRefused { entity, error });
         }
-        writer.write(Self { entity, error });
+        self.told.now.insert(this);
+        false
     }
 }
 

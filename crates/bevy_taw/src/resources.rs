@@ -3,7 +3,7 @@
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use taw::motion::Force;
-use taw::world::{MarbleId, Model, WallId};
+use taw::world::{Marble, MarbleId, Model, WallId};
 
 use crate::reflect::ModelReflect;
 
@@ -36,14 +36,25 @@ pub struct Forces(pub Vec<Force<f32>>);
 ///
 /// Reading it costs nothing. Between gather and scatter it may be changed too, for
 /// example its contacts between `GenerateContacts` and `Restitute`; at other times
-/// change components instead. Its model and gravity are overwritten whenever
-/// [`TawModel`] and [`Gravity`] change.
+/// change components instead: components and resources are the truth. With the next
+/// step its model, gravity, forces and walls are again what they say, entities that
+/// lost their rows have new ones, and rows that no entity stands behind are taken out
+/// and told as [`RowRemoved`](crate::snapshot::RowRemoved).
+///
+/// To go back in time, take a [`TawWorld::snapshot`] and [`TawWorld::restore`] it.
 #[derive(Resource, Debug, Default, Deref, DerefMut)]
 pub struct TawWorld {
     #[deref]
-    world: taw::world::World<f32>,
+    pub(crate) world: taw::world::World<f32>,
     pub(crate) marble_entities: HashMap<MarbleId, Entity>,
     pub(crate) wall_entities: HashMap<WallId, Entity>,
+    /// Marbles whose entities are disabled, as they were when they left.
+    pub(crate) away: HashMap<Entity, Marble<f32>>,
+    /// How often the world went back in time, and whether it did since the last gather.
+    pub(crate) restored: u32,
+    pub(crate) just_restored: bool,
+    /// The walls' version when they were last gathered.
+    pub(crate) walls_gathered: u64,
 }
 
 impl TawWorld {

@@ -1,10 +1,73 @@
 //! From the world back to components, where something moved.
 
+use bevy::math::Affine3A;
 use bevy::prelude::*;
+use bevy_transform_interpolation::prelude::NoTransformEasing;
 
-use crate::components::{Marble, MarbleState, Spin, Velocity, bits, rotation_bits};
+use crate::components::{Eased, Marble, MarbleState, Spin, Velocity, bits, rotation_bits};
 use crate::convert::{from_point, from_rotation, from_vector};
+use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
+
+/// What a marble's `Transform` is relative to.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame {
+    /// From here to the world and back; none for the world itself, so that it costs no rounding.
+    of_parent: Option<(Affine3A, Affine3A, Quat)>,
+}
+
+impl Frame {
+    pub const WORLD: Self = Self { of_parent: None };
+
+    /// That of a parent, if there is a way back: not from a scale of zero.
+    pub fn new(parent: &GlobalTransform) -> Option<Self> {
+        let (there, turned) = (parent.affine(), parent.rotation());
+        let back = there.inverse();
+        (there.is_finite() && back.is_finite() && turned.is_finite())
+            .then_some(Self { of_parent: Some((there, back, turned)) })
+    }
+
+    pub fn local(&self, point: Vec3) -> Vec3 {
+        self.of_parent.map_or(point, |(_, back, _)| back.transform_point3(point))
+    }
+
+    pub fn world(&self, point: Vec3) -> Vec3 {
+        self.of_parent.map_or(point, |(there, ..)| there.transform_point3(point))
+    }
+
+    pub fn turned(&self, rotation: Quat) -> Quat {
+        self.of_parent.map_or(rotation, |(.., turned)| turned.inverse() * rotation)
+    }
+
+    pub fn turned_in_world(&self, rotation: Quat) -> Quat {
+        self.of_parent.map_or(rotation, |(.., turned)| turned * rotation)
+    }
+}
+
+/// Writes a place in world space to a `Transform`, and notes it as seen. What is not finite in
+/// its frame is not written.
+pub(crate) fn put(
+    transform: &mut Mut<Transform>,
+    state: &mut Mut<MarbleState>,
+    frame: &Frame,
+    position: Option<Vec3>,
+    rotation: Option<Quat>,
+) {
+    if let Some(translation) = position.map(|position| frame.local(position))
+        && translation.is_finite()
+        && bits(translation) != bits(transform.translation)
+    {
+        transform.translation = translation;
+        state.seen.translation = bits(translation);
+    }
+    if let Some(rotation) = rotation.map(|rotation| frame.turned(rotation))
+        && rotation.is_finite()
+        && rotation_bits(rotation) != rotation_bits(transform.rotation)
+    {
+        transform.rotation = rotation;
+        state.seen.rotation = rotation_bits(rotation);
+    }
+}
 
 type Moved<'a> =
     (&'a mut Transform, Option<&'a mut Velocity>, Option<&'a mut Spin>, &'a mut MarbleState);
@@ -19,19 +82,58 @@ pub fn marbles(
         Query<Moved, With<Marble>>,
     )>,
     children: Query<(Entity, &ChildOf), With<Marble>>,
-    mut parents: Local<Vec<(Entity, GlobalTransform)>>,
+    mut frames: Local<Vec<(Entity, Frame)>>,
+    mut refusals: Refusals,
 ) {
-    transforms.p0().par_iter_mut().for_each(|moved| write(&world, moved, None));
+    transforms.p0().par_iter_mut().for_each(|moved| write(&world, moved, &Frame::WORLD));
     // A child's Transform is relative to its parents, which have all moved by now.
     let helper = transforms.p1();
-    parents.clear();
-    parents.extend(children.iter().filter_map(|(entity, child_of)| {
-        Some((entity, helper.compute_global_transform(child_of.parent()).ok()?))
+    frames.clear();
+    frames.extend(children.iter().filter_map(|(entity, child_of)| {
+        let parent = helper.compute_global_transform(child_of.parent()).ok()?;
+        let frame = Frame::new(&parent);
+        if frame.is_none() {
+            let [x, y, z] = parent.scale().to_array();
+            refusals.check(Some(entity), Err(Refusal::NoFrame(x, y, z)));
+        }
+        Some((entity, frame?))
     }));
     let mut marbles = transforms.p2();
-    for (entity, parent) in &parents {
+    for (entity, frame) in &frames {
         if let Ok(moved) = marbles.get_mut(*entity) {
-            write(&world, moved, Some(parent));
+            write(&world, moved, frame);
+        }
+    }
+}
+
+/// Keeps marbles that are children where they are while their parents move between steps, unless
+/// somebody moved them, too. Those that are eased are drawn elsewhere.
+pub fn stay(
+    world: Res<TawWorld>,
+    mut transforms: ParamSet<(TransformHelper, Query<(&mut Transform, &mut MarbleState)>)>,
+    children: Query<
+        (Entity, &ChildOf),
+        (With<Marble>, Or<(Without<Eased>, With<NoTransformEasing>)>),
+    >,
+    mut frames: Local<Vec<(Entity, Frame)>>,
+) {
+    let helper = transforms.p0();
+    frames.clear();
+    frames.extend(children.iter().filter_map(|(entity, child_of)| {
+        let parent = helper.compute_global_transform(child_of.parent()).ok()?;
+        Some((entity, Frame::new(&parent)?))
+    }));
+    let mut marbles = transforms.p1();
+    for (entity, frame) in &frames {
+        let Ok((mut transform, mut state)) = marbles.get_mut(*entity) else { continue };
+        let Some(row) = state.id.and_then(|id| world.marbles.row(id).ok()) else { continue };
+        if bits(transform.translation) == state.seen.translation {
+            let position = from_point(world.marbles.position()[row]);
+            put(&mut transform, &mut state, frame, Some(position), None);
+        }
+        if rotation_bits(transform.rotation) == state.seen.rotation {
+            let rotation = world.marbles.rotation().get(row).copied().map(from_rotation);
+            put(&mut transform, &mut state, frame, None, rotation);
         }
     }
 }
@@ -39,27 +141,15 @@ pub fn marbles(
 type MovedItem<'a> =
     (Mut<'a, Transform>, Option<Mut<'a, Velocity>>, Option<Mut<'a, Spin>>, Mut<'a, MarbleState>);
 
-fn write(world: &TawWorld, moved: MovedItem, parent: Option<&GlobalTransform>) {
+fn write(world: &TawWorld, moved: MovedItem, frame: &Frame) {
     let (mut transform, velocity, spin, mut state) = moved;
     let marbles = &world.marbles;
     let Some(row) = state.id.and_then(|id| marbles.row(id).ok()) else {
         return;
     };
     let position = from_point(marbles.position()[row]);
-    let position =
-        parent.map_or(position, |parent| parent.affine().inverse().transform_point3(position));
-    if bits(position) != bits(transform.translation) {
-        transform.translation = position;
-        state.seen.translation = bits(position);
-    }
-    if let Some(rotation) = marbles.rotation().get(row) {
-        let rotation = from_rotation(*rotation);
-        let rotation = parent.map_or(rotation, |parent| parent.rotation().inverse() * rotation);
-        if rotation_bits(rotation) != rotation_bits(transform.rotation) {
-            transform.rotation = rotation;
-            state.seen.rotation = rotation_bits(rotation);
-        }
-    }
+    let rotation = marbles.rotation().get(row).copied().map(from_rotation);
+    put(&mut transform, &mut state, frame, Some(position), rotation);
     if let Some(mut component) = velocity {
         let velocity = from_vector(marbles.velocity()[row]);
         if bits(velocity) != bits(**component) {

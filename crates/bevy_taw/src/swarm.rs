@@ -1,14 +1,17 @@
 //! Marbles in bulk that are no entities: one component holds them.
 
+use bevy::ecs::world::DeferredWorld;
 use bevy::math::bounding::Aabb3d;
+use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
 use taw::swarm::{Ball, BallId, Stage, SwarmModel};
 use taw::world::Mass;
 
 use crate::convert::to_point;
 use crate::diagnostics::StepTimes;
-use crate::refusal::{InputRefused, report};
+use crate::refusal::{Refusals, report};
 use crate::resources::TawWorld;
+use crate::snapshot::{RowRemoved, lost_balls};
 
 /// Marbles in bulk, up to millions, which collide with each other, with walls, and with the
 /// marbles that are entities. How they step is in [`TawSwarmModel`].
@@ -50,7 +53,7 @@ pub enum Tint {
 }
 
 /// How all swarms step. May change at any time; what cannot be right is refused with an
-/// [`InputRefused`], and the last good one stays.
+/// [`InputRefused`](crate::refusal::InputRefused), and the last good one stays.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut)]
 pub struct TawSwarmModel(pub SwarmModel);
 
@@ -170,15 +173,14 @@ pub(crate) fn gather(
     mut swarms: Query<(Entity, &mut Swarm)>,
     mut owners: ResMut<Owners>,
     model: Res<TawSwarmModel>,
-    mut refused: MessageWriter<InputRefused>,
+    mut refusals: Refusals,
+    mut removed: MessageWriter<RowRemoved>,
 ) {
-    let mut check = |entity, result: Result<(), taw::Error>| {
-        if let Err(error) = result {
-            InputRefused::write(&mut refused, entity, error);
-        }
-    };
-    if model.is_changed() {
-        check(None, world.swarm.set_model(**model));
+    if **model != world.swarm.model() {
+        refusals.check(None, world.swarm.set_model(**model));
+    }
+    if world.just_restored {
+        name_balls(&mut world, &mut swarms, &mut owners, &mut removed);
     }
     for (entity, mut swarm) in &mut swarms {
         if swarm.coming.is_empty() && swarm.going.is_empty() {
@@ -186,35 +188,61 @@ pub(crate) fn gather(
         }
         let swarm = &mut *swarm;
         let going = std::mem::take(&mut swarm.going);
-        check(Some(entity), world.swarm.remove(&going));
+        refusals.check(Some(entity), world.swarm.remove(&going));
         let coming = std::mem::take(&mut swarm.coming);
-        check(
-            Some(entity),
-            world.swarm.insert(&coming).map(|balls| {
-                for ball in &balls {
-                    let Ok(row) = world.swarm.row(*ball) else { continue };
-                    let slot = world.swarm.slots()[row] as usize;
-                    if owners.of_slot.len() <= slot {
-                        owners.of_slot.resize(slot + 1, None);
-                    }
-                    owners.of_slot[slot] = Some(entity);
-                }
-                swarm.balls.extend(balls);
-            }),
-        );
+        let inserted = world.swarm.insert(&coming).map(|balls| {
+            owners.note(&world, entity, &balls);
+            swarm.balls.extend(balls);
+        });
+        refusals.check(Some(entity), inserted);
+    }
+}
+
+impl Owners {
+    fn note(&mut self, world: &TawWorld, entity: Entity, balls: &[BallId]) {
+        for ball in balls {
+            let Ok(row) = world.swarm.row(*ball) else { continue };
+            let slot = world.swarm.slots()[row] as usize;
+            if self.of_slot.len() <= slot {
+                self.of_slot.resize(slot + 1, None);
+            }
+            self.of_slot[slot] = Some(entity);
+        }
+    }
+}
+
+/// Gives swarms the balls that they have in a restored world, and takes out what is nobody's.
+fn name_balls(
+    world: &mut TawWorld,
+    swarms: &mut Query<(Entity, &mut Swarm)>,
+    owners: &mut Owners,
+    removed: &mut MessageWriter<RowRemoved>,
+) {
+    owners.of_slot.clear();
+    let mut owned = HashSet::default();
+    for (entity, mut swarm) in swarms {
+        let Swarm { balls, going, .. } = &mut *swarm;
+        balls.retain(|ball| world.swarm.row(*ball).is_ok());
+        going.retain(|ball| world.swarm.row(*ball).is_ok());
+        owners.note(world, entity, balls);
+        owned.extend(balls.iter().chain(&*going).copied());
+    }
+    let lost = lost_balls(world, &owned);
+    if !lost.is_empty() {
+        log::warn!("taw took out {} balls that no swarm has", lost.len());
+        report("take out balls", world.swarm.remove(&lost));
+        removed.write_batch(lost.into_iter().map(RowRemoved::Ball));
     }
 }
 
 /// The marbles of a swarm go when it goes.
-pub(crate) fn forget(
-    removed: On<Remove, Swarm>,
-    swarms: Query<&Swarm>,
-    mut world: ResMut<TawWorld>,
-) {
-    if let Ok(swarm) = swarms.get(removed.entity) {
-        let balls: Vec<_> = swarm.balls.iter().chain(&swarm.going).copied().collect();
-        report("take out a swarm", world.swarm.remove(&balls));
-    }
+pub(crate) fn forget(removed: On<Remove, Swarm>, mut app: DeferredWorld) {
+    let Some(swarm) = app.get::<Swarm>(removed.entity) else { return };
+    let balls: Vec<_> = swarm.balls.iter().chain(&swarm.going).copied().collect();
+    let mut world = app.resource_mut::<TawWorld>();
+    // Those that somebody else took out are gone already.
+    let balls: Vec<_> = balls.into_iter().filter(|ball| world.swarm.row(*ball).is_ok()).collect();
+    report("take out a swarm", world.swarm.remove(&balls));
 }
 
 /// Moves the swarms on, after the marbles.

@@ -1,18 +1,31 @@
 //! What marbles bounce off.
 
+use bevy::math::Isometry3d;
 use bevy::prelude::*;
 use taw::shape as core;
 use taw::world::WallShape;
 
-use crate::components::WallState;
+use crate::components::{Speed, WallState, Way};
 use crate::convert::{to_point, to_vector};
+
+/// The most that the speed of a wall's surface is believed to change within a step, in m/s: the
+/// speed after a fall of five metres, which no hand and no motor gives a wall at once. What
+/// changes by more was put elsewhere, and carries nothing along; if it goes on so fast in the
+/// next step, it does move, and counts from then on.
+///
+/// A half-space is thought to be a metre in size.
+pub const LARGEST_CHANGE_OF_SPEED: f32 = 10.0;
 
 /// A wall: something solid that no contact can move. Any number of them may form one body,
 /// as children of one entity say; where they are flush, a marble feels one flat floor.
 ///
 /// It lies in the entity's own frame, about the place of its [`Transform`], and its scale
 /// counts. Move or turn that (or a parent's) and the wall follows, pushing marbles before
-/// it; how far it came since the last step is how fast it is.
+/// it; how far it came since the last step, or in the last frame, is how fast it is. A jump
+/// is no motion: see [`LARGEST_CHANGE_OF_SPEED`], and [`Teleport`](crate::components::Teleport).
+///
+/// An entity that is a marble, too, is no wall. While its entity is
+/// [`Disabled`](bevy::ecs::entity_disabling::Disabled), a wall is out of the world.
 ///
 /// ```
 /// use bevy::prelude::*;
@@ -115,6 +128,83 @@ impl Wall {
                 core::HeightField::new(corner, cell, *columns, heights)?.into()
             }
         })
+    }
+}
+
+impl Wall {
+    /// How far from the origin of its frame it goes at this scale, in metres.
+    pub(crate) fn reach(&self, scale: Vec3) -> f32 {
+        let largest = scale.abs().max_element();
+        let farthest = |points: &[Vec3]| {
+            points.iter().map(|point| (*point * scale).length()).fold(0.0, f32::max)
+        };
+        match self {
+            Self::HalfSpace(_) => 1.0,
+            Self::Sphere(Sphere { radius }) => radius * largest,
+            Self::Cuboid(Cuboid { half_size }) => (half_size * scale).length(),
+            Self::Capsule(Capsule3d { radius, half_length }) => (radius + half_length) * largest,
+            Self::Hull(points) | Self::Mesh { points, .. } => farthest(points),
+            Self::HeightField { cell, columns, heights } => {
+                let rows = heights.len() as f32 / *columns as f32;
+                let highest = heights.iter().fold(0.0, |most: f32, height| most.max(height.abs()));
+                let wide = Vec2::new(*columns as f32, rows) * *cell * 0.5;
+                (Vec3::new(wide.x, highest, wide.y) * scale).length()
+            }
+        }
+    }
+}
+
+impl Way {
+    /// Takes the wall to where it is now, a step of `dt` seconds and a frame later. Gives how
+    /// fast it came there, or `None` if it did not move or jumped.
+    ///
+    /// What it moved between fixed steps took it the frame; what it moved within this one took
+    /// it the step.
+    pub(crate) fn go_on(
+        &mut self,
+        now: Isometry3d,
+        dt: f32,
+        frame: f32,
+        reach: f32,
+        jumps: bool,
+    ) -> Option<Speed> {
+        let last = self.last.replace(now);
+        let framed = self.framed.take();
+        let last = last.filter(|_| dt > 0.0)?;
+        let framed = framed.unwrap_or(last);
+        let frame = if frame > 0.0 { frame } else { dt };
+        let (outside, inside) =
+            (Speed::between(last, framed, frame), Speed::between(framed, now, dt));
+        let measured = Speed {
+            velocity: outside.velocity + inside.velocity,
+            spin: outside.spin + inside.spin,
+        };
+        let smooth = |before: Speed| {
+            let change = (measured.velocity - before.velocity).length()
+                + (measured.spin - before.spin).length() * reach;
+            change <= LARGEST_CHANGE_OF_SPEED
+        };
+        if jumps {
+            (self.measured, self.believed) = default();
+        } else {
+            let goes_on = smooth(self.measured) || smooth(self.believed);
+            self.measured = measured;
+            self.believed = if goes_on { measured } else { Speed::default() };
+        }
+        (self.believed != Speed::default()).then_some(self.believed)
+    }
+}
+
+impl Speed {
+    /// How fast something goes from one place to the other in so many seconds.
+    fn between(last: Isometry3d, now: Isometry3d, seconds: f32) -> Self {
+        if last == now {
+            return Self::default();
+        }
+        Self {
+            velocity: Vec3::from(now.translation - last.translation) / seconds,
+            spin: (now.rotation * last.rotation.inverse()).to_scaled_axis() / seconds,
+        }
     }
 }
 

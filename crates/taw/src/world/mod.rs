@@ -204,7 +204,8 @@ impl<S: Scalar> World<S> {
         self.model
     }
 
-    /// Changes how the next step is done.
+    /// Changes how the next step is done. A model equal to the current one changes nothing;
+    /// another one forgets the impulses that contacts remember.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for the substeps or the iterations; [`Error::BallsOnly`] for
@@ -215,6 +216,9 @@ impl<S: Scalar> World<S> {
             && let Some(id) = self.marbles.first_capsule()
         {
             return Err(Error::BallsOnly(id));
+        }
+        if model == self.model {
+            return Ok(());
         }
         self.model = model;
         self.forget_contacts();

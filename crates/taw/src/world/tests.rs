@@ -265,3 +265,18 @@ fn a_contact_taken_out_is_not_restituted_and_a_made_up_one_is_passed_over() {
     world.restitute(DT).unwrap();
     assert_eq!(world.marbles.get(id).unwrap().position.y, 0.0);
 }
+
+#[test]
+fn a_model_equal_to_the_current_one_changes_nothing() {
+    let mut world = floor::<f64>();
+    let model = Model { response: Response::Impulse, ..Model::default() };
+    world.set_model(model).unwrap();
+    world.marbles.insert(Marble::new(Point3::new(0.0, 0.5, 0.0), 0.5)).unwrap();
+    for _ in 0..4 {
+        world.step(1.0 / 64.0).unwrap();
+    }
+    assert!(!world.warm.is_empty(), "the contact remembers an impulse");
+    let before = world.clone();
+    world.set_model(model).unwrap();
+    assert_eq!(world, before);
+}

@@ -325,8 +325,10 @@ impl<S: Scalar> Walls<S> {
         self.material.get(row)
     }
 
-    /// A number that is another one whenever a wall is.
-    pub(super) fn version(&self) -> u64 {
+    /// Count of all insertions, removals and changes so far: as long as it is the same, so are
+    /// the walls.
+    #[must_use]
+    pub fn version(&self) -> u64 {
         self.version
     }
 

@@ -1,0 +1,157 @@
+//! Back in time: a copy of the world, and how entities and rows find each other again.
+
+use bevy::ecs::entity::Entities;
+use bevy::platform::collections::{HashMap, HashSet};
+use bevy::prelude::*;
+use taw::swarm::BallId;
+use taw::world::{MarbleId, WallId};
+
+use crate::components::{MarbleState, WallState};
+use crate::resources::TawWorld;
+
+/// The physics of an app as it was: see [`TawWorld::snapshot`].
+#[derive(Clone, Debug)]
+pub struct TawSnapshot {
+    world: taw::world::World<f32>,
+    marble_entities: HashMap<MarbleId, Entity>,
+    wall_entities: HashMap<WallId, Entity>,
+}
+
+/// A row of the world that no entity stood behind was taken out, as after a
+/// [`TawWorld::restore`] to a time when its entity still was. Also logged as a warning.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
+pub enum RowRemoved {
+    /// A marble.
+    Marble(MarbleId),
+    /// A wall.
+    Wall(WallId),
+    /// A ball of a swarm.
+    Ball(BallId),
+}
+
+impl TawWorld {
+    /// The physics as it is, to be [restored](Self::restore) later: where all marbles and balls
+    /// of swarms are, how they move, and what their contacts remember.
+    #[must_use]
+    pub fn snapshot(&self) -> TawSnapshot {
+        TawSnapshot {
+            world: self.world.clone(),
+            marble_entities: self.marble_entities.clone(),
+            wall_entities: self.wall_entities.clone(),
+        }
+    }
+
+    /// Lets everything move on from a [`snapshot`](Self::snapshot). With the next step,
+    ///
+    /// - marbles go on from where they were then, as fast as they were; what else they are
+    ///   (radius, mass, material ...) is in their components, as ever, and so are the model,
+    ///   gravity and forces. A component that is written between this and that step counts.
+    /// - walls are where their entities' `Transform`s are, at rest until they move.
+    /// - marbles and walls that were spawned since are put in again, as their components say.
+    /// - rows of entities that are gone by now are taken out, and each is told as a
+    ///   [`RowRemoved`]. So are balls that a [`Swarm`](crate::swarm::Swarm) has lost; balls that
+    ///   it got since are lost.
+    ///
+    /// ```
+    /// # use bevy::prelude::*;
+    /// # use bevy_taw::prelude::*;
+    /// # use bevy_taw::snapshot::TawSnapshot;
+    /// #[derive(Resource)]
+    /// struct Saved(TawSnapshot);
+    ///
+    /// fn load(saved: Res<Saved>, mut world: ResMut<TawWorld>) {
+    ///     world.restore(&saved.0);
+    /// }
+    /// ```
+    pub fn restore(&mut self, snapshot: &TawSnapshot) {
+        self.world = snapshot.world.clone();
+        self.marble_entities.clone_from(&snapshot.marble_entities);
+        self.wall_entities.clone_from(&snapshot.wall_entities);
+        self.restored = self.restored.wrapping_add(1);
+        self.just_restored = true;
+    }
+}
+
+/// Gives marble entities the rows that they have in a restored world.
+pub(crate) fn name_marbles(world: &mut TawWorld, states: &mut Query<(Entity, &mut MarbleState)>) {
+    for (_, mut state) in states.iter_mut() {
+        (state.id, state.refused) = (None, false);
+    }
+    for (id, entity) in &world.marble_entities {
+        if world.world.marbles.row(*id).is_ok()
+            && let Ok((_, mut state)) = states.get_mut(*entity)
+        {
+            state.id = Some(*id);
+        }
+    }
+}
+
+/// Gives wall entities the rows that they have in a restored world, where they are at rest.
+pub(crate) fn name_walls<'a>(
+    world: &mut TawWorld,
+    states: impl Iterator<Item = (Entity, Mut<'a, WallState>)>,
+) {
+    let ids: HashMap<_, _> = world.wall_entities.iter().map(|(id, wall)| (*wall, *id)).collect();
+    for (entity, mut state) in states {
+        let id = ids.get(&entity).copied().filter(|id| world.walls.row(*id).is_ok());
+        *state = WallState { id, ..state.without_row() };
+    }
+}
+
+/// Takes out the rows of marbles that no entity stands behind. An entity that queries do not
+/// see is disabled: its marble is kept until it comes back.
+pub(crate) fn take_out_marbles(
+    world: &mut TawWorld,
+    visible: &Query<(Entity, &mut MarbleState)>,
+    entities: &Entities,
+    removed: &mut MessageWriter<RowRemoved>,
+) {
+    let has_row = |id| {
+        let entity = world.marble_entities.get(&id)?;
+        let (_, state) = visible.get(*entity).ok()?;
+        (state.id == Some(id)).then_some(())
+    };
+    let ids = (0..world.marbles.len()).filter_map(|row| world.marbles.id(row));
+    let gone: Vec<_> = ids.filter(|id| has_row(*id).is_none()).collect();
+    for id in gone {
+        let entity = world.marble_entities.remove(&id);
+        let Ok(marble) = world.marbles.remove(id) else { continue };
+        if let Some(entity) =
+            entity.filter(|entity| entities.contains(*entity) && visible.get(*entity).is_err())
+        {
+            world.away.insert(entity, marble);
+        } else {
+            log::warn!("taw took out {id:?}: no entity stands behind it");
+            removed.write(RowRemoved::Marble(id));
+        }
+    }
+    world.marble_entities.retain(|id, _| world.world.marbles.row(*id).is_ok());
+}
+
+/// Takes out the rows of walls that no entity stands behind, or one that is disabled.
+pub(crate) fn take_out_walls(
+    world: &mut TawWorld,
+    id_of: impl Fn(Entity) -> Option<WallId>,
+    entities: &Entities,
+    removed: &mut MessageWriter<RowRemoved>,
+) {
+    let stands = |id| world.wall_entities.get(&id).is_some_and(|it| id_of(*it) == Some(id));
+    let ids = (0..world.walls.len()).filter_map(|row| world.walls.id(row));
+    let gone: Vec<_> = ids.filter(|id| !stands(*id)).collect();
+    for id in gone {
+        let _ = world.walls.remove(id); // it is there: its row named it
+        let entity = world.wall_entities.remove(&id);
+        if !entity.is_some_and(|entity| entities.contains(entity)) {
+            log::warn!("taw took out {id:?}: no entity stands behind it");
+            removed.write(RowRemoved::Wall(id));
+        }
+    }
+    world.wall_entities.retain(|id, _| world.world.walls.row(*id).is_ok());
+}
+
+/// Balls that are neither a swarm's nor guests.
+pub(crate) fn lost_balls(world: &TawWorld, owned: &HashSet<BallId>) -> Vec<BallId> {
+    let swarm = &world.swarm;
+    let rows = (0..swarm.slots().len()).filter(|row| !swarm.is_guest(*row));
+    rows.filter_map(|row| swarm.id(row)).filter(|ball| !owned.contains(ball)).collect()
+}
