@@ -14,7 +14,7 @@ pub struct Tally {
     pub scenes: u64,
     /// In how many all held.
     pub held: u64,
-    /// For each invariant, in how many scenes it was the first that did not hold.
+    /// For each invariant, in how many scenes it did not hold.
     pub broken: BTreeMap<Invariant, u64>,
     /// The nearest that each came to its bound, as a part of it, and where.
     pub worst: BTreeMap<Invariant, (f64, Name)>,
@@ -26,9 +26,9 @@ impl Tally {
     /// Counts a scene.
     pub fn add(&mut self, name: Name, verdict: &Verdict) {
         self.scenes += 1;
-        match &verdict.failure {
-            None => self.held += 1,
-            Some(failure) => *self.broken.entry(failure.finding.invariant).or_default() += 1,
+        self.held += u64::from(verdict.failures.is_empty());
+        for failure in &verdict.failures {
+            *self.broken.entry(failure.finding.invariant).or_default() += 1;
         }
         for finding in &verdict.worst {
             let worst = self.worst.entry(finding.invariant).or_insert((0.0, name));
@@ -46,7 +46,7 @@ impl Tally {
 #[must_use]
 pub fn table(tallies: &BTreeMap<Kind, Tally>) -> String {
     let mut text = String::new();
-    let _ = writeln!(text, "| model | scenes | held | broken first (scenes) |");
+    let _ = writeln!(text, "| model | scenes | held | broken (scenes) |");
     let _ = writeln!(text, "|---|---|---|---|");
     for (kind, tally) in tallies {
         let Tally { scenes, held, broken, .. } = tally;

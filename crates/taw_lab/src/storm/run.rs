@@ -10,7 +10,7 @@ use taw::scene::{Movement, Running};
 
 use super::case::Case;
 use super::judge::{Bench, Finding, Invariant};
-use super::observe::Snapshot;
+use super::observe::{Body, Snapshot};
 use super::symmetry::{self, Symmetry};
 use crate::trade::trace::Number;
 
@@ -19,8 +19,8 @@ use crate::trade::trace::Number;
 pub struct Verdict {
     /// For each invariant that was judged, how near it came to its bound.
     pub worst: Vec<Finding>,
-    /// The first that did not hold.
-    pub failure: Option<Failure>,
+    /// What did not hold, each invariant once, in the order of time.
+    pub failures: Vec<Failure>,
     /// The slowest step, in seconds.
     pub slowest: f64,
 }
@@ -87,7 +87,7 @@ pub fn run(case: &Case, pulse: &Pulse) -> Verdict {
 /// Runs a case until this invariant does not hold, or, for none, any of them.
 #[must_use]
 pub fn run_for(case: &Case, only: Option<Invariant>, pulse: &Pulse) -> Verdict {
-    let mut verdict = Verdict { worst: Vec::new(), failure: None, slowest: 0.0 };
+    let mut verdict = Verdict { worst: Vec::new(), failures: Vec::new(), slowest: 0.0 };
     let caught = catch_unwind(AssertUnwindSafe(|| match case.number {
         Number::F32 => go::<f32>(case, only, pulse, &mut verdict),
         Number::F64 => go::<f64>(case, only, pulse, &mut verdict),
@@ -107,7 +107,8 @@ fn failed(invariant: Invariant) -> Finding {
 }
 
 impl Verdict {
-    /// Remembers a finding. True if the run is over.
+    /// Remembers a finding. True if the run is over: what was made of nothing breaks the rest,
+    /// too, but a wrong speed or a place out of bounds says nothing about the rest.
     fn note(
         &mut self,
         only: Option<Invariant>,
@@ -121,10 +122,24 @@ impl Verdict {
             None => self.worst.push(finding),
         }
         let counts = only.is_none_or(|only| only == finding.invariant);
-        if counts && !finding.holds() && self.failure.is_none() {
-            self.failure = Some(Failure { finding, step, what: what.into() });
+        let known = |failure: &Failure| failure.finding.invariant == finding.invariant;
+        if counts && !finding.holds() && !self.failures.iter().any(known) {
+            self.failures.push(Failure { finding, step, what: what.into() });
         }
-        self.failure.is_some()
+        let goes_on = |failure: &Failure| {
+            only.is_none()
+                && matches!(
+                    failure.finding.invariant,
+                    Invariant::Speed | Invariant::Overlap | Invariant::Closed
+                )
+        };
+        !self.failures.iter().all(goes_on)
+    }
+
+    /// The first that did not hold.
+    #[must_use]
+    pub fn failure(&self) -> Option<&Failure> {
+        self.failures.first()
     }
 }
 
@@ -148,10 +163,11 @@ fn go<S: Scalar>(case: &Case, only: Option<Invariant>, pulse: &Pulse, verdict: &
         }
         verdict.slowest = verdict.slowest.max(begin.elapsed().as_secs_f64());
         let after = Snapshot::of(&running.world);
+        let mut over = false;
         for finding in bench.judge(&before, &after) {
-            verdict.note(only, finding, step, "");
+            over |= verdict.note(only, finding, step, "");
         }
-        if verdict.failure.is_some() {
+        if over || !after.bodies.iter().all(Body::is_finite) {
             return;
         }
         before = after;
@@ -237,4 +253,42 @@ fn difference<S: Scalar>(
         spin: vector(axis * (angle / dt)),
         pivot: Point3::from_vec(vector(now.0.to_vec())),
     }))
+}
+
+/// How many steps a [`trail`] shows.
+const TRAIL: u32 = 12;
+
+/// Where a body was in the steps until this one, and the energy of all: lines to read.
+pub fn trail(case: &Case, body: usize, until: u32) -> String {
+    match case.number {
+        Number::F32 => trail_in::<f32>(case, body, until),
+        Number::F64 => trail_in::<f64>(case, body, until),
+    }
+}
+
+fn trail_in<S: Scalar>(case: &Case, body: usize, until: u32) -> String {
+    let mut text = String::new();
+    let Ok(mut running) = case.begin::<S>() else { return text };
+    for step in 0..=until {
+        let ended = step > 0
+            && catch_unwind(AssertUnwindSafe(|| advance(case, &mut running)))
+                .map_or(true, |result| result.is_err());
+        if ended {
+            break;
+        }
+        if step + TRAIL < until && step > 1 {
+            continue;
+        }
+        let now = Snapshot::of(&running.world);
+        let Some(of) = now.bodies.get(body) else { break };
+        let (at, velocity, spin) = (of.at, of.velocity, of.spin);
+        text += &format!("{step}: at {:.6} {:.6} {:.6}", at.x, at.y, at.z);
+        text += &format!(" velocity {:.6} {:.6} {:.6}", velocity.x, velocity.y, velocity.z);
+        text += &format!(" spin {:.4} {:.4} {:.4}", spin.x, spin.y, spin.z);
+        let (kinetic, potential) = (now.kinetic(), now.potential());
+        let (deepest, _) = super::judge::deepest(&now);
+        text += &format!(" wall {:.3e} overlap {deepest:.3e}", of.wall_gap);
+        text += &format!(" kinetic {kinetic:.6e} potential {potential:.6e}\n");
+    }
+    text
 }

@@ -22,7 +22,7 @@ pub fn shrink(case: &Case, invariant: Invariant, try_for: std::time::Duration) -
         if runs > MOST_RUNS || begin.elapsed() > try_for {
             return None;
         }
-        run_for(case, Some(invariant), &Pulse::default()).failure.map(|failure| failure.step)
+        run_for(case, Some(invariant), &Pulse::default()).failure().map(|failure| failure.step)
     };
     shrink_by(case, &mut fails)
 }

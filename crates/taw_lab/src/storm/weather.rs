@@ -11,7 +11,7 @@ use super::case::{Case, Kind, Name};
 use super::generate::generate;
 use super::judge::{Finding, Invariant};
 use super::report::Tally;
-use super::run::{Failure, Pulse, Verdict, run};
+use super::run::{Failure, Pulse, Verdict, run, run_for, trail};
 use super::shrink::shrink;
 
 /// What is to be done.
@@ -135,7 +135,7 @@ fn stuck(pulse: &Pulse) -> Verdict {
         body: None,
     };
     let failure = Failure { finding, step: pulse.step(), what: "it does not end".into() };
-    Verdict { worst: vec![finding], failure: Some(failure), slowest: 0.0 }
+    Verdict { worst: vec![finding], failures: vec![failure], slowest: 0.0 }
 }
 
 /// Counts, and writes failures, the first few of each sort.
@@ -144,16 +144,17 @@ fn report(plan: &Plan, verdicts: &BTreeMap<Name, Verdict>) -> std::io::Result<St
     let mut kept: BTreeMap<(Kind, Invariant), u64> = BTreeMap::new();
     for (name, verdict) in verdicts {
         storm.tallies.entry(name.kind).or_default().add(*name, verdict);
-        let Some(failure) = &verdict.failure else { continue };
-        let count = kept.entry((name.kind, failure.finding.invariant)).or_default();
-        *count += 1;
-        let mut file = None;
-        if let Some(out) = &plan.out
-            && *count <= plan.keep
-        {
-            file = Some(write(plan, *name, failure, out)?);
+        for failure in &verdict.failures {
+            let count = kept.entry((name.kind, failure.finding.invariant)).or_default();
+            *count += 1;
+            let mut file = None;
+            if let Some(out) = &plan.out
+                && *count <= plan.keep
+            {
+                file = Some(write(plan, *name, failure, out)?);
+            }
+            storm.failures.push((*name, failure.clone(), file));
         }
-        storm.failures.push((*name, failure.clone(), file));
     }
     Ok(storm)
 }
@@ -178,10 +179,10 @@ fn write(
     Ok(file)
 }
 
-/// Runs a case and says what came of it, step by step.
+/// Runs a case and says what came of it, with the last steps of the body that it is about.
 #[must_use]
 pub fn replay(case: &Case) -> String {
-    let verdict = run(case, &Pulse::default());
+    let verdict = run_for(case, case.broke, &Pulse::default());
     let mut text = format!("{}\n", case.scene.about);
     text += &format!("{:?} {} step {} s\n", case.model, case.number, case.step);
     for Finding { invariant, value, bound, body } in &verdict.worst {
@@ -189,11 +190,12 @@ pub fn replay(case: &Case) -> String {
         let body = body.map_or_else(String::new, |body| format!(" (body {body})"));
         text += &format!("{name}: {value:.3e} of {bound:.3e}{body}\n");
     }
-    match &verdict.failure {
-        None => text += "all held\n",
-        Some(Failure { finding, step, what }) => {
-            text += &format!("{} broke in step {step} {what}\n", finding.invariant.name());
-        }
+    for Failure { finding, step, what } in &verdict.failures {
+        text += &trail(case, finding.body.unwrap_or(0), *step);
+        text += &format!("{} broke in step {step} {what}\n", finding.invariant.name());
+    }
+    if verdict.failures.is_empty() {
+        text += "all held\n";
     }
     text
 }

@@ -46,7 +46,7 @@ impl Crowd {
             starts.push(Start::Stacked);
         }
         // Overlap of springs is energy, as documented.
-        if !matches!(self.kind, Kind::SpringDashpot | Kind::HertzMindlin) && dice.chance(0.3) {
+        if !self.springs() && dice.chance(0.3) {
             starts.extend([Start::Squeezed, Start::Coincident]);
         }
         let start = dice.pick(&starts);
@@ -66,6 +66,10 @@ impl Crowd {
             }
             None => case.scene.marbles = balls,
         }
+    }
+
+    fn springs(&self) -> bool {
+        matches!(self.kind, Kind::SpringDashpot | Kind::HertzMindlin)
     }
 
     /// Makes masses and shapes such as the kind knows.
@@ -127,7 +131,9 @@ impl Crowd {
             let Some(position) = position else { continue };
             ball.position = position;
             if start == Start::Thrown {
-                let speed = if dice.chance(0.1) { 50.0 } else { dice.between(0.0, 8.0) };
+                let fast = if dice.chance(0.1) { 50.0 } else { dice.between(0.0, 8.0) };
+                // What springs do not hold, they are not asked to.
+                let speed = if self.springs() { fast.min(4.0 * self.size) } else { fast };
                 ball.velocity = (dice.direction() * speed).into();
             }
             if dice.chance(0.3) {

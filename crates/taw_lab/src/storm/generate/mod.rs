@@ -67,6 +67,12 @@ fn setting(kind: Kind, dice: &mut Dice) -> Case {
         substeps: dice.pick(&[1, 1, 1, 2, 3, 4, 8]),
         iterations: dice.pick(&[1, 2, 4, 8, 8, 8, 10, 20, 50]),
     };
+    // Springs are as soft as their substeps are long: those who choose them choose short ones.
+    let springs = matches!(kind, Kind::SpringDashpot | Kind::HertzMindlin);
+    let substeps = if springs { dice.pick(&[2, 4, 8, 8]) } else { model.substeps };
+    let model = Model { substeps, ..model };
+    let steps: &[f64] =
+        if springs { &[240.0, 120.0] } else { &[240.0, 120.0, 64.0, 60.0, 60.0, 30.0] };
     let full = kind == Kind::SwarmFull;
     let swarm = (full || kind == Kind::SwarmLab).then(|| SwarmPart {
         full,
@@ -79,14 +85,7 @@ fn setting(kind: Kind, dice: &mut Dice) -> Case {
         broke: None,
         model,
         number: if dice.chance(0.6) { Number::F32 } else { Number::F64 },
-        step: dice.pick(&[
-            1.0 / 240.0,
-            1.0 / 120.0,
-            1.0 / 64.0,
-            1.0 / 60.0,
-            1.0 / 60.0,
-            1.0 / 30.0,
-        ]),
+        step: 1.0 / dice.pick(steps),
         steps: 1,
         differenced: false,
         closed: None,
@@ -117,7 +116,7 @@ fn surface(dice: &mut Dice) -> Surface {
 }
 
 /// Gives all surfaces the elasticity that `HertzMindlin` can step: substeps must be a small part
-/// of the Rayleigh time, `π R √(ρ/G) / (0.163 ν + 0.877)`, here a sixteenth for the smallest and
+/// of the Rayleigh time, `π R √(ρ/G) / (0.163 ν + 0.877)`, here an eighth for the smallest and
 /// lightest.
 fn soften(case: &mut Case) {
     if case.model.response != Response::Penalty(ContactLaw::HertzMindlin) {
@@ -129,7 +128,7 @@ fn soften(case: &mut Case) {
         return;
     }
     let poissons_ratio = case.scene.surface.poissons_ratio;
-    let time = 16.0 * case.substep();
+    let time = 8.0 * case.substep();
     let root = std::f64::consts::PI * radius / (time * (0.163 * poissons_ratio + 0.877));
     let youngs_modulus = 2.0 * (1.0 + poissons_ratio) * density * root * root;
     let surfaces = case.scene.walls.iter_mut().filter_map(|wall| wall.surface.as_mut());

@@ -68,8 +68,8 @@ impl Ledger {
     /// - recovery from overlap lifts by what the displacement needs, and gains no speed.
     ///
     /// A run gains no more, over its least energy so far, than three such steps at once: what one
-    /// bounce gains, another one loses. Springs store energy, so their run is compared with its
-    /// beginning, and 16 substeps a collision are right to a twentieth (`(ω dt)² / 2` for
+    /// bounce gains, another one loses. Soft contacts store energy, so their run is compared with
+    /// its beginning; of springs, 16 substeps a collision are right to a twentieth (`(ω dt)² / 2` for
     /// `ω dt = π / 16` is a fiftieth, twice).
     pub fn judge(
         &mut self,
@@ -114,9 +114,9 @@ impl Ledger {
             body: None,
         };
         self.least = self.least.min(net);
-        if rules.springs() {
+        if rules.soft() {
             run.value = net - self.begin;
-            run.bound += 0.05 * self.kinetic;
+            run.bound += if rules.springs() { 0.05 * self.kinetic } else { 0.0 };
             return vec![run];
         }
         vec![step, run]

@@ -6,6 +6,8 @@ mod flight;
 mod overlap;
 mod rest;
 
+pub use overlap::deepest;
+
 use serde::{Deserialize, Serialize};
 use taw::prelude::*;
 
@@ -137,6 +139,8 @@ pub struct Rules {
     pub integrator: Integrator,
     /// Whether walls move.
     pub moving: bool,
+    /// The softest contact's modulus: `E / (2 (1 − ν²))` of the softest material, in pascals.
+    pub modulus: f64,
 }
 
 impl Rules {
@@ -154,7 +158,15 @@ impl Rules {
             epsilon: if single { f64::from(f32::EPSILON) } else { f64::EPSILON },
             integrator: case.model.integrator,
             moving: case.has_moving_walls(),
+            modulus: softest(case),
         }
+    }
+
+    /// Whether contacts are soft, so that a collision takes several steps, in which it stores
+    /// energy and gives it back.
+    #[must_use]
+    pub fn soft(&self) -> bool {
+        self.springs() || self.kind == Kind::SwarmFull
     }
 
     /// Whether contacts are springs, which store energy and give it back.
@@ -175,6 +187,18 @@ impl Rules {
     fn velocity_rounding(&self, speed: f64, place: f64) -> f64 {
         8.0 * self.epsilon * self.substeps * (speed + place / self.substep)
     }
+}
+
+fn softest(case: &Case) -> f64 {
+    let scene = &case.scene;
+    let walls = scene.walls.iter().map(|wall| wall.surface);
+    let structures = scene.structures.iter().map(|wall| wall.surface);
+    let balls = scene.marbles.iter().map(|ball| ball.surface);
+    let all = walls.chain(structures).chain(balls).flatten().chain([scene.surface]);
+    let modulus = all.map(|surface| {
+        0.5 * surface.youngs_modulus / (1.0 - surface.poissons_ratio * surface.poissons_ratio)
+    });
+    modulus.fold(f64::INFINITY, f64::min)
 }
 
 /// All judges of a run, and what they remember of it.
@@ -217,7 +241,7 @@ impl Bench {
         findings.extend(self.flight.judge(rules, before, after, &near));
         findings.extend(self.rest.judge(rules, before, after));
         findings.push(overlap::overlap(rules, before, after, self.begin));
-        findings.extend(self.closed.map(|closed| overlap::closed(rules, after, closed)));
+        findings.extend(self.closed.map(|closed| overlap::closed(rules, before, after, closed)));
         findings
     }
 }

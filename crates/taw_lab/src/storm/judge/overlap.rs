@@ -14,30 +14,42 @@ pub fn finite(after: &Snapshot) -> Finding {
     Finding { invariant: Invariant::Finite, value: count as f64, bound: 0.5, body }
 }
 
-/// The deepest overlap of bodies with walls and each other, in metres, and the sum of all.
+/// The deepest overlap of bodies with walls and each other, and the sum of the deepest of each, in
+/// metres.
 pub fn deepest(snapshot: &Snapshot) -> (f64, f64) {
-    let (mut deepest, mut sum) = (0.0_f64, 0.0);
-    let mut add = |depth: f64| {
-        if depth > 0.0 {
-            deepest = deepest.max(depth);
-            sum += depth;
-        }
-    };
-    for (i, body) in snapshot.bodies.iter().enumerate() {
-        add(-body.wall_gap);
+    let count = snapshot.bodies.len();
+    let mut depth: Vec<f64> = snapshot.bodies.iter().map(|body| -body.wall_gap).collect();
+    for i in 0..count {
         for j in 0..i {
-            add(snapshot.depth(i, j));
+            let both = snapshot.depth(i, j);
+            (depth[i], depth[j]) = (depth[i].max(both), depth[j].max(both));
         }
     }
-    (deepest, sum)
+    let depth = depth.into_iter().map(|depth| depth.max(0.0));
+    depth.fold((0.0, 0.0), |(deepest, sum), depth| (depth.max(deepest), sum + depth))
+}
+
+/// How deep springs sink, as documented, in metres.
+///
+/// A collision of 16 substeps goes as deep as `v T / π` for `T` = 16 substeps, and what rests on
+/// it by its weight over the stiffness `m π² / T²`. Balls by Hertz go as deep as their energy
+/// goes into `8/15 E √R d^(5/2)`, and rest where `4/3 E √R d^(3/2)` bears all.
+fn softness(rules: &Rules, [speed, mass, radius]: [f64; 3], weight: f64) -> f64 {
+    let way = speed * rules.substep;
+    if rules.kind == Kind::SpringDashpot {
+        let time = 16.0 * rules.substep / std::f64::consts::PI;
+        return speed * time + 2.0 * weight / mass * time * time + way;
+    }
+    let stiff = rules.modulus * radius.sqrt();
+    let hit = (15.0 / 16.0 * mass * speed * speed / stiff).powf(0.4);
+    let rests = (0.75 * weight / stiff).powf(2.0 / 3.0);
+    hit + 2.0 * rests + way
 }
 
 /// Nothing sinks into anything deeper than it was in the beginning, by more than
 /// - the way of a substep, at whose end contacts are looked for;
 /// - a twentieth of the smaller radius, which nobody sees, for what few iterations leave in heaps;
-/// - springs: what a collision of 16 substeps needs (`v T / π` for `T` = 16 substeps), and what
-///   rests on it (the weight of all above by the stiffness `m π² / T²`); Hertz's contacts are as
-///   soft as their materials say, so their centres only must not pass a surface;
+/// - springs: their [softness];
 /// - event-driven: nothing but a thousandth of the radius, as it looks ahead.
 pub fn overlap(rules: &Rules, before: &Snapshot, after: &Snapshot, begin: f64) -> Finding {
     let gravity = after.gravity().magnitude();
@@ -49,11 +61,11 @@ pub fn overlap(rules: &Rules, before: &Snapshot, after: &Snapshot, begin: f64) -
         let rounding = 8.0 * rules.epsilon * after.bodies[body].at.magnitude();
         let bound = match rules.kind {
             Kind::EventDriven => 1e-3 * radius + slop,
-            Kind::SpringDashpot => {
-                let time = 16.0 * rules.substep / std::f64::consts::PI;
-                speed * time + 2.0 * gravity * total / mass * time * time + way + 0.05 * radius
+            Kind::SpringDashpot | Kind::HertzMindlin => {
+                // Half the radius for two balls alike, and the lighter of two.
+                let contact = [speed, mass, 0.5 * radius];
+                softness(rules, contact, gravity * total) + 0.05 * radius
             }
-            Kind::HertzMindlin => radius,
             _ => way + slop + 0.05 * radius,
         };
         let found = Finding {
@@ -85,19 +97,31 @@ pub fn overlap(rules: &Rules, before: &Snapshot, after: &Snapshot, begin: f64) -
 }
 
 /// No centre leaves a closed box: walls hold whatever comes at an ordinary speed. The bound is
-/// the rounding of a place.
-pub fn closed(rules: &Rules, after: &Snapshot, [low, high]: [[f64; 3]; 2]) -> Finding {
-    let mut worst = (0.0_f64, None);
-    let mut size = 0.0_f64;
-    for (i, body) in after.bodies.iter().enumerate() {
+/// the rounding of a place; for springs their softness.
+pub fn closed(
+    rules: &Rules,
+    before: &Snapshot,
+    after: &Snapshot,
+    [low, high]: [[f64; 3]; 2],
+) -> Finding {
+    let gravity = after.gravity().magnitude();
+    let total: f64 = after.bodies.iter().map(|body| body.mass).sum();
+    let mut worst = Finding { invariant: Invariant::Closed, value: 0.0, bound: 1.0, body: None };
+    for (i, (old, body)) in before.bodies.iter().zip(&after.bodies).enumerate() {
         for axis in 0..3 {
-            size = size.max(high[axis].abs()).max(low[axis].abs());
+            let size = high[axis].abs().max(low[axis].abs()).max(high[axis] - low[axis]);
             let out = (low[axis] - body.at[axis]).max(body.at[axis] - high[axis]);
-            if out > worst.0 {
-                worst = (out, Some(i));
+            let mut found = Finding { value: out, body: Some(i), ..worst };
+            found.bound = 8.0 * rules.epsilon * size;
+            if rules.springs() {
+                let speed = old.velocity.magnitude().max(body.velocity.magnitude());
+                let contact = [speed, body.mass, body.radius];
+                found.bound += softness(rules, contact, gravity * total);
+            }
+            if found.ratio() > worst.ratio() {
+                worst = found;
             }
         }
     }
-    let bound = 8.0 * rules.epsilon * size;
-    Finding { invariant: Invariant::Closed, value: worst.0, bound, body: worst.1 }
+    worst
 }
