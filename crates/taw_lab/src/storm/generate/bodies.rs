@@ -129,6 +129,9 @@ impl Crowd {
                 Start::Dropped | Start::Thrown => self.free(&balls, radius, dice, walls),
             };
             let Some(position) = position else { continue };
+            if self.springs() && walls(position) < radius {
+                continue; // overlap of springs is energy, as documented
+            }
             ball.position = position;
             if start == Start::Thrown {
                 let fast = if dice.chance(0.1) { 50.0 } else { dice.between(0.0, 8.0) };

@@ -60,7 +60,8 @@ impl Ledger {
 
     /// A step gains no energy but what [walls bring in](taw::world::Account::walls), up to
     /// - first order: a bounce happens at the end of its substep, so its height is right to the
-    ///   way of a substep: `m g v dt` of what touches, for the speeds before and after;
+    ///   way of a substep: `m g v dt` of what touches, for the speeds before and after (twice, where
+    ///   there is time for two bounces in a step), and what gravity adds in a substep;
     ///   event-driven bounces happen when they do, so a hundredth of that, for what rests;
     /// - a hundredth of what moving walls bring in, as they do so by steps;
     /// - rounding, of velocities and heights;
@@ -150,8 +151,9 @@ fn allowance(rules: &Rules, before: &Snapshot, after: &Snapshot, near: &Near) ->
         if touched {
             let vertical = old.velocity.dot(down).abs() + new.velocity.dot(down).abs();
             let part = if rules.kind == Kind::EventDriven { 0.01 } else { 1.0 };
-            allowed.fluctuation +=
-                part * mass * g * rules.substep * 2.0 * (vertical + g * rules.step);
+            let bounces = if rules.substeps > 1.0 { 2.0 } else { 1.0 };
+            let change = bounces * vertical + g * rules.substep;
+            allowed.fluctuation += part * mass * g * rules.substep * change;
         }
         let mean = (old.velocity + new.velocity) * (0.5 * rules.step);
         let up = -(new.at - old.at - mean).dot(down);

@@ -106,7 +106,8 @@ struct Sum {
 impl Falls {
     /// A cluster that touches no wall
     /// - changes its momentum by gravity alone, as every action has its reaction. Bound: the
-    ///   rounding of all velocities that were added, as many times as there are substeps.
+    ///   rounding of all velocities that were added, as many times as there are substeps; of what
+    ///   touches, and in the lab's tier of swarms of all, also that of places by the substep.
     /// - moves its centre of mass by its velocity: at the least with the one before, at the most
     ///   with the one after, so within half a step of gravity of the mean. Bound: that, and the
     ///   rounding of places. Where bodies stop where they meet, see [`LATE`].
@@ -139,7 +140,7 @@ impl Falls {
             sum.moving += mass
                 * rules.velocity_rounding(
                     speed + gravity.magnitude() * rules.step,
-                    if near.touched[i] { place } else { 0.0 },
+                    if near.touched[i] || rules.kind == Kind::SwarmLab { place } else { 0.0 },
                 );
             sum.placed += mass * 8.0 * rules.epsilon * rules.substeps * place;
         }

@@ -141,6 +141,8 @@ pub struct Rules {
     pub moving: bool,
     /// The softest contact's modulus: `E / (2 (1 − ν²))` of the softest material, in pascals.
     pub modulus: f64,
+    /// How many times more heaps sag than with eight iterations.
+    pub sag: f64,
 }
 
 impl Rules {
@@ -159,6 +161,7 @@ impl Rules {
             integrator: case.model.integrator,
             moving: case.has_moving_walls(),
             modulus: softest(case),
+            sag: (8.0 / f64::from(case.model.iterations)).max(1.0),
         }
     }
 
@@ -209,8 +212,9 @@ pub struct Bench {
     energy: energy::Ledger,
     flight: flight::Falls,
     rest: rest::Lies,
-    /// The deepest overlap at the beginning, in metres.
+    /// The deepest overlap at the beginning, in metres, and the largest speed so far, in m/s.
     begin: f64,
+    fastest: f64,
 }
 
 impl Bench {
@@ -224,6 +228,7 @@ impl Bench {
             flight: flight::Falls::default(),
             rest: rest::Lies::default(),
             begin: overlap::deepest(begin).0,
+            fastest: 0.0,
         }
     }
 
@@ -234,14 +239,18 @@ impl Bench {
         if !finite.holds() {
             return vec![finite];
         }
+        let speeds =
+            before.bodies.iter().chain(&after.bodies).map(|body| body.velocity.magnitude());
+        self.fastest = speeds.fold(self.fastest, f64::max);
         let rules = &self.rules;
         let near = flight::Near::find(rules, before, after);
         let mut findings = vec![finite];
         findings.extend(self.energy.judge(rules, before, after, &near));
         findings.extend(self.flight.judge(rules, before, after, &near));
         findings.extend(self.rest.judge(rules, before, after));
-        findings.push(overlap::overlap(rules, before, after, self.begin));
-        findings.extend(self.closed.map(|closed| overlap::closed(rules, before, after, closed)));
+        findings.push(overlap::overlap(rules, before, after, [self.begin, self.fastest]));
+        findings
+            .extend(self.closed.map(|closed| overlap::closed(rules, after, self.fastest, closed)));
         findings
     }
 }

@@ -48,10 +48,16 @@ fn softness(rules: &Rules, [speed, mass, radius]: [f64; 3], weight: f64) -> f64 
 
 /// Nothing sinks into anything deeper than it was in the beginning, by more than
 /// - the way of a substep, at whose end contacts are looked for;
-/// - a twentieth of the smaller radius, which nobody sees, for what few iterations leave in heaps;
+/// - a tenth of the smaller radius, which hardly anybody sees, for what iterations leave in heaps:
+///   eight or more, as is the default; with fewer, as many times more;
 /// - springs: their [softness];
 /// - event-driven: nothing but a thousandth of the radius, as it looks ahead.
-pub fn overlap(rules: &Rules, before: &Snapshot, after: &Snapshot, begin: f64) -> Finding {
+pub fn overlap(
+    rules: &Rules,
+    before: &Snapshot,
+    after: &Snapshot,
+    [begin, fastest]: [f64; 2],
+) -> Finding {
     let gravity = after.gravity().magnitude();
     let total: f64 = after.bodies.iter().map(|body| body.mass).sum();
     let slop = (gravity * rules.substep * rules.substep).min(1e-3);
@@ -63,10 +69,11 @@ pub fn overlap(rules: &Rules, before: &Snapshot, after: &Snapshot, begin: f64) -
             Kind::EventDriven => 1e-3 * radius + slop,
             Kind::SpringDashpot | Kind::HertzMindlin => {
                 // Half the radius for two balls alike, and the lighter of two.
-                let contact = [speed, mass, 0.5 * radius];
-                softness(rules, contact, gravity * total) + 0.05 * radius
+                // The speed is that when they met.
+                let contact = [speed.max(2.0 * fastest), mass, 0.5 * radius];
+                softness(rules, contact, gravity * total) + 0.1 * radius
             }
-            _ => way + slop + 0.05 * radius,
+            _ => way + slop + 0.1 * rules.sag * radius,
         };
         let found = Finding {
             invariant: Invariant::Overlap,
@@ -100,22 +107,21 @@ pub fn overlap(rules: &Rules, before: &Snapshot, after: &Snapshot, begin: f64) -
 /// the rounding of a place; for springs their softness.
 pub fn closed(
     rules: &Rules,
-    before: &Snapshot,
     after: &Snapshot,
+    fastest: f64,
     [low, high]: [[f64; 3]; 2],
 ) -> Finding {
     let gravity = after.gravity().magnitude();
     let total: f64 = after.bodies.iter().map(|body| body.mass).sum();
     let mut worst = Finding { invariant: Invariant::Closed, value: 0.0, bound: 1.0, body: None };
-    for (i, (old, body)) in before.bodies.iter().zip(&after.bodies).enumerate() {
+    for (i, body) in after.bodies.iter().enumerate() {
         for axis in 0..3 {
             let size = high[axis].abs().max(low[axis].abs()).max(high[axis] - low[axis]);
             let out = (low[axis] - body.at[axis]).max(body.at[axis] - high[axis]);
             let mut found = Finding { value: out, body: Some(i), ..worst };
             found.bound = 8.0 * rules.epsilon * size;
             if rules.springs() {
-                let speed = old.velocity.magnitude().max(body.velocity.magnitude());
-                let contact = [speed, body.mass, body.radius];
+                let contact = [fastest, body.mass, body.radius];
                 found.bound += softness(rules, contact, gravity * total);
             }
             if found.ratio() > worst.ratio() {
