@@ -21,5 +21,5 @@ pub use judge::{Bench, Finding, Invariant};
 pub use observe::{Body, Snapshot};
 pub use report::{Tally, table};
 pub use run::{Failure, Pulse, Verdict, run, run_for};
-pub use shrink::shrink;
+pub use shrink::{shrink, shrink_by};
 pub use weather::{Plan, Storm, replay, weather};

@@ -19,10 +19,11 @@ pub struct Ledger {
     /// What the beginning's overlap may lift, and what has been lifted so far.
     overlap: f64,
     lifted: f64,
-    /// The largest fluctuation that a step may have, and what all may have together by rounding
-    /// and by an integrator that gains.
+    /// The largest fluctuation that a step may have, what all may have together by an integrator
+    /// that gains, and the sum of the squares of what they may have by rounding.
     fluctuation: f64,
     drift: f64,
+    rounding: f64,
     /// The largest kinetic energy so far.
     kinetic: f64,
     /// The most that overlap may have taken.
@@ -33,8 +34,10 @@ pub struct Ledger {
 struct Allowance {
     /// By being of the first order.
     fluctuation: f64,
-    /// By rounding, and by an integrator that gains.
+    /// By an integrator that gains.
     drift: f64,
+    /// By rounding.
+    rounding: f64,
     /// By parting what overlaps.
     lifted: f64,
 }
@@ -53,6 +56,7 @@ impl Ledger {
             lifted: 0.0,
             fluctuation: 0.0,
             drift: 0.0,
+            rounding: 0.0,
             kinetic: begin.kinetic(),
             sunk: 0.0,
         }
@@ -68,10 +72,11 @@ impl Ledger {
     /// - explicit Euler, which gains `m g² dt² / 2` in each substep;
     /// - recovery from overlap lifts by what the displacement needs, and gains no speed.
     ///
-    /// A run gains no more, over its least energy so far, than three such steps at once: what one
-    /// bounce gains, another one loses. Soft contacts store energy, so their run is compared with
-    /// its beginning; of springs, 16 substeps a collision are right to a twentieth (`(ω dt)² / 2` for
-    /// `ω dt = π / 16` is a fiftieth, twice).
+    /// A run gains no more, over its least energy so far, than three such steps at once (what one
+    /// bounce gains, another one loses), and rounding, whose signs are random, so that it grows
+    /// with the root of the steps; four times that, as four standard deviations. Soft contacts
+    /// store energy, so their run is compared with its beginning; of springs, 16 substeps a
+    /// collision are right to a twentieth (`(ω dt)² / 2` for `ω dt = π / 16` is a fiftieth, twice).
     pub fn judge(
         &mut self,
         rules: &Rules,
@@ -96,12 +101,14 @@ impl Ledger {
         self.kinetic = self.kinetic.max(after.kinetic());
         self.fluctuation = self.fluctuation.max(allowed.fluctuation);
         self.drift += allowed.drift;
+        self.rounding += allowed.rounding * allowed.rounding;
         self.lifted += allowed.lifted;
         let (_, sum) = overlap::deepest(after);
         self.sunk = self.sunk.max(weight(after) * sum);
 
         let net = energy - self.walls;
-        let slack = self.lifted.min(self.overlap) + 3.0 * self.fluctuation + self.drift;
+        let rounding = 4.0 * self.rounding.sqrt();
+        let slack = self.lifted.min(self.overlap) + 3.0 * self.fluctuation + self.drift + rounding;
         let mut run = Finding {
             invariant: Invariant::EnergyOfRun,
             value: net - self.least,
@@ -111,7 +118,12 @@ impl Ledger {
         let step = Finding {
             invariant: Invariant::EnergyOfStep,
             value: gain,
-            bound: allowed.fluctuation + allowed.drift + allowed.lifted + walls + f64::MIN_POSITIVE,
+            bound: allowed.fluctuation
+                + allowed.drift
+                + allowed.rounding
+                + allowed.lifted
+                + walls
+                + f64::MIN_POSITIVE,
             body: None,
         };
         self.least = self.least.min(net);
@@ -133,7 +145,7 @@ fn allowance(rules: &Rules, before: &Snapshot, after: &Snapshot, near: &Near) ->
     let gravity = after.gravity();
     let g = gravity.magnitude();
     let down = if g > 0.0 { gravity / g } else { Vec3::zero() };
-    let mut allowed = Allowance { fluctuation: 0.0, drift: 0.0, lifted: 0.0 };
+    let mut allowed = Allowance { fluctuation: 0.0, drift: 0.0, rounding: 0.0, lifted: 0.0 };
     let (_, overlaps) = overlap::deepest(before);
     for (i, (old, new)) in before.bodies.iter().zip(&after.bodies).enumerate() {
         let mass = new.mass;
@@ -142,9 +154,9 @@ fn allowance(rules: &Rules, before: &Snapshot, after: &Snapshot, near: &Near) ->
         let touched = near.touched[i];
         let rounding = rules.velocity_rounding(speed, if touched { place } else { 0.0 });
         let height = 8.0 * rules.epsilon * rules.substeps * place;
-        allowed.drift += mass * (speed * rounding + rounding * rounding + g * height);
+        allowed.rounding += mass * (speed * rounding + rounding * rounding + g * height);
         let rim = new.spin.magnitude().max(old.spin.magnitude()) * new.reach();
-        allowed.drift += mass * rim * rules.velocity_rounding(rim, 0.0);
+        allowed.rounding += mass * rim * rules.velocity_rounding(rim, 0.0);
         if rules.integrator == Integrator::ExplicitEuler {
             allowed.drift += 0.5 * mass * g * g * rules.step * rules.substep;
         }
