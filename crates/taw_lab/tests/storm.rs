@@ -225,8 +225,9 @@ fn momentum_from_nothing_is_seen() {
 #[test]
 fn what_hangs_is_seen() {
     // Its velocity grows, and it stays; then, it has no velocity and stays.
-    let held = Body { velocity: Vec3::new(0.0, -G * STEP, 0.0), ..body() };
-    assert_eq!(step_of(body(), held), [Invariant::Support]);
+    let falls = Body { velocity: Vec3::new(0.0, -1.0, 0.0), ..body() };
+    let held = Body { velocity: fallen(falls).velocity, ..body() };
+    assert!(step_of(falls, held).contains(&Invariant::Support));
     assert!(step_of(body(), body()).contains(&Invariant::Momentum));
     // Near a wall, but not on it.
     let hovers = Body { at: Vec3::new(0.0, 0.11, 0.0), wall_gap: 0.01, ..body() };
@@ -288,7 +289,7 @@ fn ball(position: [f64; 3]) -> Ball {
 
 #[test]
 fn a_scene_that_is_right_holds() {
-    let marbles = vec![ball([0.0, 0.5, 0.0]), ball([0.05, 0.9, 0.0])];
+    let marbles = vec![ball([0.3, 0.5, 0.0]), ball([0.35, 0.9, 0.0])];
     let surface = Surface { restitution: 0.3, friction: 0.5, ..Surface::default() };
     let scene = Scene { walls: vec![floor()], marbles, surface, ..Scene::default() };
     let verdict = run(&case(scene), &Pulse::default());
