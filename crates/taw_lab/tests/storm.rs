@@ -232,7 +232,7 @@ fn what_hangs_is_seen() {
     // Near a wall, but not on it.
     let hovers = Body { at: Vec3::new(0.0, 0.11, 0.0), wall_gap: 0.01, ..body() };
     let scene = case(Scene::default());
-    assert_eq!(broken(&scene, &vec![vec![hovers]; 20]), [Invariant::Support]);
+    assert!(broken(&scene, &vec![vec![hovers]; 20]).contains(&Invariant::Support));
     assert_eq!(broken(&scene, &vec![vec![lying()]; 20]), []);
 }
 
