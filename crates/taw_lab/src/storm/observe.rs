@@ -90,7 +90,7 @@ impl Snapshot {
         let mut bodies = marbles(world);
         bodies.extend(balls(world));
         let stopped = world.stopped().count() + world.swarm.stopped().count();
-        let gravity = [gravity.x, gravity.y, gravity.z].map(|x| x.as_f64());
+        let gravity = [gravity.x, gravity.y, gravity.z].map(S::as_f64);
         Self { bodies, gravity, walls_work: account.walls, stopped }
     }
 

@@ -1,5 +1,6 @@
 //! One case from its first step to its last.
 
+use std::fmt::Write as _;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant};
@@ -282,13 +283,13 @@ fn trail_in<S: Scalar>(case: &Case, body: usize, until: u32) -> String {
         let now = Snapshot::of(&running.world);
         let Some(of) = now.bodies.get(body) else { break };
         let (at, velocity, spin) = (of.at, of.velocity, of.spin);
-        text += &format!("{step}: at {:.6} {:.6} {:.6}", at.x, at.y, at.z);
-        text += &format!(" velocity {:.6} {:.6} {:.6}", velocity.x, velocity.y, velocity.z);
-        text += &format!(" spin {:.4} {:.4} {:.4}", spin.x, spin.y, spin.z);
+        let _ = write!(text, "{step}: at {:.6} {:.6} {:.6}", at.x, at.y, at.z);
+        let _ = write!(text, " velocity {:.6} {:.6} {:.6}", velocity.x, velocity.y, velocity.z);
+        let _ = write!(text, " spin {:.4} {:.4} {:.4}", spin.x, spin.y, spin.z);
         let (kinetic, potential) = (now.kinetic(), now.potential());
         let (deepest, _) = super::judge::deepest(&now);
-        text += &format!(" wall {:.3e} overlap {deepest:.3e}", of.wall_gap);
-        text += &format!(" kinetic {kinetic:.6e} potential {potential:.6e}\n");
+        let _ = write!(text, " wall {:.3e} overlap {deepest:.3e}", of.wall_gap);
+        let _ = writeln!(text, " kinetic {kinetic:.6e} potential {potential:.6e}");
     }
     text
 }

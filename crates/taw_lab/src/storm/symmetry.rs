@@ -127,10 +127,14 @@ impl Symmetry {
             structure.moves = structure.moves.map(|moves| self.movement(moves));
             match &mut structure.shape {
                 Build::Mesh { points, .. } => {
-                    points.iter_mut().for_each(|point| *point = self.of(*point));
+                    for point in points {
+                        *point = self.of(*point);
+                    }
                 }
                 Build::Compound { parts } => {
-                    parts.iter_mut().for_each(|part| *part = self.form(*part));
+                    for part in parts {
+                        *part = self.form(*part);
+                    }
                 }
                 Build::HeightField { .. } => return None,
             }

@@ -1,6 +1,7 @@
 //! Many cases, on several threads, with a watch over those that do not end.
 
 use std::collections::BTreeMap;
+use std::fmt::Write as _;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, mpsc};
@@ -184,15 +185,15 @@ fn write(
 pub fn replay(case: &Case) -> String {
     let verdict = run_for(case, case.broke, &Pulse::default());
     let mut text = format!("{}\n", case.scene.about);
-    text += &format!("{:?} {} step {} s\n", case.model, case.number, case.step);
+    let _ = writeln!(text, "{:?} {} step {} s", case.model, case.number, case.step);
     for Finding { invariant, value, bound, body } in &verdict.worst {
         let name = invariant.name();
         let body = body.map_or_else(String::new, |body| format!(" (body {body})"));
-        text += &format!("{name}: {value:.3e} of {bound:.3e}{body}\n");
+        let _ = writeln!(text, "{name}: {value:.3e} of {bound:.3e}{body}");
     }
     for Failure { finding, step, what } in &verdict.failures {
         text += &trail(case, finding.body.unwrap_or(0), *step);
-        text += &format!("{} broke in step {step} {what}\n", finding.invariant.name());
+        let _ = writeln!(text, "{} broke in step {step} {what}", finding.invariant.name());
     }
     if verdict.failures.is_empty() {
         text += "all held\n";

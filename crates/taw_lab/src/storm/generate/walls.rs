@@ -108,7 +108,7 @@ fn corner(arena: &mut Arena, dice: &mut Dice) {
     arena.ground();
     let (size, first) = (arena.size, dice.between(0.0, TAU));
     let lean = if dice.chance(0.5) { 0.0 } else { dice.between(-0.6, 0.6) };
-    for i in 0..1 + dice.below(2) {
+    for i in 0..=dice.below(2) {
         let right = if dice.chance(0.5) { FRAC_PI_2 } else { dice.between(0.4, 2.6) };
         // Some along the axes, as games have them.
         let start = if lean == 0.0 { 0.0 } else { first };
@@ -321,8 +321,8 @@ fn hopper(arena: &mut Arena, dice: &mut Dice) {
     arena.floor = false;
 }
 
-fn swing(way: [f64; 3], degrees: f64, axis: [f64; 3], period: f64) -> Option<Movement> {
-    Some(Movement::Swings { way, pivot: [0.0; 3], axis, degrees, period })
+fn swing(way: [f64; 3], degrees: f64, axis: [f64; 3], period: f64) -> Movement {
+    Movement::Swings { way, pivot: [0.0; 3], axis, degrees, period }
 }
 
 fn lift(arena: &mut Arena, dice: &mut Dice) {
@@ -336,7 +336,7 @@ fn lift(arena: &mut Arena, dice: &mut Dice) {
         [0.0, -0.25 * size, 0.0],
         sides,
         Turn::default(),
-        swing([0.0, way, 0.0], 0.0, [0.0, 1.0, 0.0], period),
+        Some(swing([0.0, way, 0.0], 0.0, [0.0, 1.0, 0.0], period)),
     );
     arena.differenced = dice.chance(0.5);
 }
@@ -353,7 +353,7 @@ fn disc(arena: &mut Arena, dice: &mut Dice) {
 fn board(arena: &mut Arena, dice: &mut Dice) {
     arena.about = "a tilting board with rails";
     let (size, period) = (arena.size, dice.between(2.0, 8.0));
-    let tilt = swing([0.0; 3], dice.between(1.0, 8.0), [0.0, 0.0, 1.0], period);
+    let tilt = Some(swing([0.0; 3], dice.between(1.0, 8.0), [0.0, 0.0, 1.0], period));
     let thick = 0.2 * size;
     arena.block([0.0, -0.5 * thick, 0.0], [2.4 * size, thick, 2.4 * size], Turn::default(), tilt);
     for side in [-1.0, 1.0] {

@@ -36,10 +36,10 @@ impl Near {
         let mut near =
             Self { first: (0..count).collect(), grounded: vec![false; count], touched: vec![] };
         near.touched = vec![false; count];
-        for i in 0..count {
+        for (i, reach) in reach.iter().enumerate() {
             let gap = before.bodies[i].wall_gap.min(after.bodies[i].wall_gap);
             let half = after.bodies[i].half.magnitude();
-            near.grounded[i] = gap <= reach[i] + half;
+            near.grounded[i] = gap <= reach + half;
             near.touched[i] = near.grounded[i];
         }
         for i in 0..count {

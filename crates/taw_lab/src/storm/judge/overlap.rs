@@ -16,6 +16,7 @@ pub fn finite(after: &Snapshot) -> Finding {
 
 /// The deepest overlap of bodies with walls and each other, and the sum of the deepest of each, in
 /// metres.
+#[must_use]
 pub fn deepest(snapshot: &Snapshot) -> (f64, f64) {
     let count = snapshot.bodies.len();
     let mut depth: Vec<f64> = snapshot.bodies.iter().map(|body| -body.wall_gap).collect();
