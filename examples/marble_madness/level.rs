@@ -42,6 +42,12 @@ impl Level {
         if !scene.fields.is_empty() {
             return Err(" force fields cannot be played yet".into());
         }
+        if !scene.structures.is_empty() {
+            return Err(" walls of many parts cannot be played yet".into());
+        }
+        if scene.balls().any(|ball| ball.half_length > 0.0) {
+            return Err(" capsules cannot be played yet".into());
+        }
         Ok(Self(Some(scene)))
     }
 

@@ -12,5 +12,7 @@ pub mod scene;
 #[cfg(feature = "cli")]
 pub mod stages;
 #[cfg(feature = "cli")]
+pub mod storm;
+#[cfg(feature = "cli")]
 pub mod suite;
 pub mod trade;

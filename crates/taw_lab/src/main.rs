@@ -12,6 +12,7 @@ use taw::scene::Scene;
 use taw::world::Model;
 use taw_lab::advise::{Wish, advise, quantity, read_scene};
 use taw_lab::stages::{self, Stages};
+use taw_lab::storm::{self, Case};
 use taw_lab::suite::{self, Effort, Row};
 use taw_lab::trade::sweep::{Job, Plan, by_the_clock, in_order, read_points, sweep, write_points};
 use taw_lab::trade::trace::{Number, Setting};
@@ -108,6 +109,9 @@ enum Command {
         #[arg(long, value_parser = duration, default_value = "16.666667ms")]
         step: f64,
     },
+    /// Runs random ordinary scenes and judges them by what holds in all of them: no energy from
+    /// nothing, nothing hangs, nothing sinks in. Exit status 1 if something did not hold.
+    Storm(Storm),
     /// Joins the parts of a sweep into one report.
     Merge {
         /// Where points go.
@@ -120,6 +124,40 @@ enum Command {
         #[arg(required = true)]
         files: Vec<PathBuf>,
     },
+}
+
+#[derive(clap::Args)]
+struct Storm {
+    /// How many scenes, of all models in turn.
+    #[arg(long, default_value_t = 900)]
+    scenes: u64,
+    /// Of the random numbers: the same scenes for the same seed, whatever else is asked for.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// How many scenes run at a time.
+    #[arg(long, default_value_t = std::thread::available_parallelism().map_or(1, usize::from))]
+    jobs: usize,
+    /// Only models whose name contains this: impulse/swept.
+    #[arg(long, value_name = "PATTERN", default_value = "")]
+    only: String,
+    /// Where failures go, as files for --replay [default: nowhere]
+    #[arg(long, value_name = "DIR")]
+    out: Option<PathBuf>,
+    /// Writes failures as they are.
+    #[arg(long)]
+    no_shrink: bool,
+    /// How many failures of one model and invariant are written.
+    #[arg(long, default_value_t = 3)]
+    keep: u64,
+    /// How long a step may take before it counts as one that does not end.
+    #[arg(long, value_parser = duration, default_value = "30s")]
+    patience: f64,
+    /// Does not count an invariant of a model, as MODEL:INVARIANT: impulse/swept:speed.
+    #[arg(long, value_name = "MODEL:INVARIANT")]
+    except: Vec<String>,
+    /// Runs one scene, of a file or by its name (impulse:1:7), and says how it went.
+    #[arg(long, value_name = "FILE")]
+    replay: Option<String>,
 }
 
 fn shard(text: &str) -> Result<[usize; 2], String> {
@@ -155,6 +193,7 @@ fn main() -> ExitCode {
             print_advice(&scene, Wish { most, budget, number, step, ..Wish::default() })
         }
         Command::Bench { scene, model, number, step } => bench(&scene, &model, number, step),
+        Command::Storm(options) => storm(options),
         Command::Merge { out, report, files } => merge(&out, report, &files),
     };
     outcome.unwrap_or_else(|error| {
@@ -242,6 +281,54 @@ fn print_advice(file: &Path, wish: Wish) -> Result<ExitCode, Box<dyn Error>> {
     let asked = wish.most.is_some() || wish.budget.is_some();
     let found = !asked || advice.best(wish).is_some();
     Ok(if found { ExitCode::SUCCESS } else { ExitCode::FAILURE })
+}
+
+fn storm(options: Storm) -> Result<ExitCode, Box<dyn Error>> {
+    if let Some(name) = options.replay {
+        let case = match std::fs::read_to_string(&name) {
+            Ok(text) => Case::from_text(&text)?,
+            Err(error) => storm::generate(
+                name.parse().map_err(|other| format!("{name}: {error}, and {other}"))?,
+            ),
+        };
+        let text = storm::replay(&case);
+        print!("{text}");
+        let held = text.ends_with("all held\n");
+        return Ok(if held { ExitCode::SUCCESS } else { ExitCode::FAILURE });
+    }
+    let plan = storm::Plan {
+        scenes: options.scenes,
+        seed: options.seed,
+        only: options.only,
+        jobs: options.jobs,
+        out: options.out,
+        shrink: !options.no_shrink,
+        keep: options.keep,
+        patience: std::time::Duration::from_secs_f64(options.patience),
+    };
+    let bar = ProgressBar::new(0);
+    let found = storm::weather(&plan, |done, all| {
+        bar.set_length(all);
+        bar.set_position(done);
+    })?;
+    bar.finish_and_clear();
+    print!("{}", storm::table(&found.tallies));
+    if !found.failures.is_empty() {
+        println!("\nDid not hold (`taw-lab storm --replay NAME`):");
+    }
+    let mut held = true;
+    for (name, storm::Failure { finding, step, what }, file) in &found.failures {
+        let storm::Finding { invariant, value, bound, .. } = finding;
+        let file = file.as_ref().map_or_else(String::new, |file| format!(", {}", file.display()));
+        let invariant = invariant.name();
+        let known = options.except.contains(&format!("{}:{invariant}", name.kind));
+        held &= known;
+        let known = if known { " (known)" } else { "" };
+        println!(
+            "{name}: {invariant} in step {step}: {value:.2e} of {bound:.2e} {what}{file}{known}"
+        );
+    }
+    Ok(if held { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
 
 fn merge(out: &Path, to: Option<PathBuf>, files: &[PathBuf]) -> Result<ExitCode, Box<dyn Error>> {

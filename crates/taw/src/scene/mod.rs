@@ -10,8 +10,10 @@ mod check;
 #[cfg(feature = "serde")]
 mod number;
 mod running;
+mod structure;
 
 pub use running::Running;
+pub use structure::{Build, Structure};
 
 /// See the [module](self). All in `f64`; metres, seconds, kilograms.
 ///
@@ -57,6 +59,9 @@ pub struct Scene {
     /// What nothing can move.
     #[cfg_attr(feature = "serde", serde(default))]
     pub walls: Vec<Wall>,
+    /// Walls of many parts.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub structures: Vec<Structure>,
     /// Where marbles are counted.
     #[cfg_attr(feature = "serde", serde(default))]
     pub gates: Vec<Gate>,
@@ -310,6 +315,13 @@ pub struct Ball {
     /// In kg/m³, above zero.
     #[cfg_attr(feature = "serde", serde(default = "glass", deserialize_with = "number::positive"))]
     pub density: f64,
+    /// Above zero, it is a capsule: its line goes this far both ways from the center along its
+    /// own y axis, in metres.
+    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::not_negative"))]
+    pub half_length: f64,
+    /// How it is turned.
+    #[cfg_attr(feature = "serde", serde(default))]
+    pub turned: Turn,
     /// What it is made of, if not the scene's surface.
     #[cfg_attr(feature = "serde", serde(default))]
     pub surface: Option<Surface>,
@@ -359,6 +371,7 @@ impl Default for Scene {
             fields: Vec::new(),
             surface: Surface::default(),
             walls: Vec::new(),
+            structures: Vec::new(),
             gates: Vec::new(),
             marbles: Vec::new(),
             lattices: Vec::new(),
@@ -398,6 +411,8 @@ impl Default for Ball {
             velocity: [0.0; 3],
             spin: [0.0; 3],
             density: 2500.0,
+            half_length: 0.0,
+            turned: Turn::default(),
             surface: None,
         }
     }

@@ -1,8 +1,10 @@
 use std::f64::consts::TAU;
+use std::sync::Arc;
 
 use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
-use super::{Ball, Field, Form, Gate, Movement, Scene, Surface, Turn, Wall};
+use super::structure::cast_pose;
+use super::{Ball, Field, Form, Gate, Movement, Scene, Structure, Surface, Turn, Wall};
 use crate::Error;
 use crate::error::finite_vector;
 use crate::frame::{AxisAngle, Pose};
@@ -18,8 +20,16 @@ pub struct Running<S> {
     /// The world. Marbles have the order of the scene.
     pub world: World<S>,
     scene: Scene,
-    moving: Vec<(WallId, Form, Movement)>,
+    moving: Vec<(WallId, Shape, Movement)>,
     time: f64,
+}
+
+/// What a wall that moves looks like at the beginning.
+#[derive(Clone, Debug)]
+enum Shape {
+    Form(Form),
+    /// The structure of this number.
+    Structure(usize),
 }
 
 impl Scene {
@@ -36,18 +46,27 @@ impl Scene {
         world.set_gravity(vector(self.gravity_at(0.0)))?;
         world.set_forces(self.fields.iter().map(|field| field.force()).collect())?;
         let mut moving = Vec::new();
+        let mut insert =
+            |wall: WallShape<S>, surface: &Option<Surface>, moves: &Option<Movement>, shape| {
+                let id = world.walls.insert(wall)?;
+                let surface = surface.unwrap_or(self.surface);
+                world.walls.set_material(id, Some(surface.material()))?;
+                if let Some(movement) = moves {
+                    let motion = movement.at(0.0, 0.0)?.1;
+                    world.walls.set_motion(id, Some(motion))?;
+                    moving.push((id, shape, *movement));
+                }
+                Ok::<_, Error>(())
+            };
         for Wall { shape, surface, moves } in &self.walls {
-            let id = world.walls.insert(shape.wall(Pose::identity())?)?;
-            let surface = surface.unwrap_or(self.surface);
-            world.walls.set_material(id, Some(surface.material()))?;
-            if let Some(movement) = moves {
-                let motion = movement.at(0.0, 0.0)?.1;
-                world.walls.set_motion(id, Some(motion))?;
-                moving.push((id, *shape, *movement));
-            }
+            insert(shape.wall(Pose::identity())?, surface, moves, Shape::Form(*shape))?;
+        }
+        for (number, Structure { shape, surface, moves }) in self.structures.iter().enumerate() {
+            let wall = shape.wall(Pose::identity())?;
+            insert(wall, surface, moves, Shape::Structure(number))?;
         }
         for ball in self.balls() {
-            world.marbles.insert(ball.marble(self.surface))?;
+            world.marbles.insert(ball.marble(self.surface)?)?;
         }
         Ok(Running { world, scene: self.clone(), moving, time: 0.0 })
     }
@@ -112,9 +131,18 @@ impl<S: Scalar> Running<S> {
             let gravity = self.scene.gravity_at(self.time + 0.5 * seconds);
             self.world.set_gravity(vector(gravity))?;
         }
-        for (id, form, movement) in &self.moving {
+        for (id, shape, movement) in &self.moving {
             let (pose, motion) = movement.at(self.time, self.time + seconds)?;
-            self.world.walls.set(*id, form.wall(pose)?)?;
+            let wall = match (self.world.walls.get(*id)?, shape) {
+                // Copies share what was built once.
+                (WallShape::Mesh(mesh, _), _) => WallShape::Mesh(Arc::clone(mesh), cast_pose(pose)),
+                (WallShape::HeightField(field, _), _) => {
+                    WallShape::HeightField(Arc::clone(field), cast_pose(pose))
+                }
+                (_, Shape::Form(form)) => form.wall(pose)?,
+                (_, Shape::Structure(number)) => self.scene.structures[*number].shape.wall(pose)?,
+            };
+            self.world.walls.set(*id, wall)?;
             self.world.walls.set_motion(*id, Some(motion))?;
         }
         self.time += seconds;
@@ -185,20 +213,23 @@ impl Surface {
 }
 
 impl Ball {
-    fn marble<S: Scalar>(self, surface: Surface) -> Marble<S> {
-        Marble {
+    fn marble<S: Scalar>(self, surface: Surface) -> Result<Marble<S>, Error> {
+        let turned = self.turned.rotation()?;
+        Ok(Marble {
             velocity: vector(self.velocity),
+            rotation: Quat::from_sv(S::constant(turned.s), cast_vector(turned.v)),
             spin: vector(self.spin),
+            half_length: S::constant(self.half_length),
             mass: Mass::Density(S::constant(self.density)),
             material: Some(self.surface.unwrap_or(surface).material()),
             ..Marble::new(point(self.position), S::constant(self.radius))
-        }
+        })
     }
 }
 
 impl Form {
     /// The wall, moved by a pose.
-    fn wall<S: Scalar>(self, pose: Pose<f64>) -> Result<WallShape<S>, Error> {
+    pub(super) fn wall<S: Scalar>(self, pose: Pose<f64>) -> Result<WallShape<S>, Error> {
         let place = |at: [f64; 3]| point(pose.point(Point3::from(at)).into());
         Ok(match self {
             Self::HalfSpace { normal, through } => {

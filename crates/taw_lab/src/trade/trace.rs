@@ -8,7 +8,9 @@ use taw::scene::{Running, Scene};
 use web_time::Instant;
 
 /// In which numbers a world counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+#[derive(
+    Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
+)]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum Number {
     /// Single precision, as games do.

@@ -1,0 +1,242 @@
+//! A scene with all that says how it is stepped: what a file of the storm holds.
+
+use std::fmt;
+
+use ron::ser::PrettyConfig;
+use serde::{Deserialize, Serialize};
+use taw::prelude::*;
+use taw::scene::{Ball, Running, Scene, Surface};
+use taw::swarm::{SwarmModel, Tier};
+
+use super::judge::Invariant;
+use crate::trade::trace::Number;
+
+/// A scene, how it is stepped, and what is known of it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Case {
+    /// Which invariant it broke when it was kept.
+    #[serde(default)]
+    pub broke: Option<Invariant>,
+    /// By which model marbles are stepped.
+    pub model: Model,
+    /// In which numbers.
+    pub number: Number,
+    /// In seconds.
+    pub step: f64,
+    /// How many steps.
+    pub steps: u32,
+    /// Whether walls have the motions that differences of their poses in `f32` give, each about
+    /// its own middle, as the plugin's have.
+    #[serde(default)]
+    pub differenced: bool,
+    /// The corners of a box that nothing leaves.
+    #[serde(default)]
+    pub closed: Option<[[f64; 3]; 2]>,
+    /// Balls in bulk beside the marbles.
+    #[serde(default)]
+    pub swarm: Option<SwarmPart>,
+    /// The scene.
+    pub scene: Scene,
+}
+
+/// A swarm of a case.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SwarmPart {
+    /// Whether there is friction, bounce and spin.
+    pub full: bool,
+    /// From 1 to 1,000.
+    pub substeps: u32,
+    /// Whether balls may fall asleep.
+    pub sleeps: bool,
+    /// Of all its balls.
+    pub surface: Surface,
+    /// Its balls; what they are made of is the swarm's.
+    pub balls: Vec<Ball>,
+}
+
+impl SwarmPart {
+    /// The tier of its model.
+    #[must_use]
+    pub fn tier(&self) -> Tier {
+        if self.full { Tier::Full } else { Tier::Lab }
+    }
+
+    fn fill(&self, swarm: &mut taw::swarm::Swarm) -> Result<(), taw::Error> {
+        swarm.set_model(SwarmModel {
+            tier: self.tier(),
+            substeps: self.substeps,
+            // Threads change no bit, and the storm has one thread a scene.
+            threads: 1,
+            material: self.surface.material(),
+            sleeps: self.sleeps,
+        })?;
+        let balls = self.balls.iter().map(|ball| taw::swarm::Ball {
+            position: ball.position.map(|x| x as f32).into(),
+            radius: ball.radius as f32,
+            velocity: ball.velocity.map(|x| x as f32).into(),
+            mass: Mass::Density(ball.density as f32),
+        });
+        swarm.insert(&balls.collect::<Vec<_>>())?;
+        Ok(())
+    }
+}
+
+impl Case {
+    /// The scene at its beginning, with its account kept.
+    ///
+    /// # Errors
+    /// What the world refuses.
+    pub fn begin<S: Scalar>(&self) -> Result<Running<S>, taw::Error> {
+        let mut running = self.scene.run::<S>(self.model)?;
+        if let Some(swarm) = &self.swarm {
+            swarm.fill(&mut running.world.swarm)?;
+        }
+        running.world.keep_account(true);
+        Ok(running)
+    }
+
+    /// How many bodies there are.
+    #[must_use]
+    pub fn bodies(&self) -> usize {
+        self.scene.balls().count() + self.swarm.as_ref().map_or(0, |swarm| swarm.balls.len())
+    }
+
+    /// The substep of the marbles, in seconds.
+    #[must_use]
+    pub fn substep(&self) -> f64 {
+        self.step / f64::from(self.model.substeps)
+    }
+
+    /// Whether a wall moves.
+    #[must_use]
+    pub fn has_moving_walls(&self) -> bool {
+        self.scene.walls.iter().any(|wall| wall.moves.is_some())
+            || self.scene.structures.iter().any(|wall| wall.moves.is_some())
+    }
+
+    /// The case as a file.
+    ///
+    /// # Errors
+    /// What the serializer refuses.
+    pub fn to_text(&self) -> Result<String, ron::Error> {
+        ron::ser::to_string_pretty(self, PrettyConfig::new().depth_limit(4))
+    }
+
+    /// The case of a file.
+    ///
+    /// # Errors
+    /// What is wrong, with line and field.
+    pub fn from_text(text: &str) -> Result<Self, Box<dyn std::error::Error>> {
+        Ok(ron::from_str(text)?)
+    }
+}
+
+/// What scenes are sorted by: a response, how it detects, or a tier of swarms.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Kind {
+    /// [`Response::Displacement`], discrete.
+    Displacement,
+    /// [`Response::Displacement`], swept.
+    DisplacementSwept,
+    /// [`Response::Impulse`], discrete.
+    Impulse,
+    /// [`Response::Impulse`], swept.
+    ImpulseSwept,
+    /// [`Response::Penalty`] by springs and dashpots.
+    SpringDashpot,
+    /// [`Response::Penalty`] by Hertz and Mindlin.
+    HertzMindlin,
+    /// [`Response::EventDriven`].
+    EventDriven,
+    /// A swarm of the lab's tier, with marbles by displacement.
+    SwarmLab,
+    /// A swarm of the full tier, with marbles by impulses.
+    SwarmFull,
+}
+
+impl Kind {
+    /// All of them.
+    pub const ALL: [Self; 9] = [
+        Self::Displacement,
+        Self::DisplacementSwept,
+        Self::Impulse,
+        Self::ImpulseSwept,
+        Self::SpringDashpot,
+        Self::HertzMindlin,
+        Self::EventDriven,
+        Self::SwarmLab,
+        Self::SwarmFull,
+    ];
+
+    /// Its name in tables and options.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Displacement => "displacement",
+            Self::DisplacementSwept => "displacement/swept",
+            Self::Impulse => "impulse",
+            Self::ImpulseSwept => "impulse/swept",
+            Self::SpringDashpot => "spring-dashpot",
+            Self::HertzMindlin => "hertz-mindlin",
+            Self::EventDriven => "event-driven",
+            Self::SwarmLab => "swarm/lab",
+            Self::SwarmFull => "swarm/full",
+        }
+    }
+
+    /// That of a case.
+    #[must_use]
+    pub fn of(case: &Case) -> Self {
+        if let Some(swarm) = &case.swarm {
+            return if swarm.full { Self::SwarmFull } else { Self::SwarmLab };
+        }
+        match (case.model.response, case.model.detection) {
+            (Response::Displacement, Detection::Discrete) => Self::Displacement,
+            (Response::Displacement, Detection::Swept) => Self::DisplacementSwept,
+            (Response::Impulse, Detection::Discrete) => Self::Impulse,
+            (Response::Impulse, Detection::Swept) => Self::ImpulseSwept,
+            (Response::Penalty(ContactLaw::SpringDashpot), _) => Self::SpringDashpot,
+            (Response::Penalty(ContactLaw::HertzMindlin), _) => Self::HertzMindlin,
+            (Response::EventDriven, _) => Self::EventDriven,
+        }
+    }
+}
+
+impl fmt::Display for Kind {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+/// Names a scene of the storm: its kind, the seed of the storm, and which one of that kind it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Name {
+    /// By what it is stepped.
+    pub kind: Kind,
+    /// Of the storm.
+    pub seed: u64,
+    /// Counted from zero.
+    pub number: u64,
+}
+
+impl fmt::Display for Name {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        write!(f, "{}:{}:{}", self.kind, self.seed, self.number)
+    }
+}
+
+impl std::str::FromStr for Name {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong = || format!("{text} is not KIND:SEED:NUMBER");
+        let [kind, seed, number] = text.split(':').collect::<Vec<_>>()[..] else {
+            return Err(wrong());
+        };
+        let kind = Kind::ALL.into_iter().find(|other| other.name() == kind).ok_or_else(wrong)?;
+        let parse = |number: &str| number.parse().map_err(|_| wrong());
+        Ok(Self { kind, seed: parse(seed)?, number: parse(number)? })
+    }
+}

@@ -1,0 +1,140 @@
+//! Ordinary scenes that nobody chose.
+
+mod bodies;
+mod dice;
+mod walls;
+
+use taw::prelude::*;
+use taw::scene::{Scene, Surface};
+
+use super::case::{Case, Kind, Name, SwarmPart};
+use crate::trade::trace::Number;
+use bodies::Crowd;
+use dice::Dice;
+
+/// How many body-substeps a scene has at most, so that many scenes run.
+const MOST_WORK: f64 = 60_000.0;
+/// In seconds: long enough to fall, bounce and come to rest.
+const LONGEST: f64 = 5.0;
+
+/// The scene of a name: always the same one.
+#[must_use]
+pub fn generate(name: Name) -> Case {
+    let mut dice = Dice::of(name);
+    let mut case = setting(name.kind, &mut dice);
+    let arena = walls::arena(&mut dice, name.kind);
+    case.scene = arena.scene;
+    case.closed = arena.closed;
+    case.differenced = arena.differenced;
+    case.scene.surface = surface(&mut dice);
+    let crowd = Crowd {
+        kind: name.kind,
+        size: arena.size,
+        floor: arena.floor,
+        low: arena.low,
+        high: arena.high,
+    };
+    crowd.fill(&mut case, &mut dice);
+    soften(&mut case);
+    let count = case.bodies().max(1) as f64 * f64::from(case.model.substeps);
+    let steps = (LONGEST / case.step).min(MOST_WORK / count).max(20.0);
+    case.steps = (steps * dice.between(0.3, 1.0)).max(10.0) as u32;
+    case.scene.seconds = case.step * f64::from(case.steps);
+    case.scene.about = format!("{name}: {}", arena.about);
+    case
+}
+
+/// All but the scene.
+fn setting(kind: Kind, dice: &mut Dice) -> Case {
+    let (response, detection) = match kind {
+        Kind::Displacement | Kind::SwarmLab => (Response::Displacement, Detection::Discrete),
+        Kind::DisplacementSwept => (Response::Displacement, Detection::Swept),
+        Kind::Impulse | Kind::SwarmFull => (Response::Impulse, Detection::Discrete),
+        Kind::ImpulseSwept => (Response::Impulse, Detection::Swept),
+        Kind::SpringDashpot => (Response::Penalty(ContactLaw::SpringDashpot), Detection::Discrete),
+        Kind::HertzMindlin => (Response::Penalty(ContactLaw::HertzMindlin), Detection::Discrete),
+        Kind::EventDriven => (Response::EventDriven, Detection::Discrete),
+    };
+    let dynamic = Rotation::Dynamic;
+    let plain = Integrator::SemiImplicitEuler;
+    let integrator = if dice.chance(0.6) { plain } else { dice.pick(&Integrator::ALL) };
+    let model = Model {
+        integrator,
+        response,
+        detection,
+        rotation: dice.pick(&[Rotation::None, Rotation::Rolling, dynamic, dynamic, dynamic]),
+        precision: if dice.chance(0.2) { Precision::Compensated } else { Precision::Plain },
+        substeps: dice.pick(&[1, 1, 1, 2, 3, 4, 8]),
+        iterations: dice.pick(&[1, 2, 4, 8, 8, 8, 10, 20, 50]),
+    };
+    // Springs are as soft as their substeps are long: those who choose them choose short ones.
+    let springs = matches!(kind, Kind::SpringDashpot | Kind::HertzMindlin);
+    let substeps = if springs { dice.pick(&[2, 4, 8, 8]) } else { model.substeps };
+    let model = Model { substeps, ..model };
+    let steps: &[f64] =
+        if springs { &[240.0, 120.0] } else { &[240.0, 120.0, 64.0, 60.0, 60.0, 30.0] };
+    let full = kind == Kind::SwarmFull;
+    let swarm = (full || kind == Kind::SwarmLab).then(|| SwarmPart {
+        full,
+        substeps: dice.pick(&[1, 2, 2, 4, 8]),
+        sleeps: dice.chance(0.7),
+        surface: surface(dice),
+        balls: Vec::new(),
+    });
+    Case {
+        broke: None,
+        model,
+        number: if dice.chance(0.6) { Number::F32 } else { Number::F64 },
+        step: 1.0 / dice.pick(steps),
+        steps: 1,
+        differenced: false,
+        closed: None,
+        swarm,
+        scene: Scene::default(),
+    }
+}
+
+/// What something is made of.
+fn surface(dice: &mut Dice) -> Surface {
+    let restitution = match dice.below(4) {
+        0 => 0.0,
+        1 => 1.0,
+        _ => dice.between(0.0, 1.0),
+    };
+    let friction = if dice.chance(0.2) { 0.0 } else { dice.between(0.0, 1.5) };
+    let mut surface = Surface { restitution, friction, ..Surface::default() };
+    if dice.chance(0.2) {
+        surface.rolling_resistance = dice.between(0.0, 0.2);
+    }
+    if dice.chance(0.1) {
+        surface.spinning_resistance = dice.between(0.0, 0.2);
+    }
+    if dice.chance(0.1) {
+        surface.tangential_restitution = dice.between(-1.0, 1.0);
+    }
+    surface
+}
+
+/// Gives all surfaces the elasticity that `HertzMindlin` can step: substeps must be a small part
+/// of the Rayleigh time, `π R √(ρ/G) / (0.163 ν + 0.877)`, here an eighth for the smallest and
+/// lightest.
+fn soften(case: &mut Case) {
+    if case.model.response != Response::Penalty(ContactLaw::HertzMindlin) {
+        return;
+    }
+    let radius = case.scene.balls().map(|ball| ball.radius).fold(f64::INFINITY, f64::min);
+    let density = case.scene.balls().map(|ball| ball.density).fold(f64::INFINITY, f64::min);
+    if !radius.is_finite() {
+        return;
+    }
+    let poissons_ratio = case.scene.surface.poissons_ratio;
+    let time = 8.0 * case.substep();
+    let root = std::f64::consts::PI * radius / (time * (0.163 * poissons_ratio + 0.877));
+    let youngs_modulus = 2.0 * (1.0 + poissons_ratio) * density * root * root;
+    let surfaces = case.scene.walls.iter_mut().filter_map(|wall| wall.surface.as_mut());
+    let structures = case.scene.structures.iter_mut().filter_map(|wall| wall.surface.as_mut());
+    let balls = case.scene.marbles.iter_mut().filter_map(|ball| ball.surface.as_mut());
+    for surface in surfaces.chain(structures).chain(balls).chain([&mut case.scene.surface]) {
+        surface.youngs_modulus = youngs_modulus;
+    }
+}

@@ -1,0 +1,195 @@
+//! What nothing outside touches.
+
+use taw::prelude::*;
+
+use super::{Finding, Invariant, Rules};
+use crate::storm::case::Kind;
+use crate::storm::observe::{Body, Snapshot};
+
+/// Who may have touched whom in a step.
+#[derive(Clone, Debug)]
+pub struct Near {
+    /// For each body, the first of its cluster.
+    pub first: Vec<usize>,
+    /// For each body, whether its cluster may have touched a wall, and whether it may have
+    /// touched anything.
+    pub grounded: Vec<bool>,
+    /// Whether it may have touched anything.
+    pub touched: Vec<bool>,
+}
+
+impl Near {
+    /// Those that are, before or after the step, as near to each other as both can move in it at
+    /// the larger of their speeds, and gravity in two steps, and a hundredth of their radii.
+    #[must_use]
+    pub fn find(rules: &Rules, before: &Snapshot, after: &Snapshot) -> Self {
+        let count = after.bodies.len();
+        let gravity = after.gravity().magnitude();
+        let reach: Vec<f64> = (0..count)
+            .map(|i| {
+                let (old, new) = (&before.bodies[i], &after.bodies[i]);
+                let speed = old.velocity.magnitude().max(new.velocity.magnitude());
+                let carried = old.carried.max(new.carried);
+                (speed + carried + 2.0 * gravity * rules.step) * rules.step + 0.01 * new.radius
+            })
+            .collect();
+        let mut near =
+            Self { first: (0..count).collect(), grounded: vec![false; count], touched: vec![] };
+        near.touched = vec![false; count];
+        for (i, reach) in reach.iter().enumerate() {
+            let gap = before.bodies[i].wall_gap.min(after.bodies[i].wall_gap);
+            let half = after.bodies[i].half.magnitude();
+            near.grounded[i] = gap <= reach + half;
+            near.touched[i] = near.grounded[i];
+        }
+        for i in 0..count {
+            for j in 0..i {
+                let gap = |bodies: &[Body]| {
+                    let (a, b) = (&bodies[i], &bodies[j]);
+                    (a.at - b.at).magnitude() - a.reach() - b.reach()
+                };
+                if gap(&before.bodies).min(gap(&after.bodies)) <= reach[i] + reach[j] {
+                    (near.touched[i], near.touched[j]) = (true, true);
+                    near.join(i, j);
+                }
+            }
+        }
+        for i in 0..count {
+            near.first[i] = near.root(i);
+            let first = near.first[i];
+            near.grounded[first] |= near.grounded[i];
+        }
+        for i in 0..count {
+            near.grounded[i] = near.grounded[near.first[i]];
+        }
+        near
+    }
+
+    fn root(&self, body: usize) -> usize {
+        let mut body = body;
+        while self.first[body] != body {
+            body = self.first[body];
+        }
+        body
+    }
+
+    fn join(&mut self, a: usize, b: usize) {
+        let (a, b) = (self.root(a), self.root(b));
+        self.first[a.max(b)] = a.min(b);
+    }
+}
+
+/// For how many steps in a row each body has not gone where it should.
+#[derive(Clone, Debug, Default)]
+pub struct Falls {
+    late: Vec<u32>,
+}
+
+/// Where bodies that meet on their way stop, they lose the rest of it, as documented: in the step
+/// in which they meet, and, should they still close, in the next ones. What is held up for longer
+/// than so many steps hangs.
+const LATE: u32 = 5;
+
+/// Sums over a cluster.
+#[derive(Clone, Copy, Default)]
+struct Sum {
+    count: usize,
+    mass: f64,
+    momentum: [f64; 3],
+    /// Mass times displacement, beyond that of the mean velocity.
+    aside: [f64; 3],
+    /// Of all that moves, for the rounding: kg m/s and kg m.
+    moving: f64,
+    placed: f64,
+}
+
+impl Falls {
+    /// A cluster that touches no wall
+    /// - changes its momentum by gravity alone, as every action has its reaction. Bound: the
+    ///   rounding of all velocities that were added, as many times as there are substeps; of what
+    ///   touches, and in the lab's tier of swarms of all, also that of places by the substep.
+    /// - moves its centre of mass by its velocity: at the least with the one before, at the most
+    ///   with the one after, so within half a step of gravity of the mean. Bound: that, and the
+    ///   rounding of places. Where bodies stop where they meet, see [`LATE`].
+    pub fn judge(
+        &mut self,
+        rules: &Rules,
+        before: &Snapshot,
+        after: &Snapshot,
+        near: &Near,
+    ) -> Vec<Finding> {
+        let count = after.bodies.len();
+        self.late.resize(count, 0);
+        let gravity = after.gravity();
+        let mut sums = vec![Sum::default(); count];
+        for i in 0..count {
+            let (old, new) = (&before.bodies[i], &after.bodies[i]);
+            let sum = &mut sums[near.first[i]];
+            let gained = new.velocity - old.velocity - gravity * rules.step;
+            let mean = (new.velocity + old.velocity) * 0.5;
+            let aside = new.at - old.at - mean * rules.step;
+            let mass = new.mass;
+            sum.count += 1;
+            sum.mass += mass;
+            for axis in 0..3 {
+                sum.momentum[axis] += mass * gained[axis];
+                sum.aside[axis] += mass * aside[axis];
+            }
+            let speed = old.velocity.magnitude() + new.velocity.magnitude();
+            let place = old.at.magnitude().max(new.at.magnitude());
+            sum.moving += mass
+                * rules.velocity_rounding(
+                    speed + gravity.magnitude() * rules.step,
+                    if near.touched[i] || rules.kind == Kind::SwarmLab { place } else { 0.0 },
+                );
+            sum.placed += mass * 8.0 * rules.epsilon * rules.substeps * place;
+        }
+        let mut worst = [Invariant::Momentum, Invariant::Support].map(|invariant| Finding {
+            invariant,
+            value: 0.0,
+            bound: 1.0,
+            body: None,
+        });
+        for i in (0..count).filter(|i| near.first[*i] == *i) {
+            if near.grounded[i] {
+                self.late[i] = 0;
+                continue;
+            }
+            let [momentum, support] = self.cluster(rules, &sums[i], i, gravity.magnitude());
+            for (worst, found) in worst.iter_mut().zip([momentum, support]) {
+                if found.ratio() > worst.ratio() {
+                    *worst = found;
+                }
+            }
+        }
+        worst.to_vec()
+    }
+
+    fn cluster(&mut self, rules: &Rules, sum: &Sum, body: usize, gravity: f64) -> [Finding; 2] {
+        let length = |v: [f64; 3]| Vec3::from(v).magnitude();
+        let momentum = Finding {
+            invariant: Invariant::Momentum,
+            value: length(sum.momentum),
+            bound: sum.moving + f64::MIN_POSITIVE,
+            body: Some(body),
+        };
+        // Half a step of gravity, with a little for the mean over substeps.
+        let fall = 0.55 * gravity * rules.step * rules.step;
+        let mut support = Finding {
+            invariant: Invariant::Support,
+            value: length(sum.aside),
+            bound: sum.mass * fall + sum.placed + sum.moving * rules.step + f64::MIN_POSITIVE,
+            body: Some(body),
+        };
+        if sum.count > 1 && (rules.swept() || rules.kind == Kind::EventDriven) {
+            // Events are at any time within a step, and a sweep stops there.
+            self.late[body] = if support.holds() { 0 } else { self.late[body] + 1 };
+            if rules.kind == Kind::EventDriven {
+                // Momentum is the same before and after each, so its centre is not.
+                return [momentum, support];
+            }
+            (support.value, support.bound) = (f64::from(self.late[body]), f64::from(LATE));
+        }
+        [momentum, support]
+    }
+}

@@ -1,0 +1,256 @@
+//! What holds in every ordinary scene. One invariant a function, with its bound and the reason
+//! for the bound.
+
+mod energy;
+mod flight;
+mod overlap;
+mod rest;
+
+pub use overlap::deepest;
+
+use serde::{Deserialize, Serialize};
+use taw::prelude::*;
+
+use super::case::{Case, Kind};
+use super::observe::Snapshot;
+use crate::trade::trace::Number;
+
+/// What must hold.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
+pub enum Invariant {
+    /// A scene and a step that are right are not refused.
+    Refused,
+    /// Nothing panics.
+    Panics,
+    /// A step ends.
+    Ends,
+    /// All numbers are finite, and nothing is stopped in an ordinary scene.
+    Finite,
+    /// No step makes energy.
+    EnergyOfStep,
+    /// No run makes energy.
+    EnergyOfRun,
+    /// What touches no wall keeps its momentum but for gravity.
+    Momentum,
+    /// What nothing supports falls.
+    Support,
+    /// The speed reported is the speed moved.
+    Speed,
+    /// Nothing sinks into anything.
+    Overlap,
+    /// Nothing leaves a closed box.
+    Closed,
+    /// A clone goes on with the same bits.
+    Clone,
+    /// A scene in the mirror goes the same way.
+    Mirror,
+    /// A scene turned by a quarter about the vertical goes the same way.
+    Turn,
+}
+
+impl Invariant {
+    /// All of them.
+    pub const ALL: [Self; 14] = [
+        Self::Refused,
+        Self::Panics,
+        Self::Ends,
+        Self::Finite,
+        Self::EnergyOfStep,
+        Self::EnergyOfRun,
+        Self::Momentum,
+        Self::Support,
+        Self::Speed,
+        Self::Overlap,
+        Self::Closed,
+        Self::Clone,
+        Self::Mirror,
+        Self::Turn,
+    ];
+
+    /// Its name in tables.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Refused => "refused",
+            Self::Panics => "panics",
+            Self::Ends => "ends",
+            Self::Finite => "finite",
+            Self::EnergyOfStep => "energy/step",
+            Self::EnergyOfRun => "energy/run",
+            Self::Momentum => "momentum",
+            Self::Support => "support",
+            Self::Speed => "speed",
+            Self::Overlap => "overlap",
+            Self::Closed => "closed",
+            Self::Clone => "clone",
+            Self::Mirror => "mirror",
+            Self::Turn => "turn",
+        }
+    }
+}
+
+/// How near to its bound an invariant came.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Finding {
+    /// Which one.
+    pub invariant: Invariant,
+    /// In the unit of the invariant.
+    pub value: f64,
+    /// What the value may be at most.
+    pub bound: f64,
+    /// The body that it is about, if it is about one.
+    pub body: Option<usize>,
+}
+
+impl Finding {
+    /// The value as a part of its bound: above one, it does not hold.
+    #[must_use]
+    pub fn ratio(&self) -> f64 {
+        if self.value <= 0.0 {
+            0.0
+        } else if self.value.is_nan() || self.bound.is_nan() {
+            f64::INFINITY
+        } else {
+            self.value / self.bound
+        }
+    }
+
+    /// Whether it holds.
+    #[must_use]
+    pub fn holds(&self) -> bool {
+        self.ratio() <= 1.0
+    }
+}
+
+/// What all judges know of a case.
+#[derive(Clone, Copy, Debug)]
+pub struct Rules {
+    /// By what it is stepped.
+    pub kind: Kind,
+    /// In seconds.
+    pub step: f64,
+    /// The longest substep of marbles and swarm, in seconds, and the most of them in a step.
+    pub substep: f64,
+    /// How many in a step, at most.
+    pub substeps: f64,
+    /// Of the scalar that the state is kept in.
+    pub epsilon: f64,
+    /// How velocities become places.
+    pub integrator: Integrator,
+    /// Whether walls move.
+    pub moving: bool,
+    /// The softest contact's modulus: `E / (2 (1 − ν²))` of the softest material, in pascals.
+    pub modulus: f64,
+    /// How many times more heaps sag than with eight iterations.
+    pub sag: f64,
+}
+
+impl Rules {
+    /// Those of a case.
+    #[must_use]
+    pub fn of(case: &Case) -> Self {
+        let swarm = case.swarm.as_ref().map(|swarm| f64::from(swarm.substeps));
+        let marbles = f64::from(case.model.substeps);
+        let single = case.number == Number::F32 || swarm.is_some();
+        Self {
+            kind: Kind::of(case),
+            step: case.step,
+            substep: case.step / swarm.map_or(marbles, |swarm| swarm.min(marbles)),
+            substeps: swarm.map_or(marbles, |swarm| swarm.max(marbles)),
+            epsilon: if single { f64::from(f32::EPSILON) } else { f64::EPSILON },
+            integrator: case.model.integrator,
+            moving: case.has_moving_walls(),
+            modulus: softest(case),
+            sag: (8.0 / f64::from(case.model.iterations)).max(1.0),
+        }
+    }
+
+    /// Whether contacts are soft, so that a collision takes several steps, in which it stores
+    /// energy and gives it back.
+    #[must_use]
+    pub fn soft(&self) -> bool {
+        self.springs() || self.kind == Kind::SwarmFull
+    }
+
+    /// Whether contacts are springs, which store energy and give it back.
+    #[must_use]
+    pub fn springs(&self) -> bool {
+        matches!(self.kind, Kind::SpringDashpot | Kind::HertzMindlin)
+    }
+
+    /// Whether what meets on the way stops there and loses the rest of its way.
+    #[must_use]
+    pub fn swept(&self) -> bool {
+        matches!(self.kind, Kind::ImpulseSwept | Kind::DisplacementSwept)
+    }
+
+    /// By how much rounding changes a velocity in a step, at most, in m/s: that of the velocity
+    /// itself, and that of a place by the substep, since contacts make velocities of gaps. Eight
+    /// roundings, as a handful of operations make a number.
+    fn velocity_rounding(&self, speed: f64, place: f64) -> f64 {
+        8.0 * self.epsilon * self.substeps * (speed + place / self.substep)
+    }
+}
+
+fn softest(case: &Case) -> f64 {
+    let scene = &case.scene;
+    let walls = scene.walls.iter().map(|wall| wall.surface);
+    let structures = scene.structures.iter().map(|wall| wall.surface);
+    let balls = scene.marbles.iter().map(|ball| ball.surface);
+    let all = walls.chain(structures).chain(balls).flatten().chain([scene.surface]);
+    let modulus = all.map(|surface| {
+        0.5 * surface.youngs_modulus / (1.0 - surface.poissons_ratio * surface.poissons_ratio)
+    });
+    modulus.fold(f64::INFINITY, f64::min)
+}
+
+/// All judges of a run, and what they remember of it.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    rules: Rules,
+    closed: Option<[[f64; 3]; 2]>,
+    energy: energy::Ledger,
+    flight: flight::Falls,
+    rest: rest::Lies,
+    /// The deepest overlap at the beginning, in metres, and the largest speed so far, in m/s.
+    begin: f64,
+    fastest: f64,
+}
+
+impl Bench {
+    /// Before the first step.
+    #[must_use]
+    pub fn new(case: &Case, begin: &Snapshot) -> Self {
+        Self {
+            rules: Rules::of(case),
+            closed: case.closed,
+            energy: energy::Ledger::new(begin),
+            flight: flight::Falls::default(),
+            rest: rest::Lies::default(),
+            begin: overlap::deepest(begin).0,
+            fastest: 0.0,
+        }
+    }
+
+    /// After a step.
+    #[must_use]
+    pub fn judge(&mut self, before: &Snapshot, after: &Snapshot) -> Vec<Finding> {
+        let finite = overlap::finite(after);
+        if !finite.holds() {
+            return vec![finite];
+        }
+        let speeds =
+            before.bodies.iter().chain(&after.bodies).map(|body| body.velocity.magnitude());
+        self.fastest = speeds.fold(self.fastest, f64::max);
+        let rules = &self.rules;
+        let near = flight::Near::find(rules, before, after);
+        let mut findings = vec![finite];
+        findings.extend(self.energy.judge(rules, before, after, &near));
+        findings.extend(self.flight.judge(rules, before, after, &near));
+        findings.extend(self.rest.judge(rules, before, after));
+        findings.push(overlap::overlap(rules, before, after, [self.begin, self.fastest]));
+        findings
+            .extend(self.closed.map(|closed| overlap::closed(rules, after, self.fastest, closed)));
+        findings
+    }
+}

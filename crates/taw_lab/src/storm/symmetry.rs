@@ -1,0 +1,191 @@
+//! Nature knows neither left nor right, and no compass.
+
+use taw::prelude::*;
+use taw::scene::{Ball, Build, Form, Movement, Scene, Turn};
+
+use super::case::Case;
+use super::judge::{Finding, Invariant};
+use super::observe::Snapshot;
+use super::run::advance;
+
+/// A scene that should go like another one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Symmetry {
+    /// With x and −x exchanged.
+    Mirror,
+    /// By a quarter about y, from x to −z and from z to x.
+    Turn,
+}
+
+/// How many steps are compared, and how many in which something touches: chaos multiplies a
+/// difference in each bounce, and does not make a part in a million of the last bits of `f64` in
+/// so few.
+const STEPS: u32 = 200;
+const TOUCHED: u32 = 10;
+/// What differs by less than this part of the distances in the scene is rounding.
+const ALIKE: f64 = 1e-6;
+/// With more bodies than this, the order of contacts that are equally deep decides, which is a
+/// matter of the last bit.
+const MOST: usize = 2;
+
+impl Symmetry {
+    /// What it is judged as.
+    #[must_use]
+    pub fn invariant(self) -> Invariant {
+        match self {
+            Self::Mirror => Invariant::Mirror,
+            Self::Turn => Invariant::Turn,
+        }
+    }
+
+    /// A place or velocity.
+    #[must_use]
+    pub fn of(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Mirror => [-x, y, z],
+            Self::Turn => [z, y, -x],
+        }
+    }
+
+    /// A spin or the axis of a turn.
+    fn axial(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::Mirror => [x, -y, -z],
+            Self::Turn => [z, y, -x],
+        }
+    }
+
+    fn turn(self, turned: Turn) -> Turn {
+        Turn { axis: self.axial(turned.axis), ..turned }
+    }
+
+    /// A box is turned with all of its sides, so a turned one has the sides of the other's.
+    fn form(self, form: Form) -> Form {
+        match form {
+            Form::HalfSpace { normal, through } => {
+                Form::HalfSpace { normal: self.of(normal), through: self.of(through) }
+            }
+            Form::Box { center, size, turned } => {
+                let upright = turned.degrees == 0.0;
+                let size = match self {
+                    Self::Turn if upright => [size[2], size[1], size[0]],
+                    _ => size,
+                };
+                Form::Box { center: self.of(center), size, turned: self.turn(turned) }
+            }
+            Form::Ball { center, radius } => Form::Ball { center: self.of(center), radius },
+            Form::Capsule { from, to, radius } => {
+                Form::Capsule { from: self.of(from), to: self.of(to), radius }
+            }
+        }
+    }
+
+    fn movement(self, movement: Movement) -> Movement {
+        match movement {
+            Movement::Conveys { velocity } => Movement::Conveys { velocity: self.of(velocity) },
+            Movement::Turns { pivot, axis, degrees_per_second } => Movement::Turns {
+                pivot: self.of(pivot),
+                axis: self.axial(axis),
+                degrees_per_second,
+            },
+            Movement::Swings { way, pivot, axis, degrees, period } => Movement::Swings {
+                way: self.of(way),
+                pivot: self.of(pivot),
+                axis: self.axial(axis),
+                degrees,
+                period,
+            },
+        }
+    }
+
+    fn ball(self, ball: Ball) -> Ball {
+        Ball {
+            position: self.of(ball.position),
+            velocity: self.of(ball.velocity),
+            spin: self.axial(ball.spin),
+            turned: self.turn(ball.turned),
+            ..ball
+        }
+    }
+
+    /// The scene, as it is seen in the mirror or after a turn. None if it has what cannot be
+    /// turned exactly: a height field, whose cells have a diagonal; boxes that are turned, and
+    /// capsules, whose own axes stay.
+    #[must_use]
+    pub fn scene(self, scene: &Scene) -> Option<Scene> {
+        let mut other = scene.clone();
+        other.gravity = self.of(scene.gravity);
+        for wall in &mut other.walls {
+            let slanted = matches!(wall.shape, Form::Box { turned, .. } if turned.degrees != 0.0);
+            if self == Self::Turn && slanted {
+                return None;
+            }
+            wall.shape = self.form(wall.shape);
+            wall.moves = wall.moves.map(|moves| self.movement(moves));
+        }
+        for structure in &mut other.structures {
+            structure.moves = structure.moves.map(|moves| self.movement(moves));
+            match &mut structure.shape {
+                Build::Mesh { points, .. } => {
+                    for point in points {
+                        *point = self.of(*point);
+                    }
+                }
+                Build::Compound { parts } => {
+                    for part in parts {
+                        *part = self.form(*part);
+                    }
+                }
+                Build::HeightField { .. } => return None,
+            }
+        }
+        if self == Self::Turn && scene.balls().any(|ball| ball.half_length > 0.0) {
+            return None;
+        }
+        other.marbles = scene.balls().map(|ball| self.ball(ball)).collect();
+        other.lattices.clear();
+        Some(other)
+    }
+}
+
+/// Compares a case with its image, for the first steps, if that can tell anything.
+#[must_use]
+pub fn compare(case: &Case, symmetry: Symmetry) -> Option<Finding> {
+    if case.swarm.is_some() || case.differenced || case.bodies() > MOST || is_singular(case) {
+        return None;
+    }
+    let image = Case { scene: symmetry.scene(&case.scene)?, ..case.clone() };
+    let (mut one, mut other) = (case.begin::<f64>().ok()?, image.begin::<f64>().ok()?);
+    let mut worst =
+        Finding { invariant: symmetry.invariant(), value: 0.0, bound: ALIKE, body: None };
+    let mut touched = 0;
+    for _ in 0..STEPS.min(case.steps) {
+        advance(case, &mut one).ok()?;
+        advance(&image, &mut other).ok()?;
+        let (a, b) = (Snapshot::of(&one.world), Snapshot::of(&other.world));
+        for (i, (a, b)) in a.bodies.iter().zip(&b.bodies).enumerate() {
+            let apart = (Vec3::from(symmetry.of(a.at.into())) - b.at).magnitude();
+            let scale = a.at.magnitude() + a.velocity.magnitude() * case.step + a.radius;
+            if apart / scale > worst.value {
+                (worst.value, worst.body) = (apart / scale, Some(i));
+            }
+        }
+        touched += u32::from(a.bodies.iter().any(|body| body.wall_gap < 1e-3 * body.radius));
+        touched += u32::from(a.bodies.len() > 1 && a.depth(1, 0) > -1e-3 * a.bodies[0].radius);
+        if touched >= TOUCHED {
+            break;
+        }
+    }
+    Some(worst)
+}
+
+/// Whether it begins in a state where any direction is as good as any other: bodies at one
+/// point, or in walls, or one on the very edge of something.
+fn is_singular(case: &Case) -> bool {
+    let balls: Vec<Ball> = case.scene.balls().collect();
+    let apart = |a: &Ball, b: &Ball| {
+        (Vec3::from(a.position) - Vec3::from(b.position)).magnitude() > a.radius + b.radius
+    };
+    let pairs = balls.iter().enumerate().all(|(i, a)| balls[..i].iter().all(|b| apart(a, b)));
+    !pairs || balls.iter().any(|ball| ball.position[0].abs() < 1e-6 * ball.radius.max(1e-3))
+}

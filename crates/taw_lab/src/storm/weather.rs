@@ -1,0 +1,202 @@
+//! Many cases, on several threads, with a watch over those that do not end.
+
+use std::collections::BTreeMap;
+use std::fmt::Write as _;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, mpsc};
+use std::thread;
+use std::time::Duration;
+
+use super::case::{Case, Kind, Name};
+use super::generate::generate;
+use super::judge::{Finding, Invariant};
+use super::report::Tally;
+use super::run::{Failure, Pulse, Verdict, run, run_for, trail};
+use super::shrink::shrink;
+
+/// What is to be done.
+#[derive(Clone, Debug)]
+pub struct Plan {
+    /// How many scenes, of all kinds together.
+    pub scenes: u64,
+    /// Of all random numbers.
+    pub seed: u64,
+    /// Only kinds whose name contains this.
+    pub only: String,
+    /// How many scenes run at a time.
+    pub jobs: usize,
+    /// Where failures go, if anywhere.
+    pub out: Option<PathBuf>,
+    /// Whether failures are made small.
+    pub shrink: bool,
+    /// How many failures of one kind and invariant are written and made small.
+    pub keep: u64,
+    /// How long a step may take before it counts as one that does not end.
+    pub patience: Duration,
+}
+
+/// What came of it.
+#[derive(Clone, Debug, Default)]
+pub struct Storm {
+    /// By kind.
+    pub tallies: BTreeMap<Kind, Tally>,
+    /// What did not hold, and the files that were written.
+    pub failures: Vec<(Name, Failure, Option<PathBuf>)>,
+}
+
+/// How long a failure is made smaller, at most.
+const SHRINK_FOR: Duration = Duration::from_secs(20);
+
+/// A thread that runs scenes, seen from outside.
+struct Worker {
+    pulse: Arc<Pulse>,
+    at: Arc<Mutex<Option<Name>>>,
+}
+
+/// The scenes of a plan: of all its kinds in turn.
+fn names(plan: &Plan) -> Vec<Name> {
+    let kinds: Vec<Kind> =
+        Kind::ALL.into_iter().filter(|kind| kind.name().contains(&plan.only)).collect();
+    let turns = kinds.len().max(1) as u64;
+    let name = |i: u64| {
+        Some(Name { kind: *kinds.get((i % turns) as usize)?, seed: plan.seed, number: i / turns })
+    };
+    (0..plan.scenes).filter_map(name).collect()
+}
+
+/// Runs all scenes of a plan. `progress` is told of each that is done.
+///
+/// # Errors
+/// If a file cannot be written.
+pub fn weather(plan: &Plan, mut progress: impl FnMut(u64, u64)) -> std::io::Result<Storm> {
+    // A panic is reported with its scene; what it prints besides would be in between.
+    let hook = std::panic::take_hook();
+    std::panic::set_hook(Box::new(|_| {}));
+    let names = Arc::new(names(plan));
+    let next = Arc::new(AtomicUsize::new(0));
+    let (send, receive) = mpsc::channel();
+    let work = || hire(Arc::clone(&names), Arc::clone(&next), send.clone());
+    let mut workers: Vec<Worker> = (0..plan.jobs.max(1)).map(|_| work()).collect();
+    let mut verdicts = BTreeMap::new();
+    while verdicts.len() < names.len() {
+        match receive.recv_timeout(Duration::from_millis(200)) {
+            Ok((name, verdict)) => {
+                verdicts.insert(name, verdict);
+                progress(verdicts.len() as u64, names.len() as u64);
+            }
+            Err(_) => {
+                for worker in &mut workers {
+                    if worker.pulse.running() < plan.patience {
+                        continue;
+                    }
+                    let name = worker.at.lock().ok().and_then(|mut at| at.take());
+                    if let Some(name) = name {
+                        verdicts.insert(name, stuck(&worker.pulse));
+                        // The thread is left to itself; another one goes on.
+                        *worker = work();
+                    }
+                }
+            }
+        }
+    }
+    let storm = report(plan, &verdicts);
+    std::panic::set_hook(hook);
+    storm
+}
+
+fn hire(
+    names: Arc<Vec<Name>>,
+    next: Arc<AtomicUsize>,
+    send: mpsc::Sender<(Name, Verdict)>,
+) -> Worker {
+    let worker = Worker { pulse: Arc::default(), at: Arc::default() };
+    let (pulse, at) = (Arc::clone(&worker.pulse), Arc::clone(&worker.at));
+    thread::spawn(move || {
+        while let Some(name) = names.get(next.fetch_add(1, Ordering::Relaxed)) {
+            if let Ok(mut at) = at.lock() {
+                *at = Some(*name);
+            }
+            let verdict = run(&generate(*name), &pulse);
+            // Whoever was given up as stuck has been replaced.
+            let mine = at.lock().is_ok_and(|mut at| at.take().is_some());
+            if !mine || send.send((*name, verdict)).is_err() {
+                return;
+            }
+        }
+    });
+    worker
+}
+
+fn stuck(pulse: &Pulse) -> Verdict {
+    let finding = Finding {
+        invariant: Invariant::Ends,
+        value: pulse.running().as_secs_f64(),
+        bound: 1.0,
+        body: None,
+    };
+    let failure = Failure { finding, step: pulse.step(), what: "it does not end".into() };
+    Verdict { worst: vec![finding], failures: vec![failure], slowest: 0.0 }
+}
+
+/// Counts, and writes failures, the first few of each sort.
+fn report(plan: &Plan, verdicts: &BTreeMap<Name, Verdict>) -> std::io::Result<Storm> {
+    let mut storm = Storm::default();
+    let mut kept: BTreeMap<(Kind, Invariant), u64> = BTreeMap::new();
+    for (name, verdict) in verdicts {
+        storm.tallies.entry(name.kind).or_default().add(*name, verdict);
+        for failure in &verdict.failures {
+            let count = kept.entry((name.kind, failure.finding.invariant)).or_default();
+            *count += 1;
+            let mut file = None;
+            if let Some(out) = &plan.out
+                && *count <= plan.keep
+            {
+                file = Some(write(plan, *name, failure, out)?);
+            }
+            storm.failures.push((*name, failure.clone(), file));
+        }
+    }
+    Ok(storm)
+}
+
+fn write(
+    plan: &Plan,
+    name: Name,
+    failure: &Failure,
+    out: &std::path::Path,
+) -> std::io::Result<PathBuf> {
+    let invariant = failure.finding.invariant;
+    let mut case = Case { broke: Some(invariant), ..generate(name) };
+    case.steps = failure.step.max(1);
+    // What does not end cannot be tried again.
+    if plan.shrink && invariant != Invariant::Ends {
+        case = shrink(&case, invariant, SHRINK_FOR);
+    }
+    std::fs::create_dir_all(out)?;
+    let file = format!("{}-{name}.ron", invariant.name()).replace(['/', ':'], "-");
+    let file = out.join(file);
+    std::fs::write(&file, case.to_text().map_err(std::io::Error::other)?)?;
+    Ok(file)
+}
+
+/// Runs a case and says what came of it, with the last steps of the body that it is about.
+#[must_use]
+pub fn replay(case: &Case) -> String {
+    let verdict = run_for(case, case.broke, &Pulse::default());
+    let mut text = format!("{}\n", case.scene.about);
+    let _ = writeln!(text, "{:?} {} step {} s", case.model, case.number, case.step);
+    for Finding { invariant, value, bound, body } in &verdict.worst {
+        let name = invariant.name();
+        let body = body.map_or_else(String::new, |body| format!(" (body {body})"));
+        let _ = writeln!(text, "{name}: {value:.3e} of {bound:.3e}{body}");
+    }
+    for Failure { finding, step, what } in &verdict.failures {
+        text += &trail(case, finding.body.unwrap_or(0), *step);
+        let _ = writeln!(text, "{} broke in step {step} {what}", finding.invariant.name());
+    }
+    if verdict.failures.is_empty() {
+        text += "all held\n";
+    }
+    text
+}
