@@ -137,6 +137,20 @@ pub fn direction_and_length<S: Scalar>(v: Vec3<S>) -> Option<(Vec3<S>, S)> {
     }
 }
 
+/// A unit vector for what has no direction: for each pair of numbers another one, spread evenly
+/// over the sphere by the golden angle (González, *Measurement of areas on a sphere using
+/// Fibonacci and latitude–longitude lattices*, 2010), and always the same.
+#[must_use]
+pub fn any_direction<S: Scalar>(first: u32, second: u32) -> Vec3<S> {
+    // Fibonacci hashing (Knuth, *The Art of Computer Programming*, vol. 3, §6.4).
+    let mixed = (u64::from(first) << 32 | u64::from(second)).wrapping_mul(0x9E37_79B9_7F4A_7C15);
+    let number = |bits: u64| (bits & 0xFFFF_FFFF) as f64 / 4_294_967_296.0;
+    let (height, turn) = (2.0 * number(mixed >> 32) - 1.0, number(mixed) * std::f64::consts::TAU);
+    let (sin, cos) = turn.sin_cos_portable();
+    let across = (1.0 - height * height).sqrt();
+    cast_vector(Vec3::new(across * cos, height, across * sin))
+}
+
 /// Whether a sum of three squares kept all of its digits. Under the smallest
 /// normal number divided by epsilon, a part of it may have been denormal.
 fn squared_is_exact<S: Scalar>(squared: S) -> bool {

@@ -119,3 +119,138 @@ proptest! {
         }
     }
 }
+
+/// A world of the default detection with a floor.
+fn room(response: Response) -> World<f32> {
+    let mut world = World::default();
+    let rotation = Rotation::Dynamic;
+    world.set_model(Model { response, rotation, ..Model::default() }).unwrap();
+    world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+    world
+}
+
+#[test]
+fn two_balls_dropped_on_a_floor_come_down_and_nothing_hangs() {
+    let mut random = fastrand::Rng::with_seed(7);
+    for run in 0..400 {
+        let mut world = room(Response::Impulse);
+        let ids = [0.0_f32, 1.0].map(|height| {
+            let at =
+                Point3::new(0.3 * random.f32(), 1.0 + height + random.f32(), 0.3 * random.f32());
+            world.marbles.insert(Marble::new(at, 0.1 + 0.2 * random.f32())).unwrap()
+        });
+        for _ in 0..300 {
+            world.step(DT).unwrap();
+        }
+        for id in ids {
+            let Marble { position, velocity, radius, .. } = world.marbles.get(id).unwrap();
+            let low = position.y < radius * 1.01 + 0.01 || velocity.y.abs() < 0.2;
+            assert!(low && velocity.magnitude() < 2.5, "run {run}: {position:?}, {velocity:?}");
+        }
+    }
+}
+
+#[test]
+fn balls_poured_into_a_box_stay_slow_and_in_it() {
+    let mut random = fastrand::Rng::with_seed(8);
+    for run in 0..20 {
+        let mut world = room(Response::Impulse);
+        for normal in [Vec3::unit_x(), -Vec3::unit_x(), Vec3::unit_z(), -Vec3::unit_z()] {
+            world.walls.insert(Plane::new(normal, -0.3).unwrap()).unwrap();
+        }
+        for i in 0..40 {
+            let mut any = || 0.2 * (random.f32() - 0.5);
+            let at = Point3::new(any(), 0.2 + 0.21 * i as f32, any());
+            world.marbles.insert(Marble::new(at, 0.1)).unwrap();
+        }
+        // Nothing can be faster than what fell from the top.
+        let fastest = (2.0 * 9.81 * 9.0_f32).sqrt();
+        for step in 0..400 {
+            world.step(DT).unwrap();
+            for row in 0..world.marbles.len() {
+                let (at, speed) =
+                    (world.marbles.position()[row], world.marbles.velocity()[row].magnitude());
+                assert!(
+                    speed < fastest && at.y > 0.0 && at.y < 9.0,
+                    "run {run}, step {step}: {at:?} {speed} m/s"
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_thin_box_is_not_passed_by_default() {
+    for response in
+        [Response::Displacement, Response::Impulse, Response::Penalty(ContactLaw::SpringDashpot)]
+    {
+        for try_ in 0..20 {
+            let mut world = World::<f32>::default();
+            world.set_model(Model { response, ..Model::default() }).unwrap();
+            let plate =
+                taw::shape::Aabb::new(Point3::new(-5.0, -0.02, -5.0), Point3::new(5.0, 0.0, 5.0));
+            world.walls.insert(taw::shape::Shape::Aabb(plate.unwrap())).unwrap();
+            let at = Point3::new(0.0, 1.0 + 0.01 * try_ as f32, 0.0);
+            let velocity = Vec3::new(0.0, -10.0, 0.0);
+            let id = world.marbles.insert(Marble { velocity, ..Marble::new(at, 0.05) }).unwrap();
+            for _ in 0..60 {
+                world.step(DT).unwrap();
+                let y = world.marbles.get(id).unwrap().position.y;
+                assert!(y > 0.0, "{response:?}, from {at:?}: at {y}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_taken_out_of_the_contacts_stops_nobody() {
+    for response in RESPONSES {
+        let still = ([0.0; 3], [0.0; 3]);
+        let (mut world, ids) = world(response, &[([-3.0, 0.0, 0.0], [300.0, 0.0, 0.0]), still]);
+        world.integrate(DT).unwrap();
+        world.generate_contacts();
+        world.contacts.clear();
+        world.restitute(DT).unwrap();
+        let [a, b] = [ids[0], ids[1]].map(|id| world.marbles.get(id).unwrap());
+        assert!((a.position.x - 2.0).abs() < 1e-4, "{response:?}: {a:?}");
+        if response == Response::Impulse {
+            assert_eq!((a.velocity.x, b.velocity.x), (300.0, 0.0));
+        }
+    }
+}
+
+#[test]
+fn marbles_at_one_point_part_without_speed() {
+    for response in [Response::Impulse] {
+        for count in [2, 30] {
+            let at = vec![([0.0; 3], [0.0; 3]); count];
+            let (mut world, _) = world(response, &at);
+            for _ in 0..120 {
+                world.step(DT).unwrap();
+            }
+            let fastest =
+                world.marbles.velocity().iter().map(|v| v.magnitude()).fold(0.0, f32::max);
+            let far =
+                world.marbles.position().iter().map(|p| p.to_vec().magnitude()).fold(0.0, f32::max);
+            assert!(
+                fastest < 1e-3 && far < 0.2 * count as f32,
+                "{response:?}, {count}: {fastest} m/s, {far} m"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_radius_that_grows_throws_nobody() {
+    for response in [Response::Impulse] {
+        let mut world = room(response);
+        let id = world.marbles.insert(Marble::new(Point3::new(0.0, 0.8, 0.0), 0.8)).unwrap();
+        world.marbles.set_radius(id, 2.0).unwrap();
+        let mut highest = 0.0_f32;
+        for _ in 0..240 {
+            world.step(DT).unwrap();
+            highest = highest.max(world.marbles.get(id).unwrap().position.y);
+        }
+        assert!(highest < 2.01, "{response:?}: {highest} m");
+    }
+}

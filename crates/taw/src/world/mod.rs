@@ -394,14 +394,11 @@ impl<S: Scalar> World<S> {
             Response::Displacement => {
                 let contacts = self.contacts.len() as u32;
                 let mut pushes = self.accounting.as_ref().map(|_| Vec::new());
-                let follow = |row: u32| {
-                    integrator.get(row as usize).unwrap_or(self.model.integrator).follow::<S>() * dt
-                };
                 displacement(
                     &self.walls,
                     &mut columns,
                     &mut self.contacts,
-                    follow,
+                    dt,
                     &mut self.stopped,
                     |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change))),
                 );

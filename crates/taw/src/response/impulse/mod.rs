@@ -10,7 +10,9 @@ mod solve;
 use cgmath::{InnerSpace, Zero};
 
 use crate::contact::Contacts;
-use crate::math::{Point3, Scalar, Vec3, cast_vector, direction_and_length, is_finite};
+use crate::math::{
+    Point3, Scalar, Vec3, any_direction, cast_vector, direction_and_length, is_finite,
+};
 use crate::response::{BallSpin, Columns, Material, Mobility, Push, Work};
 use gain::{Ledger, Rebound};
 use islands::Islands;
@@ -307,7 +309,8 @@ impl<S, W: Walls<S>> Walls<S> for Before<'_, W> {
 
 impl<S: Scalar> Columns<'_, S> {
     /// The unit vector from the first to the second of a contact, and how far their
-    /// surfaces are apart (negative for an overlap). Coincident centers part along +x.
+    /// surfaces are apart (negative for an overlap). Coincident centers part any way, each pair
+    /// its own.
     /// None where the column of positions is empty, or for a gap that is not finite.
     fn normal_and_gap(
         &self,
@@ -324,7 +327,8 @@ impl<S: Scalar> Columns<'_, S> {
                 let a = a as usize;
                 let first = *position.get(a)? + self.offset(a, along[0]);
                 let apart = direction_and_length(second - first);
-                let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
+                let (normal, distance) =
+                    apart.unwrap_or_else(|| (any_direction(a as u32, b as u32), S::zero()));
                 (normal, distance - self.radius[a])
             }
         };

@@ -29,7 +29,8 @@ pub(super) fn prepare<S: Scalar>(
     for c in constraints.iter() {
         let island = islands.of_mut(c);
         island.bounces |= c.bounces;
-        island.leans |= !c.bounces;
+        // What turns on its way follows for the whole substep, too.
+        island.leans |= !c.bounces || c.along != [S::zero(); 2];
         if c.bounces {
             island.since = island.since.max(c.since.unwrap_or(island.since));
         }
