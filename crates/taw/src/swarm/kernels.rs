@@ -13,15 +13,12 @@ pub(super) struct Pushes {
     pub pressure: Vec<[f32; LANES]>,
     /// Those across them.
     pub grip: Vec<[[f32; LANES]; 3]>,
-    /// Of the batches in which some bounce: which one, and how fast they shall part, in m/s.
-    pub rebound: Vec<(u32, [f32; LANES])>,
 }
 
 impl Pushes {
     pub fn bytes(&self) -> usize {
         self.pressure.capacity() * size_of::<[f32; LANES]>()
             + self.grip.capacity() * size_of::<[[f32; LANES]; 3]>()
-            + self.rebound.capacity() * size_of::<(u32, [f32; LANES])>()
     }
 
     /// As many as there are batches, and none bears anything.
@@ -34,10 +31,6 @@ impl Pushes {
         }
         reset(&mut self.pressure, batches, [0.0; LANES]);
         reset(&mut self.grip, batches, [[0.0; LANES]; 3]);
-        // In a heap at rest few bounce.
-        self.rebound.clear();
-        self.rebound.shrink_to(batches / 16);
-        self.rebound.reserve_exact(batches / 16);
     }
 }
 
@@ -305,6 +298,8 @@ pub(super) struct Columns<'a> {
     pub velocity: Shared<'a, Row>,
     /// Radius times spin, and nothing.
     pub spin: Shared<'a, Row>,
+    /// How far each ball may still go, in metres.
+    pub budget: Shared<'a, f32>,
 }
 
 impl Soft {
@@ -324,28 +319,41 @@ pub(super) struct Solve<'a> {
 /// What a pass does.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Pass {
-    /// Sees what comes together faster than this, in m/s, and asks for this part of the speed
-    /// back.
-    Approach { speed: f32, restitution: f32 },
+    /// Lets bounce what meets in a substep and comes together fast enough.
+    Impact(Impact),
     /// Applies the impulses of the last substep again.
     Begin,
     /// Lets nothing come nearer than the gap, within a substep of which this is the inverse, and
     /// pushes overlap out.
     Solve { soft: Soft, per_second: f32 },
-    /// The same but for the overlap.
+    /// The same but for the overlap, where something is borne.
     Relax { per_second: f32 },
-    /// What came together bounces.
-    Bounce,
+}
+
+/// What bounces, and how.
+///
+/// Bounces come before gravity and contacts, one pair after another, each by the velocities that
+/// the ones before it left: an impulse of at most twice what stops a pair adds no energy to it, so
+/// none of them does, in whatever order and however many meet at once (Guendelman, Bridson and
+/// Fedkiw, 2003, "Nonconvex rigid bodies with stacking", section 6). What contacts remember is
+/// left out of it: a bounce comes once.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Impact {
+    /// What comes together more slowly is a contact, in m/s.
+    pub speed: f32,
+    /// The part of the speed that balls have afterwards.
+    pub restitution: f32,
+    /// How long a substep is, in seconds.
+    pub time: f32,
+    /// In m/s².
+    pub gravity: Row,
 }
 
 impl Kernel for Solve<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         match (self.pass, self.friction) {
-            (Pass::Approach { speed, restitution }, Some(_)) => {
-                self.approach::<L>(speed, restitution);
-            }
-            (Pass::Bounce, Some(_)) => self.bounce::<L>(),
+            (Pass::Impact(impact), Some(friction)) => self.impact::<L>(impact, friction),
             (Pass::Begin, Some(_)) => self.begin::<L, true>(),
             (Pass::Begin, None) => self.begin::<L, false>(),
             (Pass::Solve { soft, per_second }, Some(friction)) => {
@@ -360,7 +368,7 @@ impl Kernel for Solve<'_> {
             (Pass::Relax { per_second }, None) => {
                 self.solve::<L, false, false>(Soft::NOT, per_second, 0.0);
             }
-            (Pass::Approach { .. } | Pass::Bounce, None) => (),
+            (Pass::Impact(_), None) => (),
         }
     }
 }
@@ -397,6 +405,21 @@ impl Columns<'_> {
         scatter(self.velocity, batch, velocity);
     }
 
+    /// Counts how far the balls of the pairs went.
+    #[inline(always)]
+    fn spend<L: Lanes>(&self, batch: &Batch, ways: [V<L>; 2]) {
+        let mut lengths = [[0.0; LANES]; 2];
+        for (lengths, way) in lengths.iter_mut().zip(ways) {
+            way.dot(way).sqrt().store(lengths);
+        }
+        for lane in 0..batch.count as usize {
+            for (row, lengths) in batch.pair(lane).into_iter().zip(&lengths) {
+                // SAFETY: as in `scatter`.
+                unsafe { *self.budget.row(row as usize) -= lengths[lane] };
+            }
+        }
+    }
+
     /// The spins of a batch, where there are any.
     #[inline(always)]
     fn spins<L: Lanes, const ROUGH: bool>(&self, batch: &Batch) -> [[L; 4]; 2] {
@@ -406,22 +429,35 @@ impl Columns<'_> {
 
 impl Solve<'_> {
     #[inline(always)]
-    fn approach<L: Lanes>(self, speed: f32, restitution: f32) {
-        let Self { columns, batches, pushes, .. } = self;
-        let zero = L::splat(0.0);
-        pushes.rebound.clear();
-        for (batch, number) in batches.iter().zip(0..) {
-            let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, _) = normal_and_gap(&a, &b);
+    fn impact<L: Lanes>(self, impact: Impact, friction: f32) {
+        let Self { columns, batches, .. } = self;
+        if impact.restitution == 0.0 {
+            return; // contacts stop what meets
+        }
+        for batch in batches {
+            let [at_a, at_b] = gather::<L>(columns.at, batch);
             let [a, b] = gather::<L>(columns.velocity, batch);
-            let closing = V::of(&a).minus(V::of(&b)).dot(normal);
-            let rebound =
-                closing.pick_above(L::splat(speed), closing * L::splat(restitution), zero);
-            if rebound.above(zero) != 0 {
-                let mut speeds = [0.0; LANES];
-                rebound.store(&mut speeds);
-                pushes.rebound.push((number, speeds));
+            let (normal, closing, time) = meeting(&impact, [&at_a, &at_b], [&a, &b]);
+            if closing.above(L::splat(0.0)) == 0 {
+                continue;
             }
+            let relative = V::of(&b).minus(V::of(&a));
+            let mass = mass(&a, &b);
+            let along = mass * closing * L::splat(1.0 + impact.restitution);
+            let spins = columns.spins::<L, true>(batch);
+            let sliding = sliding(relative, normal, &spins);
+            let most = L::splat(friction) * along;
+            let across = held(sliding.times(L::splat(-2.0 / 7.0) * mass), most);
+            columns.hit::<L, true>(batch, [a, b], spins, normal, along, across);
+            // They meet where they are when they do, around their middle.
+            let way = relative.times(time * mass);
+            let ways = [way.times(mobility(&a)), way.times(mobility(&b))];
+            let places = [
+                V::of(&at_a).minus(ways[0]).with(at_a[3]),
+                V::of(&at_b).plus(ways[1]).with(at_b[3]),
+            ];
+            scatter(columns.at, batch, places);
+            columns.spend(batch, ways);
         }
     }
 
@@ -460,7 +496,7 @@ impl Solve<'_> {
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, gap) = normal_and_gap(&a, &b);
             let [a, b] = gather::<L>(columns.velocity, batch);
-            let [spin_a, spin_b] = columns.spins::<L, ROUGH>(batch);
+            let spins = columns.spins::<L, ROUGH>(batch);
             let relative = V::of(&b).minus(V::of(&a));
             let parting = relative.dot(normal);
             let mass = mass(&a, &b);
@@ -472,52 +508,66 @@ impl Solve<'_> {
                 let back = gap.pick_above(zero, zero, L::splat(soft.back));
                 mass * part * (parting + wish) + before * back
             } else {
-                mass * (parting + gap.max(zero) * per_second)
+                // What bears nothing may be about to bounce.
+                before.pick_above(zero, mass * (parting + gap.max(zero) * per_second), zero)
             };
             let after = (before - change).max(zero);
             after.store(&mut pressure[i]);
             let mut across = V([zero; 3]);
             if ROUGH {
-                // Of the two surfaces, across the normal.
-                let spin = V::of(&spin_a).plus(V::of(&spin_b));
-                let sliding = relative.minus(normal.times(parting)).minus(spin.cross(normal));
+                let sliding = sliding(relative, normal, &spins);
                 let old = V::<L>::load(&grip[i]);
-                let held = old.minus(sliding.times(mass * L::splat(2.0 / 7.0)));
-                let most = L::splat(friction) * after;
-                let size = held.dot(held).sqrt();
-                let part = most / size.max(L::splat(f32::MIN_POSITIVE));
-                let held = held.times(size.pick_above(most, part, one));
+                let wish = old.minus(sliding.times(mass * L::splat(2.0 / 7.0)));
+                let held = held(wish, L::splat(friction) * after);
                 held.store(&mut grip[i]);
                 across = held.minus(old);
             }
-            let spins = [spin_a, spin_b];
             columns.hit::<L, ROUGH>(batch, [a, b], spins, normal, after - before, across);
         }
     }
+}
 
-    #[inline(always)]
-    fn bounce<L: Lanes>(self) {
-        let Self { columns, batches, pushes, .. } = self;
-        let Pushes { pressure, rebound, .. } = pushes;
-        let zero = L::splat(0.0);
-        for (number, rebound) in rebound {
-            let i = *number as usize;
-            let (batch, speed) = (&batches[i], L::load(rebound));
-            let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, _) = normal_and_gap(&a, &b);
-            let [a, b] = gather::<L>(columns.velocity, batch);
-            let parting = V::of(&b).minus(V::of(&a)).dot(normal);
-            let before = L::load(&pressure[i]);
-            // Only what has met, and once.
-            let wish = before.pick_above(zero, speed - parting, zero);
-            let wish = speed.pick_above(zero, wish, zero);
-            before.pick_above(zero, zero, speed).store(rebound);
-            let after = (before + wish * mass(&a, &b)).max(zero);
-            after.store(&mut pressure[i]);
-            let none = [[zero; 4]; 2];
-            columns.hit::<L, false>(batch, [a, b], none, normal, after - before, V([zero; 3]));
-        }
-    }
+/// Which pairs meet within a substep: the normal then, how fast they come together, or zero for
+/// those that do not meet or too slowly, and in how many seconds.
+#[inline(always)]
+fn meeting<L: Lanes>(
+    impact: &Impact,
+    [at_a, at_b]: [&[L; 4]; 2],
+    [a, b]: [&[L; 4]; 2],
+) -> (V<L>, L, L) {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let way = V::of(at_b).minus(V::of(at_a));
+    let relative = V::of(b).minus(V::of(a));
+    let reach = at_a[3] + at_b[3];
+    let approach = zero - way.dot(relative);
+    // Where a sphere as wide as both meets a point.
+    let apart = (way.dot(way) - reach * reach).max(zero);
+    let square = approach * approach - relative.dot(relative) * apart;
+    let time = approach.pick_above(zero, apart / (approach + square.max(zero).sqrt()), zero);
+    let then = way.plus(relative.times(time));
+    let length = then.dot(then).sqrt();
+    let inverse = length.pick_above(zero, one / length, zero);
+    let normal = then.times(inverse);
+    let closing = zero - relative.dot(normal);
+    let closing = closing.pick_above(L::splat(impact.speed), closing, zero);
+    let closing = square.pick_above(zero, closing, zero);
+    let closing = L::splat(impact.time).pick_above(time, closing, zero);
+    (normal, closing, closing.pick_above(zero, time, zero))
+}
+
+/// How fast the surfaces of two balls slide over each other.
+#[inline(always)]
+fn sliding<L: Lanes>(relative: V<L>, normal: V<L>, [a, b]: &[[L; 4]; 2]) -> V<L> {
+    let spin = V::of(a).plus(V::of(b));
+    relative.minus(normal.times(relative.dot(normal))).minus(spin.cross(normal))
+}
+
+/// The most of an impulse that friction bears.
+#[inline(always)]
+fn held<L: Lanes>(wish: V<L>, most: L) -> V<L> {
+    let size = wish.dot(wish).sqrt();
+    let part = most / size.max(L::splat(f32::MIN_POSITIVE));
+    wish.times(size.pick_above(most, part, L::splat(1.0)))
 }
 
 /// Faster than this, in m/s, or further out, in metres, a ball is no longer a ball: squares of

@@ -1,7 +1,7 @@
 //! The three verbs of a swarm.
 
 use super::kernels::{
-    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Pass, Predict, Soft, Solve,
+    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Impact, Pass, Predict, Soft, Solve,
     squared,
 };
 use super::lanes::Row;
@@ -190,11 +190,13 @@ impl Swarm {
         let h = dt / substeps;
         let per_second = 1.0 / h;
         let soft = soft(h);
-        let bounce = 2.0 * length(gravity) * dt;
+        // What gravity makes of rest in two steps is no impact.
+        let speed = 2.0 * length(gravity) * dt;
         let restitution = self.model.material.restitution;
-        let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > bounce;
-        self.pass(Pass::Approach { speed: bounce, restitution }, faster);
+        let impact = Impact { speed, restitution, time: h, gravity: row(gravity) };
+        let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > speed;
         for _ in 0..self.model.substeps {
+            self.pass(Pass::Impact(impact), faster);
             observe(Stage::Integrate);
             self.drift(row(gravity * h), [0.0; 4]);
             self.hold_guests(row(gravity * h));
@@ -206,7 +208,6 @@ impl Swarm {
             self.hold_guests([0.0; 4]);
             observe(Stage::Restitute);
             self.pass(Pass::Relax { per_second }, |_, _| true);
-            self.pass(Pass::Bounce, faster);
         }
     }
 
@@ -270,11 +271,11 @@ impl Swarm {
     /// Changes velocities and moves the balls that are awake.
     fn drift(&mut self, change: Row, time: Row) {
         let instructions = self.instructions;
-        let budget = Shared::new(&mut self.budget);
         let columns = Columns {
             at: Shared::new(&mut self.at),
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
+            budget: Shared::new(&mut self.budget),
         };
         let slabs = Shared::new(&mut self.slabs);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
@@ -286,7 +287,7 @@ impl Swarm {
             let (rows, first) = (slab.own_rows(), slab.rows[0]);
             let (at, velocity, budget) = unsafe {
                 let at = columns.at.part(rows.clone());
-                (at, columns.velocity.part(rows.clone()), budget.part(rows))
+                (at, columns.velocity.part(rows.clone()), columns.budget.part(rows))
             };
             for touch in &mut slab.touches {
                 touch.drift(time[0]);
@@ -317,7 +318,9 @@ impl Swarm {
                     // SAFETY: a ball of the slab.
                     unsafe {
                         let (at, velocity) = (columns.at.row(row), columns.velocity.row(row));
-                        touch.solve(pass, &*at, &mut *velocity, &mut *columns.spin.row(row));
+                        let spin = &mut *columns.spin.row(row);
+                        let way = touch.solve(pass, &mut *at, &mut *velocity, spin);
+                        *columns.budget.row(row) -= way;
                     }
                 }
             }
@@ -326,6 +329,7 @@ impl Swarm {
             at: Shared::new(&mut self.at),
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
+            budget: Shared::new(&mut self.budget),
         };
         let Strays { batches, pushes, .. } = &mut strays;
         instructions.run(Solve { pass, columns, batches, pushes, friction });
@@ -339,6 +343,7 @@ impl Swarm {
             at: Shared::new(&mut self.at),
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
+            budget: Shared::new(&mut self.budget),
         };
         let slabs = Shared::new(&mut self.slabs);
         let (threads, states) = (self.model.threads as usize, &mut self.slab_states);
