@@ -96,7 +96,7 @@ impl<L: Lanes> V<L> {
 
 /// The normal from the first to the second ball, and the gap between them.
 #[inline(always)]
-fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> (V<L>, L) {
+fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4], pair: impl Fn(usize) -> [u32; 2]) -> (V<L>, L) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let least = L::splat(f32::MIN_POSITIVE);
     let way = V::of(b).minus(V::of(a));
@@ -104,10 +104,34 @@ fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> (V<L>, L) {
     let distance = squared.sqrt();
     // Root and quotient do not wait for each other.
     let inverse = squared.pick_above(least, distance * (one / squared), zero);
-    let V([x, y, z]) = way.times(inverse);
-    // Where the centers coincide, any direction is as good as another.
-    let x = squared.pick_above(least, x, one);
-    (V([x, y, z]), distance - (a[3] + b[3]))
+    let mut normal = way.times(inverse);
+    if least.above(squared) != 0 {
+        // Where the centers coincide, any direction is as good as another; with the same for all,
+        // those at one point would come into a line.
+        let mut any = [[0.0; LANES]; 3];
+        for lane in 0..LANES {
+            let direction = direction(pair(lane));
+            for (axis, x) in any.iter_mut().zip(direction) {
+                axis[lane] = x;
+            }
+        }
+        let (V([x, y, z]), V([u, v, w])) = (normal, V::load(&any));
+        let pick = [(x, u), (y, v), (z, w)];
+        normal = V(pick.map(|(x, any)| squared.pick_above(least, x, any)));
+    }
+    (normal, distance - (a[3] + b[3]))
+}
+
+/// A direction for each pair of rows, spread over the sphere.
+#[cold]
+fn direction([a, b]: [u32; 2]) -> [f32; 3] {
+    let mixed = (a ^ b.rotate_left(16)).wrapping_mul(0x9e37_79b1);
+    let mixed = (mixed ^ mixed >> 15).wrapping_mul(0x85eb_ca77);
+    let part = |shift: u32| ((mixed >> shift & 0x3ff) as f32 - 511.5) / 511.5;
+    let [x, y, z] = [part(0), part(11), part(22)];
+    // No part is zero.
+    let length = (x * x + y * y + z * z).sqrt();
+    [x / length, y / length, z / length]
 }
 
 /// The rows of a column that the pairs of a batch are about.
@@ -143,7 +167,7 @@ impl Kernel for Displace<'_> {
     fn run<L: Lanes>(self) {
         for batch in self.batches {
             let [a, b] = gather::<L>(self.at, batch);
-            let (normal, overlap) = normal_and_overlap(&a, &b);
+            let (normal, overlap) = normal_and_overlap(&a, &b, |lane| batch.pair(lane));
             let by = normal.times(overlap * L::splat(0.5));
             let moved = [V::of(&a).minus(by).with(a[3]), V::of(&b).plus(by).with(b[3])];
             scatter(self.at, batch, moved);
@@ -153,8 +177,12 @@ impl Kernel for Displace<'_> {
 
 /// The normal from the first to the second ball, and how far they overlap.
 #[inline(always)]
-fn normal_and_overlap<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> (V<L>, L) {
-    let (normal, gap) = normal_and_gap(a, b);
+fn normal_and_overlap<L: Lanes>(
+    a: &[L; 4],
+    b: &[L; 4],
+    pair: impl Fn(usize) -> [u32; 2],
+) -> (V<L>, L) {
+    let (normal, gap) = normal_and_gap(a, b, pair);
     let zero = L::splat(0.0);
     (normal, (zero - gap).max(zero))
 }
@@ -214,7 +242,8 @@ impl Kernel for DisplaceFans<'_> {
                 // SAFETY: as above; no row but its own is twice in a fan.
                 unsafe {
                     let b = L::gather(ball, &after);
-                    let (normal, overlap) = normal_and_overlap(&a, &b);
+                    let pair = |lane: usize| [row, row + u32::from(after[lane])];
+                    let (normal, overlap) = normal_and_overlap(&a, &b, pair);
                     let overlap = overlap.first(count);
                     let hits = overlap.above(L::splat(0.0)).count_ones();
                     let by = normal.times(overlap * L::splat(PART[hits as usize]));
@@ -276,18 +305,22 @@ fn mass<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> L {
     sum.pick_above(zero, L::splat(1.0) / sum, zero)
 }
 
-/// How stiff a contact is (Catto, `Solver2D`, 2024: soft contacts).
+/// How what lies on others is borne: its overlap makes it part a little, which the pass after that
+/// takes back, though not what contacts have learned to bear (Catto, `Solver2D`, 2024: relaxation).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Soft {
     /// The part of an overlap that is to go per second.
     pub rate: f32,
     /// How fast it goes at most, in m/s.
     pub fastest: f32,
-    /// The part of the impulse that a hard contact would need, and how much of what it has borne
-    /// so far it gives back.
-    pub mass: f32,
-    pub back: f32,
 }
+
+/// So much of the sum of their radii two balls may overlap before they are moved apart: what lies
+/// in a heap is then left alone, and a thousandth part is not seen.
+pub(super) const SLOP: f32 = 1e-3;
+/// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
+/// it goes no further than it should.
+pub(super) const PUSH: f32 = 0.5;
 
 /// The columns that several threads work on.
 #[derive(Clone, Copy)]
@@ -300,10 +333,6 @@ pub(super) struct Columns<'a> {
     pub spin: Shared<'a, Row>,
     /// How far each ball may still go, in metres.
     pub budget: Shared<'a, f32>,
-}
-
-impl Soft {
-    const NOT: Self = Self { rate: 0.0, fastest: 0.0, mass: 1.0, back: 0.0 };
 }
 
 /// One pass over the pairs for their impulses.
@@ -323,11 +352,12 @@ pub(super) enum Pass {
     Impact(Impact),
     /// Applies the impulses of the last substep again.
     Begin,
-    /// Lets nothing come nearer than the gap, within a substep of which this is the inverse, and
-    /// pushes overlap out.
-    Solve { soft: Soft, per_second: f32 },
-    /// The same but for the overlap, where something is borne.
-    Relax { per_second: f32 },
+    /// Lets nothing come nearer than the gap within a substep. What now meets because of other
+    /// contacts, bounces.
+    Solve(Impact),
+    /// The same once more, after the balls moved, and moves what overlaps apart. What bears nothing
+    /// and comes fast is left for the next bounce.
+    Relax(Impact),
 }
 
 /// What bounces, and how.
@@ -335,7 +365,7 @@ pub(super) enum Pass {
 /// Bounces come before gravity and contacts, one pair after another, each by the velocities that
 /// the ones before it left: an impulse of at most twice what stops a pair adds no energy to it, so
 /// none of them does, in whatever order and however many meet at once (Guendelman, Bridson and
-/// Fedkiw, 2003, "Nonconvex rigid bodies with stacking", section 6). What contacts remember is
+/// Fedkiw, 2003, "Nonconvex rigid bodies with stacking"). What contacts remember is
 /// left out of it: a bounce comes once.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Impact {
@@ -347,6 +377,8 @@ pub(super) struct Impact {
     pub time: f32,
     /// In m/s².
     pub gravity: Row,
+    /// How contacts bear what lies on them.
+    pub soft: Soft,
 }
 
 impl Kernel for Solve<'_> {
@@ -356,18 +388,10 @@ impl Kernel for Solve<'_> {
             (Pass::Impact(impact), Some(friction)) => self.impact::<L>(impact, friction),
             (Pass::Begin, Some(_)) => self.begin::<L, true>(),
             (Pass::Begin, None) => self.begin::<L, false>(),
-            (Pass::Solve { soft, per_second }, Some(friction)) => {
-                self.solve::<L, true, true>(soft, per_second, friction);
-            }
-            (Pass::Solve { soft, per_second }, None) => {
-                self.solve::<L, false, true>(soft, per_second, 0.0);
-            }
-            (Pass::Relax { per_second }, Some(friction)) => {
-                self.solve::<L, true, false>(Soft::NOT, per_second, friction);
-            }
-            (Pass::Relax { per_second }, None) => {
-                self.solve::<L, false, false>(Soft::NOT, per_second, 0.0);
-            }
+            (Pass::Solve(impact), Some(friction)) => self.solve::<L, true, true>(impact, friction),
+            (Pass::Solve(impact), None) => self.solve::<L, false, true>(impact, 0.0),
+            (Pass::Relax(impact), Some(friction)) => self.solve::<L, true, false>(impact, friction),
+            (Pass::Relax(impact), None) => self.solve::<L, false, false>(impact, 0.0),
             (Pass::Impact(_), None) => (),
         }
     }
@@ -420,6 +444,60 @@ impl Columns<'_> {
         }
     }
 
+    /// Lets those pairs bounce that meet, and of which `may` is above zero.
+    #[inline(always)]
+    fn bounce<L: Lanes>(
+        &self,
+        batch: &Batch,
+        impact: &Impact,
+        friction: f32,
+        [at_a, at_b]: [[L; 4]; 2],
+        [a, b]: [[L; 4]; 2],
+        may: L,
+    ) {
+        let zero = L::splat(0.0);
+        let (normal, closing) = meeting(impact, [&at_a, &at_b], [&a, &b]);
+        let closing = may.pick_above(zero, closing, zero);
+        if closing.above(zero) == 0 {
+            return;
+        }
+        let relative = V::of(&b).minus(V::of(&a));
+        let mass = mass(&a, &b);
+        let along = mass * closing * L::splat(1.0 + impact.restitution);
+        let spins = self.spins::<L, true>(batch);
+        let sliding = sliding(relative, normal, &spins);
+        let across = held(sliding.times(L::splat(-2.0 / 7.0) * mass), L::splat(friction) * along);
+        self.hit::<L, true>(batch, [a, b], spins, normal, along, across);
+    }
+
+    /// Moves apart what overlaps. That changes no velocity: overlap is not energy.
+    #[inline(always)]
+    fn part<L: Lanes>(
+        &self,
+        batch: &Batch,
+        [at_a, at_b]: [[L; 4]; 2],
+        [a, b]: [[L; 4]; 2],
+        normal: V<L>,
+        gap: L,
+    ) {
+        let zero = L::splat(0.0);
+        let overlap = zero - gap - (at_a[3] + at_b[3]) * L::splat(SLOP);
+        if overlap.above(zero) == 0 {
+            return;
+        }
+        // Half each, whatever they weigh: a light ball that a heavy one presses on something has
+        // nowhere to go. What sleeps stays.
+        let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
+        let a = mobility(&a).pick_above(zero, one, zero);
+        let b = mobility(&b).pick_above(zero, one, zero);
+        let by = (a + b).pick_above(zero, push / (a + b), zero);
+        let ways = [normal.times(by * a), normal.times(by * b)];
+        let places =
+            [V::of(&at_a).minus(ways[0]).with(at_a[3]), V::of(&at_b).plus(ways[1]).with(at_b[3])];
+        scatter(self.at, batch, places);
+        self.spend(batch, ways);
+    }
+
     /// The spins of a batch, where there are any.
     #[inline(always)]
     fn spins<L: Lanes, const ROUGH: bool>(&self, batch: &Batch) -> [[L; 4]; 2] {
@@ -435,29 +513,9 @@ impl Solve<'_> {
             return; // contacts stop what meets
         }
         for batch in batches {
-            let [at_a, at_b] = gather::<L>(columns.at, batch);
-            let [a, b] = gather::<L>(columns.velocity, batch);
-            let (normal, closing, time) = meeting(&impact, [&at_a, &at_b], [&a, &b]);
-            if closing.above(L::splat(0.0)) == 0 {
-                continue;
-            }
-            let relative = V::of(&b).minus(V::of(&a));
-            let mass = mass(&a, &b);
-            let along = mass * closing * L::splat(1.0 + impact.restitution);
-            let spins = columns.spins::<L, true>(batch);
-            let sliding = sliding(relative, normal, &spins);
-            let most = L::splat(friction) * along;
-            let across = held(sliding.times(L::splat(-2.0 / 7.0) * mass), most);
-            columns.hit::<L, true>(batch, [a, b], spins, normal, along, across);
-            // They meet where they are when they do, around their middle.
-            let way = relative.times(time * mass);
-            let ways = [way.times(mobility(&a)), way.times(mobility(&b))];
-            let places = [
-                V::of(&at_a).minus(ways[0]).with(at_a[3]),
-                V::of(&at_b).plus(ways[1]).with(at_b[3]),
-            ];
-            scatter(columns.at, batch, places);
-            columns.spend(batch, ways);
+            let at = gather::<L>(columns.at, batch);
+            let velocity = gather::<L>(columns.velocity, batch);
+            columns.bounce(batch, &impact, friction, at, velocity, L::splat(1.0));
         }
     }
 
@@ -467,7 +525,7 @@ impl Solve<'_> {
         let Pushes { pressure, grip, .. } = pushes;
         for (i, batch) in batches.iter().enumerate() {
             let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, _) = normal_and_gap(&a, &b);
+            let (normal, _) = normal_and_gap(&a, &b, |lane| batch.pair(lane));
             let mut across = V([L::splat(0.0); 3]);
             if ROUGH {
                 // It was across the normal of the last substep.
@@ -482,36 +540,39 @@ impl Solve<'_> {
     }
 
     #[inline(always)]
-    fn solve<L: Lanes, const ROUGH: bool, const SOFT: bool>(
-        self,
-        soft: Soft,
-        per_second: f32,
-        friction: f32,
-    ) {
+    fn solve<L: Lanes, const ROUGH: bool, const FIRST: bool>(self, impact: Impact, friction: f32) {
         let Self { columns, batches, pushes, .. } = self;
         let Pushes { pressure, grip, .. } = pushes;
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let per_second = L::splat(per_second);
+        // Where nothing bounces, all is a contact.
+        let speed = if impact.restitution > 0.0 { impact.speed } else { f32::MAX };
+        let (zero, one, soft) = (L::splat(0.0), L::splat(1.0), impact.soft);
+        let (speed, per_second) = (L::splat(speed), L::splat(1.0 / impact.time));
         for (i, batch) in batches.iter().enumerate() {
-            let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, gap) = normal_and_gap(&a, &b);
-            let [a, b] = gather::<L>(columns.velocity, batch);
-            let spins = columns.spins::<L, ROUGH>(batch);
+            let at = gather::<L>(columns.at, batch);
+            let (normal, gap) = normal_and_gap(&at[0], &at[1], |lane| batch.pair(lane));
+            let before = L::load(&pressure[i]);
+            let mut velocity = gather::<L>(columns.velocity, batch);
+            // What bears nothing and comes fast is no contact yet.
+            let closing = V::of(&velocity[0]).minus(V::of(&velocity[1])).dot(normal);
+            let fast = closing.pick_above(speed, one, zero);
+            let fresh = before.pick_above(zero, zero, fast);
+            if FIRST && fresh.above(zero) != 0 {
+                columns.bounce(batch, &impact, friction, at, velocity, fresh);
+                velocity = gather::<L>(columns.velocity, batch);
+            }
+            let [a, b] = velocity;
             let relative = V::of(&b).minus(V::of(&a));
             let parting = relative.dot(normal);
+            let spins = columns.spins::<L, ROUGH>(batch);
             let mass = mass(&a, &b);
-            let before = L::load(&pressure[i]);
-            let change = if SOFT {
+            let change = if FIRST {
                 let pushed = (gap * L::splat(soft.rate)).max(L::splat(-soft.fastest));
                 let wish = gap.pick_above(zero, gap * per_second, pushed);
-                let part = gap.pick_above(zero, one, L::splat(soft.mass));
-                let back = gap.pick_above(zero, zero, L::splat(soft.back));
-                mass * part * (parting + wish) + before * back
+                mass * (parting + wish)
             } else {
-                // What bears nothing may be about to bounce.
-                before.pick_above(zero, mass * (parting + gap.max(zero) * per_second), zero)
+                mass * (parting + gap.max(zero) * per_second)
             };
-            let after = (before - change).max(zero);
+            let after = (before - fresh.pick_above(zero, zero, change)).max(zero);
             after.store(&mut pressure[i]);
             let mut across = V([zero; 3]);
             if ROUGH {
@@ -523,18 +584,21 @@ impl Solve<'_> {
                 across = held.minus(old);
             }
             columns.hit::<L, ROUGH>(batch, [a, b], spins, normal, after - before, across);
+            if !FIRST {
+                columns.part(batch, at, [a, b], normal, gap);
+            }
         }
     }
 }
 
-/// Which pairs meet within a substep: the normal then, how fast they come together, or zero for
-/// those that do not meet or too slowly, and in how many seconds.
+/// Which pairs meet within a substep: the normal then, and how fast they come together, or zero for
+/// those that do not meet or too slowly.
 #[inline(always)]
 fn meeting<L: Lanes>(
     impact: &Impact,
     [at_a, at_b]: [&[L; 4]; 2],
     [a, b]: [&[L; 4]; 2],
-) -> (V<L>, L, L) {
+) -> (V<L>, L) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let way = V::of(at_b).minus(V::of(at_a));
     let relative = V::of(b).minus(V::of(a));
@@ -551,8 +615,7 @@ fn meeting<L: Lanes>(
     let closing = zero - relative.dot(normal);
     let closing = closing.pick_above(L::splat(impact.speed), closing, zero);
     let closing = square.pick_above(zero, closing, zero);
-    let closing = L::splat(impact.time).pick_above(time, closing, zero);
-    (normal, closing, closing.pick_above(zero, time, zero))
+    (normal, L::splat(impact.time).pick_above(time, closing, zero))
 }
 
 /// How fast the surfaces of two balls slide over each other.

@@ -1,8 +1,9 @@
 //! The three verbs of a swarm.
 
+use super::build::SOON;
 use super::kernels::{
-    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Impact, Pass, Predict, Soft, Solve,
-    squared,
+    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Impact, Pass, Predict,
+    Soft, Solve, squared,
 };
 use super::lanes::Row;
 use super::slab::Slab;
@@ -12,12 +13,9 @@ use super::walls::{Balls, HalfSpace, half_spaces};
 use super::{Stage, Surroundings, Swarm, Tier, lying};
 use crate::math::{Vec3, length};
 
-/// How stiff contacts are: at most so many oscillations a second, and as many times as much
-/// damping as stops them.
-const HERTZ: f32 = 60.0;
-const DAMPING: f32 = 10.0;
-/// How fast an overlap is pushed out at most, in m/s.
-const FASTEST_PUSH: f32 = 3.0;
+/// The part of an overlap that a contact pushes out in a substep: less than that is still there
+/// when the next one comes, more makes neighbours push each other in turn.
+const PUSHED: f32 = 0.25;
 /// For how long, in seconds, all balls of a slab lie still before they sleep.
 const FALL_ASLEEP: f32 = 0.5;
 
@@ -32,7 +30,7 @@ impl Swarm {
         observe: &mut dyn FnMut(Stage),
     ) {
         self.stopped.clear();
-        self.steps_since_build = self.steps_since_build.saturating_add(1);
+        self.steps_since_build = (self.steps_since_build + 1).min(SOON);
         if self.gravity != Some(gravity) {
             self.gravity = Some(gravity);
             self.wake_all();
@@ -188,12 +186,13 @@ impl Swarm {
         self.look_at_walls(walls, dt);
         let substeps = self.model.substeps as f32;
         let h = dt / substeps;
-        let per_second = 1.0 / h;
-        let soft = soft(h);
         // What gravity makes of rest in two steps is no impact.
         let speed = 2.0 * length(gravity) * dt;
         let restitution = self.model.material.restitution;
-        let impact = Impact { speed, restitution, time: h, gravity: row(gravity) };
+        // What lies on others is borne by pushes of what gravity makes in a step; all else that
+        // overlaps is moved apart. Where nothing has weight, overlap makes no speed at all.
+        let soft = Soft { rate: PUSHED / h, fastest: speed };
+        let impact = Impact { speed, restitution, time: h, gravity: row(gravity), soft };
         let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > speed;
         for _ in 0..self.model.substeps {
             self.pass(Pass::Impact(impact), faster);
@@ -202,12 +201,12 @@ impl Swarm {
             self.hold_guests(row(gravity * h));
             observe(Stage::Restitute);
             self.pass(Pass::Begin, |_, _| true);
-            self.pass(Pass::Solve { soft, per_second }, |_, _| true);
+            self.pass(Pass::Solve(impact), |_, _| true);
             observe(Stage::Integrate);
             self.drift([0.0; 4], [h, h, h, 0.0]);
             self.hold_guests([0.0; 4]);
             observe(Stage::Restitute);
-            self.pass(Pass::Relax { per_second }, |_, _| true);
+            self.pass(Pass::Relax(impact), |_, _| true);
         }
     }
 
@@ -449,13 +448,4 @@ pub(super) fn listed(planes: &[HalfSpace], tier: Tier) -> &[HalfSpace] {
 
 fn row(vector: Vec3<f32>) -> Row {
     [vector.x, vector.y, vector.z, 0.0]
-}
-
-/// Springs that are as stiff as so short a step allows (Catto, `Solver2D`, 2024).
-fn soft(h: f32) -> Soft {
-    let omega = 2.0 * std::f32::consts::PI * HERTZ.min(0.25 / h);
-    let a1 = 2.0 * DAMPING + h * omega;
-    let a2 = h * omega * a1;
-    let a3 = 1.0 / (1.0 + a2);
-    Soft { rate: omega / a1, fastest: FASTEST_PUSH, mass: a2 * a3, back: a3 }
 }

@@ -2,7 +2,7 @@
 
 use cgmath::InnerSpace;
 
-use super::kernels::{Impact, Pass, Soft};
+use super::kernels::{Impact, PUSH, Pass, SLOP, Soft};
 use super::lanes::Row;
 use crate::math::Vec3;
 
@@ -56,43 +56,67 @@ impl Touch {
         set(at, xyz(at) + self.normal * overlap);
     }
 
-    /// A pass as for the pairs of balls. A bounce is said in metres that the ball went.
+    /// A pass as for the pairs of balls. Says how far it moved the ball, in metres.
     pub fn solve(&mut self, pass: Pass, at: &mut Row, velocity: &mut Row, spin: &mut Row) -> f32 {
         match pass {
-            Pass::Impact(impact) => return self.bounce(&impact, at, velocity, spin),
+            Pass::Impact(impact) => {
+                return self.bounce(&impact, 0.0, at, velocity, spin).unwrap_or(0.0);
+            }
             Pass::Begin => {
                 self.grip -= self.normal * self.grip.dot(self.normal);
                 self.hit(velocity, spin, self.pressure, self.grip);
             }
-            Pass::Solve { soft, per_second } => {
-                self.push(Some(soft), per_second, at, velocity, spin);
+            Pass::Solve(impact) => {
+                if self.pressure == 0.0 {
+                    // It met another one before, and gravity was there already.
+                    let fall = -xyz(&impact.gravity).dot(self.normal) * impact.time;
+                    if let Some(way) = self.bounce(&impact, fall, at, velocity, spin) {
+                        return way;
+                    }
+                }
+                self.push(impact.time, Some(impact.soft), at, velocity, spin);
             }
-            Pass::Relax { per_second } => self.push(None, per_second, at, velocity, spin),
+            Pass::Relax(impact) => {
+                let closing = -(xyz(velocity) - self.surface).dot(self.normal);
+                if self.pressure > 0.0 || self.restitution == 0.0 || closing <= impact.speed {
+                    self.push(impact.time, None, at, velocity, spin);
+                }
+                let overlap = (-self.gap(at) - at[3] * SLOP).max(0.0) * PUSH;
+                set(at, xyz(at) + self.normal * overlap);
+                return overlap;
+            }
         }
         0.0
     }
 
-    /// Turns the ball back where it meets the wall, with the speed that it then has. Says how far
-    /// away that is, in metres.
-    fn bounce(&self, impact: &Impact, at: &mut Row, velocity: &mut Row, spin: &mut Row) -> f32 {
+    /// Turns the ball back if it meets the wall, with the speed that it then has, less what
+    /// gravity made too early, in m/s. Says how far away that is, in metres.
+    fn bounce(
+        &self,
+        impact: &Impact,
+        fall: f32,
+        at: &mut Row,
+        velocity: &mut Row,
+        spin: &mut Row,
+    ) -> Option<f32> {
         let relative = xyz(velocity) - self.surface;
         let closing = -relative.dot(self.normal);
-        let gap = self.gap(at).max(0.0);
-        if self.restitution == 0.0 || closing <= 0.0 || gap >= closing * impact.time {
-            return 0.0;
+        let (gap, early) = (self.gap(at).max(0.0), closing - fall);
+        if self.restitution == 0.0 || early <= 0.0 || gap >= closing * impact.time {
+            return None;
         }
         // Gravity works on the ball as far as it comes nearer.
-        let square = closing * closing - 2.0 * xyz(&impact.gravity).dot(self.normal) * gap;
+        let square = early * early - 2.0 * xyz(&impact.gravity).dot(self.normal) * gap;
         let meets = square.max(0.0).sqrt();
         if meets <= impact.speed {
-            return 0.0;
+            return None;
         }
-        let along = (closing + meets * self.restitution) / velocity[3];
+        let along = (closing + (meets * self.restitution - fall).max(0.0)) / velocity[3];
         let wish = self.sliding(relative, spin) * (-2.0 / 7.0 / velocity[3]);
         let across = held(wish, self.friction * along);
         set(at, xyz(at) - self.normal * gap);
         self.hit(velocity, spin, along, across);
-        gap
+        Some(gap)
     }
 
     /// How fast the ball's surface slides over the wall's, in m/s.
@@ -101,27 +125,24 @@ impl Touch {
         relative - parting - xyz(spin).cross(self.normal)
     }
 
+    /// Lets the ball come no nearer than the gap within so many seconds.
     fn push(
         &mut self,
+        time: f32,
         soft: Option<Soft>,
-        per_second: f32,
         at: &Row,
         velocity: &mut Row,
         spin: &mut Row,
     ) {
-        if soft.is_none() && self.pressure == 0.0 {
-            return; // it may be about to bounce
-        }
-        let gap = self.gap(at);
-        let mass = 1.0 / velocity[3];
+        let (gap, mass) = (self.gap(at), 1.0 / velocity[3]);
         let relative = xyz(velocity) - self.surface;
         let parting = relative.dot(self.normal);
         let change = match soft {
             Some(soft) if gap <= 0.0 => {
                 let wish = (gap * soft.rate).max(-soft.fastest);
-                mass * soft.mass * (parting + wish) + self.pressure * soft.back
+                mass * (parting + wish)
             }
-            _ => mass * (parting + gap.max(0.0) * per_second),
+            _ => mass * (parting + gap.max(0.0) / time),
         };
         let pressure = (self.pressure - change).max(0.0);
         let along = pressure - self.pressure;

@@ -26,7 +26,7 @@ pub(crate) trait Surroundings: Sync {
 }
 
 /// A half-space.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct HalfSpace {
     wall: u32,
     pub normal: Vec3<f32>,
