@@ -316,11 +316,12 @@ pub(super) struct Soft {
 }
 
 /// So much of the sum of their radii two balls may overlap before they are moved apart: what lies
-/// in a heap is then left alone, and a thousandth part is not seen.
-pub(super) const SLOP: f32 = 1e-3;
+/// in a heap is in each other by a few thousandths, which contacts push out, and every way that is
+/// moved counts until pairs are sought anew.
+pub(super) const SLOP: f32 = 1e-2;
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.
-pub(super) const PUSH: f32 = 0.5;
+const PUSH: f32 = 0.5;
 
 /// The columns that several threads work on.
 #[derive(Clone, Copy)]

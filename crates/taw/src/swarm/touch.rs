@@ -2,7 +2,7 @@
 
 use cgmath::InnerSpace;
 
-use super::kernels::{Impact, PUSH, Pass, SLOP, Soft};
+use super::kernels::{Impact, Pass, SLOP, Soft};
 use super::lanes::Row;
 use crate::math::Vec3;
 
@@ -81,7 +81,8 @@ impl Touch {
                 if self.pressure > 0.0 || self.restitution == 0.0 || closing <= impact.speed {
                     self.push(impact.time, None, at, velocity, spin);
                 }
-                let overlap = (-self.gap(at) - at[3] * SLOP).max(0.0) * PUSH;
+                // All of it: a wall gives way to nobody.
+                let overlap = (-self.gap(at) - at[3] * SLOP).max(0.0);
                 set(at, xyz(at) + self.normal * overlap);
                 return overlap;
             }
