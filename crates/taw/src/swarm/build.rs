@@ -43,7 +43,8 @@ impl Swarm {
         if self.paired {
             self.adapt_margin();
         }
-        let cap = self.cap(dt);
+        self.cap = self.find_cap(dt);
+        let cap = self.cap;
         // The budgets make room for the order: they are set anew after that.
         let order = bytemuck::cast_slice_mut(&mut self.budget);
         self.grid.sort(&self.at, 2.0 * cap, threads, order, &mut self.spare);
@@ -65,7 +66,7 @@ impl Swarm {
 
     /// The margin, or as far as all but the fastest go in two steps, who are sought for alone: a
     /// ball that goes further than others look for it would be found inside of them.
-    fn cap(&mut self, dt: f32) -> f32 {
+    fn find_cap(&mut self, dt: f32) -> f32 {
         let margin = self.margin();
         if !self.rough() {
             return margin;
@@ -142,7 +143,7 @@ impl Swarm {
             return self.build(dt, walls, observe);
         }
         observe(Stage::Pairs);
-        let cap = self.margin();
+        let cap = self.cap;
         for row in rows {
             self.strays.add(*row);
             let at = *row as usize;

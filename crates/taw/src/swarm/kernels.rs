@@ -13,6 +13,8 @@ pub(super) struct Pushes {
     pub pressure: Vec<[f32; LANES]>,
     /// Those across them.
     pub grip: Vec<[[f32; LANES]; 3]>,
+    /// Whether any of them bounced in the last round.
+    pub bounced: bool,
 }
 
 impl Pushes {
@@ -306,13 +308,19 @@ fn mass<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> L {
 }
 
 /// How what lies on others is borne: its overlap makes it part a little, which the pass after that
-/// takes back, though not what contacts have learned to bear (Catto, `Solver2D`, 2024: relaxation).
+/// takes back, though not what contacts have learned to bear. What they give back is what damps it:
+/// impulses that are applied again and corrected once a substep swing for a long time, and what
+/// pushes overlap out meanwhile makes them swing more (Catto, `Solver2D`, 2024: soft contacts).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Soft {
     /// The part of an overlap that is to go per second.
     pub rate: f32,
     /// How fast it goes at most, in m/s.
     pub fastest: f32,
+    /// The part of the impulse that a hard contact would need, and how much of what it has borne
+    /// so far it gives back.
+    pub mass: f32,
+    pub back: f32,
 }
 
 /// So much of the sum of their radii two balls may overlap before they are moved apart: what lies
@@ -353,8 +361,7 @@ pub(super) enum Pass {
     Impact(Impact),
     /// Applies the impulses of the last substep again.
     Begin,
-    /// Lets nothing come nearer than the gap within a substep. What now meets because of other
-    /// contacts, bounces.
+    /// Lets nothing come nearer than the gap within a substep.
     Solve(Impact),
     /// The same once more, after the balls moved, and moves what overlaps apart. What bears nothing
     /// and comes fast is left for the next bounce.
@@ -445,7 +452,7 @@ impl Columns<'_> {
         }
     }
 
-    /// Lets those pairs bounce that meet, and of which `may` is above zero.
+    /// Lets those pairs bounce that meet. Says whether any does.
     #[inline(always)]
     fn bounce<L: Lanes>(
         &self,
@@ -454,13 +461,11 @@ impl Columns<'_> {
         friction: f32,
         [at_a, at_b]: [[L; 4]; 2],
         [a, b]: [[L; 4]; 2],
-        may: L,
-    ) {
+    ) -> bool {
         let zero = L::splat(0.0);
         let (normal, closing) = meeting(impact, [&at_a, &at_b], [&a, &b]);
-        let closing = may.pick_above(zero, closing, zero);
         if closing.above(zero) == 0 {
-            return;
+            return false;
         }
         let relative = V::of(&b).minus(V::of(&a));
         let mass = mass(&a, &b);
@@ -469,6 +474,7 @@ impl Columns<'_> {
         let sliding = sliding(relative, normal, &spins);
         let across = held(sliding.times(L::splat(-2.0 / 7.0) * mass), L::splat(friction) * along);
         self.hit::<L, true>(batch, [a, b], spins, normal, along, across);
+        true
     }
 
     /// Moves apart what overlaps. That changes no velocity: overlap is not energy.
@@ -509,14 +515,14 @@ impl Columns<'_> {
 impl Solve<'_> {
     #[inline(always)]
     fn impact<L: Lanes>(self, impact: Impact, friction: f32) {
-        let Self { columns, batches, .. } = self;
+        let Self { columns, batches, pushes, .. } = self;
         if impact.restitution == 0.0 {
             return; // contacts stop what meets
         }
         for batch in batches {
             let at = gather::<L>(columns.at, batch);
             let velocity = gather::<L>(columns.velocity, batch);
-            columns.bounce(batch, &impact, friction, at, velocity, L::splat(1.0));
+            pushes.bounced |= columns.bounce(batch, &impact, friction, at, velocity);
         }
     }
 
@@ -552,14 +558,16 @@ impl Solve<'_> {
             let at = gather::<L>(columns.at, batch);
             let (normal, gap) = normal_and_gap(&at[0], &at[1], |lane| batch.pair(lane));
             let before = L::load(&pressure[i]);
-            let mut velocity = gather::<L>(columns.velocity, batch);
+            let velocity = gather::<L>(columns.velocity, batch);
             // What bears nothing and comes fast is no contact yet.
             let closing = V::of(&velocity[0]).minus(V::of(&velocity[1])).dot(normal);
             let fast = closing.pick_above(speed, one, zero);
-            let fresh = before.pick_above(zero, zero, fast);
+            let mut fresh = before.pick_above(zero, zero, fast);
             if FIRST && fresh.above(zero) != 0 {
-                columns.bounce(batch, &impact, friction, at, velocity, fresh);
-                velocity = gather::<L>(columns.velocity, batch);
+                // What meets nevertheless is stopped: it may come so fast only because of impulses
+                // that were applied again, and are taken back by the contacts that bear them.
+                let (_, meets) = meeting(&impact, [&at[0], &at[1]], [&velocity[0], &velocity[1]]);
+                fresh = meets.pick_above(zero, zero, fresh);
             }
             let [a, b] = velocity;
             let relative = V::of(&b).minus(V::of(&a));
@@ -569,7 +577,9 @@ impl Solve<'_> {
             let change = if FIRST {
                 let pushed = (gap * L::splat(soft.rate)).max(L::splat(-soft.fastest));
                 let wish = gap.pick_above(zero, gap * per_second, pushed);
-                mass * (parting + wish)
+                let part = gap.pick_above(zero, one, L::splat(soft.mass));
+                let back = gap.pick_above(zero, zero, L::splat(soft.back));
+                mass * part * (parting + wish) + before * back
             } else {
                 mass * (parting + gap.max(zero) * per_second)
             };

@@ -84,6 +84,9 @@ pub struct Swarm {
     /// The largest radius, and the mean of all.
     largest: f32,
     mean: f32,
+    /// How far a ball goes at most that is not sought for alone, since pairs were sought, in
+    /// metres.
+    cap: f32,
     grid: Grid,
     slabs: Vec<Slab>,
     /// The pairs of the fastest balls.
@@ -336,6 +339,7 @@ impl Swarm {
             way,
             largest: _,
             mean: _,
+            cap: _,
             grid,
             slabs,
             strays,
@@ -488,6 +492,7 @@ impl PartialEq for Swarm {
             way,
             largest,
             mean,
+            cap,
             grid,
             slabs,
             strays,
@@ -520,6 +525,7 @@ impl PartialEq for Swarm {
             && (at, velocity, spin) == (&other.at, &other.velocity, &other.spin)
             && (budget, way, before) == (&other.budget, &other.way, &other.before)
             && (largest, mean, spread) == (&other.largest, &other.mean, &other.spread)
+            && *cap == other.cap
             && (grid, slabs, strays) == (&other.grid, &other.slabs, &other.strays)
             && (self.rough() || fans(spare) == fans(&other.spare))
             && (remembers, paired) == (&other.remembers, &other.paired)

@@ -29,6 +29,8 @@ pub(super) struct Slab {
     /// For how long all have been slow, in seconds, and whether they sleep.
     pub slow: f32,
     pub asleep: bool,
+    /// Whether a ball of it or of those beside it bounced just now.
+    pub again: bool,
     /// The rows that would leave their budget in this step, and those that were stopped.
     pub leaving: Vec<u32>,
     pub stopped: Vec<u32>,
@@ -58,6 +60,7 @@ impl Slab {
             speed: _,
             slow: _,
             asleep: _,
+            again: _,
             leaving,
             stopped,
         } = self;

@@ -13,9 +13,13 @@ use super::walls::{Balls, HalfSpace, half_spaces};
 use super::{Stage, Surroundings, Swarm, Tier, lying};
 use crate::math::{Vec3, length};
 
-/// The part of an overlap that a contact pushes out in a substep: less than that is still there
-/// when the next one comes, more makes neighbours push each other in turn.
-const PUSHED: f32 = 0.25;
+/// How stiff contacts are: at most so many oscillations a second, and as many times as much
+/// damping as stops them.
+const HERTZ: f32 = 60.0;
+const DAMPING: f32 = 10.0;
+/// How often bounces are looked for in a substep while any is found: in a gas hardly ever do five
+/// balls meet in one. What meets after that is stopped.
+const ROUNDS: usize = 4;
 /// For how long, in seconds, all balls of a slab lie still before they sleep.
 const FALL_ASLEEP: f32 = 0.5;
 
@@ -189,13 +193,13 @@ impl Swarm {
         // What gravity makes of rest in two steps is no impact.
         let speed = 2.0 * length(gravity) * dt;
         let restitution = self.model.material.restitution;
-        // What lies on others is borne by pushes of what gravity makes in a step; all else that
-        // overlaps is moved apart. Where nothing has weight, overlap makes no speed at all.
-        let soft = Soft { rate: PUSHED / h, fastest: speed };
+        // What lies on others is borne by pushes of what gravity makes in a few steps; all else
+        // that overlaps is moved apart. Where nothing has weight, overlap makes no speed at all.
+        let soft = soft(h, 2.0 * speed);
         let impact = Impact { speed, restitution, time: h, gravity: row(gravity), soft };
         let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > speed;
         for _ in 0..self.model.substeps {
-            self.pass(Pass::Impact(impact), faster);
+            self.bounce(impact, faster);
             observe(Stage::Integrate);
             self.drift(row(gravity * h), [0.0; 4]);
             self.hold_guests(row(gravity * h));
@@ -207,7 +211,46 @@ impl Swarm {
             self.hold_guests([0.0; 4]);
             observe(Stage::Restitute);
             self.pass(Pass::Relax(impact), |_, _| true);
+            self.keep_out();
         }
+    }
+
+    /// Lets bounce what meets, again where a bounce may have sent a ball on to the next one.
+    fn bounce(&mut self, impact: Impact, faster: impl Fn(&Slab, f32) -> bool + Sync) {
+        self.slabs.iter_mut().for_each(|slab| slab.again = true);
+        for _ in 0..ROUNDS {
+            self.pass(Pass::Impact(impact), |slab, next| slab.again && faster(slab, next));
+            let all = self.strays.pushes.bounced;
+            let bounced = |slab: Option<&Slab>| slab.is_some_and(|slab| slab.pushes.bounced);
+            let mut any = all;
+            for i in 0..self.slabs.len() {
+                let before = i.checked_sub(1).and_then(|i| self.slabs.get(i));
+                let [own, next] = [self.slabs.get(i), self.slabs.get(i + 1)];
+                let again = bounced(before) || bounced(own) || bounced(next);
+                any |= again;
+                self.slabs[i].again = all || again;
+            }
+            self.strays.pushes.bounced = false;
+            self.slabs.iter_mut().for_each(|slab| slab.pushes.bounced = false);
+            if !any {
+                break;
+            }
+        }
+    }
+
+    /// Moves out of walls what is in them. That comes last: whatever else moves balls apart,
+    /// nothing is pressed through a wall.
+    fn keep_out(&mut self) {
+        let (at, budget) = (Shared::new(&mut self.at), Shared::new(&mut self.budget));
+        let slabs = &self.slabs;
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            let slab = &slabs[slab];
+            for touch in slab.touches.iter().filter(|_| !slab.asleep) {
+                let row = touch.row as usize;
+                // SAFETY: a ball of the slab, and nobody works on others meanwhile.
+                unsafe { *budget.row(row) -= touch.keep_out(&mut *at.row(row)) };
+            }
+        });
     }
 
     /// Sees who falls asleep, who wakes, and who may leave its budget in this step.
@@ -318,8 +361,10 @@ impl Swarm {
                     unsafe {
                         let (at, velocity) = (columns.at.row(row), columns.velocity.row(row));
                         let spin = &mut *columns.spin.row(row);
-                        let way = touch.solve(pass, &mut *at, &mut *velocity, spin);
-                        *columns.budget.row(row) -= way;
+                        if let Some(way) = touch.solve(pass, &mut *at, &mut *velocity, spin) {
+                            *columns.budget.row(row) -= way;
+                            slab.pushes.bounced = true;
+                        }
                     }
                 }
             }
@@ -448,4 +493,13 @@ pub(super) fn listed(planes: &[HalfSpace], tier: Tier) -> &[HalfSpace] {
 
 fn row(vector: Vec3<f32>) -> Row {
     [vector.x, vector.y, vector.z, 0.0]
+}
+
+/// Springs that are as stiff as so short a step allows (Catto, `Solver2D`, 2024).
+fn soft(h: f32, fastest: f32) -> Soft {
+    let omega = 2.0 * std::f32::consts::PI * HERTZ.min(0.25 / h);
+    let a1 = 2.0 * DAMPING + h * omega;
+    let a2 = h * omega * a1;
+    let a3 = 1.0 / (1.0 + a2);
+    Soft { rate: omega / a1, fastest, mass: a2 * a3, back: a3 }
 }

@@ -56,24 +56,29 @@ impl Touch {
         set(at, xyz(at) + self.normal * overlap);
     }
 
-    /// A pass as for the pairs of balls. Says how far it moved the ball, in metres.
-    pub fn solve(&mut self, pass: Pass, at: &mut Row, velocity: &mut Row, spin: &mut Row) -> f32 {
+    /// Moves the ball out, but for what a contact bears. Says how far, in metres.
+    pub fn keep_out(&self, at: &mut Row) -> f32 {
+        // All of it: a wall gives way to nobody.
+        let overlap = (-self.gap(at) - at[3] * SLOP).max(0.0);
+        set(at, xyz(at) + self.normal * overlap);
+        overlap
+    }
+
+    /// A pass as for the pairs of balls. Says how far it moved the ball if that bounced, in metres.
+    pub fn solve(
+        &mut self,
+        pass: Pass,
+        at: &mut Row,
+        velocity: &mut Row,
+        spin: &mut Row,
+    ) -> Option<f32> {
         match pass {
-            Pass::Impact(impact) => {
-                return self.bounce(&impact, 0.0, at, velocity, spin).unwrap_or(0.0);
-            }
+            Pass::Impact(impact) => return self.bounce(&impact, at, velocity, spin),
             Pass::Begin => {
                 self.grip -= self.normal * self.grip.dot(self.normal);
                 self.hit(velocity, spin, self.pressure, self.grip);
             }
             Pass::Solve(impact) => {
-                if self.pressure == 0.0 {
-                    // It met another one before, and gravity was there already.
-                    let fall = -xyz(&impact.gravity).dot(self.normal) * impact.time;
-                    if let Some(way) = self.bounce(&impact, fall, at, velocity, spin) {
-                        return way;
-                    }
-                }
                 self.push(impact.time, Some(impact.soft), at, velocity, spin);
             }
             Pass::Relax(impact) => {
@@ -81,38 +86,33 @@ impl Touch {
                 if self.pressure > 0.0 || self.restitution == 0.0 || closing <= impact.speed {
                     self.push(impact.time, None, at, velocity, spin);
                 }
-                // All of it: a wall gives way to nobody.
-                let overlap = (-self.gap(at) - at[3] * SLOP).max(0.0);
-                set(at, xyz(at) + self.normal * overlap);
-                return overlap;
             }
         }
-        0.0
+        None
     }
 
-    /// Turns the ball back if it meets the wall, with the speed that it then has, less what
-    /// gravity made too early, in m/s. Says how far away that is, in metres.
+    /// Turns the ball back if it meets the wall, with the speed that it then has. Says how far away
+    /// that is, in metres.
     fn bounce(
         &self,
         impact: &Impact,
-        fall: f32,
         at: &mut Row,
         velocity: &mut Row,
         spin: &mut Row,
     ) -> Option<f32> {
         let relative = xyz(velocity) - self.surface;
         let closing = -relative.dot(self.normal);
-        let (gap, early) = (self.gap(at).max(0.0), closing - fall);
-        if self.restitution == 0.0 || early <= 0.0 || gap >= closing * impact.time {
+        let gap = self.gap(at).max(0.0);
+        if self.restitution == 0.0 || closing <= 0.0 || gap >= closing * impact.time {
             return None;
         }
         // Gravity works on the ball as far as it comes nearer.
-        let square = early * early - 2.0 * xyz(&impact.gravity).dot(self.normal) * gap;
+        let square = closing * closing - 2.0 * xyz(&impact.gravity).dot(self.normal) * gap;
         let meets = square.max(0.0).sqrt();
         if meets <= impact.speed {
             return None;
         }
-        let along = (closing + (meets * self.restitution - fall).max(0.0)) / velocity[3];
+        let along = (closing + meets * self.restitution) / velocity[3];
         let wish = self.sliding(relative, spin) * (-2.0 / 7.0 / velocity[3]);
         let across = held(wish, self.friction * along);
         set(at, xyz(at) - self.normal * gap);
@@ -141,7 +141,7 @@ impl Touch {
         let change = match soft {
             Some(soft) if gap <= 0.0 => {
                 let wish = (gap * soft.rate).max(-soft.fastest);
-                mass * (parting + wish)
+                mass * soft.mass * (parting + wish) + self.pressure * soft.back
             }
             _ => mass * (parting + gap.max(0.0) / time),
         };
