@@ -323,10 +323,11 @@ pub(super) struct Soft {
     pub back: f32,
 }
 
-/// So much of the sum of their radii two balls may overlap before they are moved apart: what lies
-/// in a heap is in each other by a few thousandths, which contacts push out, and every way that is
-/// moved counts until pairs are sought anew.
-pub(super) const SLOP: f32 = 1e-2;
+/// So much of the sum of their radii two balls may overlap before they are moved apart, and so much
+/// of its radius a ball may be in a wall: more than what bears a heap gets. (Contacts sink by
+/// a thousandth for each three balls on them; if that is moved out, they never come to rest.)
+pub(super) const SLOP: f32 = 0.05;
+pub(super) const WALL_SLOP: f32 = 0.1;
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.
 const PUSH: f32 = 0.5;

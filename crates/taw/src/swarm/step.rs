@@ -17,6 +17,8 @@ use crate::math::{Vec3, length};
 /// damping as stops them.
 const HERTZ: f32 = 60.0;
 const DAMPING: f32 = 10.0;
+/// How fast an overlap is pushed out at most: as fast as gravity makes a ball in so many seconds.
+const PUSHING: f32 = 0.3;
 /// How often bounces are looked for in a substep while any is found: in a gas hardly ever do five
 /// balls meet in one. What meets after that is stopped.
 const ROUNDS: usize = 4;
@@ -193,9 +195,9 @@ impl Swarm {
         // What gravity makes of rest in two steps is no impact.
         let speed = 2.0 * length(gravity) * dt;
         let restitution = self.model.material.restitution;
-        // What lies on others is borne by pushes of what gravity makes in a few steps; all else
+        // What lies on others is borne by pushes; all else
         // that overlaps is moved apart. Where nothing has weight, overlap makes no speed at all.
-        let soft = soft(h, 2.0 * speed);
+        let soft = soft(h, PUSHING * length(gravity));
         let impact = Impact { speed, restitution, time: h, gravity: row(gravity), soft };
         let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > speed;
         for _ in 0..self.model.substeps {

@@ -2,7 +2,7 @@
 
 use cgmath::InnerSpace;
 
-use super::kernels::{Impact, Pass, SLOP, Soft};
+use super::kernels::{Impact, Pass, Soft, WALL_SLOP};
 use super::lanes::Row;
 use crate::math::Vec3;
 
@@ -59,7 +59,7 @@ impl Touch {
     /// Moves the ball out, but for what a contact bears. Says how far, in metres.
     pub fn keep_out(&self, at: &mut Row) -> f32 {
         // All of it: a wall gives way to nobody.
-        let overlap = (-self.gap(at) - at[3] * SLOP).max(0.0);
+        let overlap = (-self.gap(at) - at[3] * WALL_SLOP).max(0.0);
         set(at, xyz(at) + self.normal * overlap);
         overlap
     }
