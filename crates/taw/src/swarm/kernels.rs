@@ -321,12 +321,11 @@ pub(super) struct Soft {
     /// so far it gives back.
     pub mass: f32,
     pub back: f32,
+    /// So much of the sum of their radii two balls may overlap before they are moved apart.
+    pub slop: f32,
 }
 
-/// So much of the sum of their radii two balls may overlap before they are moved apart, and so much
-/// of its radius a ball may be in a wall: more than what bears a heap gets. (Contacts sink by
-/// a thousandth for each three balls on them; if that is moved out, they never come to rest.)
-pub(super) const SLOP: f32 = 0.05;
+/// So much of its radius a ball may be in a wall: more than what bears a heap gets.
 pub(super) const WALL_SLOP: f32 = 0.1;
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.
@@ -487,9 +486,10 @@ impl Columns<'_> {
         [a, b]: [[L; 4]; 2],
         normal: V<L>,
         gap: L,
+        slop: f32,
     ) {
         let zero = L::splat(0.0);
-        let overlap = zero - gap - (at_a[3] + at_b[3]) * L::splat(SLOP);
+        let overlap = zero - gap - (at_a[3] + at_b[3]) * L::splat(slop);
         if overlap.above(zero) == 0 {
             return;
         }
@@ -597,7 +597,7 @@ impl Solve<'_> {
             }
             columns.hit::<L, ROUGH>(batch, [a, b], spins, normal, after - before, across);
             if !FIRST {
-                columns.part(batch, at, [a, b], normal, gap);
+                columns.part(batch, at, [a, b], normal, gap, soft.slop);
             }
         }
     }

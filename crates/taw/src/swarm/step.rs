@@ -19,6 +19,12 @@ const HERTZ: f32 = 60.0;
 const DAMPING: f32 = 10.0;
 /// How fast an overlap is pushed out at most: as fast as gravity makes a ball in so many seconds.
 const PUSHING: f32 = 0.3;
+/// So much of the sum of their radii two balls may overlap before they are moved apart: more than
+/// what bears a heap gets. (Contacts sink by a thousandth for each three balls on them; if that is
+/// moved out, they never come to rest.)
+const SLOP: f32 = 0.05;
+/// The same where nothing lies on anything: only so that balls that touch are left alone.
+const SLOP_WEIGHTLESS: f32 = 0.01;
 /// How often bounces are looked for in a substep while any is found: in a gas hardly ever do five
 /// balls meet in one. What meets after that is stopped.
 const ROUNDS: usize = 4;
@@ -197,7 +203,7 @@ impl Swarm {
         let restitution = self.model.material.restitution;
         // What lies on others is borne by pushes; all else
         // that overlaps is moved apart. Where nothing has weight, overlap makes no speed at all.
-        let soft = soft(h, PUSHING * length(gravity));
+        let soft = soft(h, length(gravity));
         let impact = Impact { speed, restitution, time: h, gravity: row(gravity), soft };
         let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > speed;
         for _ in 0..self.model.substeps {
@@ -498,10 +504,11 @@ fn row(vector: Vec3<f32>) -> Row {
 }
 
 /// Springs that are as stiff as so short a step allows (Catto, `Solver2D`, 2024).
-fn soft(h: f32, fastest: f32) -> Soft {
+fn soft(h: f32, gravity: f32) -> Soft {
     let omega = 2.0 * std::f32::consts::PI * HERTZ.min(0.25 / h);
     let a1 = 2.0 * DAMPING + h * omega;
     let a2 = h * omega * a1;
     let a3 = 1.0 / (1.0 + a2);
-    Soft { rate: omega / a1, fastest, mass: a2 * a3, back: a3 }
+    let slop = if gravity > 0.0 { SLOP } else { SLOP_WEIGHTLESS };
+    Soft { rate: omega / a1, fastest: PUSHING * gravity, mass: a2 * a3, back: a3, slop }
 }
