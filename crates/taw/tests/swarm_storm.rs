@@ -35,7 +35,7 @@ struct Scene {
 }
 
 fn scene(seed: u64) -> Scene {
-    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 77);
+    let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15) ^ 0x4d);
     (0..8).for_each(|_| _ = random.next());
     let count = (300_f32.powf(random.next()) * random.pick(&[1.0, 1.0, 6.0])) as usize;
     let tier = random.pick(&[Tier::Full, Tier::Full, Tier::Full, Tier::Lab]);
@@ -101,7 +101,7 @@ fn energy(scene: &Scene) -> f64 {
 /// What does not hold in a scene.
 fn fault(scene: &mut Scene) -> Option<String> {
     let full = scene.world.swarm.model().tier == Tier::Full;
-    let alone = scene.world.marbles.len() == 0;
+    let alone = scene.world.marbles.is_empty();
     let begin = energy(scene);
     for step in 0..90 {
         scene.world.step(DT).unwrap();
