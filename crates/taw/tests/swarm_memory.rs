@@ -69,4 +69,42 @@ fn memory_is_counted_and_a_step_asks_for_none() {
         println!("{tier:?}: {} bytes a ball, {} of them counted", held / 20_000, counted / 20_000);
         assert!(held.abs_diff(counted) < held / 20, "{held} bytes, {counted} of them counted");
     }
+    for tier in [Tier::Lab, Tier::Full] {
+        every_byte_of_a_copy_is_counted(tier);
+    }
+}
+
+/// A copy has no room to spare, so what it takes is known to the byte: with marbles, half-spaces,
+/// another wall and fast balls, so that every column is in use.
+fn every_byte_of_a_copy_is_counted(tier: Tier) {
+    let mut world = World::<f32>::default();
+    let model = SwarmModel { tier, threads: 2, ..SwarmModel::default() };
+    world.swarm.set_model(model).unwrap();
+    world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+    let box3 =
+        taw::shape::Box3 { min: Point3::new(-2.0, 0.0, -2.0), max: Point3::new(2.0, 1.0, 2.0) };
+    world.walls.insert(box3).unwrap();
+    let balls: Vec<_> = (0..1_000_u16)
+        .map(|i| {
+            let at = |cell: u16| f32::from(cell) - 4.5;
+            let velocity = Vec3::new(0.0, if i % 100 == 0 { -30.0 } else { 0.0 }, 0.0);
+            let place = Point3::new(at(i % 10), f32::from(i / 100) + 0.5, at(i / 10 % 10));
+            Ball { velocity, ..Ball::new(place, 0.4) }
+        })
+        .collect();
+    let ids = world.swarm.insert(&balls).unwrap();
+    for i in 0..50_u8 {
+        let place = Point3::new(f32::from(i) - 25.0, 12.0, 0.0);
+        world.marbles.insert(Marble::new(place, 0.4)).unwrap();
+    }
+    for step in 0..20 {
+        world.step(1.0 / 60.0).unwrap();
+        if step == 10 {
+            world.swarm.remove(&ids[..50]).unwrap();
+        }
+        let before = HELD.load(Ordering::Relaxed);
+        let copy = world.swarm.clone();
+        let held = HELD.load(Ordering::Relaxed) - before;
+        assert_eq!(held, copy.bytes(), "{tier:?} in step {step}");
+    }
 }

@@ -39,7 +39,7 @@ impl Meter {
         let begin = Instant::now();
         world.step(S::constant(dt)).expect("the suite's steps are above zero");
         self.time += begin.elapsed();
-        self.ball_steps += world.marbles.len() as u64;
+        self.ball_steps += (world.marbles.len() + world.swarm.len()) as u64;
     }
 
     /// Steps a world for so many seconds, in whole steps; gives how many seconds that

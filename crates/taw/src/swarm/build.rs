@@ -19,8 +19,11 @@ const FAR: f32 = 16.0;
 /// Where a ball has fewer pairs than this and they are sought again after fewer steps than this,
 /// the margin becomes up to so much wider.
 const SPARSE: f32 = 2.0;
-const SOON: u32 = 6;
+pub(super) const SOON: u32 = 6;
 const WIDEST: f32 = 6.0;
+/// How far balls that are not sought for alone may go, in radii: further they pass through each
+/// other.
+const WIDE: f32 = 2.0;
 
 impl Swarm {
     /// Seeks pairs anew.
@@ -40,7 +43,8 @@ impl Swarm {
         if self.paired {
             self.adapt_margin();
         }
-        let cap = self.margin();
+        self.cap = self.find_cap(dt);
+        let cap = self.cap;
         // The budgets make room for the order: they are set anew after that.
         let order = bytemuck::cast_slice_mut(&mut self.budget);
         self.grid.sort(&self.at, 2.0 * cap, threads, order, &mut self.spare);
@@ -58,6 +62,27 @@ impl Swarm {
     /// tier a heap is livelier, and a pair more costs less.
     fn margin(&self) -> f32 {
         self.mean * (1.0 + self.spread) * if self.rough() { 0.2 } else { 0.3 }
+    }
+
+    /// The margin, or as far as all but the fastest go in two steps, who are sought for alone: a
+    /// ball that goes further than others look for it would be found inside of them.
+    fn find_cap(&mut self, dt: f32) -> f32 {
+        let margin = self.margin();
+        if !self.rough() {
+            return margin;
+        }
+        let mut ways = std::mem::take(&mut self.ways);
+        ways.clear();
+        let way = |velocity: &[f32; 4]| 2.0 * squared(*velocity).sqrt() * dt;
+        ways.extend(self.velocity.iter().map(way).filter(|way| *way > margin));
+        let alone = super::strays::room(self.at.len());
+        let mut cap = margin;
+        if ways.len() > alone {
+            let nth = ways.len() - 1 - alone;
+            cap = *ways.select_nth_unstable_by(nth, f32::total_cmp).1;
+        }
+        self.ways = ways;
+        cap.min(WIDE * self.mean).max(margin)
     }
 
     /// Widens the margin where balls leave it soon although few are beside each other.
@@ -118,7 +143,7 @@ impl Swarm {
             return self.build(dt, walls, observe);
         }
         observe(Stage::Pairs);
-        let cap = self.margin();
+        let cap = self.cap;
         for row in rows {
             self.strays.add(*row);
             let at = *row as usize;

@@ -31,7 +31,7 @@ const HALVINGS_PER_LEVEL: usize = 2;
 const SAMPLE: usize = 1024;
 
 /// One level of cells.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Level {
     /// Cells per metre.
     per_metre: f32,
@@ -51,7 +51,7 @@ pub(super) struct Level {
 }
 
 /// See the module.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Grid {
     /// The sides of the scene, the longest first.
     axes: [usize; 3],
@@ -66,7 +66,7 @@ pub(super) struct Grid {
 }
 
 /// Some rows that follow each other, before they are in order.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Part {
     first: u32,
     /// The first cell that one of them is in, and the last one.
@@ -94,7 +94,8 @@ impl Level {
 impl Grid {
     pub fn bytes(&self) -> usize {
         let numbers = self.start.capacity() + self.sample.capacity();
-        numbers * size_of::<u32>() + self.parts.capacity() * size_of::<Part>()
+        let levels = self.levels.capacity() * size_of::<Level>();
+        levels + numbers * size_of::<u32>() + self.parts.capacity() * size_of::<Part>()
     }
 
     /// How many layers of level 0 there are.

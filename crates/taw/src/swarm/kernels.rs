@@ -13,15 +13,14 @@ pub(super) struct Pushes {
     pub pressure: Vec<[f32; LANES]>,
     /// Those across them.
     pub grip: Vec<[[f32; LANES]; 3]>,
-    /// Of the batches in which some bounce: which one, and how fast they shall part, in m/s.
-    pub rebound: Vec<(u32, [f32; LANES])>,
+    /// Whether any of them bounced in the last round.
+    pub bounced: bool,
 }
 
 impl Pushes {
     pub fn bytes(&self) -> usize {
         self.pressure.capacity() * size_of::<[f32; LANES]>()
             + self.grip.capacity() * size_of::<[[f32; LANES]; 3]>()
-            + self.rebound.capacity() * size_of::<(u32, [f32; LANES])>()
     }
 
     /// As many as there are batches, and none bears anything.
@@ -34,10 +33,6 @@ impl Pushes {
         }
         reset(&mut self.pressure, batches, [0.0; LANES]);
         reset(&mut self.grip, batches, [[0.0; LANES]; 3]);
-        // In a heap at rest few bounce.
-        self.rebound.clear();
-        self.rebound.shrink_to(batches / 16);
-        self.rebound.reserve_exact(batches / 16);
     }
 }
 
@@ -103,7 +98,7 @@ impl<L: Lanes> V<L> {
 
 /// The normal from the first to the second ball, and the gap between them.
 #[inline(always)]
-fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> (V<L>, L) {
+fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4], pair: impl Fn(usize) -> [u32; 2]) -> (V<L>, L) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let least = L::splat(f32::MIN_POSITIVE);
     let way = V::of(b).minus(V::of(a));
@@ -111,10 +106,34 @@ fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> (V<L>, L) {
     let distance = squared.sqrt();
     // Root and quotient do not wait for each other.
     let inverse = squared.pick_above(least, distance * (one / squared), zero);
-    let V([x, y, z]) = way.times(inverse);
-    // Where the centers coincide, any direction is as good as another.
-    let x = squared.pick_above(least, x, one);
-    (V([x, y, z]), distance - (a[3] + b[3]))
+    let mut normal = way.times(inverse);
+    if least.above(squared) != 0 {
+        // Where the centers coincide, any direction is as good as another; with the same for all,
+        // those at one point would come into a line.
+        let mut any = [[0.0; LANES]; 3];
+        for lane in 0..LANES {
+            let direction = direction(pair(lane));
+            for (axis, x) in any.iter_mut().zip(direction) {
+                axis[lane] = x;
+            }
+        }
+        let (V([x, y, z]), V([u, v, w])) = (normal, V::load(&any));
+        let pick = [(x, u), (y, v), (z, w)];
+        normal = V(pick.map(|(x, any)| squared.pick_above(least, x, any)));
+    }
+    (normal, distance - (a[3] + b[3]))
+}
+
+/// A direction for each pair of rows, spread over the sphere.
+#[cold]
+fn direction([a, b]: [u32; 2]) -> [f32; 3] {
+    let mixed = (a ^ b.rotate_left(16)).wrapping_mul(0x9e37_79b1);
+    let mixed = (mixed ^ mixed >> 15).wrapping_mul(0x85eb_ca77);
+    let part = |shift: u32| ((mixed >> shift & 0x3ff) as f32 - 511.5) / 511.5;
+    let [x, y, z] = [part(0), part(11), part(22)];
+    // No part is zero.
+    let length = (x * x + y * y + z * z).sqrt();
+    [x / length, y / length, z / length]
 }
 
 /// The rows of a column that the pairs of a batch are about.
@@ -150,7 +169,7 @@ impl Kernel for Displace<'_> {
     fn run<L: Lanes>(self) {
         for batch in self.batches {
             let [a, b] = gather::<L>(self.at, batch);
-            let (normal, overlap) = normal_and_overlap(&a, &b);
+            let (normal, overlap) = normal_and_overlap(&a, &b, |lane| batch.pair(lane));
             let by = normal.times(overlap * L::splat(0.5));
             let moved = [V::of(&a).minus(by).with(a[3]), V::of(&b).plus(by).with(b[3])];
             scatter(self.at, batch, moved);
@@ -160,8 +179,12 @@ impl Kernel for Displace<'_> {
 
 /// The normal from the first to the second ball, and how far they overlap.
 #[inline(always)]
-fn normal_and_overlap<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> (V<L>, L) {
-    let (normal, gap) = normal_and_gap(a, b);
+fn normal_and_overlap<L: Lanes>(
+    a: &[L; 4],
+    b: &[L; 4],
+    pair: impl Fn(usize) -> [u32; 2],
+) -> (V<L>, L) {
+    let (normal, gap) = normal_and_gap(a, b, pair);
     let zero = L::splat(0.0);
     (normal, (zero - gap).max(zero))
 }
@@ -221,7 +244,8 @@ impl Kernel for DisplaceFans<'_> {
                 // SAFETY: as above; no row but its own is twice in a fan.
                 unsafe {
                     let b = L::gather(ball, &after);
-                    let (normal, overlap) = normal_and_overlap(&a, &b);
+                    let pair = |lane: usize| [row, row + u32::from(after[lane])];
+                    let (normal, overlap) = normal_and_overlap(&a, &b, pair);
                     let overlap = overlap.first(count);
                     let hits = overlap.above(L::splat(0.0)).count_ones();
                     let by = normal.times(overlap * L::splat(PART[hits as usize]));
@@ -283,7 +307,10 @@ fn mass<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> L {
     sum.pick_above(zero, L::splat(1.0) / sum, zero)
 }
 
-/// How stiff a contact is (Catto, `Solver2D`, 2024: soft contacts).
+/// How what lies on others is borne: its overlap makes it part a little, which the pass after that
+/// takes back, though not what contacts have learned to bear. What they give back is what damps it:
+/// impulses that are applied again and corrected once a substep swing for a long time, and what
+/// pushes overlap out meanwhile makes them swing more (Catto, `Solver2D`, 2024: soft contacts).
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Soft {
     /// The part of an overlap that is to go per second.
@@ -294,7 +321,15 @@ pub(super) struct Soft {
     /// so far it gives back.
     pub mass: f32,
     pub back: f32,
+    /// So much of the sum of their radii two balls may overlap before they are moved apart.
+    pub slop: f32,
 }
+
+/// So much of its radius a ball may be in a wall: more than what bears a heap gets.
+pub(super) const WALL_SLOP: f32 = 0.1;
+/// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
+/// it goes no further than it should.
+const PUSH: f32 = 0.5;
 
 /// The columns that several threads work on.
 #[derive(Clone, Copy)]
@@ -305,10 +340,8 @@ pub(super) struct Columns<'a> {
     pub velocity: Shared<'a, Row>,
     /// Radius times spin, and nothing.
     pub spin: Shared<'a, Row>,
-}
-
-impl Soft {
-    const NOT: Self = Self { rate: 0.0, fastest: 0.0, mass: 1.0, back: 0.0 };
+    /// How far each ball may still go, in metres.
+    pub budget: Shared<'a, f32>,
 }
 
 /// One pass over the pairs for their impulses.
@@ -324,43 +357,50 @@ pub(super) struct Solve<'a> {
 /// What a pass does.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum Pass {
-    /// Sees what comes together faster than this, in m/s, and asks for this part of the speed
-    /// back.
-    Approach { speed: f32, restitution: f32 },
+    /// Lets bounce what meets in a substep and comes together fast enough.
+    Impact(Impact),
     /// Applies the impulses of the last substep again.
     Begin,
-    /// Lets nothing come nearer than the gap, within a substep of which this is the inverse, and
-    /// pushes overlap out.
-    Solve { soft: Soft, per_second: f32 },
-    /// The same but for the overlap.
-    Relax { per_second: f32 },
-    /// What came together bounces.
-    Bounce,
+    /// Lets nothing come nearer than the gap within a substep.
+    Solve(Impact),
+    /// The same once more, after the balls moved, and moves what overlaps apart. What bears nothing
+    /// and comes fast is left for the next bounce.
+    Relax(Impact),
+}
+
+/// What bounces, and how.
+///
+/// Bounces come before gravity and contacts, one pair after another, each by the velocities that
+/// the ones before it left: an impulse of at most twice what stops a pair adds no energy to it, so
+/// none of them does, in whatever order and however many meet at once (Guendelman, Bridson and
+/// Fedkiw, 2003, "Nonconvex rigid bodies with stacking"). What contacts remember is
+/// left out of it: a bounce comes once.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Impact {
+    /// What comes together more slowly is a contact, in m/s.
+    pub speed: f32,
+    /// The part of the speed that balls have afterwards.
+    pub restitution: f32,
+    /// How long a substep is, in seconds.
+    pub time: f32,
+    /// In m/s².
+    pub gravity: Row,
+    /// How contacts bear what lies on them.
+    pub soft: Soft,
 }
 
 impl Kernel for Solve<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         match (self.pass, self.friction) {
-            (Pass::Approach { speed, restitution }, Some(_)) => {
-                self.approach::<L>(speed, restitution);
-            }
-            (Pass::Bounce, Some(_)) => self.bounce::<L>(),
+            (Pass::Impact(impact), Some(friction)) => self.impact::<L>(impact, friction),
             (Pass::Begin, Some(_)) => self.begin::<L, true>(),
             (Pass::Begin, None) => self.begin::<L, false>(),
-            (Pass::Solve { soft, per_second }, Some(friction)) => {
-                self.solve::<L, true, true>(soft, per_second, friction);
-            }
-            (Pass::Solve { soft, per_second }, None) => {
-                self.solve::<L, false, true>(soft, per_second, 0.0);
-            }
-            (Pass::Relax { per_second }, Some(friction)) => {
-                self.solve::<L, true, false>(Soft::NOT, per_second, friction);
-            }
-            (Pass::Relax { per_second }, None) => {
-                self.solve::<L, false, false>(Soft::NOT, per_second, 0.0);
-            }
-            (Pass::Approach { .. } | Pass::Bounce, None) => (),
+            (Pass::Solve(impact), Some(friction)) => self.solve::<L, true, true>(impact, friction),
+            (Pass::Solve(impact), None) => self.solve::<L, false, true>(impact, 0.0),
+            (Pass::Relax(impact), Some(friction)) => self.solve::<L, true, false>(impact, friction),
+            (Pass::Relax(impact), None) => self.solve::<L, false, false>(impact, 0.0),
+            (Pass::Impact(_), None) => (),
         }
     }
 }
@@ -397,6 +437,75 @@ impl Columns<'_> {
         scatter(self.velocity, batch, velocity);
     }
 
+    /// Counts how far the balls of the pairs went.
+    #[inline(always)]
+    fn spend<L: Lanes>(&self, batch: &Batch, ways: [V<L>; 2]) {
+        let mut lengths = [[0.0; LANES]; 2];
+        for (lengths, way) in lengths.iter_mut().zip(ways) {
+            way.dot(way).sqrt().store(lengths);
+        }
+        for lane in 0..batch.count as usize {
+            for (row, lengths) in batch.pair(lane).into_iter().zip(&lengths) {
+                // SAFETY: as in `scatter`.
+                unsafe { *self.budget.row(row as usize) -= lengths[lane] };
+            }
+        }
+    }
+
+    /// Lets those pairs bounce that meet. Says whether any does.
+    #[inline(always)]
+    fn bounce<L: Lanes>(
+        &self,
+        batch: &Batch,
+        impact: &Impact,
+        friction: f32,
+        [at_a, at_b]: [[L; 4]; 2],
+        [a, b]: [[L; 4]; 2],
+    ) -> bool {
+        let zero = L::splat(0.0);
+        let (normal, closing) = meeting(impact, [&at_a, &at_b], [&a, &b]);
+        if closing.above(zero) == 0 {
+            return false;
+        }
+        let relative = V::of(&b).minus(V::of(&a));
+        let mass = mass(&a, &b);
+        let along = mass * closing * L::splat(1.0 + impact.restitution);
+        let spins = self.spins::<L, true>(batch);
+        let sliding = sliding(relative, normal, &spins);
+        let across = held(sliding.times(L::splat(-2.0 / 7.0) * mass), L::splat(friction) * along);
+        self.hit::<L, true>(batch, [a, b], spins, normal, along, across);
+        true
+    }
+
+    /// Moves apart what overlaps. That changes no velocity: overlap is not energy.
+    #[inline(always)]
+    fn part<L: Lanes>(
+        &self,
+        batch: &Batch,
+        [at_a, at_b]: [[L; 4]; 2],
+        [a, b]: [[L; 4]; 2],
+        normal: V<L>,
+        gap: L,
+        slop: f32,
+    ) {
+        let zero = L::splat(0.0);
+        let overlap = zero - gap - (at_a[3] + at_b[3]) * L::splat(slop);
+        if overlap.above(zero) == 0 {
+            return;
+        }
+        // Half each, whatever they weigh: a light ball that a heavy one presses on something has
+        // nowhere to go. What sleeps stays.
+        let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
+        let a = mobility(&a).pick_above(zero, one, zero);
+        let b = mobility(&b).pick_above(zero, one, zero);
+        let by = (a + b).pick_above(zero, push / (a + b), zero);
+        let ways = [normal.times(by * a), normal.times(by * b)];
+        let places =
+            [V::of(&at_a).minus(ways[0]).with(at_a[3]), V::of(&at_b).plus(ways[1]).with(at_b[3])];
+        scatter(self.at, batch, places);
+        self.spend(batch, ways);
+    }
+
     /// The spins of a batch, where there are any.
     #[inline(always)]
     fn spins<L: Lanes, const ROUGH: bool>(&self, batch: &Batch) -> [[L; 4]; 2] {
@@ -406,22 +515,15 @@ impl Columns<'_> {
 
 impl Solve<'_> {
     #[inline(always)]
-    fn approach<L: Lanes>(self, speed: f32, restitution: f32) {
+    fn impact<L: Lanes>(self, impact: Impact, friction: f32) {
         let Self { columns, batches, pushes, .. } = self;
-        let zero = L::splat(0.0);
-        pushes.rebound.clear();
-        for (batch, number) in batches.iter().zip(0..) {
-            let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, _) = normal_and_gap(&a, &b);
-            let [a, b] = gather::<L>(columns.velocity, batch);
-            let closing = V::of(&a).minus(V::of(&b)).dot(normal);
-            let rebound =
-                closing.pick_above(L::splat(speed), closing * L::splat(restitution), zero);
-            if rebound.above(zero) != 0 {
-                let mut speeds = [0.0; LANES];
-                rebound.store(&mut speeds);
-                pushes.rebound.push((number, speeds));
-            }
+        if impact.restitution == 0.0 {
+            return; // contacts stop what meets
+        }
+        for batch in batches {
+            let at = gather::<L>(columns.at, batch);
+            let velocity = gather::<L>(columns.velocity, batch);
+            pushes.bounced |= columns.bounce(batch, &impact, friction, at, velocity);
         }
     }
 
@@ -431,7 +533,7 @@ impl Solve<'_> {
         let Pushes { pressure, grip, .. } = pushes;
         for (i, batch) in batches.iter().enumerate() {
             let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, _) = normal_and_gap(&a, &b);
+            let (normal, _) = normal_and_gap(&a, &b, |lane| batch.pair(lane));
             let mut across = V([L::splat(0.0); 3]);
             if ROUGH {
                 // It was across the normal of the last substep.
@@ -446,26 +548,34 @@ impl Solve<'_> {
     }
 
     #[inline(always)]
-    fn solve<L: Lanes, const ROUGH: bool, const SOFT: bool>(
-        self,
-        soft: Soft,
-        per_second: f32,
-        friction: f32,
-    ) {
+    fn solve<L: Lanes, const ROUGH: bool, const FIRST: bool>(self, impact: Impact, friction: f32) {
         let Self { columns, batches, pushes, .. } = self;
         let Pushes { pressure, grip, .. } = pushes;
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let per_second = L::splat(per_second);
+        // Where nothing bounces, all is a contact.
+        let speed = if impact.restitution > 0.0 { impact.speed } else { f32::MAX };
+        let (zero, one, soft) = (L::splat(0.0), L::splat(1.0), impact.soft);
+        let (speed, per_second) = (L::splat(speed), L::splat(1.0 / impact.time));
         for (i, batch) in batches.iter().enumerate() {
-            let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, gap) = normal_and_gap(&a, &b);
-            let [a, b] = gather::<L>(columns.velocity, batch);
-            let [spin_a, spin_b] = columns.spins::<L, ROUGH>(batch);
+            let at = gather::<L>(columns.at, batch);
+            let (normal, gap) = normal_and_gap(&at[0], &at[1], |lane| batch.pair(lane));
+            let before = L::load(&pressure[i]);
+            let velocity = gather::<L>(columns.velocity, batch);
+            // What bears nothing and comes fast is no contact yet.
+            let closing = V::of(&velocity[0]).minus(V::of(&velocity[1])).dot(normal);
+            let fast = closing.pick_above(speed, one, zero);
+            let mut fresh = before.pick_above(zero, zero, fast);
+            if FIRST && fresh.above(zero) != 0 {
+                // What meets nevertheless is stopped: it may come so fast only because of impulses
+                // that were applied again, and are taken back by the contacts that bear them.
+                let (_, meets) = meeting(&impact, [&at[0], &at[1]], [&velocity[0], &velocity[1]]);
+                fresh = meets.pick_above(zero, zero, fresh);
+            }
+            let [a, b] = velocity;
             let relative = V::of(&b).minus(V::of(&a));
             let parting = relative.dot(normal);
+            let spins = columns.spins::<L, ROUGH>(batch);
             let mass = mass(&a, &b);
-            let before = L::load(&pressure[i]);
-            let change = if SOFT {
+            let change = if FIRST {
                 let pushed = (gap * L::splat(soft.rate)).max(L::splat(-soft.fastest));
                 let wish = gap.pick_above(zero, gap * per_second, pushed);
                 let part = gap.pick_above(zero, one, L::splat(soft.mass));
@@ -474,50 +584,65 @@ impl Solve<'_> {
             } else {
                 mass * (parting + gap.max(zero) * per_second)
             };
-            let after = (before - change).max(zero);
+            let after = (before - fresh.pick_above(zero, zero, change)).max(zero);
             after.store(&mut pressure[i]);
             let mut across = V([zero; 3]);
             if ROUGH {
-                // Of the two surfaces, across the normal.
-                let spin = V::of(&spin_a).plus(V::of(&spin_b));
-                let sliding = relative.minus(normal.times(parting)).minus(spin.cross(normal));
+                let sliding = sliding(relative, normal, &spins);
                 let old = V::<L>::load(&grip[i]);
-                let held = old.minus(sliding.times(mass * L::splat(2.0 / 7.0)));
-                let most = L::splat(friction) * after;
-                let size = held.dot(held).sqrt();
-                let part = most / size.max(L::splat(f32::MIN_POSITIVE));
-                let held = held.times(size.pick_above(most, part, one));
+                let wish = old.minus(sliding.times(mass * L::splat(2.0 / 7.0)));
+                let held = held(wish, L::splat(friction) * after);
                 held.store(&mut grip[i]);
                 across = held.minus(old);
             }
-            let spins = [spin_a, spin_b];
             columns.hit::<L, ROUGH>(batch, [a, b], spins, normal, after - before, across);
+            if !FIRST {
+                columns.part(batch, at, [a, b], normal, gap, soft.slop);
+            }
         }
     }
+}
 
-    #[inline(always)]
-    fn bounce<L: Lanes>(self) {
-        let Self { columns, batches, pushes, .. } = self;
-        let Pushes { pressure, rebound, .. } = pushes;
-        let zero = L::splat(0.0);
-        for (number, rebound) in rebound {
-            let i = *number as usize;
-            let (batch, speed) = (&batches[i], L::load(rebound));
-            let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, _) = normal_and_gap(&a, &b);
-            let [a, b] = gather::<L>(columns.velocity, batch);
-            let parting = V::of(&b).minus(V::of(&a)).dot(normal);
-            let before = L::load(&pressure[i]);
-            // Only what has met, and once.
-            let wish = before.pick_above(zero, speed - parting, zero);
-            let wish = speed.pick_above(zero, wish, zero);
-            before.pick_above(zero, zero, speed).store(rebound);
-            let after = (before + wish * mass(&a, &b)).max(zero);
-            after.store(&mut pressure[i]);
-            let none = [[zero; 4]; 2];
-            columns.hit::<L, false>(batch, [a, b], none, normal, after - before, V([zero; 3]));
-        }
-    }
+/// Which pairs meet within a substep: the normal then, and how fast they come together, or zero for
+/// those that do not meet or too slowly.
+#[inline(always)]
+fn meeting<L: Lanes>(
+    impact: &Impact,
+    [at_a, at_b]: [&[L; 4]; 2],
+    [a, b]: [&[L; 4]; 2],
+) -> (V<L>, L) {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let way = V::of(at_b).minus(V::of(at_a));
+    let relative = V::of(b).minus(V::of(a));
+    let reach = at_a[3] + at_b[3];
+    let approach = zero - way.dot(relative);
+    // Where a sphere as wide as both meets a point.
+    let apart = (way.dot(way) - reach * reach).max(zero);
+    let square = approach * approach - relative.dot(relative) * apart;
+    let time = approach.pick_above(zero, apart / (approach + square.max(zero).sqrt()), zero);
+    let then = way.plus(relative.times(time));
+    let length = then.dot(then).sqrt();
+    let inverse = length.pick_above(zero, one / length, zero);
+    let normal = then.times(inverse);
+    let closing = zero - relative.dot(normal);
+    let closing = closing.pick_above(L::splat(impact.speed), closing, zero);
+    let closing = square.pick_above(zero, closing, zero);
+    (normal, L::splat(impact.time).pick_above(time, closing, zero))
+}
+
+/// How fast the surfaces of two balls slide over each other.
+#[inline(always)]
+fn sliding<L: Lanes>(relative: V<L>, normal: V<L>, [a, b]: &[[L; 4]; 2]) -> V<L> {
+    let spin = V::of(a).plus(V::of(b));
+    relative.minus(normal.times(relative.dot(normal))).minus(spin.cross(normal))
+}
+
+/// The most of an impulse that friction bears.
+#[inline(always)]
+fn held<L: Lanes>(wish: V<L>, most: L) -> V<L> {
+    let size = wish.dot(wish).sqrt();
+    let part = most / size.max(L::splat(f32::MIN_POSITIVE));
+    wish.times(size.pick_above(most, part, L::splat(1.0)))
 }
 
 /// Faster than this, in m/s, or further out, in metres, a ball is no longer a ball: squares of

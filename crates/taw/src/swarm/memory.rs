@@ -19,7 +19,7 @@ struct Kept {
 }
 
 /// See the module.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Memory {
     /// Where each row's pairs begin, and after the last row, one place further.
     start: Vec<u32>,

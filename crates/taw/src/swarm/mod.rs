@@ -84,12 +84,17 @@ pub struct Swarm {
     /// The largest radius, and the mean of all.
     largest: f32,
     mean: f32,
+    /// How far a ball goes at most that is not sought for alone, since pairs were sought, in
+    /// metres.
+    cap: f32,
     grid: Grid,
     slabs: Vec<Slab>,
     /// The pairs of the fastest balls.
     strays: Strays,
     /// The rows that would leave their budget in this step.
     leaving: Vec<u32>,
+    /// How far the fast balls go; only while pairs are sought.
+    ways: Vec<f32>,
     memory: Memory,
     /// For each row, the one that it was when the memory was made, if it was then.
     before: Vec<u32>,
@@ -322,24 +327,53 @@ impl Swarm {
         fn of<T>(column: &Vec<T>) -> usize {
             column.capacity() * size_of::<T>()
         }
-        of(&self.at)
-            + of(&self.velocity)
-            + of(&self.spin)
-            + of(&self.budget)
-            + of(&self.way)
-            + of(&self.before)
-            + of(&self.spare)
-            + self.lists.iter().map(of).sum::<usize>()
-            + of(&self.lists)
-            + of(&self.slab_states)
-            + self.ids.bytes()
-            + self.grid.bytes()
-            + self.memory.bytes()
-            + self.searches.iter().map(Search::bytes).sum::<usize>()
-            + self.slabs.iter().map(Slab::bytes).sum::<usize>()
-            + self.strays.bytes()
-            + of(&self.leaving)
-            + of(&self.slabs)
+        // All are named, so that none is left out.
+        let Self {
+            model: _,
+            instructions: _,
+            ids,
+            at,
+            velocity,
+            spin,
+            budget,
+            way,
+            largest: _,
+            mean: _,
+            cap: _,
+            grid,
+            slabs,
+            strays,
+            leaving,
+            ways,
+            memory,
+            before,
+            remembers: _,
+            paired: _,
+            walled: _,
+            gravity: _,
+            planes,
+            stopped,
+            invited,
+            guests,
+            guest_rows,
+            guest_slots,
+            spare,
+            lists,
+            slab_states,
+            searches,
+            rebuilds: _,
+            steps_since_build: _,
+            spread: _,
+        } = self;
+        let rows = [at, velocity, spin, spare].map(of);
+        let numbers = [budget, way, ways].map(of);
+        let names = [leaving, before, stopped, guest_rows, slab_states].map(of);
+        rows.into_iter().chain(numbers).chain(names).sum::<usize>()
+            + (of(slabs) + slabs.iter().map(Slab::bytes).sum::<usize>())
+            + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
+            + (of(lists) + lists.iter().map(of).sum::<usize>())
+            + (of(planes) + of(invited) + of(guests) + of(guest_slots))
+            + (ids.bytes() + grid.bytes() + memory.bytes() + strays.bytes())
     }
 
     /// Whether there is friction, bounce and spin.
@@ -443,15 +477,63 @@ fn retain<T: Copy>(column: &mut Vec<T>, kept: &[bool]) {
 }
 
 impl PartialEq for Swarm {
-    /// Whether they will go on alike: what is only scribbled on does not count, nor do threads.
+    /// Whether they will go on alike, bit by bit: what is only scribbled on does not count, nor do
+    /// threads and instructions.
     fn eq(&self, other: &Self) -> bool {
-        self.model.tier == other.model.tier
-            && self.model.substeps == other.model.substeps
-            && self.model.material == other.model.material
-            && self.at == other.at
-            && self.velocity == other.velocity
-            && self.spin == other.spin
-            && self.ids == other.ids
+        // All are named, so that none is left out.
+        let Self {
+            model,
+            instructions: _,
+            ids,
+            at,
+            velocity,
+            spin,
+            budget,
+            way,
+            largest,
+            mean,
+            cap,
+            grid,
+            slabs,
+            strays,
+            leaving: _,
+            ways: _,
+            memory,
+            before,
+            remembers,
+            paired,
+            walled,
+            gravity,
+            planes,
+            stopped,
+            invited,
+            guests,
+            guest_rows: _,
+            guest_slots,
+            spare,
+            lists: _,
+            slab_states: _,
+            searches: _,
+            rebuilds,
+            steps_since_build,
+            spread,
+        } = self;
+        let alone = |model: SwarmModel| SwarmModel { threads: 1, ..model };
+        // The fans are in it.
+        let fans = |spare| bytemuck::cast_slice::<Row, u32>(spare);
+        (alone(*model), ids, gravity) == (alone(other.model), &other.ids, &other.gravity)
+            && (at, velocity, spin) == (&other.at, &other.velocity, &other.spin)
+            && (budget, way, before) == (&other.budget, &other.way, &other.before)
+            && (largest, mean, spread) == (&other.largest, &other.mean, &other.spread)
+            && *cap == other.cap
+            && (grid, slabs, strays) == (&other.grid, &other.slabs, &other.strays)
+            && (self.rough() || fans(spare) == fans(&other.spare))
+            && (remembers, paired) == (&other.remembers, &other.paired)
+            && (!remembers || *memory == other.memory)
+            && (walled, planes) == (&other.walled, &other.planes)
+            && (invited, guests) == (&other.invited, &other.guests)
+            && (guest_slots, stopped) == (&other.guest_slots, &other.stopped)
+            && (rebuilds, steps_since_build) == (&other.rebuilds, &other.steps_since_build)
     }
 }
 

@@ -35,6 +35,11 @@ pub(super) fn pairs_in(batches: &[Batch]) -> usize {
 const OPEN: usize = 32;
 /// How far before the first pair of a batch a later one may lie.
 const BEFORE: u32 = 1 << 14;
+/// How many pairs are listed at most, for each ball on average, and besides. A ball has six pairs
+/// with those of its size that touch it, and some more within the margin; only balls inside of each
+/// other have more, and part as well if each is pushed by so many of the others at a time.
+const PAIRS: usize = 64;
+const MORE_PAIRS: usize = 4096;
 /// More than any ball is away from another, and its square is finite.
 const FAR: f32 = 1e18;
 
@@ -76,6 +81,8 @@ pub(super) struct Filler<'a> {
     busy: &'a mut [u32],
     open: &'a mut [Batch; OPEN],
     batches: &'a mut Vec<Batch>,
+    /// How many more pairs may be listed.
+    left: usize,
 }
 
 fn filler<'a>(
@@ -86,10 +93,30 @@ fn filler<'a>(
 ) -> Filler<'a> {
     busy.clear();
     busy.resize(balls.next_power_of_two(), 0);
-    Filler { busy, open, batches }
+    Filler { busy, open, batches, left: MORE_PAIRS }
 }
 
 impl Filler<'_> {
+    /// Makes room for the pairs of a ball; says how many of so many there is room for.
+    #[inline(always)]
+    pub fn spend(&mut self, pairs: usize) -> usize {
+        self.make_room(1);
+        self.spend_only(pairs)
+    }
+
+    /// Makes room for the pairs of so many balls.
+    pub fn make_room(&mut self, balls: usize) {
+        self.left += PAIRS * balls;
+    }
+
+    /// Says how many of so many pairs there is room for.
+    #[inline(always)]
+    pub fn spend_only(&mut self, pairs: usize) -> usize {
+        let count = pairs.min(self.left);
+        self.left -= count;
+        count
+    }
+
     #[inline(always)]
     pub fn add(&mut self, a: u32, b: u32) {
         let busy = *self.busy(a) | *self.busy(b);
@@ -168,21 +195,25 @@ trait Sink {
     /// A ball and some that come after it. Balls are named in order; those without any may be
     /// left out.
     fn fan(&mut self, ball: u32, near: &[u32]);
-    /// One more pair, in its order.
-    fn pair(&mut self, a: u32, b: u32);
+    /// A ball and some that come before or after it.
+    fn around(&mut self, ball: u32, near: &[u32]);
 }
 
 impl Sink for Filler<'_> {
     #[inline(always)]
     fn fan(&mut self, ball: u32, near: &[u32]) {
-        for other in near {
+        let count = self.spend(near.len());
+        for other in &near[..count] {
             self.add(ball, *other);
         }
     }
 
     #[inline(always)]
-    fn pair(&mut self, a: u32, b: u32) {
-        self.add(a, b);
+    fn around(&mut self, ball: u32, near: &[u32]) {
+        let count = self.spend(near.len());
+        for other in &near[..count] {
+            self.add(ball.min(*other), ball.max(*other));
+        }
     }
 }
 
@@ -239,6 +270,7 @@ impl Sink for FanFiller<'_> {
     #[inline(always)]
     fn fan(&mut self, ball: u32, near: &[u32]) {
         debug_assert!(self.next <= ball);
+        let near = &near[..self.filler.spend(near.len())];
         self.skip_to(ball);
         // The rows from this one on need a number each. The others come in order.
         let room = self.list.len() - self.filled - (self.end - ball) as usize;
@@ -259,8 +291,8 @@ impl Sink for FanFiller<'_> {
     }
 
     #[inline(always)]
-    fn pair(&mut self, a: u32, b: u32) {
-        self.filler.add(a, b);
+    fn around(&mut self, ball: u32, near: &[u32]) {
+        self.filler.around(ball, near);
     }
 }
 
@@ -427,9 +459,7 @@ fn across<L: Lanes>(
                     around.add(from.max(first), to.min(last));
                 }
             }
-            for other in around.near::<L>(small, 0) {
-                sink.pair(small.min(*other), small.max(*other));
-            }
+            sink.around(small, around.near::<L>(small, 0));
         }
     }
 }

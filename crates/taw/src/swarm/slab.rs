@@ -8,7 +8,7 @@ use super::touch::Touch;
 /// Some layers of the grid, as much as one thread works on at a time. Pairs of its balls, among
 /// themselves and with those of the next slab, are its own; so two slabs that are not neighbours
 /// have no ball in common.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Slab {
     /// The first layer, and the one after the last.
     pub layers: [u32; 2],
@@ -29,6 +29,8 @@ pub(super) struct Slab {
     /// For how long all have been slow, in seconds, and whether they sleep.
     pub slow: f32,
     pub asleep: bool,
+    /// Whether a ball of it or of those beside it bounced just now.
+    pub again: bool,
     /// The rows that would leave their budget in this step, and those that were stopped.
     pub leaving: Vec<u32>,
     pub stopped: Vec<u32>,
@@ -45,14 +47,28 @@ impl Slab {
     }
 
     pub fn bytes(&self) -> usize {
-        self.batches.capacity() * size_of::<Batch>()
-            + self.pushes.bytes()
-            + (self.touches.capacity() + self.old_touches.capacity()) * size_of::<Touch>()
-            + (self.near_planes.capacity()
-                + self.leaving.capacity()
-                + self.near_shapes.capacity()
-                + self.stopped.capacity())
-                * size_of::<u32>()
+        let Self {
+            layers: _,
+            rows: _,
+            batches,
+            pairs: _,
+            pushes,
+            touches,
+            old_touches,
+            near_planes,
+            near_shapes,
+            speed: _,
+            slow: _,
+            asleep: _,
+            again: _,
+            leaving,
+            stopped,
+        } = self;
+        let names = [near_planes, near_shapes, leaving, stopped].map(Vec::capacity);
+        batches.capacity() * size_of::<Batch>()
+            + pushes.bytes()
+            + (touches.capacity() + old_touches.capacity()) * size_of::<Touch>()
+            + names.iter().sum::<usize>() * size_of::<u32>()
     }
 
     /// Where its fans are in the list of all.

@@ -1,8 +1,9 @@
 //! The three verbs of a swarm.
 
+use super::build::SOON;
 use super::kernels::{
-    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Pass, Predict, Soft, Solve,
-    squared,
+    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Impact, Pass, Predict,
+    Soft, Solve, squared,
 };
 use super::lanes::Row;
 use super::slab::Slab;
@@ -16,8 +17,17 @@ use crate::math::{Vec3, length};
 /// damping as stops them.
 const HERTZ: f32 = 60.0;
 const DAMPING: f32 = 10.0;
-/// How fast an overlap is pushed out at most, in m/s.
-const FASTEST_PUSH: f32 = 3.0;
+/// How fast an overlap is pushed out at most: as fast as gravity makes a ball in so many seconds.
+const PUSHING: f32 = 0.3;
+/// So much of the sum of their radii two balls may overlap before they are moved apart: more than
+/// what bears a heap gets. (Contacts sink by a thousandth for each three balls on them; if that is
+/// moved out, they never come to rest.)
+const SLOP: f32 = 0.05;
+/// The same where nothing lies on anything: only so that balls that touch are left alone.
+const SLOP_WEIGHTLESS: f32 = 0.01;
+/// How often bounces are looked for in a substep while any is found: in a gas hardly ever do five
+/// balls meet in one. What meets after that is stopped.
+const ROUNDS: usize = 4;
 /// For how long, in seconds, all balls of a slab lie still before they sleep.
 const FALL_ASLEEP: f32 = 0.5;
 
@@ -32,7 +42,7 @@ impl Swarm {
         observe: &mut dyn FnMut(Stage),
     ) {
         self.stopped.clear();
-        self.steps_since_build = self.steps_since_build.saturating_add(1);
+        self.steps_since_build = (self.steps_since_build + 1).min(SOON);
         if self.gravity != Some(gravity) {
             self.gravity = Some(gravity);
             self.wake_all();
@@ -188,26 +198,67 @@ impl Swarm {
         self.look_at_walls(walls, dt);
         let substeps = self.model.substeps as f32;
         let h = dt / substeps;
-        let per_second = 1.0 / h;
-        let soft = soft(h);
-        let bounce = 2.0 * length(gravity) * dt;
+        // What gravity makes of rest in two steps is no impact.
+        let speed = 2.0 * length(gravity) * dt;
         let restitution = self.model.material.restitution;
-        let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > bounce;
-        self.pass(Pass::Approach { speed: bounce, restitution }, faster);
+        // What lies on others is borne by pushes; all else
+        // that overlaps is moved apart. Where nothing has weight, overlap makes no speed at all.
+        let soft = soft(h, length(gravity));
+        let impact = Impact { speed, restitution, time: h, gravity: row(gravity), soft };
+        let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > speed;
         for _ in 0..self.model.substeps {
+            self.bounce(impact, faster);
             observe(Stage::Integrate);
             self.drift(row(gravity * h), [0.0; 4]);
             self.hold_guests(row(gravity * h));
             observe(Stage::Restitute);
             self.pass(Pass::Begin, |_, _| true);
-            self.pass(Pass::Solve { soft, per_second }, |_, _| true);
+            self.pass(Pass::Solve(impact), |_, _| true);
             observe(Stage::Integrate);
             self.drift([0.0; 4], [h, h, h, 0.0]);
             self.hold_guests([0.0; 4]);
             observe(Stage::Restitute);
-            self.pass(Pass::Relax { per_second }, |_, _| true);
-            self.pass(Pass::Bounce, faster);
+            self.pass(Pass::Relax(impact), |_, _| true);
+            self.keep_out();
         }
+    }
+
+    /// Lets bounce what meets, again where a bounce may have sent a ball on to the next one.
+    fn bounce(&mut self, impact: Impact, faster: impl Fn(&Slab, f32) -> bool + Sync) {
+        self.slabs.iter_mut().for_each(|slab| slab.again = true);
+        for _ in 0..ROUNDS {
+            self.pass(Pass::Impact(impact), |slab, next| slab.again && faster(slab, next));
+            let all = self.strays.pushes.bounced;
+            let bounced = |slab: Option<&Slab>| slab.is_some_and(|slab| slab.pushes.bounced);
+            let mut any = all;
+            for i in 0..self.slabs.len() {
+                let before = i.checked_sub(1).and_then(|i| self.slabs.get(i));
+                let [own, next] = [self.slabs.get(i), self.slabs.get(i + 1)];
+                let again = bounced(before) || bounced(own) || bounced(next);
+                any |= again;
+                self.slabs[i].again = all || again;
+            }
+            self.strays.pushes.bounced = false;
+            self.slabs.iter_mut().for_each(|slab| slab.pushes.bounced = false);
+            if !any {
+                break;
+            }
+        }
+    }
+
+    /// Moves out of walls what is in them. That comes last: whatever else moves balls apart,
+    /// nothing is pressed through a wall.
+    fn keep_out(&mut self) {
+        let (at, budget) = (Shared::new(&mut self.at), Shared::new(&mut self.budget));
+        let slabs = &self.slabs;
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            let slab = &slabs[slab];
+            for touch in slab.touches.iter().filter(|_| !slab.asleep) {
+                let row = touch.row as usize;
+                // SAFETY: a ball of the slab, and nobody works on others meanwhile.
+                unsafe { *budget.row(row) -= touch.keep_out(&mut *at.row(row)) };
+            }
+        });
     }
 
     /// Sees who falls asleep, who wakes, and who may leave its budget in this step.
@@ -270,11 +321,11 @@ impl Swarm {
     /// Changes velocities and moves the balls that are awake.
     fn drift(&mut self, change: Row, time: Row) {
         let instructions = self.instructions;
-        let budget = Shared::new(&mut self.budget);
         let columns = Columns {
             at: Shared::new(&mut self.at),
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
+            budget: Shared::new(&mut self.budget),
         };
         let slabs = Shared::new(&mut self.slabs);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
@@ -286,7 +337,7 @@ impl Swarm {
             let (rows, first) = (slab.own_rows(), slab.rows[0]);
             let (at, velocity, budget) = unsafe {
                 let at = columns.at.part(rows.clone());
-                (at, columns.velocity.part(rows.clone()), budget.part(rows))
+                (at, columns.velocity.part(rows.clone()), columns.budget.part(rows))
             };
             for touch in &mut slab.touches {
                 touch.drift(time[0]);
@@ -317,7 +368,11 @@ impl Swarm {
                     // SAFETY: a ball of the slab.
                     unsafe {
                         let (at, velocity) = (columns.at.row(row), columns.velocity.row(row));
-                        touch.solve(pass, &*at, &mut *velocity, &mut *columns.spin.row(row));
+                        let spin = &mut *columns.spin.row(row);
+                        if let Some(way) = touch.solve(pass, &mut *at, &mut *velocity, spin) {
+                            *columns.budget.row(row) -= way;
+                            slab.pushes.bounced = true;
+                        }
                     }
                 }
             }
@@ -326,6 +381,7 @@ impl Swarm {
             at: Shared::new(&mut self.at),
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
+            budget: Shared::new(&mut self.budget),
         };
         let Strays { batches, pushes, .. } = &mut strays;
         instructions.run(Solve { pass, columns, batches, pushes, friction });
@@ -339,6 +395,7 @@ impl Swarm {
             at: Shared::new(&mut self.at),
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
+            budget: Shared::new(&mut self.budget),
         };
         let slabs = Shared::new(&mut self.slabs);
         let (threads, states) = (self.model.threads as usize, &mut self.slab_states);
@@ -447,10 +504,11 @@ fn row(vector: Vec3<f32>) -> Row {
 }
 
 /// Springs that are as stiff as so short a step allows (Catto, `Solver2D`, 2024).
-fn soft(h: f32) -> Soft {
+fn soft(h: f32, gravity: f32) -> Soft {
     let omega = 2.0 * std::f32::consts::PI * HERTZ.min(0.25 / h);
     let a1 = 2.0 * DAMPING + h * omega;
     let a2 = h * omega * a1;
     let a3 = 1.0 / (1.0 + a2);
-    Soft { rate: omega / a1, fastest: FASTEST_PUSH, mass: a2 * a3, back: a3 }
+    let slop = if gravity > 0.0 { SLOP } else { SLOP_WEIGHTLESS };
+    Soft { rate: omega / a1, fastest: PUSHING * gravity, mass: a2 * a3, back: a3, slop }
 }

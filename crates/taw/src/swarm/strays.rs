@@ -14,7 +14,7 @@ const PART: usize = 500;
 const SOME: usize = 32;
 
 /// See the module.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Strays {
     /// Their rows, in order, and a bit for each row.
     pub rows: Vec<u32>,
@@ -28,11 +28,16 @@ pub(super) struct Strays {
     sorted: Vec<u32>,
 }
 
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct Bore {
     pair: [u32; 2],
     pressure: f32,
     grip: [f32; 3],
+}
+
+/// How many there may be at most, among so many balls.
+pub(super) fn room(balls: usize) -> usize {
+    SOME + balls / PART
 }
 
 impl Strays {
@@ -43,7 +48,7 @@ impl Strays {
 
     /// How many more there may be, among so many balls.
     pub fn room(&self, balls: usize) -> usize {
-        (SOME + balls / PART).saturating_sub(self.rows.len())
+        room(balls).saturating_sub(self.rows.len())
     }
 
     /// Forgets all, in a swarm of so many.
@@ -90,6 +95,7 @@ impl Strays {
                 .rows
                 .iter()
                 .fold(0.0_f32, |most, row| most.max(at[*row as usize][3] + budget[*row as usize]));
+            filler.make_room(at.len());
             for stray in &self.rows {
                 self.beside(*stray, grid, at, budget, largest + cap, &mut filler);
             }
@@ -101,7 +107,7 @@ impl Strays {
                 let reach = at[*a as usize][3] + budget[*a as usize];
                 let far = x(a) + reach + widest;
                 for b in self.sorted[i + 1..].iter().take_while(|b| x(b) <= far) {
-                    if near(*a, *b, at, budget) {
+                    if near(*a, *b, at, budget) && filler.spend_only(1) == 1 {
                         filler.add(*a.min(b), *a.max(b));
                     }
                 }
@@ -134,7 +140,10 @@ impl Strays {
                 for row in low[1]..=high[1] {
                     let line = level.cell(grid, layer, row, 0);
                     for other in grid.first(line + low[2])..grid.first(line + high[2] + 1) {
-                        if !self.has(other) && near(stray, other, at, budget) {
+                        if !self.has(other)
+                            && near(stray, other, at, budget)
+                            && filler.spend_only(1) == 1
+                        {
                             filler.add(stray.min(other), stray.max(other));
                         }
                     }

@@ -2,7 +2,7 @@
 
 use cgmath::InnerSpace;
 
-use super::kernels::{Pass, Soft};
+use super::kernels::{Impact, Pass, Soft, WALL_SLOP};
 use super::lanes::Row;
 use crate::math::Vec3;
 
@@ -21,10 +21,9 @@ pub(super) struct Touch {
     pub surface: Vec3<f32>,
     pub friction: f32,
     pub restitution: f32,
-    /// The impulses, in N s, and how fast it shall part, in m/s.
+    /// The impulses, in N s.
     pub pressure: f32,
     pub grip: Vec3<f32>,
-    pub rebound: f32,
 }
 
 fn xyz(row: &Row) -> Vec3<f32> {
@@ -33,6 +32,12 @@ fn xyz(row: &Row) -> Vec3<f32> {
 
 fn set(row: &mut Row, to: Vec3<f32>) {
     [row[0], row[1], row[2]] = to.into();
+}
+
+/// The most of an impulse that friction bears.
+fn held(wish: Vec3<f32>, most: f32) -> Vec3<f32> {
+    let size = wish.magnitude();
+    if size > most { wish * (most / size) } else { wish }
 }
 
 impl Touch {
@@ -51,44 +56,86 @@ impl Touch {
         set(at, xyz(at) + self.normal * overlap);
     }
 
-    /// A pass as for the pairs of balls.
-    pub fn solve(&mut self, pass: Pass, at: &Row, velocity: &mut Row, spin: &mut Row) {
+    /// Moves the ball out, but for what a contact bears. Says how far, in metres.
+    pub fn keep_out(&self, at: &mut Row) -> f32 {
+        // All of it: a wall gives way to nobody.
+        let overlap = (-self.gap(at) - at[3] * WALL_SLOP).max(0.0);
+        set(at, xyz(at) + self.normal * overlap);
+        overlap
+    }
+
+    /// A pass as for the pairs of balls. Says how far it moved the ball if that bounced, in metres.
+    pub fn solve(
+        &mut self,
+        pass: Pass,
+        at: &mut Row,
+        velocity: &mut Row,
+        spin: &mut Row,
+    ) -> Option<f32> {
         match pass {
-            Pass::Approach { speed, .. } => {
-                let closing = -(xyz(velocity) - self.surface).dot(self.normal);
-                self.rebound = if closing > speed { closing * self.restitution } else { 0.0 };
-            }
+            Pass::Impact(impact) => return self.bounce(&impact, at, velocity, spin),
             Pass::Begin => {
                 self.grip -= self.normal * self.grip.dot(self.normal);
                 self.hit(velocity, spin, self.pressure, self.grip);
             }
-            Pass::Solve { soft, per_second } => {
-                self.push(Some(soft), per_second, at, velocity, spin);
+            Pass::Solve(impact) => {
+                self.push(impact.time, Some(impact.soft), at, velocity, spin);
             }
-            Pass::Relax { per_second } => self.push(None, per_second, at, velocity, spin),
-            Pass::Bounce => {
-                if self.rebound > 0.0 && self.pressure > 0.0 {
-                    let parting = (xyz(velocity) - self.surface).dot(self.normal);
-                    let change = (self.rebound - parting) / velocity[3];
-                    let pressure = (self.pressure + change).max(0.0);
-                    let change = pressure - self.pressure;
-                    (self.pressure, self.rebound) = (pressure, 0.0);
-                    self.hit(velocity, spin, change, Vec3::new(0.0, 0.0, 0.0));
+            Pass::Relax(impact) => {
+                let closing = -(xyz(velocity) - self.surface).dot(self.normal);
+                if self.pressure > 0.0 || self.restitution == 0.0 || closing <= impact.speed {
+                    self.push(impact.time, None, at, velocity, spin);
                 }
             }
         }
+        None
     }
 
+    /// Turns the ball back if it meets the wall, with the speed that it then has. Says how far away
+    /// that is, in metres.
+    fn bounce(
+        &self,
+        impact: &Impact,
+        at: &mut Row,
+        velocity: &mut Row,
+        spin: &mut Row,
+    ) -> Option<f32> {
+        let relative = xyz(velocity) - self.surface;
+        let closing = -relative.dot(self.normal);
+        let gap = self.gap(at).max(0.0);
+        if self.restitution == 0.0 || closing <= 0.0 || gap >= closing * impact.time {
+            return None;
+        }
+        // Gravity works on the ball as far as it comes nearer.
+        let square = closing * closing - 2.0 * xyz(&impact.gravity).dot(self.normal) * gap;
+        let meets = square.max(0.0).sqrt();
+        if meets <= impact.speed {
+            return None;
+        }
+        let along = (closing + meets * self.restitution) / velocity[3];
+        let wish = self.sliding(relative, spin) * (-2.0 / 7.0 / velocity[3]);
+        let across = held(wish, self.friction * along);
+        set(at, xyz(at) - self.normal * gap);
+        self.hit(velocity, spin, along, across);
+        Some(gap)
+    }
+
+    /// How fast the ball's surface slides over the wall's, in m/s.
+    fn sliding(&self, relative: Vec3<f32>, spin: &Row) -> Vec3<f32> {
+        let parting = self.normal * relative.dot(self.normal);
+        relative - parting - xyz(spin).cross(self.normal)
+    }
+
+    /// Lets the ball come no nearer than the gap within so many seconds.
     fn push(
         &mut self,
+        time: f32,
         soft: Option<Soft>,
-        per_second: f32,
         at: &Row,
         velocity: &mut Row,
         spin: &mut Row,
     ) {
-        let gap = self.gap(at);
-        let mass = 1.0 / velocity[3];
+        let (gap, mass) = (self.gap(at), 1.0 / velocity[3]);
         let relative = xyz(velocity) - self.surface;
         let parting = relative.dot(self.normal);
         let change = match soft {
@@ -96,17 +143,13 @@ impl Touch {
                 let wish = (gap * soft.rate).max(-soft.fastest);
                 mass * soft.mass * (parting + wish) + self.pressure * soft.back
             }
-            _ => mass * (parting + gap.max(0.0) * per_second),
+            _ => mass * (parting + gap.max(0.0) / time),
         };
         let pressure = (self.pressure - change).max(0.0);
         let along = pressure - self.pressure;
         self.pressure = pressure;
-        let sliding = relative - self.normal * parting - xyz(spin).cross(self.normal);
-        let mut grip = self.grip - sliding * (mass * (2.0 / 7.0));
-        let (most, size) = (self.friction * pressure, grip.magnitude());
-        if size > most {
-            grip *= most / size;
-        }
+        let wish = self.grip - self.sliding(relative, spin) * (mass * (2.0 / 7.0));
+        let grip = held(wish, self.friction * pressure);
         let across = grip - self.grip;
         self.grip = grip;
         self.hit(velocity, spin, along, across);

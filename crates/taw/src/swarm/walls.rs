@@ -26,7 +26,7 @@ pub(crate) trait Surroundings: Sync {
 }
 
 /// A half-space.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct HalfSpace {
     wall: u32,
     pub normal: Vec3<f32>,
@@ -161,8 +161,7 @@ impl Slab {
                     Touch::new(*row, [wall, part], normal, offset, [friction, restitution]);
                 touch.is_plane = false;
                 if let Some(same) = find(old, &touch) {
-                    (touch.pressure, touch.grip, touch.rebound) =
-                        (same.pressure, same.grip, same.rebound);
+                    (touch.pressure, touch.grip) = (same.pressure, same.grip);
                 }
                 self.touches.push(touch);
             });
@@ -279,7 +278,6 @@ impl Touch {
             restitution,
             pressure: 0.0,
             grip: Vec3::zero(),
-            rebound: 0.0,
         }
     }
 

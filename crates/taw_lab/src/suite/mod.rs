@@ -10,6 +10,7 @@ mod granular;
 mod impacts;
 mod numbers;
 mod rolling;
+mod swarms;
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
@@ -159,7 +160,6 @@ pub fn measure(rows: &[&'static Row], jobs: usize, mut tell: impl FnMut(&'static
 
 /// Every row, in the order of `references.md`.
 pub fn rows() -> impl Iterator<Item = &'static Row> {
-    [rolling::ROWS, bouncing::ROWS, impacts::ROWS, gas::ROWS, granular::ROWS, numbers::ROWS]
-        .into_iter()
-        .flatten()
+    let families = [rolling::ROWS, bouncing::ROWS, impacts::ROWS, gas::ROWS, granular::ROWS];
+    families.into_iter().chain([swarms::ROWS, numbers::ROWS]).flatten()
 }
