@@ -370,21 +370,7 @@ impl<S: Scalar> World<S> {
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
         self.release_what_touches_nothing();
         self.count_contacts();
-        self.inverse_mass.clear();
-        if matches!(self.model.response, Response::Impulse | Response::Penalty(_)) {
-            let masses = (0..self.marbles.len()).map(|row| self.marbles.mass(row));
-            self.inverse_mass.extend(masses.map(|mass| S::one() / mass));
-        }
-        let removals = [self.walls.removals(), self.marbles.removals()];
-        if self.warm_removals != removals {
-            self.forget_contacts();
-            self.warm_removals = removals;
-        }
-        self.held.clear();
-        if self.model.rotation == Rotation::Dynamic && self.marbles.has_held() {
-            self.held.extend((0..self.marbles.len()).map(|row| self.marbles.is_held(row)));
-        }
-        self.marbles.rods(self.model.rotation, &mut self.rods);
+        self.look_at_marbles();
         let (mut columns, material, integrator) =
             self.marbles.columns(&self.inverse_mass, &self.held, &self.rods);
         if self.model.rotation != Rotation::Dynamic {
@@ -473,6 +459,26 @@ impl<S: Scalar> World<S> {
         self.limits.apply(&mut self.marbles);
         self.count_after();
         Ok(())
+    }
+
+    /// Brings up to date what a response asks of marbles: masses, who is held, what is long;
+    /// and forgets contacts whose rows are no longer theirs.
+    fn look_at_marbles(&mut self) {
+        self.inverse_mass.clear();
+        if matches!(self.model.response, Response::Impulse | Response::Penalty(_)) {
+            let masses = (0..self.marbles.len()).map(|row| self.marbles.mass(row));
+            self.inverse_mass.extend(masses.map(|mass| S::one() / mass));
+        }
+        let removals = [self.walls.removals(), self.marbles.removals()];
+        if self.warm_removals != removals {
+            self.forget_contacts();
+            self.warm_removals = removals;
+        }
+        self.held.clear();
+        if self.model.rotation == Rotation::Dynamic && self.marbles.has_held() {
+            self.held.extend((0..self.marbles.len()).map(|row| self.marbles.is_held(row)));
+        }
+        self.marbles.rods(self.model.rotation, &mut self.rods);
     }
 
     /// Forgets what contacts remember from substep to substep.

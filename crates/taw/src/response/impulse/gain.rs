@@ -225,7 +225,7 @@ impl<S: Scalar> Columns<'_, S> {
     ) {
         self.count(constraints, islands, ledgers);
         let half = S::constant(0.5);
-        for c in constraints.iter() {
+        for c in constraints {
             let ledger = &mut ledgers[c.island as usize];
             let island = islands.of(c);
             let faster = self.closing_of(c) - c.begin;

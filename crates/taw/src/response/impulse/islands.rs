@@ -28,6 +28,7 @@ pub(super) struct Islands<S> {
 
 /// A group of marbles that touch each other, while it is solved.
 #[derive(Clone, Copy, Debug)]
+#[expect(clippy::struct_excessive_bools, reason = "each is a question of its own")]
 pub(super) struct Island<S> {
     /// Units of energy, so that squares do not vanish: 1/kg and m/s.
     mobility: S,

@@ -271,20 +271,20 @@ where
         if self.stands(row) { S::zero() } else { (self.follow)(row) * self.settings.dt }
     }
 
-    /// The mean over the marbles of a contact.
-    fn mean(&self, a: First, b: usize, of: impl Fn(usize) -> S) -> S {
-        a.marble().map_or_else(|| of(b), |a| (of(a) + of(b)) * S::constant(0.5))
-    }
-
     /// The time for which a gap follows a change of its speed, in seconds.
     fn follows(&self, a: First, b: usize) -> S {
-        self.mean(a, b, |row| self.follows_row(row))
+        mean(a, b, |row| self.follows_row(row))
     }
 
     /// By how much the velocities that the integrator keeps are ahead of those of the path, in
     /// seconds.
     fn ahead(&self, c: &Constraint<S>) -> S {
-        let follow = self.mean(c.a, c.b, |row| (self.follow)(row));
+        let follow = mean(c.a, c.b, |row| (self.follow)(row));
         (follow - S::constant(0.5)) * self.settings.dt
     }
+}
+
+/// The mean over the marbles of a contact.
+fn mean<S: Scalar>(a: First, b: usize, of: impl Fn(usize) -> S) -> S {
+    a.marble().map_or_else(|| of(b), |a| (of(a) + of(b)) * S::constant(0.5))
 }

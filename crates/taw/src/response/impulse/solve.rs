@@ -2,7 +2,7 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::islands::Islands;
+use super::islands::{Island, Islands};
 use super::{Constraint, Settings};
 use crate::math::{Scalar, Vec3, is_finite, length};
 use crate::response::Columns;
@@ -141,7 +141,7 @@ impl<S: Scalar> Columns<'_, S> {
     /// Sums up, for each island that searches, how far it is best to go along the way, which
     /// the marbles have gone.
     fn look_along_the_way(&self, constraints: &[Constraint<S>], islands: &mut Islands<S>) {
-        islands.list.iter_mut().for_each(|island| island.begin_way());
+        islands.list.iter_mut().for_each(Island::begin_way);
         for c in constraints {
             let Some(island) = islands.searching(c) else { continue };
             island.count_way(c, c.wanted - self.wanted(c));
