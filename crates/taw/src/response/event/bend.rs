@@ -20,7 +20,16 @@ use crate::shape::Nearest;
 /// its fifth power.
 const BEND: f64 = 0.02;
 /// A step is not shorter than this part of a substep.
-pub(super) const SHORTEST: f64 = 1.0 / 4096.0;
+const SHORTEST: f64 = 1.0 / 4096.0;
+/// After so many steps in one substep a ball takes longer ones, twice as long each time that it
+/// took [`PATIENCE`] more, so that it comes to the end. So many go over 2.5 radians, and over
+/// more borders of faces than one substep has for what it should show.
+const MOST_STEPS: u32 = 128;
+/// Thus 12 times as many steps more end every substep.
+const PATIENCE: u32 = 8;
+/// Over a way shorter than this part of the radius a ball is where it was: its direction is
+/// rounding, and nothing bends otherwise.
+const NO_WAY: f64 = 1e-9;
 /// How far beside a point, over the radius, the normal is looked at again to see how it turns.
 /// The rounding of one over the other is a hundred billionth.
 const BESIDE: f64 = 1e-5;
@@ -40,6 +49,8 @@ pub(super) struct Ground<'a> {
     pub radius: f64,
     pub spins: BallSpin,
     pub material: Material<f64>,
+    /// No step is shorter, in seconds.
+    pub shortest: f64,
     /// What it cost, in looks.
     pub looks: Cell<u64>,
 }
@@ -273,11 +284,11 @@ impl Ground<'_> {
     }
 
     /// Takes a slip that is hardly one, and puts the ball where it touches.
-    pub fn settled(&self, mut state: State, dt: f64) -> Option<State> {
+    pub fn settled(&self, mut state: State) -> Option<State> {
         let touch = self.touch(&state)?;
         let grip = self.give() * touch.material.friction * touch.pressure.max(0.0);
         // What friction takes in less than a shortest step: a step more would turn it around.
-        if touch.slip.magnitude() <= 2.0 * SHORTEST * grip * dt {
+        if touch.slip.magnitude() <= 2.0 * self.shortest * grip {
             let part = touch.slip / self.give();
             state.velocity -= part;
             if self.spins == BallSpin::Free {
@@ -288,46 +299,55 @@ impl Ground<'_> {
     }
 
     /// Goes on from where a ball touches, for `left` seconds at most.
-    pub fn step(&self, start: &State, left: f64, dt: f64) -> Option<Step> {
+    pub fn step(&self, start: &State, left: f64) -> Option<Step> {
         let touch = self.touch(start)?;
         if touch.pressure <= 0.0 {
             return None;
         }
         let regime = self.regime(&touch, start.spin);
         let rate = self.rate(start, regime)?;
-        let mut length = self.longest(start, &touch, rate).max(SHORTEST * dt).min(left);
-        if regime == Regime::Slides && !touch.slip.is_zero() {
-            length = length.min(self.until_it_grips(start, &touch, rate).max(SHORTEST * dt));
+        let shortest = self.shortest.min(left);
+        let mut length = self.longest(start, &touch, rate).clamp(shortest, left);
+        if regime == Regime::Slides && !touch.slip.is_zero() && touch.material.friction > 0.0 {
+            length = length.min(self.until_it_grips(start, &touch, rate).max(shortest));
         }
         let end = |length: f64| self.kutta(start, length, regime);
-        let bends = self.curvature(start, 1.0);
+        let mut state = end(length)?;
         // A step ends where one face, edge or corner does, for the next one bends otherwise.
-        let same = |length: f64| {
-            let back = end(length).map_or(0.0, |end| self.curvature(&end, -1.0));
-            (back - bends).abs() * self.radius <= CORNER
-        };
-        let shortest = (SHORTEST * dt).min(left);
-        if length > shortest && !same(length) {
-            length = halve(length, same)[1].max(shortest);
+        if length > shortest && !self.bends_alike(start, &state, &touch) {
+            let alike =
+                |length: f64| end(length).is_some_and(|end| self.bends_alike(start, &end, &touch));
+            length = halve(length, alike)[1].max(shortest);
+            state = end(length)?;
         }
-        let lasts = |length: f64| {
-            end(length).and_then(|end| self.touch(&end)).is_some_and(|t| t.pressure > 0.0)
-        };
-        let leaves = !lasts(length);
+        let presses = |end: &State| self.touch(end).is_some_and(|touch| touch.pressure > 0.0);
+        let leaves = !presses(&state);
         if leaves {
             // Just after, so that nothing presses it there any more.
-            length = halve(length, lasts)[1];
+            length = halve(length, |length| end(length).is_some_and(|end| presses(&end)))[1];
+            state = end(length)?;
         }
-        Some(Step { end: State { time: start.time + length, ..end(length)? }, leaves })
+        Some(Step { end: State { time: start.time + length, ..state }, leaves })
     }
 
-    /// How the surface bends where a ball goes, or comes from, in 1/m.
-    fn curvature(&self, state: &State, forward: f64) -> f64 {
-        let (number, Nearest { normal, .. }) = self.nearest(state.position, state.time);
-        let Some(wall) = self.walls.get(number) else { return 0.0 };
-        let over = state.velocity - wall.way(state.position, state.time);
-        let Some((way, _)) = direction_and_length(over) else { return 0.0 };
-        self.turning(state.position, state.time, normal, way * forward).magnitude()
+    /// Whether a ball that went from one place to another is still on the same face, edge or
+    /// corner: it bends there as here, along the way between.
+    fn bends_alike(&self, start: &State, end: &State, touch: &Touch) -> bool {
+        let Some(wall) = self.walls.get(touch.wall) else { return true };
+        let dt = end.time - start.time;
+        let way = end.position - start.position - wall.way(start.position, start.time) * dt;
+        let Some((way, far)) = direction_and_length(way) else { return true };
+        far <= NO_WAY * self.radius
+            || (self.curvature(end, -way) - self.curvature(start, way)).abs() * self.radius
+                <= CORNER
+    }
+
+    /// How the surface bends from where a ball is that way, in 1/m.
+    fn curvature(&self, state: &State, way: Vec3<f64>) -> f64 {
+        let normal = self.nearest(state.position, state.time).1.normal;
+        let way = way - normal * way.dot(normal);
+        let Some((way, _)) = direction_and_length(way) else { return 0.0 };
+        self.turning(state.position, state.time, normal, way).magnitude()
     }
 
     /// How long a step may be for the normal to turn by little.
@@ -380,6 +400,12 @@ impl Ground<'_> {
         end.velocity += normal * (way - end.velocity).dot(normal);
         Some(end)
     }
+}
+
+/// The shortest step of a ball that took so many in this substep, in seconds.
+pub(super) fn shortest_step(steps: u32, dt: f64) -> f64 {
+    let longer = steps.saturating_sub(MOST_STEPS) / PATIENCE;
+    (SHORTEST * dt * f64::from(1_u32 << longer.min(12))).min(dt)
 }
 
 /// The last time before a condition ends, which holds at zero and not at `hi`, and the first

@@ -4,7 +4,7 @@ use std::cell::Cell;
 
 use cgmath::{InnerSpace, Zero};
 
-use super::bend::{Ground, SHORTEST, State};
+use super::bend::{Ground, State, shortest_step};
 use super::support::Support;
 use super::{Ball, EventDriven, FLUSH, Form, LOOK, REST, Settings};
 use crate::math::Vec3;
@@ -80,7 +80,7 @@ impl EventDriven {
     pub(super) fn pressure(&self, row: usize, wall: usize, time: f64, pull: Vec3<f64>) -> f64 {
         let mut ball = self.balls[row];
         let near = [wall as u32];
-        let ground = Ground { pull, ..ground(&self.walls, &near, &ball) };
+        let ground = Ground { pull, ..ground(&self.walls, &near, &ball, 0.0) };
         ball.position = ball.position_at(time);
         ball.velocity = ball.velocity_at(time);
         ball.path.begin = time;
@@ -94,7 +94,9 @@ impl EventDriven {
         let even = self.is_even(support);
         let near = if even { vec![support as u32] } else { self.may_lie_on(row, support) };
         let Self { balls, walls, .. } = self;
-        let ground = ground(walls, &near, &balls[row]);
+        let shortest = shortest_step(balls[row].path.steps, settings.dt);
+        balls[row].path.steps += u32::from(!even);
+        let ground = ground(walls, &near, &balls[row], shortest);
         let state = State::of(&balls[row]);
         balls[row].path.stamp += 1;
         let looks = &mut self.looks;
@@ -165,7 +167,8 @@ impl EventDriven {
             let far = LOOK * ball.radius;
             let look = (far / over).min((far / stretch.acceleration.magnitude()).sqrt());
             duration = duration.min(look.max(LOOK * settings.dt)).min(settings.dt - now);
-            let shortest = (SHORTEST * settings.dt).min(duration);
+            duration = duration.max(ground.shortest).min(settings.dt - now);
+            let shortest = ground.shortest.min(duration);
             duration = end_of_face(ground, ball, normal, duration).max(shortest);
         }
         let ends = now + duration;
@@ -175,12 +178,12 @@ impl EventDriven {
     /// On what bends it is integrated. False if nothing presses it there.
     fn go_round(ground: &Ground, ball: &mut Ball, settings: &Settings) -> bool {
         let (start, dt) = (State::of(ball), settings.dt);
-        let Some(start) = ground.settled(start, dt) else { return false };
+        let Some(start) = ground.settled(start) else { return false };
         let left = dt - start.time;
         if left <= 0.0 {
             return true;
         }
-        let Some(step) = ground.step(&start, left, dt) else { return false };
+        let Some(step) = ground.step(&start, left) else { return false };
         (ball.velocity, ball.spin) = (start.velocity, start.spin);
         let length = step.end.time - start.time;
         if length > 0.0 {
@@ -203,9 +206,9 @@ impl Ball {
     }
 }
 
-fn ground<'a>(walls: &'a [super::Wall], near: &'a [u32], ball: &Ball) -> Ground<'a> {
+fn ground<'a>(walls: &'a [super::Wall], near: &'a [u32], ball: &Ball, shortest: f64) -> Ground<'a> {
     let Ball { pull, radius, spins, material, .. } = *ball;
-    Ground { walls, near, pull, radius, spins, material, looks: Cell::new(0) }
+    Ground { walls, near, pull, radius, spins, material, shortest, looks: Cell::new(0) }
 }
 
 /// After which part of a time a ball that goes straight comes to the end of the face that it

@@ -151,6 +151,8 @@ pub(crate) struct Path {
     /// How often it was brought to rest because it had too many. Each time it takes twice
     /// the energy to wake it.
     surrenders: i32,
+    /// How many steps it took in this substep over what is no half-space.
+    steps: u32,
     /// When its acceleration changes by itself.
     change: f64,
     /// Counts its paths, so that what was foreseen of an old one is known to be void.
@@ -179,6 +181,7 @@ impl Default for Path {
             losses: 0.0,
             collided: f64::NEG_INFINITY,
             surrenders: 0,
+            steps: 0,
             change: f64::INFINITY,
             stamp: 0,
             home: Home::Anywhere,
@@ -259,6 +262,7 @@ impl Ball {
             losses: self.path.losses,
             collided: self.path.collided,
             surrenders: self.path.surrenders,
+            steps: self.path.steps,
             home: self.path.home,
             ..Path::default()
         };
