@@ -58,6 +58,7 @@ fn cone<S: Scalar>(sides: u32, draw: &mut Draw) -> Mesh<S> {
     Mesh::new(points, sides).unwrap()
 }
 
+#[expect(clippy::too_many_lines, reason = "one scene, drawn from top to bottom")]
 fn scene<S: Scalar>(seed: u64) -> Scene<S> {
     let mut draw = Draw(seed);
     let mut world = World::<S>::default();

@@ -309,6 +309,8 @@ impl<S: Scalar> World<S> {
             let row = row as usize;
             let time = self.sweep.stopped[row].unwrap_or(S::one());
             self.marbles.stop_on_the_way(&mut self.sweep, row, By::Marble(other), time);
+            // Rounding may leave a gap.
+            self.sweep.grazes.push(((row as u32).min(other), (row as u32).max(other)));
         }
         for (row, change) in changes {
             self.marbles.velocity[row as usize] += change;
@@ -331,10 +333,10 @@ impl<S: Scalar> Marbles<S> {
     /// Puts a marble back to a part of its way in this substep, to what its forces had made of
     /// its velocity by then.
     fn stop_on_the_way(&mut self, sweep: &mut Sweep<S>, row: usize, by: By, time: S) {
-        let rest = S::one() - time;
-        let way = (self.position[row] - sweep.start[row]) * rest;
-        let change = (self.velocity[row] - sweep.velocity[row]) * rest;
-        self.position[row] -= way;
+        let (start, end) = (sweep.start[row], self.position[row]);
+        self.position[row] = start + (end - start) * time;
+        let way = end - self.position[row];
+        let change = (self.velocity[row] - sweep.velocity[row]) * (S::one() - time);
         self.velocity[row] -= change;
         sweep.stops.push(Stopped { row: row as u32, by, way, change });
         sweep.stands.resize(sweep.start.len(), false);

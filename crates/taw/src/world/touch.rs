@@ -174,8 +174,8 @@ impl<S: Scalar> World<S> {
         if self.sweep.grazes.is_empty() || self.model.response != Response::Impulse {
             return;
         }
-        let listed: HashSet<_> = self.contacts.mm.iter().map(|c| (c.a, c.b)).collect();
-        for (a, b) in self.sweep.grazes.drain(..).filter(|pair| !listed.contains(pair)) {
+        let mut listed: HashSet<_> = self.contacts.mm.iter().map(|c| (c.a, c.b)).collect();
+        for (a, b) in self.sweep.grazes.drain(..).filter(|pair| listed.insert(*pair)) {
             let (along, mtv) = ([S::zero(); 2], Vec3::zero());
             self.contacts.mm.push(Contact { a, b, part: 0, along, mtv });
         }

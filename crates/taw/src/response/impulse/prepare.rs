@@ -102,7 +102,9 @@ impl<S: Scalar> Columns<'_, S> {
             resistance: self.resistance(a, b, material),
         };
         constraint.begin_turning = self.turning(&constraint);
-        if fast && gap < S::zero() && dt > S::zero() {
+        // What was stopped on its way touches, whatever rounding says.
+        let stands = around.stands(b) || a.marble().is_some_and(|a| around.stands(a));
+        if fast && (gap < S::zero() || stands) && dt > S::zero() {
             let since = self.since(&constraint, gap, around);
             // Unless it is back on the ground before the substep ends.
             let pull = self.pull(&constraint, around);
