@@ -335,11 +335,17 @@ impl Ground<'_> {
     fn bends_alike(&self, start: &State, end: &State, touch: &Touch) -> bool {
         let Some(wall) = self.walls.get(touch.wall) else { return true };
         let dt = end.time - start.time;
+        let over = |at: &State| at.velocity - wall.way(at.position, at.time);
         let way = end.position - start.position - wall.way(start.position, start.time) * dt;
-        let Some((way, far)) = direction_and_length(way) else { return true };
-        far <= NO_WAY * self.radius
-            || (self.curvature(end, -way) - self.curvature(start, way)).abs() * self.radius
-                <= CORNER
+        let far = way.magnitude();
+        if far <= NO_WAY * self.radius {
+            return true;
+        }
+        // From rest it goes where it comes to.
+        let begins = over(start);
+        let begins = if begins.magnitude() * dt < 1e-3 * far { way } else { begins };
+        let bends = self.curvature(end, -over(end)) - self.curvature(start, begins);
+        bends.abs() * self.radius <= CORNER
     }
 
     /// How the surface bends from where a ball is that way, in 1/m.
