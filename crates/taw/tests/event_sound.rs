@@ -347,7 +347,8 @@ fn hopper<S: Scalar>(askew: f64, substeps: u32) -> World<S> {
     plane(vector(0.0, askew, 1.0), -0.012);
     plane(vector(0.0, 0.0, -1.0), -0.012);
     for side in [-1.0, 1.0] {
-        let turn = AxisAngle::new(vector(0.0, 0.0, 1.0), S::constant(-side * 0.785_398_163_4));
+        let turn =
+            AxisAngle::new(vector(0.0, 0.0, 1.0), S::constant(-side * std::f64::consts::FRAC_PI_4));
         let center = point(0.145 * side, 0.1, 0.0);
         let half = vector(0.01, 0.15, 0.025);
         world.walls.insert(Obb::new(center, turn.unwrap().into(), half).unwrap()).unwrap();
@@ -475,7 +476,7 @@ fn a_thousand_at_one_point_end_their_step() {
         world.step(DT as f32).unwrap();
         let (took, stopped) = (begin.elapsed(), world.stopped().count());
         println!("step {step}: {took:?}, {stopped} stopped");
-        assert!(took < Duration::from_secs(60), "{took:?}");
+        assert!(took < Duration::from_mins(1), "{took:?}");
     }
 }
 

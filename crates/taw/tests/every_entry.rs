@@ -153,7 +153,7 @@ fn each_row_is_refused_or_harmless<S: Scalar>() {
             for (x, case) in
                 nasty().into_iter().flat_map(|x| (0..row.cases).map(move |case| (x, case)))
             {
-                if goes_from_event_to_event(model, &row, x) {
+                if goes_from_event_to_event(model, x) {
                     continue;
                 }
                 count += 1;
@@ -171,9 +171,9 @@ fn each_row_is_refused_or_harmless<S: Scalar>() {
 
 /// Whether so much at once would bring a collision every few nanoseconds, which this response
 /// goes through one by one up to its cap of millions: half a minute for a step.
-fn goes_from_event_to_event<S: Scalar>(model: Model, row: &Row<S>, x: S) -> bool {
+fn goes_from_event_to_event<S: Scalar>(model: Model, x: S) -> bool {
     let huge = x.is_finite() && x.abs() > S::constant(1e20);
-    model.response == Response::EventDriven && row.scope == Scope::World && huge
+    model.response == Response::EventDriven && huge
 }
 
 /// Does it, with this number, and says what is wrong with what comes of it.
