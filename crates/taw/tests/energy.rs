@@ -74,6 +74,25 @@ fn a_ball_leaves_a_corner_no_faster_than_it_came() {
     }
 }
 
+/// Friction above 1 on both walls: what the ball presses on one, it turns into pressure on the
+/// other, without end.
+#[test]
+fn a_ball_that_two_walls_jam_is_not_lifted_out_with_energy() {
+    let bouncing = ([0.0, -0.960_654, 0.933_467], 0.05, [0.0, -0.214_353, 1.789_525], [0.0; 3]);
+    let resting = (
+        [0.0, -0.554_188, 0.552_828],
+        0.445_812,
+        [0.0, -0.136_167, 0.026_445],
+        [8.472_302, 0.0, 0.0],
+    );
+    for iterations in 1..30 {
+        let [_, gain] = leaves_the_corner_at(iterations, bouncing, [1.422_485, 1.0]);
+        assert!(gain < 0.010_654 * G, "{iterations} iterations: {gain} J/kg");
+        let [_, gain] = leaves_the_corner_at(iterations, resting, [1.323_375, 0.0]);
+        assert!(gain < 1e-4, "{iterations} iterations: {gain} J/kg");
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(20_000))]
 

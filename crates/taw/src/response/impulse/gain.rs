@@ -89,6 +89,20 @@ impl<S: Scalar> Columns<'_, S> {
         if ledgers.iter().any(Ledger::gains) {
             self.push_before_friction(constraints, islands, ledgers, settings);
         }
+        self.end_approaches(constraints, islands);
+    }
+
+    /// Pushes, without more friction, at what still approaches. Two walls whose friction presses a
+    /// ball into the other have no solution that sweeps could reach; and a ball that went on into
+    /// one of them would be lifted out, which is energy. To end an approach only lowers it.
+    fn end_approaches(&mut self, constraints: &mut [Constraint<S>], islands: &Islands<S>) {
+        for c in constraints {
+            let missing = c.still() - self.closing_of(c).dot(c.normal);
+            let island = islands.of(c);
+            if (island.bounces || !island.agrees) && missing > S::zero() {
+                self.add(c, c.normal * missing);
+            }
+        }
     }
 
     fn rebound_less(
