@@ -139,13 +139,15 @@ fn two_balls_dropped_on_a_floor_come_down_and_nothing_hangs() {
                 Point3::new(0.3 * random.f32(), 1.0 + height + random.f32(), 0.3 * random.f32());
             world.marbles.insert(Marble::new(at, 0.1 + 0.2 * random.f32())).unwrap()
         });
+        let energy = world.energy().total();
         for _ in 0..300 {
             world.step(DT).unwrap();
         }
+        assert!(world.energy().total() < energy, "run {run}");
         for id in ids {
             let Marble { position, velocity, radius, .. } = world.marbles.get(id).unwrap();
             let low = position.y < radius * 1.01 + 0.01 || velocity.y.abs() < 0.2;
-            assert!(low && velocity.magnitude() < 2.5, "run {run}: {position:?}, {velocity:?}");
+            assert!(low, "run {run}: {position:?}, {velocity:?}");
         }
     }
 }

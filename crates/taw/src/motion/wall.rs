@@ -1,4 +1,8 @@
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+use cgmath::{EuclideanSpace, One, Rotation};
+
+use super::turned;
+use crate::frame::Pose;
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
 
 /// How a wall moves, as one rigid thing: a velocity, and a spin about a pivot.
 ///
@@ -23,6 +27,14 @@ impl<S: Scalar> WallMotion<S> {
     #[must_use]
     pub fn velocity_at(&self, point: Point3<S>) -> Vec3<S> {
         self.velocity + self.spin.cross(point - self.pivot)
+    }
+
+    /// From where the wall is to where it was `time` seconds ago.
+    pub(crate) fn undone(&self, time: S) -> Pose<S> {
+        let rotation = turned(Quat::one(), self.spin, -time);
+        let pivot = self.pivot.to_vec();
+        let translation = pivot - rotation.rotate_vector(pivot) - self.velocity * time;
+        Pose { rotation, translation }
     }
 
     /// The same motion in another scalar.

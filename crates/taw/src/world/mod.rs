@@ -288,6 +288,9 @@ impl<S: Scalar> World<S> {
         self.begin_step();
         for after in (0..self.model.substeps).rev() {
             self.rest_of_step = substep * S::constant(f64::from(after));
+            if self.model.response != Response::EventDriven {
+                self.walls.go_to(self.rest_of_step);
+            }
             self.integrate(substep)?;
             self.generate_contacts();
             self.restitute(substep)?;

@@ -35,6 +35,8 @@ pub struct Walls<S> {
     material: Optional<Material<S>>,
     /// Those that were set to another place since the last step.
     moved: Optional<()>,
+    /// Where those end that are on their way through a step, and how they then move, by row.
+    ends: Vec<(usize, WallShape<S>, WallMotion<S>)>,
     /// The boxes of those that are no half-spaces, and what is in them.
     boxes: Vec<Box3<S>>,
     parts: Vec<Part>,
@@ -62,6 +64,7 @@ impl<S> Default for Walls<S> {
             motion: Optional::default(),
             material: Optional::default(),
             moved: Optional::default(),
+            ends: Vec::new(),
             boxes: Vec::new(),
             parts: Vec::new(),
             tree: BoxTree::default(),
@@ -315,8 +318,29 @@ impl<S: Scalar> Walls<S> {
         self.moved.get(row).is_some()
     }
 
+    /// Puts walls that were set to another place since the last step, and have a motion, to where
+    /// that led them `left` seconds before the end of the step.
+    pub(super) fn go_to(&mut self, left: S) {
+        if self.ends.is_empty() && left > S::zero() {
+            let rows = (0..self.shapes.len()).filter(|row| self.moved.get(*row).is_some());
+            let ends =
+                rows.filter_map(|row| Some((row, self.shapes[row].clone(), self.motion.get(row)?)));
+            self.ends = ends.collect();
+        }
+        for (row, end, motion) in &self.ends {
+            // A place that a half-space cannot have is none that it comes by.
+            let shape = if left > S::zero() { end.moved(motion.undone(left)).ok() } else { None };
+            self.shapes[*row] = shape.unwrap_or_else(|| end.clone());
+            let pivot = motion.pivot - motion.velocity * left;
+            self.motion.set(*row, Some(WallMotion { pivot, ..*motion }), self.shapes.len());
+            self.stale = self.stale.max(Stale::Places);
+        }
+    }
+
     /// Notes that a step is over: all walls are where they are to stay.
     pub(super) fn arrive(&mut self) {
+        self.go_to(S::zero());
+        self.ends.clear();
         self.moved.clear();
     }
 

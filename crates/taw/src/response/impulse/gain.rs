@@ -94,9 +94,12 @@ impl<S: Scalar> Columns<'_, S> {
 
     /// Pushes, without more friction, at what still approaches. Two walls whose friction presses a
     /// ball into the other have no solution that sweeps could reach; and a ball that went on into
-    /// one of them would be lifted out, which is energy. To end an approach only lowers it.
+    /// one of them would be lifted out, which is energy. To end an approach only lowers it. Walls,
+    /// which come first, have the last word.
     fn end_approaches(&mut self, constraints: &mut [Constraint<S>], islands: &Islands<S>) {
-        for c in constraints {
+        let forth = 0..constraints.len();
+        for row in forth.clone().chain(forth.rev()) {
+            let c = &mut constraints[row];
             let missing = c.still() - self.closing_of(c).dot(c.normal);
             let island = islands.of(c);
             if (island.bounces || !island.agrees) && missing > S::zero() {

@@ -1,0 +1,86 @@
+//! Walls that move, in steps of several substeps: each substep has them on their way.
+
+use taw::frame::Pose;
+use taw::math::Quat;
+use taw::motion::turned;
+use taw::prelude::*;
+use taw::shape::{Aabb, Shape};
+use taw::world::WallMotion;
+
+const DT: f64 = 1.0 / 30.0;
+const RADIUS: f64 = 0.1;
+
+/// A board of 10 m, its top at y = 0.
+fn board() -> WallShape<f64> {
+    let (min, max) = (Point3::new(-5.0, -0.5, -1.0), Point3::new(5.0, 0.0, 1.0));
+    Shape::Aabb(Aabb::new(min, max).unwrap()).into()
+}
+
+fn world(substeps: u32, detection: Detection) -> World<f64> {
+    let mut world = World::default();
+    let integrator = Integrator::VelocityVerlet;
+    let model = Model { response: Response::Impulse, integrator, ..Model::default() };
+    world.set_model(Model { substeps, detection, rotation: Rotation::Dynamic, ..model }).unwrap();
+    world
+}
+
+fn ball(world: &mut World<f64>, x: f64) -> MarbleId {
+    let material = Material { friction: 0.5, restitution: 0.0, ..Material::default() };
+    let marble = Marble::new(Point3::new(x, RADIUS, 0.0), RADIUS);
+    world.marbles.insert(Marble { material: Some(material), ..marble }).unwrap()
+}
+
+#[test]
+fn a_ball_stays_on_a_lift() {
+    for (substeps, speed) in [(1, 3.0), (4, 3.0), (16, 3.0), (4, -3.0), (16, -3.0)] {
+        for detection in [Detection::Discrete, Detection::Swept] {
+            let mut world = world(substeps, detection);
+            let lift = world.walls.insert(board()).unwrap();
+            let motion = WallMotion {
+                velocity: Vec3::unit_y() * speed,
+                spin: Vec3::new(0.0, 0.0, 0.0),
+                pivot: Point3::new(0.0, 0.0, 0.0),
+            };
+            world.walls.set_motion(lift, Some(motion)).unwrap();
+            let id = ball(&mut world, 0.0);
+            world.marbles.set_velocity(id, motion.velocity).unwrap();
+            for step in 1..=60 {
+                let at = Vec3::unit_y() * (speed * DT * f64::from(step));
+                let pose = Pose { translation: at, ..Pose::identity() };
+                world.walls.set(lift, board().moved(pose).unwrap()).unwrap();
+                world.step(DT).unwrap();
+                let ball = world.marbles.get(id).unwrap();
+                let gap = ball.position.y - at.y - RADIUS;
+                assert!(
+                    gap.abs() < 1e-3 && (ball.velocity.y - speed).abs() < 1e-3,
+                    "{substeps} substeps at {speed} m/s, {detection:?}, step {step}: {gap} m off at {} m/s",
+                    ball.velocity.y,
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_ball_stays_on_a_board_that_tilts() {
+    for substeps in [1, 4, 16] {
+        let mut world = world(substeps, Detection::Swept);
+        let wall = world.walls.insert(board()).unwrap();
+        let pivot = Point3::new(-4.0, 0.0, 0.0);
+        let spin = Vec3::unit_z() * 0.5;
+        let motion = WallMotion { velocity: Vec3::new(0.0, 0.0, 0.0), spin, pivot };
+        world.walls.set_motion(wall, Some(motion)).unwrap();
+        let id = ball(&mut world, 0.0);
+        world.marbles.set_velocity(id, Vec3::unit_y() * 2.0).unwrap();
+        for step in 1..=20 {
+            let turn = turned(Quat::new(1.0, 0.0, 0.0, 0.0), spin, DT * f64::from(step));
+            let pivot = Vec3::new(-4.0, 0.0, 0.0);
+            let pose = Pose { rotation: turn, translation: pivot - turn * pivot };
+            world.walls.set(wall, board().moved(pose).unwrap()).unwrap();
+            world.step(DT).unwrap();
+            let ball = world.marbles.get(id).unwrap();
+            let gap = world.walls.get(wall).unwrap().nearest(ball.position).distance - RADIUS;
+            assert!(gap.abs() < 1e-3, "{substeps} substeps, step {step}: {gap} m off the board");
+        }
+    }
+}
