@@ -9,8 +9,6 @@ const MISSED: &[(&str, &str)] = &[
     ("bouncing/666/10ms/gain", "event-driven"),
     // A substep's budget of looks ends after half of its 3.1 million collisions.
     ("impact/galperin/f64", "event-driven, f64"),
-    // A marble keeps the deepest of its contacts, so that thousands in one spot end a step.
-    ("granular/one-spot/1000", "impulse"),
     // A rebound below the speed that bounces in one step is one in a shorter step.
     ("rolling/never-worse", "impulse"),
     // Contacts that give way a little keep their motion longer.

@@ -9,6 +9,7 @@ mod gas;
 mod granular;
 mod impacts;
 mod numbers;
+mod ordinary;
 mod rolling;
 mod swarms;
 
@@ -161,5 +162,5 @@ pub fn measure(rows: &[&'static Row], jobs: usize, mut tell: impl FnMut(&'static
 /// Every row, in the order of `references.md`.
 pub fn rows() -> impl Iterator<Item = &'static Row> {
     let families = [rolling::ROWS, bouncing::ROWS, impacts::ROWS, gas::ROWS, granular::ROWS];
-    families.into_iter().chain([swarms::ROWS, numbers::ROWS]).flatten()
+    families.into_iter().chain([ordinary::ROWS, swarms::ROWS, numbers::ROWS]).flatten()
 }

@@ -102,7 +102,7 @@ impl<S: Scalar> Columns<'_, S> {
             let c = &mut constraints[row];
             let missing = c.still() - self.closing_of(c).dot(c.normal);
             let island = islands.of(c);
-            if (island.bounces || !island.agrees) && missing > S::zero() {
+            if (island.bounces || !island.agrees) && missing > self.rounding(c) {
                 self.add(c, c.normal * missing);
             }
         }

@@ -35,7 +35,9 @@ pub(super) fn solve<S: Scalar>(
             let change = marbles.solve(c);
             c.step = c.impulse() - before;
             let island = islands.of_mut(c);
-            island.change = island.change.max(change);
+            if change > island.change && change > marbles.rounding(c) {
+                island.change = change;
+            }
             island.squared += island.energy(c, c.step, c.step);
         }
         let last = sweep + 1 == settings.iterations;
@@ -65,6 +67,13 @@ impl<S: Scalar> Columns<'_, S> {
     /// The relative velocity of a contact's two points, in m/s.
     pub(super) fn closing_of(&self, c: &Constraint<S>) -> Vec3<S> {
         self.closing(c.a, c.b, c.along, c.normal, c.surface)
+    }
+
+    /// Rounding of the velocities that a contact sees, in m/s. Below it, sweeps would only push
+    /// what is fast to one side.
+    pub(super) fn rounding(&self, c: &Constraint<S>) -> S {
+        let speed = |row: usize| self.velocity[row].magnitude();
+        (speed(c.b) + c.a.marble().map_or_else(S::zero, speed)) * S::epsilon()
     }
 
     /// The change of relative velocity that a contact still asks for, in m/s.
