@@ -186,7 +186,9 @@ fn tilting_board(meter: &mut Meter, model: Model) -> f64 {
             let angle = 0.05 * (TAU * 0.25 * DT * f64::from(step)).sin();
             let rotation = turned(Quat::new(1.0, 0.0, 0.0, 0.0), vector([angle, 0.0, 0.0]), 1.0);
             let pose = Pose { rotation, ..Pose::identity() };
-            walls.iter_mut().for_each(|wall| wall.go(&mut world, pose));
+            for wall in &mut walls {
+                wall.go(&mut world, pose);
+            }
             let before = world.marbles.velocity().to_vec();
             meter.step(&mut world, DT);
             for (after, before) in world.marbles.velocity().iter().zip(before) {

@@ -165,7 +165,9 @@ impl<S: Scalar> Columns<'_, S> {
             wanted += push * (touch.least - parting);
             made -= push * parting;
         }
-        touches.iter().for_each(|touch| self.change_parting(touch, touch.change));
+        for touch in touches.iter() {
+            self.change_parting(touch, touch.change);
+        }
         made += touches
             .iter()
             .map(|touch| touch.change * touch.share() * self.parting(touch))
