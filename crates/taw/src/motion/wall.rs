@@ -9,8 +9,8 @@ use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
 /// It says how fast the wall's surface carries along what lies on it, and nothing
 /// about where the wall is at the end of a step. So a conveyor is a wall that stays where it
 /// is and has one. For one that was set to another place since the last step,
-/// [`Response::EventDriven`](crate::response::Response::EventDriven) takes it for how it came
-/// there: velocity and spin are then the mean ones over the step, and the pivot is where the
+/// [`World::step`](crate::world::World::step) takes it for how it came there, through all
+/// substeps: velocity and spin are then the mean ones over the step, and the pivot is where the
 /// step leads it to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WallMotion<S> {
