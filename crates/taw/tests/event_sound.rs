@@ -496,3 +496,38 @@ impl Draw {
         low + (high - low) * self.next()
     }
 }
+
+#[test]
+fn balls_that_part_from_each_other_stay_inside() {
+    // Just below a ceiling that it does not touch yet, out of one that is much heavier.
+    let mut closed = vec![("nothing", None)];
+    let sheet = |y: f64, corners: [[u32; 3]; 2]| {
+        let at = |x: f64, z: f64| Point3::new(x, y, z);
+        let points = vec![at(-9.0, -9.0), at(9.0, -9.0), at(9.0, 9.0), at(-9.0, 9.0)];
+        Mesh::new(points, corners.to_vec()).unwrap()
+    };
+    closed.push(("sheet", Some(sheet(1.0, [[0, 1, 2], [0, 2, 3]]))));
+    for (name, sheet) in closed {
+        for deep in [0.05, 0.1, 0.19] {
+            let mut world = world::<f64>(Rotation::Dynamic, 1);
+            let ceiling = if sheet.is_some() { 9.0 } else { 1.0 };
+            world.walls.insert(Plane::new(-Vec3::unit_y(), -ceiling).unwrap()).unwrap();
+            world.walls.insert(Plane::new(Vec3::unit_y(), -9.0).unwrap()).unwrap();
+            if let Some(sheet) = sheet.clone() {
+                world.walls.insert(sheet).unwrap();
+            }
+            for (mass, y) in [(1.0, 0.89), (1e6, 0.89 - 0.2 + deep)] {
+                let mass = Mass::Kilograms(mass);
+                let marble = Marble { mass, ..Marble::new(Point3::new(0.0, y, 0.0), 0.1) };
+                world.marbles.insert(marble).unwrap();
+            }
+            for step in 0..30 {
+                world.step(DT).unwrap();
+                for at in world.marbles.position() {
+                    let gap = 0.9 - at.y;
+                    assert!(gap > -0.1 * 4e-3, "{name}, {deep}: {gap} m at step {step}");
+                }
+            }
+        }
+    }
+}
