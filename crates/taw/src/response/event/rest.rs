@@ -129,7 +129,9 @@ impl EventDriven {
             self.begin_at_walls(row, settings);
         }
         let mut near = std::mem::take(&mut self.near);
-        near.mm.retain(|c| self.touches_ball(c, settings).is_some_and(|speed| speed >= 0.0));
+        near.mm.retain(|c| {
+            self.touches_ball(c, settings).map_or(self.is_in_another(c), |speed| speed >= 0.0)
+        });
         let mut touches = std::mem::take(&mut self.heap.touches);
         touches.clear();
         touches.resize(self.balls.len(), 0);
@@ -249,6 +251,15 @@ impl EventDriven {
         let slow = PRESS * pull * settings.dt;
         let low = self.low(contact.a, settings).max(self.low(contact.b, settings));
         (distance - first.radius - second.radius <= low && speed <= slow).then_some(slow + speed)
+    }
+
+    /// Whether a ball is too deep in another one that it does not come nearer to: the two are
+    /// pushed apart, however fast they part.
+    fn is_in_another(&self, contact: &Contact<f64>) -> bool {
+        let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
+        let apart = second.position - first.position;
+        let slop = SLOP * first.radius.min(second.radius);
+        apart.magnitude() < first.radius + second.radius - slop
     }
 
     /// The widest gap that still counts as touching, in metres: a fall from this height
