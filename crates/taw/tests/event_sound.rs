@@ -496,3 +496,94 @@ impl Draw {
         low + (high - low) * self.next()
     }
 }
+
+#[test]
+fn balls_that_part_from_each_other_stay_inside() {
+    // Just below a ceiling that it does not touch yet, out of one that is much heavier.
+    let mut closed = vec![("nothing", None)];
+    let sheet = |y: f64, corners: [[u32; 3]; 2]| {
+        let at = |x: f64, z: f64| Point3::new(x, y, z);
+        let points = vec![at(-9.0, -9.0), at(9.0, -9.0), at(9.0, 9.0), at(-9.0, 9.0)];
+        Mesh::new(points, corners.to_vec()).unwrap()
+    };
+    closed.push(("sheet", Some(sheet(1.0, [[0, 1, 2], [0, 2, 3]]))));
+    for (name, sheet) in closed {
+        for deep in [0.05, 0.1, 0.19] {
+            let mut world = world::<f64>(Rotation::Dynamic, 1);
+            let ceiling = if sheet.is_some() { 9.0 } else { 1.0 };
+            world.walls.insert(Plane::new(-Vec3::unit_y(), -ceiling).unwrap()).unwrap();
+            world.walls.insert(Plane::new(Vec3::unit_y(), -9.0).unwrap()).unwrap();
+            if let Some(sheet) = sheet.clone() {
+                world.walls.insert(sheet).unwrap();
+            }
+            for (mass, y) in [(1.0, 0.89), (1e6, 0.89 - 0.2 + deep)] {
+                let mass = Mass::Kilograms(mass);
+                let marble = Marble { mass, ..Marble::new(Point3::new(0.0, y, 0.0), 0.1) };
+                world.marbles.insert(marble).unwrap();
+            }
+            for step in 0..30 {
+                world.step(DT).unwrap();
+                for at in world.marbles.position() {
+                    let gap = 0.9 - at.y;
+                    assert!(gap > -0.1 * 4e-3, "{name}, {deep}: {gap} m at step {step}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_ball_in_a_valley_rests_on_both_of_its_sides() {
+    // A fall of a step gives 0.16 m/s; a tenth of that counts as rest among others.
+    for toward in [0.0, 0.01, 0.016] {
+        let mut world = world::<f64>(Rotation::Dynamic, 1);
+        for side in [-1.0, 1.0] {
+            let normal = Vec3::new(-0.1, 1.0, side).normalize();
+            world.walls.insert(Plane::new(normal, 0.0).unwrap()).unwrap();
+        }
+        let normal = Vec3::new(-0.1, 1.0, 1.0).normalize();
+        let high = 0.1 / normal.y;
+        let marble = Marble {
+            material: Some(surface(0.0, 0.0)),
+            velocity: normal * -toward,
+            ..Marble::new(Point3::new(0.0, high, 0.0), 0.1)
+        };
+        world.marbles.insert(marble).unwrap();
+        let mut energy = world.energy().total();
+        for step in 0..120 {
+            world.step(DT).unwrap();
+            let (now, impacts) = (world.energy().total(), world.impacts().len());
+            // First its approach ends.
+            let (gain, begins) = (now - energy, step < 20);
+            assert!(begins || gain <= 1e-9, "{toward}: {gain} J at step {step}");
+            assert!(begins || impacts == 0, "{toward}: {impacts} impacts in step {step}");
+            energy = now;
+        }
+        let across = world.marbles.velocity()[0].z;
+        assert!(across.abs() < 1e-6, "{toward}: {across} m/s");
+    }
+}
+
+#[test]
+fn balls_that_start_in_each_other_part_at_once() {
+    // Also if they part by themselves, but not soon enough.
+    for apart in [0.0, 0.3, 1.0] {
+        let mut world = world::<f64>(Rotation::Dynamic, 1);
+        for side in [-1.0, 1.0] {
+            let marble = Marble {
+                velocity: Vec3::new(0.5 * side * apart, 0.0, 0.0),
+                ..Marble::new(Point3::new(0.02 * side, 9.0, 0.0), 0.1)
+            };
+            world.marbles.insert(marble).unwrap();
+        }
+        let energy = world.energy().total();
+        for step in 0..12 {
+            world.step(DT).unwrap();
+            let gained = world.energy().total() / energy - 1.0;
+            assert!(gained.abs() < 1e-9, "{apart} m/s: {gained} at step {step}");
+        }
+        let at = world.marbles.position();
+        let gap = (at[1] - at[0]).magnitude() - 0.2;
+        assert!(gap > -0.1 * 4e-3, "{apart} m/s: {gap} m");
+    }
+}

@@ -122,6 +122,12 @@ impl EventDriven {
         let least = f64::EPSILON * 16.0 * size;
         let held = ball.path.support.is_some() || ball.path.heaped;
         let slow = self.slow(row, held, settings).max(1e-14 * velocity.magnitude());
+        // A heap that is held takes an approach as slow as that until the end of the substep.
+        let at_last = gap.speed + gap.acceleration * (settings.dt - now);
+        let rest = self.slow(row, false, settings);
+        if ball.path.heaped && gap.speed >= -slow && gap.acceleration > 0.0 && at_last >= -rest {
+            return None;
+        }
         Self::wall_event(wall, gap, least, held, slow)
     }
 

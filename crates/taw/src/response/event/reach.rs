@@ -124,19 +124,25 @@ impl EventDriven {
         now: f64,
         settings: &Settings,
     ) -> Option<f64> {
+        self.look_where_it_is(row, now, settings);
         let ball = &self.balls[row];
         let (at, left) = (ball.position_at(now), settings.dt - now);
         let speed = fastest(ball, now, left);
         let Known { center, far, .. } = *self.reach.known.get(row)?;
-        let (mut far, mut gone) = (far, (at - center).magnitude());
-        if gone >= NEAR_THE_END * far {
-            self.look_around(row, now, settings);
-            (far, gone) = (self.reach.known.get(row)?.far, 0.0);
-        }
+        let gone = (at - center).magnitude();
         // Between the two, so that each look brings it on.
         let time = (0.5 * (1.0 + NEAR_THE_END) * far - gone) / speed;
         // What is not finite knows what it knows.
         (time < left).then_some(time)
+    }
+
+    /// Has a ball look around that came to where walls may be that it does not know.
+    pub(super) fn look_where_it_is(&mut self, row: usize, now: f64, settings: &Settings) {
+        let at = self.balls[row].position_at(now);
+        let Some(Known { center, far, .. }) = self.reach.known.get(row) else { return };
+        if (at - *center).magnitude() >= NEAR_THE_END * far {
+            self.look_around(row, now, settings);
+        }
     }
 
     /// From where how far a ball may go in what is left of the substep, in metres.

@@ -14,6 +14,9 @@ use crate::shape::Nearest;
 /// Overlap that may stay, over the radius: pushing it out would lift what lies on it, and
 /// create energy.
 const SLOP: f64 = 4e-3;
+/// How often a ball is moved out of the wall that it is deepest in; of two that meet at a right
+/// angle or more, it is out after two.
+const MOST_MOVES: u32 = 16;
 
 /// What rests on each other, as the impulse method sees it.
 #[derive(Clone, Debug, Default)]
@@ -126,7 +129,9 @@ impl EventDriven {
             self.begin_at_walls(row, settings);
         }
         let mut near = std::mem::take(&mut self.near);
-        near.mm.retain(|c| self.touches_ball(c, settings).is_some_and(|speed| speed >= 0.0));
+        near.mm.retain(|c| {
+            self.touches_ball(c, settings).map_or(self.is_in_another(c), |speed| speed >= 0.0)
+        });
         let mut touches = std::mem::take(&mut self.heap.touches);
         touches.clear();
         touches.resize(self.balls.len(), 0);
@@ -151,15 +156,13 @@ impl EventDriven {
     /// Finds the walls that a ball touches at the start. Out of what it overlaps, but by what
     /// others may press it there, it is moved at once: overlap is not energy.
     fn begin_at_walls(&mut self, row: usize, settings: &Settings) {
+        self.come_out(row, 0.0);
         let mut near = std::mem::take(&mut self.near.wm);
-        self.move_out(row, self.parts_of(row).to_vec());
-        // Half-spaces have the last word: behind them there is nothing.
-        self.move_out(row, self.half_spaces().to_vec());
         let at = self.balls[row].position;
         self.name_walls(row, |wall| {
             let mtv = Vec3::zero();
             let contact = Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
-            let least = if self.goes(&contact) { f64::NEG_INFINITY } else { 0.0 };
+            let least = if self.goes(wall) { f64::NEG_INFINITY } else { 0.0 };
             if self.touches_wall(&contact, 0.0, settings).is_some_and(|speed| speed >= least)
                 && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, 0.0))
             {
@@ -170,24 +173,44 @@ impl EventDriven {
         self.near.wm = near;
     }
 
-    /// Moves a ball out of the wall that it is deepest in.
-    fn move_out(&mut self, row: usize, walls: Vec<u32>) {
-        let ball = &self.balls[row];
-        let mut deepest = (SLOP * ball.radius, Vec3::zero());
-        for wall in walls {
-            let near = self.walls[wall as usize].nearest(ball.position, 0.0);
-            let overlap = ball.radius - near.distance;
-            // No wall holds what has infinite mass.
-            if overlap > deepest.0 && ball.inverse_mass > 0.0 {
-                deepest = (overlap, near.normal * overlap);
-            }
+    /// Moves a ball out of the walls that it is in.
+    fn come_out(&mut self, row: usize, now: f64) {
+        if self.balls[row].inverse_mass <= 0.0 {
+            return; // no wall holds it
         }
-        self.balls[row].position += deepest.1;
+        self.move_out(row, now, self.parts_of(row).to_vec());
+        // Half-spaces have the last word, and those that stay: behind them there is nothing.
+        for goes in [true, false] {
+            let planes = self.half_spaces().iter().copied();
+            let planes = planes.filter(|wall| self.goes(*wall as usize) == goes).collect();
+            self.move_out(row, now, planes);
+        }
     }
 
-    /// Whether the wall of a contact goes through the substep.
-    fn goes(&self, contact: &Contact<f64>) -> bool {
-        self.walls[contact.a as usize].there.is_some()
+    /// Moves a ball out of the wall that it is deepest in, until it is in none of these or, as
+    /// between two that leave it no room, was moved often enough (von Neumann 1933, alternating
+    /// projections).
+    fn move_out(&mut self, row: usize, now: f64, walls: Vec<u32>) {
+        for _ in 0..MOST_MOVES {
+            let ball = &self.balls[row];
+            let mut deepest = (SLOP * ball.radius, Vec3::zero());
+            for wall in &walls {
+                let near = self.walls[*wall as usize].nearest(ball.position, now);
+                let overlap = ball.radius - near.distance;
+                if overlap > deepest.0 {
+                    deepest = (overlap, near.normal * overlap);
+                }
+            }
+            if deepest.1.is_zero() {
+                break;
+            }
+            self.balls[row].position += deepest.1;
+        }
+    }
+
+    /// Whether a wall goes through the substep.
+    fn goes(&self, wall: usize) -> bool {
+        self.walls[wall].there.is_some()
     }
 
     /// Whether a ball that touches one wall and nothing else rests on it.
@@ -198,7 +221,7 @@ impl EventDriven {
         let wall = &self.walls[contact.a as usize];
         // The speed of a wall that is moved from place to place jumps at the start; what lies
         // on it does not jump with it.
-        let rest = if self.goes(contact) { fall } else { REST * fall };
+        let rest = if self.goes(contact.a as usize) { fall } else { REST * fall };
         let low = 0.5 * REST * REST * fall * settings.dt;
         let low = low + ball.rounding + wall.rounding(ball.position);
         let presses = self.pressure(contact.b as usize, contact.a as usize, 0.0, ball.pull) > 0.0;
@@ -211,7 +234,7 @@ impl EventDriven {
         let (gap, speed) = self.wall_gap(contact, now);
         let ball = &self.balls[contact.b as usize];
         let fall = ball.pull.magnitude() * settings.dt;
-        let goes = self.goes(contact) && now == 0.0;
+        let goes = self.goes(contact.a as usize) && now == 0.0;
         let slow = if goes { fall } else { PRESS * fall };
         let low =
             self.low(contact.b, settings) + self.walls[contact.a as usize].rounding(ball.position);
@@ -228,6 +251,15 @@ impl EventDriven {
         let slow = PRESS * pull * settings.dt;
         let low = self.low(contact.a, settings).max(self.low(contact.b, settings));
         (distance - first.radius - second.radius <= low && speed <= slow).then_some(slow + speed)
+    }
+
+    /// Whether a ball is too deep in another one that it does not come nearer to: the two are
+    /// pushed apart, however fast they part.
+    fn is_in_another(&self, contact: &Contact<f64>) -> bool {
+        let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
+        let apart = second.position - first.position;
+        let slop = SLOP * first.radius.min(second.radius);
+        apart.magnitude() < first.radius + second.radius - slop
     }
 
     /// The widest gap that still counts as touching, in metres: a fall from this height
@@ -404,8 +436,19 @@ impl EventDriven {
                 stamp: ball.path.stamp + 1,
                 ..ball.path
             };
-            // What the method pushed apart, besides.
-            ball.position += position[at] - end;
+            // What the method pushed apart, besides; not so far that it were on the other side of
+            // a thin wall then.
+            let push = position[at] - end;
+            let most = 0.5 * ball.radius;
+            ball.position += if push.magnitude() > most { push.normalize_to(most) } else { push };
+        }
+        // It pushed out of what they touched, and maybe into what they did not.
+        for at in 0..self.heap.rows.len() {
+            let row = self.heap.rows[at] as usize;
+            if !self.balls[row].is_frozen() {
+                self.look_where_it_is(row, now, settings);
+                self.come_out(row, now);
+            }
         }
     }
 }
