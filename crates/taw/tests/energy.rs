@@ -111,7 +111,10 @@ proptest! {
         let energy = 0.5 * vector::<f64>(velocity).magnitude2() + 0.2 * (vector::<f64>(spin) * radius).magnitude2();
         // Overlap of the start is pushed out, against gravity.
         let lift = G * (-gap[0]).max(0.0);
-        prop_assert!(gain <= 1e-4 * energy + lift + 1e-4, "{gain} of {energy} J/kg");
+        // What friction holds at the end of a step fell for half of it at most: 2/7 of a rolling
+        // ball's energy there.
+        let held = (G / 60.0 / 2.0).powi(2) / 7.0;
+        prop_assert!(gain <= 1e-4 * energy + lift + held, "{gain} of {energy} J/kg");
     }
 }
 

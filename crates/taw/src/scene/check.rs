@@ -2,7 +2,9 @@
 
 use cgmath::InnerSpace;
 
-use super::{Ball, Field, Form, Gate, Lattice, Movement, Scene, Surface, Tilt, Wall};
+use super::{
+    Ball, Build, Field, Form, Gate, Lattice, Movement, Scene, Structure, Surface, Tilt, Turn, Wall,
+};
 use crate::Error;
 use crate::error::{finite, positive, within};
 use crate::math::Vec3;
@@ -62,6 +64,7 @@ impl Scene {
         self.fields.iter().try_for_each(|field| field.check())?;
         self.surface.check()?;
         self.walls.iter().try_for_each(Wall::check)?;
+        self.structures.iter().try_for_each(Structure::check)?;
         for Gate { normal, through } in &self.gates {
             direction("normal", ["normal.x", "normal.y", "normal.z"], *normal)?;
             vector(["through.x", "through.y", "through.z"], *through)?;
@@ -110,12 +113,53 @@ impl Surface {
 
 impl Wall {
     fn check(&self) -> Result<(), Error> {
-        let Self { shape, surface, moves } = self;
-        surface.iter().try_for_each(Surface::check)?;
-        let far = shape.check()?;
-        let far = far + moves.map_or(Ok(0.0), Movement::check)?;
-        // Wherever it gets, it is still somewhere. Half, because it turns about a pivot.
-        within("the reach of a wall", far, 0.0, LARGEST / 2.0).map(|_| ())
+        self.surface.iter().try_for_each(Surface::check)?;
+        stays_somewhere(self.shape.check()?, self.moves)
+    }
+}
+
+impl Structure {
+    fn check(&self) -> Result<(), Error> {
+        self.surface.iter().try_for_each(Surface::check)?;
+        stays_somewhere(self.shape.check()?, self.moves)
+    }
+}
+
+/// Wherever a wall gets, it is still somewhere. Half of all numbers, because it turns about a pivot.
+fn stays_somewhere(far: f64, moves: Option<Movement>) -> Result<(), Error> {
+    let far = far + moves.map_or(Ok(0.0), Movement::check)?;
+    within("the reach of a wall", far, 0.0, LARGEST / 2.0).map(|_| ())
+}
+
+impl Build {
+    /// How far from the origin it is at most, in metres.
+    fn check(&self) -> Result<f64, Error> {
+        match self {
+            Self::Mesh { points, .. } => points.iter().try_fold(0.0, |far: f64, point| {
+                let point = vector(["points.x", "points.y", "points.z"], *point)?;
+                Ok(far.max(point.magnitude()))
+            }),
+            Self::HeightField { corner, cell, columns, heights } => {
+                let corner = vector(["corner.x", "corner.y", "corner.z"], *corner)?;
+                let [x, z] = *cell;
+                let wide = above_zero("cell", x)? + above_zero("cell", z)?;
+                let rows = heights.len() as f64 / f64::from((*columns).max(1));
+                let high = heights.iter().try_fold(0.0, |high: f64, height| {
+                    Ok(high.max(number("heights", *height)?.abs()))
+                })?;
+                Ok(corner.magnitude() + wide * (f64::from(*columns) + rows) + high)
+            }
+            Self::Compound { parts } => {
+                parts.iter().try_fold(0.0, |far: f64, part| Ok(far.max(part.check()?)))
+            }
+        }
+    }
+}
+
+impl Turn {
+    fn check(self) -> Result<(), Error> {
+        direction("axis", ["axis.x", "axis.y", "axis.z"], self.axis)?;
+        number("degrees", self.degrees).map(|_| ())
     }
 }
 
@@ -132,8 +176,7 @@ impl Form {
                 for (field, side) in ["size.x", "size.y", "size.z"].into_iter().zip(size) {
                     above_zero(field, side)?;
                 }
-                direction("axis", ["axis.x", "axis.y", "axis.z"], turned.axis)?;
-                number("degrees", turned.degrees)?;
+                turned.check()?;
                 vector(CENTER, center)?.magnitude() + Vec3::from(size).magnitude()
             }
             Self::Ball { center, radius } => {
@@ -182,6 +225,8 @@ impl Ball {
         vector(["velocity.x", "velocity.y", "velocity.z"], self.velocity)?;
         vector(["spin.x", "spin.y", "spin.z"], self.spin)?;
         above_zero("density", self.density)?;
+        not_negative("half_length", self.half_length)?;
+        self.turned.check()?;
         self.surface.iter().try_for_each(Surface::check)
     }
 }

@@ -37,8 +37,8 @@ impl Scene {
     ///
     /// # Errors
     /// What the world refuses, now or later: [`Error::NotFinite`], [`Error::NotPositive`],
-    /// [`Error::OutOfRange`], [`Error::NotUnit`]. Numbers beyond those of `f32` in any world, and
-    /// more than [`MAX_MARBLES`](Self::MAX_MARBLES).
+    /// [`Error::OutOfRange`], [`Error::NotUnit`], [`Error::BallsOnly`]. Numbers beyond those of
+    /// `f32` in any world, and more than [`MAX_MARBLES`](Self::MAX_MARBLES).
     pub fn run<S: Scalar>(&self, model: Model) -> Result<Running<S>, Error> {
         self.check()?;
         let mut world = World::default();
@@ -68,6 +68,7 @@ impl Scene {
         for ball in self.balls() {
             world.marbles.insert(ball.marble(self.surface)?)?;
         }
+        world.takes_all_marbles()?;
         Ok(Running { world, scene: self.clone(), moving, time: 0.0 })
     }
 

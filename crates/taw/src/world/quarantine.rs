@@ -77,7 +77,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Nothing, if the response knows what all marbles are.
-    pub(super) fn takes_all_marbles(&self) -> Result<(), Error> {
+    pub(crate) fn takes_all_marbles(&self) -> Result<(), Error> {
         match self.marbles.first_capsule() {
             Some(id) if self.model.response == Response::EventDriven => Err(Error::BallsOnly(id)),
             _ => Ok(()),

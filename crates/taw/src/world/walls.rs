@@ -6,7 +6,7 @@ use super::wall_shape::WallShape;
 use crate::Error;
 use crate::contact::Closest;
 use crate::error::{finite_point, finite_vector};
-use crate::math::{Point3, Scalar, Vec3};
+use crate::math::{Point3, Scalar, Vec3, is_finite_point};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};
 use crate::shape::{Box3, BoxTree, Capsule, Nearest, Plane};
@@ -328,10 +328,12 @@ impl<S: Scalar> Walls<S> {
             self.ends = ends.collect();
         }
         for (row, end, motion) in &self.ends {
-            // A place that a half-space cannot have is none that it comes by.
-            let shape = if left > S::zero() { end.moved(motion.undone(left)).ok() } else { None };
+            // A place that it cannot have is none that it comes by.
+            let on_its_way = || end.moved(motion.undone(left)).and_then(WallShape::checked).ok();
+            let shape = if left > S::zero() { on_its_way() } else { None };
             self.shapes[*row] = shape.unwrap_or_else(|| end.clone());
-            let pivot = motion.pivot - motion.velocity * left;
+            let pivot = Some(motion.pivot - motion.velocity * left).filter(|p| is_finite_point(*p));
+            let pivot = pivot.unwrap_or(motion.pivot);
             self.motion.set(*row, Some(WallMotion { pivot, ..*motion }), self.shapes.len());
             self.stale = self.stale.max(Stale::Places);
         }

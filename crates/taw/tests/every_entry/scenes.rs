@@ -1,6 +1,8 @@
 //! The table for the numbers of scenes.
 
-use taw::scene::{Ball, Field, Form, Gate, Lattice, Movement, Scene, Surface, Tilt, Turn, Wall};
+use taw::scene::{
+    Ball, Build, Field, Form, Gate, Lattice, Movement, Scene, Structure, Surface, Tilt, Turn, Wall,
+};
 
 /// A scene with one of each.
 pub fn one_of_each() -> Scene {
@@ -36,6 +38,11 @@ pub fn one_of_each() -> Scene {
             ),
             wall(Form::Capsule { from: [0.0; 3], to: [0.0, 1.0, 0.0], radius: 0.2 }, None),
         ],
+        structures: vec![Structure {
+            shape: Build::Compound { parts: vec![Form::Ball { center: [9.0; 3], radius: 1.0 }] },
+            surface,
+            moves: None,
+        }],
         gates: vec![Gate { normal: [0.0, 1.0, 0.0], through: [0.0; 3] }],
         marbles: vec![on_floor(3.0), on_floor(3.9)],
         lattices: vec![Lattice {
@@ -123,6 +130,11 @@ pub fn rows() -> Vec<(&'static str, Set)> {
         ("scene::Ball.velocity", |s, x| s.marbles[0].velocity[1] = x),
         ("scene::Ball.spin", |s, x| s.marbles[0].spin = [x, x, x]),
         ("scene::Ball.density", |s, x| s.marbles[0].density = x),
+        ("scene::Ball.half_length", |s, x| s.marbles[0].half_length = x),
+        ("scene::Ball.turned", |s, x| s.marbles[0].turned = Turn { axis: [0.0, x, x], degrees: x }),
+        ("scene::Scene.structures", |s, x| s.structures[0].shape = Build::Mesh { points: vec![[0.0; 3], [x, 0.0, 0.0], [0.0, x, 1.0]], triangles: vec![[0, 1, 2]] }),
+        ("scene::Scene.structures", |s, x| s.structures[0].shape = Build::HeightField { corner: [x, 0.0, 0.0], cell: [1.0; 2], columns: 2, heights: vec![0.0, x, 0.0, 0.0] }),
+        ("scene::Scene.structures", |s, x| s.structures[0].shape = Build::Compound { parts: vec![Form::Ball { center: [0.0; 3], radius: x }] }),
         ("scene::Ball.surface", |s, x| s.marbles[0].surface = Some(Surface { friction: x, ..Surface::default() })),
         ("scene::Scene.lattices scene::Lattice.first", |s, x| s.lattices[0].first.radius = x),
         ("scene::Lattice.count", |s, x| s.lattices[0].count = [x.abs().min(65535.0) as u16; 3]),

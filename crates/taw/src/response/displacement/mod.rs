@@ -7,7 +7,7 @@ mod tests;
 
 use cgmath::{InnerSpace, Zero};
 
-use super::impulse::{Around, First, Warm, key_of};
+use super::impulse::{Around, First, Groups, Warm, key_of};
 use super::{Columns, Material, Walls};
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, is_finite, is_finite_point};
@@ -17,6 +17,24 @@ use crate::math::{Scalar, Vec3, is_finite, is_finite_point};
 pub(crate) struct Scratch<S> {
     touches: Vec<Touch<S>>,
     before: Vec<Vec3<S>>,
+    groups: Groups,
+    starts: Vec<Start<S>>,
+}
+
+/// What the changes of the last substep would do to those that touch each other.
+#[derive(Clone, Copy, Debug)]
+struct Start<S> {
+    /// Change that is wanted times the change that is offered, and that it would make times it.
+    wanted: S,
+    made: S,
+}
+
+impl<S: Scalar> Start<S> {
+    /// Part of the changes that brings all nearest to what is asked for.
+    fn part(self) -> S {
+        let part = self.wanted / self.made;
+        if self.made > S::zero() { part.max(S::zero()).min(S::one()) } else { S::one() }
+    }
 }
 
 /// A contact while it is solved.
@@ -24,6 +42,9 @@ pub(crate) struct Scratch<S> {
 struct Touch<S> {
     a: First,
     b: usize,
+    /// Which group of marbles that touch each other it is of: what happens in one is nothing to
+    /// the others, to the bit.
+    group: u32,
     along: [S; 2],
     /// From a to b.
     normal: Vec3<S>,
@@ -57,7 +78,7 @@ pub(crate) fn displacement<S: Scalar>(
     mut by_walls: impl FnMut(u32, Vec3<S>),
 ) {
     contacts.sort();
-    let Scratch { touches, before } = scratch;
+    let Scratch { touches, before, groups, starts } = scratch;
     before.clear();
     before.extend_from_slice(marbles.velocity);
     let wm = contacts.wm.iter().map(|c| (First::Wall(c.a, c.part), c));
@@ -65,11 +86,15 @@ pub(crate) fn displacement<S: Scalar>(
     touches.clear();
     touches
         .extend(wm.chain(mm).filter_map(|(a, c)| marbles.look(a, c.b as usize, c.along, around)));
-    marbles.begin_as_last_time(touches, warm);
+    groups.find(touches.iter().map(|t| (t.a.marble(), t.b)), marbles.velocity.len());
+    for touch in touches.iter_mut() {
+        touch.group = groups.of(touch.b);
+    }
+    marbles.begin_as_last_time(touches, warm, starts);
     let rounding = around.settings.bounce_speed * S::epsilon();
     for _ in 0..around.settings.iterations {
-        let end = |most: S, touch| most.max(marbles.end_approach(touch));
-        if touches.iter_mut().fold(S::zero(), end) <= rounding {
+        let end = |changed: bool, touch| marbles.end_approach(touch, rounding) || changed;
+        if !touches.iter_mut().fold(false, end) {
             break;
         }
     }
@@ -107,12 +132,12 @@ impl<S: Scalar> Columns<'_, S> {
             First::Marble(_) => S::zero(),
         };
         let zero = S::zero();
-        let mut touch = Touch { a, b, along, normal, surface, least: zero, change: zero };
-        let (follows, room) = (around.follows(a, b), gap + self.slop(&touch, around));
+        let mut touch = Touch { a, b, group: 0, along, normal, surface, least: zero, change: zero };
+        let follows = around.follows(a, b);
         // What was stopped on its way touches, whatever rounding says.
         let stands = around.stands(b) || a.marble().is_some_and(|a| around.stands(a));
         if follows > S::zero() && !stands {
-            touch.least = (self.parting(&touch) - room / follows).min(S::zero());
+            touch.least = (self.parting(&touch) - gap / follows).min(S::zero());
         }
         Some(touch)
     }
@@ -123,12 +148,16 @@ impl<S: Scalar> Columns<'_, S> {
         (self.velocity[touch.b] - first).dot(touch.normal) - touch.surface
     }
 
-    /// The overlap that stays, in metres, so that what rests keeps touching.
+    /// Overlap that stays, in metres, so that what rests keeps touching where positions do not
+    /// follow a change of velocity within the substep; none where they do.
     fn slop(
         &self,
         touch: &Touch<S>,
         around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> S {
+        if around.follows(touch.a, touch.b) > S::zero() {
+            return S::zero();
+        }
         let second = self.radius[touch.b];
         let smaller = touch.a.marble().map_or(second, |a| self.radius[a].min(second));
         around.settings.slop.min(smaller * around.settings.largest_slop)
@@ -147,12 +176,18 @@ impl<S: Scalar> Columns<'_, S> {
         }
     }
 
-    /// Begins with the changes of the last substep, or with that part of them which brings all
-    /// nearest to what is asked for: so they give no energy. What the sweeps do afterwards takes
-    /// some only, as each of them lowers `½ f·A f − f·w`, with `f` the changes, `A f` what they
-    /// make of the speeds, and `w` what is wanted of these.
-    fn begin_as_last_time(&mut self, touches: &mut [Touch<S>], warm: &[Warm<S>]) {
-        let (mut wanted, mut made) = (S::zero(), S::zero());
+    /// Begins with the changes of the last substep, or with that part of them which brings those
+    /// that touch each other nearest to what is asked for: so they give no energy. What the sweeps
+    /// do afterwards takes some only, as each of them lowers `½ f·A f − f·w`, with `f` the changes,
+    /// `A f` what they make of the speeds, and `w` what is wanted of these.
+    fn begin_as_last_time(
+        &mut self,
+        touches: &mut [Touch<S>],
+        warm: &[Warm<S>],
+        starts: &mut Vec<Start<S>>,
+    ) {
+        starts.clear();
+        starts.resize(touches.len(), Start { wanted: S::zero(), made: S::zero() });
         for touch in touches.iter_mut() {
             let Ok(at) =
                 warm.binary_search_by_key(&key_of(touch.a, touch.b, touch.along), Warm::key)
@@ -160,37 +195,35 @@ impl<S: Scalar> Columns<'_, S> {
                 continue;
             };
             touch.change = warm[at].pressure();
-            let push = touch.change * touch.share();
-            let parting = self.parting(touch);
-            wanted += push * (touch.least - parting);
-            made -= push * parting;
+            let (push, parting) = (touch.change * touch.share(), self.parting(touch));
+            let start = &mut starts[touch.group as usize];
+            start.wanted += push * (touch.least - parting);
+            start.made -= push * parting;
         }
         for touch in touches.iter() {
             self.change_parting(touch, touch.change);
         }
-        made += touches
-            .iter()
-            .map(|touch| touch.change * touch.share() * self.parting(touch))
-            .fold(S::zero(), |sum, push| sum + push);
-        let part =
-            if made > S::zero() { (wanted / made).max(S::zero()).min(S::one()) } else { S::one() };
+        for touch in touches.iter() {
+            starts[touch.group as usize].made += touch.change * touch.share() * self.parting(touch);
+        }
         for touch in touches.iter_mut() {
+            let part = starts[touch.group as usize].part();
             self.change_parting(touch, touch.change * (part - S::one()));
             touch.change *= part;
         }
     }
 
-    /// Ends the approach of two, or takes back what did so and is no longer needed. Gives the
-    /// change, in m/s.
-    fn end_approach(&mut self, touch: &mut Touch<S>) -> S {
+    /// Ends the approach of two, or takes back what did so and is no longer needed. False if that
+    /// is less than `rounding`, in m/s.
+    fn end_approach(&mut self, touch: &mut Touch<S>, rounding: S) -> bool {
         let wanted = touch.least - self.parting(touch);
         let change = (touch.change + wanted).max(S::zero()) - touch.change;
-        if !change.is_finite() {
-            return S::zero(); // an overflow here must not reach the other one
+        if !change.is_finite() || change.abs() <= rounding {
+            return false; // an overflow here must not reach the other one
         }
         touch.change += change;
         self.change_parting(touch, change);
-        change.abs()
+        true
     }
 
     /// Moves marbles by what changed of their velocities.

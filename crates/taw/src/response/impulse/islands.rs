@@ -19,11 +19,55 @@ const YIELD: f64 = 16.0;
 /// to the bit.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Islands<S> {
-    /// For each row, one of its island that is nearer to its first.
-    parent: Vec<u32>,
-    /// For each row that is the first of an island, which one.
-    number: Vec<u32>,
+    groups: Groups,
     pub list: Vec<Island<S>>,
+}
+
+/// Which marbles touch each other, over how many others.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Groups {
+    /// For each row, one of its group that is nearer to its first.
+    parent: Vec<u32>,
+    /// For each row that is the first of a group, which one.
+    number: Vec<u32>,
+    count: u32,
+}
+
+impl Groups {
+    /// Finds who touches whom (Tarjan 1975).
+    pub fn find(&mut self, pairs: impl Iterator<Item = (Option<usize>, usize)>, rows: usize) {
+        self.parent.clear();
+        self.parent.extend(0..rows as u32);
+        for (a, b) in pairs {
+            let Some(a) = a else { continue };
+            let (first, second) = (self.first(a), self.first(b));
+            self.parent[first.max(second)] = first.min(second) as u32;
+        }
+        self.number.clear();
+        self.number.resize(rows, u32::MAX);
+        self.count = 0;
+    }
+
+    /// Number of a row's group, by the order in which they are asked for.
+    pub fn of(&mut self, row: usize) -> u32 {
+        let first = self.first(row);
+        if self.number[first] == u32::MAX {
+            self.number[first] = self.count;
+            self.count += 1;
+        }
+        self.number[first]
+    }
+
+    /// First row of a row's group. Halves the way there for the next time.
+    fn first(&mut self, row: usize) -> usize {
+        let mut row = row as u32;
+        while self.parent[row as usize] != row {
+            let above = self.parent[row as usize];
+            self.parent[row as usize] = self.parent[above as usize];
+            row = above;
+        }
+        row as usize
+    }
 }
 
 /// A group of marbles that touch each other, while it is solved.
@@ -93,38 +137,16 @@ impl<S: Scalar> Islands<S> {
         }
     }
 
-    /// Finds who touches whom, over how many others (Tarjan 1975).
+    /// Finds which contacts are of one island.
     pub fn find(&mut self, constraints: &mut [Constraint<S>], rows: usize, speed: S) {
-        self.parent.clear();
-        self.parent.extend(0..rows as u32);
-        for c in constraints.iter() {
-            if let Some(a) = c.a.marble() {
-                let (first, second) = (self.first(a), self.first(c.b));
-                self.parent[first.max(second)] = first.min(second) as u32;
-            }
-        }
-        self.number.clear();
-        self.number.resize(rows, u32::MAX);
+        self.groups.find(constraints.iter().map(|c| (c.a.marble(), c.b)), rows);
         self.list.clear();
         for c in constraints {
-            let first = self.first(c.b);
-            if self.number[first] == u32::MAX {
-                self.number[first] = self.list.len() as u32;
+            c.island = self.groups.of(c.b);
+            if c.island as usize == self.list.len() {
                 self.list.push(Island::new(c.mobility.normal, speed));
             }
-            c.island = self.number[first];
         }
-    }
-
-    /// The first row of a row's island. Halves the way there for the next time.
-    fn first(&mut self, row: usize) -> usize {
-        let mut row = row as u32;
-        while self.parent[row as usize] != row {
-            let above = self.parent[row as usize];
-            self.parent[row as usize] = self.parent[above as usize];
-            row = above;
-        }
-        row as usize
     }
 
     /// Looks back at a sweep. True if all islands agree.

@@ -15,6 +15,7 @@ use crate::math::{
 };
 use crate::response::{BallSpin, Columns, Material, Mobility, Push, Work};
 use gain::{Ledger, Rebound};
+pub(super) use islands::Groups;
 use islands::Islands;
 use prepare::prepare;
 use solve::solve;
