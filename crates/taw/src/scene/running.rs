@@ -290,7 +290,11 @@ impl Movement {
             Self::Swings { way, pivot, axis, degrees, period } => {
                 let (part, _) = (TAU * (to / period)).sin_cos_portable();
                 let (_, rate) = (TAU * (middle / period)).sin_cos_portable();
-                let (way, rate) = (Vec3::from(way), rate * TAU / period);
+                // sin a − sin b = 2 cos((a + b) / 2) sin((a − b) / 2): the mean rate, also of what
+                // swings many times on the way.
+                let half = 0.5 * TAU * ((to - from) / period);
+                let mean = if half == 0.0 { 1.0 } else { half.sin_cos_portable().0 / half };
+                let (way, rate) = (Vec3::from(way), rate * mean * TAU / period);
                 let angle = degrees.to_radians();
                 (way * part, way * rate, pivot, axis, angle * part, angle * rate)
             }
