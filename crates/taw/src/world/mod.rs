@@ -344,7 +344,9 @@ impl<S: Scalar> World<S> {
         }
         self.stop_what_is_not_finite();
         self.reach = match self.model.response {
-            Response::Displacement | Response::Penalty(_) => S::zero(),
+            // Rounding must not end the touch of what falls together.
+            Response::Displacement => length(self.gravity) * dt * dt * S::constant(1e-3),
+            Response::Penalty(_) => S::zero(),
             Response::Impulse => length(self.gravity) * dt * dt * S::constant(2.0),
             Response::EventDriven => self.reach_at_rest(dt),
         };
