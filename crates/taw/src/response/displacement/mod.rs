@@ -108,6 +108,10 @@ pub(crate) fn displacement<S: Scalar>(
             break;
         }
     }
+    // Walls have the last word: through the floor nothing goes.
+    for touch in touches.iter().filter(|touch| touch.a.marble().is_none()) {
+        marbles.move_apart(touch, around);
+    }
     warm.clear();
     warm.extend(touches.iter().map(|t| Warm::of_pressure(key_of(t.a, t.b, t.along), t.change)));
     warm.sort_unstable_by_key(Warm::key);
