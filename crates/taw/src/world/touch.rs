@@ -171,8 +171,7 @@ impl<S: Scalar> World<S> {
 impl<S: Scalar> World<S> {
     /// Adds the marbles that met within the substep, though they are apart at its end.
     pub(super) fn touch_on_the_way(&mut self) {
-        let looks = matches!(self.model.response, Response::Displacement | Response::Impulse);
-        if self.sweep.grazes.is_empty() || !looks {
+        if self.sweep.grazes.is_empty() || self.model.response != Response::Impulse {
             return;
         }
         let mut listed: HashSet<_> = self.contacts.mm.iter().map(|c| (c.a, c.b)).collect();
