@@ -59,7 +59,8 @@ impl<S: Scalar> World<S> {
         });
         events.near.mm.extend(wanted.map(cast));
         let source = &Source::new(&self.walls, [dt.as_f64(), rest.as_f64()]);
-        let settings = Settings { dt: dt.as_f64(), iterations: self.model.iterations, source };
+        let iterations = self.model.iterations;
+        let settings = Settings { dt: dt.as_f64(), iterations, source, looks: 0.into() };
         events.work = self.accounting.is_some().then(Work::default);
         let mut impacts = Vec::new();
         self.stopped.extend(events.run(&settings, &mut impacts));

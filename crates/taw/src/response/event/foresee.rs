@@ -3,7 +3,7 @@
 use std::cmp::Reverse;
 use std::f64::consts::SQRT_2;
 
-use cgmath::InnerSpace;
+use cgmath::{InnerSpace, Zero};
 
 use super::time::{Gap, closing_time, meeting_time};
 use super::{Event, EventDriven, FLUSH, Form, Home, PRESS, REST, Settings, What};
@@ -24,7 +24,8 @@ impl EventDriven {
     pub(super) fn foresee(&mut self, row: usize, now: f64, settings: &Settings) {
         self.go_home(row, now, settings.dt);
         let ends = self.end_of_reach(row, now, settings);
-        let mut looks = 1 + self.looks_at_walls(row);
+        let walls = self.half_spaces().len() + self.parts_of(row).len();
+        settings.count(1 + walls as u64);
         let ball = &self.balls[row];
         let left = settings.dt - now;
         let mut first = (ball.path.change.max(now), What::Changes);
@@ -49,7 +50,7 @@ impl EventDriven {
             }
         });
         let mut other = |other: usize| {
-            looks += 1;
+            settings.count(1);
             if other != row
                 && let Some((after, what)) = self.foresee_meeting(row, other, now, settings)
             {
@@ -79,7 +80,6 @@ impl EventDriven {
             let stamp = ball.path.stamp;
             self.queue.push(Reverse(Event { time, row, stamp, what, tied }));
         }
-        self.looks += looks;
     }
 
     /// Names those that a ball may touch soon, itself among them, some of them twice.
@@ -182,6 +182,7 @@ impl EventDriven {
             if step == MOST_STEPS {
                 return Some((time - now, What::Looks));
             }
+            settings.count(super::PART_LOOKS);
             let (position, velocity) = (ball.position_at(time), ball.velocity_at(time));
             let Nearest { normal, distance, .. } = wall.nearest(position, time);
             let over = velocity - wall.way(position, time);
@@ -196,7 +197,7 @@ impl EventDriven {
             let after = if gap.now > least {
                 closing_time(gap)?
             } else if gap.speed < -slow {
-                let seam = self.is_seam(row, number, position, time);
+                let seam = self.is_seam(row, number, position, time, settings);
                 return (!seam).then_some((time - now, What::Hits(number)));
             } else {
                 let pressure = self.pressure(row, number, time, ball.path.acceleration);
@@ -204,7 +205,7 @@ impl EventDriven {
                 let off = step == 0 && ball.path.off == Some(number);
                 let press = !off && pressure > NO_PRESSURE * ball.pull.magnitude();
                 if press && gap.speed <= slow {
-                    if self.is_seam(row, number, position, time) {
+                    if self.is_seam(row, number, position, time, settings) {
                         return None;
                     }
                     return Some(if ball.path.heaped {
@@ -275,6 +276,7 @@ impl EventDriven {
         if (to - from).magnitude2() > farthest * farthest {
             return None;
         }
+        settings.count(if acceleration.is_zero() { 1 } else { super::QUARTIC_LOOKS });
         let (normal, distance) = direction_and_length(to - from).unwrap_or((Vec3::unit_x(), 0.0));
         let gap = distance - reach;
         let stamp = second.path.stamp;
@@ -316,7 +318,15 @@ impl EventDriven {
 
     /// Whether the point where a wall is nearest to a ball is on another wall that is as
     /// near, which is then the one that counts.
-    pub(super) fn is_seam(&self, row: usize, wall: usize, at: Point3<f64>, time: f64) -> bool {
+    pub(super) fn is_seam(
+        &self,
+        row: usize,
+        wall: usize,
+        at: Point3<f64>,
+        time: f64,
+        settings: &Settings,
+    ) -> bool {
+        settings.count(self.looks_at_walls(row));
         let ball = &self.balls[row];
         let flush = (FLUSH * ball.radius).max(ball.rounding);
         let nearest = |wall: usize, point: Point3<f64>| self.walls[wall].nearest(point, time);

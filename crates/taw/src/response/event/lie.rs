@@ -90,7 +90,7 @@ impl EventDriven {
     /// Finds out how a ball moves on that lies on a wall.
     pub(super) fn stretch(&mut self, row: usize, settings: &Settings) {
         let Some(support) = self.balls[row].path.support else { return };
-        self.looks += self.looks_at_walls(row);
+        settings.count(self.looks_at_walls(row));
         let even = self.is_even(support);
         let near = if even { vec![support as u32] } else { self.may_lie_on(row, support) };
         let Self { balls, walls, .. } = self;
@@ -99,13 +99,12 @@ impl EventDriven {
         let ground = ground(walls, &near, &balls[row], shortest);
         let state = State::of(&balls[row]);
         balls[row].path.stamp += 1;
-        let looks = &mut self.looks;
         if even || ground.is_flat(&state) {
             Self::go_straight(&ground, &mut balls[row], support, even, settings);
         } else if !Self::go_round(&ground, &mut balls[row], settings) {
             balls[row].come_off(support);
         }
-        *looks += ground.looks.get();
+        settings.count(ground.looks.get());
     }
 
     /// The walls that a ball may be on soon, besides the one that it is on: those that are

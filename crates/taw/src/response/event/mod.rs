@@ -18,6 +18,7 @@ mod support;
 mod time;
 mod wall;
 
+use std::cell::Cell as Counter;
 use std::cmp::{Ordering, Reverse};
 use std::collections::BinaryHeap;
 
@@ -61,9 +62,9 @@ const FLUSH: f64 = 5e-6;
 /// What lies on a wall that is no half-space looks where it is after this part of its
 /// radius, though not more often than after this part of a substep.
 const LOOK: f64 = 0.05;
-/// What a substep may cost, and for each ball besides, in looks at one wall or one other
-/// ball, of which a processor does some fifty million in a second. Whatever is not at its end
-/// then stays where it is, and is named.
+/// Cost that a substep may have, and for each ball besides, in looks at one half-space or one
+/// other ball, of which a processor does some fifty million in a second. Whatever is not at its
+/// end then stays where it is, and is named.
 const MOST_LOOKS: u64 = 32_000_000;
 const LOOKS_A_BALL: u64 = 20_000;
 /// So many touches are enough to hold a ball, of which one of its size has twelve at most. Of
@@ -71,6 +72,8 @@ const LOOKS_A_BALL: u64 = 20_000;
 pub(crate) const MOST_TOUCHES: u32 = 64;
 /// A look at a part of a wall that is no half-space counts as so many.
 const PART_LOOKS: u64 = 8;
+/// The time at which two balls meet that are not equally accelerated counts as so many looks.
+const QUARTIC_LOOKS: u64 = 16;
 
 /// A collision that a substep went through.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -348,6 +351,15 @@ pub(crate) struct Settings<'a> {
     pub iterations: u32,
     /// The walls.
     pub source: &'a dyn Source,
+    /// Cost of the substep so far, in looks.
+    pub looks: Counter<u64>,
+}
+
+impl Settings<'_> {
+    /// Adds to the cost of the substep.
+    fn count(&self, looks: u64) {
+        self.looks.set(self.looks.get() + looks);
+    }
 }
 
 /// The method, with what it scribbles on.
@@ -364,8 +376,6 @@ pub(crate) struct EventDriven {
     /// What is done to the balls, if somebody asks.
     pub work: Option<Work>,
     reach: Reach,
-    /// What it cost so far, in looks.
-    looks: u64,
     cells: Cells,
     anywhere: Vec<usize>,
     queue: BinaryHeap<Reverse<Event>>,
@@ -383,7 +393,6 @@ impl EventDriven {
             ball.path = Path { acceleration: ball.pull, ..Path::default() };
             ball.turned = Vec3::zero();
         }
-        self.looks = 0;
         self.find_homes(dt);
         self.find_walls(settings);
         self.begin_at_rest(settings);
@@ -392,7 +401,7 @@ impl EventDriven {
             self.foresee(row, 0.0, settings);
         }
         let most = MOST_LOOKS + LOOKS_A_BALL * self.balls.len() as u64;
-        while self.looks < most {
+        while settings.looks.get() < most {
             let Some(Reverse(event)) = self.queue.pop() else { break };
             if self.balls[event.row].path.stamp == event.stamp {
                 self.happen(event, settings, impacts);

@@ -10,6 +10,10 @@ use crate::math::Point3;
 
 /// A ball that knows the walls this many cells around needs to know no more yet.
 const MOST_CELLS: f64 = 4.0;
+/// A ball looks farther than that for as long as it finds no more parts of walls.
+const FEW_PARTS: usize = 32;
+/// A ball that looks around counts as so many looks, besides the parts that it finds.
+const LOOK_AROUND: u64 = 64;
 /// After this part of how far it may go, a ball looks around anew.
 const NEAR_THE_END: f64 = 0.9;
 /// A part of a radius that is added to how far a ball can go, so that one at rest need not
@@ -69,6 +73,7 @@ impl EventDriven {
             for row in 0..self.balls.len() {
                 let (center, far) = self.place(row, 0.0, settings);
                 let name = &mut |row, part| reach.names.push((row, part));
+                let far = far.min(MOST_CELLS * self.cells.width());
                 source.near(center, far + self.margin(row), name);
             }
         }
@@ -96,23 +101,32 @@ impl EventDriven {
         }
     }
 
-    /// Has a ball know all walls that it may come to from now on.
+    /// Has a ball know all walls that it may come to from now on, if those are not many.
     pub(super) fn look_around(&mut self, row: usize, now: f64, settings: &Settings) {
-        let (center, far) = self.place(row, now, settings);
+        let (center, farthest) = self.place(row, now, settings);
         let margin = self.margin(row);
+        let mut far = farthest.min(MOST_CELLS * self.cells.width());
         let Self { reach: Reach { index, lists, known, .. }, walls, .. } = self;
         let from = lists.len();
-        settings.source.near(center, far + margin, &mut |row, part| {
-            let place = index.get(&(row, part)).copied().or_else(|| {
-                walls.push(settings.source.wall(row, part)?);
-                let place = walls.len() as u32 - 1;
-                index.insert((row, part), place);
-                Some(place)
+        loop {
+            settings.source.near(center, far + margin, &mut |row, part| {
+                let place = index.get(&(row, part)).copied().or_else(|| {
+                    walls.push(settings.source.wall(row, part)?);
+                    let place = walls.len() as u32 - 1;
+                    index.insert((row, part), place);
+                    Some(place)
+                });
+                lists.extend(place);
             });
-            lists.extend(place);
-        });
+            let found = lists.len() - from;
+            settings.count(found as u64 * super::PART_LOOKS + LOOK_AROUND);
+            if found > FEW_PARTS || far.max(farthest) == far {
+                break;
+            }
+            lists.truncate(from);
+            far = farthest.min(2.0 * far);
+        }
         lists[from..].sort_unstable();
-        self.looks += (lists.len() - from) as u64;
         known[row] = Known { center, far, walls: [from, lists.len()] };
     }
 
@@ -127,11 +141,13 @@ impl EventDriven {
         self.look_where_it_is(row, now, settings);
         let ball = &self.balls[row];
         let (at, left) = (ball.position_at(now), settings.dt - now);
-        let speed = fastest(ball, now, left);
         let Known { center, far, .. } = *self.reach.known.get(row)?;
         let gone = (at - center).magnitude();
         // Between the two, so that each look brings it on.
-        let time = (0.5 * (1.0 + NEAR_THE_END) * far - gone) / speed;
+        let way = 0.5 * (1.0 + NEAR_THE_END) * far - gone;
+        let speed = ball.velocity_at(now).magnitude();
+        // The earliest end of a way at that speed and strongest acceleration.
+        let time = 2.0 * way / (speed + (speed * speed + 2.0 * strongest(ball) * way).sqrt());
         // What is not finite knows what it knows.
         (time < left).then_some(time)
     }
@@ -150,7 +166,7 @@ impl EventDriven {
         let ball = &self.balls[row];
         let left = settings.dt - now;
         let far = 2.0 * fastest(ball, now, left) * left + MORE * ball.radius;
-        (ball.position_at(now), far.min(MOST_CELLS * self.cells.width()))
+        (ball.position_at(now), far)
     }
 
     fn margin(&self, row: usize) -> f64 {
@@ -183,6 +199,10 @@ impl EventDriven {
 
 /// How fast a ball may be until the end of a path, unless something else happens, in m/s.
 fn fastest(ball: &Ball, now: f64, left: f64) -> f64 {
-    let pull = ball.pull.magnitude().max(ball.path.acceleration.magnitude());
-    ball.velocity_at(now).magnitude() + pull * left
+    ball.velocity_at(now).magnitude() + strongest(ball) * left
+}
+
+/// Acceleration of a ball that nothing hits, at most, in m/s².
+fn strongest(ball: &Ball) -> f64 {
+    ball.pull.magnitude().max(ball.path.acceleration.magnitude())
 }

@@ -164,12 +164,12 @@ impl EventDriven {
             let contact = Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
             let least = if self.goes(wall) { f64::NEG_INFINITY } else { 0.0 };
             if self.touches_wall(&contact, 0.0, settings).is_some_and(|speed| speed >= least)
-                && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, 0.0))
+                && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, 0.0, settings))
             {
                 near.push(contact);
             }
         });
-        self.looks += 2 * self.looks_at_walls(row);
+        settings.count(2 * self.looks_at_walls(row));
         self.near.wm = near;
     }
 
@@ -295,7 +295,7 @@ impl EventDriven {
         }
         let left = settings.dt - now;
         let walls = Between { walls: &self.walls, begin: now, end: now };
-        self.looks += Heap::cost(&contacts, settings);
+        settings.count(Heap::cost(&contacts, settings));
         self.heap.solve(&mut contacts, &walls, pull, 0.0, settings, &mut Vec::new());
         for (label, row) in self.heap.rows.iter().enumerate() {
             let ball = &mut self.balls[*row as usize];
@@ -348,20 +348,21 @@ impl EventDriven {
             if frozen {
                 self.balls[row].freeze();
             }
-            self.looks += 1 + self.looks_at_walls(row);
+            settings.count(1 + self.looks_at_walls(row));
             let at = self.balls[row].position;
             self.name_walls(row, |wall| {
                 let contact =
                     Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
                 if self.touches_wall(&contact, now, settings).is_some()
-                    && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, now))
+                    && (self.parts_of(row).is_empty()
+                        || !self.is_seam(row, wall, at, now, settings))
                 {
                     contacts.wm.push(contact);
                 }
             });
             near.clear();
             self.name_near(row, |other| near.push(other));
-            self.looks += near.len() as u64;
+            settings.count(near.len() as u64);
             near.sort_unstable();
             near.dedup();
             for other in near.iter().copied().filter(|other| *other != row) {
@@ -419,7 +420,7 @@ impl EventDriven {
             })
         });
         let walls = Between { walls: &self.walls, begin: now, end: settings.dt };
-        self.looks += Heap::cost(contacts, settings);
+        settings.count(Heap::cost(contacts, settings));
         self.heap.solve(contacts, &walls, strongest, left, settings, warm);
         let Heap { rows, position, velocity, spin, .. } = &self.heap;
         warm.retain_mut(|warm| warm.rename(|at| rows.get(at).map(|row| *row as usize)));
