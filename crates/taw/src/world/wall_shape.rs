@@ -39,7 +39,7 @@ impl<S: Scalar> WallShape<S> {
             }
             Self::HeightField(field, pose) => {
                 let pose = pose.checked()?;
-                room_for(&field.bounds(), pose)?;
+                room_for(&ground(&field), pose)?;
                 Self::HeightField(field, pose)
             }
         })
@@ -56,7 +56,7 @@ impl<S: Scalar> WallShape<S> {
             }
             Self::Solid(shape) => name(0, shape.bounding_box()),
             Self::Mesh(mesh, pose) => name(0, moved(&mesh.bounds(), *pose)),
-            Self::HeightField(field, pose) => name(0, moved(&field.bounds(), *pose)),
+            Self::HeightField(field, pose) => name(0, moved(&ground(field), *pose)),
         }
     }
 
@@ -66,7 +66,12 @@ impl<S: Scalar> WallShape<S> {
         match self {
             Self::Plane(_) | Self::Solid(_) => name(part),
             Self::Mesh(mesh, pose) => mesh.near(&moved(bounds, pose.inverse()), name),
-            Self::HeightField(field, pose) => field.near(&moved(bounds, pose.inverse()), name),
+            Self::HeightField(field, pose) => {
+                // What is below touches what is above it.
+                let mut bounds = moved(bounds, pose.inverse());
+                bounds.max.y = bounds.max.y.max(field.bounds().max.y);
+                field.near(&bounds, name);
+            }
         }
     }
 
@@ -229,6 +234,13 @@ fn room_for<S: Scalar>(bounds: &Box3<S>, pose: Pose<S>) -> Result<(), Error> {
     let Box3 { min, max } = moved(bounds, pose);
     finite_point(["shape.x", "shape.y", "shape.z"], min)?;
     finite_point(["shape.x", "shape.y", "shape.z"], max).map(|_| ())
+}
+
+/// The box around a landscape and what is solid below it, as deep as the landscape is wide.
+fn ground<S: Scalar>(field: &HeightField<S>) -> Box3<S> {
+    let mut bounds = field.bounds();
+    bounds.min.y -= (bounds.max - bounds.min).magnitude();
+    bounds
 }
 
 /// The box around a box that was moved.
