@@ -17,7 +17,6 @@
 
 use bevy::ecs::message::Messages;
 use bevy::prelude::*;
-use taw::contact::Contact;
 use taw::math::{Vec3 as TawVec3, direction_and_length, length};
 
 use crate::SubstepDelta;
@@ -107,25 +106,27 @@ pub(crate) fn are_read(
     started.is_some() || ongoing.is_some() || ended.is_some()
 }
 
-/// Notes who overlaps in this substep, before anything is restituted. What only comes
-/// near has no normal yet, and hits nothing.
+/// Notes who touches in this substep, before anything is restituted.
 pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
     let velocity = |row: u32| world.marbles.velocity()[row as usize];
-    let started = |pair: ContactPair, contact: &Contact<f32>, closing: TawVec3<f32>| {
-        let normal = from_vector(direction_and_length(contact.mtv)?.0);
-        let approach_speed = -from_vector(closing).dot(normal);
-        Some(ContactStarted { pair, normal, approach_speed })
+    let started = |pair: ContactPair, normal: TawVec3<f32>, closing: TawVec3<f32>| {
+        let (normal, closing) = (from_vector(normal), from_vector(closing));
+        ContactStarted { pair, normal, approach_speed: -closing.dot(normal) }
     };
     for contact in &world.contacts.wm {
         if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
-            touches.now.extend(started(ContactPair { a, b }, contact, velocity(contact.b)));
+            let normal = world.normal_of_wall_touch(contact);
+            let touch =
+                normal.map(|normal| started(ContactPair { a, b }, normal, velocity(contact.b)));
+            touches.now.extend(touch);
         }
     }
     for contact in &world.contacts.mm {
         if let (Some(a), Some(b)) = (world.marble_entity(contact.a), world.marble_entity(contact.b))
         {
             let closing = velocity(contact.b) - velocity(contact.a);
-            let mut touch = started(ContactPair { a, b }, contact, closing);
+            let normal = world.normal_of_marble_touch(contact);
+            let mut touch = normal.map(|normal| started(ContactPair { a, b }, normal, closing));
             if b < a {
                 // Rows move about; the order of entities does not.
                 touch = touch.map(|touch| ContactStarted {

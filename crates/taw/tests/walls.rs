@@ -83,13 +83,8 @@ fn a_marble_comes_to_rest_on_a_floor_of_any_kind() {
             }
             let marble = world.marbles.get(id).unwrap();
             let (height, speed) = (marble.position.y, marble.velocity.magnitude());
-            // The displacement keeps hopping by what gravity does in a step or two.
-            let (low, fast) = match model.response {
-                Response::Displacement => (0.02, 0.4),
-                _ => (0.005, 0.02),
-            };
-            assert!((height - 0.5).abs() < low, "{name} {:?}: {height}", model.response);
-            assert!(speed < fast, "{name} {:?}: {speed}", model.response);
+            assert!((height - 0.5).abs() < 0.005, "{name} {:?}: {height}", model.response);
+            assert!(speed < 0.02, "{name} {:?}: {speed}", model.response);
         }
     }
 }

@@ -11,9 +11,6 @@ const MISSED: &[(&str, &str)] = &[
     ("impact/galperin/f64", "event-driven, f64"),
     // It begins up to 8 mm deep in the cone, out of which it is lifted.
     ("ordinary/cone", "event-driven"),
-    // A single pass turns overlap into speed, and reports what gravity gives in half a step.
-    ("ordinary/overlap", "displacement"),
-    ("ordinary/rest", "displacement"),
     // Springs give back a part of what overlap of the start holds.
     ("ordinary/overlap", "spring and dashpot"),
     // Contacts that give way a little keep their motion longer.

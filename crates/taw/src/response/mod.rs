@@ -1,7 +1,7 @@
 //! What a touch does to those who touch. One method a file; all of them take the
 //! same columns and the same contacts.
 
-mod displacement;
+pub(crate) mod displacement;
 pub(crate) mod event;
 mod impact;
 pub(crate) mod impulse;
@@ -9,7 +9,6 @@ mod material;
 pub(crate) mod penalty;
 mod work;
 
-pub(crate) use displacement::displacement;
 pub use event::Impact;
 pub use impact::{BallSpin, Mobility, impact};
 pub(crate) use impulse::Walls;
@@ -26,13 +25,17 @@ use crate::math::{Point3, Scalar, Vec3};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Response {
-    /// The lab's method: largest displacement first, each contact is tested again;
-    /// what still touches is moved apart (a wall stays, marbles take half each), and
-    /// velocities change by that displacement per step.
+    /// The lab's method: what moved into each other is moved back (a wall stays, marbles take
+    /// half each), the largest displacement first, and velocities change by that displacement
+    /// per step. What overlapped before (spawned, grown, put there) is moved apart afterwards,
+    /// and no velocity changes: overlap is no energy.
     ///
-    /// The bottom of the ladder. The same push whatever the masses; no friction, no
-    /// restitution, no spin; one pass, so tall heaps sag; deep overlap turns into
-    /// speed.
+    /// The bottom of the ladder. The same push whatever the masses, so momentum is kept only
+    /// where they are equal; no friction, no restitution, no spin. Changes begin with those of
+    /// the last substep and go over all contacts [`Model::iterations`] times at most, so that
+    /// what lies reports no speed; tall heaps sag until they agree.
+    ///
+    /// [`Model::iterations`]: crate::world::Model::iterations
     #[default]
     Displacement,
     /// Impulses, contact by contact and round after round

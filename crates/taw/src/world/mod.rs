@@ -40,7 +40,8 @@ use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Around, Settings, Start, Warm, impulse};
 use crate::response::{
-    Impact, Response, Rod, Shear, displacement,
+    Impact, Response, Rod, Shear,
+    displacement::{self, displacement},
     penalty::{self, penalty},
 };
 use crate::swarm::Swarm;
@@ -91,6 +92,7 @@ pub struct World<S> {
     /// for them.
     velocity_before: Vec<Vec3<S>>,
     held: Vec<bool>,
+    displacement: displacement::Scratch<S>,
     impulse: impulse::Scratch<S>,
     /// What the contacts of the last substep bore, and the removals until then: they
     /// move rows, after which nothing here has the right name any more.
@@ -131,6 +133,7 @@ impl<S: Scalar> Default for World<S> {
             inverse_mass: Vec::new(),
             velocity_before: Vec::new(),
             held: Vec::new(),
+            displacement: displacement::Scratch::default(),
             impulse: impulse::Scratch::default(),
             warm: Vec::new(),
             shear: Vec::new(),
@@ -167,6 +170,7 @@ impl<S: Scalar> PartialEq for World<S> {
             inverse_mass: _,
             velocity_before: _,
             held: _,
+            displacement: _,
             impulse: _,
             warm,
             shear,
@@ -330,8 +334,8 @@ impl<S: Scalar> World<S> {
                 self.velocity_before.extend_from_slice(self.marbles.velocity());
             }
             self.marbles.integrate(drive, &mut self.stopped);
-            self.stop_at_walls(dt);
-            self.stop_where_they_meet(dt);
+            self.stop_at_walls();
+            self.stop_where_they_meet();
         }
         if !(self.model.response == Response::EventDriven
             && self.model.rotation == Rotation::Dynamic)
@@ -340,7 +344,9 @@ impl<S: Scalar> World<S> {
         }
         self.stop_what_is_not_finite();
         self.reach = match self.model.response {
-            Response::Displacement | Response::Penalty(_) => S::zero(),
+            // Rounding must not end the touch of what falls together.
+            Response::Displacement => length(self.gravity) * dt * dt * S::constant(1e-3),
+            Response::Penalty(_) => S::zero(),
             Response::Impulse => length(self.gravity) * dt * dt * S::constant(2.0),
             Response::EventDriven => self.reach_at_rest(dt),
         };
@@ -379,15 +385,34 @@ impl<S: Scalar> World<S> {
         if self.model.rotation != Rotation::Dynamic {
             columns.spin = &mut []; // what is only shown is not felt
         }
+        let settings = Settings {
+            iterations: self.model.iterations,
+            dt,
+            bounce_speed: length(self.gravity) * dt * S::constant(2.0),
+            slop: length(self.gravity) * dt * dt,
+            largest_slop: S::constant(0.001),
+        };
+        let around = Around {
+            walls: &self.walls,
+            material: |row| material.get(row).unwrap_or_default(),
+            follow: |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
+            start: Start {
+                position: &[],
+                velocity: &self.velocity_before,
+                stands: &self.sweep.stands,
+            },
+            settings: &settings,
+        };
         match self.model.response {
             Response::Displacement => {
                 let contacts = self.contacts.len() as u32;
                 let mut pushes = self.accounting.as_ref().map(|_| Vec::new());
                 displacement(
-                    &self.walls,
                     &mut columns,
                     &mut self.contacts,
-                    dt,
+                    &around,
+                    &mut self.displacement,
+                    &mut self.warm,
                     &mut self.stopped,
                     |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change))),
                 );
@@ -400,24 +425,6 @@ impl<S: Scalar> World<S> {
                 }
             }
             Response::Impulse => {
-                let settings = Settings {
-                    iterations: self.model.iterations,
-                    dt,
-                    bounce_speed: length(self.gravity) * dt * S::constant(2.0),
-                    slop: length(self.gravity) * dt * dt,
-                    largest_slop: S::constant(0.001),
-                };
-                let around = Around {
-                    walls: &self.walls,
-                    material: |row| material.get(row).unwrap_or_default(),
-                    follow: |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
-                    start: Start {
-                        position: &[],
-                        velocity: &self.velocity_before,
-                        stands: &self.sweep.stands,
-                    },
-                    settings: &settings,
-                };
                 impulse(
                     &mut columns,
                     &mut self.contacts,

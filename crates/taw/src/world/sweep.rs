@@ -95,7 +95,6 @@ struct Way<S> {
 struct Stop<S> {
     /// As a part of the way.
     time: S,
-    normal: Vec3<S>,
     wall: u32,
 }
 
@@ -130,7 +129,7 @@ impl<S: Scalar> World<S> {
     /// Puts marbles that would pass into walls by more than half of their radius to where
     /// they touch them, or by [`Response::Penalty`], whose forces need an overlap, to where
     /// half of the radius does. Walls count as they are now, and half-spaces need none of this.
-    pub(super) fn stop_at_walls(&mut self, dt: S) {
+    pub(super) fn stop_at_walls(&mut self) {
         self.walls.prepare();
         if self.sweep.start.len() != self.marbles.len() || self.walls.are_planes() {
             return;
@@ -141,14 +140,8 @@ impl<S: Scalar> World<S> {
             if length(motion) <= sphere.radius * S::constant(FAST) {
                 continue;
             }
-            let Some(Stop { time, normal, wall }) = self.first_wall(&sphere, motion) else {
-                continue;
-            };
+            let Some(Stop { time, wall }) = self.first_wall(&sphere, motion) else { continue };
             self.marbles.stop_on_the_way(&mut self.sweep, row, By::Wall(wall), time);
-            if self.model.response == Response::Displacement {
-                let depth = (motion.dot(-normal) * (S::one() - time)).max(S::zero());
-                self.marbles.velocity[row] += normal * (depth / dt);
-            }
         }
     }
 
@@ -210,7 +203,7 @@ impl<S: Scalar> World<S> {
                 return None;
             }
             if gap <= near {
-                return Some(Stop { time, normal, wall: part.wall });
+                return Some(Stop { time, wall: part.wall });
             }
             time += gap / closing;
             if time > S::one() {
@@ -221,9 +214,8 @@ impl<S: Scalar> World<S> {
     }
 
     /// Puts marbles that meet on their way to where they touch, the earliest first. What
-    /// is left of their way is lost. [`Response::Displacement`] takes its part along the
-    /// normal for the displacement, half of it for each, and changes the velocities by it.
-    pub(super) fn stop_where_they_meet(&mut self, dt: S) {
+    /// is left of their way is lost.
+    pub(super) fn stop_where_they_meet(&mut self) {
         if self.sweep.start.len() != self.marbles.len() || self.model.response.needs_overlap() {
             return; // this model does not sweep
         }
@@ -253,7 +245,7 @@ impl<S: Scalar> World<S> {
         near.sort_unstable();
         stopped.clear();
         stopped.resize(start.len(), None);
-        let (mut by, mut changes) = (Vec::new(), Vec::new());
+        let mut by = Vec::new();
         hits.clear();
         let ahead = near.iter().filter(|(a, b)| a < b);
         let way = |row: u32, now: S, stopped: &[Option<S>]| {
@@ -274,12 +266,6 @@ impl<S: Scalar> World<S> {
             let (a, b) = (way(pair.0, time, stopped), way(pair.1, time, stopped));
             if before != (a.stopped, b.stopped) {
                 continue; // it was foreseen anew
-            }
-            let apart = direction_and_length(b.sphere.center - a.sphere.center);
-            if displaces && let Some((normal, _)) = apart {
-                let depth = (a.motion - b.motion).dot(normal).max(S::zero());
-                let change = normal * (half * depth / dt);
-                changes.extend([(pair.0, -change), (pair.1, change)]);
             }
             let now = [(pair.0, a), (pair.1, b)].into_iter().filter(|(_, way)| !way.stopped);
             now.clone().for_each(|(row, _)| {
@@ -311,9 +297,6 @@ impl<S: Scalar> World<S> {
             self.marbles.stop_on_the_way(&mut self.sweep, row, By::Marble(other), time);
             // Rounding may leave a gap.
             self.sweep.grazes.push(((row as u32).min(other), (row as u32).max(other)));
-        }
-        for (row, change) in changes {
-            self.marbles.velocity[row as usize] += change;
         }
     }
 }

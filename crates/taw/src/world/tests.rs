@@ -57,9 +57,7 @@ fn a_clone_is_a_snapshot_that_steps_to_the_same_bits() {
 #[test]
 fn a_heap_comes_to_rest_and_nothing_falls_through() {
     let mut world = heap();
-    // The lab's method as it was taught, at the end of a step.
-    let detection = Detection::Discrete;
-    world.set_model(Model { detection, substeps: 4, ..Model::default() }).unwrap();
+    world.set_model(Model { substeps: 4, ..Model::default() }).unwrap();
     for _ in 0..1200 {
         world.step(DT).unwrap();
     }

@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use super::walls::{Part, Walls};
 use super::{WallShape, World};
 use crate::contact::{Contact, mtv_sphere_plane, mtv_sphere_sphere};
-use crate::math::{Scalar, Vec3, length};
+use crate::math::{Scalar, Vec3, direction_and_length, length};
 use crate::response::Response;
 use crate::shape::{Aabb, Nearest, Plane, Shape, Solid, Sphere};
 
@@ -124,6 +124,41 @@ impl<S: Scalar> World<S> {
         beads
     }
 
+    /// Unit vector from the wall to the marble of a contact, if they touch. They do with a gap of
+    /// up to 5e-6 radii, which rounding may leave under what rests.
+    #[must_use]
+    pub fn normal_of_wall_touch(&self, contact: &Contact<S>) -> Option<Vec3<S>> {
+        let Contact { a, b, part, along: [_, along], mtv } = *contact;
+        let row = b as usize;
+        let near = || {
+            let bead = *self.marbles.position().get(row)? + self.marbles.axis(row) * along;
+            let wall = self.walls.shapes().get(a as usize)?;
+            let Nearest { normal, distance, .. } = wall.nearest_of(part, bead);
+            let radius = self.marbles.radius()[row];
+            (distance - radius <= radius * S::constant(FLUSH)).then_some(normal)
+        };
+        direction_and_length(mtv).map(|(normal, _)| normal).or_else(near)
+    }
+
+    /// Unit vector from the first marble to the second of a contact, if they touch; see
+    /// [`normal_of_wall_touch`](Self::normal_of_wall_touch).
+    #[must_use]
+    pub fn normal_of_marble_touch(&self, contact: &Contact<S>) -> Option<Vec3<S>> {
+        let Contact { a, b, along, mtv, .. } = *contact;
+        let near = || {
+            let bead = |row: u32, along: S| {
+                let row = row as usize;
+                Some(*self.marbles.position().get(row)? + self.marbles.axis(row) * along)
+            };
+            let apart = bead(b, along[1])? - bead(a, along[0])?;
+            let (normal, distance) = direction_and_length(apart)?;
+            let [first, second] = [a, b].map(|row| self.marbles.radius()[row as usize]);
+            let flush = first.min(second) * S::constant(FLUSH);
+            (distance - first - second <= flush).then_some(normal)
+        };
+        direction_and_length(mtv).map(|(normal, _)| normal).or_else(near)
+    }
+
     /// Finds which marbles touch each other, or are at most `reach` metres apart.
     pub(super) fn touch_marbles(&mut self, reach: S) {
         let center = self.marbles.position();
@@ -171,7 +206,8 @@ impl<S: Scalar> World<S> {
 impl<S: Scalar> World<S> {
     /// Adds the marbles that met within the substep, though they are apart at its end.
     pub(super) fn touch_on_the_way(&mut self) {
-        if self.sweep.grazes.is_empty() || self.model.response != Response::Impulse {
+        let looks = matches!(self.model.response, Response::Displacement | Response::Impulse);
+        if self.sweep.grazes.is_empty() || !looks {
             return;
         }
         let mut listed: HashSet<_> = self.contacts.mm.iter().map(|c| (c.a, c.b)).collect();

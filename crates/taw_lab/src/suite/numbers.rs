@@ -104,7 +104,7 @@ fn extremes(meter: &mut Meter, model: Model) -> f64 {
                             .all(|v| v.x.is_finite() && v.y.is_finite() && v.z.is_finite())
                     });
                     let after = energy(&world);
-                    // Displacements turn overlap into speed; that is their nature.
+                    // Displacements part by half whatever the masses; that is their nature.
                     let keeps = model.response == Response::Displacement
                         || mass.is_infinite() // which may push for ever
  || !before.is_finite()

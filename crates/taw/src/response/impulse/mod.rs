@@ -15,6 +15,7 @@ use crate::math::{
 };
 use crate::response::{BallSpin, Columns, Material, Mobility, Push, Work};
 use gain::{Ledger, Rebound};
+pub(super) use islands::Groups;
 use islands::Islands;
 use prepare::prepare;
 use solve::solve;
@@ -63,7 +64,7 @@ pub(super) enum First {
 }
 
 impl First {
-    fn marble(self) -> Option<usize> {
+    pub(super) fn marble(self) -> Option<usize> {
         match self {
             Self::Wall(..) => None,
             Self::Marble(row) => Some(row as usize),
@@ -190,7 +191,7 @@ struct Resistance<S> {
 }
 
 /// Names a contact: walls first, then by rows.
-type Key = (bool, usize, usize, u32, [i8; 2]);
+pub(super) type Key = (bool, usize, usize, u32, [i8; 2]);
 
 /// What a contact needed in the last substep, which is a good guess for this one.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -199,6 +200,32 @@ pub(crate) struct Warm<S> {
     pressure: S,
     grip: Vec3<S>,
     twist: Vec3<S>,
+}
+
+/// The name of a contact.
+pub(super) fn key_of<S: Scalar>(a: First, b: usize, along: [S; 2]) -> Key {
+    let zero = S::zero();
+    // Which ends of capsules; one of them is often touched twice.
+    let side = along.map(|along| if along > zero { 2 } else { i8::from(along < zero) });
+    match a {
+        First::Wall(wall, part) => (false, wall as usize, b, part, side),
+        First::Marble(a) => (true, a as usize, b, 0, side),
+    }
+}
+
+impl<S: Scalar> Warm<S> {
+    /// Of a contact that only presses, in m/s.
+    pub(super) fn of_pressure(key: Key, pressure: S) -> Self {
+        Self { key, pressure, grip: Vec3::zero(), twist: Vec3::zero() }
+    }
+
+    pub(super) fn key(&self) -> Key {
+        self.key
+    }
+
+    pub(super) fn pressure(&self) -> S {
+        self.pressure
+    }
 }
 
 impl<S> Warm<S> {
@@ -214,13 +241,7 @@ impl<S> Warm<S> {
 
 impl<S: Scalar> Constraint<S> {
     fn key(&self) -> Key {
-        let zero = S::zero();
-        // Which ends of capsules; one of them is often touched twice.
-        let side = self.along.map(|along| if along > zero { 2 } else { i8::from(along < zero) });
-        match self.a {
-            First::Wall(wall, part) => (false, wall as usize, self.b, part, side),
-            First::Marble(a) => (true, a as usize, self.b, 0, side),
-        }
+        key_of(self.a, self.b, self.along)
     }
 
     /// All that it applied, times the mobility along the normal, in m/s.
@@ -312,7 +333,7 @@ impl<S: Scalar> Columns<'_, S> {
     /// surfaces are apart (negative for an overlap). Coincident centers part any way, each pair
     /// its own.
     /// None where the column of positions is empty, or for a gap that is not finite.
-    fn normal_and_gap(
+    pub(super) fn normal_and_gap(
         &self,
         position: &[Point3<S>],
         a: First,

@@ -264,17 +264,17 @@ where
     }
 
     /// Whether a row was stopped within the substep.
-    pub(super) fn stands(&self, row: usize) -> bool {
+    pub(in crate::response) fn stands(&self, row: usize) -> bool {
         self.start.stands.get(row).copied().unwrap_or(false)
     }
 
     /// The time for which a position follows a change of velocity, in seconds.
-    pub(super) fn follows_row(&self, row: usize) -> S {
+    pub(in crate::response) fn follows_row(&self, row: usize) -> S {
         if self.stands(row) { S::zero() } else { (self.follow)(row) * self.settings.dt }
     }
 
     /// The time for which a gap follows a change of its speed, in seconds.
-    fn follows(&self, a: First, b: usize) -> S {
+    pub(in crate::response) fn follows(&self, a: First, b: usize) -> S {
         mean(a, b, |row| self.follows_row(row))
     }
 
