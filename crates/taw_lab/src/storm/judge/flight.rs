@@ -108,6 +108,7 @@ impl Falls {
     /// - changes its momentum by gravity alone, as every action has its reaction. Bound: the
     ///   rounding of all velocities that were added, as many times as there are substeps; of what
     ///   touches, and in the lab's tier of swarms of all, also that of places by the substep.
+    ///   Bodies that stop where they meet lose what gravity does in the rest of the step.
     /// - moves its centre of mass by its velocity: at the least with the one before, at the most
     ///   with the one after, so within half a step of gravity of the mean. Bound: that, and the
     ///   rounding of places. Where bodies stop where they meet, see [`LATE`].
@@ -155,7 +156,7 @@ impl Falls {
                 self.late[i] = 0;
                 continue;
             }
-            let [momentum, support] = self.cluster(rules, &sums[i], i, gravity.magnitude());
+            let [momentum, support] = self.cluster(rules, &sums[i], i, gravity);
             for (worst, found) in worst.iter_mut().zip([momentum, support]) {
                 if found.ratio() > worst.ratio() {
                     *worst = found;
@@ -165,11 +166,23 @@ impl Falls {
         worst.to_vec()
     }
 
-    fn cluster(&mut self, rules: &Rules, sum: &Sum, body: usize, gravity: f64) -> [Finding; 2] {
+    fn cluster(
+        &mut self,
+        rules: &Rules,
+        sum: &Sum,
+        body: usize,
+        gravity: Vec3<f64>,
+    ) -> [Finding; 2] {
         let length = |v: [f64; 3]| Vec3::from(v).magnitude();
+        let mut gained = Vec3::from(sum.momentum);
+        if sum.count > 1 && rules.swept() && gravity.magnitude2() > 0.0 {
+            let fall = gravity * (sum.mass * rules.step);
+            gained += fall * (-gained.dot(fall) / fall.magnitude2()).clamp(0.0, 1.0);
+        }
+        let gravity = gravity.magnitude();
         let momentum = Finding {
             invariant: Invariant::Momentum,
-            value: length(sum.momentum),
+            value: gained.magnitude(),
             bound: sum.moving + f64::MIN_POSITIVE,
             body: Some(body),
         };
