@@ -17,7 +17,7 @@
 
 use bevy::ecs::message::Messages;
 use bevy::prelude::*;
-use taw::math::{Vec3 as TawVec3, direction_and_length, length};
+use taw::math::{Vec3 as TawVec3, length};
 
 use crate::SubstepDelta;
 use crate::components::{MarbleState, WallState};
