@@ -1,7 +1,7 @@
 //! Contacts that start, go on and end.
 //!
-//! They are told only to those who listen: register the kinds that you read, as
-//! Bevy's own way is, and no others are even collected.
+//! Messages are opt-in, as in Bevy: kinds that you register are sent, and contacts are collected only
+//! if at least one kind is.
 //!
 //! ```
 //! # use bevy::prelude::*;
@@ -51,7 +51,7 @@ impl ContactPair {
 #[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct ContactStarted {
-    /// Who.
+    /// The two entities.
     pub pair: ContactPair,
     /// The unit vector from `a` toward `b`.
     pub normal: Vec3,
@@ -64,7 +64,7 @@ pub struct ContactStarted {
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct ContactOngoing {
-    /// Who.
+    /// The two entities.
     pub pair: ContactPair,
 }
 
@@ -76,7 +76,7 @@ pub struct ContactOngoing {
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct ContactEnded {
-    /// Who.
+    /// The two entities.
     pub pair: ContactPair,
 }
 
@@ -87,7 +87,7 @@ pub(crate) struct Touches {
     now: Vec<ContactStarted>,
     /// Sorted, one to a pair.
     before: Vec<ContactPair>,
-    /// How many of this step's impacts were noted.
+    /// Number of this step's impacts already noted.
     impacts: usize,
 }
 
@@ -97,7 +97,7 @@ type Readers<'w> = (
     Option<ResMut<'w, Messages<ContactEnded>>>,
 );
 
-/// Whether any kind of contact message is registered.
+/// Run condition: at least one kind of contact message is registered.
 pub(crate) fn are_read(
     started: Option<Res<Messages<ContactStarted>>>,
     ongoing: Option<Res<Messages<ContactOngoing>>>,
@@ -196,7 +196,7 @@ pub(crate) fn write(
     before.extend(now.drain(..).map(|touch| touch.pair));
 }
 
-/// How far the surfaces of two are apart, and the smaller radius, in metres.
+/// Separation of two surfaces, and the smaller radius, in metres.
 struct Gap {
     width: f32,
     radius: f32,

@@ -150,11 +150,10 @@ impl Plugin for TawPlugin {
             (
                 integrate.in_set(TawSystems::Integrate),
                 generate_contacts.in_set(TawSystems::GenerateContacts),
-                messages::collect
-                    .run_if(messages::are_read)
-                    .after(TawSystems::GenerateContacts)
-                    .before(TawSystems::Restitute),
-                restitute.in_set(TawSystems::Restitute),
+                // What a game takes out of the contacts before they are restituted is not told.
+                (messages::collect.run_if(messages::are_read), restitute)
+                    .chain()
+                    .in_set(TawSystems::Restitute),
                 messages::collect_impacts.run_if(messages::are_read).after(TawSystems::Restitute),
             ),
         )

@@ -349,3 +349,18 @@ fn capsules_in_flight_keep_energy_and_angular_momentum_to_rounding() {
         }
     }
 }
+
+/// Their ends are farther apart than they are thick, though they are all but parallel.
+#[test]
+fn long_capsules_that_cross_at_a_small_angle_touch() {
+    let mut world = world(dynamic(Response::Impulse));
+    world.set_gravity(Vec3::zero()).unwrap();
+    for (z, degrees) in [(0.0, 0.0_f64), (0.015, 1.5)] {
+        let rotation = AxisAngle::new(Vec3::unit_z(), degrees.to_radians()).unwrap().into();
+        let at = Point3::new(0.0, 0.0, z);
+        let marble = Marble { half_length: 1.0, rotation, ..Marble::new(at, 0.01) };
+        world.marbles.insert(marble).unwrap();
+    }
+    world.step(1e-3).unwrap();
+    assert!(!world.contacts.mm.is_empty());
+}

@@ -62,7 +62,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// The same where some are capsules: each of these touches with its ends.
+    /// Finds contacts with half-spaces where some marbles are capsules, which touch with their ends.
     fn touch_half_spaces_at_beads(&mut self, reach: S) {
         for (a, plane) in self.walls.planes() {
             for b in 0..self.marbles.len() {
@@ -211,14 +211,15 @@ impl<S: Scalar> World<S> {
             return;
         }
         let mut listed: HashSet<_> = self.contacts.mm.iter().map(|c| (c.a, c.b)).collect();
-        for (a, b) in self.sweep.grazes.drain(..).filter(|pair| listed.insert(*pair)) {
+        for (a, b) in self.sweep.grazes.iter().copied().filter(|pair| listed.insert(*pair)) {
             let (along, mtv) = ([S::zero(); 2], Vec3::zero());
             self.contacts.mm.push(Contact { a, b, part: 0, along, mtv });
         }
     }
 }
 
-/// The way of a sphere out of a half-space; none for one that is only so near.
+/// Displacement that moves a sphere out of a half-space, in metres: zero if it is outside by at most
+/// `reach` metres, none if farther.
 #[inline]
 fn out_of_half_space<S: Scalar>(plane: &Plane<S>, sphere: &Sphere<S>, reach: S) -> Option<Vec3<S>> {
     let gap = || plane.signed_distance(sphere.center) - sphere.radius;
@@ -226,7 +227,8 @@ fn out_of_half_space<S: Scalar>(plane: &Plane<S>, sphere: &Sphere<S>, reach: S) 
     mtv_sphere_plane(sphere, plane).or_else(|| near().then(Vec3::zero))
 }
 
-/// The way of the second out of the first; none if they are only so near.
+/// Displacement that moves the second sphere out of the first, in metres: zero if they are at most
+/// `reach` metres apart, none if farther.
 #[inline]
 fn out_of_sphere<S: Scalar>(first: &Sphere<S>, second: &Sphere<S>, reach: S) -> Option<Vec3<S>> {
     let near = || {
@@ -245,9 +247,12 @@ fn beads_of_lines<S: Scalar>(
     let apart = second.center - first.center;
     let clamp = |along: S, half: S| along.max(-half).min(half);
     let (cos, on_x, on_y) = (x.dot(y), apart.dot(x), apart.dot(y));
-    let squared_sin = S::one() - cos * cos;
-    // Nearly parallel lines have no one nearest point that would stay where it is.
-    if half_x > S::zero() && half_y > S::zero() && squared_sin < S::constant(1e-3) {
+    let squared_sin = x.cross(y).magnitude2();
+    // Nearly parallel lines have no one nearest point that would stay where it is. They are not
+    // parallel if their ends lie aside of each other by a good part of their radii.
+    let slim = ((first.radius + second.radius) / half_x.min(half_y)).min(S::one());
+    let parallel = squared_sin < slim * slim * S::constant(1e-3);
+    if half_x > S::zero() && half_y > S::zero() && parallel {
         let ends = [-half_y, half_y].map(|end| clamp(on_x + cos * end, half_x));
         let beads = ends.map(|along| [along, clamp(cos * along - on_y, half_y)]);
         let mut both = SmallVec::from_slice(&beads[..1]);

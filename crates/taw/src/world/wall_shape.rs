@@ -6,14 +6,14 @@ use crate::Error;
 use crate::contact::{Closest, closest, parts_of};
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
 use crate::response::event::Form;
 use crate::shape::{
     Box3, Capsule, Compound, HeightField, Hull, Mesh, Nearest, Obb, Plane, Shape, Solid, Sphere,
     Surface, Triangle,
 };
 
-/// What a wall may be.
+/// Shape of a wall.
 #[derive(Clone, Debug, PartialEq)]
 pub enum WallShape<S> {
     /// A half-space.
@@ -27,7 +27,7 @@ pub enum WallShape<S> {
 }
 
 impl<S: Scalar> WallShape<S> {
-    /// The same, with the compounds in compounds laid out flat, or why it cannot be a wall.
+    /// Checks the shape and lays out nested compounds flat.
     pub(super) fn checked(self) -> Result<Self, Error> {
         Ok(match self {
             Self::Plane(_) => self,
@@ -86,11 +86,9 @@ impl<S: Scalar> WallShape<S> {
             Self::Plane(_) | Self::Solid(_) => name(part),
             Self::Mesh(mesh, pose) => mesh.around(pose.point_back(point), reach, &mut each),
             Self::HeightField(field, pose) => {
-                // Under a landscape it is solid however deep.
+                // A point below the surface is at most this far from it.
                 let local = pose.point_back(point);
-                let bounds = field.bounds();
-                let below = local.y < bounds.max.y;
-                let far = if below { reach.max(bounds.max.y - local.y) } else { reach };
+                let far = field.height_over(local).map_or(reach, |height| reach.max(height));
                 field.around(local, far, |part| {
                     each(part);
                     far
@@ -99,7 +97,7 @@ impl<S: Scalar> WallShape<S> {
         }
     }
 
-    /// Whether another one is at the same place. Of what is shared, copies are one.
+    /// Tests for equal shapes in one place; shared meshes and height fields compare by pointer.
     pub(super) fn is_where(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Mesh(one, pose), Self::Mesh(two, at)) => Arc::ptr_eq(one, two) && pose == at,
@@ -111,7 +109,7 @@ impl<S: Scalar> WallShape<S> {
         }
     }
 
-    /// The same wall elsewhere.
+    /// This wall, moved by `pose`.
     ///
     /// # Errors
     /// [`Error::NotFinite`] for a place that a half-space cannot have. Others are refused
@@ -236,10 +234,11 @@ fn room_for<S: Scalar>(bounds: &Box3<S>, pose: Pose<S>) -> Result<(), Error> {
     finite_point(["shape.x", "shape.y", "shape.z"], max).map(|_| ())
 }
 
-/// The box around a landscape and what is solid below it, as deep as the landscape is wide.
+/// Bounding box of a height field and of the solid below it, as deep as the field's diagonal, in
+/// metres.
 fn ground<S: Scalar>(field: &HeightField<S>) -> Box3<S> {
     let mut bounds = field.bounds();
-    bounds.min.y -= (bounds.max - bounds.min).magnitude();
+    bounds.min.y -= length(bounds.max - bounds.min);
     bounds
 }
 
@@ -248,7 +247,7 @@ fn moved<S: Scalar>(bounds: &Box3<S>, pose: Pose<S>) -> Box3<S> {
     if pose == Pose::identity() { *bounds } else { bounds.obb().moved(pose).bounding_box() }
 }
 
-/// What is nowhere is nearest to nothing.
+/// Result for a missing part: infinitely far away.
 fn nowhere<S: Scalar>(point: Point3<S>) -> Nearest<S> {
     Nearest { point, normal: Vec3::unit_y(), distance: S::infinity() }
 }

@@ -12,7 +12,7 @@ use super::{Columns, Material, Walls};
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, is_finite, is_finite_point};
 
-/// What the method only scribbles on.
+/// Scratch buffers, kept for their memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scratch<S> {
     touches: Vec<Touch<S>>,
@@ -21,10 +21,10 @@ pub(crate) struct Scratch<S> {
     starts: Vec<Start<S>>,
 }
 
-/// What the changes of the last substep would do to those that touch each other.
+/// Sums that scale the warm start of one group of marbles that touch each other, in m²/s².
 #[derive(Clone, Copy, Debug)]
 struct Start<S> {
-    /// Change that is wanted times the change that is offered, and that it would make times it.
+    /// Cached change times the change that is wanted, and times the change that it makes.
     wanted: S,
     made: S,
 }
@@ -33,7 +33,13 @@ impl<S: Scalar> Start<S> {
     /// Part of the changes that brings all nearest to what is asked for.
     fn part(self) -> S {
         let part = self.wanted / self.made;
-        if self.made > S::zero() { part.max(S::zero()).min(S::one()) } else { S::one() }
+        if self.made > S::zero() {
+            part.max(S::zero()).min(S::one())
+        } else if self.made.is_nan() {
+            S::zero() // energies overflowed
+        } else {
+            S::one()
+        }
     }
 }
 
@@ -42,8 +48,8 @@ impl<S: Scalar> Start<S> {
 struct Touch<S> {
     a: First,
     b: usize,
-    /// Which group of marbles that touch each other it is of: what happens in one is nothing to
-    /// the others, to the bit.
+    /// Index of its group of marbles that touch each other. Groups do not change each other, to the
+    /// bit.
     group: u32,
     along: [S; 2],
     /// From a to b.
@@ -146,7 +152,7 @@ impl<S: Scalar> Columns<'_, S> {
         Some(touch)
     }
 
-    /// How fast the two of a contact part, in m/s.
+    /// Separating speed of the two of a contact along its normal, in m/s.
     fn parting(&self, touch: &Touch<S>) -> S {
         let first = touch.a.marble().map_or_else(Vec3::zero, |a| self.velocity[a]);
         (self.velocity[touch.b] - first).dot(touch.normal) - touch.surface

@@ -1,4 +1,4 @@
-//! What happens to a ball next.
+//! Prediction of a ball's next event.
 
 use std::cmp::Reverse;
 use std::f64::consts::SQRT_2;
@@ -32,7 +32,7 @@ impl EventDriven {
         let mut tied = false;
         let mut offer = |after: Option<f64>, what: What| {
             // What lies behind by rounding is now.
-            let Some(after) = after else { return };
+            let Some(after) = after.filter(|after| !after.is_nan()) else { return };
             let time = now + after.max(0.0);
             match (first.1, what) {
                 // Some are named twice.
@@ -137,7 +137,7 @@ impl EventDriven {
         if held { PRESS * fall } else { REST * fall }
     }
 
-    /// What comes of the gap between a ball and a plane.
+    /// Next event of a ball and a plane by their gap, and the seconds until it.
     fn wall_event(wall: usize, gap: Gap, least: f64, held: bool, slow: f64) -> Option<(f64, What)> {
         let press = gap.acceleration < 0.0;
         if gap.now > least {
@@ -192,7 +192,10 @@ impl EventDriven {
                 acceleration: ball.path.acceleration.dot(normal)
                     - self.at_most_turned(row, number, time, settings),
             };
-            let least = f64::EPSILON * 16.0 * (ball.radius + distance.abs()) + ball.rounding;
+            // Time has no digits for a gap that is closed sooner than that.
+            let blink = f64::EPSILON * time * over.magnitude();
+            let least =
+                f64::EPSILON * 16.0 * (ball.radius + distance.abs()) + ball.rounding + blink;
             let slow = slow.max(1e-14 * velocity.magnitude());
             let after = if gap.now > least {
                 closing_time(gap)?
@@ -230,7 +233,7 @@ impl EventDriven {
         }
     }
 
-    /// How fast a ball accelerates toward a wall at most because that turns, in m/s².
+    /// Upper bound of a ball's acceleration toward a wall because that turns, in m/s².
     fn at_most_turned(&self, row: usize, wall: usize, time: f64, settings: &Settings) -> f64 {
         let Some((motion, left)) = self.walls[wall].going(time) else { return 0.0 };
         let turning = motion.spin.magnitude();
@@ -359,7 +362,7 @@ impl EventDriven {
     }
 }
 
-/// When something passes a border between cells outward, which it may lie on.
+/// Time until something leaves its cell through a border, which it may lie on, in seconds.
 fn crossing_time(gap: Gap) -> Option<f64> {
     if gap.now > 0.0 {
         closing_time(gap)

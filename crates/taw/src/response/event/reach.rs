@@ -24,7 +24,7 @@ const MORE: f64 = 1e-3;
 pub(crate) trait Source {
     /// Names all half-spaces.
     fn planes(&self, name: &mut dyn FnMut(u32));
-    /// Whether there are other walls.
+    /// Tests for walls other than half-spaces.
     fn has_parts(&self) -> bool;
     /// Names the parts of other walls that may come within `reach` metres of a point in this
     /// substep.
@@ -33,7 +33,7 @@ pub(crate) trait Source {
     fn wall(&self, row: u32, part: u32) -> Option<Wall>;
 }
 
-/// What balls know of walls.
+/// Candidate walls of all balls in a substep.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Reach {
     /// The places in the list of walls of all that are known, by row and part.
@@ -42,12 +42,12 @@ pub(super) struct Reach {
     before: Vec<(u32, u32)>,
     planes: Vec<u32>,
     has_parts: bool,
-    /// What each ball knows, one after the other.
+    /// Indices of candidate walls, ball after ball.
     lists: Vec<u32>,
     known: Vec<Known>,
 }
 
-/// What a ball knows: all walls that come to within its radius of some place.
+/// Candidate walls of a ball: all within its radius of any point at most `far` metres from `center`.
 #[derive(Clone, Copy, Debug)]
 struct Known {
     center: Point3<f64>,
@@ -81,9 +81,11 @@ impl EventDriven {
         flat.sort_unstable();
         reach.names.sort_unstable();
         reach.names.dedup();
-        reach.names.retain(|(row, part)| source.wall(*row, *part).is_some());
         self.walls.clear();
-        self.walls.extend(reach.names.iter().filter_map(|(row, part)| source.wall(*row, *part)));
+        let walls = &mut self.walls;
+        reach
+            .names
+            .retain(|(row, part)| source.wall(*row, *part).map(|wall| walls.push(wall)).is_some());
         if reach.names != reach.before {
             self.warm.clear(); // it knows walls by their places
         }
@@ -149,7 +151,7 @@ impl EventDriven {
         // The earliest end of a way at that speed and strongest acceleration.
         let time = 2.0 * way / (speed + (speed * speed + 2.0 * strongest(ball) * way).sqrt());
         // What is not finite knows what it knows.
-        (time < left).then_some(time)
+        (time > 0.0 && time < left).then_some(time)
     }
 
     /// Has a ball look around that came to where walls may be that it does not know.
@@ -161,7 +163,7 @@ impl EventDriven {
         }
     }
 
-    /// From where how far a ball may go in what is left of the substep, in metres.
+    /// Position of a ball, and the farthest that it can go in the rest of the substep, in metres.
     fn place(&self, row: usize, now: f64, settings: &Settings) -> (Point3<f64>, f64) {
         let ball = &self.balls[row];
         let left = settings.dt - now;
@@ -180,24 +182,24 @@ impl EventDriven {
         self.parts_of(row).iter().for_each(|wall| name(*wall as usize));
     }
 
-    /// Those of them that are no half-spaces.
+    /// Candidate walls of a ball, but for half-spaces.
     pub(super) fn parts_of(&self, row: usize) -> &[u32] {
         let [from, to] = self.reach.known.get(row).map_or([0; 2], |known| known.walls);
         &self.reach.lists[from..to]
     }
 
-    /// All that are.
+    /// Indices of all half-spaces.
     pub(super) fn half_spaces(&self) -> &[u32] {
         &self.reach.planes
     }
 
-    /// What it costs to look at all walls that a ball knows.
+    /// Cost of testing a ball against all its candidate walls, in looks.
     pub(super) fn looks_at_walls(&self, row: usize) -> u64 {
         self.reach.planes.len() as u64 + super::PART_LOOKS * self.parts_of(row).len() as u64
     }
 }
 
-/// How fast a ball may be until the end of a path, unless something else happens, in m/s.
+/// Upper bound of a ball's speed over the next `left` seconds without an event, in m/s.
 fn fastest(ball: &Ball, now: f64, left: f64) -> f64 {
     ball.velocity_at(now).magnitude() + strongest(ball) * left
 }

@@ -14,15 +14,15 @@ use crate::response::Columns;
 /// A gain below this part of what the impulses exchange is what the sweeps left over.
 const NONE: f64 = 1e-5;
 
-/// What the impulses of an island did, in units of the island.
+/// Energy balance of an island's impulses, in units of the island.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ledger<S> {
     bounces: bool,
     /// The energy that came in by the impulses as they are.
     work: S,
-    /// How much of it went through the contacts at all.
+    /// Energy exchanged through the contacts, the scale for `work`.
     exchanged: S,
-    /// How much more comes in with a part `x` of something, `slope x + curve x²`.
+    /// Coefficients of the energy `slope x + curve x²` that comes in with a part `x` of something.
     slope: S,
     curve: S,
 }
@@ -57,7 +57,7 @@ impl<S: Scalar> Ledger<S> {
     }
 }
 
-/// What a contact would do if all of the rebound came.
+/// State of a contact with full restitution.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Rebound<S> {
     impulse: Vec3<S>,
@@ -102,7 +102,8 @@ impl<S: Scalar> Columns<'_, S> {
             let c = &mut constraints[row];
             let missing = c.still() - self.closing_of(c).dot(c.normal);
             let island = islands.of(c);
-            if (island.bounces || !island.agrees) && missing > self.rounding(c) {
+            let unfinished = island.bounces || island.gave_up || !island.agrees;
+            if unfinished && missing > self.rounding(c) && missing.is_finite() {
                 self.add(c, c.normal * missing);
             }
         }

@@ -88,8 +88,9 @@ pub(super) struct Island<S> {
     /// The energy of all changes in this sweep and in the last.
     pub squared: S,
     last: S,
-    /// Whether the contacts have what they ask for.
+    /// Whether the contacts have what they ask for, and whether iterations once ended before.
     pub agrees: bool,
+    pub gave_up: bool,
     /// Whether it pays to go further, and which part of the way before to keep.
     pub searches: bool,
     pub kept: S,
@@ -132,6 +133,7 @@ impl<S: Scalar> Islands<S> {
     /// Sets some islands back to where the sweeps begin, and none of the others.
     pub fn begin_again(&mut self, which: impl Fn(usize) -> bool) {
         for (number, island) in self.list.iter_mut().enumerate() {
+            island.gave_up |= !island.agrees;
             island.agrees = !which(number);
             (island.last, island.searches, island.kept) = (S::zero(), false, S::zero());
         }
@@ -184,6 +186,7 @@ impl<S: Scalar> Island<S> {
             squared: zero,
             last: zero,
             agrees: false,
+            gave_up: false,
             searches: false,
             kept: zero,
             bends: false,

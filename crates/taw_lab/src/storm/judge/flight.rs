@@ -1,4 +1,4 @@
-//! What nothing outside touches.
+//! Momentum and free fall of clusters that touch no wall.
 
 use taw::prelude::*;
 
@@ -11,10 +11,9 @@ use crate::storm::observe::{Body, Snapshot};
 pub struct Near {
     /// For each body, the first of its cluster.
     pub first: Vec<usize>,
-    /// For each body, whether its cluster may have touched a wall, and whether it may have
-    /// touched anything.
+    /// For each body, whether its cluster may have touched a wall.
     pub grounded: Vec<bool>,
-    /// Whether it may have touched anything.
+    /// For each body, whether it may have touched anything.
     pub touched: Vec<bool>,
 }
 
@@ -151,28 +150,32 @@ impl Falls {
             bound: 1.0,
             body: None,
         });
-        for i in (0..count).filter(|i| near.first[*i] == *i) {
-            if near.grounded[i] {
-                self.late[i] = 0;
-                continue;
+        let mut offer = |found: Finding| {
+            let worst = &mut worst[usize::from(found.invariant == Invariant::Support)];
+            if found.ratio() > worst.ratio() {
+                *worst = found;
             }
-            let [momentum, support] = self.cluster(rules, &sums[i], i, gravity);
-            for (worst, found) in worst.iter_mut().zip([momentum, support]) {
-                if found.ratio() > worst.ratio() {
-                    *worst = found;
-                }
+        };
+        // A sweep stops at any time within a step, so only what lasts counts there.
+        let mut held_up = vec![false; count];
+        for i in (0..count).filter(|i| near.first[*i] == *i && !near.grounded[*i]) {
+            let [momentum, support] = Self::cluster(rules, &sums[i], i, gravity);
+            offer(momentum);
+            if sums[i].count > 1 && rules.swept() {
+                held_up[i] = !support.holds();
+            } else {
+                offer(support);
             }
+        }
+        for (i, late) in self.late.iter_mut().enumerate() {
+            *late = if held_up[near.first[i]] { *late + 1 } else { 0 };
+            let (value, bound) = (f64::from(*late), f64::from(LATE));
+            offer(Finding { invariant: Invariant::Support, value, bound, body: Some(i) });
         }
         worst.to_vec()
     }
 
-    fn cluster(
-        &mut self,
-        rules: &Rules,
-        sum: &Sum,
-        body: usize,
-        gravity: Vec3<f64>,
-    ) -> [Finding; 2] {
+    fn cluster(rules: &Rules, sum: &Sum, body: usize, gravity: Vec3<f64>) -> [Finding; 2] {
         let length = |v: [f64; 3]| Vec3::from(v).magnitude();
         let mut gained = Vec3::from(sum.momentum);
         if sum.count > 1 && rules.swept() && gravity.magnitude2() > 0.0 {
@@ -188,21 +191,12 @@ impl Falls {
         };
         // Half a step of gravity, with a little for the mean over substeps.
         let fall = 0.55 * gravity * rules.step * rules.step;
-        let mut support = Finding {
+        let support = Finding {
             invariant: Invariant::Support,
             value: length(sum.aside),
             bound: sum.mass * fall + sum.placed + sum.moving * rules.step + f64::MIN_POSITIVE,
             body: Some(body),
         };
-        if sum.count > 1 && (rules.swept() || rules.kind == Kind::EventDriven) {
-            // Events are at any time within a step, and a sweep stops there.
-            self.late[body] = if support.holds() { 0 } else { self.late[body] + 1 };
-            if rules.kind == Kind::EventDriven {
-                // Momentum is the same before and after each, so its centre is not.
-                return [momentum, support];
-            }
-            (support.value, support.bound) = (f64::from(self.late[body]), f64::from(LATE));
-        }
         [momentum, support]
     }
 }
