@@ -143,7 +143,7 @@ fn nobody_listens_and_nothing_is_written() {
 
 #[test]
 fn a_system_between_the_verbs_can_take_contacts_out() {
-    let mut app = scene::app();
+    let mut app = listening_app();
     let ghosts = |mut world: ResMut<TawWorld>| world.contacts.wm.clear();
     app.add_systems(
         Substep,
@@ -153,4 +153,5 @@ fn a_system_between_the_verbs_can_take_contacts_out() {
     let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
     scene::frames(&mut app, 60);
     assert!(scene::position(&app, marble).y < -3.0);
+    assert_eq!(told(&mut app), []);
 }

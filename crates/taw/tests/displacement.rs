@@ -26,7 +26,7 @@ fn fastest(world: &World<f64>) -> f64 {
     world.marbles.velocity().iter().map(|v| v.magnitude()).fold(0.0, f64::max)
 }
 
-/// How deep the deepest two overlap, in metres.
+/// Greatest overlap of two marbles, in metres.
 fn deepest(world: &World<f64>) -> f64 {
     let (at, radius) = (world.marbles.position(), world.marbles.radius());
     let depth = |i: usize, j: usize| radius[i] + radius[j] - (at[i] - at[j]).magnitude();

@@ -29,8 +29,8 @@ pub struct Model {
     /// Into how many equal parts each step is cut, from 1 to 1,000. Costs as many
     /// times as much.
     pub substeps: u32,
-    /// How many times [`Response::Impulse`] and [`Response::Displacement`] go over all contacts in
-    /// a substep, from 1 to 1,000. They stop sooner when nothing changes any more.
+    /// Iterations of [`Response::Impulse`] and [`Response::Displacement`] over all contacts in a
+    /// substep, from 1 to 1,000. They end sooner when nothing changes any more.
     pub iterations: u32,
 }
 

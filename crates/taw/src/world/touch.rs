@@ -124,39 +124,41 @@ impl<S: Scalar> World<S> {
         beads
     }
 
-    /// Unit vector from the wall to the marble of a contact, if they touch. They do with a gap of
-    /// up to 5e-6 radii, which rounding may leave under what rests.
+    /// Unit vector from the wall to the marble of a contact of `contacts.wm`, if they touch: with a
+    /// gap of up to 5e-6 radii, which rounding may leave under what rests. None beyond that, and for
+    /// rows that do not exist.
     #[must_use]
     pub fn normal_of_wall_touch(&self, contact: &Contact<S>) -> Option<Vec3<S>> {
         let Contact { a, b, part, along: [_, along], mtv } = *contact;
-        let row = b as usize;
         let near = || {
-            let bead = *self.marbles.position().get(row)? + self.marbles.axis(row) * along;
+            let Sphere { center, radius } = self.bead(b, along)?;
             let wall = self.walls.shapes().get(a as usize)?;
-            let Nearest { normal, distance, .. } = wall.nearest_of(part, bead);
-            let radius = self.marbles.radius()[row];
+            let Nearest { normal, distance, .. } = wall.nearest_of(part, center);
             (distance - radius <= radius * S::constant(FLUSH)).then_some(normal)
         };
         direction_and_length(mtv).map(|(normal, _)| normal).or_else(near)
     }
 
-    /// Unit vector from the first marble to the second of a contact, if they touch; see
-    /// [`normal_of_wall_touch`](Self::normal_of_wall_touch).
+    /// Unit vector from the first marble to the second of a contact of `contacts.mm`, if they touch:
+    /// with a gap of up to 5e-6 of the smaller radius. None beyond that, and for rows that do not
+    /// exist.
     #[must_use]
     pub fn normal_of_marble_touch(&self, contact: &Contact<S>) -> Option<Vec3<S>> {
         let Contact { a, b, along, mtv, .. } = *contact;
         let near = || {
-            let bead = |row: u32, along: S| {
-                let row = row as usize;
-                Some(*self.marbles.position().get(row)? + self.marbles.axis(row) * along)
-            };
-            let apart = bead(b, along[1])? - bead(a, along[0])?;
-            let (normal, distance) = direction_and_length(apart)?;
-            let [first, second] = [a, b].map(|row| self.marbles.radius()[row as usize]);
-            let flush = first.min(second) * S::constant(FLUSH);
-            (distance - first - second <= flush).then_some(normal)
+            let (first, second) = (self.bead(a, along[0])?, self.bead(b, along[1])?);
+            let (normal, distance) = direction_and_length(second.center - first.center)?;
+            let flush = first.radius.min(second.radius) * S::constant(FLUSH);
+            (distance - first.radius - second.radius <= flush).then_some(normal)
         };
         direction_and_length(mtv).map(|(normal, _)| normal).or_else(near)
+    }
+
+    /// The sphere of a marble that is this far along its axis from the center, in metres.
+    fn bead(&self, row: u32, along: S) -> Option<Sphere<S>> {
+        let row = row as usize;
+        let center = *self.marbles.position().get(row)? + self.marbles.axis(row) * along;
+        Some(Sphere { center, radius: self.marbles.radius()[row] })
     }
 
     /// Finds which marbles touch each other, or are at most `reach` metres apart.

@@ -67,7 +67,7 @@ impl<S: Scalar> WallShape<S> {
             Self::Plane(_) | Self::Solid(_) => name(part),
             Self::Mesh(mesh, pose) => mesh.near(&moved(bounds, pose.inverse()), name),
             Self::HeightField(field, pose) => {
-                // What is below touches what is above it.
+                // A ball below the surface touches the triangles above it.
                 let mut bounds = moved(bounds, pose.inverse());
                 bounds.max.y = bounds.max.y.max(field.bounds().max.y);
                 field.near(&bounds, name);

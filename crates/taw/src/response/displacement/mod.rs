@@ -54,7 +54,7 @@ struct Touch<S> {
     along: [S; 2],
     /// From a to b.
     normal: Vec3<S>,
-    /// How fast the wall's surface moves along the normal, in m/s; zero between marbles.
+    /// Speed of the wall's surface along the normal, in m/s; zero between marbles.
     surface: S,
     /// The least speed of parting that is asked for, in m/s: zero, or negative for two that
     /// still have a way to go.
@@ -87,11 +87,11 @@ pub(crate) fn displacement<S: Scalar>(
     let Scratch { touches, before, groups, starts } = scratch;
     before.clear();
     before.extend_from_slice(marbles.velocity);
-    let wm = contacts.wm.iter().map(|c| (First::Wall(c.a, c.part), c));
-    let mm = contacts.mm.iter().map(|c| (First::Marble(c.a), c));
     touches.clear();
-    touches
-        .extend(wm.chain(mm).filter_map(|(a, c)| marbles.look(a, c.b as usize, c.along, around)));
+    touches.extend(
+        First::of_each(contacts)
+            .filter_map(|(a, c)| marbles.look(a, c.b as usize, c.along, around)),
+    );
     groups.find(touches.iter().map(|t| (t.a.marble(), t.b)), marbles.velocity.len());
     for touch in touches.iter_mut() {
         touch.group = groups.of(touch.b);

@@ -192,8 +192,8 @@ impl EventDriven {
                 acceleration: ball.path.acceleration.dot(normal)
                     - self.at_most_turned(row, number, time, settings),
             };
-            // Time has no digits for a gap that is closed sooner than that.
-            let blink = f64::EPSILON * time * over.magnitude();
+            // Time has no digits for a gap that closes sooner than that.
+            let blink = f64::EPSILON * time * gap.speed.abs();
             let least =
                 f64::EPSILON * 16.0 * (ball.radius + distance.abs()) + ball.rounding + blink;
             let slow = slow.max(1e-14 * velocity.magnitude());

@@ -103,31 +103,37 @@ impl EventDriven {
         }
     }
 
-    /// Has a ball know all walls that it may come to from now on, if those are not many.
+    /// Has a ball know all walls that it may come to from now on, or as far as those are few.
     pub(super) fn look_around(&mut self, row: usize, now: f64, settings: &Settings) {
         let (center, farthest) = self.place(row, now, settings);
         let margin = self.margin(row);
         let mut far = farthest.min(MOST_CELLS * self.cells.width());
-        let Self { reach: Reach { index, lists, known, .. }, walls, .. } = self;
-        let from = lists.len();
-        loop {
-            settings.source.near(center, far + margin, &mut |row, part| {
-                let place = index.get(&(row, part)).copied().or_else(|| {
-                    walls.push(settings.source.wall(row, part)?);
-                    let place = walls.len() as u32 - 1;
-                    index.insert((row, part), place);
-                    Some(place)
-                });
-                lists.extend(place);
-            });
-            let found = lists.len() - from;
-            settings.count(found as u64 * super::PART_LOOKS + LOOK_AROUND);
-            if found > FEW_PARTS || far.max(farthest) == far {
+        let names_near = |far: f64| {
+            let mut names = Vec::new();
+            settings.source.near(center, far + margin, &mut |row, part| names.push((row, part)));
+            settings.count(names.len() as u64 + LOOK_AROUND);
+            names
+        };
+        let mut names = names_near(far);
+        while names.len() <= FEW_PARTS && far < farthest {
+            let farther = farthest.min(2.0 * far);
+            let more = names_near(farther);
+            if more.len() > FEW_PARTS {
                 break;
             }
-            lists.truncate(from);
-            far = farthest.min(2.0 * far);
+            (far, names) = (farther, more);
         }
+        let Self { reach: Reach { index, lists, known, .. }, walls, .. } = self;
+        let from = lists.len();
+        lists.extend(names.into_iter().filter_map(|(row, part)| {
+            index.get(&(row, part)).copied().or_else(|| {
+                walls.push(settings.source.wall(row, part)?);
+                let place = walls.len() as u32 - 1;
+                index.insert((row, part), place);
+                Some(place)
+            })
+        }));
+        settings.count((lists.len() - from) as u64 * super::PART_LOOKS);
         lists[from..].sort_unstable();
         known[row] = Known { center, far, walls: [from, lists.len()] };
     }
@@ -207,4 +213,61 @@ fn fastest(ball: &Ball, now: f64, left: f64) -> f64 {
 /// Acceleration of a ball that nothing hits, at most, in m/s².
 fn strongest(ball: &Ball) -> f64 {
     ball.pull.magnitude().max(ball.path.acceleration.magnitude())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::response::event::{Form, Path};
+    use crate::response::{BallSpin, Material};
+    use crate::shape::{Shape, Sphere};
+    use cgmath::Zero;
+
+    /// Ten thousand parts, all of them so many metres away.
+    struct Crowd(f64);
+
+    impl Source for Crowd {
+        fn planes(&self, _: &mut dyn FnMut(u32)) {}
+
+        fn has_parts(&self) -> bool {
+            true
+        }
+
+        fn near(&self, _: Point3<f64>, reach: f64, name: &mut dyn FnMut(u32, u32)) {
+            (0..10_000).filter(|_| reach >= self.0).for_each(|part| name(0, part));
+        }
+
+        fn wall(&self, row: u32, _: u32) -> Option<Wall> {
+            let sphere = Sphere::new(Point3::new(self.0, 0.0, 0.0), 1e-3).ok()?;
+            let form = Form::Solid(Shape::Sphere(sphere));
+            Some(Wall { form, row, motion: None, there: None, material: None, digit: 0.0 })
+        }
+    }
+
+    #[test]
+    fn a_fast_ball_looks_as_far_as_walls_are_few_and_no_farther() {
+        let ball = Ball {
+            position: Point3::new(0.0, 0.0, 0.0),
+            velocity: Vec3::unit_x() * 1e6,
+            spin: Vec3::zero(),
+            pull: Vec3::zero(),
+            radius: 0.1,
+            inverse_mass: 1.0,
+            material: Material::default(),
+            spins: BallSpin::Free,
+            rounding: 0.0,
+            turned: Vec3::zero(),
+            path: Path::default(),
+        };
+        for (away, far) in [(10.0, 5.0..10.0), (1e9, 2e4..1e9)] {
+            let mut method = EventDriven { balls: vec![ball], ..EventDriven::default() };
+            let source = &Crowd(away);
+            let settings = Settings { dt: 0.01, iterations: 8, source, looks: 0.into() };
+            method.find_homes(settings.dt);
+            method.find_walls(&settings);
+            assert!(far.contains(&method.reach.known[0].far), "{:?}", method.reach.known);
+            assert_eq!(method.parts_of(0).len(), 0);
+        }
+    }
 }

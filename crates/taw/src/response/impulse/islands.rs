@@ -88,8 +88,9 @@ pub(super) struct Island<S> {
     /// The energy of all changes in this sweep and in the last.
     pub squared: S,
     last: S,
-    /// Whether the contacts have what they ask for, and whether iterations once ended before.
+    /// True once the contacts have what they ask for.
     pub agrees: bool,
+    /// True if iterations ended before that, even if a later solution agreed.
     pub gave_up: bool,
     /// Whether it pays to go further, and which part of the way before to keep.
     pub searches: bool,

@@ -9,7 +9,7 @@ mod solve;
 
 use cgmath::{InnerSpace, Zero};
 
-use crate::contact::Contacts;
+use crate::contact::{Contact, Contacts};
 use crate::math::{
     Point3, Scalar, Vec3, any_direction, cast_vector, direction_and_length, is_finite,
 };
@@ -64,6 +64,12 @@ pub(super) enum First {
 }
 
 impl First {
+    /// All contacts, those with walls first.
+    pub(super) fn of_each<S>(contacts: &Contacts<S>) -> impl Iterator<Item = (Self, &Contact<S>)> {
+        let wm = contacts.wm.iter().map(|c| (Self::Wall(c.a, c.part), c));
+        wm.chain(contacts.mm.iter().map(|c| (Self::Marble(c.a), c)))
+    }
+
     pub(super) fn marble(self) -> Option<usize> {
         match self {
             Self::Wall(..) => None,
@@ -214,7 +220,7 @@ pub(super) fn key_of<S: Scalar>(a: First, b: usize, along: [S; 2]) -> Key {
 }
 
 impl<S: Scalar> Warm<S> {
-    /// Of a contact that only presses, in m/s.
+    /// Warm start of a contact without friction, from its normal impulse as a change of speed, in m/s.
     pub(super) fn of_pressure(key: Key, pressure: S) -> Self {
         Self { key, pressure, grip: Vec3::zero(), twist: Vec3::zero() }
     }

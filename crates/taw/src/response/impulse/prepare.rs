@@ -16,11 +16,10 @@ pub(super) fn prepare<S: Scalar>(
     constraints: &mut Vec<Constraint<S>>,
     islands: &mut Islands<S>,
 ) {
-    let wm = contacts.wm.iter().map(|c| (First::Wall(c.a, c.part), c));
-    let mm = contacts.mm.iter().map(|c| (First::Marble(c.a), c));
     constraints.clear();
     constraints.extend(
-        wm.chain(mm).filter_map(|(a, c)| marbles.constraint(a, c.b as usize, c.along, around)),
+        First::of_each(contacts)
+            .filter_map(|(a, c)| marbles.constraint(a, c.b as usize, c.along, around)),
     );
     islands.find(constraints, marbles.velocity.len(), around.settings.bounce_speed);
     if !constraints.iter().any(|c| c.bounces) {
