@@ -385,10 +385,12 @@ impl<S: Scalar> World<S> {
         if self.model.rotation != Rotation::Dynamic {
             columns.spin = &mut []; // what is only shown is not felt
         }
+        let bounce_speed = length(self.gravity) * dt * S::constant(2.0);
         let settings = Settings {
             iterations: self.model.iterations,
             dt,
-            bounce_speed: length(self.gravity) * dt * S::constant(2.0),
+            bounce_speed,
+            enough: bounce_speed * S::epsilon(),
             slop: length(self.gravity) * dt * dt,
             largest_slop: S::constant(0.001),
         };

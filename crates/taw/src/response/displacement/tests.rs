@@ -42,8 +42,14 @@ fn restituted<S: Scalar>(
         rods: &[],
     };
     let zero = S::zero();
-    let settings =
-        Settings { iterations: 8, dt, bounce_speed: zero, slop: zero, largest_slop: zero };
+    let settings = Settings {
+        iterations: 8,
+        dt,
+        bounce_speed: zero,
+        enough: zero,
+        slop: zero,
+        largest_slop: zero,
+    };
     let around = Around {
         walls: &floor,
         material: |_| Material::default(),

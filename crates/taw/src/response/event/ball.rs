@@ -51,6 +51,8 @@ pub(crate) struct Path {
     pub(super) off: Option<usize>,
     /// Whether its acceleration holds it in a heap.
     pub(super) heaped: bool,
+    /// What walls bring in there, in watts, for those who ask.
+    pub(super) power: f64,
     /// What the collisions of this substep took from it, as parts of their approach; all of
     /// it where no time went by since the one before.
     pub(super) losses: f64,
@@ -86,6 +88,7 @@ impl Default for Path {
             leaves: false,
             off: None,
             heaped: false,
+            power: 0.0,
             losses: 0.0,
             collided: f64::NEG_INFINITY,
             surrenders: 0,

@@ -42,9 +42,10 @@ impl EventDriven {
         self.balls[row].path.losses >= MOST_LOSSES
     }
 
-    /// Brings balls to rest that collide without end, and all that touch them.
+    /// Brings balls to rest that collide without end, and all that touch them, however fast they
+    /// part just now: between a wall and a heavy ball, a light one parts from one of them always.
     pub(super) fn surrender(&mut self, rows: [usize; 2], time: f64, settings: &Settings) {
-        for row in self.hold_from_now_on(rows, time, settings) {
+        for row in self.hold_from_now_on(rows, f64::INFINITY, time, settings) {
             let path = &mut self.balls[row].path;
             (path.losses, path.surrenders) = (0.0, path.surrenders + 1);
             if self.balls[row].is_frozen() {

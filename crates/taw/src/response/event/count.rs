@@ -30,6 +30,7 @@ impl EventDriven {
         if ball.path.heaped {
             // Pairs cancel; what it takes is the solver's.
             work.momentum += held;
+            work.walls += ball.path.power * dt;
             return;
         }
         let Some(wall) = ball.path.support else { return };

@@ -8,7 +8,7 @@ use super::bend::{Ground, State, shortest_step};
 use super::support::Support;
 use super::{Ball, EventDriven, FLUSH, Form, LOOK, REST, Settings};
 use crate::math::Vec3;
-use crate::response::BallSpin;
+use crate::response::{BallSpin, Push};
 use crate::shape::Nearest;
 
 /// How often a time is halved to find where a face ends.
@@ -33,7 +33,15 @@ impl EventDriven {
             ball.position += normal * overlap;
         }
         let way = wall_.way(ball.position, now);
-        ball.velocity += normal * (way - ball.velocity).dot(normal);
+        let change = normal * (way - ball.velocity).dot(normal);
+        if let Some(work) = &mut self.work
+            && ball.inverse_mass > 0.0
+        {
+            let mean = ball.velocity + change * 0.5 - way;
+            let impulse = change / ball.inverse_mass;
+            work.push(Push { impulse, normal, mean, fixed: [Some(way), None] });
+        }
+        ball.velocity += change;
         ball.path.support = Some(wall);
         self.stretch(row, settings);
     }

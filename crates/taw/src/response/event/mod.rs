@@ -266,7 +266,7 @@ impl EventDriven {
                 for row in [row, other] {
                     self.balls[row].path.losses += LEAN;
                 }
-                for row in self.hold_from_now_on([row, other], time, settings) {
+                for row in self.hold_from_now_on([row, other], 0.0, time, settings) {
                     self.foresee(row, time, settings);
                 }
             }

@@ -7,8 +7,8 @@ use super::wall::{Between, Wall};
 use super::{Ball, EventDriven, MOST_TOUCHES, PRESS, Path, REST, Settings};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Vec3, direction_and_length};
-use crate::response::impulse::{self, Around, Start, Warm, impulse};
-use crate::response::{BallSpin, Columns, Material};
+use crate::response::impulse::{self, Around, Groups, Start, Warm, impulse};
+use crate::response::{BallSpin, Columns, Material, Work};
 use crate::shape::Nearest;
 
 /// Overlap that may stay, over the radius: pushing it out would lift what lies on it, and
@@ -17,6 +17,18 @@ const SLOP: f64 = 4e-3;
 /// How often a ball is moved out of the wall that it is deepest in; of two that meet at a right
 /// angle or more, it is out after two.
 const MOST_MOVES: u32 = 16;
+
+/// A heap agrees where a sweep changes no velocity by more than this part of what gravity does in
+/// a substep: a hundredth of what counts as rest.
+const AGREED: f64 = 0.01 * REST;
+/// Or by more than this part of its largest speed, where nothing pulls: a hundred roundings.
+const ROUNDING: f64 = 100.0 * f64::EPSILON;
+/// Whatever the model's iterations, a heap is swept until it agrees, or for as long as no more
+/// contacts are solved than this, all sweeps together: about a millisecond. What a heap of few
+/// leaves undecided costs more, as events.
+const MOST_SOLVED: usize = 10_000;
+/// And no more often than this, which is the most that a model may have.
+const MOST_SWEEPS: u32 = 1000;
 
 /// What rests on each other, as the impulse method sees it.
 #[derive(Clone, Debug, Default)]
@@ -36,6 +48,8 @@ pub(super) struct Heap {
     inverse_mass: Vec<f64>,
     material: Vec<Material<f64>>,
     held: Vec<bool>,
+    /// Who touches whom, over how many others.
+    groups: Groups,
     scratch: impulse::Scratch<f64>,
 }
 
@@ -71,11 +85,6 @@ impl Heap {
         fill(&mut self.held, each().map(|b| b.spins == BallSpin::Ignored));
     }
 
-    /// What it costs to solve contacts, in looks.
-    fn cost(contacts: &Contacts<f64>, settings: &Settings) -> u64 {
-        2 * contacts.len() as u64 * u64::from(settings.iterations)
-    }
-
     /// Solves the contacts over `dt` seconds, or with zero what happens at once.
     fn solve(
         &mut self,
@@ -86,6 +95,7 @@ impl Heap {
         settings: &Settings,
         warm: &mut Vec<Warm<f64>>,
     ) {
+        let fastest = self.velocity.iter().map(|v| v.magnitude()).fold(0.0, f64::max);
         let mut columns = Columns {
             position: &mut self.position,
             velocity: &mut self.velocity,
@@ -95,10 +105,12 @@ impl Heap {
             held: &self.held,
             rods: &[],
         };
+        let until_it_agrees = (MOST_SOLVED / contacts.len().max(1)) as u32;
         let told = impulse::Settings {
-            iterations: settings.iterations,
+            iterations: settings.iterations.max(until_it_agrees.min(MOST_SWEEPS)),
             dt,
             bounce_speed: 2.0 * pull * settings.dt,
+            enough: (AGREED * pull * settings.dt).max(ROUNDING * fastest),
             // As deep as a gap may be wide that counts as touching.
             slop: 0.5 * PRESS * PRESS * pull * settings.dt * settings.dt,
             largest_slop: SLOP,
@@ -112,6 +124,25 @@ impl Heap {
             settings: &told,
         };
         impulse(&mut columns, contacts, &around, &mut self.scratch, warm, &mut stopped);
+        settings.count(2 * self.scratch.solved());
+    }
+}
+
+impl Heap {
+    /// Counts what contacts did at once, to balls that moved and turned so before.
+    fn count(&mut self, velocity: &mut [Vec3<f64>], spin: &mut [Vec3<f64>], work: &mut Work) {
+        let collisions = work.collisions;
+        let mut columns = Columns {
+            position: &mut self.position,
+            velocity: &mut self.velocity,
+            radius: &self.radius,
+            inverse_mass: &self.inverse_mass,
+            spin: &mut self.spin,
+            held: &self.held,
+            rods: &[],
+        };
+        self.scratch.count(&mut columns, velocity, spin, work);
+        work.collisions = collisions; // it is none: they lie there
     }
 }
 
@@ -130,7 +161,7 @@ impl EventDriven {
         }
         let mut near = std::mem::take(&mut self.near);
         near.mm.retain(|c| {
-            self.touches_ball(c, settings).map_or(self.is_in_another(c), |speed| speed >= 0.0)
+            self.touches_ball(c, 0.0, settings).map_or(self.is_in_another(c), |speed| speed >= 0.0)
         });
         let mut touches = std::mem::take(&mut self.heap.touches);
         touches.clear();
@@ -163,7 +194,7 @@ impl EventDriven {
             let mtv = Vec3::zero();
             let contact = Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
             let least = if self.goes(wall) { f64::NEG_INFINITY } else { 0.0 };
-            if self.touches_wall(&contact, 0.0, settings).is_some_and(|speed| speed >= least)
+            if self.touches_wall(&contact, 0.0, 0.0, settings).is_some_and(|speed| speed >= least)
                 && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, 0.0, settings))
             {
                 near.push(contact);
@@ -230,7 +261,13 @@ impl EventDriven {
 
     /// How much slower than what counts as rest a ball and a wall come together, or
     /// nothing if they do not touch.
-    fn touches_wall(&self, contact: &Contact<f64>, now: f64, settings: &Settings) -> Option<f64> {
+    fn touches_wall(
+        &self,
+        contact: &Contact<f64>,
+        now: f64,
+        parting: f64,
+        settings: &Settings,
+    ) -> Option<f64> {
         let (gap, speed) = self.wall_gap(contact, now);
         let ball = &self.balls[contact.b as usize];
         let fall = ball.pull.magnitude() * settings.dt;
@@ -238,11 +275,16 @@ impl EventDriven {
         let slow = if goes { fall } else { PRESS * fall };
         let low =
             self.low(contact.b, settings) + self.walls[contact.a as usize].rounding(ball.position);
-        (gap <= low && speed <= slow).then_some(slow + speed)
+        (gap <= low && speed <= slow.max(parting)).then_some(slow + speed)
     }
 
     /// The same of two balls.
-    fn touches_ball(&self, contact: &Contact<f64>, settings: &Settings) -> Option<f64> {
+    fn touches_ball(
+        &self,
+        contact: &Contact<f64>,
+        parting: f64,
+        settings: &Settings,
+    ) -> Option<f64> {
         let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
         let apart = direction_and_length(second.position - first.position);
         let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), 0.0));
@@ -250,7 +292,8 @@ impl EventDriven {
         let pull = first.pull.magnitude().max(second.pull.magnitude());
         let slow = PRESS * pull * settings.dt;
         let low = self.low(contact.a, settings).max(self.low(contact.b, settings));
-        (distance - first.radius - second.radius <= low && speed <= slow).then_some(slow + speed)
+        let gap = distance - first.radius - second.radius;
+        (gap <= low && speed <= slow.max(parting)).then_some(slow + speed)
     }
 
     /// Whether a ball is too deep in another one that it does not come nearer to: the two are
@@ -278,15 +321,17 @@ impl EventDriven {
         (distance - ball.radius, (ball.velocity - way).dot(normal))
     }
 
-    /// Lets balls, and all that touch them and each other, rest together from now on.
+    /// Lets balls, and all that touch them and each other, rest together from now on. What parts
+    /// faster than `parting`, in m/s, and than what counts as rest does not touch.
     /// Gives their rows, whose events are to be foreseen anew.
     pub(super) fn hold_from_now_on(
         &mut self,
         first: [usize; 2],
+        parting: f64,
         now: f64,
         settings: &Settings,
     ) -> Vec<usize> {
-        let (found, mut contacts) = self.all_that_touch(first, now, settings);
+        let (found, mut contacts) = self.all_that_touch(first, parting, now, settings);
         let pull = found.iter().map(|row| self.balls[*row].pull.magnitude()).fold(0.0, f64::max);
         // First what the collision does, all of it at once and without rebound.
         self.heap.take(&mut contacts, &self.balls);
@@ -295,8 +340,11 @@ impl EventDriven {
         }
         let left = settings.dt - now;
         let walls = Between { walls: &self.walls, begin: now, end: now };
-        settings.count(Heap::cost(&contacts, settings));
+        let before = self.work.map(|_| (self.heap.velocity.clone(), self.heap.spin.clone()));
         self.heap.solve(&mut contacts, &walls, pull, 0.0, settings, &mut Vec::new());
+        if let (Some(work), Some((mut velocity, mut spin))) = (&mut self.work, before) {
+            self.heap.count(&mut velocity, &mut spin, work);
+        }
         for (label, row) in self.heap.rows.iter().enumerate() {
             let ball = &mut self.balls[*row as usize];
             if !ball.is_frozen() {
@@ -318,6 +366,7 @@ impl EventDriven {
     fn all_that_touch(
         &mut self,
         first: [usize; 2],
+        parting: f64,
         now: f64,
         settings: &Settings,
     ) -> (Vec<usize>, Contacts<f64>) {
@@ -353,7 +402,7 @@ impl EventDriven {
             self.name_walls(row, |wall| {
                 let contact =
                     Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
-                if self.touches_wall(&contact, now, settings).is_some()
+                if self.touches_wall(&contact, now, parting, settings).is_some()
                     && (self.parts_of(row).is_empty()
                         || !self.is_seam(row, wall, at, now, settings))
                 {
@@ -377,7 +426,7 @@ impl EventDriven {
                 // The two that it is about touch, whatever rounding says.
                 let known = first.contains(&row) && first.contains(&other);
                 let full = touches[row].min(touches[other]) >= MOST_TOUCHES;
-                if !full && (known || self.touches_ball(&contact, settings).is_some()) {
+                if !full && (known || self.touches_ball(&contact, parting, settings).is_some()) {
                     touches[row] += 1;
                     touches[other] += 1;
                     contacts.mm.push(contact);
@@ -420,10 +469,21 @@ impl EventDriven {
             })
         });
         let walls = Between { walls: &self.walls, begin: now, end: settings.dt };
-        settings.count(Heap::cost(contacts, settings));
         self.heap.solve(contacts, &walls, strongest, left, settings, warm);
-        let Heap { rows, position, velocity, spin, .. } = &self.heap;
+        let Heap { rows, position, velocity, spin, inverse_mass, groups, scratch, .. } =
+            &mut self.heap;
         warm.retain_mut(|warm| warm.rename(|at| rows.get(at).map(|row| *row as usize)));
+        let mut power = self.work.map(|_| vec![0.0; rows.len()]);
+        if let Some(power) = &mut power {
+            scratch.for_each_carried(velocity, inverse_mass, |at, energy| {
+                power[at] += energy / left;
+            });
+        }
+        // What the method pushed apart, besides; not so far that one were on the other side of a
+        // thin wall then, and all that touch each other by the same part, so that their common
+        // center stays where it is.
+        groups.find(contacts.mm.iter().map(|c| (Some(c.a as usize), c.b as usize)), rows.len());
+        let (mut pushes, mut parts) = (vec![Vec3::zero(); rows.len()], vec![1.0_f64; rows.len()]);
         for (at, row) in rows.iter().enumerate() {
             let ball = &mut self.balls[*row as usize];
             if ball.is_frozen() {
@@ -434,14 +494,18 @@ impl EventDriven {
                 acceleration: (velocity[at] - ball.velocity) / left,
                 spin_acceleration: (spin[at] - ball.spin) / left,
                 heaped: true,
+                power: power.as_ref().map_or(0.0, |power| power[at]),
                 stamp: ball.path.stamp + 1,
                 ..ball.path
             };
-            // What the method pushed apart, besides; not so far that it were on the other side of
-            // a thin wall then.
-            let push = position[at] - end;
-            let most = 0.5 * ball.radius;
-            ball.position += if push.magnitude() > most { push.normalize_to(most) } else { push };
+            pushes[at] = position[at] - end;
+            let (group, far) = (groups.of(at) as usize, pushes[at].magnitude());
+            if far > 0.5 * ball.radius {
+                parts[group] = parts[group].min(0.5 * ball.radius / far);
+            }
+        }
+        for (at, push) in pushes.into_iter().enumerate() {
+            self.balls[rows[at] as usize].position += push * parts[groups.of(at) as usize];
         }
         // It pushed out of what they touched, and maybe into what they did not.
         for at in 0..self.heap.rows.len() {

@@ -21,6 +21,8 @@ const YIELD: f64 = 16.0;
 pub(super) struct Islands<S> {
     groups: Groups,
     pub list: Vec<Island<S>>,
+    /// Number of times that a contact was solved.
+    pub solved: u64,
 }
 
 /// Which marbles touch each other, over how many others.
@@ -144,6 +146,7 @@ impl<S: Scalar> Islands<S> {
     pub fn find(&mut self, constraints: &mut [Constraint<S>], rows: usize, speed: S) {
         self.groups.find(constraints.iter().map(|c| (c.a.marble(), c.b)), rows);
         self.list.clear();
+        self.solved = 0;
         for c in constraints {
             c.island = self.groups.of(c.b);
             if c.island as usize == self.list.len() {
@@ -153,10 +156,10 @@ impl<S: Scalar> Islands<S> {
     }
 
     /// Looks back at a sweep. True if all islands agree.
-    pub fn end_sweep(&mut self, bounce_speed: S) -> bool {
+    pub fn end_sweep(&mut self, bounce_speed: S, enough: S) -> bool {
         for island in self.list.iter_mut().filter(|island| !island.agrees) {
             // What is left is beyond what the next sweep could still see.
-            island.agrees = island.change <= bounce_speed * S::epsilon();
+            island.agrees = island.change <= enough;
             // Near the end the sweeps alone come to rest, which the search does not quite.
             let ratio = island.squared / island.last;
             let slow = ratio >= S::constant(SLOW) || ratio.is_nan();

@@ -49,6 +49,8 @@ pub(crate) struct Settings<S> {
     pub dt: S,
     /// Slower than this, in m/s, nothing bounces: what gravity does in two substeps.
     pub bounce_speed: S,
+    /// Sweeps end where the last one changed no velocity by more than this, in m/s.
+    pub enough: S,
     /// The overlap that may stay, in metres, so that what rests keeps touching.
     pub slop: S,
     /// The same as a part of the smaller radius, at most.
@@ -92,6 +94,35 @@ impl<S: Scalar> Scratch<S> {
     /// By how much a velocity still changed in the last sweep, at most, in m/s.
     pub fn residual(&self) -> S {
         self.islands.residual()
+    }
+
+    /// Number of times that a contact was solved, over all sweeps.
+    pub fn solved(&self) -> u64 {
+        self.islands.solved
+    }
+
+    /// Gives the energy that each wall, and each marble of infinite mass, brought to a row by how
+    /// it moves, in joules.
+    pub fn for_each_carried(
+        &self,
+        velocity: &[Vec3<S>],
+        inverse_mass: &[S],
+        mut give: impl FnMut(usize, S),
+    ) {
+        for c in &self.constraints {
+            let impulse = c.impulse() / c.mobility.normal;
+            match c.a {
+                First::Wall(..) => give(c.b, impulse.dot(c.surface)),
+                First::Marble(a) => {
+                    let (a, b) = (a as usize, c.b);
+                    for (one, other, impulse) in [(a, b, impulse), (b, a, -impulse)] {
+                        if inverse_mass[one] == S::zero() {
+                            give(other, impulse.dot(velocity[one]));
+                        }
+                    }
+                }
+            }
+        }
     }
 
     /// Counts what the contacts of the last substep did. `velocity` and `spin` are those at its

@@ -31,6 +31,7 @@ pub(super) fn solve<S: Scalar>(
             if islands.of(c).agrees {
                 continue;
             }
+            islands.solved += 1;
             let before = c.impulse();
             let change = marbles.solve(c);
             c.step = c.impulse() - before;
@@ -41,7 +42,7 @@ pub(super) fn solve<S: Scalar>(
             island.squared += island.energy(c, c.step, c.step);
         }
         let last = sweep + 1 == settings.iterations;
-        if islands.end_sweep(settings.bounce_speed) || last {
+        if islands.end_sweep(settings.bounce_speed, settings.enough) || last {
             break;
         }
         marbles.go_on(constraints, islands);
