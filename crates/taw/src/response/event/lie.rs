@@ -173,10 +173,12 @@ impl EventDriven {
             let over = (ball.velocity - wall.way(ball.position, now)).magnitude();
             let far = LOOK * ball.radius;
             let look = (far / over).min((far / stretch.acceleration.magnitude()).sqrt());
-            duration = duration.min(look.max(LOOK * settings.dt)).min(settings.dt - now);
-            duration = duration.max(ground.shortest).min(settings.dt - now);
-            let shortest = ground.shortest.min(duration);
-            duration = end_of_face(ground, ball, normal, duration).max(shortest);
+            let shortest = ground.shortest.min(settings.dt - now);
+            let look = look.max(LOOK * settings.dt).max(shortest).min(settings.dt - now);
+            // A slide ends at its moment, however soon: a shortest step would turn it around, and
+            // the next one back.
+            let face = end_of_face(ground, ball, normal, duration.min(look));
+            duration = duration.min(face.max(shortest));
         }
         let ends = now + duration;
         ball.path.change = if ends < settings.dt { ends } else { f64::INFINITY };
