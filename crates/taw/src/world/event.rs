@@ -143,8 +143,10 @@ impl<S: Scalar> event::Source for Source<'_, S> {
         let place = row as usize;
         let motion = self.walls.motion_of_row(place).map(WallMotion::cast);
         let moved = motion.is_some() && self.walls.has_moved(place);
+        let form = self.walls.shapes().get(place)?.exact(part)?;
         Some(Wall {
-            form: self.walls.shapes().get(place)?.exact(part)?,
+            bounds: form.bounds(),
+            form,
             row,
             motion,
             there: moved.then_some(self.there),

@@ -123,10 +123,13 @@ impl Ground<'_> {
     /// The wall that a ball there would be on: the nearest, and of several the first.
     fn nearest(&self, at: Point3<f64>, time: f64) -> (usize, Nearest<f64>) {
         self.looks.set(self.looks.get() + super::PART_LOOKS * self.near.len() as u64);
-        let each = self.near.iter().map(|wall| *wall as usize);
-        let each = each.map(|wall| (wall, self.walls[wall].nearest(at, time)));
         let nowhere = Nearest { point: at, normal: Vec3::zero(), distance: f64::INFINITY };
-        each.fold((usize::MAX, nowhere), |best, next| {
+        self.near.iter().fold((usize::MAX, nowhere), |best, wall| {
+            let wall = *wall as usize;
+            if self.walls[wall].at_least(at, time) > best.1.distance {
+                return best;
+            }
+            let next = (wall, self.walls[wall].nearest(at, time));
             let nearer = (next.1.distance, next.0) < (best.1.distance, best.0);
             if nearer { next } else { best }
         })

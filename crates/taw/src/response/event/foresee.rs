@@ -42,8 +42,17 @@ impl EventDriven {
             }
         };
         offer(ends, What::Looks);
+        // Beyond that, no wall that stays can matter in the rest of the substep.
+        let at = ball.position_at(now);
+        let speed = ball.velocity_at(now).magnitude();
+        let acceleration = ball.path.acceleration.magnitude();
+        let far = ball.radius + ball.rounding + (speed + acceleration * left) * left;
+        let far = far * (1.0 + 1e-9);
         self.name_walls(row, |wall| {
-            if ball.path.support != Some(wall)
+            let near = self.walls[wall].going(now).is_some()
+                || self.walls[wall].at_least(at, now) <= far;
+            if near
+                && ball.path.support != Some(wall)
                 && let Some((after, what)) = self.foresee_wall(row, wall, now, settings)
             {
                 offer(Some(after), what);
@@ -336,7 +345,11 @@ impl EventDriven {
         let its = nearest(wall, at);
         let mut covered = false;
         self.name_walls(row, |other| {
-            if !covered && other != wall && nearest(other, its.point).distance <= flush {
+            if !covered
+                && other != wall
+                && self.walls[other].at_least(its.point, time) <= flush
+                && nearest(other, its.point).distance <= flush
+            {
                 let theirs = nearest(other, at);
                 let before = (theirs.distance, other) < (its.distance, wall);
                 covered = before || nearest(wall, theirs.point).distance > flush;

@@ -124,7 +124,7 @@ impl EventDriven {
         let Nearest { point, normal, .. } = self.walls[support].nearest(at, now);
         let mut near = vec![support as u32];
         self.name_walls(row, |wall| {
-            if wall == support {
+            if wall == support || self.walls[wall].at_least(at, now) > far {
                 return;
             }
             let its = self.walls[wall].nearest(at, now);

@@ -241,7 +241,9 @@ mod tests {
         fn wall(&self, row: u32, _: u32) -> Option<Wall> {
             let sphere = Sphere::new(Point3::new(self.0, 0.0, 0.0), 1e-3).ok()?;
             let form = Form::Solid(Shape::Sphere(sphere));
-            Some(Wall { form, row, motion: None, there: None, material: None, digit: 0.0 })
+            let bounds = form.bounds();
+            let (motion, there, material) = (None, None, None);
+            Some(Wall { form, bounds, row, motion, there, material, digit: 0.0 })
         }
     }
 

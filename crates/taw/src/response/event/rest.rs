@@ -226,7 +226,11 @@ impl EventDriven {
             let ball = &self.balls[row];
             let mut deepest = (SLOP * ball.radius, Vec3::zero());
             for wall in &walls {
-                let near = self.walls[*wall as usize].nearest(ball.position, now);
+                let wall = &self.walls[*wall as usize];
+                if wall.at_least(ball.position, now) >= ball.radius {
+                    continue;
+                }
+                let near = wall.nearest(ball.position, now);
                 let overlap = ball.radius - near.distance;
                 if overlap > deepest.0 {
                     deepest = (overlap, near.normal * overlap);
@@ -268,13 +272,16 @@ impl EventDriven {
         parting: f64,
         settings: &Settings,
     ) -> Option<f64> {
-        let (gap, speed) = self.wall_gap(contact, now);
         let ball = &self.balls[contact.b as usize];
+        let wall = &self.walls[contact.a as usize];
+        let low = self.low(contact.b, settings) + wall.rounding(ball.position);
+        if wall.at_least(ball.position, now) > ball.radius + low {
+            return None;
+        }
+        let (gap, speed) = self.wall_gap(contact, now);
         let fall = ball.pull.magnitude() * settings.dt;
         let goes = self.goes(contact.a as usize) && now == 0.0;
         let slow = if goes { fall } else { PRESS * fall };
-        let low =
-            self.low(contact.b, settings) + self.walls[contact.a as usize].rounding(ball.position);
         (gap <= low && speed <= slow.max(parting)).then_some(slow + speed)
     }
 
