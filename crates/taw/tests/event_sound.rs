@@ -431,39 +431,6 @@ fn what_f64_holds_and_f32_does_not_stops() {
     }
 }
 
-/// A waving meadow of this many squares of two triangles along each side, six metres wide.
-fn meadow(squares: u32) -> Mesh<f64> {
-    let at = |i: u32| 6.0 * f64::from(i) / f64::from(squares) - 3.0;
-    let height = |x: f64, z: f64| 0.1 * ((2.0 * x).sin() + (3.0 * z).cos());
-    let side = squares + 1;
-    let points = (0..side * side).map(|i| (at(i % side), at(i / side)));
-    let points = points.map(|(x, z)| Point3::new(x, height(x, z), z)).collect();
-    let corners = (0..squares * squares).flat_map(|i| {
-        let a = i / squares * side + i % squares;
-        [[a, a + side, a + 1], [a + 1, a + side, a + side + 1]]
-    });
-    Mesh::new(points, corners.collect()).unwrap()
-}
-
-#[test]
-fn a_ball_on_a_large_mesh_costs_little() {
-    let mut world = world::<f64>(Rotation::Dynamic, 1);
-    world.walls.insert(meadow(200)).unwrap();
-    let marble = Marble {
-        material: Some(surface(0.3, 0.5)),
-        velocity: Vec3::new(0.7, 0.0, 0.3),
-        ..Marble::new(Point3::new(0.1, 1.0, 0.2), 0.2)
-    };
-    world.marbles.insert(marble).unwrap();
-    let begin = Instant::now();
-    for _ in 0..300 {
-        world.step(DT).unwrap();
-    }
-    println!("a step took {:?}", begin.elapsed() / 300);
-    let at = world.marbles.position()[0];
-    assert!(at.y > -0.2, "{at:?}");
-}
-
 #[test]
 fn a_thousand_at_one_point_end_their_step() {
     let mut world = world::<f32>(Rotation::Dynamic, 1);

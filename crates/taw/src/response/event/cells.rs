@@ -10,8 +10,10 @@ pub(super) type Cell = [i64; 3];
 /// Not a row.
 const NONE: u32 = u32::MAX;
 
+/// Buckets there are at least: of fewer, the cells around a ball would share many.
+const LEAST_BUCKETS: usize = 1024;
+
 /// The rows in each cell, as chains through buckets that the cells are hashed to.
-/// Buckets that two cells share name some rows in vain, which costs a look.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cells {
     width: f64,
@@ -19,6 +21,7 @@ pub(super) struct Cells {
     next: Vec<u32>,
     previous: Vec<u32>,
     bucket: Vec<u32>,
+    cell: Vec<Cell>,
 }
 
 impl Cells {
@@ -26,7 +29,9 @@ impl Cells {
     pub fn reset(&mut self, rows: usize, width: f64) {
         self.width = width;
         self.head.clear();
-        self.head.resize((2 * rows).next_power_of_two(), NONE);
+        self.head.resize((2 * rows).next_power_of_two().max(LEAST_BUCKETS), NONE);
+        self.cell.clear();
+        self.cell.resize(rows, [0; 3]);
         for list in [&mut self.next, &mut self.previous, &mut self.bucket] {
             list.clear();
             list.resize(rows, NONE);
@@ -49,7 +54,7 @@ impl Cells {
         let first = std::mem::replace(&mut self.head[bucket], row);
         let index = row as usize;
         (self.next[index], self.previous[index]) = (first, NONE);
-        self.bucket[index] = bucket as u32;
+        (self.bucket[index], self.cell[index]) = (bucket as u32, cell);
         if first != NONE {
             self.previous[first as usize] = row;
         }
@@ -69,15 +74,17 @@ impl Cells {
         }
     }
 
-    /// Names the rows in a cell and the 26 around it, some of them twice, and some of
-    /// other cells.
+    /// Names the rows in a cell and the 26 around it.
     pub fn near(&self, [x, y, z]: Cell, mut name: impl FnMut(usize)) {
         for dz in -1..=1 {
             for dy in -1..=1 {
                 for dx in -1..=1 {
-                    let mut row = self.head[self.bucket_of([x + dx, y + dy, z + dz])];
+                    let cell = [x + dx, y + dy, z + dz];
+                    let mut row = self.head[self.bucket_of(cell)];
                     while row != NONE {
-                        name(row as usize);
+                        if self.cell[row as usize] == cell {
+                            name(row as usize);
+                        }
                         row = self.next[row as usize];
                     }
                 }
@@ -90,5 +97,28 @@ impl Cells {
         let hash =
             x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663) ^ z.wrapping_mul(83_492_791);
         (hash as usize) & (self.head.len() - 1)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn each_row_around_is_named_once_and_no_other() {
+        let mut cells = Cells::default();
+        // Few rows, whose cells around outnumber the rows by far, and many.
+        for rows in [2_i64, 50, 3000] {
+            cells.reset(rows as usize, 1.0);
+            let cell = |row: i64| [row % 7, row / 7 % 7, row / 49];
+            (0..rows).for_each(|row| cells.insert(row as u32, cell(row)));
+            for at in (0..rows).map(cell) {
+                let mut named = Vec::new();
+                cells.near(at, |row| named.push(row as i64));
+                named.sort_unstable();
+                let near = |row: &i64| (0..3).all(|i| (cell(*row)[i] - at[i]).abs() <= 1);
+                assert_eq!(named, (0..rows).filter(near).collect::<Vec<_>>());
+            }
+        }
     }
 }

@@ -35,7 +35,6 @@ impl EventDriven {
             let Some(after) = after.filter(|after| !after.is_nan()) else { return };
             let time = now + after.max(0.0);
             match (first.1, what) {
-                // Some are named twice.
                 (What::Meets(a, _), What::Meets(b, _)) if a != b && time == first.0 => tied = true,
                 _ if time < first.0 => (first, tied) = ((time, what), false),
                 _ => {}
@@ -49,8 +48,8 @@ impl EventDriven {
         let far = ball.radius + ball.rounding + (speed + acceleration * left) * left;
         let far = far * (1.0 + 1e-9);
         self.name_walls(row, |wall| {
-            let near = self.walls[wall].going(now).is_some()
-                || self.walls[wall].at_least(at, now) <= far;
+            let near =
+                self.walls[wall].going(now).is_some() || self.walls[wall].at_least(at, now) <= far;
             if near
                 && ball.path.support != Some(wall)
                 && let Some((after, what)) = self.foresee_wall(row, wall, now, settings)
@@ -91,7 +90,7 @@ impl EventDriven {
         }
     }
 
-    /// Names those that a ball may touch soon, itself among them, some of them twice.
+    /// Names those that a ball may touch soon, itself among them.
     pub(super) fn name_near(&self, row: usize, mut name: impl FnMut(usize)) {
         match self.balls[row].path.home {
             Home::Cell(cell) => {

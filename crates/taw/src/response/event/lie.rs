@@ -235,3 +235,66 @@ fn end_of_face(ground: &Ground, ball: &Ball, normal: Vec3<f64>, duration: f64) -
     }
     hi
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Path, Source, Wall};
+    use super::*;
+    use crate::math::Point3;
+    use crate::response::Material;
+    use crate::shape::Triangle;
+
+    /// A large triangle, of a mesh.
+    struct Face;
+
+    impl Source for Face {
+        fn planes(&self, _: &mut dyn FnMut(u32)) {}
+
+        fn has_parts(&self) -> bool {
+            true
+        }
+
+        fn near(&self, _: Point3<f64>, _: f64, name: &mut dyn FnMut(u32, u32)) {
+            name(0, 0);
+        }
+
+        fn wall(&self, row: u32, _: u32) -> Option<Wall> {
+            let corners = [[-9.0, 0.0, -9.0], [0.0, 0.0, 9.0], [9.0, 0.0, -9.0]].map(Point3::from);
+            let form = Form::Triangle(Triangle { corners });
+            let bounds = form.bounds();
+            let (motion, there, material) = (None, None, None);
+            Some(Wall { form, bounds, row, motion, there, material, digit: 0.0 })
+        }
+    }
+
+    #[test]
+    fn a_slide_on_a_face_ends_at_its_moment_and_the_ball_rolls() {
+        let dt = 1.0 / 64.0;
+        let mut counts = Vec::new();
+        for slip in [1e-6, 1e-5, 1e-4, 1e-3] {
+            let ball = Ball {
+                position: Point3::new(0.0, 0.2, 0.0),
+                velocity: Vec3::new(1.0 + slip, 0.0, 0.0),
+                spin: Vec3::new(0.0, 0.0, -1.0 / 0.2),
+                pull: Vec3::new(0.0, -9.81, 0.0),
+                radius: 0.2,
+                inverse_mass: 1.0,
+                material: Material { friction: 0.5, ..Material::default() },
+                spins: BallSpin::Free,
+                rounding: 1e-15,
+                turned: Vec3::zero(),
+                path: Path::default(),
+            };
+            let mut method = EventDriven { balls: vec![ball], ..EventDriven::default() };
+            let settings = Settings { dt, iterations: 8, source: &Face, looks: 0.into() };
+            assert!(method.run(&settings, &mut Vec::new()).is_empty());
+            let ball = &method.balls[0];
+            let rim = Vec3::unit_y().cross(ball.spin) * ball.radius;
+            assert!((ball.velocity + rim).magnitude() < 1e-14, "{ball:?}");
+            assert!((ball.velocity.x - (1.0 + slip * 5.0 / 7.0)).abs() < 1e-12, "{ball:?}");
+            counts.push(ball.path.steps);
+        }
+        // It looks where it is each 0.01 m, and once where it begins to roll.
+        assert!(counts.iter().all(|count| *count <= 5), "{counts:?}");
+    }
+}

@@ -1,0 +1,97 @@
+//! `Response::EventDriven` on walls of many triangles: meshes and height fields.
+
+use std::time::{Duration, Instant};
+
+use taw::prelude::*;
+use taw::shape::{HeightField, Mesh};
+
+const DT: f64 = 1.0 / 60.0;
+
+fn world<S: Scalar>() -> World<S> {
+    let mut world = World::default();
+    let model = Model {
+        response: Response::EventDriven,
+        precision: Precision::Compensated,
+        rotation: Rotation::Dynamic,
+        ..Model::default()
+    };
+    world.set_model(model).unwrap();
+    world
+}
+
+fn surface<S: Scalar>(restitution: f64, friction: f64) -> Material<S> {
+    let (restitution, friction) = (S::constant(restitution), S::constant(friction));
+    Material { restitution, friction, ..Material::default() }
+}
+
+/// A waving meadow of this many squares of two triangles along each side, six metres wide.
+fn meadow(squares: u32) -> Mesh<f64> {
+    let at = |i: u32| 6.0 * f64::from(i) / f64::from(squares) - 3.0;
+    let height = |x: f64, z: f64| 0.1 * ((2.0 * x).sin() + (3.0 * z).cos());
+    let side = squares + 1;
+    let points = (0..side * side).map(|i| (at(i % side), at(i / side)));
+    let points = points.map(|(x, z)| Point3::new(x, height(x, z), z)).collect();
+    let corners = (0..squares * squares).flat_map(|i| {
+        let a = i / squares * side + i % squares;
+        [[a, a + side, a + 1], [a + 1, a + side, a + side + 1]]
+    });
+    Mesh::new(points, corners.collect()).unwrap()
+}
+
+#[test]
+fn a_ball_on_a_large_mesh_costs_little() {
+    let mut world = world::<f64>();
+    world.walls.insert(meadow(200)).unwrap();
+    let marble = Marble {
+        material: Some(surface(0.3, 0.5)),
+        velocity: Vec3::new(0.7, 0.0, 0.3),
+        ..Marble::new(Point3::new(0.1, 1.0, 0.2), 0.2)
+    };
+    world.marbles.insert(marble).unwrap();
+    let begin = Instant::now();
+    for _ in 0..300 {
+        world.step(DT).unwrap();
+    }
+    println!("a step took {:?}", begin.elapsed() / 300);
+    let at = world.marbles.position()[0];
+    assert!(at.y > -0.2, "{at:?}");
+}
+
+/// Balls of many sizes over hills of that scale: every step ends, and nobody falls through.
+fn over_hills<S: Scalar>(scale: f64) {
+    for (radius, height) in [(0.2, 1.0), (0.2, 0.5), (1e-3, 0.5), (0.2 / scale, 1.0 / scale)] {
+        let number = |x: f64| S::constant(x * scale);
+        let mut world = world::<S>();
+        let heights = (0..49).map(|i| number(0.3 * f64::from(i % 3))).collect();
+        let corner = Point3::new(number(-9.0), number(-0.3), number(-9.0));
+        let field = HeightField::new(corner, [number(3.0); 2], 7, heights).unwrap();
+        world.walls.insert(field).unwrap();
+        let marble = Marble {
+            material: Some(surface(0.3, 0.5)),
+            mass: Mass::Kilograms(S::one()),
+            ..Marble::new(Point3::new(number(0.1), number(height), number(0.2)), number(radius))
+        };
+        if world.marbles.insert(marble).is_err() {
+            continue; // too small a number for this scalar
+        }
+        for step in 0..60 {
+            let begin = Instant::now();
+            world.step(S::constant(DT)).unwrap();
+            let took = begin.elapsed();
+            assert!(took < Duration::from_secs(5), "{scale:e}, {radius}, step {step}: {took:?}");
+            let at = world.marbles.position()[0];
+            let gap = world.walls.shapes()[0].nearest(at).distance.as_f64() / scale;
+            let rounding = 100.0 * S::epsilon().as_f64();
+            assert!(gap > -1e-3 * radius - rounding, "{scale:e}, {radius}, step {step}: {at:?}, {gap:e}");
+        }
+    }
+}
+
+#[test]
+fn hills_of_any_size_hold_and_every_step_ends() {
+    for scale in [1.0, 1e6, 1e15, 1e30] {
+        over_hills::<f64>(scale);
+        over_hills::<f32>(scale);
+    }
+    over_hills::<f64>(1e100);
+}
