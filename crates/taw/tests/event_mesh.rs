@@ -82,7 +82,10 @@ fn over_hills<S: Scalar>(scale: f64) {
             let at = world.marbles.position()[0];
             let gap = world.walls.shapes()[0].nearest(at).distance.as_f64() / scale;
             let rounding = 100.0 * S::epsilon().as_f64();
-            assert!(gap > -1e-3 * radius - rounding, "{scale:e}, {radius}, step {step}: {at:?}, {gap:e}");
+            assert!(
+                gap > -1e-3 * radius - rounding,
+                "{scale:e}, {radius}, step {step}: {at:?}, {gap:e}"
+            );
         }
     }
 }

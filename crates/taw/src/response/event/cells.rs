@@ -108,15 +108,15 @@ mod tests {
     fn each_row_around_is_named_once_and_no_other() {
         let mut cells = Cells::default();
         // Few rows, whose cells around outnumber the rows by far, and many.
-        for rows in [2_i64, 50, 3000] {
+        for rows in [2_u32, 50, 3000] {
             cells.reset(rows as usize, 1.0);
-            let cell = |row: i64| [row % 7, row / 7 % 7, row / 49];
-            (0..rows).for_each(|row| cells.insert(row as u32, cell(row)));
+            let cell = |row: u32| [row % 7, row / 7 % 7, row / 49].map(i64::from);
+            (0..rows).for_each(|row| cells.insert(row, cell(row)));
             for at in (0..rows).map(cell) {
                 let mut named = Vec::new();
-                cells.near(at, |row| named.push(row as i64));
+                cells.near(at, |row| named.push(row as u32));
                 named.sort_unstable();
-                let near = |row: &i64| (0..3).all(|i| (cell(*row)[i] - at[i]).abs() <= 1);
+                let near = |row: &u32| (0..3).all(|i| (cell(*row)[i] - at[i]).abs() <= 1);
                 assert_eq!(named, (0..rows).filter(near).collect::<Vec<_>>());
             }
         }
