@@ -60,6 +60,18 @@ fn what_was_found_and_mended_stays_mended() {
     assert!(wrong.is_empty(), "{}", wrong.join("\n"));
 }
 
+/// Scenes whose failures became other ones when they were made small: balls that roll on boards
+/// that turn, on bent paths, and lie there in heaps. What the board brings in is counted.
+#[test]
+fn what_boards_bring_in_is_counted() {
+    for number in [63, 297] {
+        let case = generate(Name { kind: Kind::EventDriven, seed: 2, number });
+        let verdict = run(&case, &Pulse::default());
+        assert!(case.scene.about.contains("board"), "{}", case.scene.about);
+        assert!(verdict.failures.is_empty(), "{number}: {:?}", verdict.failures);
+    }
+}
+
 /// A case of the impulse model in single steps, in `f64`.
 fn case(scene: Scene) -> Case {
     let response = Response::Impulse;

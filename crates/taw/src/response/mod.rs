@@ -70,7 +70,7 @@ pub enum Response {
     /// capsules, edges and corners) and on walls that tilt they are integrated in steps by
     /// which the normal turns by 0.02 rad at most, and a marble leaves where nothing presses it
     /// any more. What touches several walls, or other marbles, is held as by
-    /// [`Response::Impulse`], in as many iterations as it takes for 10,000 contacts altogether;
+    /// [`Response::Impulse`], in as many iterations as it takes, for 4,000 contacts altogether;
     /// only in heaps of more do the [iterations](crate::world::Model::iterations) count. Give it
     /// 50 or more there: a contact that they leave undecided is one more event, which costs
     /// more. Bounces end when the rest of them would take less than

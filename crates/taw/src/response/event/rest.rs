@@ -24,9 +24,9 @@ const AGREED: f64 = 0.01 * REST;
 /// Or by more than this part of its largest speed, where nothing pulls: a hundred roundings.
 const ROUNDING: f64 = 100.0 * f64::EPSILON;
 /// Whatever the model's iterations, a heap is swept until it agrees, or for as long as no more
-/// contacts are solved than this, all sweeps together: about a millisecond. What a heap of few
+/// contacts are solved than this, all sweeps together: half a millisecond. What a heap of few
 /// leaves undecided costs more, as events.
-const MOST_SOLVED: usize = 10_000;
+const MOST_SOLVED: usize = 4_000;
 /// And no more often than this, which is the most that a model may have.
 const MOST_SWEEPS: u32 = 1000;
 
