@@ -259,7 +259,7 @@ impl Swarm {
             fit(&mut slab.touches);
             slab.near_shapes.clear();
             if shapes {
-                walls::near_shapes(walls, at, budget, slab.own_rows(), &mut slab.near_shapes);
+                walls::near_shapes(walls, balls, slab.own_rows(), &mut slab.near_shapes);
             }
         });
         self.find_strays(cap);

@@ -321,7 +321,7 @@ pub(super) struct Soft {
     /// so far it gives back.
     pub mass: f32,
     pub back: f32,
-    /// So much of the sum of their radii two balls may overlap before they are moved apart.
+    /// So much of twice the smaller radius two balls may overlap before they are moved apart.
     pub slop: f32,
 }
 
@@ -330,6 +330,10 @@ pub(super) const WALL_SLOP: f32 = 0.1;
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.
 const PUSH: f32 = 0.5;
+
+/// How a ball is marked that a wall bears in this step, be it through others; one less in the next
+/// one, and after that not at all.
+pub(super) const GROUNDED: f32 = 2.0;
 
 /// The columns that several threads work on.
 #[derive(Clone, Copy)]
@@ -487,17 +491,22 @@ impl Columns<'_> {
         normal: V<L>,
         gap: L,
         slop: f32,
+        grounded: L,
     ) {
         let zero = L::splat(0.0);
-        let overlap = zero - gap - (at_a[3] + at_b[3]) * L::splat(slop);
+        let smaller = at_a[3] + at_b[3] - at_a[3].max(at_b[3]);
+        let overlap = zero - gap - smaller * L::splat(2.0 * slop);
         if overlap.above(zero) == 0 {
             return;
         }
-        // Half each, whatever they weigh: a light ball that a heavy one presses on something has
-        // nowhere to go. What sleeps stays.
+        // What flies keeps its center of mass. What a wall bears goes half each, whatever they
+        // weigh: a light ball that a heavy one presses on something has nowhere to go. What sleeps
+        // stays.
         let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
-        let a = mobility(&a).pick_above(zero, one, zero);
-        let b = mobility(&b).pick_above(zero, one, zero);
+        let [a, b] = [a, b].map(|ball| {
+            let free = mobility(&ball);
+            free.pick_above(zero, grounded.pick_above(zero, one, free), zero)
+        });
         let by = (a + b).pick_above(zero, push / (a + b), zero);
         let ways = [normal.times(by * a), normal.times(by * b)];
         let places =
@@ -573,7 +582,7 @@ impl Solve<'_> {
             let [a, b] = velocity;
             let relative = V::of(&b).minus(V::of(&a));
             let parting = relative.dot(normal);
-            let spins = columns.spins::<L, ROUGH>(batch);
+            let mut spins = columns.spins::<L, ROUGH>(batch);
             let mass = mass(&a, &b);
             let change = if FIRST {
                 let pushed = (gap * L::splat(soft.rate)).max(L::splat(-soft.fastest));
@@ -586,6 +595,10 @@ impl Solve<'_> {
             };
             let after = (before - fresh.pick_above(zero, zero, change)).max(zero);
             after.store(&mut pressure[i]);
+            let grounded = spins[0][3].max(spins[1][3]);
+            for spin in &mut spins {
+                spin[3] = after.pick_above(zero, grounded, spin[3]);
+            }
             let mut across = V([zero; 3]);
             if ROUGH {
                 let sliding = sliding(relative, normal, &spins);
@@ -597,7 +610,7 @@ impl Solve<'_> {
             }
             columns.hit::<L, ROUGH>(batch, [a, b], spins, normal, after - before, across);
             if !FIRST {
-                columns.part(batch, at, [a, b], normal, gap, soft.slop);
+                columns.part(batch, at, [a, b], normal, gap, soft.slop, grounded);
             }
         }
     }

@@ -75,7 +75,8 @@ pub struct Swarm {
     /// Velocity and inverse mass, which has a minus sign while a ball sleeps. In the lab's tier,
     /// while it steps, the place before.
     velocity: Vec<Row>,
-    /// Radius times spin, and nothing; only in the full tier.
+    /// Radius times spin, and whether a wall bears it ([`GROUNDED`](kernels::GROUNDED)); only in
+    /// the full tier.
     spin: Vec<Row>,
     /// How far each ball may still go until pairs are sought again, in metres.
     budget: Vec<f32>,
@@ -108,8 +109,8 @@ pub struct Swarm {
     /// The marbles of the world that are balls here, in their order.
     pub(crate) invited: Vec<(MarbleId, BallId)>,
     guests: Vec<Guest>,
-    /// Their rows, in order; only in the lab's tier, while it steps.
-    guest_rows: Vec<u32>,
+    /// Their rows, in order, and which guest each is; only in a step.
+    guest_rows: Vec<(u32, u32)>,
     /// A bit for each slot.
     guest_slots: Vec<u64>,
     /// What a column is put in order with; then, in the lab's tier, the fans of all slabs.
@@ -239,7 +240,8 @@ impl Swarm {
         &self.velocity
     }
 
-    /// Radius times angular velocity in m/s, row by row, and nothing; empty in the lab's tier.
+    /// Radius times angular velocity in m/s, row by row, and a mark of the swarm's own; empty in the
+    /// lab's tier.
     #[must_use]
     pub fn rims(&self) -> &[[f32; 4]] {
         &self.spin
@@ -367,12 +369,12 @@ impl Swarm {
         } = self;
         let rows = [at, velocity, spin, spare].map(of);
         let numbers = [budget, way, ways].map(of);
-        let names = [leaving, before, stopped, guest_rows, slab_states].map(of);
+        let names = [leaving, before, stopped, slab_states].map(of);
         rows.into_iter().chain(numbers).chain(names).sum::<usize>()
             + (of(slabs) + slabs.iter().map(Slab::bytes).sum::<usize>())
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
             + (of(lists) + lists.iter().map(of).sum::<usize>())
-            + (of(planes) + of(invited) + of(guests) + of(guest_slots))
+            + (of(planes) + of(invited) + of(guests) + of(guest_rows) + of(guest_slots))
             + (ids.bytes() + grid.bytes() + memory.bytes() + strays.bytes())
     }
 

@@ -24,13 +24,16 @@ pub(super) struct Slab {
     /// The rows near half-spaces, and near other walls.
     pub near_planes: Vec<u32>,
     pub near_shapes: Vec<u32>,
+    /// Whether one near other walls is fast.
+    pub has_fast: bool,
     /// How fast a ball is at most, in m/s: any, one in the first layer, one in the last.
     pub speed: [f32; 3],
     /// For how long all have been slow, in seconds, and whether they sleep.
     pub slow: f32,
     pub asleep: bool,
-    /// Whether a ball of it or of those beside it bounced just now.
+    /// Whether a ball of it or of those beside it bounced just now, and in this substep.
     pub again: bool,
+    pub struck: bool,
     /// The rows that would leave their budget in this step, and those that were stopped.
     pub leaving: Vec<u32>,
     pub stopped: Vec<u32>,
@@ -57,10 +60,12 @@ impl Slab {
             old_touches,
             near_planes,
             near_shapes,
+            has_fast: _,
             speed: _,
             slow: _,
             asleep: _,
             again: _,
+            struck: _,
             leaving,
             stopped,
         } = self;

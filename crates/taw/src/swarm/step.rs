@@ -9,8 +9,10 @@ use super::lanes::Row;
 use super::slab::Slab;
 use super::strays::Strays;
 use super::team::{Shared, each, each_beside, each_rows, list_rows};
-use super::walls::{Balls, HalfSpace, half_spaces};
+use super::walls::{Balls, HalfSpace, Look, half_spaces};
 use super::{Stage, Surroundings, Swarm, Tier, lying};
+use cgmath::Zero;
+
 use crate::math::{Vec3, length};
 
 /// How stiff contacts are: at most so many oscillations a second, and as many times as much
@@ -118,23 +120,30 @@ impl Swarm {
         }
         self.leaving = leaving;
         observe(Stage::Restitute);
-        self.look_at_walls(walls, 0.0);
         self.find_guests();
+        self.look_at_walls(walls, 0.0, [dt; 2], |_| true, false);
         let (guests, planes) =
             (std::mem::take(&mut self.guest_rows), std::mem::take(&mut self.planes));
+        let named = std::mem::take(&mut self.guests);
         let spare = std::mem::take(&mut self.spare);
         let fans: &[u16] = bytemuck::cast_slice(&spare);
         for _ in 0..self.model.substeps {
             self.each_slab(|_, columns, slab| {
-                // Other walls push the guests.
+                // Others move the guests, as deep in walls as they like: a wall only bears what
+                // the swarm presses on it.
                 let mut from = slab.rows[0];
-                let its = guests.partition_point(|row| *row < slab.rows[0])
-                    ..guests.partition_point(|row| *row < slab.rows[1]);
-                for to in guests[its].iter().chain([&slab.rows[1]]) {
+                let its = guests.partition_point(|(row, _)| *row < slab.rows[0])
+                    ..guests.partition_point(|(row, _)| *row < slab.rows[1]);
+                for (to, guest) in guests[its].iter().chain([&(slab.rows[1], u32::MAX)]) {
                     // SAFETY: balls of the slab.
                     let at = unsafe { columns.at.part(from as usize..*to as usize) };
                     instructions.run(DisplaceFromPlanes { at, planes: &planes });
                     from = to + 1;
+                    let Some(guest) = named.get(*guest as usize) else { continue };
+                    for plane in &planes {
+                        // SAFETY: as above.
+                        plane.bear(guest, unsafe { &mut *columns.at.row(*to as usize) });
+                    }
                 }
                 for touch in &slab.touches {
                     // SAFETY: a ball of the slab.
@@ -148,6 +157,7 @@ impl Swarm {
             instructions.run(Displace { at, batches });
         }
         (self.guest_rows, self.planes, self.spare) = (guests, planes, spare);
+        self.guests = named;
         observe(Stage::Integrate);
         let per_second = [1.0 / dt, 1.0 / dt, 1.0 / dt, 0.0];
         let (velocity, budget) = (Shared::new(&mut self.velocity), Shared::new(&mut self.budget));
@@ -194,10 +204,13 @@ impl Swarm {
         if self.slabs.iter().all(|slab| slab.asleep) {
             return;
         }
+        self.find_guests();
         observe(Stage::Restitute);
-        self.look_at_walls(walls, dt);
         let substeps = self.model.substeps as f32;
         let h = dt / substeps;
+        let (times, all) = ([dt, h], |_: &Slab| true);
+        self.age_marks();
+        self.look_at_walls(walls, dt, times, all, false);
         // What gravity makes of rest in two steps is no impact.
         let speed = 2.0 * length(gravity) * dt;
         let restitution = self.model.material.restitution;
@@ -206,26 +219,89 @@ impl Swarm {
         let soft = soft(h, length(gravity));
         let impact = Impact { speed, restitution, time: h, gravity: row(gravity), soft };
         let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > speed;
-        for _ in 0..self.model.substeps {
+        for substep in 0..self.model.substeps {
+            let left = dt - h * substep as f32;
+            if substep > 0 {
+                self.look_at_walls(walls, left, times, |slab| slab.has_fast, true);
+            }
             self.bounce(impact, faster);
+            if self.seek_for_struck([dt, left], gravity, walls, observe) {
+                self.look_at_walls(walls, left, times, all, false);
+                observe(Stage::Restitute);
+            }
             observe(Stage::Integrate);
             self.drift(row(gravity * h), [0.0; 4]);
-            self.hold_guests(row(gravity * h));
+            self.hold_guests(row(gravity * h), 0.0);
             observe(Stage::Restitute);
             self.pass(Pass::Begin, |_, _| true);
             self.pass(Pass::Solve(impact), |_, _| true);
             observe(Stage::Integrate);
             self.drift([0.0; 4], [h, h, h, 0.0]);
-            self.hold_guests([0.0; 4]);
+            self.hold_guests([0.0; 4], h);
             observe(Stage::Restitute);
             self.pass(Pass::Relax(impact), |_, _| true);
             self.keep_out();
         }
     }
 
+    /// Forgets who was borne by a wall two steps ago.
+    fn age_marks(&mut self) {
+        let (slabs, spin) = (&self.slabs, Shared::new(&mut self.spin));
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            if !slabs[slab].asleep {
+                // SAFETY: the rows of the slab.
+                for spin in unsafe { spin.part(slabs[slab].own_rows()) } {
+                    spin[3] = (spin[3] - 1.0).max(0.0);
+                }
+            }
+        });
+    }
+
+    /// Seeks pairs and walls for balls that a bounce has sent further than their budget in the
+    /// `left` seconds of a step of `dt`. Says whether there were any.
+    fn seek_for_struck(
+        &mut self,
+        [dt, left]: [f32; 2],
+        gravity: Vec3<f32>,
+        walls: &dyn Surroundings,
+        observe: &mut dyn FnMut(Stage),
+    ) -> bool {
+        let mut leaving = std::mem::take(&mut self.leaving);
+        leaving.clear();
+        // More than this are too many.
+        let most = self.strays.room(self.at.len()) + 1;
+        for slab in self.slabs.iter().filter(|slab| slab.struck && !slab.asleep) {
+            let leaves = |row: &u32| {
+                let at = *row as usize;
+                leaves(&self.velocity[at], self.budget[at], left)
+            };
+            let room = most.saturating_sub(leaving.len());
+            leaving.extend((slab.rows[0]..slab.rows[1]).filter(leaves).take(room));
+        }
+        if !leaving.is_empty() {
+            // Rows may change.
+            for slab in &mut self.slabs {
+                self.stopped.append(&mut slab.stopped);
+            }
+            let slots = self.ids.slots();
+            self.stopped.iter_mut().for_each(|row| *row = slots[*row as usize]);
+            let rebuilds = self.rebuilds;
+            self.seek_for(&leaving, dt, walls, observe);
+            if self.rebuilds != rebuilds {
+                self.look(dt, gravity);
+                self.find_guests();
+            }
+            let rows = self.ids.columns().1;
+            self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
+        }
+        let any = !leaving.is_empty();
+        self.leaving = leaving;
+        any
+    }
+
     /// Lets bounce what meets, again where a bounce may have sent a ball on to the next one.
     fn bounce(&mut self, impact: Impact, faster: impl Fn(&Slab, f32) -> bool + Sync) {
-        self.slabs.iter_mut().for_each(|slab| slab.again = true);
+        self.slabs.iter_mut().for_each(|slab| (slab.again, slab.struck) = (true, false));
         for _ in 0..ROUNDS {
             self.pass(Pass::Impact(impact), |slab, next| slab.again && faster(slab, next));
             let all = self.strays.pushes.bounced;
@@ -237,6 +313,7 @@ impl Swarm {
                 let again = bounced(before) || bounced(own) || bounced(next);
                 any |= again;
                 self.slabs[i].again = all || again;
+                self.slabs[i].struck |= all || again;
             }
             self.strays.pushes.bounced = false;
             self.slabs.iter_mut().for_each(|slab| slab.pushes.bounced = false);
@@ -282,10 +359,7 @@ impl Swarm {
             let budget = &budget[slab.own_rows()];
             slab.leaving.clear();
             let rows = (slab.rows[0]..).zip(velocity.iter().zip(budget));
-            let leaves = |velocity: &Row, budget: f32| {
-                budget < 0.0 || squared(*velocity) * dt * dt > budget * budget
-            };
-            let leaving = rows.filter(|(_, (velocity, budget))| leaves(velocity, **budget));
+            let leaving = rows.filter(|(_, (velocity, budget))| leaves(velocity, **budget, dt));
             slab.leaving.extend(leaving.map(|(row, _)| row).take(most));
             let fastest = |from: u32, to: u32| {
                 let rows = (from - slab.rows[0]) as usize..(to - slab.rows[0]) as usize;
@@ -412,10 +486,10 @@ impl Swarm {
         });
     }
 
-    /// How long before a ball can be at a half-space it is sought for, in seconds. In the lab's
-    /// tier it may as well be inside.
-    pub(super) fn ahead(&self, dt: f32) -> f32 {
-        if self.rough() { 2.0 * dt } else { 0.0 }
+    /// How long before a ball can be at a wall it is sought for, in seconds; in the lab's tier, it
+    /// has moved already.
+    pub(super) fn ahead(&self, dt: f32) -> Option<f32> {
+        self.rough().then_some(2.0 * dt)
     }
 
     /// Seeks the balls at walls anew, where pairs are still known.
@@ -435,8 +509,7 @@ impl Swarm {
             slab.old_touches = old;
             slab.near_shapes.clear();
             if shapes {
-                let (rows, found) = (slab.own_rows(), &mut slab.near_shapes);
-                super::walls::near_shapes(walls, balls.at, balls.budget, rows, found);
+                super::walls::near_shapes(walls, balls, slab.own_rows(), &mut slab.near_shapes);
             }
         });
     }
@@ -458,13 +531,7 @@ impl Swarm {
             if walls.has_shapes() {
                 for row in &rows[mine] {
                     let row = *row as usize;
-                    super::walls::near_shapes(
-                        walls,
-                        at,
-                        budget,
-                        row..row + 1,
-                        &mut slab.near_shapes,
-                    );
+                    super::walls::near_shapes(walls, balls, row..row + 1, &mut slab.near_shapes);
                 }
                 slab.near_shapes.sort_unstable();
                 slab.near_shapes.dedup();
@@ -472,26 +539,49 @@ impl Swarm {
         }
     }
 
-    /// Walls are where they will be at the end; so long before, in seconds, they were elsewhere.
-    fn look_at_walls(&mut self, walls: &dyn Surroundings, before: f32) {
-        let (at, budget, material) = (&self.at[..], &self.budget[..], self.model.material);
-        let (guests, slots) = (&self.guest_slots[..], self.ids.slots());
-        let any = !self.guests.is_empty();
+    /// Brings the touches of some slabs up to date. Walls are where they will be at the end; so long
+    /// `before`, in seconds, they were elsewhere.
+    fn look_at_walls(
+        &mut self,
+        walls: &dyn Surroundings,
+        before: f32,
+        times: [f32; 2],
+        which: impl Fn(&Slab) -> bool + Sync,
+        only_fast: bool,
+    ) {
+        let (guests, rows) = (&self.guests[..], &self.guest_rows[..]);
+        let look = Look {
+            tier: self.model.tier,
+            at: &self.at,
+            velocity: &self.velocity,
+            budget: &self.budget,
+            material: self.model.material,
+            before,
+            times,
+            gravity: self.gravity.unwrap_or_else(Vec3::zero),
+        };
         let slabs = Shared::new(&mut self.slabs);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // SAFETY: its own.
             let slab = unsafe { &mut *slabs.row(slab) };
-            if slab.asleep {
+            if slab.asleep || !which(slab) {
                 return;
             }
-            slab.look_at_walls(walls, at, budget, material, before);
-            if any {
-                // Walls push them elsewhere.
-                let guest = |row: u32| Self::has_guest_slot(slots[row as usize], guests);
-                slab.touches.retain(|touch| !guest(touch.row));
+            slab.look_at_walls(walls, &look, only_fast);
+            if !rows.is_empty() {
+                for touch in &mut slab.touches {
+                    if let Some(guest) = Self::guest_at(guests, rows, touch.row) {
+                        touch.bear(guest);
+                    }
+                }
             }
         });
     }
+}
+
+/// Whether a ball leaves its budget within a time.
+fn leaves(velocity: &Row, budget: f32, time: f32) -> bool {
+    budget < 0.0 || squared(*velocity) * time * time > budget * budget
 }
 
 /// The half-spaces of which the balls near them are listed. The lab's tier looks at all balls.

@@ -2,7 +2,8 @@
 
 use cgmath::InnerSpace;
 
-use super::kernels::{Impact, Pass, Soft, WALL_SLOP};
+use super::guests::Guest;
+use super::kernels::{GROUNDED, Impact, Pass, Soft, WALL_SLOP};
 use super::lanes::Row;
 use crate::math::Vec3;
 
@@ -14,9 +15,14 @@ pub(super) struct Touch {
     pub part: u32,
     /// Of a half-space, or of any other shape.
     pub is_plane: bool,
-    /// The plane that the wall is like there: its normal, and how far along it the surface is.
+    /// Whether the ball is a guest, whom others move: the wall only bears what the swarm presses
+    /// on it.
+    pub bears_guest: bool,
+    /// The plane that the wall is like there: its normal, and how far along it the surface is, now
+    /// and at the end of the step.
     pub normal: Vec3<f32>,
     pub offset: f32,
+    pub offset_at_end: f32,
     /// The velocity of the surface, in m/s.
     pub surface: Vec3<f32>,
     pub friction: f32,
@@ -45,9 +51,22 @@ impl Touch {
         self.normal.dot(xyz(at)) - self.offset - at[3]
     }
 
-    /// The wall moves on for so long, in seconds.
+    /// The wall moves on for so long, in seconds. Guests are where they are at the end of the step
+    /// already, and so are their walls.
     pub fn drift(&mut self, time: f32) {
-        self.offset += self.surface.dot(self.normal) * time;
+        if !self.bears_guest {
+            self.offset += self.surface.dot(self.normal) * time;
+        }
+    }
+
+    /// Makes it one that only bears what the swarm presses on a guest: the guest's own motion, and
+    /// how deep it is in the wall already, are left to whoever moves it.
+    pub fn bear(&mut self, guest: &Guest) {
+        self.bears_guest = true;
+        (self.friction, self.restitution) = (0.0, 0.0);
+        self.surface = xyz(&guest.velocity);
+        self.offset = self.offset_at_end;
+        self.offset += self.gap(&guest.at).min(0.0);
     }
 
     /// Pushes the ball out.
@@ -152,6 +171,9 @@ impl Touch {
         let grip = held(wish, self.friction * pressure);
         let across = grip - self.grip;
         self.grip = grip;
+        if pressure > 0.0 {
+            spin[3] = GROUNDED;
+        }
         self.hit(velocity, spin, along, across);
     }
 

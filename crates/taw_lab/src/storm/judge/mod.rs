@@ -209,6 +209,8 @@ fn softest(case: &Case) -> f64 {
 pub struct Bench {
     rules: Rules,
     closed: Option<[[f64; 3]; 2]>,
+    /// Whose centre was not inside the closed box at the beginning.
+    outside: Vec<bool>,
     energy: energy::Ledger,
     flight: flight::Falls,
     rest: rest::Lies,
@@ -224,6 +226,10 @@ impl Bench {
         Self {
             rules: Rules::of(case),
             closed: case.closed,
+            outside: case.closed.map_or_else(Vec::new, |[low, high]| {
+                let out = |at: Vec3<f64>| (0..3).any(|i| at[i] < low[i] || at[i] > high[i]);
+                begin.bodies.iter().map(|body| out(body.at)).collect()
+            }),
             energy: energy::Ledger::new(begin),
             flight: flight::Falls::default(),
             rest: rest::Lies::default(),
@@ -249,8 +255,8 @@ impl Bench {
         findings.extend(self.flight.judge(rules, before, after, &near));
         findings.extend(self.rest.judge(rules, before, after));
         findings.push(overlap::overlap(rules, before, after, [self.begin, self.fastest]));
-        findings
-            .extend(self.closed.map(|closed| overlap::closed(rules, after, self.fastest, closed)));
+        let closed = |corners| overlap::closed(rules, after, self.fastest, &self.outside, corners);
+        findings.extend(self.closed.map(closed));
         findings
     }
 }
