@@ -241,6 +241,7 @@ impl Swarm {
                 layers: slab.layers,
                 rows: slab.rows,
                 search,
+                unlisted: &mut slab.unlisted,
                 batches: &mut slab.batches,
                 fans: fans.as_deref_mut(),
             });

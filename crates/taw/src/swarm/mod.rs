@@ -310,6 +310,18 @@ impl Swarm {
         self.slabs.iter().map(|slab| slab.pairs).sum::<usize>() + pairs_in(&self.strays.batches)
     }
 
+    /// Checks that all pairs near enough are looked at. Up to 64 a ball on average are, ten times as
+    /// many as touch in the densest heap; where more balls than that are inside of each other, the
+    /// rest wait until some have parted, and meanwhile overlap.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for `pairs`: how many there are, and how many of them are looked at.
+    pub fn check_pairs(&self) -> Result<(), Error> {
+        let unlisted = self.slabs.iter().map(|slab| slab.unlisted).sum::<usize>();
+        let (listed, all) = (self.pairs(), self.pairs() + unlisted + self.strays.unlisted);
+        within("pairs", all as f64, 0.0, listed as f64).map(|_| ())
+    }
+
     /// How many times a ball is near enough to a wall to be looked at. (The lab's tier looks at
     /// all balls for each half-space, and does not count these.)
     #[must_use]

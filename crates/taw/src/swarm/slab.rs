@@ -17,6 +17,8 @@ pub(super) struct Slab {
     pub batches: Vec<Batch>,
     /// How many pairs it has, in batches and fans.
     pub pairs: usize,
+    /// How many more there was no room for.
+    pub unlisted: usize,
     pub pushes: Pushes,
     /// By rows.
     pub touches: Vec<Touch>,
@@ -55,6 +57,7 @@ impl Slab {
             rows: _,
             batches,
             pairs: _,
+            unlisted: _,
             pushes,
             touches,
             old_touches,

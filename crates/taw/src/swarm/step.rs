@@ -127,28 +127,30 @@ impl Swarm {
         let named = std::mem::take(&mut self.guests);
         let spare = std::mem::take(&mut self.spare);
         let fans: &[u16] = bytemuck::cast_slice(&spare);
+        // SAFETY: the caller has the balls of the slab.
+        let displace_from_walls = |slab: &Slab, all: Shared<Row>| unsafe {
+            // Others move the guests, as deep in walls as they like: a wall only bears what the
+            // swarm presses on it.
+            let mut from = slab.rows[0];
+            let its = guests.partition_point(|(row, _)| *row < slab.rows[0])
+                ..guests.partition_point(|(row, _)| *row < slab.rows[1]);
+            for (to, guest) in guests[its].iter().chain([&(slab.rows[1], u32::MAX)]) {
+                let at = all.part(from as usize..*to as usize);
+                instructions.run(DisplaceFromPlanes { at, planes: &planes });
+                from = to + 1;
+                let Some(guest) = named.get(*guest as usize) else { continue };
+                for plane in &planes {
+                    plane.bear(guest, &mut *all.row(*to as usize));
+                }
+            }
+            for touch in &slab.touches {
+                touch.displace(&mut *all.row(touch.row as usize));
+            }
+        };
         for _ in 0..self.model.substeps {
             self.each_slab(|_, columns, slab| {
-                // Others move the guests, as deep in walls as they like: a wall only bears what
-                // the swarm presses on it.
-                let mut from = slab.rows[0];
-                let its = guests.partition_point(|(row, _)| *row < slab.rows[0])
-                    ..guests.partition_point(|(row, _)| *row < slab.rows[1]);
-                for (to, guest) in guests[its].iter().chain([&(slab.rows[1], u32::MAX)]) {
-                    // SAFETY: balls of the slab.
-                    let at = unsafe { columns.at.part(from as usize..*to as usize) };
-                    instructions.run(DisplaceFromPlanes { at, planes: &planes });
-                    from = to + 1;
-                    let Some(guest) = named.get(*guest as usize) else { continue };
-                    for plane in &planes {
-                        // SAFETY: as above.
-                        plane.bear(guest, unsafe { &mut *columns.at.row(*to as usize) });
-                    }
-                }
-                for touch in &slab.touches {
-                    // SAFETY: a ball of the slab.
-                    touch.displace(unsafe { &mut *columns.at.row(touch.row as usize) });
-                }
+                // SAFETY: balls of the slab.
+                unsafe { displace_from_walls(slab, columns.at) };
                 let (at, fans) = (columns.at, slab.fans(fans));
                 instructions.run(DisplaceFans { at, fans });
                 instructions.run(Displace { at, batches: &slab.batches });
@@ -156,6 +158,11 @@ impl Swarm {
             let (at, batches) = (Shared::new(&mut self.at), &self.strays.batches);
             instructions.run(Displace { at, batches });
         }
+        // Walls have the last word: whoever else moves balls apart, nothing is pressed through one.
+        self.each_slab(|_, columns, slab| {
+            // SAFETY: balls of the slab.
+            unsafe { displace_from_walls(slab, columns.at) };
+        });
         (self.guest_rows, self.planes, self.spare) = (guests, planes, spare);
         self.guests = named;
         observe(Stage::Integrate);

@@ -19,8 +19,9 @@ pub(super) struct Strays {
     /// Their rows, in order, and a bit for each row.
     pub rows: Vec<u32>,
     bits: Vec<u64>,
-    /// Their pairs.
+    /// Their pairs, and how many more there was no room for.
     pub batches: Vec<Batch>,
+    pub unlisted: usize,
     pub pushes: Pushes,
     /// What their pairs bore before, in order.
     bore: Vec<Bore>,
@@ -54,6 +55,7 @@ impl Strays {
     /// Forgets all, in a swarm of so many.
     pub fn clear(&mut self, balls: usize) {
         self.rows.clear();
+        self.unlisted = 0;
         self.batches.clear();
         self.pushes.reset(0);
         self.bits.clear();
@@ -89,6 +91,7 @@ impl Strays {
         self.rows.sort_unstable();
         let mut batches = std::mem::take(&mut self.batches);
         batches.clear();
+        self.unlisted = 0;
         if !self.rows.is_empty() {
             let mut filler = search.filler(64 * self.rows.len(), &mut batches);
             let widest = self
@@ -112,7 +115,7 @@ impl Strays {
                     }
                 }
             }
-            filler.close_all();
+            self.unlisted = filler.close_all();
         }
         self.batches = batches;
         if rough {

@@ -149,11 +149,17 @@ impl Rules {
     /// Those of a case.
     #[must_use]
     pub fn of(case: &Case) -> Self {
-        let swarm = case.swarm.as_ref().map(|swarm| f64::from(swarm.substeps));
+        let kind = Kind::of(case);
+        let parts = case.swarm.as_ref().map_or(1.0, |swarm| f64::from(swarm.substeps));
+        // In the lab's tier of swarms, balls move once in a step, and its parts are how often they
+        // are moved apart: iterations.
+        let lab = kind == Kind::SwarmLab;
+        let swarm = case.swarm.is_some().then_some(if lab { 1.0 } else { parts });
+        let iterations = f64::from(case.model.iterations).min(if lab { parts } else { f64::MAX });
         let marbles = f64::from(case.model.substeps);
         let single = case.number == Number::F32 || swarm.is_some();
         Self {
-            kind: Kind::of(case),
+            kind,
             step: case.step,
             substep: case.step / swarm.map_or(marbles, |swarm| swarm.min(marbles)),
             substeps: swarm.map_or(marbles, |swarm| swarm.max(marbles)),
@@ -161,7 +167,7 @@ impl Rules {
             integrator: case.model.integrator,
             moving: case.has_moving_walls(),
             modulus: softest(case),
-            sag: (8.0 / f64::from(case.model.iterations)).max(1.0),
+            sag: (8.0 / iterations).max(1.0),
         }
     }
 
