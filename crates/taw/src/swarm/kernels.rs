@@ -346,6 +346,21 @@ pub(super) struct Columns<'a> {
     pub spin: Shared<'a, Row>,
     /// How far each ball may still go, in metres.
     pub budget: Shared<'a, f32>,
+    /// The normal of the wall behind each ball, and the impulse that it bears for those who press
+    /// the ball on it, in N s; empty where all weigh about as much.
+    ///
+    /// A light ball that a heavy one presses on a wall takes a thousandth of its momentum at a
+    /// time, if the wall takes it after that. So the wall takes it at once, as if pair and wall
+    /// were solved together: the ball is moved only by what goes along the wall, and weighs as much
+    /// more along the normal of the pair (the Schur complement of the wall's contact).
+    pub backing: Shared<'a, Row>,
+}
+
+impl Columns<'_> {
+    /// Whether it is known who has a wall behind it.
+    pub fn backed(&self) -> bool {
+        self.backing.len() > 0
+    }
 }
 
 /// One pass over the pairs for their impulses.
@@ -354,8 +369,7 @@ pub(super) struct Solve<'a> {
     pub columns: Columns<'a>,
     pub batches: &'a [Batch],
     pub pushes: &'a mut Pushes,
-    /// Nothing turns and bounces where there is none.
-    pub friction: Option<f32>,
+    pub friction: f32,
 }
 
 /// What a pass does.
@@ -396,15 +410,15 @@ pub(super) struct Impact {
 impl Kernel for Solve<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        match (self.pass, self.friction) {
-            (Pass::Impact(impact), Some(friction)) => self.impact::<L>(impact, friction),
-            (Pass::Begin, Some(_)) => self.begin::<L, true>(),
-            (Pass::Begin, None) => self.begin::<L, false>(),
-            (Pass::Solve(impact), Some(friction)) => self.solve::<L, true, true>(impact, friction),
-            (Pass::Solve(impact), None) => self.solve::<L, false, true>(impact, 0.0),
-            (Pass::Relax(impact), Some(friction)) => self.solve::<L, true, false>(impact, friction),
-            (Pass::Relax(impact), None) => self.solve::<L, false, false>(impact, 0.0),
-            (Pass::Impact(_), None) => (),
+        let backed = self.columns.backed();
+        match self.pass {
+            Pass::Impact(impact) => self.impact::<L>(impact),
+            Pass::Begin if backed => self.begin::<L, true>(),
+            Pass::Begin => self.begin::<L, false>(),
+            Pass::Solve(impact) if backed => self.solve::<L, true, true>(impact),
+            Pass::Solve(impact) => self.solve::<L, false, true>(impact),
+            Pass::Relax(impact) if backed => self.solve::<L, true, false>(impact),
+            Pass::Relax(impact) => self.solve::<L, false, false>(impact),
         }
     }
 }
@@ -412,7 +426,7 @@ impl Kernel for Solve<'_> {
 impl Columns<'_> {
     /// Applies an impulse to both balls of the pairs; the second gets it as it is.
     #[inline(always)]
-    fn hit<L: Lanes, const ROUGH: bool>(
+    fn hit<L: Lanes, const BACKED: bool>(
         &self,
         batch: &Batch,
         [a, b]: [[L; 4]; 2],
@@ -422,23 +436,54 @@ impl Columns<'_> {
         across: V<L>,
     ) {
         let (mass_a, mass_b) = (mobility(&a), mobility(&b));
-        let mut impulse = normal.times(along);
-        if ROUGH {
-            impulse = impulse.plus(across);
-            // A solid ball: mass times radius squared is 2.5 times the moment of inertia. The
-            // column holds radius times spin.
-            let turn = normal.cross(across).times(L::splat(2.5));
-            let spin = [
-                V::of(&spin_a).minus(turn.times(mass_a)).with(spin_a[3]),
-                V::of(&spin_b).minus(turn.times(mass_b)).with(spin_b[3]),
-            ];
-            scatter(self.spin, batch, spin);
+        let impulse = normal.times(along).plus(across);
+        // A solid ball: mass times radius squared is 2.5 times the moment of inertia. The column
+        // holds radius times spin.
+        let turn = normal.cross(across).times(L::splat(2.5));
+        let spin = [
+            V::of(&spin_a).minus(turn.times(mass_a)).with(spin_a[3]),
+            V::of(&spin_b).minus(turn.times(mass_b)).with(spin_b[3]),
+        ];
+        scatter(self.spin, batch, spin);
+        let none = V([L::splat(0.0); 3]);
+        let [mut by_a, mut by_b] = [none.minus(impulse), impulse];
+        if BACKED {
+            let [back_a, back_b] = gather::<L>(self.backing, batch);
+            let (borne_a, borne_b);
+            (by_a, borne_a) = borne_by_wall(by_a, &back_a);
+            (by_b, borne_b) = borne_by_wall(by_b, &back_b);
+            scatter(self.backing, batch, [borne_a, borne_b]);
         }
         let velocity = [
-            V::of(&a).minus(impulse.times(mass_a)).with(a[3]),
-            V::of(&b).plus(impulse.times(mass_b)).with(b[3]),
+            V::of(&a).plus(by_a.times(mass_a)).with(a[3]),
+            V::of(&b).plus(by_b.times(mass_b)).with(b[3]),
         ];
         scatter(self.velocity, batch, velocity);
+    }
+
+    /// What two balls weigh together along their normal, with the walls behind them; nothing if
+    /// both are asleep.
+    #[inline(always)]
+    fn mass<L: Lanes, const BACKED: bool>(
+        &self,
+        batch: &Batch,
+        [a, b]: [&[L; 4]; 2],
+        normal: V<L>,
+    ) -> L {
+        if !BACKED {
+            return mass(a, b);
+        }
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let [back_a, back_b] = gather::<L>(self.backing, batch);
+        // How far the pair's normal goes into the wall.
+        let into_a = normal.dot(V::of(&back_a)).max(zero);
+        let into_b = (zero - normal.dot(V::of(&back_b))).max(zero);
+        let free = |into: L| (one - into * into).max(zero);
+        let [of_a, of_b] = [mobility(a), mobility(b)];
+        // Two that have a wall behind them each weigh no more than the heavier one.
+        let heavier = of_a + of_b - of_a.max(of_b);
+        let sum = (of_a * free(into_a) + of_b * free(into_b)).max(heavier);
+        sum.pick_above(zero, one / sum, mass(a, b))
     }
 
     /// Counts how far the balls of the pairs went.
@@ -474,10 +519,10 @@ impl Columns<'_> {
         let relative = V::of(&b).minus(V::of(&a));
         let mass = mass(&a, &b);
         let along = mass * closing * L::splat(1.0 + impact.restitution);
-        let spins = self.spins::<L, true>(batch);
+        let spins = self.spins(batch);
         let sliding = sliding(relative, normal, &spins);
         let across = held(sliding.times(L::splat(-2.0 / 7.0) * mass), L::splat(friction) * along);
-        self.hit::<L, true>(batch, [a, b], spins, normal, along, across);
+        self.hit::<L, false>(batch, [a, b], spins, normal, along, across);
         true
     }
 
@@ -515,17 +560,17 @@ impl Columns<'_> {
         self.spend(batch, ways);
     }
 
-    /// The spins of a batch, where there are any.
+    /// The spins of a batch.
     #[inline(always)]
-    fn spins<L: Lanes, const ROUGH: bool>(&self, batch: &Batch) -> [[L; 4]; 2] {
-        if ROUGH { gather(self.spin, batch) } else { [[L::splat(0.0); 4]; 2] }
+    fn spins<L: Lanes>(&self, batch: &Batch) -> [[L; 4]; 2] {
+        gather(self.spin, batch)
     }
 }
 
 impl Solve<'_> {
     #[inline(always)]
-    fn impact<L: Lanes>(self, impact: Impact, friction: f32) {
-        let Self { columns, batches, pushes, .. } = self;
+    fn impact<L: Lanes>(self, impact: Impact) {
+        let Self { columns, batches, pushes, friction, .. } = self;
         if impact.restitution == 0.0 {
             return; // contacts stop what meets
         }
@@ -537,28 +582,24 @@ impl Solve<'_> {
     }
 
     #[inline(always)]
-    fn begin<L: Lanes, const ROUGH: bool>(self) {
+    fn begin<L: Lanes, const BACKED: bool>(self) {
         let Self { columns, batches, pushes, .. } = self;
         let Pushes { pressure, grip, .. } = pushes;
         for (i, batch) in batches.iter().enumerate() {
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, _) = normal_and_gap(&a, &b, |lane| batch.pair(lane));
-            let mut across = V([L::splat(0.0); 3]);
-            if ROUGH {
-                // It was across the normal of the last substep.
-                across = V::load(&grip[i]);
-                across = across.minus(normal.times(across.dot(normal)));
-                across.store(&mut grip[i]);
-            }
-            let (velocity, spin) =
-                (gather(columns.velocity, batch), columns.spins::<L, ROUGH>(batch));
-            columns.hit::<L, ROUGH>(batch, velocity, spin, normal, L::load(&pressure[i]), across);
+            // It was across the normal of the last substep.
+            let across = V::load(&grip[i]);
+            let across = across.minus(normal.times(across.dot(normal)));
+            across.store(&mut grip[i]);
+            let (velocity, spin) = (gather(columns.velocity, batch), columns.spins(batch));
+            columns.hit::<L, BACKED>(batch, velocity, spin, normal, L::load(&pressure[i]), across);
         }
     }
 
     #[inline(always)]
-    fn solve<L: Lanes, const ROUGH: bool, const FIRST: bool>(self, impact: Impact, friction: f32) {
-        let Self { columns, batches, pushes, .. } = self;
+    fn solve<L: Lanes, const BACKED: bool, const FIRST: bool>(self, impact: Impact) {
+        let Self { columns, batches, pushes, friction, .. } = self;
         let Pushes { pressure, grip, .. } = pushes;
         // Where nothing bounces, all is a contact.
         let speed = if impact.restitution > 0.0 { impact.speed } else { f32::MAX };
@@ -582,16 +623,16 @@ impl Solve<'_> {
             let [a, b] = velocity;
             let relative = V::of(&b).minus(V::of(&a));
             let parting = relative.dot(normal);
-            let mut spins = columns.spins::<L, ROUGH>(batch);
-            let mass = mass(&a, &b);
+            let mut spins: [[L; 4]; 2] = columns.spins(batch);
+            let load = columns.mass::<L, BACKED>(batch, [&a, &b], normal);
             let change = if FIRST {
                 let pushed = (gap * L::splat(soft.rate)).max(L::splat(-soft.fastest));
                 let wish = gap.pick_above(zero, gap * per_second, pushed);
                 let part = gap.pick_above(zero, one, L::splat(soft.mass));
                 let back = gap.pick_above(zero, zero, L::splat(soft.back));
-                mass * part * (parting + wish) + before * back
+                load * part * (parting + wish) + before * back
             } else {
-                mass * (parting + gap.max(zero) * per_second)
+                load * (parting + gap.max(zero) * per_second)
             };
             let after = (before - fresh.pick_above(zero, zero, change)).max(zero);
             after.store(&mut pressure[i]);
@@ -599,21 +640,28 @@ impl Solve<'_> {
             for spin in &mut spins {
                 spin[3] = after.pick_above(zero, grounded, spin[3]);
             }
-            let mut across = V([zero; 3]);
-            if ROUGH {
-                let sliding = sliding(relative, normal, &spins);
-                let old = V::<L>::load(&grip[i]);
-                let wish = old.minus(sliding.times(mass * L::splat(2.0 / 7.0)));
-                let held = held(wish, L::splat(friction) * after);
-                held.store(&mut grip[i]);
-                across = held.minus(old);
-            }
-            columns.hit::<L, ROUGH>(batch, [a, b], spins, normal, after - before, across);
+            let sliding = sliding(relative, normal, &spins);
+            let old = V::<L>::load(&grip[i]);
+            let wish = old.minus(sliding.times(mass(&a, &b) * L::splat(2.0 / 7.0)));
+            let held = held(wish, L::splat(friction) * after);
+            held.store(&mut grip[i]);
+            let across = held.minus(old);
+            columns.hit::<L, BACKED>(batch, [a, b], spins, normal, after - before, across);
             if !FIRST {
                 columns.part(batch, at, [a, b], normal, gap, soft.slop, grounded);
             }
         }
     }
+}
+
+/// An impulse on a ball, less what the wall behind it takes of it or gives back; and the wall, with
+/// what it bears then.
+#[inline(always)]
+fn borne_by_wall<L: Lanes>(impulse: V<L>, back: &[L; 4]) -> (V<L>, [L; 4]) {
+    let normal = V::of(back);
+    let some = normal.dot(normal);
+    let borne = (back[3] - impulse.dot(normal)).max(L::splat(0.0)) * some;
+    (impulse.plus(normal.times(borne - back[3])), normal.with(borne))
 }
 
 /// Which pairs meet within a substep: the normal then, and how fast they come together, or zero for

@@ -78,6 +78,8 @@ pub struct Swarm {
     /// Radius times spin, and whether a wall bears it ([`GROUNDED`](kernels::GROUNDED)); only in
     /// the full tier.
     spin: Vec<Row>,
+    /// See [`Columns::backing`](kernels::Columns::backing); only while it steps.
+    backing: Vec<Row>,
     /// How far each ball may still go until pairs are sought again, in metres.
     budget: Vec<f32>,
     /// How far each ball wants to go in this step, in metres; only in the lab's tier.
@@ -349,6 +351,7 @@ impl Swarm {
             at,
             velocity,
             spin,
+            backing,
             budget,
             way,
             largest: _,
@@ -379,7 +382,7 @@ impl Swarm {
             steps_since_build: _,
             spread: _,
         } = self;
-        let rows = [at, velocity, spin, spare].map(of);
+        let rows = [at, velocity, spin, backing, spare].map(of);
         let numbers = [budget, way, ways].map(of);
         let names = [leaving, before, stopped, slab_states].map(of);
         rows.into_iter().chain(numbers).chain(names).sum::<usize>()
@@ -502,6 +505,7 @@ impl PartialEq for Swarm {
             at,
             velocity,
             spin,
+            backing: _,
             budget,
             way,
             largest,

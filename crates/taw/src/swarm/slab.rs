@@ -30,6 +30,8 @@ pub(super) struct Slab {
     pub has_fast: bool,
     /// How fast a ball is at most, in m/s: any, one in the first layer, one in the last.
     pub speed: [f32; 3],
+    /// The least and the largest inverse mass, in 1/kg.
+    pub inverse_masses: [f32; 2],
     /// For how long all have been slow, in seconds, and whether they sleep.
     pub slow: f32,
     pub asleep: bool,
@@ -65,6 +67,7 @@ impl Slab {
             near_shapes,
             has_fast: _,
             speed: _,
+            inverse_masses: _,
             slow: _,
             asleep: _,
             again: _,

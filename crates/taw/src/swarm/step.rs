@@ -27,6 +27,10 @@ const PUSHING: f32 = 0.3;
 const SLOP: f32 = 0.05;
 /// The same where nothing lies on anything: only so that balls that touch are left alone.
 const SLOP_WEIGHTLESS: f32 = 0.01;
+/// Where one ball weighs more than so many times as much as another, pairs look who has a wall
+/// behind it: a pair sinks in by that ratio times the way of gravity in a substep while its contact
+/// learns what it bears, less than a millimetre for each such time.
+const UNEVEN: f32 = 8.0;
 /// How often bounces are looked for in a substep while any is found: in a gas hardly ever do five
 /// balls meet in one. What meets after that is stopped.
 const ROUNDS: usize = 4;
@@ -149,8 +153,7 @@ impl Swarm {
         };
         for _ in 0..self.model.substeps {
             self.each_slab(|_, columns, slab| {
-                // SAFETY: balls of the slab.
-                unsafe { displace_from_walls(slab, columns.at) };
+                displace_from_walls(slab, columns.at);
                 let (at, fans) = (columns.at, slab.fans(fans));
                 instructions.run(DisplaceFans { at, fans });
                 instructions.run(Displace { at, batches: &slab.batches });
@@ -160,8 +163,7 @@ impl Swarm {
         }
         // Walls have the last word: whoever else moves balls apart, nothing is pressed through one.
         self.each_slab(|_, columns, slab| {
-            // SAFETY: balls of the slab.
-            unsafe { displace_from_walls(slab, columns.at) };
+            displace_from_walls(slab, columns.at);
         });
         (self.guest_rows, self.planes, self.spare) = (guests, planes, spare);
         self.guests = named;
@@ -240,6 +242,7 @@ impl Swarm {
             self.drift(row(gravity * h), [0.0; 4]);
             self.hold_guests(row(gravity * h), 0.0);
             observe(Stage::Restitute);
+            self.find_backing();
             self.pass(Pass::Begin, |_, _| true);
             self.pass(Pass::Solve(impact), |_, _| true);
             observe(Stage::Integrate);
@@ -249,6 +252,34 @@ impl Swarm {
             self.pass(Pass::Relax(impact), |_, _| true);
             self.keep_out();
         }
+    }
+
+    /// Finds for each ball the wall that bears most of it, where masses differ so much that pairs
+    /// need to know ([`Columns::backing`]).
+    fn find_backing(&mut self) {
+        let inverse = |slab: &Slab| slab.inverse_masses;
+        let [least, most] = self.slabs.iter().map(inverse).fold([f32::MAX, 0.0], wider);
+        let rows = if most > UNEVEN * least { self.at.len() } else { 0 };
+        self.backing.clear();
+        self.backing.resize(rows, [0.0; 4]);
+        if rows == 0 {
+            self.backing.shrink_to_fit();
+            return;
+        }
+        let (slabs, backing) = (&self.slabs, Shared::new(&mut self.backing));
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            // Those of a ball follow each other.
+            for of_ball in slabs[slab].touches.chunk_by(|a, b| a.row == b.row) {
+                let mut most = 0.0;
+                for touch in of_ball {
+                    if touch.pressure > most {
+                        most = touch.pressure;
+                        // SAFETY: a row of the slab.
+                        unsafe { *backing.row(touch.row as usize) = row(touch.normal) };
+                    }
+                }
+            }
+        });
     }
 
     /// Forgets who was borne by a wall two steps ago.
@@ -379,6 +410,8 @@ impl Swarm {
                 fastest(slab.rows[0], grid.first_of_layer(first)),
                 fastest(grid.first_of_layer(last), slab.rows[1]),
             ];
+            let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
+            slab.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
             slab.slow = if slab.speed[0] < lying { slab.slow + dt } else { 0.0 };
             if sleeps && slab.slow > FALL_ASLEEP {
                 (slab.asleep, slab.speed) = (true, [0.0; 3]);
@@ -407,6 +440,7 @@ impl Swarm {
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
             budget: Shared::new(&mut self.budget),
+            backing: Shared::new(&mut self.backing),
         };
         let slabs = Shared::new(&mut self.slabs);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
@@ -432,7 +466,7 @@ impl Swarm {
     /// condition holds, given how fast a ball of the next one is.
     fn pass(&mut self, pass: Pass, condition: impl Fn(&Slab, f32) -> bool + Sync) {
         let instructions = self.instructions;
-        let friction = self.rough().then_some(self.model.material.friction);
+        let friction = self.model.material.friction;
         let mut strays = std::mem::take(&mut self.strays);
         self.each_slab(|next, columns, slab| {
             if slab.asleep && next.is_none_or(|(asleep, _)| asleep)
@@ -450,6 +484,9 @@ impl Swarm {
                     unsafe {
                         let (at, velocity) = (columns.at.row(row), columns.velocity.row(row));
                         let spin = &mut *columns.spin.row(row);
+                        if columns.backed() {
+                            touch.borne_for_others = touch.share_of(&*columns.backing.row(row));
+                        }
                         if let Some(way) = touch.solve(pass, &mut *at, &mut *velocity, spin) {
                             *columns.budget.row(row) -= way;
                             slab.pushes.bounced = true;
@@ -463,6 +500,7 @@ impl Swarm {
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
             budget: Shared::new(&mut self.budget),
+            backing: Shared::new(&mut self.backing),
         };
         let Strays { batches, pushes, .. } = &mut strays;
         instructions.run(Solve { pass, columns, batches, pushes, friction });
@@ -477,6 +515,7 @@ impl Swarm {
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
             budget: Shared::new(&mut self.budget),
+            backing: Shared::new(&mut self.backing),
         };
         let slabs = Shared::new(&mut self.slabs);
         let (threads, states) = (self.model.threads as usize, &mut self.slab_states);
@@ -584,6 +623,11 @@ impl Swarm {
             }
         });
     }
+}
+
+/// The range of two ranges.
+fn wider([a, b]: [f32; 2], [c, d]: [f32; 2]) -> [f32; 2] {
+    [a.min(c), b.max(d)]
 }
 
 /// Whether a ball leaves its budget within a time.

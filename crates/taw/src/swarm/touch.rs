@@ -27,7 +27,8 @@ pub(super) struct Touch {
     pub surface: Vec3<f32>,
     pub friction: f32,
     pub restitution: f32,
-    /// The impulses, in N s.
+    /// The impulses, in N s: for the ball itself, and for others that press on it.
+    pub borne_for_others: f32,
     pub pressure: f32,
     pub grip: Vec3<f32>,
 }
@@ -67,6 +68,11 @@ impl Touch {
         self.surface = xyz(&guest.velocity);
         self.offset = self.offset_at_end;
         self.offset += self.gap(&guest.at).min(0.0);
+    }
+
+    /// The impulse that the wall has borne for others, if it is the one behind the ball.
+    pub fn share_of(&self, backing: &Row) -> f32 {
+        if xyz(backing) == self.normal { backing[3] } else { 0.0 }
     }
 
     /// Pushes the ball out.
@@ -168,7 +174,7 @@ impl Touch {
         let along = pressure - self.pressure;
         self.pressure = pressure;
         let wish = self.grip - self.sliding(relative, spin) * (mass * (2.0 / 7.0));
-        let grip = held(wish, self.friction * pressure);
+        let grip = held(wish, self.friction * (pressure + self.borne_for_others));
         let across = grip - self.grip;
         self.grip = grip;
         if pressure > 0.0 {

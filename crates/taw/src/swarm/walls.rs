@@ -355,6 +355,7 @@ impl Touch {
             surface: Vec3::zero(),
             friction,
             restitution,
+            borne_for_others: 0.0,
             pressure: 0.0,
             grip: Vec3::zero(),
         }
