@@ -266,14 +266,15 @@ impl Swarm {
             self.backing.shrink_to_fit();
             return;
         }
-        let (slabs, backing) = (&self.slabs, Shared::new(&mut self.backing));
+        let (slabs, backing, at) = (&self.slabs, Shared::new(&mut self.backing), &self.at[..]);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // Those of a ball follow each other.
             for of_ball in slabs[slab].touches.chunk_by(|a, b| a.row == b.row) {
                 let mut most = 0.0;
                 for touch in of_ball {
-                    if touch.pressure > most {
-                        most = touch.pressure;
+                    let bears = touch.bears(&at[touch.row as usize]);
+                    if bears > most {
+                        most = bears;
                         // SAFETY: a row of the slab.
                         unsafe { *backing.row(touch.row as usize) = row(touch.normal) };
                     }
@@ -550,7 +551,7 @@ impl Swarm {
             let old = std::mem::take(&mut slab.touches);
             slab.touches = std::mem::take(&mut slab.old_touches);
             slab.seek_walls(instructions, balls, planes, |touch| {
-                super::walls::find(&old, touch).map(|same| (same.pressure, same.grip))
+                super::walls::find(&old, touch).copied()
             });
             slab.old_touches = old;
             slab.near_shapes.clear();

@@ -33,6 +33,10 @@ pub(super) struct Touch {
     pub grip: Vec3<f32>,
 }
 
+/// A ball that is so near to a wall, in radii, stands on it: more than rounding, and less than
+/// anybody sees.
+const TOUCHES: f32 = 0.01;
+
 fn xyz(row: &Row) -> Vec3<f32> {
     Vec3::new(row[0], row[1], row[2])
 }
@@ -68,6 +72,18 @@ impl Touch {
         self.surface = xyz(&guest.velocity);
         self.offset = self.offset_at_end;
         self.offset += self.gap(&guest.at).min(0.0);
+    }
+
+    /// The impulse that the wall bore in the last substep, in N s; nothing, if the ball has left it.
+    pub fn bears(&self, at: &Row) -> f32 {
+        let there = self.gap(at) <= at[3] * TOUCHES;
+        if there { self.pressure + self.borne_for_others } else { 0.0 }
+    }
+
+    /// Takes over what the same touch bore before.
+    pub fn recall(&mut self, before: &Self) {
+        (self.pressure, self.grip) = (before.pressure, before.grip);
+        self.borne_for_others = before.borne_for_others;
     }
 
     /// The impulse that the wall has borne for others, if it is the one behind the ball.

@@ -93,7 +93,7 @@ impl Slab {
         instructions: Instructions,
         balls: Balls,
         planes: &[HalfSpace],
-        recall: impl Fn(&Touch) -> Option<(f32, Vec3<f32>)>,
+        recall: impl Fn(&Touch) -> Option<Touch>,
     ) {
         self.touches.clear();
         self.near_planes.clear();
@@ -105,8 +105,8 @@ impl Slab {
         for row in &self.near_planes {
             let touches = &mut self.touches;
             touch_planes(*row, balls, planes, |mut touch| {
-                if let Some((pressure, grip)) = recall(&touch) {
-                    (touch.pressure, touch.grip) = (pressure, grip);
+                if let Some(before) = recall(&touch) {
+                    touch.recall(&before);
                 }
                 make_room(touches, touches.len() + 1);
                 touches.push(touch);
@@ -171,7 +171,7 @@ impl Slab {
                     Touch::new(*row, [wall, part], normal, offset, [friction, restitution]);
                 touch.is_plane = false;
                 if let Some(same) = find(old, &touch) {
-                    (touch.pressure, touch.grip) = (same.pressure, same.grip);
+                    touch.recall(same);
                 }
                 touches.push(touch);
             };
