@@ -147,11 +147,9 @@ fn a_ball_a_thousand_times_as_heavy_rests_on_a_light_one() {
         });
         worst = worst.max(low + 1.0 - high).max(0.5 - low);
     }
-    // It sinks while its contact learns what it bears, a light ball's part at a time.
-    assert!(worst < 0.15, "{worst} m deep");
-    // A twentieth of both is not moved apart, and as much again while each substep presses it in.
-    let [low, high] = [0, 1].map(|i| world.swarm.balls()[world.swarm.row(ids[i]).unwrap()][1]);
-    assert!(low + 1.0 - high < 0.1, "{} m deep at the end", low + 1.0 - high);
+    // What a contact gives back in a substep, it has to get from an overlap: less than a
+    // millimetre.
+    assert!(worst < 1e-3, "{worst} m deep");
 }
 
 #[test]

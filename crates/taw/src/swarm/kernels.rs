@@ -356,6 +356,10 @@ pub(super) struct Columns<'a> {
     pub backing: Shared<'a, Row>,
 }
 
+/// In place of that impulse: the ball has left the wall behind it. What pairs bore with it is more
+/// than they bear without.
+pub(super) const LOST: f32 = -1.0;
+
 impl Columns<'_> {
     /// Whether it is known who has a wall behind it.
     pub fn backed(&self) -> bool {
@@ -591,9 +595,20 @@ impl Solve<'_> {
             // It was across the normal of the last substep.
             let across = V::load(&grip[i]);
             let across = across.minus(normal.times(across.dot(normal)));
+            let mut along = L::load(&pressure[i]);
+            let mut across = across;
+            if BACKED {
+                let [back_a, back_b] = gather::<L>(columns.backing, batch);
+                let (zero, one) = (L::splat(0.0), L::splat(1.0));
+                let lost = zero.pick_above(back_a[3], one, zero);
+                let kept = zero.pick_above(back_b[3], zero, one - lost);
+                along = along * kept;
+                along.store(&mut pressure[i]);
+                across = across.times(kept);
+            }
             across.store(&mut grip[i]);
             let (velocity, spin) = (gather(columns.velocity, batch), columns.spins(batch));
-            columns.hit::<L, BACKED>(batch, velocity, spin, normal, L::load(&pressure[i]), across);
+            columns.hit::<L, BACKED>(batch, velocity, spin, normal, along, across);
         }
     }
 
@@ -660,8 +675,9 @@ impl Solve<'_> {
 fn borne_by_wall<L: Lanes>(impulse: V<L>, back: &[L; 4]) -> (V<L>, [L; 4]) {
     let normal = V::of(back);
     let some = normal.dot(normal);
-    let borne = (back[3] - impulse.dot(normal)).max(L::splat(0.0)) * some;
-    (impulse.plus(normal.times(borne - back[3])), normal.with(borne))
+    let before = back[3].max(L::splat(0.0));
+    let borne = (before - impulse.dot(normal)).max(L::splat(0.0)) * some;
+    (impulse.plus(normal.times(borne - before)), normal.with(borne))
 }
 
 /// Which pairs meet within a substep: the normal then, and how fast they come together, or zero for

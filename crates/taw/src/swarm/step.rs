@@ -2,8 +2,8 @@
 
 use super::build::SOON;
 use super::kernels::{
-    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Impact, Pass, Predict,
-    Soft, Solve, squared,
+    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Impact, LOST, Pass,
+    Predict, Soft, Solve, squared,
 };
 use super::lanes::Row;
 use super::slab::Slab;
@@ -21,10 +21,11 @@ const HERTZ: f32 = 60.0;
 const DAMPING: f32 = 10.0;
 /// How fast an overlap is pushed out at most: as fast as gravity makes a ball in so many seconds.
 const PUSHING: f32 = 0.3;
-/// So much of the sum of their radii two balls may overlap before they are moved apart: more than
-/// what bears a heap gets. (Contacts sink by a thousandth for each three balls on them; if that is
-/// moved out, they never come to rest.)
-const SLOP: f32 = 0.05;
+/// So much of twice the smaller radius two balls may overlap before they are moved apart: more than
+/// what bears a heap gets, and less than the tenth of a radius that is seen, since each substep
+/// presses in a little again. (Contacts sink by a thousandth for each three balls on them; if that
+/// is moved out, they never come to rest.)
+const SLOP: f32 = 0.04;
 /// The same where nothing lies on anything: only so that balls that touch are left alone.
 const SLOP_WEIGHTLESS: f32 = 0.01;
 /// Where one ball weighs more than so many times as much as another, pairs look who has a wall
@@ -270,15 +271,21 @@ impl Swarm {
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // Those of a ball follow each other.
             for of_ball in slabs[slab].touches.chunk_by(|a, b| a.row == b.row) {
-                let mut most = 0.0;
+                let (mut most, mut behind, mut last) = (0.0, [0.0; 4], &of_ball[0]);
                 for touch in of_ball {
                     let bears = touch.bears(&at[touch.row as usize]);
                     if bears > most {
-                        most = bears;
-                        // SAFETY: a row of the slab.
-                        unsafe { *backing.row(touch.row as usize) = row(touch.normal) };
+                        (most, behind) = (bears, row(touch.normal));
+                    }
+                    if touch.borne_for_others > last.borne_for_others {
+                        last = touch;
                     }
                 }
+                if last.borne_for_others > 0.0 && behind[..3] != row(last.normal)[..3] {
+                    behind = [0.0, 0.0, 0.0, LOST];
+                }
+                // SAFETY: a row of the slab.
+                unsafe { *backing.row(last.row as usize) = behind };
             }
         });
     }
