@@ -3,6 +3,7 @@
 use std::time::Instant;
 
 use taw::Error;
+use taw::motion::WallMotion;
 use taw::prelude::*;
 use taw::shape::Aabb;
 use taw::swarm::{Ball, BallId, SwarmModel, Tier};
@@ -165,4 +166,54 @@ fn ten_thousand_balls_at_one_point_part_and_it_is_said_how_many_pairs_wait() {
         assert!(steps < 600, "{:?} after {steps} steps", world.swarm.check_pairs());
     }
     println!("all pairs are listed after {steps} steps, {:?}", begin.elapsed());
+}
+
+#[test]
+fn a_lift_does_not_pass_through_balls_while_others_are_fast() {
+    for tier in [Tier::Full, Tier::Lab] {
+        let mut world = swarm(tier, 9.81);
+        let block = |height: f32| Aabb {
+            min: Point3::new(-5.0, height - 1.0, -5.0),
+            max: Point3::new(5.0, height, 5.0),
+        };
+        let lift = world.walls.insert(block(0.0)).unwrap();
+        // Some fast ones leave their budget in each step.
+        let mut balls = vec![ball([0.0, 0.6, 0.0], [0.0; 3], 0.1, 1.0)];
+        balls
+            .extend((0..4_u8).map(|i| ball([f32::from(i), 50.0, 0.0], [60.0, 0.0, 0.0], 0.1, 1.0)));
+        let ids = world.swarm.insert(&balls).unwrap();
+        for step in 1..=60_u8 {
+            let height = 0.05 * f32::from(step);
+            world.walls.set(lift, block(height)).unwrap();
+            let motion = WallMotion {
+                velocity: Vec3::new(0.0, 3.0, 0.0),
+                spin: Vec3::new(0.0, 0.0, 0.0),
+                pivot: Point3::new(0.0, height, 0.0),
+            };
+            world.walls.set_motion(lift, Some(motion)).unwrap();
+            world.step(DT).unwrap();
+            let (at, _) = state(&world, ids[0]);
+            assert!(at.y > height + 0.07, "{at:?} in step {step}, {tier:?}");
+        }
+    }
+}
+
+#[test]
+fn marbles_beside_a_swarm_hit_each_other_as_without_it() {
+    let worlds = [false, true].map(|beside| {
+        let mut world = swarm(Tier::Full, 9.81);
+        floor(&mut world);
+        let marble = |x: f32, speed: f32| Marble {
+            velocity: Vec3::new(speed, 1.0, 0.0),
+            ..Marble::new(Point3::new(x, 0.5, 0.0), 0.1)
+        };
+        world.marbles.insert(marble(-0.5, 2.0)).unwrap();
+        world.marbles.insert(marble(0.5, -3.0)).unwrap();
+        if beside {
+            world.swarm.insert(&[ball([50.0, 0.1, 0.0], [0.0; 3], 0.1, 1.0)]).unwrap();
+        }
+        (0..90).for_each(|_| world.step(DT).unwrap());
+        world
+    });
+    assert_eq!(worlds[0].marbles.position(), worlds[1].marbles.position());
 }

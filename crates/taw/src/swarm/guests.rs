@@ -94,9 +94,12 @@ impl Swarm {
     pub(super) fn hold_guests(&mut self, change: Row, time: f32) {
         for guest in &self.guests {
             let Some(row) = self.ids.row(guest.ball) else { continue };
-            for axis in 0..3 {
-                self.velocity[row][axis] -= change[axis];
-                self.at[row][axis] -= guest.velocity[axis] * time;
+            let rows = self.velocity[row].iter_mut().zip(&mut self.at[row]);
+            for ((velocity, at), (change, own)) in
+                rows.zip(change.iter().zip(guest.velocity)).take(3)
+            {
+                *velocity -= change;
+                *at -= own * time;
             }
         }
     }

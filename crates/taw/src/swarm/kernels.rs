@@ -360,6 +360,31 @@ pub(super) struct Columns<'a> {
 /// than they bear without.
 pub(super) const LOST: f32 = -1.0;
 
+/// How the walls behind two balls make their pair heavier.
+struct Behind<L> {
+    /// What both weigh together along their normal, in kilograms, as long as the walls bear.
+    load: L,
+    /// How fast they leave the walls along it, in m/s: until then, they weigh as they are.
+    leaving: L,
+    /// Whether a wall bears.
+    bears: L,
+}
+
+impl<L: Lanes> Behind<L> {
+    /// The impulse that makes a pair of this mass part by so many m/s more slowly, less than zero
+    /// for faster.
+    #[inline(always)]
+    fn impulse(&self, alone: L, slower: L) -> L {
+        let zero = L::splat(0.0);
+        let plain = alone * slower;
+        let at_wall = slower + self.leaving;
+        let pressed = zero - (zero - self.load * at_wall).max(zero - plain);
+        let released = self.bears.pick_above(zero, self.load * slower, plain);
+        let apart = slower.pick_above(zero, released, plain);
+        zero.pick_above(at_wall, pressed, apart)
+    }
+}
+
 impl Columns<'_> {
     /// Whether it is known who has a wall behind it.
     pub fn backed(&self) -> bool {
@@ -382,7 +407,7 @@ pub(super) enum Pass {
     /// Lets bounce what meets in a substep and comes together fast enough.
     Impact(Impact),
     /// Applies the impulses of the last substep again.
-    Begin,
+    Begin(Impact),
     /// Lets nothing come nearer than the gap within a substep.
     Solve(Impact),
     /// The same once more, after the balls moved, and moves what overlaps apart. What bears nothing
@@ -417,8 +442,8 @@ impl Kernel for Solve<'_> {
         let backed = self.columns.backed();
         match self.pass {
             Pass::Impact(impact) => self.impact::<L>(impact),
-            Pass::Begin if backed => self.begin::<L, true>(),
-            Pass::Begin => self.begin::<L, false>(),
+            Pass::Begin(impact) if backed => self.begin::<L, true>(impact),
+            Pass::Begin(impact) => self.begin::<L, false>(impact),
             Pass::Solve(impact) if backed => self.solve::<L, true, true>(impact),
             Pass::Solve(impact) => self.solve::<L, false, true>(impact),
             Pass::Relax(impact) if backed => self.solve::<L, true, false>(impact),
@@ -454,8 +479,8 @@ impl Columns<'_> {
         if BACKED {
             let [back_a, back_b] = gather::<L>(self.backing, batch);
             let (borne_a, borne_b);
-            (by_a, borne_a) = borne_by_wall(by_a, &back_a);
-            (by_b, borne_b) = borne_by_wall(by_b, &back_b);
+            (by_a, borne_a) = borne_by_wall(by_a, &a, &back_a);
+            (by_b, borne_b) = borne_by_wall(by_b, &b, &back_b);
             scatter(self.backing, batch, [borne_a, borne_b]);
         }
         let velocity = [
@@ -465,18 +490,9 @@ impl Columns<'_> {
         scatter(self.velocity, batch, velocity);
     }
 
-    /// What two balls weigh together along their normal, with the walls behind them; nothing if
-    /// both are asleep.
+    /// The walls behind two balls.
     #[inline(always)]
-    fn mass<L: Lanes, const BACKED: bool>(
-        &self,
-        batch: &Batch,
-        [a, b]: [&[L; 4]; 2],
-        normal: V<L>,
-    ) -> L {
-        if !BACKED {
-            return mass(a, b);
-        }
+    fn behind<L: Lanes>(&self, batch: &Batch, [a, b]: [&[L; 4]; 2], normal: V<L>) -> Behind<L> {
         let (zero, one) = (L::splat(0.0), L::splat(1.0));
         let [back_a, back_b] = gather::<L>(self.backing, batch);
         // How far the pair's normal goes into the wall.
@@ -487,7 +503,12 @@ impl Columns<'_> {
         // Two that have a wall behind them each weigh no more than the heavier one.
         let heavier = of_a + of_b - of_a.max(of_b);
         let sum = (of_a * free(into_a) + of_b * free(into_b)).max(heavier);
-        sum.pick_above(zero, one / sum, mass(a, b))
+        let away = |ball: &[L; 4], back: &[L; 4]| V::of(ball).dot(V::of(back)).max(zero);
+        Behind {
+            load: sum.pick_above(zero, one / sum, zero),
+            leaving: away(a, &back_a) * into_a + away(b, &back_b) * into_b,
+            bears: (back_a[3] * into_a).max(back_b[3] * into_b),
+        }
     }
 
     /// Counts how far the balls of the pairs went.
@@ -586,7 +607,7 @@ impl Solve<'_> {
     }
 
     #[inline(always)]
-    fn begin<L: Lanes, const BACKED: bool>(self) {
+    fn begin<L: Lanes, const BACKED: bool>(self, impact: Impact) {
         let Self { columns, batches, pushes, .. } = self;
         let Pushes { pressure, grip, .. } = pushes;
         for (i, batch) in batches.iter().enumerate() {
@@ -597,17 +618,23 @@ impl Solve<'_> {
             let across = across.minus(normal.times(across.dot(normal)));
             let mut along = L::load(&pressure[i]);
             let mut across = across;
+            let (velocity, spin) = (gather::<L>(columns.velocity, batch), columns.spins(batch));
             if BACKED {
                 let [back_a, back_b] = gather::<L>(columns.backing, batch);
                 let (zero, one) = (L::splat(0.0), L::splat(1.0));
                 let lost = zero.pick_above(back_a[3], one, zero);
                 let kept = zero.pick_above(back_b[3], zero, one - lost);
-                along = along * kept;
+                // Nor does it bear as much once it presses the ball along the wall: it parts them
+                // no faster than an overlap is pushed out.
+                let [a, b] = &velocity;
+                let (alone, load) = (mass(a, b), columns.behind(batch, [a, b], normal).load);
+                let most = load * L::splat(impact.soft.fastest);
+                let over = (along - most).max(zero);
+                along = (along - load.pick_above(alone, over, zero)) * kept;
                 along.store(&mut pressure[i]);
                 across = across.times(kept);
             }
             across.store(&mut grip[i]);
-            let (velocity, spin) = (gather(columns.velocity, batch), columns.spins(batch));
             columns.hit::<L, BACKED>(batch, velocity, spin, normal, along, across);
         }
     }
@@ -639,15 +666,23 @@ impl Solve<'_> {
             let relative = V::of(&b).minus(V::of(&a));
             let parting = relative.dot(normal);
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
-            let load = columns.mass::<L, BACKED>(batch, [&a, &b], normal);
+            let alone = mass(&a, &b);
+            // What so much slower parting takes.
+            let impulse = |slower: L| {
+                if BACKED {
+                    columns.behind(batch, [&a, &b], normal).impulse(alone, slower)
+                } else {
+                    alone * slower
+                }
+            };
             let change = if FIRST {
                 let pushed = (gap * L::splat(soft.rate)).max(L::splat(-soft.fastest));
                 let wish = gap.pick_above(zero, gap * per_second, pushed);
                 let part = gap.pick_above(zero, one, L::splat(soft.mass));
                 let back = gap.pick_above(zero, zero, L::splat(soft.back));
-                load * part * (parting + wish) + before * back
+                part * impulse(parting + wish) + before * back
             } else {
-                load * (parting + gap.max(zero) * per_second)
+                impulse(parting + gap.max(zero) * per_second)
             };
             let after = (before - fresh.pick_above(zero, zero, change)).max(zero);
             after.store(&mut pressure[i]);
@@ -657,7 +692,7 @@ impl Solve<'_> {
             }
             let sliding = sliding(relative, normal, &spins);
             let old = V::<L>::load(&grip[i]);
-            let wish = old.minus(sliding.times(mass(&a, &b) * L::splat(2.0 / 7.0)));
+            let wish = old.minus(sliding.times(alone * L::splat(2.0 / 7.0)));
             let held = held(wish, L::splat(friction) * after);
             held.store(&mut grip[i]);
             let across = held.minus(old);
@@ -669,14 +704,17 @@ impl Solve<'_> {
     }
 }
 
-/// An impulse on a ball, less what the wall behind it takes of it or gives back; and the wall, with
-/// what it bears then.
+/// An impulse on a ball, and with it what the wall behind takes so that the ball does not come
+/// nearer, or gives back of that; and the wall, with what it bears then.
 #[inline(always)]
-fn borne_by_wall<L: Lanes>(impulse: V<L>, back: &[L; 4]) -> (V<L>, [L; 4]) {
-    let normal = V::of(back);
-    let some = normal.dot(normal);
-    let before = back[3].max(L::splat(0.0));
-    let borne = (before - impulse.dot(normal)).max(L::splat(0.0)) * some;
+fn borne_by_wall<L: Lanes>(impulse: V<L>, ball: &[L; 4], back: &[L; 4]) -> (V<L>, [L; 4]) {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let (normal, free) = (V::of(back), mobility(ball));
+    let some = free.pick_above(zero, normal.dot(normal), zero);
+    let mass = free.pick_above(zero, one / free, zero);
+    let before = back[3].max(zero);
+    let away = V::of(ball).dot(normal) * mass + impulse.dot(normal);
+    let borne = (before - away).max(zero) * some;
     (impulse.plus(normal.times(borne - before)), normal.with(borne))
 }
 
@@ -735,6 +773,9 @@ pub(super) struct Drift<'a> {
     pub change: Row,
     /// In seconds, thrice, and zero.
     pub time: Row,
+    /// Whether a budget becomes less than this.
+    pub least: f32,
+    pub overrun: &'a mut bool,
     /// The rows that were stopped because of where they would have gone.
     pub stopped: &'a mut Vec<u32>,
     pub first: u32,
@@ -752,6 +793,7 @@ impl Kernel for Drift<'_> {
             if ok {
                 (*velocity, *at) = (new, place);
                 *budget -= squared(way).sqrt();
+                *self.overrun |= *budget < self.least;
             } else {
                 *velocity = [0.0, 0.0, 0.0, velocity[3]];
                 self.stopped.push(self.first + row as u32);

@@ -26,6 +26,25 @@ impl Batch {
     }
 }
 
+/// Takes some pairs out of batches.
+pub(super) fn take_out(batches: &mut Vec<Batch>, which: impl Fn([u32; 2]) -> bool) {
+    for batch in &mut *batches {
+        let before = *batch;
+        let mut kept = (0..before.count as usize).filter(|lane| !which(before.pair(*lane)));
+        batch.count = 0;
+        if let Some(first) = kept.next() {
+            (batch.a, batch.b) = ([before.a[first]; LANES], [before.b[first]; LANES]);
+            batch.count = 1;
+            for lane in kept {
+                let to = batch.count as usize;
+                (batch.a[to], batch.b[to]) = (before.a[lane], before.b[lane]);
+                batch.count += 1;
+            }
+        }
+    }
+    batches.retain(|batch| batch.count > 0);
+}
+
 /// How many pairs there are.
 pub(super) fn pairs_in(batches: &[Batch]) -> usize {
     batches.iter().map(|batch| batch.count as usize).sum()

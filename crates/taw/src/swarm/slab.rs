@@ -9,6 +9,7 @@ use super::touch::Touch;
 /// themselves and with those of the next slab, are its own; so two slabs that are not neighbours
 /// have no ball in common.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "they have nothing to do with each other")]
 pub(super) struct Slab {
     /// The first layer, and the one after the last.
     pub layers: [u32; 2],
@@ -38,6 +39,8 @@ pub(super) struct Slab {
     /// Whether a ball of it or of those beside it bounced just now, and in this substep.
     pub again: bool,
     pub struck: bool,
+    /// Whether a ball of it went further than its budget by more than the cap.
+    pub overrun: bool,
     /// The rows that would leave their budget in this step, and those that were stopped.
     pub leaving: Vec<u32>,
     pub stopped: Vec<u32>,
@@ -72,6 +75,7 @@ impl Slab {
             asleep: _,
             again: _,
             struck: _,
+            overrun: _,
             leaving,
             stopped,
         } = self;

@@ -11,7 +11,7 @@ use super::strays::Strays;
 use super::team::{Shared, each, each_beside, each_rows, list_rows};
 use super::walls::{Balls, HalfSpace, Look, half_spaces};
 use super::{Stage, Surroundings, Swarm, Tier, lying};
-use cgmath::Zero;
+use cgmath::{InnerSpace, Zero};
 
 use crate::math::{Vec3, length};
 
@@ -113,15 +113,17 @@ impl Swarm {
         if !self.paired || !leaving.is_empty() {
             self.stopped = self.stopped.iter().map(|row| self.ids.slots()[*row as usize]).collect();
             if self.paired {
+                let rebuilds = self.rebuilds;
                 self.seek_for(&leaving, dt, walls, observe);
+                let moved = walls_changed && self.rebuilds == rebuilds;
+                self.seek_walls_that_moved(moved, dt, walls, observe);
             } else {
                 self.build(dt, walls, observe);
             }
             let rows = self.ids.columns().1;
             self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
-        } else if walls_changed {
-            observe(Stage::Walls);
-            self.seek_walls(dt, walls);
+        } else {
+            self.seek_walls_that_moved(walls_changed, dt, walls, observe);
         }
         self.leaving = leaving;
         observe(Stage::Restitute);
@@ -203,12 +205,13 @@ impl Swarm {
         } else if !leaving.is_empty() {
             let rebuilds = self.rebuilds;
             self.seek_for(&leaving, dt, walls, observe);
-            if self.rebuilds != rebuilds {
+            if self.rebuilds == rebuilds {
+                self.seek_walls_that_moved(walls_changed, dt, walls, observe);
+            } else {
                 self.look(dt, gravity);
             }
-        } else if walls_changed {
-            observe(Stage::Walls);
-            self.seek_walls(dt, walls);
+        } else {
+            self.seek_walls_that_moved(walls_changed, dt, walls, observe);
         }
         self.leaving = leaving;
         if self.slabs.iter().all(|slab| slab.asleep) {
@@ -235,20 +238,26 @@ impl Swarm {
                 self.look_at_walls(walls, left, times, |slab| slab.has_fast, true);
             }
             self.bounce(impact, faster);
-            if self.seek_for_struck([dt, left], gravity, walls, observe) {
+            let leaves = |velocity: &Row, budget| leaves(velocity, budget, left);
+            if self.seek_within_step(|slab| slab.struck, leaves, dt, walls, observe) {
                 self.look_at_walls(walls, left, times, all, false);
-                observe(Stage::Restitute);
             }
             observe(Stage::Integrate);
             self.drift(row(gravity * h), [0.0; 4]);
             self.hold_guests(row(gravity * h), 0.0);
             observe(Stage::Restitute);
             self.find_backing();
-            self.pass(Pass::Begin, |_, _| true);
+            self.pass(Pass::Begin(impact), |_, _| true);
             self.pass(Pass::Solve(impact), |_, _| true);
             observe(Stage::Integrate);
             self.drift([0.0; 4], [h, h, h, 0.0]);
             self.hold_guests([0.0; 4], h);
+            let (cap, left) = (self.cap, left - h);
+            let left_it = |_: &Row, budget: f32| budget < -cap;
+            if self.seek_within_step(|slab| slab.overrun, left_it, dt, walls, observe) {
+                self.look_at_walls(walls, left, times, all, false);
+                self.find_backing(); // rows may have changed
+            }
             observe(Stage::Restitute);
             self.pass(Pass::Relax(impact), |_, _| true);
             self.keep_out();
@@ -274,7 +283,8 @@ impl Swarm {
                 let (mut most, mut behind, mut last) = (0.0, [0.0; 4], &of_ball[0]);
                 for touch in of_ball {
                     let bears = touch.bears(&at[touch.row as usize]);
-                    if bears > most {
+                    // Of a wall that comes nearer or gives way, each has to ask for itself.
+                    if bears > most && touch.surface.dot(touch.normal) == 0.0 {
                         (most, behind) = (bears, row(touch.normal));
                     }
                     if touch.borne_for_others > last.borne_for_others {
@@ -303,12 +313,13 @@ impl Swarm {
         });
     }
 
-    /// Seeks pairs and walls for balls that a bounce has sent further than their budget in the
-    /// `left` seconds of a step of `dt`. Says whether there were any.
-    fn seek_for_struck(
+    /// Seeks pairs and walls for balls of some slabs that leave their budget within a step, since a
+    /// bounce or a contact made them faster. Says whether there were any.
+    fn seek_within_step(
         &mut self,
-        [dt, left]: [f32; 2],
-        gravity: Vec3<f32>,
+        which: impl Fn(&Slab) -> bool,
+        leaves: impl Fn(&Row, f32) -> bool,
+        dt: f32,
         walls: &dyn Surroundings,
         observe: &mut dyn FnMut(Stage),
     ) -> bool {
@@ -316,10 +327,10 @@ impl Swarm {
         leaving.clear();
         // More than this are too many.
         let most = self.strays.room(self.at.len()) + 1;
-        for slab in self.slabs.iter().filter(|slab| slab.struck && !slab.asleep) {
+        for slab in self.slabs.iter().filter(|slab| which(slab) && !slab.asleep) {
             let leaves = |row: &u32| {
                 let at = *row as usize;
-                leaves(&self.velocity[at], self.budget[at], left)
+                leaves(&self.velocity[at], self.budget[at])
             };
             let room = most.saturating_sub(leaving.len());
             leaving.extend((slab.rows[0]..slab.rows[1]).filter(leaves).take(room));
@@ -334,7 +345,7 @@ impl Swarm {
             let rebuilds = self.rebuilds;
             self.seek_for(&leaving, dt, walls, observe);
             if self.rebuilds != rebuilds {
-                self.look(dt, gravity);
+                self.look(dt, self.gravity.unwrap_or_else(Vec3::zero));
                 self.find_guests();
             }
             let rows = self.ids.columns().1;
@@ -451,6 +462,7 @@ impl Swarm {
             backing: Shared::new(&mut self.backing),
         };
         let slabs = Shared::new(&mut self.slabs);
+        let least = -self.cap;
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // SAFETY: each thread has its own slabs, and their rows.
             let slab = unsafe { &mut *slabs.row(slab) };
@@ -465,8 +477,19 @@ impl Swarm {
             for touch in &mut slab.touches {
                 touch.drift(time[0]);
             }
-            let stopped = &mut slab.stopped;
-            instructions.run(Drift { at, velocity, budget, change, time, stopped, first });
+            let (stopped, overrun) = (&mut slab.stopped, &mut slab.overrun);
+            *overrun = false;
+            instructions.run(Drift {
+                at,
+                velocity,
+                budget,
+                change,
+                time,
+                least,
+                overrun,
+                stopped,
+                first,
+            });
         });
     }
 
@@ -544,6 +567,20 @@ impl Swarm {
     /// has moved already.
     pub(super) fn ahead(&self, dt: f32) -> Option<f32> {
         self.rough().then_some(2.0 * dt)
+    }
+
+    /// Seeks the balls at walls anew, if one of these changed.
+    fn seek_walls_that_moved(
+        &mut self,
+        changed: bool,
+        dt: f32,
+        walls: &dyn Surroundings,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        if changed {
+            observe(Stage::Walls);
+            self.seek_walls(dt, walls);
+        }
     }
 
     /// Seeks the balls at walls anew, where pairs are still known.

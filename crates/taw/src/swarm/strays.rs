@@ -75,7 +75,7 @@ impl Strays {
     }
 
     /// Seeks all their pairs. `largest` is the largest radius, `cap` the most that other balls
-    /// have gone since the rows were put in order.
+    /// have gone since the rows were put in order. Guests touch each other without the swarm.
     pub fn find(
         &mut self,
         grid: &Grid,
@@ -83,6 +83,7 @@ impl Strays {
         budget: &[f32],
         [largest, cap]: [f32; 2],
         search: &mut Search,
+        guest: &dyn Fn(u32) -> bool,
         rough: bool,
     ) {
         if rough {
@@ -100,7 +101,7 @@ impl Strays {
                 .fold(0.0_f32, |most, row| most.max(at[*row as usize][3] + budget[*row as usize]));
             filler.make_room(at.len());
             for stray in &self.rows {
-                self.beside(*stray, grid, at, budget, largest + cap, &mut filler);
+                self.beside(*stray, grid, at, budget, largest + cap, guest, &mut filler);
             }
             self.sorted.clear();
             self.sorted.extend(&self.rows);
@@ -110,7 +111,8 @@ impl Strays {
                 let reach = at[*a as usize][3] + budget[*a as usize];
                 let far = x(a) + reach + widest;
                 for b in self.sorted[i + 1..].iter().take_while(|b| x(b) <= far) {
-                    if near(*a, *b, at, budget) && filler.spend_only(1) == 1 {
+                    let both_guests = guest(*a) && guest(*b);
+                    if near(*a, *b, at, budget) && !both_guests && filler.spend_only(1) == 1 {
                         filler.add(*a.min(b), *a.max(b));
                     }
                 }
@@ -132,8 +134,10 @@ impl Strays {
         at: &[Row],
         budget: &[f32],
         more: f32,
+        guest: &dyn Fn(u32) -> bool,
         filler: &mut Filler,
     ) {
+        let alone = guest(stray);
         let [x, y, z, radius] = at[stray as usize];
         let far = radius + budget[stray as usize] + more;
         for level in &grid.levels {
@@ -144,6 +148,7 @@ impl Strays {
                     let line = level.cell(grid, layer, row, 0);
                     for other in grid.first(line + low[2])..grid.first(line + high[2] + 1) {
                         if !self.has(other)
+                            && !(alone && guest(other))
                             && near(stray, other, at, budget)
                             && filler.spend_only(1) == 1
                         {

@@ -115,7 +115,7 @@ impl Touch {
     ) -> Option<f32> {
         match pass {
             Pass::Impact(impact) => return self.bounce(&impact, at, velocity, spin),
-            Pass::Begin => {
+            Pass::Begin(_) => {
                 self.grip -= self.normal * self.grip.dot(self.normal);
                 self.hit(velocity, spin, self.pressure, self.grip);
             }

@@ -160,7 +160,7 @@ impl Slab {
             }
             let first = self.touches.len();
             let touches = &mut self.touches;
-            let mut name = |[wall, part]: [u32; 2], normal: Vec3<f32>, distance| {
+            let mut name = |ball: &Row, [wall, part]: [u32; 2], normal: Vec3<f32>, distance| {
                 let named = touches[first..].iter();
                 if named.into_iter().any(|touch| [touch.wall, touch.part] == [wall, part]) {
                     return;
@@ -178,17 +178,41 @@ impl Slab {
             let mut reach = look.budget[*row as usize].max(0.0);
             if let Some(way) = way {
                 self.has_fast = true;
-                let length = way.magnitude();
-                reach = length.min(FAST * ball[3]);
-                if length > reach
-                    && let Some((part, normal, distance)) = walls.first_on_way(ball, way)
-                {
-                    name(part, normal, distance);
-                }
+                reach = way.magnitude().min(FAST * ball[3]);
+                on_way(walls, ball, way, &mut name);
             }
-            walls.shapes_at(ball, reach, &mut name);
+            walls.shapes_at(ball, reach, &mut |part, normal, distance| {
+                name(ball, part, normal, distance);
+            });
         }
         self.touches.sort_unstable_by_key(Touch::key);
+    }
+}
+
+/// Names the walls that a ball meets on its way, and along those that it met.
+fn on_way(
+    walls: &dyn Surroundings,
+    ball: &Row,
+    way: Vec3<f32>,
+    name: &mut impl FnMut(&Row, [u32; 2], Vec3<f32>, f32),
+) {
+    let (mut ball, mut way) = (*ball, way);
+    // In a corner, it meets three.
+    for _ in 0..3 {
+        if way.magnitude() <= FAST * ball[3] {
+            return;
+        }
+        let Some((part, normal, distance)) = walls.first_on_way(&ball, way) else { return };
+        name(&ball, part, normal, distance);
+        let closing = -way.dot(normal);
+        if closing.is_nan() || closing <= 0.0 {
+            return;
+        }
+        let time = ((distance - ball[3]) / closing).clamp(0.0, 1.0);
+        for (x, way) in ball.iter_mut().zip::<[f32; 3]>(way.into()) {
+            *x += way * time;
+        }
+        way = (way + normal * closing) * (1.0 - time);
     }
 }
 
