@@ -137,7 +137,7 @@ impl Strays {
         guest: &dyn Fn(u32) -> bool,
         filler: &mut Filler,
     ) {
-        let alone = guest(stray);
+        let is_guest = guest(stray);
         let [x, y, z, radius] = at[stray as usize];
         let far = radius + budget[stray as usize] + more;
         for level in &grid.levels {
@@ -147,8 +147,8 @@ impl Strays {
                 for row in low[1]..=high[1] {
                     let line = level.cell(grid, layer, row, 0);
                     for other in grid.first(line + low[2])..grid.first(line + high[2] + 1) {
-                        if !self.has(other)
-                            && !(alone && guest(other))
+                        let is_for_others = self.has(other) || is_guest && guest(other);
+                        if !is_for_others
                             && near(stray, other, at, budget)
                             && filler.spend_only(1) == 1
                         {
