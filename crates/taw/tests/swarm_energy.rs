@@ -147,11 +147,9 @@ fn a_ball_a_thousand_times_as_heavy_rests_on_a_light_one() {
         });
         worst = worst.max(low + 1.0 - high).max(0.5 - low);
     }
-    // It sinks while its contact learns what it bears, a light ball's part at a time.
-    assert!(worst < 0.15, "{worst} m deep");
-    // A twentieth of both is not moved apart, and as much again while each substep presses it in.
-    let [low, high] = [0, 1].map(|i| world.swarm.balls()[world.swarm.row(ids[i]).unwrap()][1]);
-    assert!(low + 1.0 - high < 0.1, "{} m deep at the end", low + 1.0 - high);
+    // What a contact gives back in a substep, it has to get from an overlap: less than a
+    // millimetre.
+    assert!(worst < 1e-3, "{worst} m deep");
 }
 
 #[test]
@@ -166,6 +164,37 @@ fn overlap_in_a_squeezed_start_is_not_energy() {
         for _ in 0..120 {
             world.step(DT).unwrap();
             assert_eq!(kinetic(&world.swarm), 0.0);
+        }
+    }
+}
+
+#[test]
+fn a_tower_of_heavy_and_light_balls_collapses_without_energy_from_nothing() {
+    for substeps in [1, 2, 4] {
+        let mut world = swarm(substeps, 0.3, 0.5, 9.81);
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        let balls: Vec<_> = (0..8_u8)
+            .map(|i| {
+                let mass = Mass::Kilograms(if i % 2 == 0 { 1.0 } else { 1000.0 });
+                let aside = if i % 3 == 0 { 0.02 } else { 0.0 };
+                let place = Point3::new(aside, 0.5 + f32::from(i), 0.0);
+                Ball { mass, ..Ball::new(place, 0.5) }
+            })
+            .collect();
+        world.swarm.insert(&balls).unwrap();
+        let potential = |swarm: &Swarm| {
+            let rows = swarm.balls().iter().zip(swarm.velocities());
+            rows.map(|(at, v)| 9.81 * f64::from(at[1]) / f64::from(v[3].abs())).sum::<f64>()
+        };
+        let begin = potential(&world.swarm);
+        for step in 0..300 {
+            world.step(DT).unwrap();
+            let now = kinetic(&world.swarm) + potential(&world.swarm);
+            assert!(now < begin * 1.001, "{now} J after {begin} J in step {step}, {substeps}");
+            let light = world.swarm.velocities().iter().filter(|v| v[3].abs() > 0.5);
+            let fastest = light.map(|v| v[0].hypot(v[1]).hypot(v[2])).fold(0.0, f32::max);
+            // A wedge may throw a light ball, but not faster than the tower's top could fall.
+            assert!(fastest < 30.0, "{fastest} m/s in step {step}, {substeps}");
         }
     }
 }

@@ -17,8 +17,6 @@ const G: f64 = 9.81;
 
 /// Regression scenes that fail today: each is taken out of here when its cause is mended.
 const NOT_MENDED_YET: &[&str] = &[
-    // It asks for discrete detection.
-    "plate-at-50-metres-per-second",
     // Balls on a lift overlap deeper than they may; why is not known.
     "swept-stack",
 ];

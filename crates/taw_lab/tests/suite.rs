@@ -13,12 +13,8 @@ const MISSED: &[(&str, &str)] = &[
     ("ordinary/cone", "event-driven"),
     // Springs give back a part of what overlap of the start holds.
     ("ordinary/overlap", "spring and dashpot"),
-    // Contacts that give way a little keep their motion longer.
+    // Contacts that give way a little keep their motion longer: after 10 s one ball of 600 still rolls.
     ("swarm/heap", "swarm, full"),
-    // An impulse is measured by the light ball's mass: a thousandth of the load at a time.
-    ("swarm/heavy-on-light", "swarm, full"),
-    // Two substeps stop a column of twenty layers; with four it is reached.
-    ("swarm/hopper", "swarm, full"),
 ];
 
 #[test]

@@ -3,7 +3,7 @@
 use super::grid::{reorder, reorder_rows};
 use super::kernels::squared;
 use super::memory::fit;
-use super::pairs::{Fans, FindPairs, Search, pairs_in};
+use super::pairs::{Fans, FindPairs, Search, pairs_in, take_out};
 use super::slab::Slab;
 use super::step::listed;
 use super::team::{Shared, each, each_rows, list_rows};
@@ -158,7 +158,9 @@ impl Swarm {
     fn find_strays(&mut self, cap: f32) {
         let (rough, search) = (self.rough(), &mut self.searches[0]);
         let sizes = [self.largest, cap];
-        self.strays.find(&self.grid, &self.at, &self.budget, sizes, search, rough);
+        let (slots, guests) = (self.ids.slots(), &self.guest_slots[..]);
+        let guest = |row: u32| rough && Self::has_guest_slot(slots[row as usize], guests);
+        self.strays.find(&self.grid, &self.at, &self.budget, sizes, search, &guest, rough);
     }
 
     fn reorder(&mut self) {
@@ -226,6 +228,9 @@ impl Swarm {
         let (memory, before, planes) =
             (&self.memory, &self.before[..], listed(&self.planes, self.model.tier));
         let shapes = walls.has_shapes();
+        let (slots, guests) = (self.ids.slots(), &self.guest_slots[..]);
+        let guest = |row: u32| Self::has_guest_slot(slots[row as usize], guests);
+        let several_guests = self.guests.len() > 1;
         let fans = Shared::new(bytemuck::cast_slice_mut(&mut self.spare));
         let balls = walls::Balls { at, velocity: &self.velocity, budget, ahead };
         each(threads, slabs.len(), |thread, slab| {
@@ -241,11 +246,16 @@ impl Swarm {
                 layers: slab.layers,
                 rows: slab.rows,
                 search,
+                unlisted: &mut slab.unlisted,
                 batches: &mut slab.batches,
                 fans: fans.as_deref_mut(),
             });
             let (first, rows) = (slab.rows[0], slab.rows[1] - slab.rows[0]);
             let fans = fans.map(|list| Fans { first, rows, list });
+            if rough && several_guests {
+                // They touch each other without the swarm.
+                take_out(&mut slab.batches, |pair| pair.into_iter().all(guest));
+            }
             let in_fans = fans.map_or(0, |fans| fans.of_rows().map(<[u16]>::len).sum());
             slab.pairs = in_fans + pairs_in(&slab.batches);
             fit(&mut slab.batches);
@@ -259,7 +269,7 @@ impl Swarm {
             fit(&mut slab.touches);
             slab.near_shapes.clear();
             if shapes {
-                walls::near_shapes(walls, at, budget, slab.own_rows(), &mut slab.near_shapes);
+                walls::near_shapes(walls, balls, slab.own_rows(), &mut slab.near_shapes);
             }
         });
         self.find_strays(cap);

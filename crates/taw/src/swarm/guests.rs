@@ -58,12 +58,23 @@ impl Swarm {
         self.guests = guests;
     }
 
-    /// Lists the rows of the guests.
+    /// Lists the rows of the guests, in order.
     pub(super) fn find_guests(&mut self) {
         self.guest_rows.clear();
-        let rows = self.guests.iter().filter_map(|guest| self.ids.row(guest.ball));
-        self.guest_rows.extend(rows.map(|row| row as u32));
+        let rows = self.guests.iter().zip(0..);
+        let rows = rows.filter_map(|(guest, i)| Some((self.ids.row(guest.ball)? as u32, i)));
+        self.guest_rows.extend(rows);
         self.guest_rows.sort_unstable();
+    }
+
+    /// The guest in a row, among those that were listed.
+    pub(super) fn guest_at<'a>(
+        guests: &'a [Guest],
+        guest_rows: &[(u32, u32)],
+        row: u32,
+    ) -> Option<&'a Guest> {
+        let at = guest_rows.binary_search_by_key(&row, |(row, _)| *row).ok()?;
+        guests.get(guest_rows[at].1 as usize)
     }
 
     pub(super) fn has_guest_slot(slot: u32, guest_slots: &[u64]) -> bool {
@@ -77,14 +88,19 @@ impl Swarm {
         self.add(&vec![super::Ball::new(position, super::RADII[0]); count])
     }
 
-    /// Undoes what a drift did to the guests: a change of velocity, and that they moved.
-    pub(super) fn hold_guests(&mut self, change: Row) {
+    /// Undoes what a drift did to the guests: a change of velocity, and that they moved by the
+    /// velocity that they came with. By what the swarm has changed of it they move as its balls do,
+    /// so that a push moves no center of mass.
+    pub(super) fn hold_guests(&mut self, change: Row, time: f32) {
         for guest in &self.guests {
             let Some(row) = self.ids.row(guest.ball) else { continue };
-            for (velocity, change) in self.velocity[row].iter_mut().zip(change) {
+            let rows = self.velocity[row].iter_mut().zip(&mut self.at[row]);
+            for ((velocity, at), (change, own)) in
+                rows.zip(change.iter().zip(guest.velocity)).take(3)
+            {
                 *velocity -= change;
+                *at -= own * time;
             }
-            self.at[row] = guest.at;
         }
     }
 

@@ -321,7 +321,7 @@ pub(super) struct Soft {
     /// so far it gives back.
     pub mass: f32,
     pub back: f32,
-    /// So much of the sum of their radii two balls may overlap before they are moved apart.
+    /// So much of twice the smaller radius two balls may overlap before they are moved apart.
     pub slop: f32,
 }
 
@@ -330,6 +330,10 @@ pub(super) const WALL_SLOP: f32 = 0.1;
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.
 const PUSH: f32 = 0.5;
+
+/// How a ball is marked that a wall bears in this step, be it through others; one less in the next
+/// one, and after that not at all.
+pub(super) const GROUNDED: f32 = 2.0;
 
 /// The columns that several threads work on.
 #[derive(Clone, Copy)]
@@ -342,6 +346,50 @@ pub(super) struct Columns<'a> {
     pub spin: Shared<'a, Row>,
     /// How far each ball may still go, in metres.
     pub budget: Shared<'a, f32>,
+    /// The normal of the wall behind each ball, and the impulse that it bears for those who press
+    /// the ball on it, in N s; empty where all weigh about as much.
+    ///
+    /// A light ball that a heavy one presses on a wall takes a thousandth of its momentum at a
+    /// time, if the wall takes it after that. So the wall takes it at once, as if pair and wall
+    /// were solved together: the ball is moved only by what goes along the wall, and weighs as much
+    /// more along the normal of the pair (the Schur complement of the wall's contact).
+    pub backing: Shared<'a, Row>,
+}
+
+/// In place of that impulse: the ball has left the wall behind it. What pairs bore with it is more
+/// than they bear without.
+pub(super) const LOST: f32 = -1.0;
+
+/// How the walls behind two balls make their pair heavier.
+struct Behind<L> {
+    /// What both weigh together along their normal, in kilograms, as long as the walls bear.
+    load: L,
+    /// How fast they leave the walls along it, in m/s: until then, they weigh as they are.
+    leaving: L,
+    /// Whether a wall bears.
+    bears: L,
+}
+
+impl<L: Lanes> Behind<L> {
+    /// The impulse that makes a pair of this mass part by so many m/s more slowly, less than zero
+    /// for faster.
+    #[inline(always)]
+    fn impulse(&self, alone: L, slower: L) -> L {
+        let zero = L::splat(0.0);
+        let plain = alone * slower;
+        let at_wall = slower + self.leaving;
+        let pressed = zero - (zero - self.load * at_wall).max(zero - plain);
+        let released = self.bears.pick_above(zero, self.load * slower, plain);
+        let apart = slower.pick_above(zero, released, plain);
+        zero.pick_above(at_wall, pressed, apart)
+    }
+}
+
+impl Columns<'_> {
+    /// Whether it is known who has a wall behind it.
+    pub fn backed(&self) -> bool {
+        self.backing.len() > 0
+    }
 }
 
 /// One pass over the pairs for their impulses.
@@ -350,8 +398,7 @@ pub(super) struct Solve<'a> {
     pub columns: Columns<'a>,
     pub batches: &'a [Batch],
     pub pushes: &'a mut Pushes,
-    /// Nothing turns and bounces where there is none.
-    pub friction: Option<f32>,
+    pub friction: f32,
 }
 
 /// What a pass does.
@@ -360,7 +407,7 @@ pub(super) enum Pass {
     /// Lets bounce what meets in a substep and comes together fast enough.
     Impact(Impact),
     /// Applies the impulses of the last substep again.
-    Begin,
+    Begin(Impact),
     /// Lets nothing come nearer than the gap within a substep.
     Solve(Impact),
     /// The same once more, after the balls moved, and moves what overlaps apart. What bears nothing
@@ -392,15 +439,15 @@ pub(super) struct Impact {
 impl Kernel for Solve<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        match (self.pass, self.friction) {
-            (Pass::Impact(impact), Some(friction)) => self.impact::<L>(impact, friction),
-            (Pass::Begin, Some(_)) => self.begin::<L, true>(),
-            (Pass::Begin, None) => self.begin::<L, false>(),
-            (Pass::Solve(impact), Some(friction)) => self.solve::<L, true, true>(impact, friction),
-            (Pass::Solve(impact), None) => self.solve::<L, false, true>(impact, 0.0),
-            (Pass::Relax(impact), Some(friction)) => self.solve::<L, true, false>(impact, friction),
-            (Pass::Relax(impact), None) => self.solve::<L, false, false>(impact, 0.0),
-            (Pass::Impact(_), None) => (),
+        let backed = self.columns.backed();
+        match self.pass {
+            Pass::Impact(impact) => self.impact::<L>(impact),
+            Pass::Begin(impact) if backed => self.begin::<L, true>(impact),
+            Pass::Begin(impact) => self.begin::<L, false>(impact),
+            Pass::Solve(impact) if backed => self.solve::<L, true, true>(impact),
+            Pass::Solve(impact) => self.solve::<L, false, true>(impact),
+            Pass::Relax(impact) if backed => self.solve::<L, true, false>(impact),
+            Pass::Relax(impact) => self.solve::<L, false, false>(impact),
         }
     }
 }
@@ -408,7 +455,7 @@ impl Kernel for Solve<'_> {
 impl Columns<'_> {
     /// Applies an impulse to both balls of the pairs; the second gets it as it is.
     #[inline(always)]
-    fn hit<L: Lanes, const ROUGH: bool>(
+    fn hit<L: Lanes, const BACKED: bool>(
         &self,
         batch: &Batch,
         [a, b]: [[L; 4]; 2],
@@ -418,23 +465,50 @@ impl Columns<'_> {
         across: V<L>,
     ) {
         let (mass_a, mass_b) = (mobility(&a), mobility(&b));
-        let mut impulse = normal.times(along);
-        if ROUGH {
-            impulse = impulse.plus(across);
-            // A solid ball: mass times radius squared is 2.5 times the moment of inertia. The
-            // column holds radius times spin.
-            let turn = normal.cross(across).times(L::splat(2.5));
-            let spin = [
-                V::of(&spin_a).minus(turn.times(mass_a)).with(spin_a[3]),
-                V::of(&spin_b).minus(turn.times(mass_b)).with(spin_b[3]),
-            ];
-            scatter(self.spin, batch, spin);
+        let impulse = normal.times(along).plus(across);
+        // A solid ball: mass times radius squared is 2.5 times the moment of inertia. The column
+        // holds radius times spin.
+        let turn = normal.cross(across).times(L::splat(2.5));
+        let spin = [
+            V::of(&spin_a).minus(turn.times(mass_a)).with(spin_a[3]),
+            V::of(&spin_b).minus(turn.times(mass_b)).with(spin_b[3]),
+        ];
+        scatter(self.spin, batch, spin);
+        let none = V([L::splat(0.0); 3]);
+        let [mut by_a, mut by_b] = [none.minus(impulse), impulse];
+        if BACKED {
+            let [back_a, back_b] = gather::<L>(self.backing, batch);
+            let (borne_a, borne_b);
+            (by_a, borne_a) = borne_by_wall(by_a, &a, &back_a);
+            (by_b, borne_b) = borne_by_wall(by_b, &b, &back_b);
+            scatter(self.backing, batch, [borne_a, borne_b]);
         }
         let velocity = [
-            V::of(&a).minus(impulse.times(mass_a)).with(a[3]),
-            V::of(&b).plus(impulse.times(mass_b)).with(b[3]),
+            V::of(&a).plus(by_a.times(mass_a)).with(a[3]),
+            V::of(&b).plus(by_b.times(mass_b)).with(b[3]),
         ];
         scatter(self.velocity, batch, velocity);
+    }
+
+    /// The walls behind two balls.
+    #[inline(always)]
+    fn behind<L: Lanes>(&self, batch: &Batch, [a, b]: [&[L; 4]; 2], normal: V<L>) -> Behind<L> {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let [back_a, back_b] = gather::<L>(self.backing, batch);
+        // How far the pair's normal goes into the wall.
+        let into_a = normal.dot(V::of(&back_a)).max(zero);
+        let into_b = (zero - normal.dot(V::of(&back_b))).max(zero);
+        let free = |into: L| (one - into * into).max(zero);
+        let [of_a, of_b] = [mobility(a), mobility(b)];
+        // Two that have a wall behind them each weigh no more than the heavier one.
+        let heavier = of_a + of_b - of_a.max(of_b);
+        let sum = (of_a * free(into_a) + of_b * free(into_b)).max(heavier);
+        let away = |ball: &[L; 4], back: &[L; 4]| V::of(ball).dot(V::of(back)).max(zero);
+        Behind {
+            load: sum.pick_above(zero, one / sum, zero),
+            leaving: away(a, &back_a) * into_a + away(b, &back_b) * into_b,
+            bears: (back_a[3] * into_a).max(back_b[3] * into_b),
+        }
     }
 
     /// Counts how far the balls of the pairs went.
@@ -470,10 +544,10 @@ impl Columns<'_> {
         let relative = V::of(&b).minus(V::of(&a));
         let mass = mass(&a, &b);
         let along = mass * closing * L::splat(1.0 + impact.restitution);
-        let spins = self.spins::<L, true>(batch);
+        let spins = self.spins(batch);
         let sliding = sliding(relative, normal, &spins);
         let across = held(sliding.times(L::splat(-2.0 / 7.0) * mass), L::splat(friction) * along);
-        self.hit::<L, true>(batch, [a, b], spins, normal, along, across);
+        self.hit::<L, false>(batch, [a, b], spins, normal, along, across);
         true
     }
 
@@ -487,17 +561,22 @@ impl Columns<'_> {
         normal: V<L>,
         gap: L,
         slop: f32,
+        grounded: L,
     ) {
         let zero = L::splat(0.0);
-        let overlap = zero - gap - (at_a[3] + at_b[3]) * L::splat(slop);
+        let smaller = at_a[3] + at_b[3] - at_a[3].max(at_b[3]);
+        let overlap = zero - gap - smaller * L::splat(2.0 * slop);
         if overlap.above(zero) == 0 {
             return;
         }
-        // Half each, whatever they weigh: a light ball that a heavy one presses on something has
-        // nowhere to go. What sleeps stays.
+        // What flies keeps its center of mass. What a wall bears goes half each, whatever they
+        // weigh: a light ball that a heavy one presses on something has nowhere to go. What sleeps
+        // stays.
         let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
-        let a = mobility(&a).pick_above(zero, one, zero);
-        let b = mobility(&b).pick_above(zero, one, zero);
+        let [a, b] = [a, b].map(|ball| {
+            let free = mobility(&ball);
+            free.pick_above(zero, grounded.pick_above(zero, one, free), zero)
+        });
         let by = (a + b).pick_above(zero, push / (a + b), zero);
         let ways = [normal.times(by * a), normal.times(by * b)];
         let places =
@@ -506,17 +585,17 @@ impl Columns<'_> {
         self.spend(batch, ways);
     }
 
-    /// The spins of a batch, where there are any.
+    /// The spins of a batch.
     #[inline(always)]
-    fn spins<L: Lanes, const ROUGH: bool>(&self, batch: &Batch) -> [[L; 4]; 2] {
-        if ROUGH { gather(self.spin, batch) } else { [[L::splat(0.0); 4]; 2] }
+    fn spins<L: Lanes>(&self, batch: &Batch) -> [[L; 4]; 2] {
+        gather(self.spin, batch)
     }
 }
 
 impl Solve<'_> {
     #[inline(always)]
-    fn impact<L: Lanes>(self, impact: Impact, friction: f32) {
-        let Self { columns, batches, pushes, .. } = self;
+    fn impact<L: Lanes>(self, impact: Impact) {
+        let Self { columns, batches, pushes, friction, .. } = self;
         if impact.restitution == 0.0 {
             return; // contacts stop what meets
         }
@@ -528,28 +607,41 @@ impl Solve<'_> {
     }
 
     #[inline(always)]
-    fn begin<L: Lanes, const ROUGH: bool>(self) {
+    fn begin<L: Lanes, const BACKED: bool>(self, impact: Impact) {
         let Self { columns, batches, pushes, .. } = self;
         let Pushes { pressure, grip, .. } = pushes;
         for (i, batch) in batches.iter().enumerate() {
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, _) = normal_and_gap(&a, &b, |lane| batch.pair(lane));
-            let mut across = V([L::splat(0.0); 3]);
-            if ROUGH {
-                // It was across the normal of the last substep.
-                across = V::load(&grip[i]);
-                across = across.minus(normal.times(across.dot(normal)));
-                across.store(&mut grip[i]);
+            // It was across the normal of the last substep.
+            let across = V::load(&grip[i]);
+            let across = across.minus(normal.times(across.dot(normal)));
+            let mut along = L::load(&pressure[i]);
+            let mut across = across;
+            let (velocity, spin) = (gather::<L>(columns.velocity, batch), columns.spins(batch));
+            if BACKED {
+                let [back_a, back_b] = gather::<L>(columns.backing, batch);
+                let (zero, one) = (L::splat(0.0), L::splat(1.0));
+                let lost = zero.pick_above(back_a[3], one, zero);
+                let kept = zero.pick_above(back_b[3], zero, one - lost);
+                // Nor does it bear as much once it presses the ball along the wall: it parts them
+                // no faster than an overlap is pushed out.
+                let [a, b] = &velocity;
+                let (alone, load) = (mass(a, b), columns.behind(batch, [a, b], normal).load);
+                let most = load * L::splat(impact.soft.fastest);
+                let over = (along - most).max(zero);
+                along = (along - load.pick_above(alone, over, zero)) * kept;
+                along.store(&mut pressure[i]);
+                across = across.times(kept);
             }
-            let (velocity, spin) =
-                (gather(columns.velocity, batch), columns.spins::<L, ROUGH>(batch));
-            columns.hit::<L, ROUGH>(batch, velocity, spin, normal, L::load(&pressure[i]), across);
+            across.store(&mut grip[i]);
+            columns.hit::<L, BACKED>(batch, velocity, spin, normal, along, across);
         }
     }
 
     #[inline(always)]
-    fn solve<L: Lanes, const ROUGH: bool, const FIRST: bool>(self, impact: Impact, friction: f32) {
-        let Self { columns, batches, pushes, .. } = self;
+    fn solve<L: Lanes, const BACKED: bool, const FIRST: bool>(self, impact: Impact) {
+        let Self { columns, batches, pushes, friction, .. } = self;
         let Pushes { pressure, grip, .. } = pushes;
         // Where nothing bounces, all is a contact.
         let speed = if impact.restitution > 0.0 { impact.speed } else { f32::MAX };
@@ -573,34 +665,57 @@ impl Solve<'_> {
             let [a, b] = velocity;
             let relative = V::of(&b).minus(V::of(&a));
             let parting = relative.dot(normal);
-            let spins = columns.spins::<L, ROUGH>(batch);
-            let mass = mass(&a, &b);
+            let mut spins: [[L; 4]; 2] = columns.spins(batch);
+            let alone = mass(&a, &b);
+            // What so much slower parting takes.
+            let impulse = |slower: L| {
+                if BACKED {
+                    columns.behind(batch, [&a, &b], normal).impulse(alone, slower)
+                } else {
+                    alone * slower
+                }
+            };
             let change = if FIRST {
                 let pushed = (gap * L::splat(soft.rate)).max(L::splat(-soft.fastest));
                 let wish = gap.pick_above(zero, gap * per_second, pushed);
                 let part = gap.pick_above(zero, one, L::splat(soft.mass));
                 let back = gap.pick_above(zero, zero, L::splat(soft.back));
-                mass * part * (parting + wish) + before * back
+                part * impulse(parting + wish) + before * back
             } else {
-                mass * (parting + gap.max(zero) * per_second)
+                impulse(parting + gap.max(zero) * per_second)
             };
             let after = (before - fresh.pick_above(zero, zero, change)).max(zero);
             after.store(&mut pressure[i]);
-            let mut across = V([zero; 3]);
-            if ROUGH {
-                let sliding = sliding(relative, normal, &spins);
-                let old = V::<L>::load(&grip[i]);
-                let wish = old.minus(sliding.times(mass * L::splat(2.0 / 7.0)));
-                let held = held(wish, L::splat(friction) * after);
-                held.store(&mut grip[i]);
-                across = held.minus(old);
+            let grounded = spins[0][3].max(spins[1][3]);
+            for spin in &mut spins {
+                spin[3] = after.pick_above(zero, grounded, spin[3]);
             }
-            columns.hit::<L, ROUGH>(batch, [a, b], spins, normal, after - before, across);
+            let sliding = sliding(relative, normal, &spins);
+            let old = V::<L>::load(&grip[i]);
+            let wish = old.minus(sliding.times(alone * L::splat(2.0 / 7.0)));
+            let held = held(wish, L::splat(friction) * after);
+            held.store(&mut grip[i]);
+            let across = held.minus(old);
+            columns.hit::<L, BACKED>(batch, [a, b], spins, normal, after - before, across);
             if !FIRST {
-                columns.part(batch, at, [a, b], normal, gap, soft.slop);
+                columns.part(batch, at, [a, b], normal, gap, soft.slop, grounded);
             }
         }
     }
+}
+
+/// An impulse on a ball, and with it what the wall behind takes so that the ball does not come
+/// nearer, or gives back of that; and the wall, with what it bears then.
+#[inline(always)]
+fn borne_by_wall<L: Lanes>(impulse: V<L>, ball: &[L; 4], back: &[L; 4]) -> (V<L>, [L; 4]) {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let (normal, free) = (V::of(back), mobility(ball));
+    let some = free.pick_above(zero, normal.dot(normal), zero);
+    let mass = free.pick_above(zero, one / free, zero);
+    let before = back[3].max(zero);
+    let away = V::of(ball).dot(normal) * mass + impulse.dot(normal);
+    let borne = (before - away).max(zero) * some;
+    (impulse.plus(normal.times(borne - before)), normal.with(borne))
 }
 
 /// Which pairs meet within a substep: the normal then, and how fast they come together, or zero for
@@ -658,6 +773,9 @@ pub(super) struct Drift<'a> {
     pub change: Row,
     /// In seconds, thrice, and zero.
     pub time: Row,
+    /// Whether a budget becomes less than this.
+    pub least: f32,
+    pub overrun: &'a mut bool,
     /// The rows that were stopped because of where they would have gone.
     pub stopped: &'a mut Vec<u32>,
     pub first: u32,
@@ -675,6 +793,7 @@ impl Kernel for Drift<'_> {
             if ok {
                 (*velocity, *at) = (new, place);
                 *budget -= squared(way).sqrt();
+                *self.overrun |= *budget < self.least;
             } else {
                 *velocity = [0.0, 0.0, 0.0, velocity[3]];
                 self.stopped.push(self.first + row as u32);

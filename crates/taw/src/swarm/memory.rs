@@ -7,7 +7,6 @@ use super::strays::Strays;
 use super::team::{Shared, each};
 use super::touch::Touch;
 use super::walls::find;
-use crate::math::Vec3;
 
 /// What a pair bore; kept with its first ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -113,9 +112,9 @@ impl Memory {
     }
 
     /// What a ball at a wall bore.
-    pub fn recall_touch(&self, before: &[u32], touch: &Touch) -> Option<(f32, Vec3<f32>)> {
+    pub fn recall_touch(&self, before: &[u32], touch: &Touch) -> Option<Touch> {
         let then = Touch { row: before[touch.row as usize], ..*touch };
-        find(&self.touches, &then).map(|kept| (kept.pressure, kept.grip))
+        find(&self.touches, &then).copied()
     }
 }
 

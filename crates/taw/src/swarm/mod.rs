@@ -75,8 +75,11 @@ pub struct Swarm {
     /// Velocity and inverse mass, which has a minus sign while a ball sleeps. In the lab's tier,
     /// while it steps, the place before.
     velocity: Vec<Row>,
-    /// Radius times spin, and nothing; only in the full tier.
+    /// Radius times spin, and whether a wall bears it ([`GROUNDED`](kernels::GROUNDED)); only in
+    /// the full tier.
     spin: Vec<Row>,
+    /// See [`Columns::backing`](kernels::Columns::backing); only while it steps.
+    backing: Vec<Row>,
     /// How far each ball may still go until pairs are sought again, in metres.
     budget: Vec<f32>,
     /// How far each ball wants to go in this step, in metres; only in the lab's tier.
@@ -108,8 +111,8 @@ pub struct Swarm {
     /// The marbles of the world that are balls here, in their order.
     pub(crate) invited: Vec<(MarbleId, BallId)>,
     guests: Vec<Guest>,
-    /// Their rows, in order; only in the lab's tier, while it steps.
-    guest_rows: Vec<u32>,
+    /// Their rows, in order, and which guest each is; only in a step.
+    guest_rows: Vec<(u32, u32)>,
     /// A bit for each slot.
     guest_slots: Vec<u64>,
     /// What a column is put in order with; then, in the lab's tier, the fans of all slabs.
@@ -239,7 +242,8 @@ impl Swarm {
         &self.velocity
     }
 
-    /// Radius times angular velocity in m/s, row by row, and nothing; empty in the lab's tier.
+    /// Radius times angular velocity in m/s, row by row, and a mark of the swarm's own; empty in the
+    /// lab's tier.
     #[must_use]
     pub fn rims(&self) -> &[[f32; 4]] {
         &self.spin
@@ -308,6 +312,18 @@ impl Swarm {
         self.slabs.iter().map(|slab| slab.pairs).sum::<usize>() + pairs_in(&self.strays.batches)
     }
 
+    /// Checks that all pairs near enough are looked at. Up to 64 a ball on average are, ten times as
+    /// many as touch in the densest heap; where more balls than that are inside of each other, the
+    /// rest wait until some have parted, and meanwhile overlap.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for `pairs`: how many there are, and how many of them are looked at.
+    pub fn check_pairs(&self) -> Result<(), Error> {
+        let unlisted = self.slabs.iter().map(|slab| slab.unlisted).sum::<usize>();
+        let (listed, all) = (self.pairs(), self.pairs() + unlisted + self.strays.unlisted);
+        within("pairs", all as f64, 0.0, listed as f64).map(|_| ())
+    }
+
     /// How many times a ball is near enough to a wall to be looked at. (The lab's tier looks at
     /// all balls for each half-space, and does not count these.)
     #[must_use]
@@ -335,6 +351,7 @@ impl Swarm {
             at,
             velocity,
             spin,
+            backing,
             budget,
             way,
             largest: _,
@@ -365,14 +382,14 @@ impl Swarm {
             steps_since_build: _,
             spread: _,
         } = self;
-        let rows = [at, velocity, spin, spare].map(of);
+        let rows = [at, velocity, spin, backing, spare].map(of);
         let numbers = [budget, way, ways].map(of);
-        let names = [leaving, before, stopped, guest_rows, slab_states].map(of);
+        let names = [leaving, before, stopped, slab_states].map(of);
         rows.into_iter().chain(numbers).chain(names).sum::<usize>()
             + (of(slabs) + slabs.iter().map(Slab::bytes).sum::<usize>())
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
             + (of(lists) + lists.iter().map(of).sum::<usize>())
-            + (of(planes) + of(invited) + of(guests) + of(guest_slots))
+            + (of(planes) + of(invited) + of(guests) + of(guest_rows) + of(guest_slots))
             + (ids.bytes() + grid.bytes() + memory.bytes() + strays.bytes())
     }
 
@@ -488,6 +505,7 @@ impl PartialEq for Swarm {
             at,
             velocity,
             spin,
+            backing: _,
             budget,
             way,
             largest,

@@ -9,7 +9,8 @@ use crate::response::Material;
 pub enum Tier {
     /// They move along lines, and overlapping ones are moved apart, half each: the displacement
     /// of the lecture. No masses, no friction, no bounce, no spin. What lies in a heap never
-    /// quite comes to rest, as nothing holds it but its neighbours.
+    /// quite comes to rest, as nothing holds it but its neighbours. No push makes a ball faster than
+    /// it was, so that overlap is no energy: one at rest that another hits is moved, and stays there.
     Lab,
     /// Masses, restitution, Coulomb friction and spin, by soft contacts in small steps.
     #[default]

@@ -26,6 +26,25 @@ impl Batch {
     }
 }
 
+/// Takes some pairs out of batches.
+pub(super) fn take_out(batches: &mut Vec<Batch>, which: impl Fn([u32; 2]) -> bool) {
+    for batch in &mut *batches {
+        let before = *batch;
+        let mut kept = (0..before.count as usize).filter(|lane| !which(before.pair(*lane)));
+        batch.count = 0;
+        if let Some(first) = kept.next() {
+            (batch.a, batch.b) = ([before.a[first]; LANES], [before.b[first]; LANES]);
+            batch.count = 1;
+            for lane in kept {
+                let to = batch.count as usize;
+                (batch.a[to], batch.b[to]) = (before.a[lane], before.b[lane]);
+                batch.count += 1;
+            }
+        }
+    }
+    batches.retain(|batch| batch.count > 0);
+}
+
 /// How many pairs there are.
 pub(super) fn pairs_in(batches: &[Batch]) -> usize {
     batches.iter().map(|batch| batch.count as usize).sum()
@@ -81,8 +100,9 @@ pub(super) struct Filler<'a> {
     busy: &'a mut [u32],
     open: &'a mut [Batch; OPEN],
     batches: &'a mut Vec<Batch>,
-    /// How many more pairs may be listed.
+    /// How many more pairs may be listed, and how many were not.
     left: usize,
+    unlisted: usize,
 }
 
 fn filler<'a>(
@@ -93,7 +113,7 @@ fn filler<'a>(
 ) -> Filler<'a> {
     busy.clear();
     busy.resize(balls.next_power_of_two(), 0);
-    Filler { busy, open, batches, left: MORE_PAIRS }
+    Filler { busy, open, batches, left: MORE_PAIRS, unlisted: 0 }
 }
 
 impl Filler<'_> {
@@ -114,6 +134,7 @@ impl Filler<'_> {
     pub fn spend_only(&mut self, pairs: usize) -> usize {
         let count = pairs.min(self.left);
         self.left -= count;
+        self.unlisted += pairs - count;
         count
     }
 
@@ -178,9 +199,10 @@ impl Filler<'_> {
         }
     }
 
-    /// Takes the open batches as they are.
-    pub fn close_all(&mut self) {
+    /// Takes the open batches as they are. Says how many pairs there was no room for.
+    pub fn close_all(&mut self) -> usize {
         (0..OPEN).for_each(|slot| self.close(slot));
+        self.unlisted
     }
 }
 
@@ -309,6 +331,8 @@ pub(super) struct FindPairs<'a> {
     /// The first row, of it, of the next one and after that.
     pub rows: [u32; 3],
     pub search: &'a mut Search,
+    /// How many pairs there was no room for.
+    pub unlisted: &'a mut usize,
     /// Where pairs go that are part of no fan.
     pub batches: &'a mut Vec<Batch>,
     /// Where fans go, if there shall be any: [`FAN`] for each row of the slab.
@@ -318,7 +342,7 @@ pub(super) struct FindPairs<'a> {
 impl Kernel for FindPairs<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let Self { grid, at, budget, cap, layers, rows, search, batches, fans } = self;
+        let Self { grid, at, budget, cap, layers, rows, search, unlisted, batches, fans } = self;
         let [first, next, end] = rows;
         let window = first as usize..end as usize;
         let Search { columns, busy, open } = search;
@@ -330,10 +354,10 @@ impl Kernel for FindPairs<'_> {
             let mut fans = FanFiller { next: first, end: next, list, filled: 0, filler };
             find::<L>(grid, at, layers, rows, &mut around, &mut fans);
             fans.skip_to(next);
-            fans.filler.close_all();
+            *unlisted = fans.filler.close_all();
         } else {
             find::<L>(grid, at, layers, rows, &mut around, &mut filler);
-            filler.close_all();
+            *unlisted = filler.close_all();
         }
     }
 }

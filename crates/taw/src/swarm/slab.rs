@@ -9,6 +9,7 @@ use super::touch::Touch;
 /// themselves and with those of the next slab, are its own; so two slabs that are not neighbours
 /// have no ball in common.
 #[derive(Clone, Debug, Default, PartialEq)]
+#[expect(clippy::struct_excessive_bools, reason = "they have nothing to do with each other")]
 pub(super) struct Slab {
     /// The first layer, and the one after the last.
     pub layers: [u32; 2],
@@ -17,6 +18,8 @@ pub(super) struct Slab {
     pub batches: Vec<Batch>,
     /// How many pairs it has, in batches and fans.
     pub pairs: usize,
+    /// How many more there was no room for.
+    pub unlisted: usize,
     pub pushes: Pushes,
     /// By rows.
     pub touches: Vec<Touch>,
@@ -24,13 +27,20 @@ pub(super) struct Slab {
     /// The rows near half-spaces, and near other walls.
     pub near_planes: Vec<u32>,
     pub near_shapes: Vec<u32>,
+    /// Whether one near other walls is fast.
+    pub has_fast: bool,
     /// How fast a ball is at most, in m/s: any, one in the first layer, one in the last.
     pub speed: [f32; 3],
+    /// The least and the largest inverse mass, in 1/kg.
+    pub inverse_masses: [f32; 2],
     /// For how long all have been slow, in seconds, and whether they sleep.
     pub slow: f32,
     pub asleep: bool,
-    /// Whether a ball of it or of those beside it bounced just now.
+    /// Whether a ball of it or of those beside it bounced just now, and in this substep.
     pub again: bool,
+    pub struck: bool,
+    /// Whether a ball of it went further than its budget by more than the cap.
+    pub overrun: bool,
     /// The rows that would leave their budget in this step, and those that were stopped.
     pub leaving: Vec<u32>,
     pub stopped: Vec<u32>,
@@ -52,15 +62,20 @@ impl Slab {
             rows: _,
             batches,
             pairs: _,
+            unlisted: _,
             pushes,
             touches,
             old_touches,
             near_planes,
             near_shapes,
+            has_fast: _,
             speed: _,
+            inverse_masses: _,
             slow: _,
             asleep: _,
             again: _,
+            struck: _,
+            overrun: _,
             leaving,
             stopped,
         } = self;

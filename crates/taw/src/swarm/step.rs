@@ -2,15 +2,17 @@
 
 use super::build::SOON;
 use super::kernels::{
-    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Impact, Pass, Predict,
-    Soft, Solve, squared,
+    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Impact, LOST, Pass,
+    Predict, Soft, Solve, squared,
 };
 use super::lanes::Row;
 use super::slab::Slab;
 use super::strays::Strays;
 use super::team::{Shared, each, each_beside, each_rows, list_rows};
-use super::walls::{Balls, HalfSpace, half_spaces};
+use super::walls::{Balls, HalfSpace, Look, half_spaces};
 use super::{Stage, Surroundings, Swarm, Tier, lying};
+use cgmath::{InnerSpace, Zero};
+
 use crate::math::{Vec3, length};
 
 /// How stiff contacts are: at most so many oscillations a second, and as many times as much
@@ -19,12 +21,17 @@ const HERTZ: f32 = 60.0;
 const DAMPING: f32 = 10.0;
 /// How fast an overlap is pushed out at most: as fast as gravity makes a ball in so many seconds.
 const PUSHING: f32 = 0.3;
-/// So much of the sum of their radii two balls may overlap before they are moved apart: more than
-/// what bears a heap gets. (Contacts sink by a thousandth for each three balls on them; if that is
-/// moved out, they never come to rest.)
-const SLOP: f32 = 0.05;
+/// So much of twice the smaller radius two balls may overlap before they are moved apart: more than
+/// what bears a heap gets, and less than the tenth of a radius that is seen, since each substep
+/// presses in a little again. (Contacts sink by a thousandth for each three balls on them; if that
+/// is moved out, they never come to rest.)
+const SLOP: f32 = 0.04;
 /// The same where nothing lies on anything: only so that balls that touch are left alone.
 const SLOP_WEIGHTLESS: f32 = 0.01;
+/// Where one ball weighs more than so many times as much as another, pairs look who has a wall
+/// behind it: a pair sinks in by that ratio times the way of gravity in a substep while its contact
+/// learns what it bears, less than a millimetre for each such time.
+const UNEVEN: f32 = 8.0;
 /// How often bounces are looked for in a substep while any is found: in a gas hardly ever do five
 /// balls meet in one. What meets after that is stopped.
 const ROUNDS: usize = 4;
@@ -106,40 +113,50 @@ impl Swarm {
         if !self.paired || !leaving.is_empty() {
             self.stopped = self.stopped.iter().map(|row| self.ids.slots()[*row as usize]).collect();
             if self.paired {
+                let rebuilds = self.rebuilds;
                 self.seek_for(&leaving, dt, walls, observe);
+                let moved = walls_changed && self.rebuilds == rebuilds;
+                self.seek_walls_that_moved(moved, dt, walls, observe);
             } else {
                 self.build(dt, walls, observe);
             }
             let rows = self.ids.columns().1;
             self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
-        } else if walls_changed {
-            observe(Stage::Walls);
-            self.seek_walls(dt, walls);
+        } else {
+            self.seek_walls_that_moved(walls_changed, dt, walls, observe);
         }
         self.leaving = leaving;
         observe(Stage::Restitute);
-        self.look_at_walls(walls, 0.0);
         self.find_guests();
+        self.look_at_walls(walls, 0.0, [dt; 2], |_| true, false);
         let (guests, planes) =
             (std::mem::take(&mut self.guest_rows), std::mem::take(&mut self.planes));
+        let named = std::mem::take(&mut self.guests);
         let spare = std::mem::take(&mut self.spare);
         let fans: &[u16] = bytemuck::cast_slice(&spare);
+        // SAFETY: the caller has the balls of the slab.
+        let displace_from_walls = |slab: &Slab, all: Shared<Row>| unsafe {
+            // Others move the guests, as deep in walls as they like: a wall only bears what the
+            // swarm presses on it.
+            let mut from = slab.rows[0];
+            let its = guests.partition_point(|(row, _)| *row < slab.rows[0])
+                ..guests.partition_point(|(row, _)| *row < slab.rows[1]);
+            for (to, guest) in guests[its].iter().chain([&(slab.rows[1], u32::MAX)]) {
+                let at = all.part(from as usize..*to as usize);
+                instructions.run(DisplaceFromPlanes { at, planes: &planes });
+                from = to + 1;
+                let Some(guest) = named.get(*guest as usize) else { continue };
+                for plane in &planes {
+                    plane.bear(guest, &mut *all.row(*to as usize));
+                }
+            }
+            for touch in &slab.touches {
+                touch.displace(&mut *all.row(touch.row as usize));
+            }
+        };
         for _ in 0..self.model.substeps {
             self.each_slab(|_, columns, slab| {
-                // Other walls push the guests.
-                let mut from = slab.rows[0];
-                let its = guests.partition_point(|row| *row < slab.rows[0])
-                    ..guests.partition_point(|row| *row < slab.rows[1]);
-                for to in guests[its].iter().chain([&slab.rows[1]]) {
-                    // SAFETY: balls of the slab.
-                    let at = unsafe { columns.at.part(from as usize..*to as usize) };
-                    instructions.run(DisplaceFromPlanes { at, planes: &planes });
-                    from = to + 1;
-                }
-                for touch in &slab.touches {
-                    // SAFETY: a ball of the slab.
-                    touch.displace(unsafe { &mut *columns.at.row(touch.row as usize) });
-                }
+                displace_from_walls(slab, columns.at);
                 let (at, fans) = (columns.at, slab.fans(fans));
                 instructions.run(DisplaceFans { at, fans });
                 instructions.run(Displace { at, batches: &slab.batches });
@@ -147,7 +164,12 @@ impl Swarm {
             let (at, batches) = (Shared::new(&mut self.at), &self.strays.batches);
             instructions.run(Displace { at, batches });
         }
+        // Walls have the last word: whoever else moves balls apart, nothing is pressed through one.
+        self.each_slab(|_, columns, slab| {
+            displace_from_walls(slab, columns.at);
+        });
         (self.guest_rows, self.planes, self.spare) = (guests, planes, spare);
+        self.guests = named;
         observe(Stage::Integrate);
         let per_second = [1.0 / dt, 1.0 / dt, 1.0 / dt, 0.0];
         let (velocity, budget) = (Shared::new(&mut self.velocity), Shared::new(&mut self.budget));
@@ -183,21 +205,25 @@ impl Swarm {
         } else if !leaving.is_empty() {
             let rebuilds = self.rebuilds;
             self.seek_for(&leaving, dt, walls, observe);
-            if self.rebuilds != rebuilds {
+            if self.rebuilds == rebuilds {
+                self.seek_walls_that_moved(walls_changed, dt, walls, observe);
+            } else {
                 self.look(dt, gravity);
             }
-        } else if walls_changed {
-            observe(Stage::Walls);
-            self.seek_walls(dt, walls);
+        } else {
+            self.seek_walls_that_moved(walls_changed, dt, walls, observe);
         }
         self.leaving = leaving;
         if self.slabs.iter().all(|slab| slab.asleep) {
             return;
         }
+        self.find_guests();
         observe(Stage::Restitute);
-        self.look_at_walls(walls, dt);
         let substeps = self.model.substeps as f32;
         let h = dt / substeps;
+        let (times, all) = ([dt, h], |_: &Slab| true);
+        self.age_marks();
+        self.look_at_walls(walls, dt, times, all, false);
         // What gravity makes of rest in two steps is no impact.
         let speed = 2.0 * length(gravity) * dt;
         let restitution = self.model.material.restitution;
@@ -206,26 +232,133 @@ impl Swarm {
         let soft = soft(h, length(gravity));
         let impact = Impact { speed, restitution, time: h, gravity: row(gravity), soft };
         let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > speed;
-        for _ in 0..self.model.substeps {
+        for substep in 0..self.model.substeps {
+            let left = dt - h * substep as f32;
+            if substep > 0 {
+                self.look_at_walls(walls, left, times, |slab| slab.has_fast, true);
+            }
             self.bounce(impact, faster);
+            let leaves = |velocity: &Row, budget| leaves(velocity, budget, left);
+            if self.seek_within_step(|slab| slab.struck, leaves, dt, walls, observe) {
+                self.look_at_walls(walls, left, times, all, false);
+            }
             observe(Stage::Integrate);
             self.drift(row(gravity * h), [0.0; 4]);
-            self.hold_guests(row(gravity * h));
+            self.hold_guests(row(gravity * h), 0.0);
             observe(Stage::Restitute);
-            self.pass(Pass::Begin, |_, _| true);
+            self.find_backing();
+            self.pass(Pass::Begin(impact), |_, _| true);
             self.pass(Pass::Solve(impact), |_, _| true);
             observe(Stage::Integrate);
             self.drift([0.0; 4], [h, h, h, 0.0]);
-            self.hold_guests([0.0; 4]);
+            self.hold_guests([0.0; 4], h);
+            let (cap, left) = (self.cap, left - h);
+            let left_it = |_: &Row, budget: f32| budget < -cap;
+            if self.seek_within_step(|slab| slab.overrun, left_it, dt, walls, observe) {
+                self.look_at_walls(walls, left, times, all, false);
+                self.find_backing(); // rows may have changed
+            }
             observe(Stage::Restitute);
             self.pass(Pass::Relax(impact), |_, _| true);
             self.keep_out();
         }
     }
 
+    /// Finds for each ball the wall that bears most of it, where masses differ so much that pairs
+    /// need to know ([`Columns::backing`]).
+    fn find_backing(&mut self) {
+        let inverse = |slab: &Slab| slab.inverse_masses;
+        let [least, most] = self.slabs.iter().map(inverse).fold([f32::MAX, 0.0], wider);
+        let rows = if most > UNEVEN * least { self.at.len() } else { 0 };
+        self.backing.clear();
+        self.backing.resize(rows, [0.0; 4]);
+        if rows == 0 {
+            self.backing.shrink_to_fit();
+            return;
+        }
+        let (slabs, backing, at) = (&self.slabs, Shared::new(&mut self.backing), &self.at[..]);
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            // Those of a ball follow each other.
+            for of_ball in slabs[slab].touches.chunk_by(|a, b| a.row == b.row) {
+                let (mut most, mut behind, mut last) = (0.0, [0.0; 4], &of_ball[0]);
+                for touch in of_ball {
+                    let bears = touch.bears(&at[touch.row as usize]);
+                    // Of a wall that comes nearer or gives way, each has to ask for itself.
+                    if bears > most && touch.surface.dot(touch.normal) == 0.0 {
+                        (most, behind) = (bears, row(touch.normal));
+                    }
+                    if touch.borne_for_others > last.borne_for_others {
+                        last = touch;
+                    }
+                }
+                if last.borne_for_others > 0.0 && behind[..3] != row(last.normal)[..3] {
+                    behind = [0.0, 0.0, 0.0, LOST];
+                }
+                // SAFETY: a row of the slab.
+                unsafe { *backing.row(last.row as usize) = behind };
+            }
+        });
+    }
+
+    /// Forgets who was borne by a wall two steps ago.
+    fn age_marks(&mut self) {
+        let (slabs, spin) = (&self.slabs, Shared::new(&mut self.spin));
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            if !slabs[slab].asleep {
+                // SAFETY: the rows of the slab.
+                for spin in unsafe { spin.part(slabs[slab].own_rows()) } {
+                    spin[3] = (spin[3] - 1.0).max(0.0);
+                }
+            }
+        });
+    }
+
+    /// Seeks pairs and walls for balls of some slabs that leave their budget within a step, since a
+    /// bounce or a contact made them faster. Says whether there were any.
+    fn seek_within_step(
+        &mut self,
+        which: impl Fn(&Slab) -> bool,
+        leaves: impl Fn(&Row, f32) -> bool,
+        dt: f32,
+        walls: &dyn Surroundings,
+        observe: &mut dyn FnMut(Stage),
+    ) -> bool {
+        let mut leaving = std::mem::take(&mut self.leaving);
+        leaving.clear();
+        // More than this are too many.
+        let most = self.strays.room(self.at.len()) + 1;
+        for slab in self.slabs.iter().filter(|slab| which(slab) && !slab.asleep) {
+            let leaves = |row: &u32| {
+                let at = *row as usize;
+                leaves(&self.velocity[at], self.budget[at])
+            };
+            let room = most.saturating_sub(leaving.len());
+            leaving.extend((slab.rows[0]..slab.rows[1]).filter(leaves).take(room));
+        }
+        if !leaving.is_empty() {
+            // Rows may change.
+            for slab in &mut self.slabs {
+                self.stopped.append(&mut slab.stopped);
+            }
+            let slots = self.ids.slots();
+            self.stopped.iter_mut().for_each(|row| *row = slots[*row as usize]);
+            let rebuilds = self.rebuilds;
+            self.seek_for(&leaving, dt, walls, observe);
+            if self.rebuilds != rebuilds {
+                self.look(dt, self.gravity.unwrap_or_else(Vec3::zero));
+                self.find_guests();
+            }
+            let rows = self.ids.columns().1;
+            self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
+        }
+        let any = !leaving.is_empty();
+        self.leaving = leaving;
+        any
+    }
+
     /// Lets bounce what meets, again where a bounce may have sent a ball on to the next one.
     fn bounce(&mut self, impact: Impact, faster: impl Fn(&Slab, f32) -> bool + Sync) {
-        self.slabs.iter_mut().for_each(|slab| slab.again = true);
+        self.slabs.iter_mut().for_each(|slab| (slab.again, slab.struck) = (true, false));
         for _ in 0..ROUNDS {
             self.pass(Pass::Impact(impact), |slab, next| slab.again && faster(slab, next));
             let all = self.strays.pushes.bounced;
@@ -237,6 +370,7 @@ impl Swarm {
                 let again = bounced(before) || bounced(own) || bounced(next);
                 any |= again;
                 self.slabs[i].again = all || again;
+                self.slabs[i].struck |= all || again;
             }
             self.strays.pushes.bounced = false;
             self.slabs.iter_mut().for_each(|slab| slab.pushes.bounced = false);
@@ -282,10 +416,7 @@ impl Swarm {
             let budget = &budget[slab.own_rows()];
             slab.leaving.clear();
             let rows = (slab.rows[0]..).zip(velocity.iter().zip(budget));
-            let leaves = |velocity: &Row, budget: f32| {
-                budget < 0.0 || squared(*velocity) * dt * dt > budget * budget
-            };
-            let leaving = rows.filter(|(_, (velocity, budget))| leaves(velocity, **budget));
+            let leaving = rows.filter(|(_, (velocity, budget))| leaves(velocity, **budget, dt));
             slab.leaving.extend(leaving.map(|(row, _)| row).take(most));
             let fastest = |from: u32, to: u32| {
                 let rows = (from - slab.rows[0]) as usize..(to - slab.rows[0]) as usize;
@@ -298,6 +429,8 @@ impl Swarm {
                 fastest(slab.rows[0], grid.first_of_layer(first)),
                 fastest(grid.first_of_layer(last), slab.rows[1]),
             ];
+            let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
+            slab.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
             slab.slow = if slab.speed[0] < lying { slab.slow + dt } else { 0.0 };
             if sleeps && slab.slow > FALL_ASLEEP {
                 (slab.asleep, slab.speed) = (true, [0.0; 3]);
@@ -326,8 +459,10 @@ impl Swarm {
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
             budget: Shared::new(&mut self.budget),
+            backing: Shared::new(&mut self.backing),
         };
         let slabs = Shared::new(&mut self.slabs);
+        let least = -self.cap;
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // SAFETY: each thread has its own slabs, and their rows.
             let slab = unsafe { &mut *slabs.row(slab) };
@@ -342,8 +477,19 @@ impl Swarm {
             for touch in &mut slab.touches {
                 touch.drift(time[0]);
             }
-            let stopped = &mut slab.stopped;
-            instructions.run(Drift { at, velocity, budget, change, time, stopped, first });
+            let (stopped, overrun) = (&mut slab.stopped, &mut slab.overrun);
+            *overrun = false;
+            instructions.run(Drift {
+                at,
+                velocity,
+                budget,
+                change,
+                time,
+                least,
+                overrun,
+                stopped,
+                first,
+            });
         });
     }
 
@@ -351,7 +497,7 @@ impl Swarm {
     /// condition holds, given how fast a ball of the next one is.
     fn pass(&mut self, pass: Pass, condition: impl Fn(&Slab, f32) -> bool + Sync) {
         let instructions = self.instructions;
-        let friction = self.rough().then_some(self.model.material.friction);
+        let friction = self.model.material.friction;
         let mut strays = std::mem::take(&mut self.strays);
         self.each_slab(|next, columns, slab| {
             if slab.asleep && next.is_none_or(|(asleep, _)| asleep)
@@ -369,6 +515,9 @@ impl Swarm {
                     unsafe {
                         let (at, velocity) = (columns.at.row(row), columns.velocity.row(row));
                         let spin = &mut *columns.spin.row(row);
+                        if columns.backed() {
+                            touch.borne_for_others = touch.share_of(&*columns.backing.row(row));
+                        }
                         if let Some(way) = touch.solve(pass, &mut *at, &mut *velocity, spin) {
                             *columns.budget.row(row) -= way;
                             slab.pushes.bounced = true;
@@ -382,6 +531,7 @@ impl Swarm {
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
             budget: Shared::new(&mut self.budget),
+            backing: Shared::new(&mut self.backing),
         };
         let Strays { batches, pushes, .. } = &mut strays;
         instructions.run(Solve { pass, columns, batches, pushes, friction });
@@ -396,6 +546,7 @@ impl Swarm {
             velocity: Shared::new(&mut self.velocity),
             spin: Shared::new(&mut self.spin),
             budget: Shared::new(&mut self.budget),
+            backing: Shared::new(&mut self.backing),
         };
         let slabs = Shared::new(&mut self.slabs);
         let (threads, states) = (self.model.threads as usize, &mut self.slab_states);
@@ -412,10 +563,24 @@ impl Swarm {
         });
     }
 
-    /// How long before a ball can be at a half-space it is sought for, in seconds. In the lab's
-    /// tier it may as well be inside.
-    pub(super) fn ahead(&self, dt: f32) -> f32 {
-        if self.rough() { 2.0 * dt } else { 0.0 }
+    /// How long before a ball can be at a wall it is sought for, in seconds; in the lab's tier, it
+    /// has moved already.
+    pub(super) fn ahead(&self, dt: f32) -> Option<f32> {
+        self.rough().then_some(2.0 * dt)
+    }
+
+    /// Seeks the balls at walls anew, if one of these changed.
+    fn seek_walls_that_moved(
+        &mut self,
+        changed: bool,
+        dt: f32,
+        walls: &dyn Surroundings,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        if changed {
+            observe(Stage::Walls);
+            self.seek_walls(dt, walls);
+        }
     }
 
     /// Seeks the balls at walls anew, where pairs are still known.
@@ -430,13 +595,12 @@ impl Swarm {
             let old = std::mem::take(&mut slab.touches);
             slab.touches = std::mem::take(&mut slab.old_touches);
             slab.seek_walls(instructions, balls, planes, |touch| {
-                super::walls::find(&old, touch).map(|same| (same.pressure, same.grip))
+                super::walls::find(&old, touch).copied()
             });
             slab.old_touches = old;
             slab.near_shapes.clear();
             if shapes {
-                let (rows, found) = (slab.own_rows(), &mut slab.near_shapes);
-                super::walls::near_shapes(walls, balls.at, balls.budget, rows, found);
+                super::walls::near_shapes(walls, balls, slab.own_rows(), &mut slab.near_shapes);
             }
         });
     }
@@ -458,13 +622,7 @@ impl Swarm {
             if walls.has_shapes() {
                 for row in &rows[mine] {
                     let row = *row as usize;
-                    super::walls::near_shapes(
-                        walls,
-                        at,
-                        budget,
-                        row..row + 1,
-                        &mut slab.near_shapes,
-                    );
+                    super::walls::near_shapes(walls, balls, row..row + 1, &mut slab.near_shapes);
                 }
                 slab.near_shapes.sort_unstable();
                 slab.near_shapes.dedup();
@@ -472,26 +630,54 @@ impl Swarm {
         }
     }
 
-    /// Walls are where they will be at the end; so long before, in seconds, they were elsewhere.
-    fn look_at_walls(&mut self, walls: &dyn Surroundings, before: f32) {
-        let (at, budget, material) = (&self.at[..], &self.budget[..], self.model.material);
-        let (guests, slots) = (&self.guest_slots[..], self.ids.slots());
-        let any = !self.guests.is_empty();
+    /// Brings the touches of some slabs up to date. Walls are where they will be at the end; so long
+    /// `before`, in seconds, they were elsewhere.
+    fn look_at_walls(
+        &mut self,
+        walls: &dyn Surroundings,
+        before: f32,
+        times: [f32; 2],
+        which: impl Fn(&Slab) -> bool + Sync,
+        only_fast: bool,
+    ) {
+        let (guests, rows) = (&self.guests[..], &self.guest_rows[..]);
+        let look = Look {
+            tier: self.model.tier,
+            at: &self.at,
+            velocity: &self.velocity,
+            budget: &self.budget,
+            material: self.model.material,
+            before,
+            times,
+            gravity: self.gravity.unwrap_or_else(Vec3::zero),
+        };
         let slabs = Shared::new(&mut self.slabs);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // SAFETY: its own.
             let slab = unsafe { &mut *slabs.row(slab) };
-            if slab.asleep {
+            if slab.asleep || !which(slab) {
                 return;
             }
-            slab.look_at_walls(walls, at, budget, material, before);
-            if any {
-                // Walls push them elsewhere.
-                let guest = |row: u32| Self::has_guest_slot(slots[row as usize], guests);
-                slab.touches.retain(|touch| !guest(touch.row));
+            slab.look_at_walls(walls, &look, only_fast);
+            if !rows.is_empty() {
+                for touch in &mut slab.touches {
+                    if let Some(guest) = Self::guest_at(guests, rows, touch.row) {
+                        touch.bear(guest);
+                    }
+                }
             }
         });
     }
+}
+
+/// The range of two ranges.
+fn wider([a, b]: [f32; 2], [c, d]: [f32; 2]) -> [f32; 2] {
+    [a.min(c), b.max(d)]
+}
+
+/// Whether a ball leaves its budget within a time.
+fn leaves(velocity: &Row, budget: f32, time: f32) -> bool {
+    budget < 0.0 || squared(*velocity) * time * time > budget * budget
 }
 
 /// The half-spaces of which the balls near them are listed. The lab's tier looks at all balls.

@@ -19,8 +19,9 @@ pub(super) struct Strays {
     /// Their rows, in order, and a bit for each row.
     pub rows: Vec<u32>,
     bits: Vec<u64>,
-    /// Their pairs.
+    /// Their pairs, and how many more there was no room for.
     pub batches: Vec<Batch>,
+    pub unlisted: usize,
     pub pushes: Pushes,
     /// What their pairs bore before, in order.
     bore: Vec<Bore>,
@@ -54,6 +55,7 @@ impl Strays {
     /// Forgets all, in a swarm of so many.
     pub fn clear(&mut self, balls: usize) {
         self.rows.clear();
+        self.unlisted = 0;
         self.batches.clear();
         self.pushes.reset(0);
         self.bits.clear();
@@ -73,7 +75,7 @@ impl Strays {
     }
 
     /// Seeks all their pairs. `largest` is the largest radius, `cap` the most that other balls
-    /// have gone since the rows were put in order.
+    /// have gone since the rows were put in order. Guests touch each other without the swarm.
     pub fn find(
         &mut self,
         grid: &Grid,
@@ -81,6 +83,7 @@ impl Strays {
         budget: &[f32],
         [largest, cap]: [f32; 2],
         search: &mut Search,
+        guest: &dyn Fn(u32) -> bool,
         rough: bool,
     ) {
         if rough {
@@ -89,6 +92,7 @@ impl Strays {
         self.rows.sort_unstable();
         let mut batches = std::mem::take(&mut self.batches);
         batches.clear();
+        self.unlisted = 0;
         if !self.rows.is_empty() {
             let mut filler = search.filler(64 * self.rows.len(), &mut batches);
             let widest = self
@@ -97,7 +101,7 @@ impl Strays {
                 .fold(0.0_f32, |most, row| most.max(at[*row as usize][3] + budget[*row as usize]));
             filler.make_room(at.len());
             for stray in &self.rows {
-                self.beside(*stray, grid, at, budget, largest + cap, &mut filler);
+                self.beside(*stray, grid, at, budget, largest + cap, guest, &mut filler);
             }
             self.sorted.clear();
             self.sorted.extend(&self.rows);
@@ -107,12 +111,13 @@ impl Strays {
                 let reach = at[*a as usize][3] + budget[*a as usize];
                 let far = x(a) + reach + widest;
                 for b in self.sorted[i + 1..].iter().take_while(|b| x(b) <= far) {
-                    if near(*a, *b, at, budget) && filler.spend_only(1) == 1 {
+                    let both_guests = guest(*a) && guest(*b);
+                    if near(*a, *b, at, budget) && !both_guests && filler.spend_only(1) == 1 {
                         filler.add(*a.min(b), *a.max(b));
                     }
                 }
             }
-            filler.close_all();
+            self.unlisted = filler.close_all();
         }
         self.batches = batches;
         if rough {
@@ -129,8 +134,10 @@ impl Strays {
         at: &[Row],
         budget: &[f32],
         more: f32,
+        guest: &dyn Fn(u32) -> bool,
         filler: &mut Filler,
     ) {
+        let is_guest = guest(stray);
         let [x, y, z, radius] = at[stray as usize];
         let far = radius + budget[stray as usize] + more;
         for level in &grid.levels {
@@ -140,7 +147,8 @@ impl Strays {
                 for row in low[1]..=high[1] {
                     let line = level.cell(grid, layer, row, 0);
                     for other in grid.first(line + low[2])..grid.first(line + high[2] + 1) {
-                        if !self.has(other)
+                        let is_for_others = self.has(other) || is_guest && guest(other);
+                        if !is_for_others
                             && near(stray, other, at, budget)
                             && filler.spend_only(1) == 1
                         {

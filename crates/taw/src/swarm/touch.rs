@@ -2,7 +2,8 @@
 
 use cgmath::InnerSpace;
 
-use super::kernels::{Impact, Pass, Soft, WALL_SLOP};
+use super::guests::Guest;
+use super::kernels::{GROUNDED, Impact, Pass, Soft, WALL_SLOP};
 use super::lanes::Row;
 use crate::math::Vec3;
 
@@ -14,17 +15,27 @@ pub(super) struct Touch {
     pub part: u32,
     /// Of a half-space, or of any other shape.
     pub is_plane: bool,
-    /// The plane that the wall is like there: its normal, and how far along it the surface is.
+    /// Whether the ball is a guest, whom others move: the wall only bears what the swarm presses
+    /// on it.
+    pub bears_guest: bool,
+    /// The plane that the wall is like there: its normal, and how far along it the surface is, now
+    /// and at the end of the step.
     pub normal: Vec3<f32>,
     pub offset: f32,
+    pub offset_at_end: f32,
     /// The velocity of the surface, in m/s.
     pub surface: Vec3<f32>,
     pub friction: f32,
     pub restitution: f32,
-    /// The impulses, in N s.
+    /// The impulses, in N s: for the ball itself, and for others that press on it.
+    pub borne_for_others: f32,
     pub pressure: f32,
     pub grip: Vec3<f32>,
 }
+
+/// A ball that is so near to a wall, in radii, stands on it: more than rounding, and less than
+/// anybody sees.
+const TOUCHES: f32 = 0.01;
 
 fn xyz(row: &Row) -> Vec3<f32> {
     Vec3::new(row[0], row[1], row[2])
@@ -45,9 +56,39 @@ impl Touch {
         self.normal.dot(xyz(at)) - self.offset - at[3]
     }
 
-    /// The wall moves on for so long, in seconds.
+    /// The wall moves on for so long, in seconds. Guests are where they are at the end of the step
+    /// already, and so are their walls.
     pub fn drift(&mut self, time: f32) {
-        self.offset += self.surface.dot(self.normal) * time;
+        if !self.bears_guest {
+            self.offset += self.surface.dot(self.normal) * time;
+        }
+    }
+
+    /// Makes it one that only bears what the swarm presses on a guest: the guest's own motion, and
+    /// how deep it is in the wall already, are left to whoever moves it.
+    pub fn bear(&mut self, guest: &Guest) {
+        self.bears_guest = true;
+        (self.friction, self.restitution) = (0.0, 0.0);
+        self.surface = xyz(&guest.velocity);
+        self.offset = self.offset_at_end;
+        self.offset += self.gap(&guest.at).min(0.0);
+    }
+
+    /// The impulse that the wall bore in the last substep, in N s; nothing, if the ball has left it.
+    pub fn bears(&self, at: &Row) -> f32 {
+        let there = self.gap(at) <= at[3] * TOUCHES;
+        if there { self.pressure + self.borne_for_others } else { 0.0 }
+    }
+
+    /// Takes over what the same touch bore before.
+    pub fn recall(&mut self, before: &Self) {
+        (self.pressure, self.grip) = (before.pressure, before.grip);
+        self.borne_for_others = before.borne_for_others;
+    }
+
+    /// The impulse that the wall has borne for others, if it is the one behind the ball.
+    pub fn share_of(&self, backing: &Row) -> f32 {
+        if xyz(backing) == self.normal { backing[3] } else { 0.0 }
     }
 
     /// Pushes the ball out.
@@ -74,7 +115,7 @@ impl Touch {
     ) -> Option<f32> {
         match pass {
             Pass::Impact(impact) => return self.bounce(&impact, at, velocity, spin),
-            Pass::Begin => {
+            Pass::Begin(_) => {
                 self.grip -= self.normal * self.grip.dot(self.normal);
                 self.hit(velocity, spin, self.pressure, self.grip);
             }
@@ -149,9 +190,12 @@ impl Touch {
         let along = pressure - self.pressure;
         self.pressure = pressure;
         let wish = self.grip - self.sliding(relative, spin) * (mass * (2.0 / 7.0));
-        let grip = held(wish, self.friction * pressure);
+        let grip = held(wish, self.friction * (pressure + self.borne_for_others));
         let across = grip - self.grip;
         self.grip = grip;
+        if pressure > 0.0 {
+            spin[3] = GROUNDED;
+        }
         self.hit(velocity, spin, along, across);
     }
 

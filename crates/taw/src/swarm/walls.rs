@@ -2,6 +2,8 @@ use std::ops::Range;
 
 use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
+use super::Tier;
+use super::guests::Guest;
 use super::kernels::squared;
 use super::lanes::{Instructions, Kernel, LANES, Lanes, Row};
 use super::memory::make_room;
@@ -20,6 +22,9 @@ pub(crate) trait Surroundings: Sync {
     /// Names what else is within `reach` metres of a ball, without the seams: the wall and its
     /// part, the normal, and the distance of the center.
     fn shapes_at(&self, ball: &Row, reach: f32, name: &mut dyn FnMut([u32; 2], Vec3<f32>, f32));
+    /// The part that a ball first meets on its way, likewise: with the normal where they meet, and
+    /// how far the center is from the plane across that place.
+    fn first_on_way(&self, ball: &Row, way: Vec3<f32>) -> Option<([u32; 2], Vec3<f32>, f32)>;
     /// In m/s, and the wall's own material.
     fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32>;
     fn material(&self, wall: u32) -> Option<Material<f32>>;
@@ -41,17 +46,22 @@ pub(super) struct Balls<'a> {
     pub at: &'a [Row],
     pub velocity: &'a [Row],
     pub budget: &'a [f32],
-    /// In seconds.
-    pub ahead: f32,
+    /// In seconds; none in the lab's tier, where balls have moved already, and the velocities are
+    /// the places before.
+    pub ahead: Option<f32>,
 }
 
 impl Balls<'_> {
     /// How far a ball may go before walls are sought again: its budget, or more if it is so fast
     /// that it leaves that in a step.
     #[inline(always)]
-    fn reach(&self, row: usize) -> f32 {
-        let speed = squared(self.velocity[row]).sqrt();
-        self.budget[row].max(speed * self.ahead)
+    pub fn reach(&self, row: usize) -> f32 {
+        let (velocity, at) = (self.velocity[row], self.at[row]);
+        let way = match self.ahead {
+            Some(ahead) => squared(velocity).sqrt() * ahead,
+            None => squared([0, 1, 2, 0].map(|axis| at[axis] - velocity[axis])).sqrt(),
+        };
+        self.budget[row].max(way)
     }
 }
 
@@ -83,7 +93,7 @@ impl Slab {
         instructions: Instructions,
         balls: Balls,
         planes: &[HalfSpace],
-        recall: impl Fn(&Touch) -> Option<(f32, Vec3<f32>)>,
+        recall: impl Fn(&Touch) -> Option<Touch>,
     ) {
         self.touches.clear();
         self.near_planes.clear();
@@ -95,8 +105,8 @@ impl Slab {
         for row in &self.near_planes {
             let touches = &mut self.touches;
             touch_planes(*row, balls, planes, |mut touch| {
-                if let Some((pressure, grip)) = recall(&touch) {
-                    (touch.pressure, touch.grip) = (pressure, grip);
+                if let Some(before) = recall(&touch) {
+                    touch.recall(&before);
                 }
                 make_room(touches, touches.len() + 1);
                 touches.push(touch);
@@ -120,53 +130,145 @@ impl Slab {
     }
 
     /// Brings the balls at walls up to date: how walls move, and which part of a shape is
-    /// touched.
-    pub fn look_at_walls(
-        &mut self,
-        walls: &dyn Surroundings,
-        at: &[Row],
-        budget: &[f32],
-        material: Material<f32>,
-        before: f32,
-    ) {
+    /// touched. That of fast balls only, where others know it already.
+    pub fn look_at_walls(&mut self, walls: &dyn Surroundings, look: &Look, only_fast: bool) {
         if !self.near_shapes.is_empty() {
-            self.touch_shapes(walls, at, budget, material);
+            self.touch_shapes(walls, look, only_fast);
         }
         for touch in &mut self.touches {
-            let ball = &at[touch.row as usize];
+            let ball = &look.at[touch.row as usize];
             let point = center(ball) - touch.normal * ball[3];
+            touch.bears_guest = false;
             touch.surface = walls.surface_velocity(touch.wall, point);
-            touch.drift(-before);
+            touch.offset = touch.offset_at_end;
+            touch.drift(-look.before);
         }
     }
 
-    fn touch_shapes(
-        &mut self,
-        walls: &dyn Surroundings,
-        at: &[Row],
-        budget: &[f32],
-        material: Material<f32>,
-    ) {
+    fn touch_shapes(&mut self, walls: &dyn Surroundings, look: &Look, only_fast: bool) {
         std::mem::swap(&mut self.touches, &mut self.old_touches);
         self.touches.clear();
         let old = &self.old_touches;
-        self.touches.extend(old.iter().filter(|touch| touch.is_plane));
+        let kept = |touch: &&Touch| touch.is_plane || only_fast && look.way(touch.row).is_none();
+        self.touches.extend(old.iter().filter(kept));
+        self.has_fast = false;
         for row in &self.near_shapes {
-            let ball = &at[*row as usize];
-            let reach = budget[*row as usize].max(0.0);
-            walls.shapes_at(ball, reach, &mut |[wall, part], normal, distance| {
-                let Material { friction, restitution, .. } = against(walls, wall, material);
+            let way = look.way(*row);
+            let ball = &look.ball(*row, way);
+            if only_fast && way.is_none() {
+                continue;
+            }
+            let first = self.touches.len();
+            let touches = &mut self.touches;
+            let mut name = |ball: &Row, [wall, part]: [u32; 2], normal: Vec3<f32>, distance| {
+                let named = touches[first..].iter();
+                if named.into_iter().any(|touch| [touch.wall, touch.part] == [wall, part]) {
+                    return;
+                }
+                let Material { friction, restitution, .. } = against(walls, wall, look.material);
                 let offset = normal.dot(center(ball).to_vec()) - distance;
                 let mut touch =
                     Touch::new(*row, [wall, part], normal, offset, [friction, restitution]);
                 touch.is_plane = false;
                 if let Some(same) = find(old, &touch) {
-                    (touch.pressure, touch.grip) = (same.pressure, same.grip);
+                    touch.recall(same);
                 }
-                self.touches.push(touch);
+                touches.push(touch);
+            };
+            let mut reach = look.budget[*row as usize].max(0.0);
+            if let Some(way) = way {
+                self.has_fast = true;
+                reach = way.magnitude().min(FAST * ball[3]);
+                on_way(walls, ball, way, &mut name);
+            }
+            walls.shapes_at(ball, reach, &mut |part, normal, distance| {
+                name(ball, part, normal, distance);
             });
         }
         self.touches.sort_unstable_by_key(Touch::key);
+    }
+}
+
+/// Names the walls that a ball meets on its way, and along those that it met.
+fn on_way(
+    walls: &dyn Surroundings,
+    ball: &Row,
+    way: Vec3<f32>,
+    name: &mut impl FnMut(&Row, [u32; 2], Vec3<f32>, f32),
+) {
+    let (mut ball, mut way) = (*ball, way);
+    // In a corner, it meets three.
+    for _ in 0..3 {
+        if way.magnitude() <= FAST * ball[3] {
+            return;
+        }
+        let Some((part, normal, distance)) = walls.first_on_way(&ball, way) else { return };
+        name(&ball, part, normal, distance);
+        let closing = -way.dot(normal);
+        if closing.is_nan() || closing <= 0.0 {
+            return;
+        }
+        let time = ((distance - ball[3]) / closing).clamp(0.0, 1.0);
+        for (x, way) in ball.iter_mut().zip::<[f32; 3]>(way.into()) {
+            *x += way * time;
+        }
+        way = (way + normal * closing) * (1.0 - time);
+    }
+}
+
+/// A ball that goes further than this in a step, in radii, is fast: the plane across the nearest
+/// point of a wall says little about where it meets it, so it is looked where that is, and again
+/// in each substep.
+const FAST: f32 = 0.5;
+
+/// How walls are looked at.
+#[derive(Clone, Copy)]
+pub(super) struct Look<'a> {
+    pub tier: Tier,
+    pub at: &'a [Row],
+    /// In the lab's tier, where they were: there, they have moved already.
+    pub velocity: &'a [Row],
+    pub budget: &'a [f32],
+    pub material: Material<f32>,
+    /// Walls are where they will be at the end of the step; so long before, in seconds, they were
+    /// elsewhere.
+    pub before: f32,
+    /// How long a step and a substep are, in seconds.
+    pub times: [f32; 2],
+    pub gravity: Vec3<f32>,
+}
+
+impl Look<'_> {
+    /// How far a fast ball goes in a substep, in metres; none for slow ones.
+    fn way(&self, row: u32) -> Option<Vec3<f32>> {
+        let (at, [u, v, w, _]) = (&self.at[row as usize], self.velocity[row as usize]);
+        let [step, substep] = match self.tier {
+            Tier::Lab => [Vec3::new(at[0] - u, at[1] - v, at[2] - w); 2],
+            Tier::Full => {
+                self.times.map(|time| Vec3::new(u, v, w) * time + self.gravity * (time * time))
+            }
+        };
+        (step.magnitude2() > FAST * FAST * at[3] * at[3]).then_some(substep)
+    }
+
+    /// A ball where its way begins.
+    fn ball(&self, row: u32, way: Option<Vec3<f32>>) -> Row {
+        let at = self.at[row as usize];
+        match (self.tier, way) {
+            (Tier::Lab, Some(way)) => [at[0] - way.x, at[1] - way.y, at[2] - way.z, at[3]],
+            _ => at,
+        }
+    }
+}
+
+impl HalfSpace {
+    /// Moves a guest out, but for how deep it was inside.
+    pub fn bear(&self, guest: &Guest, at: &mut Row) {
+        let gap = |ball: &Row| self.normal.dot(center(ball).to_vec()) - self.offset - ball[3];
+        let by = (gap(&guest.at).min(0.0) - gap(at)).max(0.0);
+        for (x, normal) in at.iter_mut().zip::<[f32; 3]>(self.normal.into()) {
+            *x += normal * by;
+        }
     }
 }
 
@@ -232,14 +334,13 @@ pub(super) fn find<'a>(touches: &'a [Touch], touch: &Touch) -> Option<&'a Touch>
 /// The rows among these that are near anything but half-spaces, found by ever smaller boxes.
 pub(super) fn near_shapes(
     walls: &dyn Surroundings,
-    at: &[Row],
-    budget: &[f32],
+    balls: Balls,
     rows: Range<usize>,
     found: &mut Vec<u32>,
 ) {
     let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
     for row in rows.clone() {
-        let (ball, reach) = (&at[row], at[row][3] + budget[row]);
+        let (ball, reach) = (&balls.at[row], balls.at[row][3] + balls.reach(row));
         for axis in 0..3 {
             low[axis] = low[axis].min(ball[axis] - reach);
             high[axis] = high[axis].max(ball[axis] + reach);
@@ -254,8 +355,8 @@ pub(super) fn near_shapes(
     }
     // Neighbours in the order are neighbours in space.
     let middle = rows.start + rows.len() / 2;
-    near_shapes(walls, at, budget, rows.start..middle, found);
-    near_shapes(walls, at, budget, middle..rows.end, found);
+    near_shapes(walls, balls, rows.start..middle, found);
+    near_shapes(walls, balls, middle..rows.end, found);
 }
 
 impl Touch {
@@ -271,11 +372,14 @@ impl Touch {
             wall,
             part,
             is_plane: true,
+            bears_guest: false,
             normal,
             offset,
+            offset_at_end: offset,
             surface: Vec3::zero(),
             friction,
             restitution,
+            borne_for_others: 0.0,
             pressure: 0.0,
             grip: Vec3::zero(),
         }

@@ -9,7 +9,7 @@ use super::walls::{Part, Walls};
 use crate::Error;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::response::Material;
-use crate::shape::{Aabb, Sphere};
+use crate::shape::{Aabb, Solid, Sphere};
 use crate::swarm::{BallId, Guest, Stage, Surroundings};
 
 impl<S: Scalar> World<S> {
@@ -138,6 +138,36 @@ impl<S: Scalar> Surroundings for Walls<S> {
             let normal: Vec3<f32> = cast_vector(nearest.normal);
             name([wall, part], normal, nearest.distance.as_f64() as f32);
         }
+    }
+
+    fn first_on_way(
+        &self,
+        &[x, y, z, radius]: &[f32; 4],
+        way: Vec3<f32>,
+    ) -> Option<([u32; 2], Vec3<f32>, f32)> {
+        let number = |x: f32| S::constant(f64::from(x));
+        let center: Point3<S> = cast_point(Point3::new(x, y, z));
+        let sphere = Sphere { center, radius: number(radius) };
+        let way: Vec3<S> = cast_vector(way);
+        let (start, end) = (sphere.bounding_box(), Sphere { center: center + way, ..sphere });
+        // Its core says whether it passes into the wall, its surface when it is there.
+        let core = Sphere { radius: sphere.radius * S::constant(0.5), ..sphere };
+        let mut first: Option<(Part, S)> = None;
+        Walls::near(self, &start.union(&end.bounding_box()), |part| {
+            let passes = self.meets(part, &core, way).is_some();
+            let Some(stop) = passes.then(|| self.meets(part, &sphere, way)).flatten() else {
+                return;
+            };
+            if first.is_none_or(|(_, time)| stop.time < time) {
+                first = Some((part, stop.time));
+            }
+        });
+        let (part, time) = first?;
+        // The plane there is nearer by the way up to it.
+        let nearest = self.nearest(part, center + way * time);
+        let distance = nearest.distance - way.dot(nearest.normal) * time;
+        let normal: Vec3<f32> = cast_vector(nearest.normal);
+        Some(([part.wall, part.part], normal, distance.as_f64() as f32))
     }
 
     fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32> {

@@ -8,7 +8,7 @@ use std::collections::BinaryHeap;
 use cgmath::{InnerSpace, Zero};
 
 use super::marbles::Marbles;
-use super::walls::Part;
+use super::walls::{Part, Walls};
 use super::{Detection, World};
 use crate::contact::time_of_impact_sphere_sphere;
 use crate::math::{Point3, Scalar, Vec3, direction_and_length, length};
@@ -92,9 +92,9 @@ struct Way<S> {
 }
 
 /// What a marble meets on its way.
-struct Stop<S> {
+pub(super) struct Stop<S> {
     /// As a part of the way.
-    time: S,
+    pub time: S,
     wall: u32,
 }
 
@@ -177,40 +177,17 @@ impl<S: Scalar> World<S> {
         self.walls.near(&bounds, |part| {
             // Its core says whether it passes into the wall, its surface when it is there.
             let core = Sphere { radius: sphere.radius * half, ..*sphere };
-            if self.meets(part, &core, motion).is_none() {
+            if self.walls.meets(part, &core, motion).is_none() {
                 return;
             }
             let part_of_it = if self.model.response.needs_overlap() { half } else { into };
             let all = Sphere { radius: sphere.radius * part_of_it, ..*sphere };
-            let Some(stop) = self.meets(part, &all, motion) else { return };
+            let Some(stop) = self.walls.meets(part, &all, motion) else { return };
             if best.as_ref().is_none_or(|best| stop.time < best.time) {
                 best = Some(stop);
             }
         });
         best
-    }
-
-    /// When a sphere on its way touches a part of a wall: for as long as the plane across the
-    /// nearest point keeps them apart, it does not (conservative advancement; Mirtich 1996).
-    fn meets(&self, part: Part, sphere: &Sphere<S>, motion: Vec3<S>) -> Option<Stop<S>> {
-        let near = sphere.radius * S::constant(INTO);
-        let mut time = S::zero();
-        for _ in 0..MOST_STEPS {
-            let Nearest { normal, distance, .. } =
-                self.walls.nearest(part, sphere.center + motion * time);
-            let (gap, closing) = (distance - sphere.radius, -motion.dot(normal));
-            if closing.is_nan() || closing <= S::zero() {
-                return None;
-            }
-            if gap <= near {
-                return Some(Stop { time, wall: part.wall });
-            }
-            time += gap / closing;
-            if time > S::one() {
-                return None;
-            }
-        }
-        None // it grazes
     }
 
     /// Puts marbles that meet on their way to where they touch, the earliest first. What
@@ -298,6 +275,31 @@ impl<S: Scalar> World<S> {
             // Rounding may leave a gap.
             self.sweep.grazes.push(((row as u32).min(other), (row as u32).max(other)));
         }
+    }
+}
+
+impl<S: Scalar> Walls<S> {
+    /// When a sphere on its way touches a part of a wall: for as long as the plane across the
+    /// nearest point keeps them apart, it does not (conservative advancement; Mirtich 1996).
+    pub(super) fn meets(&self, part: Part, sphere: &Sphere<S>, motion: Vec3<S>) -> Option<Stop<S>> {
+        let near = sphere.radius * S::constant(INTO);
+        let mut time = S::zero();
+        for _ in 0..MOST_STEPS {
+            let Nearest { normal, distance, .. } =
+                self.nearest(part, sphere.center + motion * time);
+            let (gap, closing) = (distance - sphere.radius, -motion.dot(normal));
+            if closing.is_nan() || closing <= S::zero() {
+                return None;
+            }
+            if gap <= near {
+                return Some(Stop { time, wall: part.wall });
+            }
+            time += gap / closing;
+            if time > S::one() {
+                return None;
+            }
+        }
+        None // it grazes
     }
 }
 

@@ -6,7 +6,6 @@ use taw::math::Vec3;
 use taw::scene::{Build, Form, Movement, Scene, Structure, Turn, Wall};
 
 use super::Dice;
-use crate::storm::case::Kind;
 
 /// Walls, and where bodies go.
 pub struct Arena {
@@ -24,7 +23,7 @@ pub struct Arena {
 }
 
 /// One of many arenas.
-pub fn arena(dice: &mut Dice, kind: Kind) -> Arena {
+pub fn arena(dice: &mut Dice) -> Arena {
     let size = if dice.chance(0.6) { 1.0 } else { dice.magnitude(0.1, 5.0) };
     let mut arena = Arena {
         scene: Scene::default(),
@@ -41,7 +40,6 @@ pub fn arena(dice: &mut Dice, kind: Kind) -> Arena {
         1 => arena.scene.gravity = (dice.upward(0.3) * -9.81).into(),
         _ => {}
     }
-    let swarm = matches!(kind, Kind::SwarmLab | Kind::SwarmFull);
     let builders: &[fn(&mut Arena, &mut Dice)] = &[
         open_floor,
         space,
@@ -62,9 +60,7 @@ pub fn arena(dice: &mut Dice, kind: Kind) -> Arena {
         board,
         belt,
     ];
-    // What a moving wall brings into a swarm, no account counts.
-    let count = if swarm { builders.len() - 4 } else { builders.len() };
-    builders[dice.below(count)](&mut arena, dice);
+    builders[dice.below(builders.len())](&mut arena, dice);
     arena
 }
 

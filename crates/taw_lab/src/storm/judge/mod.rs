@@ -149,11 +149,17 @@ impl Rules {
     /// Those of a case.
     #[must_use]
     pub fn of(case: &Case) -> Self {
-        let swarm = case.swarm.as_ref().map(|swarm| f64::from(swarm.substeps));
+        let kind = Kind::of(case);
+        let parts = case.swarm.as_ref().map_or(1.0, |swarm| f64::from(swarm.substeps));
+        // In the lab's tier of swarms, balls move once in a step, and its parts are how often they
+        // are moved apart: iterations.
+        let lab = kind == Kind::SwarmLab;
+        let swarm = case.swarm.is_some().then_some(if lab { 1.0 } else { parts });
+        let iterations = f64::from(case.model.iterations).min(if lab { parts } else { f64::MAX });
         let marbles = f64::from(case.model.substeps);
         let single = case.number == Number::F32 || swarm.is_some();
         Self {
-            kind: Kind::of(case),
+            kind,
             step: case.step,
             substep: case.step / swarm.map_or(marbles, |swarm| swarm.min(marbles)),
             substeps: swarm.map_or(marbles, |swarm| swarm.max(marbles)),
@@ -161,7 +167,7 @@ impl Rules {
             integrator: case.model.integrator,
             moving: case.has_moving_walls(),
             modulus: softest(case),
-            sag: (8.0 / f64::from(case.model.iterations)).max(1.0),
+            sag: (8.0 / iterations).max(1.0),
         }
     }
 
@@ -209,6 +215,8 @@ fn softest(case: &Case) -> f64 {
 pub struct Bench {
     rules: Rules,
     closed: Option<[[f64; 3]; 2]>,
+    /// Whose centre was not inside the closed box at the beginning.
+    outside: Vec<bool>,
     energy: energy::Ledger,
     flight: flight::Falls,
     rest: rest::Lies,
@@ -224,6 +232,10 @@ impl Bench {
         Self {
             rules: Rules::of(case),
             closed: case.closed,
+            outside: case.closed.map_or_else(Vec::new, |[low, high]| {
+                let out = |at: Vec3<f64>| (0..3).any(|i| at[i] < low[i] || at[i] > high[i]);
+                begin.bodies.iter().map(|body| out(body.at)).collect()
+            }),
             energy: energy::Ledger::new(begin),
             flight: flight::Falls::default(),
             rest: rest::Lies::default(),
@@ -249,8 +261,8 @@ impl Bench {
         findings.extend(self.flight.judge(rules, before, after, &near));
         findings.extend(self.rest.judge(rules, before, after));
         findings.push(overlap::overlap(rules, before, after, [self.begin, self.fastest]));
-        findings
-            .extend(self.closed.map(|closed| overlap::closed(rules, after, self.fastest, closed)));
+        let closed = |corners| overlap::closed(rules, after, self.fastest, &self.outside, corners);
+        findings.extend(self.closed.map(closed));
         findings
     }
 }

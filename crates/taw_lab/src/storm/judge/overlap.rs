@@ -4,7 +4,7 @@ use taw::prelude::*;
 
 use super::super::case::Kind;
 use super::{Finding, Invariant, Rules};
-use crate::storm::observe::Snapshot;
+use crate::storm::observe::{Body, Snapshot};
 
 /// All numbers are finite, and nothing was stopped: speeds of ordinary scenes are far from any
 /// overflow, so what a step has to stop came from a fault.
@@ -105,17 +105,20 @@ pub fn overlap(
 }
 
 /// No centre leaves a closed box: walls hold whatever comes at an ordinary speed. The bound is
-/// the rounding of a place; for springs their softness.
+/// the rounding of a place; for springs their softness. Of those whose centre was in a wall or
+/// outside when it began, nobody can say that they leave.
 pub fn closed(
     rules: &Rules,
     after: &Snapshot,
     fastest: f64,
+    outside: &[bool],
     [low, high]: [[f64; 3]; 2],
 ) -> Finding {
     let gravity = after.gravity().magnitude();
     let total: f64 = after.bodies.iter().map(|body| body.mass).sum();
     let mut worst = Finding { invariant: Invariant::Closed, value: 0.0, bound: 1.0, body: None };
-    for (i, body) in after.bodies.iter().enumerate() {
+    let inside = |(i, _): &(usize, &Body)| !outside.get(*i).is_some_and(|outside| *outside);
+    for (i, body) in after.bodies.iter().enumerate().filter(inside) {
         for axis in 0..3 {
             let size = high[axis].abs().max(low[axis].abs()).max(high[axis] - low[axis]);
             let out = (low[axis] - body.at[axis]).max(body.at[axis] - high[axis]);

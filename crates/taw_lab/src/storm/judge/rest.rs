@@ -59,8 +59,8 @@ impl Lies {
 
     /// What does not fall is held by something that it touches: before and after a step, there is
     /// something within a fiftieth of the radius, or within what gravity does in three substeps,
-    /// where contacts are made already. Only among balls, whose gaps are exact. Event-driven balls
-    /// bounce on their way, so what is as near as they go in a step counts; what hangs goes nowhere.
+    /// where contacts are made already, or on its way: what flies to and fro between walls turns
+    /// back in every step, far from where it is seen. Only among balls, whose gaps are exact.
     ///
     /// The figure is for how many steps in a row that is not so: a bounce in the middle of a step
     /// takes one, and what is held without a touch is held in all.
@@ -85,11 +85,8 @@ impl Lies {
                 let others = (0..count).filter(|j| *j != i).map(|j| -snapshot.depth(i, j));
                 others.fold(snapshot.bodies[i].wall_gap, f64::min)
             };
-            let mut reach = (0.02 * new.radius).max(3.0 * g * rules.substep * rules.substep);
-            if rules.kind == Kind::EventDriven {
-                let fastest = old.velocity.magnitude().max(new.velocity.magnitude());
-                reach = reach.max(fastest * rules.step);
-            }
+            let way = old.velocity.magnitude().max(new.velocity.magnitude()) * rules.step;
+            let reach = (0.02 * new.radius).max(3.0 * g * rules.substep * rules.substep).max(way);
             let falls = held < 0.5 * g * rules.step || gap(before).min(gap(after)) <= reach;
             self.hangs[i] = if falls { 0 } else { self.hangs[i] + 1 };
             if f64::from(self.hangs[i]) > worst.value {
