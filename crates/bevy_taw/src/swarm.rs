@@ -253,11 +253,19 @@ pub(crate) fn step(mut world: ResMut<TawWorld>, time: Res<Time>, mut times: ResM
     times.end_step();
 }
 
-/// Tells of the marbles that were stopped in this step.
-pub(crate) fn report_stopped(world: Res<TawWorld>) {
+/// Tells of the marbles that were stopped in this step, and once for as long as it lasts that more
+/// pairs are inside of each other than are looked at.
+pub(crate) fn report_stopped(world: Res<TawWorld>, mut waits: Local<bool>) {
     for ball in world.swarm.stopped() {
         log::warn!("taw stopped {ball:?}: its motion is no longer finite");
     }
+    let pairs = world.swarm.check_pairs();
+    if let Err(error) = pairs
+        && !*waits
+    {
+        log::warn!("balls of swarms overlap until others have parted: {error}");
+    }
+    *waits = pairs.is_err();
 }
 
 /// A colour for what lies between least (0) and most (1): blue, green, yellow, red.

@@ -257,11 +257,15 @@ fn balls_of_glass_and_lead_bounce_in_a_corner_without_gain() {
             kinetic + potential + if rotation == Rotation::Dynamic { spin } else { 0.0 }
         };
         let begin = energy(&world);
+        // Overlap is no energy, but to part it lifts what lies on it, by no more than it is deep.
+        let [a, b] = [0, 1].map(|row| world.marbles.get(world.marbles.id(row).unwrap()).unwrap());
+        let depth = (a.radius + b.radius - (a.position - b.position).magnitude()).max(0.0);
+        let weight = 9.81 * (a.mass.of_capsule(a.radius, 0.0) + b.mass.of_capsule(b.radius, 0.0));
         for step in 0..300 {
             world.step(1.0 / 60.0).unwrap();
             let gain = energy(&world) - begin;
             assert!(
-                gain < 2e-3 * begin,
+                gain < 2e-3 * begin + depth * weight,
                 "run {run}, {model:?}: {gain} J of {begin} after step {step}"
             );
         }

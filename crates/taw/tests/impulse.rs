@@ -339,3 +339,26 @@ fn friction_in_several_contacts_at_once_gains_nothing() {
         }
     }
 }
+
+#[test]
+fn eight_iterations_solve_a_heavy_ball_on_a_light_one_just_above_a_floor() {
+    // Three contacts, of which the heavy ball's with the floor comes to bear nothing. Sweeps alone
+    // take as many iterations as the masses are apart.
+    for ratio in [2.0, 33.0, 400.0, 1000.0] {
+        for light in [0.001, 0.004, 0.005] {
+            let mut world = World::<f64>::default();
+            world.set_model(Model { response: Response::Impulse, ..Model::default() }).unwrap();
+            world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+            let balls = [(light, light, 1.0), (2.0 * light + 0.016, 0.016, ratio)];
+            let ids = balls.map(|(height, radius, mass)| {
+                let ball = Marble::new(Point3::new(0.0, height, 0.0), radius);
+                world.marbles.insert(Marble { mass: Mass::Kilograms(mass), ..ball }).unwrap()
+            });
+            world.step(1.0 / 30.0).unwrap();
+            for id in ids {
+                let speed = world.marbles.get(id).unwrap().velocity.magnitude();
+                assert!(speed < 1e-6, "{ratio} times as heavy, {light} m: {speed} m/s");
+            }
+        }
+    }
+}

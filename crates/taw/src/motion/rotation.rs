@@ -13,7 +13,7 @@ pub enum Rotation {
     None,
     /// Marbles turn as if they rolled without slipping over the walls that they
     /// touch, and keep their spin in the air. It follows the motion and does not
-    /// change it.
+    /// change it: of capsules, only the spin about their axes turns them.
     Rolling,
     /// Marbles have angular momentum, as solid balls of even density; friction and
     /// torques change it. Without a response that knows friction, nothing else does.

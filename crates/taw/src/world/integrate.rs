@@ -4,7 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::marbles::{Marbles, Rest};
 use crate::math::{Quat, Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
-use crate::motion::{Force, Integrator, Motion, turned};
+use crate::motion::{Force, Integrator, Motion, Rotation, turned};
 use crate::response::Rod;
 
 /// What moves all marbles.
@@ -189,10 +189,21 @@ impl<S: Scalar> Marbles<S> {
         }
     }
 
-    /// Turns every row on by its spin for `dt` seconds.
-    pub(super) fn turn(&mut self, dt: S) {
+    /// Turns every row on by its spin for `dt` seconds. Capsules that do not feel their spin in a
+    /// world of this `rotation` turn about their axes only: else they would turn into walls, and be
+    /// lifted out, which is energy from nothing.
+    pub(super) fn turn(&mut self, dt: S, rotation: Rotation) {
         if self.has_capsules() {
-            (0..self.spin.len()).for_each(|row| self.turn_top(row, dt));
+            for row in 0..self.spin.len() {
+                let own = self.rotation_model.get(row).unwrap_or(rotation);
+                if own.min(rotation) == Rotation::Dynamic || self.half_length(row) == S::zero() {
+                    self.turn_top(row, dt);
+                } else {
+                    let axis = self.rotation[row] * Vec3::unit_y();
+                    let spin = axis * self.spin[row].dot(axis);
+                    self.rotation[row] = turned(self.rotation[row], spin, dt);
+                }
+            }
             return;
         }
         for (rotation, spin) in self.rotation.iter_mut().zip(&self.spin) {

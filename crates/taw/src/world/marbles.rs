@@ -141,7 +141,7 @@ pub struct Marbles<S> {
     /// Only of this step.
     pub(super) torque: Optional<Bivector<S>>,
     pub(super) integrator: Optional<Integrator>,
-    rotation_model: Optional<Rotation>,
+    pub(super) rotation_model: Optional<Rotation>,
     pub(super) material: Optional<Material<S>>,
 }
 

@@ -334,13 +334,12 @@ impl<S: Scalar> World<S> {
                 self.velocity_before.extend_from_slice(self.marbles.velocity());
             }
             self.marbles.integrate(drive, &mut self.stopped);
-            self.stop_at_walls();
-            self.stop_where_they_meet();
+            self.sweep_ways(dt);
         }
         if !(self.model.response == Response::EventDriven
             && self.model.rotation == Rotation::Dynamic)
         {
-            self.marbles.turn(dt);
+            self.marbles.turn(dt, self.model.rotation);
         }
         self.stop_what_is_not_finite();
         self.reach = match self.model.response {
@@ -365,6 +364,7 @@ impl<S: Scalar> World<S> {
         self.touch_walls(self.reach);
         self.touch_marbles(self.reach);
         self.touch_on_the_way();
+        self.keep_stops_that_touch();
     }
 
     /// The third verb: contacts change positions and velocities back to what the

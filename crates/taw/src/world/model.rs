@@ -43,9 +43,10 @@ pub enum Detection {
     Discrete,
     /// On the way through the substep too (continuous collision detection), so that nothing
     /// tunnels. Marbles that move against each other or a wall by more than half of their radius
-    /// in a substep stop where they first touch, with the velocity and the normal that they have
-    /// there, and lose what was left of their time. Others lose none. Costs next to nothing
-    /// where nothing is fast.
+    /// in a substep stop where they first touch. What lies or slides there goes on along the surface;
+    /// what bounces has the velocity and the normal of that moment, slides on along a wall, and
+    /// against another marble loses what was left of its time. Others lose none. Costs next to
+    /// nothing where nothing is fast.
     ///
     /// [`Response::EventDriven`] always does, and loses nothing. By [`Response::Penalty`] only
     /// walls stop marbles, once they are half of their radius deep.

@@ -24,7 +24,7 @@ pub fn shrink(case: &Case, invariant: Invariant, try_for: std::time::Duration) -
         }
         run_for(case, Some(invariant), &Pulse::default()).failure().map(|failure| failure.step)
     };
-    shrink_by(case, &mut fails)
+    shrink_by(&Case { broke: Some(invariant), ..case.clone() }, &mut fails)
 }
 
 /// Leaves out and simplifies for as long as `fails` gives the step of a failure.
@@ -72,6 +72,9 @@ fn attempt(
 fn leave_out(best: &mut Case, fails: &mut dyn FnMut(&Case) -> Option<u32>) {
     thin(best, fails, |case| Some(&mut case.scene.marbles));
     thin(best, fails, |case| case.swarm.as_mut().map(|swarm| &mut swarm.balls));
+    if best.broke == Some(Invariant::Closed) {
+        return; // a box without its walls is open
+    }
     thin(best, fails, |case| Some(&mut case.scene.walls));
     thin(best, fails, |case| Some(&mut case.scene.structures));
     thin(best, fails, |case| Some(&mut case.scene.fields));

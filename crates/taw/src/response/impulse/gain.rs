@@ -3,7 +3,7 @@
 //! and applications*, 1985): such collisions rebound less. And what iterations leave undone, or
 //! remember wrongly from the last substep, must not gain either.
 
-use cgmath::InnerSpace;
+use cgmath::{InnerSpace, Zero};
 
 use super::islands::Islands;
 use super::solve::solve;
@@ -175,7 +175,10 @@ impl<S: Scalar> Columns<'_, S> {
             self.add_twist(c, -c.twist());
             c.resistance = None;
             friction.push(std::mem::replace(&mut c.friction, S::zero()));
-            (c.rebound, c.slide) = (c.still(), c.lag - c.normal * c.lag.dot(c.normal));
+            (c.rebound, c.slide) = (
+                c.still(),
+                if c.bounces { c.lag - c.normal * c.lag.dot(c.normal) } else { Vec3::zero() },
+            );
         }
         islands.begin_again(|island| gaining[island]);
         solve(self, constraints, islands, settings);

@@ -5,9 +5,6 @@ use cgmath::InnerSpace;
 use super::Constraint;
 use crate::math::{Scalar, Vec3};
 
-/// Where a sweep has less than this part of the energy of the one before, sweeps alone
-/// are quick enough.
-const SLOW: f64 = 0.6;
 /// How much a contact gives way beyond what its marbles do, as a part of that, in units of the
 /// scalar's rounding. So a search never goes far along impulses that cancel in all but rounding:
 /// two walls that press a ball from both sides, each with friction. Sixteen roundings are what
@@ -87,21 +84,34 @@ pub(super) struct Island<S> {
     /// The largest change of a velocity in this sweep and in the last, in m/s.
     pub change: S,
     residual: S,
-    /// The energy of all changes in this sweep and in the last.
-    pub squared: S,
-    last: S,
     /// True once the contacts have what they ask for.
     pub agrees: bool,
     /// True if iterations ended before that, even if a later solution agreed.
     pub gave_up: bool,
-    /// Whether it pays to go further, and which part of the way before to keep.
+    /// Whether it pays to go further.
     pub searches: bool,
-    pub kept: S,
-    /// Whether the way leaves the cones of its contacts.
-    pub bends: bool,
-    /// The energy that a unit of the way gains at first, and what it costs.
-    wish: S,
-    cost: S,
+    search: Search<S>,
+}
+
+/// Directions that a search looks along: the last sweep, and the ways that it went before.
+pub(super) const DIRECTIONS: usize = 3;
+
+/// A search for the impulses, of all that are some of each direction, that bring an island nearest
+/// to what its contacts ask for.
+#[derive(Clone, Copy, Debug)]
+struct Search<S> {
+    /// The energy that a unit of each direction gains at first, and what each costs beside each.
+    wish: [S; DIRECTIONS],
+    cost: [[S; DIRECTIONS]; DIRECTIONS],
+    /// How much of each is best.
+    parts: [S; DIRECTIONS],
+    /// Which part of that way the first contact can go that comes to bear nothing on it.
+    short: S,
+    /// Whether friction bends the way.
+    slips: bool,
+    /// The energy that a unit of the way within the cones gains at first, and what it costs.
+    bent_wish: S,
+    bent_cost: S,
 }
 
 impl<S: Scalar> Islands<S> {
@@ -138,7 +148,7 @@ impl<S: Scalar> Islands<S> {
         for (number, island) in self.list.iter_mut().enumerate() {
             island.gave_up |= !island.agrees;
             island.agrees = !which(number);
-            (island.last, island.searches, island.kept) = (S::zero(), false, S::zero());
+            island.searches = false;
         }
     }
 
@@ -161,16 +171,9 @@ impl<S: Scalar> Islands<S> {
             // What is left is beyond what the next sweep could still see.
             island.agrees = island.change <= enough;
             // Near the end the sweeps alone come to rest, which the search does not quite.
-            let ratio = island.squared / island.last;
-            let slow = ratio >= S::constant(SLOW) || ratio.is_nan();
-            island.searches =
-                slow && !island.agrees && island.change > bounce_speed * S::constant(1e-5);
-            // Where the steps grow, it starts anew.
-            island.kept = if ratio < S::one() { ratio } else { S::zero() };
-            island.last = island.squared;
+            island.searches = !island.agrees && island.change > bounce_speed * S::constant(1e-5);
             island.residual = island.change;
-            island.bends = false;
-            (island.change, island.squared) = (S::zero(), S::zero());
+            island.change = S::zero();
         }
         self.list.iter().all(|island| island.agrees)
     }
@@ -187,15 +190,10 @@ impl<S: Scalar> Island<S> {
             since: zero,
             change: zero,
             residual: zero,
-            squared: zero,
-            last: zero,
             agrees: false,
             gave_up: false,
             searches: false,
-            kept: zero,
-            bends: false,
-            wish: zero,
-            cost: zero,
+            search: Search::new(),
         }
     }
 
@@ -212,21 +210,131 @@ impl<S: Scalar> Island<S> {
         (twist / self.speed).dot(spin / self.speed) * self.mobility
     }
 
-    /// Begins to sum up a way.
-    pub fn begin_way(&mut self) {
-        (self.wish, self.cost) = (S::zero(), S::zero());
+    /// Begins a search.
+    pub fn begin_search(&mut self) {
+        self.search = Search::new();
     }
 
-    /// Adds what a contact's part of the way gains and costs, if it gives this velocity.
-    pub fn count_way(&mut self, c: &Constraint<S>, given: Vec3<S>) {
-        self.wish += self.energy(c, c.way, c.wanted);
-        let more = c.way * (S::epsilon() * S::constant(YIELD));
-        self.cost += self.energy(c, c.way, given + more);
+    /// Adds what a contact's part of each direction gains and costs.
+    pub fn count_directions(&mut self, c: &Constraint<S>) {
+        let more = S::epsilon() * S::constant(YIELD);
+        for (row, way) in c.ways.iter().enumerate() {
+            self.search.wish[row] += self.energy(c, *way, c.wanted);
+            self.search.cost[row][row] += self.energy(c, *way, *way) * more;
+            for (column, given) in c.given.iter().enumerate().take(row + 1) {
+                self.search.cost[row][column] += self.energy(c, *way, *given);
+            }
+        }
     }
 
-    /// How far it is best to go along the way, in units of it; never back.
-    pub fn far(&self) -> S {
-        let far = self.wish / self.cost;
-        if far > S::zero() && far.is_finite() { far } else { S::zero() }
+    /// Finds how much of each direction is best.
+    pub fn choose_parts(&mut self) {
+        self.search.choose_parts();
+    }
+
+    /// Those parts of some vectors, one for each direction.
+    pub fn combine(&self, of: &[Vec3<S>; DIRECTIONS]) -> Vec3<S> {
+        let parts = self.search.parts;
+        of[0] * parts[0] + of[1] * parts[1] + of[2] * parts[2]
+    }
+
+    /// Notes that the way leaves a contact's cone at this part of it, or that friction bends it.
+    pub fn count_cone(&mut self, leaves: S, slips: bool) {
+        self.search.short = self.search.short.min(leaves);
+        self.search.slips |= slips;
+    }
+
+    /// Adds what a contact's part of the way within the cones gains and costs, if it gives this
+    /// velocity.
+    pub fn count_bent(&mut self, c: &Constraint<S>, way: Vec3<S>, given: Vec3<S>) {
+        self.search.bent_wish += self.energy(c, way, c.wanted);
+        let more = way * (S::epsilon() * S::constant(YIELD));
+        self.search.bent_cost += self.energy(c, way, given + more);
+    }
+
+    /// Which part to go of the way within the cones, or of the straight way to where the first
+    /// contact bears nothing any more: whichever lowers the energy more.
+    pub fn go(&self) -> Go<S> {
+        self.search.go()
+    }
+}
+
+/// How far to go, as a part.
+#[derive(Clone, Copy, Debug)]
+pub(super) enum Go<S> {
+    Bent(S),
+    Straight(S),
+}
+
+impl<S: Scalar> Search<S> {
+    fn new() -> Self {
+        let zero = S::zero();
+        Self {
+            wish: [zero; DIRECTIONS],
+            cost: [[zero; DIRECTIONS]; DIRECTIONS],
+            parts: [zero; DIRECTIONS],
+            short: S::infinity(),
+            slips: false,
+            bent_wish: zero,
+            bent_cost: zero,
+        }
+    }
+
+    /// Solves `cost · parts = wish` (Cholesky 1910), without directions that say nothing that others
+    /// do not.
+    fn choose_parts(&mut self) {
+        let (cost, zero) = (self.cost, S::zero());
+        let mut root = [[zero; DIRECTIONS]; DIRECTIONS];
+        let mut parts = [zero; DIRECTIONS];
+        for row in 0..DIRECTIONS {
+            for column in 0..row {
+                let known = (0..column).fold(zero, |sum, k| sum + root[row][k] * root[column][k]);
+                let pivot = root[column][column];
+                if pivot > zero {
+                    root[row][column] = (cost[row][column] - known) / pivot;
+                }
+            }
+            let known = (0..row).fold(zero, |sum, k| sum + root[row][k] * root[row][k]);
+            let pivot = cost[row][row] - known;
+            if pivot > cost[row][row] * S::epsilon() * S::constant(YIELD) && pivot.is_finite() {
+                let known = (0..row).fold(zero, |sum, k| sum + root[row][k] * parts[k]);
+                root[row][row] = pivot.sqrt();
+                parts[row] = (self.wish[row] - known) / root[row][row];
+            } else {
+                root[row] = [zero; DIRECTIONS];
+            }
+        }
+        for row in (0..DIRECTIONS).rev() {
+            let pivot = root[row][row];
+            if pivot > zero {
+                let known =
+                    (row + 1..DIRECTIONS).fold(zero, |sum, k| sum + root[k][row] * parts[k]);
+                parts[row] = (parts[row] - known) / pivot;
+            }
+        }
+        if parts.iter().all(|part| part.is_finite()) {
+            self.parts = parts;
+        }
+    }
+
+    fn go(&self) -> Go<S> {
+        let half = S::constant(0.5);
+        let gain = |part: S, wish: S, cost: S| part * wish - part * part * cost * half;
+        let bent = self.bent_wish / self.bent_cost;
+        let bent = if bent > S::zero() { bent.min(S::one()) } else { S::zero() };
+        let (mut wish, mut cost) = (S::zero(), S::zero());
+        for row in 0..DIRECTIONS {
+            wish += self.parts[row] * self.wish[row];
+            for column in 0..DIRECTIONS {
+                let of_both = self.cost[row.max(column)][row.min(column)];
+                cost += self.parts[row] * self.parts[column] * of_both;
+            }
+        }
+        let gains_bent = gain(bent, self.bent_wish, self.bent_cost);
+        if !self.slips && self.short < S::one() && gain(self.short, wish, cost) > gains_bent {
+            Go::Straight(self.short)
+        } else {
+            Go::Bent(bent)
+        }
     }
 }

@@ -11,12 +11,12 @@ use cgmath::{InnerSpace, Zero};
 
 use crate::contact::{Contact, Contacts};
 use crate::math::{
-    Point3, Scalar, Vec3, any_direction, cast_vector, direction_and_length, is_finite,
+    Mat3, Point3, Scalar, Vec3, any_direction, cast_vector, direction_and_length, is_finite,
 };
 use crate::response::{BallSpin, Columns, Material, Mobility, Push, Work};
 use gain::{Ledger, Rebound};
 pub(super) use islands::Groups;
-use islands::Islands;
+use islands::{DIRECTIONS, Islands};
 use prepare::prepare;
 use solve::solve;
 
@@ -38,8 +38,9 @@ pub(crate) struct Start<'a, S> {
     pub position: &'a [Point3<S>],
     /// Before forces changed it, in m/s.
     pub velocity: &'a [Vec3<S>],
-    /// Which rows were stopped within the substep, and no longer follow.
-    pub stands: &'a [bool],
+    /// For rows that were stopped within the substep, the part of a change of velocity that their
+    /// positions still follow, per substep; empty if none was.
+    pub stands: &'a [Option<Mat3<S>>],
 }
 
 pub(crate) struct Settings<S> {
@@ -88,6 +89,7 @@ pub(crate) struct Scratch<S> {
     islands: Islands<S>,
     ledgers: Vec<Ledger<S>>,
     rebounds: Vec<Rebound<S>>,
+    gaps: Vec<S>,
 }
 
 impl<S: Scalar> Scratch<S> {
@@ -206,10 +208,10 @@ pub(super) struct Constraint<S> {
     grip: Vec3<S>,
     /// The least that the pressure may be.
     least: S,
-    /// What the last sweep changed of them, the way on which the solver searches, and the
-    /// change of velocity that was wanted where it began.
-    step: Vec3<S>,
-    way: Vec3<S>,
+    /// What the last sweep changed of them and the ways that the search went before, and what
+    /// velocity each gives; and the change of velocity that was wanted where the search began.
+    ways: [Vec3<S>; DIRECTIONS],
+    given: [Vec3<S>; DIRECTIONS],
     wanted: Vec3<S>,
     resistance: Option<Resistance<S>>,
 }
@@ -308,7 +310,7 @@ pub(crate) fn impulse<S: Scalar>(
 ) {
     contacts.sort();
     let settings = around.settings;
-    let Scratch { before, constraints, islands, ledgers, rebounds } = scratch;
+    let Scratch { before, constraints, islands, ledgers, rebounds, gaps } = scratch;
     before.clear();
     before.extend_from_slice(marbles.velocity);
     prepare(marbles, contacts, around, constraints, islands);
@@ -317,7 +319,7 @@ pub(crate) fn impulse<S: Scalar>(
     solve(marbles, constraints, islands, settings);
     marbles.gain_nothing(constraints, islands, ledgers, rebounds, settings);
     marbles.follow(before, constraints, around);
-    marbles.push_apart(constraints, around);
+    marbles.push_apart(constraints, around, gaps);
     remember(constraints, warm);
     marbles.stop_what_overflowed(constraints, stopped);
 }

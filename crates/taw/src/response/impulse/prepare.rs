@@ -2,10 +2,10 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::islands::{Island, Islands};
+use super::islands::{DIRECTIONS, Island, Islands};
 use super::{Around, Before, Constraint, First, Walls};
 use crate::contact::Contacts;
-use crate::math::{Scalar, Vec3, direction_and_length};
+use crate::math::{Mat3, Scalar, Vec3, direction_and_length};
 use crate::response::{Columns, Material};
 
 /// Finds what each contact asks for, those with walls first, and which are of one island.
@@ -95,12 +95,14 @@ impl<S: Scalar> Columns<'_, S> {
             slide: zero,
             pressure: S::zero(),
             grip: zero,
-            step: zero,
-            way: zero,
+            ways: [zero; DIRECTIONS],
+            given: [zero; DIRECTIONS],
             wanted: zero,
             resistance: self.resistance(a, b, material),
         };
         constraint.begin_turning = self.turning(&constraint);
+        let since = around.follows(a, b) - around.ahead(&constraint);
+        constraint.lag = self.pull(&constraint, around) * since;
         // What was stopped on its way touches, whatever rounding says.
         let stands = around.stands(b) || a.marble().is_some_and(|a| around.stands(a));
         if fast && (gap < S::zero() || stands) && dt > S::zero() {
@@ -264,7 +266,19 @@ where
 
     /// Whether a row was stopped within the substep.
     pub(in crate::response) fn stands(&self, row: usize) -> bool {
-        self.start.stands.get(row).copied().unwrap_or(false)
+        self.stopped(row).is_some()
+    }
+
+    /// For a row that was stopped within the substep, the part of a change of velocity that its
+    /// position still follows, per substep.
+    fn stopped(&self, row: usize) -> Option<Mat3<S>> {
+        self.start.stands.get(row).copied().flatten()
+    }
+
+    /// How far a position follows a change of velocity, in metres.
+    pub(in crate::response) fn follow(&self, row: usize, change: Vec3<S>) -> Vec3<S> {
+        let way = change * (self.follow)(row) * self.settings.dt;
+        self.stopped(row).map_or(way, |along| along * way)
     }
 
     /// The time for which a position follows a change of velocity, in seconds.

@@ -2,7 +2,7 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::islands::{Island, Islands};
+use super::islands::{DIRECTIONS, Go, Island, Islands};
 use super::{Constraint, Settings};
 use crate::math::{Scalar, Vec3, is_finite, length};
 use crate::response::Columns;
@@ -12,10 +12,11 @@ use crate::response::impact::at_most;
 /// islands that do not agree yet.
 ///
 /// Sweep by sweep alone (Gauss and Seidel), a heavy marble on a light one would take as
-/// many sweeps as it is times as heavy. So after each sweep the solver goes on along the
-/// way that it went, as far as that makes things better (as conjugate gradients do;
-/// Silcowitz, Niebe and Erleben, *A nonsmooth nonlinear conjugate gradient method for
-/// interactive contact force problems*, 2010, there without the search for how far).
+/// many sweeps as it is times as heavy. So after each sweep the solver looks, of all impulses that
+/// are some of this sweep and some of the ways that it went before, for the best ones: sweeps as
+/// preconditioner of a search in a small subspace, as in Anderson's mixing (*Iterative procedures
+/// for nonlinear integral equations*, 1965) and, for contacts, Silcowitz, Niebe and Erleben, *A
+/// nonsmooth nonlinear conjugate gradient method for interactive contact force problems*, 2010.
 ///
 /// With `f` the impulses, `A f` the change of velocity that they make at the contacts and `w`
 /// the change that the contacts ask for, sweeps and searches lower `½ f·A f − f·w`, the
@@ -34,12 +35,11 @@ pub(super) fn solve<S: Scalar>(
             islands.solved += 1;
             let before = c.impulse();
             let change = marbles.solve(c);
-            c.step = c.impulse() - before;
+            c.ways[0] = c.impulse() - before;
             let island = islands.of_mut(c);
             if change > island.change && change > marbles.rounding(c) {
                 island.change = change;
             }
-            island.squared += island.energy(c, c.step, c.step);
         }
         let last = sweep + 1 == settings.iterations;
         if islands.end_sweep(settings.bounce_speed, settings.enough) || last {
@@ -56,6 +56,18 @@ impl<S: Scalar> Constraint<S> {
         let along = impulse.dot(self.normal);
         let pressure = along.max(self.least);
         (pressure, at_most(impulse - self.normal * along, self.hold(pressure)))
+    }
+
+    /// As much of a change of its impulse as it can bear.
+    fn way_within_cone(&self, way: Vec3<S>) -> Vec3<S> {
+        let (pressure, grip) = self.within_cone(self.impulse() + way);
+        self.normal * (pressure - self.pressure) + (grip - self.grip)
+    }
+
+    /// Up to which part of a change of its impulse it still pushes.
+    fn bears_until(&self, way: Vec3<S>) -> S {
+        let along = way.dot(self.normal);
+        if along < S::zero() { (self.least - self.pressure) / along } else { S::infinity() }
     }
 
     /// What friction can be at most beside this pressure.
@@ -99,62 +111,60 @@ impl<S: Scalar> Columns<'_, S> {
         change.magnitude()
     }
 
-    /// Goes on along the last step and a part of the way before, to where that brings the
-    /// contacts of each island nearest to what they ask for.
+    /// Goes on from a sweep: along it and the ways before, as far along each as brings the contacts
+    /// of each island nearest to what they ask for.
     fn go_on(&mut self, constraints: &mut [Constraint<S>], islands: &mut Islands<S>) {
+        islands.list.iter_mut().for_each(Island::begin_search);
         for c in constraints.iter_mut() {
             let Some(island) = islands.searching(c) else { continue };
-            c.way = c.way * island.kept + c.step;
             if c.pressure <= S::zero() {
-                c.way = Vec3::zero(); // it parts, and bears nothing
+                c.ways = [Vec3::zero(); DIRECTIONS]; // it parts, and bears nothing
             } else if island.bounces
                 || length(c.grip) >= c.hold(c.pressure) * (S::one() - S::epsilon())
             {
                 // It slides, whichever way it does. Or rebounds ask for what friction in a
                 // corner cannot give, and both would grow against each other without end.
-                c.way = c.normal * c.way.dot(c.normal);
+                c.ways = c.ways.map(|way| c.normal * way.dot(c.normal));
             }
             c.wanted = self.wanted(c);
         }
         for c in constraints.iter().filter(|c| islands.of(c).searches) {
-            self.hit_both(c, c.way);
-        }
-        self.look_along_the_way(constraints, islands);
-        // Back into the cones: what a contact cannot bear would throw others about. That bends
-        // the way, so it is looked along anew.
-        let mut bends = false;
-        for c in constraints.iter_mut() {
-            let Some(island) = islands.searching(c) else { continue };
-            let far = c.way * island.far();
-            let (pressure, grip) = c.within_cone(c.impulse() + far);
-            let way = c.normal * (pressure - c.pressure) + (grip - c.grip);
-            let bend = length(way - far) > (c.pressure + length(far)) * S::epsilon();
-            island.bends |= bend;
-            bends |= bend;
-            self.hit_both(c, way - c.way);
-            c.way = way;
-        }
-        if bends {
-            self.look_along_the_way(constraints, islands);
+            self.hit_both(c, c.ways[0]);
         }
         for c in constraints.iter_mut() {
             let Some(island) = islands.searching(c) else { continue };
-            let part = if island.bends { island.far().min(S::one()) } else { S::one() };
-            let way = c.way * part;
-            self.hit_both(c, way - c.way);
+            c.given[0] = c.wanted - self.wanted(c);
+            island.count_directions(c);
+        }
+        islands.list.iter_mut().for_each(Island::choose_parts);
+        // Within the cones: what a contact cannot bear would throw others about.
+        for c in constraints.iter_mut() {
+            let Some(island) = islands.searching(c) else { continue };
+            let (far, given) = (island.combine(&c.ways), island.combine(&c.given));
+            let way = c.way_within_cone(far);
+            let bend = way - far;
+            let across = bend - c.normal * bend.dot(c.normal);
+            let rounding = (c.pressure + length(far)) * S::epsilon();
+            island.count_cone(c.bears_until(far), length(across) > rounding);
+            self.hit_both(c, way - c.ways[0]);
+            // The oldest way makes room.
+            (c.ways, c.given) = ([far, way, c.ways[1]], [given, Vec3::zero(), c.given[1]]);
+        }
+        for c in constraints.iter_mut() {
+            let Some(island) = islands.searching(c) else { continue };
+            c.given[1] = c.wanted - self.wanted(c);
+            island.count_bent(c, c.ways[1], c.given[1]);
+        }
+        for c in constraints.iter_mut() {
+            let Some(island) = islands.searching(c) else { continue };
+            let (way, given) = match island.go() {
+                Go::Bent(part) => (c.ways[1] * part, c.given[1] * part),
+                Go::Straight(part) => (c.ways[0] * part, c.given[0] * part),
+            };
+            self.hit_both(c, way - c.ways[1]);
             // Between two points of a cone lies nothing outside of it, but for rounding.
             (c.pressure, c.grip) = c.within_cone(c.impulse() + way);
-            c.way = way;
-        }
-    }
-
-    /// Sums up, for each island that searches, how far it is best to go along the way, which
-    /// the marbles have gone.
-    fn look_along_the_way(&self, constraints: &[Constraint<S>], islands: &mut Islands<S>) {
-        islands.list.iter_mut().for_each(Island::begin_way);
-        for c in constraints {
-            let Some(island) = islands.searching(c) else { continue };
-            island.count_way(c, c.wanted - self.wanted(c));
+            (c.ways[1], c.given[1]) = (way, given);
         }
     }
 

@@ -10,6 +10,8 @@ use crate::storm::case::{Case, Kind};
 /// Who comes, and where to.
 pub struct Crowd {
     pub kind: Kind,
+    /// Whether contacts feel spins.
+    pub spins: bool,
     pub size: f64,
     pub floor: bool,
     pub low: [f64; 3],
@@ -83,6 +85,12 @@ impl Crowd {
                 ball.half_length = 0.0;
             }
             return;
+        }
+        // A spin that nobody feels would turn capsules into what they lie on.
+        if !self.spins {
+            for ball in balls.iter_mut().filter(|ball| ball.half_length > 0.0) {
+                ball.spin = [0.0; 3];
+            }
         }
         let swarm = matches!(self.kind, Kind::SwarmLab | Kind::SwarmFull);
         if self.kind == Kind::EventDriven || swarm || dice.chance(0.8) {

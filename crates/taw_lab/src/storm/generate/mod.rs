@@ -29,6 +29,7 @@ pub fn generate(name: Name) -> Case {
     case.scene.surface = surface(&mut dice);
     let crowd = Crowd {
         kind: name.kind,
+        spins: case.model.rotation == Rotation::Dynamic,
         size: arena.size,
         floor: arena.floor,
         low: arena.low,

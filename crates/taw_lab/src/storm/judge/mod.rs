@@ -184,6 +184,12 @@ impl Rules {
         matches!(self.kind, Kind::SpringDashpot | Kind::HertzMindlin)
     }
 
+    /// Whether contacts are looked for at the end of substeps only.
+    #[must_use]
+    pub fn discrete(&self) -> bool {
+        matches!(self.kind, Kind::Displacement | Kind::Impulse)
+    }
+
     /// Whether what meets on the way stops there and loses the rest of its way.
     #[must_use]
     pub fn swept(&self) -> bool {
@@ -215,7 +221,7 @@ fn softest(case: &Case) -> f64 {
 pub struct Bench {
     rules: Rules,
     closed: Option<[[f64; 3]; 2]>,
-    /// Whose centre was not inside the closed box at the beginning.
+    /// Who may be outside of the closed box.
     outside: Vec<bool>,
     energy: energy::Ledger,
     flight: flight::Falls,
@@ -261,6 +267,9 @@ impl Bench {
         findings.extend(self.flight.judge(rules, before, after, &near));
         findings.extend(self.rest.judge(rules, before, after));
         findings.push(overlap::overlap(rules, before, after, [self.begin, self.fastest]));
+        if rules.discrete() {
+            overlap::forget_the_fast(rules, after, &mut self.outside);
+        }
         let closed = |corners| overlap::closed(rules, after, self.fastest, &self.outside, corners);
         findings.extend(self.closed.map(closed));
         findings

@@ -104,6 +104,14 @@ pub fn overlap(
     worst
 }
 
+/// Takes out of a box's inmates who moves by more than half of its radius in a substep: where
+/// contacts are looked for at the end of substeps only, it may pass walls, as documented.
+pub fn forget_the_fast(rules: &Rules, after: &Snapshot, outside: &mut [bool]) {
+    for (body, outside) in after.bodies.iter().zip(outside) {
+        *outside |= body.velocity.magnitude() * rules.substep > 0.5 * body.radius;
+    }
+}
+
 /// No centre leaves a closed box: walls hold whatever comes at an ordinary speed. The bound is
 /// the rounding of a place; for springs their softness. Of those whose centre was in a wall or
 /// outside when it began, nobody can say that they leave.

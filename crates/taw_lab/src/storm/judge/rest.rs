@@ -25,7 +25,9 @@ impl Lies {
     ///   themselves);
     /// - rounding: that of the velocity, and of two places by the step.
     ///
-    /// The figure is for how many steps in a row that is not so.
+    /// What touches nothing within a fiftieth of its radius before and after, and is so fast that it
+    /// comes to the next thing within the step, may bounce there and back and is not judged. The
+    /// figure is for how many steps in a row that is not so.
     pub fn judge(&mut self, rules: &Rules, before: &Snapshot, after: &Snapshot) -> Vec<Finding> {
         self.wrong.resize(after.bodies.len(), 0);
         let gravity = after.gravity().magnitude();
@@ -45,7 +47,10 @@ impl Lies {
             let bent = if rules.moving { 0.05 * new.carried } else { 0.0 };
             let bound =
                 changed + 0.01 * gravity * rules.step + rounding + bent + overlap / rules.step;
-            let wrong = (moved - new.velocity).magnitude() > bound;
+            let gaps = [before, after].map(|snapshot| Self::gap(snapshot, i));
+            let lies = gaps.iter().all(|gap| *gap <= 0.02 * new.radius);
+            let fast = new.velocity.magnitude() * rules.step > gaps[0].min(gaps[1]);
+            let wrong = (moved - new.velocity).magnitude() > bound && (lies || !fast);
             self.wrong[i] = if wrong { self.wrong[i] + 1 } else { 0 };
             // Balls that move apart by half whatever comes lie only where their heap lets them.
             let heap = rules.kind == Kind::SwarmLab;
@@ -55,6 +60,13 @@ impl Lies {
             }
         }
         vec![worst, self.hang(rules, before, after)]
+    }
+
+    /// How far the next thing is from a body, at least, in metres.
+    fn gap(snapshot: &Snapshot, body: usize) -> f64 {
+        let others = (0..snapshot.bodies.len()).filter(|other| *other != body);
+        let gaps = others.map(|other| -snapshot.depth(body, other));
+        gaps.fold(snapshot.bodies[body].wall_gap, f64::min)
     }
 
     /// What does not fall is held by something that it touches: before and after a step, there is
@@ -81,10 +93,7 @@ impl Lies {
         for i in 0..count {
             let (old, new) = (&before.bodies[i], &after.bodies[i]);
             let held = (new.velocity - old.velocity - gravity * rules.step).magnitude();
-            let gap = |snapshot: &Snapshot| {
-                let others = (0..count).filter(|j| *j != i).map(|j| -snapshot.depth(i, j));
-                others.fold(snapshot.bodies[i].wall_gap, f64::min)
-            };
+            let gap = |snapshot: &Snapshot| Self::gap(snapshot, i);
             let way = old.velocity.magnitude().max(new.velocity.magnitude()) * rules.step;
             let reach = (0.02 * new.radius).max(3.0 * g * rules.substep * rules.substep).max(way);
             let falls = held < 0.5 * g * rules.step || gap(before).min(gap(after)) <= reach;
