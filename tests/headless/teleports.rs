@@ -101,3 +101,26 @@ fn a_lift_is_as_fast_as_it_is_at_any_frame_rate() {
         assert!((0.1..1.2).contains(&height), "{rate} frames a second: {height} m above");
     }
 }
+
+#[test]
+fn a_lift_carries_its_load_in_any_number_of_substeps() {
+    for substeps in [1, 2, 4] {
+        for response in [Response::Impulse, Response::EventDriven, Response::Displacement] {
+            let mut app = scene::app();
+            app.insert_resource(TawModel(Model { response, substeps, ..Model::default() }));
+            let lift = scene::floor(&mut app);
+            let ball = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
+            let soft = SurfaceMaterial { restitution: 0.0, ..default() };
+            app.world_mut().entity_mut(ball).insert((Velocity::default(), soft));
+            scene::frames(&mut app, 20);
+            for _ in 0..30 {
+                app.world_mut().get_mut::<Transform>(lift).unwrap().translation.y += 1.0 * STEP;
+                app.update();
+            }
+            let speed = app.world().get::<Velocity>(ball).unwrap().y;
+            assert!((speed - 1.0).abs() < 0.01, "{response:?}, {substeps}: {speed} m/s");
+            let height = scene::position(&app, ball).y - scene::position(&app, lift).y;
+            assert!((height - 0.5).abs() < 2e-3, "{response:?}, {substeps}: {height} m above");
+        }
+    }
+}

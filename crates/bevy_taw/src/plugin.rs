@@ -170,11 +170,12 @@ fn run_substeps(world: &mut World) {
     world.resource_mut::<SubstepDelta>().0 = delta;
     // Only a substep of this very schedule could be without it.
     let _ = world.try_schedule_scope(Substep, |world, schedule| {
-        for _ in 0..substeps {
+        for after in (0..substeps).rev() {
+            world.resource_mut::<TawWorld>().begin_substep(delta * after as f32);
             schedule.run(world);
         }
     });
-    world.resource_mut::<TawWorld>().marbles.clear_forces();
+    world.resource_mut::<TawWorld>().end_step();
 }
 
 fn integrate(mut world: ResMut<TawWorld>, delta: Res<SubstepDelta>, mut times: ResMut<StepTimes>) {

@@ -1,7 +1,9 @@
 //! Swept detection: what is fast does not pass through what it meets.
 
 use proptest::prelude::*;
+use taw::math::Quat;
 use taw::prelude::*;
+use taw::shape::{Mesh, Obb};
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -254,5 +256,108 @@ fn a_radius_that_grows_throws_nobody() {
             highest = highest.max(world.marbles.get(id).unwrap().position.y);
         }
         assert!(highest < 2.01, "{response:?}: {highest} m");
+    }
+}
+
+/// A slope of 1 in 20 down toward +x, of flush triangles in cells of 8 mm, or of a half-space.
+fn slope(flush: bool) -> World<f32> {
+    let mut world = World::default();
+    let (response, rotation) = (Response::Impulse, Rotation::Dynamic);
+    world.set_model(Model { response, rotation, ..Model::default() }).unwrap();
+    if !flush {
+        let wall = Plane::through(Point3::new(0.0, 0.0, 0.0), Vec3::new(0.05, 1.0, 0.0)).unwrap();
+        world.walls.insert(wall).unwrap();
+        return world;
+    }
+    let (cells, rows) = (500_u32, 3_u32);
+    let corner = |i: u32, j: u32| {
+        let x = 0.008 * i as f32;
+        Point3::new(x, -0.05 * x, 0.03 * (j as f32 - 1.5))
+    };
+    let points = (0..=cells).flat_map(|i| (0..=rows).map(move |j| corner(i, j))).collect();
+    let at = |i: u32, j: u32| i * (rows + 1) + j;
+    let cell = |i, j| {
+        let [a, b, c, d] = [at(i, j), at(i, j + 1), at(i + 1, j), at(i + 1, j + 1)];
+        [[a, b, c], [b, d, c]]
+    };
+    let triangles = (0..cells).flat_map(|i| (0..rows).flat_map(move |j| cell(i, j))).collect();
+    world.walls.insert(Mesh::new(points, triangles).unwrap()).unwrap();
+    world
+}
+
+#[test]
+fn small_balls_roll_over_flush_triangles_as_over_a_plane() {
+    for radius in [0.002_f32, 0.003, 0.005, 0.01] {
+        let speed = |flush: bool| {
+            let mut world = slope(flush);
+            let material = Some(Material { friction: 0.5, ..Material::default() });
+            let at = Point3::new(0.05, -0.0025 + 1.002 * radius, 0.003);
+            let id = world.marbles.insert(Marble { material, ..Marble::new(at, radius) }).unwrap();
+            for _ in 0..120 {
+                world.step(DT).unwrap();
+            }
+            world.marbles.get(id).unwrap().velocity.x
+        };
+        let (flush, plane) = (speed(true), speed(false));
+        assert!((flush - plane).abs() < 1e-3 * plane, "{radius} m: {flush} for {plane} m/s");
+        // Five sevenths of g sin α, as it rolls.
+        assert!((plane - 9.81 * 0.05 * 5.0 / 7.0 * 2.0).abs() < 0.02, "{radius} m: {plane} m/s");
+    }
+}
+
+#[test]
+fn bounces_do_not_carry_a_ball_out_of_a_box_of_half_spaces() {
+    let mut random = fastrand::Rng::with_seed(5);
+    for run in 0..200 {
+        let mut world = World::<f64>::default();
+        world.set_gravity(Vec3::zero()).unwrap();
+        world.set_model(Model { response: Response::Impulse, ..Model::default() }).unwrap();
+        for axis in 0..3 {
+            for side in [-1.0, 1.0] {
+                let mut normal = Vec3::zero();
+                normal[axis] = side;
+                world.walls.insert(Plane::new(normal, -1.0).unwrap()).unwrap();
+            }
+        }
+        let mut any = || 2.0 * random.f64() - 1.0;
+        let at = Point3::new(0.8 * any(), 0.8 * any(), 0.8 * any());
+        let way = Vec3::new(any(), any(), any()).normalize();
+        let speed = [10.0, 100.0, 1000.0, 1e6][run % 4];
+        let material = Some(Material { restitution: 1.0, friction: 0.0, ..Material::default() });
+        let ball = Marble { velocity: way * speed, material, ..Marble::new(at, 0.1) };
+        let id = world.marbles.insert(ball).unwrap();
+        for step in 0..30 {
+            world.step(1.0 / 60.0).unwrap();
+            let at = world.marbles.get(id).unwrap().position;
+            let far = at.x.abs().max(at.y.abs()).max(at.z.abs());
+            assert!(far < 1.0, "run {run}, {speed} m/s: {at:?} after step {step}");
+        }
+    }
+}
+
+#[test]
+fn marbles_taken_out_between_the_verbs_harm_nobody() {
+    for response in RESPONSES {
+        for late in [false, true] {
+            let fast = |z: f32| ([-0.5, 0.0, z], [300.0, 0.0, 0.0]);
+            let (mut world, ids) = world(response, &[fast(0.0), fast(1.0), fast(2.0)]);
+            let wall = Obb::new(
+                Point3::new(0.5, 0.0, 0.0),
+                Quat::new(1.0, 0.0, 0.0, 0.0),
+                Vec3::new(0.1, 9.0, 9.0),
+            );
+            world.walls.insert(wall.unwrap()).unwrap();
+            world.begin_step();
+            world.integrate(DT).unwrap();
+            if late {
+                world.generate_contacts();
+            }
+            world.marbles.remove(ids[0]).unwrap();
+            if !late {
+                world.generate_contacts();
+            }
+            world.restitute(DT).unwrap();
+            assert_eq!(world.marbles.len(), 2, "{response:?}");
+        }
     }
 }

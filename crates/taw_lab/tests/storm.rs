@@ -17,6 +17,9 @@ const G: f64 = 9.81;
 
 /// Regression scenes that fail today: each is taken out of here when its cause is mended.
 const NOT_MENDED_YET: &[&str] = &[
+    // A light ball is wedged between a floor and one 2,000 times as heavy; where something bounces,
+    // the impulse solver searches along normals only, and friction takes more iterations than there are.
+    "swept-pair-before-floor",
     // Balls on a lift overlap deeper than they may; why is not known.
     "swept-stack",
 ];

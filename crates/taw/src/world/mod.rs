@@ -291,16 +291,12 @@ impl<S: Scalar> World<S> {
         let substep = self.substep_of(dt)?;
         self.begin_step();
         for after in (0..self.model.substeps).rev() {
-            self.rest_of_step = substep * S::constant(f64::from(after));
-            if self.model.response != Response::EventDriven {
-                self.walls.go_to(self.rest_of_step);
-            }
+            self.begin_substep(substep * S::constant(f64::from(after)));
             self.integrate(substep)?;
             self.generate_contacts();
             self.restitute(substep)?;
         }
-        self.walls.arrive();
-        self.marbles.clear_forces();
+        self.end_step();
         self.step_swarm(dt, &mut |_| ())
     }
 
@@ -378,6 +374,9 @@ impl<S: Scalar> World<S> {
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
         self.release_what_touches_nothing();
+        if self.model.response == Response::Impulse {
+            self.sweep.begin_bounces(&self.marbles.position);
+        }
         self.count_contacts();
         self.look_at_marbles();
         let (mut columns, material, integrator) =
@@ -456,6 +455,7 @@ impl<S: Scalar> World<S> {
             ),
             Response::EventDriven => self.go_through_events(dt, self.rest_of_step),
         }
+        self.stop_bounces_at_walls();
         self.stop_what_is_not_finite();
         if self.model.rotation != Rotation::None {
             // The deepest contact comes first in the list, so it has the last word.
@@ -529,6 +529,22 @@ impl<S: Scalar> World<S> {
         self.quarantine.named.clear();
         self.impacts.clear();
         self.open_account();
+    }
+
+    /// Begins a substep, after which `rest` seconds of the step are left: walls that were set
+    /// elsewhere and have a motion are where that puts them by then. Whoever calls the verbs one by
+    /// one in several substeps begins each so; without it, walls are at the end of their ways.
+    pub fn begin_substep(&mut self, rest: S) {
+        self.rest_of_step = if rest.is_finite() { rest.max(S::zero()) } else { S::zero() };
+        if self.model.response != Response::EventDriven {
+            self.walls.go_to(self.rest_of_step);
+        }
+    }
+
+    /// Ends a step: walls are at the end of their ways, and forces that were applied are forgotten.
+    pub fn end_step(&mut self) {
+        self.walls.arrive();
+        self.marbles.clear_forces();
     }
 
     /// The grid of the last substep, for drawing it.

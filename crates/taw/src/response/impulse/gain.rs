@@ -185,6 +185,7 @@ impl<S: Scalar> Columns<'_, S> {
         self.rebound_by_impulse(constraints, islands, ledgers, &gaining);
         let those = constraints.iter_mut().filter(|c| gaining[c.island as usize]);
         for (c, friction) in those.zip(friction) {
+            c.pressure = c.pressure.max(S::zero()); // rounding
             (c.least, c.bound) = (c.pressure, friction * c.pressure);
         }
         islands.begin_again(|island| gaining[island]);

@@ -3,7 +3,7 @@
 use cgmath::InnerSpace;
 
 use super::Constraint;
-use crate::math::{Scalar, Vec3};
+use crate::math::{Scalar, Vec3, direction_and_length};
 
 /// How much a contact gives way beyond what its marbles do, as a part of that, in units of the
 /// scalar's rounding. So a search never goes far along impulses that cancel in all but rounding:
@@ -215,12 +215,15 @@ impl<S: Scalar> Island<S> {
         self.search = Search::new();
     }
 
-    /// Adds what a contact's part of each direction gains and costs.
-    pub fn count_directions(&mut self, c: &Constraint<S>) {
+    /// Adds what a contact's part of each direction gains and costs, if the velocities that it gives
+    /// are known to this rounding, in m/s.
+    pub fn count_directions(&mut self, c: &Constraint<S>, rounding: S) {
         let more = S::epsilon() * S::constant(YIELD);
         for (row, way) in c.ways.iter().enumerate() {
+            let Some((direction, _)) = direction_and_length(*way) else { continue };
             self.search.wish[row] += self.energy(c, *way, c.wanted);
-            self.search.cost[row][row] += self.energy(c, *way, *way) * more;
+            let unknown = *way * more + direction * rounding;
+            self.search.cost[row][row] += self.energy(c, *way, unknown);
             for (column, given) in c.given.iter().enumerate().take(row + 1) {
                 self.search.cost[row][column] += self.energy(c, *way, *given);
             }
@@ -296,7 +299,8 @@ impl<S: Scalar> Search<S> {
             }
             let known = (0..row).fold(zero, |sum, k| sum + root[row][k] * root[row][k]);
             let pivot = cost[row][row] - known;
-            if pivot > cost[row][row] * S::epsilon() * S::constant(YIELD) && pivot.is_finite() {
+            // Half of the digits are left to what a direction says that others do not.
+            if pivot > cost[row][row] * S::epsilon().sqrt() && pivot.is_finite() {
                 let known = (0..row).fold(zero, |sum, k| sum + root[row][k] * parts[k]);
                 root[row][row] = pivot.sqrt();
                 parts[row] = (self.wish[row] - known) / root[row][row];

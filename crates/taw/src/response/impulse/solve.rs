@@ -134,7 +134,7 @@ impl<S: Scalar> Columns<'_, S> {
         for c in constraints.iter_mut() {
             let Some(island) = islands.searching(c) else { continue };
             c.given[0] = c.wanted - self.wanted(c);
-            island.count_directions(c);
+            island.count_directions(c, self.rounding(c));
         }
         islands.list.iter_mut().for_each(Island::choose_parts);
         // Within the cones: what a contact cannot bear would throw others about.

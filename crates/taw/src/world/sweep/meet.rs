@@ -222,7 +222,7 @@ impl<S: Scalar> World<S> {
                 row: rows[side] as u32,
                 by: By::Marble(rows[1 - side] as u32),
                 way: motion[side] * rest,
-                change: change[side] * (rest * part),
+                change: if slides { Vec3::zero() } else { change[side] * (rest * part) },
             };
             let left = S::one() - old[side].since;
             let along =

@@ -48,6 +48,8 @@ pub(super) struct Sweep<S> {
     ways: Vec<Way<S>>,
     /// Bends at walls, row by row, in the order of time.
     bends: Vec<Bend<S>>,
+    /// Where marbles were before they followed what contacts changed.
+    bounced_from: Vec<Point3<S>>,
 }
 
 /// A marble that was stopped.
@@ -88,6 +90,9 @@ impl<S: Scalar> World<S> {
 
     /// Lets marbles go on that were stopped by what the user took out of the contacts.
     pub(super) fn release_what_touches_nothing(&mut self) {
+        if self.sweep.start.len() != self.marbles.len() {
+            self.sweep.clear(); // rows have changed
+        }
         if self.sweep.stops.is_empty() {
             return;
         }
@@ -126,6 +131,13 @@ impl<S: Scalar> Sweep<S> {
         self.stops.push(stopped);
     }
 
+    /// Remembers where marbles are before they follow what contacts change of their velocities.
+    pub fn begin_bounces(&mut self, position: &[Point3<S>]) {
+        if self.start.len() == position.len() {
+            self.bounced_from.extend_from_slice(position);
+        }
+    }
+
     /// Forgets the last substep.
     fn clear(&mut self) {
         self.start.clear();
@@ -134,6 +146,7 @@ impl<S: Scalar> Sweep<S> {
         self.stands.clear();
         self.grazes.clear();
         self.bends.clear();
+        self.bounced_from.clear();
     }
 }
 

@@ -1,6 +1,6 @@
 //! Marbles that come to walls on their way.
 
-use cgmath::{InnerSpace, SquareMatrix};
+use cgmath::{InnerSpace, SquareMatrix, Zero};
 use smallvec::SmallVec;
 
 use super::{By, FAST, INTO, MOST_BENDS, Stopped, outer};
@@ -19,6 +19,8 @@ pub(in crate::world) struct Stop<S> {
     pub time: S,
     pub wall: u32,
     pub normal: Vec3<S>,
+    /// How far it is from the wall there, in metres.
+    gap: S,
 }
 
 /// A bend of a way at a wall.
@@ -56,8 +58,9 @@ impl<S: Scalar> World<S> {
     /// [`Response::Penalty`](crate::response::Response::Penalty), whose forces need an overlap, where
     /// half of its radius does. What is left of its way, and of what forces change of its velocity,
     /// it keeps along the surface, as games' "collide and slide" does (Fauerby, *Improved collision
-    /// detection and response*, 2003). Where it comes faster than `slow`, in metres per substep, and
-    /// would slide off, it keeps nothing: off the wall it could not bounce.
+    /// detection and response*, 2003). What comes faster than `slow`, in metres per substep, has the
+    /// velocity of that moment, with which it bounces; and if it would slide off, it stays, since off
+    /// the wall it could not. What lies keeps its velocity: its weight is what friction needs.
     fn slide_along_walls(&mut self, row: usize, slow: S) {
         let mut sphere = Sphere { center: self.sweep.start[row], ..self.marbles.sphere(row) };
         let mut way = self.marbles.position[row] - sphere.center;
@@ -66,7 +69,7 @@ impl<S: Scalar> World<S> {
         let mut left = S::one();
         let mut surfaces: SmallVec<[Vec3<S>; MOST_BENDS as usize]> = SmallVec::new();
         while length(way) > sphere.radius * S::constant(FAST)
-            && let Some(Stop { time, wall, normal }) = self.first_wall(&sphere, way)
+            && let Some(Stop { time, wall, normal, .. }) = self.first_wall(&sphere, way)
         {
             sphere.center += way * time;
             let rest = S::one() - time;
@@ -85,17 +88,44 @@ impl<S: Scalar> World<S> {
             let (slid, kept) = (along * way, along * change);
             let surface = self.walls.surface_velocity(wall as usize, sphere.center);
             let closing = (velocity - surface).dot(normal);
-            let lost = felt((change - kept).dot(normal), closing);
+            let part = felt((change - kept).dot(normal), closing);
             let stop = Stopped {
                 row: row as u32,
                 by: By::Wall(wall),
                 way: way - slid,
-                change: (change - kept) * lost,
+                change: if fast { (change - kept) * part } else { Vec3::zero() },
             };
             velocity -= stop.change;
             (way, change) = (slid, kept);
             let center = sphere.center;
             self.sweep.bends.push(Bend { stop, center, left, way, change, along: along * rest });
+        }
+    }
+
+    /// Stops marbles that a bounce would carry on into another wall where they touch that, half-spaces
+    /// too: they have their velocity, and bounce there in the next substep.
+    pub(in crate::world) fn stop_bounces_at_walls(&mut self) {
+        for row in 0..self.sweep.bounced_from.len().min(self.marbles.len()) {
+            let sphere =
+                Sphere { center: self.sweep.bounced_from[row], ..self.marbles.sphere(row) };
+            let way = self.marbles.position[row] - sphere.center;
+            if length(way) <= sphere.radius * S::constant(FAST) {
+                continue;
+            }
+            let planes = self.walls.planes().filter_map(|(_, plane)| {
+                let (gap, closing) = (
+                    plane.signed_distance(sphere.center) - sphere.radius,
+                    -way.dot(plane.normal()),
+                );
+                let passes =
+                    closing > S::zero() && closing > gap + sphere.radius * S::constant(FAST);
+                passes.then(|| (gap / closing).max(S::zero()))
+            });
+            let other = self.first_wall(&sphere, way).map(|stop| stop.time);
+            let first = planes.chain(other).fold(S::one(), |first, time| first.min(time));
+            if first < S::one() {
+                self.marbles.position[row] = sphere.center + way * first;
+            }
         }
     }
 
@@ -107,17 +137,23 @@ impl<S: Scalar> World<S> {
         let way = Aabb { min: start, max: start }
             .union(&Aabb { min: start + motion, max: start + motion });
         let bounds = Aabb { min: way.min - more, max: way.max + more };
+        // Its core says whether it passes into a wall, its surface when it is there: first, wherever
+        // it touches, so that at the seam of two flush parts the one below it counts.
+        let core = Sphere { radius: sphere.radius * half, ..*sphere };
+        let mut passes = false;
+        self.walls.near(&bounds, |part| {
+            passes = passes || self.walls.meets(part, &core, motion).is_some();
+        });
+        if !passes {
+            return None;
+        }
+        let part_of_it = if self.model.response.needs_overlap() { half } else { into };
+        let all = Sphere { radius: sphere.radius * part_of_it, ..*sphere };
         let mut best: Option<Stop<S>> = None;
         self.walls.near(&bounds, |part| {
-            // Its core says whether it passes into the wall, its surface when it is there.
-            let core = Sphere { radius: sphere.radius * half, ..*sphere };
-            if self.walls.meets(part, &core, motion).is_none() {
-                return;
-            }
-            let part_of_it = if self.model.response.needs_overlap() { half } else { into };
-            let all = Sphere { radius: sphere.radius * part_of_it, ..*sphere };
             let Some(stop) = self.walls.meets(part, &all, motion) else { return };
-            if best.as_ref().is_none_or(|best| stop.time < best.time) {
+            let order = |stop: &Stop<S>| (stop.time, stop.gap);
+            if best.as_ref().is_none_or(|best| order(&stop) < order(best)) {
                 best = Some(stop);
             }
         });
@@ -136,6 +172,7 @@ impl<S: Scalar> Walls<S> {
     ) -> Option<Stop<S>> {
         let near = sphere.radius * S::constant(INTO);
         let mut time = S::zero();
+        let mut last = None;
         for _ in 0..MOST_STEPS {
             let Nearest { normal, distance, .. } =
                 self.nearest(part, sphere.center + motion * time);
@@ -144,14 +181,16 @@ impl<S: Scalar> Walls<S> {
                 return None;
             }
             if gap <= near {
-                return Some(Stop { time, wall: part.wall, normal });
+                return Some(Stop { time, wall: part.wall, normal, gap });
             }
+            last = Some(Stop { time, wall: part.wall, normal, gap });
             time += gap / closing;
             if time > S::one() {
                 return None;
             }
         }
-        None // it grazes
+        // It grazes, or is so near that rounding cannot tell.
+        last.filter(|last| last.gap <= sphere.radius)
     }
 }
 
