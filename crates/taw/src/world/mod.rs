@@ -457,20 +457,26 @@ impl<S: Scalar> World<S> {
         }
         self.stop_bounces_at_walls();
         self.stop_what_is_not_finite();
-        if self.model.rotation != Rotation::None {
-            // The deepest contact comes first in the list, so it has the last word.
-            for contact in self.contacts.wm.iter().rev() {
-                let part = Part { wall: contact.a, part: contact.part };
-                let row = contact.b as usize;
-                let normal = self.walls.nearest(part, self.marbles.position()[row]).normal;
-                if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Rolling {
-                    self.marbles.roll(row, normal);
-                }
-            }
-        }
+        self.roll_what_only_shows();
         self.limits.apply(&mut self.marbles);
         self.count_after();
         Ok(())
+    }
+
+    /// Makes marbles that turn for show only roll over the walls that they touch.
+    fn roll_what_only_shows(&mut self) {
+        if self.model.rotation == Rotation::None {
+            return;
+        }
+        // The deepest contact comes first in the list, so it has the last word.
+        for contact in self.contacts.wm.iter().rev() {
+            let part = Part { wall: contact.a, part: contact.part };
+            let row = contact.b as usize;
+            let normal = self.walls.nearest(part, self.marbles.position()[row]).normal;
+            if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Rolling {
+                self.marbles.roll(row, normal);
+            }
+        }
     }
 
     /// Brings up to date what a response asks of marbles: masses, who is held, what is long;

@@ -122,7 +122,7 @@ impl<S: Scalar> World<S> {
                 passes.then(|| (gap / closing).max(S::zero()))
             });
             let other = self.first_wall(&sphere, way).map(|stop| stop.time);
-            let first = planes.chain(other).fold(S::one(), |first, time| first.min(time));
+            let first = planes.chain(other).fold(S::one(), S::min);
             if first < S::one() {
                 self.marbles.position[row] = sphere.center + way * first;
             }
