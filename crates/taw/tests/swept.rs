@@ -361,3 +361,34 @@ fn marbles_taken_out_between_the_verbs_harm_nobody() {
         }
     }
 }
+
+#[test]
+fn walls_taken_out_between_the_verbs_harm_nobody() {
+    let all = [RESPONSES[0], RESPONSES[1], Response::EventDriven];
+    for response in all {
+        for late in [false, true] {
+            let (mut world, _) = world(response, &[([0.0; 3], [30.0, -3.0, 0.0])]);
+            let walls = [-1.0, 1.0].map(|x| {
+                let turned = Quat::new(1.0, 0.0, 0.0, 0.0);
+                let half = Vec3::new(0.1, 9.0, 9.0);
+                world
+                    .walls
+                    .insert(Obb::new(Point3::new(x, 0.0, 0.0), turned, half).unwrap())
+                    .unwrap()
+            });
+            for wall in walls {
+                world.begin_step();
+                world.integrate(DT).unwrap();
+                if late {
+                    world.generate_contacts();
+                }
+                world.walls.remove(wall).unwrap();
+                if !late {
+                    world.generate_contacts();
+                }
+                world.restitute(DT).unwrap();
+                assert_eq!(world.marbles.len(), 1, "{response:?}");
+            }
+        }
+    }
+}

@@ -370,6 +370,7 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`].
     pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
         let dt = Self::checked_dt(dt)?;
+        self.walls.prepare(); // some may have been taken out since contacts were looked for
         let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
