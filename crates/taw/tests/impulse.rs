@@ -269,7 +269,7 @@ fn the_residual_says_how_far_the_contacts_are_from_agreeing() {
     assert!(more < few && many < 1e-5, "{few}, {more}, {many} m/s");
 }
 
-/// A heap of 150 balls after 20 s, in which it gained no energy.
+/// A heap of 150 balls after a minute, in which it gained no energy.
 fn settled_heap() -> World<f64> {
     let (mut world, ..) = slope::<f64>(0.0, Rotation::Dynamic);
     for (normal, offset) in [
@@ -289,7 +289,7 @@ fn settled_heap() -> World<f64> {
     }
     let mut last = energy(&world);
     let start = last;
-    for step in 0..1200 {
+    for step in 0..3600 {
         world.step(1.0 / 60.0).unwrap();
         let now = energy(&world);
         // Pushing overlap apart lifts what lies on it, by less than it fell to overlap.
@@ -305,7 +305,7 @@ fn a_heap_gains_no_energy_and_comes_to_rest() {
     let mut speeds: Vec<_> = world.marbles.velocity().iter().map(|v| v.magnitude()).collect();
     speeds.sort_by(f64::total_cmp);
     // Nothing resists rolling here, so a few may still be on their way.
-    assert!(speeds[140] < 1e-6, "the ten fastest: {:?}", &speeds[140..]);
+    assert!(speeds[140] < 1e-12, "the ten fastest: {:?}", &speeds[140..]);
     assert!(speeds[149] < 0.02, "the ten fastest: {:?}", &speeds[140..]);
     // What the solver leaves on purpose: a two-hundredth of the smaller radius.
     world.generate_contacts();
