@@ -88,7 +88,7 @@ pub(super) struct Island<S> {
     pub agrees: bool,
     /// True if iterations ended before that, even if a later solution agreed.
     pub gave_up: bool,
-    /// Whether it pays to go further.
+    /// True where it pays to go further.
     pub searches: bool,
     search: Search<S>,
 }
@@ -103,11 +103,11 @@ struct Search<S> {
     /// The energy that a unit of each direction gains at first, and what each costs beside each.
     wish: [S; DIRECTIONS],
     cost: [[S; DIRECTIONS]; DIRECTIONS],
-    /// How much of each is best.
+    /// Coefficients of the directions.
     parts: [S; DIRECTIONS],
-    /// Which part of that way the first contact can go that comes to bear nothing on it.
+    /// Part of that way up to where the first contact comes to bear nothing.
     short: S,
-    /// Whether friction bends the way.
+    /// True if the bounds of friction bend the way.
     slips: bool,
     /// The energy that a unit of the way within the cones gains at first, and what it costs.
     bent_wish: S,
@@ -255,7 +255,7 @@ impl<S: Scalar> Island<S> {
         self.search.bent_cost += self.energy(c, way, given + more);
     }
 
-    /// Which part to go of the way within the cones, or of the straight way to where the first
+    /// Part to go of the way within the cones, or of the straight way to where the first
     /// contact bears nothing any more: whichever lowers the energy more.
     pub fn go(&self) -> Go<S> {
         self.search.go()

@@ -208,8 +208,8 @@ pub(super) struct Constraint<S> {
     grip: Vec3<S>,
     /// The least that the pressure may be.
     least: S,
-    /// What the last sweep changed of them and the ways that the search went before, and what
-    /// velocity each gives; and the change of velocity that was wanted where the search began.
+    /// Directions of the search, as impulses: the last sweep and the ways before; the relative velocity
+    /// that each gives, in m/s; and the change of velocity asked for where the search began, in m/s.
     ways: [Vec3<S>; DIRECTIONS],
     given: [Vec3<S>; DIRECTIONS],
     wanted: Vec3<S>,

@@ -55,7 +55,8 @@ impl<S: Scalar> Columns<'_, S> {
         }
     }
 
-    /// How far a marble is from a wall, in metres, but at most as deep in it as may stay.
+    /// Separation of a marble and a wall that pushing must not make smaller, in metres: below zero, at
+    /// least as deep as may stay.
     fn gap_to_keep(
         &self,
         c: &Constraint<S>,

@@ -275,7 +275,7 @@ where
         self.start.stands.get(row).copied().flatten()
     }
 
-    /// How far a position follows a change of velocity, in metres.
+    /// Way by which a position follows a change of velocity, in metres.
     pub(in crate::response) fn follow(&self, row: usize, change: Vec3<S>) -> Vec3<S> {
         let way = change * (self.follow)(row) * self.settings.dt;
         self.stopped(row).map_or(way, |along| along * way)

@@ -23,7 +23,7 @@ pub(super) struct Hit<S> {
     /// As a part of the substep.
     time: S,
     pair: (u32, u32),
-    /// How often the way of each had bent when this was foreseen.
+    /// Bends of the way of each when this was foreseen.
     bends: (u32, u32),
 }
 
@@ -52,16 +52,16 @@ impl<S: Scalar> Eq for Hit<S> {}
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Way<S> {
     sphere: Sphere<S>,
-    /// When it was there, as a part of the substep.
+    /// Time of that, as a part of the substep.
     since: S,
     /// In metres per substep, and by how much forces change the velocity, in m/s per substep.
     motion: Vec3<S>,
     change: Vec3<S>,
-    /// How often it has bent, and whether by a wall, or by another marble.
+    /// Number of bends so far, and whether a wall or another marble made one.
     bends: u32,
     held: bool,
     met: bool,
-    /// Where it bends at a wall next, as an index.
+    /// Index of the next bend at a wall.
     next: Option<u32>,
 }
 
@@ -282,12 +282,12 @@ impl<S: Scalar> Way<S> {
         Self { sphere: Sphere { center, ..self.sphere }, since: time, ..*self }
     }
 
-    /// How far it still goes, in metres.
+    /// Way to the end of the substep, in metres.
     fn rest(&self) -> Vec3<S> {
         self.motion * (S::one() - self.since)
     }
 
-    /// When it meets another that is where it is at the same time, as a part of the rest.
+    /// Time of impact with another from the same moment on, as a part of the rest.
     fn time_of_impact(&self, other: &Self) -> Option<S> {
         time_of_impact_sphere_sphere(&self.sphere, self.rest(), &other.sphere, other.rest())
     }
@@ -300,14 +300,14 @@ fn normal_of<S: Scalar>(x: &Way<S>, y: &Way<S>) -> (Vec3<S>, S) {
 }
 
 impl<S: Scalar> Hit<S> {
-    /// When the way of a row bends at a wall next.
+    /// Next bend of a row at a wall.
     fn at_wall(row: u32, ways: &[Way<S>], bends: &[Bend<S>]) -> Option<Reverse<Self>> {
         let way = &ways[row as usize];
         let time = S::one() - bends[way.next? as usize].left;
         Some(Reverse(Self { time, pair: (row, row), bends: (way.bends, way.bends) }))
     }
 
-    /// When two marbles meet, from `now` on, if they are fast.
+    /// Next meeting of two marbles from `now` on, if they are fast.
     fn foresee(pair: (u32, u32), ways: &[Way<S>], now: S) -> Option<Reverse<Self>> {
         let [x, y] = [pair.0, pair.1].map(|row| ways[row as usize].at(now));
         let radius = x.sphere.radius.min(y.sphere.radius);

@@ -24,31 +24,31 @@ const INTO: f64 = 1e-5;
 /// met. So they are stopped.
 const FAST: f64 = 0.5;
 
-/// How often a way bends in a substep, at most, before it ends: two surfaces hold a marble to an
+/// Bends of a way in a substep, at most, before it ends: two surfaces hold a marble to an
 /// edge, three to a corner, and a bowl of triangles has one after the other.
 const MOST_BENDS: u32 = 4;
 
-/// What a sweep remembers, and scribbles on.
+/// State of the sweep of a substep, and scratch memory of it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Sweep<S> {
-    /// Where marbles were before they moved, and how fast, in m/s.
+    /// Positions before the substep, in metres, and velocities, in m/s.
     pub start: Vec<Point3<S>>,
     pub velocity: Vec<Vec3<S>>,
-    /// Who was stopped in this substep; and for every row, if one was, how its place still follows
-    /// its velocity if it was: the directions that are left to it, times the part of the substep.
+    /// Stops of this substep; and for every row, if there is one, the projection by which a position
+    /// still follows a velocity: the directions that are left, times the part of the substep.
     stops: Vec<Stopped<S>>,
     pub stands: Vec<Option<Mat3<S>>>,
-    /// Which marbles meet on the way, though neither was stopped.
+    /// Pairs that meet on the way, whether or not one was stopped.
     pub grazes: Vec<(u32, u32)>,
     middle: Vec<Point3<S>>,
     reach: Vec<S>,
-    /// Who may meet whom, both ways round, in order.
+    /// Candidate pairs, both ways round, in order.
     near: Vec<(u32, u32)>,
     hits: BinaryHeap<Reverse<Hit<S>>>,
     ways: Vec<Way<S>>,
     /// Bends at walls, row by row, in the order of time.
     bends: Vec<Bend<S>>,
-    /// Where marbles were before they followed what contacts changed.
+    /// Positions before they follow what contacts change, in metres.
     bounced_from: Vec<Point3<S>>,
 }
 
@@ -58,8 +58,7 @@ pub(super) struct Stopped<S> {
     pub row: u32,
     /// By what: the row of a wall or of a marble.
     by: By,
-    /// How much further it would have gone, in metres, and by how much more its velocity would
-    /// have changed, in m/s.
+    /// Way that it lost, in metres, and change of its velocity by forces that it lost, in m/s.
     way: Vec3<S>,
     change: Vec3<S>,
 }
@@ -108,7 +107,7 @@ impl<S: Scalar> World<S> {
         });
     }
 
-    /// Whether what was stopped has a contact with what stopped it.
+    /// True for a stop whose two have a contact.
     fn touches(&self) -> impl Fn(&Stopped<S>) -> bool + use<S> {
         let walls = self.contacts.wm.iter().map(|c| (By::Wall(c.a), c.b));
         let both = |c: &Contact<S>| [(By::Marble(c.a), c.b), (By::Marble(c.b), c.a)];

@@ -13,13 +13,13 @@ use crate::world::walls::{Part, Walls};
 /// Steps enough for a marble to come to any wall but one that it only grazes.
 const MOST_STEPS: u32 = 32;
 
-/// What a marble meets on its way.
+/// Hit of a marble on a wall on its way.
 pub(in crate::world) struct Stop<S> {
     /// As a part of the way.
     pub time: S,
     pub wall: u32,
     pub normal: Vec3<S>,
-    /// How far it is from the wall there, in metres.
+    /// Separation from the wall there, in metres.
     gap: S,
 }
 
@@ -28,12 +28,12 @@ pub(in crate::world) struct Stop<S> {
 pub(super) struct Bend<S> {
     pub stop: Stopped<S>,
     pub center: Point3<S>,
-    /// Which part of the substep is left then, how far the marble still goes in it, in metres, and by
-    /// how much forces still change its velocity, in m/s.
+    /// Part of the substep that is left then, way of the marble in it, in metres, and change of its
+    /// velocity by forces in it, in m/s.
     pub left: S,
     pub way: Vec3<S>,
     pub change: Vec3<S>,
-    /// What is left to its place to follow its velocity.
+    /// Projection by which its position still follows its velocity.
     pub along: Mat3<S>,
 }
 
@@ -129,7 +129,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Where a sphere first touches a wall that it would pass into.
+    /// First touch of a sphere with a wall, if it would pass into one.
     pub(super) fn first_wall(&self, sphere: &Sphere<S>, motion: Vec3<S>) -> Option<Stop<S>> {
         let (half, into) = (S::constant(0.5), S::one() - S::constant(INTO));
         let (start, more) = (sphere.center, sphere.radius);
@@ -162,7 +162,7 @@ impl<S: Scalar> World<S> {
 }
 
 impl<S: Scalar> Walls<S> {
-    /// When a sphere on its way touches a part of a wall: for as long as the plane across the
+    /// Time at which a sphere on its way touches a part of a wall: for as long as the plane across the
     /// nearest point keeps them apart, it does not (conservative advancement; Mirtich 1996).
     pub(in crate::world) fn meets(
         &self,

@@ -10,7 +10,7 @@ use crate::storm::case::{Case, Kind};
 /// Who comes, and where to.
 pub struct Crowd {
     pub kind: Kind,
-    /// Whether contacts feel spins.
+    /// True where contacts feel spins.
     pub spins: bool,
     pub size: f64,
     pub floor: bool,

@@ -184,7 +184,7 @@ impl Rules {
         matches!(self.kind, Kind::SpringDashpot | Kind::HertzMindlin)
     }
 
-    /// Whether contacts are looked for at the end of substeps only.
+    /// True where contacts are looked for at the end of substeps only.
     #[must_use]
     pub fn discrete(&self) -> bool {
         matches!(self.kind, Kind::Displacement | Kind::Impulse)

@@ -62,7 +62,7 @@ impl Lies {
         vec![worst, self.hang(rules, before, after)]
     }
 
-    /// How far the next thing is from a body, at least, in metres.
+    /// Distance from a body to the next thing, at least, in metres.
     fn gap(snapshot: &Snapshot, body: usize) -> f64 {
         let others = (0..snapshot.bodies.len()).filter(|other| *other != body);
         let gaps = others.map(|other| -snapshot.depth(body, other));
