@@ -3,6 +3,8 @@
 
 mod all_pairs;
 mod grid;
+mod period;
 
 pub use all_pairs::all_pairs;
 pub use grid::Grid;
+pub(crate) use period::{Images, Period};

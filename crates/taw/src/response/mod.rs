@@ -19,6 +19,7 @@ pub(crate) use work::{Push, Work};
 
 use cgmath::{InnerSpace, Zero};
 
+use crate::broad::Period;
 use crate::math::{Point3, Scalar, Vec3};
 
 /// The method that restitutes.
@@ -103,6 +104,7 @@ impl Response {
 /// The columns that a response works on; all of one length.
 #[derive(Debug)]
 pub(crate) struct Columns<'a, S> {
+    pub period: Period<S>,
     /// Centers, in metres.
     pub position: &'a mut [Point3<S>],
     /// In metres per second.

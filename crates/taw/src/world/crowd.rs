@@ -1,8 +1,10 @@
 //! How many marbles one can have to do with, however many are in one place.
 
+use cgmath::Zero;
+
 use super::marbles::Marbles;
 use crate::contact::Contact;
-use crate::math::{Scalar, length};
+use crate::math::{Scalar, Vec3, length};
 
 /// How many marbles of its own size or larger a ball has contacts with at most. Twelve can touch
 /// one without overlap (Schütte and van der Waerden, *Das Problem der dreizehn Kugeln*, 1953), and
@@ -66,14 +68,13 @@ fn most_of<S: Scalar>(marbles: &Marbles<S>, row: usize) -> usize {
 
 /// How far the two of a contact are apart where it is; negative for an overlap.
 fn gap<S: Scalar>(marbles: &Marbles<S>, contact: &Contact<S>) -> S {
-    let bead = |row: u32, along: S| {
-        let row = row as usize;
-        let center = marbles.position()[row];
-        if along == S::zero() { center } else { center + marbles.axis(row) * along }
+    let (a, b) = (contact.a as usize, contact.b as usize);
+    let bead = |row: usize, along: S| {
+        if along == S::zero() { Vec3::zero() } else { marbles.axis(row) * along }
     };
     let [first, second] = contact.along;
-    let apart = length(bead(contact.b, second) - bead(contact.a, first));
-    apart - marbles.radius()[contact.a as usize] - marbles.radius()[contact.b as usize]
+    let apart = length(marbles.apart(a, b) + bead(b, second) - bead(a, first));
+    apart - marbles.radius()[a] - marbles.radius()[b]
 }
 
 impl<S: Scalar> Crowd<S> {

@@ -5,6 +5,7 @@ use cgmath::InnerSpace;
 
 use super::walls::{Part, Walls};
 use super::{Precision, World};
+use crate::broad::Period;
 use crate::contact::Contact;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::motion::{Motion, Rotation, WallMotion};
@@ -18,6 +19,9 @@ impl<S: Scalar> World<S> {
         let exact = self.model.precision == Precision::Compensated;
         let marbles = &self.marbles;
         let events = &mut self.events;
+        events.period = Period {
+            lengths: marbles.period.lengths.map(|length| length.map(|length| length.as_f64())),
+        };
         events.balls.clear();
         events.balls.extend((0..marbles.len()).map(|row| {
             let Motion { position, velocity } = marbles.exact(row);

@@ -1,8 +1,9 @@
-use cgmath::{InnerSpace, One, Zero};
+use cgmath::{EuclideanSpace, InnerSpace, One, Zero};
 
 use super::handles::{Handle, Handles};
 use super::optional::Optional;
 use crate::Error;
+use crate::broad::Period;
 use crate::error::{finite, finite_point, finite_vector, positive, within};
 use crate::frame::Bivector;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite, is_finite_point};
@@ -120,6 +121,7 @@ pub struct Marbles<S> {
     /// Whether there are columns for rotation, and for what the scalar cuts off.
     turn: bool,
     pub(super) compensated: bool,
+    pub(super) period: Period<S>,
     pub(super) position: Vec<Point3<S>>,
     pub(super) radius: Vec<S>,
     /// Only of capsules.
@@ -151,6 +153,7 @@ impl<S> Default for Marbles<S> {
             handles: Handles::default(),
             turn: false,
             compensated: false,
+            period: Period::default(),
             position: Vec::new(),
             radius: Vec::new(),
             half_length: Optional::default(),
@@ -605,6 +608,20 @@ impl<S: Scalar> Marbles<S> {
         Sphere { center: self.position[row], radius: self.radius[row] }
     }
 
+    /// The way from one row to another, in metres: the shortest one of a periodic world.
+    #[inline]
+    pub(super) fn apart(&self, a: usize, b: usize) -> Vec3<S> {
+        self.period.nearest(self.position[b] - self.position[a])
+    }
+
+    /// Puts what left the periodic box back into it.
+    pub(super) fn wrap(&mut self) {
+        if !self.period.is_open() {
+            let middle = Point3::origin();
+            self.position.iter_mut().for_each(|at| *at = self.period.image(*at, middle));
+        }
+    }
+
     /// Adds or drops the columns for rotation. New ones begin unturned and at rest.
     pub(super) fn set_turn(&mut self, turn: bool) {
         if turn != self.turn {
@@ -652,6 +669,7 @@ impl<S: Scalar> Marbles<S> {
         rods: &'a [Rod<S>],
     ) -> (Columns<'a, S>, &'a Optional<Material<S>>, &'a Optional<Integrator>) {
         let columns = Columns {
+            period: self.period,
             position: &mut self.position,
             velocity: &mut self.velocity,
             radius: &self.radius,

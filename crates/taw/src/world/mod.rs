@@ -32,9 +32,9 @@ pub use wall_shape::WallShape;
 pub use walls::{WallId, Walls};
 
 use crate::Error;
-use crate::broad::Grid;
+use crate::broad::{Grid, Images, Period};
 use crate::contact::Contacts;
-use crate::error::{finite, finite_vector};
+use crate::error::{finite, finite_vector, positive};
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
@@ -80,6 +80,7 @@ pub struct World<S> {
     /// The collisions of the last step, if the response is event-driven.
     impacts: Vec<Impact<S>>,
     grid: Grid,
+    images: Images<S>,
     /// The rows that the verb at work has stopped.
     stopped: Vec<u32>,
     quarantine: Quarantine<S>,
@@ -126,6 +127,7 @@ impl<S: Scalar> Default for World<S> {
             contacts: Contacts::default(),
             impacts: Vec::new(),
             grid: Grid::default(),
+            images: Images::default(),
             stopped: Vec::new(),
             quarantine: Quarantine::default(),
             crowd: Crowd::default(),
@@ -166,6 +168,7 @@ impl<S: Scalar> PartialEq for World<S> {
             stopped: _,
             crowd: _,
             grid: _,
+            images: _,
             reach: _,
             inverse_mass: _,
             velocity_before: _,
@@ -245,6 +248,39 @@ impl<S: Scalar> World<S> {
         finite_vector(["gravity.x", "gravity.y", "gravity.z"], gravity)?;
         finite("the length of gravity", length(gravity))?;
         self.gravity = gravity;
+        Ok(())
+    }
+
+    /// Lengths of the periodic box along the axes, in metres; none along those without sides.
+    #[must_use]
+    pub fn period(&self) -> [Option<S>; 3] {
+        self.marbles.period.lengths
+    }
+
+    /// Makes the world a periodic box around the origin: whatever leaves it through a side enters
+    /// it through the opposite one, and balls touch across the sides. Along an axis with none,
+    /// which is the default, it has no sides.
+    ///
+    /// Walls are where they are, and nowhere else: what crosses a side is to be a half-space along
+    /// it. Balls of [`World::swarm`] know no sides. Energy and account count where marbles are, so
+    /// gravity is to point along an axis without sides. But for [`Response::EventDriven`], who
+    /// goes farther than a quarter of a length in a substep may pass through others.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a length of less than eight radii of the largest marble;
+    /// [`Error::NotPositive`] for one that is no length; [`Error::BallsOnly`] if a marble is a
+    /// capsule. Steps refuse marbles that came later in the same way.
+    pub fn set_period(&mut self, lengths: [Option<S>; 3]) -> Result<(), Error> {
+        for (length, field) in lengths.iter().zip(["period.x", "period.y", "period.z"]) {
+            length.map(|length| positive(field, length)).transpose()?;
+        }
+        let period = Period { lengths };
+        self.takes_marbles_in(period)?;
+        if period != self.marbles.period {
+            self.marbles.period = period;
+            self.marbles.wrap();
+            self.forget_contacts();
+        }
         Ok(())
     }
 
@@ -461,6 +497,7 @@ impl<S: Scalar> World<S> {
         self.roll_what_only_shows();
         self.limits.apply(&mut self.marbles);
         self.count_after();
+        self.marbles.wrap();
         Ok(())
     }
 

@@ -6,6 +6,7 @@ use cgmath::One;
 use super::World;
 use super::marbles::{MarbleId, Marbles, Rest};
 use crate::Error;
+use crate::broad::Period;
 use crate::error::{positive, within};
 use crate::math::{Point3, Quat, Scalar, is_finite, is_finite_point};
 use crate::response::Response;
@@ -78,10 +79,22 @@ impl<S: Scalar> World<S> {
 
     /// Nothing, if the response knows what all marbles are.
     pub(crate) fn takes_all_marbles(&self) -> Result<(), Error> {
+        self.takes_marbles_in(self.marbles.period)?;
         match self.marbles.first_capsule() {
             Some(id) if self.model.response == Response::EventDriven => Err(Error::BallsOnly(id)),
             _ => Ok(()),
         }
+    }
+
+    /// Nothing, if all marbles are balls that fit into a period.
+    pub(super) fn takes_marbles_in(&self, period: Period<S>) -> Result<(), Error> {
+        if period.is_open() {
+            return Ok(());
+        }
+        if let Some(id) = self.marbles.first_capsule() {
+            return Err(Error::BallsOnly(id));
+        }
+        period.check_radii(self.marbles.radius())
     }
 
     /// Notes where all marbles are, before any of them moves.

@@ -147,7 +147,8 @@ impl<S: Scalar> World<S> {
         let Contact { a, b, along, mtv, .. } = *contact;
         let near = || {
             let (first, second) = (self.bead(a, along[0])?, self.bead(b, along[1])?);
-            let (normal, distance) = direction_and_length(second.center - first.center)?;
+            let apart = self.marbles.period.nearest(second.center - first.center);
+            let (normal, distance) = direction_and_length(apart)?;
             let flush = first.radius.min(second.radius) * S::constant(FLUSH);
             (distance - first.radius - second.radius <= flush).then_some(normal)
         };
@@ -166,10 +167,11 @@ impl<S: Scalar> World<S> {
         let center = self.marbles.position();
         self.crowd.begin(center.len());
         if !self.marbles.has_capsules() {
-            self.grid.rebuild(center, self.marbles.radius(), reach);
-            self.grid.pairs(center, |a, b| {
+            let (spheres, period) = ((center, self.marbles.radius()), self.marbles.period);
+            self.images.pairs(&mut self.grid, spheres, reach, period, |a, b| {
                 let (first, second) = (a as usize, b as usize);
-                let (first, second) = (self.marbles.sphere(first), self.marbles.sphere(second));
+                let (first, mut second) = (self.marbles.sphere(first), self.marbles.sphere(second));
+                second.center = period.image(second.center, first.center);
                 if let Some(mtv) = out_of_sphere(&first, &second, reach) {
                     let along = [S::zero(); 2];
                     let contact = Contact { a, b, part: 0, along, mtv };

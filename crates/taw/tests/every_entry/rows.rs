@@ -239,6 +239,11 @@ fn worlds<S: Scalar>() -> Vec<Row<S>> {
         World 1 "SpeedLimits.angular": |p, x| {
             p.world.set_speed_limits(SpeedLimits { linear: None, angular: Some(x) })
         };
+        World 3 "World::set_period": |p, x| {
+            let mut lengths = [None; 3];
+            lengths[p.case] = Some(x);
+            p.world.set_period(lengths)
+        };
         World 1 "World::set_model Model.integrator Model.response Model.rotation Model.precision Model.detection Model.substeps": |p, x| model(p, count(x), 8);
         World 1 "Model.iterations": |p, x| model(p, 1, count(x));
         World 1 "World::step": |p, x| p.world.step(x);

@@ -1,4 +1,5 @@
 use super::*;
+use crate::broad::Period;
 use crate::contact::Contact;
 use crate::math::Point3;
 use crate::response::impulse::{Settings, Start};
@@ -33,6 +34,7 @@ fn restituted<S: Scalar>(
     let mut contacts = Contacts { wm: (0..count).map(|b| contact(0, b)).collect(), mm: vec![] };
     crate::broad::all_pairs(count, |a, b| contacts.mm.push(contact(a, b)));
     let mut columns = Columns {
+        period: Period::default(),
         position: &mut position,
         velocity: &mut velocity,
         radius: &radius,

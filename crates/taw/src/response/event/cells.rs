@@ -2,6 +2,7 @@
 //! and tells when it leaves it. Cells are as wide as the largest ball, so those that
 //! touch are in neighbouring ones.
 
+use crate::broad::Period;
 use crate::math::Point3;
 
 /// The coordinates of a cell.
@@ -16,7 +17,10 @@ const LEAST_BUCKETS: usize = 1024;
 /// The rows in each cell, as chains through buckets that the cells are hashed to.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cells {
-    width: f64,
+    /// Along each axis, in metres.
+    width: [f64; 3],
+    /// Cells of a period along each axis; zero along one that has none.
+    count: Cell,
     head: Vec<u32>,
     next: Vec<u32>,
     previous: Vec<u32>,
@@ -25,9 +29,14 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Empties the grid, for this many rows and cells of this width in metres.
-    pub fn reset(&mut self, rows: usize, width: f64) {
-        self.width = width;
+    /// Empties the grid, for this many rows and cells of this width in metres, or a little wider,
+    /// so that a period has a whole number of them.
+    pub fn reset(&mut self, rows: usize, width: f64, period: Period<f64>) {
+        for (axis, length) in period.lengths.iter().enumerate() {
+            let count = length.map_or(0.0, |length| (length / width).floor());
+            self.count[axis] = count as i64;
+            self.width[axis] = length.map_or(width, |length| length / count);
+        }
         self.head.clear();
         self.head.resize((2 * rows).next_power_of_two().max(LEAST_BUCKETS), NONE);
         self.cell.clear();
@@ -38,18 +47,30 @@ impl Cells {
         }
     }
 
-    /// In metres.
-    pub fn width(&self) -> f64 {
+    /// Along each axis, in metres.
+    pub fn width(&self) -> [f64; 3] {
         self.width
+    }
+
+    /// Along the axis where it is least, in metres.
+    pub fn least_width(&self) -> f64 {
+        self.width.into_iter().fold(f64::INFINITY, f64::min)
     }
 
     /// The cell that a point is in.
     pub fn cell(&self, point: Point3<f64>) -> Cell {
-        [point.x, point.y, point.z].map(|x| (x / self.width).floor() as i64)
+        [0, 1, 2].map(|axis| (point[axis] / self.width[axis]).floor() as i64)
+    }
+
+    /// The image of a cell in the period.
+    fn image(&self, cell: Cell) -> Cell {
+        let wrap = |x: i64, count: i64| if count > 0 { x.rem_euclid(count) } else { x };
+        [0, 1, 2].map(|axis| wrap(cell[axis], self.count[axis]))
     }
 
     /// Puts a row, which is in none, into a cell.
     pub fn insert(&mut self, row: u32, cell: Cell) {
+        let cell = self.image(cell);
         let bucket = self.bucket_of(cell);
         let first = std::mem::replace(&mut self.head[bucket], row);
         let index = row as usize;
@@ -79,7 +100,7 @@ impl Cells {
         for dz in -1..=1 {
             for dy in -1..=1 {
                 for dx in -1..=1 {
-                    let cell = [x + dx, y + dy, z + dz];
+                    let cell = self.image([x + dx, y + dy, z + dz]);
                     let mut row = self.head[self.bucket_of(cell)];
                     while row != NONE {
                         if self.cell[row as usize] == cell {
@@ -109,7 +130,7 @@ mod tests {
         let mut cells = Cells::default();
         // Few rows, whose cells around outnumber the rows by far, and many.
         for rows in [2_u32, 50, 3000] {
-            cells.reset(rows as usize, 1.0);
+            cells.reset(rows as usize, 1.0, Period::default());
             let cell = |row: u32| [row % 7, row / 7 % 7, row / 49].map(i64::from);
             (0..rows).for_each(|row| cells.insert(row, cell(row)));
             for at in (0..rows).map(cell) {

@@ -137,7 +137,7 @@ impl EventDriven {
         let press = self.press_speed(a, b, settings);
         let (first, second) = (&self.balls[a], &self.balls[b]);
         let (normal, _) =
-            direction_and_length(second.position - first.position).unwrap_or((Vec3::unit_x(), 0.0));
+            direction_and_length(self.apart(first, second)).unwrap_or((Vec3::unit_x(), 0.0));
         let approach_speed = -(second.velocity - first.velocity).dot(normal);
         let mut material = first.material.against(second.material);
         if approach_speed <= 2.0 * press {

@@ -69,11 +69,10 @@ impl EventDriven {
         match ball.path.home {
             Home::Cell(cell) => {
                 let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
-                for axis in 0..3 {
-                    let low = cell[axis] as f64 * self.cells.width();
+                for (axis, width) in self.cells.width().into_iter().enumerate() {
+                    let low = cell[axis] as f64 * width;
                     let (x, v, a) = (position[axis], velocity[axis], ball.path.acceleration[axis]);
-                    let above =
-                        Gap { now: low + self.cells.width() - x, speed: -v, acceleration: -a };
+                    let above = Gap { now: low + width - x, speed: -v, acceleration: -a };
                     let below = Gap { now: x - low, speed: v, acceleration: a };
                     for (gap, step) in [(above, 1), (below, -1)] {
                         let to = cell[axis] + step;
@@ -269,6 +268,7 @@ impl EventDriven {
         let (first, second) = (&self.balls[a], &self.balls[b]);
         let left = settings.dt - now;
         let (from, to) = (first.position_at(now), second.position_at(now));
+        let apart = self.period.nearest(to - from);
         let velocity = second.velocity_at(now) - first.velocity_at(now);
         let acceleration = second.path.acceleration - first.path.acceleration;
         if first.inverse_mass + second.inverse_mass <= 0.0
@@ -277,18 +277,18 @@ impl EventDriven {
         {
             return None; // nothing could come of it
         }
-        if !is_finite(to - from) || !is_finite(velocity) || !is_finite(acceleration) {
+        if !is_finite(apart) || !is_finite(velocity) || !is_finite(acceleration) {
             return None; // what is nowhere is nobody's concern
         }
         let reach = first.radius + second.radius;
         // Most are too far away, which needs no exact distance.
         let way = (velocity.magnitude() + 0.5 * acceleration.magnitude() * left) * left;
         let farthest = (reach + way) * (1.0 + 1e-12);
-        if (to - from).magnitude2() > farthest * farthest {
+        if (apart).magnitude2() > farthest * farthest {
             return None;
         }
         settings.count(if acceleration.is_zero() { 1 } else { super::QUARTIC_LOOKS });
-        let (normal, distance) = direction_and_length(to - from).unwrap_or((Vec3::unit_x(), 0.0));
+        let (normal, distance) = direction_and_length(apart).unwrap_or((Vec3::unit_x(), 0.0));
         let gap = distance - reach;
         let stamp = second.path.stamp;
         let press = self.press_speed(a, b, settings);
@@ -296,8 +296,8 @@ impl EventDriven {
         let largest = [from.x, from.y, from.z, to.x, to.y, to.z].map(f64::abs);
         let size = largest.into_iter().fold(reach, f64::max);
         if gap > f64::EPSILON * 8.0 * size {
-            let after = meeting_time(to - from, velocity, acceleration, reach, [0.0, left])?;
-            let there = to - from + (velocity + acceleration * (0.5 * after)) * after;
+            let after = meeting_time(apart, velocity, acceleration, reach, [0.0, left])?;
+            let there = apart + (velocity + acceleration * (0.5 * after)) * after;
             let normal = there / there.magnitude();
             let speed = (velocity + acceleration * after).dot(normal);
             let pull = acceleration.dot(normal);
@@ -320,9 +320,9 @@ impl EventDriven {
         }
         // If they part and come free, they meet again; else they press in the end.
         let apex = -speed / pull;
-        let there = to - from + (velocity + acceleration * (0.5 * apex)) * apex;
+        let there = apart + (velocity + acceleration * (0.5 * apex)) * apex;
         if speed > press && there.magnitude() > reach {
-            return meeting_time(to - from, velocity, acceleration, reach, [apex, left]).map(meets);
+            return meeting_time(apart, velocity, acceleration, reach, [apex, left]).map(meets);
         }
         Some(((-press * 1.01 - speed) / pull, What::Leans(b, stamp)))
     }

@@ -25,6 +25,7 @@ use std::collections::BinaryHeap;
 
 use cgmath::{InnerSpace, Zero};
 
+use crate::broad::Period;
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, cast_vector, is_finite, is_finite_point};
 use crate::response::Work;
@@ -178,6 +179,8 @@ impl Settings<'_> {
 pub(crate) struct EventDriven {
     /// To be filled by the caller, who finds them there afterwards.
     pub balls: Vec<Ball>,
+    /// Of the world.
+    pub period: Period<f64>,
     /// Those that balls may come to.
     walls: Vec<Wall>,
     /// Pairs of balls that may touch at the start.
@@ -308,11 +311,16 @@ impl EventDriven {
         }
     }
 
+    /// The way from one ball to another, in metres.
+    fn apart(&self, first: &Ball, second: &Ball) -> Vec3<f64> {
+        self.period.nearest(second.position - first.position)
+    }
+
     /// Puts every ball where others find it.
     fn find_homes(&mut self, dt: f64) {
         let largest = self.balls.iter().fold(0.0_f64, |max, ball| max.max(ball.radius));
         // Rounding must not take a ball that touches out of the neighbouring cell.
-        self.cells.reset(self.balls.len(), 2.001 * largest);
+        self.cells.reset(self.balls.len(), 2.001 * largest, self.period);
         self.anywhere.clear();
         for row in 0..self.balls.len() {
             if self.crosses_too_many(row, dt) {
@@ -329,10 +337,12 @@ impl EventDriven {
         let Ball { velocity, path, .. } = &self.balls[row];
         let fastest = velocity.magnitude() + path.acceleration.magnitude() * left;
         // Also what has no finite cell at all.
-        let cells = fastest * left / self.cells.width();
+        let cells = fastest * left / self.cells.least_width();
         let far = self.balls[row].position;
         let far = [far.x, far.y, far.z].iter().fold(0.0_f64, |max, x| max.max(x.abs()));
-        !(cells <= FAR && far / self.cells.width() < 1e15)
+        // In a period, only who is in its cell knows which image of another one is the next.
+        let cells = if cells.is_finite() && !self.period.is_open() { 0.0 } else { cells };
+        !(cells <= FAR && far / self.cells.least_width() < 1e15)
     }
 
     /// Has a ball that became too fast looked for everywhere.

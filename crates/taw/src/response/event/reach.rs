@@ -73,7 +73,7 @@ impl EventDriven {
             for row in 0..self.balls.len() {
                 let (center, far) = self.place(row, 0.0, settings);
                 let name = &mut |row, part| reach.names.push((row, part));
-                let far = far.min(MOST_CELLS * self.cells.width());
+                let far = far.min(MOST_CELLS * self.cells.least_width());
                 source.near(center, far + self.margin(row), name);
             }
         }
@@ -107,7 +107,7 @@ impl EventDriven {
     pub(super) fn look_around(&mut self, row: usize, now: f64, settings: &Settings) {
         let (center, farthest) = self.place(row, now, settings);
         let margin = self.margin(row);
-        let mut far = farthest.min(MOST_CELLS * self.cells.width());
+        let mut far = farthest.min(MOST_CELLS * self.cells.least_width());
         let names_near = |far: f64| {
             let mut names = Vec::new();
             settings.source.near(center, far + margin, &mut |row, part| names.push((row, part)));

@@ -5,6 +5,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::wall::{Between, Wall};
 use super::{Ball, EventDriven, MOST_TOUCHES, PRESS, Path, REST, Settings};
+use crate::broad::Period;
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Vec3, direction_and_length};
 use crate::response::impulse::{self, Around, Groups, Start, Warm, impulse};
@@ -33,6 +34,7 @@ const MOST_SWEEPS: u32 = 1000;
 /// What rests on each other, as the impulse method sees it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Heap {
+    period: Period<f64>,
     /// Whose turn it is: the balls' rows, in order.
     rows: Vec<u32>,
     /// Where in `rows` a ball is.
@@ -97,6 +99,7 @@ impl Heap {
     ) {
         let fastest = self.velocity.iter().map(|v| v.magnitude()).fold(0.0, f64::max);
         let mut columns = Columns {
+            period: self.period,
             position: &mut self.position,
             velocity: &mut self.velocity,
             radius: &self.radius,
@@ -133,6 +136,7 @@ impl Heap {
     fn count(&mut self, velocity: &mut [Vec3<f64>], spin: &mut [Vec3<f64>], work: &mut Work) {
         let collisions = work.collisions;
         let mut columns = Columns {
+            period: self.period,
             position: &mut self.position,
             velocity: &mut self.velocity,
             radius: &self.radius,
@@ -293,7 +297,7 @@ impl EventDriven {
         settings: &Settings,
     ) -> Option<f64> {
         let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
-        let apart = direction_and_length(second.position - first.position);
+        let apart = direction_and_length(self.apart(first, second));
         let (normal, distance) = apart.unwrap_or((Vec3::unit_x(), 0.0));
         let speed = (second.velocity - first.velocity).dot(normal);
         let pull = first.pull.magnitude().max(second.pull.magnitude());
@@ -307,7 +311,7 @@ impl EventDriven {
     /// pushed apart, however fast they part.
     fn is_in_another(&self, contact: &Contact<f64>) -> bool {
         let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
-        let apart = second.position - first.position;
+        let apart = self.apart(first, second);
         let slop = SLOP * first.radius.min(second.radius);
         apart.magnitude() < first.radius + second.radius - slop
     }
@@ -341,6 +345,7 @@ impl EventDriven {
         let (found, mut contacts) = self.all_that_touch(first, parting, now, settings);
         let pull = found.iter().map(|row| self.balls[*row].pull.magnitude()).fold(0.0, f64::max);
         // First what the collision does, all of it at once and without rebound.
+        self.heap.period = self.period;
         self.heap.take(&mut contacts, &self.balls);
         for material in &mut self.heap.material {
             (material.restitution, material.tangential_restitution) = (0.0, 0.0);
@@ -456,6 +461,7 @@ impl EventDriven {
         warm: &mut Vec<Warm<f64>>,
     ) {
         let left = settings.dt - now;
+        self.heap.period = self.period;
         self.heap.take(contacts, &self.balls);
         let Heap { rows, label, position, velocity, .. } = &mut self.heap;
         let mut strongest: f64 = 0.0;

@@ -386,7 +386,7 @@ impl<S: Scalar> Columns<'_, S> {
             First::Marble(a) => {
                 let a = a as usize;
                 let first = *position.get(a)? + self.offset(a, along[0]);
-                let apart = direction_and_length(second - first);
+                let apart = direction_and_length(self.period.nearest(second - first));
                 let (normal, distance) =
                     apart.unwrap_or_else(|| (any_direction(a as u32, b as u32), S::zero()));
                 (normal, distance - self.radius[a])

@@ -159,7 +159,7 @@ impl<S: Scalar> Columns<'_, S> {
         if around.start.velocity.is_empty() || velocity.magnitude2() <= slow * slow || !round {
             return None;
         }
-        let apart = self.position[b] - self.position[a];
+        let apart = self.period.nearest(self.position[b] - self.position[a]);
         let reach = self.radius[a] + self.radius[b];
         // Back along the way: |apart − velocity t| = reach.
         let (slope, squared) = (apart.dot(velocity), velocity.magnitude2());

@@ -247,7 +247,8 @@ fn touch<S: Scalar>(
     if two_marbles {
         let other = (setting.material)(a);
         way -= moved(a);
-        let apart = direction_and_length(center - place(a, along[0]));
+        let apart = marbles.period.nearest(center - place(a, along[0]));
+        let apart = direction_and_length(apart);
         let (direction, centers) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
         (normal, distance) = (direction, centers - marbles.radius[a]);
         closing -= marbles.velocity[a] + marbles.swing(a, along[0]);

@@ -1,4 +1,5 @@
 use super::*;
+use crate::broad::Period;
 use crate::math::Point3;
 use crate::response::Elasticity;
 
@@ -36,6 +37,7 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
         });
         let before = velocity[1].x;
         let mut columns = Columns {
+            period: Period::default(),
             position: &mut position,
             velocity: &mut velocity,
             radius: &[radius, radius],

@@ -6,6 +6,7 @@ use cgmath::{InnerSpace, SquareMatrix, Zero};
 
 use super::walls::{Bend, Stop, felt};
 use super::{By, FAST, INTO, MOST_BENDS, Stopped, Sweep, outer};
+use crate::broad::Period;
 use crate::contact::time_of_impact_sphere_sphere;
 use crate::math::{Mat3, Scalar, Vec3, direction_and_length, length};
 use crate::response::Response;
@@ -108,7 +109,7 @@ impl<S: Scalar> World<S> {
         }
         self.bend_in_order(self.slow(dt));
         if !displaces {
-            self.sweep.name_grazes();
+            self.sweep.name_grazes(self.marbles.period);
         }
         for row in 0..self.sweep.ways.len() {
             self.arrive(row);
@@ -127,15 +128,16 @@ impl<S: Scalar> World<S> {
         reach.clear();
         let reaches = ways.iter().zip(&self.marbles.radius);
         reach.extend(reaches.map(|(way, radius)| *radius + length(way.motion) * half));
-        self.grid.rebuild(middle, reach, S::zero());
-        self.grid.pairs(middle, |a, b| {
+        let spheres = (&middle[..], &reach[..]);
+        self.images.pairs(&mut self.grid, spheres, S::zero(), self.marbles.period, |a, b| {
             if fast(a) || fast(b) {
                 near.extend([(a, b), (b, a)]);
             }
         });
         near.sort_unstable();
         let ahead = near.iter().filter(|(a, b)| a < b);
-        hits.extend(ahead.filter_map(|pair| Hit::foresee(*pair, ways, S::zero())));
+        let period = self.marbles.period;
+        hits.extend(ahead.filter_map(|pair| Hit::foresee(*pair, ways, S::zero(), period)));
     }
 
     /// Bends ways at walls and where marbles meet, the earliest first.
@@ -152,13 +154,14 @@ impl<S: Scalar> World<S> {
                 self.meet(pair, time, slow);
             }
             let Sweep { near, hits, ways, bends, .. } = &mut self.sweep;
+            let period = self.marbles.period;
             for row in [pair.0, pair.1] {
                 hits.extend(Hit::at_wall(row, ways, bends));
                 // Who was to meet it elsewhere, or not at all, may meet it here.
                 let first = near.partition_point(|pair| pair.0 < row);
                 let others = near[first..].iter().take_while(|pair| pair.0 == row);
                 hits.extend(others.filter_map(|(_, other)| {
-                    Hit::foresee((row.min(*other), row.max(*other)), ways, time)
+                    Hit::foresee((row.min(*other), row.max(*other)), ways, time, period)
                 }));
             }
         }
@@ -194,7 +197,7 @@ impl<S: Scalar> World<S> {
         let rows = [pair.0 as usize, pair.1 as usize];
         let old = rows.map(|row| self.sweep.ways[row]);
         let [x, y] = old.map(|way| way.at(time));
-        let normal = normal_of(&x, &y).0;
+        let normal = normal_of(&x, &y.beside(&x, self.marbles.period)).0;
         let yields = [0, 1].map(|side| {
             let mass = self.marbles.mass(rows[side]);
             if old[side].held { S::zero() } else { mass.recip() }
@@ -265,12 +268,12 @@ impl<S: Scalar> World<S> {
 
 impl<S: Scalar> Sweep<S> {
     /// Names those that graze each other on the way, though neither was stopped.
-    fn name_grazes(&mut self) {
+    fn name_grazes(&mut self, period: Period<S>) {
         let Self { near, ways, grazes, .. } = self;
         grazes.extend(near.iter().filter(|(a, b)| {
             let [x, y] = [*a, *b].map(|row| &ways[row as usize]);
             let straight = x.bends == 0 && y.bends == 0;
-            a < b && straight && x.time_of_impact(y).is_some()
+            a < b && straight && x.time_of_impact(&y.beside(x, period)).is_some()
         }));
     }
 }
@@ -280,6 +283,12 @@ impl<S: Scalar> Way<S> {
     fn at(&self, time: S) -> Self {
         let center = self.sphere.center + self.motion * (time - self.since);
         Self { sphere: Sphere { center, ..self.sphere }, since: time, ..*self }
+    }
+
+    /// Its image that is nearest to another way.
+    fn beside(&self, other: &Self, period: Period<S>) -> Self {
+        let center = period.image(self.sphere.center, other.sphere.center);
+        Self { sphere: Sphere { center, ..self.sphere }, ..*self }
     }
 
     /// Way to the end of the substep, in metres.
@@ -308,8 +317,14 @@ impl<S: Scalar> Hit<S> {
     }
 
     /// Next meeting of two marbles from `now` on, if they are fast.
-    fn foresee(pair: (u32, u32), ways: &[Way<S>], now: S) -> Option<Reverse<Self>> {
+    fn foresee(
+        pair: (u32, u32),
+        ways: &[Way<S>],
+        now: S,
+        period: Period<S>,
+    ) -> Option<Reverse<Self>> {
         let [x, y] = [pair.0, pair.1].map(|row| ways[row as usize].at(now));
+        let y = y.beside(&x, period);
         let radius = x.sphere.radius.min(y.sphere.radius);
         let closing = x.rest() - y.rest();
         if length(closing) <= radius * S::constant(FAST) {

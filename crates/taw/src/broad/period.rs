@@ -1,0 +1,187 @@
+//! Periodic boxes: what leaves one through a side enters it through the opposite one.
+
+use cgmath::EuclideanSpace;
+use cgmath::num_traits::Float;
+
+use super::Grid;
+use crate::Error;
+use crate::error::within;
+use crate::math::{Point3, Scalar, Vec3};
+
+/// Diameters of the largest ball that a period holds at least, so that no two balls touch each
+/// other through two sides.
+const LEAST_DIAMETERS: f64 = 4.0;
+
+/// Lengths of a periodic box along the axes, around the origin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Period<S> {
+    /// In metres; none along an axis that has no sides.
+    pub lengths: [Option<S>; 3],
+}
+
+impl<S> Default for Period<S> {
+    /// No sides at all.
+    fn default() -> Self {
+        Self { lengths: [None, None, None] }
+    }
+}
+
+impl<S: Scalar> Period<S> {
+    /// Whether there are no sides at all.
+    pub fn is_open(&self) -> bool {
+        self.lengths.iter().all(Option::is_none)
+    }
+
+    /// Nothing, if the largest of these balls fits into each length often enough.
+    pub fn check_radii(self, radius: &[S]) -> Result<(), Error> {
+        let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r));
+        let least = largest * S::constant(2.0 * LEAST_DIAMETERS);
+        for (length, field) in self.lengths.iter().zip(["period.x", "period.y", "period.z"]) {
+            length.map(|length| within(field, length, least, S::max_value())).transpose()?;
+        }
+        Ok(())
+    }
+
+    /// The shortest of all ways that differ by periods: minimum image convention (Allen and
+    /// Tildesley, *Computer Simulation of Liquids*, 1987, §1.5.2).
+    #[inline]
+    pub fn nearest(&self, way: Vec3<S>) -> Vec3<S> {
+        self.image(Point3::from_vec(way), Point3::origin()).to_vec()
+    }
+
+    /// The image of a point that is nearest to another one.
+    #[inline]
+    pub fn image(&self, mut point: Point3<S>, near: Point3<S>) -> Point3<S> {
+        for (axis, length) in self.lengths.iter().enumerate() {
+            if let Some(length) = *length {
+                let periods = ((point[axis] - near[axis]) / length).round();
+                point[axis] -= periods * length;
+            }
+        }
+        point
+    }
+}
+
+/// Spheres with their images beyond the sides, with what finding pairs writes.
+#[derive(Clone, Debug)]
+pub(crate) struct Images<S> {
+    center: Vec<Point3<S>>,
+    radius: Vec<S>,
+    row: Vec<u32>,
+    pairs: Vec<(u32, u32)>,
+}
+
+impl<S> Default for Images<S> {
+    fn default() -> Self {
+        Self { center: Vec::new(), radius: Vec::new(), row: Vec::new(), pairs: Vec::new() }
+    }
+}
+
+impl<S: Scalar> Images<S> {
+    /// Names every pair of spheres that may touch or be at most `reach` metres apart once, the
+    /// lower row first, also those across the sides of a periodic box.
+    pub fn pairs(
+        &mut self,
+        grid: &mut Grid,
+        (center, radius): (&[Point3<S>], &[S]),
+        reach: S,
+        period: Period<S>,
+        mut pair: impl FnMut(u32, u32),
+    ) {
+        if period.is_open() {
+            grid.rebuild(center, radius, reach);
+            grid.pairs(center, pair);
+            return;
+        }
+        self.list(center, radius, reach, period);
+        grid.rebuild(&self.center, &self.radius, reach);
+        let Self { row, pairs, .. } = self;
+        pairs.clear();
+        grid.pairs(&self.center, |a, b| {
+            let (a, b) = (row[a as usize], row[b as usize]);
+            if a != b {
+                pairs.push((a.min(b), a.max(b)));
+            }
+        });
+        pairs.sort_unstable();
+        pairs.dedup();
+        pairs.iter().for_each(|(a, b)| pair(*a, *b));
+    }
+
+    /// Lists all spheres, and the images that one of them may touch.
+    fn list(&mut self, center: &[Point3<S>], radius: &[S], reach: S, period: Period<S>) {
+        let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r));
+        self.center.clear();
+        self.radius.clear();
+        self.row.clear();
+        for (row, (center, radius)) in (0..).zip(center.iter().zip(radius)) {
+            let first = self.center.len();
+            self.center.push(period.image(*center, Point3::origin()));
+            let far = *radius + largest + reach;
+            for (axis, length) in period.lengths.iter().enumerate() {
+                let Some(length) = *length else { continue };
+                for image in first..self.center.len() {
+                    let at = self.center[image];
+                    for shift in [length, -length] {
+                        let mut beyond = at;
+                        beyond[axis] += shift;
+                        if beyond[axis].abs() <= length * S::constant(0.5) + far {
+                            self.center.push(beyond);
+                        }
+                    }
+                }
+            }
+            self.radius.resize(self.center.len(), *radius);
+            self.row.resize(self.center.len(), row);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::broad::all_pairs;
+    use cgmath::InnerSpace;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn pairs_across_the_sides_are_named_once(
+            at in proptest::collection::vec([-0.75..0.75_f64, -0.75..0.75_f64, -0.75..0.75_f64], 2..60),
+            sides in 1..8_u32,
+            reach in 0.0..0.05_f64,
+        ) {
+            let lengths = [0, 1, 2].map(|axis| (sides >> axis & 1 == 1).then_some(1.0));
+            let period = Period { lengths };
+            let center: Vec<Point3<f64>> = at.into_iter().map(Point3::from).collect();
+            let radius: Vec<f64> = (0..center.len()).map(|i| [0.02, 0.05, 0.12][i % 3]).collect();
+            let touches = |a: u32, b: u32| {
+                let (a, b) = (a as usize, b as usize);
+                period.nearest(center[b] - center[a]).magnitude() <= radius[a] + radius[b] + reach
+            };
+            let mut named = Vec::new();
+            Images::default().pairs(&mut Grid::default(), (&center, &radius), reach, period, |a, b| {
+                named.push((a, b));
+            });
+            let count = named.len();
+            named.dedup();
+            prop_assert_eq!(named.len(), count, "one was named twice");
+            named.retain(|(a, b)| touches(*a, *b));
+            let mut all = Vec::new();
+            all_pairs(center.len() as u32, |a, b| all.push((a, b)));
+            all.retain(|(a, b)| touches(*a, *b));
+            all.sort_unstable();
+            prop_assert_eq!(named, all);
+        }
+    }
+
+    #[test]
+    fn the_nearest_image_is_the_way_itself_where_that_is_short() {
+        let period = Period { lengths: [Some(8.0_f32), None, Some(0.3)] };
+        let short = Vec3::new(3.999, 1e9, -0.1499);
+        assert_eq!(period.nearest(short), short);
+        let there = period.nearest(Vec3::new(-5.0, 1e9, 0.25));
+        assert_eq!(there, Vec3::new(3.0, 1e9, 0.25 - 0.3));
+        assert!(period.nearest(Vec3::new(f32::NAN, 0.0, 0.0)).x.is_nan());
+    }
+}
