@@ -39,3 +39,19 @@ fn a_marble_may_turn_less_than_its_world() {
         assert_ne!(rolls.rotation, unturned);
     }
 }
+
+#[test]
+fn a_spin_that_only_shows_is_no_energy() {
+    let mut world = World::<f64>::default();
+    world.set_model(Model { rotation: Rotation::Rolling, ..Model::default() }).unwrap();
+    world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+    let velocity = Vec3::new(5.0, 0.0, 0.0);
+    let ball = Marble { velocity, ..Marble::new(Point3::new(0.0, 0.5, 0.0), 0.5) };
+    let id = world.marbles.insert(ball).unwrap();
+    let energy = world.energy().total();
+    for _ in 0..60 {
+        world.step(1.0 / 60.0).unwrap();
+        assert!((world.energy().total() / energy - 1.0).abs() < 1e-9, "{:?}", world.energy());
+    }
+    assert!((world.marbles.get(id).unwrap().spin.z + 10.0).abs() < 1e-9, "it rolls, to be seen");
+}

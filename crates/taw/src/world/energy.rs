@@ -2,14 +2,14 @@ use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
 use super::World;
 use crate::math::{Scalar, Vec3, cast_vector};
-use crate::motion::Motion;
+use crate::motion::{Motion, Rotation};
 
 /// The energy of a world's marbles, in joules, counted in `f64`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Energy {
     /// Of their velocities.
     pub kinetic: f64,
-    /// Of their spins.
+    /// Of those spins that contacts feel: [`Rotation::Dynamic`].
     pub spin: f64,
     /// In the world's gravity, against the origin.
     pub potential: f64,
@@ -35,7 +35,9 @@ impl<S: Scalar> World<S> {
             let Motion { position, velocity } = self.marbles.exact(row);
             let scale = self.marbles.gravity_scale.get(row).unwrap_or(S::one()).as_f64();
             energy.kinetic += 0.5 * mass * velocity.magnitude2();
-            energy.spin += 0.5 * mass * self.marbles.spin_energy(row);
+            if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Dynamic {
+                energy.spin += 0.5 * mass * self.marbles.spin_energy(row);
+            }
             energy.potential -= mass * scale * gravity.dot(position.to_vec());
         }
         energy

@@ -4,6 +4,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::sync::{Mutex, OnceLock};
 
 use taw::prelude::*;
+use taw::shape::Mesh;
 
 use super::{Effort, Row};
 use crate::scene::{Ball, IMPULSE, Meter, box_around, overlaps, surface, wall, world};
