@@ -271,6 +271,9 @@ impl Swarm {
             if shapes {
                 walls::near_shapes(walls, balls, slab.own_rows(), &mut slab.near_shapes);
             }
+            if rough {
+                slab.recall_shapes(|row| memory.shapes_of(before, row));
+            }
         });
         self.find_strays(cap);
         if rough {

@@ -6,7 +6,7 @@ use super::slab::Slab;
 use super::strays::Strays;
 use super::team::{Shared, each};
 use super::touch::Touch;
-use super::walls::find;
+use super::walls::{find, shapes_of};
 
 /// What a pair bore; kept with its first ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -109,6 +109,12 @@ impl Memory {
                 }
             }
         }
+    }
+
+    /// Names the touches of shapes other than half-spaces that a ball had, in order.
+    pub fn shapes_of(&self, before: &[u32], row: u32) -> impl Iterator<Item = Touch> {
+        let then = before[row as usize];
+        shapes_of(&self.touches, then).map(move |touch| Touch { row, ..*touch })
     }
 
     /// What a ball at a wall bore.

@@ -113,6 +113,8 @@ pub struct Swarm {
     guests: Vec<Guest>,
     /// Their rows, in order, and which guest each is; only in a step.
     guest_rows: Vec<(u32, u32)>,
+    /// Places and velocities of these rows before a drift.
+    kept_guests: Vec<[Row; 2]>,
     /// A bit for each slot.
     guest_slots: Vec<u64>,
     /// What a column is put in order with; then, in the lab's tier, the fans of all slabs.
@@ -373,6 +375,7 @@ impl Swarm {
             invited,
             guests,
             guest_rows,
+            kept_guests,
             guest_slots,
             spare,
             lists,
@@ -390,6 +393,7 @@ impl Swarm {
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
             + (of(lists) + lists.iter().map(of).sum::<usize>())
             + (of(planes) + of(invited) + of(guests) + of(guest_rows) + of(guest_slots))
+            + of(kept_guests)
             + (ids.bytes() + grid.bytes() + memory.bytes() + strays.bytes())
     }
 
@@ -527,6 +531,7 @@ impl PartialEq for Swarm {
             invited,
             guests,
             guest_rows: _,
+            kept_guests: _,
             guest_slots,
             spare,
             lists: _,

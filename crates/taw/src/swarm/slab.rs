@@ -36,6 +36,8 @@ pub(super) struct Slab {
     /// For how long all have been slow, in seconds, and whether they sleep.
     pub slow: f32,
     pub asleep: bool,
+    /// The speed in m/s of its fastest ball that is no guest, if it has guests.
+    pub fastest_own: Option<f32>,
     /// Whether a ball of it or of those beside it bounced just now, and in this substep.
     pub again: bool,
     pub struck: bool,
@@ -73,6 +75,7 @@ impl Slab {
             inverse_masses: _,
             slow: _,
             asleep: _,
+            fastest_own: _,
             again: _,
             struck: _,
             overrun: _,

@@ -243,15 +243,18 @@ impl Swarm {
                 self.look_at_walls(walls, left, times, all, false);
             }
             observe(Stage::Integrate);
+            let parts = [substep as f32, (substep + 1) as f32].map(|part| part / substeps);
+            self.keep_guests();
             self.drift(row(gravity * h), [0.0; 4]);
-            self.hold_guests(row(gravity * h), 0.0);
+            self.drift_guests(parts, false, 0.0);
             observe(Stage::Restitute);
             self.find_backing();
             self.pass(Pass::Begin(impact), |_, _| true);
             self.pass(Pass::Solve(impact), |_, _| true);
             observe(Stage::Integrate);
+            self.keep_guests();
             self.drift([0.0; 4], [h, h, h, 0.0]);
-            self.hold_guests([0.0; 4], h);
+            self.drift_guests(parts, true, h);
             let (cap, left) = (self.cap, left - h);
             let left_it = |_: &Row, budget: f32| budget < -cap;
             if self.seek_within_step(|slab| slab.overrun, left_it, dt, walls, observe) {
@@ -399,6 +402,9 @@ impl Swarm {
     fn look(&mut self, dt: f32, gravity: Vec3<f32>) {
         let lying = lying(gravity, self.mean);
         let sleeps = self.model.sleeps;
+        if !self.guests.is_empty() {
+            self.look_at_guests();
+        }
         let (grid, budget) = (&self.grid, &self.budget[..]);
         // More than this are too many.
         let most = self.strays.room(self.at.len()) + 1;
@@ -431,7 +437,8 @@ impl Swarm {
             ];
             let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
             slab.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
-            slab.slow = if slab.speed[0] < lying { slab.slow + dt } else { 0.0 };
+            let lies = slab.fastest_own.unwrap_or(slab.speed[0]) < lying;
+            slab.slow = if lies { slab.slow + dt } else { 0.0 };
             if sleeps && slab.slow > FALL_ASLEEP {
                 (slab.asleep, slab.speed) = (true, [0.0; 3]);
                 slab.leaving.clear();
@@ -597,11 +604,12 @@ impl Swarm {
             slab.seek_walls(instructions, balls, planes, |touch| {
                 super::walls::find(&old, touch).copied()
             });
-            slab.old_touches = old;
             slab.near_shapes.clear();
             if shapes {
                 super::walls::near_shapes(walls, balls, slab.own_rows(), &mut slab.near_shapes);
             }
+            slab.recall_shapes(|row| super::walls::shapes_of(&old, row).copied());
+            slab.old_touches = old;
         });
     }
 
@@ -662,7 +670,7 @@ impl Swarm {
             if !rows.is_empty() {
                 for touch in &mut slab.touches {
                     if let Some(guest) = Self::guest_at(guests, rows, touch.row) {
-                        touch.bear(guest);
+                        touch.bear(guest, before);
                     }
                 }
             }

@@ -114,12 +114,29 @@ impl Slab {
         }
     }
 
+    /// Takes over what the balls near other shapes than half-spaces bore there. Which parts they
+    /// touch now is looked at before the next pass.
+    pub fn recall_shapes<T: Iterator<Item = Touch>>(&mut self, recall: impl Fn(u32) -> T) {
+        let planes = self.touches.len();
+        for touch in self.near_shapes.iter().flat_map(|row| recall(*row)) {
+            let touches = &mut self.touches;
+            make_room(touches, touches.len() + 1);
+            touches.push(touch);
+        }
+        if self.touches.len() > planes {
+            self.touches.sort_unstable_by_key(Touch::key);
+        }
+    }
+
     /// Finds the half-spaces near some more balls of the slab.
     pub fn seek_walls_for(&mut self, rows: &[u32], balls: Balls, planes: &[HalfSpace]) {
         std::mem::swap(&mut self.touches, &mut self.old_touches);
         self.touches.clear();
         let old = &self.old_touches;
-        self.touches.extend(old.iter().filter(|touch| rows.binary_search(&touch.row).is_err()));
+        // Which parts of other shapes are touched is looked at before the next pass, which needs to
+        // know what they bore.
+        let kept = |touch: &&Touch| !touch.is_plane || rows.binary_search(&touch.row).is_err();
+        self.touches.extend(old.iter().filter(kept));
         for row in rows {
             let touches = &mut self.touches;
             touch_planes(*row, balls, planes, |touch| {
@@ -329,6 +346,13 @@ impl Kernel for NearPlanes<'_> {
 pub(super) fn find<'a>(touches: &'a [Touch], touch: &Touch) -> Option<&'a Touch> {
     let at = touches.binary_search_by_key(&touch.key(), Touch::key).ok()?;
     touches.get(at)
+}
+
+/// The touches of a ball with other shapes than half-spaces, among many in order.
+pub(super) fn shapes_of(touches: &[Touch], row: u32) -> impl Iterator<Item = &Touch> {
+    let first = touches.partition_point(|touch| touch.row < row);
+    let of_row = touches[first..].iter().take_while(move |touch| touch.row == row);
+    of_row.filter(|touch| !touch.is_plane)
 }
 
 /// The rows among these that are near anything but half-spaces, found by ever smaller boxes.
