@@ -70,13 +70,13 @@ impl Guest {
         let fall = squared(gravity) * dt;
         if fall > 0.0 {
             let part = (dot(&faster, &gravity) / fall).clamp(0.0, 1.0);
-            for axis in 0..3 {
-                self.from[1][axis] -= gravity[axis] * part * dt;
+            for (speed, pull) in self.from[1].iter_mut().zip(gravity).take(3) {
+                *speed -= pull * part * dt;
             }
         }
     }
 
-    /// Whether a guest that sleeps does so in this step too: what it does from rest is the same as
+    /// Says if a guest that sleeps does so in this step too: what it does from rest is the same as
     /// before, so what pulls it and holds it is. `at` is where it sleeps.
     fn sleeps_on(&mut self, at: &Row, before: &Self, lying: f32, dt: f32) -> bool {
         let now = [self.velocity, less(&self.at, at)];
@@ -111,7 +111,7 @@ fn dot(a: &Row, b: &Row) -> f32 {
 }
 
 impl Swarm {
-    /// What became of the guests in the last step, in the order of [`host`](Self::host).
+    /// Guests before and after the last step, in the order of [`host`](Self::host).
     pub(crate) fn hosted(&self) -> impl Iterator<Item = (&Guest, Guest)> {
         self.guests.iter().map(|guest| {
             let Some(row) = self.ids.row(guest.ball) else { return (guest, *guest) };

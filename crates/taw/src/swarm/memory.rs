@@ -1,14 +1,14 @@
-//! What contacts bore, while rows change places and pairs are sought anew.
+//! Memory of what contacts bore, while rows change places and pairs are sought anew.
 
+use super::batches::Batch;
 use super::kernels::Pushes;
-use super::pairs::Batch;
 use super::slab::Slab;
 use super::strays::Strays;
 use super::team::{Shared, each};
 use super::touch::Touch;
 use super::walls::{find, shapes_of};
 
-/// What a pair bore; kept with its first ball.
+/// Impulses of a pair; kept with its first ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Kept {
     /// The row of the second ball.
@@ -117,7 +117,7 @@ impl Memory {
         shapes_of(&self.touches, then).map(move |touch| Touch { row, ..*touch })
     }
 
-    /// What a ball at a wall bore.
+    /// Touch that a ball had with a wall before, with what it bore.
     pub fn recall_touch(&self, before: &[u32], touch: &Touch) -> Option<Touch> {
         let then = Touch { row: before[touch.row as usize], ..*touch };
         find(&self.touches, &then).copied()

@@ -15,7 +15,7 @@ pub(super) struct Touch {
     pub part: u32,
     /// Of a half-space, or of any other shape.
     pub is_plane: bool,
-    /// Whether the ball is a guest, whom others move: the wall only bears what the swarm presses
+    /// Set if the ball is a guest, whom others move: the wall only bears what the swarm presses
     /// on it.
     pub bears_guest: bool,
     /// The plane that the wall is like there: its normal, and how far along it the surface is, now
@@ -160,7 +160,7 @@ impl Touch {
         Some(gap)
     }
 
-    /// How fast the ball's surface slides over the wall's, in m/s.
+    /// Velocity at which the ball's surface slides over the wall's, in m/s.
     fn sliding(&self, relative: Vec3<f32>, spin: &Row) -> Vec3<f32> {
         let parting = self.normal * relative.dot(self.normal);
         relative - parting - xyz(spin).cross(self.normal)

@@ -12,11 +12,11 @@ use super::touch::Touch;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
 
-/// What balls can touch besides each other, as the world has it.
+/// Walls of the world, as the balls of a swarm meet them.
 pub(crate) trait Surroundings: Sync {
     /// Names all half-spaces: the wall, its normal, and how far along it the surface is.
     fn planes(&self, name: &mut dyn FnMut(u32, Vec3<f32>, f32));
-    /// Whether there is anything else, and whether some of it may be in a box.
+    /// Says if there is anything else, and if some of it may be in a box.
     fn has_shapes(&self) -> bool;
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;
     /// Names what else is within `reach` metres of a ball, without the seams: the wall and its
@@ -52,7 +52,7 @@ pub(super) struct Balls<'a> {
 }
 
 impl Balls<'_> {
-    /// How far a ball may go before walls are sought again: its budget, or more if it is so fast
+    /// Way of a ball before walls are sought again: its budget, or more if it is so fast
     /// that it leaves that in a step.
     #[inline(always)]
     pub fn reach(&self, row: usize) -> f32 {
@@ -238,7 +238,7 @@ fn on_way(
 /// in each substep.
 const FAST: f32 = 0.5;
 
-/// How walls are looked at.
+/// Facts that a look at walls needs.
 #[derive(Clone, Copy)]
 pub(super) struct Look<'a> {
     pub tier: Tier,
@@ -250,13 +250,13 @@ pub(super) struct Look<'a> {
     /// Walls are where they will be at the end of the step; so long before, in seconds, they were
     /// elsewhere.
     pub before: f32,
-    /// How long a step and a substep are, in seconds.
+    /// Lengths of a step and of a substep, in seconds.
     pub times: [f32; 2],
     pub gravity: Vec3<f32>,
 }
 
 impl Look<'_> {
-    /// How far a fast ball goes in a substep, in metres; none for slow ones.
+    /// Way of a fast ball in a substep, in metres; none for slow ones.
     fn way(&self, row: u32) -> Option<Vec3<f32>> {
         let (at, [u, v, w, _]) = (&self.at[row as usize], self.velocity[row as usize]);
         let [step, substep] = match self.tier {
@@ -409,7 +409,7 @@ impl Touch {
         }
     }
 
-    /// What orders them.
+    /// Key of their order.
     pub fn key(&self) -> (u32, u32, u32) {
         (self.row, self.wall, self.part)
     }
