@@ -1,6 +1,6 @@
 //! Bounces and contacts of pairs in the full tier.
 
-use super::{Pushes, V, gather, mass, mobility, normal_and_gap, scatter};
+use super::{ALL, Pushes, V, gather, mass, mobility, normal_and_gap, scatter};
 use crate::swarm::batches::Batch;
 use crate::swarm::lanes::{Kernel, LANES, Lanes, Row};
 use crate::swarm::team::Shared;
@@ -272,10 +272,9 @@ impl Columns<'_> {
         // weigh: a light ball that a heavy one presses on something has nowhere to go. What sleeps
         // stays.
         let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
-        let [a, b] = [a, b].map(|ball| {
-            let free = mobility(&ball);
-            free.pick_above(zero, grounded.pick_above(zero, one, free), zero)
-        });
+        let [free_a, free_b] = [mobility(&a), mobility(&b)];
+        let a = free_a.pick_above(zero, grounded.pick_above(zero, one, free_a), zero);
+        let b = free_b.pick_above(zero, grounded.pick_above(zero, one, free_b), zero);
         let by = (a + b).pick_above(zero, push / (a + b), zero);
         let ways = [normal.times(by * a), normal.times(by * b)];
         let places =
@@ -311,7 +310,7 @@ impl Solve<'_> {
         let Pushes { pressure, grip, .. } = pushes;
         for (i, batch) in batches.iter().enumerate() {
             let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, _) = normal_and_gap(&a, &b, |lane| batch.pair(lane));
+            let (normal, _) = normal_and_gap(&a, &b, ALL, |lane| batch.pair(lane));
             // It was across the normal of the last substep.
             let across = V::load(&grip[i]);
             let across = across.minus(normal.times(across.dot(normal)));
@@ -348,7 +347,7 @@ impl Solve<'_> {
         let (speed, per_second) = (L::splat(speed), L::splat(1.0 / impact.time));
         for (i, batch) in batches.iter().enumerate() {
             let at = gather::<L>(columns.at, batch);
-            let (normal, gap) = normal_and_gap(&at[0], &at[1], |lane| batch.pair(lane));
+            let (normal, gap) = normal_and_gap(&at[0], &at[1], ALL, |lane| batch.pair(lane));
             let before = L::load(&pressure[i]);
             let velocity = gather::<L>(columns.velocity, batch);
             // What bears nothing and comes fast is no contact yet.

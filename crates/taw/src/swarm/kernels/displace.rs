@@ -1,6 +1,6 @@
 //! Overlap moved apart in the lab's tier.
 
-use super::{V, gather, normal_and_gap, scatter};
+use super::{ALL, V, gather, normal_and_gap, scatter};
 use crate::swarm::batches::Batch;
 use crate::swarm::lanes::{Kernel, LANES, Lanes, Row};
 use crate::swarm::pairs::Fans;
@@ -18,7 +18,7 @@ impl Kernel for Displace<'_> {
     fn run<L: Lanes>(self) {
         for batch in self.batches {
             let [a, b] = gather::<L>(self.at, batch);
-            let (normal, overlap) = normal_and_overlap(&a, &b, |lane| batch.pair(lane));
+            let (normal, overlap) = normal_and_overlap(&a, &b, ALL, |lane| batch.pair(lane));
             let by = normal.times(overlap * L::splat(0.5));
             let moved = [V::of(&a).minus(by).with(a[3]), V::of(&b).plus(by).with(b[3])];
             scatter(self.at, batch, moved);
@@ -31,9 +31,10 @@ impl Kernel for Displace<'_> {
 fn normal_and_overlap<L: Lanes>(
     a: &[L; 4],
     b: &[L; 4],
+    lanes: u32,
     pair: impl Fn(usize) -> [u32; 2],
 ) -> (V<L>, L) {
-    let (normal, gap) = normal_and_gap(a, b, pair);
+    let (normal, gap) = normal_and_gap(a, b, lanes, pair);
     let zero = L::splat(0.0);
     (normal, (zero - gap).max(zero))
 }
@@ -94,7 +95,7 @@ impl Kernel for DisplaceFans<'_> {
                 unsafe {
                     let b = L::gather(ball, &after);
                     let pair = |lane: usize| [row, row + u32::from(after[lane])];
-                    let (normal, overlap) = normal_and_overlap(&a, &b, pair);
+                    let (normal, overlap) = normal_and_overlap(&a, &b, (1 << count) - 1, pair);
                     let overlap = overlap.first(count);
                     let hits = overlap.above(L::splat(0.0)).count_ones();
                     let by = normal.times(overlap * L::splat(PART[hits as usize]));

@@ -27,21 +27,25 @@ pub(in crate::swarm) struct Drift<'a> {
 impl Kernel for Drift<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
+        // In registers, not behind a reference that any of the rows might be.
+        let (change, time) = (self.change, self.time);
+        let mut lowest = f32::MAX;
         let rows = self.at.iter_mut().zip(self.velocity).zip(self.budget);
         for (row, ((at, velocity), budget)) in rows.enumerate() {
-            let new = sum(*velocity, self.change);
-            let way = product(new, self.time);
+            let new = sum(*velocity, change);
+            let way = product(new, time);
             let place = sum(*at, way);
             let ok = largest(new) < MOST && largest(place) < MOST;
             if ok {
                 (*velocity, *at) = (new, place);
                 *budget -= squared(way).sqrt();
-                *self.overrun |= *budget < self.least;
+                lowest = lowest.min(*budget);
             } else {
                 *velocity = [0.0, 0.0, 0.0, velocity[3]];
                 self.stopped.push(self.first + row as u32);
             }
         }
+        *self.overrun |= lowest < self.least;
     }
 }
 

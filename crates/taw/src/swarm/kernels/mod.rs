@@ -103,9 +103,18 @@ impl<L: Lanes> V<L> {
     }
 }
 
-/// The normal from the first to the second ball, and the gap between them.
+/// All lanes, as bits.
+const ALL: u32 = (1 << LANES) - 1;
+
+/// The normal from the first to the second ball, and the gap between them. Only those of the named
+/// lanes, as bits, are pairs of two balls.
 #[inline(always)]
-fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4], pair: impl Fn(usize) -> [u32; 2]) -> (V<L>, L) {
+fn normal_and_gap<L: Lanes>(
+    a: &[L; 4],
+    b: &[L; 4],
+    lanes: u32,
+    pair: impl Fn(usize) -> [u32; 2],
+) -> (V<L>, L) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let least = L::splat(f32::MIN_POSITIVE);
     let way = V::of(b).minus(V::of(a));
@@ -114,7 +123,7 @@ fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4], pair: impl Fn(usize) -> [u32
     // Root and quotient do not wait for each other.
     let inverse = squared.pick_above(least, distance * (one / squared), zero);
     let mut normal = way.times(inverse);
-    if least.above(squared) != 0 {
+    if least.above(squared) & lanes != 0 {
         // Where the centers coincide, any direction is as good as another; with the same for all,
         // those at one point would come into a line.
         let mut any = [[0.0; LANES]; 3];
@@ -125,8 +134,12 @@ fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4], pair: impl Fn(usize) -> [u32
             }
         }
         let (V([x, y, z]), V([u, v, w])) = (normal, V::load(&any));
-        let pick = [(x, u), (y, v), (z, w)];
-        normal = V(pick.map(|(x, any)| squared.pick_above(least, x, any)));
+        // (Not by `map`, which is compiled without the instructions of its caller.)
+        normal = V([
+            squared.pick_above(least, x, u),
+            squared.pick_above(least, y, v),
+            squared.pick_above(least, z, w),
+        ]);
     }
     (normal, distance - (a[3] + b[3]))
 }
