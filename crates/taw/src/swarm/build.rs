@@ -1,9 +1,10 @@
 //! Putting rows in order, and seeking pairs.
 
+use super::batches::{pairs_in, take_out};
 use super::grid::{reorder, reorder_rows};
 use super::kernels::squared;
 use super::memory::fit;
-use super::pairs::{Fans, FindPairs, Search, pairs_in, take_out};
+use super::pairs::{Fans, FindPairs, Search};
 use super::slab::Slab;
 use super::step::listed;
 use super::team::{Shared, each, each_rows, list_rows};
@@ -11,7 +12,7 @@ use super::{Stage, Surroundings, Swarm, Tier, walls};
 
 /// Balls in a slab at least.
 const SLAB: u32 = 512;
-/// How far a ball may go between two searches: as far as it goes in so many steps at its speed,
+/// Way of a ball between two searches at most: as far as it goes in so many steps at its speed,
 const STEPS: f32 = 12.0;
 /// or so many times as far as the margin at most if it is sought for alone.
 const FAR: f32 = 16.0;
@@ -21,7 +22,7 @@ const FAR: f32 = 16.0;
 const SPARSE: f32 = 2.0;
 pub(super) const SOON: u32 = 6;
 const WIDEST: f32 = 6.0;
-/// How far balls that are not sought for alone may go, in radii: further they pass through each
+/// Way at most of balls that are not sought for alone, in radii: further they pass through each
 /// other.
 const WIDE: f32 = 2.0;
 
@@ -58,7 +59,7 @@ impl Swarm {
         self.remembers = false;
     }
 
-    /// How far most balls may go at most until pairs are sought again, in metres. In the lab's
+    /// Way that most balls may go until pairs are sought again, in metres. In the lab's
     /// tier a heap is livelier, and a pair more costs less.
     fn margin(&self) -> f32 {
         self.mean * (1.0 + self.spread) * if self.rough() { 0.2 } else { 0.3 }
@@ -270,6 +271,9 @@ impl Swarm {
             slab.near_shapes.clear();
             if shapes {
                 walls::near_shapes(walls, balls, slab.own_rows(), &mut slab.near_shapes);
+            }
+            if rough {
+                slab.recall_shapes(|row| memory.shapes_of(before, row));
             }
         });
         self.find_strays(cap);

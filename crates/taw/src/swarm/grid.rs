@@ -23,11 +23,11 @@ const CELLS: f64 = 4096.0;
 const SIDE: f64 = 4096.0;
 /// Cells are wider than they need be by this part, which is more than rounding takes.
 const MARGIN: f32 = 1.005;
-/// How often cells are halved at most, and how often from one level to the next: with a level for
+/// Halvings of cells at most, and from one level to the next: with a level for
 /// each halving, most time goes into looking up empty cells.
 const HALVINGS: usize = 6;
 const HALVINGS_PER_LEVEL: usize = 2;
-/// How many balls are asked where the scene is.
+/// Number of balls that are asked where the scene is.
 const SAMPLE: usize = 1024;
 
 /// One level of cells.
@@ -37,13 +37,13 @@ pub(super) struct Level {
     per_metre: f32,
     /// The widest ball that belongs here, in metres.
     widest: f32,
-    /// How many layers, and cells in them in rows and along a row, without the empty ones around.
+    /// Number of layers, and of cells in them in rows and along a row, without empty ones around.
     pub layers: u32,
     rows: u32,
     cells: u32,
     /// The first cell of this level in a layer of level 0.
     base: u32,
-    /// How often cells were halved.
+    /// Number of times that cells were halved.
     pub number: u32,
     /// Cells in a row and in a layer, with the empty ones around.
     pub row_stride: u32,
@@ -57,7 +57,7 @@ pub(super) struct Grid {
     axes: [usize; 3],
     low: [f32; 3],
     pub levels: Vec<Level>,
-    /// How many cells of all levels are in a layer of level 0.
+    /// Number of cells of all levels in a layer of level 0.
     per_layer: u32,
     /// The first row of each cell, one place further, and of the one after the last.
     start: Vec<u32>,
@@ -85,7 +85,7 @@ impl Level {
             + cell
     }
 
-    /// How many rows and cells in a row there are, with the empty ones around.
+    /// Number of rows, and of cells in a row, with the empty ones around.
     pub fn size(&self) -> [u32; 2] {
         [self.rows + 2, self.cells + 2]
     }
@@ -98,7 +98,7 @@ impl Grid {
         levels + numbers * size_of::<u32>() + self.parts.capacity() * size_of::<Part>()
     }
 
-    /// How many layers of level 0 there are.
+    /// Number of layers of level 0.
     pub fn layers(&self) -> u32 {
         self.levels.first().map_or(0, |level| level.layers)
     }

@@ -14,7 +14,7 @@ pub(super) struct Ids {
     slots: Vec<u32>,
     /// The row of each slot, or [`NONE`].
     rows: Vec<u32>,
-    /// How many balls each slot had before; of slots that had none, nothing.
+    /// Number of balls that each slot had before; of slots that had none, nothing.
     generations: Vec<u32>,
     free: Vec<u32>,
 }
@@ -59,7 +59,7 @@ impl Ids {
         Ok(self.slots[first as usize..].iter().map(|slot| self.of_slot(*slot)).collect())
     }
 
-    /// Whether all of these are there, and once.
+    /// Checks that all of these are there, and once.
     pub fn check(&self, balls: &[BallId]) -> Result<(), Error> {
         let mut seen = vec![false; self.slots.len()];
         for ball in balls {

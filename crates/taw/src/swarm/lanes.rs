@@ -3,7 +3,7 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
-/// How many contacts a kernel works on at once.
+/// Number of contacts that a kernel works on at once.
 pub(super) const LANES: usize = 8;
 
 /// A row of a column: three coordinates, and one number more.

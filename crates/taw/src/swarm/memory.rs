@@ -1,14 +1,14 @@
-//! What contacts bore, while rows change places and pairs are sought anew.
+//! Memory of what contacts bore, while rows change places and pairs are sought anew.
 
+use super::batches::Batch;
 use super::kernels::Pushes;
-use super::pairs::Batch;
 use super::slab::Slab;
 use super::strays::Strays;
 use super::team::{Shared, each};
 use super::touch::Touch;
-use super::walls::find;
+use super::walls::{find, shapes_of};
 
-/// What a pair bore; kept with its first ball.
+/// Impulses of a pair; kept with its first ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Kept {
     /// The row of the second ball.
@@ -111,7 +111,13 @@ impl Memory {
         }
     }
 
-    /// What a ball at a wall bore.
+    /// Names the touches of shapes other than half-spaces that a ball had, in order.
+    pub fn shapes_of(&self, before: &[u32], row: u32) -> impl Iterator<Item = Touch> {
+        let then = before[row as usize];
+        shapes_of(&self.touches, then).map(move |touch| Touch { row, ..*touch })
+    }
+
+    /// Touch that a ball had with a wall before, with what it bore.
     pub fn recall_touch(&self, before: &[u32], touch: &Touch) -> Option<Touch> {
         let then = Touch { row: before[touch.row as usize], ..*touch };
         find(&self.touches, &then).copied()

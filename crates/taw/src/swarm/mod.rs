@@ -5,7 +5,7 @@
 //! times as fast: see [`Tier`] for what it models. It lives in a world, whose walls and
 //! marbles it touches.
 //!
-//! How a step goes:
+//! Parts of a step:
 //! - Rows lie in the order of cells, so that neighbours in space are neighbours in memory.
 //! - Layers of cells are grouped into *slabs*. Slabs that are not neighbours have no ball in
 //!   common, so threads work on the even ones first and on each odd one after those beside it, and
@@ -21,6 +21,7 @@
     reason = "kernels are compiled for the instructions of whoever calls them"
 )]
 
+mod batches;
 mod build;
 mod grid;
 mod guests;
@@ -31,6 +32,7 @@ mod memory;
 mod model;
 mod pairs;
 mod slab;
+mod state;
 mod step;
 mod strays;
 mod team;
@@ -49,11 +51,12 @@ use crate::Error;
 use crate::error::{finite_point, finite_vector, positive, within};
 use crate::math::{Point3, Vec3};
 use crate::world::MarbleId;
+use batches::pairs_in;
 use grid::Grid;
 use ids::Ids;
 use lanes::Row;
 use memory::Memory;
-use pairs::{Search, pairs_in};
+use pairs::Search;
 use slab::Slab;
 use strays::Strays;
 use walls::HalfSpace;
@@ -80,14 +83,14 @@ pub struct Swarm {
     spin: Vec<Row>,
     /// See [`Columns::backing`](kernels::Columns::backing); only while it steps.
     backing: Vec<Row>,
-    /// How far each ball may still go until pairs are sought again, in metres.
+    /// Way that each ball may still go until pairs are sought again, in metres.
     budget: Vec<f32>,
-    /// How far each ball wants to go in this step, in metres; only in the lab's tier.
+    /// Way that each ball wants to go in this step, in metres; only in the lab's tier.
     way: Vec<f32>,
     /// The largest radius, and the mean of all.
     largest: f32,
     mean: f32,
-    /// How far a ball goes at most that is not sought for alone, since pairs were sought, in
+    /// Way at most, since pairs were sought, of a ball that is not sought for alone, in
     /// metres.
     cap: f32,
     grid: Grid,
@@ -96,13 +99,13 @@ pub struct Swarm {
     strays: Strays,
     /// The rows that would leave their budget in this step.
     leaving: Vec<u32>,
-    /// How far the fast balls go; only while pairs are sought.
+    /// Ways of the fast balls; only while pairs are sought.
     ways: Vec<f32>,
     memory: Memory,
     /// For each row, the one that it was when the memory was made, if it was then.
     before: Vec<u32>,
     remembers: bool,
-    /// Whether pairs and balls at walls are up to date.
+    /// Set while pairs and balls at walls are up to date.
     paired: bool,
     walled: Option<u64>,
     gravity: Option<Vec3<f32>>,
@@ -113,22 +116,24 @@ pub struct Swarm {
     guests: Vec<Guest>,
     /// Their rows, in order, and which guest each is; only in a step.
     guest_rows: Vec<(u32, u32)>,
+    /// Places and velocities of these rows before a drift.
+    kept_guests: Vec<[Row; 2]>,
     /// A bit for each slot.
     guest_slots: Vec<u64>,
-    /// What a column is put in order with; then, in the lab's tier, the fans of all slabs.
+    /// Column to put others in order with; then, in the lab's tier, the fans of all slabs.
     spare: Vec<Row>,
     lists: Vec<Vec<u32>>,
-    /// How far each slab is, while they are worked on.
+    /// Progress of each slab, while they are worked on.
     slab_states: Vec<u32>,
     searches: Vec<Search>,
     rebuilds: u64,
     steps_since_build: u32,
-    /// How much wider than usual the margin is, as a part of it.
+    /// Width of the margin beyond the usual, as a part of that.
     spread: f32,
 }
 
 impl Swarm {
-    /// How it steps.
+    /// Model by which it steps.
     #[must_use]
     pub fn model(&self) -> SwarmModel {
         self.model
@@ -210,13 +215,13 @@ impl Swarm {
         Ok(())
     }
 
-    /// How many balls there are.
+    /// Number of balls.
     #[must_use]
     pub fn len(&self) -> usize {
         self.at.len()
     }
 
-    /// Whether there are none.
+    /// True if there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.at.is_empty()
@@ -228,7 +233,7 @@ impl Swarm {
         &self.at
     }
 
-    /// Whether the ball in a row is a marble of the world, which the swarm pushes but does not
+    /// True if the ball in a row is a marble of the world, which the swarm pushes but does not
     /// move.
     #[must_use]
     pub fn is_guest(&self, row: usize) -> bool {
@@ -299,14 +304,14 @@ impl Swarm {
         self.stopped.iter().filter_map(|row| self.ids.id(*row as usize))
     }
 
-    /// How many balls sleep.
+    /// Number of balls that sleep.
     #[must_use]
     pub fn asleep(&self) -> usize {
         let slabs = self.slabs.iter().filter(|slab| slab.asleep);
         if self.paired { slabs.map(|slab| slab.own_rows().len()).sum() } else { 0 }
     }
 
-    /// How many pairs of balls are near enough to be looked at.
+    /// Number of pairs of balls near enough to be looked at.
     #[must_use]
     pub fn pairs(&self) -> usize {
         self.slabs.iter().map(|slab| slab.pairs).sum::<usize>() + pairs_in(&self.strays.batches)
@@ -324,76 +329,20 @@ impl Swarm {
         within("pairs", all as f64, 0.0, listed as f64).map(|_| ())
     }
 
-    /// How many times a ball is near enough to a wall to be looked at. (The lab's tier looks at
-    /// all balls for each half-space, and does not count these.)
+    /// Number of times that a ball is near enough to a wall to be looked at. (The lab's tier looks
+    /// at all balls for each half-space, and does not count these.)
     #[must_use]
     pub fn near_walls(&self) -> usize {
         self.slabs.iter().map(|slab| slab.touches.len()).sum()
     }
 
-    /// How often pairs were sought so far.
+    /// Number of searches for pairs so far.
     #[must_use]
     pub fn rebuilds(&self) -> u64 {
         self.rebuilds
     }
 
-    /// How many bytes it has from the allocator, without what threads have.
-    #[must_use]
-    pub fn bytes(&self) -> usize {
-        fn of<T>(column: &Vec<T>) -> usize {
-            column.capacity() * size_of::<T>()
-        }
-        // All are named, so that none is left out.
-        let Self {
-            model: _,
-            instructions: _,
-            ids,
-            at,
-            velocity,
-            spin,
-            backing,
-            budget,
-            way,
-            largest: _,
-            mean: _,
-            cap: _,
-            grid,
-            slabs,
-            strays,
-            leaving,
-            ways,
-            memory,
-            before,
-            remembers: _,
-            paired: _,
-            walled: _,
-            gravity: _,
-            planes,
-            stopped,
-            invited,
-            guests,
-            guest_rows,
-            guest_slots,
-            spare,
-            lists,
-            slab_states,
-            searches,
-            rebuilds: _,
-            steps_since_build: _,
-            spread: _,
-        } = self;
-        let rows = [at, velocity, spin, backing, spare].map(of);
-        let numbers = [budget, way, ways].map(of);
-        let names = [leaving, before, stopped, slab_states].map(of);
-        rows.into_iter().chain(numbers).chain(names).sum::<usize>()
-            + (of(slabs) + slabs.iter().map(Slab::bytes).sum::<usize>())
-            + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
-            + (of(lists) + lists.iter().map(of).sum::<usize>())
-            + (of(planes) + of(invited) + of(guests) + of(guest_rows) + of(guest_slots))
-            + (ids.bytes() + grid.bytes() + memory.bytes() + strays.bytes())
-    }
-
-    /// Whether there is friction, bounce and spin.
+    /// True in the tier with friction, bounce and spin.
     fn rough(&self) -> bool {
         self.model.tier == Tier::Full
     }
@@ -491,68 +440,6 @@ fn retain<T: Copy>(column: &mut Vec<T>, kept: &[bool]) {
         }
     }
     column.truncate(to);
-}
-
-impl PartialEq for Swarm {
-    /// Whether they will go on alike, bit by bit: what is only scribbled on does not count, nor do
-    /// threads and instructions.
-    fn eq(&self, other: &Self) -> bool {
-        // All are named, so that none is left out.
-        let Self {
-            model,
-            instructions: _,
-            ids,
-            at,
-            velocity,
-            spin,
-            backing: _,
-            budget,
-            way,
-            largest,
-            mean,
-            cap,
-            grid,
-            slabs,
-            strays,
-            leaving: _,
-            ways: _,
-            memory,
-            before,
-            remembers,
-            paired,
-            walled,
-            gravity,
-            planes,
-            stopped,
-            invited,
-            guests,
-            guest_rows: _,
-            guest_slots,
-            spare,
-            lists: _,
-            slab_states: _,
-            searches: _,
-            rebuilds,
-            steps_since_build,
-            spread,
-        } = self;
-        let alone = |model: SwarmModel| SwarmModel { threads: 1, ..model };
-        // The fans are in it.
-        let fans = |spare| bytemuck::cast_slice::<Row, u32>(spare);
-        (alone(*model), ids, gravity) == (alone(other.model), &other.ids, &other.gravity)
-            && (at, velocity, spin) == (&other.at, &other.velocity, &other.spin)
-            && (budget, way, before) == (&other.budget, &other.way, &other.before)
-            && (largest, mean, spread) == (&other.largest, &other.mean, &other.spread)
-            && *cap == other.cap
-            && (grid, slabs, strays) == (&other.grid, &other.slabs, &other.strays)
-            && (self.rough() || fans(spare) == fans(&other.spare))
-            && (remembers, paired) == (&other.remembers, &other.paired)
-            && (!remembers || *memory == other.memory)
-            && (walled, planes) == (&other.walled, &other.planes)
-            && (invited, guests) == (&other.invited, &other.guests)
-            && (guest_slots, stopped) == (&other.guest_slots, &other.stopped)
-            && (rebuilds, steps_since_build) == (&other.rebuilds, &other.steps_since_build)
-    }
 }
 
 /// The speed in m/s up to which a ball counts as lying still, where it weighs so much.

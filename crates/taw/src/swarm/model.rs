@@ -4,7 +4,7 @@ use crate::math::{Point3, Vec3};
 use crate::motion::Mass;
 use crate::response::Material;
 
-/// What is modelled of the balls of a swarm.
+/// Physics of the balls of a swarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Tier {
     /// They move along lines, and overlapping ones are moved apart, half each: the displacement
@@ -17,20 +17,20 @@ pub enum Tier {
     Full,
 }
 
-/// How a swarm steps.
+/// Model by which a swarm steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SwarmModel {
-    /// What is modelled.
+    /// Physics of its balls.
     pub tier: Tier,
     /// Into how many equal parts each step is cut, from 1 to 1,000: in the lab's tier, how often
     /// overlapping balls are moved apart.
     pub substeps: u32,
-    /// How many threads work on a step at most, from 1 to 64. They change no bit of it.
+    /// Number of threads that work on a step at most, from 1 to 64. They change no bit of it.
     pub threads: u32,
-    /// What the balls are made of. Rolling and spinning resistance and tangential restitution
+    /// Material of the balls. Rolling and spinning resistance and tangential restitution
     /// are not modelled.
     pub material: Material<f32>,
-    /// Whether balls that lie still may fall asleep, which the full tier knows.
+    /// Lets balls that lie still fall asleep, in the full tier.
     pub sleeps: bool,
 }
 
@@ -74,7 +74,7 @@ pub struct Ball {
     pub radius: f32,
     /// In metres per second.
     pub velocity: Vec3<f32>,
-    /// How heavy it is.
+    /// Mass of the ball.
     pub mass: Mass<f32>,
 }
 
@@ -87,7 +87,7 @@ impl Ball {
     }
 }
 
-/// What a step is doing, for whoever wants to know how long it takes.
+/// Part of a step, for whoever wants to know how long each takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Stage {
     /// Velocities and places move on.

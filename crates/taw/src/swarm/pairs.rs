@@ -4,65 +4,14 @@
 
 use std::ops::Range;
 
+use super::batches::{Batch, Filler, OPEN, filler};
 use super::grid::{Grid, Level};
 use super::lanes::{Kernel, LANES, Lanes, Row};
-use super::memory::make_room;
 
-/// Eight pairs, none of which has a ball in common with another. As rows after a first one, so
-/// that two bytes suffice.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) struct Batch {
-    pub first: [u32; 2],
-    pub a: [u16; LANES],
-    pub b: [u16; LANES],
-    /// How many there are; the rest repeat the first of them.
-    pub count: u32,
-}
-
-impl Batch {
-    /// The rows of a pair.
-    pub fn pair(&self, lane: usize) -> [u32; 2] {
-        [self.first[0] + u32::from(self.a[lane]), self.first[1] + u32::from(self.b[lane])]
-    }
-}
-
-/// Takes some pairs out of batches.
-pub(super) fn take_out(batches: &mut Vec<Batch>, which: impl Fn([u32; 2]) -> bool) {
-    for batch in &mut *batches {
-        let before = *batch;
-        let mut kept = (0..before.count as usize).filter(|lane| !which(before.pair(*lane)));
-        batch.count = 0;
-        if let Some(first) = kept.next() {
-            (batch.a, batch.b) = ([before.a[first]; LANES], [before.b[first]; LANES]);
-            batch.count = 1;
-            for lane in kept {
-                let to = batch.count as usize;
-                (batch.a[to], batch.b[to]) = (before.a[lane], before.b[lane]);
-                batch.count += 1;
-            }
-        }
-    }
-    batches.retain(|batch| batch.count > 0);
-}
-
-/// How many pairs there are.
-pub(super) fn pairs_in(batches: &[Batch]) -> usize {
-    batches.iter().map(|batch| batch.count as usize).sum()
-}
-
-/// How many batches are being filled at a time.
-const OPEN: usize = 32;
-/// How far before the first pair of a batch a later one may lie.
-const BEFORE: u32 = 1 << 14;
-/// How many pairs are listed at most, for each ball on average, and besides. A ball has six pairs
-/// with those of its size that touch it, and some more within the margin; only balls inside of each
-/// other have more, and part as well if each is pushed by so many of the others at a time.
-const PAIRS: usize = 64;
-const MORE_PAIRS: usize = 4096;
 /// More than any ball is away from another, and its square is finite.
 const FAR: f32 = 1e18;
 
-/// What the search scribbles on; one for each thread.
+/// Scratch of the search; one for each thread.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Search {
     columns: Columns,
@@ -93,126 +42,7 @@ impl Search {
     }
 }
 
-/// Puts pairs into batches: each pair into the first open one in which neither ball is.
-pub(super) struct Filler<'a> {
-    /// A power of two of them. Balls whose rows end in the same bits share one, which costs at
-    /// most a place in a batch.
-    busy: &'a mut [u32],
-    open: &'a mut [Batch; OPEN],
-    batches: &'a mut Vec<Batch>,
-    /// How many more pairs may be listed, and how many were not.
-    left: usize,
-    unlisted: usize,
-}
-
-fn filler<'a>(
-    busy: &'a mut Vec<u32>,
-    open: &'a mut [Batch; OPEN],
-    balls: usize,
-    batches: &'a mut Vec<Batch>,
-) -> Filler<'a> {
-    busy.clear();
-    busy.resize(balls.next_power_of_two(), 0);
-    Filler { busy, open, batches, left: MORE_PAIRS, unlisted: 0 }
-}
-
-impl Filler<'_> {
-    /// Makes room for the pairs of a ball; says how many of so many there is room for.
-    #[inline(always)]
-    pub fn spend(&mut self, pairs: usize) -> usize {
-        self.make_room(1);
-        self.spend_only(pairs)
-    }
-
-    /// Makes room for the pairs of so many balls.
-    pub fn make_room(&mut self, balls: usize) {
-        self.left += PAIRS * balls;
-    }
-
-    /// Says how many of so many pairs there is room for.
-    #[inline(always)]
-    pub fn spend_only(&mut self, pairs: usize) -> usize {
-        let count = pairs.min(self.left);
-        self.left -= count;
-        self.unlisted += pairs - count;
-        count
-    }
-
-    #[inline(always)]
-    pub fn add(&mut self, a: u32, b: u32) {
-        let busy = *self.busy(a) | *self.busy(b);
-        let mut slot = busy.trailing_ones() as usize;
-        if slot == OPEN {
-            // A large ball among many small ones.
-            slot = self.fullest();
-            self.close(slot);
-        }
-        let batch = &mut self.open[slot];
-        let mut place = [a.wrapping_sub(batch.first[0]), b.wrapping_sub(batch.first[1])];
-        if batch.count == 0 || (place[0] | place[1]) > u32::from(u16::MAX) {
-            self.close(slot);
-            let batch = &mut self.open[slot];
-            batch.first = [a.saturating_sub(BEFORE), b.saturating_sub(BEFORE)];
-            place = [a - batch.first[0], b - batch.first[1]];
-            (batch.a, batch.b) = ([place[0] as u16; LANES], [place[1] as u16; LANES]);
-        }
-        let batch = &mut self.open[slot];
-        let lane = batch.count as usize % LANES;
-        (batch.a[lane], batch.b[lane]) = (place[0] as u16, place[1] as u16);
-        batch.count += 1;
-        *self.busy(a) |= 1 << slot;
-        *self.busy(b) |= 1 << slot;
-        if self.open[slot].count as usize == LANES {
-            self.close(slot);
-        }
-    }
-
-    /// The open batches in which a row is.
-    #[inline(always)]
-    fn busy(&mut self, row: u32) -> &mut u32 {
-        let at = row as usize & (self.busy.len() - 1);
-        // SAFETY: the length is a power of two.
-        unsafe { self.busy.get_unchecked_mut(at) }
-    }
-
-    #[cold]
-    fn fullest(&self) -> usize {
-        let counts = self.open.iter().map(|batch| batch.count);
-        counts
-            .enumerate()
-            .max_by_key(|(slot, count)| (*count, OPEN - slot))
-            .map_or(0, |(slot, _)| slot)
-    }
-
-    /// Takes an open batch as it is, and begins another one.
-    #[inline(always)]
-    fn close(&mut self, slot: usize) {
-        let batch = self.open[slot];
-        if batch.count > 0 {
-            for lane in 0..batch.count as usize {
-                for row in batch.pair(lane) {
-                    *self.busy(row) &= !(1 << slot);
-                }
-            }
-            push(self.batches, batch);
-            self.open[slot].count = 0;
-        }
-    }
-
-    /// Takes the open batches as they are. Says how many pairs there was no room for.
-    pub fn close_all(&mut self) -> usize {
-        (0..OPEN).for_each(|slot| self.close(slot));
-        self.unlisted
-    }
-}
-
-#[inline(always)]
-fn push(batches: &mut Vec<Batch>, batch: Batch) {
-    make_room(batches, batches.len() + 1);
-    batches.push(batch);
-}
-
-/// What becomes of the pairs that are found.
+/// Taker of the pairs that are found.
 trait Sink {
     /// A ball and some that come after it. Balls are named in order; those without any may be
     /// left out.
@@ -239,7 +69,7 @@ impl Sink for Filler<'_> {
     }
 }
 
-/// How many numbers the fans of a row may take, on average over a slab: as many as fit into a
+/// Numbers that the fans of a row may take, on average over a slab: as many as fit into a
 /// row of a column that is not in use meanwhile.
 pub(super) const FAN: usize = size_of::<Row>() / size_of::<u16>();
 
@@ -322,7 +152,7 @@ impl Sink for FanFiller<'_> {
 pub(super) struct FindPairs<'a> {
     pub grid: &'a Grid,
     pub at: &'a [Row],
-    /// How far each ball may go until pairs are sought again, in metres.
+    /// Way that each ball may go until pairs are sought again, in metres.
     pub budget: &'a [f32],
     /// Balls with more than this are sought for alone.
     pub cap: f32,
@@ -331,7 +161,7 @@ pub(super) struct FindPairs<'a> {
     /// The first row, of it, of the next one and after that.
     pub rows: [u32; 3],
     pub search: &'a mut Search,
-    /// How many pairs there was no room for.
+    /// Number of pairs that there was no room for.
     pub unlisted: &'a mut usize,
     /// Where pairs go that are part of no fan.
     pub batches: &'a mut Vec<Batch>,

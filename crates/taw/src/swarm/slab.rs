@@ -1,8 +1,9 @@
 use std::ops::Range;
 
+use super::batches::Batch;
 use super::kernels::Pushes;
 use super::lanes::Row;
-use super::pairs::{Batch, FAN, Fans};
+use super::pairs::{FAN, Fans};
 use super::touch::Touch;
 
 /// Some layers of the grid, as much as one thread works on at a time. Pairs of its balls, among
@@ -16,9 +17,9 @@ pub(super) struct Slab {
     /// The first row, of it, of the next one, and after that.
     pub rows: [u32; 3],
     pub batches: Vec<Batch>,
-    /// How many pairs it has, in batches and fans.
+    /// Number of its pairs, in batches and fans.
     pub pairs: usize,
-    /// How many more there was no room for.
+    /// Number of those that there was no room for.
     pub unlisted: usize,
     pub pushes: Pushes,
     /// By rows.
@@ -27,19 +28,21 @@ pub(super) struct Slab {
     /// The rows near half-spaces, and near other walls.
     pub near_planes: Vec<u32>,
     pub near_shapes: Vec<u32>,
-    /// Whether one near other walls is fast.
+    /// Set if one near other walls is fast.
     pub has_fast: bool,
-    /// How fast a ball is at most, in m/s: any, one in the first layer, one in the last.
+    /// Largest speed of a ball, in m/s: of any, of one in the first layer, of one in the last.
     pub speed: [f32; 3],
     /// The least and the largest inverse mass, in 1/kg.
     pub inverse_masses: [f32; 2],
     /// For how long all have been slow, in seconds, and whether they sleep.
     pub slow: f32,
     pub asleep: bool,
-    /// Whether a ball of it or of those beside it bounced just now, and in this substep.
+    /// The speed in m/s of its fastest ball that is no guest, if it has guests.
+    pub fastest_own: Option<f32>,
+    /// Set if a ball of it or of those beside it bounced just now, and in this substep.
     pub again: bool,
     pub struck: bool,
-    /// Whether a ball of it went further than its budget by more than the cap.
+    /// Set if a ball of it went further than its budget by more than the cap.
     pub overrun: bool,
     /// The rows that would leave their budget in this step, and those that were stopped.
     pub leaving: Vec<u32>,
@@ -73,6 +76,7 @@ impl Slab {
             inverse_masses: _,
             slow: _,
             asleep: _,
+            fastest_own: _,
             again: _,
             struck: _,
             overrun: _,

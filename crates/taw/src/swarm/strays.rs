@@ -4,10 +4,11 @@
 //! Pairs that such a ball already has in its slab stay there. One that it then has twice shares
 //! its impulse between the two.
 
+use super::batches::{Batch, Filler};
 use super::grid::Grid;
 use super::kernels::{Pushes, squared};
 use super::lanes::Row;
-use super::pairs::{Batch, Filler, Search};
+use super::pairs::Search;
 
 /// One ball of so many may stray, and besides so many.
 const PART: usize = 500;
@@ -23,7 +24,7 @@ pub(super) struct Strays {
     pub batches: Vec<Batch>,
     pub unlisted: usize,
     pub pushes: Pushes,
-    /// What their pairs bore before, in order.
+    /// Impulses that their pairs bore before, in order.
     bore: Vec<Bore>,
     /// The strays along the x axis.
     sorted: Vec<u32>,
@@ -36,18 +37,18 @@ struct Bore {
     grip: [f32; 3],
 }
 
-/// How many there may be at most, among so many balls.
+/// Number that there may be at most, among so many balls.
 pub(super) fn room(balls: usize) -> usize {
     SOME + balls / PART
 }
 
 impl Strays {
-    /// Whether so many more would be too many.
+    /// Says if so many more would be too many.
     pub fn full(&self, more: usize, balls: usize) -> bool {
         more > self.room(balls)
     }
 
-    /// How many more there may be, among so many balls.
+    /// Number that may still be added, among so many balls.
     pub fn room(&self, balls: usize) -> usize {
         room(balls).saturating_sub(self.rows.len())
     }
@@ -203,7 +204,7 @@ impl Strays {
     }
 }
 
-/// Whether two balls might touch before one of them leaves its budget.
+/// Says if two balls might touch before one of them leaves its budget.
 fn near(a: u32, b: u32, at: &[Row], budget: &[f32]) -> bool {
     let (a, b) = (a as usize, b as usize);
     let apart = [at[b][0] - at[a][0], at[b][1] - at[a][1], at[b][2] - at[a][2], 0.0];

@@ -12,9 +12,9 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// The most threads of a team.
 pub(super) const MOST_THREADS: usize = 64;
-/// How often a thread looks for work before it goes to sleep: some tenths of a millisecond.
+/// Looks for work before a thread goes to sleep: some tenths of a millisecond.
 const PATIENCE: u32 = 1 << 14;
-/// How many rows make a job.
+/// Number of rows of a job.
 pub(super) const ROWS: usize = 1 << 13;
 
 /// Work that is going on: a reference to a closure on the stack of the one who asked for it,
@@ -22,7 +22,7 @@ pub(super) const ROWS: usize = 1 << 13;
 #[derive(Clone, Copy)]
 struct Work {
     work: *const (dyn Fn(usize) + Sync),
-    /// How many helpers there may be.
+    /// Number of helpers that there may be.
     helpers: usize,
 }
 
@@ -32,9 +32,9 @@ unsafe impl Send for Work {}
 /// Where the helpers find their work.
 #[derive(Default)]
 struct Board {
-    /// How much work was put up so far.
+    /// Number of works put up so far.
     count: AtomicUsize,
-    /// How many helpers have done their part of the last one.
+    /// Number of helpers that have done their part of the last one.
     done: AtomicUsize,
     now: Mutex<Now>,
     wake: Condvar,
@@ -43,7 +43,7 @@ struct Board {
 #[derive(Default)]
 struct Now {
     work: Option<Work>,
-    /// How many helpers have taken part.
+    /// Number of helpers that have taken part.
     joined: usize,
 }
 
@@ -192,7 +192,7 @@ pub(super) fn each_rows(threads: usize, rows: usize, job: impl Fn(Range<usize>) 
     each(threads, rows.div_ceil(ROWS), |_, part| job(part * ROWS..rows.min((part + 1) * ROWS)));
 }
 
-/// The same, and lists rows: those that each part names, in the order of the rows. `lists` is
+/// Works on parts of rows, and lists rows: those that each part names, in their order. `lists` is
 /// only scribbled on.
 pub(super) fn list_rows(
     threads: usize,
@@ -213,7 +213,7 @@ pub(super) fn list_rows(
     unsafe { lists.read(0..lists.len()) }.iter().for_each(|list| listed.extend(list));
 }
 
-/// How far along each of a row of neighbours is; see [`each_beside`].
+/// Progress of each of a row of neighbours; see [`each_beside`].
 const TAKEN: u32 = 1;
 const DONE: u32 = 2;
 

@@ -15,7 +15,7 @@ pub(super) struct Touch {
     pub part: u32,
     /// Of a half-space, or of any other shape.
     pub is_plane: bool,
-    /// Whether the ball is a guest, whom others move: the wall only bears what the swarm presses
+    /// Set if the ball is a guest, whom others move: the wall only bears what the swarm presses
     /// on it.
     pub bears_guest: bool,
     /// The plane that the wall is like there: its normal, and how far along it the surface is, now
@@ -56,22 +56,21 @@ impl Touch {
         self.normal.dot(xyz(at)) - self.offset - at[3]
     }
 
-    /// The wall moves on for so long, in seconds. Guests are where they are at the end of the step
-    /// already, and so are their walls.
+    /// The wall moves on for so long, in seconds; one that bears a guest, as the guest does.
     pub fn drift(&mut self, time: f32) {
-        if !self.bears_guest {
-            self.offset += self.surface.dot(self.normal) * time;
-        }
+        self.offset += self.surface.dot(self.normal) * time;
     }
 
     /// Makes it one that only bears what the swarm presses on a guest: the guest's own motion, and
-    /// how deep it is in the wall already, are left to whoever moves it.
-    pub fn bear(&mut self, guest: &Guest) {
+    /// how deep it is in the wall already, are left to whoever moves it. The step goes on for so
+    /// long, in seconds.
+    pub fn bear(&mut self, guest: &Guest, left: f32) {
         self.bears_guest = true;
         (self.friction, self.restitution) = (0.0, 0.0);
         self.surface = xyz(&guest.velocity);
         self.offset = self.offset_at_end;
         self.offset += self.gap(&guest.at).min(0.0);
+        self.drift(-left);
     }
 
     /// The impulse that the wall bore in the last substep, in N s; nothing, if the ball has left it.
@@ -161,7 +160,7 @@ impl Touch {
         Some(gap)
     }
 
-    /// How fast the ball's surface slides over the wall's, in m/s.
+    /// Velocity at which the ball's surface slides over the wall's, in m/s.
     fn sliding(&self, relative: Vec3<f32>, spin: &Row) -> Vec3<f32> {
         let parting = self.normal * relative.dot(self.normal);
         relative - parting - xyz(spin).cross(self.normal)

@@ -12,11 +12,11 @@ use super::touch::Touch;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
 
-/// What balls can touch besides each other, as the world has it.
+/// Walls of the world, as the balls of a swarm meet them.
 pub(crate) trait Surroundings: Sync {
     /// Names all half-spaces: the wall, its normal, and how far along it the surface is.
     fn planes(&self, name: &mut dyn FnMut(u32, Vec3<f32>, f32));
-    /// Whether there is anything else, and whether some of it may be in a box.
+    /// Says if there is anything else, and if some of it may be in a box.
     fn has_shapes(&self) -> bool;
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;
     /// Names what else is within `reach` metres of a ball, without the seams: the wall and its
@@ -52,7 +52,7 @@ pub(super) struct Balls<'a> {
 }
 
 impl Balls<'_> {
-    /// How far a ball may go before walls are sought again: its budget, or more if it is so fast
+    /// Way of a ball before walls are sought again: its budget, or more if it is so fast
     /// that it leaves that in a step.
     #[inline(always)]
     pub fn reach(&self, row: usize) -> f32 {
@@ -114,12 +114,29 @@ impl Slab {
         }
     }
 
+    /// Takes over what the balls near other shapes than half-spaces bore there. Which parts they
+    /// touch now is looked at before the next pass.
+    pub fn recall_shapes<T: Iterator<Item = Touch>>(&mut self, recall: impl Fn(u32) -> T) {
+        let planes = self.touches.len();
+        for touch in self.near_shapes.iter().flat_map(|row| recall(*row)) {
+            let touches = &mut self.touches;
+            make_room(touches, touches.len() + 1);
+            touches.push(touch);
+        }
+        if self.touches.len() > planes {
+            self.touches.sort_unstable_by_key(Touch::key);
+        }
+    }
+
     /// Finds the half-spaces near some more balls of the slab.
     pub fn seek_walls_for(&mut self, rows: &[u32], balls: Balls, planes: &[HalfSpace]) {
         std::mem::swap(&mut self.touches, &mut self.old_touches);
         self.touches.clear();
         let old = &self.old_touches;
-        self.touches.extend(old.iter().filter(|touch| rows.binary_search(&touch.row).is_err()));
+        // Which parts of other shapes are touched is looked at before the next pass, which needs to
+        // know what they bore.
+        let kept = |touch: &&Touch| !touch.is_plane || rows.binary_search(&touch.row).is_err();
+        self.touches.extend(old.iter().filter(kept));
         for row in rows {
             let touches = &mut self.touches;
             touch_planes(*row, balls, planes, |touch| {
@@ -221,7 +238,7 @@ fn on_way(
 /// in each substep.
 const FAST: f32 = 0.5;
 
-/// How walls are looked at.
+/// Facts that a look at walls needs.
 #[derive(Clone, Copy)]
 pub(super) struct Look<'a> {
     pub tier: Tier,
@@ -233,13 +250,13 @@ pub(super) struct Look<'a> {
     /// Walls are where they will be at the end of the step; so long before, in seconds, they were
     /// elsewhere.
     pub before: f32,
-    /// How long a step and a substep are, in seconds.
+    /// Lengths of a step and of a substep, in seconds.
     pub times: [f32; 2],
     pub gravity: Vec3<f32>,
 }
 
 impl Look<'_> {
-    /// How far a fast ball goes in a substep, in metres; none for slow ones.
+    /// Way of a fast ball in a substep, in metres; none for slow ones.
     fn way(&self, row: u32) -> Option<Vec3<f32>> {
         let (at, [u, v, w, _]) = (&self.at[row as usize], self.velocity[row as usize]);
         let [step, substep] = match self.tier {
@@ -331,6 +348,13 @@ pub(super) fn find<'a>(touches: &'a [Touch], touch: &Touch) -> Option<&'a Touch>
     touches.get(at)
 }
 
+/// The touches of a ball with other shapes than half-spaces, among many in order.
+pub(super) fn shapes_of(touches: &[Touch], row: u32) -> impl Iterator<Item = &Touch> {
+    let first = touches.partition_point(|touch| touch.row < row);
+    let of_row = touches[first..].iter().take_while(move |touch| touch.row == row);
+    of_row.filter(|touch| !touch.is_plane)
+}
+
 /// The rows among these that are near anything but half-spaces, found by ever smaller boxes.
 pub(super) fn near_shapes(
     walls: &dyn Surroundings,
@@ -385,7 +409,7 @@ impl Touch {
         }
     }
 
-    /// What orders them.
+    /// Key of their order.
     pub fn key(&self) -> (u32, u32, u32) {
         (self.row, self.wall, self.part)
     }

@@ -28,7 +28,7 @@ impl<S: Scalar> World<S> {
         if self.swarm.len() == self.swarm.invited.len() {
             return Ok(());
         }
-        self.invite_guests()?;
+        self.invite_guests(dt)?;
         self.walls.prepare();
         let gravity = cast_vector(self.gravity);
         self.swarm.step(dt, gravity, &self.walls, self.walls.version(), observe);
@@ -52,7 +52,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Tells the swarm where the marbles are.
-    fn invite_guests(&mut self) -> Result<(), Error> {
+    fn invite_guests(&mut self, dt: f32) -> Result<(), Error> {
         if self.swarm.invited.len() != self.marbles.len() {
             let (marbles, swarm) = (&self.marbles, &mut self.swarm);
             let known =
@@ -71,14 +71,10 @@ impl<S: Scalar> World<S> {
             let radius = marbles.radius()[row];
             let spin = marbles.spin().get(row).map_or([0.0; 4], |spin| rows(*spin * radius, 0.0));
             let inverse_mass = (S::one() / marbles.mass(row)).as_f64() as f32;
-            Some(Guest {
-                ball: *ball,
-                at: rows(marbles.position()[row].to_vec(), single(radius)),
-                velocity: rows(marbles.velocity()[row], inverse_mass),
-                rim: spin,
-            })
+            let at = rows(marbles.position()[row].to_vec(), single(radius));
+            Some(Guest::new(*ball, at, rows(marbles.velocity()[row], inverse_mass), spin))
         });
-        self.swarm.host(guests);
+        self.swarm.host(guests, dt, cast_vector(self.gravity));
         self.swarm.invited = invited;
         Ok(())
     }

@@ -1,38 +1,40 @@
-//! The three verbs of a swarm.
+//! A step of a swarm, and its parts in the full tier.
+
+mod lab;
+mod seek;
+
+pub(super) use seek::listed;
 
 use super::build::SOON;
-use super::kernels::{
-    Columns, Displace, DisplaceFans, DisplaceFromPlanes, Drift, Follow, Impact, LOST, Pass,
-    Predict, Soft, Solve, squared,
-};
+use super::kernels::{Columns, Drift, Impact, LOST, Pass, Soft, Solve, squared};
 use super::lanes::Row;
 use super::slab::Slab;
 use super::strays::Strays;
-use super::team::{Shared, each, each_beside, each_rows, list_rows};
-use super::walls::{Balls, HalfSpace, Look, half_spaces};
+use super::team::{Shared, each, each_beside};
+use super::walls::half_spaces;
 use super::{Stage, Surroundings, Swarm, Tier, lying};
 use cgmath::{InnerSpace, Zero};
 
 use crate::math::{Vec3, length};
 
-/// How stiff contacts are: at most so many oscillations a second, and as many times as much
+/// Stiffness of contacts: at most so many oscillations a second, and as many times as much
 /// damping as stops them.
 const HERTZ: f32 = 60.0;
 const DAMPING: f32 = 10.0;
-/// How fast an overlap is pushed out at most: as fast as gravity makes a ball in so many seconds.
+/// Speed at which an overlap is pushed out at most: that which gravity gives in so many seconds.
 const PUSHING: f32 = 0.3;
 /// So much of twice the smaller radius two balls may overlap before they are moved apart: more than
 /// what bears a heap gets, and less than the tenth of a radius that is seen, since each substep
 /// presses in a little again. (Contacts sink by a thousandth for each three balls on them; if that
 /// is moved out, they never come to rest.)
 const SLOP: f32 = 0.04;
-/// The same where nothing lies on anything: only so that balls that touch are left alone.
+/// Slop where nothing lies on anything: only so that balls that touch are left alone.
 const SLOP_WEIGHTLESS: f32 = 0.01;
 /// Where one ball weighs more than so many times as much as another, pairs look who has a wall
 /// behind it: a pair sinks in by that ratio times the way of gravity in a substep while its contact
 /// learns what it bears, less than a millimetre for each such time.
 const UNEVEN: f32 = 8.0;
-/// How often bounces are looked for in a substep while any is found: in a gas hardly ever do five
+/// Number of looks for bounces in a substep while any is found: in a gas hardly ever do five
 /// balls meet in one. What meets after that is stopped.
 const ROUNDS: usize = 4;
 /// For how long, in seconds, all balls of a slab lie still before they sleep.
@@ -67,121 +69,6 @@ impl Swarm {
         for slab in &mut self.slabs {
             self.stopped.append(&mut slab.stopped);
         }
-    }
-
-    fn step_lab(
-        &mut self,
-        dt: f32,
-        gravity: Vec3<f32>,
-        walls: &dyn Surroundings,
-        walls_changed: bool,
-        observe: &mut dyn FnMut(Stage),
-    ) {
-        let threads = self.model.threads as usize;
-        observe(Stage::Integrate);
-        let (change, time) = (row(gravity * dt), [dt, dt, dt, 0.0]);
-        let instructions = self.instructions;
-        let mut leaving = std::mem::take(&mut self.leaving);
-        leaving.clear();
-        // More than this are too many.
-        let most = self.strays.room(self.at.len()) + 1;
-        {
-            let (at, velocity) = (Shared::new(&mut self.at), Shared::new(&mut self.velocity));
-            let (way, budget) = (Shared::new(&mut self.way), &self.budget[..]);
-            let all_stopped = std::sync::Mutex::new(&mut self.stopped);
-            list_rows(threads, at.len(), &mut self.lists, &mut leaving, |rows, leaving| {
-                let mut stopped = Vec::new();
-                // SAFETY: each job has its own rows.
-                let (at, velocity, way) = unsafe {
-                    (at.part(rows.clone()), velocity.part(rows.clone()), way.part(rows.clone()))
-                };
-                let (stop, first) = (&mut stopped, rows.start as u32);
-                instructions.run(Predict { at, velocity, way, change, time, stopped: stop, first });
-                let both = way.iter().zip(&budget[rows]);
-                let leaves = (first..).zip(both).filter(|(_, (way, budget))| way > budget);
-                leaving.extend(leaves.map(|(row, _)| row).take(most));
-                if !stopped.is_empty()
-                    && let Ok(mut all) = all_stopped.lock()
-                {
-                    all.append(&mut stopped);
-                }
-            });
-            self.stopped.sort_unstable();
-        }
-        self.hold_guests_in_lab();
-        leaving.retain(|row| self.way[*row as usize] > self.budget[*row as usize]);
-        if !self.paired || !leaving.is_empty() {
-            self.stopped = self.stopped.iter().map(|row| self.ids.slots()[*row as usize]).collect();
-            if self.paired {
-                let rebuilds = self.rebuilds;
-                self.seek_for(&leaving, dt, walls, observe);
-                let moved = walls_changed && self.rebuilds == rebuilds;
-                self.seek_walls_that_moved(moved, dt, walls, observe);
-            } else {
-                self.build(dt, walls, observe);
-            }
-            let rows = self.ids.columns().1;
-            self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
-        } else {
-            self.seek_walls_that_moved(walls_changed, dt, walls, observe);
-        }
-        self.leaving = leaving;
-        observe(Stage::Restitute);
-        self.find_guests();
-        self.look_at_walls(walls, 0.0, [dt; 2], |_| true, false);
-        let (guests, planes) =
-            (std::mem::take(&mut self.guest_rows), std::mem::take(&mut self.planes));
-        let named = std::mem::take(&mut self.guests);
-        let spare = std::mem::take(&mut self.spare);
-        let fans: &[u16] = bytemuck::cast_slice(&spare);
-        // SAFETY: the caller has the balls of the slab.
-        let displace_from_walls = |slab: &Slab, all: Shared<Row>| unsafe {
-            // Others move the guests, as deep in walls as they like: a wall only bears what the
-            // swarm presses on it.
-            let mut from = slab.rows[0];
-            let its = guests.partition_point(|(row, _)| *row < slab.rows[0])
-                ..guests.partition_point(|(row, _)| *row < slab.rows[1]);
-            for (to, guest) in guests[its].iter().chain([&(slab.rows[1], u32::MAX)]) {
-                let at = all.part(from as usize..*to as usize);
-                instructions.run(DisplaceFromPlanes { at, planes: &planes });
-                from = to + 1;
-                let Some(guest) = named.get(*guest as usize) else { continue };
-                for plane in &planes {
-                    plane.bear(guest, &mut *all.row(*to as usize));
-                }
-            }
-            for touch in &slab.touches {
-                touch.displace(&mut *all.row(touch.row as usize));
-            }
-        };
-        for _ in 0..self.model.substeps {
-            self.each_slab(|_, columns, slab| {
-                displace_from_walls(slab, columns.at);
-                let (at, fans) = (columns.at, slab.fans(fans));
-                instructions.run(DisplaceFans { at, fans });
-                instructions.run(Displace { at, batches: &slab.batches });
-            });
-            let (at, batches) = (Shared::new(&mut self.at), &self.strays.batches);
-            instructions.run(Displace { at, batches });
-        }
-        // Walls have the last word: whoever else moves balls apart, nothing is pressed through one.
-        self.each_slab(|_, columns, slab| {
-            displace_from_walls(slab, columns.at);
-        });
-        (self.guest_rows, self.planes, self.spare) = (guests, planes, spare);
-        self.guests = named;
-        observe(Stage::Integrate);
-        let per_second = [1.0 / dt, 1.0 / dt, 1.0 / dt, 0.0];
-        let (velocity, budget) = (Shared::new(&mut self.velocity), Shared::new(&mut self.budget));
-        let (at, way) = (&self.at[..], &self.way[..]);
-        each_rows(threads, at.len(), |rows| {
-            // SAFETY: each job has its own rows.
-            let (velocity, budget) =
-                unsafe { (velocity.part(rows.clone()), budget.part(rows.clone())) };
-            let (at, way) = (&at[rows.clone()], &way[rows]);
-            instructions.run(Follow { at, velocity, way, budget, per_second });
-        });
-        self.part_with_guests_in_lab(dt);
     }
 
     fn step_full(
@@ -243,15 +130,18 @@ impl Swarm {
                 self.look_at_walls(walls, left, times, all, false);
             }
             observe(Stage::Integrate);
+            let parts = [substep as f32, (substep + 1) as f32].map(|part| part / substeps);
+            self.keep_guests();
             self.drift(row(gravity * h), [0.0; 4]);
-            self.hold_guests(row(gravity * h), 0.0);
+            self.drift_guests(parts, false, 0.0);
             observe(Stage::Restitute);
             self.find_backing();
             self.pass(Pass::Begin(impact), |_, _| true);
             self.pass(Pass::Solve(impact), |_, _| true);
             observe(Stage::Integrate);
+            self.keep_guests();
             self.drift([0.0; 4], [h, h, h, 0.0]);
-            self.hold_guests([0.0; 4], h);
+            self.drift_guests(parts, true, h);
             let (cap, left) = (self.cap, left - h);
             let left_it = |_: &Row, budget: f32| budget < -cap;
             if self.seek_within_step(|slab| slab.overrun, left_it, dt, walls, observe) {
@@ -399,6 +289,9 @@ impl Swarm {
     fn look(&mut self, dt: f32, gravity: Vec3<f32>) {
         let lying = lying(gravity, self.mean);
         let sleeps = self.model.sleeps;
+        if !self.guests.is_empty() {
+            self.look_at_guests();
+        }
         let (grid, budget) = (&self.grid, &self.budget[..]);
         // More than this are too many.
         let most = self.strays.room(self.at.len()) + 1;
@@ -431,7 +324,8 @@ impl Swarm {
             ];
             let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
             slab.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
-            slab.slow = if slab.speed[0] < lying { slab.slow + dt } else { 0.0 };
+            let lies = slab.fastest_own.unwrap_or(slab.speed[0]) < lying;
+            slab.slow = if lies { slab.slow + dt } else { 0.0 };
             if sleeps && slab.slow > FALL_ASLEEP {
                 (slab.asleep, slab.speed) = (true, [0.0; 3]);
                 slab.leaving.clear();
@@ -562,112 +456,6 @@ impl Swarm {
             }
         });
     }
-
-    /// How long before a ball can be at a wall it is sought for, in seconds; in the lab's tier, it
-    /// has moved already.
-    pub(super) fn ahead(&self, dt: f32) -> Option<f32> {
-        self.rough().then_some(2.0 * dt)
-    }
-
-    /// Seeks the balls at walls anew, if one of these changed.
-    fn seek_walls_that_moved(
-        &mut self,
-        changed: bool,
-        dt: f32,
-        walls: &dyn Surroundings,
-        observe: &mut dyn FnMut(Stage),
-    ) {
-        if changed {
-            observe(Stage::Walls);
-            self.seek_walls(dt, walls);
-        }
-    }
-
-    /// Seeks the balls at walls anew, where pairs are still known.
-    fn seek_walls(&mut self, dt: f32, walls: &dyn Surroundings) {
-        let (instructions, shapes) = (self.instructions, walls.has_shapes());
-        let (planes, ahead) = (listed(&self.planes, self.model.tier), self.ahead(dt));
-        let balls = Balls { at: &self.at, velocity: &self.velocity, budget: &self.budget, ahead };
-        let slabs = Shared::new(&mut self.slabs);
-        each(self.model.threads as usize, slabs.len(), |_, slab| {
-            // SAFETY: its own.
-            let slab = unsafe { &mut *slabs.row(slab) };
-            let old = std::mem::take(&mut slab.touches);
-            slab.touches = std::mem::take(&mut slab.old_touches);
-            slab.seek_walls(instructions, balls, planes, |touch| {
-                super::walls::find(&old, touch).copied()
-            });
-            slab.old_touches = old;
-            slab.near_shapes.clear();
-            if shapes {
-                super::walls::near_shapes(walls, balls, slab.own_rows(), &mut slab.near_shapes);
-            }
-        });
-    }
-
-    /// Seeks the walls of some more balls, in order of their rows.
-    pub(super) fn seek_walls_for(&mut self, rows: &[u32], dt: f32, walls: &dyn Surroundings) {
-        let ahead = self.ahead(dt);
-        let planes = listed(&self.planes, self.model.tier);
-        let (at, budget) = (&self.at[..], &self.budget[..]);
-        let balls = Balls { at, velocity: &self.velocity, budget, ahead };
-        for slab in &mut self.slabs {
-            let mine = slab.own_rows();
-            let mine = rows.partition_point(|row| (*row as usize) < mine.start)
-                ..rows.partition_point(|row| (*row as usize) < mine.end);
-            if mine.is_empty() {
-                continue;
-            }
-            slab.seek_walls_for(&rows[mine.clone()], balls, planes);
-            if walls.has_shapes() {
-                for row in &rows[mine] {
-                    let row = *row as usize;
-                    super::walls::near_shapes(walls, balls, row..row + 1, &mut slab.near_shapes);
-                }
-                slab.near_shapes.sort_unstable();
-                slab.near_shapes.dedup();
-            }
-        }
-    }
-
-    /// Brings the touches of some slabs up to date. Walls are where they will be at the end; so long
-    /// `before`, in seconds, they were elsewhere.
-    fn look_at_walls(
-        &mut self,
-        walls: &dyn Surroundings,
-        before: f32,
-        times: [f32; 2],
-        which: impl Fn(&Slab) -> bool + Sync,
-        only_fast: bool,
-    ) {
-        let (guests, rows) = (&self.guests[..], &self.guest_rows[..]);
-        let look = Look {
-            tier: self.model.tier,
-            at: &self.at,
-            velocity: &self.velocity,
-            budget: &self.budget,
-            material: self.model.material,
-            before,
-            times,
-            gravity: self.gravity.unwrap_or_else(Vec3::zero),
-        };
-        let slabs = Shared::new(&mut self.slabs);
-        each(self.model.threads as usize, slabs.len(), |_, slab| {
-            // SAFETY: its own.
-            let slab = unsafe { &mut *slabs.row(slab) };
-            if slab.asleep || !which(slab) {
-                return;
-            }
-            slab.look_at_walls(walls, &look, only_fast);
-            if !rows.is_empty() {
-                for touch in &mut slab.touches {
-                    if let Some(guest) = Self::guest_at(guests, rows, touch.row) {
-                        touch.bear(guest);
-                    }
-                }
-            }
-        });
-    }
 }
 
 /// The range of two ranges.
@@ -675,14 +463,9 @@ fn wider([a, b]: [f32; 2], [c, d]: [f32; 2]) -> [f32; 2] {
     [a.min(c), b.max(d)]
 }
 
-/// Whether a ball leaves its budget within a time.
+/// Says if a ball leaves its budget within a time.
 fn leaves(velocity: &Row, budget: f32, time: f32) -> bool {
     budget < 0.0 || squared(*velocity) * time * time > budget * budget
-}
-
-/// The half-spaces of which the balls near them are listed. The lab's tier looks at all balls.
-pub(super) fn listed(planes: &[HalfSpace], tier: Tier) -> &[HalfSpace] {
-    if tier == Tier::Full { planes } else { &[] }
 }
 
 fn row(vector: Vec3<f32>) -> Row {

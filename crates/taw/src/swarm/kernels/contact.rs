@@ -1,321 +1,20 @@
-//! What a step does to rows and to pairs, eight at a time.
+//! Bounces and contacts of pairs in the full tier.
 
-use super::lanes::{Kernel, LANES, Lanes, Row};
-use super::memory::{fit, make_room};
-use super::pairs::{Batch, Fans};
-use super::team::Shared;
-use super::walls::HalfSpace;
+use super::{ALL, Pushes, V, gather, mass, mobility, normal_and_gap, scatter};
+use crate::swarm::batches::Batch;
+use crate::swarm::lanes::{Kernel, LANES, Lanes, Row};
+use crate::swarm::team::Shared;
 
-/// What batches of pairs bear, batch by batch; nothing in the lab's tier.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Pushes {
-    /// The impulses along the normals, in N s.
-    pub pressure: Vec<[f32; LANES]>,
-    /// Those across them.
-    pub grip: Vec<[[f32; LANES]; 3]>,
-    /// Whether any of them bounced in the last round.
-    pub bounced: bool,
-}
-
-impl Pushes {
-    pub fn bytes(&self) -> usize {
-        self.pressure.capacity() * size_of::<[f32; LANES]>()
-            + self.grip.capacity() * size_of::<[[f32; LANES]; 3]>()
-    }
-
-    /// As many as there are batches, and none bears anything.
-    pub fn reset(&mut self, batches: usize) {
-        fn reset<T: Clone>(column: &mut Vec<T>, batches: usize, none: T) {
-            column.clear();
-            make_room(column, batches);
-            column.resize(batches, none);
-            fit(column);
-        }
-        reset(&mut self.pressure, batches, [0.0; LANES]);
-        reset(&mut self.grip, batches, [[0.0; LANES]; 3]);
-    }
-}
-
-/// Three coordinates on eight lanes.
-#[derive(Clone, Copy)]
-struct V<L>([L; 3]);
-
-impl<L: Lanes> V<L> {
-    #[inline(always)]
-    fn of(row: &[L; 4]) -> Self {
-        Self([row[0], row[1], row[2]])
-    }
-
-    #[inline(always)]
-    fn load(from: &[[f32; LANES]; 3]) -> Self {
-        Self([L::load(&from[0]), L::load(&from[1]), L::load(&from[2])])
-    }
-
-    #[inline(always)]
-    fn store(self, to: &mut [[f32; LANES]; 3]) {
-        let Self([x, y, z]) = self;
-        x.store(&mut to[0]);
-        y.store(&mut to[1]);
-        z.store(&mut to[2]);
-    }
-
-    #[inline(always)]
-    fn plus(self, other: Self) -> Self {
-        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
-        Self([a + x, b + y, c + z])
-    }
-
-    #[inline(always)]
-    fn minus(self, other: Self) -> Self {
-        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
-        Self([a - x, b - y, c - z])
-    }
-
-    #[inline(always)]
-    fn times(self, by: L) -> Self {
-        let Self([x, y, z]) = self;
-        Self([x * by, y * by, z * by])
-    }
-
-    #[inline(always)]
-    fn dot(self, other: Self) -> L {
-        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
-        a * x + b * y + c * z
-    }
-
-    #[inline(always)]
-    fn cross(self, other: Self) -> Self {
-        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
-        Self([b * z - c * y, c * x - a * z, a * y - b * x])
-    }
-
-    #[inline(always)]
-    fn with(self, w: L) -> [L; 4] {
-        let Self([x, y, z]) = self;
-        [x, y, z, w]
-    }
-}
-
-/// The normal from the first to the second ball, and the gap between them.
-#[inline(always)]
-fn normal_and_gap<L: Lanes>(a: &[L; 4], b: &[L; 4], pair: impl Fn(usize) -> [u32; 2]) -> (V<L>, L) {
-    let (zero, one) = (L::splat(0.0), L::splat(1.0));
-    let least = L::splat(f32::MIN_POSITIVE);
-    let way = V::of(b).minus(V::of(a));
-    let squared = way.dot(way);
-    let distance = squared.sqrt();
-    // Root and quotient do not wait for each other.
-    let inverse = squared.pick_above(least, distance * (one / squared), zero);
-    let mut normal = way.times(inverse);
-    if least.above(squared) != 0 {
-        // Where the centers coincide, any direction is as good as another; with the same for all,
-        // those at one point would come into a line.
-        let mut any = [[0.0; LANES]; 3];
-        for lane in 0..LANES {
-            let direction = direction(pair(lane));
-            for (axis, x) in any.iter_mut().zip(direction) {
-                axis[lane] = x;
-            }
-        }
-        let (V([x, y, z]), V([u, v, w])) = (normal, V::load(&any));
-        let pick = [(x, u), (y, v), (z, w)];
-        normal = V(pick.map(|(x, any)| squared.pick_above(least, x, any)));
-    }
-    (normal, distance - (a[3] + b[3]))
-}
-
-/// A direction for each pair of rows, spread over the sphere.
-#[cold]
-fn direction([a, b]: [u32; 2]) -> [f32; 3] {
-    let mixed = (a ^ b.rotate_left(16)).wrapping_mul(0x9e37_79b1);
-    let mixed = (mixed ^ mixed >> 15).wrapping_mul(0x85eb_ca77);
-    let part = |shift: u32| ((mixed >> shift & 0x3ff) as f32 - 511.5) / 511.5;
-    let [x, y, z] = [part(0), part(11), part(22)];
-    // No part is zero.
-    let length = (x * x + y * y + z * z).sqrt();
-    [x / length, y / length, z / length]
-}
-
-/// The rows of a column that the pairs of a batch are about.
-#[inline(always)]
-fn gather<L: Lanes>(column: Shared<Row>, batch: &Batch) -> [[L; 4]; 2] {
-    let a = column.row(batch.first[0] as usize);
-    let b = column.row(batch.first[1] as usize);
-    // SAFETY: no other thread has these rows (see `Slab`).
-    unsafe { [L::gather(a, &batch.a), L::gather(b, &batch.b)] }
-}
-
-/// Writes back what was gathered.
-#[inline(always)]
-fn scatter<L: Lanes>(column: Shared<Row>, batch: &Batch, [of_a, of_b]: [[L; 4]; 2]) {
-    let a = column.row(batch.first[0] as usize);
-    let b = column.row(batch.first[1] as usize);
-    let count = batch.count as usize;
-    // SAFETY: as in `gather`, and no row is twice in a batch.
-    unsafe {
-        L::scatter(a, &batch.a, count, of_a);
-        L::scatter(b, &batch.b, count, of_b);
-    }
-}
-
-/// Pushes overlapping balls apart, half each.
-pub(super) struct Displace<'a> {
-    pub at: Shared<'a, Row>,
-    pub batches: &'a [Batch],
-}
-
-impl Kernel for Displace<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        for batch in self.batches {
-            let [a, b] = gather::<L>(self.at, batch);
-            let (normal, overlap) = normal_and_overlap(&a, &b, |lane| batch.pair(lane));
-            let by = normal.times(overlap * L::splat(0.5));
-            let moved = [V::of(&a).minus(by).with(a[3]), V::of(&b).plus(by).with(b[3])];
-            scatter(self.at, batch, moved);
-        }
-    }
-}
-
-/// The normal from the first to the second ball, and how far they overlap.
-#[inline(always)]
-fn normal_and_overlap<L: Lanes>(
-    a: &[L; 4],
-    b: &[L; 4],
-    pair: impl Fn(usize) -> [u32; 2],
-) -> (V<L>, L) {
-    let (normal, gap) = normal_and_gap(a, b, pair);
-    let zero = L::splat(0.0);
-    (normal, (zero - gap).max(zero))
-}
-
-/// The same for fans: each ball and up to eight others at a time.
-pub(super) struct DisplaceFans<'a> {
-    pub at: Shared<'a, Row>,
-    pub fans: Fans<'a>,
-}
-
-/// Which part of an overlap each of two balls moves, by how many overlap the first one: where
-/// these are moved together, they would move too far.
-const PART: [f32; LANES + 1] = [0.5, 0.5, 0.42, 0.38, 0.36, 0.36, 0.36, 0.36, 0.36];
-
-/// All bits of the first places, by how many these are.
-static FIRST: [[u16; LANES]; LANES + 1] = {
-    let mut masks = [[0; LANES]; LANES + 1];
-    let mut count = 0;
-    while count <= LANES {
-        let mut place = 0;
-        while place < count {
-            masks[count][place] = u16::MAX;
-            place += 1;
-        }
-        count += 1;
-    }
-    masks
-};
-
-impl Kernel for DisplaceFans<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Fans { first, rows, list: mut rest } = self.fans;
-        for row in first..first + rows {
-            let mut left = usize::from(rest[0]);
-            rest = &rest[1..];
-            if left == 0 {
-                continue;
-            }
-            let ball = self.at.row(row as usize);
-            // SAFETY: no other thread has this row and those of its fan (see `Slab`).
-            let mut own = unsafe { *ball };
-            while left > 0 {
-                let count = left.min(LANES);
-                let mut end = [0; LANES];
-                let eight = rest.first_chunk().unwrap_or_else(|| {
-                    end[..count].copy_from_slice(&rest[..count]);
-                    &end
-                });
-                // The places that are left over name the ball itself: what is written there is
-                // written over below.
-                let mut after = FIRST[count];
-                for (after, other) in after.iter_mut().zip(eight) {
-                    *after &= other;
-                }
-                let a = [L::splat(own[0]), L::splat(own[1]), L::splat(own[2]), L::splat(own[3])];
-                // SAFETY: as above; no row but its own is twice in a fan.
-                unsafe {
-                    let b = L::gather(ball, &after);
-                    let pair = |lane: usize| [row, row + u32::from(after[lane])];
-                    let (normal, overlap) = normal_and_overlap(&a, &b, pair);
-                    let overlap = overlap.first(count);
-                    let hits = overlap.above(L::splat(0.0)).count_ones();
-                    let by = normal.times(overlap * L::splat(PART[hits as usize]));
-                    L::scatter(ball, &after, LANES, V::of(&b).plus(by).with(b[3]));
-                    let V([x, y, z]) = by;
-                    own = [own[0] - x.sum(), own[1] - y.sum(), own[2] - z.sum(), own[3]];
-                }
-                (left, rest) = (left - count, &rest[count..]);
-            }
-            // SAFETY: as above.
-            unsafe { *ball = own };
-        }
-    }
-}
-
-/// Pushes balls out of half-spaces.
-pub(super) struct DisplaceFromPlanes<'a> {
-    pub at: &'a mut [Row],
-    pub planes: &'a [HalfSpace],
-}
-
-impl Kernel for DisplaceFromPlanes<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let zero = L::splat(0.0);
-        for rows in self.at.chunks_mut(LANES) {
-            let (base, count) = (rows.as_mut_ptr(), rows.len());
-            let places = [0, 1, 2, 3, 4, 5, 6, 7].map(|place: u16| place.min(count as u16 - 1));
-            // SAFETY: these rows are here, and each is named once among the first ones.
-            unsafe {
-                let [mut x, mut y, mut z, radius] = L::gather(base, &places);
-                let mut out = 0;
-                for HalfSpace { normal, offset, .. } in self.planes {
-                    let (nx, ny, nz) = (L::splat(normal.x), L::splat(normal.y), L::splat(normal.z));
-                    let gap = nx * x + ny * y + nz * z - L::splat(*offset) - radius;
-                    out |= zero.above(gap);
-                    let by = (zero - gap).max(zero);
-                    (x, y, z) = (x + nx * by, y + ny * by, z + nz * by);
-                }
-                if out != 0 {
-                    L::scatter(base, &places, count, [x, y, z, radius]);
-                }
-            }
-        }
-    }
-}
-
-/// The inverse mass of awake balls: those of balls asleep have a minus sign.
-#[inline(always)]
-fn mobility<L: Lanes>(velocity: &[L; 4]) -> L {
-    velocity[3].max(L::splat(0.0))
-}
-
-/// What both weigh together along their normal; nothing if both are asleep.
-#[inline(always)]
-fn mass<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> L {
-    let sum = mobility(a) + mobility(b);
-    let zero = L::splat(0.0);
-    sum.pick_above(zero, L::splat(1.0) / sum, zero)
-}
-
-/// How what lies on others is borne: its overlap makes it part a little, which the pass after that
-/// takes back, though not what contacts have learned to bear. What they give back is what damps it:
-/// impulses that are applied again and corrected once a substep swing for a long time, and what
-/// pushes overlap out meanwhile makes them swing more (Catto, `Solver2D`, 2024: soft contacts).
+/// Stiffness by which contacts bear what lies on them: overlap makes it part a little, which the
+/// pass after that takes back, though not what contacts have learned to bear. What they give back
+/// is what damps it: impulses that are applied again and corrected once a substep swing for a long
+/// time, and what pushes overlap out meanwhile makes them swing more (Catto, `Solver2D`, 2024: soft
+/// contacts).
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Soft {
+pub(in crate::swarm) struct Soft {
     /// The part of an overlap that is to go per second.
     pub rate: f32,
-    /// How fast it goes at most, in m/s.
+    /// Speed of that at most, in m/s.
     pub fastest: f32,
     /// The part of the impulse that a hard contact would need, and how much of what it has borne
     /// so far it gives back.
@@ -326,25 +25,25 @@ pub(super) struct Soft {
 }
 
 /// So much of its radius a ball may be in a wall: more than what bears a heap gets.
-pub(super) const WALL_SLOP: f32 = 0.1;
+pub(in crate::swarm) const WALL_SLOP: f32 = 0.1;
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.
 const PUSH: f32 = 0.5;
 
-/// How a ball is marked that a wall bears in this step, be it through others; one less in the next
+/// Mark of a ball that a wall bears in this step, be it through others; one less in the next
 /// one, and after that not at all.
-pub(super) const GROUNDED: f32 = 2.0;
+pub(in crate::swarm) const GROUNDED: f32 = 2.0;
 
 /// The columns that several threads work on.
 #[derive(Clone, Copy)]
-pub(super) struct Columns<'a> {
+pub(in crate::swarm) struct Columns<'a> {
     /// Center and radius.
     pub at: Shared<'a, Row>,
     /// Velocity and inverse mass.
     pub velocity: Shared<'a, Row>,
     /// Radius times spin, and nothing.
     pub spin: Shared<'a, Row>,
-    /// How far each ball may still go, in metres.
+    /// Way that each ball may still go, in metres.
     pub budget: Shared<'a, f32>,
     /// The normal of the wall behind each ball, and the impulse that it bears for those who press
     /// the ball on it, in N s; empty where all weigh about as much.
@@ -358,15 +57,15 @@ pub(super) struct Columns<'a> {
 
 /// In place of that impulse: the ball has left the wall behind it. What pairs bore with it is more
 /// than they bear without.
-pub(super) const LOST: f32 = -1.0;
+pub(in crate::swarm) const LOST: f32 = -1.0;
 
-/// How the walls behind two balls make their pair heavier.
+/// Mass that the walls behind two balls add to their pair.
 struct Behind<L> {
-    /// What both weigh together along their normal, in kilograms, as long as the walls bear.
+    /// Effective mass of both along their normal, in kilograms, as long as the walls bear.
     load: L,
-    /// How fast they leave the walls along it, in m/s: until then, they weigh as they are.
+    /// Speed at which they leave the walls along it, in m/s: until then, they weigh as they are.
     leaving: L,
-    /// Whether a wall bears.
+    /// Above zero if a wall bears.
     bears: L,
 }
 
@@ -386,14 +85,14 @@ impl<L: Lanes> Behind<L> {
 }
 
 impl Columns<'_> {
-    /// Whether it is known who has a wall behind it.
+    /// Says if it is known who has a wall behind it.
     pub fn backed(&self) -> bool {
         self.backing.len() > 0
     }
 }
 
 /// One pass over the pairs for their impulses.
-pub(super) struct Solve<'a> {
+pub(in crate::swarm) struct Solve<'a> {
     pub pass: Pass,
     pub columns: Columns<'a>,
     pub batches: &'a [Batch],
@@ -401,21 +100,21 @@ pub(super) struct Solve<'a> {
     pub friction: f32,
 }
 
-/// What a pass does.
+/// Kind of a pass.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Pass {
+pub(in crate::swarm) enum Pass {
     /// Lets bounce what meets in a substep and comes together fast enough.
     Impact(Impact),
     /// Applies the impulses of the last substep again.
     Begin(Impact),
     /// Lets nothing come nearer than the gap within a substep.
     Solve(Impact),
-    /// The same once more, after the balls moved, and moves what overlaps apart. What bears nothing
+    /// Solves once more, after the balls moved, and moves what overlaps apart. What bears nothing
     /// and comes fast is left for the next bounce.
     Relax(Impact),
 }
 
-/// What bounces, and how.
+/// Limits and numbers of bounces.
 ///
 /// Bounces come before gravity and contacts, one pair after another, each by the velocities that
 /// the ones before it left: an impulse of at most twice what stops a pair adds no energy to it, so
@@ -423,16 +122,16 @@ pub(super) enum Pass {
 /// Fedkiw, 2003, "Nonconvex rigid bodies with stacking"). What contacts remember is
 /// left out of it: a bounce comes once.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Impact {
-    /// What comes together more slowly is a contact, in m/s.
+pub(in crate::swarm) struct Impact {
+    /// Speed below which two that come together are a contact, in m/s.
     pub speed: f32,
     /// The part of the speed that balls have afterwards.
     pub restitution: f32,
-    /// How long a substep is, in seconds.
+    /// Length of a substep in seconds.
     pub time: f32,
     /// In m/s².
     pub gravity: Row,
-    /// How contacts bear what lies on them.
+    /// Stiffness of contacts.
     pub soft: Soft,
 }
 
@@ -573,10 +272,9 @@ impl Columns<'_> {
         // weigh: a light ball that a heavy one presses on something has nowhere to go. What sleeps
         // stays.
         let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
-        let [a, b] = [a, b].map(|ball| {
-            let free = mobility(&ball);
-            free.pick_above(zero, grounded.pick_above(zero, one, free), zero)
-        });
+        let [free_a, free_b] = [mobility(&a), mobility(&b)];
+        let a = free_a.pick_above(zero, grounded.pick_above(zero, one, free_a), zero);
+        let b = free_b.pick_above(zero, grounded.pick_above(zero, one, free_b), zero);
         let by = (a + b).pick_above(zero, push / (a + b), zero);
         let ways = [normal.times(by * a), normal.times(by * b)];
         let places =
@@ -612,7 +310,7 @@ impl Solve<'_> {
         let Pushes { pressure, grip, .. } = pushes;
         for (i, batch) in batches.iter().enumerate() {
             let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, _) = normal_and_gap(&a, &b, |lane| batch.pair(lane));
+            let (normal, _) = normal_and_gap(&a, &b, ALL, |lane| batch.pair(lane));
             // It was across the normal of the last substep.
             let across = V::load(&grip[i]);
             let across = across.minus(normal.times(across.dot(normal)));
@@ -649,7 +347,7 @@ impl Solve<'_> {
         let (speed, per_second) = (L::splat(speed), L::splat(1.0 / impact.time));
         for (i, batch) in batches.iter().enumerate() {
             let at = gather::<L>(columns.at, batch);
-            let (normal, gap) = normal_and_gap(&at[0], &at[1], |lane| batch.pair(lane));
+            let (normal, gap) = normal_and_gap(&at[0], &at[1], ALL, |lane| batch.pair(lane));
             let before = L::load(&pressure[i]);
             let velocity = gather::<L>(columns.velocity, batch);
             // What bears nothing and comes fast is no contact yet.
@@ -745,7 +443,7 @@ fn meeting<L: Lanes>(
     (normal, L::splat(impact.time).pick_above(time, closing, zero))
 }
 
-/// How fast the surfaces of two balls slide over each other.
+/// Velocity at which the surfaces of two balls slide over each other.
 #[inline(always)]
 fn sliding<L: Lanes>(relative: V<L>, normal: V<L>, [a, b]: &[[L; 4]; 2]) -> V<L> {
     let spin = V::of(a).plus(V::of(b));
@@ -758,128 +456,4 @@ fn held<L: Lanes>(wish: V<L>, most: L) -> V<L> {
     let size = wish.dot(wish).sqrt();
     let part = most / size.max(L::splat(f32::MIN_POSITIVE));
     wish.times(size.pick_above(most, part, L::splat(1.0)))
-}
-
-/// Faster than this, in m/s, or further out, in metres, a ball is no longer a ball: squares of
-/// such numbers and of sums of them are still finite.
-const MOST: f32 = 1e15;
-
-/// Changes velocities, and moves on what has them.
-pub(super) struct Drift<'a> {
-    pub at: &'a mut [Row],
-    pub velocity: &'a mut [Row],
-    pub budget: &'a mut [f32],
-    /// In m/s, and zero.
-    pub change: Row,
-    /// In seconds, thrice, and zero.
-    pub time: Row,
-    /// Whether a budget becomes less than this.
-    pub least: f32,
-    pub overrun: &'a mut bool,
-    /// The rows that were stopped because of where they would have gone.
-    pub stopped: &'a mut Vec<u32>,
-    pub first: u32,
-}
-
-impl Kernel for Drift<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let rows = self.at.iter_mut().zip(self.velocity).zip(self.budget);
-        for (row, ((at, velocity), budget)) in rows.enumerate() {
-            let new = sum(*velocity, self.change);
-            let way = product(new, self.time);
-            let place = sum(*at, way);
-            let ok = largest(new) < MOST && largest(place) < MOST;
-            if ok {
-                (*velocity, *at) = (new, place);
-                *budget -= squared(way).sqrt();
-                *self.overrun |= *budget < self.least;
-            } else {
-                *velocity = [0.0, 0.0, 0.0, velocity[3]];
-                self.stopped.push(self.first + row as u32);
-            }
-        }
-    }
-}
-
-#[inline(always)]
-fn sum(a: Row, b: Row) -> Row {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
-}
-
-#[inline(always)]
-fn product(a: Row, b: Row) -> Row {
-    [a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]]
-}
-
-/// Of the three coordinates.
-#[inline(always)]
-pub(super) fn squared(a: Row) -> f32 {
-    a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
-}
-
-/// Of the three coordinates; NaN if one of them is.
-#[inline(always)]
-fn largest(a: Row) -> f32 {
-    a[0].abs() + a[1].abs() + a[2].abs()
-}
-
-/// The first part of a step in the lab's tier: balls move on, and their velocities make room for
-/// the places where they were.
-pub(super) struct Predict<'a> {
-    pub at: &'a mut [Row],
-    pub velocity: &'a mut [Row],
-    /// How far each goes.
-    pub way: &'a mut [f32],
-    pub change: Row,
-    pub time: Row,
-    pub stopped: &'a mut Vec<u32>,
-    pub first: u32,
-}
-
-impl Kernel for Predict<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let rows = self.at.iter_mut().zip(self.velocity).zip(self.way);
-        for (row, ((at, velocity), length)) in rows.enumerate() {
-            let new = sum(*velocity, self.change);
-            let way = product(new, self.time);
-            let place = sum(*at, way);
-            let ok = largest(new) < MOST && largest(place) < MOST;
-            let before = [at[0], at[1], at[2], velocity[3]];
-            if ok {
-                *at = place;
-                *length = squared(way).sqrt();
-            } else {
-                *length = 0.0;
-                self.stopped.push(self.first + row as u32);
-            }
-            *velocity = before;
-        }
-    }
-}
-
-/// The last part of it: velocities are what places became, though no ball is faster than it was
-/// before others pushed it. (What is pushed out of a deep overlap would fly off otherwise.)
-pub(super) struct Follow<'a> {
-    pub at: &'a [Row],
-    pub velocity: &'a mut [Row],
-    pub way: &'a [f32],
-    pub budget: &'a mut [f32],
-    pub per_second: Row,
-}
-
-impl Kernel for Follow<'_> {
-    #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let rows = self.at.iter().zip(self.velocity).zip(self.way).zip(self.budget);
-        for (((at, velocity), expected), budget) in rows {
-            let way = [at[0] - velocity[0], at[1] - velocity[1], at[2] - velocity[2], 0.0];
-            let length = squared(way).sqrt();
-            *budget -= length;
-            let part = if length > *expected { *expected / length } else { 1.0 };
-            let new = product(way, self.per_second);
-            *velocity = [new[0] * part, new[1] * part, new[2] * part, velocity[3]];
-        }
-    }
 }

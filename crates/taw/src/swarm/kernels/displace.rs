@@ -1,0 +1,144 @@
+//! Overlap moved apart in the lab's tier.
+
+use super::{ALL, V, gather, normal_and_gap, scatter};
+use crate::swarm::batches::Batch;
+use crate::swarm::lanes::{Kernel, LANES, Lanes, Row};
+use crate::swarm::pairs::Fans;
+use crate::swarm::team::Shared;
+use crate::swarm::walls::HalfSpace;
+
+/// Pushes overlapping balls apart, half each.
+pub(in crate::swarm) struct Displace<'a> {
+    pub at: Shared<'a, Row>,
+    pub batches: &'a [Batch],
+}
+
+impl Kernel for Displace<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        for batch in self.batches {
+            let [a, b] = gather::<L>(self.at, batch);
+            let (normal, overlap) = normal_and_overlap(&a, &b, ALL, |lane| batch.pair(lane));
+            let by = normal.times(overlap * L::splat(0.5));
+            let moved = [V::of(&a).minus(by).with(a[3]), V::of(&b).plus(by).with(b[3])];
+            scatter(self.at, batch, moved);
+        }
+    }
+}
+
+/// The normal from the first to the second ball, and how far they overlap.
+#[inline(always)]
+fn normal_and_overlap<L: Lanes>(
+    a: &[L; 4],
+    b: &[L; 4],
+    lanes: u32,
+    pair: impl Fn(usize) -> [u32; 2],
+) -> (V<L>, L) {
+    let (normal, gap) = normal_and_gap(a, b, lanes, pair);
+    let zero = L::splat(0.0);
+    (normal, (zero - gap).max(zero))
+}
+
+/// Pushes apart overlapping balls of fans: each ball and up to eight others at a time.
+pub(in crate::swarm) struct DisplaceFans<'a> {
+    pub at: Shared<'a, Row>,
+    pub fans: Fans<'a>,
+}
+
+/// Which part of an overlap each of two balls moves, by how many overlap the first one: where
+/// these are moved together, they would move too far.
+const PART: [f32; LANES + 1] = [0.5, 0.5, 0.42, 0.38, 0.36, 0.36, 0.36, 0.36, 0.36];
+
+/// All bits of the first places, by how many these are.
+static FIRST: [[u16; LANES]; LANES + 1] = {
+    let mut masks = [[0; LANES]; LANES + 1];
+    let mut count = 0;
+    while count <= LANES {
+        let mut place = 0;
+        while place < count {
+            masks[count][place] = u16::MAX;
+            place += 1;
+        }
+        count += 1;
+    }
+    masks
+};
+
+impl Kernel for DisplaceFans<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let Fans { first, rows, list: mut rest } = self.fans;
+        for row in first..first + rows {
+            let mut left = usize::from(rest[0]);
+            rest = &rest[1..];
+            if left == 0 {
+                continue;
+            }
+            let ball = self.at.row(row as usize);
+            // SAFETY: no other thread has this row and those of its fan (see `Slab`).
+            let mut own = unsafe { *ball };
+            while left > 0 {
+                let count = left.min(LANES);
+                let mut end = [0; LANES];
+                let eight = rest.first_chunk().unwrap_or_else(|| {
+                    end[..count].copy_from_slice(&rest[..count]);
+                    &end
+                });
+                // The places that are left over name the ball itself: what is written there is
+                // written over below.
+                let mut after = FIRST[count];
+                for (after, other) in after.iter_mut().zip(eight) {
+                    *after &= other;
+                }
+                let a = [L::splat(own[0]), L::splat(own[1]), L::splat(own[2]), L::splat(own[3])];
+                // SAFETY: as above; no row but its own is twice in a fan.
+                unsafe {
+                    let b = L::gather(ball, &after);
+                    let pair = |lane: usize| [row, row + u32::from(after[lane])];
+                    let (normal, overlap) = normal_and_overlap(&a, &b, (1 << count) - 1, pair);
+                    let overlap = overlap.first(count);
+                    let hits = overlap.above(L::splat(0.0)).count_ones();
+                    let by = normal.times(overlap * L::splat(PART[hits as usize]));
+                    L::scatter(ball, &after, LANES, V::of(&b).plus(by).with(b[3]));
+                    let V([x, y, z]) = by;
+                    own = [own[0] - x.sum(), own[1] - y.sum(), own[2] - z.sum(), own[3]];
+                }
+                (left, rest) = (left - count, &rest[count..]);
+            }
+            // SAFETY: as above.
+            unsafe { *ball = own };
+        }
+    }
+}
+
+/// Pushes balls out of half-spaces.
+pub(in crate::swarm) struct DisplaceFromPlanes<'a> {
+    pub at: &'a mut [Row],
+    pub planes: &'a [HalfSpace],
+}
+
+impl Kernel for DisplaceFromPlanes<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let zero = L::splat(0.0);
+        for rows in self.at.chunks_mut(LANES) {
+            let (base, count) = (rows.as_mut_ptr(), rows.len());
+            let places = [0, 1, 2, 3, 4, 5, 6, 7].map(|place: u16| place.min(count as u16 - 1));
+            // SAFETY: these rows are here, and each is named once among the first ones.
+            unsafe {
+                let [mut x, mut y, mut z, radius] = L::gather(base, &places);
+                let mut out = 0;
+                for HalfSpace { normal, offset, .. } in self.planes {
+                    let (nx, ny, nz) = (L::splat(normal.x), L::splat(normal.y), L::splat(normal.z));
+                    let gap = nx * x + ny * y + nz * z - L::splat(*offset) - radius;
+                    out |= zero.above(gap);
+                    let by = (zero - gap).max(zero);
+                    (x, y, z) = (x + nx * by, y + ny * by, z + nz * by);
+                }
+                if out != 0 {
+                    L::scatter(base, &places, count, [x, y, z, radius]);
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Rows that move on: by their velocities in the full tier, before and after overlap is moved
+//! apart in the lab's.
+
+use crate::swarm::lanes::{Kernel, Lanes, Row};
+
+/// Faster than this, in m/s, or further out, in metres, a ball is no longer a ball: squares of
+/// such numbers and of sums of them are still finite.
+const MOST: f32 = 1e15;
+
+/// Changes velocities, and moves on what has them.
+pub(in crate::swarm) struct Drift<'a> {
+    pub at: &'a mut [Row],
+    pub velocity: &'a mut [Row],
+    pub budget: &'a mut [f32],
+    /// In m/s, and zero.
+    pub change: Row,
+    /// In seconds, thrice, and zero.
+    pub time: Row,
+    /// Least budget; below it, `overrun` is set.
+    pub least: f32,
+    pub overrun: &'a mut bool,
+    /// The rows that were stopped because of where they would have gone.
+    pub stopped: &'a mut Vec<u32>,
+    pub first: u32,
+}
+
+impl Kernel for Drift<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        // In registers, not behind a reference that any of the rows might be.
+        let (change, time) = (self.change, self.time);
+        let mut lowest = f32::MAX;
+        let rows = self.at.iter_mut().zip(self.velocity).zip(self.budget);
+        for (row, ((at, velocity), budget)) in rows.enumerate() {
+            let new = sum(*velocity, change);
+            let way = product(new, time);
+            let place = sum(*at, way);
+            let ok = largest(new) < MOST && largest(place) < MOST;
+            if ok {
+                (*velocity, *at) = (new, place);
+                *budget -= squared(way).sqrt();
+                lowest = lowest.min(*budget);
+            } else {
+                *velocity = [0.0, 0.0, 0.0, velocity[3]];
+                self.stopped.push(self.first + row as u32);
+            }
+        }
+        *self.overrun |= lowest < self.least;
+    }
+}
+
+#[inline(always)]
+fn sum(a: Row, b: Row) -> Row {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3] + b[3]]
+}
+
+#[inline(always)]
+fn product(a: Row, b: Row) -> Row {
+    [a[0] * b[0], a[1] * b[1], a[2] * b[2], a[3] * b[3]]
+}
+
+/// Of the three coordinates.
+#[inline(always)]
+pub(in crate::swarm) fn squared(a: Row) -> f32 {
+    a[0] * a[0] + a[1] * a[1] + a[2] * a[2]
+}
+
+/// Of the three coordinates; NaN if one of them is.
+#[inline(always)]
+fn largest(a: Row) -> f32 {
+    a[0].abs() + a[1].abs() + a[2].abs()
+}
+
+/// The first part of a step in the lab's tier: balls move on, and their velocities make room for
+/// the places where they were.
+pub(in crate::swarm) struct Predict<'a> {
+    pub at: &'a mut [Row],
+    pub velocity: &'a mut [Row],
+    /// Way of each.
+    pub way: &'a mut [f32],
+    pub change: Row,
+    pub time: Row,
+    pub stopped: &'a mut Vec<u32>,
+    pub first: u32,
+}
+
+impl Kernel for Predict<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let rows = self.at.iter_mut().zip(self.velocity).zip(self.way);
+        for (row, ((at, velocity), length)) in rows.enumerate() {
+            let new = sum(*velocity, self.change);
+            let way = product(new, self.time);
+            let place = sum(*at, way);
+            let ok = largest(new) < MOST && largest(place) < MOST;
+            let before = [at[0], at[1], at[2], velocity[3]];
+            if ok {
+                *at = place;
+                *length = squared(way).sqrt();
+            } else {
+                *length = 0.0;
+                self.stopped.push(self.first + row as u32);
+            }
+            *velocity = before;
+        }
+    }
+}
+
+/// The last part of it: velocities are what places became, though no ball is faster than it was
+/// before others pushed it. (What is pushed out of a deep overlap would fly off otherwise.)
+pub(in crate::swarm) struct Follow<'a> {
+    pub at: &'a [Row],
+    pub velocity: &'a mut [Row],
+    pub way: &'a [f32],
+    pub budget: &'a mut [f32],
+    pub per_second: Row,
+}
+
+impl Kernel for Follow<'_> {
+    #[inline(always)]
+    fn run<L: Lanes>(self) {
+        let rows = self.at.iter().zip(self.velocity).zip(self.way).zip(self.budget);
+        for (((at, velocity), expected), budget) in rows {
+            let way = [at[0] - velocity[0], at[1] - velocity[1], at[2] - velocity[2], 0.0];
+            let length = squared(way).sqrt();
+            *budget -= length;
+            let part = if length > *expected { *expected / length } else { 1.0 };
+            let new = product(way, self.per_second);
+            *velocity = [new[0] * part, new[1] * part, new[2] * part, velocity[3]];
+        }
+    }
+}

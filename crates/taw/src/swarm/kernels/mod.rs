@@ -1,0 +1,193 @@
+//! Work of a step on rows and on pairs, eight at a time.
+
+use super::batches::Batch;
+use super::lanes::{LANES, Lanes, Row};
+use super::memory::{fit, make_room};
+use super::team::Shared;
+
+mod contact;
+mod displace;
+mod drift;
+
+pub(super) use contact::{Columns, GROUNDED, Impact, LOST, Pass, Soft, Solve, WALL_SLOP};
+pub(super) use displace::{Displace, DisplaceFans, DisplaceFromPlanes};
+pub(super) use drift::{Drift, Follow, Predict, squared};
+
+/// Impulses of batches of pairs, batch by batch; none in the lab's tier.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Pushes {
+    /// The impulses along the normals, in N s.
+    pub pressure: Vec<[f32; LANES]>,
+    /// Those across them.
+    pub grip: Vec<[[f32; LANES]; 3]>,
+    /// Set if any of them bounced in the last round.
+    pub bounced: bool,
+}
+
+impl Pushes {
+    pub fn bytes(&self) -> usize {
+        self.pressure.capacity() * size_of::<[f32; LANES]>()
+            + self.grip.capacity() * size_of::<[[f32; LANES]; 3]>()
+    }
+
+    /// As many as there are batches, and none bears anything.
+    pub fn reset(&mut self, batches: usize) {
+        fn reset<T: Clone>(column: &mut Vec<T>, batches: usize, none: T) {
+            column.clear();
+            make_room(column, batches);
+            column.resize(batches, none);
+            fit(column);
+        }
+        reset(&mut self.pressure, batches, [0.0; LANES]);
+        reset(&mut self.grip, batches, [[0.0; LANES]; 3]);
+    }
+}
+
+/// Three coordinates on eight lanes.
+#[derive(Clone, Copy)]
+struct V<L>([L; 3]);
+
+impl<L: Lanes> V<L> {
+    #[inline(always)]
+    fn of(row: &[L; 4]) -> Self {
+        Self([row[0], row[1], row[2]])
+    }
+
+    #[inline(always)]
+    fn load(from: &[[f32; LANES]; 3]) -> Self {
+        Self([L::load(&from[0]), L::load(&from[1]), L::load(&from[2])])
+    }
+
+    #[inline(always)]
+    fn store(self, to: &mut [[f32; LANES]; 3]) {
+        let Self([x, y, z]) = self;
+        x.store(&mut to[0]);
+        y.store(&mut to[1]);
+        z.store(&mut to[2]);
+    }
+
+    #[inline(always)]
+    fn plus(self, other: Self) -> Self {
+        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
+        Self([a + x, b + y, c + z])
+    }
+
+    #[inline(always)]
+    fn minus(self, other: Self) -> Self {
+        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
+        Self([a - x, b - y, c - z])
+    }
+
+    #[inline(always)]
+    fn times(self, by: L) -> Self {
+        let Self([x, y, z]) = self;
+        Self([x * by, y * by, z * by])
+    }
+
+    #[inline(always)]
+    fn dot(self, other: Self) -> L {
+        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
+        a * x + b * y + c * z
+    }
+
+    #[inline(always)]
+    fn cross(self, other: Self) -> Self {
+        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
+        Self([b * z - c * y, c * x - a * z, a * y - b * x])
+    }
+
+    #[inline(always)]
+    fn with(self, w: L) -> [L; 4] {
+        let Self([x, y, z]) = self;
+        [x, y, z, w]
+    }
+}
+
+/// All lanes, as bits.
+const ALL: u32 = (1 << LANES) - 1;
+
+/// The normal from the first to the second ball, and the gap between them. Only those of the named
+/// lanes, as bits, are pairs of two balls.
+#[inline(always)]
+fn normal_and_gap<L: Lanes>(
+    a: &[L; 4],
+    b: &[L; 4],
+    lanes: u32,
+    pair: impl Fn(usize) -> [u32; 2],
+) -> (V<L>, L) {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let least = L::splat(f32::MIN_POSITIVE);
+    let way = V::of(b).minus(V::of(a));
+    let squared = way.dot(way);
+    let distance = squared.sqrt();
+    // Root and quotient do not wait for each other.
+    let inverse = squared.pick_above(least, distance * (one / squared), zero);
+    let mut normal = way.times(inverse);
+    if least.above(squared) & lanes != 0 {
+        // Where the centers coincide, any direction is as good as another; with the same for all,
+        // those at one point would come into a line.
+        let mut any = [[0.0; LANES]; 3];
+        for lane in 0..LANES {
+            let direction = direction(pair(lane));
+            for (axis, x) in any.iter_mut().zip(direction) {
+                axis[lane] = x;
+            }
+        }
+        let (V([x, y, z]), V([u, v, w])) = (normal, V::load(&any));
+        // (Not by `map`, which is compiled without the instructions of its caller.)
+        normal = V([
+            squared.pick_above(least, x, u),
+            squared.pick_above(least, y, v),
+            squared.pick_above(least, z, w),
+        ]);
+    }
+    (normal, distance - (a[3] + b[3]))
+}
+
+/// A direction for each pair of rows, spread over the sphere.
+#[cold]
+fn direction([a, b]: [u32; 2]) -> [f32; 3] {
+    let mixed = (a ^ b.rotate_left(16)).wrapping_mul(0x9e37_79b1);
+    let mixed = (mixed ^ mixed >> 15).wrapping_mul(0x85eb_ca77);
+    let part = |shift: u32| ((mixed >> shift & 0x3ff) as f32 - 511.5) / 511.5;
+    let [x, y, z] = [part(0), part(11), part(22)];
+    // No part is zero.
+    let length = (x * x + y * y + z * z).sqrt();
+    [x / length, y / length, z / length]
+}
+
+/// The rows of a column that the pairs of a batch are about.
+#[inline(always)]
+fn gather<L: Lanes>(column: Shared<Row>, batch: &Batch) -> [[L; 4]; 2] {
+    let a = column.row(batch.first[0] as usize);
+    let b = column.row(batch.first[1] as usize);
+    // SAFETY: no other thread has these rows (see `Slab`).
+    unsafe { [L::gather(a, &batch.a), L::gather(b, &batch.b)] }
+}
+
+/// Writes back what was gathered.
+#[inline(always)]
+fn scatter<L: Lanes>(column: Shared<Row>, batch: &Batch, [of_a, of_b]: [[L; 4]; 2]) {
+    let a = column.row(batch.first[0] as usize);
+    let b = column.row(batch.first[1] as usize);
+    let count = batch.count as usize;
+    // SAFETY: as in `gather`, and no row is twice in a batch.
+    unsafe {
+        L::scatter(a, &batch.a, count, of_a);
+        L::scatter(b, &batch.b, count, of_b);
+    }
+}
+
+/// The inverse mass of awake balls: those of balls asleep have a minus sign.
+#[inline(always)]
+fn mobility<L: Lanes>(velocity: &[L; 4]) -> L {
+    velocity[3].max(L::splat(0.0))
+}
+
+/// Effective mass of both along their normal; zero if both are asleep.
+#[inline(always)]
+fn mass<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> L {
+    let sum = mobility(a) + mobility(b);
+    let zero = L::splat(0.0);
+    sum.pick_above(zero, L::splat(1.0) / sum, zero)
+}
