@@ -98,3 +98,49 @@ fn hills_of_any_size_hold_and_every_step_ends() {
     }
     over_hills::<f64>(1e100);
 }
+
+/// The inside of half a pipe of so many facets, which falls by `slope` along x.
+fn half_pipe(facets: u32, radius: f64, slope: f64) -> Mesh<f64> {
+    let rim = |i: u32| std::f64::consts::PI * f64::from(i) / f64::from(facets);
+    let point = |i: u32, x: f64| {
+        let (sin, cos) = rim(i).sin_cos();
+        Point3::new(x, -radius * sin - slope * x, radius * cos)
+    };
+    let points = (0..=facets).flat_map(|i| [point(i, -0.5), point(i, 0.5)]).collect();
+    let corners = (0..facets).flat_map(|i| {
+        let a = 2 * i;
+        [[a, a + 1, a + 2], [a + 1, a + 3, a + 2]]
+    });
+    Mesh::new(points, corners.collect()).unwrap()
+}
+
+#[test]
+fn a_ball_goes_down_a_half_pipe_of_facets_without_sinking_into_them() {
+    let radius = 5e-3;
+    let cases = [0.0, 0.3, 0.5, 0.7].into_iter().flat_map(|e| [(e, 0.0), (e, 0.3)]);
+    let cases = cases.flat_map(|(e, mu)| (0..8).map(move |i| (e, mu, 1.1e-3 * f64::from(i))));
+    for (restitution, friction, z) in cases {
+        let mut world = world::<f64>();
+        world.walls.insert(half_pipe(12, 15e-3, 0.05)).unwrap();
+        let marble = Marble {
+            material: Some(surface(restitution, friction)),
+            mass: Mass::Kilograms(1.0),
+            ..Marble::new(Point3::new(-0.4, 0.02 - 6e-3, z), radius)
+        };
+        world.marbles.insert(marble).unwrap();
+        let mut energy = world.energy().total();
+        for step in 0..60 {
+            world.step(DT).unwrap();
+            let name = format!("e {restitution}, mu {friction}, from {z}, step {step}");
+            let now = world.energy().total();
+            let at = world.marbles.position()[0];
+            let deep = 1.0 - world.walls.shapes()[0].nearest(at).distance / radius;
+            // As much of an overlap as may stay.
+            assert!(deep < 4e-3, "{name}: {deep} of the radius deep");
+            let gain = (now - energy) / (9.81 * radius);
+            assert!(gain < 0.02, "{name}: gained {gain} of a lift by its radius");
+            assert_eq!(world.stopped().count(), 0, "{name}");
+            energy = now;
+        }
+    }
+}

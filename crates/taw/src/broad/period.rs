@@ -105,7 +105,9 @@ impl<S: Scalar> Images<S> {
         });
         pairs.sort_unstable();
         pairs.dedup();
-        pairs.iter().for_each(|(a, b)| pair(*a, *b));
+        for (a, b) in pairs {
+            pair(*a, *b);
+        }
     }
 
     /// Lists all spheres, and the images that one of them may touch.

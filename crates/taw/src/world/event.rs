@@ -19,9 +19,8 @@ impl<S: Scalar> World<S> {
         let exact = self.model.precision == Precision::Compensated;
         let marbles = &self.marbles;
         let events = &mut self.events;
-        events.period = Period {
-            lengths: marbles.period.lengths.map(|length| length.map(|length| length.as_f64())),
-        };
+        events.period =
+            Period { lengths: marbles.period.lengths.map(|length| length.map(S::as_f64)) };
         events.balls.clear();
         events.balls.extend((0..marbles.len()).map(|row| {
             let Motion { position, velocity } = marbles.exact(row);

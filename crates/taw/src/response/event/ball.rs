@@ -24,16 +24,16 @@ pub(crate) struct Ball {
     /// In 1/kg.
     pub inverse_mass: f64,
     pub material: Material<f64>,
-    /// Whether friction sets it spinning.
+    /// Tells if friction sets it spinning.
     pub spins: BallSpin,
-    /// How much of a gap may be due to the rounding of the position, in metres.
+    /// Part of a gap that may be due to the rounding of the position, in metres.
     pub rounding: f64,
-    /// How far it has turned in this substep, as an axial vector in radians.
+    /// Turn so far in this substep, as an axial vector in radians.
     pub turned: Vec3<f64>,
     pub path: Path,
 }
 
-/// How a ball goes on.
+/// Motion of a ball from its last event on.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Path {
     /// When it began, in seconds from the start of the substep.
@@ -45,23 +45,25 @@ pub(crate) struct Path {
     /// Where it is when its path changes by itself, if that is known better than by the
     /// acceleration.
     pub(super) arrival: Option<State>,
-    /// Whether what it lies on ends there, or bends away from under it.
+    /// True if what it lies on ends there, or bends away from under it.
     pub(super) leaves: bool,
     /// The wall that it has just come off.
     pub(super) off: Option<usize>,
-    /// Whether its acceleration holds it in a heap.
+    /// True if its acceleration holds it in a heap.
     pub(super) heaped: bool,
-    /// What walls bring in there, in watts, for those who ask.
+    /// True if other balls are in that heap.
+    pub(super) among: bool,
+    /// Power that walls bring in there, in watts, for those who ask.
     pub(super) power: f64,
-    /// What the collisions of this substep took from it, as parts of their approach; all of
+    /// Loss by the collisions of this substep, in parts of their approach; all of
     /// it where no time went by since the one before.
     pub(super) losses: f64,
     /// When the last one was.
     pub(super) collided: f64,
-    /// How often it was brought to rest because it had too many. Each time it takes twice
+    /// Number of times that it was brought to rest because it had too many. Each time it takes twice
     /// the energy to wake it.
     pub(super) surrenders: i32,
-    /// How many steps it took in this substep over what is no half-space.
+    /// Number of steps in this substep over what is no half-space.
     pub(super) steps: u32,
     /// When its acceleration changes by itself.
     pub(super) change: f64,
@@ -88,6 +90,7 @@ impl Default for Path {
             leaves: false,
             off: None,
             heaped: false,
+            among: false,
             power: 0.0,
             losses: 0.0,
             collided: f64::NEG_INFINITY,
@@ -159,7 +162,7 @@ impl Ball {
         self.path.surrenders = self.path.surrenders.max(MOST_SURRENDERS);
     }
 
-    /// Whether it stays where it is for the rest of the substep.
+    /// True if it stays where it is for the rest of the substep.
     pub(super) fn is_frozen(&self) -> bool {
         self.path.surrenders >= MOST_SURRENDERS
     }

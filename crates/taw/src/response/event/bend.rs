@@ -30,17 +30,17 @@ const PATIENCE: u32 = 8;
 /// Over a way shorter than this part of the radius a ball is where it was: its direction is
 /// rounding, and nothing bends otherwise.
 const NO_WAY: f64 = 1e-9;
-/// How far beside a point, over the radius, the normal is looked at again to see how it turns.
+/// Distance beside a point, over the radius, the normal is looked at again to see how it turns.
 /// The rounding of one over the other is a hundred billionth.
 const BESIDE: f64 = 1e-5;
-/// What bends by so much more or less, over a radius, is another face, edge or corner.
+/// Another face, edge or corner bends by so much more or less, over a radius.
 const CORNER: f64 = 0.1;
-/// How often a time is halved to find the moment when something ends.
+/// Number of halvings of a time to find the moment when something ends.
 const HALVINGS: u32 = 24;
-/// What turns by less than this over a radius is flat: that is rounding.
+/// Flat is a surface that turns by less than this over a radius: that is rounding.
 const FLAT: f64 = 1e-9;
 
-/// What a ball lies on, and how it is pulled there.
+/// Surface below a ball, and how it is pulled there.
 pub(super) struct Ground<'a> {
     pub walls: &'a [Wall],
     /// The walls that it may be on before the step is over.
@@ -51,7 +51,7 @@ pub(super) struct Ground<'a> {
     pub material: Material<f64>,
     /// No step is shorter, in seconds.
     pub shortest: f64,
-    /// What it cost, in looks.
+    /// Cost so far, in looks.
     pub looks: Cell<u64>,
 }
 
@@ -87,7 +87,7 @@ struct Rate {
     spin: Vec3<f64>,
 }
 
-/// What the touching point does.
+/// Motion of the touching point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Regime {
     Slides,
@@ -95,7 +95,7 @@ enum Regime {
     Rests,
 }
 
-/// How a ball touches what it lies on.
+/// Touch of a ball and what it lies on.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Touch {
     pub wall: usize,
@@ -104,9 +104,9 @@ pub(super) struct Touch {
     pub pressure: f64,
     /// The velocity of the touching point along the surface, in m/s.
     pub slip: Vec3<f64>,
-    /// How the normal turns, in 1/s.
+    /// Rate of change of the normal, in 1/s.
     pub bend: Vec3<f64>,
-    /// How the surface's velocity changes under the touching point, in m/s².
+    /// Rate of change of the surface's velocity under the touching point, in m/s².
     surface_rate: Vec3<f64>,
     material: Material<f64>,
 }
@@ -115,7 +115,7 @@ pub(super) struct Touch {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step {
     pub end: State,
-    /// Whether it ends because the ball comes off.
+    /// True if it ends because the ball comes off.
     pub leaves: bool,
 }
 
@@ -135,7 +135,7 @@ impl Ground<'_> {
         })
     }
 
-    /// How the normal turns for a point that goes over the wall, in 1/s.
+    /// Rate of change of the normal for a point that goes over the wall, in 1/s.
     fn turning(&self, at: Point3<f64>, time: f64, normal: Vec3<f64>, over: Vec3<f64>) -> Vec3<f64> {
         let Some((along, speed)) = direction_and_length(over) else { return Vec3::zero() };
         let beside = BESIDE * self.radius;
@@ -147,7 +147,7 @@ impl Ground<'_> {
         there * (speed / beside)
     }
 
-    /// Whether the surface is flat around a point, and does not turn but about its normal.
+    /// Tests if the surface is flat around a point, and does not turn but about its normal.
     pub fn is_flat(&self, state: &State) -> bool {
         let (wall, Nearest { normal, .. }) = self.nearest(state.position, state.time);
         let Some(wall) = self.walls.get(wall) else { return false };
@@ -162,12 +162,12 @@ impl Ground<'_> {
             || ![x, -x, y, -y].into_iter().any(bends)
     }
 
-    /// Whether the normal at a place is this one.
+    /// Tests if the normal at a place is this one.
     pub fn has_normal(&self, at: Point3<f64>, time: f64, normal: Vec3<f64>) -> bool {
         (self.nearest(at, time).1.normal - normal).magnitude() <= FLAT
     }
 
-    /// How a ball touches what it is nearest to.
+    /// Touch of a ball and what it is nearest to.
     pub fn touch(&self, state: &State) -> Option<Touch> {
         let State { time, position, velocity, spin } = *state;
         let (number, Nearest { normal, .. }) = self.nearest(position, time);
@@ -208,7 +208,7 @@ impl Ground<'_> {
         })
     }
 
-    /// What resists rolling, as a change of the touching point's velocity by the spin.
+    /// Resistance to rolling, as a change of the touching point's velocity by the spin.
     fn resistance(&self, touch: &Touch, spin: Vec3<f64>) -> Vec3<f64> {
         if self.spins == BallSpin::Ignored || touch.material.rolling_resistance == 0.0 {
             return Vec3::zero();
@@ -333,7 +333,7 @@ impl Ground<'_> {
         Some(Step { end: State { time: start.time + length, ..state }, leaves })
     }
 
-    /// Whether a ball that went from one place to another is still on the same face, edge or
+    /// Tests if a ball that went from one place to another is still on the same face, edge or
     /// corner: it bends there as here, along the way between.
     fn bends_alike(&self, start: &State, end: &State, touch: &Touch) -> bool {
         let Some(wall) = self.walls.get(touch.wall) else { return true };
@@ -351,7 +351,7 @@ impl Ground<'_> {
         bends.abs() * self.radius <= CORNER
     }
 
-    /// How the surface bends from where a ball is that way, in 1/m.
+    /// Curvature of the surface from where a ball is that way, in 1/m.
     fn curvature(&self, state: &State, way: Vec3<f64>) -> f64 {
         let normal = self.nearest(state.position, state.time).1.normal;
         let way = way - normal * way.dot(normal);
@@ -359,7 +359,7 @@ impl Ground<'_> {
         self.turning(state.position, state.time, normal, way).magnitude()
     }
 
-    /// How long a step may be for the normal to turn by little.
+    /// Longest step in which the normal turns by little.
     fn longest(&self, start: &State, touch: &Touch, rate: Rate) -> f64 {
         let (x, y) = across(touch.normal);
         let ways = [x, -x, y, -y];

@@ -1,22 +1,23 @@
-//! What a collision does: to two balls, to several at one moment, to a ball and a wall.
+//! Effect of a collision: on two balls, to several at one moment, to a ball and a wall.
 
 use std::cmp::Reverse;
 
 use cgmath::{InnerSpace, Zero};
 
-use super::{Event, EventDriven, Impact, MOST_LOSSES, Settings, What};
+use super::hold::{Held, Pressed};
+use super::{Event, EventDriven, Impact, MOST_LOSSES, MOST_SURRENDERS, Settings, What};
 use crate::math::{Vec3, direction_and_length};
 use crate::response::impact::at_most;
 use crate::response::{Material, Mobility, Push, impact};
 
-/// How many rounds collisions at one moment have to agree.
+/// Rounds that collisions at one moment have to agree.
 const MOST_ROUNDS: u32 = 1000;
 
-/// What happens at one moment.
+/// Events of one moment.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Moment {
     pairs: Vec<(usize, usize)>,
-    /// What is not a collision.
+    /// Events other than collisions.
     rest: Vec<Event>,
     rows: Vec<usize>,
     collisions: Vec<Collision>,
@@ -30,14 +31,14 @@ struct Collision {
     impact: Impact<f64>,
     mobility: Mobility<f64>,
     material: Material<f64>,
-    /// How much of what it asks for it may take at once, beside others.
+    /// Part of what it asks for that it may take at once, beside others.
     share: f64,
-    /// What the second one feels, in N s.
+    /// Impulse on the second one, in N s.
     impulse: Vec3<f64>,
 }
 
 impl EventDriven {
-    /// Whether a ball has had so many collisions that took energy that they will not end.
+    /// Tests if a ball has had so many collisions that took energy that they will not end.
     pub(super) fn loses(&self, row: usize) -> bool {
         self.balls[row].path.losses >= MOST_LOSSES
     }
@@ -45,19 +46,32 @@ impl EventDriven {
     /// Brings balls to rest that collide without end, and all that touch them, however fast they
     /// part just now: between a wall and a heavy ball, a light one parts from one of them always.
     pub(super) fn surrender(&mut self, rows: [usize; 2], time: f64, settings: &Settings) {
-        for row in self.hold_from_now_on(rows, f64::INFINITY, time, settings) {
+        let Held { rows, pressed } = self.hold_from_now_on(rows, f64::INFINITY, time, settings);
+        for row in rows {
             let path = &mut self.balls[row].path;
-            (path.losses, path.surrenders) = (0.0, path.surrenders + 1);
-            if self.balls[row].is_frozen() {
+            path.losses = 0.0;
+            if !self.balls[row].is_frozen() && self.gives_up(row, pressed) {
                 self.balls[row].freeze();
             }
             self.foresee(row, time, settings);
         }
     }
 
+    /// Counts that a ball was brought to rest. True if something presses it that will not end:
+    /// only what is outside could take its momentum.
+    fn gives_up(&mut self, row: usize, pressed: Pressed) -> bool {
+        let surrenders = &mut self.balls[row].path.surrenders;
+        let most = match pressed {
+            Pressed::FromOutside => MOST_SURRENDERS,
+            Pressed::ByForces | Pressed::No => MOST_SURRENDERS - 1,
+        };
+        *surrenders = (*surrenders + 1).min(most);
+        *surrenders == MOST_SURRENDERS
+    }
+
     /// Lets two balls bounce off each other, and whoever else meets at the same moment.
     ///
-    /// What happens at one moment happens to all at once, so that no order is preferred:
+    /// All that happens at one moment happens at once, so that no order is preferred:
     /// the mirror image of a scene has the mirror image of its future, to the bit.
     pub(super) fn meet(
         &mut self,
@@ -132,7 +146,7 @@ impl EventDriven {
         self.moment = Moment { pairs, rest, rows, collisions };
     }
 
-    /// What two balls that touch bring into their collision.
+    /// Begin of a collision of two balls that touch.
     fn collision(&mut self, a: usize, b: usize, settings: &Settings) -> Collision {
         let press = self.press_speed(a, b, settings);
         let (first, second) = (&self.balls[a], &self.balls[b]);

@@ -1,4 +1,4 @@
-//! What happens to balls between two events, for those who ask.
+//! Account of what happens to balls between two events, for those who ask.
 
 use cgmath::InnerSpace;
 

@@ -6,7 +6,7 @@ use std::f64::consts::SQRT_2;
 use cgmath::{InnerSpace, Zero};
 
 use super::time::{Gap, closing_time, meeting_time};
-use super::{Event, EventDriven, FLUSH, Form, Home, PRESS, REST, Settings, What};
+use super::{Event, EventDriven, FLUSH, Form, Home, PRESS, REST, SLOP, Settings, What};
 use crate::math::{Point3, Vec3, direction_and_length, is_finite};
 use crate::shape::Nearest;
 
@@ -171,8 +171,8 @@ impl EventDriven {
         }
     }
 
-    /// The same of a wall that is no half-space, or turns: for as long as the plane across the
-    /// nearest point keeps them apart, they do not meet; then there is another one
+    /// Next event of a ball and a wall that is no half-space, or turns: for as long as the plane
+    /// across the nearest point keeps them apart, they do not meet; then there is another one
     /// (conservative advancement; Mirtich 1996).
     fn foresee_part(
         &self,
@@ -184,7 +184,15 @@ impl EventDriven {
         let (ball, number, wall) = (&self.balls[row], wall, &self.walls[wall]);
         let (mut time, mut step) = (now, 0);
         let held = ball.path.support.is_some() || ball.path.heaped;
+        let rest = self.slow(row, false, settings);
+        // The face that holds it may end under it before the substep does; it must not go deep
+        // into the next one.
         let slow = self.slow(row, held, settings);
+        let slow = if ball.path.among {
+            slow
+        } else {
+            slow.min(SLOP * ball.radius / settings.dt).max(rest)
+        };
         loop {
             if step == MOST_STEPS {
                 return Some((time - now, What::Looks));
@@ -203,7 +211,7 @@ impl EventDriven {
             let blink = f64::EPSILON * time * gap.speed.abs();
             let least =
                 f64::EPSILON * 16.0 * (ball.radius + distance.abs()) + ball.rounding + blink;
-            let slow = slow.max(1e-14 * velocity.magnitude());
+            let [rest, slow] = [rest, slow].map(|slow| slow.max(1e-14 * velocity.magnitude()));
             let after = if gap.now > least {
                 closing_time(gap)?
             } else if gap.speed < -slow {
@@ -224,6 +232,14 @@ impl EventDriven {
                     } else {
                         (time - now, What::SettlesOn(number))
                     });
+                }
+                // What nothing presses is not at rest there until it has no approach; but what is
+                // held takes its own until the end of the substep.
+                let at_last = gap.speed + gap.acceleration * (settings.dt - time);
+                let taken = ball.path.among || ball.path.heaped && at_last >= -rest;
+                if !press && gap.speed < -rest && !taken {
+                    let seam = self.is_seam(row, number, position, time, settings);
+                    return (!seam).then_some((time - now, What::Hits(number)));
                 }
                 if gap.speed > 0.0 && gap.acceleration < 0.0 {
                     // It comes back to this plane, or later.
@@ -327,7 +343,7 @@ impl EventDriven {
         Some(((-press * 1.01 - speed) / pull, What::Leans(b, stamp)))
     }
 
-    /// Whether the point where a wall is nearest to a ball is on another wall that is as
+    /// Tests if the point where a wall is nearest to a ball is on another wall that is as
     /// near, which is then the one that counts.
     pub(super) fn is_seam(
         &self,

@@ -11,7 +11,7 @@ use crate::math::Vec3;
 use crate::response::{BallSpin, Push};
 use crate::shape::Nearest;
 
-/// How often a time is halved to find where a face ends.
+/// Number of halvings of a time to find where a face ends.
 const HALVINGS: u32 = 24;
 
 /// A wall that rises by less than this angle, in radians, goes on like the one before.
@@ -74,7 +74,7 @@ impl EventDriven {
         }
     }
 
-    /// Whether a wall is a half-space that turns about its normal at most.
+    /// Tests if a wall is a half-space that turns about its normal at most.
     pub(super) fn is_even(&self, wall: usize) -> bool {
         let wall = &self.walls[wall];
         let Form::Plane { normal, .. } = wall.form else { return false };

@@ -12,6 +12,9 @@ mod cells;
 mod collide;
 mod count;
 mod foresee;
+mod heap;
+mod hold;
+mod knot;
 mod lie;
 mod reach;
 mod rest;
@@ -34,16 +37,16 @@ use ball::Home;
 pub(crate) use ball::{Ball, Path};
 use cells::Cells;
 use collide::Moment;
+use heap::Heap;
 use reach::Reach;
 pub(crate) use reach::Source;
-use rest::Heap;
 pub(crate) use wall::{Form, Wall};
 
 /// A wall is left or met again only faster than this part of what gravity does to a
 /// speed in a substep. Slower, a ball rests on it: the bounces that it still had ahead
 /// would have taken a few thousandths of a substep.
 const REST: f64 = 1e-3;
-/// The same for balls that press each other, which touch anew each time that they have
+/// That part for balls that press each other, which touch anew each time that they have
 /// gained so much. Ten times a substep, until the next one knows that they rest.
 const PRESS: f64 = 0.1;
 /// Balls that cross more cells than this in a substep are looked for everywhere.
@@ -52,17 +55,20 @@ const FAR: f64 = 1000.0;
 /// of restitution a half count as one, and so does one that took no time), a ball is at
 /// rest among those that it touches: what is left would take endlessly many.
 const MOST_LOSSES: f64 = 64.0;
-/// How many collisions it counts for that a ball begins to rest on another, which takes
+/// Number of collisions that it counts for that a ball begins to rest on another, which takes
 /// about as long.
 const LEAN: f64 = 8.0;
 /// After so many times at rest and out of it again, something presses a ball that nothing
 /// can stop. For the rest of the substep it stays where it is; the next one pushes it out.
 const MOST_SURRENDERS: i32 = 10;
-/// What is no time between two collisions, over the substep.
+/// A shorter time between two collisions is none, over the substep.
 const NO_TIME: f64 = 1e-13;
-/// What lies this part of a radius outside of another wall is still on it; see `world::touch`.
+/// A ball that is this part of a radius outside of another wall is still on it; see `world::touch`.
 const FLUSH: f64 = 5e-6;
-/// What lies on a wall that is no half-space looks where it is after this part of its
+/// Overlap that may stay, over the radius: pushing it out would lift what lies on it, and
+/// create energy.
+const SLOP: f64 = 4e-3;
+/// A ball on a wall that is no half-space looks where it is after this part of its
 /// radius, though not more often than after this part of a substep.
 const LOOK: f64 = 0.05;
 /// Cost that a substep may have, and for each ball besides, in looks at one half-space or one
@@ -83,18 +89,18 @@ const QUARTIC_LOOKS: u64 = 16;
 pub struct Impact<S> {
     /// The row of the first: a marble, or of a wall if `on_wall`.
     pub a: u32,
-    /// Whether the first is a wall.
+    /// True if the first is a wall.
     pub on_wall: bool,
     /// The row of the second, a marble.
     pub b: u32,
     /// The unit vector from the first to the second.
     pub normal: Vec3<S>,
-    /// How fast they came together along it, in m/s.
+    /// Speed at which they came together along it, in m/s.
     pub approach_speed: S,
 }
 
 impl Impact<f64> {
-    /// The same in another scalar.
+    /// Conversion to another scalar.
     pub(crate) fn cast<S: Scalar>(self) -> Impact<S> {
         Impact {
             a: self.a,
@@ -106,7 +112,7 @@ impl Impact<f64> {
     }
 }
 
-/// What may happen to a ball.
+/// Possible events of a ball.
 #[derive(Clone, Copy, Debug)]
 enum What {
     Hits(usize),
@@ -131,7 +137,7 @@ struct Event {
     row: usize,
     stamp: u32,
     what: What,
-    /// Whether it meets another one at the very same time.
+    /// True if it meets another one at the very same time.
     tied: bool,
 }
 
@@ -155,7 +161,7 @@ impl PartialEq for Event {
 
 impl Eq for Event {}
 
-/// What the method is told, besides balls and walls.
+/// Input of the method, besides balls and walls.
 pub(crate) struct Settings<'a> {
     /// The length of the substep, in seconds.
     pub dt: f64,
@@ -185,9 +191,9 @@ pub(crate) struct EventDriven {
     walls: Vec<Wall>,
     /// Pairs of balls that may touch at the start.
     pub near: Contacts<f64>,
-    /// What the heaps' contacts bore in the last substep.
+    /// Impulses that the heaps' contacts bore in the last substep.
     pub warm: Vec<Warm<f64>>,
-    /// What is done to the balls, if somebody asks.
+    /// Work done on the balls, if somebody asks.
     pub work: Option<Work>,
     reach: Reach,
     cells: Cells,
@@ -269,7 +275,7 @@ impl EventDriven {
                 for row in [row, other] {
                     self.balls[row].path.losses += LEAN;
                 }
-                for row in self.hold_from_now_on([row, other], 0.0, time, settings) {
+                for row in self.hold_from_now_on([row, other], 0.0, time, settings).rows {
                     self.foresee(row, time, settings);
                 }
             }

@@ -51,7 +51,7 @@ pub(super) struct Reach {
 #[derive(Clone, Copy, Debug)]
 struct Known {
     center: Point3<f64>,
-    /// How far that place may be from the center, in metres.
+    /// Distance of that place from the center, at most, in metres.
     far: f64,
     /// Where its walls are in the lists.
     walls: [usize; 2],

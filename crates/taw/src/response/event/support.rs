@@ -12,10 +12,10 @@ use crate::math::{Vec3, direction_and_length};
 
 /// By what angle a surface may turn in one go, in radians.
 const BEND: f64 = 4e-3;
-/// What is left of a slide that bends, over the substep, when its end goes straight.
+/// Rest of a slide that bends, over the substep, when its end goes straight.
 const LAST: f64 = 1.0 / 256.0;
 
-/// What a ball lies on, how it is pulled there, and what it is made of.
+/// Surface below a ball, how it is pulled there, and what it is made of.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Support {
     pub normal: Vec3<f64>,
@@ -31,14 +31,14 @@ pub(super) struct Support {
     pub friction: f64,
     pub rolling_resistance: f64,
     pub spinning_resistance: f64,
-    /// Whether friction sets the ball spinning.
+    /// True if friction sets the ball spinning.
     pub spins: bool,
 }
 
 /// Accelerations that last for a while.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Stretch {
-    /// What friction does to velocity and spin at once, in less than a millionth of a
+    /// Changes that friction makes to velocity and spin at once, in less than a millionth of a
     /// step: it takes a slip that is hardly one. In m/s and rad/s.
     pub velocity_change: Vec3<f64>,
     pub spin_change: Vec3<f64>,
@@ -64,7 +64,7 @@ impl Rolling {
     }
 }
 
-/// What the touching point does.
+/// Motion of the touching point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Regime {
     Slides,
@@ -73,7 +73,7 @@ enum Regime {
 }
 
 impl Support {
-    /// How a ball with this velocity and spin goes on, for `dt` seconds at most.
+    /// Motion of a ball with this velocity and spin, for `dt` seconds at most.
     pub fn stretch(&self, velocity: Vec3<f64>, spin: Vec3<f64>, dt: f64) -> Stretch {
         let n = self.normal;
         let along = |x: Vec3<f64>| x - n * x.dot(n);
@@ -131,7 +131,7 @@ impl Support {
         if slip.magnitude() <= rounding { Vec3::zero() } else { slip }
     }
 
-    /// How the velocity of the surface changes under a ball that moves over it.
+    /// Rate of change of the surface's velocity under a ball that moves over it.
     fn surface_rate(&self, at: Rolling) -> Vec3<f64> {
         let rate = self.turning.cross(at.v);
         rate - self.normal * rate.dot(self.normal)
@@ -154,7 +154,7 @@ impl Support {
         if friction <= self.friction * self.pressure { Regime::Rolls } else { Regime::Slides }
     }
 
-    /// What resists the rolling, as a change of `p`.
+    /// Resistance to rolling, as a change of `p`.
     fn resistance(&self, at: Rolling) -> Vec3<f64> {
         // A ball that just begins will roll down the pull, against which `p` turns.
         let against = direction_and_length(at.p)
@@ -188,7 +188,7 @@ impl Support {
         Rolling { v: self.pull + friction, p }
     }
 
-    /// Whether the rate stays the same until the regime changes: nothing turns.
+    /// Tests if the rate stays the same until the regime changes: nothing turns.
     fn is_steady(&self, now: Rolling, rate: Rolling, regime: Regime) -> bool {
         // A difference of speeds has the rounding of the speeds.
         let rounding = 1e-15 * (now.v.magnitude() + now.p.magnitude() + self.surface.magnitude());
@@ -201,7 +201,7 @@ impl Support {
             && (self.rolling_resistance == 0.0 || straight(now.p, rate.p))
     }
 
-    /// Whether what is left of a slide is so little that it may go straight. What that
+    /// Tests if what is left of a slide is so little that it may go straight. What that
     /// neglects is left over, as a slide that is shorter still.
     fn is_nearly_over(&self, now: Rolling, rate: Rolling, regime: Regime, dt: f64) -> bool {
         let (slip, rate) = (self.slip(now), rate.v + rate.p);

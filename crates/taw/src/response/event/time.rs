@@ -5,7 +5,7 @@ use cgmath::InnerSpace;
 
 use crate::math::Vec3;
 
-/// How far apart two things are along the line that they would touch on, how fast that
+/// Distance of two things along the line that they would touch on, how fast that
 /// grows, and how fast the growth does: m, m/s, m/s².
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Gap {

@@ -7,7 +7,7 @@ use crate::motion::{WallMotion, turned};
 use crate::response::{Material, Walls};
 use crate::shape::{Box3, Nearest, Shape, Solid, Triangle};
 
-/// How much a distance may be off by rounding, over itself and the coordinates: many times what
+/// Error of a distance by rounding, over itself and the coordinates: many times what
 /// a handful of operations leave.
 const ROUNDING: f64 = 1e-12;
 
@@ -18,7 +18,7 @@ pub(crate) struct Wall {
     pub form: Form,
     /// Around the form, if it has an end.
     pub bounds: Option<Box3<f64>>,
-    /// What the world calls it.
+    /// Row in the world.
     pub row: u32,
     pub motion: Option<WallMotion<f64>>,
     /// Of one that was moved to where it is: how many seconds after the begin of the substep
@@ -26,12 +26,12 @@ pub(crate) struct Wall {
     /// stays, and only carries along what lies on it, like a conveyor.
     pub there: Option<f64>,
     pub material: Option<Material<f64>>,
-    /// How far a point of it may be from where it should be by the rounding of its place, over
+    /// Error of a point of it by the rounding of its place, over
     /// its coordinates.
     pub digit: f64,
 }
 
-/// What a [`Wall`] is.
+/// Kinds of a [`Wall`].
 #[derive(Clone, Debug)]
 pub(crate) enum Form {
     Plane {
@@ -68,7 +68,7 @@ impl Form {
 }
 
 impl Wall {
-    /// What counts between this wall and a ball of that material.
+    /// Material that counts between this wall and a ball of that material.
     pub fn against(&self, ball: Material<f64>) -> Material<f64> {
         self.material.map_or(ball, |its| ball.against(its))
     }
@@ -131,7 +131,7 @@ impl Wall {
         velocity - normal * velocity.dot(normal)
     }
 
-    /// How much of a gap to a point may be due to the rounding of the wall's place.
+    /// Part of a gap to a point that may be due to the rounding of the wall's place.
     pub fn rounding(&self, point: Point3<f64>) -> f64 {
         let Some((motion, _)) = self.going(0.0) else { return 0.0 };
         let coordinates = [point, motion.pivot].map(|p| p.x.abs().max(p.y.abs()).max(p.z.abs()));
