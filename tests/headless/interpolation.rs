@@ -29,6 +29,22 @@ fn motion_is_even_between_steps() {
 }
 
 #[test]
+fn what_crosses_a_side_of_a_periodic_box_is_drawn_on_its_way() {
+    let (mut app, marble) = app();
+    let period = [Some(4.0), None, None];
+    app.world_mut().resource_mut::<TawWorld>().set_period(period).unwrap();
+    let mut last = scene::position(&app, marble).x;
+    for frame in 0..60 {
+        app.update();
+        let now = scene::position(&app, marble).x;
+        let way = (now - last).rem_euclid(4.0);
+        assert!((way - 0.25).abs() < 1e-5, "frame {frame} moved it by {way}");
+        assert!(now.abs() <= 3.0, "frame {frame} drew it at {now}");
+        last = now;
+    }
+}
+
+#[test]
 fn a_teleport_between_steps_is_neither_undone_nor_smeared() {
     // At each of the four frames within a step, and exactly onto the ends of the
     // step that is being drawn. (Where it is drawn already, nobody can teleport it.)

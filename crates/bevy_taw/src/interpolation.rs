@@ -139,6 +139,8 @@ fn draw(
     if eased.restored == world.restored
         && let Some((start, turned)) = eased.from
     {
+        // Who crossed a side of a periodic box did not come from the other one.
+        let start = from_point(world.nearest_image(to_point(start), to_point(position)));
         position = start.lerp(position, part);
         rotation = rotation.map(|end| turned.map_or(end, |start| start.slerp(end, part)));
     }

@@ -35,7 +35,7 @@ use crate::Error;
 use crate::broad::{Grid, Images, Period};
 use crate::contact::Contacts;
 use crate::error::{finite, finite_vector, positive};
-use crate::math::{Scalar, Vec3, cast_vector, length};
+use crate::math::{Point3, Scalar, Vec3, cast_vector, length};
 use crate::motion::{Force, Rotation};
 use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Around, Settings, Start, Warm, impulse};
@@ -282,6 +282,12 @@ impl<S: Scalar> World<S> {
             self.forget_contacts();
         }
         Ok(())
+    }
+
+    /// Image of a point across the sides of the periodic box that is nearest to another point.
+    #[must_use]
+    pub fn nearest_image(&self, point: Point3<S>, near: Point3<S>) -> Point3<S> {
+        self.marbles.period.image(point, near)
     }
 
     /// The force fields that act on every marble besides gravity.
