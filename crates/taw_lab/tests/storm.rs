@@ -20,7 +20,9 @@ const NOT_MENDED_YET: &[&str] = &[
     // A light ball is wedged between a floor and one 2,000 times as heavy; where something bounces,
     // the impulse solver searches along normals only, and friction takes more iterations than there are.
     "swept-pair-before-floor",
-    // Balls on a lift overlap deeper than they may; why is not known.
+    // A light ball goes to and fro between a lift and a ball 115 times as heavy, one bounce a substep,
+    // and the heavy one comes 4 mm nearer in each: contacts are found where ways end, not ahead of
+    // the velocity that a bounce gives.
     "swept-stack",
 ];
 
