@@ -21,8 +21,8 @@ const NOT_MENDED_YET: &[&str] = &[
     // the impulse solver searches along normals only, and friction takes more iterations than there are.
     "swept-pair-before-floor",
     // A light ball goes to and fro between a lift and a ball 115 times as heavy, one bounce a substep,
-    // and the heavy one comes 4 mm nearer in each: contacts are found where ways end, not ahead of
-    // the velocity that a bounce gives.
+    // while the heavy one comes 4 mm nearer in each: a bounce that carries it on by less than half a
+    // radius is not stopped at the lift, so the next substep finds it there and not at the other one.
     "swept-stack",
 ];
 
