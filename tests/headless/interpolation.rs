@@ -31,13 +31,13 @@ fn motion_is_even_between_steps() {
 #[test]
 fn what_crosses_a_side_of_a_periodic_box_is_drawn_on_its_way() {
     let (mut app, marble) = app();
-    let period = [Some(4.0), None, None];
+    let period = [Some(4.25), None, None];
     app.world_mut().resource_mut::<TawWorld>().set_period(period).unwrap();
     let mut last = scene::position(&app, marble).x;
     for frame in 0..60 {
         app.update();
         let now = scene::position(&app, marble).x;
-        let way = (now - last).rem_euclid(4.0);
+        let way = (now - last).rem_euclid(4.25);
         assert!((way - 0.25).abs() < 1e-5, "frame {frame} moved it by {way}");
         assert!(now.abs() <= 3.0, "frame {frame} drew it at {now}");
         last = now;

@@ -4,7 +4,7 @@ use cgmath::InnerSpace;
 use taw::Error;
 use taw::prelude::*;
 
-const SIDE: f64 = 4.0;
+const SIDE: f64 = 4.01;
 
 fn models() -> Vec<Model> {
     let elastic = Model { rotation: Rotation::None, ..Model::default() };
@@ -181,15 +181,16 @@ fn what_does_not_fit_is_refused_and_nothing_changes() {
     let mut world = world::<f64>(models()[1]);
     let id = world.marbles.insert(ball([0.0; 3], [1.0, 0.0, 0.0], 0.5, 1.0)).unwrap();
     let before = world.clone();
-    let short = Error::OutOfRange { field: "period.y", value: 3.9, min: 4.0, max: f64::MAX };
-    assert_eq!(world.set_period([None, Some(3.9), None]), Err(short));
+    let short = Error::OutOfRange { field: "period.y", value: 4.0, min: 4.01, max: f64::MAX };
+    assert_eq!(world.set_period([None, Some(4.0), None]), Err(short));
     let none = Error::NotPositive { field: "period.x", value: 0.0 };
     assert_eq!(world.set_period([Some(0.0), None, None]), Err(none));
     assert_eq!(world, before);
     // Those that come or grow later are refused by the step.
     world.marbles.set_radius(id, 0.6).unwrap();
     let before = world.clone();
-    let short = Error::OutOfRange { field: "period.x", value: 4.0, min: 4.8, max: f64::MAX };
+    let short =
+        Error::OutOfRange { field: "period.x", value: 4.01, min: 0.6 * 8.02, max: f64::MAX };
     assert_eq!(world.step(1.0 / 60.0), Err(short));
     assert_eq!(world, before);
     world.marbles.set_radius(id, 0.5).unwrap();

@@ -102,3 +102,20 @@ fn marbles_among_balls_fall_asleep_with_them_and_sink_no_further() {
         }
     }
 }
+
+#[test]
+fn balls_whose_last_marble_is_gone_do_not_fall_asleep_in_flight() {
+    let (mut world, ids) = poured(Walls::BoxFloor, 1, 1);
+    let floor = world.walls.id(0).unwrap();
+    for second in 0..14 {
+        let mut falling = world.clone();
+        falling.marbles.remove(ids[0]).unwrap();
+        falling.step(DT).unwrap();
+        falling.walls.remove(floor).unwrap();
+        seconds(&mut falling, 2);
+        assert_eq!(falling.swarm.asleep(), 0, "the floor goes after {second} s");
+        let slowest = falling.swarm.velocities().iter().map(|v| -v[1]).fold(f32::MAX, f32::min);
+        assert!(slowest > 1.0, "the floor goes after {second} s: {slowest} m/s");
+        seconds(&mut world, 1);
+    }
+}

@@ -8,9 +8,9 @@ use crate::Error;
 use crate::error::within;
 use crate::math::{Point3, Scalar, Vec3};
 
-/// Diameters of the largest ball that a period holds at least, so that no two balls touch each
-/// other through two sides.
-const LEAST_DIAMETERS: f64 = 4.0;
+/// Diameters of the largest ball that a period holds at least, so that there are four cells as wide
+/// as such a ball along it: balls in neighbouring cells are then nearest where they are neighbours.
+const LEAST_DIAMETERS: f64 = 4.01;
 
 /// Lengths of a periodic box along the axes, around the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +27,7 @@ impl<S> Default for Period<S> {
 }
 
 impl<S: Scalar> Period<S> {
-    /// Whether there are no sides at all.
+    /// True without any side.
     pub fn is_open(&self) -> bool {
         self.lengths.iter().all(Option::is_none)
     }
@@ -54,8 +54,17 @@ impl<S: Scalar> Period<S> {
     pub fn image(&self, mut point: Point3<S>, near: Point3<S>) -> Point3<S> {
         for (axis, length) in self.lengths.iter().enumerate() {
             if let Some(length) = *length {
-                let periods = ((point[axis] - near[axis]) / length).round();
-                point[axis] -= periods * length;
+                let way = point[axis] - near[axis];
+                if way.abs() >= length {
+                    // What rounding leaves of so long a way is exact.
+                    point[axis] = near[axis] + way % length;
+                }
+                let way = point[axis] - near[axis];
+                // What is on a side stays on that side.
+                let half = length * S::constant(0.5);
+                if way.abs() > half {
+                    point[axis] -= length.copysign(way);
+                }
             }
         }
         point
@@ -96,11 +105,15 @@ impl<S: Scalar> Images<S> {
         self.list(center, radius, reach, period);
         grid.rebuild(&self.center, &self.radius, reach);
         let Self { row, pairs, .. } = self;
+        let inside = center.len() as u32;
         pairs.clear();
         grid.pairs(&self.center, |a, b| {
-            let (a, b) = (row[a as usize], row[b as usize]);
-            if a != b {
-                pairs.push((a.min(b), a.max(b)));
+            // Of two that touch across a side, one may as well be inside.
+            if a < inside {
+                let (a, b) = (row[a as usize], row[b as usize]);
+                if a != b {
+                    pairs.push((a.min(b), a.max(b)));
+                }
             }
         });
         pairs.sort_unstable();
@@ -110,31 +123,34 @@ impl<S: Scalar> Images<S> {
         }
     }
 
-    /// Lists all spheres, and the images that one of them may touch.
+    /// Lists all spheres where they are in the box, then the images that one of them may touch.
     fn list(&mut self, center: &[Point3<S>], radius: &[S], reach: S, period: Period<S>) {
         let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r));
         self.center.clear();
+        self.center.extend(center.iter().map(|center| period.image(*center, Point3::origin())));
         self.radius.clear();
+        self.radius.extend_from_slice(radius);
         self.row.clear();
-        for (row, (center, radius)) in (0..).zip(center.iter().zip(radius)) {
-            let first = self.center.len();
-            self.center.push(period.image(*center, Point3::origin()));
-            let far = *radius + largest + reach;
+        self.row.extend(0..center.len() as u32);
+        for inside in 0..center.len() {
+            let (first, radius) = (self.center.len(), radius[inside]);
             for (axis, length) in period.lengths.iter().enumerate() {
                 let Some(length) = *length else { continue };
-                for image in first..self.center.len() {
+                let half = length * S::constant(0.5);
+                let far = (radius + largest + reach).min(half);
+                for image in std::iter::once(inside).chain(first..self.center.len()) {
                     let at = self.center[image];
                     for shift in [length, -length] {
                         let mut beyond = at;
                         beyond[axis] += shift;
-                        if beyond[axis].abs() <= length * S::constant(0.5) + far {
+                        if beyond[axis].abs() <= half + far {
                             self.center.push(beyond);
                         }
                     }
                 }
             }
-            self.radius.resize(self.center.len(), *radius);
-            self.row.resize(self.center.len(), row);
+            self.radius.resize(self.center.len(), radius);
+            self.row.resize(self.center.len(), inside as u32);
         }
     }
 }

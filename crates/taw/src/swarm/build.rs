@@ -203,7 +203,8 @@ impl Swarm {
             slab.layers = [begin, layer];
             slab.rows = [first, next, next];
             slab.slow = 0.0;
-            let asleep = |row: &[f32; 4]| row[3] < 0.0;
+            slab.fastest_own = None;
+            let asleep = |row: &[f32; 4]| row[3].is_sign_negative();
             let velocities = &mut self.velocity[first as usize..next as usize];
             slab.asleep = !velocities.is_empty() && velocities.iter().all(asleep);
             if !slab.asleep {

@@ -146,7 +146,7 @@ impl Swarm {
             let (at, velocity) = (self.at[row], self.velocity[row]);
             self.largest = self.largest.max(guest.at[3]);
             let before = old.get(i).filter(|before| before.ball == guest.ball);
-            if velocity[3] < 0.0 {
+            if velocity[3].is_sign_negative() {
                 let unchanged = velocity[3] == -guest.velocity[3] && at[3] == guest.at[3];
                 let sleeps = |before| guest.sleeps_on(&at, before, lying, dt);
                 if unchanged && before.is_some_and(sleeps) {
@@ -163,7 +163,10 @@ impl Swarm {
                 guest.restless = moved > most * dt || faster > lying;
                 guest.find_begin(&at, &velocity, dt, pull);
             }
-            self.budget[row] -= squared(less(&guest.from[0], &at)).sqrt();
+            // A drift counts the way of its velocity; whoever moves it besides is counted here.
+            let [jump, way] = [less(&guest.from[0], &at), less(&guest.at, &guest.from[0])];
+            let own = (squared(guest.from[1]).sqrt() + squared(pull).sqrt() * dt) * dt;
+            self.budget[row] -= squared(jump).sqrt() + (squared(way).sqrt() - own).max(0.0);
             (self.at[row], self.velocity[row]) = (guest.from[0], guest.from[1]);
             if let Some(spin) = self.spin.get_mut(row) {
                 *spin = guest.rim;
@@ -242,7 +245,7 @@ impl Swarm {
     pub(super) fn drift_guests(&mut self, [from, to]: [f32; 2], place: bool, time: f32) {
         for ((row, guest), [at, velocity]) in self.guest_rows.iter().zip(&self.kept_guests) {
             let (row, guest) = (*row as usize, &self.guests[*guest as usize]);
-            if self.velocity[row][3] < 0.0 {
+            if self.velocity[row][3].is_sign_negative() {
                 continue;
             }
             let ([at_from, before], [at_to, after]) = (guest.alone(from), guest.alone(to));

@@ -37,7 +37,7 @@ struct Bore {
     grip: [f32; 3],
 }
 
-/// Number that there may be at most, among so many balls.
+/// Largest number of strays among so many balls.
 pub(super) fn room(balls: usize) -> usize {
     SOME + balls / PART
 }

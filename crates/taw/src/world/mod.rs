@@ -262,12 +262,13 @@ impl<S: Scalar> World<S> {
     /// which is the default, it has no sides.
     ///
     /// Walls are where they are, and nowhere else: what crosses a side is to be a half-space along
-    /// it. Balls of [`World::swarm`] know no sides. Energy and account count where marbles are, so
-    /// gravity is to point along an axis without sides. But for [`Response::EventDriven`], who
-    /// goes farther than a quarter of a length in a substep may pass through others.
+    /// it. Balls of [`World::swarm`], queries and attraction know no sides. [`World::energy`] and
+    /// the account count where marbles are: who crosses a side along gravity changes them. But for
+    /// [`Response::EventDriven`], who goes farther than a quarter of a length in a substep may pass
+    /// through others.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a length of less than eight radii of the largest marble;
+    /// [`Error::OutOfRange`] for a length of less than 8.02 radii of the largest marble;
     /// [`Error::NotPositive`] for one that is no length; [`Error::BallsOnly`] if a marble is a
     /// capsule. Steps refuse marbles that came later in the same way.
     pub fn set_period(&mut self, lengths: [Option<S>; 3]) -> Result<(), Error> {
@@ -327,7 +328,8 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not
-    /// in [`World::TIMES`]; [`Error::BallsOnly`] for a capsule in a world that is event-driven.
+    /// in [`World::TIMES`]; [`Error::BallsOnly`] for a capsule in a world that is event-driven
+    /// or periodic; [`Error::OutOfRange`] for a marble too large for its [period](Self::set_period).
     /// Then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
         let substep = self.substep_of(dt)?;
@@ -348,7 +350,7 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
-    /// [`Error::BallsOnly`] for a capsule in a world that is event-driven; then nothing has moved.
+    /// and what [`World::step`] says of marbles; then nothing has moved.
     pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
         let dt = Self::checked_dt(dt)?;
         self.takes_all_marbles()?;

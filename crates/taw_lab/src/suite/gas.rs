@@ -56,8 +56,8 @@ fn compressibility(filling: f64) -> f64 {
     numerator / (1.0 - y).powi(3)
 }
 
-/// How far the pressure in the middle of a box is off the hard-sphere fluid's at the density
-/// there, relatively. `margin` is what counts as wall.
+/// Relative error of the pressure in the middle of a box, against the hard-sphere fluid at the
+/// density there. `margin` is what counts as wall.
 fn pressure_in_the_middle(
     meter: &mut Meter,
     count: u32,
@@ -92,7 +92,7 @@ fn pressure_in_the_middle(
     (found / compressibility(there) - 1.0).abs()
 }
 
-/// How far the pressure of a gas without walls is off the hard-sphere fluid's, relatively.
+/// Relative error of the pressure of a gas without walls, against the hard-sphere fluid.
 fn pressure(meter: &mut Meter, count: u32, filling: f64, seconds: f64) -> f64 {
     let (mut world, half) = gas(count, filling, 1.0);
     let side = Some((2.0 * half) as f32);

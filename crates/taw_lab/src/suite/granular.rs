@@ -167,8 +167,8 @@ fn discharge(meter: &mut Meter, diameter: f64) -> [f64; 2] {
     [rate(meter, 15.0), rate(meter, 15.0)]
 }
 
-/// A square plate of this width at this height with a round hole in the middle.
-fn plate(radius: f64, width: f64, height: f64) -> Mesh<f32> {
+/// A round plate at this height with a round hole in the middle; radii in metres.
+fn plate(hole: f64, radius: f64, height: f64) -> Mesh<f32> {
     const CORNERS: u32 = 96;
     let ring = |radius: f64| {
         (0..CORNERS).map(move |i| {
@@ -176,7 +176,7 @@ fn plate(radius: f64, width: f64, height: f64) -> Mesh<f32> {
             Point3::new(x * radius, height, z * radius).map(|x| x as f32)
         })
     };
-    let points = ring(radius).chain(ring(width)).collect();
+    let points = ring(hole).chain(ring(radius)).collect();
     let triangles = (0..CORNERS).flat_map(|i| {
         let j = (i + 1) % CORNERS;
         [[i, j, i + CORNERS], [j, j + CORNERS, i + CORNERS]]
@@ -286,7 +286,7 @@ pub const ROWS: &[Row] = &[
     },
     Row {
         name: "granular/repose/repeatable",
-        setup: "972 balls flow down a rough incline without ends, µ 0.5, until it is lowered enough: three seeds stop at the same slope",
+        setup: "972 balls creep down a rough incline without ends at 0.1 √(g d), µ 0.5: three seeds need the same slope",
         metric: "spread of the angle, degrees",
         model: "impulse, 2 substeps",
         target: 2.0,

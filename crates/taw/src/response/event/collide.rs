@@ -1,4 +1,4 @@
-//! Effect of a collision: on two balls, to several at one moment, to a ball and a wall.
+//! Effect of a collision: on two balls, on several at one moment, on a ball and a wall.
 
 use std::cmp::Reverse;
 
@@ -146,7 +146,7 @@ impl EventDriven {
         self.moment = Moment { pairs, rest, rows, collisions };
     }
 
-    /// Begin of a collision of two balls that touch.
+    /// Collision of two balls that touch, before its impulse.
     fn collision(&mut self, a: usize, b: usize, settings: &Settings) -> Collision {
         let press = self.press_speed(a, b, settings);
         let (first, second) = (&self.balls[a], &self.balls[b]);

@@ -300,7 +300,7 @@ impl EventDriven {
         // Most are too far away, which needs no exact distance.
         let way = (velocity.magnitude() + 0.5 * acceleration.magnitude() * left) * left;
         let farthest = (reach + way) * (1.0 + 1e-12);
-        if (apart).magnitude2() > farthest * farthest {
+        if apart.magnitude2() > farthest * farthest {
             return None;
         }
         settings.count(if acceleration.is_zero() { 1 } else { super::QUARTIC_LOOKS });

@@ -70,7 +70,8 @@ impl Table {
 impl Heap {
     /// Takes over those balls that the contacts are about, and names them by their place
     /// here.
-    pub fn take(&mut self, contacts: &mut Contacts<f64>, balls: &[Ball]) {
+    pub fn take(&mut self, contacts: &mut Contacts<f64>, balls: &[Ball], period: Period<f64>) {
+        self.table.period = period;
         self.rows.clear();
         self.rows.extend(contacts.wm.iter().map(|c| c.b));
         self.rows.extend(contacts.mm.iter().flat_map(|c| [c.a, c.b]));

@@ -39,23 +39,13 @@ impl EventDriven {
     ) -> Held {
         let (found, mut contacts) = self.all_that_touch(first, parting, now, settings);
         let pull = found.iter().map(|row| self.balls[*row].pull.magnitude()).fold(0.0, f64::max);
-        // First what the collision does, all of it at once and without rebound.
-        self.heap.table.period = self.period;
-        self.heap.take(&mut contacts, &self.balls);
-        for material in &mut self.heap.material {
-            (material.restitution, material.tangential_restitution) = (0.0, 0.0);
-        }
+        // First what the collision does.
+        self.heap.take(&mut contacts, &self.balls, self.period);
         let left = settings.dt - now;
-        let walls = Between { walls: &self.walls, begin: now, end: now };
-        let before =
-            self.work.map(|_| (self.heap.table.velocity.clone(), self.heap.table.spin.clone()));
-        self.heap.solve(&mut contacts, &walls, pull, 0.0, settings, &mut Vec::new());
-        if let (Some(work), Some((mut velocity, mut spin))) = (&mut self.work, before) {
-            self.heap.count(&mut velocity, &mut spin, work);
-        }
+        self.end_collision(&mut contacts, now, pull, settings);
         if parting == f64::INFINITY {
             let enough = self.heap.enough(pull, settings);
-            self.end_knot(&contacts, now, enough);
+            self.end_knot(&contacts, now, enough, settings);
         }
         for (label, row) in self.heap.rows.iter().enumerate() {
             let ball = &mut self.balls[*row as usize];
@@ -78,6 +68,27 @@ impl EventDriven {
             self.keep_going(&found);
         }
         Held { rows: found, pressed }
+    }
+
+    /// Ends the approach of what the heap has taken over, all of it at once and without rebound;
+    /// `pull` is the strongest acceleration, in m/s².
+    pub(super) fn end_collision(
+        &mut self,
+        contacts: &mut Contacts<f64>,
+        now: f64,
+        pull: f64,
+        settings: &Settings,
+    ) {
+        for material in &mut self.heap.material {
+            (material.restitution, material.tangential_restitution) = (0.0, 0.0);
+        }
+        let walls = Between { walls: &self.walls, begin: now, end: now };
+        let before =
+            self.work.map(|_| (self.heap.table.velocity.clone(), self.heap.table.spin.clone()));
+        self.heap.solve(contacts, &walls, pull, 0.0, settings, &mut Vec::new());
+        if let (Some(work), Some((mut velocity, mut spin))) = (&mut self.work, before) {
+            self.heap.count(&mut velocity, &mut spin, work);
+        }
     }
 
     /// Lets balls keep their velocity, for so short a time that nothing presses them noticeably.
@@ -188,8 +199,7 @@ impl EventDriven {
         warm: &mut Vec<Warm<f64>>,
     ) {
         let left = settings.dt - now;
-        self.heap.table.period = self.period;
-        self.heap.take(contacts, &self.balls);
+        self.heap.take(contacts, &self.balls, self.period);
         let Heap { rows, label, table: Table { position, velocity, .. }, .. } = &mut self.heap;
         let mut strongest: f64 = 0.0;
         // Where each would be at the end of the substep if nothing held it.

@@ -8,9 +8,9 @@
 
 use cgmath::InnerSpace;
 
-use super::EventDriven;
 use super::heap::Table;
 use super::wall::Between;
+use super::{EventDriven, Settings};
 use crate::broad::Period;
 use crate::contact::Contacts;
 use crate::math::{Point3, Vec3, direction_and_length};
@@ -74,6 +74,7 @@ struct Knot<'a> {
     impulse: Vec<f64>,
     /// Those that others determine already.
     dependent: Vec<bool>,
+    settings: &'a Settings<'a>,
 }
 
 impl Knot<'_> {
@@ -120,6 +121,7 @@ impl Knot<'_> {
 
     /// The tie that closes fastest beside those that push.
     fn fastest(&self, speeds: &[f64], enough: f64) -> Option<usize> {
+        self.settings.count((self.ties.len() * (1 + self.active.len())) as u64);
         let mut fastest = (-enough, None);
         for (number, tie) in self.ties.iter().enumerate() {
             if self.dependent[number] || self.active.contains(&number) {
@@ -140,6 +142,7 @@ impl Knot<'_> {
     /// the last one is determined by the others.
     fn solve(&self, speeds: &[f64]) -> Option<Vec<f64>> {
         let count = self.active.len();
+        self.settings.count((count * count * (1 + count / 6)) as u64);
         let mut lower = vec![0.0; count * count];
         let mut impulse = vec![0.0; count];
         for i in 0..count {
@@ -169,7 +172,13 @@ impl Knot<'_> {
 
 impl EventDriven {
     /// Ends what a heap that was solved at once has left of its approach, above `enough`, in m/s.
-    pub(super) fn end_knot(&mut self, contacts: &Contacts<f64>, now: f64, enough: f64) {
+    pub(super) fn end_knot(
+        &mut self,
+        contacts: &Contacts<f64>,
+        now: f64,
+        enough: f64,
+        settings: &Settings,
+    ) {
         let walls = Between { walls: &self.walls, begin: now, end: now };
         let ties = ties(contacts, &walls, &self.heap.start, self.period);
         let Table { velocity, inverse_mass, .. } = &mut self.heap.table;
@@ -180,7 +189,7 @@ impl EventDriven {
             }
             let (active, impulse, dependent) =
                 (Vec::new(), vec![0.0; ties.len()], vec![false; ties.len()]);
-            let knot = Knot { ties: &ties, inverse_mass, active, impulse, dependent };
+            let knot = Knot { ties: &ties, inverse_mass, active, impulse, dependent, settings };
             let impulses = knot.untie(&speeds, enough);
             let before: Vec<_> = ties.iter().map(|tie| tie.closing(velocity)).collect();
             for (tie, impulse) in ties.iter().zip(&impulses) {

@@ -59,11 +59,12 @@ impl EventDriven {
                 continue;
             }
             let mut contacts = Contacts { wm: walls.to_vec(), ..Contacts::default() };
-            self.heap.table.period = self.period;
-            self.heap.take(&mut contacts, &self.balls);
-            let ball = &self.balls[row as usize];
-            self.end_knot(&contacts, 0.0, REST * ball.pull.magnitude() * settings.dt);
-            self.balls[row as usize].velocity = self.heap.table.velocity[0];
+            self.heap.take(&mut contacts, &self.balls, self.period);
+            let pull = self.balls[row as usize].pull.magnitude();
+            self.end_collision(&mut contacts, 0.0, pull, settings);
+            self.end_knot(&contacts, 0.0, REST * pull * settings.dt, settings);
+            let ball = &mut self.balls[row as usize];
+            (ball.velocity, ball.spin) = (self.heap.table.velocity[0], self.heap.table.spin[0]);
         }
     }
 
