@@ -25,6 +25,9 @@ const DEPENDENT: f64 = 1e-14;
 /// Rounding of the first solution is solved again, and once more.
 const PASSES: u32 = 3;
 
+/// Products of two ties that take the time of a look: three nanoseconds each, of twenty.
+const PRODUCTS: u64 = 7;
+
 /// Two that touch and shall come no nearer.
 #[derive(Clone, Copy, Debug)]
 struct Tie {
@@ -44,6 +47,14 @@ impl Tie {
 
     fn speed(&self, velocity: &[Vec3<f64>]) -> f64 {
         self.closing(velocity).dot(self.normal)
+    }
+
+    /// Pushes the two apart, by an impulse in N s.
+    fn push(&self, impulse: f64, inverse_mass: &[f64], velocity: &mut [Vec3<f64>]) {
+        velocity[self.b] += self.normal * (impulse * inverse_mass[self.b]);
+        if let Some(a) = self.a {
+            velocity[a] -= self.normal * (impulse * inverse_mass[a]);
+        }
     }
 
     /// The speed that an impulse of one at the other tie gives to this one.
@@ -68,8 +79,12 @@ impl Tie {
 struct Knot<'a> {
     ties: &'a [Tie],
     inverse_mass: &'a [f64],
+    /// Before any of them pushes, in m/s.
+    velocity: &'a [Vec3<f64>],
     /// Those that push.
     active: Vec<usize>,
+    /// Rows of the Cholesky factor of what they give each other.
+    factor: Vec<Vec<f64>>,
     /// In N s.
     impulse: Vec<f64>,
     /// Those that others determine already.
@@ -84,7 +99,7 @@ impl Knot<'_> {
             if self.active.len() >= MOST_TIES {
                 break;
             }
-            let Some(next) = self.fastest(speeds, enough) else { break };
+            let Some(next) = self.fastest(enough) else { break };
             self.active.push(next);
             let Some(mut whole) = self.solve(speeds) else {
                 self.active.pop();
@@ -103,12 +118,12 @@ impl Knot<'_> {
                         *impulse = 0.0;
                     }
                 }
-                let Self { active, impulse, .. } = &mut self;
-                let before = active.len();
-                active.retain(|tie| impulse[*tie] > 0.0);
-                if active.len() == before {
+                let Self { active, impulse, factor, .. } = &mut self;
+                let Some(first) = active.iter().position(|tie| impulse[*tie] <= 0.0) else {
                     return self.impulse; // rounding has the last word
-                }
+                };
+                active.retain(|tie| impulse[*tie] > 0.0);
+                factor.truncate(first);
                 let Some(rest) = self.solve(speeds) else { return self.impulse };
                 whole = rest;
             }
@@ -119,19 +134,22 @@ impl Knot<'_> {
         self.impulse
     }
 
+    /// Adds products of ties to the cost of the substep.
+    fn count(&self, products: usize) {
+        self.settings.count(products as u64 / PRODUCTS);
+    }
+
     /// The tie that closes fastest beside those that push.
-    fn fastest(&self, speeds: &[f64], enough: f64) -> Option<usize> {
-        self.settings.count((self.ties.len() * (1 + self.active.len())) as u64);
+    fn fastest(&self, enough: f64) -> Option<usize> {
+        self.count(self.velocity.len() + self.ties.len());
+        let mut velocity = self.velocity.to_vec();
+        for tie in &self.active {
+            self.ties[*tie].push(self.impulse[*tie], self.inverse_mass, &mut velocity);
+        }
         let mut fastest = (-enough, None);
         for (number, tie) in self.ties.iter().enumerate() {
-            if self.dependent[number] || self.active.contains(&number) {
-                continue;
-            }
-            let others = self.active.iter().map(|other| {
-                tie.given_by(&self.ties[*other], self.inverse_mass) * self.impulse[*other]
-            });
-            let speed = speeds[number] + others.sum::<f64>();
-            if speed < fastest.0 {
+            let speed = tie.speed(&velocity);
+            if speed < fastest.0 && !self.dependent[number] && !self.active.contains(&number) {
                 fastest = (speed, Some(number));
             }
         }
@@ -140,31 +158,35 @@ impl Knot<'_> {
 
     /// Impulses of those that push, after which none of them closes or parts (Cholesky). None if
     /// the last one is determined by the others.
-    fn solve(&self, speeds: &[f64]) -> Option<Vec<f64>> {
+    fn solve(&mut self, speeds: &[f64]) -> Option<Vec<f64>> {
         let count = self.active.len();
-        self.settings.count((count * count * (1 + count / 6)) as u64);
-        let mut lower = vec![0.0; count * count];
-        let mut impulse = vec![0.0; count];
-        for i in 0..count {
+        for i in self.factor.len()..count {
+            self.count(i * (4 + i) / 4);
             let tie = &self.ties[self.active[i]];
+            let mut row: Vec<f64> = Vec::with_capacity(i + 1);
             for j in 0..=i {
                 let given = tie.given_by(&self.ties[self.active[j]], self.inverse_mass);
-                let before: f64 = (0..j).map(|k| lower[i * count + k] * lower[j * count + k]).sum();
-                let rest = given - before;
+                let other = self.factor.get(j).unwrap_or(&row);
+                let rest = given - row.iter().zip(other).map(|(x, y)| x * y).sum::<f64>();
                 if i > j {
-                    lower[i * count + j] = rest / lower[j * count + j];
+                    row.push(rest / self.factor[j][j]);
                 } else if rest > DEPENDENT * given {
-                    lower[i * count + i] = rest.sqrt();
+                    row.push(rest.sqrt());
                 } else {
                     return None;
                 }
             }
-            let before: f64 = (0..i).map(|k| lower[i * count + k] * impulse[k]).sum();
-            impulse[i] = (-speeds[self.active[i]] - before) / lower[i * count + i];
+            self.factor.push(row);
+        }
+        self.count(count * count / 4);
+        let mut impulse = vec![0.0; count];
+        for (i, row) in self.factor.iter().enumerate() {
+            let before: f64 = row[..i].iter().zip(&impulse).map(|(x, y)| x * y).sum();
+            impulse[i] = (-speeds[self.active[i]] - before) / row[i];
         }
         for i in (0..count).rev() {
-            let after: f64 = (i + 1..count).map(|k| lower[k * count + i] * impulse[k]).sum();
-            impulse[i] = (impulse[i] - after) / lower[i * count + i];
+            let after: f64 = (i + 1..count).map(|k| self.factor[k][i] * impulse[k]).sum();
+            impulse[i] = (impulse[i] - after) / self.factor[i][i];
         }
         Some(impulse)
     }
@@ -187,16 +209,20 @@ impl EventDriven {
             if speeds.iter().all(|speed| *speed >= -enough) {
                 break;
             }
-            let (active, impulse, dependent) =
-                (Vec::new(), vec![0.0; ties.len()], vec![false; ties.len()]);
-            let knot = Knot { ties: &ties, inverse_mass, active, impulse, dependent, settings };
+            let knot = Knot {
+                ties: &ties,
+                inverse_mass,
+                velocity,
+                active: Vec::new(),
+                factor: Vec::new(),
+                impulse: vec![0.0; ties.len()],
+                dependent: vec![false; ties.len()],
+                settings,
+            };
             let impulses = knot.untie(&speeds, enough);
             let before: Vec<_> = ties.iter().map(|tie| tie.closing(velocity)).collect();
             for (tie, impulse) in ties.iter().zip(&impulses) {
-                velocity[tie.b] += tie.normal * (impulse * inverse_mass[tie.b]);
-                if let Some(a) = tie.a {
-                    velocity[a] -= tie.normal * (impulse * inverse_mass[a]);
-                }
+                tie.push(*impulse, inverse_mass, velocity);
             }
             let Some(work) = &mut self.work else { continue };
             for ((tie, impulse), before) in ties.iter().zip(impulses).zip(before) {
