@@ -1,5 +1,9 @@
 //! Scenes with a known outcome, under `Response::EventDriven`.
 
+#[path = "common/draw.rs"]
+mod draw;
+
+use draw::Draw;
 use taw::prelude::*;
 
 const G: f64 = 9.81;
@@ -191,23 +195,6 @@ fn no_wall_moves_a_marble_of_infinite_mass() {
     let id = world.marbles.insert(peg).unwrap();
     run(&mut world, 1.0 / 60.0, 1.0);
     assert_eq!(world.marbles.get(id).unwrap().position, at);
-}
-
-/// Numbers in [0, 1) that depend on nothing but how many were drawn.
-struct Draw(u64);
-
-impl Draw {
-    fn next(&mut self) -> f64 {
-        // Steele, Lea and Flood 2014.
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
 }
 
 /// A marble of any kind, somewhere in a box of two metres, overlapping whatever is there.

@@ -1,26 +1,13 @@
 //! Clusters of unlike balls that meet in the air, under `Response::EventDriven`: nothing outside
 //! touches them, so that their momentum stays, and nothing gives them energy.
 
+#[path = "common/draw.rs"]
+mod draw;
+
+use draw::Draw;
 use taw::prelude::*;
 
 const DT: f64 = 1.0 / 60.0;
-
-/// Numbers in [0, 1) that depend on nothing but how many were drawn.
-struct Draw(u64);
-
-impl Draw {
-    fn next(&mut self) -> f64 {
-        // Steele, Lea and Flood 2014.
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
-    }
-}
 
 /// So many balls, flung at one point from all sides.
 fn cluster(seed: u64, count: usize) -> World<f64> {
@@ -75,7 +62,7 @@ fn momenta(world: &World<f64>) -> impl Iterator<Item = Vec3<f64>> {
     masses(world).into_iter().zip(world.marbles.velocity()).map(|(mass, velocity)| velocity * mass)
 }
 
-/// How deep balls are in each other, over the smaller radius.
+/// Deepest overlap of two balls, over the smaller radius.
 fn overlap(world: &World<f64>) -> f64 {
     let marbles = &world.marbles;
     let mut deepest = 0.0_f64;
@@ -89,7 +76,7 @@ fn overlap(world: &World<f64>) -> f64 {
     deepest
 }
 
-/// What fails in this cluster, if anything does.
+/// Description of a failure in this cluster, if there is one.
 fn judge(seed: u64, count: usize) -> Option<String> {
     let mut world = cluster(seed, count);
     let mass: f64 = masses(&world).iter().sum();

@@ -1,8 +1,12 @@
 //! Ordinary scenes that `Response::EventDriven` must not break in: walls that move, surfaces
 //! that bend, numbers at the end of their range, steps that must end.
 
+#[path = "common/draw.rs"]
+mod draw;
+
 use std::time::{Duration, Instant};
 
+use draw::Draw;
 use taw::frame::{AxisAngle, Pose};
 use taw::prelude::*;
 use taw::shape::{Aabb, Capsule, HeightField, Hull, Mesh, Obb};
@@ -444,23 +448,6 @@ fn a_thousand_at_one_point_end_their_step() {
         let (took, stopped) = (begin.elapsed(), world.stopped().count());
         println!("step {step}: {took:?}, {stopped} stopped");
         assert!(took < Duration::from_mins(1), "{took:?}");
-    }
-}
-
-/// Numbers in [0, 1) that depend on nothing but how many were drawn.
-struct Draw(u64);
-
-impl Draw {
-    fn next(&mut self) -> f64 {
-        // Steele, Lea and Flood 2014.
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        ((z ^ (z >> 31)) >> 11) as f64 / (1_u64 << 53) as f64
-    }
-
-    fn between(&mut self, low: f64, high: f64) -> f64 {
-        low + (high - low) * self.next()
     }
 }
 

@@ -30,7 +30,8 @@ const PATIENCE: u32 = 8;
 /// Over a way shorter than this part of the radius a ball is where it was: its direction is
 /// rounding, and nothing bends otherwise.
 const NO_WAY: f64 = 1e-9;
-/// Distance beside a point, over the radius, the normal is looked at again to see how it turns.
+/// Distance beside a point, over the radius, at which the normal is looked at again, to see how it
+/// turns.
 /// The rounding of one over the other is a hundred billionth.
 const BESIDE: f64 = 1e-5;
 /// Another face, edge or corner bends by so much more or less, over a radius.
