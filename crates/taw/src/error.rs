@@ -56,6 +56,14 @@ pub enum Error {
     /// A marble is a capsule, where the model knows balls only.
     #[error("{0:?} is a capsule, and the model knows balls only")]
     BallsOnly(MarbleId),
+    /// The response has no method for something that the world has or is asked for.
+    #[error("{response} does not support {feature}")]
+    Unsupported {
+        /// The response, by its name in code.
+        response: &'static str,
+        /// Name of what it does not support.
+        feature: &'static str,
+    },
     /// No ball of a swarm has this handle, or it is named twice.
     #[error("no ball has the handle {0:?}, or it is named twice")]
     NoSuchBall(BallId),

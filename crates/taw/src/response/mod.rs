@@ -51,6 +51,21 @@ pub enum Response {
     /// in two substeps nothing bounces. What overlaps is pushed apart by the masses
     /// without a change of velocity.
     Impulse,
+    /// Soft contacts in small steps (Catto, 2024, `Solver2D`): masses, restitution, friction,
+    /// rolling and spinning resistance, and spin if the model's rotation is dynamic. The one for
+    /// games: made for thousands of balls, on all threads, and nothing tunnels through walls.
+    ///
+    /// Marbles and the balls of the [swarm](crate::world::World::swarm) are solved as one, with
+    /// the threads and the sleep of its [model](crate::swarm::SwarmModel) and the
+    /// [substeps](crate::world::Model::substeps) of the world's, which are parts of the third verb.
+    /// Contacts give way a little: each bears by sinking in, by about a thousandth of the radius
+    /// for three balls on it. What lies still for half a second sleeps.
+    ///
+    /// Knows balls only, by semi-implicit steps of `f32` in any world, and no periods; marbles may
+    /// have their own mass, material, gravity scale, damping, forces and rotation model, not their
+    /// own integrator. It finds contacts by itself, so taking some out of the world's lists does not
+    /// keep marbles apart.
+    SoftStep,
     /// Forces that grow with the overlap: touches take time, many marbles can push at
     /// once, and what a contact bears is a force in newtons.
     ///
@@ -95,6 +110,12 @@ pub enum Response {
 }
 
 impl Response {
+    /// False if it knows balls only.
+    #[must_use]
+    pub fn knows_capsules(self) -> bool {
+        !matches!(self, Self::EventDriven | Self::SoftStep)
+    }
+
     /// Whether it acts only on what overlaps.
     pub(crate) fn needs_overlap(self) -> bool {
         matches!(self, Self::Penalty(_))

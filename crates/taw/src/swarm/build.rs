@@ -7,8 +7,10 @@ use super::memory::fit;
 use super::pairs::{Fans, FindPairs, Search};
 use super::slab::Slab;
 use super::step::listed;
+use super::strays::Strays;
+use super::surfaces::SurfaceOf;
 use super::team::{Shared, each, each_rows, list_rows};
-use super::{Stage, Surroundings, Swarm, Tier, walls};
+use super::{Stage, Surroundings, Swarm, walls};
 
 /// Balls in a slab at least.
 const SLAB: u32 = 512;
@@ -160,16 +162,24 @@ impl Swarm {
         let (rough, search) = (self.rough(), &mut self.searches[0]);
         let sizes = [self.largest, cap];
         let (slots, guests) = (self.ids.slots(), &self.guest_slots[..]);
-        let guest = |row: u32| rough && Self::has_guest_slot(slots[row as usize], guests);
+        // Bodies that are hosted meet like all others.
+        let apart = rough && !self.guests.is_empty();
+        let guest = |row: u32| apart && Self::has_guest_slot(slots[row as usize], guests);
         self.strays.find(&self.grid, &self.at, &self.budget, sizes, search, &guest, rough);
+        if rough {
+            let surfaces =
+                SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
+            let Strays { batches, pushes, .. } = &mut self.strays;
+            pushes.set_numbers(batches, surfaces);
+        }
     }
 
     fn reorder(&mut self) {
-        let threads = self.model.threads as usize;
+        let (threads, rough) = (self.model.threads as usize, self.rough());
         let (order, spare) = (bytemuck::cast_slice(&self.budget), &mut self.spare);
         reorder_rows(&mut self.at, spare, order, threads);
         reorder_rows(&mut self.velocity, spare, order, threads);
-        if self.model.tier == Tier::Full {
+        if rough {
             reorder_rows(&mut self.spin, spare, order, threads);
             reorder(&mut self.before, spare, order, threads);
         } else {
@@ -204,6 +214,7 @@ impl Swarm {
             slab.rows = [first, next, next];
             slab.slow = 0.0;
             slab.fastest_own = None;
+            slab.read_asleep = false;
             let asleep = |row: &[f32; 4]| row[3].is_sign_negative();
             let velocities = &mut self.velocity[first as usize..next as usize];
             slab.asleep = !velocities.is_empty() && velocities.iter().all(asleep);
@@ -221,20 +232,20 @@ impl Swarm {
     }
 
     fn find_pairs(&mut self, cap: f32, dt: f32, walls: &dyn Surroundings) {
-        let (threads, rough) = (self.model.threads as usize, self.rough());
+        let (threads, rough, tier) = (self.model.threads as usize, self.rough(), self.tier());
         let (instructions, ahead) = (self.instructions, self.ahead(dt));
         self.searches.resize(threads, Search::default());
         let slabs = Shared::new(&mut self.slabs);
         let searches = Shared::new(&mut self.searches);
         let (grid, at, budget) = (&self.grid, &self.at[..], &self.budget[..]);
-        let (memory, before, planes) =
-            (&self.memory, &self.before[..], listed(&self.planes, self.model.tier));
+        let (memory, before, planes) = (&self.memory, &self.before[..], listed(&self.planes, tier));
         let shapes = walls.has_shapes();
         let (slots, guests) = (self.ids.slots(), &self.guest_slots[..]);
         let guest = |row: u32| Self::has_guest_slot(slots[row as usize], guests);
         let several_guests = self.guests.len() > 1;
         let fans = Shared::new(bytemuck::cast_slice_mut(&mut self.spare));
-        let balls = walls::Balls { at, velocity: &self.velocity, budget, ahead };
+        let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
+        let balls = walls::Balls { at, velocity: &self.velocity, budget, ahead, surfaces };
         each(threads, slabs.len(), |thread, slab| {
             // SAFETY: its thread's, and its own.
             let (search, slab) = unsafe { (&mut *searches.row(thread), &mut *slabs.row(slab)) };
@@ -263,6 +274,7 @@ impl Swarm {
             fit(&mut slab.batches);
             if rough {
                 slab.pushes.reset(slab.batches.len());
+                slab.pushes.set_numbers(&slab.batches, surfaces);
                 memory.recall(&slab.batches, before, &mut slab.pushes);
             }
             slab.seek_walls(instructions, balls, planes, |touch| {

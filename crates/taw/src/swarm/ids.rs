@@ -26,6 +26,11 @@ impl Ids {
         &self.slots
     }
 
+    /// The row of each slot.
+    pub fn rows(&self) -> &[u32] {
+        &self.rows
+    }
+
     pub fn id(&self, row: usize) -> Option<BallId> {
         self.slots.get(row).map(|slot| self.of_slot(*slot))
     }

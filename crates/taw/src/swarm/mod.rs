@@ -22,6 +22,7 @@
 )]
 
 mod batches;
+mod bodies;
 mod build;
 mod grid;
 mod guests;
@@ -35,14 +36,17 @@ mod slab;
 mod state;
 mod step;
 mod strays;
+mod surfaces;
 mod team;
 mod touch;
 mod walls;
 
+pub(crate) use bodies::{Body, BodyColumns, MarbleRow, NO_ROW, Push};
 pub(crate) use guests::Guest;
 pub use ids::BallId;
 pub use lanes::Instructions;
 pub use model::{Ball, Stage, SwarmModel, Tier};
+pub(crate) use surfaces::Surface;
 pub(crate) use walls::Surroundings;
 
 use cgmath::{EuclideanSpace, Zero};
@@ -59,6 +63,7 @@ use memory::Memory;
 use pairs::Search;
 use slab::Slab;
 use strays::Strays;
+use surfaces::{SurfaceOf, Surfaces};
 use walls::HalfSpace;
 
 /// The smallest and the largest radius, in metres: their cubes and squares of squares are
@@ -113,6 +118,11 @@ pub struct Swarm {
     stopped: Vec<u32>,
     /// The marbles of the world that are balls here, in their order.
     pub(crate) invited: Vec<(MarbleId, BallId)>,
+    /// Set if these are rows like all others, and no guests.
+    hosting: bool,
+    /// What moves them besides gravity.
+    pushes: Vec<bodies::Push>,
+    surfaces: Surfaces,
     guests: Vec<Guest>,
     /// Their rows, in order, and which guest each is; only in a step.
     guest_rows: Vec<(u32, u32)>,
@@ -145,11 +155,16 @@ impl Swarm {
     /// [`Error::OutOfRange`] for a number of it.
     pub fn set_model(&mut self, model: SwarmModel) -> Result<(), Error> {
         let model = model.checked()?;
-        if model.tier != self.model.tier {
+        let tier = self.tier();
+        let resists = self.surface_of().differ();
+        self.model = model;
+        if self.tier() != tier {
             (self.paired, self.remembers) = (false, false);
             self.before.clear();
+        } else if resists || self.surface_of().differ() {
+            self.remember();
+            self.paired = false; // pairs have numbers of their own
         }
-        self.model = model;
         self.shape_columns();
         self.walled = None;
         self.wake_all();
@@ -202,6 +217,11 @@ impl Swarm {
     pub fn remove(&mut self, balls: &[BallId]) -> Result<(), Error> {
         self.ids.check(balls)?;
         self.remember();
+        for ball in balls {
+            if let Some(slot) = self.slot_of(*ball) {
+                self.surfaces.set(slot, None);
+            }
+        }
         let kept = self.ids.remove(balls);
         retain(&mut self.at, &kept);
         retain(&mut self.velocity, &kept);
@@ -344,7 +364,13 @@ impl Swarm {
 
     /// True in the tier with friction, bounce and spin.
     fn rough(&self) -> bool {
-        self.model.tier == Tier::Full
+        self.tier() == Tier::Full
+    }
+
+    /// Surfaces by row.
+    fn surface_of(&self) -> SurfaceOf<'_> {
+        let model = self.model.material;
+        SurfaceOf { model, surfaces: &self.surfaces, slots: self.ids.slots() }
     }
 
     /// Gives the columns that only one tier needs as many rows as there are balls, or none.

@@ -37,6 +37,8 @@ pub(super) struct Slab {
     /// For how long all have been slow, in seconds, and whether they sleep.
     pub slow: f32,
     pub asleep: bool,
+    /// Set once the bodies that fell asleep in it were read.
+    pub read_asleep: bool,
     /// The speed in m/s of its fastest ball that is no guest, if it has guests.
     pub fastest_own: Option<f32>,
     /// Set if a ball of it or of those beside it bounced just now, and in this substep.
@@ -76,6 +78,7 @@ impl Slab {
             inverse_masses: _,
             slow: _,
             asleep: _,
+            read_asleep: _,
             fastest_own: _,
             again: _,
             struck: _,

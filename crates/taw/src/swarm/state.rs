@@ -40,6 +40,9 @@ impl Swarm {
             planes,
             stopped,
             invited,
+            hosting: _,
+            pushes,
+            surfaces,
             guests,
             guest_rows,
             kept_guests,
@@ -60,7 +63,7 @@ impl Swarm {
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
             + (of(lists) + lists.iter().map(of).sum::<usize>())
             + (of(planes) + of(invited) + of(guests) + of(guest_rows) + of(guest_slots))
-            + of(kept_guests)
+            + (of(kept_guests) + of(pushes) + surfaces.bytes())
             + (ids.bytes() + grid.bytes() + memory.bytes() + strays.bytes())
     }
 }
@@ -97,6 +100,9 @@ impl PartialEq for Swarm {
             planes,
             stopped,
             invited,
+            hosting,
+            pushes,
+            surfaces,
             guests,
             guest_rows: _,
             kept_guests: _,
@@ -123,6 +129,7 @@ impl PartialEq for Swarm {
             && (!remembers || *memory == other.memory)
             && (walled, planes) == (&other.walled, &other.planes)
             && (invited, guests) == (&other.invited, &other.guests)
+            && (hosting, pushes, surfaces) == (&other.hosting, &other.pushes, &other.surfaces)
             && (guest_slots, stopped) == (&other.guest_slots, &other.stopped)
             && (rebuilds, steps_since_build) == (&other.rebuilds, &other.steps_since_build)
     }

@@ -5,6 +5,7 @@ use cgmath::InnerSpace;
 use super::guests::Guest;
 use super::kernels::{GROUNDED, Impact, Pass, Soft, WALL_SLOP};
 use super::lanes::Row;
+use super::surfaces::WallNumbers;
 use crate::math::Vec3;
 
 /// A ball near a part of a wall.
@@ -25,12 +26,13 @@ pub(super) struct Touch {
     pub offset_at_end: f32,
     /// The velocity of the surface, in m/s.
     pub surface: Vec3<f32>,
-    pub friction: f32,
-    pub restitution: f32,
+    pub numbers: WallNumbers,
     /// The impulses, in N s: for the ball itself, and for others that press on it.
     pub borne_for_others: f32,
     pub pressure: f32,
     pub grip: Vec3<f32>,
+    /// Angular impulse against rolling and spinning, over the radius, in N s.
+    pub torque: Vec3<f32>,
 }
 
 /// A ball that is so near to a wall, in radii, stands on it: more than rounding, and less than
@@ -52,7 +54,7 @@ fn held(wish: Vec3<f32>, most: f32) -> Vec3<f32> {
 }
 
 impl Touch {
-    fn gap(&self, at: &Row) -> f32 {
+    pub fn gap(&self, at: &Row) -> f32 {
         self.normal.dot(xyz(at)) - self.offset - at[3]
     }
 
@@ -66,7 +68,7 @@ impl Touch {
     /// long, in seconds.
     pub fn bear(&mut self, guest: &Guest, left: f32) {
         self.bears_guest = true;
-        (self.friction, self.restitution) = (0.0, 0.0);
+        (self.numbers.friction, self.numbers.restitution) = (0.0, 0.0);
         self.surface = xyz(&guest.velocity);
         self.offset = self.offset_at_end;
         self.offset += self.gap(&guest.at).min(0.0);
@@ -81,7 +83,7 @@ impl Touch {
 
     /// Takes over what the same touch bore before.
     pub fn recall(&mut self, before: &Self) {
-        (self.pressure, self.grip) = (before.pressure, before.grip);
+        (self.pressure, self.grip, self.torque) = (before.pressure, before.grip, before.torque);
         self.borne_for_others = before.borne_for_others;
     }
 
@@ -117,13 +119,16 @@ impl Touch {
             Pass::Begin(_) => {
                 self.grip -= self.normal * self.grip.dot(self.normal);
                 self.hit(velocity, spin, self.pressure, self.grip);
+                let give = self.numbers.inertia_factor * velocity[3];
+                set(spin, xyz(spin) - self.torque * give);
             }
             Pass::Solve(impact) => {
                 self.push(impact.time, Some(impact.soft), at, velocity, spin);
             }
             Pass::Relax(impact) => {
                 let closing = -(xyz(velocity) - self.surface).dot(self.normal);
-                if self.pressure > 0.0 || self.restitution == 0.0 || closing <= impact.speed {
+                if self.pressure > 0.0 || self.numbers.restitution == 0.0 || closing <= impact.speed
+                {
                     self.push(impact.time, None, at, velocity, spin);
                 }
             }
@@ -143,7 +148,7 @@ impl Touch {
         let relative = xyz(velocity) - self.surface;
         let closing = -relative.dot(self.normal);
         let gap = self.gap(at).max(0.0);
-        if self.restitution == 0.0 || closing <= 0.0 || gap >= closing * impact.time {
+        if self.numbers.restitution == 0.0 || closing <= 0.0 || gap >= closing * impact.time {
             return None;
         }
         // Gravity works on the ball as far as it comes nearer.
@@ -152,9 +157,9 @@ impl Touch {
         if meets <= impact.speed {
             return None;
         }
-        let along = (closing + meets * self.restitution) / velocity[3];
-        let wish = self.sliding(relative, spin) * (-2.0 / 7.0 / velocity[3]);
-        let across = held(wish, self.friction * along);
+        let along = (closing + meets * self.numbers.restitution) / velocity[3];
+        let wish = self.sliding(relative, spin) * (-self.tangent_mass() / velocity[3]);
+        let across = held(wish, self.numbers.friction * along);
         set(at, xyz(at) - self.normal * gap);
         self.hit(velocity, spin, along, across);
         Some(gap)
@@ -188,20 +193,43 @@ impl Touch {
         let pressure = (self.pressure - change).max(0.0);
         let along = pressure - self.pressure;
         self.pressure = pressure;
-        let wish = self.grip - self.sliding(relative, spin) * (mass * (2.0 / 7.0));
-        let grip = held(wish, self.friction * (pressure + self.borne_for_others));
+        let wish = self.grip - self.sliding(relative, spin) * (mass * self.tangent_mass());
+        let grip = held(wish, self.numbers.friction * (pressure + self.borne_for_others));
         let across = grip - self.grip;
         self.grip = grip;
         if pressure > 0.0 {
             spin[3] = GROUNDED;
         }
         self.hit(velocity, spin, along, across);
+        self.resist(velocity, spin);
     }
 
     fn hit(&self, velocity: &mut Row, spin: &mut Row, along: f32, across: Vec3<f32>) {
         let inverse_mass = velocity[3];
         set(velocity, xyz(velocity) + (self.normal * along + across) * inverse_mass);
-        let turn = self.normal.cross(across) * (2.5 * inverse_mass);
+        let turn = self.normal.cross(across) * (self.numbers.inertia_factor * inverse_mass);
         set(spin, xyz(spin) - turn);
+    }
+
+    /// Effective mass of the touched point along the wall, over the mass of the ball.
+    fn tangent_mass(&self) -> f32 {
+        1.0 / (1.0 + self.numbers.inertia_factor)
+    }
+
+    /// Slows rolling and spinning, by a torque of at most the resistance times normal force times
+    /// radius.
+    fn resist(&mut self, velocity: &Row, spin: &mut Row) {
+        let WallNumbers { rolling_resistance, spinning_resistance, inertia_factor, .. } =
+            self.numbers;
+        let give = inertia_factor * velocity[3];
+        if rolling_resistance + spinning_resistance == 0.0 || give == 0.0 {
+            return;
+        }
+        let wish = self.torque + xyz(spin) / give;
+        let about = self.normal * self.normal.dot(wish);
+        let torque = held(wish - about, rolling_resistance * self.pressure)
+            + held(about, spinning_resistance * self.pressure);
+        set(spin, xyz(spin) - (torque - self.torque) * give);
+        self.torque = torque;
     }
 }

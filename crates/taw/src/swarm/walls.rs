@@ -8,6 +8,7 @@ use super::kernels::squared;
 use super::lanes::{Instructions, Kernel, LANES, Lanes, Row};
 use super::memory::make_room;
 use super::slab::Slab;
+use super::surfaces::{SurfaceOf, WallNumbers};
 use super::touch::Touch;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
@@ -36,8 +37,8 @@ pub(super) struct HalfSpace {
     wall: u32,
     pub normal: Vec3<f32>,
     pub offset: f32,
-    friction: f32,
-    restitution: f32,
+    /// Of the wall itself, if it has one.
+    material: Option<Material<f32>>,
 }
 
 /// The columns that say which balls may come to a wall.
@@ -49,6 +50,7 @@ pub(super) struct Balls<'a> {
     /// In seconds; none in the lab's tier, where balls have moved already, and the velocities are
     /// the places before.
     pub ahead: Option<f32>,
+    pub surfaces: SurfaceOf<'a>,
 }
 
 impl Balls<'_> {
@@ -66,20 +68,11 @@ impl Balls<'_> {
 }
 
 /// All half-spaces.
-pub(super) fn half_spaces(
-    walls: &dyn Surroundings,
-    material: Material<f32>,
-    planes: &mut Vec<HalfSpace>,
-) {
+pub(super) fn half_spaces(walls: &dyn Surroundings, planes: &mut Vec<HalfSpace>) {
     planes.clear();
     walls.planes(&mut |wall, normal, offset| {
-        let Material { friction, restitution, .. } = against(walls, wall, material);
-        planes.push(HalfSpace { wall, normal, offset, friction, restitution });
+        planes.push(HalfSpace { wall, normal, offset, material: walls.material(wall) });
     });
-}
-
-fn against(walls: &dyn Surroundings, wall: u32, material: Material<f32>) -> Material<f32> {
-    walls.material(wall).map_or(material, |its| material.against(its))
 }
 
 fn center(at: &Row) -> Point3<f32> {
@@ -182,10 +175,9 @@ impl Slab {
                 if named.into_iter().any(|touch| [touch.wall, touch.part] == [wall, part]) {
                     return;
                 }
-                let Material { friction, restitution, .. } = against(walls, wall, look.material);
+                let numbers = WallNumbers::new(look.surfaces.row(*row), walls.material(wall));
                 let offset = normal.dot(center(ball).to_vec()) - distance;
-                let mut touch =
-                    Touch::new(*row, [wall, part], normal, offset, [friction, restitution]);
+                let mut touch = Touch::new(*row, [wall, part], normal, offset, numbers);
                 touch.is_plane = false;
                 if let Some(same) = find(old, &touch) {
                     touch.recall(same);
@@ -246,7 +238,7 @@ pub(super) struct Look<'a> {
     /// In the lab's tier, where they were: there, they have moved already.
     pub velocity: &'a [Row],
     pub budget: &'a [f32],
-    pub material: Material<f32>,
+    pub surfaces: SurfaceOf<'a>,
     /// Walls are where they will be at the end of the step; so long before, in seconds, they were
     /// elsewhere.
     pub before: f32,
@@ -293,11 +285,12 @@ impl HalfSpace {
 fn touch_planes(row: u32, balls: Balls, planes: &[HalfSpace], mut name: impl FnMut(Touch)) {
     let (ball, reach) = (&balls.at[row as usize], balls.reach(row as usize));
     for plane in planes {
-        let HalfSpace { wall, normal, offset, friction, restitution } = *plane;
+        let HalfSpace { wall, normal, offset, material } = *plane;
         let gap = normal.dot(center(ball).to_vec()) - offset - ball[3];
         // A wall may also come nearer; who moves it seeks again.
         if gap < reach {
-            name(Touch::new(row, [wall, 0], normal, offset, [friction, restitution]));
+            let numbers = WallNumbers::new(balls.surfaces.row(row), material);
+            name(Touch::new(row, [wall, 0], normal, offset, numbers));
         }
     }
 }
@@ -389,7 +382,7 @@ impl Touch {
         [wall, part]: [u32; 2],
         normal: Vec3<f32>,
         offset: f32,
-        [friction, restitution]: [f32; 2],
+        numbers: WallNumbers,
     ) -> Self {
         Self {
             row,
@@ -401,11 +394,11 @@ impl Touch {
             offset,
             offset_at_end: offset,
             surface: Vec3::zero(),
-            friction,
-            restitution,
+            numbers,
             borne_for_others: 0.0,
             pressure: 0.0,
             grip: Vec3::zero(),
+            torque: Vec3::zero(),
         }
     }
 

@@ -10,6 +10,7 @@ use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite, is_finite_
 use crate::motion::{Integrator, Mass, Motion, Rotation};
 use crate::response::{Columns, Material, Rod};
 use crate::shape::{Capsule, Shape, Sphere};
+use crate::swarm::BodyColumns;
 
 /// Names a marble for as long as it is in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -467,6 +468,16 @@ impl<S: Scalar> Marbles<S> {
         !(self.force.is_empty() && self.torque.is_empty() && self.damping.is_empty())
     }
 
+    /// True if gravity does not accelerate all alike, or other things than gravity do.
+    pub(super) fn accelerate_differently(&self) -> bool {
+        self.are_pushed() || !(self.gravity_scale.is_empty() && self.mass.is_empty())
+    }
+
+    /// True if all have the default mass and material and turn as the world's model says.
+    pub(super) fn are_alike(&self) -> bool {
+        self.mass.is_empty() && self.material.is_empty() && self.rotation_model.is_empty()
+    }
+
     /// Whether there is one like that.
     pub(super) fn has_held(&self) -> bool {
         !self.rotation_model.is_empty()
@@ -681,12 +692,28 @@ impl<S: Scalar> Marbles<S> {
         (columns, &self.material, &self.integrator)
     }
 
+    /// Columns that a solver of rows writes.
+    pub(super) fn body_columns(&mut self, turns: bool) -> BodyColumns<'_, S> {
+        let (spin, rotation) = if turns {
+            (&mut self.spin[..], &mut self.rotation[..])
+        } else {
+            (&mut [][..], &mut [][..])
+        };
+        BodyColumns {
+            position: &mut self.position,
+            velocity: &mut self.velocity,
+            spin,
+            rotation,
+            radius: &self.radius,
+        }
+    }
+
     /// In kilograms; infinite for what nothing accelerates.
     pub(super) fn mass(&self, row: usize) -> S {
         self.own_mass(row).of_capsule(self.radius[row], self.half_length(row))
     }
 
-    fn own_mass(&self, row: usize) -> Mass<S> {
+    pub(super) fn own_mass(&self, row: usize) -> Mass<S> {
         self.mass.get(row).unwrap_or_default()
     }
 

@@ -13,6 +13,7 @@ mod model;
 mod optional;
 mod quarantine;
 mod query;
+mod soft_step;
 mod swarm;
 mod sweep;
 #[cfg(test)]
@@ -49,6 +50,7 @@ use account::Accounting;
 use crowd::Crowd;
 use integrate::Drive;
 use quarantine::Quarantine;
+use soft_step::SoftStep;
 use sweep::Sweep;
 use touch::Near;
 use walls::Part;
@@ -105,6 +107,7 @@ pub struct World<S> {
     /// How much of a step comes after the substep, in seconds; zero unless within one.
     rest_of_step: S,
     events: EventDriven,
+    soft_step: SoftStep<S>,
     sweep: Sweep<S>,
     near_walls: Vec<Near<S>>,
     /// What is long about marbles, and how far they reach.
@@ -143,6 +146,7 @@ impl<S: Scalar> Default for World<S> {
             accelerations: Vec::new(),
             rest_of_step: S::zero(),
             events: EventDriven::default(),
+            soft_step: SoftStep::default(),
             sweep: Sweep::default(),
             near_walls: Vec::new(),
             rods: Vec::new(),
@@ -181,6 +185,7 @@ impl<S: Scalar> PartialEq for World<S> {
             accelerations: _,
             rest_of_step: _,
             events,
+            soft_step: _,
             sweep: _,
             near_walls: _,
             rods: _,
@@ -216,16 +221,20 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for the substeps or the iterations; [`Error::BallsOnly`] for
-    /// [`Response::EventDriven`] if a marble is a capsule.
+    /// [`Response::EventDriven`] and [`Response::SoftStep`] if a marble is a capsule;
+    /// [`Error::Unsupported`] for [`Response::SoftStep`] in a periodic world.
     pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
         let model = model.checked()?;
-        if model.response == Response::EventDriven
+        if !model.response.knows_capsules()
             && let Some(id) = self.marbles.first_capsule()
         {
             return Err(Error::BallsOnly(id));
         }
         if model == self.model {
             return Ok(());
+        }
+        if model.response == Response::SoftStep && !self.marbles.period.is_open() {
+            return Err(Error::Unsupported { response: "SoftStep", feature: "a period" });
         }
         self.model = model;
         self.forget_contacts();
@@ -270,13 +279,14 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// [`Error::OutOfRange`] for a length of less than 8.02 radii of the largest marble;
     /// [`Error::NotPositive`] for one that is no length; [`Error::BallsOnly`] if a marble is a
-    /// capsule. Steps refuse marbles that came later in the same way.
+    /// capsule; [`Error::Unsupported`] for [`Response::SoftStep`]. Steps refuse marbles that came later in the same way.
     pub fn set_period(&mut self, lengths: [Option<S>; 3]) -> Result<(), Error> {
         for (length, field) in lengths.iter().zip(["period.x", "period.y", "period.z"]) {
             length.map(|length| positive(field, length)).transpose()?;
         }
         let period = Period { lengths };
         self.takes_marbles_in(period)?;
+        self.knows_period(period)?;
         if period != self.marbles.period {
             self.marbles.period = period;
             self.marbles.wrap();
@@ -334,7 +344,7 @@ impl<S: Scalar> World<S> {
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
         let substep = self.substep_of(dt)?;
         self.begin_step();
-        for after in (0..self.model.substeps).rev() {
+        for after in (0..self.model.passes()).rev() {
             self.begin_substep(substep * S::constant(f64::from(after)));
             self.integrate(substep)?;
             self.generate_contacts();
@@ -356,6 +366,9 @@ impl<S: Scalar> World<S> {
         self.takes_all_marbles()?;
         self.note_places();
         self.count_before();
+        if self.model.response == Response::SoftStep {
+            return self.integrate_forces(dt);
+        }
         self.begin_sweep();
         let drive = Drive {
             integrator: self.model.integrator,
@@ -387,7 +400,7 @@ impl<S: Scalar> World<S> {
             Response::Displacement => length(self.gravity) * dt * dt * S::constant(1e-3),
             Response::Penalty(_) => S::zero(),
             Response::Impulse => length(self.gravity) * dt * dt * S::constant(2.0),
-            Response::EventDriven => self.reach_at_rest(dt),
+            Response::EventDriven | Response::SoftStep => self.reach_at_rest(dt),
         };
         self.count_forces();
         Ok(())
@@ -401,6 +414,9 @@ impl<S: Scalar> World<S> {
     /// together later is found later.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
+        if self.model.response == Response::SoftStep {
+            return self.find_soft_contacts();
+        }
         self.touch_walls(self.reach);
         self.touch_marbles(self.reach);
         self.touch_on_the_way();
@@ -414,6 +430,9 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`].
     pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
         let dt = Self::checked_dt(dt)?;
+        if self.model.response == Response::SoftStep {
+            return self.solve_soft_contacts(dt);
+        }
         self.walls.prepare(); // some may have been taken out since contacts were looked for
         let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
@@ -499,6 +518,7 @@ impl<S: Scalar> World<S> {
                 self.accounting.as_mut().map(|accounting| &mut accounting.work),
             ),
             Response::EventDriven => self.go_through_events(dt, self.rest_of_step),
+            Response::SoftStep => {}
         }
         self.stop_bounces_at_walls();
         self.stop_what_is_not_finite();
@@ -588,7 +608,7 @@ impl<S: Scalar> World<S> {
     /// one in several substeps begins each so; without it, walls are at the end of their ways.
     pub fn begin_substep(&mut self, rest: S) {
         self.rest_of_step = if rest.is_finite() { rest.max(S::zero()) } else { S::zero() };
-        if self.model.response != Response::EventDriven {
+        if !matches!(self.model.response, Response::EventDriven | Response::SoftStep) {
             self.walls.go_to(self.rest_of_step);
         }
     }

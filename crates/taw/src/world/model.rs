@@ -88,6 +88,13 @@ impl Model {
     /// The largest number of [iterations](Model::iterations).
     pub const MAX_ITERATIONS: u32 = 1000;
 
+    /// Number of times that the three verbs run in a step: once per substep, or once in all where
+    /// the [response](Self::response) cuts its verb into substeps by itself.
+    #[must_use]
+    pub fn passes(&self) -> u32 {
+        if self.response == Response::SoftStep { 1 } else { self.substeps }
+    }
+
     /// This model, if a world can step with it.
     pub(super) fn checked(self) -> Result<Self, Error> {
         let check = |field, count, most| within(field, f64::from(count), 1.0, f64::from(most));

@@ -65,10 +65,11 @@ impl<S: Scalar> World<S> {
     /// The length of a substep, if a step of `dt` seconds can be made.
     pub(crate) fn substep_of(&self, dt: S) -> Result<S, Error> {
         let substeps = S::constant(f64::from(self.model.substeps));
+        let passes = S::constant(f64::from(self.model.passes()));
         let [least, most] = Self::TIMES.map(S::constant);
         within("dt", positive("dt", dt)?, least * substeps, most)?;
         self.takes_all_marbles()?;
-        Ok(dt / substeps)
+        Ok(dt / passes)
     }
 
     /// `dt`, if a substep can be so long.
@@ -81,9 +82,17 @@ impl<S: Scalar> World<S> {
     pub(crate) fn takes_all_marbles(&self) -> Result<(), Error> {
         self.takes_marbles_in(self.marbles.period)?;
         match self.marbles.first_capsule() {
-            Some(id) if self.model.response == Response::EventDriven => Err(Error::BallsOnly(id)),
-            _ => Ok(()),
+            Some(id) if !self.model.response.knows_capsules() => Err(Error::BallsOnly(id)),
+            _ => self.knows_period(self.marbles.period),
         }
+    }
+
+    /// Nothing, if the response knows periods, or there is none.
+    pub(super) fn knows_period(&self, period: Period<S>) -> Result<(), Error> {
+        if self.model.response == Response::SoftStep && !period.is_open() {
+            return Err(Error::Unsupported { response: "SoftStep", feature: "a period" });
+        }
+        Ok(())
     }
 
     /// Nothing, if all marbles are balls that fit into a period.

@@ -8,7 +8,7 @@ use super::touch::{Near, drop_seams, parts_near};
 use super::walls::{Part, Walls};
 use crate::Error;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
-use crate::response::Material;
+use crate::response::{Material, Response};
 use crate::shape::{Aabb, Solid, Sphere};
 use crate::swarm::{BallId, Guest, Stage, Surroundings};
 
@@ -24,6 +24,10 @@ impl<S: Scalar> World<S> {
     /// [`Error::Full`] at 2³² balls.
     pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
         let dt = Self::checked_dt(dt)?.as_f64() as f32;
+        if self.model.response == Response::SoftStep {
+            return Ok(()); // it moved with the marbles
+        }
+        self.swarm.set_hosting(false);
         self.see_guests_off()?;
         if self.swarm.len() == self.swarm.invited.len() {
             return Ok(());
@@ -38,7 +42,7 @@ impl<S: Scalar> World<S> {
 
     /// Forgets guests of which the world lost the marble or the swarm the ball, whoever took
     /// them out.
-    fn see_guests_off(&mut self) -> Result<(), Error> {
+    pub(super) fn see_guests_off(&mut self) -> Result<(), Error> {
         let (marbles, swarm) = (&self.marbles, &mut self.swarm);
         let stays = |(marble, _): &(MarbleId, BallId)| marbles.row(*marble).is_ok();
         let is_there = |(_, ball): &(MarbleId, BallId)| swarm.row(*ball).is_ok();
@@ -51,8 +55,8 @@ impl<S: Scalar> World<S> {
         swarm.remove(&gone.into_iter().map(|(_, ball)| ball).collect::<Vec<_>>())
     }
 
-    /// Tells the swarm where the marbles are.
-    fn invite_guests(&mut self, dt: f32) -> Result<(), Error> {
+    /// Gives every marble a ball in the swarm.
+    pub(super) fn invite_all(&mut self) -> Result<(), Error> {
         if self.swarm.invited.len() != self.marbles.len() {
             let (marbles, swarm) = (&self.marbles, &mut self.swarm);
             let known =
@@ -63,6 +67,12 @@ impl<S: Scalar> World<S> {
             swarm.invited.extend(new.into_iter().zip(balls));
             swarm.invited.sort_unstable();
         }
+        Ok(())
+    }
+
+    /// Tells the swarm where the marbles are.
+    fn invite_guests(&mut self, dt: f32) -> Result<(), Error> {
+        self.invite_all()?;
         let (marbles, invited) = (&self.marbles, std::mem::take(&mut self.swarm.invited));
         let guests = invited.iter().filter_map(|(marble, ball)| {
             let row = marbles.row(*marble).ok()?;
@@ -95,7 +105,7 @@ impl<S: Scalar> World<S> {
 }
 
 /// In metres and m/s.
-const FURTHEST: f32 = 1e12;
+pub(super) const FURTHEST: f32 = 1e12;
 
 impl<S: Scalar> Surroundings for Walls<S> {
     fn planes(&self, name: &mut dyn FnMut(u32, Vec3<f32>, f32)) {

@@ -2,7 +2,8 @@
 
 use super::{ALL, Pushes, V, gather, mass, mobility, normal_and_gap, scatter};
 use crate::swarm::batches::Batch;
-use crate::swarm::lanes::{Kernel, LANES, Lanes, Row};
+use crate::swarm::lanes::{Instructions, Kernel, LANES, Lanes, Row};
+use crate::swarm::surfaces::{PairNumbers, SOLID_BALL};
 use crate::swarm::team::Shared;
 
 /// Stiffness by which contacts bear what lies on them: overlap makes it part a little, which the
@@ -92,7 +93,10 @@ impl Columns<'_> {
 }
 
 /// One pass over the pairs for their impulses.
-pub(in crate::swarm) struct Solve<'a> {
+///
+/// `BACKED` if it is known who has a wall behind it, `OWN` if pairs have numbers of their own: each
+/// of the four is compiled alone.
+struct Solve<'a, const BACKED: bool, const OWN: bool> {
     pub pass: Pass,
     pub columns: Columns<'a>,
     pub batches: &'a [Batch],
@@ -135,18 +139,83 @@ pub(in crate::swarm) struct Impact {
     pub soft: Soft,
 }
 
-impl Kernel for Solve<'_> {
+/// Goes over the pairs of some batches.
+pub(in crate::swarm) fn solve(
+    instructions: Instructions,
+    pass: Pass,
+    columns: Columns,
+    batches: &[Batch],
+    pushes: &mut Pushes,
+    friction: f32,
+) {
+    macro_rules! run {
+        ($backed:literal, $own:literal) => {
+            instructions.run(Solve::<$backed, $own> { pass, columns, batches, pushes, friction })
+        };
+    }
+    match (columns.backed(), !pushes.numbers.is_empty()) {
+        (false, false) => run!(false, false),
+        (false, true) => run!(false, true),
+        (true, false) => run!(true, false),
+        (true, true) => run!(true, true),
+    }
+}
+
+impl<const BACKED: bool, const OWN: bool> Kernel for Solve<'_, BACKED, OWN> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
-        let backed = self.columns.backed();
         match self.pass {
             Pass::Impact(impact) => self.impact::<L>(impact),
-            Pass::Begin(impact) if backed => self.begin::<L, true>(impact),
-            Pass::Begin(impact) => self.begin::<L, false>(impact),
-            Pass::Solve(impact) if backed => self.solve::<L, true, true>(impact),
-            Pass::Solve(impact) => self.solve::<L, false, true>(impact),
-            Pass::Relax(impact) if backed => self.solve::<L, true, false>(impact),
-            Pass::Relax(impact) => self.solve::<L, false, false>(impact),
+            Pass::Begin(impact) => self.begin::<L>(impact),
+            Pass::Solve(impact) => self.solve::<L, true>(impact),
+            Pass::Relax(impact) => self.solve::<L, false>(impact),
+        }
+    }
+}
+
+/// Numbers of the surfaces of a batch.
+#[derive(Clone, Copy)]
+struct Numbers<L> {
+    friction: L,
+    restitution: L,
+    /// Mass times radius squared over the moment of inertia of both.
+    inertia_factors: [L; 2],
+}
+
+impl<L: Lanes> Numbers<L> {
+    #[inline(always)]
+    fn load<const OWN: bool>(
+        own: &[PairNumbers],
+        batch: usize,
+        friction: f32,
+        restitution: f32,
+    ) -> Self {
+        if OWN {
+            let PairNumbers { friction, restitution, inertia_factors: [a, b], .. } = &own[batch];
+            Self {
+                friction: L::load(friction),
+                restitution: L::load(restitution),
+                inertia_factors: [L::load(a), L::load(b)],
+            }
+        } else {
+            Self {
+                friction: L::splat(friction),
+                restitution: L::splat(restitution),
+                inertia_factors: [L::splat(SOLID_BALL); 2],
+            }
+        }
+    }
+
+    /// Effective mass of the touched points across the normal. `alone` is that along it.
+    #[inline(always)]
+    fn tangent_mass<const OWN: bool>(&self, alone: L, [a, b]: [&[L; 4]; 2]) -> L {
+        if OWN {
+            let one = L::splat(1.0);
+            let [of_a, of_b] = self.inertia_factors;
+            let sum = mobility(a) * (one + of_a) + mobility(b) * (one + of_b);
+            sum.pick_above(L::splat(0.0), one / sum, L::splat(0.0))
+        } else {
+            alone * L::splat(2.0 / 7.0)
         }
     }
 }
@@ -162,15 +231,15 @@ impl Columns<'_> {
         normal: V<L>,
         along: L,
         across: V<L>,
+        [factor_a, factor_b]: [L; 2],
     ) {
         let (mass_a, mass_b) = (mobility(&a), mobility(&b));
         let impulse = normal.times(along).plus(across);
-        // A solid ball: mass times radius squared is 2.5 times the moment of inertia. The column
-        // holds radius times spin.
-        let turn = normal.cross(across).times(L::splat(2.5));
+        // The column holds radius times spin.
+        let turn = normal.cross(across);
         let spin = [
-            V::of(&spin_a).minus(turn.times(mass_a)).with(spin_a[3]),
-            V::of(&spin_b).minus(turn.times(mass_b)).with(spin_b[3]),
+            V::of(&spin_a).minus(turn.times(factor_a * mass_a)).with(spin_a[3]),
+            V::of(&spin_b).minus(turn.times(factor_b * mass_b)).with(spin_b[3]),
         ];
         scatter(self.spin, batch, spin);
         let none = V([L::splat(0.0); 3]);
@@ -227,26 +296,30 @@ impl Columns<'_> {
 
     /// Lets those pairs bounce that meet. Says whether any does.
     #[inline(always)]
-    fn bounce<L: Lanes>(
+    fn bounce<L: Lanes, const OWN: bool>(
         &self,
         batch: &Batch,
         impact: &Impact,
-        friction: f32,
+        numbers: &Numbers<L>,
         [at_a, at_b]: [[L; 4]; 2],
         [a, b]: [[L; 4]; 2],
     ) -> bool {
         let zero = L::splat(0.0);
         let (normal, closing) = meeting(impact, [&at_a, &at_b], [&a, &b]);
+        // What does not bounce is stopped by its contact.
+        let closing =
+            if OWN { numbers.restitution.pick_above(zero, closing, zero) } else { closing };
         if closing.above(zero) == 0 {
             return false;
         }
         let relative = V::of(&b).minus(V::of(&a));
         let mass = mass(&a, &b);
-        let along = mass * closing * L::splat(1.0 + impact.restitution);
+        let along = mass * closing * (L::splat(1.0) + numbers.restitution);
         let spins = self.spins(batch);
         let sliding = sliding(relative, normal, &spins);
-        let across = held(sliding.times(L::splat(-2.0 / 7.0) * mass), L::splat(friction) * along);
-        self.hit::<L, false>(batch, [a, b], spins, normal, along, across);
+        let wish = sliding.times(zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
+        let across = held(wish, numbers.friction * along);
+        self.hit::<L, false>(batch, [a, b], spins, normal, along, across, numbers.inertia_factors);
         true
     }
 
@@ -283,6 +356,45 @@ impl Columns<'_> {
         self.spend(batch, ways);
     }
 
+    /// Applies angular impulses about the centers of both; the second gets it as it is.
+    #[inline(always)]
+    fn twist<L: Lanes>(&self, batch: &Batch, inertia: &Inertia<L>, torque: V<L>) {
+        let [a, b] = self.spins::<L>(batch);
+        let [by_a, by_b] = inertia.surface_speed;
+        let spins = [
+            V::of(&a).minus(torque.times(by_a)).with(a[3]),
+            V::of(&b).plus(torque.times(by_b)).with(b[3]),
+        ];
+        scatter(self.spin, batch, spins);
+    }
+
+    /// Slows how the two turn against each other, by a torque of at most the resistance times
+    /// normal force times effective radius.
+    #[inline(always)]
+    fn resist<L: Lanes>(
+        &self,
+        batch: &Batch,
+        inertia: &Inertia<L>,
+        normal: V<L>,
+        normal_impulse: L,
+        numbers: &PairNumbers,
+        torque: &mut [[f32; LANES]; 3],
+    ) {
+        let most = normal_impulse * inertia.radius;
+        let rolling = L::load(&numbers.rolling_resistance) * most;
+        let spinning = L::load(&numbers.spinning_resistance) * most;
+        let before = V::<L>::load(torque);
+        let (zero, [a, b]) = (L::splat(0.0), self.spins::<L>(batch));
+        let [per_a, per_b] = inertia.per_radius;
+        let turning = V::of(&b).times(per_b).minus(V::of(&a).times(per_a));
+        let wish = before.minus(turning.times(inertia.mass));
+        let about = normal.times(wish.dot(normal));
+        let after =
+            held(wish.minus(about), rolling.max(zero)).plus(held(about, spinning.max(zero)));
+        after.store(torque);
+        self.twist(batch, inertia, after.minus(before));
+    }
+
     /// The spins of a batch.
     #[inline(always)]
     fn spins<L: Lanes>(&self, batch: &Batch) -> [[L; 4]; 2] {
@@ -290,24 +402,26 @@ impl Columns<'_> {
     }
 }
 
-impl Solve<'_> {
+impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
     #[inline(always)]
     fn impact<L: Lanes>(self, impact: Impact) {
         let Self { columns, batches, pushes, friction, .. } = self;
-        if impact.restitution == 0.0 {
+        if !OWN && impact.restitution == 0.0 {
             return; // contacts stop what meets
         }
-        for batch in batches {
+        for (i, batch) in batches.iter().enumerate() {
             let at = gather::<L>(columns.at, batch);
             let velocity = gather::<L>(columns.velocity, batch);
-            pushes.bounced |= columns.bounce(batch, &impact, friction, at, velocity);
+            let numbers =
+                Numbers::<L>::load::<OWN>(&pushes.numbers, i, friction, impact.restitution);
+            pushes.bounced |= columns.bounce::<L, OWN>(batch, &impact, &numbers, at, velocity);
         }
     }
 
     #[inline(always)]
-    fn begin<L: Lanes, const BACKED: bool>(self, impact: Impact) {
-        let Self { columns, batches, pushes, .. } = self;
-        let Pushes { pressure, grip, .. } = pushes;
+    fn begin<L: Lanes>(self, impact: Impact) {
+        let Self { columns, batches, pushes, friction, .. } = self;
+        let Pushes { pressure, grip, torque, numbers: own, .. } = pushes;
         for (i, batch) in batches.iter().enumerate() {
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, _) = normal_and_gap(&a, &b, ALL, |lane| batch.pair(lane));
@@ -333,19 +447,28 @@ impl Solve<'_> {
                 across = across.times(kept);
             }
             across.store(&mut grip[i]);
-            columns.hit::<L, BACKED>(batch, velocity, spin, normal, along, across);
+            let numbers = Numbers::<L>::load::<OWN>(own, i, friction, impact.restitution);
+            let factors = numbers.inertia_factors;
+            columns.hit::<L, BACKED>(batch, velocity, spin, normal, along, across, factors);
+            if OWN {
+                let [a, b] = gather::<L>(columns.at, batch);
+                let inertia = Inertia::new([&a, &b], &velocity, factors);
+                columns.twist(batch, &inertia, V::load(&torque[i]));
+            }
         }
     }
 
     #[inline(always)]
-    fn solve<L: Lanes, const BACKED: bool, const FIRST: bool>(self, impact: Impact) {
+    fn solve<L: Lanes, const FIRST: bool>(self, impact: Impact) {
         let Self { columns, batches, pushes, friction, .. } = self;
-        let Pushes { pressure, grip, .. } = pushes;
-        // Where nothing bounces, all is a contact.
-        let speed = if impact.restitution > 0.0 { impact.speed } else { f32::MAX };
+        let Pushes { pressure, grip, torque, numbers: own, .. } = pushes;
         let (zero, one, soft) = (L::splat(0.0), L::splat(1.0), impact.soft);
-        let (speed, per_second) = (L::splat(speed), L::splat(1.0 / impact.time));
+        let per_second = L::splat(1.0 / impact.time);
         for (i, batch) in batches.iter().enumerate() {
+            let numbers = Numbers::<L>::load::<OWN>(own, i, friction, impact.restitution);
+            // Where nothing bounces, all is a contact.
+            let speed =
+                numbers.restitution.pick_above(zero, L::splat(impact.speed), L::splat(f32::MAX));
             let at = gather::<L>(columns.at, batch);
             let (normal, gap) = normal_and_gap(&at[0], &at[1], ALL, |lane| batch.pair(lane));
             let before = L::load(&pressure[i]);
@@ -390,14 +513,47 @@ impl Solve<'_> {
             }
             let sliding = sliding(relative, normal, &spins);
             let old = V::<L>::load(&grip[i]);
-            let wish = old.minus(sliding.times(alone * L::splat(2.0 / 7.0)));
-            let held = held(wish, L::splat(friction) * after);
+            let wish = old.minus(sliding.times(numbers.tangent_mass::<OWN>(alone, [&a, &b])));
+            let held = held(wish, numbers.friction * after);
             held.store(&mut grip[i]);
-            let across = held.minus(old);
-            columns.hit::<L, BACKED>(batch, [a, b], spins, normal, after - before, across);
+            let (along, across, factors) =
+                (after - before, held.minus(old), numbers.inertia_factors);
+            columns.hit::<L, BACKED>(batch, [a, b], spins, normal, along, across, factors);
+            if OWN {
+                let inertia = Inertia::new([&at[0], &at[1]], &[a, b], factors);
+                columns.resist(batch, &inertia, normal, after, &own[i], &mut torque[i]);
+            }
             if !FIRST {
                 columns.part(batch, at, [a, b], normal, gap, soft.slop, grounded);
             }
+        }
+    }
+}
+
+/// Inertia of the balls of a batch against torques.
+struct Inertia<L> {
+    /// Change of radius times angular velocity by an angular impulse, in m/s per N m s.
+    surface_speed: [L; 2],
+    /// Reciprocals of the radii.
+    per_radius: [L; 2],
+    /// Moment of inertia against turning against each other, in kg m².
+    mass: L,
+    /// Effective radius, in metres.
+    radius: L,
+}
+
+impl<L: Lanes> Inertia<L> {
+    #[inline(always)]
+    fn new([at_a, at_b]: [&[L; 4]; 2], [a, b]: &[[L; 4]; 2], [of_a, of_b]: [L; 2]) -> Self {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let [per_a, per_b] = [one / at_a[3], one / at_b[3]];
+        let [by_a, by_b] = [of_a * mobility(a) * per_a, of_b * mobility(b) * per_b];
+        let sum = by_a * per_a + by_b * per_b;
+        Self {
+            surface_speed: [by_a, by_b],
+            per_radius: [per_a, per_b],
+            mass: sum.pick_above(zero, one / sum, zero),
+            radius: one / (per_a + per_b),
         }
     }
 }

@@ -12,10 +12,14 @@ pub(in crate::swarm) struct Drift<'a> {
     pub at: &'a mut [Row],
     pub velocity: &'a mut [Row],
     pub budget: &'a mut [f32],
+    pub spin: &'a [Row],
     /// In m/s, and zero.
     pub change: Row,
     /// In seconds, thrice, and zero.
     pub time: Row,
+    /// Way back of what no wall bears, in metres: half of what gravity changed velocities by, over
+    /// the time. So what flies does so along its parabola (velocity Verlet).
+    pub back: Row,
     /// Least budget; below it, `overrun` is set.
     pub least: f32,
     pub overrun: &'a mut bool,
@@ -28,12 +32,13 @@ impl Kernel for Drift<'_> {
     #[inline(always)]
     fn run<L: Lanes>(self) {
         // In registers, not behind a reference that any of the rows might be.
-        let (change, time) = (self.change, self.time);
+        let (change, time, back) = (self.change, self.time, self.back);
         let mut lowest = f32::MAX;
-        let rows = self.at.iter_mut().zip(self.velocity).zip(self.budget);
-        for (row, ((at, velocity), budget)) in rows.enumerate() {
+        let rows = self.at.iter_mut().zip(self.velocity).zip(self.budget).zip(self.spin);
+        for (row, (((at, velocity), budget), spin)) in rows.enumerate() {
             let new = sum(*velocity, change);
             let way = product(new, time);
+            let way = if spin[3] == 0.0 { sum(way, back) } else { way };
             let place = sum(*at, way);
             let ok = largest(new) < MOST && largest(place) < MOST;
             if ok {

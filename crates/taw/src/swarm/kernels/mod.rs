@@ -3,13 +3,14 @@
 use super::batches::Batch;
 use super::lanes::{LANES, Lanes, Row};
 use super::memory::{fit, make_room};
+use super::surfaces::{PairNumbers, SurfaceOf};
 use super::team::Shared;
 
 mod contact;
 mod displace;
 mod drift;
 
-pub(super) use contact::{Columns, GROUNDED, Impact, LOST, Pass, Soft, Solve, WALL_SLOP};
+pub(super) use contact::{Columns, GROUNDED, Impact, LOST, Pass, Soft, WALL_SLOP, solve};
 pub(super) use displace::{Displace, DisplaceFans, DisplaceFromPlanes};
 pub(super) use drift::{Drift, Follow, Predict, squared};
 
@@ -20,6 +21,10 @@ pub(super) struct Pushes {
     pub pressure: Vec<[f32; LANES]>,
     /// Those across them.
     pub grip: Vec<[[f32; LANES]; 3]>,
+    /// Angular impulses against rolling and spinning, in N m s, and the numbers of each pair: both
+    /// only where surfaces differ or resist.
+    pub torque: Vec<[[f32; LANES]; 3]>,
+    pub numbers: Vec<PairNumbers>,
     /// Set if any of them bounced in the last round.
     pub bounced: bool,
 }
@@ -27,7 +32,8 @@ pub(super) struct Pushes {
 impl Pushes {
     pub fn bytes(&self) -> usize {
         self.pressure.capacity() * size_of::<[f32; LANES]>()
-            + self.grip.capacity() * size_of::<[[f32; LANES]; 3]>()
+            + (self.grip.capacity() + self.torque.capacity()) * size_of::<[[f32; LANES]; 3]>()
+            + self.numbers.capacity() * size_of::<PairNumbers>()
     }
 
     /// As many as there are batches, and none bears anything.
@@ -40,6 +46,13 @@ impl Pushes {
         }
         reset(&mut self.pressure, batches, [0.0; LANES]);
         reset(&mut self.grip, batches, [[0.0; LANES]; 3]);
+    }
+
+    /// Sets the numbers of each pair, where they have some.
+    pub fn set_numbers(&mut self, batches: &[Batch], surfaces: SurfaceOf) {
+        surfaces.of_pairs(batches, &mut self.numbers);
+        self.torque.clear();
+        self.torque.resize(self.numbers.len(), [[0.0; LANES]; 3]);
     }
 }
 

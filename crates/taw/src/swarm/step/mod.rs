@@ -6,7 +6,7 @@ mod seek;
 pub(super) use seek::listed;
 
 use super::build::SOON;
-use super::kernels::{Columns, Drift, Impact, LOST, Pass, Soft, Solve, squared};
+use super::kernels::{Columns, Drift, Impact, LOST, Pass, Soft, solve, squared};
 use super::lanes::Row;
 use super::slab::Slab;
 use super::strays::Strays;
@@ -50,6 +50,37 @@ impl Swarm {
         version: u64,
         observe: &mut dyn FnMut(Stage),
     ) {
+        let walls_changed = self.begin(gravity, walls, version);
+        match self.tier() {
+            Tier::Lab => self.step_lab(dt, gravity, walls, walls_changed, observe),
+            Tier::Full => {
+                self.find_contacts(dt, gravity, walls, walls_changed, observe);
+                self.solve(dt, self.model.substeps, walls, observe);
+            }
+        }
+        self.end();
+    }
+
+    /// Begins a step of bodies and balls: looks who may touch. Returns whether all sleep.
+    pub(crate) fn prepare(
+        &mut self,
+        dt: f32,
+        gravity: Vec3<f32>,
+        walls: &dyn Surroundings,
+        version: u64,
+    ) {
+        let walls_changed = self.begin(gravity, walls, version);
+        self.find_contacts(dt, gravity, walls, walls_changed, &mut |_| ());
+    }
+
+    /// Ends it: moves all on in substeps, and solves the contacts.
+    pub(crate) fn finish(&mut self, dt: f32, substeps: u32, walls: &dyn Surroundings) {
+        self.solve(dt, substeps, walls, &mut |_| ());
+        self.end();
+    }
+
+    /// Begins a step: gravity and walls. Returns whether these changed.
+    fn begin(&mut self, gravity: Vec3<f32>, walls: &dyn Surroundings, version: u64) -> bool {
         self.stopped.clear();
         self.steps_since_build = (self.steps_since_build + 1).min(SOON);
         if self.gravity != Some(gravity) {
@@ -58,20 +89,21 @@ impl Swarm {
         }
         let walls_changed = self.walled != Some(version);
         if walls_changed {
-            half_spaces(walls, self.model.material, &mut self.planes);
+            half_spaces(walls, &mut self.planes);
             self.wake_all();
             self.walled = Some(version);
         }
-        match self.model.tier {
-            Tier::Lab => self.step_lab(dt, gravity, walls, walls_changed, observe),
-            Tier::Full => self.step_full(dt, gravity, walls, walls_changed, observe),
-        }
+        walls_changed
+    }
+
+    fn end(&mut self) {
         for slab in &mut self.slabs {
             self.stopped.append(&mut slab.stopped);
         }
     }
 
-    fn step_full(
+    /// Brings up to date which pairs are near, and which balls are near walls; and who sleeps.
+    fn find_contacts(
         &mut self,
         dt: f32,
         gravity: Vec3<f32>,
@@ -101,12 +133,24 @@ impl Swarm {
             self.seek_walls_that_moved(walls_changed, dt, walls, observe);
         }
         self.leaving = leaving;
+    }
+
+    /// Moves all on by `dt` seconds, in substeps: *bounce*, *integrate velocities*, *warm start*,
+    /// *solve*, *integrate positions*, *relax* (Catto, 2024, `Solver2D`, `solve_soft_step.c`).
+    fn solve(
+        &mut self,
+        dt: f32,
+        count: u32,
+        walls: &dyn Surroundings,
+        observe: &mut dyn FnMut(Stage),
+    ) {
         if self.slabs.iter().all(|slab| slab.asleep) {
             return;
         }
         self.find_guests();
         observe(Stage::Restitute);
-        let substeps = self.model.substeps as f32;
+        let gravity = self.gravity.unwrap_or_else(Vec3::zero);
+        let substeps = count as f32;
         let h = dt / substeps;
         let (times, all) = ([dt, h], |_: &Slab| true);
         self.age_marks();
@@ -119,7 +163,7 @@ impl Swarm {
         let soft = soft(h, length(gravity));
         let impact = Impact { speed, restitution, time: h, gravity: row(gravity), soft };
         let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > speed;
-        for substep in 0..self.model.substeps {
+        for substep in 0..count {
             let left = dt - h * substep as f32;
             if substep > 0 {
                 self.look_at_walls(walls, left, times, |slab| slab.has_fast, true);
@@ -131,8 +175,9 @@ impl Swarm {
             }
             observe(Stage::Integrate);
             let parts = [substep as f32, (substep + 1) as f32].map(|part| part / substeps);
+            self.push_bodies(1.0 / substeps);
             self.keep_guests();
-            self.drift(row(gravity * h), [0.0; 4]);
+            self.drift(row(gravity * h), [0.0; 4], [0.0; 4]);
             self.drift_guests(parts, false, 0.0);
             observe(Stage::Restitute);
             self.find_backing();
@@ -140,7 +185,8 @@ impl Swarm {
             self.pass(Pass::Solve(impact), |_, _| true);
             observe(Stage::Integrate);
             self.keep_guests();
-            self.drift([0.0; 4], [h, h, h, 0.0]);
+            self.drift([0.0; 4], [h, h, h, 0.0], row(gravity * (-0.5 * h * h)));
+            self.take_pushes_back(-0.5 * h / substeps);
             self.drift_guests(parts, true, h);
             let (cap, left) = (self.cap, left - h);
             let left_it = |_: &Row, budget: f32| budget < -cap;
@@ -346,7 +392,7 @@ impl Swarm {
     }
 
     /// Changes velocities and moves the balls that are awake.
-    fn drift(&mut self, change: Row, time: Row) {
+    fn drift(&mut self, change: Row, time: Row, back: Row) {
         let instructions = self.instructions;
         let columns = Columns {
             at: Shared::new(&mut self.at),
@@ -364,9 +410,11 @@ impl Swarm {
                 return;
             }
             let (rows, first) = (slab.own_rows(), slab.rows[0]);
-            let (at, velocity, budget) = unsafe {
+            let (at, velocity, spin, budget) = unsafe {
                 let at = columns.at.part(rows.clone());
-                (at, columns.velocity.part(rows.clone()), columns.budget.part(rows))
+                let (velocity, spin) =
+                    (columns.velocity.part(rows.clone()), columns.spin.part(rows.clone()));
+                (at, velocity, spin, columns.budget.part(rows))
             };
             for touch in &mut slab.touches {
                 touch.drift(time[0]);
@@ -376,9 +424,11 @@ impl Swarm {
             instructions.run(Drift {
                 at,
                 velocity,
+                spin,
                 budget,
                 change,
                 time,
+                back,
                 least,
                 overrun,
                 stopped,
@@ -400,7 +450,7 @@ impl Swarm {
                 return;
             }
             let Slab { batches, pushes, .. } = &mut *slab;
-            instructions.run(Solve { pass, columns, batches, pushes, friction });
+            solve(instructions, pass, columns, batches, pushes, friction);
             // Walls come last, so that nothing is pushed into them.
             if !slab.asleep {
                 for touch in &mut slab.touches {
@@ -428,7 +478,7 @@ impl Swarm {
             backing: Shared::new(&mut self.backing),
         };
         let Strays { batches, pushes, .. } = &mut strays;
-        instructions.run(Solve { pass, columns, batches, pushes, friction });
+        solve(instructions, pass, columns, batches, pushes, friction);
         self.strays = strays;
     }
 

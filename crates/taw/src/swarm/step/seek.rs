@@ -4,6 +4,7 @@ use cgmath::Zero;
 
 use crate::math::Vec3;
 use crate::swarm::slab::Slab;
+use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::team::{Shared, each};
 use crate::swarm::walls::{Balls, HalfSpace, Look, find, near_shapes, shapes_of};
 use crate::swarm::{Stage, Surroundings, Swarm, Tier};
@@ -32,8 +33,19 @@ impl Swarm {
     /// Seeks the balls at walls anew, where pairs are still known.
     pub(in crate::swarm) fn seek_walls(&mut self, dt: f32, walls: &dyn Surroundings) {
         let (instructions, shapes) = (self.instructions, walls.has_shapes());
-        let (planes, ahead) = (listed(&self.planes, self.model.tier), self.ahead(dt));
-        let balls = Balls { at: &self.at, velocity: &self.velocity, budget: &self.budget, ahead };
+        let (planes, ahead) = (listed(&self.planes, self.tier()), self.ahead(dt));
+        let (at, budget) = (&self.at[..], &self.budget[..]);
+        let balls = Balls {
+            at,
+            velocity: &self.velocity,
+            budget,
+            ahead,
+            surfaces: SurfaceOf {
+                model: self.model.material,
+                surfaces: &self.surfaces,
+                slots: self.ids.slots(),
+            },
+        };
         let slabs = Shared::new(&mut self.slabs);
         each(self.model.threads as usize, slabs.len(), |_, slab| {
             // SAFETY: its own.
@@ -58,9 +70,14 @@ impl Swarm {
         walls: &dyn Surroundings,
     ) {
         let ahead = self.ahead(dt);
-        let planes = listed(&self.planes, self.model.tier);
+        let planes = listed(&self.planes, self.tier());
         let (at, budget) = (&self.at[..], &self.budget[..]);
-        let balls = Balls { at, velocity: &self.velocity, budget, ahead };
+        let surfaces = SurfaceOf {
+            model: self.model.material,
+            surfaces: &self.surfaces,
+            slots: self.ids.slots(),
+        };
+        let balls = Balls { at, velocity: &self.velocity, budget, ahead, surfaces };
         for slab in &mut self.slabs {
             let mine = slab.own_rows();
             let mine = rows.partition_point(|row| (*row as usize) < mine.start)
@@ -92,11 +109,15 @@ impl Swarm {
     ) {
         let (guests, rows) = (&self.guests[..], &self.guest_rows[..]);
         let look = Look {
-            tier: self.model.tier,
+            tier: self.tier(),
             at: &self.at,
             velocity: &self.velocity,
             budget: &self.budget,
-            material: self.model.material,
+            surfaces: SurfaceOf {
+                model: self.model.material,
+                surfaces: &self.surfaces,
+                slots: self.ids.slots(),
+            },
             before,
             times,
             gravity: self.gravity.unwrap_or_else(Vec3::zero),

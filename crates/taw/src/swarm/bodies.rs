@@ -1,0 +1,293 @@
+//! Balls of the swarm that are marbles of the world: rows of the same solve as all others.
+
+use cgmath::{EuclideanSpace, InnerSpace};
+
+use super::kernels::squared;
+use super::lanes::Row;
+use super::surfaces::{Surface, SurfaceOf};
+use super::team::{Shared, each};
+use super::{BallId, Swarm, Tier};
+use crate::contact::{Contact, Contacts};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector};
+use crate::motion::turned;
+
+/// State of a marble as a row.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Body {
+    pub slot: u32,
+    /// Center and radius, in metres.
+    pub at: Row,
+    /// Velocity in m/s, and inverse mass in 1/kg.
+    pub velocity: Row,
+    /// Radius times angular velocity, in m/s.
+    pub spin: Row,
+    /// None for that of the swarm's model.
+    pub surface: Option<Surface>,
+}
+
+/// Change of velocity that a body gets besides gravity in a step, in m/s.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Push {
+    pub slot: u32,
+    pub change: [f32; 3],
+}
+
+/// Columns of the marbles that a step changes.
+pub(crate) struct BodyColumns<'a, S> {
+    pub position: &'a mut [Point3<S>],
+    pub velocity: &'a mut [Vec3<S>],
+    /// Empty where marbles do not turn.
+    pub spin: &'a mut [Vec3<S>],
+    pub rotation: &'a mut [Quat<S>],
+    pub radius: &'a [S],
+}
+
+/// No row.
+pub(crate) const NO_ROW: u32 = u32::MAX;
+
+/// Numbers of a marble that a step changes, and its radius.
+#[derive(Clone, Copy)]
+pub(crate) struct MarbleRow<S> {
+    pub position: Point3<S>,
+    pub velocity: Vec3<S>,
+    /// None where contacts do not set it spinning.
+    pub spin: Option<Vec3<S>>,
+    pub radius: S,
+}
+
+fn number<S: Scalar>(x: f32) -> S {
+    S::constant(f64::from(x))
+}
+
+fn vector<S: Scalar>(row: &Row) -> Vec3<S> {
+    Vec3::new(number(row[0]), number(row[1]), number(row[2]))
+}
+
+impl Swarm {
+    /// Makes bodies rows like all others, or guests that somebody else moves.
+    pub(crate) fn set_hosting(&mut self, hosting: bool) {
+        if hosting == self.hosting {
+            return;
+        }
+        let tier = self.tier();
+        self.hosting = hosting;
+        if self.tier() != tier {
+            self.before.clear();
+        }
+        self.guests.clear();
+        self.guest_rows.clear();
+        self.pushes.clear();
+        self.surfaces.clear();
+        (self.paired, self.remembers, self.walled) = (false, false, None);
+        self.shape_columns();
+        self.wake_all();
+    }
+
+    /// Physics that the step models: bodies need all of it.
+    pub(super) fn tier(&self) -> Tier {
+        if self.hosting { Tier::Full } else { self.model.tier }
+    }
+
+    /// Marks which slots are bodies.
+    pub(crate) fn set_bodies(&mut self, slots: impl Iterator<Item = u32>) {
+        self.guest_slots.clear();
+        self.guest_slots.resize(self.ids.slots().len().div_ceil(64), 0);
+        for slot in slots {
+            let word = slot as usize / 64;
+            if self.guest_slots.len() <= word {
+                self.guest_slots.resize(word + 1, 0);
+            }
+            self.guest_slots[word] |= 1 << (slot % 64);
+        }
+    }
+
+    /// True if a marble is still as [`Self::read_bodies`] left it.
+    #[inline]
+    pub(crate) fn is_as_read<S: Scalar>(&self, slot: u32, marble: MarbleRow<S>) -> bool {
+        let row = self.ids.rows()[slot as usize] as usize;
+        let [at, velocity] = [&self.at[row], &self.velocity[row]];
+        let MarbleRow { position, velocity: speed, spin, radius } = marble;
+        let turns = || spin.is_none_or(|spin| spin == vector::<S>(&self.spin[row]) / radius);
+        Point3::from_vec(vector(at)) == position
+            && number::<S>(at[3]) == radius
+            && vector(velocity) == speed
+            && turns()
+    }
+
+    /// Takes over what changed of bodies, and wakes those.
+    pub(crate) fn write_bodies(&mut self, bodies: &[Body]) {
+        let (mut resized, mut resurfaced) = (false, false);
+        for body in bodies {
+            let row = self.ids.rows()[body.slot as usize] as usize;
+            resurfaced |= self.surfaces.set(body.slot, body.surface);
+            self.wake(row);
+            let at = self.at[row];
+            resized |= at[3] != body.at[3];
+            self.budget[row] -= squared(less(body.at, at)).sqrt() + (body.at[3] - at[3]).abs();
+            (self.at[row], self.velocity[row]) = (body.at, body.velocity);
+            let [x, y, z, _] = body.spin;
+            self.spin[row] = [x, y, z, self.spin[row][3]];
+        }
+        if resized {
+            self.measure();
+        }
+        if resurfaced {
+            self.remember();
+            (self.paired, self.walled) = (false, None);
+        }
+    }
+
+    /// Sets what moves bodies besides gravity in the next step: the change of velocity of each, in
+    /// m/s. Wakes those for which it is another one than in the last step.
+    pub(crate) fn set_pushes(&mut self, pushes: impl Iterator<Item = Push>) {
+        let now: Vec<_> = pushes.collect();
+        let before = std::mem::take(&mut self.pushes);
+        for i in 0..before.len().max(now.len()) {
+            let (old, new) = (before.get(i), now.get(i));
+            if old != new {
+                for push in [old, new].into_iter().flatten() {
+                    let row = self.ids.rows().get(push.slot as usize).copied();
+                    if let Some(row) = row.filter(|row| *row != NO_ROW) {
+                        self.wake(row as usize);
+                    }
+                }
+            }
+        }
+        self.pushes = now;
+    }
+
+    /// Applies a part of these, where bodies are awake.
+    pub(super) fn push_bodies(&mut self, part: f32) {
+        let rows = self.ids.rows();
+        for Push { slot, change } in &self.pushes {
+            let Some(velocity) = self.velocity.get_mut(rows[*slot as usize] as usize) else {
+                continue;
+            };
+            if !velocity[3].is_sign_negative() {
+                for (speed, change) in velocity.iter_mut().zip(change) {
+                    *speed += change * part;
+                }
+            }
+        }
+    }
+
+    /// Moves bodies that no wall bears by these changes times some seconds: back by half of what
+    /// they moved too far by them, as a drift does for gravity.
+    pub(super) fn take_pushes_back(&mut self, time: f32) {
+        let rows = self.ids.rows();
+        for Push { slot, change } in &self.pushes {
+            let row = rows[*slot as usize] as usize;
+            let Some(at) = self.at.get_mut(row) else { continue };
+            if self.spin[row][3] == 0.0 && !self.velocity[row][3].is_sign_negative() {
+                for (x, change) in at.iter_mut().zip(change) {
+                    *x += change * time;
+                }
+            }
+        }
+    }
+
+    /// Writes the rows of bodies back to the columns of the marbles, of which each slot has one or
+    /// [none](NO_ROW). What slept through the step is as it was. Rotations go on by `dt` seconds; with
+    /// none, only what has just fallen asleep is read.
+    pub(crate) fn read_bodies<S: Scalar>(
+        &mut self,
+        marble_of_slot: &[u32],
+        columns: BodyColumns<S>,
+        dt: Option<S>,
+    ) {
+        let BodyColumns { position, velocity, spin, rotation, radius } = columns;
+        let (position, velocity) = (Shared::new(position), Shared::new(velocity));
+        let (turns, spin, rotation) = (!spin.is_empty(), Shared::new(spin), Shared::new(rotation));
+        let slots = self.ids.slots();
+        let [places, speeds, spins] = [&self.at[..], &self.velocity[..], &self.spin[..]];
+        let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
+        let slabs = Shared::new(&mut self.slabs);
+        each(self.model.threads as usize, slabs.len(), |_, slab| {
+            // SAFETY: each thread has its own slabs.
+            let slab = unsafe { &mut *slabs.row(slab) };
+            if slab.asleep && slab.read_asleep || !slab.asleep && dt.is_none() {
+                return;
+            }
+            slab.read_asleep = slab.asleep;
+            for row in slab.own_rows() {
+                let marble = marble_of_slot.get(slots[row] as usize).copied().unwrap_or(NO_ROW);
+                if marble == NO_ROW {
+                    continue;
+                }
+                let marble = marble as usize;
+                // SAFETY: a marble is that of one slot, and a slot that of one row.
+                unsafe {
+                    *position.row(marble) = Point3::from_vec(vector(&places[row]));
+                    *velocity.row(marble) = vector(&speeds[row]);
+                    if turns && !surfaces.row(row as u32).rotation_locked {
+                        let rate: Vec3<S> = vector(&spins[row]) / radius[marble];
+                        *spin.row(marble) = rate;
+                        let rotation = rotation.row(marble);
+                        *rotation = dt.map_or(*rotation, |dt| turned(*rotation, rate, dt));
+                    }
+                }
+            }
+        });
+    }
+
+    /// Lists the contacts of bodies: with a wall or each other, of which the gap is at most `reach`
+    /// metres, or closes within `dt` seconds.
+    pub(crate) fn list_contacts<S: Scalar>(
+        &self,
+        marble_of_slot: &[u32],
+        [reach, dt]: [f32; 2],
+        contacts: &mut Contacts<S>,
+    ) {
+        let slots = self.ids.slots();
+        let marble = |row: u32| {
+            let marble = marble_of_slot.get(slots[row as usize] as usize).copied();
+            marble.filter(|marble| *marble != NO_ROW)
+        };
+        let touches = |gap: f32, closing: f32| gap <= reach || gap < closing * dt;
+        for touch in self.slabs.iter().flat_map(|slab| &slab.touches) {
+            let Some(b) = marble(touch.row) else { continue };
+            let row = touch.row as usize;
+            let gap = touch.gap(&self.at[row]);
+            let closing = -(vector::<f32>(&self.velocity[row]) - touch.surface);
+            if touches(gap, closing.dot(touch.normal)) {
+                let mtv = cast_vector(touch.normal * (-gap).max(0.0));
+                let along = [S::zero(); 2];
+                contacts.wm.push(Contact { a: touch.wall, b, part: touch.part, along, mtv });
+            }
+        }
+        let batches = self.slabs.iter().map(|slab| &slab.batches).chain([&self.strays.batches]);
+        for batch in batches.flatten() {
+            for lane in 0..batch.count as usize {
+                let rows = batch.pair(lane);
+                let [Some(a), Some(b)] = rows.map(marble) else { continue };
+                let [p, q] = rows.map(|row| &self.at[row as usize]);
+                let [u, v] = rows.map(|row| vector::<f32>(&self.velocity[row as usize]));
+                let apart = vector::<f32>(q) - vector(p);
+                let distance = apart.magnitude();
+                let gap = distance - (p[3] + q[3]);
+                let normal = if distance > 0.0 { apart / distance } else { Vec3::unit_x() };
+                if touches(gap, (u - v).dot(normal)) {
+                    let mtv = cast_vector(normal * (-gap).max(0.0));
+                    let (a, b, mtv) = if a < b { (a, b, mtv) } else { (b, a, -mtv) };
+                    contacts.mm.push(Contact { a, b, part: 0, along: [S::zero(); 2], mtv });
+                }
+            }
+        }
+    }
+
+    /// Slot of a ball.
+    pub(crate) fn slot_of(&self, ball: BallId) -> Option<u32> {
+        self.ids.row(ball).map(|row| self.ids.slots()[row])
+    }
+
+    /// Rows that the last step stopped, as slots.
+    pub(crate) fn stopped_slots(&self) -> impl Iterator<Item = u32> + '_ {
+        let slots = self.ids.slots();
+        self.stopped.iter().filter_map(|row| slots.get(*row as usize).copied())
+    }
+}
+
+/// The first three numbers of a row, less those of another.
+fn less(a: Row, b: Row) -> Row {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2], 0.0]
+}

@@ -1,0 +1,157 @@
+//! Surfaces of balls that differ, and the numbers that two of them make of a contact.
+
+use super::batches::Batch;
+use super::lanes::LANES;
+use crate::response::Material;
+
+/// Mass times radius squared over the moment of inertia of a solid ball.
+pub(super) const SOLID_BALL: f32 = 2.5;
+
+/// Surface of a ball: its material, and whether contacts can set it spinning.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Surface {
+    pub material: Material<f32>,
+    pub rotation_locked: bool,
+}
+
+impl Surface {
+    /// Mass times radius squared over the moment of inertia; zero where the rotation is locked.
+    fn inertia_factor(self) -> f32 {
+        if self.rotation_locked { 0.0 } else { SOLID_BALL }
+    }
+}
+
+/// Surfaces of all balls. Most have that of the swarm's model, which takes no memory.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Surfaces {
+    /// Different ones, in the order in which they came.
+    list: Vec<Surface>,
+    /// One more than the place in the list, by slot; zero for the model's surface.
+    of_slot: Vec<u32>,
+}
+
+impl Surfaces {
+    /// Gives a slot a surface of its own, or that of the model. Returns whether it had another.
+    pub fn set(&mut self, slot: u32, surface: Option<Surface>) -> bool {
+        let index = surface.map_or(0, |surface| {
+            let known = self.list.iter().rposition(|known| *known == surface);
+            let index = known.unwrap_or_else(|| {
+                self.list.push(surface);
+                self.list.len() - 1
+            });
+            index as u32 + 1
+        });
+        let slot = slot as usize;
+        if index == 0 && slot >= self.of_slot.len() {
+            return false;
+        }
+        if self.of_slot.len() <= slot {
+            self.of_slot.resize(slot + 1, 0);
+        }
+        std::mem::replace(&mut self.of_slot[slot], index) != index
+    }
+
+    /// Drops what no slot has any more.
+    pub fn clear(&mut self) {
+        self.list.clear();
+        self.of_slot.clear();
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.list.capacity() * size_of::<Surface>() + self.of_slot.capacity() * size_of::<u32>()
+    }
+}
+
+/// Lookup of surfaces by row.
+#[derive(Clone, Copy)]
+pub(super) struct SurfaceOf<'a> {
+    pub model: Material<f32>,
+    pub surfaces: &'a Surfaces,
+    /// Slot of each row.
+    pub slots: &'a [u32],
+}
+
+impl SurfaceOf<'_> {
+    /// Surface of the ball in a row.
+    #[inline]
+    pub fn row(&self, row: u32) -> Surface {
+        let own = || {
+            let index = *self.surfaces.of_slot.get(self.slots[row as usize] as usize)?;
+            self.surfaces.list.get((index as usize).checked_sub(1)?).copied()
+        };
+        let plain = Surface { material: self.model, rotation_locked: false };
+        if self.surfaces.list.is_empty() { plain } else { own().unwrap_or(plain) }
+    }
+
+    /// True if pairs need numbers of their own.
+    pub fn differ(&self) -> bool {
+        let resists = |m: &Material<f32>| m.rolling_resistance > 0.0 || m.spinning_resistance > 0.0;
+        resists(&self.model) || !self.surfaces.list.is_empty()
+    }
+
+    /// Fills in the numbers of the pairs of some batches; none, if all balls have one surface that
+    /// resists neither rolling nor spinning.
+    pub fn of_pairs(&self, batches: &[Batch], numbers: &mut Vec<PairNumbers>) {
+        numbers.clear();
+        if !self.differ() {
+            return;
+        }
+        numbers.extend(batches.iter().map(|batch| {
+            let mut numbers = PairNumbers::default();
+            for lane in 0..batch.count as usize {
+                numbers.set(lane, batch.pair(lane).map(|row| self.row(row)));
+            }
+            numbers
+        }));
+    }
+}
+
+/// Numbers of the contacts of a batch.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(super) struct PairNumbers {
+    pub friction: [f32; LANES],
+    pub restitution: [f32; LANES],
+    pub rolling_resistance: [f32; LANES],
+    pub spinning_resistance: [f32; LANES],
+    /// Mass times radius squared over the moment of inertia of both; zero where locked.
+    pub inertia_factors: [[f32; LANES]; 2],
+}
+
+impl PairNumbers {
+    fn set(&mut self, lane: usize, [a, b]: [Surface; 2]) {
+        let material = a.material.against(b.material);
+        self.friction[lane] = material.friction;
+        self.restitution[lane] = material.restitution;
+        self.rolling_resistance[lane] = material.rolling_resistance;
+        self.spinning_resistance[lane] = material.spinning_resistance;
+        let factors = [a, b].map(Surface::inertia_factor);
+        for (lanes, factor) in self.inertia_factors.iter_mut().zip(factors) {
+            lanes[lane] = factor;
+        }
+    }
+}
+
+/// Numbers of the contact of a ball with a wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct WallNumbers {
+    pub friction: f32,
+    pub restitution: f32,
+    pub rolling_resistance: f32,
+    pub spinning_resistance: f32,
+    /// Mass times radius squared over the moment of inertia of the ball; zero where locked.
+    pub inertia_factor: f32,
+}
+
+impl WallNumbers {
+    /// Numbers of a ball on a wall, which may have a material of its own.
+    pub fn new(ball: Surface, wall: Option<Material<f32>>) -> Self {
+        let material = wall.map_or(ball.material, |wall| ball.material.against(wall));
+        Self {
+            friction: material.friction,
+            restitution: material.restitution,
+            rolling_resistance: material.rolling_resistance,
+            spinning_resistance: material.spinning_resistance,
+            inertia_factor: ball.inertia_factor(),
+        }
+    }
+}

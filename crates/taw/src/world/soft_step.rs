@@ -1,0 +1,224 @@
+//! The three verbs of [`Response::SoftStep`]: marbles are rows of the same solve as the balls of
+//! the swarm.
+
+use cgmath::{EuclideanSpace, Zero};
+
+use super::World;
+use super::integrate::Drive;
+use super::swarm::FURTHEST;
+use crate::Error;
+use crate::math::{Scalar, Vec3, cast_vector, length};
+use crate::motion::{Mass, Rotation};
+use crate::response::Material;
+use crate::swarm::{Body, MarbleRow, NO_ROW, Push, Surface};
+
+/// Correspondence of marbles and rows, and scratch memory.
+#[derive(Clone, Debug)]
+pub(super) struct SoftStep<S> {
+    /// Removals and number of marbles for which these hold, and whether the balls of the swarm
+    /// have the material of marbles that have none of their own.
+    known: Option<(u64, usize, bool)>,
+    slot_of_marble: Vec<u32>,
+    marble_of_slot: Vec<u32>,
+    /// Last seen by marble; empty while no marble has any of its own.
+    details: Vec<Details<S>>,
+    changed: Vec<Body>,
+    /// Length of the step, in seconds, and version of the walls when contacts were found.
+    dt: f32,
+    walls: u64,
+}
+
+/// Rarely changing numbers of a marble that rows need.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Details<S> {
+    mass: Mass<S>,
+    material: Option<Material<S>>,
+    rotation_locked: bool,
+}
+
+impl<S: Scalar> Details<S> {
+    fn surface(self) -> Surface {
+        let material = self.material.map_or_else(Material::default, Material::cast);
+        Surface { material, rotation_locked: self.rotation_locked }
+    }
+}
+
+impl<S> Default for SoftStep<S> {
+    fn default() -> Self {
+        Self {
+            known: None,
+            slot_of_marble: Vec::new(),
+            marble_of_slot: Vec::new(),
+            details: Vec::new(),
+            changed: Vec::new(),
+            dt: 0.0,
+            walls: 0,
+        }
+    }
+}
+
+/// Least inverse mass of a row, in 1/kg: products with it and quotients by it are numbers.
+const LEAST_INVERSE_MASS: f32 = 1e-25;
+
+impl<S: Scalar> World<S> {
+    /// The first verb: forces other than gravity become changes of velocity, which the third one
+    /// applies in substeps.
+    pub(super) fn integrate_forces(&mut self, dt: S) -> Result<(), Error> {
+        if self.model.rotation == Rotation::Dynamic {
+            self.marbles.spin_up(dt);
+        } else {
+            self.marbles.turn(dt, self.model.rotation);
+        }
+        self.soft_step.dt = dt.as_f64() as f32;
+        self.stop_what_is_not_finite();
+        self.sync_bodies()?;
+        let drive = Drive {
+            integrator: self.model.integrator,
+            gravity: self.gravity,
+            forces: &self.forces,
+            dt,
+        };
+        self.accelerations.clear();
+        if !self.forces.is_empty() || self.marbles.accelerate_differently() {
+            self.marbles.mean_accelerations(drive, &mut self.accelerations);
+        }
+        let (gravity, dt) = (cast_vector::<S, f64>(self.gravity), dt.as_f64());
+        let slots = &self.soft_step.slot_of_marble;
+        let pushes = self.accelerations.iter().zip(slots).filter_map(|(acceleration, slot)| {
+            let change: [f64; 3] = ((acceleration - gravity) * dt).into();
+            let change = change.map(|x| (x as f32).clamp(-FURTHEST, FURTHEST));
+            (change != [0.0; 3]).then_some(Push { slot: *slot, change })
+        });
+        self.swarm.set_pushes(pushes);
+        Ok(())
+    }
+
+    /// The second verb: finds which pairs may touch within the step, and lists those of marbles.
+    pub(super) fn find_soft_contacts(&mut self) {
+        self.walls.prepare();
+        let (dt, gravity) = (self.soft_step.dt, cast_vector(self.gravity));
+        self.soft_step.walls = self.walls.version();
+        self.swarm.prepare(dt, gravity, &self.walls, self.walls.version());
+        let reach = 2.0 * length(gravity) * dt * dt;
+        let marbles = &self.soft_step.marble_of_slot;
+        let turns = self.model.rotation == Rotation::Dynamic;
+        self.swarm.read_bodies(marbles, self.marbles.body_columns(turns), None);
+        self.swarm.list_contacts(marbles, [reach, dt], &mut self.contacts);
+        self.contacts.sort();
+    }
+
+    /// The third verb: moves marbles on in substeps, and solves their contacts.
+    pub(super) fn solve_soft_contacts(&mut self, dt: S) -> Result<(), Error> {
+        self.count_contacts();
+        self.sync_bodies()?; // somebody may have moved some since the first verb
+        self.walls.prepare();
+        let gravity = cast_vector(self.gravity);
+        if self.soft_step.walls != self.walls.version() {
+            self.swarm.prepare(self.soft_step.dt, gravity, &self.walls, self.walls.version());
+        }
+        self.swarm.finish(dt.as_f64() as f32, self.model.substeps, &self.walls);
+        let marbles = &self.soft_step.marble_of_slot;
+        let stopped = self.swarm.stopped_slots();
+        let stopped = stopped.filter_map(|slot| marbles.get(slot as usize).copied());
+        self.stopped.extend(stopped.filter(|marble| *marble != NO_ROW));
+        let turns = self.model.rotation == Rotation::Dynamic;
+        self.swarm.read_bodies(marbles, self.marbles.body_columns(turns), Some(dt));
+        self.stop_what_is_not_finite();
+        self.roll_what_only_shows();
+        self.limits.apply(&mut self.marbles);
+        self.count_after();
+        Ok(())
+    }
+
+    /// Brings rows up to date with marbles that came, went, or were changed by others than the
+    /// solver.
+    fn sync_bodies(&mut self) -> Result<(), Error> {
+        self.swarm.set_hosting(true);
+        let plain_swarm = self.swarm.model().material == Material::default();
+        let known = Some((self.marbles.removals(), self.marbles.len(), plain_swarm));
+        let stale = self.soft_step.known != known || self.swarm.invited.len() != self.marbles.len();
+        if stale {
+            self.see_guests_off()?;
+            self.invite_all()?;
+            self.match_slots();
+            self.soft_step.known = known;
+        }
+        let rotation = self.model.rotation;
+        let marbles = &self.marbles;
+        let SoftStep { slot_of_marble, details, changed, .. } = &mut self.soft_step;
+        let simple = marbles.are_alike() && rotation == Rotation::Dynamic;
+        let plain = Details { mass: Mass::default(), material: None, rotation_locked: false };
+        if simple && details.iter().all(|own| *own == plain) {
+            details.clear();
+        } else {
+            details.resize(marbles.len(), plain);
+        }
+        changed.clear();
+        for (row, slot) in slot_of_marble.iter().enumerate() {
+            if *slot == NO_ROW {
+                continue;
+            }
+            let now = if details.is_empty() {
+                plain
+            } else {
+                Details {
+                    mass: marbles.own_mass(row),
+                    material: marbles.material.get(row),
+                    rotation_locked: marbles.rotation_of(row, rotation) != Rotation::Dynamic,
+                }
+            };
+            let spin = marbles.spin.get(row).copied().filter(|_| !now.rotation_locked);
+            let same = details.get(row).is_none_or(|before| *before == now);
+            let marble = MarbleRow {
+                position: marbles.position[row],
+                velocity: marbles.velocity[row],
+                spin,
+                radius: marbles.radius[row],
+            };
+            if same && !stale && self.swarm.is_as_read(*slot, marble) {
+                continue;
+            }
+            if let Some(details) = details.get_mut(row) {
+                *details = now;
+            }
+            let own = now.material.is_some() || now.rotation_locked;
+            let surface = (own || !plain_swarm).then(|| now.surface());
+            changed.push(body(*slot, marble, marbles.mass(row), surface));
+        }
+        self.swarm.write_bodies(&self.soft_step.changed);
+        Ok(())
+    }
+
+    /// Finds the slot of each marble, and the marble of each slot.
+    fn match_slots(&mut self) {
+        let SoftStep { slot_of_marble, marble_of_slot, details, .. } = &mut self.soft_step;
+        details.clear();
+        slot_of_marble.clear();
+        slot_of_marble.resize(self.marbles.len(), NO_ROW);
+        marble_of_slot.clear();
+        for (marble, ball) in &self.swarm.invited {
+            if let (Ok(row), Some(slot)) = (self.marbles.row(*marble), self.swarm.slot_of(*ball)) {
+                slot_of_marble[row] = slot;
+                let slots = marble_of_slot.len().max(slot as usize + 1);
+                marble_of_slot.resize(slots, NO_ROW);
+                marble_of_slot[slot as usize] = row as u32;
+            }
+        }
+        self.swarm.set_bodies(slot_of_marble.iter().copied().filter(|slot| *slot != NO_ROW));
+    }
+}
+
+/// A marble as a row.
+fn body<S: Scalar>(slot: u32, marble: MarbleRow<S>, mass: S, surface: Option<Surface>) -> Body {
+    let single = |x: S| (x.as_f64() as f32).clamp(-FURTHEST, FURTHEST);
+    let row = |v: Vec3<S>, last: f32| [single(v.x), single(v.y), single(v.z), last];
+    let spin = marble.spin.map_or_else(Vec3::zero, |spin| spin * marble.radius);
+    let inverse_mass = ((S::one() / mass).as_f64() as f32).max(LEAST_INVERSE_MASS);
+    Body {
+        slot,
+        at: row(marble.position.to_vec(), single(marble.radius)),
+        velocity: row(marble.velocity, inverse_mass),
+        spin: row(spin, 0.0),
+        surface,
+    }
+}
