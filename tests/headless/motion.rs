@@ -10,7 +10,7 @@ use crate::scene::{self, STEP};
 fn velocity_with(bundle: impl Bundle) -> Vec3 {
     let mut app = scene::app();
     app.insert_resource(Gravity(Vec3::NEG_Y * 8.0));
-    app.insert_resource(Forces(vec![Force::Custom(|_, _| [12.0, 0.0, 0.0].into())]));
+    app.insert_resource(Forces(vec![ForceField::Custom(|_, _| [12.0, 0.0, 0.0].into())]));
     let marble = app.world_mut().spawn((Marble::default(), Velocity::default(), bundle)).id();
     scene::frames(&mut app, 64);
     **app.world().get::<Velocity>(marble).unwrap()
@@ -31,7 +31,7 @@ fn mass_and_gravity_scale_say_what_forces_do() {
 fn a_mass_may_change_and_go() {
     let mut app = scene::app();
     app.insert_resource(Gravity(Vec3::ZERO));
-    app.insert_resource(Forces(vec![Force::Custom(|_, _| [64.0, 0.0, 0.0].into())]));
+    app.insert_resource(Forces(vec![ForceField::Custom(|_, _| [64.0, 0.0, 0.0].into())]));
     let heavy = (Marble::default(), Velocity::default(), MarbleMass::Kilograms(4.0));
     let marble = app.world_mut().spawn(heavy).id();
     let speed = |app: &App| app.world().get::<Velocity>(marble).unwrap().x;

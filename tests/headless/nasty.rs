@@ -314,7 +314,7 @@ fn negative(x: f32) -> bool {
     !(x.is_finite() && x >= 0.0)
 }
 
-fn force(of: fn(f32) -> Force<f32>) -> Set {
+fn force(of: fn(f32) -> ForceField<f32>) -> Set {
     Box::new(move |world, x| world.resource_mut::<Forces>().0 = vec![of(x)])
 }
 
@@ -329,14 +329,14 @@ fn numbers_of_resources() -> Vec<Row> {
         ("Gravity.z", Box::new(|w, x| w.resource_mut::<Gravity>().z = x), bad),
         (
             "Drag.velocity",
-            force(|x| Force::Drag(Medium { velocity: [0.0, x, 0.0].into(), ..STILL })),
+            force(|x| ForceField::Drag(Medium { velocity: [0.0, x, 0.0].into(), ..STILL })),
             bad,
         ),
-        ("Drag.linear", force(|x| Force::Drag(Medium { linear: x, ..STILL })), negative),
-        ("Drag.quadratic", force(|x| Force::Drag(Medium { quadratic: x, ..STILL })), negative),
+        ("Drag.linear", force(|x| ForceField::Drag(Medium { linear: x, ..STILL })), negative),
+        ("Drag.quadratic", force(|x| ForceField::Drag(Medium { quadratic: x, ..STILL })), negative),
         (
             "Spring.anchor",
-            force(|x| Force::Spring {
+            force(|x| ForceField::Spring {
                 anchor: [0.0, 0.0, x].into(),
                 rest_length: 1.0,
                 stiffness: 1.0,
@@ -345,22 +345,30 @@ fn numbers_of_resources() -> Vec<Row> {
         ),
         (
             "Spring.rest_length",
-            force(|x| Force::Spring { anchor: [0.0; 3].into(), rest_length: x, stiffness: 1.0 }),
+            force(|x| ForceField::Spring {
+                anchor: [0.0; 3].into(),
+                rest_length: x,
+                stiffness: 1.0,
+            }),
             negative,
         ),
         (
             "Spring.stiffness",
-            force(|x| Force::Spring { anchor: [0.0; 3].into(), rest_length: 1.0, stiffness: x }),
+            force(|x| ForceField::Spring {
+                anchor: [0.0; 3].into(),
+                rest_length: 1.0,
+                stiffness: x,
+            }),
             negative,
         ),
         (
             "Attraction.center",
-            force(|x| Force::Attraction { center: [x, 0.0, 0.0].into(), strength: 1.0 }),
+            force(|x| ForceField::Attraction { center: [x, 0.0, 0.0].into(), strength: 1.0 }),
             bad,
         ),
         (
             "Attraction.strength",
-            force(|x| Force::Attraction { center: [0.0; 3].into(), strength: x }),
+            force(|x| ForceField::Attraction { center: [0.0; 3].into(), strength: x }),
             bad,
         ),
     ]

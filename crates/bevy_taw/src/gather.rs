@@ -39,7 +39,7 @@ pub fn settings(
         && let Err(error) = world.set_model(**model)
     {
         let capsule = match error {
-            taw::Error::BallsOnly(id) => world.marble_entities.get(&id).copied(),
+            taw::Error::UnsupportedShape(id) => world.marble_entities.get(&id).copied(),
             _ => None,
         };
         refusals.check(capsule, Err(error));

@@ -209,7 +209,7 @@ impl Gathering<'_, '_> {
         }
         state.posed = Some(seen);
         let rotation = to_rotation(now.rotation);
-        let shape = shape.moved(Pose { rotation, translation: to_vector(translation) });
+        let shape = shape.transformed(Pose { rotation, translation: to_vector(translation) });
         let put = shape.and_then(|shape| match state.id {
             Some(id) => self.world.walls.set(id, shape),
             None => self.world.walls.insert(shape).map(|id| {

@@ -104,7 +104,7 @@ pub mod prelude {
     pub use crate::swarm::{Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;
     pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
-    pub use taw::motion::{Force, Integrator, Medium, Rotation};
+    pub use taw::motion::{ForceField, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};
     pub use taw::swarm::{Ball, SwarmModel, Tier};
     pub use taw::world::{Detection, Model, Precision};

@@ -213,7 +213,7 @@ fn gap(
     let b = marble(pair.b)?;
     if let Ok(wall) = walls.get(pair.a) {
         let wall = world.walls.get(wall.id?).ok()?;
-        Some(Gap { width: wall.nearest(b.position).distance - b.radius, radius: b.radius })
+        Some(Gap { width: wall.project_point(b.position).distance - b.radius, radius: b.radius })
     } else {
         let a = marble(pair.a)?;
         let width = length(b.position - a.position) - a.radius - b.radius;

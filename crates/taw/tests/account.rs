@@ -201,7 +201,7 @@ fn drag_and_pushes_are_forces() {
         let mut world = world(response, material(0.5, 0.5), &[([0.0, 9.0, 0.0], [3.0, 0.0, 0.0])]);
         world.set_model(Model { integrator: Integrator::Rk4, ..model(response) }).unwrap();
         let medium = taw::motion::Medium { velocity: Vec3::zero(), linear: 0.5, quadratic: 0.0 };
-        world.set_forces(vec![Force::Drag(medium)]).unwrap();
+        world.set_forces(vec![ForceField::Drag(medium)]).unwrap();
         world.set_gravity(Vec3::zero()).unwrap();
         let sum = run(&mut world, 1.0, 1.0 / 240.0);
         let left = 0.5 * 9.0 * (-1.0_f64).exp();

@@ -279,12 +279,12 @@ fn what_cannot_be_a_capsule_is_refused_by_name() {
     assert!(error.starts_with("half_length must be in [0"), "{error}");
     let id = world.marbles.insert(capsule([0.0; 3], 0.0)).unwrap();
     let events = Model { response: Response::EventDriven, ..world.model() };
-    assert_eq!(world.set_model(events), Err(taw::Error::BallsOnly(id)));
+    assert_eq!(world.set_model(events), Err(taw::Error::UnsupportedShape(id)));
     world.marbles.set_half_length(id, 0.0).unwrap();
     world.set_model(events).unwrap();
     world.marbles.set_half_length(id, 1.0).unwrap();
     let before = world.clone();
-    assert_eq!(world.step(DT), Err(taw::Error::BallsOnly(id)));
+    assert_eq!(world.step(DT), Err(taw::Error::UnsupportedShape(id)));
     assert_eq!(world, before);
     world.marbles.remove(id).unwrap();
     world.step(DT).unwrap();

@@ -91,7 +91,7 @@ impl<S: Scalar> Mover<S> {
             pivot: point(0.0, height, 0.0),
         };
         self.last = (height, angle);
-        let shape = self.shape.moved(Self::pose(height, angle)).unwrap();
+        let shape = self.shape.transformed(Self::pose(height, angle)).unwrap();
         world.walls.set(self.id, shape).unwrap();
         world.walls.set_motion(self.id, Some(motion)).unwrap();
     }
@@ -99,7 +99,7 @@ impl<S: Scalar> Mover<S> {
     /// How far a marble is off the wall.
     fn gap(&self, world: &World<S>, row: usize) -> f64 {
         let shape = world.walls.get(self.id).unwrap();
-        let near = shape.nearest(world.marbles.position()[row]);
+        let near = shape.project_point(world.marbles.position()[row]);
         (near.distance - world.marbles.radius()[row]).as_f64()
     }
 }

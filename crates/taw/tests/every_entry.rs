@@ -242,7 +242,7 @@ fn scenes_are_refused_or_run<S: Scalar>() {
                 let clock = Instant::now();
                 let mut running = match scene.run::<S>(model) {
                     Ok(running) => running,
-                    Err(Error::BallsOnly(_)) => continue, // named as the marble that it is
+                    Err(Error::UnsupportedShape(_)) => continue, // named as the marble that it is
                     Err(error) => {
                         let (field, _) = named(error);
                         assert!(!field.is_empty(), "{name} = {x:?}: {error}");

@@ -197,7 +197,7 @@ impl<S: Scalar> Trial<S> {
         }
         for shape in self.world.walls.shapes() {
             if let WallShape::Solid(shape) = shape {
-                let Aabb { min, max } = taw::shape::Solid::bounding_box(shape);
+                let Aabb { min, max } = taw::shape::BoundedShape::bounding_box(shape);
                 let most = [min.x, min.y, min.z, max.x, max.y, max.z];
                 self.reaches_far |= most.into_iter().any(|x| x.abs().as_f64() > 300.0);
             }

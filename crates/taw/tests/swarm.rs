@@ -439,7 +439,7 @@ fn a_box_that_moves_is_noticed_by_balls_at_rest() {
     for tier in [Tier::Full, Tier::Lab] {
         let mut world = world(SwarmModel { sleeps: true, ..model(tier) }, None);
         let id = world.swarm.insert(&[Ball::new(Point3::new(0.0, 0.5, 0.0), 0.5)]).unwrap()[0];
-        let at = |x: f32| taw::shape::Box3 {
+        let at = |x: f32| taw::shape::Aabb3 {
             min: Point3::new(x - 1.0, 0.1, -2.0),
             max: Point3::new(x, 2.0, 2.0),
         };

@@ -4,7 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::marbles::{Marbles, Rest};
 use crate::math::{Quat, Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
-use crate::motion::{Force, Integrator, Motion, Rotation, turned};
+use crate::motion::{ForceField, Integrator, Motion, Rotation, integrate_rotation};
 use crate::response::Rod;
 
 /// What moves all marbles.
@@ -12,7 +12,7 @@ use crate::response::Rod;
 pub(super) struct Drive<'a, S> {
     pub integrator: Integrator,
     pub gravity: Vec3<S>,
-    pub forces: &'a [Force<S>],
+    pub forces: &'a [ForceField<S>],
     /// In seconds.
     pub dt: S,
 }
@@ -58,7 +58,7 @@ impl<S: Scalar> Marbles<S> {
             rows.each(|row, motion| {
                 let integrator = self.integrator.get(row).unwrap_or(drive.integrator);
                 let next = motion
-                    .after(integrator, drive.dt, |motion| drive.acceleration(self, row, motion));
+                    .step(integrator, drive.dt, |motion| drive.acceleration(self, row, motion));
                 Motion { velocity: next.velocity * self.kept(row, drive.dt), ..next }
             });
         }
@@ -96,7 +96,7 @@ impl<S: Scalar> Marbles<S> {
 
     fn exact_after(&self, row: usize, drive: Drive<S>) -> Motion<f64> {
         let integrator = self.integrator.get(row).unwrap_or(drive.integrator);
-        let next = self.exact(row).after(integrator, drive.dt.as_f64(), |at| {
+        let next = self.exact(row).step(integrator, drive.dt.as_f64(), |at| {
             let (position, velocity) = (cast_point(at.position), cast_vector(at.velocity));
             cast_vector(drive.acceleration(self, row, Motion { position, velocity }))
         });
@@ -201,13 +201,13 @@ impl<S: Scalar> Marbles<S> {
                 } else {
                     let axis = self.rotation[row] * Vec3::unit_y();
                     let spin = axis * self.spin[row].dot(axis);
-                    self.rotation[row] = turned(self.rotation[row], spin, dt);
+                    self.rotation[row] = integrate_rotation(self.rotation[row], spin, dt);
                 }
             }
             return;
         }
         for (rotation, spin) in self.rotation.iter_mut().zip(&self.spin) {
-            *rotation = turned(*rotation, *spin, dt);
+            *rotation = integrate_rotation(*rotation, *spin, dt);
         }
     }
 
@@ -219,7 +219,7 @@ impl<S: Scalar> Marbles<S> {
     fn turn_top(&mut self, row: usize, dt: S) {
         let (rotation, half) = (self.rotation[row], self.half_length(row));
         if half == S::zero() || self.spin[row].is_zero() {
-            self.rotation[row] = turned(rotation, self.spin[row], dt);
+            self.rotation[row] = integrate_rotation(rotation, self.spin[row], dt);
             return;
         }
         let exact = |rotation: Quat<S>| {
@@ -233,7 +233,7 @@ impl<S: Scalar> Marbles<S> {
         let about_axis = spin.dot(axis);
         let precession = spin + axis * (about_axis * (along / across - 1.0));
         let own = axis * (about_axis - precession.dot(axis));
-        let rotation = turned(turned(rotation, own, dt), precession, dt);
+        let rotation = integrate_rotation(integrate_rotation(rotation, own, dt), precession, dt);
         self.rotation[row] = Quat::from_sv(S::constant(rotation.s), cast_vector(rotation.v));
         // About the axis as it is kept, which rounding has tilted: so the spin along it, and
         // with it the energy of thin capsules, does not change.
@@ -245,7 +245,7 @@ impl<S: Scalar> Marbles<S> {
     /// Turns a row on by an angle, an axial vector in radians.
     pub(super) fn turn_by(&mut self, row: usize, angle: Vec3<S>) {
         if let Some(rotation) = self.rotation.get_mut(row) {
-            *rotation = turned(*rotation, angle, S::one());
+            *rotation = integrate_rotation(*rotation, angle, S::one());
         }
     }
 

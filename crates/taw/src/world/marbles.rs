@@ -69,7 +69,7 @@ impl<S: Scalar> Marble<S> {
 }
 
 /// What takes a part of a marble's speed in every second, wherever it is: `1 − e^−rate`.
-/// A convenience of games; what a medium does is [`Force::Drag`](crate::motion::Force).
+/// A convenience of games; what a medium does is [`ForceField::Drag`](crate::motion::ForceField).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Damping<S> {
     /// Of the velocity, in 1/s, at least zero.

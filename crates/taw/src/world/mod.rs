@@ -27,7 +27,7 @@ pub use energy::Energy;
 pub use limits::SpeedLimits;
 pub use marbles::{Damping, Marble, MarbleId, Marbles};
 pub use model::{Detection, Model, Precision};
-pub use query::{Found, Queries, QueryTree, Thing};
+pub use query::{ColliderId, Queries, QueryHit, QueryTree};
 pub use wall_shape::WallShape;
 pub use walls::{WallId, Walls};
 
@@ -36,7 +36,7 @@ use crate::broad::{Grid, Images, Period};
 use crate::contact::Contacts;
 use crate::error::{finite, finite_vector, positive};
 use crate::math::{Point3, Scalar, Vec3, cast_vector, length};
-use crate::motion::{Force, Rotation};
+use crate::motion::{ForceField, Rotation};
 use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Around, Settings, Start, Warm, impulse};
 use crate::response::{
@@ -62,7 +62,7 @@ use walls::Part;
 pub struct World<S> {
     model: Model,
     gravity: Vec3<S>,
-    forces: Vec<Force<S>>,
+    forces: Vec<ForceField<S>>,
     limits: SpeedLimits<S>,
     /// What moves.
     pub marbles: Marbles<S>,
@@ -215,14 +215,14 @@ impl<S: Scalar> World<S> {
     /// another one forgets the impulses that contacts remember.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for the substeps or the iterations; [`Error::BallsOnly`] for
+    /// [`Error::OutOfRange`] for the substeps or the iterations; [`Error::UnsupportedShape`] for
     /// [`Response::EventDriven`] if a marble is a capsule.
     pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
         let model = model.checked()?;
         if model.response == Response::EventDriven
             && let Some(id) = self.marbles.first_capsule()
         {
-            return Err(Error::BallsOnly(id));
+            return Err(Error::UnsupportedShape(id));
         }
         if model == self.model {
             return Ok(());
@@ -269,7 +269,7 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a length of less than 8.02 radii of the largest marble;
-    /// [`Error::NotPositive`] for one that is no length; [`Error::BallsOnly`] if a marble is a
+    /// [`Error::NotPositive`] for one that is no length; [`Error::UnsupportedShape`] if a marble is a
     /// capsule. Steps refuse marbles that came later in the same way.
     pub fn set_period(&mut self, lengths: [Option<S>; 3]) -> Result<(), Error> {
         for (length, field) in lengths.iter().zip(["period.x", "period.y", "period.z"]) {
@@ -293,7 +293,7 @@ impl<S: Scalar> World<S> {
 
     /// The force fields that act on every marble besides gravity.
     #[must_use]
-    pub fn forces(&self) -> &[Force<S>] {
+    pub fn forces(&self) -> &[ForceField<S>] {
         &self.forces
     }
 
@@ -301,8 +301,8 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a number of one of them.
-    pub fn set_forces(&mut self, forces: Vec<Force<S>>) -> Result<(), Error> {
-        self.forces = forces.into_iter().map(Force::checked).collect::<Result<_, _>>()?;
+    pub fn set_forces(&mut self, forces: Vec<ForceField<S>>) -> Result<(), Error> {
+        self.forces = forces.into_iter().map(ForceField::checked).collect::<Result<_, _>>()?;
         Ok(())
     }
 
@@ -328,7 +328,7 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not
-    /// in [`World::TIMES`]; [`Error::BallsOnly`] for a capsule in a world that is event-driven
+    /// in [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven
     /// or periodic; [`Error::OutOfRange`] for a marble too large for its [period](Self::set_period).
     /// Then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
@@ -441,7 +441,7 @@ impl<S: Scalar> World<S> {
         let around = Around {
             walls: &self.walls,
             material: |row| material.get(row).unwrap_or_default(),
-            follow: |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
+            follow: |row| integrator.get(row).unwrap_or(self.model.integrator).position_weight(),
             start: Start {
                 position: &[],
                 velocity: &self.velocity_before,
@@ -489,7 +489,9 @@ impl<S: Scalar> World<S> {
                     law,
                     dt,
                     material: |row| material.get(row).unwrap_or_default(),
-                    follow: |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
+                    follow: |row| {
+                        integrator.get(row).unwrap_or(self.model.integrator).position_weight()
+                    },
                 },
                 &mut columns,
                 &mut self.contacts,
@@ -518,7 +520,7 @@ impl<S: Scalar> World<S> {
         for contact in self.contacts.wm.iter().rev() {
             let part = Part { wall: contact.a, part: contact.part };
             let row = contact.b as usize;
-            let normal = self.walls.nearest(part, self.marbles.position()[row]).normal;
+            let normal = self.walls.project_point(part, self.marbles.position()[row]).normal;
             if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Rolling {
                 self.marbles.roll(row, normal);
             }

@@ -81,7 +81,9 @@ impl<S: Scalar> World<S> {
     pub(crate) fn takes_all_marbles(&self) -> Result<(), Error> {
         self.takes_marbles_in(self.marbles.period)?;
         match self.marbles.first_capsule() {
-            Some(id) if self.model.response == Response::EventDriven => Err(Error::BallsOnly(id)),
+            Some(id) if self.model.response == Response::EventDriven => {
+                Err(Error::UnsupportedShape(id))
+            }
             _ => Ok(()),
         }
     }
@@ -92,7 +94,7 @@ impl<S: Scalar> World<S> {
             return Ok(());
         }
         if let Some(id) = self.marbles.first_capsule() {
-            return Err(Error::BallsOnly(id));
+            return Err(Error::UnsupportedShape(id));
         }
         period.check_radii(self.marbles.radius())
     }

@@ -9,7 +9,7 @@ use super::walls::{Part, Walls};
 use crate::Error;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::response::Material;
-use crate::shape::{Aabb, Solid, Sphere};
+use crate::shape::{Aabb, BoundedShape, Sphere};
 use crate::swarm::{BallId, Guest, Stage, Surroundings};
 
 impl<S: Scalar> World<S> {
@@ -160,7 +160,7 @@ impl<S: Scalar> Surroundings for Walls<S> {
         });
         let (part, time) = first?;
         // The plane there is nearer by the way up to it.
-        let nearest = self.nearest(part, center + way * time);
+        let nearest = self.project_point(part, center + way * time);
         let distance = nearest.distance - way.dot(nearest.normal) * time;
         let normal: Vec3<f32> = cast_vector(nearest.normal);
         Some(([part.wall, part.part], normal, distance.as_f64() as f32))

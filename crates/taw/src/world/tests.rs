@@ -95,7 +95,7 @@ fn a_bad_step_changes_nothing() {
 fn a_bad_force_is_refused_and_changes_nothing() {
     let mut world = floor::<f32>();
     let anchor = Point3::new(0.0, 0.0, 0.0);
-    let spring = |stiffness| Force::Spring { anchor, rest_length: 0.0, stiffness };
+    let spring = |stiffness| ForceField::Spring { anchor, rest_length: 0.0, stiffness };
     world.set_forces(vec![spring(1.0)]).unwrap();
     let error = world.set_forces(vec![spring(2.0), spring(-1.0)]).unwrap_err();
     assert!(error.to_string().starts_with("stiffness"), "{error}");
@@ -106,7 +106,7 @@ fn a_bad_force_is_refused_and_changes_nothing() {
 fn mass_and_gravity_scale_say_what_forces_do() {
     let mut world = World::<f64>::default();
     world.set_gravity(Vec3::new(0.0, -8.0, 0.0)).unwrap();
-    world.set_forces(vec![Force::Custom(|_, _| Vec3::new(12.0, 0.0, 0.0))]).unwrap();
+    world.set_forces(vec![ForceField::Custom(|_, _| Vec3::new(12.0, 0.0, 0.0))]).unwrap();
     let fallen = |marble: Marble<f64>| {
         let mut world = world.clone();
         let id = world.marbles.insert(marble).unwrap();

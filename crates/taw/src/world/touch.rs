@@ -10,7 +10,7 @@ use super::{WallShape, World};
 use crate::contact::{Contact, mtv_sphere_plane, mtv_sphere_sphere};
 use crate::math::{Scalar, Vec3, direction_and_length, length};
 use crate::response::Response;
-use crate::shape::{Aabb, Nearest, Plane, Shape, Solid, Sphere};
+use crate::shape::{Aabb, BoundedShape, Plane, PointProjection, Shape, Sphere};
 
 /// A point that lies this part of a radius outside of another wall is still on it: so much
 /// would turn a normal by less than 1e-5 rad, and no more are walls apart or askew that were
@@ -21,7 +21,7 @@ const FLUSH: f64 = 5e-6;
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Near<S> {
     pub part: Part,
-    pub nearest: Nearest<S>,
+    pub nearest: PointProjection<S>,
 }
 
 impl<S: Scalar> World<S> {
@@ -113,7 +113,7 @@ impl<S: Scalar> World<S> {
         let Aabb { min, max } = capsule.bounding_box();
         let (center, axis) = (self.marbles.sphere(b).center, self.marbles.axis(b));
         self.walls.near(&Aabb { min: min - more, max: max + more }, |part| {
-            let Some(touch) = self.walls.closest(part, capsule) else { return };
+            let Some(touch) = self.walls.closest_points(part, capsule) else { return };
             let along = (touch.on_b - center).dot(axis);
             let inside = along.abs() < half * S::constant(0.999);
             let new = |other: &S| (along - *other).abs() > capsule.radius * S::constant(0.01);
@@ -133,7 +133,7 @@ impl<S: Scalar> World<S> {
         let near = || {
             let Sphere { center, radius } = self.bead(b, along)?;
             let wall = self.walls.shapes().get(a as usize)?;
-            let Nearest { normal, distance, .. } = wall.nearest_of(part, center);
+            let PointProjection { normal, distance, .. } = wall.project_point_on(part, center);
             (distance - radius <= radius * S::constant(FLUSH)).then_some(normal)
         };
         direction_and_length(mtv).map(|(normal, _)| normal).or_else(near)
@@ -283,7 +283,7 @@ pub(super) fn parts_near<S: Scalar>(
     let more = Vec3::new(far, far, far);
     let bounds = Aabb { min: sphere.center - more, max: sphere.center + more };
     walls.near(&bounds, |part| {
-        let nearest = walls.nearest(part, sphere.center);
+        let nearest = walls.project_point(part, sphere.center);
         if nearest.distance <= far {
             near.push(Near { part, nearest });
         }
@@ -320,7 +320,7 @@ pub(super) fn drop_seams<S: Scalar>(walls: &Walls<S>, sphere: &Sphere<S>, near: 
     let rounding = S::epsilon() * S::constant(4.0) * largest;
     let flush = (sphere.radius * S::constant(FLUSH)).max(rounding);
     let on = |point: &Near<S>, other: &Near<S>| {
-        walls.nearest(other.part, point.nearest.point).distance <= flush
+        walls.project_point(other.part, point.nearest.point).distance <= flush
     };
     let before =
         |x: &Near<S>, y: &Near<S>| (x.nearest.distance, x.part) < (y.nearest.distance, y.part);

@@ -3,14 +3,14 @@ use std::sync::Arc;
 use cgmath::{EuclideanSpace, InnerSpace};
 
 use crate::Error;
-use crate::contact::{Closest, closest, parts_of};
+use crate::contact::{ClosestPoints, closest_points, sub_shapes};
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
 use crate::response::event::Form;
 use crate::shape::{
-    Box3, Capsule, Compound, HeightField, Hull, Mesh, Nearest, Obb, Plane, Shape, Solid, Sphere,
-    Surface, Triangle,
+    Aabb3, BoundedShape, Capsule, Compound, HeightField, Hull, Mesh, Obb, Plane, PointProjection,
+    Shape, Sphere, Surface, Triangle,
 };
 
 /// Shape of a wall.
@@ -46,7 +46,7 @@ impl<S: Scalar> WallShape<S> {
     }
 
     /// The boxes around it: of a compound one for each part, of a plane none.
-    pub(super) fn boxes(&self, mut name: impl FnMut(u32, Box3<S>)) {
+    pub(super) fn boxes(&self, mut name: impl FnMut(u32, Aabb3<S>)) {
         match self {
             Self::Plane(_) => {}
             Self::Solid(Shape::Compound(compound)) => {
@@ -55,22 +55,24 @@ impl<S: Scalar> WallShape<S> {
                 }
             }
             Self::Solid(shape) => name(0, shape.bounding_box()),
-            Self::Mesh(mesh, pose) => name(0, moved(&mesh.bounds(), *pose)),
-            Self::HeightField(field, pose) => name(0, moved(&ground(field), *pose)),
+            Self::Mesh(mesh, pose) => name(0, transformed_box(&mesh.bounds(), *pose)),
+            Self::HeightField(field, pose) => name(0, transformed_box(&ground(field), *pose)),
         }
     }
 
     /// Names the parts near a box, of which one of its own boxes is.
-    pub(super) fn near(&self, part: u32, bounds: &Box3<S>, name: impl FnMut(u32)) {
+    pub(super) fn near(&self, part: u32, bounds: &Aabb3<S>, name: impl FnMut(u32)) {
         let mut name = name;
         match self {
             Self::Plane(_) | Self::Solid(_) => name(part),
-            Self::Mesh(mesh, pose) => mesh.near(&moved(bounds, pose.inverse()), name),
+            Self::Mesh(mesh, pose) => {
+                mesh.for_each_in_box(&transformed_box(bounds, pose.inverse()), name)
+            }
             Self::HeightField(field, pose) => {
                 // A ball below the surface touches the triangles above it.
-                let mut bounds = moved(bounds, pose.inverse());
+                let mut bounds = transformed_box(bounds, pose.inverse());
                 bounds.max.y = bounds.max.y.max(field.bounds().max.y);
-                field.near(&bounds, name);
+                field.for_each_in_box(&bounds, name);
             }
         }
     }
@@ -84,12 +86,14 @@ impl<S: Scalar> WallShape<S> {
         };
         match self {
             Self::Plane(_) | Self::Solid(_) => name(part),
-            Self::Mesh(mesh, pose) => mesh.around(pose.point_back(point), reach, &mut each),
+            Self::Mesh(mesh, pose) => {
+                mesh.for_each_near(pose.inverse_transform_point(point), reach, &mut each)
+            }
             Self::HeightField(field, pose) => {
                 // A point below the surface is at most this far from it.
-                let local = pose.point_back(point);
-                let far = field.height_over(local).map_or(reach, |height| reach.max(height));
-                field.around(local, far, |part| {
+                let local = pose.inverse_transform_point(point);
+                let far = field.signed_height(local).map_or(reach, |height| reach.max(height));
+                field.for_each_near(local, far, |part| {
                     each(part);
                     far
                 });
@@ -114,14 +118,14 @@ impl<S: Scalar> WallShape<S> {
     /// # Errors
     /// [`Error::NotFinite`] for a place that a half-space cannot have. Others are refused
     /// when they become a wall.
-    pub fn moved(&self, pose: Pose<S>) -> Result<Self, Error> {
+    pub fn transformed(&self, pose: Pose<S>) -> Result<Self, Error> {
         Ok(match self {
             Self::Plane(plane) => {
-                let normal = pose.vector(plane.normal()).normalize();
-                let on = pose.point(Point3::from_vec(plane.normal() * plane.offset()));
+                let normal = pose.transform_vector(plane.normal()).normalize();
+                let on = pose.transform_point(Point3::from_vec(plane.normal() * plane.offset()));
                 Self::Plane(Plane::through(on, normal)?)
             }
-            Self::Solid(shape) => Self::Solid(shape.moved(pose)),
+            Self::Solid(shape) => Self::Solid(shape.transformed(pose)),
             Self::Mesh(mesh, before) => Self::Mesh(Arc::clone(mesh), pose * *before),
             Self::HeightField(field, before) => {
                 Self::HeightField(Arc::clone(field), pose * *before)
@@ -131,11 +135,11 @@ impl<S: Scalar> WallShape<S> {
 
     /// Where its surface is nearest to a point.
     #[must_use]
-    pub fn nearest(&self, point: Point3<S>) -> Nearest<S> {
+    pub fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
         let on = |surface: &dyn Fn(&mut dyn FnMut(u32) -> S)| {
             let mut best = nowhere(point);
             surface(&mut |part| {
-                let next = self.nearest_of(part, point);
+                let next = self.project_point_on(part, point);
                 if next.distance.abs() < best.distance.abs() {
                     best = next;
                 }
@@ -144,50 +148,54 @@ impl<S: Scalar> WallShape<S> {
             best
         };
         match self {
-            Self::Plane(_) => self.nearest_of(0, point),
-            Self::Solid(shape) => shape.nearest(point),
-            Self::Mesh(mesh, pose) => {
-                on(&|name| mesh.around(pose.point_back(point), S::infinity(), name))
-            }
-            Self::HeightField(field, pose) => {
-                on(&|name| field.around(pose.point_back(point), S::infinity(), name))
-            }
+            Self::Plane(_) => self.project_point_on(0, point),
+            Self::Solid(shape) => shape.project_point(point),
+            Self::Mesh(mesh, pose) => on(&|name| {
+                mesh.for_each_near(pose.inverse_transform_point(point), S::infinity(), name)
+            }),
+            Self::HeightField(field, pose) => on(&|name| {
+                field.for_each_near(pose.inverse_transform_point(point), S::infinity(), name)
+            }),
         }
     }
 
     /// Where a part of it is nearest to a point.
-    pub(super) fn nearest_of(&self, part: u32, point: Point3<S>) -> Nearest<S> {
+    pub(super) fn project_point_on(&self, part: u32, point: Point3<S>) -> PointProjection<S> {
         match self {
             Self::Plane(plane) => {
                 let (normal, distance) = (plane.normal(), plane.signed_distance(point));
-                Nearest { point: point - normal * distance, normal, distance }
+                PointProjection { point: point - normal * distance, normal, distance }
             }
             Self::Solid(_) => match self.part(part) {
-                Some(shape) => shape.nearest(point),
+                Some(shape) => shape.project_point(point),
                 None => nowhere(point),
             },
             Self::Mesh(mesh, pose) => placed(*pose, point, |point| {
-                mesh.triangle(part).map(|triangle| triangle.nearest(point))
+                mesh.triangle(part).map(|triangle| triangle.project_point(point))
             }),
             Self::HeightField(field, pose) => placed(*pose, point, |point| {
-                let near = field.triangle(part)?.nearest(point);
-                let below = field.height_over(point).is_some_and(|height| height > S::zero());
-                Some(if below { near.inside_out() } else { near })
+                let near = field.triangle(part)?.project_point(point);
+                let below = field.signed_height(point).is_some_and(|height| height > S::zero());
+                Some(if below { near.flipped() } else { near })
             }),
         }
     }
 
     /// Where a part is nearest to a capsule, unless it is a half-space.
-    pub(super) fn closest(&self, part: u32, capsule: &Capsule<S>) -> Option<Closest<S>> {
+    pub(super) fn closest_points(
+        &self,
+        part: u32,
+        capsule: &Capsule<S>,
+    ) -> Option<ClosestPoints<S>> {
         let triangle = |triangle: Triangle<S>, pose: &Pose<S>| {
-            let corners = triangle.corners.map(|corner| pose.point(corner));
-            closest(&Triangle { corners }, capsule)
+            let corners = triangle.corners.map(|corner| pose.transform_point(corner));
+            closest_points(&Triangle { corners }, capsule)
         };
         match self {
             Self::Plane(_) => None,
             Self::Solid(_) => {
-                let parts = parts_of(self.part(part)?).into_iter();
-                parts.map(|part| closest(part, capsule)).next()
+                let parts = sub_shapes(self.part(part)?).into_iter();
+                parts.map(|part| closest_points(part, capsule)).next()
             }
             Self::Mesh(mesh, pose) => mesh.triangle(part).map(|it| triangle(it, pose)),
             Self::HeightField(field, pose) => field.triangle(part).map(|it| triangle(it, pose)),
@@ -198,7 +206,9 @@ impl<S: Scalar> WallShape<S> {
     pub(super) fn exact(&self, part: u32) -> Option<Form> {
         let triangle = |triangle: Option<Triangle<S>>, pose: &Pose<S>| {
             let corners = triangle?.corners;
-            Some(Triangle { corners: corners.map(|corner| cast_point(pose.point(corner))) })
+            Some(Triangle {
+                corners: corners.map(|corner| cast_point(pose.transform_point(corner))),
+            })
         };
         match self {
             Self::Plane(plane) => {
@@ -208,7 +218,7 @@ impl<S: Scalar> WallShape<S> {
                 let (normal, offset) = (normal / length, plane.offset().as_f64() / length);
                 Some(Form::Plane { normal, offset })
             }
-            Self::Solid(_) => self.part(part).map(|shape| Form::Solid(shape.in_scalar())),
+            Self::Solid(_) => self.part(part).map(|shape| Form::Solid(shape.cast())),
             Self::Mesh(mesh, pose) => triangle(mesh.triangle(part), pose).map(Form::Triangle),
             Self::HeightField(field, pose) => {
                 triangle(field.triangle(part), pose).map(Form::SolidBelow)
@@ -227,45 +237,45 @@ impl<S: Scalar> WallShape<S> {
 }
 
 /// Nothing, if a surface in this box, moved, is still finite.
-fn room_for<S: Scalar>(bounds: &Box3<S>, pose: Pose<S>) -> Result<(), Error> {
+fn room_for<S: Scalar>(bounds: &Aabb3<S>, pose: Pose<S>) -> Result<(), Error> {
     finite_vector(["size.x", "size.y", "size.z"], bounds.max - bounds.min)?;
-    let Box3 { min, max } = moved(bounds, pose);
+    let Aabb3 { min, max } = transformed_box(bounds, pose);
     finite_point(["shape.x", "shape.y", "shape.z"], min)?;
     finite_point(["shape.x", "shape.y", "shape.z"], max).map(|_| ())
 }
 
 /// Bounding box of a height field and of the solid below it, as deep as the field's diagonal, in
 /// metres.
-fn ground<S: Scalar>(field: &HeightField<S>) -> Box3<S> {
+fn ground<S: Scalar>(field: &HeightField<S>) -> Aabb3<S> {
     let mut bounds = field.bounds();
     bounds.min.y -= length(bounds.max - bounds.min);
     bounds
 }
 
 /// The box around a box that was moved.
-fn moved<S: Scalar>(bounds: &Box3<S>, pose: Pose<S>) -> Box3<S> {
-    if pose == Pose::identity() { *bounds } else { bounds.obb().moved(pose).bounding_box() }
+fn transformed_box<S: Scalar>(bounds: &Aabb3<S>, pose: Pose<S>) -> Aabb3<S> {
+    if pose == Pose::identity() { *bounds } else { bounds.obb().transformed(pose).bounding_box() }
 }
 
 /// Result for a missing part: infinitely far away.
-fn nowhere<S: Scalar>(point: Point3<S>) -> Nearest<S> {
-    Nearest { point, normal: Vec3::unit_y(), distance: S::infinity() }
+fn nowhere<S: Scalar>(point: Point3<S>) -> PointProjection<S> {
+    PointProjection { point, normal: Vec3::unit_y(), distance: S::infinity() }
 }
 
 /// The answer of a surface that was moved.
 fn placed<S: Scalar>(
     pose: Pose<S>,
     point: Point3<S>,
-    nearest: impl FnOnce(Point3<S>) -> Option<Nearest<S>>,
-) -> Nearest<S> {
+    nearest: impl FnOnce(Point3<S>) -> Option<PointProjection<S>>,
+) -> PointProjection<S> {
     if pose == Pose::identity() {
         return nearest(point).unwrap_or_else(|| nowhere(point));
     }
-    nearest(pose.point_back(point)).map_or_else(
+    nearest(pose.inverse_transform_point(point)).map_or_else(
         || nowhere(point),
-        |near| Nearest {
-            point: pose.point(near.point),
-            normal: pose.vector(near.normal).normalize(),
+        |near| PointProjection {
+            point: pose.transform_point(near.point),
+            normal: pose.transform_vector(near.normal).normalize(),
             ..near
         },
     )
@@ -289,8 +299,8 @@ impl<S> From<Sphere<S>> for WallShape<S> {
     }
 }
 
-impl<S> From<Box3<S>> for WallShape<S> {
-    fn from(aabb: Box3<S>) -> Self {
+impl<S> From<Aabb3<S>> for WallShape<S> {
+    fn from(aabb: Aabb3<S>) -> Self {
         Self::Solid(Shape::Aabb(aabb))
     }
 }

@@ -4,12 +4,12 @@ use super::handles::{Handle, Handles};
 use super::optional::Optional;
 use super::wall_shape::WallShape;
 use crate::Error;
-use crate::contact::Closest;
+use crate::contact::ClosestPoints;
 use crate::error::{finite_point, finite_vector};
 use crate::math::{Point3, Scalar, Vec3, is_finite_point};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};
-use crate::shape::{Box3, BoxTree, Capsule, Nearest, Plane};
+use crate::shape::{Aabb3, Bvh, Capsule, Plane, PointProjection};
 
 /// Names a wall for as long as it is in the world.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -38,9 +38,9 @@ pub struct Walls<S> {
     /// Where those end that are on their way through a step, and how they then move, by row.
     ends: Vec<(usize, WallShape<S>, WallMotion<S>)>,
     /// The boxes of those that are no half-spaces, and what is in them.
-    boxes: Vec<Box3<S>>,
+    boxes: Vec<Aabb3<S>>,
     parts: Vec<Part>,
-    tree: BoxTree<S>,
+    tree: Bvh<S>,
     stale: Stale,
     /// How often a wall came, went, or changed.
     version: u64,
@@ -67,7 +67,7 @@ impl<S> Default for Walls<S> {
             ends: Vec::new(),
             boxes: Vec::new(),
             parts: Vec::new(),
-            tree: BoxTree::default(),
+            tree: Bvh::default(),
             stale: Stale::Nothing,
             version: 0,
         }
@@ -191,7 +191,7 @@ impl<S: Scalar> Walls<S> {
         if self.stale == Stale::Places {
             self.tree.refit(&self.boxes);
         } else {
-            self.tree = BoxTree::new(&self.boxes);
+            self.tree = Bvh::new(&self.boxes);
         }
         self.stale = Stale::Nothing;
     }
@@ -203,8 +203,8 @@ impl<S: Scalar> Walls<S> {
 
     /// Names the parts of walls, but for half-spaces, that may have a point in common with a
     /// box.
-    pub(super) fn near(&self, bounds: &Box3<S>, mut name: impl FnMut(Part)) {
-        self.tree.near(bounds, |item| {
+    pub(super) fn near(&self, bounds: &Aabb3<S>, mut name: impl FnMut(Part)) {
+        self.tree.for_each_in_box(bounds, |item| {
             let Part { wall, part } = self.parts[item as usize];
             self.shapes[wall as usize].near(part, bounds, |part| name(Part { wall, part }));
         });
@@ -213,7 +213,7 @@ impl<S: Scalar> Walls<S> {
     /// Names the parts of walls, but for half-spaces, that may be within `reach` metres of a
     /// point.
     pub(super) fn around(&self, point: Point3<S>, reach: S, mut name: impl FnMut(Part)) {
-        self.tree.around(point, reach, |item| {
+        self.tree.for_each_near(point, reach, |item| {
             let Part { wall, part } = self.parts[item as usize];
             self.shapes[wall as usize].around(part, point, reach, |part| name(Part { wall, part }));
             reach
@@ -221,17 +221,21 @@ impl<S: Scalar> Walls<S> {
     }
 
     /// Where a part is nearest to a point.
-    pub(super) fn nearest(&self, Part { wall, part }: Part, point: Point3<S>) -> Nearest<S> {
-        self.shapes[wall as usize].nearest_of(part, point)
+    pub(super) fn project_point(
+        &self,
+        Part { wall, part }: Part,
+        point: Point3<S>,
+    ) -> PointProjection<S> {
+        self.shapes[wall as usize].project_point_on(part, point)
     }
 
     /// Where a part is nearest to a capsule, unless it is a half-space.
-    pub(super) fn closest(
+    pub(super) fn closest_points(
         &self,
         Part { wall, part }: Part,
         capsule: &Capsule<S>,
-    ) -> Option<Closest<S>> {
-        self.shapes[wall as usize].closest(part, capsule)
+    ) -> Option<ClosestPoints<S>> {
+        self.shapes[wall as usize].closest_points(part, capsule)
     }
 
     /// All half-spaces, with their rows.
@@ -329,7 +333,8 @@ impl<S: Scalar> Walls<S> {
         }
         for (row, end, motion) in &self.ends {
             // A place that it cannot have is none that it comes by.
-            let on_its_way = || end.moved(motion.undone(left)).and_then(WallShape::checked).ok();
+            let on_its_way =
+                || end.transformed(motion.pose_before(left)).and_then(WallShape::checked).ok();
             let shape = if left > S::zero() { on_its_way() } else { None };
             self.shapes[*row] = shape.unwrap_or_else(|| end.clone());
             let pivot = Some(motion.pivot - motion.velocity * left).filter(|p| is_finite_point(*p));
@@ -378,7 +383,8 @@ impl<S: Scalar> Walls<S> {
 
 impl<S: Scalar> response::Walls<S> for Walls<S> {
     fn normal_and_distance(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S) {
-        let Nearest { normal, distance, .. } = self.shapes[wall].nearest_of(part, point);
+        let PointProjection { normal, distance, .. } =
+            self.shapes[wall].project_point_on(part, point);
         (normal, distance)
     }
 

@@ -183,7 +183,7 @@ fn beside_walls<S: Scalar>(mut body: Body, world: &World<S>) -> Body {
     }
     for (row, shape) in world.walls.shapes().iter().enumerate() {
         for ball in body.balls() {
-            let distance = shape.nearest(point(ball)).distance.as_f64();
+            let distance = shape.project_point(point(ball)).distance.as_f64();
             body.wall_gap = body.wall_gap.min(distance - body.radius);
         }
         let motion = world.walls.id(row).and_then(|id| world.walls.motion(id).ok().flatten());

@@ -232,7 +232,7 @@ fn difference<S: Scalar>(
         _ => Point3::origin(),
     };
     let single = |pose: Pose<f64>| {
-        let place = pose.point(middle);
+        let place = pose.transform_point(middle);
         let place = Point3::new(place.x as f32, place.y as f32, place.z as f32);
         let turn = pose.rotation;
         let [x, y, z] = [turn.v.x, turn.v.y, turn.v.z].map(|x| x as f32);

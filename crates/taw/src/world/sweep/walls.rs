@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use super::{By, FAST, INTO, MOST_BENDS, Stopped, outer};
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
 use crate::response::Walls as _;
-use crate::shape::{Aabb, Nearest, Sphere};
+use crate::shape::{Aabb, PointProjection, Sphere};
 use crate::world::World;
 use crate::world::walls::{Part, Walls};
 
@@ -79,7 +79,7 @@ impl<S: Scalar> World<S> {
             let there = sphere.center + along * way;
             let slides_off = || {
                 let wall = &self.walls.shapes()[wall as usize];
-                wall.nearest(there).distance > sphere.radius
+                wall.project_point(there).distance > sphere.radius
             };
             let fast = -way.dot(normal) > slow * left;
             if surfaces.len() == MOST_BENDS as usize || (fast && slides_off()) {
@@ -174,8 +174,8 @@ impl<S: Scalar> Walls<S> {
         let mut time = S::zero();
         let mut last = None;
         for _ in 0..MOST_STEPS {
-            let Nearest { normal, distance, .. } =
-                self.nearest(part, sphere.center + motion * time);
+            let PointProjection { normal, distance, .. } =
+                self.project_point(part, sphere.center + motion * time);
             let (gap, closing) = (distance - sphere.radius, -motion.dot(normal));
             if closing.is_nan() || closing <= S::zero() {
                 return None;

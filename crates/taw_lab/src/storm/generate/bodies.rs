@@ -194,7 +194,7 @@ fn distances(case: &Case) -> impl Fn([f64; 3]) -> f64 + use<> {
     let shapes = running.map(|running| running.world.walls.shapes().to_vec()).unwrap_or_default();
     move |at| {
         let point = Point3::from(at);
-        let far = shapes.iter().map(|shape| shape.nearest(point).distance);
+        let far = shapes.iter().map(|shape| shape.project_point(point).distance);
         far.fold(f64::INFINITY, f64::min)
     }
 }
