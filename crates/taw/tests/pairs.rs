@@ -209,7 +209,7 @@ fn millions_of_pairs_know_their_distance_and_their_way_out() {
     println!("{CASES} cases of up to 36 pairs in each scalar, 1,000 directions each");
 }
 
-/// QueryHit by the test above: a capsule over the edge of a face that is nearly across its way, so
+/// Found by the test above: a capsule over the edge of a face that is nearly across its way, so
 /// that what is over the face is not the deepest.
 #[test]
 fn the_deepest_point_may_lie_beyond_the_edge_of_a_face() {

@@ -330,7 +330,7 @@ fn walls<S: Scalar>() -> Vec<Row<S>> {
         World 6 "Pose.translation": |p, x| {
             with_pose(p, pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x)))
         };
-        World 1 "WallShape::moved": |p, x| {
+        World 1 "WallShape::transformed": |p, x| {
             let pose = pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x));
             let moved = p.world.walls.get(p.wall)?.transformed(pose)?;
             p.world.walls.set(p.wall, moved)
