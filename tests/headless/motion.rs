@@ -295,7 +295,8 @@ fn energy_is_measured_only_when_asked() {
 fn where_the_energy_goes_is_told_only_when_asked() {
     use bevy::diagnostic::{DiagnosticPath, DiagnosticsStore};
     use bevy_taw::diagnostics::{
-        COLLISIONS, DEEPEST, FRICTION_LOSS, RESTITUTION_LOSS, SOLVER_LOSS, enable_accuracy,
+        COLLISIONS, FRICTION_LOSS, MAX_PENETRATION, RESTITUTION_LOSS, SOLVER_LOSS,
+        enable_energy_audit,
     };
     let mut app = scene::app();
     app.insert_resource(TawModel(Model { response: Response::EventDriven, ..default() }));
@@ -312,10 +313,10 @@ fn where_the_energy_goes_is_told_only_when_asked() {
         store.get(path).unwrap().values().sum::<f64>()
     };
     let enable = |app: &mut App, on| {
-        enable_accuracy(&mut app.world_mut().resource_mut::<DiagnosticsStore>(), on);
+        enable_energy_audit(&mut app.world_mut().resource_mut::<DiagnosticsStore>(), on);
     };
     scene::frames(&mut app, 4);
-    assert_eq!(app.world().resource::<TawWorld>().account(), None);
+    assert_eq!(app.world().resource::<TawWorld>().energy_audit(), None);
     assert_eq!(sum(&app, &COLLISIONS), 0.0);
     enable(&mut app, true);
     scene::frames(&mut app, 36);
@@ -323,11 +324,11 @@ fn where_the_energy_goes_is_told_only_when_asked() {
     let restitution = sum(&app, &RESTITUTION_LOSS);
     assert!((restitution - taken).abs() < 1e-4, "{restitution} is not {taken}");
     assert!(sum(&app, &SOLVER_LOSS).abs() < 1e-4, "{}", sum(&app, &SOLVER_LOSS));
-    assert_eq!((sum(&app, &FRICTION_LOSS), sum(&app, &DEEPEST)), (0.0, 0.0));
+    assert_eq!((sum(&app, &FRICTION_LOSS), sum(&app, &MAX_PENETRATION)), (0.0, 0.0));
     assert_eq!(sum(&app, &COLLISIONS), 1.0);
     enable(&mut app, false);
     scene::frames(&mut app, 4);
-    assert_eq!(app.world().resource::<TawWorld>().account(), None);
+    assert_eq!(app.world().resource::<TawWorld>().energy_audit(), None);
 }
 
 #[test]

@@ -115,7 +115,7 @@ pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
     };
     for contact in &world.contacts.wm {
         if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
-            let normal = world.normal_of_wall_touch(contact);
+            let normal = world.wall_contact_normal(contact);
             let touch =
                 normal.map(|normal| started(ContactPair { a, b }, normal, velocity(contact.b)));
             touches.now.extend(touch);
@@ -125,7 +125,7 @@ pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
         if let (Some(a), Some(b)) = (world.marble_entity(contact.a), world.marble_entity(contact.b))
         {
             let closing = velocity(contact.b) - velocity(contact.a);
-            let normal = world.normal_of_marble_touch(contact);
+            let normal = world.marble_contact_normal(contact);
             let mut touch = normal.map(|normal| started(ContactPair { a, b }, normal, closing));
             if b < a {
                 // Rows move about; the order of entities does not.

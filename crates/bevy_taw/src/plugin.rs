@@ -120,7 +120,7 @@ impl Plugin for TawPlugin {
             FixedUpdate,
             (
                 (
-                    diagnostics::keep_account,
+                    diagnostics::update_energy_audit,
                     gather::settings,
                     gather_walls::walls,
                     gather::marbles,

@@ -148,7 +148,7 @@ fn compensated_precision_moves_where_plain_precision_stands() {
             };
             let id = world.marbles.insert(ball).unwrap();
             (0..1000).for_each(|_| world.step(1.0 / 1024.0).unwrap());
-            world.marbles.get_exact(id).unwrap().position.x - 1e6
+            world.marbles.get_high_precision(id).unwrap().position.x - 1e6
         };
         assert_eq!(way(Precision::Plain), 0.0, "{response:?}");
         assert!((way(Precision::Compensated) - 1000.0 / 1024.0).abs() < 1e-9, "{response:?}");

@@ -68,7 +68,7 @@ impl Scene {
         for ball in self.balls() {
             world.marbles.insert(ball.marble(self.surface)?)?;
         }
-        world.takes_all_marbles()?;
+        world.check_shapes()?;
         Ok(Running { world, scene: self.clone(), moving, time: 0.0 })
     }
 
@@ -114,7 +114,7 @@ impl<S: Scalar> Running<S> {
     /// # Errors
     /// As [`World::step`]; then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
-        self.world.substep_of(dt)?;
+        self.world.validated_substep(dt)?;
         self.move_walls(dt)?;
         self.world.step(dt)
     }
@@ -126,7 +126,7 @@ impl<S: Scalar> Running<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
     /// [`Error::NoSuchWall`] if a kinematic wall was removed; then nothing has changed.
     pub fn move_walls(&mut self, dt: S) -> Result<(), Error> {
-        let seconds = World::checked_dt(dt)?.as_f64();
+        let seconds = World::validated_dt(dt)?.as_f64();
         self.moving.iter().try_for_each(|(id, ..)| self.world.walls.row(*id).map(|_| ()))?;
         if !self.scene.tilts.is_empty() {
             let gravity = self.scene.gravity_at(self.time + 0.5 * seconds);

@@ -1,29 +1,29 @@
 //! The state as columns, the choice of methods, and the step.
 
-mod account;
-mod apply;
-mod crowd;
+mod contact_limit;
+mod continuous;
 mod energy;
-mod event;
+mod energy_audit;
+mod event_driven;
+mod external_forces;
 mod handles;
 mod integrate;
 mod limits;
 mod marbles;
 mod model;
-mod optional;
+mod narrow_phase;
 mod quarantine;
 mod query;
+mod sparse_column;
 mod swarm;
-mod sweep;
 #[cfg(test)]
 mod tests;
-mod touch;
 mod wall_shape;
 mod walls;
 
 pub use crate::motion::{Mass, WallMotion};
-pub use account::Account;
 pub use energy::Energy;
+pub use energy_audit::EnergyAudit;
 pub use limits::SpeedLimits;
 pub use marbles::{Damping, Marble, MarbleId, Marbles};
 pub use model::{Detection, Model, Precision};
@@ -45,13 +45,13 @@ use crate::response::{
     penalty::{self, penalty},
 };
 use crate::swarm::Swarm;
-use account::Accounting;
-use crowd::Crowd;
-use integrate::Drive;
+use contact_limit::ContactLimit;
+use continuous::Continuous;
+use energy_audit::AuditState;
+use integrate::StepContext;
+use narrow_phase::Candidate;
 use quarantine::Quarantine;
-use sweep::Sweep;
-use touch::Near;
-use walls::Part;
+use walls::SubShape;
 
 /// Everything that moves and everything that it can touch.
 ///
@@ -84,7 +84,7 @@ pub struct World<S> {
     /// The rows that the verb at work has stopped.
     stopped: Vec<u32>,
     quarantine: Quarantine<S>,
-    crowd: Crowd<S>,
+    contact_limit: ContactLimit<S>,
     /// How wide a gap still makes a contact, in metres: what gravity closes in two
     /// substeps, for a response that looks ahead.
     reach: S,
@@ -105,12 +105,12 @@ pub struct World<S> {
     /// How much of a step comes after the substep, in seconds; zero unless within one.
     rest_of_step: S,
     events: EventDriven,
-    sweep: Sweep<S>,
-    near_walls: Vec<Near<S>>,
+    continuous: Continuous<S>,
+    near_walls: Vec<Candidate<S>>,
     /// What is long about marbles, and how far they reach.
     rods: Vec<Rod<S>>,
     reaches: Vec<S>,
-    accounting: Option<Box<Accounting<S>>>,
+    audit_state: Option<Box<AuditState<S>>>,
 }
 
 impl<S: Scalar> Default for World<S> {
@@ -130,7 +130,7 @@ impl<S: Scalar> Default for World<S> {
             images: Images::default(),
             stopped: Vec::new(),
             quarantine: Quarantine::default(),
-            crowd: Crowd::default(),
+            contact_limit: ContactLimit::default(),
             reach: S::zero(),
             inverse_mass: Vec::new(),
             velocity_before: Vec::new(),
@@ -143,11 +143,11 @@ impl<S: Scalar> Default for World<S> {
             accelerations: Vec::new(),
             rest_of_step: S::zero(),
             events: EventDriven::default(),
-            sweep: Sweep::default(),
+            continuous: Continuous::default(),
             near_walls: Vec::new(),
             rods: Vec::new(),
             reaches: Vec::new(),
-            accounting: None,
+            audit_state: None,
         }
     }
 }
@@ -166,7 +166,7 @@ impl<S: Scalar> PartialEq for World<S> {
             impacts,
             quarantine,
             stopped: _,
-            crowd: _,
+            contact_limit: _,
             grid: _,
             images: _,
             reach: _,
@@ -181,11 +181,11 @@ impl<S: Scalar> PartialEq for World<S> {
             accelerations: _,
             rest_of_step: _,
             events,
-            sweep: _,
+            continuous: _,
             near_walls: _,
             rods: _,
             reaches: _,
-            accounting: _,
+            audit_state: _,
         } = self;
         *model == other.model
             && *gravity == other.gravity
@@ -197,7 +197,7 @@ impl<S: Scalar> PartialEq for World<S> {
             && *walls == other.walls
             && *swarm == other.swarm
             && *contacts == other.contacts
-            && quarantine.named == other.quarantine.named
+            && quarantine.stopped == other.quarantine.stopped
             && *warm == other.warm
             && *shear == other.shear
             && *warm_removals == other.warm_removals
@@ -229,7 +229,8 @@ impl<S: Scalar> World<S> {
         }
         self.model = model;
         self.forget_contacts();
-        self.marbles.set_turn(model.rotation != Rotation::None || self.marbles.has_capsules());
+        self.marbles
+            .enable_rotation(model.rotation != Rotation::None || self.marbles.has_capsules());
         self.marbles.set_compensated(model.precision == Precision::Compensated);
         Ok(())
     }
@@ -276,7 +277,7 @@ impl<S: Scalar> World<S> {
             length.map(|length| positive(field, length)).transpose()?;
         }
         let period = Period { lengths };
-        self.takes_marbles_in(period)?;
+        self.check_period(period)?;
         if period != self.marbles.period {
             self.marbles.period = period;
             self.marbles.wrap();
@@ -332,7 +333,7 @@ impl<S: Scalar> World<S> {
     /// or periodic; [`Error::OutOfRange`] for a marble too large for its [period](Self::set_period).
     /// Then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
-        let substep = self.substep_of(dt)?;
+        let substep = self.validated_substep(dt)?;
         self.begin_step();
         for after in (0..self.model.substeps).rev() {
             self.begin_substep(substep * S::constant(f64::from(after)));
@@ -352,19 +353,19 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
     /// and what [`World::step`] says of marbles; then nothing has moved.
     pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
-        let dt = Self::checked_dt(dt)?;
-        self.takes_all_marbles()?;
-        self.note_places();
-        self.count_before();
-        self.begin_sweep();
-        let drive = Drive {
+        let dt = Self::validated_dt(dt)?;
+        self.check_shapes()?;
+        self.store_poses();
+        self.audit_before();
+        self.begin_continuous();
+        let drive = StepContext {
             integrator: self.model.integrator,
             gravity: self.gravity,
             forces: &self.forces,
             dt,
         };
         if self.model.rotation == Rotation::Dynamic {
-            self.marbles.spin_up(dt);
+            self.marbles.integrate_angular_velocity(dt);
         }
         if self.model.response == Response::EventDriven {
             self.marbles.mean_accelerations(drive, &mut self.accelerations);
@@ -374,22 +375,22 @@ impl<S: Scalar> World<S> {
                 self.velocity_before.extend_from_slice(self.marbles.velocity());
             }
             self.marbles.integrate(drive, &mut self.stopped);
-            self.sweep_ways(dt);
+            self.solve_continuous(dt);
         }
         if !(self.model.response == Response::EventDriven
             && self.model.rotation == Rotation::Dynamic)
         {
-            self.marbles.turn(dt, self.model.rotation);
+            self.marbles.integrate_rotations(dt, self.model.rotation);
         }
-        self.stop_what_is_not_finite();
+        self.quarantine_non_finite();
         self.reach = match self.model.response {
             // Rounding must not end the touch of what falls together.
             Response::Displacement => length(self.gravity) * dt * dt * S::constant(1e-3),
             Response::Penalty(_) => S::zero(),
             Response::Impulse => length(self.gravity) * dt * dt * S::constant(2.0),
-            Response::EventDriven => self.reach_at_rest(dt),
+            Response::EventDriven => self.resting_contact_distance(dt),
         };
-        self.count_forces();
+        self.audit_forces();
         Ok(())
     }
 
@@ -401,10 +402,10 @@ impl<S: Scalar> World<S> {
     /// together later is found later.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
-        self.touch_walls(self.reach);
-        self.touch_marbles(self.reach);
-        self.touch_on_the_way();
-        self.keep_stops_that_touch();
+        self.collide_walls(self.reach);
+        self.collide_marbles(self.reach);
+        self.add_grazing_contacts();
+        self.drop_separated_stops();
     }
 
     /// The third verb: contacts change positions and velocities back to what the
@@ -413,16 +414,16 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`].
     pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
-        let dt = Self::checked_dt(dt)?;
-        self.walls.prepare(); // some may have been taken out since contacts were looked for
+        let dt = Self::validated_dt(dt)?;
+        self.walls.update_tree(); // some may have been taken out since contacts were looked for
         let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
-        self.release_what_touches_nothing();
+        self.release_separated_stops();
         if self.model.response == Response::Impulse {
-            self.sweep.begin_bounces(&self.marbles.position);
+            self.continuous.begin_bounces(&self.marbles.position);
         }
-        self.count_contacts();
+        self.audit_contacts();
         self.look_at_marbles();
         let (mut columns, material, integrator) =
             self.marbles.columns(&self.inverse_mass, &self.held, &self.rods);
@@ -445,14 +446,14 @@ impl<S: Scalar> World<S> {
             start: Start {
                 position: &[],
                 velocity: &self.velocity_before,
-                stands: &self.sweep.stands,
+                stands: &self.continuous.stands,
             },
             settings: &settings,
         };
         match self.model.response {
             Response::Displacement => {
                 let contacts = self.contacts.len() as u32;
-                let mut pushes = self.accounting.as_ref().map(|_| Vec::new());
+                let mut pushes = self.audit_state.as_ref().map(|_| Vec::new());
                 displacement(
                     &mut columns,
                     &mut self.contacts,
@@ -462,11 +463,11 @@ impl<S: Scalar> World<S> {
                     &mut self.stopped,
                     |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change))),
                 );
-                if let Some(accounting) = &mut self.accounting {
-                    accounting.work.collisions = contacts;
+                if let Some(audit_state) = &mut self.audit_state {
+                    audit_state.work.collisions = contacts;
                     for (row, change) in pushes.into_iter().flatten() {
                         let mass = self.marbles.mass(row as usize).as_f64();
-                        accounting.work.momentum += cast_vector::<S, f64>(change) * mass;
+                        audit_state.work.momentum += cast_vector::<S, f64>(change) * mass;
                     }
                 }
             }
@@ -479,8 +480,8 @@ impl<S: Scalar> World<S> {
                     &mut self.warm,
                     &mut self.stopped,
                 );
-                if let Some(accounting) = &mut self.accounting {
-                    let Accounting { velocity, spin, work, .. } = &mut **accounting;
+                if let Some(audit_state) = &mut self.audit_state {
+                    let AuditState { velocity, spin, work, .. } = &mut **audit_state;
                     self.impulse.count(&mut columns, velocity, spin, work);
                 }
             }
@@ -498,15 +499,15 @@ impl<S: Scalar> World<S> {
                 &self.walls,
                 &mut self.shear,
                 &mut self.stopped,
-                self.accounting.as_mut().map(|accounting| &mut accounting.work),
+                self.audit_state.as_mut().map(|audit_state| &mut audit_state.work),
             ),
-            Response::EventDriven => self.go_through_events(dt, self.rest_of_step),
+            Response::EventDriven => self.step_events(dt, self.rest_of_step),
         }
         self.stop_bounces_at_walls();
-        self.stop_what_is_not_finite();
+        self.quarantine_non_finite();
         self.roll_what_only_shows();
         self.limits.apply(&mut self.marbles);
-        self.count_after();
+        self.audit_after();
         self.marbles.wrap();
         Ok(())
     }
@@ -518,11 +519,11 @@ impl<S: Scalar> World<S> {
         }
         // The deepest contact comes first in the list, so it has the last word.
         for contact in self.contacts.wm.iter().rev() {
-            let part = Part { wall: contact.a, part: contact.part };
+            let part = SubShape { wall: contact.a, part: contact.part };
             let row = contact.b as usize;
             let normal = self.walls.project_point(part, self.marbles.position()[row]).normal;
             if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Rolling {
-                self.marbles.roll(row, normal);
+                self.marbles.roll_without_slip(row, normal);
             }
         }
     }
@@ -541,8 +542,9 @@ impl<S: Scalar> World<S> {
             self.warm_removals = removals;
         }
         self.held.clear();
-        if self.model.rotation == Rotation::Dynamic && self.marbles.has_held() {
-            self.held.extend((0..self.marbles.len()).map(|row| self.marbles.is_held(row)));
+        if self.model.rotation == Rotation::Dynamic && self.marbles.has_rotation_locks() {
+            self.held
+                .extend((0..self.marbles.len()).map(|row| self.marbles.is_rotation_locked(row)));
         }
         self.marbles.rods(self.model.rotation, &mut self.rods);
     }
@@ -556,7 +558,7 @@ impl<S: Scalar> World<S> {
 
     /// The marbles that the last step stopped because their motion overflowed, each once.
     pub fn stopped(&self) -> impl Iterator<Item = MarbleId> + '_ {
-        self.quarantine.named.iter().copied()
+        self.quarantine.stopped.iter().copied()
     }
 
     /// The collisions of the last step, in the order of time within each substep. Only
@@ -580,9 +582,9 @@ impl<S: Scalar> World<S> {
     pub fn begin_step(&mut self) {
         self.rest_of_step = S::zero();
         self.stopped.clear();
-        self.quarantine.named.clear();
+        self.quarantine.stopped.clear();
         self.impacts.clear();
-        self.open_account();
+        self.reset_audit();
     }
 
     /// Begins a substep, after which `rest` seconds of the step are left: walls that were set
@@ -591,13 +593,13 @@ impl<S: Scalar> World<S> {
     pub fn begin_substep(&mut self, rest: S) {
         self.rest_of_step = if rest.is_finite() { rest.max(S::zero()) } else { S::zero() };
         if self.model.response != Response::EventDriven {
-            self.walls.go_to(self.rest_of_step);
+            self.walls.interpolate_to(self.rest_of_step);
         }
     }
 
     /// Ends a step: walls are at the end of their ways, and forces that were applied are forgotten.
     pub fn end_step(&mut self) {
-        self.walls.arrive();
+        self.walls.finish_step();
         self.marbles.clear_forces();
     }
 

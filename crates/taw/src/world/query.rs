@@ -1,10 +1,10 @@
-//! Questions about a world, through a tree of all that is in it.
+//! Spatial queries through a bounding volume hierarchy.
 
 use std::borrow::Cow;
 
 use cgmath::InnerSpace;
 
-use super::walls::Part;
+use super::walls::SubShape;
 use super::{MarbleId, WallId, WallShape, World};
 use crate::contact::{
     Convex, RayCast, RayHit, ShapeCastHit, TriangleResult, closest_points_of_plane,
@@ -15,7 +15,7 @@ use crate::frame::{Pose, Ray};
 use crate::math::{Point3, Scalar, Vec3, is_finite, is_finite_point, length};
 use crate::shape::{Aabb, Aabb3, BoundedShape, Bvh, Plane, PointProjection, Shape, Surface};
 
-/// Something in a world.
+/// A collider: a marble or a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum ColliderId {
     /// A marble.
@@ -24,17 +24,17 @@ pub enum ColliderId {
     Wall(WallId),
 }
 
-/// What a query found, and where.
+/// Hit of a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct QueryHit<T> {
-    /// In or on what.
+    /// The collider that was hit.
     pub collider: ColliderId,
-    /// The result.
+    /// Result of the query.
     pub result: T,
 }
 
-/// Where all that is in a world is, for [`World::queries`]. Kept from one time to the next, it
-/// is only refitted to what moved.
+/// Query acceleration structure of a world for [`World::queries`]. Kept between queries, it is only
+/// refitted.
 #[derive(Clone, Debug)]
 pub struct QueryTree<S> {
     tree: Bvh<S>,
@@ -42,12 +42,12 @@ pub struct QueryTree<S> {
     boxes: Vec<Aabb3<S>>,
 }
 
-/// What is in one box of the tree.
+/// Item of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Item {
-    /// By its row.
+    /// Index of a marble.
     Marble(u32),
-    Wall(Part),
+    Wall(SubShape),
 }
 
 impl<S> Default for QueryTree<S> {
@@ -65,8 +65,8 @@ impl<S: Scalar> QueryTree<S> {
             self.boxes.push(world.marbles.shape_of_row(row).bounding_box());
         }
         for (wall, shape) in (0..).zip(world.walls.shapes()) {
-            shape.boxes(|part, bounds| {
-                self.items.push(Item::Wall(Part { wall, part }));
+            shape.for_each_box(|part, bounds| {
+                self.items.push(Item::Wall(SubShape { wall, part }));
                 self.boxes.push(bounds);
             });
         }
@@ -78,11 +78,11 @@ impl<S: Scalar> QueryTree<S> {
     }
 }
 
-/// Asks a world as it is now; from [`World::queries`]. Every question takes a filter, which
-/// says of each collider whether it counts; `|_| true` leaves none out.
+/// Spatial queries of the current state, created by [`World::queries`]. Every query takes a filter
+/// that selects colliders; `|_| true` selects all.
 ///
-/// Of meshes and height fields, rays and shapes meet the surface, from either side; only
-/// [`Queries::project_point`] counts what is below a height field as inside.
+/// Ray and shape casts hit meshes and height fields on their surface, from either side; only
+/// [`Queries::project_point`] treats the volume below a height field as inside.
 #[derive(Debug)]
 pub struct Queries<'a, S> {
     world: &'a World<S>,
@@ -90,8 +90,8 @@ pub struct Queries<'a, S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// Readies the tree for questions about the world as it is now. What lies far from where
-    /// it was slows the questions down, and never makes them wrong.
+    /// Updates the tree to the current state. Large translation since the last build slow queries down,
+    /// and never make them wrong.
     ///
     /// ```
     /// use taw::frame::Ray;
@@ -115,12 +115,12 @@ impl<S: Scalar> World<S> {
 }
 
 /// Turns an result in the frame of a surface into one of the world.
-trait Placed<S> {
-    fn placed(self, pose: Pose<S>) -> Self;
+trait ToWorld<S> {
+    fn to_world(self, pose: Pose<S>) -> Self;
 }
 
-impl<S: Scalar> Placed<S> for RayHit<S> {
-    fn placed(self, pose: Pose<S>) -> Self {
+impl<S: Scalar> ToWorld<S> for RayHit<S> {
+    fn to_world(self, pose: Pose<S>) -> Self {
         Self {
             point: pose.transform_point(self.point),
             normal: pose.transform_vector(self.normal),
@@ -129,8 +129,8 @@ impl<S: Scalar> Placed<S> for RayHit<S> {
     }
 }
 
-impl<S: Scalar> Placed<S> for ShapeCastHit<S> {
-    fn placed(self, pose: Pose<S>) -> Self {
+impl<S: Scalar> ToWorld<S> for ShapeCastHit<S> {
+    fn to_world(self, pose: Pose<S>) -> Self {
         Self {
             point: pose.transform_point(self.point),
             normal: pose.transform_vector(self.normal),
@@ -148,26 +148,26 @@ impl<S: Scalar> Queries<'_, S> {
     }
 
     fn planes(&self) -> impl Iterator<Item = (Item, &Plane<S>)> {
-        let item = |wall| Item::Wall(Part { wall, part: 0 });
+        let item = |wall| Item::Wall(SubShape { wall, part: 0 });
         self.world.walls.planes().map(move |(row, plane)| (item(row), plane))
     }
 
-    /// Where a ray first meets anything within a distance, which may be infinite.
+    /// First hit of a ray within a distance, which may be infinite.
     pub fn cast_ray(
         &self,
         ray: &Ray<S>,
-        longest: S,
+        max_distance: S,
         filter: impl Fn(ColliderId) -> bool,
     ) -> Option<QueryHit<RayHit<S>>> {
-        let hits = self.cast_ray_all(ray, longest, filter);
+        let hits = self.cast_ray_all(ray, max_distance, filter);
         hits.into_iter().next()
     }
 
-    /// Where a ray first meets each of all that it meets within a distance, the nearest first.
+    /// First hit of a ray on each collider within a distance, nearest first.
     pub fn cast_ray_all(
         &self,
         ray: &Ray<S>,
-        longest: S,
+        max_distance: S,
         filter: impl Fn(ColliderId) -> bool,
     ) -> Vec<QueryHit<RayHit<S>>> {
         let mut hits = Hits { queries: self, filter, found: Vec::new() };
@@ -175,40 +175,43 @@ impl<S: Scalar> Queries<'_, S> {
             return hits.found;
         }
         for (item, plane) in self.planes() {
-            hits.add(item, || plane.cast_ray(ray, longest));
+            hits.add(item, || plane.cast_ray(ray, max_distance));
         }
-        // Beyond the tree there is nothing.
-        let Some(bounds) = self.tree.tree.bounds() else { return hits.first_of_each() };
+        // The ray ends beyond the bounds.
+        let Some(bounds) = self.tree.tree.bounds() else { return hits.dedup_by_collider() };
         let reach = length(bounds.center() - ray.origin) + length(bounds.max - bounds.min);
-        let motion = ray.direction * reach.min(longest);
+        let motion = ray.direction * reach.min(max_distance);
         self.tree.tree.for_each_on_segment(ray.origin, motion, |number| {
             let item = self.tree.items[number as usize];
             hits.add(item, || match item {
                 Item::Marble(row) => {
-                    self.world.marbles.shape_of_row(row as usize).cast_ray(ray, longest)
+                    self.world.marbles.shape_of_row(row as usize).cast_ray(ray, max_distance)
                 }
-                Item::Wall(part) => {
-                    cast_on_wall(&self.world.walls.shapes()[part.wall as usize], part, ray, longest)
-                }
+                Item::Wall(part) => cast_ray_on_wall(
+                    &self.world.walls.shapes()[part.wall as usize],
+                    part,
+                    ray,
+                    max_distance,
+                ),
             });
         });
-        hits.first_of_each()
+        hits.dedup_by_collider()
     }
 
-    /// What a shape first touches that moves along a line without turning. What it touches
-    /// from the start counts if it comes closer, and not if it parts.
+    /// First hit of a shape that translates along a line. A collider that it touches at the start
+    /// counts if they approach, and not if they separate.
     pub fn cast_shape(
         &self,
         shape: &Shape<S>,
-        moves: Vec3<S>,
+        translation: Vec3<S>,
         filter: impl Fn(ColliderId) -> bool,
     ) -> Option<QueryHit<ShapeCastHit<S>>> {
         let mut best: Option<QueryHit<ShapeCastHit<S>>> = None;
-        let mut offer = |item: Item, ask: &dyn Fn() -> Option<ShapeCastHit<S>>| {
+        let mut offer = |item: Item, query: &dyn Fn() -> Option<ShapeCastHit<S>>| {
             let Some(collider) = self.collider(item).filter(|collider| filter(*collider)) else {
                 return;
             };
-            let Some(result) = ask() else { return };
+            let Some(result) = query() else { return };
             let next = QueryHit { collider, result };
             let key = |found: &QueryHit<ShapeCastHit<S>>| (found.result.time, found.collider);
             if best.as_ref().is_none_or(|best| key(&next) < key(best)) {
@@ -217,32 +220,42 @@ impl<S: Scalar> Queries<'_, S> {
         };
         let still = Vec3::new(S::zero(), S::zero(), S::zero());
         for (item, plane) in self.planes() {
-            offer(item, &|| earliest(shape, |part| sweep_plane(plane, part, moves)));
+            offer(item, &|| {
+                min_by_time(shape, |part| shape_cast_half_space(plane, part, translation))
+            });
         }
         let start = shape.bounding_box();
-        let end = Aabb { min: start.min + moves, max: start.max + moves };
+        let end = Aabb { min: start.min + translation, max: start.max + translation };
         self.tree.tree.for_each_in_box(&start.union(&end), |number| {
             let item = self.tree.items[number as usize];
             match item {
                 Item::Marble(row) => {
                     let marble = self.world.marbles.shape_of_row(row as usize);
                     offer(item, &|| {
-                        Some(shape_cast_of_shapes(&marble, still, shape, moves)?.result)
+                        Some(shape_cast_of_shapes(&marble, still, shape, translation)?.result)
                     });
                 }
-                Item::Wall(Part { wall, part: number }) => {
+                Item::Wall(SubShape { wall, part: number }) => {
                     match &self.world.walls.shapes()[wall as usize] {
                         WallShape::Plane(_) => {}
                         solid @ WallShape::Solid(_) => offer(item, &|| {
-                            let touch =
-                                shape_cast_of_shapes(solid.part(number)?, still, shape, moves)?;
+                            let touch = shape_cast_of_shapes(
+                                solid.sub_shape(number)?,
+                                still,
+                                shape,
+                                translation,
+                            )?;
                             Some(touch.result)
                         }),
                         WallShape::Mesh(mesh, pose) => {
-                            offer(item, &|| sweep_placed(&**mesh, *pose, shape, moves));
+                            offer(item, &|| {
+                                shape_cast_transformed(&**mesh, *pose, shape, translation)
+                            });
                         }
                         WallShape::HeightField(field, pose) => {
-                            offer(item, &|| sweep_placed(&**field, *pose, shape, moves));
+                            offer(item, &|| {
+                                shape_cast_transformed(&**field, *pose, shape, translation)
+                            });
                         }
                     }
                 }
@@ -251,7 +264,7 @@ impl<S: Scalar> Queries<'_, S> {
         best
     }
 
-    /// All that a shape has a point in common with, in order.
+    /// All colliders that overlap a shape, in order.
     pub fn overlaps(
         &self,
         shape: &Shape<S>,
@@ -273,20 +286,20 @@ impl<S: Scalar> Queries<'_, S> {
                     let near = || closest_points_of_shapes(&marble, shape);
                     offer(item, &|| near().is_some_and(|near| near.result.touching()));
                 }
-                Item::Wall(Part { wall, part: number }) => {
+                Item::Wall(SubShape { wall, part: number }) => {
                     match &self.world.walls.shapes()[wall as usize] {
                         WallShape::Plane(_) => {}
                         solid @ WallShape::Solid(_) => offer(item, &|| {
                             let near = solid
-                                .part(number)
+                                .sub_shape(number)
                                 .and_then(|wall| closest_points_of_shapes(wall, shape));
                             near.is_some_and(|near| near.result.touching())
                         }),
                         WallShape::Mesh(mesh, pose) => {
-                            offer(item, &|| touches_placed(&**mesh, *pose, shape));
+                            offer(item, &|| overlaps_transformed(&**mesh, *pose, shape));
                         }
                         WallShape::HeightField(field, pose) => {
-                            offer(item, &|| touches_placed(&**field, *pose, shape));
+                            offer(item, &|| overlaps_transformed(&**field, *pose, shape));
                         }
                     }
                 }
@@ -297,8 +310,8 @@ impl<S: Scalar> Queries<'_, S> {
         found
     }
 
-    /// Where the nearest surface is, within a distance of a point, which may be infinite. Of
-    /// what the point is inside of, that out of which the way is longest.
+    /// Projects a point onto the nearest surface within a distance, which may be infinite. If the
+    /// point is inside several shapes, the one it penetrates deepest.
     pub fn project_point(
         &self,
         point: Point3<S>,
@@ -307,11 +320,11 @@ impl<S: Scalar> Queries<'_, S> {
     ) -> Option<QueryHit<PointProjection<S>>> {
         let mut best: Option<QueryHit<PointProjection<S>>> = None;
         let mut reach = within;
-        let mut offer = |item: Item, ask: &dyn Fn() -> PointProjection<S>| {
+        let mut offer = |item: Item, query: &dyn Fn() -> PointProjection<S>| {
             let Some(collider) = self.collider(item).filter(|collider| filter(*collider)) else {
                 return reach;
             };
-            let next = QueryHit { collider, result: ask() };
+            let next = QueryHit { collider, result: query() };
             let key =
                 |found: &QueryHit<PointProjection<S>>| (found.result.distance, found.collider);
             let near = next.result.distance <= within;
@@ -331,7 +344,7 @@ impl<S: Scalar> Queries<'_, S> {
                 Item::Marble(row) => {
                     self.world.marbles.shape_of_row(row as usize).project_point(point)
                 }
-                Item::Wall(Part { wall, part }) => match &walls[wall as usize] {
+                Item::Wall(SubShape { wall, part }) => match &walls[wall as usize] {
                     solid @ WallShape::Solid(_) => solid.project_point_on(part, point),
                     other => other.project_point(point),
                 },
@@ -341,7 +354,7 @@ impl<S: Scalar> Queries<'_, S> {
     }
 }
 
-/// Collects hits.
+/// Collector of ray hits.
 struct Hits<'a, S, F> {
     queries: &'a Queries<'a, S>,
     filter: F,
@@ -349,16 +362,16 @@ struct Hits<'a, S, F> {
 }
 
 impl<S: Scalar, F: Fn(ColliderId) -> bool> Hits<'_, S, F> {
-    fn add(&mut self, item: Item, ask: impl FnOnce() -> Option<RayHit<S>>) {
+    fn add(&mut self, item: Item, query: impl FnOnce() -> Option<RayHit<S>>) {
         let collider = self.queries.collider(item).filter(|collider| (self.filter)(*collider));
         if let Some(collider) = collider
-            && let Some(result) = ask()
+            && let Some(result) = query()
         {
             self.found.push(QueryHit { collider, result });
         }
     }
 
-    fn first_of_each(mut self) -> Vec<QueryHit<RayHit<S>>> {
+    fn dedup_by_collider(mut self) -> Vec<QueryHit<RayHit<S>>> {
         let order = |x: S, y: S| x.partial_cmp(&y).unwrap_or(std::cmp::Ordering::Equal);
         let by_distance = |x: &QueryHit<RayHit<S>>, y: &QueryHit<RayHit<S>>| {
             order(x.result.distance, y.result.distance)
@@ -370,42 +383,42 @@ impl<S: Scalar, F: Fn(ColliderId) -> bool> Hits<'_, S, F> {
     }
 }
 
-fn cast_on_wall<S: Scalar>(
+fn cast_ray_on_wall<S: Scalar>(
     wall: &WallShape<S>,
-    Part { part, .. }: Part,
+    SubShape { part, .. }: SubShape,
     ray: &Ray<S>,
-    longest: S,
+    max_distance: S,
 ) -> Option<RayHit<S>> {
     let local = |pose: &Pose<S>| Ray {
         origin: pose.inverse_transform_point(ray.origin),
         direction: pose.inverse_transform_vector(ray.direction),
     };
-    let placed = |hit: Option<TriangleResult<RayHit<S>>>, pose: &Pose<S>| {
-        hit.map(|hit| hit.result.placed(*pose))
+    let to_world = |hit: Option<TriangleResult<RayHit<S>>>, pose: &Pose<S>| {
+        hit.map(|hit| hit.result.to_world(*pose))
     };
     match wall {
-        WallShape::Plane(plane) => plane.cast_ray(ray, longest),
-        WallShape::Solid(_) => wall.part(part)?.cast_ray(ray, longest),
+        WallShape::Plane(plane) => plane.cast_ray(ray, max_distance),
+        WallShape::Solid(_) => wall.sub_shape(part)?.cast_ray(ray, max_distance),
         WallShape::Mesh(mesh, pose) => {
-            placed(ray_cast_on_surface(&**mesh, &local(pose), longest), pose)
+            to_world(ray_cast_on_surface(&**mesh, &local(pose), max_distance), pose)
         }
         WallShape::HeightField(field, pose) => {
-            placed(ray_cast_on_surface(&**field, &local(pose), longest), pose)
+            to_world(ray_cast_on_surface(&**field, &local(pose), max_distance), pose)
         }
     }
 }
 
-/// What the part says of a shape that touches something first.
-fn earliest<S: Scalar>(
+/// Earliest hit among the sub-shapes of a shape.
+fn min_by_time<S: Scalar>(
     shape: &Shape<S>,
-    ask: impl Fn(&dyn Convex<S>) -> Option<ShapeCastHit<S>>,
+    query: impl Fn(&dyn Convex<S>) -> Option<ShapeCastHit<S>>,
 ) -> Option<ShapeCastHit<S>> {
-    let touches = sub_shapes(shape).into_iter().filter_map(ask);
+    let touches = sub_shapes(shape).into_iter().filter_map(query);
     touches.reduce(|x, y| if y.time < x.time { y } else { x })
 }
 
-/// A shape as seen from a frame.
-fn in_frame<S: Scalar>(shape: &Shape<S>, pose: Pose<S>) -> Cow<'_, Shape<S>> {
+/// Transforms a shape into a local frame.
+fn to_local<S: Scalar>(shape: &Shape<S>, pose: Pose<S>) -> Cow<'_, Shape<S>> {
     if pose == Pose::identity() {
         Cow::Borrowed(shape)
     } else {
@@ -413,32 +426,37 @@ fn in_frame<S: Scalar>(shape: &Shape<S>, pose: Pose<S>) -> Cow<'_, Shape<S>> {
     }
 }
 
-fn sweep_placed<S: Scalar>(
+fn shape_cast_transformed<S: Scalar>(
     surface: &impl Surface<S>,
     pose: Pose<S>,
     shape: &Shape<S>,
-    moves: Vec3<S>,
+    translation: Vec3<S>,
 ) -> Option<ShapeCastHit<S>> {
-    let moves = pose.inverse_transform_vector(moves);
-    let touch = |part: &dyn Convex<S>| Some(shape_cast_on_surface(surface, part, moves)?.result);
-    Some(earliest(&in_frame(shape, pose), touch)?.placed(pose))
+    let translation = pose.inverse_transform_vector(translation);
+    let touch =
+        |part: &dyn Convex<S>| Some(shape_cast_on_surface(surface, part, translation)?.result);
+    Some(min_by_time(&to_local(shape, pose), touch)?.to_world(pose))
 }
 
-fn touches_placed<S: Scalar>(surface: &impl Surface<S>, pose: Pose<S>, shape: &Shape<S>) -> bool {
+fn overlaps_transformed<S: Scalar>(
+    surface: &impl Surface<S>,
+    pose: Pose<S>,
+    shape: &Shape<S>,
+) -> bool {
     let touches = |part| closest_points_of_surface(surface, part, S::zero()).is_some();
-    sub_shapes(&in_frame(shape, pose)).into_iter().any(touches)
+    sub_shapes(&to_local(shape, pose)).into_iter().any(touches)
 }
 
-/// When a convex shape that moves along a line first touches a half-space.
-fn sweep_plane<S: Scalar>(
+/// First contact of a translating convex shape with a half-space.
+fn shape_cast_half_space<S: Scalar>(
     plane: &Plane<S>,
     shape: &dyn Convex<S>,
-    moves: Vec3<S>,
+    translation: Vec3<S>,
 ) -> Option<ShapeCastHit<S>> {
     let normal = plane.normal();
     let lowest = shape.support(-normal);
-    let (gap, closing) = (plane.signed_distance(lowest), -moves.dot(normal));
+    let (gap, closing) = (plane.signed_distance(lowest), -translation.dot(normal));
     let time = (gap / closing).max(S::zero());
     let meets = closing > S::zero() && time <= S::one();
-    meets.then(|| ShapeCastHit { time, normal, point: lowest + moves * time })
+    meets.then(|| ShapeCastHit { time, normal, point: lowest + translation * time })
 }

@@ -86,7 +86,7 @@ impl Snapshot {
     #[must_use]
     pub fn of<S: Scalar>(world: &World<S>) -> Self {
         let gravity = world.gravity();
-        let account = world.account().unwrap_or_default();
+        let account = world.energy_audit().unwrap_or_default();
         let mut bodies = marbles(world);
         bodies.extend(balls(world));
         let stopped = world.stopped().count() + world.swarm.stopped().count();
@@ -130,7 +130,7 @@ impl Snapshot {
 fn marbles<S: Scalar>(world: &World<S>) -> Vec<Body> {
     let ids = (0..world.marbles.len()).filter_map(|row| world.marbles.id(row));
     let spins = world.model().rotation == Rotation::Dynamic;
-    let exact = ids.filter_map(|id| world.marbles.get_exact(id).ok());
+    let exact = ids.filter_map(|id| world.marbles.get_high_precision(id).ok());
     let body = |marble: Marble<f64>| {
         let at = marble.position.to_vec();
         let half = marble.rotation * Vec3::unit_y() * marble.half_length;

@@ -62,7 +62,7 @@ impl Ledger {
         }
     }
 
-    /// A step gains no energy but what [walls bring in](taw::world::Account::walls), up to
+    /// A step gains no energy but what [walls bring in](taw::world::EnergyAudit::walls), up to
     /// - first order: a bounce happens at the end of its substep, so its height is right to the
     ///   way of a substep: `m g v dt` of what touches, for the speeds before and after (twice, where
     ///   there is time for two bounces in a step), and what gravity adds in a substep;
