@@ -42,7 +42,7 @@ impl Takes {
 const TABLE: &[(&str, &str, Takes)] = &[
     ("Marble", ".radius", Takes::Positive),
     ("Velocity", ".0", Takes::Finite),
-    ("Spin", ".0", Takes::Finite),
+    ("AngularVelocity", ".0", Takes::Finite),
     ("MarbleMass", ".0", Takes::Positive),
     ("GravityScale", ".0", Takes::Finite),
     ("SurfaceMaterial", ".restitution", Takes::Within(0.0, 1.0)),
@@ -104,7 +104,12 @@ type Sample = (fn(&mut EntityWorldMut), &'static [&'static str]);
 
 fn marble(entity: &mut EntityWorldMut) {
     let all = (
-        (Marble::new(0.5), Velocity::default(), Spin::default(), MarbleMass::Density(1_000.0)),
+        (
+            Marble::new(0.5),
+            Velocity::default(),
+            AngularVelocity::default(),
+            MarbleMass::Density(1_000.0),
+        ),
         (GravityScale(1.0), SurfaceMaterial::default(), MarbleDamping::default()),
         (ExternalForce::default(), ExternalImpulse::default(), HalfLength(0.0)),
         Transform::from_xyz(0.0, 1.0, 0.0),
@@ -119,7 +124,7 @@ fn wall(entity: &mut EntityWorldMut, wall: Wall) {
 const OF_MARBLES: &[&str] = &[
     "Marble",
     "Velocity",
-    "Spin",
+    "AngularVelocity",
     "MarbleMass",
     "GravityScale",
     "SurfaceMaterial",

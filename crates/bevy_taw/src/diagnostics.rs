@@ -276,7 +276,7 @@ pub(crate) fn measure(
     diagnostics.add_measurement(&WALL_CONTACTS, || world.contacts.wm.len() as f64);
     diagnostics.add_measurement(&MARBLE_CONTACTS, || world.contacts.mm.len() as f64);
     diagnostics.add_measurement(&KINETIC_ENERGY, || world.energy().kinetic);
-    diagnostics.add_measurement(&ROTATIONAL_ENERGY, || world.energy().spin);
+    diagnostics.add_measurement(&ROTATIONAL_ENERGY, || world.energy().rotational);
     diagnostics.add_measurement(&POTENTIAL_ENERGY, || world.energy().potential);
     if let Some(audit) = world.energy_audit() {
         for (path, _, read) in audit_metrics() {

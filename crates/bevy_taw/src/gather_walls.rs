@@ -198,7 +198,7 @@ impl Gathering<'_, '_> {
         if let Some(id) = state.id {
             let motion = speed.map(|speed| WallMotion {
                 velocity: to_vector(speed.velocity),
-                spin: to_vector(speed.spin),
+                angular_velocity: to_vector(speed.angular_velocity),
                 pivot: to_point(translation),
             });
             self.refusals.check(Some(entity), self.world.walls.set_motion(id, motion));

@@ -93,8 +93,9 @@ pub use taw;
 /// What nearly every game needs.
 pub mod prelude {
     pub use crate::components::{
-        ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble, MarbleDamping,
-        MarbleIntegrator, MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Teleport, Velocity,
+        AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
+        MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, SurfaceMaterial, Teleport,
+        Velocity,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;

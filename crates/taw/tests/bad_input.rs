@@ -41,7 +41,7 @@ fn is_sane<S: Scalar>(marble: &Marble<S>) -> bool {
     let point = [marble.position.x, marble.position.y, marble.position.z];
     let rotation =
         [marble.rotation.s, marble.rotation.v.x, marble.rotation.v.y, marble.rotation.v.z];
-    let vectors = [marble.velocity, marble.spin].map(|v| [v.x, v.y, v.z]);
+    let vectors = [marble.velocity, marble.angular_velocity].map(|v| [v.x, v.y, v.z]);
     point.iter().chain(&rotation).chain(vectors.iter().flatten()).all(|x| x.is_finite())
 }
 
@@ -143,7 +143,7 @@ fn a_spin_that_overflows_is_stopped_named_once_and_leaves_a_rotation() {
     for response in RESPONSES {
         let mut world = on_a_floor::<f32>(Model { substeps: 4, ..model(response) });
         let spin = Vec3::new(3e38, 3e38, 3e38);
-        let mad = Marble { spin, ..Marble::new(at(0.0, 0.49, 0.0), 0.5) };
+        let mad = Marble { angular_velocity: spin, ..Marble::new(at(0.0, 0.49, 0.0), 0.5) };
         let mad = world.marbles.insert(mad).unwrap();
         let other = world.marbles.insert(Marble::new(at(9.0, 0.5, 0.0), 0.5)).unwrap();
         let mut alone = on_a_floor::<f32>(Model { substeps: 4, ..model(response) });

@@ -111,7 +111,7 @@ fn rolling_resistance_takes_the_rest() {
         let resists = Material { rolling_resistance: 0.05, ..material(0.0, 0.5) };
         let mut world = world(response, resists, &[([0.0, 0.1, 0.0], [1.0, 0.0, 0.0])]);
         let id = world.marbles.id(0).unwrap();
-        world.marbles.set_spin(id, Vec3::new(0.0, 0.0, -10.0)).unwrap();
+        world.marbles.set_angular_velocity(id, Vec3::new(0.0, 0.0, -10.0)).unwrap();
         let sum = run(&mut world, 5.0, 1.0 / 240.0);
         near(world.energy().kinetic, 0.0, 1e-20);
         let tolerance = if response == Response::Impulse { 1e-2 } else { 1e-10 };
@@ -126,8 +126,11 @@ fn a_belt_brings_in_what_it_gives_and_what_it_rubs_off() {
         let mut world = world(response, material(0.0, 0.3), &[([0.0, 0.1, 0.0], [0.0; 3])]);
         let belt = world.walls.id(0).unwrap();
         let velocity = Vec3::new(1.4, 0.0, 0.0);
-        let motion =
-            taw::motion::WallMotion { velocity, spin: Vec3::zero(), pivot: Point3::origin() };
+        let motion = taw::motion::WallMotion {
+            velocity,
+            angular_velocity: Vec3::zero(),
+            pivot: Point3::origin(),
+        };
         world.walls.set_motion(belt, Some(motion)).unwrap();
         let sum = run(&mut world, 1.0, 1.0 / 240.0);
         // Friction brings the ball to 2/7 of the belt's speed.
@@ -135,7 +138,7 @@ fn a_belt_brings_in_what_it_gives_and_what_it_rubs_off() {
         let tolerance = if response == Response::Impulse { 2e-3 } else { 1e-12 };
         near(world.energy().kinetic, 0.5 * speed * speed, tolerance);
         near(sum.walls, speed * 1.4, tolerance);
-        let rest = world.energy().kinetic + world.energy().spin;
+        let rest = world.energy().kinetic + world.energy().rotational;
         near(sum.friction, speed * 1.4 - rest, tolerance);
         near(sum.solver, 0.0, tolerance);
     }

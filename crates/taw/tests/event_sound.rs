@@ -87,7 +87,7 @@ impl<S: Scalar> Mover<S> {
         let per = |x: f64| x / dt;
         let motion = WallMotion {
             velocity: vector(0.0, per(height - self.last.0), 0.0),
-            spin: vector(0.0, 0.0, per(angle - self.last.1)),
+            angular_velocity: vector(0.0, 0.0, per(angle - self.last.1)),
             pivot: point(0.0, height, 0.0),
         };
         self.last = (height, angle);
@@ -275,7 +275,7 @@ fn a_ball_pivots_over_an_edge_and_a_corner_and_keeps_its_energy() {
             let marble = Marble {
                 material: Some(surface(0.0, 1e6)),
                 velocity: Vec3::new(0.1, 0.0, 0.0),
-                spin: Vec3::new(0.0, 0.0, -1.0),
+                angular_velocity: Vec3::new(0.0, 0.0, -1.0),
                 ..Marble::new(Point3::new(-0.05, 0.1, 0.3), 0.1)
             };
             world.marbles.insert(marble).unwrap();

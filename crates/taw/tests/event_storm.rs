@@ -156,7 +156,7 @@ fn scene<S: Scalar>(seed: u64) -> Scene<S> {
             .marbles
             .insert(Marble {
                 velocity: vector(velocity),
-                spin: vector(spin),
+                angular_velocity: vector(spin),
                 mass: Mass::Density(S::constant(draw.one_of(&[1000.0, 1000.0, 10.0, 8000.0]))),
                 material: Some(material),
                 ..Marble::new(point(position), S::constant(radius))
@@ -179,7 +179,7 @@ impl<S: Scalar> Scene<S> {
             let pose = Pose { rotation: turn.into(), translation };
             let motion = WallMotion {
                 velocity: vector([0.0, (after.0 - before.0) / dt, 0.0]),
-                spin: vector([0.0, 0.0, (after.1 - before.1) / dt]),
+                angular_velocity: vector([0.0, 0.0, (after.1 - before.1) / dt]),
                 pivot: point([0.0, after.0, 0.0]),
             };
             self.world.walls.set(*id, shape.transformed(pose).unwrap()).unwrap();

@@ -93,8 +93,11 @@ impl<S: Scalar> Place<S> {
         let once = named.iter().collect::<BTreeSet<_>>().len() == named.len();
         once && marbles.map(|id| self.world.marbles.get(id).unwrap()).all(|m| {
             let rotation = [m.rotation.s, m.rotation.v.x, m.rotation.v.y, m.rotation.v.z];
-            let rows =
-                [m.position - Point3::new(S::zero(), S::zero(), S::zero()), m.velocity, m.spin];
+            let rows = [
+                m.position - Point3::new(S::zero(), S::zero(), S::zero()),
+                m.velocity,
+                m.angular_velocity,
+            ];
             rows.iter().flat_map(|v| [v.x, v.y, v.z]).chain(rotation).all(S::is_finite)
         })
     }

@@ -38,7 +38,7 @@ fn a_ball_stays_on_a_lift() {
             let lift = world.walls.insert(board()).unwrap();
             let motion = WallMotion {
                 velocity: Vec3::unit_y() * speed,
-                spin: Vec3::new(0.0, 0.0, 0.0),
+                angular_velocity: Vec3::new(0.0, 0.0, 0.0),
                 pivot: Point3::new(0.0, 0.0, 0.0),
             };
             world.walls.set_motion(lift, Some(motion)).unwrap();
@@ -68,7 +68,8 @@ fn a_ball_stays_on_a_board_that_tilts() {
         let wall = world.walls.insert(board()).unwrap();
         let pivot = Point3::new(-4.0, 0.0, 0.0);
         let spin = Vec3::unit_z() * 0.5;
-        let motion = WallMotion { velocity: Vec3::new(0.0, 0.0, 0.0), spin, pivot };
+        let motion =
+            WallMotion { velocity: Vec3::new(0.0, 0.0, 0.0), angular_velocity: spin, pivot };
         world.walls.set_motion(wall, Some(motion)).unwrap();
         let id = ball(&mut world, 0.0);
         world.marbles.set_velocity(id, Vec3::unit_y() * 2.0).unwrap();

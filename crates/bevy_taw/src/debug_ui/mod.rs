@@ -141,7 +141,7 @@ pub fn energy(ui: &mut Ui, diagnostics: &mut DiagnosticsStore) {
     let lines = [
         ("Potential", paths::POTENTIAL_ENERGY),
         ("Kinetic", paths::KINETIC_ENERGY),
-        ("Spin", paths::ROTATIONAL_ENERGY),
+        ("Rotational", paths::ROTATIONAL_ENERGY),
     ];
     time_plot(ui, "taw energy", "J", |plot| {
         let history = |path| diagnostics.get(path).map(Diagnostic::values);

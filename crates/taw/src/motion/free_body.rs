@@ -80,18 +80,19 @@ mod tests {
     #[test]
     fn the_motor_equation_equals_rotation_and_translation_apart() {
         let inertia = Vec3::new(1.6, 4.16, 5.44_f64);
-        let spin = Vec3::new(0.4, 3.0, -0.7);
+        let angular_velocity = Vec3::new(0.4, 3.0, -0.7);
         let velocity = Vec3::new(2.0, -1.0, 0.5);
         let seconds = 3.0;
         let apart = |steps: u32| {
             let dt = seconds / f64::from(steps);
-            let start = FreeRotation::new(Quat::one(), spin.mul_element_wise(inertia));
+            let start = FreeRotation::new(Quat::one(), angular_velocity.mul_element_wise(inertia));
             (0..steps).fold(start, |body, _| body.step(inertia, dt))
         };
         let reference = apart(100_000).attitude();
         let error = |steps: u32| {
             let dt = seconds / f64::from(steps);
-            let start = (Motor::identity(), Twist { angular_velocity: spin.into(), velocity });
+            let start =
+                (Motor::identity(), Twist { angular_velocity: angular_velocity.into(), velocity });
             let (motor, twist) =
                 (0..steps).fold(start, |(m, t), _| integrate_free_body(m, t, inertia, dt));
             let rotation = motor.rotation();

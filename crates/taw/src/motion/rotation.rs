@@ -24,8 +24,12 @@ pub enum Rotation {
 /// seconds: exact for a constant one.
 #[must_use]
 #[inline]
-pub fn integrate_rotation<S: Scalar>(rotation: Quat<S>, spin: Vec3<S>, dt: S) -> Quat<S> {
-    let Some((axis, speed)) = direction_and_length(spin) else {
+pub fn integrate_rotation<S: Scalar>(
+    rotation: Quat<S>,
+    angular_velocity: Vec3<S>,
+    dt: S,
+) -> Quat<S> {
+    let Some((axis, speed)) = direction_and_length(angular_velocity) else {
         return rotation;
     };
     let turned = axis_angle(axis, speed * dt) * rotation;
@@ -135,9 +139,10 @@ mod tests {
 
     #[test]
     fn a_turn_is_exact_however_long_the_step() {
-        let spin = Vec3::new(0.3, -2.0, 0.7_f64);
-        let once = integrate_rotation(Quat::one(), spin, 3.0);
-        let many = (0..3000).fold(Quat::one(), |q, _| integrate_rotation(q, spin, 0.001));
+        let angular_velocity = Vec3::new(0.3, -2.0, 0.7_f64);
+        let once = integrate_rotation(Quat::one(), angular_velocity, 3.0);
+        let many =
+            (0..3000).fold(Quat::one(), |q, _| integrate_rotation(q, angular_velocity, 0.001));
         assert!((once - many).magnitude() < 1e-12 || (once + many).magnitude() < 1e-12);
     }
 
@@ -157,11 +162,15 @@ mod tests {
 
     /// The box of the Dzhanibekov effect: turns about its middle axis, with a bit of
     /// the others. Gives (worst relative energy error, times at which the body's own
-    /// spin about y changed its sign).
+    /// angular_velocity about y changed its sign).
     fn dzhanibekov<S: Scalar>(dt: f64) -> (f64, Vec<f64>) {
         let inertia = Vec3::new(1.6, 4.16, 5.44).map(S::constant);
-        let spin = Vec3::new(0.01, 5.0, 0.01).map(S::constant);
-        let momentum = Vec3::new(spin.x * inertia.x, spin.y * inertia.y, spin.z * inertia.z);
+        let angular_velocity = Vec3::new(0.01, 5.0, 0.01).map(S::constant);
+        let momentum = Vec3::new(
+            angular_velocity.x * inertia.x,
+            angular_velocity.y * inertia.y,
+            angular_velocity.z * inertia.z,
+        );
         let mut body = FreeRotation::new(Quat::one(), momentum);
         let start = body.energy(inertia).as_f64();
         let (mut worst, mut flips, mut last): (f64, _, f64) = (0.0, Vec::new(), 1.0);

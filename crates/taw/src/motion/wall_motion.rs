@@ -16,7 +16,7 @@ pub struct WallMotion<S> {
     /// Velocity of the pivot, in m/s.
     pub velocity: Vec3<S>,
     /// Angular velocity in rad/s, an axial vector in world space.
-    pub spin: Vec3<S>,
+    pub angular_velocity: Vec3<S>,
     /// Center of rotation, in metres.
     pub pivot: Point3<S>,
 }
@@ -25,12 +25,12 @@ impl<S: Scalar> WallMotion<S> {
     /// Velocity of a point that moves with the wall, in m/s.
     #[must_use]
     pub fn velocity_at(&self, point: Point3<S>) -> Vec3<S> {
-        self.velocity + self.spin.cross(point - self.pivot)
+        self.velocity + self.angular_velocity.cross(point - self.pivot)
     }
 
     /// Relative pose of the wall `time` seconds ago.
     pub(crate) fn pose_before(&self, time: S) -> Pose<S> {
-        let rotation = integrate_rotation(Quat::one(), self.spin, -time);
+        let rotation = integrate_rotation(Quat::one(), self.angular_velocity, -time);
         let pivot = self.pivot.to_vec();
         let translation = pivot - rotation.rotate_vector(pivot) - self.velocity * time;
         Pose { rotation, translation }
@@ -40,7 +40,7 @@ impl<S: Scalar> WallMotion<S> {
     pub(crate) fn cast<T: Scalar>(self) -> WallMotion<T> {
         WallMotion {
             velocity: cast_vector(self.velocity),
-            spin: cast_vector(self.spin),
+            angular_velocity: cast_vector(self.angular_velocity),
             pivot: cast_point(self.pivot),
         }
     }

@@ -224,7 +224,10 @@ impl Ball {
         vector(["position.x", "position.y", "position.z"], self.position)?;
         above_zero("radius", self.radius)?;
         vector(["velocity.x", "velocity.y", "velocity.z"], self.velocity)?;
-        vector(["spin.x", "spin.y", "spin.z"], self.spin)?;
+        vector(
+            ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"],
+            self.angular_velocity,
+        )?;
         above_zero("density", self.density)?;
         not_negative("half_length", self.half_length)?;
         self.turned.check()?;

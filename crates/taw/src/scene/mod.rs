@@ -310,7 +310,7 @@ pub struct Ball {
     pub velocity: [f64; 3],
     /// Angular velocity, in rad/s.
     #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
-    pub spin: [f64; 3],
+    pub angular_velocity: [f64; 3],
     /// Density in kg/m³, above zero.
     #[cfg_attr(feature = "serde", serde(default = "glass", deserialize_with = "number::positive"))]
     pub density: f64,
@@ -407,7 +407,7 @@ impl Default for Ball {
             position: [0.0; 3],
             radius: 0.005,
             velocity: [0.0; 3],
-            spin: [0.0; 3],
+            angular_velocity: [0.0; 3],
             density: 2500.0,
             half_length: 0.0,
             turned: Turn::default(),

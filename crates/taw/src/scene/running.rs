@@ -219,7 +219,7 @@ impl Ball {
         Ok(Marble {
             velocity: vector(self.velocity),
             rotation: Quat::from_sv(S::constant(turned.s), cast_vector(turned.v)),
-            spin: vector(self.spin),
+            angular_velocity: vector(self.angular_velocity),
             half_length: S::constant(self.half_length),
             mass: Mass::Density(S::constant(self.density)),
             material: Some(self.surface.unwrap_or(surface).material()),
@@ -279,7 +279,7 @@ impl Movement {
             Self::Conveys { velocity } => {
                 let motion = WallMotion {
                     velocity: vector(velocity),
-                    spin: Vec3::zero(),
+                    angular_velocity: Vec3::zero(),
                     pivot: Point3::origin(),
                 };
                 return Ok((Pose::identity(), motion));
@@ -310,7 +310,7 @@ impl Movement {
         let pose = Pose { rotation, translation: pivot - turned_pivot + way };
         let motion = WallMotion {
             velocity: cast_vector(velocity),
-            spin: cast_vector(direction * rate),
+            angular_velocity: cast_vector(direction * rate),
             pivot: point((pivot + way).into()),
         };
         Ok((pose, motion))

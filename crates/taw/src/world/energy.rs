@@ -10,7 +10,7 @@ pub struct Energy {
     /// Translational kinetic energy.
     pub kinetic: f64,
     /// Rotational kinetic energy of marbles with [`Rotation::Dynamic`].
-    pub spin: f64,
+    pub rotational: f64,
     /// Potential energy in the world's gravity, relative to the origin.
     pub potential: f64,
 }
@@ -19,7 +19,7 @@ impl Energy {
     /// Total energy.
     #[must_use]
     pub fn total(self) -> f64 {
-        self.kinetic + self.spin + self.potential
+        self.kinetic + self.rotational + self.potential
     }
 }
 
@@ -35,7 +35,7 @@ impl<S: Scalar> World<S> {
             let scale = self.marbles.gravity_scale.get(row).unwrap_or(S::one()).as_f64();
             energy.kinetic += 0.5 * mass * velocity.magnitude2();
             if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Dynamic {
-                energy.spin += 0.5 * mass * self.marbles.rotational_energy(row);
+                energy.rotational += 0.5 * mass * self.marbles.rotational_energy(row);
             }
             energy.potential -= mass * scale * gravity.dot(position.to_vec());
         }

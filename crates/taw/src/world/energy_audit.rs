@@ -53,7 +53,7 @@ pub(super) struct AuditState<S> {
     residual: Vec3<f64>,
     /// Velocities and angular velocities by index, and the energy, at the start of the substep.
     pub velocity: Vec<Vec3<S>>,
-    pub spin: Vec<Vec3<S>>,
+    pub angular_velocity: Vec<Vec3<S>>,
     energy: f64,
     /// Potential energy and momentum after contacts were generated.
     potential: f64,
@@ -71,7 +71,7 @@ impl<S: Scalar> World<S> {
                     audit: EnergyAudit::default(),
                     residual: Vec3::zero(),
                     velocity: Vec::new(),
-                    spin: Vec::new(),
+                    angular_velocity: Vec::new(),
                     energy: 0.0,
                     potential: 0.0,
                     moment: Vec3::zero(),
@@ -101,8 +101,8 @@ impl<S: Scalar> World<S> {
         audit_state.energy = self.energy().total();
         audit_state.velocity.clear();
         audit_state.velocity.extend_from_slice(self.marbles.velocity());
-        audit_state.spin.clear();
-        audit_state.spin.extend_from_slice(self.marbles.spin());
+        audit_state.angular_velocity.clear();
+        audit_state.angular_velocity.extend_from_slice(self.marbles.angular_velocity());
         self.audit_state = Some(audit_state);
     }
 

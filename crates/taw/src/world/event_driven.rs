@@ -134,7 +134,7 @@ impl<S: Scalar> event::Source for Source<'_, S> {
         let way = |motion: &WallMotion<f64>| {
             let arm = (point - motion.pivot).magnitude() + reach;
             let arm = arm + motion.velocity.magnitude() * self.there;
-            (motion.velocity.magnitude() + motion.spin.magnitude() * arm) * self.there
+            (motion.velocity.magnitude() + motion.angular_velocity.magnitude() * arm) * self.there
         };
         let way = self.moving.iter().map(way).fold(0.0, f64::max);
         let digits =

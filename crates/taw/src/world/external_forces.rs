@@ -2,7 +2,7 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::marbles::{MarbleId, Marbles, SPIN, VELOCITY};
+use super::marbles::{ANGULAR_VELOCITY, MarbleId, Marbles, VELOCITY};
 use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Bivector;
@@ -113,10 +113,10 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         finite_vector(IMPULSE, impulse)?;
         let lever = finite_point(POINT, point)? - self.position[row];
-        let before = self.spin.get(row).copied();
+        let before = self.angular_velocity.get(row).copied();
         self.apply_angular_impulse(id, Bivector::wedge(lever, impulse))?;
         self.apply_impulse(id, impulse).inspect_err(|_| {
-            if let (Some(slot), Some(before)) = (self.spin.get_mut(row), before) {
+            if let (Some(slot), Some(before)) = (self.angular_velocity.get_mut(row), before) {
                 *slot = before;
             }
         })
@@ -137,8 +137,8 @@ impl<S: Scalar> Marbles<S> {
         let impulse =
             finite_vector(["impulse.yz", "impulse.zx", "impulse.xy"], impulse.into().dual())?;
         let change = self.apply_inverse_inertia(row, impulse);
-        if let Some(spin) = self.spin.get_mut(row) {
-            *spin = finite_vector(SPIN, *spin + change)?;
+        if let Some(angular_velocity) = self.angular_velocity.get_mut(row) {
+            *angular_velocity = finite_vector(ANGULAR_VELOCITY, *angular_velocity + change)?;
         }
         Ok(())
     }
@@ -169,27 +169,29 @@ impl<S: Scalar> Marbles<S> {
     /// [`Error::NoSuchMarble`].
     pub fn angular_momentum(&self, id: MarbleId) -> Result<Bivector<S>, Error> {
         let row = self.row(id)?;
-        let spin = self.spin.get(row).copied().unwrap_or_else(Vec3::zero);
+        let angular_velocity = self.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero);
         let mass = self.mass(row);
-        Ok(if spin.is_zero() {
-            spin
+        Ok(if angular_velocity.is_zero() {
+            angular_velocity
         } else {
-            self.scale_by_moments(row, spin, |moment| moment * mass)
+            self.scale_by_moments(row, angular_velocity, |moment| moment * mass)
         }
         .into())
     }
 
     /// Twice the rotational kinetic energy over the mass, in m²/s².
     pub(super) fn rotational_energy(&self, row: usize) -> f64 {
-        let (spin, radius) = (self.angular_velocity_f64(row), self.radius[row].as_f64());
+        let (angular_velocity, radius) =
+            (self.angular_velocity_f64(row), self.radius[row].as_f64());
         let half = self.half_length(row).as_f64();
         if half == 0.0 {
-            return 0.4 * (spin * radius).magnitude2();
+            return 0.4 * (angular_velocity * radius).magnitude2();
         }
         let [along, across] = Rod::moments(radius, half);
         let axis = cast_vector::<S, f64>(self.axis(row)).normalize();
-        let about_axis = spin.dot(axis);
-        about_axis * about_axis * along + (spin - axis * about_axis).magnitude2() * across
+        let about_axis = angular_velocity.dot(axis);
+        about_axis * about_axis * along
+            + (angular_velocity - axis * about_axis).magnitude2() * across
     }
 
     /// Applies the inverse inertia tensor to an angular impulse; zero for infinite mass.

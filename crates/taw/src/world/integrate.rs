@@ -140,23 +140,27 @@ impl<S: Scalar> Marbles<S> {
     /// Angular velocity in high precision, in rad/s.
     pub(super) fn angular_velocity_f64(&self, row: usize) -> Vec3<f64> {
         let low = self.compensation.get(row).copied().unwrap_or_default();
-        let spin = self.spin.get(row).copied().unwrap_or_else(Vec3::zero);
-        cast_vector::<S, f64>(spin) + cast_vector(low.spin)
+        let angular_velocity = self.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero);
+        cast_vector::<S, f64>(angular_velocity) + cast_vector(low.angular_velocity)
     }
 
     /// Splits the angular velocity likewise. Does nothing in a model without rotation.
-    pub(super) fn set_angular_velocity_f64(&mut self, row: usize, spin: Vec3<f64>) -> bool {
-        if let Some(slot) = self.spin.get_mut(row) {
-            *slot = cast_vector(spin);
+    pub(super) fn set_angular_velocity_f64(
+        &mut self,
+        row: usize,
+        angular_velocity: Vec3<f64>,
+    ) -> bool {
+        if let Some(slot) = self.angular_velocity.get_mut(row) {
+            *slot = cast_vector(angular_velocity);
             if !is_finite(*slot) {
                 *slot = Vec3::zero();
                 if let Some(low) = self.compensation.get_mut(row) {
-                    low.spin = Vec3::zero();
+                    low.angular_velocity = Vec3::zero();
                 }
                 return false;
             }
             if let Some(low) = self.compensation.get_mut(row) {
-                low.spin = cast_vector(spin - cast_vector(*slot));
+                low.angular_velocity = cast_vector(angular_velocity - cast_vector(*slot));
             }
         }
         true
@@ -172,19 +176,19 @@ impl<S: Scalar> Marbles<S> {
         if self.torque.is_empty() && self.damping.is_empty() {
             return;
         }
-        for row in 0..self.spin.len() {
+        for row in 0..self.angular_velocity.len() {
             if self.is_rotation_locked(row) {
                 continue;
             }
-            let mut spin = self.spin[row];
+            let mut angular_velocity = self.angular_velocity[row];
             if let Some(torque) = self.torque.get(row) {
-                spin += self.apply_inverse_inertia(row, torque.dual()) * dt;
+                angular_velocity += self.apply_inverse_inertia(row, torque.dual()) * dt;
             }
             if let Some(damping) = self.damping.get(row) {
-                spin *= (-damping.angular * dt).exp_portable();
+                angular_velocity *= (-damping.angular * dt).exp_portable();
             }
-            if is_finite(spin) && spin != self.spin[row] {
-                self.spin[row] = spin;
+            if is_finite(angular_velocity) && angular_velocity != self.angular_velocity[row] {
+                self.angular_velocity[row] = angular_velocity;
             }
         }
     }
@@ -194,20 +198,21 @@ impl<S: Scalar> Marbles<S> {
     /// lifted out, which gains energy.
     pub(super) fn integrate_rotations(&mut self, dt: S, rotation: Rotation) {
         if self.has_capsules() {
-            for row in 0..self.spin.len() {
+            for row in 0..self.angular_velocity.len() {
                 let own = self.rotation_model.get(row).unwrap_or(rotation);
                 if own.min(rotation) == Rotation::Dynamic || self.half_length(row) == S::zero() {
                     self.integrate_symmetric_top(row, dt);
                 } else {
                     let axis = self.rotation[row] * Vec3::unit_y();
-                    let spin = axis * self.spin[row].dot(axis);
-                    self.rotation[row] = integrate_rotation(self.rotation[row], spin, dt);
+                    let angular_velocity = axis * self.angular_velocity[row].dot(axis);
+                    self.rotation[row] =
+                        integrate_rotation(self.rotation[row], angular_velocity, dt);
                 }
             }
             return;
         }
-        for (rotation, spin) in self.rotation.iter_mut().zip(&self.spin) {
-            *rotation = integrate_rotation(*rotation, *spin, dt);
+        for (rotation, angular_velocity) in self.rotation.iter_mut().zip(&self.angular_velocity) {
+            *rotation = integrate_rotation(*rotation, *angular_velocity, dt);
         }
     }
 
@@ -219,20 +224,20 @@ impl<S: Scalar> Marbles<S> {
     /// the same direction.
     fn integrate_symmetric_top(&mut self, row: usize, dt: S) {
         let (rotation, half) = (self.rotation[row], self.half_length(row));
-        if half == S::zero() || self.spin[row].is_zero() {
-            self.rotation[row] = integrate_rotation(rotation, self.spin[row], dt);
+        if half == S::zero() || self.angular_velocity[row].is_zero() {
+            self.rotation[row] = integrate_rotation(rotation, self.angular_velocity[row], dt);
             return;
         }
         let exact = |rotation: Quat<S>| {
             Quat::from_sv(rotation.s.as_f64(), cast_vector(rotation.v)).normalize()
         };
-        let (spin, dt) = (self.angular_velocity_f64(row), dt.as_f64());
+        let (angular_velocity, dt) = (self.angular_velocity_f64(row), dt.as_f64());
         let rotation = exact(rotation);
         let axis = (rotation * Vec3::unit_y()).normalize();
         let [along, across] = Rod::moments(self.radius[row].as_f64(), half.as_f64());
         // Precession rate: angular momentum over the moment across the axis.
-        let about_axis = spin.dot(axis);
-        let precession = spin + axis * (about_axis * (along / across - 1.0));
+        let about_axis = angular_velocity.dot(axis);
+        let precession = angular_velocity + axis * (about_axis * (along / across - 1.0));
         let own = axis * (about_axis - precession.dot(axis));
         let rotation = integrate_rotation(integrate_rotation(rotation, own, dt), precession, dt);
         self.rotation[row] = Quat::from_sv(S::constant(rotation.s), cast_vector(rotation.v));

@@ -31,7 +31,7 @@ impl<S: Scalar> SpeedLimits<S> {
     /// Clamps velocities and angular velocities to the limits.
     pub(super) fn apply(self, marbles: &mut Marbles<S>) {
         for (limit, column) in
-            [(self.linear, &mut marbles.velocity), (self.angular, &mut marbles.spin)]
+            [(self.linear, &mut marbles.velocity), (self.angular, &mut marbles.angular_velocity)]
         {
             let Some(limit) = limit else { continue };
             for v in column {

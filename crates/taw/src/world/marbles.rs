@@ -36,7 +36,7 @@ pub struct Marble<S> {
     pub rotation: Quat<S>,
     /// Angular velocity in rad/s, an axial vector in world space. Stored only by a model with
     /// rotation.
-    pub spin: Vec3<S>,
+    pub angular_velocity: Vec3<S>,
     /// Own integrator instead of the model's.
     pub integrator: Option<Integrator>,
     /// Own rotation model, limited by the world's: a marble may roll visually, or not rotate at
@@ -56,7 +56,7 @@ impl<S: Scalar> Marble<S> {
             half_length: S::zero(),
             velocity: Vec3::zero(),
             rotation: Quat::one(),
-            spin: Vec3::zero(),
+            angular_velocity: Vec3::zero(),
             mass: Mass::default(),
             gravity_scale: S::one(),
             damping: Damping::default(),
@@ -103,12 +103,12 @@ impl<S: Scalar> Damping<S> {
 pub(super) struct Compensation<S> {
     pub position: Vec3<S>,
     pub velocity: Vec3<S>,
-    pub spin: Vec3<S>,
+    pub angular_velocity: Vec3<S>,
 }
 
 impl<S: Scalar> Default for Compensation<S> {
     fn default() -> Self {
-        Self { position: Vec3::zero(), velocity: Vec3::zero(), spin: Vec3::zero() }
+        Self { position: Vec3::zero(), velocity: Vec3::zero(), angular_velocity: Vec3::zero() }
     }
 }
 
@@ -129,7 +129,7 @@ pub struct Marbles<S> {
     pub(super) velocity: Vec<Vec3<S>>,
     /// Empty in a model without rotation, as is `angular_velocity`.
     pub(super) rotation: Vec<Quat<S>>,
-    pub(super) spin: Vec<Vec3<S>>,
+    pub(super) angular_velocity: Vec<Vec3<S>>,
     /// Empty in a model of plain precision.
     pub(super) compensation: Vec<Compensation<S>>,
     /// Non-default masses.
@@ -159,7 +159,7 @@ impl<S> Default for Marbles<S> {
             half_length: SparseColumn::default(),
             velocity: Vec::new(),
             rotation: Vec::new(),
-            spin: Vec::new(),
+            angular_velocity: Vec::new(),
             compensation: Vec::new(),
             mass: SparseColumn::default(),
             gravity_scale: SparseColumn::default(),
@@ -174,7 +174,8 @@ impl<S> Default for Marbles<S> {
 }
 
 const POSITION: [&str; 3] = ["position.x", "position.y", "position.z"];
-pub(super) const SPIN: [&str; 3] = ["spin.x", "spin.y", "spin.z"];
+pub(super) const ANGULAR_VELOCITY: [&str; 3] =
+    ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
 pub(super) const VELOCITY: [&str; 3] = ["velocity.x", "velocity.y", "velocity.z"];
 
 impl<S: Scalar> Marbles<S> {
@@ -190,7 +191,7 @@ impl<S: Scalar> Marbles<S> {
         let half_length = checked_half_length(marble.half_length)?;
         let velocity = finite_vector(VELOCITY, marble.velocity)?;
         let rotation = checked_rotation(marble.rotation)?;
-        let spin = finite_vector(SPIN, marble.spin)?;
+        let angular_velocity = finite_vector(ANGULAR_VELOCITY, marble.angular_velocity)?;
         let mass = marble.mass.checked()?;
         mass.of_size(radius, marble.half_length)?;
         let gravity_scale = finite("gravity_scale", marble.gravity_scale)?;
@@ -206,7 +207,7 @@ impl<S: Scalar> Marbles<S> {
         if self.has_rotation {
             self.rotation.push(rotation);
             let turns = marble.rotation_model != Some(Rotation::None);
-            self.spin.push(if turns { spin } else { Vec3::zero() });
+            self.angular_velocity.push(if turns { angular_velocity } else { Vec3::zero() });
         }
         if self.compensated {
             self.compensation.push(Compensation::default());
@@ -236,7 +237,7 @@ impl<S: Scalar> Marbles<S> {
             self.velocity.swap_remove(row);
             if self.has_rotation {
                 self.rotation.swap_remove(row);
-                self.spin.swap_remove(row);
+                self.angular_velocity.swap_remove(row);
             }
             if self.compensated {
                 self.compensation.swap_remove(row);
@@ -266,7 +267,7 @@ impl<S: Scalar> Marbles<S> {
             half_length: self.half_length(row),
             velocity: self.velocity[row],
             rotation: self.rotation.get(row).copied().unwrap_or_else(Quat::one),
-            spin: self.spin.get(row).copied().unwrap_or_else(Vec3::zero),
+            angular_velocity: self.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero),
             mass: self.mass.get(row).unwrap_or_default(),
             gravity_scale: self.gravity_scale.get(row).unwrap_or(S::one()),
             damping: self.damping.get(row).unwrap_or_default(),
@@ -290,7 +291,7 @@ impl<S: Scalar> Marbles<S> {
         Ok(Marble {
             position,
             velocity,
-            spin: self.angular_velocity_f64(row),
+            angular_velocity: self.angular_velocity_f64(row),
             radius: marble.radius.as_f64(),
             half_length: marble.half_length.as_f64(),
             mass: marble.mass.cast(),
@@ -375,13 +376,18 @@ impl<S: Scalar> Marbles<S> {
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`], [`Error::NotFinite`].
-    pub fn set_spin(&mut self, id: MarbleId, spin: Vec3<S>) -> Result<(), Error> {
-        let (row, spin) = (self.row(id)?, finite_vector(SPIN, spin)?);
-        if let Some(slot) = self.spin.get_mut(row) {
-            *slot = spin;
+    pub fn set_angular_velocity(
+        &mut self,
+        id: MarbleId,
+        angular_velocity: Vec3<S>,
+    ) -> Result<(), Error> {
+        let (row, angular_velocity) =
+            (self.row(id)?, finite_vector(ANGULAR_VELOCITY, angular_velocity)?);
+        if let Some(slot) = self.angular_velocity.get_mut(row) {
+            *slot = angular_velocity;
         }
         if let Some(low) = self.compensation.get_mut(row) {
-            low.spin = Vec3::zero();
+            low.angular_velocity = Vec3::zero();
         }
         Ok(())
     }
@@ -447,7 +453,7 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         self.rotation_model.set(row, model, self.handles.len());
         if model == Some(Rotation::None) {
-            self.set_spin(id, Vec3::zero())?;
+            self.set_angular_velocity(id, Vec3::zero())?;
         }
         Ok(())
     }
@@ -513,8 +519,8 @@ impl<S: Scalar> Marbles<S> {
 
     /// Angular velocities by index, in rad/s; empty in a model without rotation.
     #[must_use]
-    pub fn spin(&self) -> &[Vec3<S>] {
-        &self.spin
+    pub fn angular_velocity(&self) -> &[Vec3<S>] {
+        &self.angular_velocity
     }
 
     /// Index of a marble, valid until the next removal.
@@ -628,20 +634,20 @@ impl<S: Scalar> Marbles<S> {
             self.has_rotation = enable;
             let rows = if enable { self.position.len() } else { 0 };
             self.rotation = vec![Quat::one(); rows];
-            self.spin = vec![Vec3::zero(); rows];
+            self.angular_velocity = vec![Vec3::zero(); rows];
         }
     }
 
     /// Sets the angular velocity of rolling without slip over a surface at rest with this normal.
     pub(super) fn roll_without_slip(&mut self, row: usize, normal: Vec3<S>) {
-        let spin = normal.cross(self.velocity[row]) / self.radius[row];
+        let angular_velocity = normal.cross(self.velocity[row]) / self.radius[row];
         if self.half_length.get(row).is_some() {
             return; // it does not roll whichever way it goes
         }
-        if let Some(slot) = self.spin.get_mut(row)
-            && is_finite(spin)
+        if let Some(slot) = self.angular_velocity.get_mut(row)
+            && is_finite(angular_velocity)
         {
-            *slot = spin;
+            *slot = angular_velocity;
         }
     }
 
@@ -660,10 +666,10 @@ impl<S: Scalar> Marbles<S> {
             (self.position[row], self.velocity[row]) = (position, velocity);
         }
         let turned = rim / self.radius[row];
-        if let Some(spin) = self.spin.get_mut(row)
-            && is_finite(*spin + turned)
+        if let Some(angular_velocity) = self.angular_velocity.get_mut(row)
+            && is_finite(*angular_velocity + turned)
         {
-            *spin += turned;
+            *angular_velocity += turned;
         }
     }
 
@@ -680,7 +686,7 @@ impl<S: Scalar> Marbles<S> {
             velocity: &mut self.velocity,
             radius: &self.radius,
             inverse_mass,
-            spin: &mut self.spin,
+            spin: &mut self.angular_velocity,
             held,
             rods,
         };
@@ -698,22 +704,22 @@ impl<S: Scalar> Marbles<S> {
 
     /// Returns true if the state of a marble is finite.
     pub(super) fn is_finite_state(&self, row: usize) -> bool {
-        let turns = |spin: &Vec3<S>| is_finite(*spin);
+        let turns = |angular_velocity: &Vec3<S>| is_finite(*angular_velocity);
         let turned = |q: &Quat<S>| q.s.is_finite() && is_finite(q.v);
         is_finite_point(self.position[row])
             && is_finite(self.velocity[row])
-            && self.spin.get(row).is_none_or(turns)
+            && self.angular_velocity.get(row).is_none_or(turns)
             && self.rotation.get(row).is_none_or(turned)
     }
 
     /// Stops a marble: clears velocity, angular velocity and their compensation.
     pub(super) fn stop(&mut self, row: usize) {
         self.velocity[row] = Vec3::zero();
-        if let Some(spin) = self.spin.get_mut(row) {
-            *spin = Vec3::zero();
+        if let Some(angular_velocity) = self.angular_velocity.get_mut(row) {
+            *angular_velocity = Vec3::zero();
         }
         if let Some(low) = self.compensation.get_mut(row) {
-            (low.velocity, low.spin) = (Vec3::zero(), Vec3::zero());
+            (low.velocity, low.angular_velocity) = (Vec3::zero(), Vec3::zero());
         }
     }
 }

@@ -481,8 +481,8 @@ impl<S: Scalar> World<S> {
                     &mut self.stopped,
                 );
                 if let Some(audit_state) = &mut self.audit_state {
-                    let AuditState { velocity, spin, work, .. } = &mut **audit_state;
-                    self.impulse.count(&mut columns, velocity, spin, work);
+                    let AuditState { velocity, angular_velocity, work, .. } = &mut **audit_state;
+                    self.impulse.count(&mut columns, velocity, angular_velocity, work);
                 }
             }
             Response::Penalty(law) => penalty(

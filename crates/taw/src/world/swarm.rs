@@ -69,7 +69,10 @@ impl<S: Scalar> World<S> {
             let single = |x: S| (x.as_f64() as f32).clamp(-FURTHEST, FURTHEST);
             let rows = |v: Vec3<S>, last: f32| [single(v.x), single(v.y), single(v.z), last];
             let radius = marbles.radius()[row];
-            let spin = marbles.spin().get(row).map_or([0.0; 4], |spin| rows(*spin * radius, 0.0));
+            let spin = marbles
+                .angular_velocity()
+                .get(row)
+                .map_or([0.0; 4], |spin| rows(*spin * radius, 0.0));
             let inverse_mass = (S::one() / marbles.mass(row)).as_f64() as f32;
             let at = rows(marbles.position()[row].to_vec(), single(radius));
             Some(Guest::new(*ball, at, rows(marbles.velocity()[row], inverse_mass), spin))

@@ -260,7 +260,10 @@ impl<S: Scalar> Walls<S> {
         let row = self.row(id)?;
         if let Some(motion) = motion {
             finite_vector(["velocity.x", "velocity.y", "velocity.z"], motion.velocity)?;
-            finite_vector(["spin.x", "spin.y", "spin.z"], motion.spin)?;
+            finite_vector(
+                ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"],
+                motion.angular_velocity,
+            )?;
             finite_point(["pivot.x", "pivot.y", "pivot.z"], motion.pivot)?;
         }
         self.version += u64::from(self.motion.get(row) != motion);

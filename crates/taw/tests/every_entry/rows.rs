@@ -151,7 +151,7 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
         };
         Marble 4 "Marble.velocity": |p, x| { let v = on_axis(p.case, x); insert(p, |m| m.velocity = v) };
         Marble 3 "Marble.rotation": |p, x| { let q = quaternions(x)[p.case]; insert(p, |m| m.rotation = q) };
-        Marble 4 "Marble.spin": |p, x| { let v = on_axis(p.case, x); insert(p, |m| m.spin = v) };
+        Marble 4 "Marble.angular_velocity": |p, x| { let v = on_axis(p.case, x); insert(p, |m| m.angular_velocity = v) };
         Marble 1 "Marble.mass Mass::Density": |p, x| insert(p, |m| m.mass = Mass::Density(x));
         Marble 1 "Mass::Kilograms": |p, x| insert(p, |m| m.mass = Mass::Kilograms(x));
         Marble 1 "Marble.gravity_scale": |p, x| insert(p, |m| m.gravity_scale = x);
@@ -170,7 +170,7 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
             p.world.marbles.set_half_length(p.subject, x)
         };
         Marble 3 "Marbles::set_rotation": |p, x| p.world.marbles.set_rotation(p.subject, quaternions(x)[p.case]);
-        Marble 4 "Marbles::set_spin": |p, x| { let v = on_axis(p.case, x); p.world.marbles.set_spin(p.subject, v) };
+        Marble 4 "Marbles::set_angular_velocity": |p, x| { let v = on_axis(p.case, x); p.world.marbles.set_angular_velocity(p.subject, v) };
         Marble 1 "Marbles::set_mass": |p, x| p.world.marbles.set_mass(p.subject, Mass::Kilograms(x));
         Marble 1 "Marbles::set_gravity_scale": |p, x| p.world.marbles.set_gravity_scale(p.subject, x);
         Marble 1 "Marbles::set_damping": |p, x| p.world.marbles.set_damping(p.subject, Damping { linear: x, angular: x });
@@ -337,15 +337,15 @@ fn walls<S: Scalar>() -> Vec<Row<S>> {
         };
         World 4 "Walls::set_motion WallMotion.velocity": |p, x| {
             let (none, pivot) = (vector(zero(), zero(), zero()), point(zero(), zero(), zero()));
-            { let v = on_axis(p.case, x); p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: v, spin: none, pivot })) }
+            { let v = on_axis(p.case, x); p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: v, angular_velocity: none, pivot })) }
         };
-        World 1 "WallMotion.spin": |p, x| {
+        World 1 "WallMotion.angular_velocity": |p, x| {
             let (none, pivot) = (vector(zero(), zero(), zero()), point(zero(), zero(), zero()));
-            p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: none, spin: vector(x, x, x), pivot }))
+            p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: none, angular_velocity: vector(x, x, x), pivot }))
         };
         World 1 "WallMotion.pivot": |p, x| {
             let (none, spin) = (vector(zero(), zero(), zero()), vector(zero(), zero(), one()));
-            p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: none, spin, pivot: point(x, x, x) }))
+            p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: none, angular_velocity: spin, pivot: point(x, x, x) }))
         };
     }
 }

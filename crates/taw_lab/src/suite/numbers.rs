@@ -86,7 +86,7 @@ fn extremes(meter: &mut Meter, model: Model) -> f64 {
                     let ball = Ball {
                         at: [0.0, 0.5, 0.0],
                         velocity: [1.0, -1.0, 0.0],
-                        spin: [0.0, 0.0, spin],
+                        angular_velocity: [0.0, 0.0, spin],
                         material,
                         ..Ball::default()
                     };
@@ -148,7 +148,7 @@ fn not_finite(meter: &mut Meter) -> f64 {
         let refused = [
             Marble { position: Point3::new(bad, 0.0, 0.0), ..good },
             Marble { velocity: v, ..good },
-            Marble { spin: v, ..good },
+            Marble { angular_velocity: v, ..good },
             Marble { radius: bad, ..good },
             Marble { rotation: Quat::new(bad, 0.0, 0.0, 0.0), ..good },
             Marble { gravity_scale: bad, ..good },

@@ -53,7 +53,7 @@ fn corner(meter: &mut Meter, model: Model) -> f64 {
                 random.between(-3.0, 0.0),
                 random.between(0.0, 3.0),
             ],
-            spin: random.vector(10.0),
+            angular_velocity: random.vector(10.0),
             material: surface(random.between(0.0, 1.0), random.between(0.0, 1.5)),
             ..Ball::default()
         };
@@ -99,7 +99,7 @@ fn cone(meter: &mut Meter, model: Model) -> f64 {
             at: [random.between(-0.01, 0.01), high, random.between(-0.01, 0.01)],
             radius: 0.25,
             velocity: random.vector(0.8),
-            spin: random.vector(10.0),
+            angular_velocity: random.vector(10.0),
             material: surface(0.0, random.between(0.3, 1.3)),
             ..Ball::default()
         };
@@ -123,7 +123,7 @@ fn groove(meter: &mut Meter, model: Model) -> f64 {
             at: [0.0, 0.25 / cos + random.between(0.0, 0.1), 0.0],
             radius: 0.25,
             velocity: random.vector(1.0),
-            spin: random.vector(10.0),
+            angular_velocity: random.vector(10.0),
             material: surface(random.between(0.0, 1.0), random.between(0.3, 1.3)),
             ..Ball::default()
         };
@@ -156,7 +156,7 @@ impl Moving {
         let turn = pose.rotation * self.pose.rotation.conjugate();
         let motion = WallMotion {
             velocity: (after - before) / DT as f32,
-            spin: turn.v * (2.0 / DT as f32),
+            angular_velocity: turn.v * (2.0 / DT as f32),
             pivot: after,
         };
         let plane = Plane::through(after, normal).expect("a unit vector");

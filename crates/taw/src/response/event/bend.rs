@@ -153,7 +153,8 @@ impl Ground<'_> {
         let (wall, PointProjection { normal, .. }) = self.nearest(state.position, state.time);
         let Some(wall) = self.walls.get(wall) else { return false };
         if wall.going(0.0).is_some_and(|(motion, _)| {
-            motion.spin.cross(normal).magnitude() > 1e-12 * motion.spin.magnitude()
+            motion.angular_velocity.cross(normal).magnitude()
+                > 1e-12 * motion.angular_velocity.magnitude()
         }) {
             return false;
         }
@@ -180,13 +181,13 @@ impl Ground<'_> {
         let point = position - normal * self.radius;
         let mut surface_rate = Vec3::zero();
         if let Some((motion, _)) = wall.going(time) {
-            let turning = motion.spin;
+            let turning = motion.angular_velocity;
             bend += turning.cross(normal);
             needed += normal.dot(turning.cross(velocity - motion.velocity + over));
             surface_rate = turning.cross(velocity - bend * self.radius - motion.velocity);
         } else if let Some(motion) = wall.motion {
             let full = motion.velocity_at(point);
-            surface_rate = motion.spin.cross(velocity - bend * self.radius);
+            surface_rate = motion.angular_velocity.cross(velocity - bend * self.radius);
             surface_rate -= bend * full.dot(normal);
         }
         let mut slip = along(velocity - wall.surface_velocity(normal, point, time));
@@ -371,7 +372,7 @@ impl Ground<'_> {
         let mut longest =
             (BEND / (curved * speed)).min((BEND / (curved * rate.acceleration.magnitude())).sqrt());
         if let Some((motion, _)) = wall.going(0.0) {
-            longest = longest.min(BEND / motion.spin.magnitude());
+            longest = longest.min(BEND / motion.angular_velocity.magnitude());
         }
         // What looks flat may bend farther on.
         longest.min(super::LOOK * self.radius / speed)

@@ -259,7 +259,7 @@ impl EventDriven {
     /// Upper bound of a ball's acceleration toward a wall because that turns, in m/s².
     fn at_most_turned(&self, row: usize, wall: usize, time: f64, settings: &Settings) -> f64 {
         let Some((motion, left)) = self.walls[wall].going(time) else { return 0.0 };
-        let turning = motion.spin.magnitude();
+        let turning = motion.angular_velocity.magnitude();
         if turning == 0.0 {
             return 0.0;
         }

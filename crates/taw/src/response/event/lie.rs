@@ -79,7 +79,8 @@ impl EventDriven {
         let wall = &self.walls[wall];
         let Form::Plane { normal, .. } = wall.form else { return false };
         wall.going(0.0).is_none_or(|(motion, _)| {
-            motion.spin.cross(normal).magnitude() <= 1e-12 * motion.spin.magnitude()
+            motion.angular_velocity.cross(normal).magnitude()
+                <= 1e-12 * motion.angular_velocity.magnitude()
         })
     }
 
@@ -153,7 +154,7 @@ impl EventDriven {
         let along = Support {
             normal,
             surface: wall.surface_velocity(normal, touch, now),
-            turning: wall.motion.map_or_else(Vec3::zero, |motion| motion.spin),
+            turning: wall.motion.map_or_else(Vec3::zero, |motion| motion.angular_velocity),
             pull: ball.pull + normal * pressure,
             pressure,
             radius: ball.radius,

@@ -80,7 +80,8 @@ impl Wall {
 
     /// Where its surface is nearest to a point at a time.
     pub fn nearest(&self, point: Point3<f64>, time: f64) -> PointProjection<f64> {
-        let Some((WallMotion { velocity, spin, pivot }, left)) = self.going(time) else {
+        let Some((WallMotion { velocity, angular_velocity: spin, pivot }, left)) = self.going(time)
+        else {
             return self.form.nearest(point);
         };
         let on = point + velocity * left;
@@ -100,7 +101,7 @@ impl Wall {
     pub fn at_least(&self, point: Point3<f64>, time: f64) -> f64 {
         let Some(bounds) = &self.bounds else { return f64::NEG_INFINITY };
         let on = match self.going(time) {
-            Some((motion, _)) if !motion.spin.is_zero() => return f64::NEG_INFINITY,
+            Some((motion, _)) if !motion.angular_velocity.is_zero() => return f64::NEG_INFINITY,
             Some((motion, left)) => point + motion.velocity * left,
             None => point,
         };
