@@ -150,7 +150,7 @@ fn rack(
                 ..default()
             },
             Velocity::default(),
-            Spin::default(),
+            AngularVelocity::default(),
             Transform::from_xyz(at.x, RADIUS, at.y),
             Mesh3d(mesh.clone()),
             MeshMaterial3d(materials.add(StandardMaterial {

@@ -114,7 +114,7 @@ fn start(
         commands.spawn((
             Marble::new(RADIUS),
             Velocity(velocity),
-            Spin((under - velocity).cross(Vec3::Y) / RADIUS),
+            AngularVelocity((under - velocity).cross(Vec3::Y) / RADIUS),
             SurfaceMaterial { friction: 2.0, restitution: 0.3, ..default() },
             Trail(VecDeque::new(), colour),
             Transform::from_xyz(x, RADIUS, 0.0),

@@ -2,7 +2,7 @@
 
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
-use bevy_taw::taw::prelude::{QueryTree, Thing};
+use bevy_taw::taw::prelude::{ColliderId, QueryTree};
 use taw_examples::Pointer;
 
 use crate::controls::{Action, just_pressed};
@@ -22,8 +22,8 @@ fn flick(
 ) {
     let Some(ray) = pointer.ray() else { return };
     let queries = world.queries(&mut tree);
-    let hit = queries.cast_ray(&ray, f32::INFINITY, |thing| matches!(thing, Thing::Marble(_)));
-    let Some(Thing::Marble(id)) = hit.map(|found| found.thing) else { return };
+    let hit = queries.cast_ray(&ray, f32::INFINITY, |thing| matches!(thing, ColliderId::Marble(_)));
+    let Some(ColliderId::Marble(id)) = hit.map(|found| found.collider) else { return };
     let entity = world.marbles.row(id).ok().and_then(|row| world.marble_entity(row as u32));
     if let Some(mut velocity) = entity.and_then(|entity| marbles.get_mut(entity).ok()) {
         // Up, and away from the eye.

@@ -203,7 +203,7 @@ fn marble_of(ball: &Ball, bag: &mut Bag, look: &Look) -> impl Bundle + use<> {
     let velocity = place(ball.velocity);
     (
         MarbleMass::Density(ball.density as f32),
-        Spin(place(ball.spin)),
+        AngularVelocity(place(ball.angular_velocity)),
         colored(Transform::from_translation(at), velocity, radius, bag, look),
     )
 }

@@ -112,7 +112,7 @@ fn panels(
         let energy = section(ui, "Energy", false, |ui| debug_ui::energy(ui, &mut diagnostics));
         bevy_taw::diagnostics::enable_energy(&mut diagnostics, energy);
         let account = section(ui, "Accuracy", false, |ui| debug_ui::accuracy(ui, &mut diagnostics));
-        bevy_taw::diagnostics::enable_accuracy(&mut diagnostics, account);
+        bevy_taw::diagnostics::enable_energy_audit(&mut diagnostics, account);
         section(ui, "Draw", false, |ui| debug_ui::gizmos(ui, &mut gizmos));
         ui.separator();
         ui.weak("F1 lists all keys, Tab hides the panels");

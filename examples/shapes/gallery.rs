@@ -2,8 +2,9 @@
 
 use bevy::prelude::*;
 use bevy_taw::taw::contact::{
-    Closest, ManifoldPoint, closest_of_surface, closest_plane, closest_shapes, manifolds_of_shapes,
-    manifolds_of_surface, parts_of, sweep_against_surface, sweep_shapes,
+    ClosestPoints, ManifoldPoint, closest_points_of_plane, closest_points_of_shapes,
+    closest_points_of_surface, manifolds_of_shapes, manifolds_of_surface, shape_cast_of_shapes,
+    shape_cast_on_surface, sub_shapes,
 };
 use bevy_taw::taw::frame::Pose;
 use bevy_taw::taw::math::{Point3, Quat as TawQuat, Vec3 as TawVec3};
@@ -107,18 +108,18 @@ pub fn ground(kind: Kind) -> Option<Ground> {
 pub fn second(scene: &Scene) -> Option<Shape<f32>> {
     let [x, y, z, w] = scene.place.rotation.to_array();
     let translation = taw_vector(scene.place.translation);
-    let moved =
-        shape(scene.kinds[1])?.moved(Pose { rotation: TawQuat::new(w, x, y, z), translation });
+    let moved = shape(scene.kinds[1])?
+        .transformed(Pose { rotation: TawQuat::new(w, x, y, z), translation });
     // A box along the axes stays along them.
     Some(match (scene.kinds[1], &moved) {
-        (Kind::Aabb, _) => shape(Kind::Aabb)?.moved(Pose { translation, ..Pose::identity() }),
+        (Kind::Aabb, _) => shape(Kind::Aabb)?.transformed(Pose { translation, ..Pose::identity() }),
         _ => moved,
     })
 }
 
 /// All that the core says of the two.
 pub struct Answers {
-    pub closest: Option<Closest<f32>>,
+    pub closest: Option<ClosestPoints<f32>>,
     /// Points on both surfaces.
     pub touches: Vec<(Vec3, f32, u32)>,
     /// When, as a part of the way, and where.
@@ -131,16 +132,16 @@ pub fn ask(scene: &Scene) -> Option<Answers> {
     let point = |p: &ManifoldPoint<f32>| (bevy_point(p.on_b), p.distance, p.feature);
     if let Some(a) = shape(scene.kinds[0]) {
         let touches = manifolds_of_shapes(&a, &b, 0.0);
-        let impact = sweep_shapes(&a, still, &b, way).map(|found| found.answer);
+        let impact = shape_cast_of_shapes(&a, still, &b, way).map(|found| found.result);
         return Some(Answers {
-            closest: closest_shapes(&a, &b).map(|found| found.answer),
-            touches: touches.iter().flat_map(|it| it.answer.points.iter().map(point)).collect(),
+            closest: closest_points_of_shapes(&a, &b).map(|found| found.result),
+            touches: touches.iter().flat_map(|it| it.result.points.iter().map(point)).collect(),
             impact: impact.map(|it| (it.time, bevy_point(it.point), bevy_vector(it.normal))),
         });
     }
     Some(match ground(scene.kinds[0])? {
         Ground::Plane(plane) => {
-            let found = closest_plane(&plane, &b);
+            let found = closest_points_of_plane(&plane, &b);
             let closing = -scene.way.dot(bevy_vector(found.normal));
             let time = (found.distance / closing).max(0.0);
             let at = bevy_point(found.on_b) + scene.way * time;
@@ -161,21 +162,21 @@ pub fn ask(scene: &Scene) -> Option<Answers> {
 }
 
 fn ask_surface(surface: &impl Surface<f32>, b: &Shape<f32>, way: TawVec3<f32>) -> Answers {
-    let parts = parts_of(b);
-    let near = parts.iter().filter_map(|part| closest_of_surface(surface, *part, 5.0));
+    let parts = sub_shapes(b);
+    let near = parts.iter().filter_map(|part| closest_points_of_surface(surface, *part, 5.0));
     let touches = parts.iter().flat_map(|part| manifolds_of_surface(surface, *part, 0.0));
-    let impacts = parts.iter().filter_map(|part| sweep_against_surface(surface, *part, way));
-    let first = impacts.reduce(|x, y| if y.answer.time < x.answer.time { y } else { x });
+    let impacts = parts.iter().filter_map(|part| shape_cast_on_surface(surface, *part, way));
+    let first = impacts.reduce(|x, y| if y.result.time < x.result.time { y } else { x });
     Answers {
         closest: near
-            .map(|found| found.answer)
+            .map(|found| found.result)
             .reduce(|x, y| if y.distance < x.distance { y } else { x }),
         touches: touches
-            .flat_map(|it| it.answer.points)
+            .flat_map(|it| it.result.points)
             .map(|p| (bevy_point(p.on_b), p.distance, p.feature))
             .collect(),
         impact: first.map(|it| {
-            let touch = it.answer;
+            let touch = it.result;
             (touch.time, bevy_point(touch.point), bevy_vector(touch.normal))
         }),
     }

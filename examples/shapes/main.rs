@@ -14,7 +14,7 @@ use bevy::color::palettes::tailwind;
 use bevy::prelude::*;
 use bevy_egui::input::EguiWantsInput;
 use bevy_egui::{EguiContexts, EguiPlugin, EguiPrimaryContextPass, egui};
-use bevy_taw::taw::contact::{Cast, Closest};
+use bevy_taw::taw::contact::{ClosestPoints, RayCast};
 use clap::{Parser, ValueEnum};
 use drawing::draw;
 use gallery::{Answers, Kind, Scene, ask, bevy_point, second, shape};
@@ -70,7 +70,7 @@ fn drag(
         return;
     };
     if buttons.just_pressed(MouseButton::Left) && !egui.wants_any_pointer_input() {
-        let hit = second(&scene).and_then(|shape| shape.cast(&ray, f32::INFINITY));
+        let hit = second(&scene).and_then(|shape| shape.cast_ray(&ray, f32::INFINITY));
         scene.held = hit.map(|hit| (hit.distance, scene.place.translation - bevy_point(hit.point)));
     }
     if let Some((distance, offset)) = scene.held {
@@ -110,7 +110,7 @@ fn panel(mut contexts: EguiContexts, mut scene: ResMut<Scene>) -> Result {
         });
         ui.separator();
         let Some(Answers { closest, touches, impact }) = answers else { return };
-        if let Some(Closest { distance, normal, .. }) = closest {
+        if let Some(ClosestPoints { distance, normal, .. }) = closest {
             let what = if distance <= 0.0 { "overlap" } else { "distance" };
             ui.label(format!("{what}: {:.6} m", distance.abs()));
             ui.label(format!("normal: {:.4} {:.4} {:.4}", normal.x, normal.y, normal.z));

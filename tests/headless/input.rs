@@ -110,7 +110,7 @@ fn settings_and_components_are_open_to_reflection() {
         "bevy_taw::components::Marble",
         "bevy_taw::wall::Wall",
         "bevy_taw::components::Velocity",
-        "bevy_taw::components::Spin",
+        "bevy_taw::components::AngularVelocity",
         "bevy_taw::components::MarbleMass",
         "bevy_taw::components::GravityScale",
         "bevy_taw::components::SurfaceMaterial",

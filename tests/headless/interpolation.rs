@@ -84,12 +84,12 @@ fn a_marble_that_is_scaled_for_show_keeps_its_way() {
 fn turning_is_even_between_steps_once_it_is_modelled() {
     let (mut app, marble) = app();
     let turned = |app: &App| app.world().get::<Transform>(marble).unwrap().rotation;
-    app.world_mut().entity_mut(marble).insert(Spin(Vec3::Y * 0.25 / STEP));
+    app.world_mut().entity_mut(marble).insert(AngularVelocity(Vec3::Y * 0.25 / STEP));
     scene::frames(&mut app, 8);
     assert_eq!(turned(&app), Quat::IDENTITY, "the model has no rotation yet");
     app.world_mut().resource_mut::<TawModel>().rotation = Rotation::Rolling;
     scene::frames(&mut app, 4);
-    app.world_mut().get_mut::<Spin>(marble).unwrap().y = 0.25 / STEP;
+    app.world_mut().get_mut::<AngularVelocity>(marble).unwrap().y = 0.25 / STEP;
     scene::frames(&mut app, 12);
     let mut last = turned(&app);
     for frame in 0..20 {

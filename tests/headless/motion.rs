@@ -10,7 +10,7 @@ use crate::scene::{self, STEP};
 fn velocity_with(bundle: impl Bundle) -> Vec3 {
     let mut app = scene::app();
     app.insert_resource(Gravity(Vec3::NEG_Y * 8.0));
-    app.insert_resource(Forces(vec![Force::Custom(|_, _| [12.0, 0.0, 0.0].into())]));
+    app.insert_resource(Forces(vec![ForceField::Custom(|_, _| [12.0, 0.0, 0.0].into())]));
     let marble = app.world_mut().spawn((Marble::default(), Velocity::default(), bundle)).id();
     scene::frames(&mut app, 64);
     **app.world().get::<Velocity>(marble).unwrap()
@@ -31,7 +31,7 @@ fn mass_and_gravity_scale_say_what_forces_do() {
 fn a_mass_may_change_and_go() {
     let mut app = scene::app();
     app.insert_resource(Gravity(Vec3::ZERO));
-    app.insert_resource(Forces(vec![Force::Custom(|_, _| [64.0, 0.0, 0.0].into())]));
+    app.insert_resource(Forces(vec![ForceField::Custom(|_, _| [64.0, 0.0, 0.0].into())]));
     let heavy = (Marble::default(), Velocity::default(), MarbleMass::Kilograms(4.0));
     let marble = app.world_mut().spawn(heavy).id();
     let speed = |app: &App| app.world().get::<Velocity>(marble).unwrap().x;
@@ -69,7 +69,7 @@ fn a_marble_rolls_as_far_as_it_turns() {
     app.world_mut().resource_mut::<TawModel>().rotation = Rotation::Rolling;
     scene::floor(&mut app);
     let start = Transform::from_xyz(0.0, 0.25, 0.0);
-    let rolling = (Marble::new(0.25), start, Velocity(Vec3::X * 2.0), Spin::default());
+    let rolling = (Marble::new(0.25), start, Velocity(Vec3::X * 2.0), AngularVelocity::default());
     let marble = app.world_mut().spawn(rolling).id();
     app.update(); // from here on it spins
     let before = *app.world().get::<Transform>(marble).unwrap();
@@ -79,7 +79,7 @@ fn a_marble_rolls_as_far_as_it_turns() {
     let turned = after.rotation * before.rotation.inverse();
     let exact = Quat::from_rotation_z(-way / 0.25);
     assert!(turned.angle_between(exact) < 1e-3, "{turned}, not {exact}");
-    assert_eq!(**app.world().get::<Spin>(marble).unwrap(), Vec3::NEG_Z * 8.0);
+    assert_eq!(**app.world().get::<AngularVelocity>(marble).unwrap(), Vec3::NEG_Z * 8.0);
 
     // Turned by hand, it rolls on from there.
     app.world_mut().get_mut::<Transform>(marble).unwrap().rotation = Quat::IDENTITY;
@@ -94,7 +94,8 @@ fn rotation_that_is_switched_on_begins_where_marbles_are() {
     app.insert_resource(Gravity(Vec3::ZERO));
     let parent = app.world_mut().spawn(Transform::from_rotation(Quat::from_rotation_x(0.5))).id();
     let turned = Quat::from_rotation_y(1.0);
-    let bundle = (Marble::default(), Transform::from_rotation(turned), Spin(Vec3::Y * 2.0));
+    let bundle =
+        (Marble::default(), Transform::from_rotation(turned), AngularVelocity(Vec3::Y * 2.0));
     let root = app.world_mut().spawn(bundle).id();
     let child = app.world_mut().spawn((bundle, ChildOf(parent))).id();
     let rotation = |app: &App, marble| app.world().get::<Transform>(marble).unwrap().rotation;
@@ -103,7 +104,7 @@ fn rotation_that_is_switched_on_begins_where_marbles_are() {
     app.update();
     let exact = Quat::from_rotation_y(1.0 + 2.0 * STEP);
     assert!(rotation(&app, root).angle_between(exact) < 1e-3, "{}", rotation(&app, root));
-    // The spin is in world space, so the child's own frame is turned against it.
+    // The angular velocity is in world space, so the child's own frame is turned against it.
     let angle = rotation(&app, child).angle_between(turned);
     assert!((angle - 2.0 * STEP).abs() < 1e-3, "it turned by {angle}");
 }
@@ -120,12 +121,12 @@ fn a_sliding_marble_comes_to_roll() {
     dynamic(&mut app);
     scene::floor(&mut app);
     let start = Transform::from_xyz(0.0, 0.5, 0.0);
-    let sliding = (Marble::new(0.5), start, Velocity(Vec3::X * 5.0), Spin::default());
+    let sliding = (Marble::new(0.5), start, Velocity(Vec3::X * 5.0), AngularVelocity::default());
     let marble = app.world_mut().spawn(sliding).id();
     scene::frames(&mut app, 128);
     let speed = app.world().get::<Velocity>(marble).unwrap().x;
     assert!((speed - 25.0 / 7.0).abs() < 1e-4, "{speed} m/s");
-    assert!((app.world().get::<Spin>(marble).unwrap().z * 0.5 + speed).abs() < 1e-4);
+    assert!((app.world().get::<AngularVelocity>(marble).unwrap().z * 0.5 + speed).abs() < 1e-4);
 }
 
 #[test]
@@ -182,13 +183,18 @@ fn an_external_force_lasts_as_long_as_its_component() {
     app.insert_resource(Gravity(Vec3::ZERO));
     // At the top of the ball: it pushes and turns.
     let force = ExternalForce::at(Vec3::X * 64.0, Vec3::Y * 0.5);
-    let ball = (Marble::new(0.5), MarbleMass::Kilograms(2.0), Velocity::default(), Spin::default());
+    let ball = (
+        Marble::new(0.5),
+        MarbleMass::Kilograms(2.0),
+        Velocity::default(),
+        AngularVelocity::default(),
+    );
     let marble = app.world_mut().spawn((ball, force)).id();
     scene::frames(&mut app, 2);
     let velocity = |app: &App| **app.world().get::<Velocity>(marble).unwrap();
     assert_eq!(velocity(&app), Vec3::X);
     // τ / I = 32 / (2/5 · 2 · 0.25) = 160 rad/s², clockwise.
-    assert!((app.world().get::<Spin>(marble).unwrap().z + 5.0).abs() < 1e-5);
+    assert!((app.world().get::<AngularVelocity>(marble).unwrap().z + 5.0).abs() < 1e-5);
     app.world_mut().entity_mut(marble).remove::<ExternalForce>();
     scene::frames(&mut app, 8);
     assert_eq!(velocity(&app), Vec3::X);
@@ -200,12 +206,17 @@ fn an_external_impulse_hits_once() {
     dynamic(&mut app);
     app.insert_resource(Gravity(Vec3::ZERO));
     let hit = ExternalImpulse::at(Vec3::X * 2.0, Vec3::Y * 0.2);
-    let ball = (Marble::new(0.5), MarbleMass::Kilograms(2.0), Velocity::default(), Spin::default());
+    let ball = (
+        Marble::new(0.5),
+        MarbleMass::Kilograms(2.0),
+        Velocity::default(),
+        AngularVelocity::default(),
+    );
     let marble = app.world_mut().spawn((ball, hit)).id();
     scene::frames(&mut app, 8);
     assert_eq!(**app.world().get::<Velocity>(marble).unwrap(), Vec3::X);
     assert!(
-        (app.world().get::<Spin>(marble).unwrap().z + 2.0).abs() < 1e-6,
+        (app.world().get::<AngularVelocity>(marble).unwrap().z + 2.0).abs() < 1e-6,
         "0.4 / (2/5 · 2 · 0.25)"
     );
     assert_eq!(*app.world().get::<ExternalImpulse>(marble).unwrap(), ExternalImpulse::default());
@@ -217,11 +228,13 @@ fn damping_takes_its_part_each_second() {
     dynamic(&mut app);
     app.insert_resource(Gravity(Vec3::ZERO));
     let damping = MarbleDamping { linear: 0.5, angular: 2.0 };
-    let bundle = (Marble::default(), Velocity(Vec3::X), Spin(Vec3::Y), damping);
+    let bundle = (Marble::default(), Velocity(Vec3::X), AngularVelocity(Vec3::Y), damping);
     let marble = app.world_mut().spawn(bundle).id();
     scene::frames(&mut app, 64);
     assert!((app.world().get::<Velocity>(marble).unwrap().x - (-0.5_f32).exp()).abs() < 1e-5);
-    assert!((app.world().get::<Spin>(marble).unwrap().y - (-2.0_f32).exp()).abs() < 1e-5);
+    assert!(
+        (app.world().get::<AngularVelocity>(marble).unwrap().y - (-2.0_f32).exp()).abs() < 1e-5
+    );
 }
 
 #[test]
@@ -295,7 +308,8 @@ fn energy_is_measured_only_when_asked() {
 fn where_the_energy_goes_is_told_only_when_asked() {
     use bevy::diagnostic::{DiagnosticPath, DiagnosticsStore};
     use bevy_taw::diagnostics::{
-        COLLISIONS, DEEPEST, FRICTION_LOSS, RESTITUTION_LOSS, SOLVER_LOSS, enable_accuracy,
+        COLLISIONS, FRICTION_LOSS, MAX_PENETRATION, RESTITUTION_LOSS, SOLVER_LOSS,
+        enable_energy_audit,
     };
     let mut app = scene::app();
     app.insert_resource(TawModel(Model { response: Response::EventDriven, ..default() }));
@@ -312,10 +326,10 @@ fn where_the_energy_goes_is_told_only_when_asked() {
         store.get(path).unwrap().values().sum::<f64>()
     };
     let enable = |app: &mut App, on| {
-        enable_accuracy(&mut app.world_mut().resource_mut::<DiagnosticsStore>(), on);
+        enable_energy_audit(&mut app.world_mut().resource_mut::<DiagnosticsStore>(), on);
     };
     scene::frames(&mut app, 4);
-    assert_eq!(app.world().resource::<TawWorld>().account(), None);
+    assert_eq!(app.world().resource::<TawWorld>().energy_audit(), None);
     assert_eq!(sum(&app, &COLLISIONS), 0.0);
     enable(&mut app, true);
     scene::frames(&mut app, 36);
@@ -323,11 +337,11 @@ fn where_the_energy_goes_is_told_only_when_asked() {
     let restitution = sum(&app, &RESTITUTION_LOSS);
     assert!((restitution - taken).abs() < 1e-4, "{restitution} is not {taken}");
     assert!(sum(&app, &SOLVER_LOSS).abs() < 1e-4, "{}", sum(&app, &SOLVER_LOSS));
-    assert_eq!((sum(&app, &FRICTION_LOSS), sum(&app, &DEEPEST)), (0.0, 0.0));
+    assert_eq!((sum(&app, &FRICTION_LOSS), sum(&app, &MAX_PENETRATION)), (0.0, 0.0));
     assert_eq!(sum(&app, &COLLISIONS), 1.0);
     enable(&mut app, false);
     scene::frames(&mut app, 4);
-    assert_eq!(app.world().resource::<TawWorld>().account(), None);
+    assert_eq!(app.world().resource::<TawWorld>().energy_audit(), None);
 }
 
 #[test]
@@ -338,7 +352,7 @@ fn a_marble_may_turn_less_than_the_model_says() {
     let mut slide = |z: f32| {
         let start = Transform::from_xyz(0.0, 0.5, z);
         app.world_mut()
-            .spawn((Marble::new(0.5), start, Velocity(Vec3::X * 5.0), Spin::default()))
+            .spawn((Marble::new(0.5), start, Velocity(Vec3::X * 5.0), AngularVelocity::default()))
             .id()
     };
     let (free, held) = (slide(0.0), slide(3.0));

@@ -42,7 +42,7 @@ impl Takes {
 const TABLE: &[(&str, &str, Takes)] = &[
     ("Marble", ".radius", Takes::Positive),
     ("Velocity", ".0", Takes::Finite),
-    ("Spin", ".0", Takes::Finite),
+    ("AngularVelocity", ".0", Takes::Finite),
     ("MarbleMass", ".0", Takes::Positive),
     ("GravityScale", ".0", Takes::Finite),
     ("SurfaceMaterial", ".restitution", Takes::Within(0.0, 1.0)),
@@ -104,7 +104,12 @@ type Sample = (fn(&mut EntityWorldMut), &'static [&'static str]);
 
 fn marble(entity: &mut EntityWorldMut) {
     let all = (
-        (Marble::new(0.5), Velocity::default(), Spin::default(), MarbleMass::Density(1_000.0)),
+        (
+            Marble::new(0.5),
+            Velocity::default(),
+            AngularVelocity::default(),
+            MarbleMass::Density(1_000.0),
+        ),
         (GravityScale(1.0), SurfaceMaterial::default(), MarbleDamping::default()),
         (ExternalForce::default(), ExternalImpulse::default(), HalfLength(0.0)),
         Transform::from_xyz(0.0, 1.0, 0.0),
@@ -119,7 +124,7 @@ fn wall(entity: &mut EntityWorldMut, wall: Wall) {
 const OF_MARBLES: &[&str] = &[
     "Marble",
     "Velocity",
-    "Spin",
+    "AngularVelocity",
     "MarbleMass",
     "GravityScale",
     "SurfaceMaterial",
@@ -314,7 +319,7 @@ fn negative(x: f32) -> bool {
     !(x.is_finite() && x >= 0.0)
 }
 
-fn force(of: fn(f32) -> Force<f32>) -> Set {
+fn force(of: fn(f32) -> ForceField<f32>) -> Set {
     Box::new(move |world, x| world.resource_mut::<Forces>().0 = vec![of(x)])
 }
 
@@ -329,14 +334,14 @@ fn numbers_of_resources() -> Vec<Row> {
         ("Gravity.z", Box::new(|w, x| w.resource_mut::<Gravity>().z = x), bad),
         (
             "Drag.velocity",
-            force(|x| Force::Drag(Medium { velocity: [0.0, x, 0.0].into(), ..STILL })),
+            force(|x| ForceField::Drag(Medium { velocity: [0.0, x, 0.0].into(), ..STILL })),
             bad,
         ),
-        ("Drag.linear", force(|x| Force::Drag(Medium { linear: x, ..STILL })), negative),
-        ("Drag.quadratic", force(|x| Force::Drag(Medium { quadratic: x, ..STILL })), negative),
+        ("Drag.linear", force(|x| ForceField::Drag(Medium { linear: x, ..STILL })), negative),
+        ("Drag.quadratic", force(|x| ForceField::Drag(Medium { quadratic: x, ..STILL })), negative),
         (
             "Spring.anchor",
-            force(|x| Force::Spring {
+            force(|x| ForceField::Spring {
                 anchor: [0.0, 0.0, x].into(),
                 rest_length: 1.0,
                 stiffness: 1.0,
@@ -345,22 +350,30 @@ fn numbers_of_resources() -> Vec<Row> {
         ),
         (
             "Spring.rest_length",
-            force(|x| Force::Spring { anchor: [0.0; 3].into(), rest_length: x, stiffness: 1.0 }),
+            force(|x| ForceField::Spring {
+                anchor: [0.0; 3].into(),
+                rest_length: x,
+                stiffness: 1.0,
+            }),
             negative,
         ),
         (
             "Spring.stiffness",
-            force(|x| Force::Spring { anchor: [0.0; 3].into(), rest_length: 1.0, stiffness: x }),
+            force(|x| ForceField::Spring {
+                anchor: [0.0; 3].into(),
+                rest_length: 1.0,
+                stiffness: x,
+            }),
             negative,
         ),
         (
             "Attraction.center",
-            force(|x| Force::Attraction { center: [x, 0.0, 0.0].into(), strength: 1.0 }),
+            force(|x| ForceField::Attraction { center: [x, 0.0, 0.0].into(), strength: 1.0 }),
             bad,
         ),
         (
             "Attraction.strength",
-            force(|x| Force::Attraction { center: [0.0; 3].into(), strength: x }),
+            force(|x| ForceField::Attraction { center: [0.0; 3].into(), strength: x }),
             bad,
         ),
     ]

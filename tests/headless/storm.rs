@@ -92,7 +92,7 @@ impl Storm {
         let mut entity = self.app.world_mut().entity_mut(marble);
         let random = &mut self.random;
         if random.bool() {
-            entity.insert((Velocity(point(random, 5.0)), Spin(point(random, 5.0))));
+            entity.insert((Velocity(point(random, 5.0)), AngularVelocity(point(random, 5.0))));
         }
         if random.bool() {
             let (restitution, friction) = (random.f32(), 1.5 * random.f32());
@@ -268,7 +268,7 @@ impl Storm {
     /// In joules, of all marbles together.
     fn energy(&self) -> f64 {
         let energy = self.app.world().resource::<TawWorld>().energy();
-        energy.kinetic + energy.spin + energy.potential
+        energy.kinetic + energy.rotational + energy.potential
     }
 }
 

@@ -46,11 +46,11 @@ impl Marble {
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct Velocity(pub Vec3);
 
-/// The spin of a marble: its angular velocity in radians per second, as an axial
-/// vector in world space. Only a [`Model`](taw::world::Model) with rotation keeps it.
+/// Angular velocity of a marble in radians per second, an axial vector in world space. Only a
+/// [`Model`](taw::world::Model) with rotation keeps it.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
-pub struct Spin(pub Vec3);
+pub struct AngularVelocity(pub Vec3);
 
 /// How heavy a marble is. Without it, a marble is of glass.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
@@ -146,7 +146,7 @@ impl From<SurfaceMaterial> for Material<f32> {
 pub struct MarbleDamping {
     /// Of the velocity, in 1/s, at least zero.
     pub linear: f32,
-    /// Of the spin, in 1/s, at least zero; counts if the model's rotation is dynamic.
+    /// Rate for the angular velocity in 1/s, at least zero; counts if the model's rotation is dynamic.
     pub angular: f32,
 }
 
@@ -261,7 +261,7 @@ pub(crate) struct SeenMarble {
     pub radius: u32,
     pub half_length: Option<u32>,
     pub velocity: Option<[u32; 3]>,
-    pub spin: Option<[u32; 3]>,
+    pub angular_velocity: Option<[u32; 3]>,
     /// Which kind of mass, and its number.
     pub mass: Option<(u8, u32)>,
     pub gravity_scale: Option<u32>,
@@ -318,11 +318,11 @@ pub(crate) struct Way {
     pub believed: Speed,
 }
 
-/// A velocity, and a spin about the wall's own place.
+/// Velocity, and angular velocity about the wall's own position.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Speed {
     pub velocity: Vec3,
-    pub spin: Vec3,
+    pub angular_velocity: Vec3,
 }
 
 impl SurfaceMaterial {

@@ -9,7 +9,7 @@ use bevy::platform::time::Instant;
 use bevy::prelude::*;
 
 use taw::swarm::Stage;
-use taw::world::Account;
+use taw::world::EnergyAudit;
 
 use crate::convert::from_vector;
 use crate::resources::TawWorld;
@@ -51,73 +51,80 @@ pub const MARBLE_CONTACTS: DiagnosticPath = DiagnosticPath::const_new("taw/marbl
 /// until [`enable_energy`].
 pub const KINETIC_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/energy/kinetic");
 /// The energy of their spins, in joules.
-pub const SPIN_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/energy/spin");
+pub const ROTATIONAL_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/energy/rotational");
 /// Their energy in gravity, against the origin, in joules.
 pub const POTENTIAL_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/energy/potential");
 /// How large the sum of their momenta is, in kg m/s.
 pub const MOMENTUM: DiagnosticPath = DiagnosticPath::const_new("taw/momentum");
 
 /// What sliding took in a step, in joules. This and the next eight are off until
-/// [`enable_accuracy`]; each is the field of an [`Account`] by that name. Marbles count, swarms do
+/// [`enable_energy_audit`]; each is the field of an [`EnergyAudit`] by that name. Marbles count, swarms do
 /// not.
-pub const FRICTION_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/account/friction");
+pub const FRICTION_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/friction");
 /// What collisions took along their normals, in joules.
-pub const RESTITUTION_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/account/restitution");
+pub const RESTITUTION_LOSS: DiagnosticPath =
+    DiagnosticPath::const_new("taw/energy_audit/restitution");
 /// What rolling and spinning resistance took, in joules.
-pub const RESISTANCE_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/account/resistance");
+pub const RESISTANCE_LOSS: DiagnosticPath =
+    DiagnosticPath::const_new("taw/energy_audit/resistance");
 /// What the method took that no law of physics asked for, in joules; negative if it gave.
-pub const SOLVER_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/account/solver");
+pub const SOLVER_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/solver");
 /// What moving walls brought in, in joules.
-pub const WALL_WORK: DiagnosticPath = DiagnosticPath::const_new("taw/account/walls");
+pub const WALL_WORK: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/walls");
 /// What force fields, pushes and damping brought in, in joules.
-pub const FORCE_WORK: DiagnosticPath = DiagnosticPath::const_new("taw/account/forces");
+pub const FORCE_WORK: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/forces");
 /// The momentum that came from nowhere, in kg m/s.
-pub const MOMENTUM_RESIDUAL: DiagnosticPath = DiagnosticPath::const_new("taw/account/momentum");
+pub const MOMENTUM_RESIDUAL: DiagnosticPath =
+    DiagnosticPath::const_new("taw/energy_audit/momentum");
 /// How deep the deepest contact was when it was found, in metres.
-pub const DEEPEST: DiagnosticPath = DiagnosticPath::const_new("taw/account/deepest");
+pub const MAX_PENETRATION: DiagnosticPath =
+    DiagnosticPath::const_new("taw/energy_audit/max_penetration");
 /// How many collisions a step had.
-pub const COLLISIONS: DiagnosticPath = DiagnosticPath::const_new("taw/account/collisions");
+pub const COLLISIONS: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/collisions");
 
-/// A figure of an account: where it is found, its unit, how it is read.
-type Figure = (DiagnosticPath, &'static str, fn(&Account) -> f64);
+/// A metric of the energy audit: diagnostic path, unit, accessor.
+type Metric = (DiagnosticPath, &'static str, fn(&EnergyAudit) -> f64);
 
 /// All of them.
-fn figures() -> [Figure; 9] {
+fn audit_metrics() -> [Metric; 9] {
     [
-        (FRICTION_LOSS, " J", |account| account.friction),
-        (RESTITUTION_LOSS, " J", |account| account.restitution),
-        (RESISTANCE_LOSS, " J", |account| account.resistance),
-        (SOLVER_LOSS, " J", |account| account.solver),
-        (WALL_WORK, " J", |account| account.walls),
-        (FORCE_WORK, " J", |account| account.forces),
-        (MOMENTUM_RESIDUAL, " kg m/s", |account| account.momentum),
-        (DEEPEST, " m", |account| account.deepest),
-        (COLLISIONS, "", |account| account.collisions.into()),
+        (FRICTION_LOSS, " J", |audit| audit.friction),
+        (RESTITUTION_LOSS, " J", |audit| audit.restitution),
+        (RESISTANCE_LOSS, " J", |audit| audit.resistance),
+        (SOLVER_LOSS, " J", |audit| audit.solver),
+        (WALL_WORK, " J", |audit| audit.walls),
+        (FORCE_WORK, " J", |audit| audit.forces),
+        (MOMENTUM_RESIDUAL, " kg m/s", |audit| audit.momentum),
+        (MAX_PENETRATION, " m", |audit| audit.max_penetration),
+        (COLLISIONS, "", |audit| audit.collisions.into()),
     ]
 }
 
-/// Has an account kept of where the energy of every step goes, or no longer. Off, it costs
-/// nothing; on, some more looks at every marble and contact.
-pub fn enable_accuracy(store: &mut DiagnosticsStore, enabled: bool) {
-    for (path, ..) in figures() {
+/// Switches the energy audit of every step on or off. Off, it is free; on, it costs a few passes
+/// over all marbles and contacts.
+pub fn enable_energy_audit(store: &mut DiagnosticsStore, enabled: bool) {
+    for (path, ..) in audit_metrics() {
         if let Some(diagnostic) = store.get_mut(&path) {
             diagnostic.is_enabled = enabled;
         }
     }
 }
 
-/// Keeps an account if one of its figures is asked for.
-pub(crate) fn keep_account(mut world: ResMut<TawWorld>, store: Option<Res<DiagnosticsStore>>) {
+/// Enables the energy audit of the world while one of its diagnostics is enabled.
+pub(crate) fn update_energy_audit(
+    mut world: ResMut<TawWorld>,
+    store: Option<Res<DiagnosticsStore>>,
+) {
     let asked = |path: &DiagnosticPath| {
         store.as_ref().and_then(|store| store.get(path)).is_some_and(|figure| figure.is_enabled)
     };
-    let keep = figures().iter().any(|(path, ..)| asked(path));
-    world.bypass_change_detection().keep_account(keep);
+    let keep = audit_metrics().iter().any(|(path, ..)| asked(path));
+    world.bypass_change_detection().enable_energy_audit(keep);
 }
 
 /// Has energy and momentum measured in every step, or no longer. Off, they cost nothing.
 pub fn enable_energy(store: &mut DiagnosticsStore, enabled: bool) {
-    for path in [&KINETIC_ENERGY, &SPIN_ENERGY, &POTENTIAL_ENERGY, &MOMENTUM] {
+    for path in [&KINETIC_ENERGY, &ROTATIONAL_ENERGY, &POTENTIAL_ENERGY, &MOMENTUM] {
         if let Some(diagnostic) = store.get_mut(path) {
             diagnostic.is_enabled = enabled;
         }
@@ -135,7 +142,7 @@ pub(crate) fn register(app: &mut App) {
     }
     for (path, unit) in [
         (KINETIC_ENERGY, " J"),
-        (SPIN_ENERGY, " J"),
+        (ROTATIONAL_ENERGY, " J"),
         (POTENTIAL_ENERGY, " J"),
         (MOMENTUM, " kg m/s"),
     ] {
@@ -143,7 +150,7 @@ pub(crate) fn register(app: &mut App) {
         diagnostic.is_enabled = false;
         app.register_diagnostic(diagnostic);
     }
-    for (path, unit, _) in figures() {
+    for (path, unit, _) in audit_metrics() {
         let mut diagnostic = Diagnostic::new(path).with_suffix(unit).with_max_history_length(600);
         diagnostic.is_enabled = false;
         app.register_diagnostic(diagnostic);
@@ -269,11 +276,11 @@ pub(crate) fn measure(
     diagnostics.add_measurement(&WALL_CONTACTS, || world.contacts.wm.len() as f64);
     diagnostics.add_measurement(&MARBLE_CONTACTS, || world.contacts.mm.len() as f64);
     diagnostics.add_measurement(&KINETIC_ENERGY, || world.energy().kinetic);
-    diagnostics.add_measurement(&SPIN_ENERGY, || world.energy().spin);
+    diagnostics.add_measurement(&ROTATIONAL_ENERGY, || world.energy().rotational);
     diagnostics.add_measurement(&POTENTIAL_ENERGY, || world.energy().potential);
-    if let Some(account) = world.account() {
-        for (path, _, read) in figures() {
-            diagnostics.add_measurement(&path, || read(&account));
+    if let Some(audit) = world.energy_audit() {
+        for (path, _, read) in audit_metrics() {
+            diagnostics.add_measurement(&path, || read(&audit));
         }
     }
     diagnostics.add_measurement(&MOMENTUM, || {

@@ -10,9 +10,9 @@ use taw::response::Response;
 use taw::world as core;
 
 use crate::components::{
-    ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble, MarbleDamping,
-    MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, SeenMarble, Spin, SurfaceMaterial,
-    Velocity, WallState, bits, rotation_bits,
+    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
+    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, SeenMarble,
+    SurfaceMaterial, Velocity, WallState, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
@@ -39,7 +39,7 @@ pub fn settings(
         && let Err(error) = world.set_model(**model)
     {
         let capsule = match error {
-            taw::Error::BallsOnly(id) => world.marble_entities.get(&id).copied(),
+            taw::Error::UnsupportedShape(id) => world.marble_entities.get(&id).copied(),
             _ => None,
         };
         refusals.check(capsule, Err(error));
@@ -63,7 +63,7 @@ type MarbleItem<'a> =
 type OptionalComponents<'a> = (
     Option<&'a HalfLength>,
     Option<&'a Velocity>,
-    Option<&'a Spin>,
+    Option<&'a AngularVelocity>,
     Option<&'a MarbleMass>,
     Option<&'a GravityScale>,
     Option<&'a MarbleDamping>,
@@ -91,7 +91,7 @@ impl SeenMarble {
             radius: marble.radius.to_bits(),
             half_length: half_length.map(|half| half.to_bits()),
             velocity: velocity.map(|v| bits(**v)),
-            spin: spin.map(|s| bits(**s)),
+            angular_velocity: spin.map(|s| bits(**s)),
             mass: mass.map(|m| m.bits()),
             gravity_scale: gravity_scale.map(|g| g.to_bits()),
             damping: damping.map(|d| [d.linear, d.angular].map(f32::to_bits)),
@@ -135,7 +135,7 @@ pub fn marbles(
     let (rows, restored) = (&world.marbles, world.just_restored);
     queries.p0().par_iter_mut().for_each(|(_, marble, transform, optional, _, mut state)| {
         if begins_to_turn {
-            (state.seen.rotation, state.seen.spin) = ([0; 4], None); // no rotation's bits
+            (state.seen.rotation, state.seen.angular_velocity) = ([0; 4], None); // no rotation's bits
         }
         if knows_capsules && optional.0.is_some() {
             (state.seen.half_length, state.refused) = (None, false);
@@ -201,7 +201,7 @@ fn take_over(
         half_length,
         velocity: to_vector(velocity.map_or(Vec3::ZERO, |v| **v)),
         rotation: to_rotation(place.rotation),
-        spin: to_vector(spin.map_or(Vec3::ZERO, |s| **s)),
+        angular_velocity: to_vector(spin.map_or(Vec3::ZERO, |s| **s)),
         mass: mass.copied().unwrap_or_default().into(),
         gravity_scale: *gravity_scale.copied().unwrap_or_default(),
         damping: damping.map_or_else(core::Damping::default, |d| core::Damping {
@@ -256,8 +256,8 @@ fn come_back(
     if seen.velocity.is_none() {
         now.velocity = away.velocity;
     }
-    if seen.spin.is_none() {
-        now.spin = away.spin;
+    if seen.angular_velocity.is_none() {
+        now.angular_velocity = away.angular_velocity;
     }
 }
 
@@ -293,8 +293,8 @@ fn update(
     if seen.velocity != last.velocity && seen.velocity.is_some() {
         set(marbles.set_velocity(id, now.velocity));
     }
-    if seen.spin != last.spin && seen.spin.is_some() {
-        set(marbles.set_spin(id, now.spin));
+    if seen.angular_velocity != last.angular_velocity && seen.angular_velocity.is_some() {
+        set(marbles.set_angular_velocity(id, now.angular_velocity));
     }
     if all || seen.mass != last.mass {
         set(marbles.set_mass(id, now.mass));

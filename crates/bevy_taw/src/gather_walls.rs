@@ -198,7 +198,7 @@ impl Gathering<'_, '_> {
         if let Some(id) = state.id {
             let motion = speed.map(|speed| WallMotion {
                 velocity: to_vector(speed.velocity),
-                spin: to_vector(speed.spin),
+                angular_velocity: to_vector(speed.angular_velocity),
                 pivot: to_point(translation),
             });
             self.refusals.check(Some(entity), self.world.walls.set_motion(id, motion));
@@ -209,7 +209,7 @@ impl Gathering<'_, '_> {
         }
         state.posed = Some(seen);
         let rotation = to_rotation(now.rotation);
-        let shape = shape.moved(Pose { rotation, translation: to_vector(translation) });
+        let shape = shape.transformed(Pose { rotation, translation: to_vector(translation) });
         let put = shape.and_then(|shape| match state.id {
             Some(id) => self.world.walls.set(id, shape),
             None => self.world.walls.insert(shape).map(|id| {

@@ -86,7 +86,7 @@ fn draw(world: Res<TawWorld>, mut gizmos: Gizmos<TawGizmos>) {
         }
     }
     if config.grid {
-        let (cells, width) = world.grid().occupied();
+        let (cells, width) = world.grid().occupied_cells();
         for corner in cells {
             let center = Vec3::from(corner.map(|x| x as f32)) + Vec3::splat(width as f32 / 2.0);
             let cell = Transform::from_translation(center).with_scale(Vec3::splat(width as f32));

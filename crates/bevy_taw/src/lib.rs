@@ -93,8 +93,9 @@ pub use taw;
 /// What nearly every game needs.
 pub mod prelude {
     pub use crate::components::{
-        ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble, MarbleDamping,
-        MarbleIntegrator, MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Teleport, Velocity,
+        AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
+        MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, SurfaceMaterial, Teleport,
+        Velocity,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;
@@ -104,7 +105,7 @@ pub mod prelude {
     pub use crate::swarm::{Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;
     pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
-    pub use taw::motion::{Force, Integrator, Medium, Rotation};
+    pub use taw::motion::{ForceField, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};
     pub use taw::swarm::{Ball, SwarmModel, Tier};
     pub use taw::world::{Detection, Model, Precision};

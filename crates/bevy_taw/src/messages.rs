@@ -115,7 +115,7 @@ pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
     };
     for contact in &world.contacts.wm {
         if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
-            let normal = world.normal_of_wall_touch(contact);
+            let normal = world.wall_contact_normal(contact);
             let touch =
                 normal.map(|normal| started(ContactPair { a, b }, normal, velocity(contact.b)));
             touches.now.extend(touch);
@@ -125,7 +125,7 @@ pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
         if let (Some(a), Some(b)) = (world.marble_entity(contact.a), world.marble_entity(contact.b))
         {
             let closing = velocity(contact.b) - velocity(contact.a);
-            let normal = world.normal_of_marble_touch(contact);
+            let normal = world.marble_contact_normal(contact);
             let mut touch = normal.map(|normal| started(ContactPair { a, b }, normal, closing));
             if b < a {
                 // Rows move about; the order of entities does not.
@@ -213,7 +213,7 @@ fn gap(
     let b = marble(pair.b)?;
     if let Ok(wall) = walls.get(pair.a) {
         let wall = world.walls.get(wall.id?).ok()?;
-        Some(Gap { width: wall.nearest(b.position).distance - b.radius, radius: b.radius })
+        Some(Gap { width: wall.project_point(b.position).distance - b.radius, radius: b.radius })
     } else {
         let a = marble(pair.a)?;
         let width = length(b.position - a.position) - a.radius - b.radius;

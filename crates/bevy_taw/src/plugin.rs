@@ -3,8 +3,9 @@ use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
 
 use crate::components::{
-    ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble, MarbleDamping,
-    MarbleIntegrator, MarbleMass, MarbleRotation, Spin, SurfaceMaterial, Teleport, Velocity,
+    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
+    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, SurfaceMaterial, Teleport,
+    Velocity,
 };
 use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
@@ -96,7 +97,7 @@ impl Plugin for TawPlugin {
             .add_message::<InputRefused>()
             .add_message::<RowRemoved>()
             .add_message::<MarbleStopped>();
-        app.register_type::<(Marble, Velocity, Spin, MarbleMass, GravityScale)>()
+        app.register_type::<(Marble, Velocity, AngularVelocity, MarbleMass, GravityScale)>()
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
             .register_type::<(Wall, Teleport)>()
@@ -120,7 +121,7 @@ impl Plugin for TawPlugin {
             FixedUpdate,
             (
                 (
-                    diagnostics::keep_account,
+                    diagnostics::update_energy_audit,
                     gather::settings,
                     gather_walls::walls,
                     gather::marbles,

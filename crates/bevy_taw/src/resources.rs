@@ -2,7 +2,7 @@
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
-use taw::motion::Force;
+use taw::motion::ForceField;
 use taw::world::{Marble, MarbleId, Model, WallId};
 
 use crate::reflect::ModelReflect;
@@ -29,7 +29,7 @@ impl Default for Gravity {
 /// The force fields that act on every marble besides gravity. A field whose numbers
 /// cannot be right is refused like a wrong [`TawModel`], with all the others.
 #[derive(Resource, Clone, Debug, Default, PartialEq, Deref, DerefMut)]
-pub struct Forces(pub Vec<Force<f32>>);
+pub struct Forces(pub Vec<ForceField<f32>>);
 
 /// The physics of this app: a [`taw::world::World`], and which of its rows are
 /// which entities.

@@ -4,7 +4,9 @@ use bevy::math::Affine3A;
 use bevy::prelude::*;
 use bevy_transform_interpolation::prelude::NoTransformEasing;
 
-use crate::components::{Eased, Marble, MarbleState, Spin, Velocity, bits, rotation_bits};
+use crate::components::{
+    AngularVelocity, Eased, Marble, MarbleState, Velocity, bits, rotation_bits,
+};
 use crate::convert::{from_point, from_rotation, from_vector};
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
@@ -69,10 +71,14 @@ pub(crate) fn put(
     }
 }
 
-type Moved<'a> =
-    (&'a mut Transform, Option<&'a mut Velocity>, Option<&'a mut Spin>, &'a mut MarbleState);
+type Moved<'a> = (
+    &'a mut Transform,
+    Option<&'a mut Velocity>,
+    Option<&'a mut AngularVelocity>,
+    &'a mut MarbleState,
+);
 
-/// Writes `Transform`, `Velocity` and `Spin` of the marbles that moved, and of those
+/// Writes `Transform`, `Velocity` and `AngularVelocity` of the marbles that moved, and of those
 /// whose own values were refused.
 pub fn marbles(
     world: Res<TawWorld>,
@@ -138,8 +144,12 @@ pub fn stay(
     }
 }
 
-type MovedItem<'a> =
-    (Mut<'a, Transform>, Option<Mut<'a, Velocity>>, Option<Mut<'a, Spin>>, Mut<'a, MarbleState>);
+type MovedItem<'a> = (
+    Mut<'a, Transform>,
+    Option<Mut<'a, Velocity>>,
+    Option<Mut<'a, AngularVelocity>>,
+    Mut<'a, MarbleState>,
+);
 
 fn write(world: &TawWorld, moved: MovedItem, frame: &Frame) {
     let (mut transform, velocity, spin, mut state) = moved;
@@ -157,11 +167,11 @@ fn write(world: &TawWorld, moved: MovedItem, frame: &Frame) {
             state.seen.velocity = Some(bits(velocity));
         }
     }
-    if let (Some(mut component), Some(spin)) = (spin, marbles.spin().get(row)) {
+    if let (Some(mut component), Some(spin)) = (spin, marbles.angular_velocity().get(row)) {
         let spin = from_vector(*spin);
         if bits(spin) != bits(**component) {
             **component = spin;
-            state.seen.spin = Some(bits(spin));
+            state.seen.angular_velocity = Some(bits(spin));
         }
     }
 }

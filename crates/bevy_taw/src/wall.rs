@@ -177,11 +177,11 @@ impl Way {
             (Speed::between(last, framed, frame), Speed::between(framed, now, dt));
         let measured = Speed {
             velocity: outside.velocity + inside.velocity,
-            spin: outside.spin + inside.spin,
+            angular_velocity: outside.angular_velocity + inside.angular_velocity,
         };
         let smooth = |before: Speed| {
             let change = (measured.velocity - before.velocity).length()
-                + (measured.spin - before.spin).length() * reach;
+                + (measured.angular_velocity - before.angular_velocity).length() * reach;
             change <= LARGEST_CHANGE_OF_SPEED
         };
         if jumps {
@@ -203,7 +203,7 @@ impl Speed {
         }
         Self {
             velocity: Vec3::from(now.translation - last.translation) / seconds,
-            spin: (now.rotation * last.rotation.inverse()).to_scaled_axis() / seconds,
+            angular_velocity: (now.rotation * last.rotation.inverse()).to_scaled_axis() / seconds,
         }
     }
 }

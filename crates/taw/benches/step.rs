@@ -146,7 +146,7 @@ fn second_on_a_board_event_driven(bencher: Bencher, count: u32) {
             let (before, after) = (turned(step), turned(step + 1));
             let spin = (after * before.conjugate()).v * (2.0 / DT);
             let pivot = Point3::origin();
-            let motion = WallMotion { velocity: Vec3::zero(), spin, pivot };
+            let motion = WallMotion { velocity: Vec3::zero(), angular_velocity: spin, pivot };
             for (wall, (normal, offset)) in walls.iter().zip(FACES) {
                 let normal = (after * Vec3::from(normal)).normalize();
                 let plane = Plane::new(normal, offset).expect("a unit vector");

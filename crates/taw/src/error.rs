@@ -5,7 +5,7 @@ use crate::math::{Point3, Quat, Scalar, Vec3, length};
 use crate::swarm::BallId;
 use crate::world::{MarbleId, WallId};
 
-/// Why an input was refused. Whatever returns one has changed nothing.
+/// Reason why an input was rejected. A function that returns one has changed nothing.
 ///
 /// Values are given as `f64`, whichever scalar the world uses.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -14,77 +14,77 @@ pub enum Error {
     /// A number is NaN or infinite.
     #[error("{field} must be finite, but is {value}")]
     NotFinite {
-        /// The field, as the caller knows it.
+        /// Name of the field.
         field: &'static str,
-        /// The number that was given.
+        /// The given number.
         value: f64,
     },
     /// A number is zero, negative, NaN or infinite.
     #[error("{field} must be finite and above zero, but is {value}")]
     NotPositive {
-        /// The field, as the caller knows it.
+        /// Name of the field.
         field: &'static str,
-        /// The number that was given.
+        /// The given number.
         value: f64,
     },
     /// A number is outside the range that its meaning allows, or NaN.
     #[error("{field} must be in [{min}, {max}], but is {value}")]
     OutOfRange {
-        /// The field, as the caller knows it.
+        /// Name of the field.
         field: &'static str,
-        /// The number that was given.
+        /// The given number.
         value: f64,
-        /// The least that is allowed.
+        /// Smallest allowed value.
         min: f64,
-        /// The most that is allowed.
+        /// Largest allowed value.
         max: f64,
     },
-    /// A direction that must have length one does not.
+    /// A direction or quaternion is not of unit length.
     #[error("{field} must have length 1, but has length {value}")]
     NotUnit {
-        /// The field, as the caller knows it.
+        /// Name of the field.
         field: &'static str,
-        /// The length that was given.
+        /// The given length.
         value: f64,
     },
-    /// Points lie in a plane, where something solid is needed.
+    /// Points are coplanar where a solid is needed.
     #[error("{field} lie in a plane")]
-    Flat {
-        /// The field, as the caller knows it.
+    Coplanar {
+        /// Name of the field.
         field: &'static str,
     },
-    /// A marble is a capsule, where the model knows balls only.
+    /// A marble is a capsule where only balls are supported.
     #[error("{0:?} is a capsule, and the model knows balls only")]
-    BallsOnly(MarbleId),
-    /// The response has no method for something that the world has or is asked for.
+    UnsupportedShape(MarbleId),
+    /// The response has no method for a feature of the world.
     #[error("{response} does not support {feature}")]
     Unsupported {
-        /// The response, by its name in code.
+        /// Name of the response in code.
         response: &'static str,
-        /// Name of what it does not support.
+        /// Name of the feature.
         feature: &'static str,
     },
-    /// No ball of a swarm has this handle, or it is named twice.
+    /// No ball of a swarm has this handle, or it is listed twice.
     #[error("no ball has the handle {0:?}, or it is named twice")]
     NoSuchBall(BallId),
-    /// No marble has this handle: it was removed, or is another world's.
+    /// No marble has this handle: it was removed, or belongs to another world.
     #[error("no marble has the handle {0:?}")]
     NoSuchMarble(MarbleId),
-    /// No wall has this handle: it was removed, or is another world's.
+    /// No wall has this handle: it was removed, or belongs to another world.
     #[error("no wall has the handle {0:?}")]
     NoSuchWall(WallId),
-    /// No node has this handle: it was removed, or is another tree's.
+    /// No node has this handle: it was removed, or belongs to another tree.
     #[error("no node has the handle {0:?}")]
     NoSuchNode(NodeId),
-    /// A node would carry itself.
+    /// A node would become its own ancestor.
     #[error("the node {0:?} carries its new parent")]
-    CarriesItself(NodeId),
-    /// Handles count rows in 32 bits, and all of them are taken.
+    Cycle(NodeId),
+    /// All 2³² indices of a handle are taken.
     #[error("the world holds {0} rows already, which is all that a handle can name")]
     Full(usize),
 }
 
-/// The number, if it is finite.
+/// Validates a finite number.
 pub(crate) fn finite<S: Scalar>(field: &'static str, value: S) -> Result<S, Error> {
     if value.is_finite() {
         Ok(value)
@@ -93,7 +93,7 @@ pub(crate) fn finite<S: Scalar>(field: &'static str, value: S) -> Result<S, Erro
     }
 }
 
-/// The number, if it is finite and above zero.
+/// Validates a finite number above zero.
 pub(crate) fn positive<S: Scalar>(field: &'static str, value: S) -> Result<S, Error> {
     if value.is_finite() && value > S::zero() {
         Ok(value)
@@ -102,7 +102,7 @@ pub(crate) fn positive<S: Scalar>(field: &'static str, value: S) -> Result<S, Er
     }
 }
 
-/// The number, if it is in `[min, max]`.
+/// Validates a number in `[min, max]`.
 pub(crate) fn within<S: Scalar>(field: &'static str, value: S, min: S, max: S) -> Result<S, Error> {
     if value >= min && value <= max {
         Ok(value)
@@ -116,10 +116,10 @@ pub(crate) fn within<S: Scalar>(field: &'static str, value: S, min: S, max: S) -
     }
 }
 
-/// The rotation, if its length is about one; made that long if it drifted.
+/// Validates a rotation of about unit length and normalizes it if it drifted.
 ///
-/// Within 1e-5 it is taken as it is: so much would shift what is a hundred metres away by a
-/// millimetre. Up to 1e-3 is what a few thousand products in `f32` let it drift.
+/// Within 1e-5 it is used unchanged: that would shift a point a hundred metres away by a
+/// millimetre. Up to 1e-3 is the drift of a few thousand products in `f32`.
 pub(crate) fn rotation<S: Scalar>(field: &'static str, q: Quat<S>) -> Result<Quat<S>, Error> {
     let norm = q.s.as_f64().hypot(length(q.v).as_f64());
     let off = (norm - 1.0).abs();
@@ -129,7 +129,7 @@ pub(crate) fn rotation<S: Scalar>(field: &'static str, q: Quat<S>) -> Result<Qua
     Ok(if off > 1e-5 { q.normalize() } else { q })
 }
 
-/// The vector, if all of its components are finite.
+/// Validates a finite vector.
 pub(crate) fn finite_vector<S: Scalar>(
     field: [&'static str; 3],
     v: Vec3<S>,
@@ -140,7 +140,7 @@ pub(crate) fn finite_vector<S: Scalar>(
     Ok(v)
 }
 
-/// Nothing, if all coordinates of a point of two or three dimensions are finite.
+/// Checks that all coordinates of a point of two or three dimensions are finite.
 pub(crate) fn coordinates<P>(field: [&'static str; 3], point: P) -> Result<(), Error>
 where
     P: Array + Copy,
@@ -149,7 +149,7 @@ where
     (0..P::len()).zip(field).try_for_each(|(axis, field)| finite(field, point[axis]).map(|_| ()))
 }
 
-/// The point, if all of its coordinates are finite.
+/// Validates a finite point.
 pub(crate) fn finite_point<S: Scalar>(
     field: [&'static str; 3],
     p: Point3<S>,

@@ -70,12 +70,12 @@ pub use error::Error;
 pub mod prelude {
     pub use crate::contact::{Contact, Contacts};
     pub use crate::math::{Point3, Scalar, Vec3};
-    pub use crate::motion::{Force, Integrator, Rotation};
+    pub use crate::motion::{ForceField, Integrator, Rotation};
     pub use crate::response::{Combine, ContactLaw, Material, Response};
     pub use crate::shape::{Plane, Sphere};
     pub use crate::world::{
-        Detection, Found, Marble, MarbleId, Mass, Model, Precision, QueryTree, Thing, WallId,
-        WallShape, World,
+        ColliderId, Detection, Marble, MarbleId, Mass, Model, Precision, QueryHit, QueryTree,
+        WallId, WallShape, World,
     };
     pub use cgmath::prelude::*;
 }

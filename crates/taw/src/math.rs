@@ -1,49 +1,48 @@
-//! Names for cgmath's types and the few functions that it lacks. Nothing here
-//! knows about shapes or time.
+//! Aliases of cgmath's types and the few functions that it lacks. Independent of shapes and time.
 
 use cgmath::num_traits::{self, Float, ToPrimitive};
 use cgmath::{BaseFloat, InnerSpace};
 
-/// A displacement, velocity or direction.
+/// Displacement, velocity or direction.
 pub type Vec3<S> = cgmath::Vector3<S>;
-/// A location.
+/// Position.
 pub type Point3<S> = cgmath::Point3<S>;
-/// A rotation.
+/// Rotation.
 pub type Quat<S> = cgmath::Quaternion<S>;
 /// A 3×3 matrix, column-major.
 pub type Mat3<S> = cgmath::Matrix3<S>;
 /// A 4×4 matrix, column-major.
 pub type Mat4<S> = cgmath::Matrix4<S>;
 
-/// The number type that a world counts in: `f32` or `f64`.
+/// Floating-point type of a world: `f32` or `f64`.
 pub trait Scalar: BaseFloat + Default + Send + Sync + 'static {
-    /// The nearest value of this type to a constant.
+    /// Rounds a constant to this type.
     #[must_use]
     fn constant(value: f64) -> Self {
         // Both implementors convert every f64; NaN is unreachable.
         num_traits::cast(value).unwrap_or_else(Self::nan)
     }
 
-    /// This value as an `f64`, exactly.
+    /// Converts to `f64`, exactly.
     #[must_use]
     fn as_f64(self) -> f64 {
         ToPrimitive::to_f64(&self).unwrap_or(f64::NAN)
     }
 
-    /// Sine and cosine of an angle in radians, by a pure-Rust library: the same bits
-    /// on every machine, which the platform's own cannot promise.
+    /// Sine and cosine of an angle in radians, by a pure-Rust library: bit-identical on every
+    /// platform, which the platform's own is not.
     #[must_use]
     fn sin_cos_portable(self) -> (Self, Self);
 
-    /// The angle of the point (`x`, this) in radians, in [−π, π], likewise.
+    /// Angle of the point (`x`, `self`) in radians, in [−π, π]; bit-identical on every platform.
     #[must_use]
     fn atan2_portable(self, x: Self) -> Self;
 
-    /// e to the power of this, likewise.
+    /// e to the power of this; bit-identical on every platform.
     #[must_use]
     fn exp_portable(self) -> Self;
 
-    /// The natural logarithm, likewise.
+    /// Natural logarithm; bit-identical on every platform.
     #[must_use]
     fn ln_portable(self) -> Self;
 }
@@ -84,23 +83,22 @@ impl Scalar for f64 {
     }
 }
 
-/// The same vector in another scalar.
+/// Converts a vector to another scalar.
 #[must_use]
 #[inline]
 pub fn cast_vector<S: Scalar, T: Scalar>(v: Vec3<S>) -> Vec3<T> {
     v.map(|x| T::constant(x.as_f64()))
 }
 
-/// The same point in another scalar.
+/// Converts a point to another scalar.
 #[must_use]
 #[inline]
 pub fn cast_point<S: Scalar, T: Scalar>(p: Point3<S>) -> Point3<T> {
     p.map(|x| T::constant(x.as_f64()))
 }
 
-/// The length of `v`, right also where squares of its components would overflow
-/// or vanish. Infinite only if a component is, or if the length itself is beyond
-/// the scalar's range.
+/// Length of `v` without overflow or underflow of squares. Infinite only if a component is, or if
+/// the length itself is beyond the scalar's range.
 #[must_use]
 #[inline]
 pub fn length<S: Scalar>(v: Vec3<S>) -> S {
@@ -137,9 +135,9 @@ pub fn direction_and_length<S: Scalar>(v: Vec3<S>) -> Option<(Vec3<S>, S)> {
     }
 }
 
-/// A unit vector for what has no direction: for each pair of numbers another one, spread evenly
-/// over the sphere by the golden angle (González, *Measurement of areas on a sphere using
-/// Fibonacci and latitude–longitude lattices*, 2010), and always the same.
+/// Deterministic unit vector for a pair of indices without a direction: spread evenly over the
+/// sphere by the golden angle (González, *Measurement of areas on a sphere using Fibonacci and
+/// latitude–longitude lattices*, 2010).
 #[must_use]
 pub fn any_direction<S: Scalar>(first: u32, second: u32) -> Vec3<S> {
     // Fibonacci hashing (Knuth, *The Art of Computer Programming*, vol. 3, §6.4).
@@ -151,26 +149,26 @@ pub fn any_direction<S: Scalar>(first: u32, second: u32) -> Vec3<S> {
     cast_vector(Vec3::new(across * cos, height, across * sin))
 }
 
-/// Whether a sum of three squares kept all of its digits. Under the smallest
-/// normal number divided by epsilon, a part of it may have been denormal.
+/// Returns true if a sum of three squares kept all of its digits. Under the smallest normal number
+/// divided by epsilon, one of them may have been denormal.
 fn squared_is_exact<S: Scalar>(squared: S) -> bool {
     squared.is_finite() && squared > S::min_positive_value() / S::epsilon()
 }
 
-/// NaN if a component is.
+/// Largest absolute component; NaN if a component is.
 fn largest_component<S: Scalar>(v: Vec3<S>) -> S {
     let (x, y, z) = (v.x.abs(), v.y.abs(), v.z.abs());
     if x.is_nan() || y.is_nan() || z.is_nan() { S::nan() } else { Float::max(x, Float::max(y, z)) }
 }
 
-/// Whether all components are finite.
+/// Returns true if all components are finite.
 #[must_use]
 #[inline]
 pub fn is_finite<S: Scalar>(v: Vec3<S>) -> bool {
     v.x.is_finite() && v.y.is_finite() && v.z.is_finite()
 }
 
-/// Whether all coordinates are finite.
+/// Returns true if all coordinates are finite.
 #[must_use]
 #[inline]
 pub fn is_finite_point<S: Scalar>(p: Point3<S>) -> bool {

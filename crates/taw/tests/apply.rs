@@ -44,7 +44,11 @@ fn forces_and_torques_add_up_and_last_one_step() {
             );
             // The lever along y and the force along z turn from y to z, about +x.
             let exact = Vec3::new(1.0 * 0.25 / 0.2, 0.6 * 0.25 / 0.2, 0.0);
-            assert!((ball.spin - exact).magnitude() < 1e-15, "{response:?}: {:?}", ball.spin);
+            assert!(
+                (ball.angular_velocity - exact).magnitude() < 1e-15,
+                "{response:?}: {:?}",
+                ball.angular_velocity
+            );
         }
     }
 }
@@ -60,7 +64,7 @@ fn impulses_change_momentum_by_themselves() {
     let turned = marbles.angular_momentum(id).unwrap() - Bivector::wedge(lever, impulse);
     assert!(turned.dual().magnitude() < 1e-15);
     marbles.apply_angular_impulse(id, -Bivector::wedge(lever, impulse)).unwrap();
-    assert!(marbles.get(id).unwrap().spin.magnitude() < 1e-15);
+    assert!(marbles.get(id).unwrap().angular_velocity.magnitude() < 1e-15);
     marbles.set_momentum(id, Vec3::new(0.0, 8.0, 0.0)).unwrap();
     assert_eq!(marbles.get(id).unwrap().velocity.y, 4.0);
     assert_eq!(world.momentum(), Vec3::new(0.0, 8.0, 0.0));
@@ -104,16 +108,16 @@ fn there_is_no_limit_but_one_that_is_set() {
         let (mut world, id) = one_ball(response);
         let (v, w) = (Vec3::new(3e5, 0.0, 4e5), Vec3::new(0.0, 1e6, 0.0));
         world.marbles.set_velocity(id, v).unwrap();
-        world.marbles.set_spin(id, w).unwrap();
+        world.marbles.set_angular_velocity(id, w).unwrap();
         world.step(1e-3).unwrap();
         let ball = world.marbles.get(id).unwrap();
-        assert_eq!((ball.velocity, ball.spin), (v, w), "{response:?}");
+        assert_eq!((ball.velocity, ball.angular_velocity), (v, w), "{response:?}");
         let limits = SpeedLimits { linear: Some(10.0), angular: Some(100.0) };
         world.set_speed_limits(limits).unwrap();
         world.step(1e-3).unwrap();
         let ball = world.marbles.get(id).unwrap();
         assert!((ball.velocity - Vec3::new(6.0, 0.0, 8.0)).magnitude() < 1e-12, "{response:?}");
-        assert!((ball.spin.y - 100.0).abs() < 1e-12, "{response:?}");
+        assert!((ball.angular_velocity.y - 100.0).abs() < 1e-12, "{response:?}");
     }
 }
 
@@ -123,13 +127,16 @@ fn damping_leaves_its_part_whatever_the_step() {
         for steps in [1, 7, 100] {
             let (mut world, id) = one_ball(response);
             world.marbles.set_velocity(id, Vec3::new(4.0, 0.0, 0.0)).unwrap();
-            world.marbles.set_spin(id, Vec3::new(0.0, 3.0, 0.0)).unwrap();
+            world.marbles.set_angular_velocity(id, Vec3::new(0.0, 3.0, 0.0)).unwrap();
             let damping = Damping { linear: 0.5, angular: 30.0 };
             world.marbles.set_damping(id, damping).unwrap();
             (0..steps).for_each(|_| world.step(1.0 / f64::from(steps)).unwrap());
             let ball = world.marbles.get(id).unwrap();
             assert!((ball.velocity.x - 4.0 * (-0.5_f64).exp()).abs() < 1e-12, "{response:?}");
-            assert!((ball.spin.y - 3.0 * (-30.0_f64).exp()).abs() < 1e-12, "{response:?}");
+            assert!(
+                (ball.angular_velocity.y - 3.0 * (-30.0_f64).exp()).abs() < 1e-12,
+                "{response:?}"
+            );
         }
     }
 }
@@ -148,7 +155,7 @@ fn compensated_precision_moves_where_plain_precision_stands() {
             };
             let id = world.marbles.insert(ball).unwrap();
             (0..1000).for_each(|_| world.step(1.0 / 1024.0).unwrap());
-            world.marbles.get_exact(id).unwrap().position.x - 1e6
+            world.marbles.get_high_precision(id).unwrap().position.x - 1e6
         };
         assert_eq!(way(Precision::Plain), 0.0, "{response:?}");
         assert!((way(Precision::Compensated) - 1000.0 / 1024.0).abs() < 1e-9, "{response:?}");

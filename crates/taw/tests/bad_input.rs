@@ -41,7 +41,7 @@ fn is_sane<S: Scalar>(marble: &Marble<S>) -> bool {
     let point = [marble.position.x, marble.position.y, marble.position.z];
     let rotation =
         [marble.rotation.s, marble.rotation.v.x, marble.rotation.v.y, marble.rotation.v.z];
-    let vectors = [marble.velocity, marble.spin].map(|v| [v.x, v.y, v.z]);
+    let vectors = [marble.velocity, marble.angular_velocity].map(|v| [v.x, v.y, v.z]);
     point.iter().chain(&rotation).chain(vectors.iter().flatten()).all(|x| x.is_finite())
 }
 
@@ -143,7 +143,7 @@ fn a_spin_that_overflows_is_stopped_named_once_and_leaves_a_rotation() {
     for response in RESPONSES {
         let mut world = on_a_floor::<f32>(Model { substeps: 4, ..model(response) });
         let spin = Vec3::new(3e38, 3e38, 3e38);
-        let mad = Marble { spin, ..Marble::new(at(0.0, 0.49, 0.0), 0.5) };
+        let mad = Marble { angular_velocity: spin, ..Marble::new(at(0.0, 0.49, 0.0), 0.5) };
         let mad = world.marbles.insert(mad).unwrap();
         let other = world.marbles.insert(Marble::new(at(9.0, 0.5, 0.0), 0.5)).unwrap();
         let mut alone = on_a_floor::<f32>(Model { substeps: 4, ..model(response) });
@@ -169,7 +169,7 @@ fn what_overflows_is_named_once_in_a_step_of_many_substeps_and_by_its_own_name()
         let first = world.marbles.insert(Marble::new(at(-50.0, 0.0, 0.0), 0.5)).unwrap();
         let mad = world.marbles.insert(Marble::new(at(0.0, 0.0, 0.0), 0.5)).unwrap();
         world
-            .set_forces(vec![Force::Custom(|at, _| {
+            .set_forces(vec![ForceField::Custom(|at, _| {
                 if at.position.x > -1.0 {
                     Vec3::new(f32::NAN, 0.0, 0.0)
                 } else {
@@ -208,7 +208,7 @@ fn walls_that_cannot_be_are_refused_by_name() {
     for rotation in rotations {
         walls.push(("rotation", WallShape::Mesh(mesh.clone(), turned(rotation))));
         walls.push(("rotation", WallShape::HeightField(heights.clone(), turned(rotation))));
-        let obb = Shape::Obb(Obb { center: origin, rotation, half_widths: one });
+        let obb = Shape::Obb(Obb { center: origin, rotation, half_extents: one });
         walls.push(("rotation", obb.clone().into()));
         walls.push(("rotation", Compound::new(vec![sphere(1.0), obb]).unwrap().into()));
     }
@@ -219,9 +219,9 @@ fn walls_that_cannot_be_are_refused_by_name() {
     }
     let upside_down = Shape::Aabb(Aabb { min: at(0.0, 1.0, 0.0), max: origin });
     walls.push(("max.y", upside_down.into()));
-    let half_widths = Vec3::new(1.0, -1.0, 1.0);
-    let inverted = Obb { center: origin, rotation: Quat::new(1.0, 0.0, 0.0, 0.0), half_widths };
-    walls.push(("half_widths.y", inverted.into()));
+    let half_extents = Vec3::new(1.0, -1.0, 1.0);
+    let inverted = Obb { center: origin, rotation: Quat::new(1.0, 0.0, 0.0, 0.0), half_extents };
+    walls.push(("half_extents.y", inverted.into()));
     let far = Aabb { min: at(-3e38, 0.0, 0.0), max: at::<f32>(3e38, 1.0, 1.0) };
     walls.push(("size.x", far.into()));
     let id = world.walls.insert(sphere(1.0)).unwrap();
@@ -241,8 +241,8 @@ fn walls_that_cannot_be_are_refused_by_name() {
 fn a_rotation_that_drifted_a_little_is_taken_without_the_drift() {
     let mut world = World::<f32>::default();
     let rotation = Quat::new(1.0005, 0.0, 0.0, 0.0);
-    let half_widths = Vec3::new(1.0, 1.0, 1.0);
-    let id = world.walls.insert(Obb { center: at(0.0, 0.0, 0.0), rotation, half_widths }).unwrap();
+    let half_extents = Vec3::new(1.0, 1.0, 1.0);
+    let id = world.walls.insert(Obb { center: at(0.0, 0.0, 0.0), rotation, half_extents }).unwrap();
     let WallShape::Solid(Shape::Obb(obb)) = world.walls.get(id).unwrap() else { panic!() };
     assert_eq!(obb.rotation.s, 1.0);
 }

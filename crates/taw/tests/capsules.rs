@@ -42,10 +42,10 @@ fn a_capsule_weighs_and_turns_as_cylinder_and_ball_do() {
     let across =
         cylinder * (r * r / 4.0 + h * h / 3.0) + ball * (0.4 * r * r + h * h + 0.75 * h * r);
     for (spin, moment) in [(Vec3::unit_y(), along), (Vec3::unit_x(), across)] {
-        world.marbles.set_spin(id, spin).unwrap();
+        world.marbles.set_angular_velocity(id, spin).unwrap();
         let momentum: Vec3<f64> = world.marbles.angular_momentum(id).unwrap().dual();
         assert!((momentum.magnitude() / moment - 1.0).abs() < 1e-12, "{momentum:?} {moment}");
-        assert!((world.energy().spin / (0.5 * moment) - 1.0).abs() < 1e-12);
+        assert!((world.energy().rotational / (0.5 * moment) - 1.0).abs() < 1e-12);
     }
     world.marbles.set_velocity(id, Vec3::unit_x()).unwrap();
     assert!((world.momentum().x / (cylinder + ball) - 1.0).abs() < 1e-12);
@@ -57,15 +57,15 @@ fn a_capsule_that_nothing_touches_keeps_its_energy_and_angular_momentum() {
     let mut world = world(dynamic(Response::Impulse));
     world.set_gravity(Vec3::zero()).unwrap();
     let id = world.marbles.insert(capsule([0.0; 3], 0.7)).unwrap();
-    world.marbles.set_spin(id, Vec3::new(3.0, 11.0, -2.0)).unwrap();
+    world.marbles.set_angular_velocity(id, Vec3::new(3.0, 11.0, -2.0)).unwrap();
     let momentum = |world: &World<f64>| world.marbles.angular_momentum(id).unwrap().dual();
-    let (before, energy) = (momentum(&world), world.energy().spin);
+    let (before, energy) = (momentum(&world), world.energy().rotational);
     for _ in 0..6_000 {
         world.step(DT).unwrap();
     }
     let off: Vec3<f64> = momentum(&world) - before;
     assert!(off.magnitude() < 1e-10 * before.magnitude(), "{off:?} in 100 s");
-    assert!((world.energy().spin / energy - 1.0).abs() < 1e-10);
+    assert!((world.energy().rotational / energy - 1.0).abs() < 1e-10);
 }
 
 /// Floors at zero: a half-space, a box, a mesh.
@@ -108,8 +108,8 @@ fn a_capsule_falls_over_and_lies_still() {
                 assert!(axis(&marble).y.abs() < 0.02, "{what}");
                 assert!(marble.velocity.magnitude() < 0.1, "{what}");
                 // It may still roll, for nothing resists that.
-                let along = marble.spin.dot(axis(&marble));
-                let across = marble.spin - axis(&marble) * along;
+                let along = marble.angular_velocity.dot(axis(&marble));
+                let across = marble.angular_velocity - axis(&marble) * along;
                 assert!(across.magnitude() < 0.05, "{what}");
             }
         }
@@ -147,7 +147,7 @@ fn a_bounce_turns_back_the_velocity_of_the_point_that_is_touched() {
         let marble = world.marbles.get(id).unwrap();
         let lower = if axis(&marble).y > 0.0 { -axis(&marble) } else { axis(&marble) };
         let arm = lower * 0.5 - Vec3::unit_y() * 0.25;
-        let touching = marble.velocity + marble.spin.cross(arm);
+        let touching = marble.velocity + marble.angular_velocity.cross(arm);
         assert!(
             (touching.y - 2.0 * restitution).abs() < 1e-9,
             "{restitution} {tilt}: {touching:?}"
@@ -176,7 +176,7 @@ fn a_collision_keeps_momentum_and_angular_momentum() {
         let ids = [-1.0, 1.0].map(|x| {
             let mut marble = capsule([x, 0.2 * next(), 0.2 * next()], 3.0 * next());
             marble.velocity = Vec3::new(-3.0 * x, 0.3 * next(), 0.3 * next());
-            marble.spin = Vec3::new(next(), next(), next());
+            marble.angular_velocity = Vec3::new(next(), next(), next());
             marble.half_length = if next() > 0.0 { 0.5 } else { 0.0 };
             marble.material = Some(material(0.7, 0.0));
             world.marbles.insert(marble).unwrap()
@@ -230,7 +230,7 @@ fn a_capsule_rolls_down_a_slope_as_its_moment_says() {
         world.step(DT).unwrap();
     }
     let marble = world.marbles.get(id).unwrap();
-    world.marbles.set_spin(id, axis(&marble)).unwrap();
+    world.marbles.set_angular_velocity(id, axis(&marble)).unwrap();
     let moment: Vec3<f64> = world.marbles.angular_momentum(id).unwrap().dual();
     let mass = world.marbles.momentum(id).unwrap().magnitude() / marble.velocity.magnitude();
     let pull = 9.81 * slope.sin() / (1.0 + moment.magnitude() / (mass * 0.25 * 0.25));
@@ -279,12 +279,12 @@ fn what_cannot_be_a_capsule_is_refused_by_name() {
     assert!(error.starts_with("half_length must be in [0"), "{error}");
     let id = world.marbles.insert(capsule([0.0; 3], 0.0)).unwrap();
     let events = Model { response: Response::EventDriven, ..world.model() };
-    assert_eq!(world.set_model(events), Err(taw::Error::BallsOnly(id)));
+    assert_eq!(world.set_model(events), Err(taw::Error::UnsupportedShape(id)));
     world.marbles.set_half_length(id, 0.0).unwrap();
     world.set_model(events).unwrap();
     world.marbles.set_half_length(id, 1.0).unwrap();
     let before = world.clone();
-    assert_eq!(world.step(DT), Err(taw::Error::BallsOnly(id)));
+    assert_eq!(world.step(DT), Err(taw::Error::UnsupportedShape(id)));
     assert_eq!(world, before);
     world.marbles.remove(id).unwrap();
     world.step(DT).unwrap();
@@ -308,18 +308,23 @@ fn drift_in_flight<S: Scalar>(spin: [f64; 3], shape: [f64; 2], substeps: u32) ->
     let origin = Point3::new(S::zero(), S::zero(), S::zero());
     let id = world
         .marbles
-        .insert(Marble { half_length, rotation, spin, ..Marble::new(origin, radius) })
+        .insert(Marble {
+            half_length,
+            rotation,
+            angular_velocity: spin,
+            ..Marble::new(origin, radius)
+        })
         .unwrap();
     let momentum = |world: &World<S>| -> Vec3<f64> {
         let momentum = world.marbles.angular_momentum(id).unwrap().dual();
         momentum.map(Scalar::as_f64)
     };
-    let (before, energy) = (momentum(&world), world.energy().spin);
+    let (before, energy) = (momentum(&world), world.energy().rotational);
     let mut worst = [0.0_f64; 2];
     for _ in 0..6_000 {
         world.step(S::constant(DT)).unwrap();
         let off = (momentum(&world) - before).magnitude() / before.magnitude();
-        let gained = (world.energy().spin / energy - 1.0).abs();
+        let gained = (world.energy().rotational / energy - 1.0).abs();
         worst = [worst[0].max(gained), worst[1].max(off)];
     }
     worst

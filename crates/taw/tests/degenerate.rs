@@ -12,13 +12,14 @@ use std::fmt::Debug;
 
 use cgmath::MetricSpace;
 use taw::contact::{
-    Cast, Closest, RayHit, closest, closest_exhaustive, closest_plane, manifold, sweep,
+    ClosestPoints, RayCast, RayHit, closest_points, closest_points_brute_force,
+    closest_points_of_plane, manifold, shape_cast,
 };
 use taw::frame::{AxisAngle, Pose, Ray, Rotor};
 use taw::math::{Quat, cast_point, cast_vector};
-use taw::motion::turned;
+use taw::motion::integrate_rotation;
 use taw::prelude::*;
-use taw::shape::{Capsule, Hull, Obb, Solid, Triangle};
+use taw::shape::{BoundedShape, Capsule, Hull, Obb, Triangle};
 use things::Thing;
 
 const SCALES: [f64; 5] = [1e-6, 1e-3, 1.0, 1e3, 1e6];
@@ -52,7 +53,7 @@ impl Place {
     }
 
     fn vector(&self, v: [f64; 3]) -> Vec3<f64> {
-        self.pose.vector(Vec3::from(v)) * self.scale
+        self.pose.transform_vector(Vec3::from(v)) * self.scale
     }
 
     fn point<S: Scalar>(&self, p: [f64; 3]) -> Point3<S> {
@@ -127,7 +128,7 @@ impl Def {
     }
 }
 
-fn finite<S: Scalar>(found: &Closest<S>) -> bool {
+fn finite<S: Scalar>(found: &ClosestPoints<S>) -> bool {
     let point = |p: Point3<S>| p.x.is_finite() && p.y.is_finite() && p.z.is_finite();
     found.distance.is_finite() && point(found.on_a) && point(found.on_b)
 }
@@ -158,11 +159,12 @@ impl Tally {
         let (x, y) = (a.thing::<S>(place), b.thing::<S>(place));
         let size = a.size() + b.size();
         let tolerance = place.tolerance::<S>(size);
-        let one = each!(&x, x => each!(&y, y => closest(x, y)));
-        let other = each!(&x, x => each!(&y, y => closest(y, x)));
-        let slow = each!(&x, x => each!(&y, y => closest_exhaustive(x, y)));
+        let one = each!(&x, x => each!(&y, y => closest_points(x, y)));
+        let other = each!(&x, x => each!(&y, y => closest_points(y, x)));
+        let slow = each!(&x, x => each!(&y, y => closest_points_brute_force(x, y)));
         let touches = each!(&x, x => each!(&y, y => manifold(x, y, S::zero())));
-        let off = |found: &Closest<S>| (found.distance.as_f64() - distance * place.scale).abs();
+        let off =
+            |found: &ClosestPoints<S>| (found.distance.as_f64() - distance * place.scale).abs();
         let length = one.normal.map(Scalar::as_f64).magnitude();
         let apart: Point3<f64> = cast_point(one.on_b);
         let apart = (apart - cast_point::<S, f64>(one.on_a)).dot(one.normal.map(Scalar::as_f64));
@@ -299,7 +301,7 @@ fn spheres_and_others() {
             let Thing::Sphere(ball) = Ball([7.0, height, -3.0], 0.5).thing::<f64>(&place) else {
                 continue;
             };
-            let found = closest_plane(&floor, &ball);
+            let found = closest_points_of_plane(&floor, &ball);
             let off = (found.distance - gap * place.scale).abs();
             tally.check(finite(&found) && off <= 4.0 * place.tolerance::<f64>(10.0), || {
                 format!("a plane at {height}, {place:?}: {found:?}")
@@ -421,8 +423,8 @@ impl Tally {
         let (x, y) = (a.thing::<S>(place), b.thing::<S>(place));
         let moves = |v: [f64; 3]| cast_vector::<f64, S>(place.vector(v));
         let (p, q) = (moves(a_moves), moves(b_moves));
-        let one = each!(&x, x => each!(&y, y => sweep(x, p, y, q)));
-        let other = each!(&x, x => each!(&y, y => sweep(y, q, x, p)));
+        let one = each!(&x, x => each!(&y, y => shape_cast(x, p, y, q)));
+        let other = each!(&x, x => each!(&y, y => shape_cast(y, q, x, p)));
         let apart = place.vector(b_moves) - place.vector(a_moves);
         let speed = one
             .map_or(apart.magnitude(), |touch| apart.dot(touch.normal.map(Scalar::as_f64)).abs());
@@ -523,11 +525,11 @@ fn sweeps() {
 
 fn cast<S: Scalar>(thing: &Thing<S>, ray: &Ray<S>, longest: S) -> Option<RayHit<S>> {
     match thing {
-        Thing::Sphere(it) => it.cast(ray, longest),
-        Thing::Aabb(it) => it.cast(ray, longest),
-        Thing::Obb(it) => it.cast(ray, longest),
-        Thing::Capsule(it) => it.cast(ray, longest),
-        Thing::Hull(it) => it.cast(ray, longest),
+        Thing::Sphere(it) => it.cast_ray(ray, longest),
+        Thing::Aabb(it) => it.cast_ray(ray, longest),
+        Thing::Obb(it) => it.cast_ray(ray, longest),
+        Thing::Capsule(it) => it.cast_ray(ray, longest),
+        Thing::Hull(it) => it.cast_ray(ray, longest),
         Thing::Triangle(_) => None,
     }
 }
@@ -542,7 +544,7 @@ impl Tally {
         place: &Place,
     ) {
         let thing = def.thing::<S>(place);
-        let direction = place.pose.vector(Vec3::from(along)).map(S::constant);
+        let direction = place.pose.transform_vector(Vec3::from(along)).map(S::constant);
         let ray = Ray { origin: place.point(from), direction };
         let found = cast(&thing, &ray, S::constant(longest * place.scale));
         let far = Vec3::from(from).magnitude() + def.size();
@@ -633,7 +635,7 @@ fn bad_rotations<S: Scalar + Debug>(tally: &mut Tally) {
         let spin = Vec3::new(S::zero(), S::constant(speed), S::constant(speed * 1e-3));
         let mut rotation = q(1.0, 0.0);
         for _ in 0..100 {
-            rotation = turned(rotation, spin, S::constant(1.0 / 60.0));
+            rotation = integrate_rotation(rotation, spin, S::constant(1.0 / 60.0));
         }
         let length = rotation.s.as_f64().hypot(cast_vector::<S, f64>(rotation.v).magnitude());
         tally.check((length - 1.0).abs() < 1e-5, || format!("{spin:?} makes {rotation:?}"));
@@ -694,10 +696,10 @@ fn flushing_to_zero_changes_nothing() {
     let place = Place { scale: 1.0, offset: 0.0, pose: Pose::identity() };
     let ask = |a: Def, b: Def| {
         let (x, y) = (a.thing::<f32>(&place), b.thing::<f32>(&place));
-        let found: Closest<f32> = each!(&x, x => each!(&y, y => closest(x, y)));
+        let found: ClosestPoints<f32> = each!(&x, x => each!(&y, y => closest_points(x, y)));
         let moves = Vec3::new(-3.0, 0.4, -0.2);
         let still = Vec3::new(0.0, 0.0, 0.0);
-        let touch = each!(&x, x => each!(&y, y => sweep(x, still, y, moves)));
+        let touch = each!(&x, x => each!(&y, y => shape_cast(x, still, y, moves)));
         let n = found.normal;
         [found.distance, n.x, n.y, n.z, touch.map_or(-1.0, |touch| touch.time)]
     };

@@ -52,7 +52,7 @@ fn leaves_the_corner_at(
     world.walls.insert(plane([0.0, 1.0, 0.0], [0.0, -1.0, 0.0])).unwrap();
     world.walls.insert(plane([0.0, 0.0, -1.0], [0.0, 0.0, 1.0])).unwrap();
     let marble = marble(at, radius, velocity, surface(m[0], m[1]));
-    let id = world.marbles.insert(Marble { spin: vector(spin), ..marble }).unwrap();
+    let id = world.marbles.insert(Marble { angular_velocity: vector(spin), ..marble }).unwrap();
     let mass = world.energy().kinetic / (0.5 * vector::<f64>(velocity).magnitude2());
     let before = world.energy().total();
     world.step(1.0 / 60.0).unwrap();
@@ -144,7 +144,7 @@ fn a_ball_at_the_bottom_of_a_cone_is_not_thrown_up() {
         let spin = vector([20.0 * any(), 20.0 * any(), 20.0 * any()]);
         let ball =
             marble([0.02 * any(), high, 0.02 * any()], 0.25, velocity, surface(1.0 + any(), 0.0));
-        let id = world.marbles.insert(Marble { spin, ..ball }).unwrap();
+        let id = world.marbles.insert(Marble { angular_velocity: spin, ..ball }).unwrap();
         let mass = world.energy().kinetic / (0.5 * vector::<f64>(velocity).magnitude2());
         let begin = world.energy().total() / mass;
         for step in 0..240 {
@@ -192,7 +192,7 @@ impl Board {
             let spin = turn.v * (2.0 / dt as f32);
             let motion = WallMotion {
                 velocity: (after - before) / dt as f32,
-                spin,
+                angular_velocity: spin,
                 pivot: Point3::from_vec(after),
             };
             world.walls.set_motion(*id, Some(motion)).unwrap();
@@ -253,7 +253,7 @@ fn balls_of_glass_and_lead_bounce_in_a_corner_without_gain() {
         }
         // What only shows that it rolls has no energy of it.
         let energy = |world: &World<f64>| {
-            let Energy { kinetic, spin, potential } = world.energy();
+            let Energy { kinetic, rotational: spin, potential } = world.energy();
             kinetic + potential + if rotation == Rotation::Dynamic { spin } else { 0.0 }
         };
         let begin = energy(&world);

@@ -80,7 +80,7 @@ fn over_hills<S: Scalar>(scale: f64) {
             let took = begin.elapsed();
             assert!(took < Duration::from_secs(5), "{scale:e}, {radius}, step {step}: {took:?}");
             let at = world.marbles.position()[0];
-            let gap = world.walls.shapes()[0].nearest(at).distance.as_f64() / scale;
+            let gap = world.walls.shapes()[0].project_point(at).distance.as_f64() / scale;
             let rounding = 100.0 * S::epsilon().as_f64();
             assert!(
                 gap > -1e-3 * radius - rounding,
@@ -134,7 +134,7 @@ fn a_ball_goes_down_a_half_pipe_of_facets_without_sinking_into_them() {
             let name = format!("e {restitution}, mu {friction}, from {z}, step {step}");
             let now = world.energy().total();
             let at = world.marbles.position()[0];
-            let deep = 1.0 - world.walls.shapes()[0].nearest(at).distance / radius;
+            let deep = 1.0 - world.walls.shapes()[0].project_point(at).distance / radius;
             // As much of an overlap as may stay.
             assert!(deep < 4e-3, "{name}: {deep} of the radius deep");
             let gain = (now - energy) / (9.81 * radius);

@@ -87,11 +87,11 @@ impl<S: Scalar> Mover<S> {
         let per = |x: f64| x / dt;
         let motion = WallMotion {
             velocity: vector(0.0, per(height - self.last.0), 0.0),
-            spin: vector(0.0, 0.0, per(angle - self.last.1)),
+            angular_velocity: vector(0.0, 0.0, per(angle - self.last.1)),
             pivot: point(0.0, height, 0.0),
         };
         self.last = (height, angle);
-        let shape = self.shape.moved(Self::pose(height, angle)).unwrap();
+        let shape = self.shape.transformed(Self::pose(height, angle)).unwrap();
         world.walls.set(self.id, shape).unwrap();
         world.walls.set_motion(self.id, Some(motion)).unwrap();
     }
@@ -99,7 +99,7 @@ impl<S: Scalar> Mover<S> {
     /// How far a marble is off the wall.
     fn gap(&self, world: &World<S>, row: usize) -> f64 {
         let shape = world.walls.get(self.id).unwrap();
-        let near = shape.nearest(world.marbles.position()[row]);
+        let near = shape.project_point(world.marbles.position()[row]);
         (near.distance - world.marbles.radius()[row]).as_f64()
     }
 }
@@ -275,7 +275,7 @@ fn a_ball_pivots_over_an_edge_and_a_corner_and_keeps_its_energy() {
             let marble = Marble {
                 material: Some(surface(0.0, 1e6)),
                 velocity: Vec3::new(0.1, 0.0, 0.0),
-                spin: Vec3::new(0.0, 0.0, -1.0),
+                angular_velocity: Vec3::new(0.0, 0.0, -1.0),
                 ..Marble::new(Point3::new(-0.05, 0.1, 0.3), 0.1)
             };
             world.marbles.insert(marble).unwrap();

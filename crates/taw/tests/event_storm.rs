@@ -135,7 +135,11 @@ fn scene<S: Scalar>(seed: u64) -> Scene<S> {
         // Squeezed among each other, but not into walls.
         let free = |at: [f64; 3]| {
             let at = point::<S>(at);
-            world.walls.shapes().iter().all(|wall| wall.nearest(at).distance.as_f64() >= radius)
+            world
+                .walls
+                .shapes()
+                .iter()
+                .all(|wall| wall.project_point(at).distance.as_f64() >= radius)
         };
         for _ in 0..50 {
             if free(position) {
@@ -152,7 +156,7 @@ fn scene<S: Scalar>(seed: u64) -> Scene<S> {
             .marbles
             .insert(Marble {
                 velocity: vector(velocity),
-                spin: vector(spin),
+                angular_velocity: vector(spin),
                 mass: Mass::Density(S::constant(draw.one_of(&[1000.0, 1000.0, 10.0, 8000.0]))),
                 material: Some(material),
                 ..Marble::new(point(position), S::constant(radius))
@@ -175,10 +179,10 @@ impl<S: Scalar> Scene<S> {
             let pose = Pose { rotation: turn.into(), translation };
             let motion = WallMotion {
                 velocity: vector([0.0, (after.0 - before.0) / dt, 0.0]),
-                spin: vector([0.0, 0.0, (after.1 - before.1) / dt]),
+                angular_velocity: vector([0.0, 0.0, (after.1 - before.1) / dt]),
                 pivot: point([0.0, after.0, 0.0]),
             };
-            self.world.walls.set(*id, shape.moved(pose).unwrap()).unwrap();
+            self.world.walls.set(*id, shape.transformed(pose).unwrap()).unwrap();
             self.world.walls.set_motion(*id, Some(motion)).unwrap();
         }
         self.time += dt;
@@ -193,7 +197,7 @@ impl<S: Scalar> Scene<S> {
         for row in 0..marbles.len() {
             let at = marbles.position()[row];
             for wall in self.world.walls.shapes() {
-                let gap = wall.nearest(at).distance.as_f64() - radius(row);
+                let gap = wall.project_point(at).distance.as_f64() - radius(row);
                 deepest = deepest.max(-gap / radius(row));
             }
         }

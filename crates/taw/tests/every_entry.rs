@@ -93,8 +93,11 @@ impl<S: Scalar> Place<S> {
         let once = named.iter().collect::<BTreeSet<_>>().len() == named.len();
         once && marbles.map(|id| self.world.marbles.get(id).unwrap()).all(|m| {
             let rotation = [m.rotation.s, m.rotation.v.x, m.rotation.v.y, m.rotation.v.z];
-            let rows =
-                [m.position - Point3::new(S::zero(), S::zero(), S::zero()), m.velocity, m.spin];
+            let rows = [
+                m.position - Point3::new(S::zero(), S::zero(), S::zero()),
+                m.velocity,
+                m.angular_velocity,
+            ];
             rows.iter().flat_map(|v| [v.x, v.y, v.z]).chain(rotation).all(S::is_finite)
         })
     }
@@ -242,7 +245,7 @@ fn scenes_are_refused_or_run<S: Scalar>() {
                 let clock = Instant::now();
                 let mut running = match scene.run::<S>(model) {
                     Ok(running) => running,
-                    Err(Error::BallsOnly(_)) => continue, // named as the marble that it is
+                    Err(Error::UnsupportedShape(_)) => continue, // named as the marble that it is
                     Err(error) => {
                         let (field, _) = named(error);
                         assert!(!field.is_empty(), "{name} = {x:?}: {error}");

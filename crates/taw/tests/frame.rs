@@ -71,9 +71,9 @@ proptest! {
 
     #[test]
     fn a_rotor_turns_as_its_quaternion_does(p in rotation(), q in rotation()) {
-        let both = Rotor::from(p).after(Rotor::from(q));
+        let both = Rotor::from(p) * Rotor::from(q);
         prop_assert!(apart(Quat::from(both), p * q) <= 4.0);
-        let none = both.after(both.reverse());
+        let none = both * both.reverse();
         prop_assert!((none.scalar - 1.0).abs() < 1e-14);
         prop_assert!(none.bivector.dual().magnitude() < 1e-14);
     }
@@ -85,19 +85,19 @@ proptest! {
     ) {
         let pose = Pose { rotation: q, translation: Vec3::from(t) };
         let (motor, point) = (Motor::from(pose), Point3::from(p));
-        prop_assert!(motor.point(point).distance(pose.point(point)) < 1e-13);
+        prop_assert!(motor.transform_point(point).distance(pose.transform_point(point)) < 1e-13);
         let plane = Plane::through(point, Vec3::new(1.0, 2.0, -2.0)).unwrap();
-        let (normal, offset) = motor.plane(plane.normal(), plane.offset());
-        prop_assert!((normal - pose.vector(plane.normal())).magnitude() < 1e-14);
-        prop_assert!((normal.dot(pose.point(point).to_vec()) - offset).abs() < 1e-13);
-        let line = motor.line(Line::through(point, Vec3::new(0.6, 0.0, 0.8)));
-        let there = Line::through(pose.point(point), pose.vector(Vec3::new(0.6, 0.0, 0.8)));
+        let (normal, offset) = motor.transform_plane(plane.normal(), plane.offset());
+        prop_assert!((normal - pose.transform_vector(plane.normal())).magnitude() < 1e-14);
+        prop_assert!((normal.dot(pose.transform_point(point).to_vec()) - offset).abs() < 1e-13);
+        let line = motor.transform_line(Line::through(point, Vec3::new(0.6, 0.0, 0.8)));
+        let there = Line::through(pose.transform_point(point), pose.transform_vector(Vec3::new(0.6, 0.0, 0.8)));
         prop_assert!((line.direction - there.direction).magnitude() < 1e-14);
         prop_assert!((line.moment - there.moment).magnitude() < 1e-13);
         let (back, other) = (Pose::from(motor.inverse()), pose.inverse());
         prop_assert!((back.translation - other.translation).magnitude() < 1e-13);
         let screw = Motor::exp(motor.log(), 1.0);
-        prop_assert!(screw.point(point).distance(pose.point(point)) < 1e-12);
+        prop_assert!(screw.transform_point(point).distance(pose.transform_point(point)) < 1e-12);
     }
 
     #[test]
@@ -108,14 +108,14 @@ proptest! {
         let parent = Pose { rotation: q, translation: Vec3::from(t) };
         let local = Pose { rotation: q * q, translation: Vec3::new(1.0, 2.0, 3.0) };
         let (world, point) = (parent * local, Point3::from(p));
-        let at = world.point(point);
-        prop_assert!(at.distance(parent.point(local.point(point))) < 1e-13);
+        let at = world.transform_point(point);
+        prop_assert!(at.distance(parent.transform_point(local.transform_point(point))) < 1e-13);
         let matrix = parent.matrix() * local.matrix();
         prop_assert!(at.distance(matrix.transform_point(point)) < 1e-13);
-        prop_assert!(point.distance(world.point_back(at)) < 1e-13);
-        prop_assert!(point.distance(world.inverse().point(at)) < 1e-13);
+        prop_assert!(point.distance(world.inverse_transform_point(at)) < 1e-13);
+        prop_assert!(point.distance(world.inverse().transform_point(at)) < 1e-13);
         let scaled = parent.scaled(2.0).concat(&local.scaled(3.0)).transform_point(point);
-        let by_hand = parent.point(local.point(point * 3.0) * 2.0);
+        let by_hand = parent.transform_point(local.transform_point(point * 3.0) * 2.0);
         prop_assert!(scaled.distance(by_hand) < 1e-12);
     }
 

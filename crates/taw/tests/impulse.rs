@@ -50,7 +50,7 @@ fn a_sliding_ball_ends_up_rolling_at_five_sevenths_of_its_speed() {
             let id = world.marbles.insert(marble).unwrap();
             // It rolls after 2 v / (7 µ g) = 0.485 s.
             run(&mut world, dt, 2.0);
-            let Marble { velocity, spin, .. } = world.marbles.get(id).unwrap();
+            let Marble { velocity, angular_velocity: spin, .. } = world.marbles.get(id).unwrap();
             let exact = toward * (25.0 / 7.0);
             assert!((velocity - exact).magnitude() < 5e-5, "{velocity:?} in steps of {dt}");
             let slip = velocity + up.cross(spin) * 0.5;
@@ -70,7 +70,7 @@ fn a_ball_rolls_down_a_slope_with_five_sevenths_of_the_pull() {
         let (mut world, up, _) = slope::<f64>(20.0, Rotation::Dynamic);
         let id = world.marbles.insert(on(up, 0.5, surface(0.0, 0.5))).unwrap();
         run(&mut world, dt, 4.0);
-        let Marble { velocity, spin, .. } = world.marbles.get(id).unwrap();
+        let Marble { velocity, angular_velocity: spin, .. } = world.marbles.get(id).unwrap();
         let exact = 5.0 / 7.0 * G * 20_f64.to_radians().sin() * 4.0;
         assert!((velocity.magnitude() / exact - 1.0).abs() < 1e-9, "{velocity:?}, not {exact}");
         assert!((spin.magnitude() * 0.5 / exact - 1.0).abs() < 1e-9, "{spin:?}");
@@ -94,7 +94,7 @@ fn too_little_friction_lets_it_slip() {
     let (mut world, up, _) = slope::<f64>(60.0, Rotation::Dynamic);
     let id = world.marbles.insert(on(up, 0.5, surface(0.0, 0.45))).unwrap();
     run(&mut world, 1.0 / 60.0, 1.0);
-    let Marble { velocity, spin, .. } = world.marbles.get(id).unwrap();
+    let Marble { velocity, angular_velocity: spin, .. } = world.marbles.get(id).unwrap();
     let (sin, cos) = 60_f64.to_radians().sin_cos();
     assert!((velocity.magnitude() / (G * (sin - 0.45 * cos)) - 1.0).abs() < 1e-9);
     assert!((spin.magnitude() / (2.5 * 0.45 * G * cos / 0.5) - 1.0).abs() < 1e-9);
@@ -216,7 +216,7 @@ fn walls_carry_along_what_lies_on_them() {
     let (mut world, up, wall) = slope::<f64>(0.0, Rotation::None);
     let motion = WallMotion {
         velocity: Vec3::new(0.7, 0.0, 0.0),
-        spin: Vec3::new(0.0, 0.0, 0.0),
+        angular_velocity: Vec3::new(0.0, 0.0, 0.0),
         pivot: Point3::new(0.0, 0.0, 0.0),
     };
     world.walls.set_motion(wall, Some(motion)).unwrap();
@@ -242,7 +242,7 @@ fn energy(world: &World<f64>) -> f64 {
     ids.map(|id| {
         let m = world.marbles.get(id).unwrap();
         let mass = m.mass.of(m.radius);
-        let rim = m.spin.magnitude() * m.radius;
+        let rim = m.angular_velocity.magnitude() * m.radius;
         mass * (0.5 * m.velocity.magnitude2() + 0.2 * rim * rim + G * m.position.y)
     })
     .sum()
@@ -323,7 +323,7 @@ fn friction_in_several_contacts_at_once_gains_nothing() {
             world.set_gravity(Vec3::zero()).unwrap();
             let first = on(up, 0.5, surface(1.0, 1.0));
             let velocity = Vec3::new(speed, -1.0, 0.0);
-            let first = Marble { velocity, spin: Vec3::unit_z() * spin, ..first };
+            let first = Marble { velocity, angular_velocity: Vec3::unit_z() * spin, ..first };
             let second = Point3::new(1.0, 0.5, 0.0);
             let velocity = Vec3::new(-speed, 0.0, 0.0);
             world.marbles.insert(first).unwrap();

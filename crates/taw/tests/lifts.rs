@@ -2,7 +2,7 @@
 
 use taw::frame::Pose;
 use taw::math::Quat;
-use taw::motion::turned;
+use taw::motion::integrate_rotation;
 use taw::prelude::*;
 use taw::shape::{Aabb, Shape};
 use taw::world::WallMotion;
@@ -38,7 +38,7 @@ fn a_ball_stays_on_a_lift() {
             let lift = world.walls.insert(board()).unwrap();
             let motion = WallMotion {
                 velocity: Vec3::unit_y() * speed,
-                spin: Vec3::new(0.0, 0.0, 0.0),
+                angular_velocity: Vec3::new(0.0, 0.0, 0.0),
                 pivot: Point3::new(0.0, 0.0, 0.0),
             };
             world.walls.set_motion(lift, Some(motion)).unwrap();
@@ -47,7 +47,7 @@ fn a_ball_stays_on_a_lift() {
             for step in 1..=60 {
                 let at = Vec3::unit_y() * (speed * DT * f64::from(step));
                 let pose = Pose { translation: at, ..Pose::identity() };
-                world.walls.set(lift, board().moved(pose).unwrap()).unwrap();
+                world.walls.set(lift, board().transformed(pose).unwrap()).unwrap();
                 world.step(DT).unwrap();
                 let ball = world.marbles.get(id).unwrap();
                 let gap = ball.position.y - at.y - RADIUS;
@@ -68,18 +68,20 @@ fn a_ball_stays_on_a_board_that_tilts() {
         let wall = world.walls.insert(board()).unwrap();
         let pivot = Point3::new(-4.0, 0.0, 0.0);
         let spin = Vec3::unit_z() * 0.5;
-        let motion = WallMotion { velocity: Vec3::new(0.0, 0.0, 0.0), spin, pivot };
+        let motion =
+            WallMotion { velocity: Vec3::new(0.0, 0.0, 0.0), angular_velocity: spin, pivot };
         world.walls.set_motion(wall, Some(motion)).unwrap();
         let id = ball(&mut world, 0.0);
         world.marbles.set_velocity(id, Vec3::unit_y() * 2.0).unwrap();
         for step in 1..=20 {
-            let turn = turned(Quat::new(1.0, 0.0, 0.0, 0.0), spin, DT * f64::from(step));
+            let turn =
+                integrate_rotation(Quat::new(1.0, 0.0, 0.0, 0.0), spin, DT * f64::from(step));
             let pivot = Vec3::new(-4.0, 0.0, 0.0);
             let pose = Pose { rotation: turn, translation: pivot - turn * pivot };
-            world.walls.set(wall, board().moved(pose).unwrap()).unwrap();
+            world.walls.set(wall, board().transformed(pose).unwrap()).unwrap();
             world.step(DT).unwrap();
             let ball = world.marbles.get(id).unwrap();
-            let gap = world.walls.get(wall).unwrap().nearest(ball.position).distance - RADIUS;
+            let gap = world.walls.get(wall).unwrap().project_point(ball.position).distance - RADIUS;
             assert!(gap.abs() < 1e-3, "{substeps} substeps, step {step}: {gap} m off the board");
         }
     }

@@ -115,7 +115,7 @@ impl<S: Scalar> Trial<S> {
                 let mut marble = Marble::new(position, d);
                 match call.whom {
                     0 => marble.velocity = v,
-                    1 => marble.spin = v,
+                    1 => marble.angular_velocity = v,
                     2 => marble.mass = Mass::Density(a),
                     3 => marble.mass = Mass::Kilograms(b),
                     4 => marble.damping = Damping { linear: a, angular: b },
@@ -137,7 +137,7 @@ impl<S: Scalar> Trial<S> {
             (9, Some(id)) => marbles.set_position(id, Point3::from_vec(v)),
             (10, Some(id)) => marbles.set_velocity(id, v),
             (11, Some(id)) => marbles.set_radius(id, a),
-            (12, Some(id)) => marbles.set_spin(id, v),
+            (12, Some(id)) => marbles.set_angular_velocity(id, v),
             (13, Some(id)) => marbles.set_mass(id, Mass::Density(a)),
             (14, Some(id)) => marbles.set_rotation(id, Quat::new(a, b, c, d)),
             (15, Some(id)) => marbles.apply_force_at(id, v, Point3::new(d, a, b)),
@@ -159,7 +159,7 @@ impl<S: Scalar> Trial<S> {
             (23, _) => {
                 let motion = WallMotion {
                     velocity: v,
-                    spin: Vec3::new(d, a, b),
+                    angular_velocity: Vec3::new(d, a, b),
                     pivot: Point3::new(c, d, a),
                 };
                 wall.map_or(Ok(()), |wall| self.world.walls.set_motion(wall, Some(motion)))
@@ -187,7 +187,8 @@ impl<S: Scalar> Trial<S> {
         for id in all {
             let m = self.world.marbles.get(id).unwrap();
             let rotation = [m.rotation.s, m.rotation.v.x, m.rotation.v.y, m.rotation.v.z];
-            let rows = [m.position.to_vec(), m.velocity, m.spin].map(|v| [v.x, v.y, v.z]);
+            let rows =
+                [m.position.to_vec(), m.velocity, m.angular_velocity].map(|v| [v.x, v.y, v.z]);
             assert!(rows.iter().flatten().chain(&rotation).all(|x| x.is_finite()), "{m:?}");
         }
         for id in &self.near {
@@ -197,7 +198,7 @@ impl<S: Scalar> Trial<S> {
         }
         for shape in self.world.walls.shapes() {
             if let WallShape::Solid(shape) = shape {
-                let Aabb { min, max } = taw::shape::Solid::bounding_box(shape);
+                let Aabb { min, max } = taw::shape::BoundedShape::bounding_box(shape);
                 let most = [min.x, min.y, min.z, max.x, max.y, max.z];
                 self.reaches_far |= most.into_iter().any(|x| x.abs().as_f64() > 300.0);
             }

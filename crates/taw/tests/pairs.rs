@@ -7,20 +7,21 @@ use cgmath::MetricSpace;
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
 use taw::contact::{
-    Closest, Convex, Manifold, Skeleton, closest, closest_exhaustive, closest_plane, manifold,
+    ClosestPoints, Convex, Features, Manifold, closest_points, closest_points_brute_force,
+    closest_points_of_plane, manifold,
 };
 use taw::frame::{AxisAngle, Pose};
 use taw::math::cast_point;
 use taw::prelude::*;
-use taw::shape::{Capsule, Obb, Solid};
+use taw::shape::{BoundedShape, Capsule, Obb};
 use things::{Numbers, Thing, numbers, things};
 
-fn near<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> Closest<S> {
-    each!(a, a => each!(b, b => closest(a, b)))
+fn near<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> ClosestPoints<S> {
+    each!(a, a => each!(b, b => closest_points(a, b)))
 }
 
-fn readable<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> Closest<S> {
-    each!(a, a => each!(b, b => closest_exhaustive(a, b)))
+fn readable<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> ClosestPoints<S> {
+    each!(a, a => each!(b, b => closest_points_brute_force(a, b)))
 }
 
 fn touch<S: Scalar>(a: &Thing<S>, b: &Thing<S>, margin: S) -> Manifold<S> {
@@ -32,7 +33,7 @@ fn support<S: Scalar>(thing: &Thing<S>, direction: Vec3<f64>) -> Point3<f64> {
 }
 
 fn surface<S: Scalar>(thing: &Thing<S>, point: Point3<S>) -> f64 {
-    each!(thing, it => it.nearest(point)).distance.as_f64()
+    each!(thing, it => it.project_point(point)).distance.as_f64()
 }
 
 fn radius<S: Scalar>(thing: &Thing<S>) -> f64 {
@@ -42,8 +43,8 @@ fn radius<S: Scalar>(thing: &Thing<S>) -> f64 {
 /// The largest angle between edges and faces that are parallel but for 1e-7 rad.
 fn nearly_parallel<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> f64 {
     let [first, second] =
-        [a, b].map(|thing| each!(thing, it => Skeleton::of(&it.core(Point3::origin()))));
-    let normals = |of: &Skeleton| of.faces.iter().map(|face| face.0).collect::<Vec<_>>();
+        [a, b].map(|thing| each!(thing, it => Features::of(&it.core(Point3::origin()))));
+    let normals = |of: &Features| of.faces.iter().map(|face| face.0).collect::<Vec<_>>();
     let (m, n) = (normals(&first), normals(&second));
     let mut worst: f64 = 0.0;
     let mut note = |sin: f64| worst = if sin < 1e-7 { worst.max(sin) } else { worst };
@@ -62,7 +63,7 @@ fn nearly_parallel<S: Scalar>(a: &Thing<S>, b: &Thing<S>) -> f64 {
 }
 
 fn middle<S: Scalar>(thing: &Thing<S>) -> Point3<S> {
-    each!(thing, it => it.middle())
+    each!(thing, it => it.center())
 }
 
 /// Asserts that an answer is right: both points are on the surfaces, a plane across the
@@ -79,7 +80,7 @@ fn check<S: Scalar>(
     // Edges and faces that are nearly parallel may be taken for such.
     let rounding =
         (S::epsilon().as_f64() * 64.0).max(4e-12).max(2.0 * nearly_parallel(a, b)) * size;
-    let Closest { distance, normal, on_a, on_b } = found;
+    let ClosestPoints { distance, normal, on_a, on_b } = found;
     let (distance, normal) = (distance.as_f64(), normal.map(Scalar::as_f64));
     prop_assert!((normal.magnitude() - 1.0).abs() < 1e-5, "{found:?}");
     let width = |d: Vec3<f64>| (support(a, d) - support(b, -d)).dot(d);
@@ -179,7 +180,7 @@ fn check_moved(a: &Thing<f64>, b: &Thing<f64>, size: f64) -> Result<(), TestCase
     let turn = AxisAngle::new(Vec3::new(0.6, 0.0, 0.8), 2.3).unwrap().into();
     let translation = Vec3::new(0.7, -0.4, 0.2) * size;
     let pose = Pose { rotation: turn, translation };
-    let (here, there) = (near(a, b), near(&a.moved(pose), &b.moved(pose)));
+    let (here, there) = (near(a, b), near(&a.transformed(pose), &b.transformed(pose)));
     let off = (here.distance - there.distance).abs();
     // Beside rounding, the angle that edges may be off and count as parallel.
     let allowed = (1e-13 + 2.0 * nearly_parallel(a, b)).max(4e-12) * size;
@@ -245,7 +246,7 @@ proptest! {
     fn a_plane_touches_what_reaches_it(first in numbers(), offset in -2.0..2.0_f64) {
         let plane = Plane::through(Point3::new(0.0, offset, 0.0), Vec3::new(0.3, 1.0, -0.2)).unwrap();
         for thing in things::<f64>(&first, 1.0, 0.0) {
-            let found = each!(&thing, it => closest_plane(&plane, it));
+            let found = each!(&thing, it => closest_points_of_plane(&plane, it));
             let lowest = support(&thing, -plane.normal());
             prop_assert!((found.distance - plane.signed_distance(lowest)).abs() < 1e-14);
             prop_assert!(plane.signed_distance(found.on_a).abs() < 1e-14);

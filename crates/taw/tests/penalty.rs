@@ -155,7 +155,10 @@ fn masses_and_materials_of_any_size_gain_nothing() {
                 let at = [0.01 * i as f64, 0.2 + 0.25 * i as f64, 0.0];
                 let spin = Vec3::new(3.0, 1.0, -5.0);
                 let mass = Mass::Density(density);
-                world.marbles.insert(Marble { mass, spin, ..ball(at, 0.1, own) }).unwrap();
+                world
+                    .marbles
+                    .insert(Marble { mass, angular_velocity: spin, ..ball(at, 0.1, own) })
+                    .unwrap();
             }
             let start = world.energy().total();
             for _ in 0..2_000 {
@@ -196,8 +199,11 @@ fn a_turning_wall_drives_a_ball_no_faster_than_itself() {
             floor(&mut world);
             let spin = Vec3::new(0.0, 7.0, 0.0);
             let id = world.walls.id(0).unwrap();
-            let motion =
-                taw::motion::WallMotion { velocity: Vec3::zero(), spin, pivot: Point3::origin() };
+            let motion = taw::motion::WallMotion {
+                velocity: Vec3::zero(),
+                angular_velocity: spin,
+                pivot: Point3::origin(),
+            };
             world.walls.set_motion(id, Some(motion)).unwrap();
             for i in 0..8 {
                 let at = [0.3 * f64::from(i), 0.1, 0.0];

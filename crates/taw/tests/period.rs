@@ -196,8 +196,8 @@ fn what_does_not_fit_is_refused_and_nothing_changes() {
     world.marbles.set_radius(id, 0.5).unwrap();
     let capsule = Marble { half_length: 0.2, ..Marble::new(Point3::new(0.0, 1.0, 0.0), 0.2) };
     let id = world.marbles.insert(capsule).unwrap();
-    assert_eq!(world.step(1.0 / 60.0), Err(Error::BallsOnly(id)));
-    assert_eq!(world.set_period([Some(8.0); 3]), Err(Error::BallsOnly(id)));
+    assert_eq!(world.step(1.0 / 60.0), Err(Error::UnsupportedShape(id)));
+    assert_eq!(world.set_period([Some(8.0); 3]), Err(Error::UnsupportedShape(id)));
     world.set_period([None; 3]).unwrap();
     world.step(1.0 / 60.0).unwrap();
 }

@@ -5,50 +5,58 @@ mod things;
 
 use proptest::prelude::*;
 use proptest::test_runner::TestRunner;
-use taw::contact::{Cast, Closest, Convex, Course, RayHit, Touch, closest, sweep, sweep_turning};
+use taw::contact::{
+    ClosestPoints, Convex, RayCast, RayHit, ShapeCastHit, Sweep, closest_points, shape_cast,
+    time_of_impact,
+};
 use taw::frame::{AxisAngle, Pose, Ray};
 use taw::math::{cast_point, direction_and_length};
 use taw::prelude::*;
-use taw::shape::{Capsule, Obb, Solid};
+use taw::shape::{BoundedShape, Capsule, Obb};
 use things::{Numbers, Thing, numbers, things};
 
 fn cast<S: Scalar>(thing: &Thing<S>, ray: &Ray<S>, longest: S) -> Option<RayHit<S>> {
     match thing {
-        Thing::Sphere(it) => it.cast(ray, longest),
-        Thing::Aabb(it) => it.cast(ray, longest),
-        Thing::Obb(it) => it.cast(ray, longest),
-        Thing::Capsule(it) => it.cast(ray, longest),
-        Thing::Hull(it) => it.cast(ray, longest),
+        Thing::Sphere(it) => it.cast_ray(ray, longest),
+        Thing::Aabb(it) => it.cast_ray(ray, longest),
+        Thing::Obb(it) => it.cast_ray(ray, longest),
+        Thing::Capsule(it) => it.cast_ray(ray, longest),
+        Thing::Hull(it) => it.cast_ray(ray, longest),
         Thing::Triangle(_) => None,
     }
 }
 
 fn middle(thing: &Thing<f64>) -> Point3<f64> {
-    each!(thing, it => it.middle())
+    each!(thing, it => it.center())
 }
 
 fn distance(thing: &Thing<f64>, point: Point3<f64>) -> f64 {
-    each!(thing, it => it.nearest(point)).distance
+    each!(thing, it => it.project_point(point)).distance
 }
 
 fn moved(thing: &Thing<f64>, by: Vec3<f64>) -> Thing<f64> {
-    thing.moved(Pose { translation: by, ..Pose::identity() })
+    thing.transformed(Pose { translation: by, ..Pose::identity() })
 }
 
-fn turned(thing: &Thing<f64>, course: &Course<f64>, time: f64) -> Thing<f64> {
-    let (axis, angle) = direction_and_length(course.turns).unwrap_or((Vec3::unit_x(), 0.0));
+fn turned(thing: &Thing<f64>, sweep: &Sweep<f64>, time: f64) -> Thing<f64> {
+    let (axis, angle) = direction_and_length(sweep.rotation).unwrap_or((Vec3::unit_x(), 0.0));
     let rotation = AxisAngle::new(axis, angle * time).unwrap().into();
-    let pivot = course.pivot.to_vec();
-    let turn = Pose { rotation, translation: pivot + course.moves * time - rotation * pivot };
-    thing.moved(turn)
+    let pivot = sweep.center.to_vec();
+    let turn = Pose { rotation, translation: pivot + sweep.translation * time - rotation * pivot };
+    thing.transformed(turn)
 }
 
-fn near(a: &Thing<f64>, b: &Thing<f64>) -> Closest<f64> {
-    each!(a, a => each!(b, b => closest(a, b)))
+fn near(a: &Thing<f64>, b: &Thing<f64>) -> ClosestPoints<f64> {
+    each!(a, a => each!(b, b => closest_points(a, b)))
 }
 
-fn swept(a: &Thing<f64>, by: Vec3<f64>, b: &Thing<f64>, other: Vec3<f64>) -> Option<Touch<f64>> {
-    each!(a, a => each!(b, b => sweep(a, by, b, other)))
+fn swept(
+    a: &Thing<f64>,
+    by: Vec3<f64>,
+    b: &Thing<f64>,
+    other: Vec3<f64>,
+) -> Option<ShapeCastHit<f64>> {
+    each!(a, a => each!(b, b => shape_cast(a, by, b, other)))
 }
 
 proptest! {
@@ -120,7 +128,7 @@ fn check_sweep(
             prop_assert!(before > -1e-8, "{a:?} {b:?} {touch:?} {before}");
         }
     }
-    if let Some(Touch { time, normal, point }) = touch {
+    if let Some(ShapeCastHit { time, normal, point }) = touch {
         let there = apart(time);
         prop_assert!(there.distance < 1e-8, "{touch:?} {there:?}");
         prop_assert!((other - by).dot(normal) < 0.0, "they come together");
@@ -142,13 +150,13 @@ fn check_turning_sweep(
     courses: &Courses,
     steps: u32,
 ) -> Result<(), TestCaseError> {
-    let course = |i: usize, pivot| Course {
-        moves: Vec3::from(courses.moves[i]),
-        turns: Vec3::from(courses.turns[i]),
-        pivot,
+    let sweep_of = |i: usize, pivot| Sweep {
+        translation: Vec3::from(courses.moves[i]),
+        rotation: Vec3::from(courses.turns[i]),
+        center: pivot,
     };
-    let (x, y) = (course(0, Point3::from(courses.pivot)), course(1, middle(b)));
-    let touch = each!(a, a => each!(b, b => sweep_turning(a, &x, b, &y)));
+    let (x, y) = (sweep_of(0, Point3::from(courses.pivot)), sweep_of(1, middle(b)));
+    let touch = each!(a, a => each!(b, b => time_of_impact(a, &x, b, &y)));
     let apart = |time: f64| near(&turned(a, &x, time), &turned(b, &y, time));
     let end = touch.map_or(1.0, |touch| touch.time);
     if apart(0.0).distance > 0.0 {
@@ -156,15 +164,15 @@ fn check_turning_sweep(
             let before = apart(end * f64::from(part) / f64::from(steps)).distance;
             prop_assert!(before > -1e-8, "{a:?} {b:?} {touch:?} {before}");
         }
-        if let Some(Touch { time, .. }) = touch {
+        if let Some(ShapeCastHit { time, .. }) = touch {
             let there = apart(time);
             prop_assert!(there.distance < 6e-6, "{touch:?} {there:?}"); // of six metres
         }
     }
-    let still = Course { turns: Vec3::new(0.0, 0.0, 0.0), ..x };
-    let straight = Course { turns: Vec3::new(0.0, 0.0, 0.0), ..y };
-    let one = each!(a, a => each!(b, b => sweep_turning(a, &still, b, &straight)));
-    let other = swept(a, x.moves, b, y.moves);
+    let still = Sweep { rotation: Vec3::new(0.0, 0.0, 0.0), ..x };
+    let straight = Sweep { rotation: Vec3::new(0.0, 0.0, 0.0), ..y };
+    let one = each!(a, a => each!(b, b => time_of_impact(a, &still, b, &straight)));
+    let other = swept(a, x.translation, b, y.translation);
     // Out of each other, two ways may be as short; one of them may be where they go.
     let overlap = apart(0.0).distance <= 0.0;
     prop_assert!(overlap || one.is_some() == other.is_some(), "{a:?} {b:?}");
@@ -246,7 +254,7 @@ fn rays_from_afar_hit_where_they_should() {
                 let Some(hit) = hit else { panic!("missed from {far} m: {ray:?}") };
                 // What the ray as given meets, in f64.
                 let exact: Point3<f64> = cast_point(hit.point);
-                let off = each!(&shape, it => it.nearest(cast_point(exact))).distance.abs();
+                let off = each!(&shape, it => it.project_point(cast_point(exact))).distance.abs();
                 worst = worst.max(f64::from(off));
             }
         }
@@ -258,7 +266,7 @@ fn rays_from_afar_hit_where_they_should() {
 #[test]
 fn rays_at_the_edge_of_sense() {
     let center = Point3::new(1.0, 2.0, 3.0);
-    let obb = Obb::along_axes(&taw::shape::Aabb {
+    let obb = Obb::from_aabb(&taw::shape::Aabb {
         min: center - Vec3::new(1.0, 1.0, 1.0),
         max: center + Vec3::new(1.0, 1.0, 1.0),
     });
@@ -286,8 +294,8 @@ fn rays_at_the_edge_of_sense() {
     }
     let floor = Plane::new(Vec3::unit_y(), 1.0).unwrap();
     let down = Ray { origin: Point3::new(5.0, 4.0, 5.0), direction: -Vec3::unit_y() };
-    assert_eq!(floor.cast(&down, 9.0).map(|hit| hit.distance), Some(3.0));
-    assert_eq!(floor.cast(&Ray { direction: Vec3::unit_x(), ..down }, 9.0), None);
+    assert_eq!(floor.cast_ray(&down, 9.0).map(|hit| hit.distance), Some(3.0));
+    assert_eq!(floor.cast_ray(&Ray { direction: Vec3::unit_x(), ..down }, 9.0), None);
 }
 
 #[test]
@@ -296,7 +304,7 @@ fn sweeps_at_the_edge_of_sense() {
     let still = Vec3::new(0.0, 0.0, 0.0);
     let right = |v: f64| Vec3::new(v, 0.0, 0.0);
     let time = |b: &Sphere<f64>, a_moves, b_moves| {
-        sweep(&ball(0.0, 0.0), a_moves, b, b_moves).map(|touch| touch.time)
+        shape_cast(&ball(0.0, 0.0), a_moves, b, b_moves).map(|touch| touch.time)
     };
     assert_eq!(time(&ball(3.0, 0.0), still, still), None, "at rest");
     assert_eq!(time(&ball(1.0, 0.0), still, still), None, "touching, at rest");

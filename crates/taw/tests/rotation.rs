@@ -28,14 +28,23 @@ fn a_marble_may_turn_less_than_its_world() {
         let [free, rolls, slides] = ids.map(|id| world.marbles.get(id).unwrap());
         // It rolls after 2 v / (7 µ g) = 0.73 s, and is slowed no more.
         assert!((free.velocity.x - 25.0 / 7.0).abs() < 1e-2, "{response:?}: {free:?}");
-        assert!((free.spin.z + free.velocity.x / 0.5).abs() < 2e-2, "{response:?}: {free:?}");
+        assert!(
+            (free.angular_velocity.z + free.velocity.x / 0.5).abs() < 2e-2,
+            "{response:?}: {free:?}"
+        );
         let slid = 5.0 - 0.2 * 9.81;
         for marble in [rolls, slides] {
             assert!((marble.velocity.x - slid).abs() < 2e-2, "{response:?}: {marble:?}");
         }
-        assert!((rolls.spin.z + rolls.velocity.x / 0.5).abs() < 0.2, "{response:?}: {rolls:?}");
+        assert!(
+            (rolls.angular_velocity.z + rolls.velocity.x / 0.5).abs() < 0.2,
+            "{response:?}: {rolls:?}"
+        );
         let unturned = taw::math::Quat::new(1.0, 0.0, 0.0, 0.0);
-        assert_eq!((slides.spin, slides.rotation), (Vec3::new(0.0, 0.0, 0.0), unturned));
+        assert_eq!(
+            (slides.angular_velocity, slides.rotation),
+            (Vec3::new(0.0, 0.0, 0.0), unturned)
+        );
         assert_ne!(rolls.rotation, unturned);
     }
 }
@@ -53,5 +62,8 @@ fn a_spin_that_only_shows_is_no_energy() {
         world.step(1.0 / 60.0).unwrap();
         assert!((world.energy().total() / energy - 1.0).abs() < 1e-9, "{:?}", world.energy());
     }
-    assert!((world.marbles.get(id).unwrap().spin.z + 10.0).abs() < 1e-9, "it rolls, to be seen");
+    assert!(
+        (world.marbles.get(id).unwrap().angular_velocity.z + 10.0).abs() < 1e-9,
+        "it rolls, to be seen"
+    );
 }

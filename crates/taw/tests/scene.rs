@@ -116,7 +116,7 @@ fn walls_convey_turn_and_swing() {
     };
     assert!((obb.center.x - 2.0).abs() < 1e-9 && obb.center.z.abs() < 1e-9, "{:?}", obb.center);
     let motion = running.world.walls.motion(running.world.walls.id(0).unwrap()).unwrap().unwrap();
-    assert!((motion.spin.y - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
+    assert!((motion.angular_velocity.y - std::f64::consts::FRAC_PI_2).abs() < 1e-12);
     // Its surface moves as the wall does.
     let point = Point3::new(0.0, 0.0, 0.0);
     assert!((motion.velocity_at(point).z - std::f64::consts::FRAC_PI_2).abs() < 1e-9);
@@ -162,7 +162,7 @@ mod files {
             moves: Some(Swings(way: (1, 0, 0), period: 2)),
         ),
     ],
-    marbles: [(position: (0, 5, 0), radius: 0.5, spin: (0, 0, 1))],
+    marbles: [(position: (0, 5, 0), radius: 0.5, angular_velocity: (0, 0, 1))],
     lattices: [(
         first: (position: (3, 3, 3), radius: 0.1),
         count: (2, 2, 2),

@@ -4,7 +4,7 @@ use cgmath::MetricSpace;
 use proptest::prelude::*;
 use taw::frame::{AxisAngle, Pose};
 use taw::prelude::*;
-use taw::shape::{Aabb, Capsule, Compound, Hull, Obb, Shape, Solid};
+use taw::shape::{Aabb, BoundedShape, Capsule, Compound, Hull, Obb, Shape};
 
 fn point() -> impl Strategy<Value = Point3<f64>> {
     [-2.0..2.0_f64, -2.0..2.0, -2.0..2.0].prop_map(Point3::from)
@@ -24,9 +24,9 @@ fn shapes() -> impl Strategy<Value = Vec<Shape<f64>>> {
         let sphere = Shape::Sphere(Sphere::new(points[0], r).unwrap());
         let aabb =
             Aabb { min: points[1], max: points[1] }.union(&Aabb { min: points[2], max: points[2] });
-        let obb = Obb::along_axes(&aabb).moved(pose);
+        let obb = Obb::from_aabb(&aabb).transformed(pose);
         let capsule = Capsule::new(points[3], points[4], r).unwrap();
-        let hull = Hull::new(&points).unwrap().moved(pose);
+        let hull = Hull::new(&points).unwrap().transformed(pose);
         let parts = vec![sphere.clone(), Shape::Obb(obb), Shape::Hull(hull.clone())];
         vec![
             sphere,
@@ -54,14 +54,14 @@ proptest! {
                 prop_assert!((high - bounds.max.to_vec().dot(axis)).abs() < 1e-13, "{shape:?}");
                 prop_assert!((low - bounds.min.to_vec().dot(axis)).abs() < 1e-13, "{shape:?}");
             }
-            let moved = shape.moved(pose);
+            let moved = shape.transformed(pose);
             prop_assert!((moved.volume() - shape.volume()).abs() < 1e-12);
             for point in &points {
-                let near = shape.nearest(*point);
+                let near = shape.project_point(*point);
                 let (out, normal) = (*point - near.point, near.normal);
                 prop_assert!((normal.magnitude() - 1.0).abs() < 1e-14, "{near:?}");
                 prop_assert!((out - normal * near.distance).magnitude() < 1e-12, "{near:?}");
-                let surface = shape.nearest(near.point);
+                let surface = shape.project_point(near.point);
                 if !matches!(shape, Shape::Compound(_)) {
                     prop_assert!(surface.distance.abs() < 1e-12, "{shape:?}: {surface:?}");
                     // Nothing of a convex shape is in front of the plane where it is nearest.
@@ -76,9 +76,9 @@ proptest! {
                 prop_assert_eq!(shape.contains(*point), near.distance <= 0.0);
                 let closest = shape.closest_point(*point);
                 prop_assert!((closest.distance(*point) - near.distance.max(0.0)).abs() < 1e-12);
-                let there = moved.nearest(pose.point(*point));
+                let there = moved.project_point(pose.transform_point(*point));
                 prop_assert!((there.distance - near.distance).abs() < 1e-12, "moved along");
-                prop_assert!(bounds.has(closest) || near.distance > -1e-12);
+                prop_assert!(bounds.contains_point(closest) || near.distance > -1e-12);
             }
         }
     }
@@ -92,7 +92,7 @@ proptest! {
         let (corners, edges, faces) = (hull.points().len(), hull.edges().len(), hull.faces().len());
         prop_assert_eq!(corners + faces, edges + 2, "{} corners, {} faces", corners, faces);
         for point in &points {
-            prop_assert!(hull.nearest(*point).distance <= 1e-9 * scale);
+            prop_assert!(hull.project_point(*point).distance <= 1e-9 * scale);
         }
         for corner in hull.points() {
             prop_assert!(points.iter().any(|point| point.distance(corner) <= 1e-9 * scale));
@@ -106,13 +106,13 @@ proptest! {
     ) {
         let points: Vec<_> = points
             .iter()
-            .map(|[x, y, z]| pose.point(Point3::new(f64::from(*x), f64::from(*y), f64::from(*z))))
+            .map(|[x, y, z]| pose.transform_point(Point3::new(f64::from(*x), f64::from(*y), f64::from(*z))))
             .collect();
         if let Ok(hull) = Hull::new(&points) {
             prop_assert_eq!(hull.points().len() + hull.faces().len(), hull.edges().len() + 2);
             prop_assert!(hull.volume() > 0.1, "a sixth is the least that four of them have");
             for point in &points {
-                prop_assert!(hull.nearest(*point).distance <= 1e-9);
+                prop_assert!(hull.project_point(*point).distance <= 1e-9);
             }
         }
     }

@@ -74,9 +74,9 @@ fn a_slipping_ball_rolls_at_five_sevenths_of_its_speed() {
         world.step(1.0 / 60.0).unwrap();
     }
     let marble = world.marbles.get(taw).unwrap();
-    println!("{} {}", marble.velocity.x, marble.spin.z);
+    println!("{} {}", marble.velocity.x, marble.angular_velocity.z);
     assert!((marble.velocity.x - 15.0 / 7.0).abs() < 1e-3, "{marble:?}");
-    assert!((marble.spin.z * 0.2 + marble.velocity.x).abs() < 1e-3, "{marble:?}");
+    assert!((marble.angular_velocity.z * 0.2 + marble.velocity.x).abs() < 1e-3, "{marble:?}");
 }
 
 #[test]

@@ -5,8 +5,8 @@ mod things;
 
 use proptest::prelude::*;
 use taw::contact::{
-    Closest, OfTriangle, cast_on_surface, closest, closest_of_surface, manifolds_of_surface,
-    sweep_against_surface,
+    ClosestPoints, TriangleResult, closest_points, closest_points_of_surface, manifolds_of_surface,
+    ray_cast_on_surface, shape_cast_on_surface,
 };
 use taw::frame::Ray;
 use taw::prelude::*;
@@ -45,27 +45,27 @@ proptest! {
         for thing in things::<f64>(&shape, 0.3, 0.0) {
             each!(&thing, thing => {
                 let all = (0..2 * (COLUMNS - 1) * (ROWS - 1)).map(|triangle| {
-                    OfTriangle { triangle, answer: closest(&field.triangle(triangle).unwrap(), thing) }
+                    TriangleResult { triangle, result: closest_points(&field.triangle(triangle).unwrap(), thing) }
                 });
-                let key = |of: &OfTriangle<Closest<f64>>| (of.answer.distance, of.triangle);
+                let key = |of: &TriangleResult<ClosestPoints<f64>>| (of.result.distance, of.triangle);
                 let best = all.reduce(|s, t| if key(&t) < key(&s) { t } else { s });
-                let near = best.filter(|best| best.answer.distance <= 0.2);
-                let found = closest_of_surface(&field, thing, 0.2);
-                prop_assert_eq!(found, closest_of_surface(&mesh, thing, 0.2));
+                let near = best.filter(|best| best.result.distance <= 0.2);
+                let found = closest_points_of_surface(&field, thing, 0.2);
+                prop_assert_eq!(found, closest_points_of_surface(&mesh, thing, 0.2));
                 prop_assert_eq!(found.is_some(), near.is_some());
                 if let (Some(found), Some(near)) = (found, near) {
-                    let off = (found.answer.distance - near.answer.distance).abs();
+                    let off = (found.result.distance - near.result.distance).abs();
                     prop_assert!(off < 1e-11, "{found:?} {near:?}"); // of shapes of two metres
                 }
                 let touches = manifolds_of_surface(&field, thing, 0.01);
                 prop_assert_eq!(&touches, &manifolds_of_surface(&mesh, thing, 0.01));
                 prop_assert_eq!(
                     touches.is_empty(),
-                    best.is_none_or(|best| best.answer.distance > 0.01)
+                    best.is_none_or(|best| best.result.distance > 0.01)
                 );
                 let moves = Vec3::from(moves);
-                let first = sweep_against_surface(&field, thing, moves);
-                prop_assert_eq!(first, sweep_against_surface(&mesh, thing, moves));
+                let first = shape_cast_on_surface(&field, thing, moves);
+                prop_assert_eq!(first, shape_cast_on_surface(&mesh, thing, moves));
             });
         }
     }
@@ -93,19 +93,19 @@ proptest! {
             (origin, on, false), // it may pass over the top
         ] {
             let ray = Ray { origin, direction: (toward - origin).normalize() };
-            let hit = cast_on_surface(&field, &ray, f64::INFINITY);
-            prop_assert_eq!(hit, cast_on_surface(&mesh, &ray, f64::INFINITY));
+            let hit = ray_cast_on_surface(&field, &ray, f64::INFINITY);
+            prop_assert_eq!(hit, ray_cast_on_surface(&mesh, &ray, f64::INFINITY));
             prop_assert!(hit.is_some() || !must, "{ray:?} slipped through");
-            if let Some(OfTriangle { triangle, answer }) = hit {
-                let near = closest_of_surface(&field, &Sphere { center: answer.point, radius: 0.1 }, 0.0);
-                let off = near.unwrap().answer.distance + 0.1;
-                prop_assert!(off < 1e-12, "{answer:?} on {triangle}");
-                prop_assert!(answer.normal.dot(ray.direction) <= 0.0);
+            if let Some(TriangleResult { triangle, result }) = hit {
+                let near = closest_points_of_surface(&field, &Sphere { center: result.point, radius: 0.1 }, 0.0);
+                let off = near.unwrap().result.distance + 0.1;
+                prop_assert!(off < 1e-12, "{result:?} on {triangle}");
+                prop_assert!(result.normal.dot(ray.direction) <= 0.0);
                 // Nothing comes before it.
-                let step = answer.distance / 100.0;
+                let step = result.distance / 100.0;
                 let side = |at: Point3<f64>| {
                     let down = Ray { origin: at, direction: -Vec3::unit_y() };
-                    cast_on_surface(&field, &down, f64::INFINITY).is_some()
+                    ray_cast_on_surface(&field, &down, f64::INFINITY).is_some()
                 };
                 for i in 1_u8..99 {
                     let at = ray.at(step * f64::from(i));
@@ -140,8 +140,8 @@ fn bad_surfaces_are_refused_by_name() {
     // No more than a point, and yet it is touched where it is.
     let dot = mesh(vec![[0, 1, 2]]).unwrap();
     let ball = Sphere { center: Point3::new(0.0, 0.5, 0.0), radius: 1.0 };
-    let touch = closest_of_surface(&dot, &ball, 0.0).unwrap().answer;
+    let touch = closest_points_of_surface(&dot, &ball, 0.0).unwrap().result;
     assert_eq!((touch.distance, touch.normal), (-0.5, Vec3::unit_y()));
     let down = Ray { origin: Point3::new(0.0, 2.0, 0.0), direction: -Vec3::unit_y() };
-    assert_eq!(cast_on_surface(&dot, &down, 9.0), None, "a ray meets areas only");
+    assert_eq!(ray_cast_on_surface(&dot, &down, 9.0), None, "a ray meets areas only");
 }

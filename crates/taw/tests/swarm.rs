@@ -422,7 +422,7 @@ fn a_wall_that_moves_takes_balls_along() {
         world.walls.set(floor, Plane::new(Vec3::unit_y(), height).unwrap()).unwrap();
         let up = taw::motion::WallMotion {
             velocity: Vec3::new(0.0, 2.0, 0.0),
-            spin: Vec3::new(0.0, 0.0, 0.0),
+            angular_velocity: Vec3::new(0.0, 0.0, 0.0),
             pivot: Point3::new(0.0, 0.0, 0.0),
         };
         world.walls.set_motion(floor, Some(up)).unwrap();
@@ -439,7 +439,7 @@ fn a_box_that_moves_is_noticed_by_balls_at_rest() {
     for tier in [Tier::Full, Tier::Lab] {
         let mut world = world(SwarmModel { sleeps: true, ..model(tier) }, None);
         let id = world.swarm.insert(&[Ball::new(Point3::new(0.0, 0.5, 0.0), 0.5)]).unwrap()[0];
-        let at = |x: f32| taw::shape::Box3 {
+        let at = |x: f32| taw::shape::Aabb3 {
             min: Point3::new(x - 1.0, 0.1, -2.0),
             max: Point3::new(x, 2.0, 2.0),
         };
@@ -449,7 +449,7 @@ fn a_box_that_moves_is_noticed_by_balls_at_rest() {
         for step in 1..=300_u16 {
             let motion = taw::motion::WallMotion {
                 velocity: Vec3::new(1.2, 0.0, 0.0),
-                spin: Vec3::new(0.0, 0.0, 0.0),
+                angular_velocity: Vec3::new(0.0, 0.0, 0.0),
                 pivot: Point3::new(0.0, 0.0, 0.0),
             };
             world.walls.set(wall, at(-5.0 + 1.2 * f32::from(step) * DT)).unwrap();

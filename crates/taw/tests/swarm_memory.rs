@@ -82,7 +82,7 @@ fn every_byte_of_a_copy_is_counted(tier: Tier) {
     world.swarm.set_model(model).unwrap();
     world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
     let box3 =
-        taw::shape::Box3 { min: Point3::new(-2.0, 0.0, -2.0), max: Point3::new(2.0, 1.0, 2.0) };
+        taw::shape::Aabb3 { min: Point3::new(-2.0, 0.0, -2.0), max: Point3::new(2.0, 1.0, 2.0) };
     world.walls.insert(box3).unwrap();
     let balls: Vec<_> = (0..1_000_u16)
         .map(|i| {

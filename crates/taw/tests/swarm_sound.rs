@@ -187,7 +187,7 @@ fn a_lift_does_not_pass_through_balls_while_others_are_fast() {
             world.walls.set(lift, block(height)).unwrap();
             let motion = WallMotion {
                 velocity: Vec3::new(0.0, 3.0, 0.0),
-                spin: Vec3::new(0.0, 0.0, 0.0),
+                angular_velocity: Vec3::new(0.0, 0.0, 0.0),
                 pivot: Point3::new(0.0, height, 0.0),
             };
             world.walls.set_motion(lift, Some(motion)).unwrap();

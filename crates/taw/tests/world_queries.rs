@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use proptest::prelude::*;
-use taw::contact::{Cast, closest, sweep};
+use taw::contact::{RayCast, closest_points, shape_cast};
 use taw::frame::{AxisAngle, Pose, Ray};
 use taw::prelude::*;
 use taw::shape::{Aabb, Capsule, Compound, HeightField, Hull, Mesh, Obb, Shape};
@@ -46,26 +46,27 @@ fn world(numbers: &[[f64; 3]]) -> World<f64> {
 }
 
 /// All things of a world.
-fn things(world: &World<f64>) -> Vec<Thing> {
-    let marbles = (0..world.marbles.len()).map(|row| Thing::Marble(world.marbles.id(row).unwrap()));
-    let walls = (0..world.walls.len()).map(|row| Thing::Wall(world.walls.id(row).unwrap()));
+fn things(world: &World<f64>) -> Vec<ColliderId> {
+    let marbles =
+        (0..world.marbles.len()).map(|row| ColliderId::Marble(world.marbles.id(row).unwrap()));
+    let walls = (0..world.walls.len()).map(|row| ColliderId::Wall(world.walls.id(row).unwrap()));
     marbles.chain(walls).collect()
 }
 
 /// Whether it is a height field: rays and shapes meet the surface of one, from below, too.
-fn is_field(world: &World<f64>, thing: Thing) -> bool {
-    let Thing::Wall(id) = thing else { return false };
+fn is_field(world: &World<f64>, thing: ColliderId) -> bool {
+    let ColliderId::Wall(id) = thing else { return false };
     matches!(world.walls.get(id), Ok(WallShape::HeightField(..)))
 }
 
 /// How far a thing's surface is from a point.
-fn distance(world: &World<f64>, thing: Thing, point: Point3<f64>) -> f64 {
+fn distance(world: &World<f64>, thing: ColliderId, point: Point3<f64>) -> f64 {
     match thing {
-        Thing::Marble(id) => {
+        ColliderId::Marble(id) => {
             let marble = world.marbles.get(id).unwrap();
             (point - marble.position).magnitude() - marble.radius
         }
-        Thing::Wall(id) => world.walls.get(id).unwrap().nearest(point).distance,
+        ColliderId::Wall(id) => world.walls.get(id).unwrap().project_point(point).distance,
     }
 }
 
@@ -87,25 +88,25 @@ proptest! {
         let origin = Point3::from(from);
         let ray = Ray { origin, direction: (Point3::from(to) - origin).normalize() };
         let all = queries.cast_ray_all(&ray, 9.0, |_| true);
-        prop_assert!(all.is_sorted_by(|x, y| x.answer.distance <= y.answer.distance));
+        prop_assert!(all.is_sorted_by(|x, y| x.result.distance <= y.result.distance));
         let first = queries.cast_ray(&ray, 9.0, |_| true);
         prop_assert_eq!(first, all.first().copied());
         // Alone, each answers the same; and without it, the others do.
         for thing in things(&world) {
             let alone = queries.cast_ray(&ray, 9.0, |it| it == thing);
-            let among = all.iter().find(|found| found.thing == thing).copied();
+            let among = all.iter().find(|found| found.collider == thing).copied();
             prop_assert_eq!(alone, among);
             let others = queries.cast_ray_all(&ray, 9.0, |it| it != thing);
             prop_assert_eq!(others.len(), all.len() - usize::from(among.is_some()));
-            if let Thing::Marble(id) = thing {
+            if let ColliderId::Marble(id) = thing {
                 let marble = world.marbles.get(id).unwrap();
                 let sphere = Sphere { center: marble.position, radius: marble.radius };
-                prop_assert_eq!(sphere.cast(&ray, 9.0), alone.map(|found| found.answer));
+                prop_assert_eq!(sphere.cast_ray(&ray, 9.0), alone.map(|found| found.result));
             }
             // What it hits is there, and nothing of it comes before.
-            let end = alone.map_or(9.0, |found| found.answer.distance);
+            let end = alone.map_or(9.0, |found| found.result.distance);
             if let Some(found) = alone && end > 0.0 {
-                let off = distance(&world, thing, found.answer.point);
+                let off = distance(&world, thing, found.result.point);
                 prop_assert!(off.abs() < 1e-9, "{found:?} {off}");
             }
             let field = is_field(&world, thing);
@@ -125,12 +126,12 @@ proptest! {
         let mut tree = QueryTree::default();
         let queries = world.queries(&mut tree);
         let at = Point3::from(at);
-        let found = queries.closest(at, within, |_| true);
+        let found = queries.project_point(at, within, |_| true);
         let all = things(&world).into_iter().map(|thing| (distance(&world, thing, at), thing));
         let best = all.reduce(|x, y| if y.0 < x.0 { y } else { x }).unwrap();
         prop_assert_eq!(found.is_some(), best.0 <= within);
         if let Some(found) = found {
-            prop_assert!((found.answer.distance - best.0).abs() < 1e-12, "{found:?} {best:?}");
+            prop_assert!((found.result.distance - best.0).abs() < 1e-12, "{found:?} {best:?}");
         }
     }
 
@@ -162,17 +163,17 @@ proptest! {
         }
         let moves = Vec3::from(moves);
         let first = queries.cast_shape(&Shape::Sphere(ball), moves, |_| true);
-        let end = first.map_or(1.0, |found| found.answer.time);
+        let end = first.map_or(1.0, |found| found.result.time);
         for thing in things(&world) {
             let alone = queries.cast_shape(&Shape::Sphere(ball), moves, |it| it == thing);
-            let time = alone.map(|found| found.answer.time);
+            let time = alone.map(|found| found.result.time);
             prop_assert!(time.is_none_or(|time| time >= end));
-            if let Thing::Marble(id) = thing {
+            if let ColliderId::Marble(id) = thing {
                 let marble = world.marbles.get(id).unwrap();
                 let sphere = Sphere { center: marble.position, radius: marble.radius };
-                let exact = sweep(&sphere, Vec3::new(0.0, 0.0, 0.0), &ball, moves);
+                let exact = shape_cast(&sphere, Vec3::new(0.0, 0.0, 0.0), &ball, moves);
                 prop_assert_eq!(time, exact.map(|touch| touch.time));
-                prop_assert_eq!(found.contains(&thing), closest(&sphere, &ball).touching());
+                prop_assert_eq!(found.contains(&thing), closest_points(&sphere, &ball).touching());
             }
             if !found.contains(&thing) {
                 for part in 0..20 {
@@ -206,14 +207,15 @@ fn a_tree_that_is_refitted_answers_as_one_that_is_new() {
             let all = world.queries(&mut kept).cast_ray_all(&ray, f64::INFINITY, |_| true);
             let fresh = world.queries(&mut new).cast_ray_all(&ray, f64::INFINITY, |_| true);
             assert_eq!(all, fresh);
-            let near = world.queries(&mut kept).closest(at, f64::INFINITY, |_| true);
-            assert_eq!(near, world.queries(&mut new).closest(at, f64::INFINITY, |_| true));
+            let near = world.queries(&mut kept).project_point(at, f64::INFINITY, |_| true);
+            assert_eq!(near, world.queries(&mut new).project_point(at, f64::INFINITY, |_| true));
         }
     }
     let ball = Sphere::new(Point3::new(0.0, 0.0, 0.0), 100.0).unwrap();
     let all = world.queries(&mut kept).overlaps(&Shape::Sphere(ball), |_| true);
     assert_eq!(all.len(), things(&world).len());
-    let walls =
-        world.queries(&mut kept).overlaps(&Shape::Sphere(ball), |it| matches!(it, Thing::Wall(_)));
+    let walls = world
+        .queries(&mut kept)
+        .overlaps(&Shape::Sphere(ball), |it| matches!(it, ColliderId::Wall(_)));
     assert_eq!(walls.len(), world.walls.len());
 }

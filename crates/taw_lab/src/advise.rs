@@ -112,7 +112,7 @@ impl Snapshot {
         let swarm = std::mem::take(&mut of.swarm);
         let mut world = of.clone();
         // Costs are those of a game that keeps none.
-        world.keep_account(false);
+        world.enable_energy_audit(false);
         of.swarm = swarm;
         for row in 0..world.walls.len() {
             if let Some(id) = world.walls.id(row) {
@@ -490,8 +490,8 @@ mod tests {
     #[test]
     fn a_snapshot_keeps_no_account() {
         let mut world = World::default();
-        world.keep_account(true);
-        assert_eq!(Snapshot::new(&mut world, 1.0).world.account(), None);
-        assert!(world.account().is_some());
+        world.enable_energy_audit(true);
+        assert_eq!(Snapshot::new(&mut world, 1.0).world.energy_audit(), None);
+        assert!(world.energy_audit().is_some());
     }
 }

@@ -119,7 +119,7 @@ pub struct Ball {
     /// In m/s.
     pub velocity: [f64; 3],
     /// In rad/s.
-    pub spin: [f64; 3],
+    pub angular_velocity: [f64; 3],
     /// In kilograms.
     pub mass: f64,
     /// What it is made of.
@@ -133,7 +133,7 @@ impl Default for Ball {
             at: [0.0, 0.5, 0.0],
             radius: 0.5,
             velocity: [0.0; 3],
-            spin: [0.0; 3],
+            angular_velocity: [0.0; 3],
             mass: 1.0,
             material: surface(0.0, 0.0),
         }
@@ -168,7 +168,7 @@ impl Ball {
         };
         let marble = Marble {
             velocity: vector(self.velocity),
-            spin: vector(self.spin),
+            angular_velocity: vector(self.angular_velocity),
             mass: if self.mass.is_finite() {
                 Mass::Kilograms(number(self.mass))
             } else {
@@ -184,8 +184,8 @@ impl Ball {
 /// Where a ball is and how it moves, in `f64`: position, velocity, spin.
 #[must_use]
 pub fn state<S: Scalar>(world: &World<S>, id: MarbleId) -> [Vec3<f64>; 3] {
-    let marble = world.marbles.get_exact(id).expect("nobody takes balls out");
-    [marble.position.to_vec(), marble.velocity, marble.spin]
+    let marble = world.marbles.get_high_precision(id).expect("nobody takes balls out");
+    [marble.position.to_vec(), marble.velocity, marble.angular_velocity]
 }
 
 /// Kinetic (with spin) and potential energy of all balls, in joules.

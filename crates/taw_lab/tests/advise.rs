@@ -186,7 +186,11 @@ fn a_snapshot_stands_still() {
     let mut world = world(0.0);
     let id = world.walls.id(0).unwrap();
     let velocity = Vec3::new(1.0, 0.0, 0.0);
-    let motion = taw::motion::WallMotion { velocity, spin: Vec3::zero(), pivot: Point3::origin() };
+    let motion = taw::motion::WallMotion {
+        velocity,
+        angular_velocity: Vec3::zero(),
+        pivot: Point3::origin(),
+    };
     world.walls.set_motion(id, Some(motion)).unwrap();
     let snapshot = Snapshot::new(&mut world, 1.0);
     assert_eq!(world.walls.motion(id).unwrap(), Some(motion));

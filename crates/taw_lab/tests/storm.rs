@@ -97,7 +97,7 @@ fn body() -> Body {
     Body {
         at: Vec3::new(0.0, 5.0, 0.0),
         velocity: zero,
-        spin: zero,
+        angular_velocity: zero,
         mass: 1.0,
         radius: 0.1,
         half: zero,
@@ -164,7 +164,7 @@ fn energy_from_nothing_is_seen() {
     assert!(step_of(falls, rises).contains(&Invariant::EnergyOfStep));
     let kicked = Body { velocity: Vec3::new(1.0, 0.0, 0.0), ..lying() };
     assert!(step_of(lying(), kicked).contains(&Invariant::EnergyOfStep));
-    let spun = Body { spin: Vec3::new(0.0, 20.0, 0.0), ..lying() };
+    let spun = Body { angular_velocity: Vec3::new(0.0, 20.0, 0.0), ..lying() };
     assert!(step_of(lying(), spun).contains(&Invariant::EnergyOfStep));
 }
 
@@ -267,7 +267,7 @@ fn sinking_leaving_and_numbers_that_are_none_are_seen() {
     let inside = Case { closed: Some(closed), ..case(Scene::default()) };
     let out = Body { at: Vec3::new(1.01, 0.1, 0.0), ..lying() };
     assert!(broken(&inside, &[vec![lying()], vec![out]]).contains(&Invariant::Closed));
-    let nan = Body { spin: Vec3::new(f64::NAN, 0.0, 0.0), ..lying() };
+    let nan = Body { angular_velocity: Vec3::new(f64::NAN, 0.0, 0.0), ..lying() };
     assert_eq!(step_of(lying(), nan), [Invariant::Finite]);
     let stopped = Snapshot { stopped: 1, ..snapshot(vec![lying()]) };
     let mut bench = Bench::new(&case(Scene::default()), &snapshot(vec![lying()]));

@@ -11,9 +11,9 @@ use divan::counter::ItemsCount;
 use parry3d::glamx::{Pose3, Quat as ParryQuat, Vec3 as ParryVec3};
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, contact};
 use parry3d::shape as parry;
-use taw::contact::{Closest, Convex, closest, closest_of_surface, closest_plane, manifold};
+use taw::contact::{ClosestPoints, Convex, closest_points, closest_points_of_surface, closest_points_of_plane, manifold};
 use taw::math::{Point3, Quat, Vec3};
-use taw::shape::{Box3, Capsule, HeightField, Hull, Mesh, Obb, Plane, Sphere, Surface};
+use taw::shape::{Aabb3, Capsule, HeightField, Hull, Mesh, Obb, Plane, Sphere, Surface};
 
 /// Pairs in a line.
 const COUNT: usize = 100;
@@ -90,12 +90,12 @@ impl Kind for SphereKind {
 }
 
 impl Kind for AabbKind {
-    type Taw = Box3<f32>;
+    type Taw = Aabb3<f32>;
     type Parry = parry::Cuboid;
     const TURNS: bool = false;
     fn taw(of: &Numbers) -> Self::Taw {
         let (at, half) = (Point3::from(of.at), Vec3::from(of.sizes));
-        Box3 { min: at - half, max: at + half }
+        Aabb3 { min: at - half, max: at + half }
     }
     fn parry(of: &Numbers) -> Self::Parry {
         parry::Cuboid::new(of.sizes.into())
@@ -106,7 +106,7 @@ impl Kind for ObbKind {
     type Taw = Obb<f32>;
     type Parry = parry::Cuboid;
     fn taw(of: &Numbers) -> Self::Taw {
-        Obb { center: of.at.into(), rotation: turn(of), half_widths: of.sizes.into() }
+        Obb { center: of.at.into(), rotation: turn(of), half_extents: of.sizes.into() }
     }
     fn parry(of: &Numbers) -> Self::Parry {
         parry::Cuboid::new(of.sizes.into())
@@ -185,7 +185,7 @@ macro_rules! pairs {
             #[divan::bench]
             fn distance_taw(bencher: Bencher) {
                 in_taw::<$a, $b>(bencher, |a, b| {
-                    let found: Closest<f32> = $closest(a, b);
+                    let found: ClosestPoints<f32> = $closest(a, b);
                     found.distance
                 });
             }
@@ -201,22 +201,22 @@ macro_rules! pairs {
 }
 
 pairs! {
-    sphere_sphere: SphereKind, SphereKind, closest;
-    plane_sphere: PlaneKind, SphereKind, closest_plane;
-    sphere_aabb: SphereKind, AabbKind, closest;
-    sphere_obb: SphereKind, ObbKind, closest;
-    sphere_capsule: SphereKind, CapsuleKind, closest;
-    sphere_hull: SphereKind, HullKind, closest;
-    plane_obb: PlaneKind, ObbKind, closest_plane;
-    plane_capsule: PlaneKind, CapsuleKind, closest_plane;
-    plane_hull: PlaneKind, HullKind, closest_plane;
-    aabb_aabb: AabbKind, AabbKind, closest;
-    obb_obb: ObbKind, ObbKind, closest;
-    obb_capsule: ObbKind, CapsuleKind, closest;
-    obb_hull: ObbKind, HullKind, closest;
-    capsule_capsule: CapsuleKind, CapsuleKind, closest;
-    capsule_hull: CapsuleKind, HullKind, closest;
-    hull_hull: HullKind, HullKind, closest;
+    sphere_sphere: SphereKind, SphereKind, closest_points;
+    plane_sphere: PlaneKind, SphereKind, closest_points_of_plane;
+    sphere_aabb: SphereKind, AabbKind, closest_points;
+    sphere_obb: SphereKind, ObbKind, closest_points;
+    sphere_capsule: SphereKind, CapsuleKind, closest_points;
+    sphere_hull: SphereKind, HullKind, closest_points;
+    plane_obb: PlaneKind, ObbKind, closest_points_of_plane;
+    plane_capsule: PlaneKind, CapsuleKind, closest_points_of_plane;
+    plane_hull: PlaneKind, HullKind, closest_points_of_plane;
+    aabb_aabb: AabbKind, AabbKind, closest_points;
+    obb_obb: ObbKind, ObbKind, closest_points;
+    obb_capsule: ObbKind, CapsuleKind, closest_points;
+    obb_hull: ObbKind, HullKind, closest_points;
+    capsule_capsule: CapsuleKind, CapsuleKind, closest_points;
+    capsule_hull: CapsuleKind, HullKind, closest_points;
+    hull_hull: HullKind, HullKind, closest_points;
 }
 
 /// Where they touch, in taw and in parry.
@@ -322,7 +322,7 @@ where
 {
     let shapes: Vec<_> = over_hills().iter().map(A::taw).collect();
     let ask = |shape: &A::Taw| {
-        closest_of_surface(surface, shape, NEAR).map_or(0.0, |found| found.answer.distance)
+        closest_points_of_surface(surface, shape, NEAR).map_or(0.0, |found| found.result.distance)
     };
     bencher
         .counter(ItemsCount::new(COUNT))

@@ -8,9 +8,9 @@ use cgmath::{EuclideanSpace, InnerSpace};
 use parry3d::glamx::{Pose3, Quat as ParryQuat, Vec3 as ParryVec3};
 use parry3d::query::contact;
 use parry3d::shape as parry;
-use taw::contact::{Closest, closest};
+use taw::contact::{ClosestPoints, closest_points};
 use taw::math::{Point3, Quat, Vec3};
-use taw::shape::{Capsule, Hull, Obb, Solid, Sphere};
+use taw::shape::{Capsule, Hull, Obb, BoundedShape, Sphere};
 
 /// Pairs of each two kinds.
 const PAIRS: u32 = 4_000;
@@ -71,8 +71,8 @@ fn random(kind: usize, random: &mut fastrand::Rng) -> Both {
             Box::new(parry::Ball::new(sizes[0])),
         ),
         1 => (
-            Taw::Obb(Obb { center, rotation, half_widths: sizes.into() }),
-            Taw::Obb(Obb { center: middle, rotation: exact, half_widths: wide(sizes) }),
+            Taw::Obb(Obb { center, rotation, half_extents: sizes.into() }),
+            Taw::Obb(Obb { center: middle, rotation: exact, half_extents: wide(sizes) }),
             Box::new(parry::Cuboid::new(sizes.into())),
         ),
         2 => {
@@ -153,8 +153,8 @@ fn where_taw_and_parry_differ_taw_is_right() {
             let (mut differ, mut theirs, mut ours) = (0, 0.0_f64, 0.0_f64);
             for _ in 0..PAIRS {
                 let (a, b) = (random(first, &mut generator), random(second, &mut generator));
-                let found: Closest<f32> =
-                    each!(&a.single, x => each!(&b.single, y => closest(x, y)));
+                let found: ClosestPoints<f32> =
+                    each!(&a.single, x => each!(&b.single, y => closest_points(x, y)));
                 let parry = contact(&a.pose, &*a.parry, &b.pose, &*b.parry, 100.0);
                 let parry = parry.ok().flatten().expect("an answer at any distance");
                 let hint = Vec3::from(parry.normal1.to_array().map(f64::from)).normalize();

@@ -110,7 +110,7 @@ impl Engine for Rapier {
             let body = rapier::RigidBodyBuilder::dynamic()
                 .translation(theirs(vec(ball.position)))
                 .linvel(theirs(vec(ball.velocity)))
-                .angvel(theirs(vec(ball.spin)))
+                .angvel(theirs(vec(ball.angular_velocity)))
                 .can_sleep(false);
             let shape = rapier::ColliderBuilder::ball(ball.radius as f32);
             let shape = shape.density(ball.density as f32);
@@ -222,7 +222,7 @@ impl Engine for Avian {
                 avian::RigidBody::Dynamic,
                 avian::SleepingDisabled,
                 avian::LinearVelocity(vec(ball.velocity)),
-                avian::AngularVelocity(vec(ball.spin)),
+                avian::AngularVelocity(vec(ball.angular_velocity)),
                 avian::ConstantForce::default(),
             );
             world.spawn((body, shape, density, place, made_of(surface_of(&ball, scene)))).id()

@@ -141,7 +141,7 @@ pub fn energy(ui: &mut Ui, diagnostics: &mut DiagnosticsStore) {
     let lines = [
         ("Potential", paths::POTENTIAL_ENERGY),
         ("Kinetic", paths::KINETIC_ENERGY),
-        ("Spin", paths::SPIN_ENERGY),
+        ("Rotational", paths::ROTATIONAL_ENERGY),
     ];
     time_plot(ui, "taw energy", "J", |plot| {
         let history = |path| diagnostics.get(path).map(Diagnostic::values);
@@ -167,7 +167,7 @@ pub fn energy(ui: &mut Ui, diagnostics: &mut DiagnosticsStore) {
 /// Where the energy of the last steps went, and how far the method was from what it should do.
 /// Measures it while it is shown.
 pub fn accuracy(ui: &mut Ui, diagnostics: &mut DiagnosticsStore) {
-    paths::enable_accuracy(diagnostics, true);
+    paths::enable_energy_audit(diagnostics, true);
     // Of a second at the usual sixty steps, for one step shows next to nothing.
     let sum = |path: &DiagnosticPath| {
         let recent = diagnostics.get(path).map(|figure| {
@@ -191,7 +191,7 @@ pub fn accuracy(ui: &mut Ui, diagnostics: &mut DiagnosticsStore) {
         }
         for (name, path, unit) in [
             ("Momentum from nowhere", paths::MOMENTUM_RESIDUAL, " kg m/s"),
-            ("Deepest contact", paths::DEEPEST, " m"),
+            ("Deepest contact", paths::MAX_PENETRATION, " m"),
         ] {
             ui.label(name);
             ui.monospace(format!("{:.2e}{unit}", sum(&path).fold(0.0, f64::max)));

@@ -1,15 +1,14 @@
-//! A uniform grid on every scale that the radii need.
+//! A hierarchical uniform grid.
 //!
-//! A sphere lies in the cell of its center, on the level whose cells are just
-//! wide enough for it: level 0 has cells as wide as the largest sphere, and each
-//! further level halves them. Two spheres that touch are therefore in the same or
-//! in neighbouring cells of the coarser one's level. One size in a scene means
-//! one level, which is the plain uniform grid; a pebble among boulders costs no
-//! more than among pebbles.
+//! A sphere lies in the cell of its center, on the level whose cells are just wide enough for it:
+//! level 0 has cells as wide as the largest sphere, and each further level halves them. Two spheres
+//! that touch are therefore in equal or neighbouring cells of the coarser one's level. With one
+//! size there is one level, which is the plain uniform grid; a pebble among boulders costs no more
+//! than among pebbles.
 //!
-//! There are no buckets and no hashing: the cells are one list of (key, row),
-//! sorted. Three neighbouring cells along x are one run of keys, and as the list
-//! is walked in order, the runs beside it are walked in order too.
+//! There are no buckets and no hashing: the cells are one sorted list of (key, index). Three
+//! neighbouring cells along x are one run of keys, and as the list is walked in order, the runs
+//! beside it are walked in order too.
 
 use std::ops::Range;
 
@@ -21,30 +20,30 @@ use crate::math::{Point3, Scalar};
 const AXIS_BITS: u32 = 20;
 /// The coordinate of the cell at the origin, in the middle of the axis.
 const AXIS_MIDDLE: f64 = (1_u64 << (AXIS_BITS - 1)) as f64;
-/// The last coordinate. It is never given out, nor is 0, so that the neighbour of
-/// a cell is never in the next row of cells.
+/// The last coordinate. Neither it nor 0 is assigned, so that the neighbour of a cell is never in
+/// the next row of cells.
 const AXIS_MAX: f64 = ((1_u64 << AXIS_BITS) - 1) as f64;
-/// What remains of 64 bits gives 16 levels: radii of 1 : 65,536 before the
-/// smallest share the last level with somewhat larger cells than they need.
+/// The remaining bits of 64 give 16 levels: radii of 1 : 65,536 before the smallest share the last
+/// level with somewhat larger cells than they need.
 const LEVELS: u32 = 16;
-/// Cells are wider than the spheres by this much, which is more than rounding
-/// takes from a distance in `f32`.
+/// Cells are wider than the spheres by this factor, which is more than rounding takes from a
+/// distance in `f32`.
 const CELL_MARGIN: f64 = 1.0 + 1e-6;
-/// Below this width (in metres, as all that follows) its reciprocal overflows.
+/// Smallest cell width in metres: below it the reciprocal overflows.
 const LEAST_CELL: f64 = 1e-300;
 
-/// Finds the pairs of spheres that might touch. See the module's source for how.
+/// Broad phase for spheres. The module's source explains the method.
 ///
-/// Build it anew with [`Grid::rebuild`] whenever spheres have moved; it keeps its
-/// memory. The pairs that it finds do not depend on where the scene lies, and a
-/// stray sphere far out costs the others nothing.
+/// Rebuild it with [`Grid::rebuild`] whenever spheres have moved; it keeps its memory. The
+/// candidate pairs do not depend on where the scene lies, and a sphere far out costs the others
+/// nothing.
 #[derive(Clone, Debug, Default)]
 pub struct Grid {
-    /// Sorted by key, then by row.
+    /// Sorted by key, then by index.
     cells: Vec<Cell>,
-    /// The middle of the scene: where the coordinate is in the middle of its range.
+    /// Center of the scene, at the middle of the coordinate range, in metres.
     origin: [f64; 3],
-    /// The width of a cell on level 0, in metres.
+    /// Width of a cell on level 0, in metres.
     width: f64,
 }
 
@@ -55,10 +54,9 @@ struct Cell {
 }
 
 impl Grid {
-    /// Sorts the spheres into cells. Spheres with a gap of up to `reach` metres
-    /// between them count as touching; zero for those that do.
+    /// Sorts the spheres into cells. Spheres up to `reach` metres apart count as touching.
     pub fn rebuild<S: Scalar>(&mut self, center: &[Point3<S>], radius: &[S], reach: S) {
-        // None, if it is no length.
+        // Zero for a negative or NaN margin.
         let half_reach = if reach > S::zero() { reach * S::constant(0.5) } else { S::zero() };
         let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r)) + half_reach;
         self.width = (2.0 * largest.as_f64() * CELL_MARGIN).max(LEAST_CELL);
@@ -71,8 +69,8 @@ impl Grid {
         self.cells.sort_unstable();
     }
 
-    /// Names every pair of spheres in the same or neighbouring cells once, the
-    /// lower row first. `center` is what the grid was built from.
+    /// Visits every pair of spheres in equal or neighbouring cells once, the lower index first.
+    /// `center` must be that of the last rebuild.
     pub fn pairs<S: Scalar>(&self, center: &[Point3<S>], mut pair: impl FnMut(u32, u32)) {
         let mut emit = |a: &Cell, b: &Cell| pair(a.row.min(b.row), a.row.max(b.row));
         for level in 0..LEVELS {
@@ -87,9 +85,9 @@ impl Grid {
         }
     }
 
-    /// The edges of level 0's cells that hold something, for drawing: the lower
-    /// corner of each, and their common width in metres.
-    pub fn occupied(&self) -> (impl Iterator<Item = [f64; 3]> + '_, f64) {
+    /// Occupied cells of level 0, for drawing: the lower corner of each, and their common width, in
+    /// metres.
+    pub fn occupied_cells(&self) -> (impl Iterator<Item = [f64; 3]> + '_, f64) {
         let mut last = None;
         let cells = self.cells[self.level(0)].iter();
         let distinct = cells.filter(move |cell| last.replace(cell.key) != Some(cell.key));
@@ -100,7 +98,7 @@ impl Grid {
         (corners, self.width)
     }
 
-    /// Where the cells of a level are in the list.
+    /// Range of the cells of a level.
     fn level(&self, level: u32) -> Range<usize> {
         let start = |level: u32| {
             self.cells.partition_point(|cell| cell.key >> (3 * AXIS_BITS) < u64::from(level))
@@ -113,8 +111,8 @@ impl Grid {
         let cells_per_metre = (1_u64 << level) as f64 / self.width;
         let axis = |x: S, origin: f64| {
             let cell = ((x.as_f64() - origin) * cells_per_metre).floor() + AXIS_MIDDLE;
-            // Clamping keeps neighbours neighbours, so nothing is lost out there. What is
-            // nowhere, or among cells without an end, is in the middle; it could be anywhere.
+            // Clamping keeps neighbours neighbours, so nothing is lost out there. NaN maps to the
+            // middle.
             let cell = if cell.is_nan() { AXIS_MIDDLE } else { cell };
             cell.clamp(1.0, AXIS_MAX - 1.0) as u64
         };
@@ -124,8 +122,8 @@ impl Grid {
         (((u64::from(level) << AXIS_BITS | z) << AXIS_BITS | y) << AXIS_BITS) | x
     }
 
-    /// Spheres of one level against those of a coarser one: there, all 27 cells
-    /// around the smaller sphere's center.
+    /// Pairs of spheres of one level with those of a coarser one, in the 27 cells around each
+    /// center.
     fn pairs_across<S: Scalar>(
         &self,
         cells: &[Cell],
@@ -154,18 +152,18 @@ impl Grid {
     }
 }
 
-/// The step in keys to the next row of cells along y.
+/// Key step to the next row of cells along y.
 const ROW: i64 = 1 << AXIS_BITS;
-/// The step in keys to the next layer of cells along z.
+/// Key step to the next layer of cells along z.
 const LAYER: i64 = 1 << (2 * AXIS_BITS);
 /// All rows of cells around one, itself included.
 const ROWS_AROUND: [i64; 9] =
     [-LAYER - ROW, -LAYER, -LAYER + ROW, -ROW, 0, ROW, LAYER - ROW, LAYER, LAYER + ROW];
-/// Those of them that come later in the order of keys.
+/// Rows of [`ROWS_AROUND`] that come later in the order of keys.
 const ROWS_AHEAD: [i64; 4] = [ROW, LAYER - ROW, LAYER, LAYER + ROW];
 
-/// Pairs within the same and neighbouring cells of one level. Only neighbours
-/// that come later in the order are looked at, so that each pair is named once.
+/// Pairs within equal and neighbouring cells of one level. Only later neighbours are visited, so
+/// that each pair is reported once.
 fn pairs_in_level(cells: &[Cell], emit: &mut impl FnMut(&Cell, &Cell)) {
     for (i, cell) in cells.iter().enumerate() {
         cells[i + 1..]
@@ -200,8 +198,7 @@ fn level_of<S: Scalar>(radius: S, largest: S) -> u32 {
     level
 }
 
-/// The mean of the centers. A single stray moves it by little, unlike a corner of
-/// the scene's bounds.
+/// Mean of the centers. A single outlier moves it by little, unlike the bounds.
 fn middle<S: Scalar>(center: &[Point3<S>]) -> [f64; 3] {
     let count = center.len().max(1) as f64;
     let mean = |axis: fn(&Point3<S>) -> S| {
@@ -214,7 +211,7 @@ fn middle<S: Scalar>(center: &[Point3<S>]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::broad::all_pairs;
+    use crate::broad::brute_force_pairs;
     use crate::contact::touching_sphere_sphere;
     use crate::shape::Sphere;
     use proptest::prelude::*;
@@ -242,7 +239,7 @@ mod tests {
         let mut grid = Grid::default();
         grid.rebuild(center, radius, S::zero());
         let by_grid = touching(center, radius, |pair| grid.pairs(center, pair));
-        let by_all = touching(center, radius, |pair| all_pairs(center.len() as u32, pair));
+        let by_all = touching(center, radius, |pair| brute_force_pairs(center.len() as u32, pair));
         assert_eq!(by_grid, by_all);
     }
 
@@ -300,7 +297,7 @@ mod tests {
             let mut named = Vec::new();
             grid.pairs(&center, |a, b| named.push((a, b)));
             prop_assert!(named.contains(&(0, 1)), "the two that touch, of {center:?}");
-            prop_assert!(grid.occupied().0.count() <= center.len());
+            prop_assert!(grid.occupied_cells().0.count() <= center.len());
         }
     }
 

@@ -1,10 +1,10 @@
-//! Who might touch. A broad phase names pairs of rows, never fewer than touch and
-//! as few others as it can; whether they do is [`contact`](crate::contact)'s.
+//! Broad phase: candidate pairs of indices, never fewer than touch and as few others as possible.
+//! Whether they touch is tested in [`contact`](crate::contact).
 
-mod all_pairs;
+mod brute_force;
 mod grid;
 mod period;
 
-pub use all_pairs::all_pairs;
+pub use brute_force::brute_force_pairs;
 pub use grid::Grid;
 pub(crate) use period::{Images, Period};

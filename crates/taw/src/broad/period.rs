@@ -1,4 +1,4 @@
-//! Periodic boxes: what leaves one through a side enters it through the opposite one.
+//! Periodic boundary conditions: a body that leaves through a side enters through the opposite one.
 
 use cgmath::EuclideanSpace;
 use cgmath::num_traits::Float;
@@ -8,31 +8,31 @@ use crate::Error;
 use crate::error::within;
 use crate::math::{Point3, Scalar, Vec3};
 
-/// Diameters of the largest ball that a period holds at least, so that there are four cells as wide
-/// as such a ball along it: balls in neighbouring cells are then nearest where they are neighbours.
+/// Smallest period in diameters of the largest ball, so that there are four cells of that width
+/// along it: balls in neighbouring cells are then nearest where they are neighbours.
 const LEAST_DIAMETERS: f64 = 4.01;
 
 /// Lengths of a periodic box along the axes, around the origin.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Period<S> {
-    /// In metres; none along an axis that has no sides.
+    /// Lengths in metres; none along a non-periodic axis.
     pub lengths: [Option<S>; 3],
 }
 
 impl<S> Default for Period<S> {
-    /// No sides at all.
+    /// Not periodic.
     fn default() -> Self {
         Self { lengths: [None, None, None] }
     }
 }
 
 impl<S: Scalar> Period<S> {
-    /// True without any side.
+    /// Returns true without a periodic axis.
     pub fn is_open(&self) -> bool {
         self.lengths.iter().all(Option::is_none)
     }
 
-    /// Nothing, if the largest of these balls fits into each length often enough.
+    /// Checks that the largest of these balls fits into each length often enough.
     pub fn check_radii(self, radius: &[S]) -> Result<(), Error> {
         let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r));
         let least = largest * S::constant(2.0 * LEAST_DIAMETERS);
@@ -42,25 +42,25 @@ impl<S: Scalar> Period<S> {
         Ok(())
     }
 
-    /// The shortest of all ways that differ by periods: minimum image convention (Allen and
-    /// Tildesley, *Computer Simulation of Liquids*, 1987, §1.5.2).
+    /// Shortest displacement modulo periods: minimum image convention (Allen and Tildesley,
+    /// *Computer Simulation of Liquids*, 1987, §1.5.2).
     #[inline]
     pub fn nearest(&self, way: Vec3<S>) -> Vec3<S> {
         self.image(Point3::from_vec(way), Point3::origin()).to_vec()
     }
 
-    /// The image of a point that is nearest to another one.
+    /// Image of a point that is nearest to another one.
     #[inline]
     pub fn image(&self, mut point: Point3<S>, near: Point3<S>) -> Point3<S> {
         for (axis, length) in self.lengths.iter().enumerate() {
             if let Some(length) = *length {
                 let way = point[axis] - near[axis];
                 if way.abs() >= length {
-                    // What rounding leaves of so long a way is exact.
+                    // The remainder is exact.
                     point[axis] = near[axis] + way % length;
                 }
                 let way = point[axis] - near[axis];
-                // What is on a side stays on that side.
+                // A point on a side stays on that side.
                 let half = length * S::constant(0.5);
                 if way.abs() > half {
                     point[axis] -= length.copysign(way);
@@ -71,7 +71,7 @@ impl<S: Scalar> Period<S> {
     }
 }
 
-/// Spheres with their images beyond the sides, with what finding pairs writes.
+/// Spheres with their periodic images, and scratch memory of the pair search.
 #[derive(Clone, Debug)]
 pub(crate) struct Images<S> {
     center: Vec<Point3<S>>,
@@ -87,8 +87,8 @@ impl<S> Default for Images<S> {
 }
 
 impl<S: Scalar> Images<S> {
-    /// Names every pair of spheres that may touch or be at most `reach` metres apart once, the
-    /// lower row first, also those across the sides of a periodic box.
+    /// Visits every pair of spheres at most `reach` metres apart, and some more, once, the lower
+    /// index first, also across the sides of a periodic box.
     pub fn pairs(
         &mut self,
         grid: &mut Grid,
@@ -108,7 +108,7 @@ impl<S: Scalar> Images<S> {
         let inside = center.len() as u32;
         pairs.clear();
         grid.pairs(&self.center, |a, b| {
-            // Of two that touch across a side, one may as well be inside.
+            // Of two that touch across a side, one is inside for some image.
             if a < inside {
                 let (a, b) = (row[a as usize], row[b as usize]);
                 if a != b {
@@ -123,7 +123,7 @@ impl<S: Scalar> Images<S> {
         }
     }
 
-    /// Lists all spheres where they are in the box, then the images that one of them may touch.
+    /// Lists all spheres wrapped into the box, then the images that one of them may touch.
     fn list(&mut self, center: &[Point3<S>], radius: &[S], reach: S, period: Period<S>) {
         let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r));
         self.center.clear();
@@ -158,7 +158,7 @@ impl<S: Scalar> Images<S> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::broad::all_pairs;
+    use crate::broad::brute_force_pairs;
     use cgmath::InnerSpace;
     use proptest::prelude::*;
 
@@ -186,7 +186,7 @@ mod tests {
             prop_assert_eq!(named.len(), count, "one was named twice");
             named.retain(|(a, b)| touches(*a, *b));
             let mut all = Vec::new();
-            all_pairs(center.len() as u32, |a, b| all.push((a, b)));
+            brute_force_pairs(center.len() as u32, |a, b| all.push((a, b)));
             all.retain(|(a, b)| touches(*a, *b));
             all.sort_unstable();
             prop_assert_eq!(named, all);

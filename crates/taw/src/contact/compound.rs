@@ -1,82 +1,90 @@
-use super::closest::{Closest, closest};
+use super::closest::{ClosestPoints, closest_points};
 use super::core::Convex;
 use super::manifold::{Manifold, manifold};
-use super::sweep::{Touch, sweep};
+use super::shape_cast::{ShapeCastHit, shape_cast};
 use crate::math::{Scalar, Vec3};
 use crate::shape::Shape;
 
-/// What two parts of shapes say of each other.
+/// Result for a pair of convex sub-shapes.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OfParts<T> {
-    /// The convex parts, by their places among all of their shape's, in order; zero for a
-    /// shape that has only one.
-    pub parts: [u32; 2],
-    /// The answer.
-    pub answer: T,
+pub struct SubShapeResult<T> {
+    /// Indices of the convex sub-shapes, in depth-first order; zero for a simple shape.
+    pub sub_shapes: [u32; 2],
+    /// Result of the query.
+    pub result: T,
 }
 
-/// All convex parts of a shape, those of compounds in compounds, too.
+/// Lists all convex sub-shapes, including those of nested compounds.
 #[must_use]
-pub fn parts_of<S: Scalar>(shape: &Shape<S>) -> Vec<&dyn Convex<S>> {
+pub fn sub_shapes<S: Scalar>(shape: &Shape<S>) -> Vec<&dyn Convex<S>> {
     match shape {
         Shape::Sphere(sphere) => vec![sphere],
         Shape::Aabb(aabb) => vec![aabb],
         Shape::Obb(obb) => vec![obb],
         Shape::Capsule(capsule) => vec![capsule],
         Shape::Hull(hull) => vec![hull],
-        Shape::Compound(compound) => compound.parts().iter().flat_map(parts_of).collect(),
+        Shape::Compound(compound) => compound.parts().iter().flat_map(sub_shapes).collect(),
     }
 }
 
-/// Asks each part of one about each part of the other.
-fn each<S: Scalar, T>(
+/// Runs a query for every pair of sub-shapes.
+fn query_pairs<S: Scalar, T>(
     a: &Shape<S>,
     b: &Shape<S>,
-    ask: impl Fn(&dyn Convex<S>, &dyn Convex<S>) -> Option<T>,
-) -> Vec<OfParts<T>> {
-    let (first, second) = (parts_of(a), parts_of(b));
-    let mut answers = Vec::new();
+    query: impl Fn(&dyn Convex<S>, &dyn Convex<S>) -> Option<T>,
+) -> Vec<SubShapeResult<T>> {
+    let (first, second) = (sub_shapes(a), sub_shapes(b));
+    let mut results = Vec::new();
     for (i, x) in (0..).zip(&first) {
         for (j, y) in (0..).zip(&second) {
-            answers.extend(ask(*x, *y).map(|answer| OfParts { parts: [i, j], answer }));
+            results
+                .extend(query(*x, *y).map(|result| SubShapeResult { sub_shapes: [i, j], result }));
         }
     }
-    answers
+    results
 }
 
-/// The answer with the least of something; of several, the first.
-fn least<S: Scalar, T>(answers: Vec<OfParts<T>>, of: impl Fn(&T) -> S) -> Option<OfParts<T>> {
-    let less = |s: &OfParts<T>, t: &OfParts<T>| of(&t.answer) < of(&s.answer);
-    answers.into_iter().reduce(|best, next| if less(&best, &next) { next } else { best })
+/// The result with the smallest key; among equals, the first.
+fn min_by<S: Scalar, T>(
+    results: Vec<SubShapeResult<T>>,
+    of: impl Fn(&T) -> S,
+) -> Option<SubShapeResult<T>> {
+    let less = |s: &SubShapeResult<T>, t: &SubShapeResult<T>| of(&t.result) < of(&s.result);
+    results.into_iter().reduce(|best, next| if less(&best, &next) { next } else { best })
 }
 
-/// Where two shapes are nearest to each other, or where two of their parts are deepest in
-/// each other. None for a compound without parts, which cannot be made.
+/// Closest points of two shapes, or deepest points of two of their sub-shapes. None for an empty
+/// compound, which cannot be constructed.
 #[must_use]
-pub fn closest_shapes<S: Scalar>(a: &Shape<S>, b: &Shape<S>) -> Option<OfParts<Closest<S>>> {
-    least(each(a, b, |x, y| Some(closest(x, y))), |answer| answer.distance)
+pub fn closest_points_of_shapes<S: Scalar>(
+    a: &Shape<S>,
+    b: &Shape<S>,
+) -> Option<SubShapeResult<ClosestPoints<S>>> {
+    min_by(query_pairs(a, b, |x, y| Some(closest_points(x, y))), |result| result.distance)
 }
 
-/// Where two shapes touch, or are at most `margin` metres apart: part by part.
+/// Contact manifolds of two shapes, one per pair of sub-shapes at most `margin` metres apart.
 #[must_use]
 pub fn manifolds_of_shapes<S: Scalar>(
     a: &Shape<S>,
     b: &Shape<S>,
     margin: S,
-) -> Vec<OfParts<Manifold<S>>> {
-    each(a, b, |x, y| Some(manifold(x, y, margin)).filter(|found| !found.points.is_empty()))
+) -> Vec<SubShapeResult<Manifold<S>>> {
+    query_pairs(a, b, |x, y| Some(manifold(x, y, margin)).filter(|found| !found.points.is_empty()))
 }
 
-/// When two shapes that move along straight lines, without turning, first touch, if they do;
-/// as [`sweep`] of each two of their parts.
+/// First contact of two shapes that translate along straight lines, if any; as [`shape_cast`] of
+/// query_pairs pair of sub-shapes.
 #[must_use]
-pub fn sweep_shapes<S: Scalar>(
+pub fn shape_cast_of_shapes<S: Scalar>(
     a: &Shape<S>,
-    a_moves: Vec3<S>,
+    a_translation: Vec3<S>,
     b: &Shape<S>,
-    b_moves: Vec3<S>,
-) -> Option<OfParts<Touch<S>>> {
-    least(each(a, b, |x, y| sweep(x, a_moves, y, b_moves)), |answer| answer.time)
+    b_translation: Vec3<S>,
+) -> Option<SubShapeResult<ShapeCastHit<S>>> {
+    min_by(query_pairs(a, b, |x, y| shape_cast(x, a_translation, y, b_translation)), |result| {
+        result.time
+    })
 }
 
 #[cfg(test)]
@@ -102,16 +110,16 @@ mod tests {
 
     #[test]
     fn the_nearest_part_answers() {
-        let near = closest_shapes(&corner(), &ball(4.0, 1.5)).unwrap();
-        assert_eq!((near.parts, near.answer.distance), ([0, 0], 0.5));
-        let near = closest_shapes(&ball(1.25, 4.0), &corner()).unwrap();
-        assert_eq!((near.parts, near.answer.normal), ([0, 1], -Vec3::unit_x()));
+        let near = closest_points_of_shapes(&corner(), &ball(4.0, 1.5)).unwrap();
+        assert_eq!((near.sub_shapes, near.result.distance), ([0, 0], 0.5));
+        let near = closest_points_of_shapes(&ball(1.25, 4.0), &corner()).unwrap();
+        assert_eq!((near.sub_shapes, near.result.normal), ([0, 1], -Vec3::unit_x()));
     }
 
     #[test]
     fn a_ball_in_a_corner_touches_both_parts() {
         let touches = manifolds_of_shapes(&corner(), &ball(1.0, 1.0), 1e-9);
-        let seen: Vec<_> = touches.iter().map(|t| (t.parts, t.answer.normal)).collect();
+        let seen: Vec<_> = touches.iter().map(|t| (t.sub_shapes, t.result.normal)).collect();
         assert_eq!(seen, [([0, 0], Vec3::unit_y()), ([1, 0], Vec3::unit_x())]);
         assert_eq!(manifolds_of_shapes(&corner(), &ball(3.0, 3.0), 0.1), []);
     }
@@ -119,12 +127,13 @@ mod tests {
     #[test]
     fn the_part_that_is_met_first_stops_it() {
         let moves = Vec3::new(-4.0, -2.0, 0.0);
-        let touch = sweep_shapes(&corner(), Vec3::new(0.0, 0.0, 0.0), &ball(3.0, 2.5), moves);
+        let touch =
+            shape_cast_of_shapes(&corner(), Vec3::new(0.0, 0.0, 0.0), &ball(3.0, 2.5), moves);
         let touch = touch.unwrap();
-        assert_eq!(touch.parts, [1, 0], "the wall");
-        assert!((touch.answer.time - 0.5).abs() < 1e-9);
+        assert_eq!(touch.sub_shapes, [1, 0], "the wall");
+        assert!((touch.result.time - 0.5).abs() < 1e-9);
         let away = Vec3::new(4.0, 2.0, 0.0);
         let still = Vec3::new(0.0, 0.0, 0.0);
-        assert_eq!(sweep_shapes(&corner(), still, &ball(3.0, 2.5), away), None);
+        assert_eq!(shape_cast_of_shapes(&corner(), still, &ball(3.0, 2.5), away), None);
     }
 }

@@ -2,11 +2,11 @@ use cgmath::{EuclideanSpace, InnerSpace, Matrix3};
 use smallvec::SmallVec;
 
 use crate::math::{Mat3, Point3, Scalar, Vec3, cast_point, cast_vector};
-use crate::shape::{Box3, Capsule, Face, Hull, Obb, Solid, Sphere, Triangle, farthest_of};
+use crate::shape::{Aabb3, BoundedShape, Capsule, Face, Hull, Obb, Sphere, Triangle, farthest_of};
 
-/// A convex shape as all points within `radius` of a polyhedron, which may also be a
-/// point, a line, or flat. All in `f64`, about some origin that is near, so that nothing
-/// is lost far from that of the world.
+/// A convex shape as a polyhedral core with a rounding radius: all points within `radius` of a
+/// polyhedron, which may also be a point, a segment, or flat. Coordinates are `f64` relative to a
+/// nearby origin, so that nothing is lost far from the origin of the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Core<'a> {
     pub(super) kind: Kind<'a>,
@@ -24,8 +24,8 @@ pub(super) enum Kind<'a> {
         points: &'a [Point3<f64>],
         edges: &'a [[u32; 2]],
         faces: &'a [Face],
-        turn: Mat3<f64>,
-        at: Vec3<f64>,
+        rotation: Mat3<f64>,
+        translation: Vec3<f64>,
         size: f64,
     },
 }
@@ -37,32 +37,32 @@ pub(super) struct Cuboid {
     pub half: [f64; 3],
 }
 
-/// A corner and its number.
-pub(super) type Corner = (Vec3<f64>, u32);
-/// Corners around a face, or the ends of a line, or a point.
-pub(super) type Outline = SmallVec<[Corner; 8]>;
+/// Position and index of a vertex.
+pub(super) type IndexedVertex = (Vec3<f64>, u32);
+/// Vertices around a face, the ends of a segment, or a point.
+pub(super) type Polygon = SmallVec<[IndexedVertex; 8]>;
 
-/// What has a [`Core`].
-pub trait Convex<S: Scalar>: Solid<S> {
-    /// The core about an origin.
+/// A shape that has a [`Core`].
+pub trait Convex<S: Scalar>: BoundedShape<S> {
+    /// The core relative to an origin.
     #[must_use]
     fn core(&self, origin: Point3<f64>) -> Core<'_>;
 
-    /// A point in the middle of it.
+    /// Center of the shape.
     #[must_use]
-    fn middle(&self) -> Point3<S>;
+    fn center(&self) -> Point3<S>;
 
-    /// Itself, if it is nothing but a sphere, for which all questions have short answers.
+    /// The shape as a sphere, if it is one: spheres have closed-form answers.
     #[must_use]
     fn as_sphere(&self) -> Option<Sphere<S>> {
         None
     }
 }
 
-/// What is nearly parallel to a face lies on it: the sine of a thousandth of a turn.
-pub(super) const FLAT: f64 = 6e-3;
+/// Sine below which a direction counts as parallel: about a thousandth of a turn.
+pub(super) const PARALLEL_SIN: f64 = 6e-3;
 
-/// The faces of a box, by the bits of its corners: along −x, x, −y, y, −z, z.
+/// The faces of a box by the bits of its vertices: −x, x, −y, y, −z, z.
 pub(super) const BOX_FACES: [[u32; 4]; 6] =
     [[0, 4, 6, 2], [1, 3, 7, 5], [0, 1, 5, 4], [2, 6, 7, 3], [0, 2, 3, 1], [4, 5, 7, 6]];
 
@@ -74,17 +74,17 @@ impl Cuboid {
         })
     }
 
-    /// The number of the corner that is farthest along a direction.
-    pub fn farthest(&self, direction: Vec3<f64>) -> u32 {
+    /// Index of the vertex that is farthest along a direction.
+    pub fn support(&self, direction: Vec3<f64>) -> u32 {
         (0..3).fold(0, |corner, i| corner | u32::from(self.axes[i].dot(direction) > 0.0) << i)
     }
 
-    /// How far it reaches along a direction, from its middle.
+    /// Half extent along a direction.
     pub fn reach(&self, direction: Vec3<f64>) -> f64 {
         (0..3).map(|i| self.half[i] * self.axes[i].dot(direction).abs()).sum()
     }
 
-    /// The face that looks most along a direction.
+    /// Index of the face whose normal is most aligned with a direction.
     fn facing(&self, direction: Vec3<f64>) -> usize {
         let along = self.axes.map(|axis| axis.dot(direction));
         let axis =
@@ -97,26 +97,26 @@ impl Cuboid {
     }
 }
 
-/// Where a corner of a hull is.
-fn placed(turn: &Mat3<f64>, at: Vec3<f64>, point: Point3<f64>) -> Vec3<f64> {
-    turn.x * point.x + turn.y * point.y + turn.z * point.z + at
+/// Transforms a vertex of a hull.
+fn placed(rotation: &Mat3<f64>, translation: Vec3<f64>, point: Point3<f64>) -> Vec3<f64> {
+    rotation.x * point.x + rotation.y * point.y + rotation.z * point.z + translation
 }
 
-/// The unit normal of a triangle, unless it is as good as a line.
+/// The unit normal of a triangle; none if it is degenerate.
 fn normal_of(corners: [Vec3<f64>; 3]) -> Option<Vec3<f64>> {
     Triangle { corners: corners.map(Point3::from_vec) }.normal()
 }
 
 impl Core<'_> {
-    /// How far around its polyhedron it reaches, in metres.
+    /// Rounding radius around the polyhedron, in metres.
     #[must_use]
     pub fn radius(&self) -> f64 {
         self.radius
     }
 
-    /// Its corner that is farthest along a direction, and the number of it.
-    pub(super) fn support(&self, direction: Vec3<f64>) -> Corner {
-        let farthest = |corners: &[Vec3<f64>]| {
+    /// Support point: position and index of the vertex that is farthest along a direction.
+    pub(super) fn support(&self, direction: Vec3<f64>) -> IndexedVertex {
+        let support = |corners: &[Vec3<f64>]| {
             let mut best = (corners[0], 0);
             for (i, corner) in (1..).zip(&corners[1..]) {
                 if (corner - best.0).dot(direction) > 0.0 {
@@ -127,22 +127,25 @@ impl Core<'_> {
         };
         match &self.kind {
             Kind::Point(point) => (*point, 0),
-            Kind::Segment(ends) => farthest(ends),
-            Kind::Triangle(corners) => farthest(corners),
+            Kind::Segment(ends) => support(ends),
+            Kind::Triangle(corners) => support(corners),
             Kind::Cuboid(cuboid) => {
-                let corner = cuboid.farthest(direction);
+                let corner = cuboid.support(direction);
                 (cuboid.corner(corner), corner)
             }
-            Kind::Hull { points, turn, at, .. } => {
-                let local =
-                    Vec3::new(turn.x.dot(direction), turn.y.dot(direction), turn.z.dot(direction));
+            Kind::Hull { points, rotation, translation, .. } => {
+                let local = Vec3::new(
+                    rotation.x.dot(direction),
+                    rotation.y.dot(direction),
+                    rotation.z.dot(direction),
+                );
                 let best = farthest_of(points, local);
-                (placed(turn, *at, points[best]), best as u32)
+                (placed(rotation, *translation, points[best]), best as u32)
             }
         }
     }
 
-    /// About how far its corners are from each other; and the radius, if that is greater.
+    /// Approximate extent of the core, at least the radius, in metres.
     pub(super) fn size(&self) -> f64 {
         let largest = |v: Vec3<f64>| v.x.abs().max(v.y.abs()).max(v.z.abs());
         let far = match &self.kind {
@@ -155,36 +158,36 @@ impl Core<'_> {
         far.max(self.radius)
     }
 
-    /// Whether it is a triangle that is no line.
-    pub(super) fn is_flat(&self) -> bool {
+    /// Returns true for a triangle that is not degenerate.
+    pub(super) fn is_nondegenerate_triangle(&self) -> bool {
         matches!(&self.kind, Kind::Triangle(corners) if normal_of(*corners).is_some())
     }
 
-    /// A point in it.
+    /// A point inside the core.
     pub(super) fn inside(&self) -> Vec3<f64> {
         match &self.kind {
             Kind::Point(point) => *point,
             Kind::Segment([a, b]) => (a + b) * 0.5,
             Kind::Triangle([a, b, c]) => (a + b + c) / 3.0,
             Kind::Cuboid(cuboid) => cuboid.center,
-            Kind::Hull { at, .. } => *at,
+            Kind::Hull { translation, .. } => *translation,
         }
     }
 
-    /// The same, a way off.
-    pub(super) fn moved(mut self, by: Vec3<f64>) -> Self {
+    /// Translates the core.
+    pub(super) fn translated(mut self, by: Vec3<f64>) -> Self {
         match &mut self.kind {
             Kind::Point(point) => *point += by,
             Kind::Segment(ends) => ends.iter_mut().for_each(|end| *end += by),
             Kind::Triangle(corners) => corners.iter_mut().for_each(|corner| *corner += by),
             Kind::Cuboid(cuboid) => cuboid.center += by,
-            Kind::Hull { at, .. } => *at += by,
+            Kind::Hull { translation, .. } => *translation += by,
         }
         self
     }
 
-    /// The same, turned about the origin.
-    pub(super) fn turned(mut self, by: Mat3<f64>) -> Self {
+    /// Rotates the core about the origin.
+    pub(super) fn rotated(mut self, by: Mat3<f64>) -> Self {
         match &mut self.kind {
             Kind::Point(point) => *point = by * *point,
             Kind::Segment(ends) => ends.iter_mut().for_each(|end| *end = by * *end),
@@ -193,12 +196,14 @@ impl Core<'_> {
                 cuboid.center = by * cuboid.center;
                 cuboid.axes.iter_mut().for_each(|axis| *axis = by * *axis);
             }
-            Kind::Hull { turn, at, .. } => (*turn, *at) = (by * *turn, by * *at),
+            Kind::Hull { rotation, translation, .. } => {
+                (*rotation, *translation) = (by * *rotation, by * *translation)
+            }
         }
         self
     }
 
-    /// The number of the face whose normal is a direction, but for [`FLAT`].
+    /// Index of the face whose normal is within [`PARALLEL_SIN`] of a direction.
     pub(super) fn face_along(&self, direction: Vec3<f64>) -> Option<usize> {
         let face = match &self.kind {
             Kind::Point(_) | Kind::Segment(_) => None,
@@ -206,9 +211,12 @@ impl Core<'_> {
                 normal_of(*corners).map(|normal| usize::from(normal.dot(direction) < 0.0))
             }
             Kind::Cuboid(cuboid) => Some(cuboid.facing(direction)),
-            Kind::Hull { faces, turn, .. } => {
-                let local =
-                    Vec3::new(turn.x.dot(direction), turn.y.dot(direction), turn.z.dot(direction));
+            Kind::Hull { faces, rotation, .. } => {
+                let local = Vec3::new(
+                    rotation.x.dot(direction),
+                    rotation.y.dot(direction),
+                    rotation.z.dot(direction),
+                );
                 let (mut best, mut most) = (0, f64::NEG_INFINITY);
                 for (i, face) in faces.iter().enumerate() {
                     let next = face.normal.dot(local);
@@ -219,14 +227,15 @@ impl Core<'_> {
                 Some(best)
             }
         }?;
-        (self.normal(face).cross(direction).magnitude2() < FLAT * FLAT).then_some(face)
+        (self.normal(face).cross(direction).magnitude2() < PARALLEL_SIN * PARALLEL_SIN)
+            .then_some(face)
     }
 
     /// The normal of a face.
     pub(super) fn normal(&self, face: usize) -> Vec3<f64> {
         match &self.kind {
             Kind::Cuboid(cuboid) => cuboid.normal(face),
-            Kind::Hull { faces, turn, .. } => turn * faces[face].normal,
+            Kind::Hull { faces, rotation, .. } => rotation * faces[face].normal,
             Kind::Triangle(corners) => {
                 let normal = normal_of(*corners).unwrap_or_else(Vec3::unit_x);
                 if face == 0 { normal } else { -normal }
@@ -235,14 +244,14 @@ impl Core<'_> {
         }
     }
 
-    /// The corners of a face, counterclockwise.
-    pub(super) fn face(&self, face: usize) -> Outline {
+    /// The vertices of a face, counterclockwise.
+    pub(super) fn face(&self, face: usize) -> Polygon {
         match &self.kind {
             Kind::Cuboid(cuboid) => {
                 BOX_FACES[face].iter().map(|corner| (cuboid.corner(*corner), *corner)).collect()
             }
-            Kind::Hull { points, faces, turn, at, .. } => {
-                let corner = |i: &u32| (placed(turn, *at, points[*i as usize]), *i);
+            Kind::Hull { points, faces, rotation, translation, .. } => {
+                let corner = |i: &u32| (placed(rotation, *translation, points[*i as usize]), *i);
                 faces[face].corners.iter().map(corner).collect()
             }
             Kind::Triangle([a, b, c]) => {
@@ -258,18 +267,21 @@ impl Core<'_> {
         }
     }
 
-    /// Of the faces with the most of the farthest corners along a direction, the one that
-    /// looks most that way; else the line or the point.
-    pub(super) fn facing(&self, direction: Vec3<f64>) -> Outline {
+    /// The face with the most support vertices along a direction, and of several the one most
+    /// aligned with it; else the segment or the point.
+    pub(super) fn facing(&self, direction: Vec3<f64>) -> Polygon {
         let face = match &self.kind {
             Kind::Point(_) | Kind::Segment(_) => 0,
             Kind::Triangle(corners) => {
                 usize::from(normal_of(*corners).is_some_and(|normal| normal.dot(direction) < 0.0))
             }
             Kind::Cuboid(cuboid) => cuboid.facing(direction),
-            Kind::Hull { points, faces, turn, size, .. } => {
-                let local =
-                    Vec3::new(turn.x.dot(direction), turn.y.dot(direction), turn.z.dot(direction));
+            Kind::Hull { points, faces, rotation, size, .. } => {
+                let local = Vec3::new(
+                    rotation.x.dot(direction),
+                    rotation.y.dot(direction),
+                    rotation.z.dot(direction),
+                );
                 let along: SmallVec<[f64; 32]> =
                     points.iter().map(|point| point.to_vec().dot(local)).collect();
                 let reach = along.iter().copied().fold(f64::NEG_INFINITY, f64::max) - 1e-12 * size;
@@ -297,7 +309,7 @@ impl<S: Scalar> Convex<S> for Sphere<S> {
         Core { kind: Kind::Point(local(self.center, origin)), radius: self.radius.as_f64() }
     }
 
-    fn middle(&self) -> Point3<S> {
+    fn center(&self) -> Point3<S> {
         self.center
     }
 
@@ -312,7 +324,7 @@ impl<S: Scalar> Convex<S> for Capsule<S> {
         Core { kind: Kind::Segment(ends), radius: self.radius.as_f64() }
     }
 
-    fn middle(&self) -> Point3<S> {
+    fn center(&self) -> Point3<S> {
         self.a + (self.b - self.a) * S::constant(0.5)
     }
 
@@ -325,19 +337,19 @@ impl<S: Scalar> Convex<S> for Obb<S> {
     fn core(&self, origin: Point3<f64>) -> Core<'_> {
         let cuboid = Cuboid {
             center: local(self.center, origin),
-            // In f64 from the start, or the corners would be rounded.
-            axes: self.exact_axes(),
-            half: cast_vector(self.half_widths).into(),
+            // In f64 from the start, or the vertices would be rounded.
+            axes: self.axes_f64(),
+            half: cast_vector(self.half_extents).into(),
         };
         Core { kind: Kind::Cuboid(cuboid), radius: 0.0 }
     }
 
-    fn middle(&self) -> Point3<S> {
+    fn center(&self) -> Point3<S> {
         self.center
     }
 }
 
-impl<S: Scalar> Convex<S> for Box3<S> {
+impl<S: Scalar> Convex<S> for Aabb3<S> {
     fn core(&self, origin: Point3<f64>) -> Core<'_> {
         let (low, high) = (local(self.min, origin), local(self.max, origin));
         let half = (high - low) * 0.5;
@@ -346,7 +358,7 @@ impl<S: Scalar> Convex<S> for Box3<S> {
         Core { kind: Kind::Cuboid(cuboid), radius: 0.0 }
     }
 
-    fn middle(&self) -> Point3<S> {
+    fn center(&self) -> Point3<S> {
         self.center()
     }
 }
@@ -357,7 +369,7 @@ impl<S: Scalar> Convex<S> for Triangle<S> {
         Core { kind: Kind::Triangle(corners), radius: 0.0 }
     }
 
-    fn middle(&self) -> Point3<S> {
+    fn center(&self) -> Point3<S> {
         let [a, b, c] = self.corners;
         a + ((b - a) + (c - a)) / S::constant(3.0)
     }
@@ -365,19 +377,19 @@ impl<S: Scalar> Convex<S> for Triangle<S> {
 
 impl<S: Scalar> Convex<S> for Hull<S> {
     fn core(&self, origin: Point3<f64>) -> Core<'_> {
-        let pose = self.exact_pose();
+        let pose = self.pose_f64();
         let kind = Kind::Hull {
             points: self.local_points(),
             edges: self.edges(),
             faces: self.faces(),
-            turn: Matrix3::from(pose.rotation),
-            at: pose.translation - origin.to_vec(),
+            rotation: Matrix3::from(pose.rotation),
+            translation: pose.translation - origin.to_vec(),
             size: self.size(),
         };
         Core { kind, radius: 0.0 }
     }
 
-    fn middle(&self) -> Point3<S> {
-        Point3::from_vec(cast_vector(self.exact_pose().translation))
+    fn center(&self) -> Point3<S> {
+        Point3::from_vec(cast_vector(self.pose_f64().translation))
     }
 }

@@ -1,38 +1,38 @@
-//! How far two cores are apart, by corners that are farthest in some directions (Gilbert,
-//! Johnson and Keerthi 1988; the regions as in Ericson, *Real-Time Collision Detection*,
-//! 2005, §9.5).
+//! Distance of two cores by GJK (Gilbert, Johnson and Keerthi 1988; Voronoi regions as in Ericson,
+//! *Real-Time Collision Detection*, 2005, §9.5).
 
 use cgmath::InnerSpace;
 
-use super::closest::{Between, CERTAIN};
+use super::closest::{LocalClosestPoints, TOLERANCE};
 use super::core::Core;
 use crate::math::Vec3;
 
-/// A corner of the difference of two cores: of all `b - a`, with the `a`.
+/// A vertex of the Minkowski difference `B − A`, with its witness point on A.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Vertex {
     pub difference: Vec3<f64>,
     pub on_a: Vec3<f64>,
 }
 
-/// The corner of the difference that is farthest along a direction.
+/// Support point of the Minkowski difference along a direction.
 #[inline]
 pub(super) fn vertex(a: &Core<'_>, b: &Core<'_>, direction: Vec3<f64>) -> Vertex {
     let (on_a, on_b) = (a.support(-direction).0, b.support(direction).0);
     Vertex { difference: on_b - on_a, on_a }
 }
 
-/// What is known after the search.
+/// Result of GJK.
 pub(super) enum Gjk {
-    Apart(Between),
-    /// Farther than anybody asked.
-    Beyond,
-    /// Four corners of the difference with the origin between them.
-    Together([Vertex; 4]),
-    Unsure,
+    Separated(LocalClosestPoints),
+    /// Farther apart than the limit.
+    OutOfRange,
+    /// A tetrahedron of the Minkowski difference around the origin.
+    Overlapping([Vertex; 4]),
+    NotConverged,
 }
 
-/// Corners of the difference, and how much of each makes its point nearest to the origin.
+/// Simplex of the Minkowski difference with the barycentric weights of its point nearest to the
+/// origin.
 #[derive(Clone, Copy)]
 struct Simplex {
     vertices: [Vertex; 4],
@@ -43,8 +43,8 @@ struct Simplex {
 impl Simplex {
     fn of<const N: usize>(vertices: [Vertex; N], weights: [f64; N]) -> Self {
         let zero = Vec3::new(0.0, 0.0, 0.0);
-        let nothing = Vertex { difference: zero, on_a: zero };
-        let mut simplex = Self { vertices: [nothing; 4], weights: [0.0; 4], count: N };
+        let unused = Vertex { difference: zero, on_a: zero };
+        let mut simplex = Self { vertices: [unused; 4], weights: [0.0; 4], count: N };
         simplex.vertices[..N].copy_from_slice(&vertices);
         simplex.weights[..N].copy_from_slice(&weights);
         simplex
@@ -56,62 +56,67 @@ impl Simplex {
     }
 }
 
-/// Steps enough for any pair of hulls; more is a sign of rounding.
-const STEPS: usize = 100;
+/// Enough for any pair of hulls; more is a sign of rounding.
+const MAX_ITERATIONS: usize = 100;
 
-/// Searches from a direction on, for what is no farther than a limit. `size` is that of both.
+/// Runs GJK from a start direction. Ends early beyond the `limit`; `size` is the extent of both.
 pub(super) fn gjk(a: &Core<'_>, b: &Core<'_>, start: Vec3<f64>, size: f64, limit: f64) -> Gjk {
     let mut simplex = Simplex::of([vertex(a, b, start)], [1.0]);
     let mut least = f64::INFINITY;
-    for _ in 0..STEPS {
+    for _ in 0..MAX_ITERATIONS {
         let nearest = simplex.sum(|vertex| vertex.difference);
         let squared = nearest.magnitude2();
         let distance = squared.sqrt();
-        if distance.is_nan() || distance <= CERTAIN * size {
-            return Gjk::Unsure; // they touch
+        if distance.is_nan() || distance <= TOLERANCE * size {
+            return Gjk::NotConverged; // they touch
         }
         let next = vertex(a, b, -nearest);
-        // No point of the difference is nearer than the plane through this corner.
-        let off = (squared - next.difference.dot(nearest)) / distance;
-        if distance - off > limit {
-            return Gjk::Beyond;
+        // Lower bound: no point of the difference is nearer than the plane through this vertex.
+        let gap_to_bound = (squared - next.difference.dot(nearest)) / distance;
+        if distance - gap_to_bound > limit {
+            return Gjk::OutOfRange;
         }
-        if off <= 0.1 * CERTAIN * size {
+        if gap_to_bound <= 0.1 * TOLERANCE * size {
             let on_a = simplex.sum(|vertex| vertex.on_a);
             let normal = nearest / distance;
-            return Gjk::Apart(Between { distance, normal, on_a, on_b: on_a + nearest });
+            return Gjk::Separated(LocalClosestPoints {
+                distance,
+                normal,
+                on_a,
+                on_b: on_a + nearest,
+            });
         }
         if squared >= least {
-            return Gjk::Unsure; // no better than before
+            return Gjk::NotConverged; // no better than before
         }
         least = squared;
         let [p, q, r, _] = simplex.vertices;
         simplex = match simplex.count {
-            1 => of_segment([p, next]),
-            2 => of_triangle([p, q, next]),
-            _ => match of_tetrahedron(&[p, q, r, next]) {
+            1 => closest_on_segment([p, next]),
+            2 => closest_on_triangle([p, q, next]),
+            _ => match closest_on_tetrahedron(&[p, q, r, next]) {
                 Some(simplex) => simplex,
-                None => return Gjk::Together([p, q, r, next]),
+                None => return Gjk::Overlapping([p, q, r, next]),
             },
         };
     }
-    Gjk::Unsure
+    Gjk::NotConverged
 }
 
 #[inline]
-fn of_segment([p, q]: [Vertex; 2]) -> Simplex {
+fn closest_on_segment([p, q]: [Vertex; 2]) -> Simplex {
     let along = q.difference - p.difference;
-    let part = -p.difference.dot(along) / along.magnitude2();
-    if part > 0.0 && part < 1.0 {
-        Simplex::of([p, q], [1.0 - part, part])
+    let fraction = -p.difference.dot(along) / along.magnitude2();
+    if fraction > 0.0 && fraction < 1.0 {
+        Simplex::of([p, q], [1.0 - fraction, fraction])
     } else {
-        Simplex::of([if part >= 1.0 { q } else { p }], [1.0])
+        Simplex::of([if fraction >= 1.0 { q } else { p }], [1.0])
     }
 }
 
-/// By the region that the origin is in.
+/// Classifies the origin by Voronoi region.
 #[inline]
-fn of_triangle([p, q, r]: [Vertex; 3]) -> Simplex {
+fn closest_on_triangle([p, q, r]: [Vertex; 3]) -> Simplex {
     let (a, b, c) = (p.difference, q.difference, r.difference);
     let (ab, ac) = (b - a, c - a);
     let (d1, d2) = (-ab.dot(a), -ac.dot(a));
@@ -124,7 +129,7 @@ fn of_triangle([p, q, r]: [Vertex; 3]) -> Simplex {
     }
     let vc = d1 * d4 - d3 * d2;
     if vc <= 0.0 && d1 >= 0.0 && d3 <= 0.0 {
-        return of_segment([p, q]);
+        return closest_on_segment([p, q]);
     }
     let (d5, d6) = (-ab.dot(c), -ac.dot(c));
     if d6 >= 0.0 && d5 <= d6 {
@@ -132,29 +137,29 @@ fn of_triangle([p, q, r]: [Vertex; 3]) -> Simplex {
     }
     let vb = d5 * d2 - d1 * d6;
     if vb <= 0.0 && d2 >= 0.0 && d6 <= 0.0 {
-        return of_segment([p, r]);
+        return closest_on_segment([p, r]);
     }
     let va = d3 * d6 - d5 * d4;
     if va <= 0.0 && d4 - d3 >= 0.0 && d5 - d6 >= 0.0 {
-        return of_segment([q, r]);
+        return closest_on_segment([q, r]);
     }
     let all = va + vb + vc;
     Simplex::of([p, q, r], [va / all, vb / all, vc / all])
 }
 
-/// None if the origin is inside.
-fn of_tetrahedron(vertices: &[Vertex; 4]) -> Option<Simplex> {
+/// Returns none if the origin is inside.
+fn closest_on_tetrahedron(vertices: &[Vertex; 4]) -> Option<Simplex> {
     let mut best: Option<(f64, Simplex)> = None;
     for [i, j, k, l] in [[0, 1, 2, 3], [0, 2, 3, 1], [0, 3, 1, 2], [1, 3, 2, 0]] {
         let [x, y, z, other] = [i, j, k, l].map(|i: usize| &vertices[i]);
         let normal = (y.difference - x.difference).cross(z.difference - x.difference);
         let inner = (other.difference - x.difference).dot(normal);
         let origin = -x.difference.dot(normal);
-        // On the other side than the fourth corner, or no side at all.
+        // Beyond the face, seen from the fourth vertex, or degenerate.
         if origin * inner > 0.0 {
             continue;
         }
-        let simplex = of_triangle([*x, *y, *z]);
+        let simplex = closest_on_triangle([*x, *y, *z]);
         let squared = simplex.sum(|vertex| vertex.difference).magnitude2();
         if best.as_ref().is_none_or(|(least, _)| squared < *least) {
             best = Some((squared, simplex));

@@ -2,22 +2,21 @@ use cgmath::InnerSpace;
 
 use smallvec::SmallVec;
 
-use super::closest::{Between, Closest, closest, within};
-use super::core::{Convex, Core, Corner, FLAT, Kind, Outline};
-use super::exhaustive::{Axis, Of};
+use super::brute_force::{Axis, AxisSource};
+use super::closest::{ClosestPoints, LocalClosestPoints, closest_points, core_distance};
+use super::core::{Convex, Core, IndexedVertex, Kind, PARALLEL_SIN, Polygon};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
 
-/// Where two things touch: a point, the ends of a segment, or up to four corners of a
-/// polygon.
+/// Contact manifold: a point, the ends of a segment, or up to four vertices of a polygon.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Manifold<S> {
-    /// From the first to the second, a unit vector; if there are no points, only roughly so.
+    /// Unit vector from the first to the second; approximate if there are no points.
     pub normal: Vec3<S>,
-    /// One to four, or none if they are farther apart than was asked for.
+    /// One to four points; none if the shapes are farther apart than the margin.
     pub points: Points<S>,
 }
 
-/// The points of a [`Manifold`], without memory of their own on the heap.
+/// The points of a [`Manifold`], without heap allocation.
 pub type Points<S> = SmallVec<[ManifoldPoint<S>; 4]>;
 
 /// One point of a [`Manifold`].
@@ -27,10 +26,10 @@ pub struct ManifoldPoint<S> {
     pub on_a: Point3<S>,
     /// On the surface of the second.
     pub on_b: Point3<S>,
-    /// How far they are apart here, in metres; negative where they overlap.
+    /// Separation at this point, in metres; negative for a penetration.
     pub distance: S,
-    /// Names the corners, edges and faces that meet here: the same as long as these do.
-    /// Among hulls of more than 511 corners, two points may have one name.
+    /// Feature id: identifies the vertices, edges and faces that meet here, stable as long as they
+    /// do. Among hulls of more than 511 vertices, two points may share an id.
     pub feature: u32,
 }
 
@@ -43,14 +42,14 @@ struct ContactPoint {
     feature: u32,
 }
 
-type Touches = SmallVec<[ContactPoint; 8]>;
+type ContactPoints = SmallVec<[ContactPoint; 8]>;
 
-/// How much deeper the nearest points may be than all others, as a part of the sizes, until they
-/// are one of the points, too; and what tells its name from theirs.
-const BEYOND: f64 = 1e-3;
-const NEAREST: u32 = 1 << 30;
+/// Depth relative to the sizes by which the deepest points must exceed all others to be added, and
+/// the feature bit that marks them.
+const EXTRA_POINT_DEPTH: f64 = 1e-3;
+const DEEPEST_FEATURE: u32 = 1 << 30;
 
-/// Where two convex shapes touch, or are at most `margin` metres apart.
+/// Contact manifold of two convex shapes at most `margin` metres apart.
 #[must_use]
 pub fn manifold<S: Scalar>(
     a: &(impl Convex<S> + ?Sized),
@@ -58,31 +57,35 @@ pub fn manifold<S: Scalar>(
     margin: S,
 ) -> Manifold<S> {
     if a.as_sphere().is_some() || b.as_sphere().is_some() {
-        let Closest { distance, normal, on_a, on_b } = closest(a, b);
+        let ClosestPoints { distance, normal, on_a, on_b } = closest_points(a, b);
         let mut points = Points::new();
         if distance <= margin {
             points.push(ManifoldPoint { on_a, on_b, distance, feature: 0 });
         }
         return Manifold { normal, points };
     }
-    let origin = cast_point::<S, f64>(a.middle());
+    let origin = cast_point::<S, f64>(a.center());
     let (x, y) = (a.core(origin), b.core(origin));
     let margin = margin.as_f64();
-    let Some(nearest) = within(&x, &y, margin) else {
+    let Some(nearest) = core_distance(&x, &y, margin) else {
         let normal = direction_and_length(y.inside() - x.inside());
         let normal = cast_vector(normal.map_or_else(Vec3::unit_x, |(normal, _)| normal));
         return Manifold { normal, points: Points::new() };
     };
     let (normal, distance) = (nearest.normal(), nearest.distance());
-    let face_of_b = || y.face_along(-normal).map(Of::FaceOfB);
-    let of = x.face_along(normal).map(Of::FaceOfA).or_else(face_of_b).unwrap_or(Of::Edges);
-    let mut points = contact_points(&x, &y, &Axis { normal, separation: distance, of });
+    let face_of_b = || y.face_along(-normal).map(AxisSource::FaceOfB);
+    let of = x
+        .face_along(normal)
+        .map(AxisSource::FaceOfA)
+        .or_else(face_of_b)
+        .unwrap_or(AxisSource::Edges);
+    let mut points = contact_points(&x, &y, &Axis { normal, separation: distance, source: of });
     points.retain(|point| point.distance - x.radius - y.radius <= margin);
-    // Where the face is a little off the normal, the deepest point may lie beyond its edge.
+    // If the face is slightly oblique to the normal, the deepest point may lie beyond its edge.
     let bottom = points.iter().map(|point| point.distance).fold(f64::INFINITY, f64::min);
-    if bottom - distance > BEYOND * (x.size() + y.size()) {
-        let Between { on_a, on_b, .. } = nearest.between(&x, &y);
-        let feature = NEAREST | x.support(normal).1 << 10 | y.support(-normal).1;
+    if bottom - distance > EXTRA_POINT_DEPTH * (x.size() + y.size()) {
+        let LocalClosestPoints { on_a, on_b, .. } = nearest.local_closest_points(&x, &y);
+        let feature = DEEPEST_FEATURE | x.support(normal).1 << 10 | y.support(-normal).1;
         points.push(ContactPoint { on_a, on_b, distance, feature });
     }
     reduce(&mut points, normal);
@@ -96,8 +99,8 @@ pub fn manifold<S: Scalar>(
     Manifold { normal: cast_vector(normal), points: public.collect() }
 }
 
-/// The middle of where two cores, without their radii, are deepest in each other along the
-/// normal of a face.
+/// Mean of the deepest contact points of two cores, without their radii, along the normal of a
+/// face.
 pub(super) fn deepest(a: &Core<'_>, b: &Core<'_>, axis: &Axis) -> (Vec3<f64>, Vec3<f64>) {
     let points = contact_points(a, b, axis);
     let bottom = points.iter().map(|p| p.distance).fold(f64::INFINITY, f64::min);
@@ -107,34 +110,36 @@ pub(super) fn deepest(a: &Core<'_>, b: &Core<'_>, axis: &Axis) -> (Vec3<f64>, Ve
         sum += point.on_b;
         count += 1.0;
     }
-    // What rounding cut away is at the farthest corner.
+    // If rounding clipped everything, the support point.
     let on_b = if count > 0.0 { sum / count } else { b.support(-axis.normal).0 };
     (on_b - axis.normal * axis.separation, on_b)
 }
 
-/// Where two cores, without their radii, touch along an axis: the part of the one's face
-/// that is over the other's, or what two lines side by side share, if they do.
-fn contact_points(a: &Core<'_>, b: &Core<'_>, axis: &Axis) -> Touches {
-    match axis.of {
-        Of::FaceOfA(face) => over_face(a, face, b, axis.normal),
-        Of::FaceOfB(face) => {
-            let mut points = over_face(b, face, a, -axis.normal);
+/// Contact points of two cores, without their radii, along an axis: one face clipped against the
+/// other, or the overlap of two parallel segments.
+fn contact_points(a: &Core<'_>, b: &Core<'_>, axis: &Axis) -> ContactPoints {
+    match axis.source {
+        AxisSource::FaceOfA(face) => clip_to_face(a, face, b, axis.normal),
+        AxisSource::FaceOfB(face) => {
+            let mut points = clip_to_face(b, face, a, -axis.normal);
             for point in &mut points {
                 (point.on_a, point.on_b) = (point.on_b, point.on_a);
                 point.feature |= 1 << 31;
             }
             points
         }
-        Of::Edges => match (&a.kind, &b.kind) {
-            (Kind::Segment(a), Kind::Segment(b)) => side_by_side(*a, *b, axis.normal),
-            _ => Touches::new(),
+        AxisSource::Edges => match (&a.kind, &b.kind) {
+            (Kind::Segment(a), Kind::Segment(b)) => {
+                contact_points_of_parallel_segments(*a, *b, axis.normal)
+            }
+            _ => ContactPoints::new(),
         },
     }
 }
 
-/// The points of what of `other` faces a face of `one`, cut to its outline (Sutherland and
+/// Clips the face of `other` that faces a face of `one` against its side planes (Sutherland and
 /// Hodgman 1974).
-fn over_face(one: &Core<'_>, face: usize, other: &Core<'_>, normal: Vec3<f64>) -> Touches {
+fn clip_to_face(one: &Core<'_>, face: usize, other: &Core<'_>, normal: Vec3<f64>) -> ContactPoints {
     let (plane, corners) = (one.normal(face), one.face(face));
     let mut outline = other.facing(-normal);
     for side in 0..corners.len() {
@@ -145,8 +150,8 @@ fn over_face(one: &Core<'_>, face: usize, other: &Core<'_>, normal: Vec3<f64>) -
             continue;
         }
         outline = match outline[..] {
-            [here, next] => cut_segment([here, next], side as u32, height),
-            _ => cut(&outline, side as u32, height),
+            [here, next] => clip_segment([here, next], side as u32, height),
+            _ => clip_polygon(&outline, side as u32, height),
         };
     }
     let from = corners[0].0;
@@ -165,12 +170,16 @@ fn over_face(one: &Core<'_>, face: usize, other: &Core<'_>, normal: Vec3<f64>) -
         .collect()
 }
 
-/// Names the sides that an outline is cut along, beside the edges that it had.
-const CUT: u32 = 512;
+/// Feature ids of clip planes start here, after those of edges.
+const CLIP_FEATURE: u32 = 512;
 
-/// What of a polygon is not above a side. Each corner has the name of the edge after it.
-fn cut(outline: &[Corner], side: u32, height: impl Fn(Vec3<f64>) -> f64) -> Outline {
-    let mut left = Outline::new();
+/// Clips a polygon against a side plane. Each vertex has the id of the edge after it.
+fn clip_polygon(
+    outline: &[IndexedVertex],
+    side: u32,
+    height: impl Fn(Vec3<f64>) -> f64,
+) -> Polygon {
+    let mut left = Polygon::new();
     for (i, here) in outline.iter().enumerate() {
         let next = outline[(i + 1) % outline.len()];
         let (h, k) = (height(here.0), height(next.0));
@@ -179,7 +188,7 @@ fn cut(outline: &[Corner], side: u32, height: impl Fn(Vec3<f64>) -> f64) -> Outl
         }
         let crossing = here.0 + (next.0 - here.0) * (h / (h - k));
         if h < 0.0 && k > 0.0 {
-            left.push((crossing, CUT + side));
+            left.push((crossing, CLIP_FEATURE + side));
         } else if h > 0.0 && k < 0.0 {
             left.push((crossing, here.1));
         }
@@ -187,24 +196,32 @@ fn cut(outline: &[Corner], side: u32, height: impl Fn(Vec3<f64>) -> f64) -> Outl
     left
 }
 
-/// What of a segment is not above a side. Each end has its own name.
-fn cut_segment([here, next]: [Corner; 2], side: u32, height: impl Fn(Vec3<f64>) -> f64) -> Outline {
+/// Clips a segment against a side plane. Each end has its own id.
+fn clip_segment(
+    [here, next]: [IndexedVertex; 2],
+    side: u32,
+    height: impl Fn(Vec3<f64>) -> f64,
+) -> Polygon {
     let (h, k) = (height(here.0), height(next.0));
-    let crossing = (here.0 + (next.0 - here.0) * (h / (h - k)), CUT + side);
+    let crossing = (here.0 + (next.0 - here.0) * (h / (h - k)), CLIP_FEATURE + side);
     match (h <= 0.0, k <= 0.0) {
         (true, true) => [here, next].into_iter().collect(),
         (true, false) => [here, crossing].into_iter().collect(),
         (false, true) => [crossing, next].into_iter().collect(),
-        (false, false) => Outline::new(),
+        (false, false) => Polygon::new(),
     }
 }
 
-/// The ends of what two parallel lines share, else nothing.
-fn side_by_side([p, q]: [Vec3<f64>; 2], other: [Vec3<f64>; 2], normal: Vec3<f64>) -> Touches {
-    let mut points = Touches::new();
+/// End points of the overlap of two parallel segments, if any.
+fn contact_points_of_parallel_segments(
+    [p, q]: [Vec3<f64>; 2],
+    other: [Vec3<f64>; 2],
+    normal: Vec3<f64>,
+) -> ContactPoints {
+    let mut points = ContactPoints::new();
     let (along, across) = (direction_and_length(q - p), direction_and_length(other[1] - other[0]));
     let (Some((along, long)), Some((across, _))) = (along, across) else { return points };
-    if along.cross(across).magnitude2() > FLAT * FLAT {
+    if along.cross(across).magnitude2() > PARALLEL_SIN * PARALLEL_SIN {
         return points;
     }
     for (number, end) in (0..).zip(other) {
@@ -220,9 +237,9 @@ fn side_by_side([p, q]: [Vec3<f64>; 2], other: [Vec3<f64>; 2], normal: Vec3<f64>
     points
 }
 
-/// Leaves four of many points: the deepest, the farthest from it, and on both sides of the
-/// line between them the one that makes the largest triangle.
-fn reduce(points: &mut Touches, normal: Vec3<f64>) {
+/// Reduces the manifold to four points: the deepest, the farthest from it, and on both sides of the
+/// line between them the one that spans the largest triangle.
+fn reduce(points: &mut ContactPoints, normal: Vec3<f64>) {
     if points.len() <= 4 {
         return;
     }
@@ -239,7 +256,7 @@ fn reduce(points: &mut Touches, normal: Vec3<f64>) {
         |p: &ContactPoint| (farthest.on_a - deepest.on_a).cross(p.on_a - deepest.on_a).dot(normal);
     let (left, high) = best(&side);
     let (right, low) = best(&|p| -side(p));
-    let mut kept: Touches = [deepest, farthest].into_iter().collect();
+    let mut kept: ContactPoints = [deepest, farthest].into_iter().collect();
     kept.extend((high > 0.0).then_some(left));
     kept.extend((low > 0.0).then_some(right));
     *points = kept;

@@ -1,72 +1,76 @@
-//! When things touch, and by how much: tests between two shapes, and the lists of
-//! touches that a step works through. Who is tested against whom is decided in
-//! [`broad`](crate::broad).
+//! Narrow phase: distance, penetration, contact manifolds, ray casts and shape casts between two
+//! shapes, and the lists of contacts of a step. Candidate pairs come from [`broad`](crate::broad).
 //!
-//! # Which function answers what
+//! # Which function computes what
 //!
-//! | of | whether | how far, and the way out | where, as points | when |
+//! | pair | overlap test | distance and penetration | contact points | time of impact |
 //! |---|---|---|---|---|
-//! | two spheres | [`touching_sphere_sphere`] | [`mtv_sphere_sphere`], [`closest`] | [`manifold`] | [`time_of_impact_sphere_sphere`] |
-//! | sphere and half-space | [`touching_sphere_plane`] | [`mtv_sphere_plane`], [`closest_plane`] | | |
-//! | any bounded shape and half-space | [`Closest::touching`] | [`closest_plane`] | | |
-//! | any two of sphere, box, capsule and hull | [`Closest::touching`] | [`closest`] | [`manifold`] | [`sweep`] |
-//! | two of these that turn as they move | | | | [`sweep_turning`] |
-//! | any two shapes, compounds too | [`Closest::touching`] | [`closest_shapes`] | [`manifolds_of_shapes`] | [`sweep_shapes`] |
-//! | a mesh or height field and any of these | [`Closest::touching`] | [`closest_of_surface`] | [`manifolds_of_surface`] | [`sweep_against_surface`] |
-//! | ray and any shape | [`Cast::cast`], [`cast_on_surface`] | | | |
+//! | two spheres | [`touching_sphere_sphere`] | [`mtv_sphere_sphere`], [`closest_points`] | [`manifold`] | [`time_of_impact_sphere_sphere`] |
+//! | sphere and half-space | [`touching_sphere_plane`] | [`mtv_sphere_plane`], [`closest_points_of_plane`] | | |
+//! | any bounded shape and half-space | [`ClosestPoints::touching`] | [`closest_points_of_plane`] | | |
+//! | any two of sphere, box, capsule and hull | [`ClosestPoints::touching`] | [`closest_points`] | [`manifold`] | [`shape_cast`] |
+//! | two of these, rotating as they move | | | | [`time_of_impact`] |
+//! | any two shapes, compounds included | [`ClosestPoints::touching`] | [`closest_points_of_shapes`] | [`manifolds_of_shapes`] | [`shape_cast_of_shapes`] |
+//! | mesh or height field and any of these | [`ClosestPoints::touching`] | [`closest_points_of_surface`] | [`manifolds_of_surface`] | [`shape_cast_on_surface`] |
+//! | ray and any shape | [`RayCast::cast_ray`], [`ray_cast_on_surface`] | | | |
 //!
-//! How right a distance is, and by which method it is found:
+//! Methods and accuracy of the distance:
 //!
-//! | of | method | right to |
+//! | pair | method | accurate to |
 //! |---|---|---|
-//! | sphere and anything | the nearest point, in closed form | 4 epsilons of the scalar, of the largest coordinate |
-//! | half-space and anything | the farthest point behind it | the same |
-//! | two capsules | the nearest points of two lines, in closed form | 4e-12 of their size |
-//! | two boxes | fifteen axes if they overlap, else as all others | 4e-12 |
-//! | all others | corners that are farthest in some directions, until a bound from below and one from above agree | 4e-12 |
-//! | sweeps along lines | planes that keep them apart | 1e-10 of their size, never late |
-//! | sweeps that turn | the same, with bent paths | 1e-6 of their size, never late |
+//! | sphere and anything | point projection in closed form | 4 epsilons of the scalar, of the largest coordinate |
+//! | half-space and anything | support point | 4 epsilons of the scalar, of the largest coordinate |
+//! | two capsules | closest points of two segments, in closed form | 4e-12 of their size |
+//! | two boxes | separating axis test (15 axes) if they overlap, else GJK | 4e-12 |
+//! | all others | GJK and EPA, until a lower and an upper bound agree | 4e-12 |
+//! | shape casts along lines | conservative advancement | 1e-10 of their size, never late |
+//! | shape casts with rotation | conservative advancement with bent paths | 1e-6 of their size, never late |
 //!
-//! But for the first two, all is found in `f64` about the middle of one of the two, and rounded
-//! once to the scalar. Where edges or faces are parallel but for less than 1e-7 rad, the
-//! distance is right to that angle. `tests/degenerate.rs` is the table of what breaks such
-//! code elsewhere.
+//! Except for the first two, all are computed in `f64` relative to the center of one of the two
+//! shapes, and rounded once to the scalar. Where edges or faces are parallel to within 1e-7 rad,
+//! the distance is accurate to that angle. `tests/degenerate.rs` lists degenerate cases that break
+//! such code elsewhere.
 //!
-//! # The displacement
-//! Every test gives the *minimum translation vector*: the shortest displacement
-//! of the second thing that takes it out of the first. Touching without overlap
-//! is a touch, with a displacement of zero.
+//! # Minimum translation vector
+//! Every penetration is given as the *minimum translation vector* (`mtv`): the shortest
+//! displacement of the second shape that takes it out of the first. Touching without overlap is a
+//! contact with a displacement of zero.
 
-mod boxes;
+mod box_box;
+mod brute_force;
 mod closest;
 mod compound;
+mod contacts;
 mod core;
-mod exhaustive;
+mod epa;
 mod gjk;
-mod list;
 mod manifold;
-mod polytope;
-mod ray;
+mod ray_cast;
+mod shape_cast;
 mod sphere_plane;
 mod sphere_sphere;
 mod surface;
-mod sweep;
-mod turning;
+mod time_of_impact;
 
-pub use closest::{Closest, closest, closest_exhaustive, closest_plane};
-pub use compound::{OfParts, closest_shapes, manifolds_of_shapes, parts_of, sweep_shapes};
+pub use brute_force::Features;
+pub use closest::{
+    ClosestPoints, closest_points, closest_points_brute_force, closest_points_of_plane,
+};
+pub use compound::{
+    SubShapeResult, closest_points_of_shapes, manifolds_of_shapes, shape_cast_of_shapes, sub_shapes,
+};
+pub use contacts::{Contact, Contacts};
 pub use core::{Convex, Core};
-pub use exhaustive::Skeleton;
-pub use list::{Contact, Contacts};
 pub use manifold::{Manifold, ManifoldPoint, Points, manifold};
-pub use ray::{Cast, RayHit};
+pub use ray_cast::{RayCast, RayHit};
+pub use shape_cast::{ShapeCastHit, shape_cast};
 pub use sphere_plane::{mtv_sphere_plane, touching_sphere_plane};
 pub use sphere_sphere::{mtv_sphere_sphere, time_of_impact_sphere_sphere, touching_sphere_sphere};
 pub use surface::{
-    OfTriangle, cast_on_surface, closest_of_surface, manifolds_of_surface, sweep_against_surface,
+    TriangleResult, closest_points_of_surface, manifolds_of_surface, ray_cast_on_surface,
+    shape_cast_on_surface,
 };
-pub use sweep::{Touch, sweep};
-pub use turning::{Course, sweep_turning};
+pub use time_of_impact::{Sweep, time_of_impact};
 
 #[cfg(test)]
 mod tests {
@@ -96,8 +100,8 @@ mod tests {
         })
     }
 
-    /// Asserts that `mtv` takes the sphere out, and that nothing shorter by 0.1 %
-    /// does. `separation` is how far apart the two are, negative for an overlap.
+    /// Asserts that `mtv` takes the sphere out, and that nothing shorter by 0.1 % does.
+    /// `separation` is the distance of the two, negative for an overlap.
     fn assert_separates_and_is_minimal<S: Scalar>(
         b: &Sphere<S>,
         mtv: Vec3<S>,

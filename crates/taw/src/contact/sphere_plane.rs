@@ -1,18 +1,17 @@
 use crate::math::{Scalar, Vec3};
 use crate::shape::{Plane, Sphere};
 
-/// Whether a sphere touches a half-space: its center is at most a radius in front
-/// of the surface, or anywhere behind it (Ericson, *Real-Time Collision
-/// Detection*, 2005, §5.2.2, the half-space case).
+/// Overlap test of a sphere and a half-space: the center is at most a radius in front of the
+/// surface, or anywhere behind it (Ericson, *Real-Time Collision Detection*, 2005, §5.2.2, the
+/// half-space case).
 #[must_use]
 #[inline]
 pub fn touching_sphere_plane<S: Scalar>(sphere: &Sphere<S>, plane: &Plane<S>) -> bool {
     plane.signed_distance(sphere.center) <= sphere.radius
 }
 
-/// The shortest displacement of the sphere that takes it out of the half-space,
-/// or `None` if they do not touch. Always along the normal: a sphere whose center
-/// is behind the surface comes back out in front.
+/// Minimum translation vector of the sphere out of the half-space, or `None` if they do not touch.
+/// Always along the normal: a sphere whose center is behind the surface comes back out in front.
 #[must_use]
 #[inline]
 pub fn mtv_sphere_plane<S: Scalar>(sphere: &Sphere<S>, plane: &Plane<S>) -> Option<Vec3<S>> {

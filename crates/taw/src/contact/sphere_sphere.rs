@@ -3,17 +3,16 @@ use cgmath::InnerSpace;
 use crate::math::{Scalar, Vec3, direction_and_length, length};
 use crate::shape::Sphere;
 
-/// Whether two spheres touch: the distance of their centers is at most the sum of
-/// their radii (Ericson, *Real-Time Collision Detection*, 2005, §4.3.1, there
-/// squared on both sides, which overflows sooner).
+/// Overlap test of two spheres: the distance of their centers is at most the sum of their radii
+/// (Ericson, *Real-Time Collision Detection*, 2005, §4.3.1, there squared on both sides, which
+/// overflows sooner).
 #[must_use]
 #[inline]
 pub fn touching_sphere_sphere<S: Scalar>(a: &Sphere<S>, b: &Sphere<S>) -> bool {
     length(b.center - a.center) <= a.radius + b.radius
 }
 
-/// The shortest displacement of `b` that parts it from `a`, or `None` if they do
-/// not touch.
+/// Minimum translation vector of `b` out of `a`, or `None` if they do not touch.
 ///
 /// It points from the center of `a` to that of `b`. Where the centers coincide
 /// every direction is equally short; then it is **+x**.
@@ -28,26 +27,25 @@ pub fn mtv_sphere_sphere<S: Scalar>(a: &Sphere<S>, b: &Sphere<S>) -> Option<Vec3
     }
 }
 
-/// When two spheres that move along straight lines first touch, as a part of their
-/// motion in `[0, 1]`; `a_moves` and `b_moves` are all of it. None if they do not, or
-/// touch at the start already.
+/// Time of impact of two spheres that translate along straight lines, as a fraction of their motion
+/// in `[0, 1]`. None if they do not meet, or touch at the start already.
 #[must_use]
 pub fn time_of_impact_sphere_sphere<S: Scalar>(
     a: &Sphere<S>,
-    a_moves: Vec3<S>,
+    a_translation: Vec3<S>,
     b: &Sphere<S>,
-    b_moves: Vec3<S>,
+    b_translation: Vec3<S>,
 ) -> Option<S> {
-    let (apart, motion) = (b.center - a.center, b_moves - a_moves);
+    let (apart, motion) = (b.center - a.center, b_translation - a_translation);
     let reach = a.radius + b.radius;
     let distance = length(apart);
-    // In units of the reach, so that no square vanishes or overflows.
+    // In units of the sum of radii, so that no square vanishes or overflows.
     let (d, m) = (apart / reach, motion / reach);
     let open = (distance / reach - S::one()) * (distance / reach + S::one());
     let (slope, squared) = (d.dot(m), m.magnitude2());
     let discriminant = slope * slope - squared * open;
     let meets = open > S::zero() && slope < S::zero() && discriminant >= S::zero();
-    // The smaller zero of the quadratic, in the form that subtracts nothing.
+    // Smaller root of the quadratic, in the form without cancellation.
     let time = open / (discriminant.sqrt() - slope);
     (meets && time <= S::one()).then_some(time)
 }

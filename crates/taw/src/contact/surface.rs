@@ -1,79 +1,80 @@
 use cgmath::{EuclideanSpace, InnerSpace};
 
-use super::closest::{Between, Closest, between_within, closest};
+use super::closest::{
+    ClosestPoints, LocalClosestPoints, closest_points, local_closest_points_within,
+};
 use super::core::{Convex, Core, Kind};
 use super::manifold::{Manifold, manifold};
-use super::ray::RayHit;
-use super::sweep::{Touch, sweep};
+use super::ray_cast::RayHit;
+use super::shape_cast::{ShapeCastHit, shape_cast};
 use crate::frame::Ray;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
-use crate::shape::{Aabb, Box3, Sphere, Surface, Triangle};
+use crate::shape::{Aabb, Aabb3, Sphere, Surface, Triangle};
 
-/// What one triangle of a surface says.
+/// Result for one triangle of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct OfTriangle<T> {
-    /// Its number.
+pub struct TriangleResult<T> {
+    /// Index of the triangle.
     pub triangle: u32,
-    /// The answer, with the triangle as the first and the shape as the second.
-    pub answer: T,
+    /// Result of the query, with the triangle as the first shape.
+    pub result: T,
 }
 
-/// A box, and a margin around it.
-fn around<S: Scalar>(bounds: Box3<S>, margin: S) -> Box3<S> {
+/// Expands a box by a margin.
+fn expanded<S: Scalar>(bounds: Aabb3<S>, margin: S) -> Aabb3<S> {
     let more = Vec3::new(margin, margin, margin);
     Aabb { min: bounds.min - more, max: bounds.max + more }
 }
 
-/// Where a surface is nearest to a convex shape, or deepest in it, if that is within
-/// `margin` metres.
+/// Closest points of a surface and a convex shape, if within `margin` metres.
 #[must_use]
-pub fn closest_of_surface<S: Scalar>(
+pub fn closest_points_of_surface<S: Scalar>(
     surface: &impl Surface<S>,
     shape: &(impl Convex<S> + ?Sized),
     margin: S,
-) -> Option<OfTriangle<Closest<S>>> {
+) -> Option<TriangleResult<ClosestPoints<S>>> {
     if let Some(sphere) = shape.as_sphere() {
         return closest_of_sphere(surface, &sphere, margin);
     }
-    let origin = cast_point::<S, f64>(shape.middle());
+    let origin = cast_point::<S, f64>(shape.center());
     let core = shape.core(origin);
-    // Rounding must not hide who is as near.
+    // Rounding must not hide a tie.
     let rounding = 1e-9 * core.size();
-    let mut best: Option<(f64, u32, Between)> = None;
-    surface.near(&around(shape.bounding_box(), margin), |number| {
+    let mut best: Option<(f64, u32, LocalClosestPoints)> = None;
+    surface.for_each_in_box(&expanded(shape.bounding_box(), margin), |number| {
         let Some(triangle) = surface.triangle(number) else { return };
         let limit = best.map_or(margin.as_f64(), |(distance, ..)| distance + rounding);
         let triangle = triangle.core(origin);
-        if at_least(&triangle, &core) > limit {
+        if distance_lower_bound(&triangle, &core) > limit {
             return;
         }
-        if let Some(found) = between_within(&triangle, &core, limit)
+        if let Some(found) = local_closest_points_within(&triangle, &core, limit)
             && best.is_none_or(|(distance, other, _)| (found.distance, number) < (distance, other))
         {
             best = Some((found.distance, number, found));
         }
     });
-    best.map(|(_, triangle, found)| OfTriangle { triangle, answer: found.about(origin) })
+    best.map(|(_, triangle, found)| TriangleResult { triangle, result: found.about(origin) })
 }
 
 fn closest_of_sphere<S: Scalar>(
     surface: &impl Surface<S>,
     sphere: &Sphere<S>,
     margin: S,
-) -> Option<OfTriangle<Closest<S>>> {
+) -> Option<TriangleResult<ClosestPoints<S>>> {
     let origin = cast_point::<S, f64>(sphere.center);
     let mut best: Option<(f64, u32)> = None;
     let mut reach = sphere.radius + margin;
-    surface.around(sphere.center, reach, |number| {
+    surface.for_each_near(sphere.center, reach, |number| {
         let Some(triangle) = surface.triangle(number) else { return reach };
         let corners = triangle.corners.map(|corner| cast_point::<S, f64>(corner) - origin);
         let limit = best.map_or(f64::MAX, |(squared, _)| squared);
-        // Its plane may be too far already; with room for rounding.
+        // The plane may be too far already; with a tolerance for rounding.
         let normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
         let height = corners[0].dot(normal);
         if height * height <= limit * normal.magnitude2() * (1.0 + 1e-9) {
             let corners = corners.map(EuclideanSpace::from_vec);
-            let squared = Triangle { corners }.closest_to_origin().to_vec().magnitude2();
+            let squared = Triangle { corners }.project_origin().to_vec().magnitude2();
             if best.is_none_or(|best| (squared, number) < best) {
                 best = Some((squared, number));
                 reach = S::constant(squared.sqrt());
@@ -82,12 +83,12 @@ fn closest_of_sphere<S: Scalar>(
         reach
     });
     let (_, triangle) = best?;
-    let answer = closest(&surface.triangle(triangle)?, sphere);
-    (answer.distance <= margin).then_some(OfTriangle { triangle, answer })
+    let result = closest_points(&surface.triangle(triangle)?, sphere);
+    (result.distance <= margin).then_some(TriangleResult { triangle, result })
 }
 
-/// How far a triangle and a shape are apart at least: along the normal of the triangle.
-fn at_least(triangle: &Core<'_>, core: &Core<'_>) -> f64 {
+/// Lower bound of the distance of a triangle and a shape: separation along the triangle's normal.
+fn distance_lower_bound(triangle: &Core<'_>, core: &Core<'_>) -> f64 {
     let Kind::Triangle([a, b, c]) = &triangle.kind else { return f64::NEG_INFINITY };
     let Some((normal, _)) = direction_and_length((b - a).cross(c - a)) else {
         return f64::NEG_INFINITY;
@@ -98,41 +99,42 @@ fn at_least(triangle: &Core<'_>, core: &Core<'_>) -> f64 {
     above.max(below) - core.radius
 }
 
-/// Where a convex shape touches a surface, or is at most `margin` metres from it: triangle
-/// by triangle, in the order of their numbers.
+/// Contact manifolds of a convex shape on a surface, one per triangle at most `margin` metres away,
+/// in the order of triangle indices.
 #[must_use]
 pub fn manifolds_of_surface<S: Scalar>(
     surface: &impl Surface<S>,
     shape: &(impl Convex<S> + ?Sized),
     margin: S,
-) -> Vec<OfTriangle<Manifold<S>>> {
+) -> Vec<TriangleResult<Manifold<S>>> {
     let mut numbers = Vec::new();
-    surface.near(&around(shape.bounding_box(), margin), |number| numbers.push(number));
+    surface.for_each_in_box(&expanded(shape.bounding_box(), margin), |number| numbers.push(number));
     numbers.sort_unstable();
     numbers.dedup();
     let touches = numbers.into_iter().filter_map(|number| {
-        let answer = manifold(&surface.triangle(number)?, shape, margin);
-        (!answer.points.is_empty()).then_some(OfTriangle { triangle: number, answer })
+        let result = manifold(&surface.triangle(number)?, shape, margin);
+        (!result.points.is_empty()).then_some(TriangleResult { triangle: number, result })
     });
     touches.collect()
 }
 
-/// When a convex shape that moves along a line, without turning, first touches a surface, if
-/// it does; as [`sweep`] of each of its triangles.
+/// First contact of a convex shape that translates along a line with a surface, if any; as
+/// [`shape_cast`] of each of its triangles.
 #[must_use]
-pub fn sweep_against_surface<S: Scalar>(
+pub fn shape_cast_on_surface<S: Scalar>(
     surface: &impl Surface<S>,
     shape: &(impl Convex<S> + ?Sized),
-    moves: Vec3<S>,
-) -> Option<OfTriangle<Touch<S>>> {
-    let (mut best, start): (Option<OfTriangle<Touch<S>>>, _) = (None, shape.bounding_box());
-    let end = Aabb { min: start.min + moves, max: start.max + moves };
+    translation: Vec3<S>,
+) -> Option<TriangleResult<ShapeCastHit<S>>> {
+    let (mut best, start): (Option<TriangleResult<ShapeCastHit<S>>>, _) =
+        (None, shape.bounding_box());
+    let end = Aabb { min: start.min + translation, max: start.max + translation };
     let still = Vec3::new(S::zero(), S::zero(), S::zero());
-    surface.near(&start.union(&end), |number| {
+    surface.for_each_in_box(&start.union(&end), |number| {
         let triangle = surface.triangle(number);
-        if let Some(answer) = triangle.and_then(|it| sweep(&it, still, shape, moves)) {
-            let key = |of: &OfTriangle<Touch<S>>| (of.answer.time, of.triangle);
-            let next = OfTriangle { triangle: number, answer };
+        if let Some(result) = triangle.and_then(|it| shape_cast(&it, still, shape, translation)) {
+            let key = |of: &TriangleResult<ShapeCastHit<S>>| (of.result.time, of.triangle);
+            let next = TriangleResult { triangle: number, result };
             if best.as_ref().is_none_or(|best| key(&next) < key(best)) {
                 best = Some(next);
             }
@@ -141,27 +143,27 @@ pub fn sweep_against_surface<S: Scalar>(
     best
 }
 
-/// Where a ray first meets a surface, from whichever side, within a distance.
+/// First hit of a ray on a surface, from either side, within a distance.
 ///
-/// No ray slips between two triangles that share an edge: both count the edge alike (Woop,
-/// Benthin and Wald, *Watertight ray/triangle intersection*, 2013).
+/// Watertight: no ray slips between two triangles that share an edge, since both test the edge
+/// alike (Woop, Benthin and Wald, *Watertight ray/triangle intersection*, 2013).
 #[must_use]
-pub fn cast_on_surface<S: Scalar>(
+pub fn ray_cast_on_surface<S: Scalar>(
     surface: &impl Surface<S>,
     ray: &Ray<S>,
-    longest: S,
-) -> Option<OfTriangle<RayHit<S>>> {
-    // Beyond the surface there is none of it.
+    max_distance: S,
+) -> Option<TriangleResult<RayHit<S>>> {
+    // The ray ends beyond the bounds.
     let bounds = surface.bounds();
     let far = bounds.max - bounds.min;
     let reach = (bounds.center() - ray.origin).magnitude() + far.magnitude();
-    let motion = ray.direction * reach.min(longest);
-    let mut best: Option<OfTriangle<RayHit<S>>> = None;
-    surface.along(ray.origin, motion, |number| {
+    let motion = ray.direction * reach.min(max_distance);
+    let mut best: Option<TriangleResult<RayHit<S>>> = None;
+    surface.for_each_on_segment(ray.origin, motion, |number| {
         let Some(triangle) = surface.triangle(number) else { return };
-        if let Some(answer) = meet(triangle.corners, ray, longest) {
-            let key = |of: &OfTriangle<RayHit<S>>| (of.answer.distance, of.triangle);
-            let next = OfTriangle { triangle: number, answer };
+        if let Some(result) = intersect_triangle(triangle.corners, ray, max_distance) {
+            let key = |of: &TriangleResult<RayHit<S>>| (of.result.distance, of.triangle);
+            let next = TriangleResult { triangle: number, result };
             if best.as_ref().is_none_or(|best| key(&next) < key(best)) {
                 best = Some(next);
             }
@@ -170,11 +172,15 @@ pub fn cast_on_surface<S: Scalar>(
     best
 }
 
-fn meet<S: Scalar>(corners: [Point3<S>; 3], ray: &Ray<S>, longest: S) -> Option<RayHit<S>> {
+fn intersect_triangle<S: Scalar>(
+    corners: [Point3<S>; 3],
+    ray: &Ray<S>,
+    max_distance: S,
+) -> Option<RayHit<S>> {
     let origin = cast_point::<S, f64>(ray.origin);
     let (along, _) = direction_and_length(cast_vector::<S, f64>(ray.direction))?;
     let [a, b, c] = corners.map(|corner| cast_point::<S, f64>(corner) - origin);
-    // Sheared so that the ray runs along its greatest axis.
+    // Sheared so that the ray runs along its dominant axis.
     let z = (1..3).fold(0, |most, i| if along[i].abs() > along[most].abs() { i } else { most });
     let (x, y) = ((z + 1) % 3, (z + 2) % 3);
     let flat =
@@ -189,7 +195,7 @@ fn meet<S: Scalar>(corners: [Point3<S>; 3], ray: &Ray<S>, longest: S) -> Option<
     let at = (a * weights[0] + b * weights[1] + c * weights[2]) / sum;
     let distance = at.dot(along);
     let (normal, _) = direction_and_length((b - a).cross(c - a))?;
-    (distance >= 0.0 && distance <= longest.as_f64()).then(|| RayHit {
+    (distance >= 0.0 && distance <= max_distance.as_f64()).then(|| RayHit {
         distance: S::constant(distance),
         point: cast_point(origin + along * distance),
         normal: cast_vector(if normal.dot(along) > 0.0 { -normal } else { normal }),

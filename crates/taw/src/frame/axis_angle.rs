@@ -12,7 +12,7 @@ pub struct AxisAngle<S> {
 }
 
 impl<S: Scalar> AxisAngle<S> {
-    /// The rotation by `angle` radians about a direction of any length but zero.
+    /// Creates the rotation by `angle` radians about a direction of any length except zero.
     ///
     /// # Errors
     /// [`Error::NotFinite`], or [`Error::NotUnit`] if the axis is zero.
@@ -25,13 +25,13 @@ impl<S: Scalar> AxisAngle<S> {
         Ok(Self { axis, angle })
     }
 
-    /// A unit vector.
+    /// Axis, a unit vector.
     #[must_use]
     pub fn axis(self) -> Vec3<S> {
         self.axis
     }
 
-    /// In radians.
+    /// Angle, in radians.
     #[must_use]
     pub fn angle(self) -> S {
         self.angle
@@ -46,7 +46,7 @@ impl<S: Scalar> From<AxisAngle<S>> for Quat<S> {
 }
 
 impl<S: Scalar> From<Quat<S>> for AxisAngle<S> {
-    /// The short way: an angle in [0, π]. No rotation at all is one about x.
+    /// The short way round: an angle in [0, π]. The identity becomes a zero rotation about x.
     fn from(rotation: Quat<S>) -> Self {
         let short = if rotation.s < S::zero() { -rotation } else { rotation };
         match direction_and_length(short.v) {

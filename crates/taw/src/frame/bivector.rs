@@ -4,34 +4,34 @@ use cgmath::Zero;
 
 use crate::math::{Scalar, Vec3};
 
-/// An oriented area: what turns, and how much. A torque, an angular velocity and an
-/// angular momentum are bivectors; in three dimensions each has an axial vector that is
-/// perpendicular to it and as long as it is large, its [dual](Bivector::dual).
+/// An oriented area. Torque, angular velocity and angular momentum are bivectors; in three
+/// dimensions each has an axial vector that is perpendicular to it and of equal magnitude, its
+/// [dual](Bivector::dual).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bivector<S> {
-    /// The part in the plane of y and z, from y toward z.
+    /// Component in the plane of y and z, from y toward z.
     pub yz: S,
-    /// The part in the plane of z and x, from z toward x.
+    /// Component in the plane of z and x, from z toward x.
     pub zx: S,
-    /// The part in the plane of x and y, from x toward y.
+    /// Component in the plane of x and y, from x toward y.
     pub xy: S,
 }
 
 impl<S: Scalar> Bivector<S> {
-    /// The parallelogram of two vectors, from `a` toward `b`: as a torque, that of the
-    /// force `b` at the end of the lever `a`.
+    /// Exterior product of two vectors, from `a` toward `b`: as a torque, that of the force `b` at
+    /// the lever arm `a`.
     #[must_use]
     pub fn wedge(a: Vec3<S>, b: Vec3<S>) -> Self {
         a.cross(b).into()
     }
 
-    /// The axial vector: about which axis it turns, by the right hand, and how much.
+    /// The axial vector: axis of rotation by the right hand, and magnitude.
     #[must_use]
     pub fn dual(self) -> Vec3<S> {
         Vec3::new(self.yz, self.zx, self.xy)
     }
 
-    /// Nothing.
+    /// The zero bivector.
     #[must_use]
     pub fn zero() -> Self {
         Vec3::zero().into()
@@ -39,7 +39,7 @@ impl<S: Scalar> Bivector<S> {
 }
 
 impl<S: Scalar> From<Vec3<S>> for Bivector<S> {
-    /// What turns about this axial vector.
+    /// The bivector of an axial vector.
     fn from(axial: Vec3<S>) -> Self {
         Self { yz: axial.x, zx: axial.y, xy: axial.z }
     }

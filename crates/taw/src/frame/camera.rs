@@ -5,12 +5,12 @@ use crate::Error;
 use crate::error::{positive, within};
 use crate::math::{Mat4, Point3, Scalar, Vec3};
 
-/// A half-line.
+/// A ray.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray<S> {
-    /// Where it begins.
+    /// Origin, in metres.
     pub origin: Point3<S>,
-    /// A unit vector.
+    /// Direction, a unit vector.
     pub direction: Vec3<S>,
 }
 
@@ -22,11 +22,11 @@ impl<S: Scalar> Ray<S> {
     }
 }
 
-/// What looks at a scene and draws it in perspective. On the screen, x goes from −1 at the
-/// left to 1 at the right, y from −1 at the bottom to 1 at the top.
+/// A perspective camera. Screen coordinates run from −1 at the left and the bottom to 1 at the
+/// right and the top.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Camera<S> {
-    /// Where it is; it looks along −z, and y is up.
+    /// Position and rotation; it looks along −z, and y is up.
     pub pose: Pose<S>,
     field_of_view: S,
     aspect: S,
@@ -35,8 +35,8 @@ pub struct Camera<S> {
 }
 
 impl<S: Scalar> Camera<S> {
-    /// A camera with a vertical field of view in radians, a width over height, and the
-    /// distances in metres of the nearest and the farthest that it draws.
+    /// Creates a camera from the vertical field of view in radians, the aspect ratio (width over
+    /// height), and the distances of the near and the far plane in metres.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a field of view outside of (0, π), or a far that is not
@@ -57,42 +57,41 @@ impl<S: Scalar> Camera<S> {
         Ok(Self { pose, field_of_view, aspect, near, far })
     }
 
-    /// From the world to the camera's own frame.
+    /// View matrix: from the world to the camera's frame.
     #[must_use]
     pub fn view(&self) -> Mat4<S> {
         self.pose.inverse().matrix()
     }
 
-    /// From the camera's own frame to the screen, and a depth from −1 at the near plane to
-    /// 1 at the far one, after the division by w.
+    /// Projection matrix: from the camera's frame to the screen, with a depth from −1 at the near
+    /// plane to 1 at the far one after the division by w.
     #[must_use]
     pub fn projection(&self) -> Mat4<S> {
         let Self { field_of_view, aspect, near, far, .. } = *self;
         PerspectiveFov { fovy: Rad(field_of_view), aspect, near, far }.to_perspective().into()
     }
 
-    /// Where on the screen a point is, unless it is behind the camera. It may be beside
-    /// the screen.
+    /// Projects a point to the screen, unless it is behind the camera. The result may be off the
+    /// screen.
     #[must_use]
     pub fn project(&self, point: Point3<S>) -> Option<Point2<S>> {
-        let local = self.pose.point_back(point);
+        let local = self.pose.inverse_transform_point(point);
         let [half_width, half_height] = self.half_sizes();
         let ahead = -local.z;
         (ahead > S::zero())
             .then(|| Point2::new(local.x / (ahead * half_width), local.y / (ahead * half_height)))
     }
 
-    /// What a place on the screen looks along: the way from the camera to all that it
-    /// hides.
+    /// Picking ray through a point of the screen.
     #[must_use]
     pub fn ray(&self, screen: Point2<S>) -> Ray<S> {
         let [half_width, half_height] = self.half_sizes();
         let local = Vec3::new(screen.x * half_width, screen.y * half_height, -S::one());
         let origin = Point3::from_vec(self.pose.translation);
-        Ray { origin, direction: self.pose.vector(local).normalize() }
+        Ray { origin, direction: self.pose.transform_vector(local).normalize() }
     }
 
-    /// Of the screen, one metre ahead.
+    /// Half width and half height of the view, one metre ahead.
     fn half_sizes(&self) -> [S; 2] {
         let (sin, cos) = (self.field_of_view * S::constant(0.5)).sin_cos_portable();
         [sin / cos * self.aspect, sin / cos]

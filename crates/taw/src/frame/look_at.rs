@@ -5,8 +5,8 @@ use crate::Error;
 use crate::error::finite_vector;
 use crate::math::{Mat3, Quat, Scalar, Vec3, direction_and_length};
 
-/// A rotation by what it makes of the axes: −z looks `forward`, y points `up`. Both are
-/// unit vectors, at right angles.
+/// A rotation given by the images of two axes: −z looks `forward`, y points `up`. Both are
+/// perpendicular unit vectors.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct LookAt<S> {
     forward: Vec3<S>,
@@ -14,9 +14,8 @@ pub struct LookAt<S> {
 }
 
 impl<S: Scalar> LookAt<S> {
-    /// What looks along a direction, as upright as it can: with `up` as near to that
-    /// direction as it gets. What looks straight up or down has its head where −z or z
-    /// is (or y, if that is where it looks).
+    /// Creates a rotation that looks along a direction with `up` as upright as possible. Straight
+    /// up or down, the up vector is −z or z instead (or y, if that is the direction).
     ///
     /// # Errors
     /// [`Error::NotFinite`], or [`Error::NotUnit`] if one of them is zero.
@@ -26,11 +25,11 @@ impl<S: Scalar> LookAt<S> {
         let zero = |field| Error::NotUnit { field, value: 0.0 };
         let (forward, _) = direction_and_length(forward).ok_or(zero("forward"))?;
         let (up, _) = direction_and_length(up).ok_or(zero("up"))?;
-        // What is left of a direction beside another one, if it is more than rounding.
+        // Component perpendicular to the direction, if it is more than rounding.
         let beside = |v: Vec3<S>| {
             let rest = v - forward * v.dot(forward);
             let (unit, length) = direction_and_length(rest)?;
-            // Once more, for what the first subtraction rounded.
+            // Once more, for the rounding of the first subtraction.
             let unit = (unit - forward * unit.dot(forward)).normalize();
             (length > S::epsilon() * S::constant(8.0)).then_some(unit)
         };
@@ -39,13 +38,13 @@ impl<S: Scalar> LookAt<S> {
         Ok(Self { forward, up: up.unwrap_or_else(Vec3::unit_y) })
     }
 
-    /// Where it looks.
+    /// Forward direction.
     #[must_use]
     pub fn forward(self) -> Vec3<S> {
         self.forward
     }
 
-    /// Where its head is.
+    /// Up direction.
     #[must_use]
     pub fn up(self) -> Vec3<S> {
         self.up

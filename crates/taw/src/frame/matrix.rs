@@ -2,17 +2,16 @@ use cgmath::InnerSpace;
 
 use crate::math::{Mat3, Quat, Scalar};
 
-/// The matrix whose columns are where a rotation takes the axes.
+/// Rotation matrix: its columns are the images of the axes.
 #[must_use]
 pub fn matrix_of_rotation<S: Scalar>(rotation: Quat<S>) -> Mat3<S> {
     rotation.into()
 }
 
-/// The rotation that takes the axes to the columns of a matrix, which are unit vectors at
-/// right angles, right-handed.
+/// The rotation of a matrix whose columns are right-handed perpendicular unit vectors.
 ///
-/// From the largest of the four components, so that nothing small is divided by
-/// (Shepperd, *Quaternion from rotation matrix*, 1978).
+/// Computed from the largest of the four components, so that nothing small is divided by (Shepperd,
+/// *Quaternion from rotation matrix*, 1978).
 #[must_use]
 pub fn rotation_of_matrix<S: Scalar>(matrix: &Mat3<S>) -> Quat<S> {
     let [x, y, z] = [matrix.x, matrix.y, matrix.z];

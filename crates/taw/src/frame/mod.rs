@@ -1,8 +1,7 @@
-//! Where a thing is and how it is turned.
+//! Rigid transforms, and every common form of a rotation.
 //!
-//! Axes are right-handed, with y up; what looks ahead looks along −z. A rotation is a unit
-//! quaternion, and the other forms that the field uses convert to and from it: each in a
-//! file of its own, each round trip within four epsilons.
+//! Axes are right-handed, with y up and −z forward. A rotation is a unit quaternion; the other
+//! forms convert to and from it, each in a file of its own, each round trip within four epsilons.
 
 mod axis_angle;
 mod bivector;

@@ -7,9 +7,8 @@ use crate::Error;
 use crate::error::{finite_vector, rotation};
 use crate::math::{Mat4, Point3, Quat, Scalar, Vec3};
 
-/// Where a thing is and how it is turned, in the frame of something else: what takes its
-/// own coordinates to those of the other. Poses multiply from the left, local ones last:
-/// `world = parent * local`.
+/// A rigid transform (isometry): position and rotation of a local frame in a parent frame. Poses
+/// multiply from the left, local ones last: `world = parent * local`.
 ///
 /// ```
 /// use taw::frame::{AxisAngle, Pose};
@@ -26,21 +25,21 @@ use crate::math::{Mat4, Point3, Quat, Scalar, Vec3};
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose<S> {
-    /// A unit quaternion.
+    /// Rotation, a unit quaternion.
     pub rotation: Quat<S>,
-    /// In metres.
+    /// Translation, in metres.
     pub translation: Vec3<S>,
 }
 
 impl<S: Scalar> Pose<S> {
-    /// That which leaves everything where it is.
+    /// The identity.
     #[must_use]
     pub fn identity() -> Self {
         Self { rotation: Quat::one(), translation: Vec3::zero() }
     }
 
-    /// This pose, if it is one: finite, and with a rotation of length one, from which it may
-    /// have drifted by 1e-3.
+    /// Validates the pose: finite, and with a rotation whose length is within 1e-3 of one, which is
+    /// then normalized.
     ///
     /// # Errors
     /// [`Error::NotFinite`] for the translation, [`Error::NotUnit`] for the rotation.
@@ -50,52 +49,52 @@ impl<S: Scalar> Pose<S> {
         Ok(Self { rotation: rotation("rotation", self.rotation)?, translation })
     }
 
-    /// The way back.
+    /// Inverse transform.
     #[must_use]
     pub fn inverse(self) -> Self {
         let rotation = self.rotation.conjugate();
         Self { rotation, translation: rotation * -self.translation }
     }
 
-    /// Where a point is that has these coordinates here.
+    /// Transforms a point from the local to the parent frame.
     #[must_use]
-    pub fn point(self, point: Point3<S>) -> Point3<S> {
+    pub fn transform_point(self, point: Point3<S>) -> Point3<S> {
         Point3::from_vec(self.rotation * point.to_vec() + self.translation)
     }
 
-    /// Where a direction points.
+    /// Transforms a vector from the local to the parent frame.
     #[must_use]
-    pub fn vector(self, vector: Vec3<S>) -> Vec3<S> {
+    pub fn transform_vector(self, vector: Vec3<S>) -> Vec3<S> {
         self.rotation * vector
     }
 
-    /// The coordinates here of a point that is there.
+    /// Transforms a point from the parent to the local frame.
     #[must_use]
-    pub fn point_back(self, point: Point3<S>) -> Point3<S> {
+    pub fn inverse_transform_point(self, point: Point3<S>) -> Point3<S> {
         Point3::from_vec(self.rotation.conjugate() * (point.to_vec() - self.translation))
     }
 
-    /// The direction here of one that points there.
+    /// Transforms a vector from the parent to the local frame.
     #[must_use]
-    pub fn vector_back(self, vector: Vec3<S>) -> Vec3<S> {
+    pub fn inverse_transform_vector(self, vector: Vec3<S>) -> Vec3<S> {
         self.rotation.conjugate() * vector
     }
 
-    /// The pose that is `part` of the way to another: straight, and turning at a steady
-    /// speed the short way round.
+    /// Interpolates to another pose by a fraction: straight, and rotating at a steady speed the
+    /// short way round.
     #[must_use]
-    pub fn toward(self, other: Self, part: S) -> Self {
-        let translation = self.translation + (other.translation - self.translation) * part;
-        Self { rotation: slerp(self.rotation, other.rotation, part), translation }
+    pub fn interpolate(self, other: Self, fraction: S) -> Self {
+        let translation = self.translation + (other.translation - self.translation) * fraction;
+        Self { rotation: slerp(self.rotation, other.rotation, fraction), translation }
     }
 
-    /// The same as a matrix.
+    /// Homogeneous matrix.
     #[must_use]
     pub fn matrix(self) -> Mat4<S> {
         self.scaled(S::one()).into()
     }
 
-    /// The same after all lengths have been multiplied, as cgmath's type for such.
+    /// Adds a uniform scale, as cgmath's type for such transforms.
     #[must_use]
     pub fn scaled(self, scale: S) -> Decomposed<Vec3<S>, Quat<S>> {
         Decomposed { scale, rot: self.rotation, disp: self.translation }
@@ -105,7 +104,7 @@ impl<S: Scalar> Pose<S> {
 impl<S: Scalar> Mul for Pose<S> {
     type Output = Self;
 
-    /// What takes first there, then here.
+    /// Composition: the local pose first, then this one.
     fn mul(self, local: Self) -> Self {
         Self {
             rotation: self.rotation * local.rotation,

@@ -1,3 +1,5 @@
+use std::ops::Mul;
+
 use crate::frame::Bivector;
 use crate::math::{Quat, Scalar};
 
@@ -6,22 +8,25 @@ use crate::math::{Quat, Scalar};
 /// (Hestenes, *New foundations for classical mechanics*, 1986, §5).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Rotor<S> {
-    /// The cosine of half of the angle.
+    /// Cosine of half of the angle.
     pub scalar: S,
-    /// The plane that it turns in, backwards, times the sine of half of the angle.
+    /// Plane of rotation, reversed, times the sine of half of the angle.
     pub bivector: Bivector<S>,
 }
 
 impl<S: Scalar> Rotor<S> {
-    /// Which turns back.
+    /// Inverse rotation: the reverse, in the algebra.
     #[must_use]
     pub fn reverse(self) -> Self {
         Self { bivector: -self.bivector, ..self }
     }
+}
 
-    /// This rotation after another one: the geometric product.
-    #[must_use]
-    pub fn after(self, first: Self) -> Self {
+impl<S: Scalar> Mul for Rotor<S> {
+    type Output = Self;
+
+    /// Composition: the geometric product, which applies `first` first.
+    fn mul(self, first: Self) -> Self {
         let (a, b) = (self.bivector.dual(), first.bivector.dual());
         // The product of two bivectors is minus that of their duals.
         Self {

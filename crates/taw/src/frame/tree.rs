@@ -5,12 +5,12 @@ use crate::Error;
 use crate::math::Scalar;
 
 new_key_type! {
-    /// Names a node of a [`Tree`].
+    /// Identifies a node of a [`Tree`].
     pub struct NodeId;
 }
 
-/// Things that carry each other: each node has a pose in the frame of its parent, or in
-/// the world if it has none.
+/// A transform hierarchy: each node has a pose in the frame of its parent, or in the world if it is
+/// a root.
 #[derive(Clone, Debug, Default)]
 pub struct Tree<S> {
     nodes: SlotMap<NodeId, Node<S>>,
@@ -24,7 +24,7 @@ struct Node<S> {
 }
 
 impl<S: Scalar> Tree<S> {
-    /// Adds a node under another one, or under the world.
+    /// Adds a node under a parent, or as a root.
     ///
     /// # Errors
     /// [`Error::NoSuchNode`] for the parent; for the pose as [`Pose::checked`].
@@ -34,27 +34,27 @@ impl<S: Scalar> Tree<S> {
             self.node(parent)?;
         }
         let id = self.nodes.insert(Node { local, parent, children: Vec::new() });
-        self.adopt(id, parent);
+        self.attach(id, parent);
         Ok(id)
     }
 
-    /// Takes out a node and all that it carries.
+    /// Removes a node and its descendants.
     ///
     /// # Errors
     /// [`Error::NoSuchNode`].
     pub fn remove(&mut self, id: NodeId) -> Result<(), Error> {
         self.node(id)?;
-        self.orphan(id);
-        let mut doomed = vec![id];
-        while let Some(id) = doomed.pop() {
+        self.detach(id);
+        let mut to_remove = vec![id];
+        while let Some(id) = to_remove.pop() {
             if let Some(node) = self.nodes.remove(id) {
-                doomed.extend(node.children);
+                to_remove.extend(node.children);
             }
         }
         Ok(())
     }
 
-    /// The pose in the frame of the parent.
+    /// Local pose, in the frame of the parent.
     ///
     /// # Errors
     /// [`Error::NoSuchNode`].
@@ -62,7 +62,7 @@ impl<S: Scalar> Tree<S> {
         Ok(self.node(id)?.local)
     }
 
-    /// Moves a node, and with it all that it carries.
+    /// Sets the local pose of a node; its descendants follow.
     ///
     /// # Errors
     /// [`Error::NoSuchNode`]; for the pose as [`Pose::checked`].
@@ -72,7 +72,7 @@ impl<S: Scalar> Tree<S> {
         Ok(())
     }
 
-    /// The pose in the world.
+    /// World pose.
     ///
     /// # Errors
     /// [`Error::NoSuchNode`].
@@ -86,7 +86,7 @@ impl<S: Scalar> Tree<S> {
         Ok(pose)
     }
 
-    /// What carries a node.
+    /// Parent of a node.
     ///
     /// # Errors
     /// [`Error::NoSuchNode`].
@@ -94,7 +94,7 @@ impl<S: Scalar> Tree<S> {
         Ok(self.node(id)?.parent)
     }
 
-    /// What a node carries, in the order in which it came to.
+    /// Children of a node, in the order of attachment.
     ///
     /// # Errors
     /// [`Error::NoSuchNode`].
@@ -102,17 +102,17 @@ impl<S: Scalar> Tree<S> {
         Ok(&self.node(id)?.children)
     }
 
-    /// Hands a node over to another parent, or to the world, without moving it there.
+    /// Attaches a node to another parent, or makes it a root, and keeps its world pose.
     ///
     /// # Errors
-    /// [`Error::NoSuchNode`], or [`Error::CarriesItself`] if the node carries that parent;
+    /// [`Error::NoSuchNode`], or [`Error::Cycle`] if the new parent is a descendant of the node;
     /// [`Error::NotFinite`] if the pose in the frame of the new parent is not finite.
     pub fn set_parent(&mut self, id: NodeId, parent: Option<NodeId>) -> Result<(), Error> {
         let pose = self.world(id)?;
         let mut above = parent;
         while let Some(ancestor) = above {
             if ancestor == id {
-                return Err(Error::CarriesItself(id));
+                return Err(Error::Cycle(id));
             }
             above = self.node(ancestor)?.parent;
         }
@@ -121,8 +121,8 @@ impl<S: Scalar> Tree<S> {
             None => pose,
         }
         .checked()?;
-        self.orphan(id);
-        self.adopt(id, parent);
+        self.detach(id);
+        self.attach(id, parent);
         self.nodes[id].local = local;
         Ok(())
     }
@@ -131,13 +131,13 @@ impl<S: Scalar> Tree<S> {
         self.nodes.get(id).ok_or(Error::NoSuchNode(id))
     }
 
-    fn orphan(&mut self, id: NodeId) {
+    fn detach(&mut self, id: NodeId) {
         if let Some(parent) = self.nodes[id].parent.take() {
             self.nodes[parent].children.retain(|child| *child != id);
         }
     }
 
-    fn adopt(&mut self, id: NodeId, parent: Option<NodeId>) {
+    fn attach(&mut self, id: NodeId, parent: Option<NodeId>) {
         self.nodes[id].parent = parent;
         if let Some(parent) = parent {
             self.nodes[parent].children.push(id);
@@ -166,8 +166,8 @@ mod tests {
         let ship = tree.insert(None, pose(-40.0, 2.0)).unwrap();
         let chained = pose(1.0, 0.5) * pose(2.0, 1.0) * pose(3.0, -0.7);
         let point = Point3::new(0.3, 0.4, 0.5);
-        let at = |tree: &Tree<f64>| tree.world(load).unwrap().point(point);
-        assert!(at(&tree).distance(chained.point(point)) < 1e-14);
+        let at = |tree: &Tree<f64>| tree.world(load).unwrap().transform_point(point);
+        assert!(at(&tree).distance(chained.transform_point(point)) < 1e-14);
 
         let before = at(&tree);
         tree.set_parent(load, Some(ship)).unwrap();
@@ -189,7 +189,7 @@ mod tests {
         let b = tree.insert(Some(a), pose(2.0, 0.2)).unwrap();
         let c = tree.insert(Some(b), pose(3.0, 0.3)).unwrap();
         for id in [a, b, c] {
-            assert_eq!(tree.set_parent(a, Some(id)), Err(Error::CarriesItself(a)));
+            assert_eq!(tree.set_parent(a, Some(id)), Err(Error::Cycle(a)));
         }
         assert_eq!(tree.parent(c), Ok(Some(b)));
         tree.remove(b).unwrap();

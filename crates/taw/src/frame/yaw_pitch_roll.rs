@@ -2,16 +2,15 @@ use cgmath::num_traits::FloatConst;
 
 use crate::math::{Quat, Scalar};
 
-/// A rotation by three angles in radians: first it rolls about its own z axis, then its
-/// nose goes up by the pitch about x, then it turns left by the yaw about y, which stays
-/// upright. (Bevy calls that `EulerRot::YXZ`.)
+/// A rotation by Euler angles in radians, intrinsic yaw (y), pitch (x), roll (z): Bevy's
+/// `EulerRot::YXZ`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct YawPitchRoll<S> {
-    /// About y.
+    /// Yaw about y.
     pub yaw: S,
-    /// About x.
+    /// Pitch about x.
     pub pitch: S,
-    /// About z.
+    /// Roll about z.
     pub roll: S,
 }
 
@@ -29,9 +28,9 @@ impl<S: Scalar> From<YawPitchRoll<S>> for Quat<S> {
 }
 
 impl<S: Scalar + FloatConst> From<Quat<S>> for YawPitchRoll<S> {
-    /// A pitch in [−π/2, π/2]; yaw and roll in [−π, π]. Looking straight up or down (gimbal
-    /// lock), only the sum or the difference of yaw and roll means anything: then the roll
-    /// is zero. Near it, both lose digits, but not what they make together.
+    /// Pitch in [−π/2, π/2]; yaw and roll in [−π, π]. In gimbal lock, only the sum or the
+    /// difference of yaw and roll is defined: then the roll is zero. Near it, both lose digits, but
+    /// not the rotation that they make together.
     ///
     /// The sums and differences of the components are products of sines and cosines of
     /// the half sum and half difference of yaw and roll, so no arc sine is needed

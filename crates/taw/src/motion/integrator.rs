@@ -1,15 +1,14 @@
 use crate::math::{Point3, Scalar, Vec3};
 
-/// How velocities become positions and accelerations velocities.
+/// Time integration method.
 ///
-/// The order says how the error of a given time span falls with the step: a step of
-/// half the length divides it by 2 to the power of the order, until the rounding of
-/// the scalar type takes over.
+/// The order says how the error over a given time span falls with the step: halving the step
+/// divides it by 2 to the power of the order, until the rounding of the scalar dominates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Integrator {
-    /// Position by the old velocity, then velocity. Order 1. Under constant
-    /// acceleration it lags by `a t dt / 2`, and it feeds oscillations.
+    /// Position by the old velocity, then velocity. Order 1. Under constant acceleration it lags by
+    /// `a t dt / 2`, and it adds energy to oscillations.
     ExplicitEuler,
     /// Velocity, then position by the new velocity. Order 1. Under constant
     /// acceleration it leads by `a t dt / 2`; its oscillations stay bounded.
@@ -19,21 +18,21 @@ pub enum Integrator {
     /// the mean of old and new acceleration (Swope et al. 1982). Order 2, exact
     /// under constant acceleration; oscillations stay bounded.
     VelocityVerlet,
-    /// Half of the way by the old velocity, the whole acceleration there, the other
-    /// half by the new velocity. Order 2, exact under constant acceleration;
-    /// oscillations stay bounded. One acceleration a step, where Verlet takes two.
+    /// Half a step by the old velocity, the acceleration there, the other half by the new velocity.
+    /// Order 2, exact under constant acceleration; oscillations stay bounded. One evaluation of the
+    /// acceleration per step, where Verlet takes two.
     Leapfrog,
-    /// The weighted mean of four slopes (Kutta 1901). Order 4, exact under constant
-    /// acceleration. Four accelerations a step; slowly loses energy.
+    /// Weighted mean of four slopes (Kutta 1901). Order 4, exact under constant acceleration. Four
+    /// evaluations of the acceleration per step; slowly loses energy.
     Rk4,
 }
 
 impl Integrator {
-    /// How far a change of velocity within a step has moved the position at its end,
-    /// as a part of change times step: what a force that is found only after the step
-    /// still has to move, for the step to be as if it had been known before.
+    /// Position weight of a velocity change: by which fraction of change times step a velocity
+    /// change within the step has moved the position at its end. A force known only after the step
+    /// must still move the body by that much.
     #[must_use]
-    pub(crate) fn follow<S: Scalar>(self) -> S {
+    pub(crate) fn position_weight<S: Scalar>(self) -> S {
         match self {
             Self::ExplicitEuler => S::zero(),
             Self::SemiImplicitEuler => S::one(),
@@ -41,7 +40,7 @@ impl Integrator {
         }
     }
 
-    /// All of them, from the crudest to the finest.
+    /// All integrators, from the crudest to the finest.
     pub const ALL: [Self; 5] = [
         Self::ExplicitEuler,
         Self::SemiImplicitEuler,
@@ -51,30 +50,30 @@ impl Integrator {
     ];
 }
 
-/// Where something is, and how it moves. Its methods are the integrators.
+/// Position and velocity of a point mass. Its methods are the integrators.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion<S> {
-    /// In metres.
+    /// Position, in metres.
     pub position: Point3<S>,
-    /// In metres per second.
+    /// Velocity, in m/s.
     pub velocity: Vec3<S>,
 }
 
 impl<S: Scalar> Motion<S> {
-    /// Further along a slope: `velocity` for the position, `acceleration` for the
-    /// velocity, for `dt` seconds.
-    fn along(self, velocity: Vec3<S>, acceleration: Vec3<S>, dt: S) -> Self {
+    /// Explicit step along a slope: `velocity` for the position, `acceleration` for the velocity,
+    /// for `dt` seconds.
+    fn advance(self, velocity: Vec3<S>, acceleration: Vec3<S>, dt: S) -> Self {
         Self {
             position: self.position + velocity * dt,
             velocity: self.velocity + acceleration * dt,
         }
     }
 
-    /// After `dt` seconds by this integrator. `acceleration` gives m/s² at a place
+    /// Steps by `dt` seconds with the given integrator. `acceleration` returns m/s² for a position
     /// and velocity.
     #[must_use]
     #[inline]
-    pub fn after(
+    pub fn step(
         self,
         integrator: Integrator,
         dt: S,
@@ -89,14 +88,14 @@ impl<S: Scalar> Motion<S> {
         }
     }
 
-    /// After `dt` seconds by [`Integrator::ExplicitEuler`].
+    /// Steps by `dt` seconds with [`Integrator::ExplicitEuler`].
     #[must_use]
     #[inline]
     pub fn explicit_euler(self, dt: S, acceleration: impl Fn(Self) -> Vec3<S>) -> Self {
-        self.along(self.velocity, acceleration(self), dt)
+        self.advance(self.velocity, acceleration(self), dt)
     }
 
-    /// After `dt` seconds by [`Integrator::SemiImplicitEuler`].
+    /// Steps by `dt` seconds with [`Integrator::SemiImplicitEuler`].
     #[must_use]
     #[inline]
     pub fn semi_implicit_euler(self, dt: S, acceleration: impl Fn(Self) -> Vec3<S>) -> Self {
@@ -104,8 +103,8 @@ impl<S: Scalar> Motion<S> {
         Self { position: self.position + velocity * dt, velocity }
     }
 
-    /// After `dt` seconds by [`Integrator::VelocityVerlet`]. Where the acceleration
-    /// depends on the velocity, the new one is estimated by the old acceleration.
+    /// Steps by `dt` seconds with [`Integrator::VelocityVerlet`]. Where the acceleration depends on
+    /// the velocity, the new one is estimated by the old acceleration.
     #[must_use]
     #[inline]
     pub fn velocity_verlet(self, dt: S, acceleration: impl Fn(Self) -> Vec3<S>) -> Self {
@@ -116,8 +115,8 @@ impl<S: Scalar> Motion<S> {
         Self { position, velocity: self.velocity + (before + after) * half }
     }
 
-    /// After `dt` seconds by [`Integrator::Leapfrog`]. Where the acceleration depends
-    /// on the velocity, that in the middle is estimated by the acceleration there.
+    /// Steps by `dt` seconds with [`Integrator::Leapfrog`]. Where the acceleration depends on the
+    /// velocity, that at the midpoint is estimated by the acceleration there.
     #[must_use]
     #[inline]
     pub fn leapfrog(self, dt: S, acceleration: impl Fn(Self) -> Vec3<S>) -> Self {
@@ -130,20 +129,20 @@ impl<S: Scalar> Motion<S> {
         Self { position: middle + velocity * half, velocity }
     }
 
-    /// After `dt` seconds by [`Integrator::Rk4`].
+    /// Steps by `dt` seconds with [`Integrator::Rk4`].
     #[must_use]
     #[inline]
     pub fn rk4(self, dt: S, acceleration: impl Fn(Self) -> Vec3<S>) -> Self {
         let two = S::one() + S::one();
         let (half, sixth) = (dt / two, dt / (two + two + two));
         let (v1, a1) = (self.velocity, acceleration(self));
-        let second = self.along(v1, a1, half);
+        let second = self.advance(v1, a1, half);
         let (v2, a2) = (second.velocity, acceleration(second));
-        let third = self.along(v2, a2, half);
+        let third = self.advance(v2, a2, half);
         let (v3, a3) = (third.velocity, acceleration(third));
-        let fourth = self.along(v3, a3, dt);
+        let fourth = self.advance(v3, a3, dt);
         let (v4, a4) = (fourth.velocity, acceleration(fourth));
-        self.along(v1 + (v2 + v3) * two + v4, a1 + (a2 + a3) * two + a4, sixth)
+        self.advance(v1 + (v2 + v3) * two + v4, a1 + (a2 + a3) * two + a4, sixth)
     }
 }
 
@@ -163,7 +162,7 @@ mod tests {
         let dt = S::one() / S::constant(30.0);
         let mut motion = start::<S>(0.0, 0.0);
         for _ in 0..30 {
-            motion = motion.after(integrator, dt, |_| Vec3::unit_x() * S::constant(30.0));
+            motion = motion.step(integrator, dt, |_| Vec3::unit_x() * S::constant(30.0));
         }
         (motion.position.x.as_f64(), motion.velocity.x.as_f64())
     }
@@ -195,7 +194,7 @@ mod tests {
         let dt = time / f64::from(steps);
         let mut motion = start::<f64>(1.0, 0.0);
         for _ in 0..steps {
-            motion = motion.after(integrator, dt, |at| -at.position.to_vec());
+            motion = motion.step(integrator, dt, |at| -at.position.to_vec());
         }
         (motion.position.x - time.cos()).hypot(motion.velocity.x + time.sin())
     }
@@ -219,7 +218,7 @@ mod tests {
         let mut motion = start::<f64>(1.0, 0.0);
         let mut worst: f64 = 0.0;
         for _ in 0..1_000_000 {
-            motion = motion.after(integrator, dt, |at| -at.position.to_vec());
+            motion = motion.step(integrator, dt, |at| -at.position.to_vec());
             let twice = motion.position.to_vec().magnitude2() + motion.velocity.magnitude2();
             worst = worst.max((twice - 1.0).abs());
             if !worst.is_finite() {

@@ -2,19 +2,19 @@ use crate::Error;
 use crate::error::{positive, within};
 use crate::math::Scalar;
 
-/// How heavy a marble is.
+/// Mass of a marble.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Mass<S> {
-    /// Of this density all through, in kg/m³, above zero. Follows the size.
+    /// Uniform density in kg/m³, above zero. The mass follows the size.
     Density(S),
-    /// This many kilograms, above zero, whatever the size.
+    /// Mass in kilograms, above zero, independent of the size.
     Kilograms(S),
-    /// So heavy that no force and no gravity changes its velocity.
+    /// Infinite mass: no force and no gravity changes its velocity (kinematic).
     Infinite,
 }
 
 impl<S: Scalar> Default for Mass<S> {
-    /// That of glass: 2,500 kg/m³.
+    /// Glass: 2,500 kg/m³.
     fn default() -> Self {
         Self::Density(S::constant(2500.0))
     }
@@ -38,14 +38,14 @@ impl<S: Scalar> Mass<S> {
         }
     }
 
-    /// Nothing, if a marble of this size is neither so light nor so heavy that the scalar has no
-    /// number for it, or for its moment of inertia.
+    /// Checks that the mass and the moment of inertia of a marble of this size are representable in
+    /// the scalar.
     ///
-    /// Names what was given, and what else it might be: the number that would do for the mass of
-    /// glass is not to blame.
+    /// The error names an explicit mass, or a density if glass of this size would be representable;
+    /// else the radius or the half length.
     pub(crate) fn of_size(self, radius: S, half_length: S) -> Result<(), Error> {
         let (least, most) = (S::min_positive_value(), S::max_value());
-        // Of which squares and their reciprocals are numbers.
+        // The squares and their reciprocals must be representable.
         within("radius", radius, least.sqrt(), most.sqrt())?;
         within("half_length", half_length, S::zero(), most.sqrt())?;
         let has_number = |mass: Self, half: S| {
@@ -76,7 +76,7 @@ impl<S: Scalar> Mass<S> {
         Err(Error::OutOfRange { field, value: value.as_f64(), min, max })
     }
 
-    /// In kilograms, for a ball of this radius in metres.
+    /// Mass in kilograms of a ball of this radius in metres.
     #[must_use]
     pub fn of(self, radius: S) -> S {
         match self {
@@ -89,7 +89,7 @@ impl<S: Scalar> Mass<S> {
         }
     }
 
-    /// The same for a capsule of this half length in metres.
+    /// Mass in kilograms of a capsule of this radius and half length in metres.
     #[must_use]
     pub fn of_capsule(self, radius: S, half_length: S) -> S {
         let longer = S::one() + S::constant(1.5) * half_length / radius;

@@ -1,15 +1,15 @@
-//! How a thing moves while nothing touches it: integrators, forces, masses, rotation.
+//! Motion without contacts: integrators, force fields, masses, rotation.
 
-mod force;
+mod force_field;
+mod free_body;
 mod integrator;
 mod mass;
-mod rigid;
 mod rotation;
-mod wall;
+mod wall_motion;
 
-pub use force::{Force, Medium};
+pub use force_field::{ForceField, Medium};
+pub use free_body::{integrate_free_body, world_velocity};
 pub use integrator::{Integrator, Motion};
 pub use mass::Mass;
-pub use rigid::{move_free, world_velocity};
-pub use rotation::{FreeRotation, Rotation, turned};
-pub use wall::WallMotion;
+pub use rotation::{FreeRotation, Rotation, integrate_rotation};
+pub use wall_motion::WallMotion;

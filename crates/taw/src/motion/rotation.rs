@@ -4,56 +4,59 @@ use cgmath::{InnerSpace, Rotation as _};
 
 use crate::math::{Quat, Scalar, Vec3, cast_vector, direction_and_length};
 
-/// How much of turning a world models. In the order of how much that is.
+/// Rotation model of a world, ordered by how much it simulates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Rotation {
-    /// None. Takes no memory and no time.
+    /// No rotation, at no cost in memory and time.
     #[default]
     None,
-    /// Marbles turn as if they rolled without slipping over the walls that they
-    /// touch, and keep their spin in the air. It follows the motion and does not
-    /// change it: of capsules, only the spin about their axes turns them.
+    /// Visual rolling: marbles rotate as if they rolled without slipping over the walls that they
+    /// touch, and keep their angular velocity in the air. Rotation follows the motion and does not
+    /// affect it; capsules rotate about their axes only.
     Rolling,
-    /// Marbles have angular momentum, as solid balls of even density; friction and
-    /// torques change it. Without a response that knows friction, nothing else does.
+    /// Rigid-body rotation of solid bodies of uniform density: friction and torques change the
+    /// angular momentum. Without a response that has friction, only torques do.
     Dynamic,
 }
 
-/// `rotation` turned on by the angular velocity `spin` (an axial vector in world
-/// space, rad/s) for `dt` seconds: exact while the spin stays the same.
+/// Integrates a rotation by an angular velocity (axial vector in world space, rad/s) for `dt`
+/// seconds: exact for a constant one.
 #[must_use]
 #[inline]
-pub fn turned<S: Scalar>(rotation: Quat<S>, spin: Vec3<S>, dt: S) -> Quat<S> {
-    let Some((axis, speed)) = direction_and_length(spin) else {
+pub fn integrate_rotation<S: Scalar>(
+    rotation: Quat<S>,
+    angular_velocity: Vec3<S>,
+    dt: S,
+) -> Quat<S> {
+    let Some((axis, speed)) = direction_and_length(angular_velocity) else {
         return rotation;
     };
-    let turned = about(axis, speed * dt) * rotation;
-    // Rounding lets the length drift, and only the length of one is a rotation.
+    let turned = axis_angle(axis, speed * dt) * rotation;
+    // Rounding lets the length drift from one.
     turned.normalize()
 }
 
-/// The rotation about a unit axis by `angle` radians.
-fn about<S: Scalar>(axis: Vec3<S>, angle: S) -> Quat<S> {
+/// Rotation about a unit axis by `angle` radians.
+fn axis_angle<S: Scalar>(axis: Vec3<S>, angle: S) -> Quat<S> {
     let (sin, cos) = (angle * S::constant(0.5)).sin_cos_portable();
     Quat::from_sv(cos, axis * sin)
 }
 
-/// The axes of the symmetric top that is most like a body: its own axis, and the two
-/// across, whose inverse moments are the closest.
+/// Axes of the symmetric top closest to a body: its own axis, and the two across, whose inverse
+/// moments differ least.
 fn symmetric_axes<S: Scalar>(inverse: Vec3<S>) -> [usize; 3] {
     let apart = |[_, a, b]: [usize; 3]| (inverse[a] - inverse[b]).abs();
     let closer = |x, y| if apart(y) < apart(x) { y } else { x };
     closer(closer([2, 0, 1], [0, 1, 2]), [1, 2, 0])
 }
 
-/// The rotation of a body that nothing touches.
+/// Rotation of a torque-free rigid body.
 ///
-/// The angular momentum is kept in the body's own axes, where that about an unstable
-/// axis can be tiny beside the rest and still have all of its digits. It is kept and
-/// counted in `f64`, whatever the scalar: when an unstable body turns over depends on its
-/// energy to a few parts in a million, which the roundings of a few thousand steps in
-/// `f32` would use up.
+/// The angular momentum is stored in the body's own axes, where its component about an unstable
+/// axis can be tiny beside the others without losing digits. State and computation are in `f64` for
+/// any scalar: the time when an unstable body flips depends on its energy to a few parts in a
+/// million, which the rounding of a few thousand steps in `f32` would use up.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FreeRotation<S> {
     attitude: Quat<f64>,
@@ -62,7 +65,7 @@ pub struct FreeRotation<S> {
 }
 
 impl<S: Scalar> FreeRotation<S> {
-    /// A body with this attitude (from its principal axes to the world) and angular
+    /// Creates a body with this attitude (from its principal axes to the world) and angular
     /// momentum (in kg m²/s, along its principal axes).
     #[must_use]
     pub fn new(attitude: Quat<S>, momentum: Vec3<S>) -> Self {
@@ -70,37 +73,37 @@ impl<S: Scalar> FreeRotation<S> {
         Self { attitude, momentum: cast_vector(momentum), scalar: PhantomData }
     }
 
-    /// From the body's principal axes to the world.
+    /// Attitude: from the body's principal axes to the world.
     #[must_use]
     pub fn attitude(&self) -> Quat<S> {
         Quat::from_sv(S::constant(self.attitude.s), cast_vector(self.attitude.v))
     }
 
-    /// In kg m²/s, along the body's principal axes.
+    /// Angular momentum in kg m²/s, along the body's principal axes.
     #[must_use]
     pub fn momentum(&self) -> Vec3<S> {
         cast_vector(self.momentum)
     }
 
-    /// After `dt` seconds, for a body with these principal moments of inertia
-    /// (kg m², about its x, y and z axes, all above zero).
+    /// Steps by `dt` seconds, for a body with these principal moments of inertia (kg m², about its
+    /// x, y and z axes, all above zero).
     ///
-    /// A symmetric top, two of whose moments are equal, is solved exactly for any
-    /// `dt`. What an asymmetric one has more is split off and applied half before,
-    /// half after (Strang), which makes the step order 2 and reversible (Touma and
-    /// Wisdom, *Lie-Poisson integrators for rigid body dynamics*, 1994; Dullweber,
-    /// Leimkuhler and McLachlan 1997).
+    /// A symmetric top, with two equal moments, is solved exactly for any `dt`. The excess of an
+    /// asymmetric one is split off and applied half before, half after (Strang), which makes the
+    /// step order 2 and reversible (Touma and Wisdom, *Lie-Poisson integrators for rigid body
+    /// dynamics*, 1994; Dullweber, Leimkuhler and McLachlan 1997).
     #[must_use]
-    pub fn after(self, inertia: Vec3<S>, dt: S) -> Self {
+    pub fn step(self, inertia: Vec3<S>, dt: S) -> Self {
         let inverse: Vec3<f64> = inertia.map(|moment| 1.0 / moment.as_f64());
         let [alone, common, other] = symmetric_axes(inverse);
         let dt = dt.as_f64();
-        // About one of the body's axes, by what its moment differs from the common one.
+        // Rotates about one of the body's axes, by the excess of its inverse moment over the common
+        // one.
         let turn_in_body = |body: Self, axis: usize, dt: f64| {
             let excess = inverse[axis] - inverse[common];
             let mut unit = Vec3::new(0.0, 0.0, 0.0);
             unit[axis] = 1.0;
-            let turn = about(unit, body.momentum[axis] * excess * dt);
+            let turn = axis_angle(unit, body.momentum[axis] * excess * dt);
             Self {
                 attitude: body.attitude * turn,
                 momentum: turn.conjugate().rotate_vector(body.momentum),
@@ -108,21 +111,20 @@ impl<S: Scalar> FreeRotation<S> {
             }
         };
         let mut body = turn_in_body(self, other, 0.5 * dt);
-        // The symmetric top spins about its own axis and, with it, about the angular
-        // momentum.
+        // The symmetric top rotates about its own axis and, with it, about the angular momentum.
         body = turn_in_body(body, alone, dt);
         let momentum = body.attitude.rotate_vector(body.momentum);
-        body.attitude = turned(body.attitude, momentum * inverse[common], dt);
+        body.attitude = integrate_rotation(body.attitude, momentum * inverse[common], dt);
         turn_in_body(body, other, 0.5 * dt)
     }
 
-    /// In kg m²/s, in world space.
+    /// Angular momentum in kg m²/s, in world space.
     #[must_use]
     pub fn angular_momentum(&self) -> Vec3<S> {
         cast_vector(self.attitude.rotate_vector(self.momentum))
     }
 
-    /// Half of the angular velocity along the angular momentum, in joules.
+    /// Rotational kinetic energy, in joules.
     #[must_use]
     pub fn energy(&self, inertia: Vec3<S>) -> S {
         let parts = self.momentum.zip(cast_vector(inertia), |l, moment: f64| l * l / moment);
@@ -137,9 +139,10 @@ mod tests {
 
     #[test]
     fn a_turn_is_exact_however_long_the_step() {
-        let spin = Vec3::new(0.3, -2.0, 0.7_f64);
-        let once = turned(Quat::one(), spin, 3.0);
-        let many = (0..3000).fold(Quat::one(), |q, _| turned(q, spin, 0.001));
+        let angular_velocity = Vec3::new(0.3, -2.0, 0.7_f64);
+        let once = integrate_rotation(Quat::one(), angular_velocity, 3.0);
+        let many =
+            (0..3000).fold(Quat::one(), |q, _| integrate_rotation(q, angular_velocity, 0.001));
         assert!((once - many).magnitude() < 1e-12 || (once + many).magnitude() < 1e-12);
     }
 
@@ -149,8 +152,8 @@ mod tests {
             let inertia = Vec3::from(inertia);
             let start =
                 FreeRotation::new(Quat::new(0.5, 0.5, -0.5, 0.5), Vec3::new(0.3, -2.0, 0.7_f64));
-            let once = start.after(inertia, 3.0);
-            let many = (0..3000).fold(start, |body, _| body.after(inertia, 0.001));
+            let once = start.step(inertia, 3.0);
+            let many = (0..3000).fold(start, |body, _| body.step(inertia, 0.001));
             let (once, many) = (once.attitude(), many.attitude());
             let apart = (once - many).magnitude().min((once + many).magnitude());
             assert!(apart < 1e-12, "{inertia:?}: {apart} apart");
@@ -159,16 +162,20 @@ mod tests {
 
     /// The box of the Dzhanibekov effect: turns about its middle axis, with a bit of
     /// the others. Gives (worst relative energy error, times at which the body's own
-    /// spin about y changed its sign).
+    /// angular_velocity about y changed its sign).
     fn dzhanibekov<S: Scalar>(dt: f64) -> (f64, Vec<f64>) {
         let inertia = Vec3::new(1.6, 4.16, 5.44).map(S::constant);
-        let spin = Vec3::new(0.01, 5.0, 0.01).map(S::constant);
-        let momentum = Vec3::new(spin.x * inertia.x, spin.y * inertia.y, spin.z * inertia.z);
+        let angular_velocity = Vec3::new(0.01, 5.0, 0.01).map(S::constant);
+        let momentum = Vec3::new(
+            angular_velocity.x * inertia.x,
+            angular_velocity.y * inertia.y,
+            angular_velocity.z * inertia.z,
+        );
         let mut body = FreeRotation::new(Quat::one(), momentum);
         let start = body.energy(inertia).as_f64();
         let (mut worst, mut flips, mut last): (f64, _, f64) = (0.0, Vec::new(), 1.0);
         for step in 1..=(100.0 / dt).round() as u32 {
-            body = body.after(inertia, S::constant(dt));
+            body = body.step(inertia, S::constant(dt));
             worst = worst.max((body.energy(inertia).as_f64() / start - 1.0).abs());
             let now = body.momentum().y.as_f64();
             if now * last < 0.0 {

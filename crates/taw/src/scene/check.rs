@@ -1,4 +1,4 @@
-//! Whether the numbers of a scene can be those of a world, of whichever scalar.
+//! Validation of scenes: numbers must suit a world of any scalar.
 
 use cgmath::InnerSpace;
 
@@ -9,7 +9,7 @@ use crate::Error;
 use crate::error::{finite, positive, within};
 use crate::math::Vec3;
 
-/// The scene becomes a world of any scalar, so its numbers are such as `f32` can hold.
+/// Numbers must be representable in `f32`, since a scene becomes a world of any scalar.
 const LARGEST: f64 = f32::MAX as f64;
 const LEAST: f64 = f32::MIN_POSITIVE as f64;
 
@@ -34,7 +34,7 @@ fn direction(field: &'static str, fields: [&'static str; 3], v: [f64; 3]) -> Res
     if v == [0.0; 3] {
         return Err(Error::NotUnit { field, value: 0.0 });
     }
-    // However it is turned: none of it overflows, and no digit of it is lost.
+    // No component overflows or loses digits in any rotation.
     let length = vector(fields, v)?.magnitude();
     within(field, length, LEAST / f64::from(f32::EPSILON), LARGEST / 2.0).map(|_| ())
 }
@@ -45,14 +45,14 @@ fn gravity(v: [f64; 3]) -> Result<(), Error> {
 }
 
 impl Scene {
-    /// How many marbles a scene may have: with their contacts they take up to a kilobyte each,
+    /// Maximum number of marbles of a scene: with their contacts they take up to a kilobyte each,
     /// so a gigabyte together.
     pub const MAX_MARBLES: u32 = 1_000_000;
 
-    /// Nothing, if all numbers are such as any world can take now and later.
+    /// Checks that all numbers suit any world, now and later.
     ///
-    /// What only one thing can have (a restitution up to one, say) is refused when the world is
-    /// given it.
+    /// Limits of single properties, such as a restitution of at most one, are checked when the
+    /// world is built.
     pub(super) fn check(&self) -> Result<(), Error> {
         above_zero("seconds", self.seconds)?;
         gravity(self.gravity)?;
@@ -125,14 +125,15 @@ impl Structure {
     }
 }
 
-/// Wherever a wall gets, it is still somewhere. Half of all numbers, because it turns about a pivot.
+/// Checks that a wall stays representable along its whole motion, at half of the number range
+/// because it rotates about a pivot.
 fn stays_somewhere(far: f64, moves: Option<Movement>) -> Result<(), Error> {
     let far = far + moves.map_or(Ok(0.0), Movement::check)?;
     within("the reach of a wall", far, 0.0, LARGEST / 2.0).map(|_| ())
 }
 
 impl Build {
-    /// How far from the origin it is at most, in metres.
+    /// Largest distance from the origin, in metres.
     fn check(&self) -> Result<f64, Error> {
         match self {
             Self::Mesh { points, .. } => points.iter().try_fold(0.0, |far: f64, point| {
@@ -164,7 +165,7 @@ impl Turn {
 }
 
 impl Form {
-    /// How far from the origin it is at most, in metres; of a half-space, its given point.
+    /// Largest distance from the origin, in metres; for a half-space, that of its given point.
     fn check(self) -> Result<f64, Error> {
         const CENTER: [&str; 3] = ["center.x", "center.y", "center.z"];
         Ok(match self {
@@ -192,7 +193,7 @@ impl Form {
 }
 
 impl Movement {
-    /// How far it takes a wall at most, in metres.
+    /// Largest displacement of a wall, in metres.
     fn check(self) -> Result<f64, Error> {
         const PIVOT: [&str; 3] = ["pivot.x", "pivot.y", "pivot.z"];
         const AXIS: [&str; 3] = ["axis.x", "axis.y", "axis.z"];
@@ -223,7 +224,10 @@ impl Ball {
         vector(["position.x", "position.y", "position.z"], self.position)?;
         above_zero("radius", self.radius)?;
         vector(["velocity.x", "velocity.y", "velocity.z"], self.velocity)?;
-        vector(["spin.x", "spin.y", "spin.z"], self.spin)?;
+        vector(
+            ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"],
+            self.angular_velocity,
+        )?;
         above_zero("density", self.density)?;
         not_negative("half_length", self.half_length)?;
         self.turned.check()?;

@@ -1,10 +1,9 @@
-//! A scene as a plain value: what is there, what moves by itself, and what happens over time.
+//! Scene descriptions as plain values: bodies, kinematic motions, and changes over time.
 //!
-//! It says nothing about how it is stepped: the same scene becomes a world of any
-//! [`Scalar`](crate::math::Scalar) and [`Model`](crate::world::Model), which is what makes models
-//! comparable. With the feature `serde` it is read from files; `scenes/*.ron` of the lab are such.
-//! Numbers out of their range are refused where they stand, with line and field (see [`Scene`] for
-//! an example).
+//! A scene is independent of the solver: it becomes a world of any [`Scalar`](crate::math::Scalar)
+//! and [`Model`](crate::world::Model), which makes models comparable. With the feature `serde` it
+//! is read from files, such as `scenes/*.ron` of the lab. Numbers out of range are rejected with
+//! line and field (see [`Scene`] for an example).
 
 mod check;
 #[cfg(feature = "serde")]
@@ -15,7 +14,7 @@ mod structure;
 pub use running::Running;
 pub use structure::{Build, Structure};
 
-/// See the [module](self). All in `f64`; metres, seconds, kilograms.
+/// Scene description; see the [module](self). All in `f64`; metres, seconds, kilograms.
 ///
 /// ```
 /// # #[cfg(feature = "serde")] {
@@ -38,62 +37,62 @@ pub use structure::{Build, Structure};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Scene {
-    /// What it shows, for people.
+    /// Human-readable description.
     #[cfg_attr(feature = "serde", serde(default))]
     pub about: String,
-    /// For how long it is looked at, in seconds, above zero.
+    /// Simulated time in seconds, above zero.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "number::positive"))]
     pub seconds: f64,
-    /// In m/s².
+    /// Gravity, in m/s².
     #[cfg_attr(feature = "serde", serde(default = "earth", deserialize_with = "number::vector"))]
     pub gravity: [f64; 3],
-    /// How gravity changes, if it does: as one who tilts the whole scene sees it.
+    /// Gravity over time, if it changes: as seen in the frame of a tilted scene.
     #[cfg_attr(feature = "serde", serde(default))]
     pub tilts: Vec<Tilt>,
-    /// What pulls and pushes besides.
+    /// Force fields besides gravity.
     #[cfg_attr(feature = "serde", serde(default))]
     pub fields: Vec<Field>,
-    /// What marbles and walls are made of that say nothing else.
+    /// Default material of marbles and walls.
     #[cfg_attr(feature = "serde", serde(default))]
     pub surface: Surface,
-    /// What nothing can move.
+    /// Walls (static or kinematic colliders) of one simple shape.
     #[cfg_attr(feature = "serde", serde(default))]
     pub walls: Vec<Wall>,
-    /// Walls of many parts.
+    /// Walls of composite shapes.
     #[cfg_attr(feature = "serde", serde(default))]
     pub structures: Vec<Structure>,
-    /// Where marbles are counted.
+    /// Sensor planes, behind which marbles are counted.
     #[cfg_attr(feature = "serde", serde(default))]
     pub gates: Vec<Gate>,
-    /// Marbles one by one.
+    /// Single marbles.
     #[cfg_attr(feature = "serde", serde(default))]
     pub marbles: Vec<Ball>,
-    /// Marbles by the dozen.
+    /// Lattices of marbles.
     #[cfg_attr(feature = "serde", serde(default))]
     pub lattices: Vec<Lattice>,
 }
 
-/// Gravity at a moment. In between it goes over evenly; before the first moment and after the
-/// last one it is as in these.
+/// Keyframe of gravity. Linear interpolation between keyframes; constant before the first and after
+/// the last one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Tilt {
-    /// When, in seconds.
+    /// Time, in seconds.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "number::not_negative"))]
     pub at: f64,
-    /// In m/s².
+    /// Gravity, in m/s².
     #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
     pub gravity: [f64; 3],
 }
 
-/// A plane that marbles pass: it stops nothing, and whoever looks at a scene counts those behind
-/// it. At the mouth of a hopper, that is its throughput.
+/// Sensor plane: it has no contacts; an observer counts the marbles behind it. At the outlet of a
+/// hopper, that is its throughput.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Gate {
-    /// Toward the side that they come from; of any length but zero.
+    /// Normal toward the side that marbles come from; of any length but zero.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "number::direction"))]
     pub normal: [f64; 3],
     /// A point of the plane.
@@ -101,47 +100,47 @@ pub struct Gate {
     pub through: [f64; 3],
 }
 
-/// A [force field](crate::motion::Force).
+/// Description of a [force field](crate::motion::ForceField).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub enum Field {
-    /// The resistance of a medium that moves or not.
+    /// Drag of a medium at rest or in motion.
     Drag {
-        /// How the medium moves, in m/s.
+        /// Velocity of the medium, in m/s.
         #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
         velocity: [f64; 3],
-        /// In N s/m, at least zero.
+        /// Linear drag in N s/m, at least zero.
         #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::not_negative"))]
         linear: f64,
-        /// In N s²/m², at least zero.
+        /// Quadratic drag in N s²/m², at least zero.
         #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::not_negative"))]
         quadratic: f64,
     },
-    /// A spring from each marble to a point.
+    /// A spring from each marble to a fixed point.
     Spring {
-        /// Where it is fastened.
+        /// Anchor point, in metres.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
         anchor: [f64; 3],
-        /// In metres, at least zero.
+        /// Rest length in metres, at least zero.
         #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::not_negative"))]
         rest_length: f64,
-        /// In N/m, at least zero.
+        /// Spring constant in N/m, at least zero.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::not_negative"))]
         stiffness: f64,
     },
     /// A point that attracts with the inverse square of the distance.
     Attraction {
-        /// Where it is.
+        /// Center, in metres.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
         center: [f64; 3],
-        /// In m³/s²; negative repels.
+        /// Strength in m³/s²; negative repels.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::any"))]
         strength: f64,
     },
 }
 
-/// What a thing is made of; see [`Material`](crate::response::Material).
+/// Description of a [`Material`](crate::response::Material).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
@@ -169,29 +168,29 @@ pub struct Surface {
     pub poissons_ratio: f64,
 }
 
-/// A wall.
+/// Description of a wall of a simple shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Wall {
-    /// Where it is at the beginning.
+    /// Shape and initial pose.
     pub shape: Form,
-    /// What it is made of, if not the scene's surface.
+    /// Own material instead of the scene's.
     #[cfg_attr(feature = "serde", serde(default))]
     pub surface: Option<Surface>,
-    /// How it moves, if it does.
+    /// Kinematic motion, if any.
     #[cfg_attr(feature = "serde", serde(default))]
     pub moves: Option<Movement>,
 }
 
-/// What a wall may be.
+/// Description of a simple shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub enum Form {
-    /// All that is behind a plane.
+    /// A half-space behind a plane.
     HalfSpace {
-        /// Toward the free side; of any length but zero.
+        /// Normal toward the free side; of any length but zero.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::direction"))]
         normal: [f64; 3],
         /// A point of the plane.
@@ -203,10 +202,10 @@ pub enum Form {
         /// In metres.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
         center: [f64; 3],
-        /// Its sides, in metres, above zero.
+        /// Side lengths in metres, above zero.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::sides"))]
         size: [f64; 3],
-        /// How it is turned.
+        /// Rotation about the center.
         #[cfg_attr(feature = "serde", serde(default))]
         turned: Turn,
     },
@@ -219,12 +218,12 @@ pub enum Form {
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::positive"))]
         radius: f64,
     },
-    /// All points so near to a line.
+    /// A capsule.
     Capsule {
-        /// Where the line begins.
+        /// First end of the segment, in metres.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
         from: [f64; 3],
-        /// Where it ends.
+        /// Second end of the segment, in metres.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
         to: [f64; 3],
         /// In metres, above zero.
@@ -233,96 +232,95 @@ pub enum Form {
     },
 }
 
-/// A turn about an axis.
+/// Rotation by an angle about an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Turn {
-    /// Of any length but zero.
+    /// Axis of any length but zero.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "number::direction"))]
     pub axis: [f64; 3],
-    /// Counter-clockwise where the axis points to the one who looks.
+    /// Angle in degrees, by the right hand.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "number::any"))]
     pub degrees: f64,
 }
 
-/// How a wall moves.
+/// Kinematic motion of a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub enum Movement {
-    /// It stays, and its surface carries along what lies on it.
+    /// Conveyor belt: the wall stays in place, and its surface moves.
     Conveys {
-        /// In m/s.
+        /// Surface velocity, in m/s.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
         velocity: [f64; 3],
     },
-    /// It turns for ever.
+    /// Constant rotation.
     Turns {
         /// A point of the axis.
         #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
         pivot: [f64; 3],
-        /// Of any length but zero.
+        /// Axis of any length but zero.
         #[cfg_attr(
             feature = "serde",
             serde(default = "up", deserialize_with = "number::direction")
         )]
         axis: [f64; 3],
-        /// How fast.
+        /// Angular speed in degrees per second.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::any"))]
         degrees_per_second: f64,
     },
-    /// It goes there and back, as a sine does.
+    /// Harmonic oscillation.
     Swings {
-        /// From the middle to where it turns back, in metres.
+        /// Amplitude of the translation, in metres.
         #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
         way: [f64; 3],
         /// A point of the axis.
         #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
         pivot: [f64; 3],
-        /// Of any length but zero.
+        /// Axis of any length but zero.
         #[cfg_attr(
             feature = "serde",
             serde(default = "up", deserialize_with = "number::direction")
         )]
         axis: [f64; 3],
-        /// How far it turns about the axis.
+        /// Amplitude of the rotation about the axis, in degrees.
         #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::any"))]
         degrees: f64,
-        /// For there and back, in seconds, above zero.
+        /// Period in seconds, above zero.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "number::positive"))]
         period: f64,
     },
 }
 
-/// A marble.
+/// Description of a marble.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Ball {
-    /// Of its center, in metres.
+    /// Center, in metres.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
     pub position: [f64; 3],
     /// In metres, above zero.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "number::positive"))]
     pub radius: f64,
-    /// In m/s.
+    /// Velocity, in m/s.
     #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
     pub velocity: [f64; 3],
-    /// In rad/s.
+    /// Angular velocity, in rad/s.
     #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
-    pub spin: [f64; 3],
-    /// In kg/m³, above zero.
+    pub angular_velocity: [f64; 3],
+    /// Density in kg/m³, above zero.
     #[cfg_attr(feature = "serde", serde(default = "glass", deserialize_with = "number::positive"))]
     pub density: f64,
-    /// Above zero, it is a capsule: its line goes this far both ways from the center along its
-    /// own y axis, in metres.
+    /// Half length of a capsule's segment along its own y axis, in metres; zero for a ball.
     #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::not_negative"))]
     pub half_length: f64,
-    /// How it is turned.
+    /// Initial rotation.
     #[cfg_attr(feature = "serde", serde(default))]
     pub turned: Turn,
-    /// What it is made of, if not the scene's surface.
+    /// Own material instead of the scene's.
     #[cfg_attr(feature = "serde", serde(default))]
     pub surface: Option<Surface>,
 }
@@ -332,15 +330,15 @@ pub struct Ball {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Lattice {
-    /// The first one: the marble of which the others are copies.
+    /// The first marble, of which the others are copies.
     pub first: Ball,
-    /// How many along each side.
+    /// Number of marbles along each axis.
     pub count: [u16; 3],
-    /// From one to the next, in metres.
+    /// Spacing along each axis, in metres.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
     pub pitch: [f64; 3],
-    /// Up to which part of the pitch each is put aside, and of the radius each is smaller: always
-    /// the same for the same lattice.
+    /// Random displacement of each marble up to this fraction of the pitch, and shrinking up to
+    /// this fraction of the radius; deterministic.
     #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::part"))]
     pub disorder: f64,
 }
@@ -361,7 +359,7 @@ fn glass() -> f64 {
 }
 
 impl Default for Scene {
-    /// Nothing, for a second, on Earth.
+    /// An empty scene of one second with Earth's gravity.
     fn default() -> Self {
         Self {
             about: String::new(),
@@ -380,7 +378,7 @@ impl Default for Scene {
 }
 
 impl Default for Surface {
-    /// That of a default [`Material`](crate::response::Material).
+    /// The default [`Material`](crate::response::Material).
     fn default() -> Self {
         let material = crate::response::Material::<f64>::default();
         Self {
@@ -396,20 +394,20 @@ impl Default for Surface {
 }
 
 impl Default for Turn {
-    /// Not turned.
+    /// No rotation.
     fn default() -> Self {
         Self { axis: [0.0, 1.0, 0.0], degrees: 0.0 }
     }
 }
 
 impl Default for Ball {
-    /// A marble of glass in the origin, a centimetre across, at rest.
+    /// A marble of glass at the origin, a centimetre across, at rest.
     fn default() -> Self {
         Self {
             position: [0.0; 3],
             radius: 0.005,
             velocity: [0.0; 3],
-            spin: [0.0; 3],
+            angular_velocity: [0.0; 3],
             density: 2500.0,
             half_length: 0.0,
             turned: Turn::default(),
@@ -419,13 +417,14 @@ impl Default for Ball {
 }
 
 impl Lattice {
-    /// The marbles.
+    /// Lists the marbles.
     pub fn balls(&self) -> impl Iterator<Item = Ball> + use<> {
         let Self { first, count, pitch, disorder } = *self;
         let [nx, ny, nz] = count.map(u64::from);
         (0..nx * ny * nz).map(move |i| {
             let cell = [i % nx, i / nx / nz, i / nx % nz].map(|n| n as f64);
-            // The fractional parts of multiples of such numbers spread evenly (Roberts 2018, R4).
+            // Low-discrepancy sequence: fractional parts of multiples of such numbers spread evenly
+            // (Roberts 2018, R4).
             let random = |n: usize| {
                 let step =
                     [0.856_674_883_854_503, 0.733_891_856_627_126, 0.628_706_721_009_064][n % 3];

@@ -1,4 +1,4 @@
-//! Numbers of a scene, refused where they stand.
+//! Deserialization of scene numbers with validation, so that errors have line and field.
 
 use serde::{Deserialize, Deserializer, de::Error};
 

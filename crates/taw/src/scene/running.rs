@@ -9,36 +9,36 @@ use crate::Error;
 use crate::error::finite_vector;
 use crate::frame::{AxisAngle, Pose};
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, direction_and_length};
-use crate::motion::{Force, Mass, Medium, WallMotion};
+use crate::motion::{ForceField, Mass, Medium, WallMotion};
 use crate::response::{Elasticity, Material};
 use crate::shape::{Capsule, Obb, Plane, Sphere};
 use crate::world::{Marble, Model, WallId, WallShape, World};
 
-/// A [`Scene`] that goes on: its world, and what moves in it by itself.
+/// Running simulation of a [`Scene`]: its world and kinematic motions.
 #[derive(Clone, Debug)]
 pub struct Running<S> {
-    /// The world. Marbles have the order of the scene.
+    /// The world, with marbles in the order of the scene.
     pub world: World<S>,
     scene: Scene,
     moving: Vec<(WallId, Shape, Movement)>,
     time: f64,
 }
 
-/// What a wall that moves looks like at the beginning.
+/// Initial shape of a kinematic wall.
 #[derive(Clone, Debug)]
 enum Shape {
     Form(Form),
-    /// The structure of this number.
+    /// Index of a structure.
     Structure(usize),
 }
 
 impl Scene {
-    /// The scene at its beginning, to be stepped by this model.
+    /// Builds the initial state, to be stepped by a model.
     ///
     /// # Errors
-    /// What the world refuses, now or later: [`Error::NotFinite`], [`Error::NotPositive`],
-    /// [`Error::OutOfRange`], [`Error::NotUnit`], [`Error::BallsOnly`]. Numbers beyond those of
-    /// `f32` in any world, and more than [`MAX_MARBLES`](Self::MAX_MARBLES).
+    /// Errors of the world: [`Error::NotFinite`], [`Error::NotPositive`], [`Error::OutOfRange`],
+    /// [`Error::NotUnit`], [`Error::UnsupportedShape`]. Also numbers beyond those of `f32` in any
+    /// world, and more than [`MAX_MARBLES`](Self::MAX_MARBLES).
     pub fn run<S: Scalar>(&self, model: Model) -> Result<Running<S>, Error> {
         self.check()?;
         let mut world = World::default();
@@ -68,11 +68,11 @@ impl Scene {
         for ball in self.balls() {
             world.marbles.insert(ball.marble(self.surface)?)?;
         }
-        world.takes_all_marbles()?;
+        world.check_shapes()?;
         Ok(Running { world, scene: self.clone(), moving, time: 0.0 })
     }
 
-    /// Gravity at a time, in m/s².
+    /// Interpolated gravity at a time, in m/s².
     #[must_use]
     pub fn gravity_at(&self, time: f64) -> [f64; 3] {
         let (Some(first), Some(last)) = (self.tilts.first(), self.tilts.last()) else {
@@ -94,7 +94,7 @@ impl Scene {
         last.gravity
     }
 
-    /// All its marbles: those one by one first.
+    /// All marbles: single ones first.
     pub fn balls(&self) -> impl Iterator<Item = Ball> + '_ {
         let lattices = self.lattices.iter().flat_map(super::Lattice::balls);
         self.marbles.iter().copied().chain(lattices)
@@ -102,31 +102,31 @@ impl Scene {
 }
 
 impl<S> From<World<S>> for Running<S> {
-    /// A world that is there already: nothing moves in it by itself but what its model moves.
+    /// Wraps an existing world without kinematic motions.
     fn from(world: World<S>) -> Self {
         Self { world, scene: Scene::default(), moving: Vec::new(), time: 0.0 }
     }
 }
 
 impl<S: Scalar> Running<S> {
-    /// Goes on by `dt` seconds: gravity as it is halfway, walls where they are at the end.
+    /// Steps by `dt` seconds: gravity of the midpoint, walls at their poses of the end.
     ///
     /// # Errors
     /// As [`World::step`]; then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
-        self.world.substep_of(dt)?;
+        self.world.validated_substep(dt)?;
         self.move_walls(dt)?;
         self.world.step(dt)
     }
 
-    /// The first part of a [step](Self::step): gravity and walls. For those who step the
-    /// [world](Self::world) by themselves.
+    /// First part of a [step](Self::step): updates gravity and walls, for callers who step the
+    /// [world](Self::world) themselves.
     ///
     /// # Errors
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
-    /// [`Error::NoSuchWall`] if one that moves was taken out; then nothing has changed.
+    /// [`Error::NoSuchWall`] if a kinematic wall was removed; then nothing has changed.
     pub fn move_walls(&mut self, dt: S) -> Result<(), Error> {
-        let seconds = World::checked_dt(dt)?.as_f64();
+        let seconds = World::validated_dt(dt)?.as_f64();
         self.moving.iter().try_for_each(|(id, ..)| self.world.walls.row(*id).map(|_| ()))?;
         if !self.scene.tilts.is_empty() {
             let gravity = self.scene.gravity_at(self.time + 0.5 * seconds);
@@ -135,7 +135,7 @@ impl<S: Scalar> Running<S> {
         for (id, shape, movement) in &self.moving {
             let (pose, motion) = movement.at(self.time, self.time + seconds)?;
             let wall = match (self.world.walls.get(*id)?, shape) {
-                // Copies share what was built once.
+                // Copies share the built geometry.
                 (WallShape::Mesh(mesh, _), _) => WallShape::Mesh(Arc::clone(mesh), cast_pose(pose)),
                 (WallShape::HeightField(field, _), _) => {
                     WallShape::HeightField(Arc::clone(field), cast_pose(pose))
@@ -150,13 +150,13 @@ impl<S: Scalar> Running<S> {
         Ok(())
     }
 
-    /// How far it is, in seconds.
+    /// Simulated time, in seconds.
     #[must_use]
     pub fn time(&self) -> f64 {
         self.time
     }
 
-    /// How many marbles are behind a gate by now: those behind several count several times.
+    /// Number of marbles behind a sensor plane; those behind several count several times.
     #[must_use]
     pub fn passed(&self) -> usize {
         let behind = |gate: &Gate| {
@@ -167,7 +167,7 @@ impl<S: Scalar> Running<S> {
         self.scene.gates.iter().map(behind).sum()
     }
 
-    /// What it began with.
+    /// The initial scene.
     #[must_use]
     pub fn scene(&self) -> &Scene {
         &self.scene
@@ -175,27 +175,27 @@ impl<S: Scalar> Running<S> {
 }
 
 impl Field {
-    fn force<S: Scalar>(self) -> Force<S> {
+    fn force<S: Scalar>(self) -> ForceField<S> {
         match self {
-            Self::Drag { velocity, linear, quadratic } => Force::Drag(Medium {
+            Self::Drag { velocity, linear, quadratic } => ForceField::Drag(Medium {
                 velocity: vector(velocity),
                 linear: S::constant(linear),
                 quadratic: S::constant(quadratic),
             }),
-            Self::Spring { anchor, rest_length, stiffness } => Force::Spring {
+            Self::Spring { anchor, rest_length, stiffness } => ForceField::Spring {
                 anchor: point(anchor),
                 rest_length: S::constant(rest_length),
                 stiffness: S::constant(stiffness),
             },
             Self::Attraction { center, strength } => {
-                Force::Attraction { center: point(center), strength: S::constant(strength) }
+                ForceField::Attraction { center: point(center), strength: S::constant(strength) }
             }
         }
     }
 }
 
 impl Surface {
-    /// The material that it stands for.
+    /// Converts to a material.
     #[must_use]
     pub fn material<S: Scalar>(self) -> Material<S> {
         Material {
@@ -219,7 +219,7 @@ impl Ball {
         Ok(Marble {
             velocity: vector(self.velocity),
             rotation: Quat::from_sv(S::constant(turned.s), cast_vector(turned.v)),
-            spin: vector(self.spin),
+            angular_velocity: vector(self.angular_velocity),
             half_length: S::constant(self.half_length),
             mass: Mass::Density(S::constant(self.density)),
             material: Some(self.surface.unwrap_or(surface).material()),
@@ -229,12 +229,13 @@ impl Ball {
 }
 
 impl Form {
-    /// The wall, moved by a pose.
+    /// The wall shape, transformed by a pose.
     pub(super) fn wall<S: Scalar>(self, pose: Pose<f64>) -> Result<WallShape<S>, Error> {
-        let place = |at: [f64; 3]| point(pose.point(Point3::from(at)).into());
+        let place = |at: [f64; 3]| point(pose.transform_point(Point3::from(at)).into());
         Ok(match self {
             Self::HalfSpace { normal, through } => {
-                Plane::through(place(through), vector(pose.vector(normal.into()).into()))?.into()
+                Plane::through(place(through), vector(pose.transform_vector(normal.into()).into()))?
+                    .into()
             }
             Self::Box { center, size, turned } => {
                 let turn = pose.rotation * turned.rotation()?;
@@ -253,16 +254,16 @@ impl Form {
 
 impl Turn {
     fn rotation(self) -> Result<Quat<f64>, Error> {
-        turned(self.axis, self.degrees.to_radians())
+        axis_angle(self.axis, self.degrees.to_radians())
     }
 }
 
-fn turned(axis: [f64; 3], radians: f64) -> Result<Quat<f64>, Error> {
+fn axis_angle(axis: [f64; 3], radians: f64) -> Result<Quat<f64>, Error> {
     Ok(AxisAngle::new(Vec3::from(axis), radians)?.into())
 }
 
 impl Movement {
-    /// Where a wall that moves like this is after so many seconds, seen from where it began.
+    /// Pose of a wall after a time in seconds, relative to its initial one.
     ///
     /// # Errors
     /// [`Error::NotFinite`] for the axis, [`Error::NotUnit`] for one without a length.
@@ -270,15 +271,15 @@ impl Movement {
         Ok(self.at::<f64>(time, time)?.0)
     }
 
-    /// Where a wall is at a time, seen from where it began, and how it moves from an earlier one
-    /// until then.
+    /// Pose of a wall at the time `to`, relative to its initial one, and its mean motion since the
+    /// time `from`.
     fn at<S: Scalar>(self, from: f64, to: f64) -> Result<(Pose<f64>, WallMotion<S>), Error> {
         let middle = 0.5 * (from + to);
         let (way, velocity, pivot, axis, angle, rate) = match self {
             Self::Conveys { velocity } => {
                 let motion = WallMotion {
                     velocity: vector(velocity),
-                    spin: Vec3::zero(),
+                    angular_velocity: Vec3::zero(),
                     pivot: Point3::origin(),
                 };
                 return Ok((Pose::identity(), motion));
@@ -290,8 +291,8 @@ impl Movement {
             Self::Swings { way, pivot, axis, degrees, period } => {
                 let (part, _) = (TAU * (to / period)).sin_cos_portable();
                 let (_, rate) = (TAU * (middle / period)).sin_cos_portable();
-                // sin a − sin b = 2 cos((a + b) / 2) sin((a − b) / 2): the mean rate, also of what
-                // swings many times on the way.
+                // sin a − sin b = 2 cos((a + b) / 2) sin((a − b) / 2): the mean rate, also over
+                // many periods.
                 let half = 0.5 * TAU * ((to - from) / period);
                 let mean = if half == 0.0 { 1.0 } else { half.sin_cos_portable().0 / half };
                 let (way, rate) = (Vec3::from(way), rate * mean * TAU / period);
@@ -303,13 +304,13 @@ impl Movement {
         let (direction, _) =
             direction_and_length(finite_vector(["axis.x", "axis.y", "axis.z"], Vec3::from(axis))?)
                 .ok_or(Error::NotUnit { field: "axis", value: 0.0 })?;
-        let rotation = turned(axis, angle)?;
-        // About the pivot, then on the way.
-        let turned_pivot = Pose { rotation, translation: Vec3::zero() }.point(pivot);
+        let rotation = axis_angle(axis, angle)?;
+        // Rotation about the pivot, then translation.
+        let turned_pivot = Pose { rotation, translation: Vec3::zero() }.transform_point(pivot);
         let pose = Pose { rotation, translation: pivot - turned_pivot + way };
         let motion = WallMotion {
             velocity: cast_vector(velocity),
-            spin: cast_vector(direction * rate),
+            angular_velocity: cast_vector(direction * rate),
             pivot: point((pivot + way).into()),
         };
         Ok((pose, motion))

@@ -1,4 +1,4 @@
-//! Walls that are made of many parts.
+//! Walls of composite shapes.
 
 use std::sync::Arc;
 
@@ -9,61 +9,60 @@ use crate::math::{Point3, Quat, Scalar, cast_vector};
 use crate::shape::{Compound, HeightField, Mesh};
 use crate::world::WallShape;
 
-/// A wall of many parts.
+/// Description of a wall of a composite shape.
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Structure {
-    /// Where it is at the beginning.
+    /// Shape and initial pose.
     pub shape: Build,
-    /// What it is made of, if not the scene's surface.
+    /// Own material instead of the scene's.
     #[cfg_attr(feature = "serde", serde(default))]
     pub surface: Option<Surface>,
-    /// How it moves, if it does.
+    /// Kinematic motion, if any.
     #[cfg_attr(feature = "serde", serde(default))]
     pub moves: Option<Movement>,
 }
 
-/// The parts of a [`Structure`].
+/// Shape of a [`Structure`].
 #[derive(Clone, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub enum Build {
     /// A [mesh](crate::shape::Mesh).
     Mesh {
-        /// The corners, in metres.
+        /// Vertices, in metres.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "files::points"))]
         points: Vec<[f64; 3]>,
-        /// Three corners each, by their numbers from zero.
+        /// Three vertex indices each, from zero.
         triangles: Vec<[u32; 3]>,
     },
     /// A [height field](crate::shape::HeightField), solid below.
     HeightField {
-        /// Where the first column and row meet, at height zero, in metres.
+        /// Corner of the first column and row, at height zero, in metres.
         #[cfg_attr(feature = "serde", serde(default, deserialize_with = "super::number::vector"))]
         corner: [f64; 3],
-        /// From one column to the next along x, and from row to row along z, in metres, above
-        /// zero.
+        /// Spacing of columns along x and of rows along z, in metres, above zero.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "files::cell"))]
         cell: [f64; 2],
-        /// How many heights a row has, at least two.
+        /// Number of heights per row, at least two.
         columns: u32,
-        /// In metres, row by row.
+        /// Heights in metres, row by row.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "files::heights"))]
         heights: Vec<f64>,
     },
-    /// A [compound](crate::shape::Compound) of bounded forms.
+    /// A [compound](crate::shape::Compound) of bounded simple shapes.
     Compound {
-        /// At least one, and no half-space.
+        /// Sub-shapes: at least one, and no half-space.
         parts: Vec<Form>,
     },
 }
 
 impl Build {
-    /// The wall, moved by a pose.
+    /// The wall shape, transformed by a pose.
     ///
     /// # Errors
-    /// What the parts refuse, and [`Error::NotFinite`] for a half-space in a compound.
+    /// Errors of the sub-shapes, and [`Error::NotFinite`] for a half-space in a compound.
     pub(super) fn wall<S: Scalar>(&self, pose: Pose<f64>) -> Result<WallShape<S>, Error> {
         let point = |p: &[f64; 3]| Point3::from(p.map(S::constant));
         Ok(match self {
@@ -80,7 +79,7 @@ impl Build {
             Self::Compound { parts } => {
                 let solid = |form: &Form| match form.wall(pose)? {
                     WallShape::Solid(shape) => Ok(shape),
-                    // Endless.
+                    // Unbounded.
                     _ => Err(Error::NotFinite { field: "parts", value: f64::INFINITY }),
                 };
                 let parts = parts.iter().map(solid).collect::<Result<_, _>>()?;
@@ -90,13 +89,13 @@ impl Build {
     }
 }
 
-/// The pose in another scalar.
+/// Converts to another scalar.
 pub(super) fn cast_pose<S: Scalar>(pose: Pose<f64>) -> Pose<S> {
     let rotation = Quat::from_sv(S::constant(pose.rotation.s), cast_vector(pose.rotation.v));
     Pose { rotation, translation: cast_vector(pose.translation) }
 }
 
-/// Numbers of a structure, refused where they stand.
+/// Deserialization with validation.
 #[cfg(feature = "serde")]
 mod files {
     use serde::{Deserialize, Deserializer, de::Error};

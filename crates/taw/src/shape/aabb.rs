@@ -1,30 +1,30 @@
 use cgmath::{Array, Point2};
 
-use super::{Nearest, Obb, Solid};
+use super::{BoundedShape, Obb, PointProjection};
 use crate::Error;
 use crate::error::{coordinates, within};
 use crate::math::{Point3, Scalar, Vec3, length};
 
-/// A box along the axes, in a space of two or three dimensions. It may be flat.
+/// Axis-aligned bounding box in two or three dimensions. It may be flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Aabb<P> {
-    /// The corner with the least coordinates, in metres.
+    /// Lower corner, in metres.
     pub min: P,
-    /// The corner with the greatest, none of them below the least.
+    /// Upper corner, in metres; no coordinate below the lower one.
     pub max: P,
 }
 
-/// A box along the axes in three dimensions.
-pub type Box3<S> = Aabb<Point3<S>>;
+/// Axis-aligned box in three dimensions.
+pub type Aabb3<S> = Aabb<Point3<S>>;
 
-/// A box along the axes in two dimensions.
-pub type Rectangle<S> = Aabb<Point2<S>>;
+/// Axis-aligned box in two dimensions.
+pub type Aabb2<S> = Aabb<Point2<S>>;
 
 impl<P, S: Scalar> Aabb<P>
 where
     P: Array<Element = S> + Copy,
 {
-    /// A box, checked.
+    /// Validates a box.
     ///
     /// # Errors
     /// [`Error::NotFinite`] for a corner, [`Error::OutOfRange`] for a `max` below `min`.
@@ -37,65 +37,65 @@ where
         Ok(Self { min, max })
     }
 
-    /// Whether a point is in it or on its surface.
+    /// Returns true for a point inside or on the surface.
     #[must_use]
-    pub fn has(&self, point: P) -> bool {
+    pub fn contains_point(&self, point: P) -> bool {
         (0..P::len()).all(|i| self.min[i] <= point[i] && point[i] <= self.max[i])
     }
 
-    /// Whether the two have a point in common.
+    /// Returns true if the two boxes have a point in common.
     #[must_use]
     pub fn overlaps(&self, other: &Self) -> bool {
         (0..P::len()).all(|i| self.min[i] <= other.max[i] && other.min[i] <= self.max[i])
     }
 
-    /// The smallest box that both are in.
+    /// The smallest box that contains both.
     #[must_use]
     pub fn union(&self, other: &Self) -> Self {
         let (mut min, mut max) = (self.min, self.max);
         for i in 0..P::len() {
-            min[i] = least(min[i], other.min[i]);
-            max[i] = -least(-max[i], -other.max[i]);
+            min[i] = smaller(min[i], other.min[i]);
+            max[i] = -smaller(-max[i], -other.max[i]);
         }
         Self { min, max }
     }
 
-    /// The point of the box that is nearest to another one.
+    /// The point of the box that is nearest to a given point.
     #[must_use]
     pub fn clamp(&self, point: P) -> P {
         let mut nearest = point;
         for i in 0..P::len() {
-            nearest[i] = -least(-self.min[i], -least(nearest[i], self.max[i]));
+            nearest[i] = -smaller(-self.min[i], -smaller(nearest[i], self.max[i]));
         }
         nearest
     }
 }
 
-fn least<S: Scalar>(a: S, b: S) -> S {
+fn smaller<S: Scalar>(a: S, b: S) -> S {
     if b < a { b } else { a }
 }
 
-impl<S: Scalar> Box3<S> {
-    /// The same box as one that may turn.
+impl<S: Scalar> Aabb3<S> {
+    /// Converts to an oriented box.
     #[must_use]
     pub fn obb(&self) -> Obb<S> {
-        Obb::along_axes(self)
+        Obb::from_aabb(self)
     }
 
-    /// How far a point is outside, in metres; zero inside.
+    /// Distance of a point from the box in metres; zero inside.
     #[must_use]
-    pub fn gap(&self, point: Point3<S>) -> S {
+    pub fn distance_to_point(&self, point: Point3<S>) -> S {
         length(point - self.clamp(point))
     }
 
-    /// The middle.
+    /// Center of the box.
     #[must_use]
     pub fn center(&self) -> Point3<S> {
         self.min + (self.max - self.min) * S::constant(0.5)
     }
 }
 
-impl<S: Scalar> Solid<S> for Box3<S> {
+impl<S: Scalar> BoundedShape<S> for Aabb3<S> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
         let mut point = self.min;
         for axis in 0..3 {
@@ -115,12 +115,12 @@ impl<S: Scalar> Solid<S> for Box3<S> {
         size.x * size.y * size.z
     }
 
-    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
-        self.obb().nearest(point)
+    fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
+        self.obb().project_point(point)
     }
 
     fn contains(&self, point: Point3<S>) -> bool {
-        self.has(point)
+        self.contains_point(point)
     }
 }
 
@@ -139,12 +139,15 @@ mod tests {
 
     #[test]
     fn rectangles_are_boxes_too() {
-        let new = |a: f64, b: f64| Rectangle::new(Point2::new(a, a), Point2::new(b, b)).unwrap();
+        let new = |a: f64, b: f64| Aabb2::new(Point2::new(a, a), Point2::new(b, b)).unwrap();
         let (first, second) = (new(0.0, 2.0), new(2.0, 3.0));
         assert!(first.overlaps(&second), "they touch");
         assert!(!first.overlaps(&new(2.1, 3.0)));
         assert_eq!(first.union(&second), new(0.0, 3.0));
         assert_eq!(first.clamp(Point2::new(-1.0, 1.5)), Point2::new(0.0, 1.5));
-        assert!(first.has(Point2::new(2.0, 0.0)) && !first.has(Point2::new(2.0, -0.1)));
+        assert!(
+            first.contains_point(Point2::new(2.0, 0.0))
+                && !first.contains_point(Point2::new(2.0, -0.1))
+        );
     }
 }

@@ -1,6 +1,6 @@
 use cgmath::{Array, Point2};
 
-use super::{Aabb, Box3, Nearest, Solid};
+use super::{Aabb, Aabb3, BoundedShape, PointProjection};
 use crate::Error;
 use crate::error::{coordinates, positive};
 use crate::math::{Point3, Scalar, Vec3, direction_and_length};
@@ -8,7 +8,7 @@ use crate::math::{Point3, Scalar, Vec3, direction_and_length};
 /// All points within `radius` of `center`, in a space of two or three dimensions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball<P, S> {
-    /// The middle, in metres.
+    /// Center, in metres.
     pub center: P,
     /// In metres, finite and above zero.
     pub radius: S,
@@ -24,7 +24,7 @@ impl<P, S: Scalar> Ball<P, S>
 where
     P: Array<Element = S> + Copy,
 {
-    /// A ball, checked.
+    /// Validates a ball.
     ///
     /// # Errors
     /// [`Error::NotFinite`] for the center, [`Error::NotPositive`] for the radius.
@@ -33,14 +33,14 @@ where
         Ok(Self { center, radius: positive("radius", radius)? })
     }
 
-    /// Whether a point is in it or on its surface.
+    /// Returns true for a point inside or on the surface.
     #[must_use]
-    pub fn has(&self, point: P) -> bool {
+    pub fn contains_point(&self, point: P) -> bool {
         let along = (0..P::len()).map(|axis| point[axis] - self.center[axis]);
         along.fold(S::zero(), S::hypot) <= self.radius
     }
 
-    /// The smallest box that it is in.
+    /// Bounding box.
     #[must_use]
     pub fn bounds(&self) -> Aabb<P> {
         let mut bounds = Aabb { min: self.center, max: self.center };
@@ -52,13 +52,13 @@ where
     }
 }
 
-impl<S: Scalar> Solid<S> for Sphere<S> {
+impl<S: Scalar> BoundedShape<S> for Sphere<S> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
         let (unit, _) = direction_and_length(direction).unwrap_or((Vec3::unit_x(), S::zero()));
         self.center + unit * self.radius
     }
 
-    fn bounding_box(&self) -> Box3<S> {
+    fn bounding_box(&self) -> Aabb3<S> {
         self.bounds()
     }
 
@@ -67,11 +67,11 @@ impl<S: Scalar> Solid<S> for Sphere<S> {
         factor * self.radius * self.radius * self.radius
     }
 
-    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
+    fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
         let apart = direction_and_length(point - self.center);
         let (normal, length) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
         let distance = length - self.radius;
-        Nearest { point: self.center + normal * self.radius, normal, distance }
+        PointProjection { point: self.center + normal * self.radius, normal, distance }
     }
 }
 
@@ -94,7 +94,10 @@ mod tests {
     #[test]
     fn circles_are_balls_too() {
         let circle = Circle::new(Point2::new(1.0, 2.0), 0.5).unwrap();
-        assert!(circle.has(Point2::new(1.5, 2.0)) && !circle.has(Point2::new(1.4, 2.4)));
+        assert!(
+            circle.contains_point(Point2::new(1.5, 2.0))
+                && !circle.contains_point(Point2::new(1.4, 2.4))
+        );
         assert_eq!(circle.bounds().max, Point2::new(1.5, 2.5));
     }
 }

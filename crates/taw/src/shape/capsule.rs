@@ -1,25 +1,25 @@
 use cgmath::InnerSpace;
 
-use super::{Aabb, Box3, Nearest, Solid, Sphere};
+use super::{Aabb, Aabb3, BoundedShape, PointProjection, Sphere};
 use crate::Error;
 use crate::error::{finite_point, positive};
 use crate::frame::Pose;
 use crate::math::{Point3, Scalar, Vec3, direction_and_length, length};
 
-/// All points within `radius` of the line from `a` to `b`. Where the two are one point, it
-/// is a sphere.
+/// A capsule: all points within `radius` of the segment from `a` to `b`. With coincident ends it is
+/// a sphere.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Capsule<S> {
-    /// One end of the line, in metres.
+    /// First end of the segment, in metres.
     pub a: Point3<S>,
-    /// The other.
+    /// Second end of the segment, in metres.
     pub b: Point3<S>,
     /// In metres, finite and above zero.
     pub radius: S,
 }
 
 impl<S: Scalar> Capsule<S> {
-    /// A capsule, checked.
+    /// Validates a capsule.
     ///
     /// # Errors
     /// [`Error::NotFinite`] for an end, [`Error::NotPositive`] for the radius.
@@ -31,16 +31,16 @@ impl<S: Scalar> Capsule<S> {
         })
     }
 
-    /// The same capsule elsewhere.
+    /// Transforms the capsule by a pose.
     #[must_use]
-    pub fn moved(&self, pose: Pose<S>) -> Self {
-        Self { a: pose.point(self.a), b: pose.point(self.b), ..*self }
+    pub fn transformed(&self, pose: Pose<S>) -> Self {
+        Self { a: pose.transform_point(self.a), b: pose.transform_point(self.b), ..*self }
     }
 
-    /// The point of the line that is nearest to another one (Ericson, *Real-Time Collision
+    /// The point of the segment that is nearest to a given point (Ericson, *Real-Time Collision
     /// Detection*, 2005, §5.1.2).
     #[must_use]
-    pub fn nearest_of_line(&self, point: Point3<S>) -> Point3<S> {
+    pub fn project_on_segment(&self, point: Point3<S>) -> Point3<S> {
         let Some((along, long)) = direction_and_length(self.b - self.a) else { return self.a };
         let part = (point - self.a).dot(along);
         if part <= S::zero() {
@@ -53,13 +53,13 @@ impl<S: Scalar> Capsule<S> {
     }
 }
 
-impl<S: Scalar> Solid<S> for Capsule<S> {
+impl<S: Scalar> BoundedShape<S> for Capsule<S> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
         let center = if (self.b - self.a).dot(direction) > S::zero() { self.b } else { self.a };
         Sphere { center, radius: self.radius }.support(direction)
     }
 
-    fn bounding_box(&self) -> Box3<S> {
+    fn bounding_box(&self) -> Aabb3<S> {
         let ends = Aabb { min: self.a, max: self.a }.union(&Aabb { min: self.b, max: self.b });
         let reach = Vec3::new(self.radius, self.radius, self.radius);
         Aabb { min: ends.min - reach, max: ends.max + reach }
@@ -70,26 +70,26 @@ impl<S: Scalar> Solid<S> for Capsule<S> {
         disc * (length(self.b - self.a) + S::constant(4.0 / 3.0) * self.radius)
     }
 
-    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
-        let center = self.nearest_of_line(point);
+    fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
+        let center = self.project_on_segment(point);
         let out = point - center;
-        // On the line, but for rounding, every way across is as short.
+        // On the segment, to within rounding, every perpendicular is equally short.
         let largest = [self.a, self.b, point]
             .iter()
             .flat_map(|p| [p.x.abs(), p.y.abs(), p.z.abs()])
             .fold(S::zero(), S::max);
         let (normal, far) = direction_and_length(out)
             .filter(|(_, far)| *far > largest * S::epsilon() * S::constant(4.0))
-            .unwrap_or_else(|| (across(self.b - self.a), S::zero()));
+            .unwrap_or_else(|| (any_perpendicular(self.b - self.a), S::zero()));
         let distance = far - self.radius;
-        Nearest { point: center + normal * self.radius, normal, distance }
+        PointProjection { point: center + normal * self.radius, normal, distance }
     }
 }
 
-/// A unit vector at right angles to a direction: along +x for none at all.
-pub(crate) fn across<S: Scalar>(direction: Vec3<S>) -> Vec3<S> {
+/// Any unit vector perpendicular to a direction; +x for zero.
+pub(crate) fn any_perpendicular<S: Scalar>(direction: Vec3<S>) -> Vec3<S> {
     let Some((unit, _)) = direction_and_length(direction) else { return Vec3::unit_x() };
-    // Beside the axis that it is least along.
+    // From the axis that it is least aligned with.
     let [x, y, z] = [unit.x.abs(), unit.y.abs(), unit.z.abs()];
     let axis = if x <= y && x <= z {
         Vec3::unit_x()
@@ -123,7 +123,7 @@ mod tests {
         let capsule = Capsule::new(at, at, 0.5).unwrap();
         let sphere = Sphere::new(at, 0.5).unwrap();
         for point in [at, Point3::new(4.0, 2.0, 3.0), Point3::new(1.1, 2.1, 3.1)] {
-            assert_eq!(capsule.nearest(point), sphere.nearest(point));
+            assert_eq!(capsule.project_point(point), sphere.project_point(point));
         }
         assert_eq!(capsule.bounding_box(), sphere.bounding_box());
         assert!((capsule.volume() - sphere.volume()).abs() < 1e-15);
@@ -131,12 +131,12 @@ mod tests {
     }
 
     #[test]
-    fn on_its_line_the_way_out_is_across() {
+    fn on_its_line_the_way_out_is_any_perpendicular() {
         let capsule =
             Capsule::new(Point3::new(0.0, -1.0, 0.0), Point3::new(0.0, 1.0, 0.0), 0.5).unwrap();
-        let nearest = capsule.nearest(Point3::new(0.0_f64, 0.3, 0.0));
+        let nearest = capsule.project_point(Point3::new(0.0_f64, 0.3, 0.0));
         assert_eq!((nearest.distance, nearest.normal.y), (-0.5, 0.0));
-        let above = capsule.nearest(Point3::new(0.0, 2.0, 0.0));
+        let above = capsule.project_point(Point3::new(0.0, 2.0, 0.0));
         assert_eq!((above.distance, above.point), (0.5, Point3::new(0.0, 1.5, 0.0)));
     }
 }

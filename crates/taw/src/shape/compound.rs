@@ -1,13 +1,13 @@
 use cgmath::InnerSpace;
 
-use super::{Box3, Capsule, Hull, Nearest, Obb, Solid, Sphere};
+use super::{Aabb3, BoundedShape, Capsule, Hull, Obb, PointProjection, Sphere};
 use crate::Error;
 use crate::error::{self, finite_point, finite_vector, within};
 use crate::frame::Pose;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
 
-/// Several parts that are one thing. Of one kind, `Compound<Obb<f32>>` say, nothing needs
-/// to be matched; of mixed kinds it is a `Compound<Shape<f32>>`.
+/// Compound shape of several sub-shapes. With a single type, such as `Compound<Obb<f32>>`, queries
+/// need no `match`; a mixed one is a `Compound<Shape<f32>>`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Compound<T> {
     parts: Vec<T>,
@@ -16,33 +16,32 @@ pub struct Compound<T> {
 /// Any bounded convex shape, or a compound of such.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Shape<S> {
-    /// All points near one.
+    /// A sphere.
     Sphere(Sphere<S>),
-    /// A box along the axes.
-    Aabb(Box3<S>),
-    /// A box.
+    /// An axis-aligned box.
+    Aabb(Aabb3<S>),
+    /// An oriented box.
     Obb(Obb<S>),
-    /// All points near a line.
+    /// A capsule.
     Capsule(Capsule<S>),
-    /// What is around some points.
+    /// A convex hull.
     Hull(Hull<S>),
-    /// Several of these.
+    /// A compound.
     Compound(Compound<Shape<S>>),
 }
 
 impl<T> Compound<T> {
-    /// How many compounds may be inside each other: what walks through them takes some hundred
-    /// bytes of the stack for each.
+    /// Maximum nesting depth: recursion takes some hundred bytes of stack per level.
     pub const MAX_LEVELS: u32 = 64;
 
-    /// A compound, checked.
+    /// Validates a compound.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for no parts at all, or for more than
-    /// [`MAX_LEVELS`](Self::MAX_LEVELS) compounds inside each other.
+    /// [`Error::OutOfRange`] for an empty list, or for more than [`MAX_LEVELS`](Self::MAX_LEVELS)
+    /// nested compounds.
     pub fn new<S: Scalar>(parts: Vec<T>) -> Result<Self, Error>
     where
-        T: Solid<S>,
+        T: BoundedShape<S>,
     {
         let count = u32::try_from(parts.len()).unwrap_or(u32::MAX);
         within("parts.len()", f64::from(count), 1.0, f64::from(u32::MAX - 1))?;
@@ -52,14 +51,14 @@ impl<T> Compound<T> {
         Ok(compound)
     }
 
-    /// What it is made of; never nothing.
+    /// Sub-shapes; never empty.
     #[must_use]
     pub fn parts(&self) -> &[T] {
         &self.parts
     }
 }
 
-impl<S: Scalar, T: Solid<S>> Solid<S> for Compound<T> {
+impl<S: Scalar, T: BoundedShape<S>> BoundedShape<S> for Compound<T> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
         let along =
             |point: Point3<S>| cgmath::dot(point - self.parts[0].support(direction), direction);
@@ -68,7 +67,7 @@ impl<S: Scalar, T: Solid<S>> Solid<S> for Compound<T> {
         points.fold(first, |best, point| if along(point) > along(best) { point } else { best })
     }
 
-    fn bounding_box(&self) -> Box3<S> {
+    fn bounding_box(&self) -> Aabb3<S> {
         let first = self.parts[0].bounding_box();
         self.parts.iter().fold(first, |all, part| all.union(&part.bounding_box()))
     }
@@ -81,18 +80,18 @@ impl<S: Scalar, T: Solid<S>> Solid<S> for Compound<T> {
         1 + self.parts.iter().map(T::levels).max().unwrap_or(0)
     }
 
-    /// That of the part that the point is deepest in, or nearest to.
-    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
-        let first = self.parts[0].nearest(point);
+    /// Projection onto the sub-shape that the point is deepest in, or nearest to.
+    fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
+        let first = self.parts[0].project_point(point);
         self.parts[1..]
             .iter()
-            .map(|part| part.nearest(point))
+            .map(|part| part.project_point(point))
             .fold(first, |best, next| if next.distance < best.distance { next } else { best })
     }
 }
 
 impl<S: Scalar> Compound<Shape<S>> {
-    /// Its simple parts, and those of the compounds in it.
+    /// Collects the simple sub-shapes, including those of nested compounds.
     fn flatten(self, simple: &mut Vec<Shape<S>>) {
         for part in self.parts {
             match part {
@@ -104,41 +103,41 @@ impl<S: Scalar> Compound<Shape<S>> {
 }
 
 impl<S: Scalar> Shape<S> {
-    /// The same shape elsewhere. A box along the axes becomes one that may be turned.
+    /// Transforms the shape by a pose. An axis-aligned box becomes an oriented one.
     #[must_use]
-    pub fn moved(&self, pose: Pose<S>) -> Self {
+    pub fn transformed(&self, pose: Pose<S>) -> Self {
         match self {
             Self::Sphere(sphere) => {
-                Self::Sphere(Sphere { center: pose.point(sphere.center), ..*sphere })
+                Self::Sphere(Sphere { center: pose.transform_point(sphere.center), ..*sphere })
             }
-            Self::Aabb(aabb) => Self::Obb(aabb.obb().moved(pose)),
-            Self::Obb(obb) => Self::Obb(obb.moved(pose)),
-            Self::Capsule(capsule) => Self::Capsule(capsule.moved(pose)),
-            Self::Hull(hull) => Self::Hull(hull.moved(pose)),
+            Self::Aabb(aabb) => Self::Obb(aabb.obb().transformed(pose)),
+            Self::Obb(obb) => Self::Obb(obb.transformed(pose)),
+            Self::Capsule(capsule) => Self::Capsule(capsule.transformed(pose)),
+            Self::Hull(hull) => Self::Hull(hull.transformed(pose)),
             Self::Compound(compound) => {
-                let parts = compound.parts.iter().map(|part| part.moved(pose)).collect();
+                let parts = compound.parts.iter().map(|part| part.transformed(pose)).collect();
                 Self::Compound(Compound { parts })
             }
         }
     }
 
-    /// The same in another scalar.
-    pub(crate) fn in_scalar<T: Scalar>(&self) -> Shape<T> {
+    /// Converts to another scalar.
+    pub(crate) fn cast<T: Scalar>(&self) -> Shape<T> {
         match self {
             Self::Sphere(Sphere { center, radius }) => Shape::Sphere(Sphere {
                 center: cast_point(*center),
                 radius: T::constant(radius.as_f64()),
             }),
-            Self::Aabb(Box3 { min, max }) => {
-                Shape::Aabb(Box3 { min: cast_point(*min), max: cast_point(*max) })
+            Self::Aabb(Aabb3 { min, max }) => {
+                Shape::Aabb(Aabb3 { min: cast_point(*min), max: cast_point(*max) })
             }
-            Self::Obb(Obb { center, rotation, half_widths }) => {
+            Self::Obb(Obb { center, rotation, half_extents }) => {
                 let (s, v) = (T::constant(rotation.s.as_f64()), cast_vector(rotation.v));
                 Shape::Obb(Obb {
                     center: cast_point(*center),
-                    // As long as it should be in that scalar.
+                    // Normalized in that scalar.
                     rotation: Quat::from_sv(s, v).normalize(),
-                    half_widths: cast_vector(*half_widths),
+                    half_extents: cast_vector(*half_extents),
                 })
             }
             Self::Capsule(Capsule { a, b, radius }) => Shape::Capsule(Capsule {
@@ -146,22 +145,21 @@ impl<S: Scalar> Shape<S> {
                 b: cast_point(*b),
                 radius: T::constant(radius.as_f64()),
             }),
-            Self::Hull(hull) => Shape::Hull(hull.in_scalar()),
+            Self::Hull(hull) => Shape::Hull(hull.cast()),
             Self::Compound(compound) => {
-                let parts = compound.parts.iter().map(Self::in_scalar).collect();
+                let parts = compound.parts.iter().map(Self::cast).collect();
                 Shape::Compound(Compound { parts })
             }
         }
     }
 
-    /// This shape, if it can be one, whoever put its numbers together; with the compounds in
-    /// compounds laid out flat.
+    /// Validates the shape and flattens nested compounds.
     pub(crate) fn checked(self) -> Result<Self, Error> {
         let shape = match self {
             Self::Sphere(Sphere { center, radius }) => Self::Sphere(Sphere::new(center, radius)?),
-            Self::Aabb(Box3 { min, max }) => Self::Aabb(Box3::new(min, max)?),
-            Self::Obb(Obb { center, rotation, half_widths }) => {
-                Self::Obb(Obb::new(center, error::rotation("rotation", rotation)?, half_widths)?)
+            Self::Aabb(Aabb3 { min, max }) => Self::Aabb(Aabb3::new(min, max)?),
+            Self::Obb(Obb { center, rotation, half_extents }) => {
+                Self::Obb(Obb::new(center, error::rotation("rotation", rotation)?, half_extents)?)
             }
             Self::Capsule(Capsule { a, b, radius }) => Self::Capsule(Capsule::new(a, b, radius)?),
             Self::Hull(hull) => Self::Hull(hull.checked()?),
@@ -172,8 +170,8 @@ impl<S: Scalar> Shape<S> {
                 Self::Compound(Compound::new(parts)?)
             }
         };
-        // Numbers that are right one by one may overflow together.
-        let Box3 { min, max } = shape.bounding_box();
+        // Individually valid numbers may overflow together.
+        let Aabb3 { min, max } = shape.bounding_box();
         for corner in [min, max] {
             finite_point(["shape.x", "shape.y", "shape.z"], corner)?;
         }
@@ -181,7 +179,7 @@ impl<S: Scalar> Shape<S> {
         Ok(shape)
     }
 
-    fn solid(&self) -> &dyn Solid<S> {
+    fn solid(&self) -> &dyn BoundedShape<S> {
         match self {
             Self::Sphere(sphere) => sphere,
             Self::Aabb(aabb) => aabb,
@@ -193,12 +191,12 @@ impl<S: Scalar> Shape<S> {
     }
 }
 
-impl<S: Scalar> Solid<S> for Shape<S> {
+impl<S: Scalar> BoundedShape<S> for Shape<S> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
         self.solid().support(direction)
     }
 
-    fn bounding_box(&self) -> Box3<S> {
+    fn bounding_box(&self) -> Aabb3<S> {
         self.solid().bounding_box()
     }
 
@@ -210,7 +208,7 @@ impl<S: Scalar> Solid<S> for Shape<S> {
         self.solid().levels()
     }
 
-    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
-        self.solid().nearest(point)
+    fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
+        self.solid().project_point(point)
     }
 }

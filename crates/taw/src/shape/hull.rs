@@ -1,61 +1,60 @@
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
-use super::polygon::{closest_of_segment, normal_of_polygon};
-use super::wrap::wrap;
-use super::{Aabb, Box3, Nearest, Solid};
+use super::convex_hull::convex_hull;
+use super::polygon::{normal_of_polygon, project_on_segment};
+use super::{Aabb, Aabb3, BoundedShape, PointProjection};
 use crate::Error;
 use crate::error::{finite_point, within};
 use crate::frame::Pose;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
 use cgmath::{EuclideanSpace, InnerSpace};
 
-/// The smallest convex shape around some points. Copies that are elsewhere share them.
+/// Convex hull of points. Transformed copies share its vertices.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Hull<S> {
     pose: Pose<S>,
     polyhedron: Arc<Polyhedron>,
 }
 
-/// Corners, edges and faces, about the middle of the corners; in `f64`, whatever the
-/// scalar, since a hull is asked many things and rounded once.
+/// Vertices, edges and faces relative to the center; in `f64` for any scalar, so that results are
+/// rounded only once.
 #[derive(Debug, PartialEq)]
 struct Polyhedron {
     points: Vec<Point3<f64>>,
     edges: Vec<[u32; 2]>,
     faces: Vec<Face>,
-    /// Of the planes of the faces, from the origin.
+    /// Plane offsets of the faces, from the origin.
     offsets: Vec<f64>,
-    /// The greatest distance of a corner from the first one.
+    /// Greatest distance of a vertex from the first one.
     size: f64,
-    /// The greatest coordinate of a corner.
+    /// Greatest absolute coordinate of a vertex.
     largest: f64,
 }
 
-/// A flat side of a hull.
+/// A face of a hull.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Face {
-    /// Out of the hull, a unit vector in the hull's own frame.
+    /// Outward unit normal in the hull's own frame.
     pub normal: Vec3<f64>,
-    /// Which of the hull's points are its corners, counterclockwise as seen from outside.
+    /// Vertex indices, counterclockwise as seen from outside.
     pub corners: Vec<u32>,
 }
 
-/// Into how many parts the size of the points is cut, to find who is a corner with
-/// integers, exactly.
-const PARTS: f64 = (1_u64 << 38) as f64;
-/// Triangles lie in one face if their corners are within this part of the size of it, or
-/// within twice the scalar's epsilon, by which the points themselves are rounded.
-const FLAT: f64 = 1e-11;
+/// Resolution of the integer lattice over the size of the points, on which the hull is computed
+/// exactly.
+const LATTICE_CELLS: f64 = (1_u64 << 38) as f64;
+/// Triangles are coplanar if their vertices are within this fraction of the size, or within twice
+/// the scalar's epsilon, by which the points themselves are rounded.
+const COPLANARITY: f64 = 1e-11;
 
 impl<S: Scalar> Hull<S> {
-    /// The hull of these points. Those inside are left out. Each point is compared with each
-    /// face so far, so a hull of thousands of corners takes seconds.
+    /// Computes the hull of points; interior points are dropped. Each point is compared with each
+    /// face so far, so a hull of thousands of vertices takes seconds.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for fewer than four points, [`Error::NotFinite`] for a
-    /// coordinate, [`Error::Flat`] if they lie in a plane, but for
-    /// 1e-11 of their size or two epsilons.
+    /// [`Error::OutOfRange`] for fewer than four points, [`Error::NotFinite`] for a coordinate,
+    /// [`Error::Coplanar`] if they lie in a plane to within 1e-11 of their size or two epsilons.
     pub fn new(points: &[Point3<S>]) -> Result<Self, Error> {
         let count = f64::from(u32::try_from(points.len()).unwrap_or(u32::MAX));
         within("points.len()", count, 4.0, f64::from(u32::MAX - 1))?;
@@ -69,18 +68,18 @@ impl<S: Scalar> Hull<S> {
         });
         let (center, size) = (bounds.center(), bounds.max - bounds.min);
         let size = size.x.max(size.y).max(size.z);
-        let flat = Error::Flat { field: "points" };
+        let flat = Error::Coplanar { field: "points" };
         if size.is_nan() || size <= 0.0 {
             return Err(flat);
         }
-        let (corners, triangles) = corners_and_triangles(points, center, size).ok_or(flat)?;
-        // About the middle as the scalar has it.
+        let (corners, triangles) = vertices_and_triangles(points, center, size).ok_or(flat)?;
+        // Relative to the center as rounded to the scalar.
         let middle = cast_point::<S, f64>(cast_point(center)).to_vec();
         let local = |row: &usize| cast_point::<S, f64>(points[*row]) - middle;
         let points: Vec<_> = corners.iter().map(local).collect();
-        let thin = size * FLAT.max(2.0 * S::epsilon().as_f64());
-        let mut faces = merge(&points, &triangles, thin);
-        let points = drop_what_is_no_corner(&points, &mut faces);
+        let thin = size * COPLANARITY.max(2.0 * S::epsilon().as_f64());
+        let mut faces = merge_coplanar(&points, &triangles, thin);
+        let points = remove_non_vertices(&points, &mut faces);
         if faces.len() < 4 || faces.iter().any(|face| face.corners.len() < 3) {
             return Err(flat);
         }
@@ -96,7 +95,7 @@ impl<S: Scalar> Hull<S> {
             points,
             faces,
         };
-        let thinnest = polyhedron.faces.iter().map(|face| polyhedron.depth_behind(face));
+        let thinnest = polyhedron.faces.iter().map(|face| polyhedron.thickness_behind(face));
         if thinnest.fold(f64::INFINITY, f64::min) <= thin {
             return Err(flat);
         }
@@ -105,62 +104,62 @@ impl<S: Scalar> Hull<S> {
         Ok(Self { pose, polyhedron: Arc::new(polyhedron) })
     }
 
-    /// The same hull elsewhere.
+    /// Transforms the hull by a pose.
     #[must_use]
-    pub fn moved(&self, pose: Pose<S>) -> Self {
+    pub fn transformed(&self, pose: Pose<S>) -> Self {
         Self { pose: pose * self.pose, polyhedron: Arc::clone(&self.polyhedron) }
     }
 
-    /// This hull, if it is where one can be.
+    /// Validates the pose.
     pub(crate) fn checked(self) -> Result<Self, Error> {
         Ok(Self { pose: self.pose.checked()?, ..self })
     }
 
-    /// The same in another scalar.
-    pub(crate) fn in_scalar<T: Scalar>(&self) -> Hull<T> {
+    /// Converts to another scalar.
+    pub(crate) fn cast<T: Scalar>(&self) -> Hull<T> {
         let Pose { rotation, translation } = self.pose;
         let (s, v) = (T::constant(rotation.s.as_f64()), cast_vector(rotation.v));
         let pose = Pose { rotation: Quat::from_sv(s, v), translation: cast_vector(translation) };
         Hull { pose, polyhedron: Arc::clone(&self.polyhedron) }
     }
 
-    /// Where its own frame is.
+    /// Pose of the hull's own frame.
     #[must_use]
     pub fn pose(&self) -> Pose<S> {
         self.pose
     }
 
-    /// Its corners, where they are now.
+    /// Vertices in the world.
     pub fn points(&self) -> impl ExactSizeIterator<Item = Point3<S>> + '_ {
-        let pose = self.exact_pose();
-        self.polyhedron.points.iter().map(move |point| cast_point(pose.point(*point)))
+        let pose = self.pose_f64();
+        self.polyhedron.points.iter().map(move |point| cast_point(pose.transform_point(*point)))
     }
 
-    /// Its edges, as pairs of corners.
+    /// Edges as pairs of vertex indices.
     #[must_use]
     pub fn edges(&self) -> &[[u32; 2]] {
         &self.polyhedron.edges
     }
 
-    /// Its faces.
+    /// Faces.
     #[must_use]
     pub fn faces(&self) -> &[Face] {
         &self.polyhedron.faces
     }
 
-    /// Its corners in its own frame, in metres.
+    /// Vertices in the hull's own frame, in metres.
     #[must_use]
     pub fn local_points(&self) -> &[Point3<f64>] {
         &self.polyhedron.points
     }
 
-    /// The greatest distance of a corner from the first one, in metres.
+    /// Greatest distance of a vertex from the first one, in metres.
     pub(crate) fn size(&self) -> f64 {
         self.polyhedron.size
     }
 
-    /// Where its own frame is, with the rotation made as long as it should be.
-    pub(crate) fn exact_pose(&self) -> Pose<f64> {
+    /// The pose in `f64` with the rotation normalized.
+    pub(crate) fn pose_f64(&self) -> Pose<f64> {
         let Pose { rotation, translation } = self.pose;
         let rotation = Quat::from_sv(rotation.s.as_f64(), cast_vector(rotation.v)).normalize();
         Pose { rotation, translation: cast_vector(translation) }
@@ -172,30 +171,30 @@ impl<S: Scalar> Hull<S> {
 }
 
 impl Polyhedron {
-    /// How far behind a face the farthest corner is.
-    fn depth_behind(&self, face: &Face) -> f64 {
+    /// Thickness: distance of the farthest vertex behind a face.
+    fn thickness_behind(&self, face: &Face) -> f64 {
         let on = self.points[face.corners[0] as usize];
         let depth = |point: &Point3<f64>| (on - *point).dot(face.normal);
         self.points.iter().map(depth).fold(0.0, f64::max)
     }
 }
 
-impl<S: Scalar> Solid<S> for Hull<S> {
+impl<S: Scalar> BoundedShape<S> for Hull<S> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
-        let pose = self.exact_pose();
-        let local = pose.vector_back(cast_vector(direction));
+        let pose = self.pose_f64();
+        let local = pose.inverse_transform_vector(cast_vector(direction));
         let farthest = farthest_of(&self.polyhedron.points, local);
-        cast_point(pose.point(self.polyhedron.points[farthest]))
+        cast_point(pose.transform_point(self.polyhedron.points[farthest]))
     }
 
-    fn bounding_box(&self) -> Box3<S> {
+    fn bounding_box(&self) -> Aabb3<S> {
         let corner = |point: Point3<S>| Aabb { min: point, max: point };
-        let first = corner(cast_point(self.exact_pose().point(self.local(0))));
+        let first = corner(cast_point(self.pose_f64().transform_point(self.local(0))));
         self.points().fold(first, |all, point| all.union(&corner(point)))
     }
 
     fn volume(&self) -> S {
-        // Tetrahedra from the middle to the triangles of each face.
+        // Tetrahedra from the center to the triangles of each face.
         let mut six = 0.0;
         for face in self.faces() {
             let first = self.local(face.corners[0]).to_vec();
@@ -207,12 +206,12 @@ impl<S: Scalar> Solid<S> for Hull<S> {
         S::constant(six / 6.0)
     }
 
-    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
-        let pose = self.exact_pose();
-        let local = pose.point_back(cast_point(point));
-        let answer = |surface: Point3<f64>, normal: Vec3<f64>, distance: f64| Nearest {
-            point: cast_point(pose.point(surface)),
-            normal: cast_vector(pose.vector(normal)),
+    fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
+        let pose = self.pose_f64();
+        let local = pose.inverse_transform_point(cast_point(point));
+        let answer = |surface: Point3<f64>, normal: Vec3<f64>, distance: f64| PointProjection {
+            point: cast_point(pose.transform_point(surface)),
+            normal: cast_vector(pose.transform_vector(normal)),
             distance: S::constant(distance),
         };
         let Polyhedron { points, faces, offsets, largest, .. } = &*self.polyhedron;
@@ -225,15 +224,16 @@ impl<S: Scalar> Solid<S> for Hull<S> {
             }
         }
         let below = local - face.normal * highest;
-        // Just outside, by no more than rounding can tell, counts as on the face.
-        if highest <= largest * f64::EPSILON * 64.0 || side_of(points, face, local, |_, _| ()) {
+        // Just outside, within rounding, counts as on the face.
+        if highest <= largest * f64::EPSILON * 64.0 || is_over_face(points, face, local, |_, _| ())
+        {
             return answer(below, face.normal, highest);
         }
-        // Beside it: on the sides of the faces that it is in front of, the nearest point.
+        // Beside the face: nearest point on the edges and faces that face the point.
         let mut nearest = (f64::INFINITY, local);
         for next in faces.iter().zip(offsets).filter(|next| height(*next) > 0.0) {
-            let over = side_of(points, next.0, local, |from, to| {
-                let there = closest_of_segment(from, to, local);
+            let over = is_over_face(points, next.0, local, |from, to| {
+                let there = project_on_segment(from, to, local);
                 let squared = (local - there).magnitude2();
                 if squared < nearest.0 {
                     nearest = (squared, there);
@@ -253,12 +253,12 @@ impl<S: Scalar> Solid<S> for Hull<S> {
     }
 }
 
-/// The point that is farthest along a direction; of several, the first.
+/// Index of the support point along a direction; among several, the first.
 pub(crate) fn farthest_of(points: &[Point3<f64>], direction: Vec3<f64>) -> usize {
     let (mut best, mut reach) = (0, f64::NEG_INFINITY);
     for (i, point) in points.iter().enumerate() {
         let next = point.x * direction.x + point.y * direction.y + point.z * direction.z;
-        // Without a jump, which would be guessed wrongly too often.
+        // Branchless: a branch would be mispredicted too often.
         let farther = next > reach;
         best = if farther { i } else { best };
         reach = if farther { next } else { reach };
@@ -266,9 +266,8 @@ pub(crate) fn farthest_of(points: &[Point3<f64>], direction: Vec3<f64>) -> usize
     best
 }
 
-/// Whether a point is over or under a face; if not, names the sides of it that the point is
-/// beside.
-fn side_of(
+/// Returns true if a point projects into a face; else reports the edges that it is beside.
+fn is_over_face(
     points: &[Point3<f64>],
     face: &Face,
     point: Point3<f64>,
@@ -287,9 +286,8 @@ fn side_of(
     over
 }
 
-/// Which points are corners, and the triangles between them, as numbers of corners; none
-/// if the points lie in a plane.
-fn corners_and_triangles<S: Scalar>(
+/// Vertices of the hull and its triangles by vertex index; none if the points are coplanar.
+fn vertices_and_triangles<S: Scalar>(
     points: &[Point3<S>],
     center: Point3<f64>,
     size: f64,
@@ -298,14 +296,14 @@ fn corners_and_triangles<S: Scalar>(
     let mut lattice = Vec::new();
     let mut seen = BTreeSet::new();
     for (row, point) in points.iter().enumerate() {
-        let apart = (cast_point::<S, f64>(*point) - center) / size * PARTS;
+        let apart = (cast_point::<S, f64>(*point) - center) / size * LATTICE_CELLS;
         let at = apart.map(|x| x.round() as i128);
         if seen.insert([at.x, at.y, at.z]) {
             rows.push(row);
             lattice.push(at);
         }
     }
-    let mut triangles = wrap(&lattice)?;
+    let mut triangles = convex_hull(&lattice)?;
     let mut corners: Vec<_> = triangles.iter().flatten().copied().collect();
     corners.sort_unstable();
     corners.dedup();
@@ -315,12 +313,12 @@ fn corners_and_triangles<S: Scalar>(
     Some((corners.into_iter().map(|corner| rows[corner as usize]).collect(), triangles))
 }
 
-/// Puts triangles that lie in one plane together.
-fn merge(points: &[Point3<f64>], triangles: &[[u32; 3]], flat: f64) -> Vec<Face> {
+/// Merges coplanar triangles into faces.
+fn merge_coplanar(points: &[Point3<f64>], triangles: &[[u32; 3]], flat: f64) -> Vec<Face> {
     let at = |corner: u32| points[corner as usize];
     let mut faces = Vec::new();
     let mut left: Vec<[u32; 3]> = triangles.to_vec();
-    // From the largest, whose plane is known best.
+    // Largest first, since its plane is known best.
     let area = |[a, b, c]: &[u32; 3]| (at(*b) - at(*a)).cross(at(*c) - at(*a)).magnitude();
     left.sort_by(|s, t| area(t).partial_cmp(&area(s)).unwrap_or(std::cmp::Ordering::Equal));
     while let Some(first) = left.first().copied() {
@@ -335,9 +333,9 @@ fn merge(points: &[Point3<f64>], triangles: &[[u32; 3]], flat: f64) -> Vec<Face>
     faces
 }
 
-/// Keeps those points where at least three faces meet, and renames them in the faces.
-/// Others lie on an edge.
-fn drop_what_is_no_corner(points: &[Point3<f64>], faces: &mut [Face]) -> Vec<Point3<f64>> {
+/// Keeps points where at least three faces meet and remaps the indices in the faces. Others lie on
+/// an edge.
+fn remove_non_vertices(points: &[Point3<f64>], faces: &mut [Face]) -> Vec<Point3<f64>> {
     let mut meet = vec![0_u32; points.len()];
     faces.iter().flat_map(|face| &face.corners).for_each(|corner| meet[*corner as usize] += 1);
     let mut kept = Vec::new();
@@ -355,8 +353,7 @@ fn drop_what_is_no_corner(points: &[Point3<f64>], faces: &mut [Face]) -> Vec<Poi
     kept
 }
 
-/// The corners around triangles that lie in one plane, in order: along those sides that
-/// only one of them has.
+/// Boundary loop of coplanar triangles: along the edges that only one of them has.
 fn outline(triangles: &[[u32; 3]]) -> Vec<u32> {
     let sides = triangles.iter().flat_map(|[a, b, c]| [(*a, *b), (*b, *c), (*c, *a)]);
     let sides: BTreeSet<_> = sides.collect();

@@ -1,25 +1,24 @@
-//! What a thing is. Shapes are plain values in the coordinates of their world; whether two
-//! of them touch is a question for [`contact`](crate::contact). What each can say of
-//! itself is [`Solid`].
+//! Shapes as plain values in world coordinates. Overlap tests between two shapes are in
+//! [`contact`](crate::contact); queries of a single shape are in [`BoundedShape`].
 
 mod aabb;
 mod ball;
-mod box_tree;
+mod bvh;
 mod capsule;
 mod compound;
+mod convex_hull;
 mod hull;
 mod obb;
 mod plane;
 pub(crate) mod polygon;
 mod surface;
 mod triangle;
-mod wrap;
 
-pub use aabb::{Aabb, Box3, Rectangle};
+pub use aabb::{Aabb, Aabb2, Aabb3};
 pub use ball::{Ball, Circle, Sphere};
-pub use box_tree::BoxTree;
+pub use bvh::Bvh;
 pub use capsule::Capsule;
-pub(crate) use capsule::across;
+pub(crate) use capsule::any_perpendicular;
 pub use compound::{Compound, Shape};
 pub(crate) use hull::farthest_of;
 pub use hull::{Face, Hull};
@@ -30,60 +29,60 @@ pub use triangle::Triangle;
 
 use crate::math::{Point3, Scalar, Vec3};
 
-/// Where a surface is nearest to a point.
+/// Projection of a point onto the surface of a shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Nearest<S> {
-    /// On the surface.
+pub struct PointProjection<S> {
+    /// The projected point, on the surface.
     pub point: Point3<S>,
-    /// The unit vector that points out of the shape there: the shortest way out for what
-    /// is inside. Where several are as short, always the same one of them.
+    /// Outward unit normal there: for an inside point, the direction of least penetration. Among
+    /// equally near surfaces the choice is deterministic.
     pub normal: Vec3<S>,
-    /// How far the point is outside, in metres; negative inside.
+    /// Signed distance of the point in metres; negative inside.
     pub distance: S,
 }
 
-impl<S: Scalar> Nearest<S> {
-    /// The same of a surface whose inside is where the point is.
-    pub(crate) fn inside_out(self) -> Self {
+impl<S: Scalar> PointProjection<S> {
+    /// Flips inside and outside.
+    pub(crate) fn flipped(self) -> Self {
         Self { normal: -self.normal, distance: -self.distance, ..self }
     }
 }
 
-/// What every bounded shape can say of itself.
-pub trait Solid<S: Scalar> {
-    /// Its point that is farthest along a direction (of any length but zero). Of several,
-    /// always the same one.
+/// Queries of a bounded shape: support mapping, bounding box, volume and point projection.
+pub trait BoundedShape<S: Scalar> {
+    /// Support point: the point farthest along a direction of any length except zero. Deterministic
+    /// among several.
     #[must_use]
     fn support(&self, direction: Vec3<S>) -> Point3<S>;
 
-    /// The smallest box along the axes that it is in.
+    /// The smallest axis-aligned bounding box.
     #[must_use]
-    fn bounding_box(&self) -> Box3<S>;
+    fn bounding_box(&self) -> Aabb3<S>;
 
-    /// In m³. Parts of a compound that overlap count twice.
+    /// Volume in m³. Overlapping parts of a compound count twice.
     #[must_use]
     fn volume(&self) -> S;
 
-    /// Where its surface is nearest to a point.
+    /// Projects a point onto the surface.
     #[must_use]
-    fn nearest(&self, point: Point3<S>) -> Nearest<S>;
+    fn project_point(&self, point: Point3<S>) -> PointProjection<S>;
 
-    /// How many compounds are inside each other; none in a simple shape.
+    /// Nesting depth of compounds; zero for a simple shape.
     #[must_use]
     fn levels(&self) -> u32 {
         0
     }
 
-    /// Whether a point is in it or on its surface.
+    /// Returns true for a point inside or on the surface.
     #[must_use]
     fn contains(&self, point: Point3<S>) -> bool {
-        self.nearest(point).distance <= S::zero()
+        self.project_point(point).distance <= S::zero()
     }
 
-    /// Its point that is nearest to another one: that one itself, if it is inside.
+    /// The nearest point of the solid: the given point itself, if it is inside.
     #[must_use]
     fn closest_point(&self, point: Point3<S>) -> Point3<S> {
-        let nearest = self.nearest(point);
+        let nearest = self.project_point(point);
         if nearest.distance <= S::zero() { point } else { nearest.point }
     }
 }

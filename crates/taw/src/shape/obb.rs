@@ -1,72 +1,72 @@
 use cgmath::{EuclideanSpace, InnerSpace, Matrix3, One};
 
-use super::{Aabb, Box3, Nearest, Solid};
+use super::{Aabb, Aabb3, BoundedShape, PointProjection};
 use crate::Error;
 use crate::error::{finite_point, within};
 use crate::frame::Pose;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, direction_and_length, length};
 
-/// A box that may be turned. It may be flat.
+/// Oriented bounding box. It may be flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Obb<S> {
-    /// The middle, in metres.
+    /// Center, in metres.
     pub center: Point3<S>,
-    /// A unit quaternion.
+    /// Rotation, a unit quaternion.
     pub rotation: Quat<S>,
-    /// From the middle to the faces along its own axes, in metres, none below zero.
-    pub half_widths: Vec3<S>,
+    /// Half extents along its own axes, in metres, none below zero.
+    pub half_extents: Vec3<S>,
 }
 
 impl<S: Scalar> Obb<S> {
-    /// How far the length of a rotation may be from one, as for the normal of a plane.
+    /// Tolerance of the length of a rotation, as for the normal of a plane.
     const UNIT_TOLERANCE: f64 = 1e-5;
 
-    /// A box, checked.
+    /// Validates a box.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] for the center, [`Error::NotUnit`] for a rotation whose length
-    /// is more than 1e-5 from one, [`Error::OutOfRange`] for a half width below zero.
-    pub fn new(center: Point3<S>, rotation: Quat<S>, half_widths: Vec3<S>) -> Result<Self, Error> {
+    /// [`Error::NotFinite`] for the center, [`Error::NotUnit`] for a rotation whose length is more
+    /// than 1e-5 from one, [`Error::OutOfRange`] for a half extent below zero.
+    pub fn new(center: Point3<S>, rotation: Quat<S>, half_extents: Vec3<S>) -> Result<Self, Error> {
         finite_point(["center.x", "center.y", "center.z"], center)?;
         let norm = rotation.s.as_f64().hypot(length(rotation.v).as_f64());
         if norm.is_nan() || (norm - 1.0).abs() > Self::UNIT_TOLERANCE {
             return Err(Error::NotUnit { field: "rotation", value: norm });
         }
-        let fields = ["half_widths.x", "half_widths.y", "half_widths.z"];
+        let fields = ["half_extents.x", "half_extents.y", "half_extents.z"];
         for (axis, field) in fields.into_iter().enumerate() {
-            within(field, half_widths[axis], S::zero(), S::max_value())?;
+            within(field, half_extents[axis], S::zero(), S::max_value())?;
         }
-        Ok(Self { center, rotation, half_widths })
+        Ok(Self { center, rotation, half_extents })
     }
 
-    /// A box that is not turned.
+    /// Converts an axis-aligned box.
     #[must_use]
-    pub fn along_axes(aabb: &Box3<S>) -> Self {
-        let half_widths = (aabb.max - aabb.min) * S::constant(0.5);
-        Self { center: aabb.min + half_widths, rotation: Quat::one(), half_widths }
+    pub fn from_aabb(aabb: &Aabb3<S>) -> Self {
+        let half_extents = (aabb.max - aabb.min) * S::constant(0.5);
+        Self { center: aabb.min + half_extents, rotation: Quat::one(), half_extents }
     }
 
-    /// Where it is, and how it is turned.
+    /// Position and rotation.
     #[must_use]
     pub fn pose(&self) -> Pose<S> {
         Pose { rotation: self.rotation, translation: self.center.to_vec() }
     }
 
-    /// The same box elsewhere.
+    /// Transforms the box by a pose.
     #[must_use]
-    pub fn moved(&self, pose: Pose<S>) -> Self {
-        let (center, rotation) = (pose.point(self.center), pose.rotation * self.rotation);
+    pub fn transformed(&self, pose: Pose<S>) -> Self {
+        let (center, rotation) = (pose.transform_point(self.center), pose.rotation * self.rotation);
         Self { center, rotation, ..*self }
     }
 
-    /// Its own axes, as unit vectors of the world.
+    /// Local axes, as unit vectors of the world.
     #[must_use]
     pub fn axes(&self) -> [Vec3<S>; 3] {
         [Vec3::unit_x(), Vec3::unit_y(), Vec3::unit_z()].map(|axis| self.rotation * axis)
     }
 
-    /// The same in `f64`, with the rotation made as long as it should be.
-    pub(crate) fn exact_axes(&self) -> [Vec3<f64>; 3] {
+    /// Local axes in `f64`, with the rotation normalized.
+    pub(crate) fn axes_f64(&self) -> [Vec3<f64>; 3] {
         let (s, v) = (self.rotation.s.as_f64(), cast_vector(self.rotation.v));
         let rotation = Quat::from_sv(s, v).normalize();
         [Vec3::unit_x(), Vec3::unit_y(), Vec3::unit_z()].map(|axis| rotation * axis)
@@ -76,7 +76,7 @@ impl<S: Scalar> Obb<S> {
     #[must_use]
     pub fn corners(&self) -> [Point3<S>; 8] {
         let [x, y, z] = self.axes();
-        let Vec3 { x: width, y: height, z: depth } = self.half_widths;
+        let Vec3 { x: width, y: height, z: depth } = self.half_extents;
         std::array::from_fn(|i| {
             let side = |bit: usize| if i & bit == 0 { -S::one() } else { S::one() };
             let across = x * (width * side(1)) + y * (height * side(2)) + z * (depth * side(4));
@@ -85,9 +85,9 @@ impl<S: Scalar> Obb<S> {
     }
 }
 
-impl<S: Scalar> Solid<S> for Obb<S> {
+impl<S: Scalar> BoundedShape<S> for Obb<S> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
-        let mut local = self.half_widths;
+        let mut local = self.half_extents;
         let along = self.rotation.conjugate() * direction;
         for axis in 0..3 {
             if along[axis] <= S::zero() {
@@ -97,42 +97,42 @@ impl<S: Scalar> Solid<S> for Obb<S> {
         self.center + self.rotation * local
     }
 
-    fn bounding_box(&self) -> Box3<S> {
+    fn bounding_box(&self) -> Aabb3<S> {
         let [x, y, z] = self.axes();
-        let size = self.half_widths;
+        let size = self.half_extents;
         let reach = x.map(S::abs) * size.x + y.map(S::abs) * size.y + z.map(S::abs) * size.z;
         Aabb { min: self.center - reach, max: self.center + reach }
     }
 
     fn volume(&self) -> S {
-        let Vec3 { x, y, z } = self.half_widths;
+        let Vec3 { x, y, z } = self.half_extents;
         S::constant(8.0) * x * y * z
     }
 
-    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
+    fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
         let turn = Matrix3::from(self.rotation);
         let away = point - self.center;
         let local = Vec3::new(turn.x.dot(away), turn.y.dot(away), turn.z.dot(away));
-        let half = self.half_widths;
+        let half = self.half_extents;
         let inside = Vec3::new(
-            num_clamp(local.x, half.x),
-            num_clamp(local.y, half.y),
-            num_clamp(local.z, half.z),
+            clamp_symmetric(local.x, half.x),
+            clamp_symmetric(local.y, half.y),
+            clamp_symmetric(local.z, half.z),
         );
         let there = |v: Vec3<S>| turn.x * v.x + turn.y * v.y + turn.z * v.z;
         if let Some((normal, distance)) = direction_and_length(there(local - inside)) {
-            return Nearest { point: self.center + there(inside), normal, distance };
+            return PointProjection { point: self.center + there(inside), normal, distance };
         }
-        // Inside: the nearest face. Of faces as near, the first axis, and the side on which
-        // the point is, or the positive one.
-        let gap = |axis: usize| self.half_widths[axis] - local[axis].abs();
+        // Inside: the nearest face. Among equally near faces, the first axis, and the side of the
+        // point, or the positive one.
+        let gap = |axis: usize| self.half_extents[axis] - local[axis].abs();
         let axis = (1..3).fold(0, |best, i| if gap(i) < gap(best) { i } else { best });
         let side = if local[axis] < S::zero() { -S::one() } else { S::one() };
         let mut normal = Vec3::new(S::zero(), S::zero(), S::zero());
         normal[axis] = side;
         let mut surface = local;
-        surface[axis] = side * self.half_widths[axis];
-        Nearest {
+        surface[axis] = side * self.half_extents[axis];
+        PointProjection {
             point: self.center + there(surface),
             normal: there(normal).normalize(),
             distance: -gap(axis),
@@ -141,7 +141,7 @@ impl<S: Scalar> Solid<S> for Obb<S> {
 }
 
 #[inline]
-fn num_clamp<S: Scalar>(x: S, half: S) -> S {
+fn clamp_symmetric<S: Scalar>(x: S, half: S) -> S {
     if x > half {
         half
     } else if x < -half {
@@ -167,7 +167,7 @@ mod tests {
         let origin = Point3::new(0.0, 0.0, 0.0);
         let sizes = Vec3::new(1.0, -1.0, 1.0);
         let error = Obb::new(origin, Quat::one(), sizes).unwrap_err();
-        assert!(error.to_string().starts_with("half_widths.y must be in [0"));
+        assert!(error.to_string().starts_with("half_extents.y must be in [0"));
         let long = Quat::new(2.0, 0.0, 0.0, 0.0);
         let error = Obb::new(origin, long, Vec3::new(1.0, 1.0, 1.0)).unwrap_err();
         assert_eq!(error, Error::NotUnit { field: "rotation", value: 2.0 });
@@ -185,8 +185,8 @@ mod tests {
             ([0.0, 0.0, 0.0], [0.0, 0.0, 0.5], -0.5),
         ];
         for (at, surface, distance) in cases {
-            let nearest = obb.nearest(obb.pose().point(Point3::from(at)));
-            let expected = obb.pose().point(Point3::from(surface));
+            let nearest = obb.project_point(obb.pose().transform_point(Point3::from(at)));
+            let expected = obb.pose().transform_point(Point3::from(surface));
             assert!(nearest.point.distance(expected) < 1e-15, "{at:?}: {nearest:?}");
             assert!((nearest.distance - distance).abs() < 1e-15, "{at:?}: {nearest:?}");
         }
@@ -201,7 +201,7 @@ mod tests {
             let along = |p: Point3<f64>| p.to_vec().dot(direction);
             let farthest = obb.corners().map(along).into_iter().fold(f64::MIN, f64::max);
             assert!((along(obb.support(direction)) - farthest).abs() < 1e-14);
-            assert!(obb.corners().iter().all(|corner| bounds.has(*corner)));
+            assert!(obb.corners().iter().all(|corner| bounds.contains_point(*corner)));
         }
         assert_eq!(obb.volume(), 8.0);
     }

@@ -6,8 +6,8 @@ use crate::math::{Point3, Scalar, Vec3, direction_and_length, length};
 
 /// A half-space: everything behind the surface `normal · x = offset` is solid.
 ///
-/// The normal points to the free side. A plane has no thickness to be on the
-/// wrong side of: whatever is behind it is inside it.
+/// The normal points to the free side. A plane has no thickness: a point behind it is inside,
+/// however deep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane<S> {
     normal: Vec3<S>,
@@ -15,13 +15,13 @@ pub struct Plane<S> {
 }
 
 impl<S: Scalar> Plane<S> {
-    /// How far the length of a normal may be from one. Rotating a unit vector
-    /// costs a few epsilons (6e-7 in `f32`); at a hundred metres from the origin
-    /// this much would shift the surface by a millimetre.
+    /// Tolerance of the length of a normal. Rotating a unit vector costs a few epsilons (6e-7 in
+    /// `f32`); at a hundred metres from the origin this much would shift the surface by a
+    /// millimetre.
     const UNIT_TOLERANCE: f64 = 1e-5;
 
-    /// The half-space behind the surface at `offset` metres from the origin along
-    /// the unit vector `normal`.
+    /// Creates the half-space behind the surface at `offset` metres from the origin along the unit
+    /// vector `normal`.
     ///
     /// # Errors
     /// [`Error::NotFinite`], or [`Error::NotUnit`] if the normal's length is more
@@ -36,8 +36,8 @@ impl<S: Scalar> Plane<S> {
         Ok(Self { normal, offset })
     }
 
-    /// The half-space whose surface goes through `point` and whose free side is
-    /// where `direction` points. The direction may have any length but zero.
+    /// Creates the half-space whose surface goes through `point` and whose free side is where
+    /// `direction` points. The direction may have any length but zero.
     ///
     /// # Errors
     /// [`Error::NotFinite`], or [`Error::NotUnit`] if the direction is zero.
@@ -62,7 +62,7 @@ impl<S: Scalar> Plane<S> {
         self.offset
     }
 
-    /// How far `point` is in front of the surface, in metres; negative behind it.
+    /// Signed distance of `point` from the surface, in metres; negative behind it.
     #[must_use]
     #[inline]
     pub fn signed_distance(&self, point: Point3<S>) -> S {

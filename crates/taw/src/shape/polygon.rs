@@ -1,11 +1,11 @@
-//! Flat convex polygons: what faces of hulls are.
+//! Planar convex polygons: the faces of hulls.
 
 use cgmath::{EuclideanSpace, InnerSpace};
 
 use crate::math::{Point3, Scalar, Vec3, direction_and_length};
 
-/// The unit normal of a polygon, counterclockwise about it (Newell; Sutherland, Sproull and
-/// Schumacker 1974): right for any number of corners, however many lie on a line.
+/// The unit normal of a counterclockwise polygon (Newell; Sutherland, Sproull and Schumacker 1974),
+/// also with many collinear vertices.
 pub(crate) fn normal_of_polygon<S: Scalar>(corners: &[Point3<S>]) -> Vec3<S> {
     let first = corners.first().copied().unwrap_or_else(Point3::origin);
     let ends = corners.iter().skip(1).chain(corners.first());
@@ -16,8 +16,8 @@ pub(crate) fn normal_of_polygon<S: Scalar>(corners: &[Point3<S>]) -> Vec3<S> {
     direction_and_length(twice).map_or_else(Vec3::unit_x, |(normal, _)| normal)
 }
 
-/// The point of a polygon that is nearest to another one.
-pub(crate) fn closest_of_polygon<S: Scalar>(
+/// The point of a polygon that is nearest to a given point.
+pub(crate) fn project_on_polygon<S: Scalar>(
     corners: &[Point3<S>],
     normal: Vec3<S>,
     point: Point3<S>,
@@ -32,7 +32,7 @@ pub(crate) fn closest_of_polygon<S: Scalar>(
     }
     let mut best = (S::infinity(), point);
     for (a, b) in corners.iter().zip(ends()) {
-        let there = closest_of_segment(*a, *b, point);
+        let there = project_on_segment(*a, *b, point);
         let squared = (there - point).magnitude2();
         if squared < best.0 {
             best = (squared, there);
@@ -41,8 +41,8 @@ pub(crate) fn closest_of_polygon<S: Scalar>(
     best.1
 }
 
-/// The point between two others that is nearest to a third one.
-pub(crate) fn closest_of_segment<S: Scalar>(
+/// The point of a segment that is nearest to a given point.
+pub(crate) fn project_on_segment<S: Scalar>(
     a: Point3<S>,
     b: Point3<S>,
     point: Point3<S>,

@@ -1,46 +1,45 @@
 use cgmath::EuclideanSpace;
 
-use super::{Aabb, Box3, BoxTree, Solid, Triangle};
+use super::{Aabb, Aabb3, BoundedShape, Bvh, Triangle};
 use crate::Error;
 use crate::error::{finite_point, positive, within};
 use crate::math::{Point3, Scalar, Vec3, is_finite_point};
 
-/// What is made of triangles and carries others: a landscape, a track. It has no inside.
+/// A triangle surface, such as a landscape or a track. It has no volume.
 pub trait Surface<S: Scalar> {
-    /// One of its triangles, by its number.
+    /// A triangle by its index.
     #[must_use]
     fn triangle(&self, number: u32) -> Option<Triangle<S>>;
 
-    /// Names all triangles that may have a point in common with a box, and some more.
-    fn near(&self, bounds: &Box3<S>, name: impl FnMut(u32));
+    /// Visits all triangles that may overlap a box, and some more.
+    fn for_each_in_box(&self, bounds: &Aabb3<S>, visit: impl FnMut(u32));
 
-    /// Names all triangles that may be within `reach` metres of a point, and some more, the
-    /// nearer ones about first. The answer to each is how far is still of interest.
-    fn around(&self, point: Point3<S>, reach: S, name: impl FnMut(u32) -> S);
+    /// Visits all triangles that may be within `reach` metres of a point, and some more, roughly
+    /// nearest first. `visit` returns the reach from then on.
+    fn for_each_near(&self, point: Point3<S>, reach: S, visit: impl FnMut(u32) -> S);
 
-    /// The box around all of it.
+    /// Bounding box.
     #[must_use]
-    fn bounds(&self) -> Box3<S>;
+    fn bounds(&self) -> Aabb3<S>;
 
-    /// Names all triangles that may be met on the way from a point along a motion, and
-    /// some more.
-    fn along(&self, from: Point3<S>, motion: Vec3<S>, name: impl FnMut(u32));
+    /// Visits all triangles that may cross the segment from a point along a motion, and some more.
+    fn for_each_on_segment(&self, from: Point3<S>, motion: Vec3<S>, visit: impl FnMut(u32));
 }
 
-/// Triangles that share their corners.
+/// Indexed triangle mesh.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mesh<S> {
     points: Vec<Point3<S>>,
     triangles: Vec<[u32; 3]>,
-    tree: BoxTree<S>,
+    tree: Bvh<S>,
 }
 
 impl<S: Scalar> Mesh<S> {
-    /// A mesh, checked. Triangles may be slivers, or have no area at all.
+    /// Validates a mesh. Triangles may be slivers, or have no area.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] for a point, [`Error::OutOfRange`] for no triangles, or for the
-    /// number of a corner that there is not.
+    /// [`Error::NotFinite`] for a point, [`Error::OutOfRange`] for no triangles, or for a vertex
+    /// index out of range.
     pub fn new(points: Vec<Point3<S>>, triangles: Vec<[u32; 3]>) -> Result<Self, Error> {
         for point in &points {
             finite_point(["points.x", "points.y", "points.z"], *point)?;
@@ -50,22 +49,22 @@ impl<S: Scalar> Mesh<S> {
         for corner in triangles.iter().flatten() {
             within("triangles", f64::from(*corner), 0.0, count(points.len()) - 1.0)?;
         }
-        let mut mesh = Self { points, triangles, tree: BoxTree::default() };
+        let mut mesh = Self { points, triangles, tree: Bvh::default() };
         let boxes: Vec<_> = (0..mesh.triangles.len() as u32)
             .filter_map(|number| mesh.triangle(number))
             .map(|triangle| triangle.bounding_box())
             .collect();
-        mesh.tree = BoxTree::new(&boxes);
+        mesh.tree = Bvh::new(&boxes);
         Ok(mesh)
     }
 
-    /// The corners.
+    /// Vertices, in metres.
     #[must_use]
     pub fn points(&self) -> &[Point3<S>] {
         &self.points
     }
 
-    /// Three corners each.
+    /// Three vertex indices each.
     #[must_use]
     pub fn triangles(&self) -> &[[u32; 3]] {
         &self.triangles
@@ -78,24 +77,24 @@ impl<S: Scalar> Surface<S> for Mesh<S> {
         Some(Triangle { corners: corners.map(|corner| self.points[corner as usize]) })
     }
 
-    fn near(&self, bounds: &Box3<S>, name: impl FnMut(u32)) {
-        self.tree.near(bounds, name);
+    fn for_each_in_box(&self, bounds: &Aabb3<S>, visit: impl FnMut(u32)) {
+        self.tree.for_each_in_box(bounds, visit);
     }
 
-    fn around(&self, point: Point3<S>, reach: S, name: impl FnMut(u32) -> S) {
-        self.tree.around(point, reach, name);
+    fn for_each_near(&self, point: Point3<S>, reach: S, visit: impl FnMut(u32) -> S) {
+        self.tree.for_each_near(point, reach, visit);
     }
 
-    fn bounds(&self) -> Box3<S> {
+    fn bounds(&self) -> Aabb3<S> {
         self.tree.bounds().unwrap_or(Aabb { min: Point3::origin(), max: Point3::origin() })
     }
 
-    fn along(&self, from: Point3<S>, motion: Vec3<S>, name: impl FnMut(u32)) {
-        self.tree.along(from, motion, name);
+    fn for_each_on_segment(&self, from: Point3<S>, motion: Vec3<S>, visit: impl FnMut(u32)) {
+        self.tree.for_each_on_segment(from, motion, visit);
     }
 }
 
-/// Heights over a grid of points in the plane of x and z, with two triangles in each cell.
+/// Height field over a grid in the x–z plane, with two triangles per cell.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightField<S> {
     corner: Point3<S>,
@@ -127,7 +126,7 @@ impl<S: Scalar> HeightField<S> {
         within("columns", f64::from(columns), 2.0, f64::from(u32::MAX))?;
         let count = u32::try_from(heights.len()).unwrap_or(u32::MAX);
         let rows = count / columns;
-        // Two triangles a cell have numbers of 32 bits.
+        // Two triangles per cell are indexed with 32 bits.
         let whole = f64::from(rows.max(2)) * f64::from(columns);
         within("heights.len()", f64::from(count), whole, whole.min(f64::from(u32::MAX / 2)))?;
         for height in &heights {
@@ -136,7 +135,7 @@ impl<S: Scalar> HeightField<S> {
         let lowest = heights.iter().fold(S::infinity(), |low, height| low.min(*height));
         let highest = heights.iter().fold(S::neg_infinity(), |high, height| high.max(*height));
         let field = Self { corner, cell, columns, rows, heights, lowest, highest };
-        // Numbers that are right one by one may overflow together.
+        // Individually valid numbers may overflow together.
         let Aabb { min, max } = field.bounds();
         finite_point(["corner.x", "corner.y", "corner.z"], min)?;
         finite_point(["columns * cell[0]", "heights", "rows * cell[1]"], max)?;
@@ -149,9 +148,9 @@ impl<S: Scalar> HeightField<S> {
         Point3::new(self.corner.x + x, self.height(column, row), self.corner.z + z)
     }
 
-    /// How high the surface is above or below a point, in metres along y; none beside it.
+    /// Signed height of the surface above a point, in metres along y; none outside the field.
     #[must_use]
-    pub fn height_over(&self, point: Point3<S>) -> Option<S> {
+    pub fn signed_height(&self, point: Point3<S>) -> Option<S> {
         let place = |x: S, start: S, width: S, cells: u32| {
             let place = (x - start) / width;
             let cell = place.as_f64().floor().clamp(0.0, f64::from(cells - 1));
@@ -178,8 +177,8 @@ impl<S: Scalar> HeightField<S> {
         self.corner.y + self.heights[row as usize * self.columns as usize + column as usize]
     }
 
-    /// Which cells of `count` points, this wide, from a place on, are between two others; and
-    /// those that rounding might take for them.
+    /// Range of the cells, of `count` points spaced by `width` from `start`, that overlap an
+    /// interval, including those within rounding.
     fn range([from, to]: [S; 2], start: S, width: S, count: u32) -> std::ops::Range<u32> {
         let cells = f64::from(count - 1);
         let largest = from.abs().max(to.abs()).max(start.abs()) / width;
@@ -190,29 +189,29 @@ impl<S: Scalar> HeightField<S> {
         first as u32..end as u32
     }
 
-    /// The row and the column of the cell that a triangle is in.
+    /// Row and column of the cell of a triangle.
     fn place(&self, number: u32) -> (u32, u32) {
         let cell = number / 2;
         (cell / (self.columns - 1), cell % (self.columns - 1))
     }
 
-    /// Names the triangles of cells in these columns that a box is over or under.
-    fn cells(&self, columns: std::ops::Range<u32>, bounds: &Box3<S>, mut name: impl FnMut(u32)) {
+    /// Visits the triangles of the cells in these columns that overlap a box in x–z.
+    fn cells(&self, columns: std::ops::Range<u32>, bounds: &Aabb3<S>, mut visit: impl FnMut(u32)) {
         for row in self.rows([bounds.min.z, bounds.max.z]) {
             for column in columns.clone() {
                 let cell = row * (self.columns - 1) + column;
-                name(2 * cell);
-                name(2 * cell + 1);
+                visit(2 * cell);
+                visit(2 * cell + 1);
             }
         }
     }
 
-    /// The rows between two places along z.
+    /// Rows between two coordinates along z.
     fn rows(&self, [from, to]: [S; 2]) -> std::ops::Range<u32> {
         Self::range([from, to], self.corner.z, self.cell[1], self.rows)
     }
 
-    /// The columns between two places along x.
+    /// Columns between two coordinates along x.
     fn columns(&self, [from, to]: [S; 2]) -> std::ops::Range<u32> {
         Self::range([from, to], self.corner.x, self.cell[0], self.columns)
     }
@@ -235,7 +234,7 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
         Some(Triangle { corners })
     }
 
-    fn near(&self, bounds: &Box3<S>, mut name: impl FnMut(u32)) {
+    fn for_each_in_box(&self, bounds: &Aabb3<S>, mut visit: impl FnMut(u32)) {
         if !is_finite_point(bounds.min) || !is_finite_point(bounds.max) {
             return;
         }
@@ -246,22 +245,22 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
             let (near, far) = (height(0, 0), height(1, 1));
             let (lowest, highest) = (near.min(far).min(one), near.max(far).max(one));
             if lowest <= bounds.max.y && highest >= bounds.min.y {
-                name(number);
+                visit(number);
             }
         });
     }
 
-    fn around(&self, point: Point3<S>, mut reach: S, mut name: impl FnMut(u32) -> S) {
+    fn for_each_near(&self, point: Point3<S>, mut reach: S, mut visit: impl FnMut(u32) -> S) {
         let here = self.columns([point.x, point.x]).zip(self.rows([point.z, point.z])).next();
         let mut cell = |column: u32, row: u32, reach: S| {
             let number = 2 * (row * (self.columns - 1) + column);
-            let reach = name(number).min(reach);
-            name(number + 1).min(reach)
+            let reach = visit(number).min(reach);
+            visit(number + 1).min(reach)
         };
         if let Some((column, row)) = here {
             reach = cell(column, row, reach);
         }
-        // How far from the point a cell is at least, along one axis.
+        // Distance of a cell from the point along one axis, at least.
         let gap = |cell: u32, start: S, width: S, at: S| {
             let left = start + S::constant(f64::from(cell)) * width;
             (left - at).max(at - (left + width)).max(S::zero())
@@ -284,19 +283,19 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
         }
     }
 
-    fn bounds(&self) -> Box3<S> {
+    fn bounds(&self) -> Aabb3<S> {
         let far = self.point(self.columns - 1, self.rows - 1);
         let low = Vec3::new(self.corner.x, self.corner.y + self.lowest, self.corner.z);
         let high = Vec3::new(far.x, self.corner.y + self.highest, far.z);
         Aabb { min: Point3::from_vec(low), max: Point3::from_vec(high) }
     }
 
-    fn along(&self, from: Point3<S>, motion: Vec3<S>, mut name: impl FnMut(u32)) {
+    fn for_each_on_segment(&self, from: Point3<S>, motion: Vec3<S>, mut visit: impl FnMut(u32)) {
         let to = from + motion;
         if !is_finite_point(from) || !is_finite_point(to) {
             return;
         }
-        // Column by column, the rows that it is over meanwhile.
+        // Column by column, the rows that the segment crosses meanwhile.
         for column in self.columns([from.x.min(to.x), from.x.max(to.x)]) {
             let left = self.corner.x + S::constant(f64::from(column)) * self.cell[0];
             let part = |x: S, straight: S| {
@@ -306,7 +305,7 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
             let ends = [part(left, S::zero()), part(left + self.cell[0], S::one())];
             let [p, q] = ends.map(|part| from + motion * part);
             let meanwhile = Aabb { min: p, max: p }.union(&Aabb { min: q, max: q });
-            self.cells(column..column + 1, &meanwhile, &mut name);
+            self.cells(column..column + 1, &meanwhile, &mut visit);
         }
     }
 }

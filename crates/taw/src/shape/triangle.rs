@@ -1,19 +1,18 @@
 use cgmath::{EuclideanSpace, InnerSpace};
 
-use super::polygon::closest_of_segment;
-use super::{Aabb, Box3, Nearest, Solid};
+use super::polygon::project_on_segment;
+use super::{Aabb, Aabb3, BoundedShape, PointProjection};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
 
-/// A flat piece of a surface. It has no inside, and both of its sides are alike. It may be
-/// a sliver, or no more than a line or a point.
+/// A triangle: two-sided and without volume. It may be a sliver, a segment or a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Triangle<S> {
-    /// In metres; counterclockwise as seen from where the normal points.
+    /// Vertices in metres, counterclockwise as seen from where the normal points.
     pub corners: [Point3<S>; 3],
 }
 
 impl<S: Scalar> Triangle<S> {
-    /// The unit normal, unless the corners lie on a line.
+    /// The unit normal, unless the vertices are collinear.
     #[must_use]
     pub fn normal(&self) -> Option<Vec3<S>> {
         let [a, b, c] = self.corners;
@@ -24,29 +23,28 @@ impl<S: Scalar> Triangle<S> {
         (twice > longest * S::epsilon()).then_some(normal)
     }
 
-    /// Where it is nearest to a point, if what is below it, against y, is solid: a point
-    /// straight behind it, by no more than it is wide, is inside.
-    pub(crate) fn nearest_if_solid_below(&self, point: Point3<S>) -> Nearest<S> {
+    /// Projects a point as if the volume below, against y, were solid: a point straight behind the
+    /// triangle, by no more than its width, is inside.
+    pub(crate) fn project_point_one_sided(&self, point: Point3<S>) -> PointProjection<S> {
         let [a, b, c] = self.corners;
         let deepest = (b - a).magnitude().min((c - a).magnitude());
-        let near = self.nearest(point);
+        let near = self.project_point(point);
         let up = self.normal().map(|n| if n.y < S::zero() { -n } else { n });
         match up {
-            // But for rounding.
+            // Straight behind, to within rounding.
             Some(up)
                 if near.distance > S::zero()
                     && near.distance <= deepest
                     && (near.normal + up).magnitude() < S::constant(1e-3) =>
             {
-                near.inside_out()
+                near.flipped()
             }
             _ => near,
         }
     }
 
-    /// Its point that is nearest to the origin: on a side that the origin is beside, or below
-    /// or above it.
-    pub(crate) fn closest_to_origin(&self) -> Point3<S> {
+    /// The point nearest to the origin, on an edge or in the interior.
+    pub(crate) fn project_origin(&self) -> Point3<S> {
         let [a, b, c] = self.corners.map(EuclideanSpace::to_vec);
         let (ab, ac) = (b - a, c - a);
         let normal = ab.cross(ac);
@@ -59,18 +57,18 @@ impl<S: Scalar> Triangle<S> {
                 return Point3::from_vec(normal * (a.dot(normal) / squared));
             }
         }
-        self.closest_of_sides(Point3::origin())
+        self.project_on_edges(Point3::origin())
     }
 
-    fn closest_of_sides(&self, point: Point3<S>) -> Point3<S> {
+    fn project_on_edges(&self, point: Point3<S>) -> Point3<S> {
         let [a, b, c] = self.corners;
-        let nearest = [[a, b], [b, c], [c, a]].map(|[p, q]| closest_of_segment(p, q, point));
+        let nearest = [[a, b], [b, c], [c, a]].map(|[p, q]| project_on_segment(p, q, point));
         let far = |p: Point3<S>| (p - point).magnitude2();
         nearest.into_iter().fold(a, |best, next| if far(next) < far(best) { next } else { best })
     }
 }
 
-impl<S: Scalar> Solid<S> for Triangle<S> {
+impl<S: Scalar> BoundedShape<S> for Triangle<S> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
         let [a, b, c] = self.corners;
         let farther = |best: Point3<S>, next: Point3<S>| {
@@ -79,7 +77,7 @@ impl<S: Scalar> Solid<S> for Triangle<S> {
         farther(farther(a, b), c)
     }
 
-    fn bounding_box(&self) -> Box3<S> {
+    fn bounding_box(&self) -> Aabb3<S> {
         let [a, b, c] = self.corners.map(|corner| Aabb { min: corner, max: corner });
         a.union(&b).union(&c)
     }
@@ -88,17 +86,17 @@ impl<S: Scalar> Solid<S> for Triangle<S> {
         S::zero()
     }
 
-    /// Never inside: the distance is zero on it, and above zero elsewhere.
-    fn nearest(&self, point: Point3<S>) -> Nearest<S> {
-        // In f64 about the point, or rounding would choose between its sides.
+    /// Never inside: the distance is zero on the triangle and positive elsewhere.
+    fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
+        // In f64 relative to the point, or rounding would choose between the sides.
         let origin = cast_point::<S, f64>(point);
         let local = |corner| Point3::from_vec(cast_point::<S, f64>(corner) - origin);
         let exact = Triangle { corners: self.corners.map(local) };
-        let there = exact.closest_to_origin();
+        let there = exact.project_origin();
         let out = direction_and_length(-there.to_vec());
         let (normal, distance) =
             out.unwrap_or_else(|| (exact.normal().unwrap_or_else(Vec3::unit_y), 0.0));
-        Nearest {
+        PointProjection {
             point: cast_point(origin + there.to_vec()),
             normal: cast_vector(normal),
             distance: S::constant(distance),

@@ -9,7 +9,7 @@ use super::team::{Shared, each};
 use super::{BallId, Swarm, Tier};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector};
-use crate::motion::turned;
+use crate::motion::integrate_rotation;
 
 /// State of a marble as a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -37,7 +37,7 @@ pub(crate) struct BodyColumns<'a, S> {
     pub position: &'a mut [Point3<S>],
     pub velocity: &'a mut [Vec3<S>],
     /// Empty where marbles do not turn.
-    pub spin: &'a mut [Vec3<S>],
+    pub angular_velocity: &'a mut [Vec3<S>],
     pub rotation: &'a mut [Quat<S>],
     pub radius: &'a [S],
 }
@@ -195,7 +195,7 @@ impl Swarm {
         columns: BodyColumns<S>,
         dt: Option<S>,
     ) {
-        let BodyColumns { position, velocity, spin, rotation, radius } = columns;
+        let BodyColumns { position, velocity, angular_velocity: spin, rotation, radius } = columns;
         let (position, velocity) = (Shared::new(position), Shared::new(velocity));
         let (turns, spin, rotation) = (!spin.is_empty(), Shared::new(spin), Shared::new(rotation));
         let slots = self.ids.slots();
@@ -223,7 +223,8 @@ impl Swarm {
                         let rate: Vec3<S> = vector(&spins[row]) / radius[marble];
                         *spin.row(marble) = rate;
                         let rotation = rotation.row(marble);
-                        *rotation = dt.map_or(*rotation, |dt| turned(*rotation, rate, dt));
+                        *rotation =
+                            dt.map_or(*rotation, |dt| integrate_rotation(*rotation, rate, dt));
                     }
                 }
             }

@@ -1,28 +1,28 @@
 use crate::Error;
 
-/// A stable name for a row that may move. Its generation tells it from names that
-/// the same slot had before.
+/// Generational handle of an index that may move. The generation distinguishes it from earlier
+/// handles of the same slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct Handle {
     pub slot: u32,
     pub generation: u32,
 }
 
-/// Which handle is in which row, both ways.
+/// Bidirectional map of handles and indices (a generational arena).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Handles {
     slots: Vec<Slot>,
-    /// The slot of each row.
+    /// Slot of each index.
     rows: Vec<u32>,
-    /// Slots without a row, the last freed first.
+    /// Free slots, the last freed first.
     free: Vec<u32>,
-    /// How often a row went, which moves another.
+    /// Number of removals, each of which moves another index.
     removals: u64,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 struct Slot {
-    /// The generation of the handle that has the row, or that comes next.
+    /// Generation of the current or next handle.
     generation: u32,
     row: Option<u32>,
 }
@@ -32,12 +32,12 @@ impl Handles {
         self.rows.len()
     }
 
-    /// How many handles were forgotten so far.
+    /// Number of removals so far.
     pub fn removals(&self) -> u64 {
         self.removals
     }
 
-    /// A handle for a new last row.
+    /// Creates a handle for a new last index.
     pub fn push(&mut self) -> Result<Handle, Error> {
         let full = |_| Error::Full(self.rows.len());
         let row = u32::try_from(self.rows.len()).map_err(full)?;
@@ -54,8 +54,7 @@ impl Handles {
         Ok(Handle { slot, generation: entry.generation })
     }
 
-    /// Forgets a handle. The last row takes the place of the row that it had,
-    /// which is returned.
+    /// Removes a handle. The last index is swapped into its place, which is returned.
     pub fn swap_remove(&mut self, handle: Handle) -> Option<usize> {
         let row = self.row(handle)?;
         self.rows.swap_remove(row);
@@ -65,7 +64,7 @@ impl Handles {
         }
         let slot = &mut self.slots[handle.slot as usize];
         slot.row = None;
-        // A slot whose generations are used up is never given out again.
+        // A slot with exhausted generations is never reused.
         if let Some(next) = slot.generation.checked_add(1) {
             slot.generation = next;
             self.free.push(handle.slot);
@@ -73,14 +72,14 @@ impl Handles {
         Some(row)
     }
 
-    /// The row that a handle names now.
+    /// Current index of a handle.
     pub fn row(&self, handle: Handle) -> Option<usize> {
         let slot = self.slots.get(handle.slot as usize)?;
         let row = slot.row? as usize;
         (slot.generation == handle.generation).then_some(row)
     }
 
-    /// The handle of a row.
+    /// Handle of an index.
     pub fn handle(&self, row: usize) -> Option<Handle> {
         let slot = *self.rows.get(row)?;
         Some(Handle { slot, generation: self.slots[slot as usize].generation })

@@ -1,24 +1,24 @@
-//! The first verb on the columns of marbles.
+//! Time integration of the marble columns.
 
 use cgmath::{InnerSpace, Zero};
 
-use super::marbles::{Marbles, Rest};
+use super::marbles::{Compensation, Marbles};
 use crate::math::{Quat, Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
-use crate::motion::{Force, Integrator, Motion, Rotation, turned};
+use crate::motion::{ForceField, Integrator, Motion, Rotation, integrate_rotation};
 use crate::response::Rod;
 
-/// What moves all marbles.
+/// Step context: integrator, gravity, force fields and time step.
 #[derive(Clone, Copy)]
-pub(super) struct Drive<'a, S> {
+pub(super) struct StepContext<'a, S> {
     pub integrator: Integrator,
     pub gravity: Vec3<S>,
-    pub forces: &'a [Force<S>],
-    /// In seconds.
+    pub forces: &'a [ForceField<S>],
+    /// Time step, in seconds.
     pub dt: S,
 }
 
-impl<S: Scalar> Drive<'_, S> {
-    /// What acts on the marble in a row, in m/s².
+impl<S: Scalar> StepContext<'_, S> {
+    /// Acceleration of a marble, in m/s².
     fn acceleration(&self, marbles: &Marbles<S>, row: usize, motion: Motion<S>) -> Vec3<S> {
         let mass = marbles.mass(row);
         if mass.is_infinite() {
@@ -33,233 +33,239 @@ impl<S: Scalar> Drive<'_, S> {
 }
 
 impl<S: Scalar> Marbles<S> {
-    /// Moves every row on. A row that would become infinite or NaN keeps its place,
-    /// loses its velocity, and is added to `stopped`.
-    pub(super) fn integrate(&mut self, drive: Drive<S>, stopped: &mut Vec<u32>) {
-        if !self.rest.is_empty() {
-            self.integrate_compensated(drive, stopped);
+    /// Integrates all marbles. A marble whose motion would become infinite or NaN keeps its
+    /// position, loses its velocity, and is added to `stopped`.
+    pub(super) fn integrate(&mut self, context: StepContext<S>, stopped: &mut Vec<u32>) {
+        if !self.compensation.is_empty() {
+            self.integrate_compensated(context, stopped);
             return;
         }
-        // The columns leave while they are written, so that the rest can be read.
+        // The columns are taken out while they are written, so that the others can be read.
         let mut position = std::mem::take(&mut self.position);
         let mut velocity = std::mem::take(&mut self.velocity);
         let mut rows = Rows { position: &mut position, velocity: &mut velocity, stopped };
-        let only_gravity = drive.forces.is_empty()
+        let only_gravity = context.forces.is_empty()
             && self.gravity_scale.is_empty()
             && self.mass.is_empty()
             && self.force.is_empty();
         let same_for_all = self.integrator.is_empty() && self.damping.is_empty();
         if only_gravity && same_for_all {
-            rows.integrate(drive.integrator, drive.dt, |_, _| drive.gravity);
+            rows.integrate(context.integrator, context.dt, |_, _| context.gravity);
         } else if same_for_all {
-            let all = |row: usize, motion| drive.acceleration(self, row, motion);
-            rows.integrate(drive.integrator, drive.dt, all);
+            let all = |row: usize, motion| context.acceleration(self, row, motion);
+            rows.integrate(context.integrator, context.dt, all);
         } else {
             rows.each(|row, motion| {
-                let integrator = self.integrator.get(row).unwrap_or(drive.integrator);
+                let integrator = self.integrator.get(row).unwrap_or(context.integrator);
                 let next = motion
-                    .after(integrator, drive.dt, |motion| drive.acceleration(self, row, motion));
-                Motion { velocity: next.velocity * self.kept(row, drive.dt), ..next }
+                    .step(integrator, context.dt, |motion| context.acceleration(self, row, motion));
+                Motion { velocity: next.velocity * self.damping_factor(row, context.dt), ..next }
             });
         }
         (self.position, self.velocity) = (position, velocity);
     }
 
-    /// The same in `f64`, keeping what the scalar cuts off.
-    fn integrate_compensated(&mut self, drive: Drive<S>, stopped: &mut Vec<u32>) {
+    /// Integrates in `f64` and stores the rounding errors in the compensation column.
+    fn integrate_compensated(&mut self, context: StepContext<S>, stopped: &mut Vec<u32>) {
         for row in 0..self.len() {
-            let start = self.exact(row);
-            let next = self.exact_after(row, drive);
+            let start = self.motion_f64(row);
+            let next = self.step_f64(row, context);
             let overflowed = !(is_finite_point(next.position) && is_finite(next.velocity));
             if overflowed {
-                self.set_exact(row, Motion { velocity: Vec3::zero(), ..start });
+                self.set_motion_f64(row, Motion { velocity: Vec3::zero(), ..start });
             }
-            if overflowed || !self.set_exact(row, next) {
+            if overflowed || !self.set_motion_f64(row, next) {
                 stopped.push(row as u32);
             }
         }
     }
 
-    /// The mean acceleration of every row over the step, in m/s², which moves none.
-    pub(super) fn mean_accelerations(&self, drive: Drive<S>, mean: &mut Vec<Vec3<f64>>) {
+    /// Mean acceleration of every marble over the step, in m/s², without moving any.
+    pub(super) fn mean_accelerations(&self, context: StepContext<S>, mean: &mut Vec<Vec3<f64>>) {
         mean.clear();
         mean.extend((0..self.len()).map(|row| {
-            let change = self.exact_after(row, drive).velocity - self.exact(row).velocity;
-            // Under gravity alone it is known without the rounding of a difference.
-            if drive.forces.is_empty() && self.damping.get(row).is_none() {
-                cast_vector(drive.acceleration(self, row, self.motion(row)))
+            let change = self.step_f64(row, context).velocity - self.motion_f64(row).velocity;
+            // Under gravity alone, without the rounding of a difference.
+            if context.forces.is_empty() && self.damping.get(row).is_none() {
+                cast_vector(context.acceleration(self, row, self.motion(row)))
             } else {
-                change / drive.dt.as_f64()
+                change / context.dt.as_f64()
             }
         }));
     }
 
-    fn exact_after(&self, row: usize, drive: Drive<S>) -> Motion<f64> {
-        let integrator = self.integrator.get(row).unwrap_or(drive.integrator);
-        let next = self.exact(row).after(integrator, drive.dt.as_f64(), |at| {
+    fn step_f64(&self, row: usize, context: StepContext<S>) -> Motion<f64> {
+        let integrator = self.integrator.get(row).unwrap_or(context.integrator);
+        let next = self.motion_f64(row).step(integrator, context.dt.as_f64(), |at| {
             let (position, velocity) = (cast_point(at.position), cast_vector(at.velocity));
-            cast_vector(drive.acceleration(self, row, Motion { position, velocity }))
+            cast_vector(context.acceleration(self, row, Motion { position, velocity }))
         });
-        Motion { velocity: next.velocity * self.kept(row, drive.dt).as_f64(), ..next }
+        Motion { velocity: next.velocity * self.damping_factor(row, context.dt).as_f64(), ..next }
     }
 
     fn motion(&self, row: usize) -> Motion<S> {
         Motion { position: self.position[row], velocity: self.velocity[row] }
     }
 
-    /// Position and velocity with what the scalar cuts off.
-    pub(super) fn exact(&self, row: usize) -> Motion<f64> {
-        let rest = self.rest.get(row).copied().unwrap_or_default();
+    /// Position and velocity in high precision, including the compensation.
+    pub(super) fn motion_f64(&self, row: usize) -> Motion<f64> {
+        let low = self.compensation.get(row).copied().unwrap_or_default();
         Motion {
-            position: cast_point(self.position[row]) + cast_vector(rest.position),
-            velocity: cast_vector(self.velocity[row]) + cast_vector(rest.velocity),
+            position: cast_point(self.position[row]) + cast_vector(low.position),
+            velocity: cast_vector(self.velocity[row]) + cast_vector(low.velocity),
         }
     }
 
-    /// Splits position and velocity into what the scalar holds and the rest. False if they are
-    /// beyond what it holds: then the row keeps its place and loses its velocity.
-    pub(super) fn set_exact(&mut self, row: usize, motion: Motion<f64>) -> bool {
+    /// Splits position and velocity into the scalar part and the compensation. Returns false on
+    /// overflow: then the marble keeps its position and loses its velocity.
+    pub(super) fn set_motion_f64(&mut self, row: usize, motion: Motion<f64>) -> bool {
         let position = cast_point(motion.position);
         let velocity = cast_vector(motion.velocity);
         if !is_finite_point(position) || !is_finite(velocity) {
             self.velocity[row] = Vec3::zero();
-            if let Some(rest) = self.rest.get_mut(row) {
-                rest.velocity = Vec3::zero();
+            if let Some(low) = self.compensation.get_mut(row) {
+                low.velocity = Vec3::zero();
             }
             return false;
         }
         self.position[row] = position;
         self.velocity[row] = velocity;
-        if let Some(rest) = self.rest.get_mut(row) {
-            rest.position = cast_vector(motion.position - cast_point(position));
-            rest.velocity = cast_vector(motion.velocity - cast_vector(velocity));
+        if let Some(low) = self.compensation.get_mut(row) {
+            low.position = cast_vector(motion.position - cast_point(position));
+            low.velocity = cast_vector(motion.velocity - cast_vector(velocity));
         }
         true
     }
 
-    /// The spin with what the scalar cuts off, in rad/s.
-    pub(super) fn exact_spin(&self, row: usize) -> Vec3<f64> {
-        let rest = self.rest.get(row).copied().unwrap_or_default();
-        let spin = self.spin.get(row).copied().unwrap_or_else(Vec3::zero);
-        cast_vector::<S, f64>(spin) + cast_vector(rest.spin)
+    /// Angular velocity in high precision, in rad/s.
+    pub(super) fn angular_velocity_f64(&self, row: usize) -> Vec3<f64> {
+        let low = self.compensation.get(row).copied().unwrap_or_default();
+        let angular_velocity = self.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero);
+        cast_vector::<S, f64>(angular_velocity) + cast_vector(low.angular_velocity)
     }
 
-    /// Splits the spin in the same way. Does nothing in a model without rotation.
-    pub(super) fn set_exact_spin(&mut self, row: usize, spin: Vec3<f64>) -> bool {
-        if let Some(slot) = self.spin.get_mut(row) {
-            *slot = cast_vector(spin);
+    /// Splits the angular velocity likewise. Does nothing in a model without rotation.
+    pub(super) fn set_angular_velocity_f64(
+        &mut self,
+        row: usize,
+        angular_velocity: Vec3<f64>,
+    ) -> bool {
+        if let Some(slot) = self.angular_velocity.get_mut(row) {
+            *slot = cast_vector(angular_velocity);
             if !is_finite(*slot) {
                 *slot = Vec3::zero();
-                if let Some(rest) = self.rest.get_mut(row) {
-                    rest.spin = Vec3::zero();
+                if let Some(low) = self.compensation.get_mut(row) {
+                    low.angular_velocity = Vec3::zero();
                 }
                 return false;
             }
-            if let Some(rest) = self.rest.get_mut(row) {
-                rest.spin = cast_vector(spin - cast_vector(*slot));
+            if let Some(low) = self.compensation.get_mut(row) {
+                low.angular_velocity = cast_vector(angular_velocity - cast_vector(*slot));
             }
         }
         true
     }
 
-    /// The part of the velocity that damping leaves after `dt` seconds.
-    fn kept(&self, row: usize, dt: S) -> S {
+    /// Fraction of the velocity left by damping after `dt` seconds.
+    fn damping_factor(&self, row: usize, dt: S) -> S {
         self.damping.get(row).map_or(S::one(), |damping| (-damping.linear * dt).exp_portable())
     }
 
-    /// Lets torques and damping change the spins over `dt` seconds.
-    pub(super) fn spin_up(&mut self, dt: S) {
+    /// Integrates torques and angular damping over `dt` seconds.
+    pub(super) fn integrate_angular_velocity(&mut self, dt: S) {
         if self.torque.is_empty() && self.damping.is_empty() {
             return;
         }
-        for row in 0..self.spin.len() {
-            if self.is_held(row) {
+        for row in 0..self.angular_velocity.len() {
+            if self.is_rotation_locked(row) {
                 continue;
             }
-            let mut spin = self.spin[row];
+            let mut angular_velocity = self.angular_velocity[row];
             if let Some(torque) = self.torque.get(row) {
-                spin += self.spin_by(row, torque.dual()) * dt;
+                angular_velocity += self.apply_inverse_inertia(row, torque.dual()) * dt;
             }
             if let Some(damping) = self.damping.get(row) {
-                spin *= (-damping.angular * dt).exp_portable();
+                angular_velocity *= (-damping.angular * dt).exp_portable();
             }
-            if is_finite(spin) && spin != self.spin[row] {
-                self.spin[row] = spin;
+            if is_finite(angular_velocity) && angular_velocity != self.angular_velocity[row] {
+                self.angular_velocity[row] = angular_velocity;
             }
         }
     }
 
-    /// Turns every row on by its spin for `dt` seconds. Capsules that do not feel their spin in a
-    /// world of this `rotation` turn about their axes only: else they would turn into walls, and be
-    /// lifted out, which is energy from nothing.
-    pub(super) fn turn(&mut self, dt: S, rotation: Rotation) {
+    /// Integrates rotations over `dt` seconds. Capsules without dynamic rotation in a world of this
+    /// `rotation` rotate about their axes only: otherwise they would rotate into walls and be
+    /// lifted out, which gains energy.
+    pub(super) fn integrate_rotations(&mut self, dt: S, rotation: Rotation) {
         if self.has_capsules() {
-            for row in 0..self.spin.len() {
+            for row in 0..self.angular_velocity.len() {
                 let own = self.rotation_model.get(row).unwrap_or(rotation);
                 if own.min(rotation) == Rotation::Dynamic || self.half_length(row) == S::zero() {
-                    self.turn_top(row, dt);
+                    self.integrate_symmetric_top(row, dt);
                 } else {
                     let axis = self.rotation[row] * Vec3::unit_y();
-                    let spin = axis * self.spin[row].dot(axis);
-                    self.rotation[row] = turned(self.rotation[row], spin, dt);
+                    let angular_velocity = axis * self.angular_velocity[row].dot(axis);
+                    self.rotation[row] =
+                        integrate_rotation(self.rotation[row], angular_velocity, dt);
                 }
             }
             return;
         }
-        for (rotation, spin) in self.rotation.iter_mut().zip(&self.spin) {
-            *rotation = turned(*rotation, *spin, dt);
+        for (rotation, angular_velocity) in self.rotation.iter_mut().zip(&self.angular_velocity) {
+            *rotation = integrate_rotation(*rotation, *angular_velocity, dt);
         }
     }
 
-    /// Turns a row on as what it is, a symmetric top: it turns evenly about its axis, and the
-    /// axis about the angular momentum, which stays (Landau and Lifshitz, *Mechanics*, §33).
+    /// Rotates a capsule as the symmetric top that it is: steadily about its axis, and the axis
+    /// about the conserved angular momentum (Landau and Lifshitz, *Mechanics*, §33).
     ///
-    /// Counted in `f64` and rounded once. In `f32` a quaternion is a unit only to 1e-7, and its
-    /// axis too: the spin along it would grow by that in every substep, always the same way.
-    fn turn_top(&mut self, row: usize, dt: S) {
+    /// Computed in `f64` and rounded once. In `f32` a quaternion and its axis are normalized only
+    /// to 1e-7: the angular velocity along the axis would grow by that in every substep, always in
+    /// the same direction.
+    fn integrate_symmetric_top(&mut self, row: usize, dt: S) {
         let (rotation, half) = (self.rotation[row], self.half_length(row));
-        if half == S::zero() || self.spin[row].is_zero() {
-            self.rotation[row] = turned(rotation, self.spin[row], dt);
+        if half == S::zero() || self.angular_velocity[row].is_zero() {
+            self.rotation[row] = integrate_rotation(rotation, self.angular_velocity[row], dt);
             return;
         }
         let exact = |rotation: Quat<S>| {
             Quat::from_sv(rotation.s.as_f64(), cast_vector(rotation.v)).normalize()
         };
-        let (spin, dt) = (self.exact_spin(row), dt.as_f64());
+        let (angular_velocity, dt) = (self.angular_velocity_f64(row), dt.as_f64());
         let rotation = exact(rotation);
         let axis = (rotation * Vec3::unit_y()).normalize();
         let [along, across] = Rod::moments(self.radius[row].as_f64(), half.as_f64());
-        // Angular momentum over the moment across: how fast the axis goes around it.
-        let about_axis = spin.dot(axis);
-        let precession = spin + axis * (about_axis * (along / across - 1.0));
+        // Precession rate: angular momentum over the moment across the axis.
+        let about_axis = angular_velocity.dot(axis);
+        let precession = angular_velocity + axis * (about_axis * (along / across - 1.0));
         let own = axis * (about_axis - precession.dot(axis));
-        let rotation = turned(turned(rotation, own, dt), precession, dt);
+        let rotation = integrate_rotation(integrate_rotation(rotation, own, dt), precession, dt);
         self.rotation[row] = Quat::from_sv(S::constant(rotation.s), cast_vector(rotation.v));
-        // About the axis as it is kept, which rounding has tilted: so the spin along it, and
-        // with it the energy of thin capsules, does not change.
+        // Relative to the stored, rounded axis, so that the angular velocity along it, and with it
+        // the energy of thin capsules, does not change.
         let axis = (exact(self.rotation[row]) * Vec3::unit_y()).normalize();
         let next = precession + axis * (about_axis - precession.dot(axis));
-        self.set_exact_spin(row, next);
+        self.set_angular_velocity_f64(row, next);
     }
 
-    /// Turns a row on by an angle, an axial vector in radians.
-    pub(super) fn turn_by(&mut self, row: usize, angle: Vec3<S>) {
+    /// Rotates a marble by an angle, an axial vector in radians.
+    pub(super) fn rotate_by(&mut self, row: usize, angle: Vec3<S>) {
         if let Some(rotation) = self.rotation.get_mut(row) {
-            *rotation = turned(*rotation, angle, S::one());
+            *rotation = integrate_rotation(*rotation, angle, S::one());
         }
     }
 
-    /// Adds or drops the column of what the scalar cuts off.
+    /// Adds or drops the compensation column.
     pub(super) fn set_compensated(&mut self, compensated: bool) {
         if compensated != self.compensated {
             self.compensated = compensated;
             let rows = if compensated { self.position.len() } else { 0 };
-            self.rest = vec![Rest::default(); rows];
+            self.compensation = vec![Compensation::default(); rows];
         }
     }
 }
 
-/// The columns that an integrator writes.
+/// Columns that an integrator writes.
 struct Rows<'a, S> {
     position: &'a mut [crate::math::Point3<S>],
     velocity: &'a mut [Vec3<S>],
@@ -267,7 +273,7 @@ struct Rows<'a, S> {
 }
 
 impl<S: Scalar> Rows<'_, S> {
-    /// Moves every row on, by a kernel that is chosen once for all of them.
+    /// Integrates all marbles with a kernel that is chosen once for all.
     fn integrate(
         &mut self,
         integrator: Integrator,

@@ -5,13 +5,12 @@ use crate::Error;
 use crate::error::positive;
 use crate::math::{Scalar, length};
 
-/// The fastest that marbles may be, for games that want it. There is no limit unless one
-/// is set here.
+/// Speed limits of marbles, for games. None by default.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SpeedLimits<S> {
-    /// Of the velocity, in m/s, above zero.
+    /// Maximum speed in m/s, above zero.
     pub linear: Option<S>,
-    /// Of the spin, in rad/s, above zero.
+    /// Maximum angular speed in rad/s, above zero.
     pub angular: Option<S>,
 }
 
@@ -29,10 +28,10 @@ impl<S: Scalar> SpeedLimits<S> {
         Ok(self)
     }
 
-    /// Slows down whatever is faster.
+    /// Clamps velocities and angular velocities to the limits.
     pub(super) fn apply(self, marbles: &mut Marbles<S>) {
         for (limit, column) in
-            [(self.linear, &mut marbles.velocity), (self.angular, &mut marbles.spin)]
+            [(self.linear, &mut marbles.velocity), (self.angular, &mut marbles.angular_velocity)]
         {
             let Some(limit) = limit else { continue };
             for v in column {

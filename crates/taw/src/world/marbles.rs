@@ -1,7 +1,7 @@
 use cgmath::{EuclideanSpace, InnerSpace, One, Zero};
 
 use super::handles::{Handle, Handles};
-use super::optional::Optional;
+use super::sparse_column::SparseColumn;
 use crate::Error;
 use crate::broad::Period;
 use crate::error::{finite, finite_point, finite_vector, positive, within};
@@ -12,44 +12,43 @@ use crate::response::{Columns, Material, Rod};
 use crate::shape::{Capsule, Shape, Sphere};
 use crate::swarm::BodyColumns;
 
-/// Names a marble for as long as it is in the world.
+/// Stable handle of a marble.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MarbleId(Handle);
 
-/// One marble as a value: what goes into the columns, and what comes out.
+/// Description of a marble (a rigid sphere or capsule) as a value.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Marble<S> {
-    /// The center, in metres.
+    /// Center, in metres.
     pub position: Point3<S>,
-    /// In metres, above zero.
+    /// Radius in metres, above zero.
     pub radius: S,
-    /// Above zero, it is a capsule: all points within the radius of a line along its own y
-    /// axis, which goes this far both ways from the center, in metres.
+    /// Half length of a capsule's segment along its own y axis, in metres; zero for a ball.
     pub half_length: S,
-    /// In metres per second.
+    /// Velocity, in m/s.
     pub velocity: Vec3<S>,
-    /// How heavy it is.
+    /// Mass.
     pub mass: Mass<S>,
-    /// How many times the world's gravity it feels: 0 floats, −1 rises.
+    /// Gravity scale: 0 floats, −1 rises.
     pub gravity_scale: S,
-    /// What slows it wherever it is.
+    /// Damping of velocity and angular velocity.
     pub damping: Damping<S>,
-    /// How it is turned. Kept only by a model with rotation.
+    /// Rotation. Stored only by a model with rotation.
     pub rotation: Quat<S>,
-    /// Its angular velocity in rad/s, an axial vector in world space. Kept only by a
-    /// model with rotation.
-    pub spin: Vec3<S>,
-    /// This marble's own integrator instead of the model's.
+    /// Angular velocity in rad/s, an axial vector in world space. Stored only by a model with
+    /// rotation.
+    pub angular_velocity: Vec3<S>,
+    /// Own integrator instead of the model's.
     pub integrator: Option<Integrator>,
-    /// This marble's own rotation model, where the world's models no less: a marble may
-    /// roll for show, or not turn at all, among others that have angular momentum.
+    /// Own rotation model, limited by the world's: a marble may roll visually, or not rotate at
+    /// all, among others with angular momentum.
     pub rotation_model: Option<Rotation>,
-    /// This marble's own material instead of the default one.
+    /// Own material instead of the default one.
     pub material: Option<Material<S>>,
 }
 
 impl<S: Scalar> Marble<S> {
-    /// A marble of glass, at rest.
+    /// Creates a marble of glass, at rest.
     #[must_use]
     pub fn new(position: Point3<S>, radius: S) -> Self {
         Self {
@@ -58,7 +57,7 @@ impl<S: Scalar> Marble<S> {
             half_length: S::zero(),
             velocity: Vec3::zero(),
             rotation: Quat::one(),
-            spin: Vec3::zero(),
+            angular_velocity: Vec3::zero(),
             mass: Mass::default(),
             gravity_scale: S::one(),
             damping: Damping::default(),
@@ -69,13 +68,14 @@ impl<S: Scalar> Marble<S> {
     }
 }
 
-/// What takes a part of a marble's speed in every second, wherever it is: `1 − e^−rate`.
-/// A convenience of games; what a medium does is [`Force::Drag`](crate::motion::Force).
+/// Exponential damping: removes the fraction `1 − e^−rate` of the velocity per second. A
+/// convenience for games; for the drag of a medium see
+/// [`ForceField::Drag`](crate::motion::ForceField).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Damping<S> {
-    /// Of the velocity, in 1/s, at least zero.
+    /// Rate for the velocity in 1/s, at least zero.
     pub linear: S,
-    /// Of the spin, in 1/s, at least zero. Counts if the model's rotation is dynamic.
+    /// Rate for the angular velocity in 1/s, at least zero. Used with dynamic rotation only.
     pub angular: S,
 }
 
@@ -99,83 +99,84 @@ impl<S: Scalar> Damping<S> {
     }
 }
 
-/// What the scalar cuts off a row's numbers.
+/// Compensation: the low parts of a marble's double-single numbers, which the scalar cuts off.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Rest<S> {
+pub(super) struct Compensation<S> {
     pub position: Vec3<S>,
     pub velocity: Vec3<S>,
-    pub spin: Vec3<S>,
+    pub angular_velocity: Vec3<S>,
 }
 
-impl<S: Scalar> Default for Rest<S> {
+impl<S: Scalar> Default for Compensation<S> {
     fn default() -> Self {
-        Self { position: Vec3::zero(), velocity: Vec3::zero(), spin: Vec3::zero() }
+        Self { position: Vec3::zero(), velocity: Vec3::zero(), angular_velocity: Vec3::zero() }
     }
 }
 
-/// Dynamic spheres, in columns: row *i* of each belongs to the same marble.
+/// Marbles (dynamic spheres and capsules) as columns: index *i* of each belongs to one marble.
 ///
-/// Rows move when marbles are removed; a [`MarbleId`] finds its row again.
+/// Indices change when marbles are removed; a [`MarbleId`] stays valid.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Marbles<S> {
     handles: Handles,
-    /// Whether there are columns for rotation, and for what the scalar cuts off.
-    turn: bool,
+    /// Flags: columns for rotation and for compensation exist.
+    has_rotation: bool,
     pub(super) compensated: bool,
     pub(super) period: Period<S>,
     pub(super) position: Vec<Point3<S>>,
     pub(super) radius: Vec<S>,
-    /// Only of capsules.
-    pub(super) half_length: Optional<S>,
+    /// Capsules only.
+    pub(super) half_length: SparseColumn<S>,
     pub(super) velocity: Vec<Vec3<S>>,
-    /// Empty in a model without rotation, as is `spin`.
+    /// Empty in a model without rotation, as is `angular_velocity`.
     pub(super) rotation: Vec<Quat<S>>,
-    pub(super) spin: Vec<Vec3<S>>,
+    pub(super) angular_velocity: Vec<Vec3<S>>,
     /// Empty in a model of plain precision.
-    pub(super) rest: Vec<Rest<S>>,
-    /// Only what is not the default.
-    pub(super) mass: Optional<Mass<S>>,
-    /// Only what is not one.
-    pub(super) gravity_scale: Optional<S>,
-    /// Only what is not none.
-    pub(super) damping: Optional<Damping<S>>,
-    /// Only of this step.
-    pub(super) force: Optional<Vec3<S>>,
-    /// Only of this step.
-    pub(super) torque: Optional<Bivector<S>>,
-    pub(super) integrator: Optional<Integrator>,
-    pub(super) rotation_model: Optional<Rotation>,
-    pub(super) material: Optional<Material<S>>,
+    pub(super) compensation: Vec<Compensation<S>>,
+    /// Non-default masses.
+    pub(super) mass: SparseColumn<Mass<S>>,
+    /// Gravity scales other than one.
+    pub(super) gravity_scale: SparseColumn<S>,
+    /// Non-zero damping.
+    pub(super) damping: SparseColumn<Damping<S>>,
+    /// Applied force of this step.
+    pub(super) force: SparseColumn<Vec3<S>>,
+    /// Applied torque of this step.
+    pub(super) torque: SparseColumn<Bivector<S>>,
+    pub(super) integrator: SparseColumn<Integrator>,
+    pub(super) rotation_model: SparseColumn<Rotation>,
+    pub(super) material: SparseColumn<Material<S>>,
 }
 
 impl<S> Default for Marbles<S> {
     fn default() -> Self {
         Self {
             handles: Handles::default(),
-            turn: false,
+            has_rotation: false,
             compensated: false,
             period: Period::default(),
             position: Vec::new(),
             radius: Vec::new(),
-            half_length: Optional::default(),
+            half_length: SparseColumn::default(),
             velocity: Vec::new(),
             rotation: Vec::new(),
-            spin: Vec::new(),
-            rest: Vec::new(),
-            mass: Optional::default(),
-            gravity_scale: Optional::default(),
-            damping: Optional::default(),
-            force: Optional::default(),
-            torque: Optional::default(),
-            integrator: Optional::default(),
-            rotation_model: Optional::default(),
-            material: Optional::default(),
+            angular_velocity: Vec::new(),
+            compensation: Vec::new(),
+            mass: SparseColumn::default(),
+            gravity_scale: SparseColumn::default(),
+            damping: SparseColumn::default(),
+            force: SparseColumn::default(),
+            torque: SparseColumn::default(),
+            integrator: SparseColumn::default(),
+            rotation_model: SparseColumn::default(),
+            material: SparseColumn::default(),
         }
     }
 }
 
 const POSITION: [&str; 3] = ["position.x", "position.y", "position.z"];
-pub(super) const SPIN: [&str; 3] = ["spin.x", "spin.y", "spin.z"];
+pub(super) const ANGULAR_VELOCITY: [&str; 3] =
+    ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
 pub(super) const VELOCITY: [&str; 3] = ["velocity.x", "velocity.y", "velocity.z"];
 
 impl<S: Scalar> Marbles<S> {
@@ -183,15 +184,15 @@ impl<S: Scalar> Marbles<S> {
     ///
     /// # Errors
     /// [`Error::NotFinite`], [`Error::NotPositive`], [`Error::NotUnit`] or [`Error::OutOfRange`]
-    /// for its fields, also where size and density together make a mass that the scalar has no
-    /// number for; [`Error::Full`] at 2³² marbles.
+    /// for its fields, also if size and density together make a mass that the scalar cannot
+    /// represent; [`Error::Full`] at 2³² marbles.
     pub fn insert(&mut self, marble: Marble<S>) -> Result<MarbleId, Error> {
         let position = finite_point(POSITION, marble.position)?;
         let radius = positive("radius", marble.radius)?;
         let half_length = checked_half_length(marble.half_length)?;
         let velocity = finite_vector(VELOCITY, marble.velocity)?;
         let rotation = checked_rotation(marble.rotation)?;
-        let spin = finite_vector(SPIN, marble.spin)?;
+        let angular_velocity = finite_vector(ANGULAR_VELOCITY, marble.angular_velocity)?;
         let mass = marble.mass.checked()?;
         mass.of_size(radius, marble.half_length)?;
         let gravity_scale = finite("gravity_scale", marble.gravity_scale)?;
@@ -199,24 +200,24 @@ impl<S: Scalar> Marbles<S> {
         let material = marble.material.map(Material::checked).transpose()?;
         let handle = self.handles.push()?;
         if half_length.is_some() {
-            self.set_turn(true); // which way it points counts in any model
+            self.enable_rotation(true); // which way it points counts in any model
         }
         self.position.push(position);
         self.radius.push(radius);
         self.velocity.push(velocity);
-        if self.turn {
+        if self.has_rotation {
             self.rotation.push(rotation);
             let turns = marble.rotation_model != Some(Rotation::None);
-            self.spin.push(if turns { spin } else { Vec3::zero() });
+            self.angular_velocity.push(if turns { angular_velocity } else { Vec3::zero() });
         }
         if self.compensated {
-            self.rest.push(Rest::default());
+            self.compensation.push(Compensation::default());
         }
         let rows = self.position.len();
         self.half_length.set(rows - 1, half_length, rows);
-        self.mass.set(rows - 1, but(mass, Mass::default()), rows);
-        self.gravity_scale.set(rows - 1, but(gravity_scale, S::one()), rows);
-        self.damping.set(rows - 1, but(damping, Damping::default()), rows);
+        self.mass.set(rows - 1, non_default(mass, Mass::default()), rows);
+        self.gravity_scale.set(rows - 1, non_default(gravity_scale, S::one()), rows);
+        self.damping.set(rows - 1, non_default(damping, Damping::default()), rows);
         self.force.set(rows - 1, None, rows);
         self.torque.set(rows - 1, None, rows);
         self.integrator.set(rows - 1, marble.integrator, rows);
@@ -225,7 +226,7 @@ impl<S: Scalar> Marbles<S> {
         Ok(MarbleId(handle))
     }
 
-    /// Takes a marble out and gives it back.
+    /// Removes a marble and returns it.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
@@ -235,12 +236,12 @@ impl<S: Scalar> Marbles<S> {
             self.position.swap_remove(row);
             self.radius.swap_remove(row);
             self.velocity.swap_remove(row);
-            if self.turn {
+            if self.has_rotation {
                 self.rotation.swap_remove(row);
-                self.spin.swap_remove(row);
+                self.angular_velocity.swap_remove(row);
             }
             if self.compensated {
-                self.rest.swap_remove(row);
+                self.compensation.swap_remove(row);
             }
             self.half_length.swap_remove(row);
             self.mass.swap_remove(row);
@@ -255,7 +256,7 @@ impl<S: Scalar> Marbles<S> {
         Ok(marble)
     }
 
-    /// The marble as it is now.
+    /// Current state of a marble.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
@@ -267,7 +268,7 @@ impl<S: Scalar> Marbles<S> {
             half_length: self.half_length(row),
             velocity: self.velocity[row],
             rotation: self.rotation.get(row).copied().unwrap_or_else(Quat::one),
-            spin: self.spin.get(row).copied().unwrap_or_else(Vec3::zero),
+            angular_velocity: self.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero),
             mass: self.mass.get(row).unwrap_or_default(),
             gravity_scale: self.gravity_scale.get(row).unwrap_or(S::one()),
             damping: self.damping.get(row).unwrap_or_default(),
@@ -277,21 +278,21 @@ impl<S: Scalar> Marbles<S> {
         })
     }
 
-    /// The marble as it is now, in `f64`, with what [`Precision::Compensated`] remembers
-    /// beyond the world's scalar.
+    /// Current state of a marble in `f64`, including the compensation of
+    /// [`Precision::Compensated`].
     ///
     /// [`Precision::Compensated`]: super::Precision::Compensated
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
-    pub fn get_exact(&self, id: MarbleId) -> Result<Marble<f64>, Error> {
+    pub fn get_high_precision(&self, id: MarbleId) -> Result<Marble<f64>, Error> {
         let (row, marble) = (self.row(id)?, self.get(id)?);
-        let Motion { position, velocity } = self.exact(row);
+        let Motion { position, velocity } = self.motion_f64(row);
         let rotation = marble.rotation;
         Ok(Marble {
             position,
             velocity,
-            spin: self.exact_spin(row),
+            angular_velocity: self.angular_velocity_f64(row),
             radius: marble.radius.as_f64(),
             half_length: marble.half_length.as_f64(),
             mass: marble.mass.cast(),
@@ -304,37 +305,37 @@ impl<S: Scalar> Marbles<S> {
         })
     }
 
-    /// Moves a marble to a new place at once.
+    /// Teleports a marble.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`], [`Error::NotFinite`].
     pub fn set_position(&mut self, id: MarbleId, position: Point3<S>) -> Result<(), Error> {
         let row = self.row(id)?;
         self.position[row] = finite_point(POSITION, position)?;
-        if let Some(rest) = self.rest.get_mut(row) {
-            rest.position = Vec3::zero();
+        if let Some(low) = self.compensation.get_mut(row) {
+            low.position = Vec3::zero();
         }
         Ok(())
     }
 
-    /// Gives a marble a new velocity, in metres per second.
+    /// Sets the velocity of a marble, in m/s.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`], [`Error::NotFinite`].
     pub fn set_velocity(&mut self, id: MarbleId, velocity: Vec3<S>) -> Result<(), Error> {
         let row = self.row(id)?;
         self.velocity[row] = finite_vector(VELOCITY, velocity)?;
-        if let Some(rest) = self.rest.get_mut(row) {
-            rest.velocity = Vec3::zero();
+        if let Some(low) = self.compensation.get_mut(row) {
+            low.velocity = Vec3::zero();
         }
         Ok(())
     }
 
-    /// Gives a marble a new radius, in metres, about the same center.
+    /// Sets the radius of a marble about the same center, in metres.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`], [`Error::NotPositive`]; [`Error::OutOfRange`] if it would then be
-    /// so light or so heavy that the scalar has no number for it.
+    /// [`Error::NoSuchMarble`], [`Error::NotPositive`]; [`Error::OutOfRange`] if the scalar cannot
+    /// represent the resulting mass or inertia.
     pub fn set_radius(&mut self, id: MarbleId, radius: S) -> Result<(), Error> {
         let (row, radius) = (self.row(id)?, positive("radius", radius)?);
         self.own_mass(row).of_size(radius, self.half_length(row))?;
@@ -342,7 +343,7 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// Makes a capsule of a marble, of this half length in metres, or with zero a ball.
+    /// Sets the half length of a marble in metres: a capsule above zero, a ball at zero.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`], [`Error::OutOfRange`].
@@ -352,13 +353,13 @@ impl<S: Scalar> Marbles<S> {
         let half_length = checked_half_length(half_length)?;
         self.own_mass(row).of_size(self.radius[row], given)?;
         if half_length.is_some() {
-            self.set_turn(true);
+            self.enable_rotation(true);
         }
         self.half_length.set(row, half_length, self.handles.len());
         Ok(())
     }
 
-    /// Turns a marble at once. Does nothing in a model without rotation, but to capsules.
+    /// Sets the rotation of a marble. Does nothing in a model without rotation, except to capsules.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`]; [`Error::NotUnit`] if the length of the quaternion is
@@ -371,57 +372,62 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// Gives a marble a new spin, in rad/s as an axial vector in world space. Does
+    /// Sets the angular velocity of a marble, in rad/s as an axial vector in world space. Does
     /// nothing in a model without rotation.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`], [`Error::NotFinite`].
-    pub fn set_spin(&mut self, id: MarbleId, spin: Vec3<S>) -> Result<(), Error> {
-        let (row, spin) = (self.row(id)?, finite_vector(SPIN, spin)?);
-        if let Some(slot) = self.spin.get_mut(row) {
-            *slot = spin;
+    pub fn set_angular_velocity(
+        &mut self,
+        id: MarbleId,
+        angular_velocity: Vec3<S>,
+    ) -> Result<(), Error> {
+        let (row, angular_velocity) =
+            (self.row(id)?, finite_vector(ANGULAR_VELOCITY, angular_velocity)?);
+        if let Some(slot) = self.angular_velocity.get_mut(row) {
+            *slot = angular_velocity;
         }
-        if let Some(rest) = self.rest.get_mut(row) {
-            rest.spin = Vec3::zero();
+        if let Some(low) = self.compensation.get_mut(row) {
+            low.angular_velocity = Vec3::zero();
         }
         Ok(())
     }
 
-    /// Gives a marble a new mass.
+    /// Sets the mass of a marble.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`], [`Error::NotPositive`]; [`Error::OutOfRange`] if it is so light
-    /// or so heavy, for the size of the marble, that the scalar has no number for it.
+    /// [`Error::NoSuchMarble`], [`Error::NotPositive`]; [`Error::OutOfRange`] if the scalar cannot
+    /// represent it or the inertia.
     pub fn set_mass(&mut self, id: MarbleId, mass: Mass<S>) -> Result<(), Error> {
         let (row, mass) = (self.row(id)?, mass.checked()?);
         mass.of_size(self.radius[row], self.half_length(row))?;
-        self.mass.set(row, but(mass, Mass::default()), self.handles.len());
+        self.mass.set(row, non_default(mass, Mass::default()), self.handles.len());
         Ok(())
     }
 
-    /// Sets how many times the world's gravity a marble feels.
+    /// Sets the gravity scale of a marble.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`], [`Error::NotFinite`].
     pub fn set_gravity_scale(&mut self, id: MarbleId, scale: S) -> Result<(), Error> {
         let row = self.row(id)?;
-        let scale = but(finite("gravity_scale", scale)?, S::one());
+        let scale = non_default(finite("gravity_scale", scale)?, S::one());
         self.gravity_scale.set(row, scale, self.handles.len());
         Ok(())
     }
 
-    /// Says what slows a marble wherever it is.
+    /// Sets the damping of a marble.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`], [`Error::OutOfRange`].
     pub fn set_damping(&mut self, id: MarbleId, damping: Damping<S>) -> Result<(), Error> {
         let row = self.row(id)?;
-        let damping = but(damping.checked()?, Damping::default());
+        let damping = non_default(damping.checked()?, Damping::default());
         self.damping.set(row, damping, self.handles.len());
         Ok(())
     }
 
-    /// Gives a marble its own integrator, or with `None` the model's.
+    /// Sets a marble's own integrator, or with `None` the model's.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
@@ -435,8 +441,8 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// Gives a marble its own rotation model, or with `None` the world's. One that does not
-    /// spin as the world's model would begins at rest.
+    /// Sets a marble's own rotation model, or with `None` the world's. A marble set to no rotation
+    /// loses its angular velocity.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
@@ -448,42 +454,42 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         self.rotation_model.set(row, model, self.handles.len());
         if model == Some(Rotation::None) {
-            self.set_spin(id, Vec3::zero())?;
+            self.set_angular_velocity(id, Vec3::zero())?;
         }
         Ok(())
     }
 
-    /// How the marble in a row turns in a world of this model.
+    /// Rotation model of a marble in a world of this model.
     pub(super) fn rotation_of(&self, row: usize, world: Rotation) -> Rotation {
         self.rotation_model.get(row).map_or(world, |own| own.min(world))
     }
 
-    /// Whether contacts and torques cannot set the marble in a row spinning.
-    pub(super) fn is_held(&self, row: usize) -> bool {
+    /// Returns true if contacts and torques do not affect the marble's rotation.
+    pub(super) fn is_rotation_locked(&self, row: usize) -> bool {
         self.rotation_of(row, Rotation::Dynamic) != Rotation::Dynamic
     }
 
-    /// Whether anything but gravity moves some of them.
-    pub(super) fn are_pushed(&self) -> bool {
+    /// Returns true if any marble has applied forces, torques or damping.
+    pub(super) fn has_external_forces(&self) -> bool {
         !(self.force.is_empty() && self.torque.is_empty() && self.damping.is_empty())
     }
 
-    /// True if gravity does not accelerate all alike, or other things than gravity do.
+    /// Returns true if gravity does not accelerate all alike, or other forces act.
     pub(super) fn accelerate_differently(&self) -> bool {
-        self.are_pushed() || !(self.gravity_scale.is_empty() && self.mass.is_empty())
+        self.has_external_forces() || !(self.gravity_scale.is_empty() && self.mass.is_empty())
     }
 
-    /// True if all have the default mass and material and turn as the world's model says.
+    /// Returns true if all have the default mass and material and no own rotation model.
     pub(super) fn are_alike(&self) -> bool {
         self.mass.is_empty() && self.material.is_empty() && self.rotation_model.is_empty()
     }
 
-    /// Whether there is one like that.
-    pub(super) fn has_held(&self) -> bool {
+    /// Returns true if any marble has its own rotation model.
+    pub(super) fn has_rotation_locks(&self) -> bool {
         !self.rotation_model.is_empty()
     }
 
-    /// Gives a marble its own material, or with `None` the default one.
+    /// Sets a marble's own material, or with `None` the default one.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`], [`Error::OutOfRange`].
@@ -498,37 +504,37 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// The centers, by row, in metres.
+    /// Centers by index, in metres.
     #[must_use]
     pub fn position(&self) -> &[Point3<S>] {
         &self.position
     }
 
-    /// The radii, by row, in metres.
+    /// Radii by index, in metres.
     #[must_use]
     pub fn radius(&self) -> &[S] {
         &self.radius
     }
 
-    /// The velocities, by row, in metres per second.
+    /// Velocities by index, in m/s.
     #[must_use]
     pub fn velocity(&self) -> &[Vec3<S>] {
         &self.velocity
     }
 
-    /// How each marble is turned, by row; empty in a model without rotation.
+    /// Rotations by index; empty in a model without rotation.
     #[must_use]
     pub fn rotation(&self) -> &[Quat<S>] {
         &self.rotation
     }
 
-    /// The spins, by row, in rad/s; empty in a model without rotation.
+    /// Angular velocities by index, in rad/s; empty in a model without rotation.
     #[must_use]
-    pub fn spin(&self) -> &[Vec3<S>] {
-        &self.spin
+    pub fn angular_velocity(&self) -> &[Vec3<S>] {
+        &self.angular_velocity
     }
 
-    /// The row of a marble, until the next removal.
+    /// Index of a marble, valid until the next removal.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
@@ -536,13 +542,13 @@ impl<S: Scalar> Marbles<S> {
         self.handles.row(id.0).ok_or(Error::NoSuchMarble(id))
     }
 
-    /// The marble in a row.
+    /// Handle of the marble at an index.
     #[must_use]
     pub fn id(&self, row: usize) -> Option<MarbleId> {
         self.handles.handle(row).map(MarbleId)
     }
 
-    /// How many marbles were taken out so far.
+    /// Number of removals so far.
     pub(super) fn removals(&self) -> u64 {
         self.handles.removals()
     }
@@ -553,30 +559,30 @@ impl<S: Scalar> Marbles<S> {
         self.position.len()
     }
 
-    /// Whether there are no marbles.
+    /// Returns true without any marble.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.position.is_empty()
     }
 
-    /// Zero for a ball.
+    /// Half length of a marble in metres; zero for a ball.
     pub(super) fn half_length(&self, row: usize) -> S {
         self.half_length.get(row).unwrap_or_else(S::zero)
     }
 
-    /// The first marble that is a capsule.
+    /// First marble that is a capsule.
     pub(super) fn first_capsule(&self) -> Option<MarbleId> {
         let row = (0..self.len()).find(|row| self.half_length.get(*row).is_some())?;
         self.id(row)
     }
 
-    /// Whether there are capsules.
+    /// Returns true if any marble is a capsule.
     #[must_use]
     pub fn has_capsules(&self) -> bool {
         !self.half_length.is_empty()
     }
 
-    /// What a marble is now: a sphere or a capsule.
+    /// Current shape of a marble: a sphere or a capsule.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
@@ -594,12 +600,12 @@ impl<S: Scalar> Marbles<S> {
         }
     }
 
-    /// Which way a capsule points, as a unit vector of the world.
+    /// Axis of a capsule, as a unit vector of the world.
     pub(super) fn axis(&self, row: usize) -> Vec3<S> {
         self.rotation.get(row).map_or_else(Vec3::unit_y, |turn| turn * Vec3::unit_y())
     }
 
-    /// What is long about every row, if any is a capsule. In a world of this model.
+    /// Capsule axes and inertia of all marbles, if any is a capsule, in a world of this model.
     pub(super) fn rods(&self, model: Rotation, rods: &mut Vec<Rod<S>>) {
         rods.clear();
         if !self.has_capsules() {
@@ -614,18 +620,18 @@ impl<S: Scalar> Marbles<S> {
         }));
     }
 
-    /// The ball in the middle of a row that exists.
+    /// Sphere around the center of a marble.
     pub(super) fn sphere(&self, row: usize) -> Sphere<S> {
         Sphere { center: self.position[row], radius: self.radius[row] }
     }
 
-    /// The way from one row to another, in metres: the shortest one of a periodic world.
+    /// Displacement between two marbles in metres: the shortest one of a periodic world.
     #[inline]
     pub(super) fn apart(&self, a: usize, b: usize) -> Vec3<S> {
         self.period.nearest(self.position[b] - self.position[a])
     }
 
-    /// Puts what left the periodic box back into it.
+    /// Wraps positions into the periodic box.
     pub(super) fn wrap(&mut self) {
         if !self.period.is_open() {
             let middle = Point3::origin();
@@ -633,59 +639,65 @@ impl<S: Scalar> Marbles<S> {
         }
     }
 
-    /// Adds or drops the columns for rotation. New ones begin unturned and at rest.
-    pub(super) fn set_turn(&mut self, turn: bool) {
-        if turn != self.turn {
-            self.turn = turn;
-            let rows = if turn { self.position.len() } else { 0 };
+    /// Adds or drops the columns for rotation. New ones start with no rotation, at rest.
+    pub(super) fn enable_rotation(&mut self, enable: bool) {
+        if enable != self.has_rotation {
+            self.has_rotation = enable;
+            let rows = if enable { self.position.len() } else { 0 };
             self.rotation = vec![Quat::one(); rows];
-            self.spin = vec![Vec3::zero(); rows];
+            self.angular_velocity = vec![Vec3::zero(); rows];
         }
     }
 
-    /// Makes a row spin as if it rolled over a surface at rest with this normal.
-    pub(super) fn roll(&mut self, row: usize, normal: Vec3<S>) {
-        let spin = normal.cross(self.velocity[row]) / self.radius[row];
+    /// Sets the angular velocity of rolling without slip over a surface at rest with this normal.
+    pub(super) fn roll_without_slip(&mut self, row: usize, normal: Vec3<S>) {
+        let angular_velocity = normal.cross(self.velocity[row]) / self.radius[row];
         if self.half_length.get(row).is_some() {
             return; // it does not roll whichever way it goes
         }
-        if let Some(slot) = self.spin.get_mut(row)
-            && is_finite(spin)
+        if let Some(slot) = self.angular_velocity.get_mut(row)
+            && is_finite(angular_velocity)
         {
-            *slot = spin;
+            *slot = angular_velocity;
         }
     }
 
-    /// Moves a marble and changes its velocity and radius times its spin, where that is finite
-    /// and it is there.
-    pub(super) fn push(&mut self, id: MarbleId, way: Vec3<S>, faster: Vec3<S>, rim: Vec3<S>) {
+    /// Adds a displacement, a velocity change, and a change of radius times angular velocity to a
+    /// marble, where it exists and the result is finite.
+    pub(super) fn apply_delta(
+        &mut self,
+        id: MarbleId,
+        way: Vec3<S>,
+        faster: Vec3<S>,
+        rim: Vec3<S>,
+    ) {
         let Ok(row) = self.row(id) else { return };
         let (position, velocity) = (self.position[row] + way, self.velocity[row] + faster);
         if is_finite_point(position) && is_finite(velocity) {
             (self.position[row], self.velocity[row]) = (position, velocity);
         }
         let turned = rim / self.radius[row];
-        if let Some(spin) = self.spin.get_mut(row)
-            && is_finite(*spin + turned)
+        if let Some(angular_velocity) = self.angular_velocity.get_mut(row)
+            && is_finite(*angular_velocity + turned)
         {
-            *spin += turned;
+            *angular_velocity += turned;
         }
     }
 
-    /// What a response works on: the columns, and what single marbles have.
+    /// Columns for a response, with own materials and integrators.
     pub(super) fn columns<'a>(
         &'a mut self,
         inverse_mass: &'a [S],
         held: &'a [bool],
         rods: &'a [Rod<S>],
-    ) -> (Columns<'a, S>, &'a Optional<Material<S>>, &'a Optional<Integrator>) {
+    ) -> (Columns<'a, S>, &'a SparseColumn<Material<S>>, &'a SparseColumn<Integrator>) {
         let columns = Columns {
             period: self.period,
             position: &mut self.position,
             velocity: &mut self.velocity,
             radius: &self.radius,
             inverse_mass,
-            spin: &mut self.spin,
+            spin: &mut self.angular_velocity,
             held,
             rods,
         };
@@ -694,21 +706,21 @@ impl<S: Scalar> Marbles<S> {
 
     /// Columns that a solver of rows writes.
     pub(super) fn body_columns(&mut self, turns: bool) -> BodyColumns<'_, S> {
-        let (spin, rotation) = if turns {
-            (&mut self.spin[..], &mut self.rotation[..])
+        let (angular_velocity, rotation) = if turns {
+            (&mut self.angular_velocity[..], &mut self.rotation[..])
         } else {
             (&mut [][..], &mut [][..])
         };
         BodyColumns {
             position: &mut self.position,
             velocity: &mut self.velocity,
-            spin,
+            angular_velocity,
             rotation,
             radius: &self.radius,
         }
     }
 
-    /// In kilograms; infinite for what nothing accelerates.
+    /// Mass in kilograms; infinite for kinematic marbles.
     pub(super) fn mass(&self, row: usize) -> S {
         self.own_mass(row).of_capsule(self.radius[row], self.half_length(row))
     }
@@ -717,37 +729,37 @@ impl<S: Scalar> Marbles<S> {
         self.mass.get(row).unwrap_or_default()
     }
 
-    /// Whether all that moves of a row is a number.
-    pub(super) fn is_sane(&self, row: usize) -> bool {
-        let turns = |spin: &Vec3<S>| is_finite(*spin);
+    /// Returns true if the state of a marble is finite.
+    pub(super) fn is_finite_state(&self, row: usize) -> bool {
+        let turns = |angular_velocity: &Vec3<S>| is_finite(*angular_velocity);
         let turned = |q: &Quat<S>| q.s.is_finite() && is_finite(q.v);
         is_finite_point(self.position[row])
             && is_finite(self.velocity[row])
-            && self.spin.get(row).is_none_or(turns)
+            && self.angular_velocity.get(row).is_none_or(turns)
             && self.rotation.get(row).is_none_or(turned)
     }
 
-    /// Takes velocity and spin of a row, and what the scalar cut off.
+    /// Stops a marble: clears velocity, angular velocity and their compensation.
     pub(super) fn stop(&mut self, row: usize) {
         self.velocity[row] = Vec3::zero();
-        if let Some(spin) = self.spin.get_mut(row) {
-            *spin = Vec3::zero();
+        if let Some(angular_velocity) = self.angular_velocity.get_mut(row) {
+            *angular_velocity = Vec3::zero();
         }
-        if let Some(rest) = self.rest.get_mut(row) {
-            (rest.velocity, rest.spin) = (Vec3::zero(), Vec3::zero());
+        if let Some(low) = self.compensation.get_mut(row) {
+            (low.velocity, low.angular_velocity) = (Vec3::zero(), Vec3::zero());
         }
     }
 }
 
-/// None for a ball.
+/// Validates a half length; none for a ball.
 fn checked_half_length<S: Scalar>(half_length: S) -> Result<Option<S>, Error> {
     let half_length = within("half_length", half_length, S::zero(), S::max_value())?;
-    Ok(but(half_length, S::zero()))
+    Ok(non_default(half_length, S::zero()))
 }
 
-/// The quaternion as a rotation, if its length is about one.
+/// Validates and normalizes a rotation.
 fn checked_rotation<S: Scalar>(rotation: Quat<S>) -> Result<Quat<S>, Error> {
-    // What a few thousand products in f32 let it drift, and no more.
+    // Drift of a few thousand products in f32, at most.
     let length = rotation.magnitude();
     if (length.as_f64() - 1.0).abs() <= 1e-3 {
         Ok(rotation.normalize())
@@ -756,7 +768,7 @@ fn checked_rotation<S: Scalar>(rotation: Quat<S>) -> Result<Quat<S>, Error> {
     }
 }
 
-/// A value, but `None` for the one that goes without saying.
-fn but<T: PartialEq>(value: T, usual: T) -> Option<T> {
+/// The value, or `None` for the default one.
+fn non_default<T: PartialEq>(value: T, usual: T) -> Option<T> {
     (value != usual).then_some(value)
 }

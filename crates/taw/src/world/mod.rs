@@ -1,34 +1,34 @@
 //! The state as columns, the choice of methods, and the step.
 
-mod account;
-mod apply;
-mod crowd;
+mod contact_limit;
+mod continuous;
 mod energy;
-mod event;
+mod energy_audit;
+mod event_driven;
+mod external_forces;
 mod handles;
 mod integrate;
 mod limits;
 mod marbles;
 mod model;
-mod optional;
+mod narrow_phase;
 mod quarantine;
 mod query;
 mod soft_step;
+mod sparse_column;
 mod swarm;
-mod sweep;
 #[cfg(test)]
 mod tests;
-mod touch;
 mod wall_shape;
 mod walls;
 
 pub use crate::motion::{Mass, WallMotion};
-pub use account::Account;
 pub use energy::Energy;
+pub use energy_audit::EnergyAudit;
 pub use limits::SpeedLimits;
 pub use marbles::{Damping, Marble, MarbleId, Marbles};
 pub use model::{Detection, Model, Precision};
-pub use query::{Found, Queries, QueryTree, Thing};
+pub use query::{ColliderId, Queries, QueryHit, QueryTree};
 pub use wall_shape::WallShape;
 pub use walls::{WallId, Walls};
 
@@ -37,7 +37,7 @@ use crate::broad::{Grid, Images, Period};
 use crate::contact::Contacts;
 use crate::error::{finite, finite_vector, positive};
 use crate::math::{Point3, Scalar, Vec3, cast_vector, length};
-use crate::motion::{Force, Rotation};
+use crate::motion::{ForceField, Rotation};
 use crate::response::event::EventDriven;
 use crate::response::impulse::{self, Around, Settings, Start, Warm, impulse};
 use crate::response::{
@@ -46,14 +46,14 @@ use crate::response::{
     penalty::{self, penalty},
 };
 use crate::swarm::Swarm;
-use account::Accounting;
-use crowd::Crowd;
-use integrate::Drive;
+use contact_limit::ContactLimit;
+use continuous::Continuous;
+use energy_audit::AuditState;
+use integrate::StepContext;
+use narrow_phase::Candidate;
 use quarantine::Quarantine;
 use soft_step::SoftStep;
-use sweep::Sweep;
-use touch::Near;
-use walls::Part;
+use walls::SubShape;
 
 /// Everything that moves and everything that it can touch.
 ///
@@ -64,7 +64,7 @@ use walls::Part;
 pub struct World<S> {
     model: Model,
     gravity: Vec3<S>,
-    forces: Vec<Force<S>>,
+    forces: Vec<ForceField<S>>,
     limits: SpeedLimits<S>,
     /// What moves.
     pub marbles: Marbles<S>,
@@ -86,7 +86,7 @@ pub struct World<S> {
     /// The rows that the verb at work has stopped.
     stopped: Vec<u32>,
     quarantine: Quarantine<S>,
-    crowd: Crowd<S>,
+    contact_limit: ContactLimit<S>,
     /// How wide a gap still makes a contact, in metres: what gravity closes in two
     /// substeps, for a response that looks ahead.
     reach: S,
@@ -108,12 +108,12 @@ pub struct World<S> {
     rest_of_step: S,
     events: EventDriven,
     soft_step: SoftStep<S>,
-    sweep: Sweep<S>,
-    near_walls: Vec<Near<S>>,
+    continuous: Continuous<S>,
+    near_walls: Vec<Candidate<S>>,
     /// What is long about marbles, and how far they reach.
     rods: Vec<Rod<S>>,
     reaches: Vec<S>,
-    accounting: Option<Box<Accounting<S>>>,
+    audit_state: Option<Box<AuditState<S>>>,
 }
 
 impl<S: Scalar> Default for World<S> {
@@ -133,7 +133,7 @@ impl<S: Scalar> Default for World<S> {
             images: Images::default(),
             stopped: Vec::new(),
             quarantine: Quarantine::default(),
-            crowd: Crowd::default(),
+            contact_limit: ContactLimit::default(),
             reach: S::zero(),
             inverse_mass: Vec::new(),
             velocity_before: Vec::new(),
@@ -147,11 +147,11 @@ impl<S: Scalar> Default for World<S> {
             rest_of_step: S::zero(),
             events: EventDriven::default(),
             soft_step: SoftStep::default(),
-            sweep: Sweep::default(),
+            continuous: Continuous::default(),
             near_walls: Vec::new(),
             rods: Vec::new(),
             reaches: Vec::new(),
-            accounting: None,
+            audit_state: None,
         }
     }
 }
@@ -170,7 +170,7 @@ impl<S: Scalar> PartialEq for World<S> {
             impacts,
             quarantine,
             stopped: _,
-            crowd: _,
+            contact_limit: _,
             grid: _,
             images: _,
             reach: _,
@@ -186,11 +186,11 @@ impl<S: Scalar> PartialEq for World<S> {
             rest_of_step: _,
             events,
             soft_step: _,
-            sweep: _,
+            continuous: _,
             near_walls: _,
             rods: _,
             reaches: _,
-            accounting: _,
+            audit_state: _,
         } = self;
         *model == other.model
             && *gravity == other.gravity
@@ -202,7 +202,7 @@ impl<S: Scalar> PartialEq for World<S> {
             && *walls == other.walls
             && *swarm == other.swarm
             && *contacts == other.contacts
-            && quarantine.named == other.quarantine.named
+            && quarantine.stopped == other.quarantine.stopped
             && *warm == other.warm
             && *shear == other.shear
             && *warm_removals == other.warm_removals
@@ -220,7 +220,7 @@ impl<S: Scalar> World<S> {
     /// another one forgets the impulses that contacts remember.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for the substeps or the iterations; [`Error::BallsOnly`] for
+    /// [`Error::OutOfRange`] for the substeps or the iterations; [`Error::UnsupportedShape`] for
     /// [`Response::EventDriven`] and [`Response::SoftStep`] if a marble is a capsule;
     /// [`Error::Unsupported`] for [`Response::SoftStep`] in a periodic world.
     pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
@@ -228,7 +228,7 @@ impl<S: Scalar> World<S> {
         if !model.response.knows_capsules()
             && let Some(id) = self.marbles.first_capsule()
         {
-            return Err(Error::BallsOnly(id));
+            return Err(Error::UnsupportedShape(id));
         }
         if model == self.model {
             return Ok(());
@@ -238,7 +238,8 @@ impl<S: Scalar> World<S> {
         }
         self.model = model;
         self.forget_contacts();
-        self.marbles.set_turn(model.rotation != Rotation::None || self.marbles.has_capsules());
+        self.marbles
+            .enable_rotation(model.rotation != Rotation::None || self.marbles.has_capsules());
         self.marbles.set_compensated(model.precision == Precision::Compensated);
         Ok(())
     }
@@ -278,15 +279,14 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a length of less than 8.02 radii of the largest marble;
-    /// [`Error::NotPositive`] for one that is no length; [`Error::BallsOnly`] if a marble is a
+    /// [`Error::NotPositive`] for one that is no length; [`Error::UnsupportedShape`] if a marble is a
     /// capsule; [`Error::Unsupported`] for [`Response::SoftStep`]. Steps refuse marbles that came later in the same way.
     pub fn set_period(&mut self, lengths: [Option<S>; 3]) -> Result<(), Error> {
         for (length, field) in lengths.iter().zip(["period.x", "period.y", "period.z"]) {
             length.map(|length| positive(field, length)).transpose()?;
         }
         let period = Period { lengths };
-        self.takes_marbles_in(period)?;
-        self.knows_period(period)?;
+        self.check_period(period)?;
         if period != self.marbles.period {
             self.marbles.period = period;
             self.marbles.wrap();
@@ -303,7 +303,7 @@ impl<S: Scalar> World<S> {
 
     /// The force fields that act on every marble besides gravity.
     #[must_use]
-    pub fn forces(&self) -> &[Force<S>] {
+    pub fn forces(&self) -> &[ForceField<S>] {
         &self.forces
     }
 
@@ -311,8 +311,8 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a number of one of them.
-    pub fn set_forces(&mut self, forces: Vec<Force<S>>) -> Result<(), Error> {
-        self.forces = forces.into_iter().map(Force::checked).collect::<Result<_, _>>()?;
+    pub fn set_forces(&mut self, forces: Vec<ForceField<S>>) -> Result<(), Error> {
+        self.forces = forces.into_iter().map(ForceField::checked).collect::<Result<_, _>>()?;
         Ok(())
     }
 
@@ -338,11 +338,11 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not
-    /// in [`World::TIMES`]; [`Error::BallsOnly`] for a capsule in a world that is event-driven
+    /// in [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven
     /// or periodic; [`Error::OutOfRange`] for a marble too large for its [period](Self::set_period).
     /// Then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
-        let substep = self.substep_of(dt)?;
+        let substep = self.validated_substep(dt)?;
         self.begin_step();
         for after in (0..self.model.passes()).rev() {
             self.begin_substep(substep * S::constant(f64::from(after)));
@@ -362,22 +362,22 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
     /// and what [`World::step`] says of marbles; then nothing has moved.
     pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
-        let dt = Self::checked_dt(dt)?;
-        self.takes_all_marbles()?;
-        self.note_places();
-        self.count_before();
+        let dt = Self::validated_dt(dt)?;
+        self.check_shapes()?;
+        self.store_poses();
+        self.audit_before();
         if self.model.response == Response::SoftStep {
             return self.integrate_forces(dt);
         }
-        self.begin_sweep();
-        let drive = Drive {
+        self.begin_continuous();
+        let drive = StepContext {
             integrator: self.model.integrator,
             gravity: self.gravity,
             forces: &self.forces,
             dt,
         };
         if self.model.rotation == Rotation::Dynamic {
-            self.marbles.spin_up(dt);
+            self.marbles.integrate_angular_velocity(dt);
         }
         if self.model.response == Response::EventDriven {
             self.marbles.mean_accelerations(drive, &mut self.accelerations);
@@ -387,22 +387,22 @@ impl<S: Scalar> World<S> {
                 self.velocity_before.extend_from_slice(self.marbles.velocity());
             }
             self.marbles.integrate(drive, &mut self.stopped);
-            self.sweep_ways(dt);
+            self.solve_continuous(dt);
         }
         if !(self.model.response == Response::EventDriven
             && self.model.rotation == Rotation::Dynamic)
         {
-            self.marbles.turn(dt, self.model.rotation);
+            self.marbles.integrate_rotations(dt, self.model.rotation);
         }
-        self.stop_what_is_not_finite();
+        self.quarantine_non_finite();
         self.reach = match self.model.response {
             // Rounding must not end the touch of what falls together.
             Response::Displacement => length(self.gravity) * dt * dt * S::constant(1e-3),
             Response::Penalty(_) => S::zero(),
             Response::Impulse => length(self.gravity) * dt * dt * S::constant(2.0),
-            Response::EventDriven | Response::SoftStep => self.reach_at_rest(dt),
+            Response::EventDriven | Response::SoftStep => self.resting_contact_distance(dt),
         };
-        self.count_forces();
+        self.audit_forces();
         Ok(())
     }
 
@@ -417,10 +417,10 @@ impl<S: Scalar> World<S> {
         if self.model.response == Response::SoftStep {
             return self.find_soft_contacts();
         }
-        self.touch_walls(self.reach);
-        self.touch_marbles(self.reach);
-        self.touch_on_the_way();
-        self.keep_stops_that_touch();
+        self.collide_walls(self.reach);
+        self.collide_marbles(self.reach);
+        self.add_grazing_contacts();
+        self.drop_separated_stops();
     }
 
     /// The third verb: contacts change positions and velocities back to what the
@@ -429,19 +429,19 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`].
     pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
-        let dt = Self::checked_dt(dt)?;
+        let dt = Self::validated_dt(dt)?;
         if self.model.response == Response::SoftStep {
             return self.solve_soft_contacts(dt);
         }
-        self.walls.prepare(); // some may have been taken out since contacts were looked for
+        self.walls.update_tree(); // some may have been taken out since contacts were looked for
         let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
-        self.release_what_touches_nothing();
+        self.release_separated_stops();
         if self.model.response == Response::Impulse {
-            self.sweep.begin_bounces(&self.marbles.position);
+            self.continuous.begin_bounces(&self.marbles.position);
         }
-        self.count_contacts();
+        self.audit_contacts();
         self.look_at_marbles();
         let (mut columns, material, integrator) =
             self.marbles.columns(&self.inverse_mass, &self.held, &self.rods);
@@ -460,18 +460,18 @@ impl<S: Scalar> World<S> {
         let around = Around {
             walls: &self.walls,
             material: |row| material.get(row).unwrap_or_default(),
-            follow: |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
+            follow: |row| integrator.get(row).unwrap_or(self.model.integrator).position_weight(),
             start: Start {
                 position: &[],
                 velocity: &self.velocity_before,
-                stands: &self.sweep.stands,
+                stands: &self.continuous.stands,
             },
             settings: &settings,
         };
         match self.model.response {
             Response::Displacement => {
                 let contacts = self.contacts.len() as u32;
-                let mut pushes = self.accounting.as_ref().map(|_| Vec::new());
+                let mut pushes = self.audit_state.as_ref().map(|_| Vec::new());
                 displacement(
                     &mut columns,
                     &mut self.contacts,
@@ -481,11 +481,11 @@ impl<S: Scalar> World<S> {
                     &mut self.stopped,
                     |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change))),
                 );
-                if let Some(accounting) = &mut self.accounting {
-                    accounting.work.collisions = contacts;
+                if let Some(audit_state) = &mut self.audit_state {
+                    audit_state.work.collisions = contacts;
                     for (row, change) in pushes.into_iter().flatten() {
                         let mass = self.marbles.mass(row as usize).as_f64();
-                        accounting.work.momentum += cast_vector::<S, f64>(change) * mass;
+                        audit_state.work.momentum += cast_vector::<S, f64>(change) * mass;
                     }
                 }
             }
@@ -498,9 +498,9 @@ impl<S: Scalar> World<S> {
                     &mut self.warm,
                     &mut self.stopped,
                 );
-                if let Some(accounting) = &mut self.accounting {
-                    let Accounting { velocity, spin, work, .. } = &mut **accounting;
-                    self.impulse.count(&mut columns, velocity, spin, work);
+                if let Some(audit_state) = &mut self.audit_state {
+                    let AuditState { velocity, angular_velocity, work, .. } = &mut **audit_state;
+                    self.impulse.count(&mut columns, velocity, angular_velocity, work);
                 }
             }
             Response::Penalty(law) => penalty(
@@ -508,23 +508,25 @@ impl<S: Scalar> World<S> {
                     law,
                     dt,
                     material: |row| material.get(row).unwrap_or_default(),
-                    follow: |row| integrator.get(row).unwrap_or(self.model.integrator).follow(),
+                    follow: |row| {
+                        integrator.get(row).unwrap_or(self.model.integrator).position_weight()
+                    },
                 },
                 &mut columns,
                 &mut self.contacts,
                 &self.walls,
                 &mut self.shear,
                 &mut self.stopped,
-                self.accounting.as_mut().map(|accounting| &mut accounting.work),
+                self.audit_state.as_mut().map(|audit_state| &mut audit_state.work),
             ),
-            Response::EventDriven => self.go_through_events(dt, self.rest_of_step),
+            Response::EventDriven => self.step_events(dt, self.rest_of_step),
             Response::SoftStep => {}
         }
         self.stop_bounces_at_walls();
-        self.stop_what_is_not_finite();
+        self.quarantine_non_finite();
         self.roll_what_only_shows();
         self.limits.apply(&mut self.marbles);
-        self.count_after();
+        self.audit_after();
         self.marbles.wrap();
         Ok(())
     }
@@ -536,11 +538,11 @@ impl<S: Scalar> World<S> {
         }
         // The deepest contact comes first in the list, so it has the last word.
         for contact in self.contacts.wm.iter().rev() {
-            let part = Part { wall: contact.a, part: contact.part };
+            let part = SubShape { wall: contact.a, part: contact.part };
             let row = contact.b as usize;
-            let normal = self.walls.nearest(part, self.marbles.position()[row]).normal;
+            let normal = self.walls.project_point(part, self.marbles.position()[row]).normal;
             if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Rolling {
-                self.marbles.roll(row, normal);
+                self.marbles.roll_without_slip(row, normal);
             }
         }
     }
@@ -559,8 +561,9 @@ impl<S: Scalar> World<S> {
             self.warm_removals = removals;
         }
         self.held.clear();
-        if self.model.rotation == Rotation::Dynamic && self.marbles.has_held() {
-            self.held.extend((0..self.marbles.len()).map(|row| self.marbles.is_held(row)));
+        if self.model.rotation == Rotation::Dynamic && self.marbles.has_rotation_locks() {
+            self.held
+                .extend((0..self.marbles.len()).map(|row| self.marbles.is_rotation_locked(row)));
         }
         self.marbles.rods(self.model.rotation, &mut self.rods);
     }
@@ -574,7 +577,7 @@ impl<S: Scalar> World<S> {
 
     /// The marbles that the last step stopped because their motion overflowed, each once.
     pub fn stopped(&self) -> impl Iterator<Item = MarbleId> + '_ {
-        self.quarantine.named.iter().copied()
+        self.quarantine.stopped.iter().copied()
     }
 
     /// The collisions of the last step, in the order of time within each substep. Only
@@ -598,9 +601,9 @@ impl<S: Scalar> World<S> {
     pub fn begin_step(&mut self) {
         self.rest_of_step = S::zero();
         self.stopped.clear();
-        self.quarantine.named.clear();
+        self.quarantine.stopped.clear();
         self.impacts.clear();
-        self.open_account();
+        self.reset_audit();
     }
 
     /// Begins a substep, after which `rest` seconds of the step are left: walls that were set
@@ -609,13 +612,13 @@ impl<S: Scalar> World<S> {
     pub fn begin_substep(&mut self, rest: S) {
         self.rest_of_step = if rest.is_finite() { rest.max(S::zero()) } else { S::zero() };
         if !matches!(self.model.response, Response::EventDriven | Response::SoftStep) {
-            self.walls.go_to(self.rest_of_step);
+            self.walls.interpolate_to(self.rest_of_step);
         }
     }
 
     /// Ends a step: walls are at the end of their ways, and forces that were applied are forgotten.
     pub fn end_step(&mut self) {
-        self.walls.arrive();
+        self.walls.finish_step();
         self.marbles.clear_forces();
     }
 

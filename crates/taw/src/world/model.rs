@@ -3,8 +3,8 @@ use crate::error::within;
 use crate::motion::{Integrator, Rotation};
 use crate::response::Response;
 
-/// The choice that the user makes: what to model, and how finely. A plain value,
-/// to be compared, stored, and changed between steps.
+/// Simulation settings: the physics to model, and its accuracy. A plain value, to be compared,
+/// stored, and changed between steps.
 ///
 /// ```
 /// use taw::prelude::*;
@@ -16,55 +16,54 @@ use crate::response::Response;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(default, deny_unknown_fields))]
 pub struct Model {
-    /// How things move. A marble may have its own.
+    /// Integrator. A marble may have its own.
     pub integrator: Integrator,
-    /// What touches do.
+    /// Contact response (solver).
     pub response: Response,
-    /// Whether marbles turn.
+    /// Rotation model.
     pub rotation: Rotation,
-    /// Whether marbles keep what the scalar cuts off.
+    /// Numerical precision of the state.
     pub precision: Precision,
-    /// Whether touches are looked for on the way, too.
+    /// Collision detection: discrete or continuous.
     pub detection: Detection,
-    /// Into how many equal parts each step is cut, from 1 to 1,000. Costs as many
-    /// times as much.
+    /// Substeps per step, from 1 to 1,000. The cost is proportional.
     pub substeps: u32,
     /// Iterations of [`Response::Impulse`] and [`Response::Displacement`] over all contacts in a
     /// substep, from 1 to 1,000. They end sooner when nothing changes any more.
     pub iterations: u32,
 }
 
-/// When touches are looked for.
+/// Collision detection mode.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Detection {
-    /// At the end of each substep. Marbles that move by more than their radii in it may
-    /// pass through each other, and through thin walls. (Half-spaces are solid behind.)
+    /// Discrete collision detection at the end of each substep. Marbles that move by more than
+    /// their radii in it may tunnel through each other and through thin walls. (Half-spaces are
+    /// solid behind.)
     Discrete,
-    /// On the way through the substep too (continuous collision detection), so that nothing
-    /// tunnels. Marbles that move against each other or a wall by more than half of their radius
-    /// in a substep stop where they first touch. What lies or slides there goes on along the surface;
-    /// what bounces has the velocity and the normal of that moment, slides on along a wall, and
-    /// against another marble loses what was left of its time. Others lose none. Costs next to
-    /// nothing where nothing is fast.
+    /// Continuous collision detection (CCD) within each substep, so that nothing tunnels. Marbles
+    /// that move against each other or a wall by more than half of their radius in a substep stop
+    /// at the time of impact. Resting and sliding marbles continue along the surface; bouncing ones
+    /// keep the velocity and normal of that moment, slide on along a wall, and lose the rest of
+    /// their time against another marble. Others lose none. Nearly free where nothing is fast.
     ///
-    /// [`Response::EventDriven`] always does, and loses nothing. By [`Response::Penalty`] only
-    /// walls stop marbles, once they are half of their radius deep.
+    /// [`Response::EventDriven`] is always continuous, and loses no time. With
+    /// [`Response::Penalty`] only walls stop marbles, once they are half of their radius deep.
     #[default]
     Swept,
 }
 
-/// How exactly marbles remember where they are and how they move.
+/// Numerical precision of positions and velocities.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Precision {
-    /// As the world's scalar can.
+    /// Precision of the world's scalar.
     #[default]
     Plain,
-    /// Nearly as `f64` can, also in a world of `f32`, which keeps what it cuts off in
-    /// columns of its own (36 bytes a marble). Far from the origin, and in steps so short
-    /// that a plain sum would not change, marbles then move as they should. In a world of
-    /// `f64` it changes nothing.
+    /// Compensated (double-single) precision, nearly that of `f64` also in a world of `f32`:
+    /// rounding errors are kept in columns of their own (36 bytes per marble). Marbles then move
+    /// correctly far from the origin, and in steps so short that a plain sum would not change. In a
+    /// world of `f64` it changes nothing.
     Compensated,
 }
 
@@ -83,9 +82,9 @@ impl Default for Model {
 }
 
 impl Model {
-    /// The largest number of [substeps](Model::substeps).
+    /// Maximum number of [substeps](Model::substeps).
     pub const MAX_SUBSTEPS: u32 = 1000;
-    /// The largest number of [iterations](Model::iterations).
+    /// Maximum number of [iterations](Model::iterations).
     pub const MAX_ITERATIONS: u32 = 1000;
 
     /// Number of times that the three verbs run in a step: once per substep, or once in all where
@@ -95,7 +94,7 @@ impl Model {
         if self.response == Response::SoftStep { 1 } else { self.substeps }
     }
 
-    /// This model, if a world can step with it.
+    /// Validates the model.
     pub(super) fn checked(self) -> Result<Self, Error> {
         let check = |field, count, most| within(field, f64::from(count), 1.0, f64::from(most));
         check("substeps", self.substeps, Self::MAX_SUBSTEPS)?;

@@ -1,36 +1,36 @@
-//! What turns infinite or NaN stops, is named, and is forgotten by what contacts remember; so
-//! nothing else learns of it.
+//! Quarantine of non-finite bodies: a marble whose state overflows is stopped and reported, and its
+//! cached contact impulses are dropped, so that no other marble is affected.
 
 use cgmath::One;
 
 use super::World;
-use super::marbles::{MarbleId, Marbles, Rest};
+use super::marbles::{Compensation, MarbleId, Marbles};
 use crate::Error;
 use crate::broad::Period;
 use crate::error::{positive, within};
 use crate::math::{Point3, Quat, Scalar, is_finite, is_finite_point};
 use crate::response::Response;
 
-/// Where marbles were when the substep began, and who was stopped since the step did.
+/// Poses at the start of the substep, and the marbles stopped since the start of the step.
 #[derive(Clone, Debug)]
 pub(super) struct Quarantine<S> {
     position: Vec<Point3<S>>,
     rotation: Vec<Quat<S>>,
-    /// Rows as they were are those of now only if none went.
+    /// Number of removals at that time: with others, the stored indices are stale.
     removals: u64,
-    /// In the order of their handles, each once.
-    pub named: Vec<MarbleId>,
+    /// Stopped marbles, sorted by handle, each once.
+    pub stopped: Vec<MarbleId>,
 }
 
 impl<S> Default for Quarantine<S> {
     fn default() -> Self {
-        Self { position: Vec::new(), rotation: Vec::new(), removals: 0, named: Vec::new() }
+        Self { position: Vec::new(), rotation: Vec::new(), removals: 0, stopped: Vec::new() }
     }
 }
 
 impl<S: Scalar> Quarantine<S> {
-    /// Notes where all are, which is finite.
-    fn note(&mut self, marbles: &Marbles<S>) {
+    /// Stores the poses, which are finite.
+    fn store(&mut self, marbles: &Marbles<S>) {
         self.removals = marbles.removals();
         self.position.clear();
         self.position.extend_from_slice(marbles.position());
@@ -38,14 +38,14 @@ impl<S: Scalar> Quarantine<S> {
         self.rotation.extend_from_slice(marbles.rotation());
     }
 
-    /// Puts a row back to where it was noted, as far as it is nowhere now.
-    fn put_back(&self, marbles: &mut Marbles<S>, row: usize) {
+    /// Restores the stored pose of a marble where the current one is not finite.
+    fn restore(&self, marbles: &mut Marbles<S>, row: usize) {
         let position = self.position.get(row).filter(|_| self.removals == marbles.removals());
         if !is_finite_point(marbles.position[row]) {
             marbles.position[row] =
                 position.copied().unwrap_or_else(|| Point3::from([S::zero(); 3]));
-            if let Some(rest) = marbles.rest.get_mut(row) {
-                *rest = Rest::default();
+            if let Some(low) = marbles.compensation.get_mut(row) {
+                *low = Compensation::default();
             }
         }
         if let Some(rotation) = marbles.rotation.get_mut(row)
@@ -57,65 +57,59 @@ impl<S: Scalar> Quarantine<S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// The shortest and the longest time, in seconds, that a step and each of its substeps can
-    /// be: its square and the reciprocal of that are numbers of `f32`, in which the swarm counts
-    /// in any world.
+    /// Shortest and longest duration in seconds of a step and of each substep: their squares and
+    /// reciprocals are representable in `f32`, in which the swarm computes.
     pub const TIMES: [f64; 2] = [1e-18, 1e18];
 
-    /// The length of a substep, if a step of `dt` seconds can be made.
-    pub(crate) fn substep_of(&self, dt: S) -> Result<S, Error> {
+    /// Length of a substep; validates a step of `dt` seconds.
+    pub(crate) fn validated_substep(&self, dt: S) -> Result<S, Error> {
         let substeps = S::constant(f64::from(self.model.substeps));
         let passes = S::constant(f64::from(self.model.passes()));
         let [least, most] = Self::TIMES.map(S::constant);
         within("dt", positive("dt", dt)?, least * substeps, most)?;
-        self.takes_all_marbles()?;
+        self.check_shapes()?;
         Ok(dt / passes)
     }
 
-    /// `dt`, if a substep can be so long.
-    pub(crate) fn checked_dt(dt: S) -> Result<S, Error> {
+    /// Validates the length of a substep.
+    pub(crate) fn validated_dt(dt: S) -> Result<S, Error> {
         let [least, most] = Self::TIMES.map(S::constant);
         within("dt", positive("dt", dt)?, least, most)
     }
 
-    /// Nothing, if the response knows what all marbles are.
-    pub(crate) fn takes_all_marbles(&self) -> Result<(), Error> {
-        self.takes_marbles_in(self.marbles.period)?;
+    /// Checks that the response supports the shapes of all marbles.
+    pub(crate) fn check_shapes(&self) -> Result<(), Error> {
+        self.check_period(self.marbles.period)?;
         match self.marbles.first_capsule() {
-            Some(id) if !self.model.response.knows_capsules() => Err(Error::BallsOnly(id)),
-            _ => self.knows_period(self.marbles.period),
+            Some(id) if !self.model.response.knows_capsules() => Err(Error::UnsupportedShape(id)),
+            _ => Ok(()),
         }
     }
 
-    /// Nothing, if the response knows periods, or there is none.
-    pub(super) fn knows_period(&self, period: Period<S>) -> Result<(), Error> {
-        if self.model.response == Response::SoftStep && !period.is_open() {
-            return Err(Error::Unsupported { response: "SoftStep", feature: "a period" });
-        }
-        Ok(())
-    }
-
-    /// Nothing, if all marbles are balls that fit into a period.
-    pub(super) fn takes_marbles_in(&self, period: Period<S>) -> Result<(), Error> {
+    /// Checks that all marbles are balls that fit into a period.
+    pub(super) fn check_period(&self, period: Period<S>) -> Result<(), Error> {
         if period.is_open() {
             return Ok(());
         }
+        if self.model.response == Response::SoftStep {
+            return Err(Error::Unsupported { response: "SoftStep", feature: "a period" });
+        }
         if let Some(id) = self.marbles.first_capsule() {
-            return Err(Error::BallsOnly(id));
+            return Err(Error::UnsupportedShape(id));
         }
         period.check_radii(self.marbles.radius())
     }
 
-    /// Notes where all marbles are, before any of them moves.
-    pub(super) fn note_places(&mut self) {
-        self.quarantine.note(&self.marbles);
+    /// Stores the poses of all marbles before any of them moves.
+    pub(super) fn store_poses(&mut self) {
+        self.quarantine.store(&self.marbles);
     }
 
-    /// Stops what is no longer finite, where it was when the substep began, and names it with
-    /// those that a verb has stopped by itself.
-    pub(super) fn stop_what_is_not_finite(&mut self) {
-        let mad = (0..self.marbles.len()).filter(|row| !self.marbles.is_sane(*row));
-        self.stopped.extend(mad.map(|row| row as u32));
+    /// Stops marbles with non-finite state where they were at the start of the substep, and reports
+    /// them together with those that a stage has stopped itself.
+    pub(super) fn quarantine_non_finite(&mut self) {
+        let non_finite = (0..self.marbles.len()).filter(|row| !self.marbles.is_finite_state(*row));
+        self.stopped.extend(non_finite.map(|row| row as u32));
         if self.stopped.is_empty() {
             return;
         }
@@ -123,7 +117,7 @@ impl<S: Scalar> World<S> {
         rows.sort_unstable();
         rows.dedup();
         for row in rows.iter().map(|row| *row as usize) {
-            self.quarantine.put_back(&mut self.marbles, row);
+            self.quarantine.restore(&mut self.marbles, row);
             self.marbles.stop(row);
         }
         let stays = |row: usize| rows.binary_search(&(row as u32)).is_err().then_some(row);
@@ -131,9 +125,11 @@ impl<S: Scalar> World<S> {
         self.events.warm.retain_mut(|warm| warm.rename(stays));
         self.shear
             .retain(|shear| shear.rows().into_iter().flatten().all(|row| stays(row).is_some()));
-        self.quarantine.named.extend(rows.iter().filter_map(|row| self.marbles.id(*row as usize)));
-        self.quarantine.named.sort_unstable();
-        self.quarantine.named.dedup();
+        self.quarantine
+            .stopped
+            .extend(rows.iter().filter_map(|row| self.marbles.id(*row as usize)));
+        self.quarantine.stopped.sort_unstable();
+        self.quarantine.stopped.dedup();
         rows.clear();
         self.stopped = rows;
     }

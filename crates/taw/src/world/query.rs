@@ -1,57 +1,58 @@
-//! Questions about a world, through a tree of all that is in it.
+//! Spatial queries through a bounding volume hierarchy.
 
 use std::borrow::Cow;
 
 use cgmath::InnerSpace;
 
-use super::walls::Part;
+use super::walls::SubShape;
 use super::{MarbleId, WallId, WallShape, World};
 use crate::contact::{
-    Cast, Convex, OfTriangle, RayHit, Touch, cast_on_surface, closest_of_surface, closest_plane,
-    closest_shapes, parts_of, sweep_against_surface, sweep_shapes,
+    Convex, RayCast, RayHit, ShapeCastHit, TriangleResult, closest_points_of_plane,
+    closest_points_of_shapes, closest_points_of_surface, ray_cast_on_surface, shape_cast_of_shapes,
+    shape_cast_on_surface, sub_shapes,
 };
 use crate::frame::{Pose, Ray};
 use crate::math::{Point3, Scalar, Vec3, is_finite, is_finite_point, length};
-use crate::shape::{Aabb, Box3, BoxTree, Nearest, Plane, Shape, Solid, Surface};
+use crate::shape::{Aabb, Aabb3, BoundedShape, Bvh, Plane, PointProjection, Shape, Surface};
 
-/// Something in a world.
+/// A collider: a marble or a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub enum Thing {
+pub enum ColliderId {
     /// A marble.
     Marble(MarbleId),
     /// A wall.
     Wall(WallId),
 }
 
-/// What a query found, and where.
+/// Hit of a query.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Found<T> {
-    /// In or on what.
-    pub thing: Thing,
-    /// The answer.
-    pub answer: T,
+pub struct QueryHit<T> {
+    /// The collider that was hit.
+    pub collider: ColliderId,
+    /// Result of the query.
+    pub result: T,
 }
 
-/// Where all that is in a world is, for [`World::queries`]. Kept from one time to the next, it
-/// is only refitted to what moved.
+/// Query acceleration structure of a world for [`World::queries`]. Kept between queries, it is only
+/// refitted.
 #[derive(Clone, Debug)]
 pub struct QueryTree<S> {
-    tree: BoxTree<S>,
+    tree: Bvh<S>,
     items: Vec<Item>,
-    boxes: Vec<Box3<S>>,
+    boxes: Vec<Aabb3<S>>,
 }
 
-/// What is in one box of the tree.
+/// Item of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Item {
-    /// By its row.
+    /// Index of a marble.
     Marble(u32),
-    Wall(Part),
+    Wall(SubShape),
 }
 
 impl<S> Default for QueryTree<S> {
     fn default() -> Self {
-        Self { tree: BoxTree::default(), items: Vec::new(), boxes: Vec::new() }
+        Self { tree: Bvh::default(), items: Vec::new(), boxes: Vec::new() }
     }
 }
 
@@ -64,24 +65,24 @@ impl<S: Scalar> QueryTree<S> {
             self.boxes.push(world.marbles.shape_of_row(row).bounding_box());
         }
         for (wall, shape) in (0..).zip(world.walls.shapes()) {
-            shape.boxes(|part, bounds| {
-                self.items.push(Item::Wall(Part { wall, part }));
+            shape.for_each_box(|part, bounds| {
+                self.items.push(Item::Wall(SubShape { wall, part }));
                 self.boxes.push(bounds);
             });
         }
         if self.items == before {
             self.tree.refit(&self.boxes);
         } else {
-            self.tree = BoxTree::new(&self.boxes);
+            self.tree = Bvh::new(&self.boxes);
         }
     }
 }
 
-/// Asks a world as it is now; from [`World::queries`]. Every question takes a filter, which
-/// says of each thing whether it counts; `|_| true` leaves none out.
+/// Spatial queries of the current state, created by [`World::queries`]. Every query takes a filter
+/// that selects colliders; `|_| true` selects all.
 ///
-/// Of meshes and height fields, rays and shapes meet the surface, from either side; only
-/// [`Queries::closest`] counts what is below a height field as inside.
+/// Ray and shape casts hit meshes and height fields on their surface, from either side; only
+/// [`Queries::project_point`] treats the volume below a height field as inside.
 #[derive(Debug)]
 pub struct Queries<'a, S> {
     world: &'a World<S>,
@@ -89,8 +90,8 @@ pub struct Queries<'a, S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// Readies the tree for questions about the world as it is now. What lies far from where
-    /// it was slows the questions down, and never makes them wrong.
+    /// Updates the tree to the current state. Large translation since the last build slow queries down,
+    /// and never make them wrong.
     ///
     /// ```
     /// use taw::frame::Ray;
@@ -103,7 +104,7 @@ impl<S: Scalar> World<S> {
     /// let mut tree = QueryTree::default();
     /// let found = world.queries(&mut tree).cast_ray(&down, 10.0, |_| true);
     /// let found = found.ok_or(taw::Error::NoSuchWall(floor))?;
-    /// assert_eq!((found.thing, found.answer.distance), (Thing::Wall(floor), 2.0));
+    /// assert_eq!((found.collider, found.result.distance), (ColliderId::Wall(floor), 2.0));
     /// # Ok(())
     /// # }
     /// ```
@@ -113,122 +114,148 @@ impl<S: Scalar> World<S> {
     }
 }
 
-/// Turns an answer in the frame of a surface into one of the world.
-trait Placed<S> {
-    fn placed(self, pose: Pose<S>) -> Self;
+/// Turns an result in the frame of a surface into one of the world.
+trait ToWorld<S> {
+    fn to_world(self, pose: Pose<S>) -> Self;
 }
 
-impl<S: Scalar> Placed<S> for RayHit<S> {
-    fn placed(self, pose: Pose<S>) -> Self {
-        Self { point: pose.point(self.point), normal: pose.vector(self.normal), ..self }
+impl<S: Scalar> ToWorld<S> for RayHit<S> {
+    fn to_world(self, pose: Pose<S>) -> Self {
+        Self {
+            point: pose.transform_point(self.point),
+            normal: pose.transform_vector(self.normal),
+            ..self
+        }
     }
 }
 
-impl<S: Scalar> Placed<S> for Touch<S> {
-    fn placed(self, pose: Pose<S>) -> Self {
-        Self { point: pose.point(self.point), normal: pose.vector(self.normal), ..self }
+impl<S: Scalar> ToWorld<S> for ShapeCastHit<S> {
+    fn to_world(self, pose: Pose<S>) -> Self {
+        Self {
+            point: pose.transform_point(self.point),
+            normal: pose.transform_vector(self.normal),
+            ..self
+        }
     }
 }
 
 impl<S: Scalar> Queries<'_, S> {
-    fn thing(&self, item: Item) -> Option<Thing> {
+    fn collider(&self, item: Item) -> Option<ColliderId> {
         match item {
-            Item::Marble(row) => self.world.marbles.id(row as usize).map(Thing::Marble),
-            Item::Wall(part) => self.world.walls.id(part.wall as usize).map(Thing::Wall),
+            Item::Marble(row) => self.world.marbles.id(row as usize).map(ColliderId::Marble),
+            Item::Wall(part) => self.world.walls.id(part.wall as usize).map(ColliderId::Wall),
         }
     }
 
     fn planes(&self) -> impl Iterator<Item = (Item, &Plane<S>)> {
-        let item = |wall| Item::Wall(Part { wall, part: 0 });
+        let item = |wall| Item::Wall(SubShape { wall, part: 0 });
         self.world.walls.planes().map(move |(row, plane)| (item(row), plane))
     }
 
-    /// Where a ray first meets anything within a distance, which may be infinite.
+    /// First hit of a ray within a distance, which may be infinite.
     pub fn cast_ray(
         &self,
         ray: &Ray<S>,
-        longest: S,
-        filter: impl Fn(Thing) -> bool,
-    ) -> Option<Found<RayHit<S>>> {
-        let hits = self.cast_ray_all(ray, longest, filter);
+        max_distance: S,
+        filter: impl Fn(ColliderId) -> bool,
+    ) -> Option<QueryHit<RayHit<S>>> {
+        let hits = self.cast_ray_all(ray, max_distance, filter);
         hits.into_iter().next()
     }
 
-    /// Where a ray first meets each of all that it meets within a distance, the nearest first.
+    /// First hit of a ray on each collider within a distance, nearest first.
     pub fn cast_ray_all(
         &self,
         ray: &Ray<S>,
-        longest: S,
-        filter: impl Fn(Thing) -> bool,
-    ) -> Vec<Found<RayHit<S>>> {
+        max_distance: S,
+        filter: impl Fn(ColliderId) -> bool,
+    ) -> Vec<QueryHit<RayHit<S>>> {
         let mut hits = Hits { queries: self, filter, found: Vec::new() };
         if !is_finite_point(ray.origin) || !is_finite(ray.direction) {
             return hits.found;
         }
         for (item, plane) in self.planes() {
-            hits.add(item, || plane.cast(ray, longest));
+            hits.add(item, || plane.cast_ray(ray, max_distance));
         }
-        // Beyond the tree there is nothing.
-        let Some(bounds) = self.tree.tree.bounds() else { return hits.first_of_each() };
+        // The ray ends beyond the bounds.
+        let Some(bounds) = self.tree.tree.bounds() else { return hits.dedup_by_collider() };
         let reach = length(bounds.center() - ray.origin) + length(bounds.max - bounds.min);
-        let motion = ray.direction * reach.min(longest);
-        self.tree.tree.along(ray.origin, motion, |number| {
+        let motion = ray.direction * reach.min(max_distance);
+        self.tree.tree.for_each_on_segment(ray.origin, motion, |number| {
             let item = self.tree.items[number as usize];
             hits.add(item, || match item {
                 Item::Marble(row) => {
-                    self.world.marbles.shape_of_row(row as usize).cast(ray, longest)
+                    self.world.marbles.shape_of_row(row as usize).cast_ray(ray, max_distance)
                 }
-                Item::Wall(part) => {
-                    cast_on_wall(&self.world.walls.shapes()[part.wall as usize], part, ray, longest)
-                }
+                Item::Wall(part) => cast_ray_on_wall(
+                    &self.world.walls.shapes()[part.wall as usize],
+                    part,
+                    ray,
+                    max_distance,
+                ),
             });
         });
-        hits.first_of_each()
+        hits.dedup_by_collider()
     }
 
-    /// What a shape first touches that moves along a line without turning. What it touches
-    /// from the start counts if it comes closer, and not if it parts.
+    /// First hit of a shape that translates along a line. A collider that it touches at the start
+    /// counts if they approach, and not if they separate.
     pub fn cast_shape(
         &self,
         shape: &Shape<S>,
-        moves: Vec3<S>,
-        filter: impl Fn(Thing) -> bool,
-    ) -> Option<Found<Touch<S>>> {
-        let mut best: Option<Found<Touch<S>>> = None;
-        let mut offer = |item: Item, ask: &dyn Fn() -> Option<Touch<S>>| {
-            let Some(thing) = self.thing(item).filter(|thing| filter(*thing)) else { return };
-            let Some(answer) = ask() else { return };
-            let next = Found { thing, answer };
-            let key = |found: &Found<Touch<S>>| (found.answer.time, found.thing);
+        translation: Vec3<S>,
+        filter: impl Fn(ColliderId) -> bool,
+    ) -> Option<QueryHit<ShapeCastHit<S>>> {
+        let mut best: Option<QueryHit<ShapeCastHit<S>>> = None;
+        let mut offer = |item: Item, query: &dyn Fn() -> Option<ShapeCastHit<S>>| {
+            let Some(collider) = self.collider(item).filter(|collider| filter(*collider)) else {
+                return;
+            };
+            let Some(result) = query() else { return };
+            let next = QueryHit { collider, result };
+            let key = |found: &QueryHit<ShapeCastHit<S>>| (found.result.time, found.collider);
             if best.as_ref().is_none_or(|best| key(&next) < key(best)) {
                 best = Some(next);
             }
         };
         let still = Vec3::new(S::zero(), S::zero(), S::zero());
         for (item, plane) in self.planes() {
-            offer(item, &|| earliest(shape, |part| sweep_plane(plane, part, moves)));
+            offer(item, &|| {
+                min_by_time(shape, |part| shape_cast_half_space(plane, part, translation))
+            });
         }
         let start = shape.bounding_box();
-        let end = Aabb { min: start.min + moves, max: start.max + moves };
-        self.tree.tree.near(&start.union(&end), |number| {
+        let end = Aabb { min: start.min + translation, max: start.max + translation };
+        self.tree.tree.for_each_in_box(&start.union(&end), |number| {
             let item = self.tree.items[number as usize];
             match item {
                 Item::Marble(row) => {
                     let marble = self.world.marbles.shape_of_row(row as usize);
-                    offer(item, &|| Some(sweep_shapes(&marble, still, shape, moves)?.answer));
+                    offer(item, &|| {
+                        Some(shape_cast_of_shapes(&marble, still, shape, translation)?.result)
+                    });
                 }
-                Item::Wall(Part { wall, part: number }) => {
+                Item::Wall(SubShape { wall, part: number }) => {
                     match &self.world.walls.shapes()[wall as usize] {
                         WallShape::Plane(_) => {}
                         solid @ WallShape::Solid(_) => offer(item, &|| {
-                            let touch = sweep_shapes(solid.part(number)?, still, shape, moves)?;
-                            Some(touch.answer)
+                            let touch = shape_cast_of_shapes(
+                                solid.sub_shape(number)?,
+                                still,
+                                shape,
+                                translation,
+                            )?;
+                            Some(touch.result)
                         }),
                         WallShape::Mesh(mesh, pose) => {
-                            offer(item, &|| sweep_placed(&**mesh, *pose, shape, moves));
+                            offer(item, &|| {
+                                shape_cast_transformed(&**mesh, *pose, shape, translation)
+                            });
                         }
                         WallShape::HeightField(field, pose) => {
-                            offer(item, &|| sweep_placed(&**field, *pose, shape, moves));
+                            offer(item, &|| {
+                                shape_cast_transformed(&**field, *pose, shape, translation)
+                            });
                         }
                     }
                 }
@@ -237,37 +264,42 @@ impl<S: Scalar> Queries<'_, S> {
         best
     }
 
-    /// All that a shape has a point in common with, in order.
-    pub fn overlaps(&self, shape: &Shape<S>, filter: impl Fn(Thing) -> bool) -> Vec<Thing> {
+    /// All colliders that overlap a shape, in order.
+    pub fn overlaps(
+        &self,
+        shape: &Shape<S>,
+        filter: impl Fn(ColliderId) -> bool,
+    ) -> Vec<ColliderId> {
         let mut found = Vec::new();
         let mut offer = |item: Item, touches: &dyn Fn() -> bool| {
-            let thing = self.thing(item).filter(|thing| filter(*thing));
-            found.extend(thing.filter(|_| touches()));
+            let collider = self.collider(item).filter(|collider| filter(*collider));
+            found.extend(collider.filter(|_| touches()));
         };
         for (item, plane) in self.planes() {
-            offer(item, &|| closest_plane(plane, shape).touching());
+            offer(item, &|| closest_points_of_plane(plane, shape).touching());
         }
-        self.tree.tree.near(&shape.bounding_box(), |number| {
+        self.tree.tree.for_each_in_box(&shape.bounding_box(), |number| {
             let item = self.tree.items[number as usize];
             match item {
                 Item::Marble(row) => {
                     let marble = self.world.marbles.shape_of_row(row as usize);
-                    let near = || closest_shapes(&marble, shape);
-                    offer(item, &|| near().is_some_and(|near| near.answer.touching()));
+                    let near = || closest_points_of_shapes(&marble, shape);
+                    offer(item, &|| near().is_some_and(|near| near.result.touching()));
                 }
-                Item::Wall(Part { wall, part: number }) => {
+                Item::Wall(SubShape { wall, part: number }) => {
                     match &self.world.walls.shapes()[wall as usize] {
                         WallShape::Plane(_) => {}
                         solid @ WallShape::Solid(_) => offer(item, &|| {
-                            let near =
-                                solid.part(number).and_then(|wall| closest_shapes(wall, shape));
-                            near.is_some_and(|near| near.answer.touching())
+                            let near = solid
+                                .sub_shape(number)
+                                .and_then(|wall| closest_points_of_shapes(wall, shape));
+                            near.is_some_and(|near| near.result.touching())
                         }),
                         WallShape::Mesh(mesh, pose) => {
-                            offer(item, &|| touches_placed(&**mesh, *pose, shape));
+                            offer(item, &|| overlaps_transformed(&**mesh, *pose, shape));
                         }
                         WallShape::HeightField(field, pose) => {
-                            offer(item, &|| touches_placed(&**field, *pose, shape));
+                            offer(item, &|| overlaps_transformed(&**field, *pose, shape));
                         }
                     }
                 }
@@ -278,38 +310,43 @@ impl<S: Scalar> Queries<'_, S> {
         found
     }
 
-    /// Where the nearest surface is, within a distance of a point, which may be infinite. Of
-    /// what the point is inside of, that out of which the way is longest.
-    pub fn closest(
+    /// Projects a point onto the nearest surface within a distance, which may be infinite. If the
+    /// point is inside several shapes, the one it penetrates deepest.
+    pub fn project_point(
         &self,
         point: Point3<S>,
         within: S,
-        filter: impl Fn(Thing) -> bool,
-    ) -> Option<Found<Nearest<S>>> {
-        let mut best: Option<Found<Nearest<S>>> = None;
+        filter: impl Fn(ColliderId) -> bool,
+    ) -> Option<QueryHit<PointProjection<S>>> {
+        let mut best: Option<QueryHit<PointProjection<S>>> = None;
         let mut reach = within;
-        let mut offer = |item: Item, ask: &dyn Fn() -> Nearest<S>| {
-            let Some(thing) = self.thing(item).filter(|thing| filter(*thing)) else { return reach };
-            let next = Found { thing, answer: ask() };
-            let key = |found: &Found<Nearest<S>>| (found.answer.distance, found.thing);
-            let near = next.answer.distance <= within;
+        let mut offer = |item: Item, query: &dyn Fn() -> PointProjection<S>| {
+            let Some(collider) = self.collider(item).filter(|collider| filter(*collider)) else {
+                return reach;
+            };
+            let next = QueryHit { collider, result: query() };
+            let key =
+                |found: &QueryHit<PointProjection<S>>| (found.result.distance, found.collider);
+            let near = next.result.distance <= within;
             if near && best.as_ref().is_none_or(|best| key(&next) < key(best)) {
                 best = Some(next);
-                reach = next.answer.distance.max(S::zero());
+                reach = next.result.distance.max(S::zero());
             }
             reach
         };
         let walls = self.world.walls.shapes();
         for (item, plane) in self.planes() {
-            offer(item, &|| WallShape::Plane(*plane).nearest(point));
+            offer(item, &|| WallShape::Plane(*plane).project_point(point));
         }
-        self.tree.tree.around(point, within, |number| {
+        self.tree.tree.for_each_near(point, within, |number| {
             let item = self.tree.items[number as usize];
             offer(item, &|| match item {
-                Item::Marble(row) => self.world.marbles.shape_of_row(row as usize).nearest(point),
-                Item::Wall(Part { wall, part }) => match &walls[wall as usize] {
-                    solid @ WallShape::Solid(_) => solid.nearest_of(part, point),
-                    other => other.nearest(point),
+                Item::Marble(row) => {
+                    self.world.marbles.shape_of_row(row as usize).project_point(point)
+                }
+                Item::Wall(SubShape { wall, part }) => match &walls[wall as usize] {
+                    solid @ WallShape::Solid(_) => solid.project_point_on(part, point),
+                    other => other.project_point(point),
                 },
             })
         });
@@ -317,104 +354,109 @@ impl<S: Scalar> Queries<'_, S> {
     }
 }
 
-/// Collects hits.
+/// Collector of ray hits.
 struct Hits<'a, S, F> {
     queries: &'a Queries<'a, S>,
     filter: F,
-    found: Vec<Found<RayHit<S>>>,
+    found: Vec<QueryHit<RayHit<S>>>,
 }
 
-impl<S: Scalar, F: Fn(Thing) -> bool> Hits<'_, S, F> {
-    fn add(&mut self, item: Item, ask: impl FnOnce() -> Option<RayHit<S>>) {
-        let thing = self.queries.thing(item).filter(|thing| (self.filter)(*thing));
-        if let Some(thing) = thing
-            && let Some(answer) = ask()
+impl<S: Scalar, F: Fn(ColliderId) -> bool> Hits<'_, S, F> {
+    fn add(&mut self, item: Item, query: impl FnOnce() -> Option<RayHit<S>>) {
+        let collider = self.queries.collider(item).filter(|collider| (self.filter)(*collider));
+        if let Some(collider) = collider
+            && let Some(result) = query()
         {
-            self.found.push(Found { thing, answer });
+            self.found.push(QueryHit { collider, result });
         }
     }
 
-    fn first_of_each(mut self) -> Vec<Found<RayHit<S>>> {
+    fn dedup_by_collider(mut self) -> Vec<QueryHit<RayHit<S>>> {
         let order = |x: S, y: S| x.partial_cmp(&y).unwrap_or(std::cmp::Ordering::Equal);
-        let by_distance = |x: &Found<RayHit<S>>, y: &Found<RayHit<S>>| {
-            order(x.answer.distance, y.answer.distance)
+        let by_distance = |x: &QueryHit<RayHit<S>>, y: &QueryHit<RayHit<S>>| {
+            order(x.result.distance, y.result.distance)
         };
-        self.found.sort_by(|x, y| x.thing.cmp(&y.thing).then(by_distance(x, y)));
-        self.found.dedup_by_key(|found| found.thing);
+        self.found.sort_by(|x, y| x.collider.cmp(&y.collider).then(by_distance(x, y)));
+        self.found.dedup_by_key(|found| found.collider);
         self.found.sort_by(by_distance);
         self.found
     }
 }
 
-fn cast_on_wall<S: Scalar>(
+fn cast_ray_on_wall<S: Scalar>(
     wall: &WallShape<S>,
-    Part { part, .. }: Part,
+    SubShape { part, .. }: SubShape,
     ray: &Ray<S>,
-    longest: S,
+    max_distance: S,
 ) -> Option<RayHit<S>> {
     let local = |pose: &Pose<S>| Ray {
-        origin: pose.point_back(ray.origin),
-        direction: pose.vector_back(ray.direction),
+        origin: pose.inverse_transform_point(ray.origin),
+        direction: pose.inverse_transform_vector(ray.direction),
     };
-    let placed = |hit: Option<OfTriangle<RayHit<S>>>, pose: &Pose<S>| {
-        hit.map(|hit| hit.answer.placed(*pose))
+    let to_world = |hit: Option<TriangleResult<RayHit<S>>>, pose: &Pose<S>| {
+        hit.map(|hit| hit.result.to_world(*pose))
     };
     match wall {
-        WallShape::Plane(plane) => plane.cast(ray, longest),
-        WallShape::Solid(_) => wall.part(part)?.cast(ray, longest),
+        WallShape::Plane(plane) => plane.cast_ray(ray, max_distance),
+        WallShape::Solid(_) => wall.sub_shape(part)?.cast_ray(ray, max_distance),
         WallShape::Mesh(mesh, pose) => {
-            placed(cast_on_surface(&**mesh, &local(pose), longest), pose)
+            to_world(ray_cast_on_surface(&**mesh, &local(pose), max_distance), pose)
         }
         WallShape::HeightField(field, pose) => {
-            placed(cast_on_surface(&**field, &local(pose), longest), pose)
+            to_world(ray_cast_on_surface(&**field, &local(pose), max_distance), pose)
         }
     }
 }
 
-/// What the part says of a shape that touches something first.
-fn earliest<S: Scalar>(
+/// Earliest hit among the sub-shapes of a shape.
+fn min_by_time<S: Scalar>(
     shape: &Shape<S>,
-    ask: impl Fn(&dyn Convex<S>) -> Option<Touch<S>>,
-) -> Option<Touch<S>> {
-    let touches = parts_of(shape).into_iter().filter_map(ask);
+    query: impl Fn(&dyn Convex<S>) -> Option<ShapeCastHit<S>>,
+) -> Option<ShapeCastHit<S>> {
+    let touches = sub_shapes(shape).into_iter().filter_map(query);
     touches.reduce(|x, y| if y.time < x.time { y } else { x })
 }
 
-/// A shape as seen from a frame.
-fn in_frame<S: Scalar>(shape: &Shape<S>, pose: Pose<S>) -> Cow<'_, Shape<S>> {
+/// Transforms a shape into a local frame.
+fn to_local<S: Scalar>(shape: &Shape<S>, pose: Pose<S>) -> Cow<'_, Shape<S>> {
     if pose == Pose::identity() {
         Cow::Borrowed(shape)
     } else {
-        Cow::Owned(shape.moved(pose.inverse()))
+        Cow::Owned(shape.transformed(pose.inverse()))
     }
 }
 
-fn sweep_placed<S: Scalar>(
+fn shape_cast_transformed<S: Scalar>(
     surface: &impl Surface<S>,
     pose: Pose<S>,
     shape: &Shape<S>,
-    moves: Vec3<S>,
-) -> Option<Touch<S>> {
-    let moves = pose.vector_back(moves);
-    let touch = |part: &dyn Convex<S>| Some(sweep_against_surface(surface, part, moves)?.answer);
-    Some(earliest(&in_frame(shape, pose), touch)?.placed(pose))
+    translation: Vec3<S>,
+) -> Option<ShapeCastHit<S>> {
+    let translation = pose.inverse_transform_vector(translation);
+    let touch =
+        |part: &dyn Convex<S>| Some(shape_cast_on_surface(surface, part, translation)?.result);
+    Some(min_by_time(&to_local(shape, pose), touch)?.to_world(pose))
 }
 
-fn touches_placed<S: Scalar>(surface: &impl Surface<S>, pose: Pose<S>, shape: &Shape<S>) -> bool {
-    let touches = |part| closest_of_surface(surface, part, S::zero()).is_some();
-    parts_of(&in_frame(shape, pose)).into_iter().any(touches)
+fn overlaps_transformed<S: Scalar>(
+    surface: &impl Surface<S>,
+    pose: Pose<S>,
+    shape: &Shape<S>,
+) -> bool {
+    let touches = |part| closest_points_of_surface(surface, part, S::zero()).is_some();
+    sub_shapes(&to_local(shape, pose)).into_iter().any(touches)
 }
 
-/// When a convex shape that moves along a line first touches a half-space.
-fn sweep_plane<S: Scalar>(
+/// First contact of a translating convex shape with a half-space.
+fn shape_cast_half_space<S: Scalar>(
     plane: &Plane<S>,
     shape: &dyn Convex<S>,
-    moves: Vec3<S>,
-) -> Option<Touch<S>> {
+    translation: Vec3<S>,
+) -> Option<ShapeCastHit<S>> {
     let normal = plane.normal();
     let lowest = shape.support(-normal);
-    let (gap, closing) = (plane.signed_distance(lowest), -moves.dot(normal));
+    let (gap, closing) = (plane.signed_distance(lowest), -translation.dot(normal));
     let time = (gap / closing).max(S::zero());
     let meets = closing > S::zero() && time <= S::one();
-    meets.then(|| Touch { time, normal, point: lowest + moves * time })
+    meets.then(|| ShapeCastHit { time, normal, point: lowest + translation * time })
 }

@@ -4,7 +4,7 @@
 use cgmath::{EuclideanSpace, Zero};
 
 use super::World;
-use super::integrate::Drive;
+use super::integrate::StepContext;
 use super::swarm::FURTHEST;
 use crate::Error;
 use crate::math::{Scalar, Vec3, cast_vector, length};
@@ -65,14 +65,14 @@ impl<S: Scalar> World<S> {
     /// applies in substeps.
     pub(super) fn integrate_forces(&mut self, dt: S) -> Result<(), Error> {
         if self.model.rotation == Rotation::Dynamic {
-            self.marbles.spin_up(dt);
+            self.marbles.integrate_angular_velocity(dt);
         } else {
-            self.marbles.turn(dt, self.model.rotation);
+            self.marbles.integrate_rotations(dt, self.model.rotation);
         }
         self.soft_step.dt = dt.as_f64() as f32;
-        self.stop_what_is_not_finite();
+        self.quarantine_non_finite();
         self.sync_bodies()?;
-        let drive = Drive {
+        let drive = StepContext {
             integrator: self.model.integrator,
             gravity: self.gravity,
             forces: &self.forces,
@@ -95,7 +95,7 @@ impl<S: Scalar> World<S> {
 
     /// The second verb: finds which pairs may touch within the step, and lists those of marbles.
     pub(super) fn find_soft_contacts(&mut self) {
-        self.walls.prepare();
+        self.walls.update_tree();
         let (dt, gravity) = (self.soft_step.dt, cast_vector(self.gravity));
         self.soft_step.walls = self.walls.version();
         self.swarm.prepare(dt, gravity, &self.walls, self.walls.version());
@@ -109,9 +109,9 @@ impl<S: Scalar> World<S> {
 
     /// The third verb: moves marbles on in substeps, and solves their contacts.
     pub(super) fn solve_soft_contacts(&mut self, dt: S) -> Result<(), Error> {
-        self.count_contacts();
+        self.audit_contacts();
         self.sync_bodies()?; // somebody may have moved some since the first verb
-        self.walls.prepare();
+        self.walls.update_tree();
         let gravity = cast_vector(self.gravity);
         if self.soft_step.walls != self.walls.version() {
             self.swarm.prepare(self.soft_step.dt, gravity, &self.walls, self.walls.version());
@@ -123,10 +123,10 @@ impl<S: Scalar> World<S> {
         self.stopped.extend(stopped.filter(|marble| *marble != NO_ROW));
         let turns = self.model.rotation == Rotation::Dynamic;
         self.swarm.read_bodies(marbles, self.marbles.body_columns(turns), Some(dt));
-        self.stop_what_is_not_finite();
+        self.quarantine_non_finite();
         self.roll_what_only_shows();
         self.limits.apply(&mut self.marbles);
-        self.count_after();
+        self.audit_after();
         Ok(())
     }
 
@@ -167,7 +167,7 @@ impl<S: Scalar> World<S> {
                     rotation_locked: marbles.rotation_of(row, rotation) != Rotation::Dynamic,
                 }
             };
-            let spin = marbles.spin.get(row).copied().filter(|_| !now.rotation_locked);
+            let spin = marbles.angular_velocity.get(row).copied().filter(|_| !now.rotation_locked);
             let same = details.get(row).is_none_or(|before| *before == now);
             let marble = MarbleRow {
                 position: marbles.position[row],

@@ -4,12 +4,12 @@ use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::World;
 use super::marbles::MarbleId;
-use super::touch::{Near, drop_seams, parts_near};
-use super::walls::{Part, Walls};
+use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
+use super::walls::{SubShape, Walls};
 use crate::Error;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::response::{Material, Response};
-use crate::shape::{Aabb, Solid, Sphere};
+use crate::shape::{Aabb, BoundedShape, Sphere};
 use crate::swarm::{BallId, Guest, Stage, Surroundings};
 
 impl<S: Scalar> World<S> {
@@ -23,7 +23,7 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
     /// [`Error::Full`] at 2³² balls.
     pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
-        let dt = Self::checked_dt(dt)?.as_f64() as f32;
+        let dt = Self::validated_dt(dt)?.as_f64() as f32;
         if self.model.response == Response::SoftStep {
             return Ok(()); // it moved with the marbles
         }
@@ -33,7 +33,7 @@ impl<S: Scalar> World<S> {
             return Ok(());
         }
         self.invite_guests(dt)?;
-        self.walls.prepare();
+        self.walls.update_tree();
         let gravity = cast_vector(self.gravity);
         self.swarm.step(dt, gravity, &self.walls, self.walls.version(), observe);
         self.part_with_guests();
@@ -79,7 +79,10 @@ impl<S: Scalar> World<S> {
             let single = |x: S| (x.as_f64() as f32).clamp(-FURTHEST, FURTHEST);
             let rows = |v: Vec3<S>, last: f32| [single(v.x), single(v.y), single(v.z), last];
             let radius = marbles.radius()[row];
-            let spin = marbles.spin().get(row).map_or([0.0; 4], |spin| rows(*spin * radius, 0.0));
+            let spin = marbles
+                .angular_velocity()
+                .get(row)
+                .map_or([0.0; 4], |spin| rows(*spin * radius, 0.0));
             let inverse_mass = (S::one() / marbles.mass(row)).as_f64() as f32;
             let at = rows(marbles.position()[row].to_vec(), single(radius));
             Some(Guest::new(*ball, at, rows(marbles.velocity()[row], inverse_mass), spin))
@@ -99,7 +102,7 @@ impl<S: Scalar> World<S> {
             let moved = change(&before.at, &after.at);
             let faster = change(&before.velocity, &after.velocity);
             let turned = change(&before.rim, &after.rim);
-            self.marbles.push(*marble, moved, faster, turned);
+            self.marbles.apply_delta(*marble, moved, faster, turned);
         }
     }
 }
@@ -116,13 +119,13 @@ impl<S: Scalar> Surroundings for Walls<S> {
     }
 
     fn has_shapes(&self) -> bool {
-        !self.are_planes()
+        !self.are_half_spaces()
     }
 
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool {
         let bounds = Aabb { min: cast_point(low.into()), max: cast_point(high.into()) };
         let mut any = false;
-        Walls::near(self, &bounds, |_| any = true);
+        Walls::for_each_in_box(self, &bounds, |_| any = true);
         any
     }
 
@@ -136,11 +139,11 @@ impl<S: Scalar> Surroundings for Walls<S> {
         let center = cast_point(Point3::new(x, y, z));
         let sphere = Sphere { center, radius: number(radius) };
         let mut near = Vec::new();
-        parts_near(self, &sphere, number(reach), &mut near);
+        candidate_sub_shapes(self, &sphere, number(reach), &mut near);
         if near.len() > 1 {
-            drop_seams(self, &sphere, &mut near);
+            remove_ghost_collisions(self, &sphere, &mut near);
         }
-        for Near { part: Part { wall, part }, nearest } in near {
+        for Candidate { part: SubShape { wall, part }, nearest } in near {
             let normal: Vec3<f32> = cast_vector(nearest.normal);
             name([wall, part], normal, nearest.distance.as_f64() as f32);
         }
@@ -158,10 +161,11 @@ impl<S: Scalar> Surroundings for Walls<S> {
         let (start, end) = (sphere.bounding_box(), Sphere { center: center + way, ..sphere });
         // Its core says whether it passes into the wall, its surface when it is there.
         let core = Sphere { radius: sphere.radius * S::constant(0.5), ..sphere };
-        let mut first: Option<(Part, S)> = None;
-        Walls::near(self, &start.union(&end.bounding_box()), |part| {
-            let passes = self.meets(part, &core, way).is_some();
-            let Some(stop) = passes.then(|| self.meets(part, &sphere, way)).flatten() else {
+        let mut first: Option<(SubShape, S)> = None;
+        Walls::for_each_in_box(self, &start.union(&end.bounding_box()), |part| {
+            let passes = self.time_of_impact(part, &core, way).is_some();
+            let Some(stop) = passes.then(|| self.time_of_impact(part, &sphere, way)).flatten()
+            else {
                 return;
             };
             if first.is_none_or(|(_, time)| stop.time < time) {
@@ -170,7 +174,7 @@ impl<S: Scalar> Surroundings for Walls<S> {
         });
         let (part, time) = first?;
         // The plane there is nearer by the way up to it.
-        let nearest = self.nearest(part, center + way * time);
+        let nearest = self.project_point(part, center + way * time);
         let distance = nearest.distance - way.dot(nearest.normal) * time;
         let normal: Vec3<f32> = cast_vector(nearest.normal);
         Some(([part.wall, part.part], normal, distance.as_f64() as f32))

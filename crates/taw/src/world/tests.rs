@@ -95,7 +95,7 @@ fn a_bad_step_changes_nothing() {
 fn a_bad_force_is_refused_and_changes_nothing() {
     let mut world = floor::<f32>();
     let anchor = Point3::new(0.0, 0.0, 0.0);
-    let spring = |stiffness| Force::Spring { anchor, rest_length: 0.0, stiffness };
+    let spring = |stiffness| ForceField::Spring { anchor, rest_length: 0.0, stiffness };
     world.set_forces(vec![spring(1.0)]).unwrap();
     let error = world.set_forces(vec![spring(2.0), spring(-1.0)]).unwrap_err();
     assert!(error.to_string().starts_with("stiffness"), "{error}");
@@ -106,7 +106,7 @@ fn a_bad_force_is_refused_and_changes_nothing() {
 fn mass_and_gravity_scale_say_what_forces_do() {
     let mut world = World::<f64>::default();
     world.set_gravity(Vec3::new(0.0, -8.0, 0.0)).unwrap();
-    world.set_forces(vec![Force::Custom(|_, _| Vec3::new(12.0, 0.0, 0.0))]).unwrap();
+    world.set_forces(vec![ForceField::Custom(|_, _| Vec3::new(12.0, 0.0, 0.0))]).unwrap();
     let fallen = |marble: Marble<f64>| {
         let mut world = world.clone();
         let id = world.marbles.insert(marble).unwrap();
@@ -140,26 +140,26 @@ fn a_rolling_marble_turns_by_its_way_over_its_radius() {
     let turned = start.rotation.conjugate() * end.rotation;
     let exact = Quat::new((angle / 2.0).cos(), 0.0, 0.0, (angle / 2.0).sin());
     assert!((turned - exact).magnitude() < 1e-12, "{turned:?}, not {exact:?}");
-    assert_eq!(end.spin, Vec3::new(0.0, 0.0, -8.0));
+    assert_eq!(end.angular_velocity, Vec3::new(0.0, 0.0, -8.0));
 }
 
 #[test]
 fn rotation_takes_columns_only_while_it_is_modelled() {
     let mut world = heap();
     world.step(DT).unwrap();
-    assert!(world.marbles.rotation().is_empty() && world.marbles.spin().is_empty());
+    assert!(world.marbles.rotation().is_empty() && world.marbles.angular_velocity().is_empty());
     let without = world.clone();
     world.set_model(Model { rotation: Rotation::Rolling, ..Model::default() }).unwrap();
     assert_eq!(world.marbles.rotation().len(), 200);
     let id = world.marbles.id(7).unwrap();
-    world.marbles.set_spin(id, Vec3::new(1.0, 0.0, 0.0)).unwrap();
+    world.marbles.set_angular_velocity(id, Vec3::new(1.0, 0.0, 0.0)).unwrap();
     world.marbles.remove(world.marbles.id(0).unwrap()).unwrap();
-    assert_eq!(world.marbles.get(id).unwrap().spin.x, 1.0);
+    assert_eq!(world.marbles.get(id).unwrap().angular_velocity.x, 1.0);
     assert!(world.marbles.set_rotation(id, Quat::new(0.0, 0.0, 0.0, 0.0)).is_err());
     world.marbles.insert(Marble::new(Point3::new(0.0, 9.0, 0.0), 0.1)).unwrap();
     (0..60).for_each(|_| world.step(DT).unwrap());
     world.set_model(Model::default()).unwrap();
-    assert!(world.marbles.rotation().is_empty() && world.marbles.spin().is_empty());
+    assert!(world.marbles.rotation().is_empty() && world.marbles.angular_velocity().is_empty());
     assert_eq!(without.marbles.len(), world.marbles.len());
 }
 

@@ -3,14 +3,14 @@ use std::sync::Arc;
 use cgmath::{EuclideanSpace, InnerSpace};
 
 use crate::Error;
-use crate::contact::{Closest, closest, parts_of};
+use crate::contact::{ClosestPoints, closest_points, sub_shapes};
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
 use crate::response::event::Form;
 use crate::shape::{
-    Box3, Capsule, Compound, HeightField, Hull, Mesh, Nearest, Obb, Plane, Shape, Solid, Sphere,
-    Surface, Triangle,
+    Aabb3, BoundedShape, Capsule, Compound, HeightField, Hull, Mesh, Obb, Plane, PointProjection,
+    Shape, Sphere, Surface, Triangle,
 };
 
 /// Shape of a wall.
@@ -20,76 +20,88 @@ pub enum WallShape<S> {
     Plane(Plane<S>),
     /// Any bounded shape, or a compound of such.
     Solid(Shape<S>),
-    /// Triangles, solid from both sides and hollow between. Copies share them.
+    /// Triangle mesh: two-sided and hollow. Copies share it.
     Mesh(Arc<Mesh<S>>, Pose<S>),
-    /// A landscape, solid below. Copies share it.
+    /// Height field, solid below. Copies share it.
     HeightField(Arc<HeightField<S>>, Pose<S>),
 }
 
 impl<S: Scalar> WallShape<S> {
-    /// Checks the shape and lays out nested compounds flat.
+    /// Validates the shape and flattens nested compounds.
     pub(super) fn checked(self) -> Result<Self, Error> {
         Ok(match self {
             Self::Plane(_) => self,
             Self::Solid(shape) => Self::Solid(shape.checked()?),
             Self::Mesh(mesh, pose) => {
                 let pose = pose.checked()?;
-                room_for(&mesh.bounds(), pose)?;
+                check_bounds(&mesh.bounds(), pose)?;
                 Self::Mesh(mesh, pose)
             }
             Self::HeightField(field, pose) => {
                 let pose = pose.checked()?;
-                room_for(&ground(&field), pose)?;
+                check_bounds(&solid_bounds(&field), pose)?;
                 Self::HeightField(field, pose)
             }
         })
     }
 
-    /// The boxes around it: of a compound one for each part, of a plane none.
-    pub(super) fn boxes(&self, mut name: impl FnMut(u32, Box3<S>)) {
+    /// Visits the bounding boxes: one per sub-shape of a compound, none for a half-space.
+    pub(super) fn for_each_box(&self, mut visit: impl FnMut(u32, Aabb3<S>)) {
         match self {
             Self::Plane(_) => {}
             Self::Solid(Shape::Compound(compound)) => {
                 for (part, shape) in (0..).zip(compound.parts()) {
-                    name(part, shape.bounding_box());
+                    visit(part, shape.bounding_box());
                 }
             }
-            Self::Solid(shape) => name(0, shape.bounding_box()),
-            Self::Mesh(mesh, pose) => name(0, moved(&mesh.bounds(), *pose)),
-            Self::HeightField(field, pose) => name(0, moved(&ground(field), *pose)),
-        }
-    }
-
-    /// Names the parts near a box, of which one of its own boxes is.
-    pub(super) fn near(&self, part: u32, bounds: &Box3<S>, name: impl FnMut(u32)) {
-        let mut name = name;
-        match self {
-            Self::Plane(_) | Self::Solid(_) => name(part),
-            Self::Mesh(mesh, pose) => mesh.near(&moved(bounds, pose.inverse()), name),
+            Self::Solid(shape) => visit(0, shape.bounding_box()),
+            Self::Mesh(mesh, pose) => visit(0, transformed_box(&mesh.bounds(), *pose)),
             Self::HeightField(field, pose) => {
-                // A ball below the surface touches the triangles above it.
-                let mut bounds = moved(bounds, pose.inverse());
-                bounds.max.y = bounds.max.y.max(field.bounds().max.y);
-                field.near(&bounds, name);
+                visit(0, transformed_box(&solid_bounds(field), *pose))
             }
         }
     }
 
-    /// Names the parts that may be within `reach` metres of a point, of which one of its own
-    /// boxes is.
-    pub(super) fn around(&self, part: u32, point: Point3<S>, reach: S, mut name: impl FnMut(u32)) {
+    /// Visits the sub-shapes that may overlap a box, within one of its bounding boxes.
+    pub(super) fn for_each_in_box(&self, part: u32, bounds: &Aabb3<S>, visit: impl FnMut(u32)) {
+        let mut visit = visit;
+        match self {
+            Self::Plane(_) | Self::Solid(_) => visit(part),
+            Self::Mesh(mesh, pose) => {
+                mesh.for_each_in_box(&transformed_box(bounds, pose.inverse()), visit)
+            }
+            Self::HeightField(field, pose) => {
+                // A ball below the surface touches the triangles above it.
+                let mut bounds = transformed_box(bounds, pose.inverse());
+                bounds.max.y = bounds.max.y.max(field.bounds().max.y);
+                field.for_each_in_box(&bounds, visit);
+            }
+        }
+    }
+
+    /// Visits the sub-shapes that may be within `reach` metres of a point, within one of its
+    /// bounding boxes.
+    pub(super) fn for_each_near(
+        &self,
+        part: u32,
+        point: Point3<S>,
+        reach: S,
+        mut visit: impl FnMut(u32),
+    ) {
         let mut each = |part| {
-            name(part);
+            visit(part);
             reach
         };
         match self {
-            Self::Plane(_) | Self::Solid(_) => name(part),
-            Self::Mesh(mesh, pose) => mesh.around(pose.point_back(point), reach, &mut each),
+            Self::Plane(_) | Self::Solid(_) => visit(part),
+            Self::Mesh(mesh, pose) => {
+                mesh.for_each_near(pose.inverse_transform_point(point), reach, &mut each)
+            }
             Self::HeightField(field, pose) => {
                 // A point below the surface is at most this far from it.
-                let local = pose.point_back(point);
-                let far = field.height_over(local).map_or(reach, |height| reach.max(height));
-                field.around(local, far, |part| {
+                let local = pose.inverse_transform_point(point);
+                let far = field.signed_height(local).map_or(reach, |height| reach.max(height));
+                field.for_each_near(local, far, |part| {
                     each(part);
                     far
                 });
@@ -98,7 +110,7 @@ impl<S: Scalar> WallShape<S> {
     }
 
     /// Tests for equal shapes in one place; shared meshes and height fields compare by pointer.
-    pub(super) fn is_where(&self, other: &Self) -> bool {
+    pub(super) fn is_same_placement(&self, other: &Self) -> bool {
         match (self, other) {
             (Self::Mesh(one, pose), Self::Mesh(two, at)) => Arc::ptr_eq(one, two) && pose == at,
             (Self::HeightField(one, pose), Self::HeightField(two, at)) => {
@@ -109,19 +121,19 @@ impl<S: Scalar> WallShape<S> {
         }
     }
 
-    /// This wall, moved by `pose`.
+    /// Transforms the wall by `pose`.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] for a place that a half-space cannot have. Others are refused
+    /// [`Error::NotFinite`] for a pose that a half-space cannot have. Other shapes are validated
     /// when they become a wall.
-    pub fn moved(&self, pose: Pose<S>) -> Result<Self, Error> {
+    pub fn transformed(&self, pose: Pose<S>) -> Result<Self, Error> {
         Ok(match self {
             Self::Plane(plane) => {
-                let normal = pose.vector(plane.normal()).normalize();
-                let on = pose.point(Point3::from_vec(plane.normal() * plane.offset()));
+                let normal = pose.transform_vector(plane.normal()).normalize();
+                let on = pose.transform_point(Point3::from_vec(plane.normal() * plane.offset()));
                 Self::Plane(Plane::through(on, normal)?)
             }
-            Self::Solid(shape) => Self::Solid(shape.moved(pose)),
+            Self::Solid(shape) => Self::Solid(shape.transformed(pose)),
             Self::Mesh(mesh, before) => Self::Mesh(Arc::clone(mesh), pose * *before),
             Self::HeightField(field, before) => {
                 Self::HeightField(Arc::clone(field), pose * *before)
@@ -129,13 +141,13 @@ impl<S: Scalar> WallShape<S> {
         })
     }
 
-    /// Where its surface is nearest to a point.
+    /// Projects a point onto the surface.
     #[must_use]
-    pub fn nearest(&self, point: Point3<S>) -> Nearest<S> {
+    pub fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
         let on = |surface: &dyn Fn(&mut dyn FnMut(u32) -> S)| {
-            let mut best = nowhere(point);
+            let mut best = no_projection(point);
             surface(&mut |part| {
-                let next = self.nearest_of(part, point);
+                let next = self.project_point_on(part, point);
                 if next.distance.abs() < best.distance.abs() {
                     best = next;
                 }
@@ -144,71 +156,77 @@ impl<S: Scalar> WallShape<S> {
             best
         };
         match self {
-            Self::Plane(_) => self.nearest_of(0, point),
-            Self::Solid(shape) => shape.nearest(point),
-            Self::Mesh(mesh, pose) => {
-                on(&|name| mesh.around(pose.point_back(point), S::infinity(), name))
-            }
-            Self::HeightField(field, pose) => {
-                on(&|name| field.around(pose.point_back(point), S::infinity(), name))
-            }
+            Self::Plane(_) => self.project_point_on(0, point),
+            Self::Solid(shape) => shape.project_point(point),
+            Self::Mesh(mesh, pose) => on(&|visit| {
+                mesh.for_each_near(pose.inverse_transform_point(point), S::infinity(), visit)
+            }),
+            Self::HeightField(field, pose) => on(&|visit| {
+                field.for_each_near(pose.inverse_transform_point(point), S::infinity(), visit)
+            }),
         }
     }
 
-    /// Where a part of it is nearest to a point.
-    pub(super) fn nearest_of(&self, part: u32, point: Point3<S>) -> Nearest<S> {
+    /// Projects a point onto a sub-shape.
+    pub(super) fn project_point_on(&self, part: u32, point: Point3<S>) -> PointProjection<S> {
         match self {
             Self::Plane(plane) => {
                 let (normal, distance) = (plane.normal(), plane.signed_distance(point));
-                Nearest { point: point - normal * distance, normal, distance }
+                PointProjection { point: point - normal * distance, normal, distance }
             }
-            Self::Solid(_) => match self.part(part) {
-                Some(shape) => shape.nearest(point),
-                None => nowhere(point),
+            Self::Solid(_) => match self.sub_shape(part) {
+                Some(shape) => shape.project_point(point),
+                None => no_projection(point),
             },
-            Self::Mesh(mesh, pose) => placed(*pose, point, |point| {
-                mesh.triangle(part).map(|triangle| triangle.nearest(point))
+            Self::Mesh(mesh, pose) => project_transformed(*pose, point, |point| {
+                mesh.triangle(part).map(|triangle| triangle.project_point(point))
             }),
-            Self::HeightField(field, pose) => placed(*pose, point, |point| {
-                let near = field.triangle(part)?.nearest(point);
-                let below = field.height_over(point).is_some_and(|height| height > S::zero());
-                Some(if below { near.inside_out() } else { near })
+            Self::HeightField(field, pose) => project_transformed(*pose, point, |point| {
+                let near = field.triangle(part)?.project_point(point);
+                let below = field.signed_height(point).is_some_and(|height| height > S::zero());
+                Some(if below { near.flipped() } else { near })
             }),
         }
     }
 
-    /// Where a part is nearest to a capsule, unless it is a half-space.
-    pub(super) fn closest(&self, part: u32, capsule: &Capsule<S>) -> Option<Closest<S>> {
+    /// Closest points of a sub-shape and a capsule, except for half-spaces.
+    pub(super) fn closest_points(
+        &self,
+        part: u32,
+        capsule: &Capsule<S>,
+    ) -> Option<ClosestPoints<S>> {
         let triangle = |triangle: Triangle<S>, pose: &Pose<S>| {
-            let corners = triangle.corners.map(|corner| pose.point(corner));
-            closest(&Triangle { corners }, capsule)
+            let corners = triangle.corners.map(|corner| pose.transform_point(corner));
+            closest_points(&Triangle { corners }, capsule)
         };
         match self {
             Self::Plane(_) => None,
             Self::Solid(_) => {
-                let parts = parts_of(self.part(part)?).into_iter();
-                parts.map(|part| closest(part, capsule)).next()
+                let parts = sub_shapes(self.sub_shape(part)?).into_iter();
+                parts.map(|part| closest_points(part, capsule)).next()
             }
             Self::Mesh(mesh, pose) => mesh.triangle(part).map(|it| triangle(it, pose)),
             Self::HeightField(field, pose) => field.triangle(part).map(|it| triangle(it, pose)),
         }
     }
 
-    /// A part in `f64`, for a response that counts so.
-    pub(super) fn exact(&self, part: u32) -> Option<Form> {
+    /// Sub-shape in `f64`.
+    pub(super) fn sub_shape_f64(&self, part: u32) -> Option<Form> {
         let triangle = |triangle: Option<Triangle<S>>, pose: &Pose<S>| {
             let corners = triangle?.corners;
-            Some(Triangle { corners: corners.map(|corner| cast_point(pose.point(corner))) })
+            Some(Triangle {
+                corners: corners.map(|corner| cast_point(pose.transform_point(corner))),
+            })
         };
         match self {
             Self::Plane(plane) => {
-                // What rounding leaves of a unit vector's length would add energy.
+                // Normalized in `f64`: the rounded length would add energy.
                 let normal = cast_vector::<S, f64>(plane.normal());
                 let length = normal.magnitude();
                 let (normal, offset) = (normal / length, plane.offset().as_f64() / length);
                 Some(Form::Plane { normal, offset })
             }
-            Self::Solid(_) => self.part(part).map(|shape| Form::Solid(shape.in_scalar())),
+            Self::Solid(_) => self.sub_shape(part).map(|shape| Form::Solid(shape.cast())),
             Self::Mesh(mesh, pose) => triangle(mesh.triangle(part), pose).map(Form::Triangle),
             Self::HeightField(field, pose) => {
                 triangle(field.triangle(part), pose).map(Form::SolidBelow)
@@ -216,8 +234,8 @@ impl<S: Scalar> WallShape<S> {
         }
     }
 
-    /// A convex part.
-    pub(super) fn part(&self, part: u32) -> Option<&Shape<S>> {
+    /// Convex sub-shape.
+    pub(super) fn sub_shape(&self, part: u32) -> Option<&Shape<S>> {
         match self {
             Self::Solid(Shape::Compound(compound)) => compound.parts().get(part as usize),
             Self::Solid(shape) => Some(shape),
@@ -226,46 +244,46 @@ impl<S: Scalar> WallShape<S> {
     }
 }
 
-/// Nothing, if a surface in this box, moved, is still finite.
-fn room_for<S: Scalar>(bounds: &Box3<S>, pose: Pose<S>) -> Result<(), Error> {
+/// Checks that a surface in this box, transformed, is finite.
+fn check_bounds<S: Scalar>(bounds: &Aabb3<S>, pose: Pose<S>) -> Result<(), Error> {
     finite_vector(["size.x", "size.y", "size.z"], bounds.max - bounds.min)?;
-    let Box3 { min, max } = moved(bounds, pose);
+    let Aabb3 { min, max } = transformed_box(bounds, pose);
     finite_point(["shape.x", "shape.y", "shape.z"], min)?;
     finite_point(["shape.x", "shape.y", "shape.z"], max).map(|_| ())
 }
 
 /// Bounding box of a height field and of the solid below it, as deep as the field's diagonal, in
 /// metres.
-fn ground<S: Scalar>(field: &HeightField<S>) -> Box3<S> {
+fn solid_bounds<S: Scalar>(field: &HeightField<S>) -> Aabb3<S> {
     let mut bounds = field.bounds();
     bounds.min.y -= length(bounds.max - bounds.min);
     bounds
 }
 
-/// The box around a box that was moved.
-fn moved<S: Scalar>(bounds: &Box3<S>, pose: Pose<S>) -> Box3<S> {
-    if pose == Pose::identity() { *bounds } else { bounds.obb().moved(pose).bounding_box() }
+/// Bounding box of a transformed box.
+fn transformed_box<S: Scalar>(bounds: &Aabb3<S>, pose: Pose<S>) -> Aabb3<S> {
+    if pose == Pose::identity() { *bounds } else { bounds.obb().transformed(pose).bounding_box() }
 }
 
 /// Result for a missing part: infinitely far away.
-fn nowhere<S: Scalar>(point: Point3<S>) -> Nearest<S> {
-    Nearest { point, normal: Vec3::unit_y(), distance: S::infinity() }
+fn no_projection<S: Scalar>(point: Point3<S>) -> PointProjection<S> {
+    PointProjection { point, normal: Vec3::unit_y(), distance: S::infinity() }
 }
 
-/// The answer of a surface that was moved.
-fn placed<S: Scalar>(
+/// Projection onto a transformed surface.
+fn project_transformed<S: Scalar>(
     pose: Pose<S>,
     point: Point3<S>,
-    nearest: impl FnOnce(Point3<S>) -> Option<Nearest<S>>,
-) -> Nearest<S> {
+    nearest: impl FnOnce(Point3<S>) -> Option<PointProjection<S>>,
+) -> PointProjection<S> {
     if pose == Pose::identity() {
-        return nearest(point).unwrap_or_else(|| nowhere(point));
+        return nearest(point).unwrap_or_else(|| no_projection(point));
     }
-    nearest(pose.point_back(point)).map_or_else(
-        || nowhere(point),
-        |near| Nearest {
-            point: pose.point(near.point),
-            normal: pose.vector(near.normal).normalize(),
+    nearest(pose.inverse_transform_point(point)).map_or_else(
+        || no_projection(point),
+        |near| PointProjection {
+            point: pose.transform_point(near.point),
+            normal: pose.transform_vector(near.normal).normalize(),
             ..near
         },
     )
@@ -289,8 +307,8 @@ impl<S> From<Sphere<S>> for WallShape<S> {
     }
 }
 
-impl<S> From<Box3<S>> for WallShape<S> {
-    fn from(aabb: Box3<S>) -> Self {
+impl<S> From<Aabb3<S>> for WallShape<S> {
+    fn from(aabb: Aabb3<S>) -> Self {
         Self::Solid(Shape::Aabb(aabb))
     }
 }

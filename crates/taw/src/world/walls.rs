@@ -1,57 +1,57 @@
 use cgmath::Zero;
 
 use super::handles::{Handle, Handles};
-use super::optional::Optional;
+use super::sparse_column::SparseColumn;
 use super::wall_shape::WallShape;
 use crate::Error;
-use crate::contact::Closest;
+use crate::contact::ClosestPoints;
 use crate::error::{finite_point, finite_vector};
 use crate::math::{Point3, Scalar, Vec3, is_finite_point};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};
-use crate::shape::{Box3, BoxTree, Capsule, Nearest, Plane};
+use crate::shape::{Aabb3, Bvh, Capsule, Plane, PointProjection};
 
-/// Names a wall for as long as it is in the world.
+/// Stable handle of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct WallId(Handle);
 
-/// A wall, and one of its parts: of a compound, or a triangle of a surface.
+/// Sub-shape of a wall: part of a compound, or triangle of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) struct Part {
+pub(super) struct SubShape {
     pub wall: u32,
     pub part: u32,
 }
 
-/// What no contact can move: half-spaces and shapes, fixed or moved by the user.
+/// Walls: static and kinematic colliders, which no contact moves.
 #[derive(Clone, Debug)]
 pub struct Walls<S> {
     handles: Handles,
     shapes: Vec<WallShape<S>>,
-    /// The rows of half-spaces, in order: every step asks for them, among however many others.
+    /// Indices of half-spaces, in order: every step visits them, among however many others.
     planes: Vec<u32>,
-    /// Only of those that move.
-    motion: Optional<WallMotion<S>>,
-    /// Only of those that have one of their own.
-    material: Optional<Material<S>>,
-    /// Those that were set to another place since the last step.
-    moved: Optional<()>,
-    /// Where those end that are on their way through a step, and how they then move, by row.
+    /// Motion of moving walls.
+    motion: SparseColumn<WallMotion<S>>,
+    /// Materials of walls that have their own.
+    material: SparseColumn<Material<S>>,
+    /// Walls that were set to another pose since the last step.
+    moved: SparseColumn<()>,
+    /// Final shapes and motions, by index, of walls on their way through a step.
     ends: Vec<(usize, WallShape<S>, WallMotion<S>)>,
-    /// The boxes of those that are no half-spaces, and what is in them.
-    boxes: Vec<Box3<S>>,
-    parts: Vec<Part>,
-    tree: BoxTree<S>,
-    stale: Stale,
-    /// How often a wall came, went, or changed.
+    /// Bounding boxes of all walls except half-spaces, and their sub-shapes.
+    boxes: Vec<Aabb3<S>>,
+    sub_shapes: Vec<SubShape>,
+    tree: Bvh<S>,
+    dirty: Dirty,
+    /// Number of insertions, removals and changes.
     version: u64,
 }
 
-/// What changed since the tree was built.
+/// Changes since the tree was built.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
-enum Stale {
+enum Dirty {
     #[default]
     Nothing,
-    Places,
+    Poses,
     All,
 }
 
@@ -61,14 +61,14 @@ impl<S> Default for Walls<S> {
             handles: Handles::default(),
             shapes: Vec::new(),
             planes: Vec::new(),
-            motion: Optional::default(),
-            material: Optional::default(),
-            moved: Optional::default(),
+            motion: SparseColumn::default(),
+            material: SparseColumn::default(),
+            moved: SparseColumn::default(),
             ends: Vec::new(),
             boxes: Vec::new(),
-            parts: Vec::new(),
-            tree: BoxTree::default(),
-            stale: Stale::Nothing,
+            sub_shapes: Vec::new(),
+            tree: Bvh::default(),
+            dirty: Dirty::Nothing,
             version: 0,
         }
     }
@@ -76,7 +76,7 @@ impl<S> Default for Walls<S> {
 
 impl<S: Scalar> PartialEq for Walls<S> {
     fn eq(&self, other: &Self) -> bool {
-        // The rest follows from the shapes.
+        // The other fields follow from the shapes.
         let Self { handles, shapes, motion, material, moved, .. } = self;
         *handles == other.handles
             && *shapes == other.shapes
@@ -95,7 +95,7 @@ impl<S: Scalar> Walls<S> {
     pub fn insert(&mut self, wall: impl Into<WallShape<S>>) -> Result<WallId, Error> {
         let shape = wall.into().checked()?;
         let handle = self.handles.push()?;
-        self.change(&shape, Stale::All);
+        self.change(&shape, Dirty::All);
         if matches!(shape, WallShape::Plane(_)) {
             self.planes.push(self.shapes.len() as u32);
         }
@@ -107,7 +107,7 @@ impl<S: Scalar> Walls<S> {
         Ok(WallId(handle))
     }
 
-    /// Takes a wall out and gives it back.
+    /// Removes a wall and returns it.
     ///
     /// # Errors
     /// [`Error::NoSuchWall`].
@@ -117,15 +117,15 @@ impl<S: Scalar> Walls<S> {
         self.motion.swap_remove(row);
         self.material.swap_remove(row);
         self.moved.swap_remove(row);
-        // Another wall has this row now.
-        self.stale = Stale::All;
+        // Another wall has this index now.
+        self.dirty = Dirty::All;
         self.version += 1;
         let shape = self.shapes.swap_remove(row);
-        self.list_planes();
+        self.collect_planes();
         Ok(shape)
     }
 
-    /// The wall.
+    /// Shape of a wall.
     ///
     /// # Errors
     /// [`Error::NoSuchWall`].
@@ -133,8 +133,7 @@ impl<S: Scalar> Walls<S> {
         self.row(id).map(|row| &self.shapes[row])
     }
 
-    /// Moves a wall to a new place, or makes another one of it. Marbles that are then inside
-    /// are pushed out by the next step.
+    /// Moves a wall or replaces its shape. Marbles inside it are pushed out by the next step.
     ///
     /// # Errors
     /// [`Error::NoSuchWall`]; for a shape as [`Walls::insert`].
@@ -143,98 +142,108 @@ impl<S: Scalar> Walls<S> {
         let shape = wall.into().checked()?;
         let parts = |shape: &WallShape<S>| {
             let mut count = 0;
-            shape.boxes(|_, _| count += 1);
+            shape.for_each_box(|_, _| count += 1);
             count
         };
         let same = parts(&shape) == parts(&self.shapes[row]);
-        if !shape.is_where(&self.shapes[row]) {
+        if !shape.is_same_placement(&self.shapes[row]) {
             self.moved.set(row, Some(()), self.shapes.len());
         }
-        self.change(&shape, if same { Stale::Places } else { Stale::All });
+        self.change(&shape, if same { Dirty::Poses } else { Dirty::All });
         let is_plane = |shape: &WallShape<S>| matches!(shape, WallShape::Plane(_));
         let turns = is_plane(&shape) != is_plane(&self.shapes[row]);
         self.shapes[row] = shape;
         if turns {
-            self.list_planes();
+            self.collect_planes();
         }
         Ok(())
     }
 
-    fn list_planes(&mut self) {
+    fn collect_planes(&mut self) {
         self.planes.clear();
         let rows = (0..).zip(&self.shapes);
         let planes = rows.filter(|(_, shape)| matches!(shape, WallShape::Plane(_)));
         self.planes.extend(planes.map(|(row, _)| row));
     }
 
-    /// Notes that a wall is new or elsewhere.
-    fn change(&mut self, shape: &WallShape<S>, stale: Stale) {
+    /// Records that a wall is new or elsewhere.
+    fn change(&mut self, shape: &WallShape<S>, dirty: Dirty) {
         self.version += 1;
-        if stale == Stale::All || !matches!(shape, WallShape::Plane(_)) {
-            self.stale = self.stale.max(stale);
+        if dirty == Dirty::All || !matches!(shape, WallShape::Plane(_)) {
+            self.dirty = self.dirty.max(dirty);
         }
     }
 
-    /// Brings the tree up to date. Walls that only moved are refitted.
-    pub(super) fn prepare(&mut self) {
-        if self.stale == Stale::Nothing {
+    /// Updates the tree. Moved walls are refitted.
+    pub(super) fn update_tree(&mut self) {
+        if self.dirty == Dirty::Nothing {
             return;
         }
         self.boxes.clear();
-        self.parts.clear();
+        self.sub_shapes.clear();
         for (wall, shape) in (0..).zip(&self.shapes) {
-            shape.boxes(|part, bounds| {
-                self.parts.push(Part { wall, part });
+            shape.for_each_box(|part, bounds| {
+                self.sub_shapes.push(SubShape { wall, part });
                 self.boxes.push(bounds);
             });
         }
-        if self.stale == Stale::Places {
+        if self.dirty == Dirty::Poses {
             self.tree.refit(&self.boxes);
         } else {
-            self.tree = BoxTree::new(&self.boxes);
+            self.tree = Bvh::new(&self.boxes);
         }
-        self.stale = Stale::Nothing;
+        self.dirty = Dirty::Nothing;
     }
 
-    /// Whether all walls are half-spaces.
-    pub(super) fn are_planes(&self) -> bool {
-        self.parts.is_empty()
+    /// Returns true if all walls are half-spaces.
+    pub(super) fn are_half_spaces(&self) -> bool {
+        self.sub_shapes.is_empty()
     }
 
-    /// Names the parts of walls, but for half-spaces, that may have a point in common with a
-    /// box.
-    pub(super) fn near(&self, bounds: &Box3<S>, mut name: impl FnMut(Part)) {
-        self.tree.near(bounds, |item| {
-            let Part { wall, part } = self.parts[item as usize];
-            self.shapes[wall as usize].near(part, bounds, |part| name(Part { wall, part }));
+    /// Visits the sub-shapes of walls, except half-spaces, that may overlap a box.
+    pub(super) fn for_each_in_box(&self, bounds: &Aabb3<S>, mut visit: impl FnMut(SubShape)) {
+        self.tree.for_each_in_box(bounds, |item| {
+            let SubShape { wall, part } = self.sub_shapes[item as usize];
+            self.shapes[wall as usize]
+                .for_each_in_box(part, bounds, |part| visit(SubShape { wall, part }));
         });
     }
 
-    /// Names the parts of walls, but for half-spaces, that may be within `reach` metres of a
+    /// Visits the sub-shapes of walls, except half-spaces, that may be within `reach` metres of a
     /// point.
-    pub(super) fn around(&self, point: Point3<S>, reach: S, mut name: impl FnMut(Part)) {
-        self.tree.around(point, reach, |item| {
-            let Part { wall, part } = self.parts[item as usize];
-            self.shapes[wall as usize].around(part, point, reach, |part| name(Part { wall, part }));
+    pub(super) fn for_each_near(
+        &self,
+        point: Point3<S>,
+        reach: S,
+        mut visit: impl FnMut(SubShape),
+    ) {
+        self.tree.for_each_near(point, reach, |item| {
+            let SubShape { wall, part } = self.sub_shapes[item as usize];
+            self.shapes[wall as usize]
+                .for_each_near(part, point, reach, |part| visit(SubShape { wall, part }));
             reach
         });
     }
 
-    /// Where a part is nearest to a point.
-    pub(super) fn nearest(&self, Part { wall, part }: Part, point: Point3<S>) -> Nearest<S> {
-        self.shapes[wall as usize].nearest_of(part, point)
-    }
-
-    /// Where a part is nearest to a capsule, unless it is a half-space.
-    pub(super) fn closest(
+    /// Projects a point onto a sub-shape.
+    pub(super) fn project_point(
         &self,
-        Part { wall, part }: Part,
-        capsule: &Capsule<S>,
-    ) -> Option<Closest<S>> {
-        self.shapes[wall as usize].closest(part, capsule)
+        SubShape { wall, part }: SubShape,
+        point: Point3<S>,
+    ) -> PointProjection<S> {
+        self.shapes[wall as usize].project_point_on(part, point)
     }
 
-    /// All half-spaces, with their rows.
+    /// Closest points of a sub-shape and a capsule, except for half-spaces.
+    pub(super) fn closest_points(
+        &self,
+        SubShape { wall, part }: SubShape,
+        capsule: &Capsule<S>,
+    ) -> Option<ClosestPoints<S>> {
+        self.shapes[wall as usize].closest_points(part, capsule)
+    }
+
+    /// All half-spaces with their indices.
     pub(super) fn planes(&self) -> impl Iterator<Item = (u32, &Plane<S>)> {
         self.planes.iter().filter_map(|row| match &self.shapes[*row as usize] {
             WallShape::Plane(plane) => Some((*row, plane)),
@@ -242,8 +251,8 @@ impl<S: Scalar> Walls<S> {
         })
     }
 
-    /// Says how a wall moves, or with `None` that it is at rest. It is up to the
-    /// caller to move it accordingly, with [`Walls::set`].
+    /// Sets the motion of a wall, or with `None` puts it at rest. The caller moves it accordingly,
+    /// with [`Walls::set`].
     ///
     /// # Errors
     /// [`Error::NoSuchWall`], [`Error::NotFinite`].
@@ -251,7 +260,10 @@ impl<S: Scalar> Walls<S> {
         let row = self.row(id)?;
         if let Some(motion) = motion {
             finite_vector(["velocity.x", "velocity.y", "velocity.z"], motion.velocity)?;
-            finite_vector(["spin.x", "spin.y", "spin.z"], motion.spin)?;
+            finite_vector(
+                ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"],
+                motion.angular_velocity,
+            )?;
             finite_point(["pivot.x", "pivot.y", "pivot.z"], motion.pivot)?;
         }
         self.version += u64::from(self.motion.get(row) != motion);
@@ -259,7 +271,7 @@ impl<S: Scalar> Walls<S> {
         Ok(())
     }
 
-    /// How a wall moves, or `None` if it is at rest.
+    /// Motion of a wall, or `None` if it is at rest.
     ///
     /// # Errors
     /// [`Error::NoSuchWall`].
@@ -267,8 +279,8 @@ impl<S: Scalar> Walls<S> {
         self.row(id).map(|row| self.motion.get(row))
     }
 
-    /// Gives a wall a material of its own, which counts together with the marble's, or
-    /// with `None` leaves it to the marble's alone.
+    /// Sets the wall's own material, which is combined with the marble's; with `None` the marble's
+    /// counts alone.
     ///
     /// # Errors
     /// [`Error::NoSuchWall`], [`Error::OutOfRange`].
@@ -280,7 +292,7 @@ impl<S: Scalar> Walls<S> {
         Ok(())
     }
 
-    /// The material of a wall, if it has one of its own.
+    /// The wall's own material, if any.
     ///
     /// # Errors
     /// [`Error::NoSuchWall`].
@@ -288,13 +300,13 @@ impl<S: Scalar> Walls<S> {
         self.row(id).map(|row| self.material.get(row))
     }
 
-    /// All walls, by row.
+    /// Shapes of all walls, by index.
     #[must_use]
     pub fn shapes(&self) -> &[WallShape<S>] {
         &self.shapes
     }
 
-    /// The row of a wall, until the next removal.
+    /// Index of a wall, valid until the next removal.
     ///
     /// # Errors
     /// [`Error::NoSuchWall`].
@@ -302,25 +314,25 @@ impl<S: Scalar> Walls<S> {
         self.handles.row(id.0).ok_or(Error::NoSuchWall(id))
     }
 
-    /// The wall in a row.
+    /// Handle of the wall at an index.
     #[must_use]
     pub fn id(&self, row: usize) -> Option<WallId> {
         self.handles.handle(row).map(WallId)
     }
 
-    /// How the wall in a row moves.
+    /// Motion of the wall at an index.
     pub(super) fn motion_of_row(&self, row: usize) -> Option<WallMotion<S>> {
         self.motion.get(row)
     }
 
-    /// Whether the wall in a row was set to another place since the last step.
+    /// Returns true if the wall at an index was set to another pose since the last step.
     pub(super) fn has_moved(&self, row: usize) -> bool {
         self.moved.get(row).is_some()
     }
 
-    /// Puts walls that were set to another place since the last step, and have a motion, to where
-    /// that led them `left` seconds before the end of the step.
-    pub(super) fn go_to(&mut self, left: S) {
+    /// Moves walls that were set to another pose since the last step, and have a motion, to their
+    /// interpolated pose `left` seconds before the end of the step.
+    pub(super) fn interpolate_to(&mut self, left: S) {
         if self.ends.is_empty() && left > S::zero() {
             let rows = (0..self.shapes.len()).filter(|row| self.moved.get(*row).is_some());
             let ends =
@@ -328,37 +340,37 @@ impl<S: Scalar> Walls<S> {
             self.ends = ends.collect();
         }
         for (row, end, motion) in &self.ends {
-            // A place that it cannot have is none that it comes by.
-            let on_its_way = || end.moved(motion.undone(left)).and_then(WallShape::checked).ok();
+            // An invalid pose is skipped.
+            let on_its_way =
+                || end.transformed(motion.pose_before(left)).and_then(WallShape::checked).ok();
             let shape = if left > S::zero() { on_its_way() } else { None };
             self.shapes[*row] = shape.unwrap_or_else(|| end.clone());
             let pivot = Some(motion.pivot - motion.velocity * left).filter(|p| is_finite_point(*p));
             let pivot = pivot.unwrap_or(motion.pivot);
             self.motion.set(*row, Some(WallMotion { pivot, ..*motion }), self.shapes.len());
-            self.stale = self.stale.max(Stale::Places);
+            self.dirty = self.dirty.max(Dirty::Poses);
         }
     }
 
-    /// Notes that a step is over: all walls are where they are to stay.
-    pub(super) fn arrive(&mut self) {
-        self.go_to(S::zero());
+    /// Ends a step: all walls are at their final poses.
+    pub(super) fn finish_step(&mut self) {
+        self.interpolate_to(S::zero());
         self.ends.clear();
         self.moved.clear();
     }
 
-    /// The own material of the wall in a row.
+    /// The wall's own material, by index.
     pub(super) fn material_of_row(&self, row: usize) -> Option<Material<S>> {
         self.material.get(row)
     }
 
-    /// Count of all insertions, removals and changes so far: as long as it is the same, so are
-    /// the walls.
+    /// Number of insertions, removals and changes so far: unchanged as long as the walls are.
     #[must_use]
     pub fn version(&self) -> u64 {
         self.version
     }
 
-    /// How many walls were taken out so far.
+    /// Number of removals so far.
     pub(super) fn removals(&self) -> u64 {
         self.handles.removals()
     }
@@ -378,7 +390,8 @@ impl<S: Scalar> Walls<S> {
 
 impl<S: Scalar> response::Walls<S> for Walls<S> {
     fn normal_and_distance(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S) {
-        let Nearest { normal, distance, .. } = self.shapes[wall].nearest_of(part, point);
+        let PointProjection { normal, distance, .. } =
+            self.shapes[wall].project_point_on(part, point);
         (normal, distance)
     }
 

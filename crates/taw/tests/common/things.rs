@@ -4,7 +4,7 @@
 use proptest::prelude::*;
 use taw::frame::{AxisAngle, Pose};
 use taw::prelude::*;
-use taw::shape::{Aabb, Capsule, Hull, Obb, Solid, Triangle};
+use taw::shape::{Aabb, BoundedShape, Capsule, Hull, Obb, Triangle};
 
 /// One of each kind, of about this size, about here; its size beside it.
 #[derive(Clone, Debug)]
@@ -34,20 +34,22 @@ macro_rules! each {
 
 impl Thing<f64> {
     /// The same elsewhere. A box along the axes stays one unless it is turned.
-    pub fn moved(&self, pose: Pose<f64>) -> Self {
+    pub fn transformed(&self, pose: Pose<f64>) -> Self {
         let by = pose.translation;
         match self.clone() {
-            Self::Sphere(it) => Self::Sphere(Sphere { center: pose.point(it.center), ..it }),
+            Self::Sphere(it) => {
+                Self::Sphere(Sphere { center: pose.transform_point(it.center), ..it })
+            }
             Self::Aabb(it) if pose == (Pose { translation: by, ..Pose::identity() }) => {
                 Self::Aabb(Aabb { min: it.min + by, max: it.max + by })
             }
-            Self::Aabb(it) => Self::Obb(it.obb().moved(pose)),
-            Self::Obb(it) => Self::Obb(it.moved(pose)),
-            Self::Capsule(it) => Self::Capsule(it.moved(pose)),
-            Self::Triangle(it) => {
-                Self::Triangle(Triangle { corners: it.corners.map(|corner| pose.point(corner)) })
-            }
-            Self::Hull(it) => Self::Hull(it.moved(pose)),
+            Self::Aabb(it) => Self::Obb(it.obb().transformed(pose)),
+            Self::Obb(it) => Self::Obb(it.transformed(pose)),
+            Self::Capsule(it) => Self::Capsule(it.transformed(pose)),
+            Self::Triangle(it) => Self::Triangle(Triangle {
+                corners: it.corners.map(|corner| pose.transform_point(corner)),
+            }),
+            Self::Hull(it) => Self::Hull(it.transformed(pose)),
         }
     }
 }
@@ -67,8 +69,8 @@ pub fn things<S: Scalar>(
     let turn = AxisAngle::new(Vec3::from(*axis), *angle).unwrap();
     let axis = turn.axis().map(S::constant);
     let rotation = AxisAngle::new(axis, S::constant(turn.angle())).unwrap().into();
-    let half_widths = Vec3::from([0, 1, 2].map(|i| size(points[0][i])));
-    let obb = Obb::new(point([0.0; 3]), rotation, half_widths).unwrap();
+    let half_extents = Vec3::from([0, 1, 2].map(|i| size(points[0][i])));
+    let obb = Obb::new(point([0.0; 3]), rotation, half_extents).unwrap();
     let corners: Vec<_> = points.iter().map(|p| point(*p)).collect();
     let mut all = vec![
         Thing::Sphere(Sphere::new(point([0.0; 3]), size(points[0][0])).unwrap()),

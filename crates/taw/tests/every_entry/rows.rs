@@ -9,7 +9,7 @@ use taw::motion::{Medium, WallMotion};
 use taw::prelude::*;
 use taw::response::Elasticity;
 use taw::scene::{Movement, Running};
-use taw::shape::{Aabb, Box3, Capsule, Compound, HeightField, Hull, Mesh, Obb, Shape};
+use taw::shape::{Aabb, Aabb3, Capsule, Compound, HeightField, Hull, Mesh, Obb, Shape};
 use taw::swarm;
 use taw::world::{Damping, SpeedLimits};
 
@@ -151,7 +151,7 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
         };
         Marble 4 "Marble.velocity": |p, x| { let v = on_axis(p.case, x); insert(p, |m| m.velocity = v) };
         Marble 3 "Marble.rotation": |p, x| { let q = quaternions(x)[p.case]; insert(p, |m| m.rotation = q) };
-        Marble 4 "Marble.spin": |p, x| { let v = on_axis(p.case, x); insert(p, |m| m.spin = v) };
+        Marble 4 "Marble.angular_velocity": |p, x| { let v = on_axis(p.case, x); insert(p, |m| m.angular_velocity = v) };
         Marble 1 "Marble.mass Mass::Density": |p, x| insert(p, |m| m.mass = Mass::Density(x));
         Marble 1 "Mass::Kilograms": |p, x| insert(p, |m| m.mass = Mass::Kilograms(x));
         Marble 1 "Marble.gravity_scale": |p, x| insert(p, |m| m.gravity_scale = x);
@@ -170,7 +170,7 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
             p.world.marbles.set_half_length(p.subject, x)
         };
         Marble 3 "Marbles::set_rotation": |p, x| p.world.marbles.set_rotation(p.subject, quaternions(x)[p.case]);
-        Marble 4 "Marbles::set_spin": |p, x| { let v = on_axis(p.case, x); p.world.marbles.set_spin(p.subject, v) };
+        Marble 4 "Marbles::set_angular_velocity": |p, x| { let v = on_axis(p.case, x); p.world.marbles.set_angular_velocity(p.subject, v) };
         Marble 1 "Marbles::set_mass": |p, x| p.world.marbles.set_mass(p.subject, Mass::Kilograms(x));
         Marble 1 "Marbles::set_gravity_scale": |p, x| p.world.marbles.set_gravity_scale(p.subject, x);
         Marble 1 "Marbles::set_damping": |p, x| p.world.marbles.set_damping(p.subject, Damping { linear: x, angular: x });
@@ -198,40 +198,40 @@ fn worlds<S: Scalar>() -> Vec<Row<S>> {
         World 4 "World::set_gravity": |p, x| {
             p.world.set_gravity(on_axis(p.case, x))
         };
-        World 1 "World::set_forces Force::Drag Medium.velocity": |p, x| {
+        World 1 "World::set_forces ForceField::Drag Medium.velocity": |p, x| {
             let velocity = vector(x, zero(), zero());
-            p.world.set_forces(vec![Force::Drag(Medium { velocity, linear: one(), quadratic: one() })])
+            p.world.set_forces(vec![ForceField::Drag(Medium { velocity, linear: one(), quadratic: one() })])
         };
         World 1 "Medium.linear": |p, x| {
             let velocity = vector(one(), zero(), zero());
-            p.world.set_forces(vec![Force::Drag(Medium { velocity, linear: x, quadratic: one() })])
+            p.world.set_forces(vec![ForceField::Drag(Medium { velocity, linear: x, quadratic: one() })])
         };
         World 1 "Medium.quadratic": |p, x| {
             let velocity = vector(one(), zero(), zero());
-            p.world.set_forces(vec![Force::Drag(Medium { velocity, linear: one(), quadratic: x })])
+            p.world.set_forces(vec![ForceField::Drag(Medium { velocity, linear: one(), quadratic: x })])
         };
-        World 1 "Force::Spring.anchor": |p, x| {
+        World 1 "ForceField::Spring.anchor": |p, x| {
             let anchor = point(x, x, x);
-            p.world.set_forces(vec![Force::Spring { anchor, rest_length: one(), stiffness: one() }])
+            p.world.set_forces(vec![ForceField::Spring { anchor, rest_length: one(), stiffness: one() }])
         };
-        World 1 "Force::Spring.rest_length": |p, x| {
+        World 1 "ForceField::Spring.rest_length": |p, x| {
             let anchor = point(zero(), zero(), zero());
-            p.world.set_forces(vec![Force::Spring { anchor, rest_length: x, stiffness: one() }])
+            p.world.set_forces(vec![ForceField::Spring { anchor, rest_length: x, stiffness: one() }])
         };
-        World 1 "Force::Spring.stiffness": |p, x| {
+        World 1 "ForceField::Spring.stiffness": |p, x| {
             let anchor = point(zero(), zero(), zero());
-            p.world.set_forces(vec![Force::Spring { anchor, rest_length: one(), stiffness: x }])
+            p.world.set_forces(vec![ForceField::Spring { anchor, rest_length: one(), stiffness: x }])
         };
-        World 1 "Force::Attraction.center": |p, x| {
-            p.world.set_forces(vec![Force::Attraction { center: point(x, x, x), strength: one() }])
+        World 1 "ForceField::Attraction.center": |p, x| {
+            p.world.set_forces(vec![ForceField::Attraction { center: point(x, x, x), strength: one() }])
         };
-        World 1 "Force::Attraction.strength": |p, x| {
+        World 1 "ForceField::Attraction.strength": |p, x| {
             let center = point(zero(), zero(), zero());
-            p.world.set_forces(vec![Force::Attraction { center, strength: x }])
+            p.world.set_forces(vec![ForceField::Attraction { center, strength: x }])
         };
-        World 1 "Force::Custom": |p, x| {
+        World 1 "ForceField::Custom": |p, x| {
             if !x.is_nan() { return Ok(()) }
-            p.world.set_forces(vec![Force::Custom(|_, mass| vector(mass / S::zero(), S::zero(), S::zero()))])
+            p.world.set_forces(vec![ForceField::Custom(|_, mass| vector(mass / S::zero(), S::zero(), S::zero()))])
         };
         World 1 "World::set_speed_limits SpeedLimits.linear": |p, x| {
             p.world.set_speed_limits(SpeedLimits { linear: Some(x), angular: None })
@@ -307,17 +307,17 @@ fn walls<S: Scalar>() -> Vec<Row<S>> {
         World 4 "Aabb.min": |p, x| solid(p, Shape::Aabb(Aabb { min: point(x, x, x), max: point(one(), zero(), one()) }));
         World 4 "Aabb.max": |p, x| solid(p, Shape::Aabb(Aabb { min: point(zero(), -one::<S>(), zero()), max: point(x, x, x) }));
         World 4 "Obb.center": |p, x| {
-            let half_widths = vector(one(), one(), one());
+            let half_extents = vector(one(), one(), one());
             let rotation = Quat::new(one(), zero(), zero(), zero());
-            solid(p, Shape::Obb(Obb { center: point(x, x, x), rotation, half_widths }))
+            solid(p, Shape::Obb(Obb { center: point(x, x, x), rotation, half_extents }))
         };
         World 4 "Obb.rotation": |p, x| {
-            let (center, half_widths) = (point(zero(), -one::<S>(), zero()), vector(one(), one(), one()));
-            solid(p, Shape::Obb(Obb { center, rotation: quaternions(x)[p.case % 3], half_widths }))
+            let (center, half_extents) = (point(zero(), -one::<S>(), zero()), vector(one(), one(), one()));
+            solid(p, Shape::Obb(Obb { center, rotation: quaternions(x)[p.case % 3], half_extents }))
         };
-        World 4 "Obb.half_widths": |p, x| {
+        World 4 "Obb.half_extents": |p, x| {
             let rotation = Quat::new(one(), zero(), zero(), zero());
-            solid(p, Shape::Obb(Obb { center: point(zero(), -one::<S>(), zero()), rotation, half_widths: vector(x, x, x) }))
+            solid(p, Shape::Obb(Obb { center: point(zero(), -one::<S>(), zero()), rotation, half_extents: vector(x, x, x) }))
         };
         World 4 "Capsule.a": |p, x| solid(p, Shape::Capsule(Capsule { a: point(x, x, x), b: point(zero(), zero(), zero()), radius: one() }));
         World 4 "Capsule.b": |p, x| solid(p, Shape::Capsule(Capsule { a: point(zero(), zero(), zero()), b: point(x, x, x), radius: one() }));
@@ -330,22 +330,22 @@ fn walls<S: Scalar>() -> Vec<Row<S>> {
         World 6 "Pose.translation": |p, x| {
             with_pose(p, pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x)))
         };
-        World 1 "WallShape::moved": |p, x| {
+        World 1 "WallShape::transformed": |p, x| {
             let pose = pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x));
-            let moved = p.world.walls.get(p.wall)?.moved(pose)?;
+            let moved = p.world.walls.get(p.wall)?.transformed(pose)?;
             p.world.walls.set(p.wall, moved)
         };
         World 4 "Walls::set_motion WallMotion.velocity": |p, x| {
             let (none, pivot) = (vector(zero(), zero(), zero()), point(zero(), zero(), zero()));
-            { let v = on_axis(p.case, x); p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: v, spin: none, pivot })) }
+            { let v = on_axis(p.case, x); p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: v, angular_velocity: none, pivot })) }
         };
-        World 1 "WallMotion.spin": |p, x| {
+        World 1 "WallMotion.angular_velocity": |p, x| {
             let (none, pivot) = (vector(zero(), zero(), zero()), point(zero(), zero(), zero()));
-            p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: none, spin: vector(x, x, x), pivot }))
+            p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: none, angular_velocity: vector(x, x, x), pivot }))
         };
         World 1 "WallMotion.pivot": |p, x| {
             let (none, spin) = (vector(zero(), zero(), zero()), vector(zero(), zero(), one()));
-            p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: none, spin, pivot: point(x, x, x) }))
+            p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: none, angular_velocity: spin, pivot: point(x, x, x) }))
         };
     }
 }
@@ -356,7 +356,7 @@ fn constructors<S: Scalar>() -> Vec<Row<S>> {
             let (at, radius) = if p.case < 2 { (x, one()) } else { (zero(), x) };
             wall(p, Sphere::new(point(at, at, at), radius)?)
         };
-        World 2 "Aabb::new": |p, x| wall(p, Box3::new(point(x, -one::<S>(), zero()), point(one(), zero(), x))?);
+        World 2 "Aabb::new": |p, x| wall(p, Aabb3::new(point(x, -one::<S>(), zero()), point(one(), zero(), x))?);
         World 3 "Obb::new": |p, x| {
             let straight = Quat::new(one(), zero(), zero(), zero());
             let unit = vector(one(), one(), one());
@@ -380,7 +380,7 @@ fn constructors<S: Scalar>() -> Vec<Row<S>> {
             let mut corners = corners.map(|c| Point3::from(c.map(S::constant))).to_vec();
             corners.push(point(zero(), zero(), x));
             match Hull::new(&corners) {
-                Err(Error::Flat { field }) => Err(Error::NotUnit { field, value: 0.0 }),
+                Err(Error::Coplanar { field }) => Err(Error::NotUnit { field, value: 0.0 }),
                 hull => wall(p, hull?),
             }
         };
@@ -405,13 +405,13 @@ fn constructors<S: Scalar>() -> Vec<Row<S>> {
             wall(p, Plane::through(point(at, at, at), vector(zero(), along, along))?)
         };
         World 3 "AxisAngle::new": |p, x| {
-            let half_widths = vector(one(), one(), one());
+            let half_extents = vector(one(), one(), one());
             let turned = |axis, angle| AxisAngle::new(axis, angle).map(Quat::from);
             let rotation = match p.case {
                 0 => turned(vector(x, x, zero()), one())?,
                 _ => turned(vector(zero(), one(), zero()), x)?,
             };
-            wall(p, Obb::new(point(zero(), zero(), zero()), rotation, half_widths)?)
+            wall(p, Obb::new(point(zero(), zero(), zero()), rotation, half_extents)?)
         };
         World 2 "LookAt::new": |p, x| {
             let rotation = Quat::from(LookAt::new(vector(x, one(), zero()), vector(zero(), x, x))?);

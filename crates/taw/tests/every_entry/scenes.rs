@@ -128,7 +128,7 @@ pub fn rows() -> Vec<(&'static str, Set)> {
         ("scene::Scene.marbles scene::Ball.position", |s, x| s.marbles[0].position = [x, x, x]),
         ("scene::Ball.radius", |s, x| s.marbles[0].radius = x),
         ("scene::Ball.velocity", |s, x| s.marbles[0].velocity[1] = x),
-        ("scene::Ball.spin", |s, x| s.marbles[0].spin = [x, x, x]),
+        ("scene::Ball.angular_velocity", |s, x| s.marbles[0].angular_velocity = [x, x, x]),
         ("scene::Ball.density", |s, x| s.marbles[0].density = x),
         ("scene::Ball.half_length", |s, x| s.marbles[0].half_length = x),
         ("scene::Ball.turned", |s, x| s.marbles[0].turned = Turn { axis: [0.0, x, x], degrees: x }),

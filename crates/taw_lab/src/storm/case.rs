@@ -93,7 +93,7 @@ impl Case {
         if let Some(swarm) = &self.swarm {
             swarm.fill(&mut running.world.swarm)?;
         }
-        running.world.keep_account(true);
+        running.world.enable_energy_audit(true);
         Ok(running)
     }
 

@@ -10,7 +10,7 @@ pub struct Body {
     /// In m/s.
     pub velocity: Vec3<f64>,
     /// In rad/s; zero if nothing feels it.
-    pub spin: Vec3<f64>,
+    pub angular_velocity: Vec3<f64>,
     /// In kilograms.
     pub mass: f64,
     /// In metres.
@@ -35,7 +35,7 @@ impl Body {
     pub fn spin_energy(&self) -> f64 {
         let (r, h) = (self.radius, self.half.magnitude());
         if h == 0.0 {
-            return 0.2 * self.mass * r * r * self.spin.magnitude2();
+            return 0.2 * self.mass * r * r * self.angular_velocity.magnitude2();
         }
         // Volumes without π: 2 h r² and 4/3 r³.
         let (cylinder, ends) = (2.0 * h * r * r, 4.0 / 3.0 * r.powi(3));
@@ -44,8 +44,9 @@ impl Body {
         let across = share
             * (cylinder * (0.25 * r * r + h * h / 3.0)
                 + ends * (0.4 * r * r + h * h + 0.75 * h * r));
-        let about = self.spin.dot(self.half / h);
-        0.5 * (along * about * about + across * (self.spin.magnitude2() - about * about))
+        let about = self.angular_velocity.dot(self.half / h);
+        0.5 * (along * about * about
+            + across * (self.angular_velocity.magnitude2() - about * about))
     }
 
     /// The balls that stand for it: itself, or the two ends and the middle of a capsule.
@@ -64,7 +65,7 @@ impl Body {
     /// Whether all its numbers are finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
-        [self.at, self.velocity, self.spin].iter().all(|v| v.magnitude2().is_finite())
+        [self.at, self.velocity, self.angular_velocity].iter().all(|v| v.magnitude2().is_finite())
     }
 }
 
@@ -86,7 +87,7 @@ impl Snapshot {
     #[must_use]
     pub fn of<S: Scalar>(world: &World<S>) -> Self {
         let gravity = world.gravity();
-        let account = world.account().unwrap_or_default();
+        let account = world.energy_audit().unwrap_or_default();
         let mut bodies = marbles(world);
         bodies.extend(balls(world));
         let stopped = world.stopped().count() + world.swarm.stopped().count();
@@ -130,7 +131,7 @@ impl Snapshot {
 fn marbles<S: Scalar>(world: &World<S>) -> Vec<Body> {
     let ids = (0..world.marbles.len()).filter_map(|row| world.marbles.id(row));
     let spins = world.model().rotation == Rotation::Dynamic;
-    let exact = ids.filter_map(|id| world.marbles.get_exact(id).ok());
+    let exact = ids.filter_map(|id| world.marbles.get_high_precision(id).ok());
     let body = |marble: Marble<f64>| {
         let at = marble.position.to_vec();
         let half = marble.rotation * Vec3::unit_y() * marble.half_length;
@@ -138,7 +139,7 @@ fn marbles<S: Scalar>(world: &World<S>) -> Vec<Body> {
         let body = Body {
             at,
             velocity: marble.velocity,
-            spin: if spins { marble.spin } else { Vec3::zero() },
+            angular_velocity: if spins { marble.angular_velocity } else { Vec3::zero() },
             mass,
             radius: marble.radius,
             half,
@@ -161,7 +162,7 @@ fn balls<S: Scalar>(world: &World<S>) -> Vec<Body> {
             let body = Body {
                 at: Vec3::new(x, y, z),
                 velocity: Vec3::new(vx, vy, vz),
-                spin: Vec3::new(sx, sy, sz) / radius,
+                angular_velocity: Vec3::new(sx, sy, sz) / radius,
                 mass: inverse_mass.abs().recip(),
                 radius,
                 half: Vec3::zero(),
@@ -183,7 +184,7 @@ fn beside_walls<S: Scalar>(mut body: Body, world: &World<S>) -> Body {
     }
     for (row, shape) in world.walls.shapes().iter().enumerate() {
         for ball in body.balls() {
-            let distance = shape.nearest(point(ball)).distance.as_f64();
+            let distance = shape.project_point(point(ball)).distance.as_f64();
             body.wall_gap = body.wall_gap.min(distance - body.radius);
         }
         let motion = world.walls.id(row).and_then(|id| world.walls.motion(id).ok().flatten());

@@ -232,7 +232,7 @@ fn difference<S: Scalar>(
         _ => Point3::origin(),
     };
     let single = |pose: Pose<f64>| {
-        let place = pose.point(middle);
+        let place = pose.transform_point(middle);
         let place = Point3::new(place.x as f32, place.y as f32, place.z as f32);
         let turn = pose.rotation;
         let [x, y, z] = [turn.v.x, turn.v.y, turn.v.z].map(|x| x as f32);
@@ -251,7 +251,7 @@ fn difference<S: Scalar>(
     let vector = |v: Vec3<f32>| Vec3::new(v.x, v.y, v.z).map(|x: f32| S::constant(f64::from(x)));
     Ok(Some(taw::motion::WallMotion {
         velocity: vector((now.0 - last.0) / dt),
-        spin: vector(axis * (angle / dt)),
+        angular_velocity: vector(axis * (angle / dt)),
         pivot: Point3::from_vec(vector(now.0.to_vec())),
     }))
 }
@@ -282,7 +282,7 @@ fn trail_in<S: Scalar>(case: &Case, body: usize, until: u32) -> String {
         }
         let now = Snapshot::of(&running.world);
         let Some(of) = now.bodies.get(body) else { break };
-        let (at, velocity, spin) = (of.at, of.velocity, of.spin);
+        let (at, velocity, spin) = (of.at, of.velocity, of.angular_velocity);
         let _ = write!(text, "{step}: at {:.6} {:.6} {:.6}", at.x, at.y, at.z);
         let _ = write!(text, " velocity {:.6} {:.6} {:.6}", velocity.x, velocity.y, velocity.z);
         let _ = write!(text, " spin {:.4} {:.4} {:.4}", spin.x, spin.y, spin.z);

@@ -127,7 +127,7 @@ const SIMPLER: [fn(&mut Case); 15] = [
     |case| case.step = 1.0 / 60.0,
     |case| case.scene.gravity = [0.0, -9.81, 0.0],
     |case| case.scene.marbles.iter_mut().for_each(|ball| ball.surface = None),
-    |case| case.scene.marbles.iter_mut().for_each(|ball| ball.spin = [0.0; 3]),
+    |case| case.scene.marbles.iter_mut().for_each(|ball| ball.angular_velocity = [0.0; 3]),
     |case| case.scene.marbles.iter_mut().for_each(|ball| ball.half_length = 0.0),
     |case| case.scene.marbles.iter_mut().for_each(|ball| ball.density = 1000.0),
     |case| {
@@ -164,7 +164,8 @@ fn round(best: &mut Case, fails: &mut dyn FnMut(&Case) -> Option<u32>) {
                         |x: f64| if scale > 0.0 { (x * scale).round() / scale } else { 0.0 };
                     if attempt(best, fails, |case| {
                         let ball = &mut case.scene.marbles[body];
-                        let vector = [&mut ball.position, &mut ball.velocity, &mut ball.spin];
+                        let vector =
+                            [&mut ball.position, &mut ball.velocity, &mut ball.angular_velocity];
                         let [position, velocity, spin] = vector;
                         let number = &mut [position, velocity, spin][field][axis];
                         *number = shorter(*number);

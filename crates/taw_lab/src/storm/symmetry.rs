@@ -102,7 +102,7 @@ impl Symmetry {
         Ball {
             position: self.of(ball.position),
             velocity: self.of(ball.velocity),
-            spin: self.axial(ball.spin),
+            angular_velocity: self.axial(ball.angular_velocity),
             turned: self.turn(ball.turned),
             ..ball
         }

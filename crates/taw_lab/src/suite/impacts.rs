@@ -27,7 +27,7 @@ fn bounce(
         at,
         radius,
         velocity: [v[0], v[1], 0.0],
-        spin: [0.0, 0.0, spin],
+        angular_velocity: [0.0, 0.0, spin],
         material,
         ..Ball::default()
     };

@@ -19,7 +19,7 @@ fn dzhanibekov(dt: f64) -> [f64; 4] {
     let (mut energy, mut turned): (f64, f64) = (0.0, 0.0);
     let (mut flips, mut last, mut at) = (0, 1.0, 0.0);
     for step in 1..=(100.0 / dt).round() as u32 {
-        body = body.after(inertia, dt as f32);
+        body = body.step(inertia, dt as f32);
         energy = energy.max((f64::from(body.energy(inertia)) / start - 1.0).abs());
         let off = body.angular_momentum().map(f64::from) - axis;
         turned = turned.max(off.magnitude() / axis.magnitude());
@@ -86,7 +86,7 @@ fn extremes(meter: &mut Meter, model: Model) -> f64 {
                     let ball = Ball {
                         at: [0.0, 0.5, 0.0],
                         velocity: [1.0, -1.0, 0.0],
-                        spin: [0.0, 0.0, spin],
+                        angular_velocity: [0.0, 0.0, spin],
                         material,
                         ..Ball::default()
                     };
@@ -148,7 +148,7 @@ fn not_finite(meter: &mut Meter) -> f64 {
         let refused = [
             Marble { position: Point3::new(bad, 0.0, 0.0), ..good },
             Marble { velocity: v, ..good },
-            Marble { spin: v, ..good },
+            Marble { angular_velocity: v, ..good },
             Marble { radius: bad, ..good },
             Marble { rotation: Quat::new(bad, 0.0, 0.0, 0.0), ..good },
             Marble { gravity_scale: bad, ..good },
@@ -174,12 +174,14 @@ fn not_finite(meter: &mut Meter) -> f64 {
             // Far from the others, and heavy, by which the force knows it.
             Ball { at: [-50.0, 1.0, 0.0], mass: 1e3, ..Ball::default() }.insert(&mut world);
             if sick {
-                let force = Force::Custom(|_, mass| {
+                let force = ForceField::Custom(|_, mass| {
                     vector([if mass > 100.0 { f64::NAN } else { 0.0 }, 0.0, 0.0])
                 });
                 world.set_forces(vec![force]).expect("a function");
             } else {
-                world.set_forces(vec![Force::Custom(|_, _| vector([0.0; 3]))]).expect("a function");
+                world
+                    .set_forces(vec![ForceField::Custom(|_, _| vector([0.0; 3]))])
+                    .expect("a function");
             }
             let mut stopped = 0;
             for _ in 0..60 {

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use taw::frame::Pose;
 use taw::math::Quat;
-use taw::motion::{WallMotion, turned};
+use taw::motion::{WallMotion, integrate_rotation};
 use taw::prelude::*;
 use taw::shape::Mesh;
 
@@ -53,7 +53,7 @@ fn corner(meter: &mut Meter, model: Model) -> f64 {
                 random.between(-3.0, 0.0),
                 random.between(0.0, 3.0),
             ],
-            spin: random.vector(10.0),
+            angular_velocity: random.vector(10.0),
             material: surface(random.between(0.0, 1.0), random.between(0.0, 1.5)),
             ..Ball::default()
         };
@@ -99,7 +99,7 @@ fn cone(meter: &mut Meter, model: Model) -> f64 {
             at: [random.between(-0.01, 0.01), high, random.between(-0.01, 0.01)],
             radius: 0.25,
             velocity: random.vector(0.8),
-            spin: random.vector(10.0),
+            angular_velocity: random.vector(10.0),
             material: surface(0.0, random.between(0.3, 1.3)),
             ..Ball::default()
         };
@@ -123,7 +123,7 @@ fn groove(meter: &mut Meter, model: Model) -> f64 {
             at: [0.0, 0.25 / cos + random.between(0.0, 0.1), 0.0],
             radius: 0.25,
             velocity: random.vector(1.0),
-            spin: random.vector(10.0),
+            angular_velocity: random.vector(10.0),
             material: surface(random.between(0.0, 1.0), random.between(0.3, 1.3)),
             ..Ball::default()
         };
@@ -150,13 +150,13 @@ impl Moving {
     }
 
     fn go(&mut self, world: &mut World<f32>, pose: Pose<f32>) {
-        let [before, after] =
-            [self.pose, pose].map(|pose| pose.point(Point3::from_vec(vector(self.through))));
-        let normal = pose.vector(vector::<f32>(self.normal)).normalize();
+        let [before, after] = [self.pose, pose]
+            .map(|pose| pose.transform_point(Point3::from_vec(vector(self.through))));
+        let normal = pose.transform_vector(vector::<f32>(self.normal)).normalize();
         let turn = pose.rotation * self.pose.rotation.conjugate();
         let motion = WallMotion {
             velocity: (after - before) / DT as f32,
-            spin: turn.v * (2.0 / DT as f32),
+            angular_velocity: turn.v * (2.0 / DT as f32),
             pivot: after,
         };
         let plane = Plane::through(after, normal).expect("a unit vector");
@@ -184,7 +184,8 @@ fn tilting_board(meter: &mut Meter, model: Model) -> f64 {
         }
         for step in 0..1200 {
             let angle = 0.05 * (TAU * 0.25 * DT * f64::from(step)).sin();
-            let rotation = turned(Quat::new(1.0, 0.0, 0.0, 0.0), vector([angle, 0.0, 0.0]), 1.0);
+            let rotation =
+                integrate_rotation(Quat::new(1.0, 0.0, 0.0, 0.0), vector([angle, 0.0, 0.0]), 1.0);
             let pose = Pose { rotation, ..Pose::identity() };
             for wall in &mut walls {
                 wall.go(&mut world, pose);

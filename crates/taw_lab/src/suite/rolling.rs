@@ -77,7 +77,7 @@ fn turntable(meter: &mut Meter, dt: f64) -> [f64; 3] {
     let table = world.walls.id(0).expect("the floor");
     let motion = WallMotion {
         velocity: vector([0.0; 3]),
-        spin: vector([0.0, omega, 0.0]),
+        angular_velocity: vector([0.0, omega, 0.0]),
         pivot: Point3::new(0.0, 0.0, 0.0),
     };
     world.walls.set_motion(table, Some(motion)).expect("finite");
@@ -86,8 +86,13 @@ fn turntable(meter: &mut Meter, dt: f64) -> [f64; 3] {
     let table_velocity = Vec3::new(0.0, omega, 0.0).cross(Vec3::new(2.0, 0.0, 0.0));
     // n × w = (table − v) / r, so w = (table − v) × n / r.
     let spin = (table_velocity - v).cross(Vec3::unit_y()) / 0.5;
-    let id = Ball { at: at.into(), velocity: v.into(), spin: spin.into(), ..on_slope(0.0, 1e3) }
-        .insert(&mut world);
+    let id = Ball {
+        at: at.into(),
+        velocity: v.into(),
+        angular_velocity: spin.into(),
+        ..on_slope(0.0, 1e3)
+    }
+    .insert(&mut world);
     let rate = 2.0 / 7.0 * omega;
     let radius = 0.5 / rate;
     // The velocity turns about +y with the table.
@@ -138,8 +143,11 @@ fn box_with_balls(meter: &mut Meter, degrees: f64, dt: f64) -> f64 {
         let mut stepped = |speed: f64, world: &World<f32>| {
             let mut next = world.clone();
             let velocity = vector((toward * speed).into());
-            let motion =
-                WallMotion { velocity, spin: vector([0.0; 3]), pivot: Point3::new(0.0, 0.0, 0.0) };
+            let motion = WallMotion {
+                velocity,
+                angular_velocity: vector([0.0; 3]),
+                pivot: Point3::new(0.0, 0.0, 0.0),
+            };
             next.walls.set_motion(top, Some(motion)).expect("finite");
             meter.step(&mut next, dt);
             next
@@ -176,14 +184,14 @@ fn resistances(meter: &mut Meter, model: Model, dt: f64) -> f64 {
     let mut world = slope::<f32>(model, 0.0);
     let rolling = Ball {
         velocity: [2.0, 0.0, 0.0],
-        spin: [0.0, 0.0, -4.0],
+        angular_velocity: [0.0, 0.0, -4.0],
         material: rough(0.05, 0.0),
         ..Ball::default()
     }
     .insert(&mut world);
     let spinning = Ball {
         at: [0.0, 0.5, 5.0],
-        spin: [0.0, 10.0, 0.0],
+        angular_velocity: [0.0, 10.0, 0.0],
         material: rough(0.0, 0.02),
         ..Ball::default()
     }
@@ -250,7 +258,7 @@ fn far_roll(meter: &mut Meter, model: Model, far: f64) -> f64 {
     let id = Ball {
         at: [far, 0.5, 0.0],
         velocity: [1.0, 0.0, 0.0],
-        spin: [0.0, 0.0, -2.0],
+        angular_velocity: [0.0, 0.0, -2.0],
         ..on_slope(0.0, 0.5)
     }
     .insert(&mut world);
@@ -284,7 +292,7 @@ fn carried(meter: &mut Meter, model: Model) -> f64 {
     let motion = |velocity: [f64; 3]| {
         Some(WallMotion {
             velocity: vector(velocity),
-            spin: vector([0.0; 3]),
+            angular_velocity: vector([0.0; 3]),
             pivot: Point3::new(0.0, 0.0, 0.0),
         })
     };

@@ -98,7 +98,7 @@ pub async fn film<S: Scalar>(
         if i % every == 0 || i == steps {
             let mut frame = Frame { time: i as f64 * step, ..Frame::default() };
             for id in &ids {
-                let marble = running.world.marbles.get_exact(*id).ok()?;
+                let marble = running.world.marbles.get_high_precision(*id).ok()?;
                 frame.at.push(marble.position.to_vec());
                 frame.velocity.push(marble.velocity);
             }

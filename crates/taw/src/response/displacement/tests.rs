@@ -32,7 +32,7 @@ fn restituted<S: Scalar>(
     let (count, all) = (spheres.len() as u32, Vec3::unit_y()); // only the order depends on it
     let contact = |a, b| Contact { a, b, part: 0, along: [S::zero(); 2], mtv: all };
     let mut contacts = Contacts { wm: (0..count).map(|b| contact(0, b)).collect(), mm: vec![] };
-    crate::broad::all_pairs(count, |a, b| contacts.mm.push(contact(a, b)));
+    crate::broad::brute_force_pairs(count, |a, b| contacts.mm.push(contact(a, b)));
     let mut columns = Columns {
         period: Period::default(),
         position: &mut position,

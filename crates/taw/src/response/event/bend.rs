@@ -14,7 +14,7 @@ use cgmath::{InnerSpace, Zero};
 use super::{Ball, Wall};
 use crate::math::{Point3, Vec3, direction_and_length};
 use crate::response::{BallSpin, Material};
-use crate::shape::Nearest;
+use crate::shape::PointProjection;
 
 /// By what angle the normal may turn in one step, in radians: what a step leaves out is of
 /// its fifth power.
@@ -122,9 +122,9 @@ pub(super) struct Step {
 
 impl Ground<'_> {
     /// The wall that a ball there would be on: the nearest, and of several the first.
-    fn nearest(&self, at: Point3<f64>, time: f64) -> (usize, Nearest<f64>) {
+    fn nearest(&self, at: Point3<f64>, time: f64) -> (usize, PointProjection<f64>) {
         self.looks.set(self.looks.get() + super::PART_LOOKS * self.near.len() as u64);
-        let nowhere = Nearest { point: at, normal: Vec3::zero(), distance: f64::INFINITY };
+        let nowhere = PointProjection { point: at, normal: Vec3::zero(), distance: f64::INFINITY };
         self.near.iter().fold((usize::MAX, nowhere), |best, wall| {
             let wall = *wall as usize;
             if self.walls[wall].at_least(at, time) > best.1.distance {
@@ -150,10 +150,11 @@ impl Ground<'_> {
 
     /// Tests if the surface is flat around a point, and does not turn but about its normal.
     pub fn is_flat(&self, state: &State) -> bool {
-        let (wall, Nearest { normal, .. }) = self.nearest(state.position, state.time);
+        let (wall, PointProjection { normal, .. }) = self.nearest(state.position, state.time);
         let Some(wall) = self.walls.get(wall) else { return false };
         if wall.going(0.0).is_some_and(|(motion, _)| {
-            motion.spin.cross(normal).magnitude() > 1e-12 * motion.spin.magnitude()
+            motion.angular_velocity.cross(normal).magnitude()
+                > 1e-12 * motion.angular_velocity.magnitude()
         }) {
             return false;
         }
@@ -171,7 +172,7 @@ impl Ground<'_> {
     /// Touch of a ball and what it is nearest to.
     pub fn touch(&self, state: &State) -> Option<Touch> {
         let State { time, position, velocity, spin } = *state;
-        let (number, Nearest { normal, .. }) = self.nearest(position, time);
+        let (number, PointProjection { normal, .. }) = self.nearest(position, time);
         let wall = self.walls.get(number)?;
         let over = velocity - wall.way(position, time);
         let along = |x: Vec3<f64>| x - normal * x.dot(normal);
@@ -180,13 +181,13 @@ impl Ground<'_> {
         let point = position - normal * self.radius;
         let mut surface_rate = Vec3::zero();
         if let Some((motion, _)) = wall.going(time) {
-            let turning = motion.spin;
+            let turning = motion.angular_velocity;
             bend += turning.cross(normal);
             needed += normal.dot(turning.cross(velocity - motion.velocity + over));
             surface_rate = turning.cross(velocity - bend * self.radius - motion.velocity);
         } else if let Some(motion) = wall.motion {
             let full = motion.velocity_at(point);
-            surface_rate = motion.spin.cross(velocity - bend * self.radius);
+            surface_rate = motion.angular_velocity.cross(velocity - bend * self.radius);
             surface_rate -= bend * full.dot(normal);
         }
         let mut slip = along(velocity - wall.surface_velocity(normal, point, time));
@@ -371,7 +372,7 @@ impl Ground<'_> {
         let mut longest =
             (BEND / (curved * speed)).min((BEND / (curved * rate.acceleration.magnitude())).sqrt());
         if let Some((motion, _)) = wall.going(0.0) {
-            longest = longest.min(BEND / motion.spin.magnitude());
+            longest = longest.min(BEND / motion.angular_velocity.magnitude());
         }
         // What looks flat may bend farther on.
         longest.min(super::LOOK * self.radius / speed)
@@ -404,7 +405,7 @@ impl Ground<'_> {
         };
         let mut end = start.after(mean, dt);
         // What is left out goes, lest it add up.
-        let (wall, Nearest { normal, distance, .. }) = self.nearest(end.position, end.time);
+        let (wall, PointProjection { normal, distance, .. }) = self.nearest(end.position, end.time);
         end.position += normal * (self.radius - distance);
         let way = self.walls.get(wall)?.way(end.position, end.time);
         end.velocity += normal * (way - end.velocity).dot(normal);
@@ -431,6 +432,6 @@ fn halve(mut hi: f64, holds: impl Fn(f64) -> bool) -> [f64; 2] {
 
 /// Two unit vectors across one, and across each other.
 fn across(normal: Vec3<f64>) -> (Vec3<f64>, Vec3<f64>) {
-    let x = crate::shape::across(normal);
+    let x = crate::shape::any_perpendicular(normal);
     (x, normal.cross(x))
 }

@@ -8,7 +8,7 @@ use cgmath::{InnerSpace, Zero};
 use super::time::{Gap, closing_time, meeting_time};
 use super::{Event, EventDriven, FLUSH, Form, Home, PRESS, REST, SLOP, Settings, What};
 use crate::math::{Point3, Vec3, direction_and_length, is_finite};
-use crate::shape::Nearest;
+use crate::shape::PointProjection;
 
 /// Steps enough for a ball to come to any wall but one that it only grazes; then it looks
 /// again.
@@ -119,7 +119,7 @@ impl EventDriven {
             return self.foresee_part(row, wall, now, settings);
         }
         let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
-        let Nearest { normal, distance, .. } = self.walls[wall].nearest(position, now);
+        let PointProjection { normal, distance, .. } = self.walls[wall].nearest(position, now);
         let gap = Gap {
             now: distance - ball.radius,
             speed: (velocity - self.walls[wall].way(position, now)).dot(normal),
@@ -199,7 +199,7 @@ impl EventDriven {
             }
             settings.count(super::PART_LOOKS);
             let (position, velocity) = (ball.position_at(time), ball.velocity_at(time));
-            let Nearest { normal, distance, .. } = wall.nearest(position, time);
+            let PointProjection { normal, distance, .. } = wall.nearest(position, time);
             let over = velocity - wall.way(position, time);
             let gap = Gap {
                 now: distance - ball.radius,
@@ -259,7 +259,7 @@ impl EventDriven {
     /// Upper bound of a ball's acceleration toward a wall because that turns, in m/s².
     fn at_most_turned(&self, row: usize, wall: usize, time: f64, settings: &Settings) -> f64 {
         let Some((motion, left)) = self.walls[wall].going(time) else { return 0.0 };
-        let turning = motion.spin.magnitude();
+        let turning = motion.angular_velocity.magnitude();
         if turning == 0.0 {
             return 0.0;
         }

@@ -9,7 +9,7 @@ use super::support::Support;
 use super::{Ball, EventDriven, FLUSH, Form, LOOK, REST, Settings};
 use crate::math::Vec3;
 use crate::response::{BallSpin, Push};
-use crate::shape::Nearest;
+use crate::shape::PointProjection;
 
 /// Number of halvings of a time to find where a face ends.
 const HALVINGS: u32 = 24;
@@ -23,7 +23,7 @@ impl EventDriven {
         let ball = &mut self.balls[row];
         let wall_ = &self.walls[wall];
         let now = ball.path.begin;
-        let Nearest { normal, distance, .. } = wall_.nearest(ball.position, now);
+        let PointProjection { normal, distance, .. } = wall_.nearest(ball.position, now);
         ball.release();
         // The rounding of the place goes too, lest it add up. Overlap is not energy: it goes
         // without a change of velocity.
@@ -79,7 +79,8 @@ impl EventDriven {
         let wall = &self.walls[wall];
         let Form::Plane { normal, .. } = wall.form else { return false };
         wall.going(0.0).is_none_or(|(motion, _)| {
-            motion.spin.cross(normal).magnitude() <= 1e-12 * motion.spin.magnitude()
+            motion.angular_velocity.cross(normal).magnitude()
+                <= 1e-12 * motion.angular_velocity.magnitude()
         })
     }
 
@@ -121,7 +122,7 @@ impl EventDriven {
         let ball = &self.balls[row];
         let (at, now) = (ball.position, ball.path.begin);
         let far = ball.radius * (1.0 + 2.0 * LOOK) + ball.rounding;
-        let Nearest { point, normal, .. } = self.walls[support].nearest(at, now);
+        let PointProjection { point, normal, .. } = self.walls[support].nearest(at, now);
         let mut near = vec![support as u32];
         self.name_walls(row, |wall| {
             if wall == support || self.walls[wall].at_least(at, now) > far {
@@ -153,7 +154,7 @@ impl EventDriven {
         let along = Support {
             normal,
             surface: wall.surface_velocity(normal, touch, now),
-            turning: wall.motion.map_or_else(Vec3::zero, |motion| motion.spin),
+            turning: wall.motion.map_or_else(Vec3::zero, |motion| motion.angular_velocity),
             pull: ball.pull + normal * pressure,
             pressure,
             radius: ball.radius,

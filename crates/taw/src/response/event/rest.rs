@@ -9,7 +9,7 @@ use super::wall::Wall;
 use super::{EventDriven, PRESS, REST, SLOP, Settings};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Vec3, direction_and_length};
-use crate::shape::Nearest;
+use crate::shape::PointProjection;
 
 /// Number of times that a ball is moved out of the wall that it is deepest in; of two that meet at
 /// a right angle or more, it is out after two.
@@ -207,7 +207,7 @@ impl EventDriven {
     fn wall_gap(&self, contact: &Contact<f64>, now: f64) -> (f64, f64) {
         let ball = &self.balls[contact.b as usize];
         let wall: &Wall = &self.walls[contact.a as usize];
-        let Nearest { normal, distance, .. } = wall.nearest(ball.position, now);
+        let PointProjection { normal, distance, .. } = wall.nearest(ball.position, now);
         let way = wall.way(ball.position, now);
         (distance - ball.radius, (ball.velocity - way).dot(normal))
     }

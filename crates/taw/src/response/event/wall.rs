@@ -3,9 +3,9 @@
 use cgmath::{InnerSpace, One, Rotation as _, Zero};
 
 use crate::math::{Point3, Quat, Vec3};
-use crate::motion::{WallMotion, turned};
+use crate::motion::{WallMotion, integrate_rotation};
 use crate::response::{Material, Walls};
-use crate::shape::{Box3, Nearest, Shape, Solid, Triangle};
+use crate::shape::{Aabb3, BoundedShape, PointProjection, Shape, Triangle};
 
 /// Error of a distance by rounding, over itself and the coordinates: many times what
 /// a handful of operations leave.
@@ -17,7 +17,7 @@ pub(crate) struct Wall {
     /// As it is at the time that `there` says, or always.
     pub form: Form,
     /// Around the form, if it has an end.
-    pub bounds: Option<Box3<f64>>,
+    pub bounds: Option<Aabb3<f64>>,
     /// Row in the world.
     pub row: u32,
     pub motion: Option<WallMotion<f64>>,
@@ -46,7 +46,7 @@ pub(crate) enum Form {
 
 impl Form {
     /// The box around it, if it has an end.
-    pub fn bounds(&self) -> Option<Box3<f64>> {
+    pub fn bounds(&self) -> Option<Aabb3<f64>> {
         match self {
             Self::Plane { .. } => None,
             Self::Solid(shape) => Some(shape.bounding_box()),
@@ -54,15 +54,15 @@ impl Form {
         }
     }
 
-    fn nearest(&self, point: Point3<f64>) -> Nearest<f64> {
+    fn nearest(&self, point: Point3<f64>) -> PointProjection<f64> {
         match self {
             Self::Plane { normal, offset } => {
                 let distance = normal.dot(Vec3::new(point.x, point.y, point.z)) - offset;
-                Nearest { point: point - normal * distance, normal: *normal, distance }
+                PointProjection { point: point - normal * distance, normal: *normal, distance }
             }
-            Self::Solid(shape) => shape.nearest(point),
-            Self::Triangle(triangle) => triangle.nearest(point),
-            Self::SolidBelow(triangle) => triangle.nearest_if_solid_below(point),
+            Self::Solid(shape) => shape.project_point(point),
+            Self::Triangle(triangle) => triangle.project_point(point),
+            Self::SolidBelow(triangle) => triangle.project_point_one_sided(point),
         }
     }
 }
@@ -79,20 +79,21 @@ impl Wall {
     }
 
     /// Where its surface is nearest to a point at a time.
-    pub fn nearest(&self, point: Point3<f64>, time: f64) -> Nearest<f64> {
-        let Some((WallMotion { velocity, spin, pivot }, left)) = self.going(time) else {
+    pub fn nearest(&self, point: Point3<f64>, time: f64) -> PointProjection<f64> {
+        let Some((WallMotion { velocity, angular_velocity: spin, pivot }, left)) = self.going(time)
+        else {
             return self.form.nearest(point);
         };
         let on = point + velocity * left;
         if spin.is_zero() {
             let near = self.form.nearest(on);
-            return Nearest { point: near.point - velocity * left, ..near };
+            return PointProjection { point: near.point - velocity * left, ..near };
         }
-        let turn = turned(Quat::one(), spin, left);
+        let turn = integrate_rotation(Quat::one(), spin, left);
         let near = self.form.nearest(pivot + turn.rotate_vector(on - pivot));
         let back = turn.conjugate();
         let point = pivot - velocity * left + back.rotate_vector(near.point - pivot);
-        Nearest { point, normal: back.rotate_vector(near.normal), ..near }
+        PointProjection { point, normal: back.rotate_vector(near.normal), ..near }
     }
 
     /// Lower bound of the distance that [`nearest`](Self::nearest) gives, at the cost of a few
@@ -100,11 +101,11 @@ impl Wall {
     pub fn at_least(&self, point: Point3<f64>, time: f64) -> f64 {
         let Some(bounds) = &self.bounds else { return f64::NEG_INFINITY };
         let on = match self.going(time) {
-            Some((motion, _)) if !motion.spin.is_zero() => return f64::NEG_INFINITY,
+            Some((motion, _)) if !motion.angular_velocity.is_zero() => return f64::NEG_INFINITY,
             Some((motion, left)) => point + motion.velocity * left,
             None => point,
         };
-        let gap = bounds.gap(on);
+        let gap = bounds.distance_to_point(on);
         let deep = matches!(self.form, Form::SolidBelow(_))
             && gap <= (bounds.max - bounds.min).magnitude() * (1.0 + ROUNDING);
         if deep {
@@ -148,7 +149,7 @@ pub(super) struct Between<'a> {
 
 impl Walls<f64> for Between<'_> {
     fn normal_and_distance(&self, wall: usize, _: u32, point: Point3<f64>) -> (Vec3<f64>, f64) {
-        let Nearest { normal, distance, .. } = self.walls[wall].nearest(point, self.end);
+        let PointProjection { normal, distance, .. } = self.walls[wall].nearest(point, self.end);
         (normal, distance)
     }
 
@@ -158,7 +159,7 @@ impl Walls<f64> for Between<'_> {
         _: u32,
         point: Point3<f64>,
     ) -> (Vec3<f64>, f64) {
-        let Nearest { normal, distance, .. } = self.walls[wall].nearest(point, self.begin);
+        let PointProjection { normal, distance, .. } = self.walls[wall].nearest(point, self.begin);
         (normal, distance)
     }
 

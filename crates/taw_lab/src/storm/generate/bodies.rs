@@ -62,7 +62,7 @@ impl Crowd {
                 let marbles = marbles.min(balls.len() / 2);
                 swarm.balls = balls.split_off(marbles);
                 for ball in &mut swarm.balls {
-                    (ball.half_length, ball.spin) = (0.0, [0.0; 3]);
+                    (ball.half_length, ball.angular_velocity) = (0.0, [0.0; 3]);
                 }
                 case.scene.marbles = balls;
             }
@@ -89,7 +89,7 @@ impl Crowd {
         // A spin that nobody feels would turn capsules into what they lie on.
         if !self.spins {
             for ball in balls.iter_mut().filter(|ball| ball.half_length > 0.0) {
-                ball.spin = [0.0; 3];
+                ball.angular_velocity = [0.0; 3];
             }
         }
         let swarm = matches!(self.kind, Kind::SwarmLab | Kind::SwarmFull);
@@ -148,7 +148,7 @@ impl Crowd {
                 ball.velocity = (dice.direction() * speed).into();
             }
             if dice.chance(0.3) {
-                ball.spin = (dice.direction() * dice.between(0.0, 50.0)).into();
+                ball.angular_velocity = (dice.direction() * dice.between(0.0, 50.0)).into();
             }
             if own_surfaces {
                 ball.surface = Some(surface(dice));
@@ -194,7 +194,7 @@ fn distances(case: &Case) -> impl Fn([f64; 3]) -> f64 + use<> {
     let shapes = running.map(|running| running.world.walls.shapes().to_vec()).unwrap_or_default();
     move |at| {
         let point = Point3::from(at);
-        let far = shapes.iter().map(|shape| shape.nearest(point).distance);
+        let far = shapes.iter().map(|shape| shape.project_point(point).distance);
         far.fold(f64::INFINITY, f64::min)
     }
 }

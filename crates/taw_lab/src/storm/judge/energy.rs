@@ -62,7 +62,7 @@ impl Ledger {
         }
     }
 
-    /// A step gains no energy but what [walls bring in](taw::world::Account::walls), up to
+    /// A step gains no energy but what [walls bring in](taw::world::EnergyAudit::walls), up to
     /// - first order: a bounce happens at the end of its substep, so its height is right to the
     ///   way of a substep: `m g v dt` of what touches, for the speeds before and after (twice, where
     ///   there is time for two bounces in a step), and what gravity adds in a substep;
@@ -155,7 +155,8 @@ fn allowance(rules: &Rules, before: &Snapshot, after: &Snapshot, near: &Near) ->
         let rounding = rules.velocity_rounding(speed, if touched { place } else { 0.0 });
         let height = 8.0 * rules.epsilon * rules.substeps * place;
         allowed.rounding += mass * (speed * rounding + rounding * rounding + g * height);
-        let rim = new.spin.magnitude().max(old.spin.magnitude()) * new.reach();
+        let rim =
+            new.angular_velocity.magnitude().max(old.angular_velocity.magnitude()) * new.reach();
         allowed.rounding += mass * rim * rules.velocity_rounding(rim, 0.0);
         if rules.integrator == Integrator::ExplicitEuler {
             allowed.drift += 0.5 * mass * g * g * rules.step * rules.substep;

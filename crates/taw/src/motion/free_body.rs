@@ -3,20 +3,20 @@ use cgmath::{ElementWise, Rotation as _};
 use crate::frame::{Motor, Twist};
 use crate::math::{Scalar, Vec3, cast_vector};
 
-/// How a free body moves on, as one equation (Newton and Euler in the body's frame, `M' =
-/// M B / 2` for the motor `M` and the twist `B`): rotation and translation at once.
+/// Integrates a free rigid body as one equation (Newton and Euler in the body's frame, `M' = M B /
+/// 2` for the motor `M` and the twist `B`): rotation and translation at once.
 ///
-/// Gives motor and twist after `dt` seconds, for a body with these principal moments of
-/// inertia (kg m², all above zero) whose axes are the motor's. Of order 4 in the twist
-/// (Kutta 1901) and 2 in the motor, which stays a rigid motion however long the step.
+/// Returns motor and twist after `dt` seconds, for a body with these principal moments of inertia
+/// (kg m², all above zero) whose axes are the motor's. Order 4 in the twist (Kutta 1901) and 2 in
+/// the motor, which stays a rigid motion however long the step.
 ///
-/// The twist is counted in `f64` and rounded once. That is not enough for a body that turns
-/// about its unstable axis in `f32`: when it turns over depends on its energy to a few parts in
-/// a million, and the rounding of each of some thousand twists uses that up. The box of the
-/// Dzhanibekov effect, which turns over every 5 s, is off by 1.7 s after 100 s of steps of
-/// 1/60 s. [`FreeRotation`](super::FreeRotation) keeps its state in `f64` and is not.
+/// The twist is computed in `f64` and rounded once. In `f32` that is not enough for a body that
+/// rotates about its unstable axis: the time when it flips depends on its energy to a few parts in
+/// a million, which the rounding of some thousand steps uses up. The box of the Dzhanibekov effect,
+/// which flips every 5 s, is off by 1.7 s after 100 s of steps of 1/60 s.
+/// [`FreeRotation`](super::FreeRotation) keeps its state in `f64` and is not.
 #[must_use]
-pub fn move_free<S: Scalar>(
+pub fn integrate_free_body<S: Scalar>(
     motor: Motor<S>,
     twist: Twist<S>,
     inertia: Vec3<S>,
@@ -24,18 +24,17 @@ pub fn move_free<S: Scalar>(
 ) -> (Motor<S>, Twist<S>) {
     let (start, exact_dt) = (exact(twist), dt.as_f64());
     let inertia: Vec3<f64> = cast_vector(inertia);
-    // In the body's frame a constant velocity turns against the body, and the angular
-    // momentum does too.
+    // In the body's frame, constant velocity and angular momentum rotate against the body.
     let rate = |twist: Twist<f64>| {
-        let turning = twist.turning.dual();
-        let momentum = turning.mul_element_wise(inertia);
+        let angular_velocity = twist.angular_velocity.dual();
+        let momentum = angular_velocity.mul_element_wise(inertia);
         Twist {
-            turning: momentum.cross(turning).div_element_wise(inertia).into(),
-            velocity: twist.velocity.cross(turning),
+            angular_velocity: momentum.cross(angular_velocity).div_element_wise(inertia).into(),
+            velocity: twist.velocity.cross(angular_velocity),
         }
     };
     let along = |rate: Twist<f64>, dt: f64| Twist {
-        turning: start.turning + rate.turning * dt,
+        angular_velocity: start.angular_velocity + rate.angular_velocity * dt,
         velocity: start.velocity + rate.velocity * dt,
     };
     let k1 = rate(start);
@@ -43,26 +42,28 @@ pub fn move_free<S: Scalar>(
     let k3 = rate(along(k2, 0.5 * exact_dt));
     let k4 = rate(along(k3, exact_dt));
     let slope = Twist {
-        turning: k1.turning + (k2.turning + k3.turning) * 2.0 + k4.turning,
+        angular_velocity: k1.angular_velocity
+            + (k2.angular_velocity + k3.angular_velocity) * 2.0
+            + k4.angular_velocity,
         velocity: k1.velocity + (k2.velocity + k3.velocity) * 2.0 + k4.velocity,
     };
     let next = rounded(along(slope, exact_dt / 6.0));
-    // The screw of the twist in the middle of the step.
+    // Screw motion of the midpoint twist.
     let middle = rounded(along(k2, 0.5 * exact_dt));
-    (motor.after(Motor::exp(middle, dt)).normalized(), next)
+    ((motor * Motor::exp(middle, dt)).normalized(), next)
 }
 
 fn exact<S: Scalar>(twist: Twist<S>) -> Twist<f64> {
-    let turning: Vec3<f64> = cast_vector(twist.turning.dual());
-    Twist { turning: turning.into(), velocity: cast_vector(twist.velocity) }
+    let angular_velocity: Vec3<f64> = cast_vector(twist.angular_velocity.dual());
+    Twist { angular_velocity: angular_velocity.into(), velocity: cast_vector(twist.velocity) }
 }
 
 fn rounded<S: Scalar>(twist: Twist<f64>) -> Twist<S> {
-    let turning: Vec3<S> = cast_vector(twist.turning.dual());
-    Twist { turning: turning.into(), velocity: cast_vector(twist.velocity) }
+    let angular_velocity: Vec3<S> = cast_vector(twist.angular_velocity.dual());
+    Twist { angular_velocity: angular_velocity.into(), velocity: cast_vector(twist.velocity) }
 }
 
-/// The velocity of the body's origin in world space, in m/s.
+/// Velocity of the body's origin in world space, in m/s.
 #[must_use]
 pub fn world_velocity<S: Scalar>(motor: Motor<S>, twist: Twist<S>) -> Vec3<S> {
     motor.rotation().rotate_vector(twist.velocity)
@@ -79,19 +80,21 @@ mod tests {
     #[test]
     fn the_motor_equation_equals_rotation_and_translation_apart() {
         let inertia = Vec3::new(1.6, 4.16, 5.44_f64);
-        let spin = Vec3::new(0.4, 3.0, -0.7);
+        let angular_velocity = Vec3::new(0.4, 3.0, -0.7);
         let velocity = Vec3::new(2.0, -1.0, 0.5);
         let seconds = 3.0;
         let apart = |steps: u32| {
             let dt = seconds / f64::from(steps);
-            let start = FreeRotation::new(Quat::one(), spin.mul_element_wise(inertia));
-            (0..steps).fold(start, |body, _| body.after(inertia, dt))
+            let start = FreeRotation::new(Quat::one(), angular_velocity.mul_element_wise(inertia));
+            (0..steps).fold(start, |body, _| body.step(inertia, dt))
         };
         let reference = apart(100_000).attitude();
         let error = |steps: u32| {
             let dt = seconds / f64::from(steps);
-            let start = (Motor::identity(), Twist { turning: spin.into(), velocity });
-            let (motor, twist) = (0..steps).fold(start, |(m, t), _| move_free(m, t, inertia, dt));
+            let start =
+                (Motor::identity(), Twist { angular_velocity: angular_velocity.into(), velocity });
+            let (motor, twist) =
+                (0..steps).fold(start, |(m, t), _| integrate_free_body(m, t, inertia, dt));
             let rotation = motor.rotation();
             let turned = (rotation - reference).magnitude().min((rotation + reference).magnitude());
             let moved = (motor.translation() - velocity * seconds).magnitude();
@@ -111,14 +114,15 @@ mod tests {
     /// 1/60 s.
     fn twentieth_flip<S: Scalar>() -> f64 {
         let inertia = Vec3::new(1.6, 4.16, 5.44).map(S::constant);
-        let turning = Vec3::new(0.01, 5.0, 0.01).map(S::constant);
+        let angular_velocity = Vec3::new(0.01, 5.0, 0.01).map(S::constant);
         let velocity = Vec3::new(0.0, 0.0, 0.0).map(S::constant);
-        let mut state = (Motor::identity(), Twist { turning: turning.into(), velocity });
+        let mut state =
+            (Motor::identity(), Twist { angular_velocity: angular_velocity.into(), velocity });
         let (mut flips, mut last) = (0, 1.0);
         for step in 1..=7200 {
             let (motor, twist) = state;
-            state = move_free(motor, twist, inertia, S::constant(1.0 / 60.0));
-            let now = state.1.turning.dual().y.as_f64();
+            state = integrate_free_body(motor, twist, inertia, S::constant(1.0 / 60.0));
+            let now = state.1.angular_velocity.dual().y.as_f64();
             flips += u32::from(now * last < 0.0);
             last = now;
             if flips == 20 {

@@ -1,46 +1,47 @@
-//! Two boxes, by the fifteen directions that can tell them apart (Gottschalk, Lin and
-//! Manocha 1996; the terms as in Ericson, *Real-Time Collision Detection*, 2005, §4.4.1).
+//! Two boxes by the separating axis test with 15 axes (Gottschalk, Lin and Manocha 1996; terms as
+//! in Ericson, *Real-Time Collision Detection*, 2005, §4.4.1).
 
 use cgmath::InnerSpace;
 
-use super::closest::{Between, CERTAIN};
+use super::brute_force::{Axis, AxisSource, at_right_angles, crossing};
+use super::closest::{LocalClosestPoints, TOLERANCE};
 use super::core::{Core, Cuboid, Kind};
-use super::exhaustive::{Axis, Of, at_right_angles, crossing};
 use super::manifold::deepest;
 use crate::math::Vec3;
 
-/// The direction along which two boxes overlap least, or are farthest apart.
+/// Axis of least overlap or greatest separation of two boxes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BoxAxis {
-    /// From the first to the second, a unit vector.
+    /// Unit vector from the first to the second.
     pub normal: Vec3<f64>,
-    /// How far they are apart along it.
+    /// Separation along the axis; negative for an overlap.
     pub distance: f64,
-    pub of: Rows,
+    pub of: BoxAxisSource,
 }
 
-/// What the direction of a [`BoxAxis`] is at right angles to.
+/// Features that define a [`BoxAxis`].
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Rows {
+pub(super) enum BoxAxisSource {
     FaceOfA,
     FaceOfB,
     Edges(usize, usize),
 }
 
-/// Below this sine the terms of an axis have lost too many digits.
+/// Sine below which the terms of an edge axis have lost too many digits.
 const NEARLY_PARALLEL: f64 = 1e-3;
 
-/// Of directions that are as good, the first, and that of a face rather than that of edges.
+/// Axis of greatest separation. Among equally good axes the first is taken, and faces win over
+/// edges.
 pub(super) fn boxes(a: &Cuboid, b: &Cuboid, size: f64) -> BoxAxis {
     let apart = b.center - a.center;
     let (along_a, along_b) = (a.axes.map(|x| x.dot(apart)), b.axes.map(|x| x.dot(apart)));
     let cos = a.axes.map(|x| b.axes.map(|y| x.dot(y)));
     let signed = |axis: Vec3<f64>, along: f64| if along < 0.0 { -axis } else { axis };
-    // Rounding must not choose between those that are as good.
-    let better = CERTAIN * size;
+    // Rounding must not choose among equally good axes.
+    let better = TOLERANCE * size;
     let mut best =
-        BoxAxis { normal: Vec3::unit_x(), distance: f64::NEG_INFINITY, of: Rows::FaceOfA };
-    let mut offer = |distance: f64, normal: &dyn Fn() -> Vec3<f64>, of: Rows| {
+        BoxAxis { normal: Vec3::unit_x(), distance: f64::NEG_INFINITY, of: BoxAxisSource::FaceOfA };
+    let mut offer = |distance: f64, normal: &dyn Fn() -> Vec3<f64>, of: BoxAxisSource| {
         if distance > best.distance + better || best.distance == f64::NEG_INFINITY {
             best = BoxAxis { normal: normal(), distance, of };
         }
@@ -48,17 +49,17 @@ pub(super) fn boxes(a: &Cuboid, b: &Cuboid, size: f64) -> BoxAxis {
     for i in 0..3 {
         let reach: f64 = (0..3).map(|j| b.half[j] * cos[i][j].abs()).sum();
         let distance = along_a[i].abs() - a.half[i] - reach;
-        offer(distance, &|| signed(a.axes[i], along_a[i]), Rows::FaceOfA);
+        offer(distance, &|| signed(a.axes[i], along_a[i]), BoxAxisSource::FaceOfA);
     }
     for j in 0..3 {
         let reach: f64 = (0..3).map(|i| a.half[i] * cos[i][j].abs()).sum();
         let distance = along_b[j].abs() - b.half[j] - reach;
-        offer(distance, &|| signed(b.axes[j], along_b[j]), Rows::FaceOfB);
+        offer(distance, &|| signed(b.axes[j], along_b[j]), BoxAxisSource::FaceOfB);
     }
     for i in 0..3 {
         for j in 0..3 {
             let sin = (1.0 - cos[i][j] * cos[i][j]).max(0.0).sqrt();
-            let of = Rows::Edges(i, j);
+            let of = BoxAxisSource::Edges(i, j);
             if sin < NEARLY_PARALLEL {
                 let Some(unit) = at_right_angles(a.axes[i], b.axes[j]) else { continue };
                 let along = apart.dot(unit);
@@ -80,24 +81,25 @@ pub(super) fn boxes(a: &Cuboid, b: &Cuboid, size: f64) -> BoxAxis {
 }
 
 impl BoxAxis {
-    /// With the points where two boxes are deepest.
-    pub fn with_points(self, a: &Core<'_>, b: &Core<'_>) -> Between {
+    /// Adds the deepest points.
+    pub fn with_points(self, a: &Core<'_>, b: &Core<'_>) -> LocalClosestPoints {
         let Self { normal, distance, of } = self;
-        let on_b =
-            if let (Kind::Cuboid(x), Kind::Cuboid(y), Rows::Edges(i, j)) = (&a.kind, &b.kind, of) {
-                // The edges that are farthest out.
-                let edge = |of: &Cuboid, row: usize, out: Vec3<f64>| {
-                    let corner = of.farthest(out);
-                    [of.corner(corner & !(1 << row)), of.corner(corner | 1 << row)]
-                };
-                crossing(edge(x, i, normal), edge(y, j, -normal)).map(|(_, on_b)| on_b)
-            } else {
-                let of_a = || a.face_along(normal).map(Of::FaceOfA);
-                let of_b = || b.face_along(-normal).map(Of::FaceOfB);
-                let of = if matches!(of, Rows::FaceOfB) { of_b() } else { of_a() };
-                of.map(|of| deepest(a, b, &Axis { normal, separation: distance, of }).1)
+        let on_b = if let (Kind::Cuboid(x), Kind::Cuboid(y), BoxAxisSource::Edges(i, j)) =
+            (&a.kind, &b.kind, of)
+        {
+            // The support edges.
+            let edge = |of: &Cuboid, row: usize, out: Vec3<f64>| {
+                let corner = of.support(out);
+                [of.corner(corner & !(1 << row)), of.corner(corner | 1 << row)]
             };
+            crossing(edge(x, i, normal), edge(y, j, -normal)).map(|(_, on_b)| on_b)
+        } else {
+            let of_a = || a.face_along(normal).map(AxisSource::FaceOfA);
+            let of_b = || b.face_along(-normal).map(AxisSource::FaceOfB);
+            let of = if matches!(of, BoxAxisSource::FaceOfB) { of_b() } else { of_a() };
+            of.map(|of| deepest(a, b, &Axis { normal, separation: distance, source: of }).1)
+        };
         let on_b = on_b.unwrap_or_else(|| b.support(-normal).0);
-        Between { distance, normal, on_a: on_b - normal * distance, on_b }
+        LocalClosestPoints { distance, normal, on_a: on_b - normal * distance, on_b }
     }
 }

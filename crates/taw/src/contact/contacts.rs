@@ -4,30 +4,31 @@ use cgmath::InnerSpace;
 
 use crate::math::{Scalar, Vec3, length};
 
-/// A touch between two things, named by their rows in the world's columns. Rows
-/// stay put within a step, and only within it.
+/// A contact point between two bodies, given by their indices in the world's columns. Indices are
+/// stable within a step only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact<S> {
-    /// The row of the first: a wall, or the marble of the lower row.
+    /// Index of the first body: a wall, or the marble with the lower index.
     pub a: u32,
-    /// The row of the second: always a marble.
+    /// Index of the second body: always a marble.
     pub b: u32,
-    /// Which part of the wall: of a compound, or which triangle of a surface. Zero for what
-    /// has only one, and between marbles.
+    /// Sub-shape of the wall: part of a compound or triangle of a surface. Zero for simple shapes,
+    /// and between marbles.
     pub part: u32,
-    /// How far from the middle of each, along its own axis, it is touched, in metres: zero but
-    /// for capsules.
+    /// Contact anchor on the axis of each body, in metres from its center: zero except for
+    /// capsules.
     pub along: [S; 2],
-    /// The displacement of `b` that parts it from `a`, in metres.
+    /// Minimum translation vector (penetration vector): displacement of `b` that separates it from
+    /// `a`, in metres.
     pub mtv: Vec3<S>,
 }
 
-/// The touches of a substep.
+/// Contact lists of a substep.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Contacts<S> {
-    /// Wall against marble.
+    /// Wall–marble contacts.
     pub wm: Vec<Contact<S>>,
-    /// Marble against marble.
+    /// Marble–marble contacts.
     pub mm: Vec<Contact<S>>,
 }
 
@@ -38,9 +39,8 @@ impl<S> Default for Contacts<S> {
 }
 
 impl<S: Scalar> Contacts<S> {
-    /// Puts the largest displacement first in both lists. Equal ones are ordered
-    /// by their rows, and a NaN comes last, so that the order never depends on
-    /// how the touches were found.
+    /// Sorts both lists by penetration, deepest first. Ties are ordered by indices and NaN comes
+    /// last, so the order does not depend on how the contacts were found.
     pub fn sort(&mut self) {
         self.wm.sort_unstable_by(deeper_first);
         self.mm.sort_unstable_by(deeper_first);
@@ -52,13 +52,13 @@ impl<S: Scalar> Contacts<S> {
         self.mm.clear();
     }
 
-    /// The number of touches in both lists.
+    /// The number of contacts in both lists.
     #[must_use]
     pub fn len(&self) -> usize {
         self.wm.len() + self.mm.len()
     }
 
-    /// Whether nothing touches.
+    /// Returns true without any contact.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -75,7 +75,7 @@ fn deeper_first<S: Scalar>(x: &Contact<S>, y: &Contact<S>) -> Ordering {
     }
     let descending = |x: S, y: S| y.partial_cmp(&x).unwrap_or(Ordering::Equal);
     (squared_x.is_nan().cmp(&squared_y.is_nan()))
-        // Squares of the tiny and the huge vanish and overflow alike.
+        // Squares of tiny and huge lengths vanish and overflow alike.
         .then_with(|| descending(length(x.mtv), length(y.mtv)))
         .then_with(|| (x.a, x.b, x.part).cmp(&(y.a, y.b, y.part)))
         .then_with(|| descending(x.along[0], y.along[0]))

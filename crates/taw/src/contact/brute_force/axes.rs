@@ -1,27 +1,26 @@
-//! Separating axes: directions along which two polyhedra can be told apart (Gottschalk,
-//! Lin and Manocha, *`OBBTree`*, 1996).
+//! Separating axes of two polyhedra (Gottschalk, Lin and Manocha, *`OBBTree`*, 1996).
 
 use cgmath::InnerSpace;
 
-use super::skeleton::Skeleton;
+use super::features::Features;
 use crate::math::{Vec3, direction_and_length, is_finite};
 
-/// Two directions whose sine is below this are parallel.
+/// Sine below which two directions are parallel.
 pub(in crate::contact) const PARALLEL: f64 = 1e-12;
 
-/// A direction from one to the other, and how far it keeps them apart.
+/// A candidate separating axis.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::contact) struct Axis {
-    /// From the first to the second, a unit vector.
+    /// Unit vector from the first to the second.
     pub normal: Vec3<f64>,
-    /// How far they are apart along it, without their radii.
+    /// Separation along the axis, without the radii.
     pub separation: f64,
-    pub of: Of,
+    pub source: AxisSource,
 }
 
-/// What an axis is at right angles to.
+/// Features that define an axis.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(in crate::contact) enum Of {
+pub(in crate::contact) enum AxisSource {
     /// A face of the first.
     FaceOfA(usize),
     FaceOfB(usize),
@@ -29,21 +28,20 @@ pub(in crate::contact) enum Of {
     Edges,
 }
 
-/// The axis that keeps two polyhedra apart most, or along which they overlap least; none if
-/// neither has a face. Of axes that are as good, the first, and that of a face rather than
-/// that of edges.
-pub(in crate::contact) fn widest_axis(a: &Skeleton, b: &Skeleton) -> Option<Axis> {
+/// Axis of greatest separation or least overlap; none if neither polyhedron has a face. Among
+/// equally good axes the first is taken, and faces win over edges.
+pub(in crate::contact) fn axis_of_max_separation(a: &Features, b: &Features) -> Option<Axis> {
     let of_a = a.faces.iter().enumerate().map(|(face, (normal, corners))| Axis {
         normal: *normal,
         separation: -b.reach(-*normal) - a.points[corners[0] as usize].dot(*normal),
-        of: Of::FaceOfA(face),
+        source: AxisSource::FaceOfA(face),
     });
     let of_b = b.faces.iter().enumerate().map(|(face, (normal, corners))| Axis {
         normal: -*normal,
         separation: -a.reach(-*normal) - b.points[corners[0] as usize].dot(*normal),
-        of: Of::FaceOfB(face),
+        source: AxisSource::FaceOfB(face),
     });
-    // Rounding must not choose between those that are as good.
+    // Rounding must not choose among equally good axes.
     let better = 1e-12 * (a.size() + b.size());
     let wider = |best: Option<Axis>, next: Axis| match best {
         Some(best) if next.separation <= best.separation + better => Some(best),
@@ -51,8 +49,8 @@ pub(in crate::contact) fn widest_axis(a: &Skeleton, b: &Skeleton) -> Option<Axis
     };
     let best = of_a.chain(of_b).fold(None, wider)?;
     let pairs = a.directions.iter().flat_map(|d| b.directions.iter().map(move |e| (*d, *e)));
-    // Beside something flat, also those across its plane and an edge.
-    let flat = |x: &Skeleton| (x.faces.len() == 2).then(|| x.faces[0].0);
+    // For flat polyhedra, also the axes across their plane and an edge.
+    let flat = |x: &Features| (x.faces.len() == 2).then(|| x.faces[0].0);
     let across = [flat(a), flat(b)].into_iter().flatten().flat_map(|plane| {
         let directions = a.directions.iter().chain(&b.directions);
         directions.filter_map(move |along| at_right_angles(plane, *along))
@@ -62,16 +60,16 @@ pub(in crate::contact) fn widest_axis(a: &Skeleton, b: &Skeleton) -> Option<Axis
         [normal, -normal].map(|normal| Axis {
             normal,
             separation: -b.reach(-normal) - a.reach(normal),
-            of: Of::Edges,
+            source: AxisSource::Edges,
         })
     });
     of_edges.fold(Some(best), wider)
 }
 
-/// The unit vector at right angles to two others, unless they are parallel.
+/// The unit vector perpendicular to two others, unless they are parallel.
 ///
-/// Of nearly parallel ones the cross product has few digits left, so it is turned until
-/// it is at right angles as exactly as a product can tell.
+/// For nearly parallel vectors the cross product has few digits left, so it is corrected until it
+/// is perpendicular to within rounding.
 pub(in crate::contact) fn at_right_angles(d: Vec3<f64>, e: Vec3<f64>) -> Option<Vec3<f64>> {
     let cross = d.cross(e);
     let sin = cross.magnitude();

@@ -5,40 +5,39 @@ use crate::error::{finite_point, finite_vector, within};
 use crate::math::{Point3, Scalar, Vec3, direction_and_length};
 use crate::motion::Motion;
 
-/// A force field: what pulls and pushes every marble, wherever it is, besides
-/// gravity.
+/// A force field that acts on every marble besides gravity.
 #[derive(Clone, Copy, Debug)]
-pub enum Force<S> {
-    /// The resistance of a medium that moves (a wind) or not.
+pub enum ForceField<S> {
+    /// Drag of a medium at rest or in motion, such as wind.
     Drag(Medium<S>),
-    /// A spring from each marble to one point.
+    /// A spring from each marble to a fixed point.
     Spring {
-        /// Where it is fastened.
+        /// Anchor point, in metres.
         anchor: Point3<S>,
-        /// Its length without load, in metres, at least zero.
+        /// Rest length in metres, at least zero.
         rest_length: S,
-        /// In N/m, at least zero.
+        /// Spring constant in N/m, at least zero.
         stiffness: S,
     },
-    /// A point that attracts with the inverse square of the distance, as a planet
-    /// does: the same acceleration for all masses.
+    /// Attraction to a point with the inverse square of the distance, as to a planet: the
+    /// acceleration is equal for all masses.
     Attraction {
-        /// Where it is.
+        /// Center, in metres.
         center: Point3<S>,
         /// Gravitational constant times mass, in m³/s². Negative repels.
         strength: S,
     },
-    /// The user's own: newtons, from a marble's motion and its mass in kg.
+    /// User-defined force in newtons, from a marble's motion and its mass in kg.
     ///
-    /// A plain function, so that a world stays a plain value; it must depend on
-    /// nothing but its arguments.
+    /// A plain function, so that a world stays a plain value; its result must depend on the
+    /// arguments only.
     Custom(fn(Motion<S>, S) -> Vec3<S>),
 }
 
-/// What marbles move through.
+/// A resisting medium.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Medium<S> {
-    /// How the medium itself moves, in m/s.
+    /// Velocity of the medium, in m/s.
     pub velocity: Vec3<S>,
     /// Force per relative speed, in N s/m, at least zero (Stokes).
     pub linear: S,
@@ -46,7 +45,7 @@ pub struct Medium<S> {
     pub quadratic: S,
 }
 
-impl<S: Scalar> PartialEq for Force<S> {
+impl<S: Scalar> PartialEq for ForceField<S> {
     /// Two custom forces are equal if they are the same function.
     fn eq(&self, other: &Self) -> bool {
         match (self, other) {
@@ -65,8 +64,8 @@ impl<S: Scalar> PartialEq for Force<S> {
     }
 }
 
-impl<S: Scalar> Force<S> {
-    /// This force, if its numbers can be right.
+impl<S: Scalar> ForceField<S> {
+    /// Validates the numbers.
     pub(crate) fn checked(self) -> Result<Self, Error> {
         let not_negative = |field, value| within(field, value, S::zero(), S::max_value());
         match self {
@@ -90,7 +89,7 @@ impl<S: Scalar> Force<S> {
         Ok(self)
     }
 
-    /// The acceleration of something of this mass (kg), in m/s².
+    /// Acceleration of a body of this mass (kg), in m/s².
     #[must_use]
     pub fn acceleration(&self, motion: Motion<S>, mass: S) -> Vec3<S> {
         match *self {
@@ -119,7 +118,7 @@ mod tests {
     /// Something of 2 kg under `forces` alone, after `seconds` in steps of about a
     /// millisecond by RK4.
     fn moved(
-        forces: &[Force<f64>],
+        forces: &[ForceField<f64>],
         position: Point3<f64>,
         velocity: Vec3<f64>,
         seconds: f64,
@@ -138,7 +137,7 @@ mod tests {
     fn linear_drag_decays_exponentially_toward_the_wind() {
         let wind = Vec3::new(3.0, 0.0, 0.0);
         let medium = Medium { velocity: wind, linear: 0.5, quadratic: 0.0 };
-        let end = moved(&[Force::Drag(medium)], ORIGIN, Vec3::new(0.0, 4.0, 0.0), 2.0);
+        let end = moved(&[ForceField::Drag(medium)], ORIGIN, Vec3::new(0.0, 4.0, 0.0), 2.0);
         let left = (-0.5_f64 / 2.0 * 2.0).exp();
         let exact = Vec3::new(3.0 * (1.0 - left), 4.0 * left, 0.0);
         assert!((end.velocity - exact).magnitude() < 1e-12, "{:?}", end.velocity);
@@ -147,14 +146,14 @@ mod tests {
     #[test]
     fn quadratic_drag_decays_as_one_over_time() {
         let medium = Medium { velocity: Vec3::zero(), linear: 0.0, quadratic: 0.5 };
-        let end = moved(&[Force::Drag(medium)], ORIGIN, Vec3::new(0.0, 4.0, 0.0), 2.0);
+        let end = moved(&[ForceField::Drag(medium)], ORIGIN, Vec3::new(0.0, 4.0, 0.0), 2.0);
         let exact = 4.0 / (1.0 + 0.5 / 2.0 * 4.0 * 2.0);
         assert!((end.velocity.y - exact).abs() < 1e-11, "{:?}", end.velocity);
     }
 
     #[test]
     fn a_spring_swings_with_its_period() {
-        let spring = Force::Spring { anchor: ORIGIN, rest_length: 1.0, stiffness: 8.0 };
+        let spring = ForceField::Spring { anchor: ORIGIN, rest_length: 1.0, stiffness: 8.0 };
         let start = Point3::new(1.5, 0.0, 0.0);
         let end = moved(&[spring], start, Vec3::zero(), 1.0);
         assert!((end.position.x - (1.0 + 0.5 * 2.0_f64.cos())).abs() < 1e-12, "{:?}", end.position);
@@ -163,7 +162,7 @@ mod tests {
 
     #[test]
     fn a_planet_comes_round_again() {
-        let sun = Force::Attraction { center: ORIGIN, strength: 4.0 };
+        let sun = ForceField::Attraction { center: ORIGIN, strength: 4.0 };
         let period = std::f64::consts::TAU * (8.0_f64 / 4.0).sqrt(); // sqrt(r³ / strength)
         let start = Point3::new(2.0, 0.0, 0.0);
         let end = moved(&[sun], start, Vec3::new(0.0, 0.0, 2.0_f64.sqrt()), period);
@@ -172,10 +171,10 @@ mod tests {
 
     #[test]
     fn forces_add_up_and_a_custom_one_is_a_function() {
-        let push = Force::Custom(|_, mass| Vec3::new(0.0, mass * 3.0, 0.0));
+        let push = ForceField::Custom(|_, mass| Vec3::new(0.0, mass * 3.0, 0.0));
         let end = moved(&[push, push], ORIGIN, Vec3::zero(), 1.0);
         assert!((end.position.y - 3.0).abs() < 1e-12, "{:?}", end.position);
         assert_eq!(push, push);
-        assert_ne!(push, Force::Custom(|_, mass| Vec3::new(mass, 0.0, 0.0)));
+        assert_ne!(push, ForceField::Custom(|_, mass| Vec3::new(mass, 0.0, 0.0)));
     }
 }

@@ -1,20 +1,20 @@
-/// A column that exists only while some row has a value of its own.
+/// A sparse column: allocated only while some marble has a value of its own.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Optional<T> {
+pub(super) struct SparseColumn<T> {
     /// Empty, or as long as the other columns.
     values: Vec<Option<T>>,
-    /// How many of them are there.
+    /// Number of present values.
     present: usize,
 }
 
-impl<T> Default for Optional<T> {
+impl<T> Default for SparseColumn<T> {
     fn default() -> Self {
         Self { values: Vec::new(), present: 0 }
     }
 }
 
-impl<T: Copy> Optional<T> {
-    /// Whether no row has a value.
+impl<T: Copy> SparseColumn<T> {
+    /// Returns true if no index has a value.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
@@ -23,7 +23,7 @@ impl<T: Copy> Optional<T> {
         self.values.get(row).copied().flatten()
     }
 
-    /// Sets the value of one of `rows` rows, of which the last may be new.
+    /// Sets the value at an index of `rows`, the last of which may be new.
     pub fn set(&mut self, row: usize, value: Option<T>, rows: usize) {
         if self.values.is_empty() && value.is_none() {
             return;
@@ -35,7 +35,7 @@ impl<T: Copy> Optional<T> {
         }
     }
 
-    /// Takes the value of every row.
+    /// Clears all values.
     pub fn clear(&mut self) {
         self.values.clear();
         self.present = 0;
@@ -48,7 +48,7 @@ impl<T: Copy> Optional<T> {
         }
     }
 
-    /// Notes that a value came or went. With the last one the column goes too.
+    /// Updates the count. Without values the column is deallocated.
     fn count(&mut self, came: bool, went: bool) {
         self.present = self.present + usize::from(came) - usize::from(went);
         if self.present == 0 {
@@ -63,7 +63,7 @@ mod tests {
 
     #[test]
     fn the_column_exists_only_while_a_row_has_a_value() {
-        let mut column = Optional::default();
+        let mut column = SparseColumn::default();
         column.set(2, None, 5);
         assert!(column.is_empty());
         column.set(3, Some('x'), 5);

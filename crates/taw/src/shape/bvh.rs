@@ -1,40 +1,38 @@
 use smallvec::SmallVec;
 
-use super::{Aabb, Box3};
+use super::{Aabb, Aabb3};
 use crate::math::{Point3, Scalar};
 
-/// Things by their bounding boxes, halved again and again, so that few are looked at to
-/// find those in one place.
+/// Bounding volume hierarchy: a binary tree of bounding boxes, for queries of items by place.
 #[derive(Clone, Debug, PartialEq)]
-pub struct BoxTree<S> {
+pub struct Bvh<S> {
     nodes: Vec<Node<S>>,
-    /// The things, leaf by leaf.
+    /// Items, leaf by leaf.
     items: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Node<S> {
-    bounds: Box3<S>,
-    /// Of a leaf, where its things begin; else the number of its second child. The first
-    /// one follows it.
+    bounds: Aabb3<S>,
+    /// First item of a leaf; else the index of the second child. The first child follows the node.
     next: u32,
-    /// How many things; zero if it has children.
+    /// Number of items; zero for an inner node.
     count: u32,
 }
 
-impl<S> Default for BoxTree<S> {
+impl<S> Default for Bvh<S> {
     fn default() -> Self {
         Self { nodes: Vec::new(), items: Vec::new() }
     }
 }
 
-/// A leaf has no more things than this.
-const LEAF: usize = 4;
+/// Maximum number of items per leaf.
+const MAX_LEAF_ITEMS: usize = 4;
 
-impl<S: Scalar> BoxTree<S> {
-    /// A tree of things that are named by their places in this list.
+impl<S: Scalar> Bvh<S> {
+    /// Builds a tree over items that are identified by their index in the list.
     #[must_use]
-    pub fn new(boxes: &[Box3<S>]) -> Self {
+    pub fn new(boxes: &[Aabb3<S>]) -> Self {
         let mut tree = Self { nodes: Vec::new(), items: (0..boxes.len() as u32).collect() };
         if !boxes.is_empty() {
             tree.build(boxes, 0, boxes.len());
@@ -42,17 +40,17 @@ impl<S: Scalar> BoxTree<S> {
         tree
     }
 
-    fn build(&mut self, boxes: &[Box3<S>], from: usize, to: usize) {
+    fn build(&mut self, boxes: &[Aabb3<S>], from: usize, to: usize) {
         let of = |item: u32| boxes[item as usize];
         let first = of(self.items[from]);
         let bounds = self.items[from..to].iter().fold(first, |all, i| all.union(&of(*i)));
         let node = self.nodes.len();
         let leaf = Node { bounds, next: from as u32, count: (to - from) as u32 };
         self.nodes.push(leaf);
-        if to - from <= LEAF {
+        if to - from <= MAX_LEAF_ITEMS {
             return;
         }
-        // Halved across the axis along which the middles are spread most.
+        // Median split across the axis along which the centers are spread most.
         let point = |item: u32| of(item).center();
         let start = Aabb { min: point(self.items[from]), max: point(self.items[from]) };
         let spread = self.items[from..to]
@@ -71,9 +69,9 @@ impl<S: Scalar> BoxTree<S> {
         self.build(boxes, middle, to);
     }
 
-    /// Takes new boxes for the same things: the tree keeps its form, which is good as long as
-    /// they stay about where they were.
-    pub fn refit(&mut self, boxes: &[Box3<S>]) {
+    /// Refits the tree to new boxes of the same items: its topology stays, which is good as long as
+    /// items stay about where they were.
+    pub fn refit(&mut self, boxes: &[Aabb3<S>]) {
         // Children come after their parents.
         for number in (0..self.nodes.len()).rev() {
             let Node { next, count, .. } = self.nodes[number];
@@ -91,15 +89,20 @@ impl<S: Scalar> BoxTree<S> {
         }
     }
 
-    /// Names all things whose boxes may have a point in common with this one, and some more.
-    pub fn near(&self, bounds: &Box3<S>, name: impl FnMut(u32)) {
-        self.visit(|node| node.overlaps(bounds), name);
+    /// Visits all items whose boxes may overlap a box, and some more.
+    pub fn for_each_in_box(&self, bounds: &Aabb3<S>, visit: impl FnMut(u32)) {
+        self.visit(|node| node.overlaps(bounds), visit);
     }
 
-    /// Names all things whose boxes a line may go through, between these parts of the way
-    /// from a point along a motion, and some more.
-    pub fn along(&self, from: Point3<S>, motion: cgmath::Vector3<S>, name: impl FnMut(u32)) {
-        let crosses = |bounds: &Box3<S>| {
+    /// Visits all items whose boxes may cross the segment from a point along a motion, and some
+    /// more.
+    pub fn for_each_on_segment(
+        &self,
+        from: Point3<S>,
+        motion: cgmath::Vector3<S>,
+        visit: impl FnMut(u32),
+    ) {
+        let crosses = |bounds: &Aabb3<S>| {
             let (mut into, mut out) = (S::zero(), S::one());
             for axis in 0..3 {
                 let (low, high) = (bounds.min[axis] - from[axis], bounds.max[axis] - from[axis]);
@@ -113,42 +116,42 @@ impl<S: Scalar> BoxTree<S> {
                     out = out.min(s.max(t));
                 }
             }
-            // With room for rounding.
+            // With a tolerance for rounding.
             into <= out * (S::one() + S::epsilon() * S::constant(8.0))
         };
-        self.visit(crosses, name);
+        self.visit(crosses, visit);
     }
 
-    /// Names all things whose boxes may be within `reach` metres of a point, and some more,
-    /// the nearer ones about first. The answer to each is how far is still of interest.
-    pub fn around(&self, point: Point3<S>, mut reach: S, mut name: impl FnMut(u32) -> S) {
+    /// Visits all items whose boxes may be within `reach` metres of a point, and some more, roughly
+    /// nearest first. `visit` returns the reach from then on.
+    pub fn for_each_near(&self, point: Point3<S>, mut reach: S, mut visit: impl FnMut(u32) -> S) {
         let gap = |number: u32| {
             let bounds = self.nodes.get(number as usize).map(|node| node.bounds);
-            bounds.map_or(S::infinity(), |bounds| bounds.gap(point))
+            bounds.map_or(S::infinity(), |bounds| bounds.distance_to_point(point))
         };
-        // With room for rounding.
-        let room = S::one() + S::epsilon() * S::constant(64.0);
+        // With a tolerance for rounding.
+        let tolerance = S::one() + S::epsilon() * S::constant(64.0);
         let mut open = SmallVec::<[(S, u32); 64]>::new();
         open.push((gap(0), 0));
         while let Some((far, number)) = open.pop() {
-            if far.is_nan() || far > reach * room {
+            if far.is_nan() || far > reach * tolerance {
                 continue;
             }
             let Some(node) = self.nodes.get(number as usize) else { continue };
             if node.count > 0 {
                 let from = node.next as usize;
                 for item in &self.items[from..from + node.count as usize] {
-                    reach = name(*item).min(reach);
+                    reach = visit(*item).min(reach);
                 }
             } else {
                 let (first, second) = ((gap(number + 1), number + 1), (gap(node.next), node.next));
-                // The nearer one is opened first.
+                // The nearer one is visited first.
                 open.extend(if first.0 <= second.0 { [second, first] } else { [first, second] });
             }
         }
     }
 
-    fn visit(&self, enters: impl Fn(&Box3<S>) -> bool, mut name: impl FnMut(u32)) {
+    fn visit(&self, enters: impl Fn(&Aabb3<S>) -> bool, mut visit: impl FnMut(u32)) {
         let mut open = SmallVec::<[u32; 64]>::from_slice(&[0]);
         while let Some(number) = open.pop() {
             let Some(node) = self.nodes.get(number as usize) else { continue };
@@ -157,16 +160,16 @@ impl<S: Scalar> BoxTree<S> {
             }
             if node.count > 0 {
                 let from = node.next as usize;
-                self.items[from..from + node.count as usize].iter().for_each(|i| name(*i));
+                self.items[from..from + node.count as usize].iter().for_each(|i| visit(*i));
             } else {
                 open.extend([node.next, number + 1]);
             }
         }
     }
 
-    /// The box around all.
+    /// Bounding box of all items.
     #[must_use]
-    pub fn bounds(&self) -> Option<Box3<S>> {
+    pub fn bounds(&self) -> Option<Aabb3<S>> {
         self.nodes.first().map(|node| node.bounds)
     }
 }

@@ -1,73 +1,74 @@
-//! The readable version of [`between`](super::closest::between): all corners are compared
-//! with all faces, and all edges with each other. Exact but for rounding, and without
-//! iterations. The fast versions are tested against it, and where one of them cannot show
-//! that its answer is right, this one is asked.
+//! Brute-force separating axis test: the readable reference for
+//! [`local_closest_points`](super::closest::local_closest_points). Compares all vertices with all
+//! faces and all edges with each other; exact except for rounding, without iterations. The fast
+//! versions are tested against it and fall back to it where they do not converge.
 
 mod axes;
-mod skeleton;
+mod features;
 
-pub use skeleton::Skeleton;
+pub use features::Features;
 
 use cgmath::{EuclideanSpace, InnerSpace};
 
-use super::closest::Between;
+use super::closest::LocalClosestPoints;
 use super::core::Core;
 use super::manifold::deepest;
 use crate::math::{Point3, Vec3, direction_and_length};
-use crate::shape::across;
-use crate::shape::polygon::{closest_of_polygon, closest_of_segment};
-use axes::widest_axis;
-pub(super) use axes::{Axis, Of, PARALLEL, at_right_angles};
+use crate::shape::any_perpendicular;
+use crate::shape::polygon::{project_on_polygon, project_on_segment};
+use axes::axis_of_max_separation;
+pub(super) use axes::{Axis, AxisSource, PARALLEL, at_right_angles};
 
-/// Where two cores, without their radii, are nearest or deepest.
+/// Closest or deepest points of two cores without their radii.
 ///
-/// Of those that overlap, the directions of faces and of pairs of edges say where the way
-/// out is shortest (separating axes; Gottschalk, Lin and Manocha 1996).
-pub(super) fn between(x: &Core<'_>, y: &Core<'_>) -> Between {
-    let (a, b) = (&Skeleton::of(x), &Skeleton::of(y));
-    // What is nearer than this is told by the axis, not by a difference that is rounding.
-    let near = 1e-12 * (x.size() + y.size());
-    let axis = widest_axis(a, b);
+/// Overlapping cores use the separating axis test (Gottschalk, Lin and Manocha 1996).
+pub(super) fn local_closest_points(x: &Core<'_>, y: &Core<'_>) -> LocalClosestPoints {
+    let (a, b) = (&Features::of(x), &Features::of(y));
+    // Below this distance the axis gives the normal, since the difference of the points is rounding
+    // noise.
+    let tolerance = 1e-12 * (x.size() + y.size());
+    let axis = axis_of_max_separation(a, b);
     match axis {
-        Some(axis) if axis.separation <= near => {
-            let (on_a, on_b) = match axis.of {
-                Of::Edges => crossing_edges(a, b, &axis),
+        Some(axis) if axis.separation <= tolerance => {
+            let (on_a, on_b) = match axis.source {
+                AxisSource::Edges => crossing_edges(a, b, &axis),
                 _ => deepest(x, y, &axis),
             };
-            Between { distance: axis.separation, normal: axis.normal, on_a, on_b }
+            LocalClosestPoints { distance: axis.separation, normal: axis.normal, on_a, on_b }
         }
         axis => {
             let (on_a, on_b) = nearest_features(a, b);
-            let out = direction_and_length(on_b - on_a).filter(|(_, far)| *far > near);
-            let (normal, distance) =
-                out.unwrap_or_else(|| (axis.map_or_else(|| beside(a, b), |axis| axis.normal), 0.0));
-            Between { distance, normal, on_a, on_b }
+            let out = direction_and_length(on_b - on_a).filter(|(_, far)| *far > tolerance);
+            let (normal, distance) = out.unwrap_or_else(|| {
+                (axis.map_or_else(|| normal_between_touching_lines(a, b), |axis| axis.normal), 0.0)
+            });
+            LocalClosestPoints { distance, normal, on_a, on_b }
         }
     }
 }
 
-/// A direction between two lines that cross or lie in each other: every one at right angles
-/// to both is as short a way out.
-fn beside(a: &Skeleton, b: &Skeleton) -> Vec3<f64> {
+/// Normal between two crossing or collinear segments: any direction perpendicular to both gives the
+/// same penetration.
+fn normal_between_touching_lines(a: &Features, b: &Features) -> Vec3<f64> {
     let [first, second] = [a, b].map(|x| x.directions.first().copied());
     let both = first.zip(second).map(|(first, second)| first.cross(second));
-    both.filter(|both| both.magnitude() > PARALLEL)
-        .and_then(direction_and_length)
-        .map_or_else(|| across(first.or(second).unwrap_or_else(Vec3::unit_x)), |(unit, _)| unit)
+    both.filter(|both| both.magnitude() > PARALLEL).and_then(direction_and_length).map_or_else(
+        || any_perpendicular(first.or(second).unwrap_or_else(Vec3::unit_x)),
+        |(unit, _)| unit,
+    )
 }
 
-/// The points of two skeletons that are nearest to each other: of all corners with all
-/// faces, and all edges with all edges.
-fn nearest_features(a: &Skeleton, b: &Skeleton) -> (Vec3<f64>, Vec3<f64>) {
-    // A distance changes so little about the nearest points that many are as near, but for
-    // rounding. Of those, the pair across which most of the shapes is kept apart is right.
+/// Closest points by comparing all vertices with all faces, and all edges with all edges.
+fn nearest_features(a: &Features, b: &Features) -> (Vec3<f64>, Vec3<f64>) {
+    // Distances vary little around the closest points, so many pairs tie to within rounding. Among
+    // those, the pair whose plane separates the shapes most is right.
     let mut least = f64::INFINITY;
-    let mut as_near: Vec<(f64, (Vec3<f64>, Vec3<f64>))> = Vec::new();
+    let mut ties: Vec<(f64, (Vec3<f64>, Vec3<f64>))> = Vec::new();
     let mut offer = |pair: (Vec3<f64>, Vec3<f64>)| {
         let squared = (pair.1 - pair.0).magnitude2();
         least = least.min(squared);
         if squared <= least * (1.0 + 1e-12) {
-            as_near.push((squared, pair));
+            ties.push((squared, pair));
         }
     };
     let mut corners = Vec::new();
@@ -80,7 +81,7 @@ fn nearest_features(a: &Skeleton, b: &Skeleton) -> (Vec3<f64>, Vec3<f64>) {
             }
             for point in &other.points {
                 let point = Point3::from_vec(*point);
-                let there = closest_of_polygon(&corners, *normal, point).to_vec();
+                let there = project_on_polygon(&corners, *normal, point).to_vec();
                 offer(if swap { (point.to_vec(), there) } else { (there, point.to_vec()) });
             }
         }
@@ -88,7 +89,7 @@ fn nearest_features(a: &Skeleton, b: &Skeleton) -> (Vec3<f64>, Vec3<f64>) {
             one.points.iter().flat_map(|p| other.edges.iter().map(move |e| (p, e)))
         {
             let [from, to] = segment.map(|i| Point3::from_vec(other.points[i as usize]));
-            let there = closest_of_segment(from, to, Point3::from_vec(*point)).to_vec();
+            let there = project_on_segment(from, to, Point3::from_vec(*point)).to_vec();
             offer(if swap { (there, *point) } else { (*point, there) });
         }
     }
@@ -99,28 +100,28 @@ fn nearest_features(a: &Skeleton, b: &Skeleton) -> (Vec3<f64>, Vec3<f64>) {
             offer(pair);
         }
     }
-    as_near.retain(|(squared, _)| *squared <= least * (1.0 + 1e-12));
-    let kept_apart = |(on_a, on_b): (Vec3<f64>, Vec3<f64>)| {
+    ties.retain(|(squared, _)| *squared <= least * (1.0 + 1e-12));
+    let separation = |(on_a, on_b): (Vec3<f64>, Vec3<f64>)| {
         let out = direction_and_length(on_b - on_a);
         out.map_or(f64::NEG_INFINITY, |(normal, _)| -b.reach(-normal) - a.reach(normal))
     };
     let first = (f64::NEG_INFINITY, (a.points[0], b.points[0]));
-    let best = as_near.into_iter().enumerate().fold(first, |best, (i, (_, pair))| {
-        let apart = kept_apart(pair);
+    let best = ties.into_iter().enumerate().fold(first, |best, (i, (_, pair))| {
+        let apart = separation(pair);
         if i == 0 || apart > best.0 { (apart, pair) } else { best }
     });
     best.1
 }
 
-/// Whether a face of something flat has no area of its own.
+/// Returns true for a degenerate face without area.
 fn is_line(corners: &[Point3<f64>]) -> bool {
     let ends = corners.iter().skip(1).chain(corners.first());
     let shortest = corners.iter().zip(ends).map(|(a, b)| (b - a).magnitude2());
     shortest.fold(f64::INFINITY, f64::min) <= 0.0
 }
 
-/// Where two segments are nearest to each other if that is at no end of either; else, near
-/// there. None if they are parallel (Ericson, *Real-Time Collision Detection*, 2005, §5.1.9).
+/// Closest points of two segments if they are interior to both; else approximate. None if parallel
+/// (Ericson, *Real-Time Collision Detection*, 2005, §5.1.9).
 pub(in crate::contact) fn crossing(
     [p, q]: [Vec3<f64>; 2],
     [r, s]: [Vec3<f64>; 2],
@@ -139,15 +140,15 @@ pub(in crate::contact) fn crossing(
     Some((p + along_a * first.clamp(0.0, long_a), r + along_b * second.clamp(0.0, long_b)))
 }
 
-/// Where those edges are nearest to each other that are deepest along an axis.
-fn crossing_edges(a: &Skeleton, b: &Skeleton, axis: &Axis) -> (Vec3<f64>, Vec3<f64>) {
-    let far = |of: &Skeleton, edge: &[u32; 2], normal: Vec3<f64>| {
+/// Closest points of the two support edges along an axis.
+fn crossing_edges(a: &Features, b: &Features, axis: &Axis) -> (Vec3<f64>, Vec3<f64>) {
+    let far = |of: &Features, edge: &[u32; 2], normal: Vec3<f64>| {
         (of.points[edge[0] as usize] + of.points[edge[1] as usize]).dot(normal)
     };
-    // Those that are farthest out, and of those that are as far the two that cross: nearly
-    // parallel edges of others may be farther out by a little, and elsewhere.
-    let ends = |of: &Skeleton, edge: &[u32; 2]| edge.map(|i| of.points[i as usize]);
-    let near = 1e-9 * (a.size() + b.size());
+    // The support edges, and among ties the two that cross: nearly parallel edges elsewhere may
+    // reach slightly farther.
+    let ends = |of: &Features, edge: &[u32; 2]| edge.map(|i| of.points[i as usize]);
+    let tolerance = 1e-9 * (a.size() + b.size());
     let mut best: Option<(f64, f64, (Vec3<f64>, Vec3<f64>))> = None;
     for first in &a.edges {
         for second in &b.edges {
@@ -156,7 +157,7 @@ fn crossing_edges(a: &Skeleton, b: &Skeleton, axis: &Axis) -> (Vec3<f64>, Vec3<f
             let between = on_b - on_a;
             let aside = (between - axis.normal * between.dot(axis.normal)).magnitude2();
             let better = best.is_none_or(|(farthest, least, _)| {
-                out > farthest + near || (out >= farthest - near && aside < least)
+                out > farthest + tolerance || (out >= farthest - tolerance && aside < least)
             });
             if better {
                 best = Some((out, aside, (on_a, on_b)));

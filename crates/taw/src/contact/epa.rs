@@ -1,65 +1,65 @@
-//! The way out of two cores that overlap, by a polytope that grows in their difference
-//! until the face of it that is nearest to the origin is one of the difference itself (van
+//! Penetration of two overlapping cores by EPA, the expanding polytope algorithm: a polytope grows
+//! inside the Minkowski difference until its face nearest to the origin lies on the boundary (van
 //! den Bergen, *Proximity queries and penetration depth computation*, 2001).
 
 use cgmath::InnerSpace;
 
-use super::closest::{Between, CERTAIN};
+use super::closest::{LocalClosestPoints, TOLERANCE};
 use super::core::Core;
 use super::gjk::{Vertex, vertex};
 use crate::math::{Vec3, direction_and_length};
 
 /// A face of the polytope.
 #[derive(Clone, Copy)]
-struct Triangle {
+struct Face {
     corners: [usize; 3],
-    /// Out of the polytope, a unit vector.
+    /// Outward unit normal.
     normal: Vec3<f64>,
-    /// Of its plane, from the origin.
+    /// Distance of its plane from the origin.
     height: f64,
 }
 
-/// Steps enough for any pair of hulls of a few hundred corners.
-const STEPS: usize = 1_000;
+/// Enough for any pair of hulls of a few hundred vertices.
+const MAX_ITERATIONS: usize = 1_000;
 
-/// Where two cores are deepest in each other, from four corners of their difference
-/// around the origin on; none where rounding forbids to say so.
-pub(super) fn way_out(
+/// Deepest points of two overlapping cores, from a tetrahedron of the Minkowski difference around
+/// the origin; none if rounding prevents convergence.
+pub(super) fn penetration(
     a: &Core<'_>,
     b: &Core<'_>,
     start: [Vertex; 4],
     size: f64,
-) -> Option<Between> {
+) -> Option<LocalClosestPoints> {
     let mut vertices = Vec::with_capacity(32);
     vertices.extend(start);
     let mut faces = Vec::with_capacity(64);
     let [p, q, r, s] = start.map(|vertex| vertex.difference);
-    let turned = (q - p).cross(r - p).dot(s - p) > 0.0;
+    let flipped = (q - p).cross(r - p).dot(s - p) > 0.0;
     for [i, j, k] in [[0, 1, 2], [0, 2, 3], [0, 3, 1], [1, 3, 2]] {
-        faces.push(face(&vertices, if turned { [i, k, j] } else { [i, j, k] })?);
+        faces.push(face(&vertices, if flipped { [i, k, j] } else { [i, j, k] })?);
     }
-    let mut rim: Vec<[usize; 2]> = Vec::with_capacity(32);
-    for _ in 0..STEPS {
+    let mut horizon: Vec<[usize; 2]> = Vec::with_capacity(32);
+    for _ in 0..MAX_ITERATIONS {
         let nearest = *faces.iter().reduce(|x, y| if y.height < x.height { y } else { x })?;
         let next = vertex(a, b, nearest.normal);
         let reach = next.difference.dot(nearest.normal);
-        if reach - nearest.height <= CERTAIN * size {
-            return Some(answer(&vertices, &faces, &nearest, reach, size));
+        if reach - nearest.height <= TOLERANCE * size {
+            return Some(closest_points_on(&vertices, &faces, &nearest, reach, size));
         }
-        // What sees the new corner goes; the rim of it is joined to the corner.
-        rim.clear();
+        // Faces that see the new vertex are removed; their horizon is joined to the vertex.
+        horizon.clear();
         let above = 1e-14 * size;
-        faces.retain(|face: &Triangle| {
+        faces.retain(|face: &Face| {
             let seen = next.difference.dot(face.normal) - face.height > above;
             if seen {
                 let [i, j, k] = face.corners;
                 for edge in [[i, j], [j, k], [k, i]] {
-                    let back = rim.iter().position(|[from, to]| [*to, *from] == edge);
+                    let back = horizon.iter().position(|[from, to]| [*to, *from] == edge);
                     match back {
                         Some(place) => {
-                            rim.swap_remove(place);
+                            horizon.swap_remove(place);
                         }
-                        None => rim.push(edge),
+                        None => horizon.push(edge),
                     }
                 }
             }
@@ -67,35 +67,36 @@ pub(super) fn way_out(
         });
         let new = vertices.len();
         vertices.push(next);
-        for [from, to] in &rim {
+        for [from, to] in &horizon {
             faces.push(face(&vertices, [*from, *to, new])?);
         }
     }
     None
 }
 
-/// A face, if it is no line and the origin is behind it.
-fn face(vertices: &[Vertex], corners: [usize; 3]) -> Option<Triangle> {
+/// A face, unless it is degenerate or has the origin in front of it.
+fn face(vertices: &[Vertex], corners: [usize; 3]) -> Option<Face> {
     let [p, q, r] = corners.map(|i| vertices[i].difference);
     let (normal, twice) = direction_and_length((q - p).cross(r - p))?;
     let longest = (q - p).magnitude2().max((r - q).magnitude2()).max((p - r).magnitude2());
     let height = (p + q + r).dot(normal) / 3.0;
-    (twice > 1e-10 * longest && height > -1e-13 * longest.sqrt()).then_some(Triangle {
+    (twice > 1e-10 * longest && height > -1e-13 * longest.sqrt()).then_some(Face {
         corners,
         normal,
         height,
     })
 }
 
-/// What the nearest face says: of those in its plane, the one that the origin is below.
-fn answer(
+/// Witness points on the nearest face; among coplanar faces, on the one that contains the
+/// projection of the origin.
+fn closest_points_on(
     vertices: &[Vertex],
-    faces: &[Triangle],
-    nearest: &Triangle,
+    faces: &[Face],
+    nearest: &Face,
     reach: f64,
     size: f64,
-) -> Between {
-    let weights = |face: &Triangle| {
+) -> LocalClosestPoints {
+    let weights = |face: &Face| {
         let [p, q, r] = face.corners.map(|i| vertices[i].difference);
         let below = face.normal * face.height;
         let part = |x: Vec3<f64>, y: Vec3<f64>| (x - below).cross(y - below).dot(face.normal);
@@ -103,10 +104,10 @@ fn answer(
         let all: f64 = parts.iter().sum();
         parts.map(|part| part / all)
     };
-    let least = |face: &Triangle| weights(face).into_iter().fold(f64::INFINITY, f64::min);
+    let least = |face: &Face| weights(face).into_iter().fold(f64::INFINITY, f64::min);
     let mut best = (least(nearest), nearest);
     for face in faces {
-        let same = face.height <= nearest.height + 4.0 * CERTAIN * size;
+        let same = face.height <= nearest.height + 4.0 * TOLERANCE * size;
         if best.0 < 0.0 && same && least(face) > best.0 {
             best = (least(face), face);
         }
@@ -117,7 +118,7 @@ fn answer(
     let on_a = corners.fold(Vec3::new(0.0, 0.0, 0.0), |sum, (i, weight)| {
         sum + vertices[*i].on_a * (weight / all)
     });
-    // The difference is `b - a`, so `b` has to go the other way.
+    // The difference is `B − A`, so `B` has to go the opposite way.
     let (normal, distance) = (-best.1.normal, -reach);
-    Between { distance, normal, on_a, on_b: on_a + normal * distance }
+    LocalClosestPoints { distance, normal, on_a, on_b: on_a + normal * distance }
 }

@@ -1,9 +1,9 @@
-//! Between the columns and [`Response::EventDriven`](crate::response::Response), which
-//! counts in `f64`.
+//! Adapter between the columns and [`Response::EventDriven`](crate::response::Response), which
+//! computes in `f64`.
 
 use cgmath::InnerSpace;
 
-use super::walls::{Part, Walls};
+use super::walls::{SubShape, Walls};
 use super::{Precision, World};
 use crate::broad::Period;
 use crate::contact::Contact;
@@ -13,9 +13,9 @@ use crate::response::event::{self, Ball, Path, Settings, Wall};
 use crate::response::{BallSpin, Impact, Material, Work};
 
 impl<S: Scalar> World<S> {
-    /// Goes through a substep of `dt` seconds, event by event, with `rest` seconds of the step
-    /// after it: at its end, walls are where they are.
-    pub(super) fn go_through_events(&mut self, dt: S, rest: S) {
+    /// Runs the event-driven solver for a substep of `dt` seconds. `rest` is the time of the step
+    /// after it: walls reach their poses at the end of the step.
+    pub(super) fn step_events(&mut self, dt: S, rest: S) {
         let exact = self.model.precision == Precision::Compensated;
         let marbles = &self.marbles;
         let events = &mut self.events;
@@ -23,20 +23,20 @@ impl<S: Scalar> World<S> {
             Period { lengths: marbles.period.lengths.map(|length| length.map(S::as_f64)) };
         events.balls.clear();
         events.balls.extend((0..marbles.len()).map(|row| {
-            let Motion { position, velocity } = marbles.exact(row);
+            let Motion { position, velocity } = marbles.motion_f64(row);
             let largest = position.x.abs().max(position.y.abs()).max(position.z.abs());
             let digit = if exact { f64::EPSILON } else { S::epsilon().as_f64() };
             let radius = marbles.radius()[row].as_f64();
             Ball {
                 position,
                 velocity,
-                spin: marbles.exact_spin(row),
+                spin: marbles.angular_velocity_f64(row),
                 pull: self.accelerations.get(row).copied().unwrap_or(Vec3::new(0.0, 0.0, 0.0)),
                 radius,
                 inverse_mass: 1.0 / marbles.mass(row).as_f64(),
                 material: marbles.material.get(row).unwrap_or_default().cast(),
                 spins: match self.model.rotation {
-                    Rotation::Dynamic if !marbles.is_held(row) => BallSpin::Free,
+                    Rotation::Dynamic if !marbles.is_rotation_locked(row) => BallSpin::Free,
                     _ => BallSpin::Ignored,
                 },
                 rounding: 4.0 * digit * (largest + radius),
@@ -64,32 +64,32 @@ impl<S: Scalar> World<S> {
         let source = &Source::new(&self.walls, [dt.as_f64(), rest.as_f64()]);
         let iterations = self.model.iterations;
         let settings = Settings { dt: dt.as_f64(), iterations, source, looks: 0.into() };
-        events.work = self.accounting.is_some().then(Work::default);
+        events.work = self.audit_state.is_some().then(Work::default);
         let mut impacts = Vec::new();
         self.stopped.extend(events.run(&settings, &mut impacts));
         self.impacts.extend(impacts.into_iter().map(Impact::cast));
-        if let (Some(accounting), Some(work)) = (&mut self.accounting, self.events.work) {
-            accounting.work = work;
+        if let (Some(audit_state), Some(work)) = (&mut self.audit_state, self.events.work) {
+            audit_state.work = work;
         }
         for (row, ball) in self.events.balls.iter().enumerate() {
             let (position, velocity) = (ball.position, ball.velocity);
-            let mut whole = self.marbles.set_exact(row, Motion { position, velocity });
+            let mut whole = self.marbles.set_motion_f64(row, Motion { position, velocity });
             if self.model.rotation == Rotation::Dynamic {
-                whole &= self.marbles.set_exact_spin(row, ball.spin);
-                self.marbles.turn_by(row, cast_vector(ball.turned));
+                whole &= self.marbles.set_angular_velocity_f64(row, ball.spin);
+                self.marbles.rotate_by(row, cast_vector(ball.turned));
             }
             if !whole && !self.stopped.contains(&(row as u32)) {
                 self.stopped.push(row as u32);
             }
         }
         if rest <= S::zero() {
-            self.walls.arrive();
+            self.walls.finish_step();
         }
     }
 
-    /// How wide a gap may still be one between marbles at rest: many times what the
-    /// method takes for such, and what rounding hides.
-    pub(super) fn reach_at_rest(&self, dt: S) -> S {
+    /// Contact distance of resting marbles in metres: many times the tolerance of the method, and
+    /// of rounding.
+    pub(super) fn resting_contact_distance(&self, dt: S) -> S {
         let strongest = self.accelerations.iter().map(|a| a.magnitude());
         let fall = strongest.fold(0.0, f64::max) * dt.as_f64() * dt.as_f64();
         let far = self.marbles.position().iter().map(|p| {
@@ -102,20 +102,21 @@ impl<S: Scalar> World<S> {
     }
 }
 
-/// The walls of a world, for a substep.
+/// Walls of a world for a substep.
 struct Source<'a, S> {
     walls: &'a Walls<S>,
-    /// How many seconds after the begin of the substep walls come to where they are.
+    /// Time in seconds from the start of the substep until walls reach their current poses.
     there: f64,
-    /// The motions of those that go there.
-    going: Vec<WallMotion<f64>>,
+    /// Motions of the walls on their way there.
+    moving: Vec<WallMotion<f64>>,
 }
 
 impl<'a, S: Scalar> Source<'a, S> {
     fn new(walls: &'a Walls<S>, [dt, rest]: [f64; 2]) -> Self {
         let rows = (0..walls.len()).filter(|row| walls.has_moved(*row));
-        let going = rows.filter_map(|row| walls.motion_of_row(row)).map(WallMotion::cast).collect();
-        Self { walls, there: dt + rest, going }
+        let moving =
+            rows.filter_map(|row| walls.motion_of_row(row)).map(WallMotion::cast).collect();
+        Self { walls, there: dt + rest, moving }
     }
 }
 
@@ -125,28 +126,29 @@ impl<S: Scalar> event::Source for Source<'_, S> {
     }
 
     fn has_parts(&self) -> bool {
-        !self.walls.are_planes()
+        !self.walls.are_half_spaces()
     }
 
     fn near(&self, point: Point3<f64>, reach: f64, name: &mut dyn FnMut(u32, u32)) {
-        // Walls are at the end of their way, from which they may be as far as they go.
+        // Walls are at their final poses, from which they may be as far as they move.
         let way = |motion: &WallMotion<f64>| {
             let arm = (point - motion.pivot).magnitude() + reach;
             let arm = arm + motion.velocity.magnitude() * self.there;
-            (motion.velocity.magnitude() + motion.spin.magnitude() * arm) * self.there
+            (motion.velocity.magnitude() + motion.angular_velocity.magnitude() * arm) * self.there
         };
-        let way = self.going.iter().map(way).fold(0.0, f64::max);
+        let way = self.moving.iter().map(way).fold(0.0, f64::max);
         let digits =
             8.0 * S::epsilon().as_f64() * point.x.abs().max(point.y.abs()).max(point.z.abs());
         let reach = S::constant((reach + way) * (1.0 + 1e-6) + digits);
-        self.walls.around(cast_point(point), reach, |Part { wall, part }| name(wall, part));
+        self.walls
+            .for_each_near(cast_point(point), reach, |SubShape { wall, part }| name(wall, part));
     }
 
     fn wall(&self, row: u32, part: u32) -> Option<Wall> {
         let place = row as usize;
         let motion = self.walls.motion_of_row(place).map(WallMotion::cast);
         let moved = motion.is_some() && self.walls.has_moved(place);
-        let form = self.walls.shapes().get(place)?.exact(part)?;
+        let form = self.walls.shapes().get(place)?.sub_shape_f64(part)?;
         Some(Wall {
             bounds: form.bounds(),
             form,

@@ -3,16 +3,16 @@ use cgmath::{EuclideanSpace, InnerSpace};
 use crate::contact::core::{BOX_FACES, Core, Kind};
 use crate::math::{Vec3, direction_and_length};
 
-/// A [`Core`] as lists of all that it is made of.
+/// Vertices, edges and faces of a [`Core`].
 #[derive(Clone, Debug, PartialEq)]
-pub struct Skeleton {
-    /// The corners, in metres.
+pub struct Features {
+    /// Vertices, in metres.
     pub points: Vec<Vec3<f64>>,
-    /// Pairs of corners.
+    /// Pairs of vertices.
     pub edges: Vec<[u32; 2]>,
-    /// The directions that edges have, as unit vectors, each of them once.
+    /// Distinct edge directions, as unit vectors.
     pub directions: Vec<Vec3<f64>>,
-    /// The normals of faces, as unit vectors, with their corners, counterclockwise.
+    /// Unit normals of the faces with their vertices, counterclockwise.
     pub faces: Vec<(Vec3<f64>, Vec<u32>)>,
 }
 
@@ -32,23 +32,23 @@ const BOX_EDGES: [[u32; 2]; 12] = [
     [3, 7],
 ];
 
-impl Skeleton {
-    /// All parts of a core.
+impl Features {
+    /// Lists all features of a core.
     #[must_use]
     pub fn of(core: &Core<'_>) -> Self {
         let (points, edges, faces): (Vec<_>, Vec<_>, _) = match &core.kind {
             Kind::Point(point) => (vec![*point], Vec::new(), 0),
             Kind::Segment(ends) => (ends.to_vec(), vec![[0, 1]], 0),
-            // Both sides are alike. A line has none.
+            // Both sides count. A degenerate triangle has none.
             Kind::Triangle(corners) => {
                 let edges = vec![[0, 1], [1, 2], [2, 0]];
-                (corners.to_vec(), edges, 2 * usize::from(core.is_flat()))
+                (corners.to_vec(), edges, 2 * usize::from(core.is_nondegenerate_triangle()))
             }
             Kind::Cuboid(cuboid) => {
                 ((0..8).map(|i| cuboid.corner(i)).collect(), BOX_EDGES.to_vec(), BOX_FACES.len())
             }
-            Kind::Hull { points, edges, faces, turn, at, .. } => {
-                let there = points.iter().map(|point| turn * point.to_vec() + at);
+            Kind::Hull { points, edges, faces, rotation, translation, .. } => {
+                let there = points.iter().map(|point| rotation * point.to_vec() + translation);
                 (there.collect(), edges.to_vec(), faces.len())
             }
         };
@@ -70,13 +70,13 @@ impl Skeleton {
         Self { faces: (0..faces).map(face).collect(), points, edges, directions }
     }
 
-    /// The greatest distance of a corner from the first one.
+    /// Greatest distance of a vertex from the first one.
     pub(super) fn size(&self) -> f64 {
         let far = self.points.iter().map(|point| (point - self.points[0]).magnitude());
         far.fold(0.0, f64::max)
     }
 
-    /// How far it reaches along a direction, from its origin.
+    /// Support distance along a direction, from the origin.
     pub(super) fn reach(&self, direction: Vec3<f64>) -> f64 {
         self.points.iter().map(|point| point.dot(direction)).fold(f64::NEG_INFINITY, f64::max)
     }

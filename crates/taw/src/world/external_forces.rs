@@ -1,8 +1,8 @@
-//! Forces, impulses and momentum of single marbles.
+//! External forces, impulses and momentum of single marbles.
 
 use cgmath::{InnerSpace, Zero};
 
-use super::marbles::{MarbleId, Marbles, SPIN, VELOCITY};
+use super::marbles::{ANGULAR_VELOCITY, MarbleId, Marbles, VELOCITY};
 use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Bivector;
@@ -14,15 +14,14 @@ const IMPULSE: [&str; 3] = ["impulse.x", "impulse.y", "impulse.z"];
 const POINT: [&str; 3] = ["point.x", "point.y", "point.z"];
 const TORQUE: [&str; 3] = ["torque.yz", "torque.zx", "torque.xy"];
 
-/// Forces and torques last for one [`World::step`](super::World::step), all of its
-/// substeps, and add up. Torques count only in a model whose rotation is dynamic.
-/// Impulses change velocities at once.
+/// Forces and torques act for one [`World::step`](super::World::step), in all of its substeps, and
+/// add up. Torques count only in a model with dynamic rotation. Impulses change velocities
+/// immediately.
 impl<S: Scalar> Marbles<S> {
-    /// Pushes a marble at its center, in newtons.
+    /// Applies a force at the center of a marble, in newtons.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for the force, or for the sum of all
-    /// so far.
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for the force, or for the accumulated sum.
     pub fn apply_force(&mut self, id: MarbleId, force: Vec3<S>) -> Result<(), Error> {
         let row = self.row(id)?;
         let sum = self.force_with(row, force)?;
@@ -30,21 +29,21 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// The force on a row with another one.
+    /// Accumulated force of a marble plus another one.
     fn force_with(&self, row: usize, force: Vec3<S>) -> Result<Vec3<S>, Error> {
         finite_vector(FORCE, force)?;
         finite_vector(FORCE, self.force.get(row).unwrap_or_else(Vec3::zero) + force)
     }
 
-    /// The torque on a row with another one.
+    /// Accumulated torque of a marble plus another one.
     fn torque_with(&self, row: usize, torque: Vec3<S>) -> Result<Bivector<S>, Error> {
         finite_vector(TORQUE, torque)?;
         let sum = self.torque.get(row).unwrap_or_else(Bivector::zero).dual() + torque;
         finite_vector(TORQUE, sum).map(Bivector::from)
     }
 
-    /// Pushes a marble at a point (in world space, of its surface or not), which turns it
-    /// too.
+    /// Applies a force at a point in world space, on the surface or not, which also causes a
+    /// torque.
     ///
     /// # Errors
     /// As [`Marbles::apply_force`] and [`Marbles::apply_torque`], and [`Error::NotFinite`] for
@@ -64,11 +63,10 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// Turns a marble, in N m: a [`Bivector`], or the axial vector that is its dual.
+    /// Applies a torque in N m: a [`Bivector`], or its dual axial vector.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for the torque, or for the sum of all
-    /// so far.
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for the torque, or for the accumulated sum.
     pub fn apply_torque(
         &mut self,
         id: MarbleId,
@@ -80,14 +78,14 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// Forgets all forces and torques that were applied. A step ends with this.
+    /// Clears all applied forces and torques. A step ends with this.
     pub fn clear_forces(&mut self) {
         self.force.clear();
         self.torque.clear();
     }
 
-    /// Changes a marble's velocity at once, as a hit at its center does: by `impulse` (in
-    /// N s) over its mass.
+    /// Applies an impulse (in N s) at the center of a marble: changes its velocity by the impulse
+    /// over its mass.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] if the impulse or the velocity
@@ -100,12 +98,12 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// Hits a marble at a point, as a cue does: velocity and, in a model with rotation,
-    /// spin change.
+    /// Applies an impulse at a point, as a cue does: changes velocity and, in a model with
+    /// rotation, angular velocity.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for impulse or point, or for what
-    /// comes of them; then nothing has changed.
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for impulse or point, or for the resulting
+    /// velocities; then nothing has changed.
     pub fn apply_impulse_at(
         &mut self,
         id: MarbleId,
@@ -115,21 +113,21 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         finite_vector(IMPULSE, impulse)?;
         let lever = finite_point(POINT, point)? - self.position[row];
-        let before = self.spin.get(row).copied();
+        let before = self.angular_velocity.get(row).copied();
         self.apply_angular_impulse(id, Bivector::wedge(lever, impulse))?;
         self.apply_impulse(id, impulse).inspect_err(|_| {
-            if let (Some(slot), Some(before)) = (self.spin.get_mut(row), before) {
+            if let (Some(slot), Some(before)) = (self.angular_velocity.get_mut(row), before) {
                 *slot = before;
             }
         })
     }
 
-    /// Changes a marble's spin at once: by an angular impulse (in kg m²/s) over its moment
-    /// of inertia. Does nothing in a model without rotation.
+    /// Applies an angular impulse (in kg m²/s): changes the angular velocity by the impulse over
+    /// the moment of inertia. Does nothing in a model without rotation.
     ///
     /// # Errors
-    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] if the impulse or the spin after it
-    /// is not finite.
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] if the impulse or the resulting angular
+    /// velocity is not finite.
     pub fn apply_angular_impulse(
         &mut self,
         id: MarbleId,
@@ -138,14 +136,14 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         let impulse =
             finite_vector(["impulse.yz", "impulse.zx", "impulse.xy"], impulse.into().dual())?;
-        let change = self.spin_by(row, impulse);
-        if let Some(spin) = self.spin.get_mut(row) {
-            *spin = finite_vector(SPIN, *spin + change)?;
+        let change = self.apply_inverse_inertia(row, impulse);
+        if let Some(angular_velocity) = self.angular_velocity.get_mut(row) {
+            *angular_velocity = finite_vector(ANGULAR_VELOCITY, *angular_velocity + change)?;
         }
         Ok(())
     }
 
-    /// Mass times velocity, in kg m/s; infinite for a moving marble of infinite mass.
+    /// Momentum in kg m/s; infinite for a moving marble of infinite mass.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
@@ -155,7 +153,7 @@ impl<S: Scalar> Marbles<S> {
         Ok(if velocity.is_zero() { velocity } else { velocity * mass })
     }
 
-    /// Gives a marble the velocity that this momentum (in kg m/s) means for its mass.
+    /// Sets the velocity from a momentum in kg m/s.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for the momentum or the velocity.
@@ -165,41 +163,46 @@ impl<S: Scalar> Marbles<S> {
         self.set_velocity(id, momentum / self.mass(row))
     }
 
-    /// Moment of inertia times spin, about the marble's center, in kg m²/s; zero in a
-    /// model without rotation.
+    /// Angular momentum about the marble's center, in kg m²/s; zero in a model without rotation.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
     pub fn angular_momentum(&self, id: MarbleId) -> Result<Bivector<S>, Error> {
         let row = self.row(id)?;
-        let spin = self.spin.get(row).copied().unwrap_or_else(Vec3::zero);
+        let angular_velocity = self.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero);
         let mass = self.mass(row);
-        Ok(if spin.is_zero() { spin } else { self.by_moments(row, spin, |moment| moment * mass) }
-            .into())
+        Ok(if angular_velocity.is_zero() {
+            angular_velocity
+        } else {
+            self.scale_by_moments(row, angular_velocity, |moment| moment * mass)
+        }
+        .into())
     }
 
-    /// Twice the energy of the spin over the mass, in m²/s².
-    pub(super) fn spin_energy(&self, row: usize) -> f64 {
-        let (spin, radius) = (self.exact_spin(row), self.radius[row].as_f64());
+    /// Twice the rotational kinetic energy over the mass, in m²/s².
+    pub(super) fn rotational_energy(&self, row: usize) -> f64 {
+        let (angular_velocity, radius) =
+            (self.angular_velocity_f64(row), self.radius[row].as_f64());
         let half = self.half_length(row).as_f64();
         if half == 0.0 {
-            return 0.4 * (spin * radius).magnitude2();
+            return 0.4 * (angular_velocity * radius).magnitude2();
         }
         let [along, across] = Rod::moments(radius, half);
         let axis = cast_vector::<S, f64>(self.axis(row)).normalize();
-        let about_axis = spin.dot(axis);
-        about_axis * about_axis * along + (spin - axis * about_axis).magnitude2() * across
+        let about_axis = angular_velocity.dot(axis);
+        about_axis * about_axis * along
+            + (angular_velocity - axis * about_axis).magnitude2() * across
     }
 
-    /// What an angular impulse changes a spin by. Nothing for infinite mass.
-    pub(super) fn spin_by(&self, row: usize, impulse: Vec3<S>) -> Vec3<S> {
+    /// Applies the inverse inertia tensor to an angular impulse; zero for infinite mass.
+    pub(super) fn apply_inverse_inertia(&self, row: usize, impulse: Vec3<S>) -> Vec3<S> {
         let mass = self.mass(row);
-        self.by_moments(row, impulse, |moment| S::one() / mass / moment)
+        self.scale_by_moments(row, impulse, |moment| S::one() / mass / moment)
     }
 
-    /// An axial vector, times something of the moments of inertia over the mass: about the
-    /// axis of a capsule, and across it; those of a ball are `2/5 r²`, in m².
-    pub(super) fn by_moments(&self, row: usize, v: Vec3<S>, of: impl Fn(S) -> S) -> Vec3<S> {
+    /// Applies a function of the principal moments of inertia per mass to an axial vector: about
+    /// the axis of a capsule, and across it. For a ball the moment is `2/5 r²`, in m².
+    pub(super) fn scale_by_moments(&self, row: usize, v: Vec3<S>, of: impl Fn(S) -> S) -> Vec3<S> {
         let (radius, half) = (self.radius[row], self.half_length(row));
         if half == S::zero() {
             return v * of(S::constant(0.4) * radius * radius);

@@ -1,7 +1,7 @@
 //! Where the energy of a step goes, against what formulas say of the same scene.
 
 use taw::prelude::*;
-use taw::world::Account;
+use taw::world::EnergyAudit;
 
 const BOTH: [Response; 2] = [Response::EventDriven, Response::Impulse];
 
@@ -31,18 +31,18 @@ fn world(
         };
         world.marbles.insert(marble).unwrap();
     }
-    world.keep_account(true);
+    world.enable_energy_audit(true);
     world
 }
 
 /// Steps for so many seconds and adds the accounts up. In each step, what is accounted for is
 /// what the energy changed by.
-fn run(world: &mut World<f64>, seconds: f64, dt: f64) -> Account {
-    let mut sum = Account::default();
+fn run(world: &mut World<f64>, seconds: f64, dt: f64) -> EnergyAudit {
+    let mut sum = EnergyAudit::default();
     for _ in 0..(seconds / dt).round() as u32 {
         let before = world.energy().total();
         world.step(dt).unwrap();
-        let a = world.account().unwrap();
+        let a = world.energy_audit().unwrap();
         let taken = a.friction + a.restitution + a.resistance + a.solver;
         let change = a.forces + a.walls - taken;
         let error = world.energy().total() - before - change;
@@ -55,7 +55,7 @@ fn run(world: &mut World<f64>, seconds: f64, dt: f64) -> Account {
         sum.resistance += a.resistance;
         sum.solver += a.solver;
         sum.momentum = sum.momentum.max(a.momentum);
-        sum.deepest = sum.deepest.max(a.deepest);
+        sum.max_penetration = sum.max_penetration.max(a.max_penetration);
         sum.collisions += a.collisions;
     }
     sum
@@ -111,7 +111,7 @@ fn rolling_resistance_takes_the_rest() {
         let resists = Material { rolling_resistance: 0.05, ..material(0.0, 0.5) };
         let mut world = world(response, resists, &[([0.0, 0.1, 0.0], [1.0, 0.0, 0.0])]);
         let id = world.marbles.id(0).unwrap();
-        world.marbles.set_spin(id, Vec3::new(0.0, 0.0, -10.0)).unwrap();
+        world.marbles.set_angular_velocity(id, Vec3::new(0.0, 0.0, -10.0)).unwrap();
         let sum = run(&mut world, 5.0, 1.0 / 240.0);
         near(world.energy().kinetic, 0.0, 1e-20);
         let tolerance = if response == Response::Impulse { 1e-2 } else { 1e-10 };
@@ -126,8 +126,11 @@ fn a_belt_brings_in_what_it_gives_and_what_it_rubs_off() {
         let mut world = world(response, material(0.0, 0.3), &[([0.0, 0.1, 0.0], [0.0; 3])]);
         let belt = world.walls.id(0).unwrap();
         let velocity = Vec3::new(1.4, 0.0, 0.0);
-        let motion =
-            taw::motion::WallMotion { velocity, spin: Vec3::zero(), pivot: Point3::origin() };
+        let motion = taw::motion::WallMotion {
+            velocity,
+            angular_velocity: Vec3::zero(),
+            pivot: Point3::origin(),
+        };
         world.walls.set_motion(belt, Some(motion)).unwrap();
         let sum = run(&mut world, 1.0, 1.0 / 240.0);
         // Friction brings the ball to 2/7 of the belt's speed.
@@ -135,7 +138,7 @@ fn a_belt_brings_in_what_it_gives_and_what_it_rubs_off() {
         let tolerance = if response == Response::Impulse { 2e-3 } else { 1e-12 };
         near(world.energy().kinetic, 0.5 * speed * speed, tolerance);
         near(sum.walls, speed * 1.4, tolerance);
-        let rest = world.energy().kinetic + world.energy().spin;
+        let rest = world.energy().kinetic + world.energy().rotational;
         near(sum.friction, speed * 1.4 - rest, tolerance);
         near(sum.solver, 0.0, tolerance);
     }
@@ -168,8 +171,8 @@ fn what_the_labs_method_does_to_momentum_is_seen() {
     let second = world.marbles.id(1).unwrap();
     world.marbles.set_mass(second, Mass::Kilograms(3.0)).unwrap();
     world.step(0.01).unwrap();
-    let account = world.account().unwrap();
-    near(account.deepest, 0.04, 1e-12);
+    let account = world.energy_audit().unwrap();
+    near(account.max_penetration, 0.04, 1e-12);
     // Each gets 0.02 m in 0.01 s.
     near(account.momentum, (3.0 - 1.0) * 2.0, 1e-9);
     near(account.solver, 0.5 * 3.0 * 4.0 * 4.0 - 0.5 * (1.0 + 3.0) * 2.0 * 2.0, 1e-9);
@@ -179,7 +182,7 @@ fn what_the_labs_method_does_to_momentum_is_seen() {
     world.marbles.set_position(second, Point3::new(5.0, 0.1, 0.0)).unwrap();
     world.marbles.set_velocity(second, Vec3::new(0.0, -2.0, 0.0)).unwrap();
     world.step(0.01).unwrap();
-    near(world.account().unwrap().momentum, 0.0, 1e-9);
+    near(world.energy_audit().unwrap().momentum, 0.0, 1e-9);
 }
 
 #[test]
@@ -201,7 +204,7 @@ fn drag_and_pushes_are_forces() {
         let mut world = world(response, material(0.5, 0.5), &[([0.0, 9.0, 0.0], [3.0, 0.0, 0.0])]);
         world.set_model(Model { integrator: Integrator::Rk4, ..model(response) }).unwrap();
         let medium = taw::motion::Medium { velocity: Vec3::zero(), linear: 0.5, quadratic: 0.0 };
-        world.set_forces(vec![Force::Drag(medium)]).unwrap();
+        world.set_forces(vec![ForceField::Drag(medium)]).unwrap();
         world.set_gravity(Vec3::zero()).unwrap();
         let sum = run(&mut world, 1.0, 1.0 / 240.0);
         let left = 0.5 * 9.0 * (-1.0_f64).exp();
@@ -228,12 +231,12 @@ fn off_it_says_nothing_and_on_it_changes_nothing() {
         let resists = Material { rolling_resistance: 0.02, ..material(0.4, 0.4) };
         let mut on = world(response, resists, &marbles);
         let mut off = on.clone();
-        off.keep_account(false);
+        off.enable_energy_audit(false);
         run(&mut on, 1.0, 1.0 / 120.0);
         for _ in 0..120 {
             off.step(1.0 / 120.0).unwrap();
         }
         assert!(on == off, "{response:?}");
-        assert_eq!(off.account(), None);
+        assert_eq!(off.energy_audit(), None);
     }
 }

@@ -1,11 +1,11 @@
-//! Marbles that meet each other on their way.
+//! Continuous collision of marbles with each other.
 
 use std::cmp::{Ordering, Reverse};
 
 use cgmath::{InnerSpace, SquareMatrix, Zero};
 
-use super::walls::{Bend, Stop, felt};
-use super::{By, FAST, INTO, MOST_BENDS, Stopped, Sweep, outer};
+use super::walls::{Bend, WallImpact, lost_fraction};
+use super::{By, Continuous, MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Stopped, outer};
 use crate::broad::Period;
 use crate::contact::time_of_impact_sphere_sphere;
 use crate::math::{Mat3, Scalar, Vec3, direction_and_length, length};
@@ -13,52 +13,52 @@ use crate::response::Response;
 use crate::shape::Sphere;
 use crate::world::World;
 
-/// Whose way past each other is shorter than this part of the smaller radius cannot graze each
-/// other by more than a hundredth of that, which is not worth a look.
-const SLOW: f64 = 0.02;
+/// Relative motion below this fraction of the smaller radius cannot graze deeper than a hundredth
+/// of that, which is negligible.
+const MIN_GRAZING_MOTION: f64 = 0.02;
 
-/// Two marbles that will meet, unless the way of one of them bends before; or, for one with itself,
-/// where its way bends at a wall.
+/// Predicted meeting of two marbles, valid until one of their paths bends; or, for a marble paired
+/// with itself, its bend at a wall.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Hit<S> {
-    /// As a part of the substep.
+pub(super) struct Meeting<S> {
+    /// Fraction of the substep.
     time: S,
     pair: (u32, u32),
-    /// Bends of the way of each when this was foreseen.
+    /// Bend counts of both paths at the time of prediction.
     bends: (u32, u32),
 }
 
-impl<S: Scalar> Ord for Hit<S> {
+impl<S: Scalar> Ord for Meeting<S> {
     fn cmp(&self, other: &Self) -> Ordering {
         let time = self.time.partial_cmp(&other.time).unwrap_or(Ordering::Equal);
         time.then(self.pair.cmp(&other.pair))
     }
 }
 
-impl<S: Scalar> PartialOrd for Hit<S> {
+impl<S: Scalar> PartialOrd for Meeting<S> {
     fn partial_cmp(&self, other: &Self) -> Option<Ordering> {
         Some(self.cmp(other))
     }
 }
 
-impl<S: Scalar> PartialEq for Hit<S> {
+impl<S: Scalar> PartialEq for Meeting<S> {
     fn eq(&self, other: &Self) -> bool {
         self.cmp(other).is_eq()
     }
 }
 
-impl<S: Scalar> Eq for Hit<S> {}
+impl<S: Scalar> Eq for Meeting<S> {}
 
-/// A marble on its way through a substep, since its way last bent.
+/// Path of a marble through a substep since its last bend.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Way<S> {
+pub(super) struct Path<S> {
     sphere: Sphere<S>,
-    /// Time of that, as a part of the substep.
+    /// Time of the last bend, as a fraction of the substep.
     since: S,
-    /// In metres per substep, and by how much forces change the velocity, in m/s per substep.
+    /// Motion in metres per substep, and velocity change by forces in m/s per substep.
     motion: Vec3<S>,
     change: Vec3<S>,
-    /// Number of bends so far, and whether a wall or another marble made one.
+    /// Number of bends so far, and whether a wall or another marble caused one.
     bends: u32,
     held: bool,
     met: bool,
@@ -67,29 +67,30 @@ pub(super) struct Way<S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// Goes the ways of a substep again if something was fast in it: stops what would pass into
-    /// walls or through each other where it touches, the earliest first, and lets slide what only
-    /// lies there.
-    pub(in crate::world) fn sweep_ways(&mut self, dt: S) {
-        if self.sweep.start.len() != self.marbles.len() {
+    /// Retraces the paths of a substep if any marble was fast: stops those that would pass into
+    /// walls or through each other at the time of impact, in the order of time, and lets resting
+    /// ones slide.
+    pub(in crate::world) fn solve_continuous(&mut self, dt: S) {
+        if self.continuous.start.len() != self.marbles.len() {
             return; // this model does not sweep
         }
         self.bend_at_walls(dt);
         let marbles = &self.marbles;
-        let Sweep { start, velocity, near, hits, ways, bends, .. } = &mut self.sweep;
+        let Continuous { start, velocity, candidates, meetings, paths, bends, .. } =
+            &mut self.continuous;
         let displaces = self.model.response == Response::Displacement;
-        // The displacement changes by itself with the way, and has no normals to get right.
-        let slow = S::constant(if displaces { FAST } else { SLOW });
+        // Displacement changes along the path by itself, and has no normals to get right.
+        let slow = S::constant(if displaces { MAX_FREE_MOTION } else { MIN_GRAZING_MOTION });
         let smallest = marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
         let moved = |row: usize| marbles.position[row] - start[row];
         let fast = |row: usize| length(moved(row)) > smallest * slow * S::constant(0.5);
-        near.clear();
+        candidates.clear();
         if !(0..start.len()).any(fast) {
             return;
         }
-        let into = S::one() - S::constant(INTO);
-        ways.clear();
-        ways.extend((0..start.len()).map(|row| Way {
+        let into = S::one() - S::constant(OVERLAP);
+        paths.clear();
+        paths.extend((0..start.len()).map(|row| Path {
             sphere: Sphere { center: start[row], radius: marbles.radius[row] * into },
             since: S::zero(),
             motion: moved(row),
@@ -99,52 +100,53 @@ impl<S: Scalar> World<S> {
             met: false,
             next: None,
         }));
-        hits.clear();
+        meetings.clear();
         for (index, bend) in bends.iter().enumerate().rev() {
-            ways[bend.stop.row as usize].next = Some(index as u32);
+            paths[bend.stop.row as usize].next = Some(index as u32);
         }
-        hits.extend((0..start.len() as u32).filter_map(|row| Hit::at_wall(row, ways, bends)));
+        meetings
+            .extend((0..start.len() as u32).filter_map(|row| Meeting::at_wall(row, paths, bends)));
         if !self.model.response.needs_overlap() {
-            self.find_who_may_meet(slow);
+            self.predict_meetings(slow);
         }
-        self.bend_in_order(self.slow(dt));
+        self.bend_in_order(self.resting_approach(dt));
         if !displaces {
-            self.sweep.name_grazes(self.marbles.period);
+            self.continuous.collect_grazes(self.marbles.period);
         }
-        for row in 0..self.sweep.ways.len() {
+        for row in 0..self.continuous.paths.len() {
             self.arrive(row);
         }
     }
 
-    /// Finds who may meet whom, and when first; `slow` is the part of the smallest radius that a way
-    /// must be longer than twice.
-    fn find_who_may_meet(&mut self, slow: S) {
-        let Sweep { middle, reach, near, hits, ways, .. } = &mut self.sweep;
+    /// Finds candidate pairs and predicts their first meetings; `slow` is the fraction of the
+    /// smallest radius that twice a motion must exceed.
+    fn predict_meetings(&mut self, slow: S) {
+        let Continuous { middle, reach, candidates, meetings, paths, .. } = &mut self.continuous;
         let half = S::constant(0.5);
         let smallest = self.marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
-        let fast = |row: u32| length(ways[row as usize].motion) > smallest * slow * half;
+        let fast = |row: u32| length(paths[row as usize].motion) > smallest * slow * half;
         middle.clear();
-        middle.extend(ways.iter().map(|way| way.sphere.center + way.motion * half));
+        middle.extend(paths.iter().map(|way| way.sphere.center + way.motion * half));
         reach.clear();
-        let reaches = ways.iter().zip(&self.marbles.radius);
+        let reaches = paths.iter().zip(&self.marbles.radius);
         reach.extend(reaches.map(|(way, radius)| *radius + length(way.motion) * half));
         let spheres = (&middle[..], &reach[..]);
         self.images.pairs(&mut self.grid, spheres, S::zero(), self.marbles.period, |a, b| {
             if fast(a) || fast(b) {
-                near.extend([(a, b), (b, a)]);
+                candidates.extend([(a, b), (b, a)]);
             }
         });
-        near.sort_unstable();
-        let ahead = near.iter().filter(|(a, b)| a < b);
+        candidates.sort_unstable();
+        let ahead = candidates.iter().filter(|(a, b)| a < b);
         let period = self.marbles.period;
-        hits.extend(ahead.filter_map(|pair| Hit::foresee(*pair, ways, S::zero(), period)));
+        meetings.extend(ahead.filter_map(|pair| Meeting::predict(*pair, paths, S::zero(), period)));
     }
 
-    /// Bends ways at walls and where marbles meet, the earliest first.
+    /// Processes bends at walls and meetings of marbles in the order of time.
     fn bend_in_order(&mut self, slow: S) {
-        while let Some(Reverse(hit)) = self.sweep.hits.pop() {
-            let Hit { time, pair, bends } = hit;
-            let bent = |row: u32| self.sweep.ways[row as usize].bends;
+        while let Some(Reverse(hit)) = self.continuous.meetings.pop() {
+            let Meeting { time, pair, bends } = hit;
+            let bent = |row: u32| self.continuous.paths[row as usize].bends;
             if bends != (bent(pair.0), bent(pair.1)) {
                 continue; // it was foreseen anew
             }
@@ -153,28 +155,28 @@ impl<S: Scalar> World<S> {
             } else {
                 self.meet(pair, time, slow);
             }
-            let Sweep { near, hits, ways, bends, .. } = &mut self.sweep;
+            let Continuous { candidates, meetings, paths, bends, .. } = &mut self.continuous;
             let period = self.marbles.period;
             for row in [pair.0, pair.1] {
-                hits.extend(Hit::at_wall(row, ways, bends));
-                // Who was to meet it elsewhere, or not at all, may meet it here.
-                let first = near.partition_point(|pair| pair.0 < row);
-                let others = near[first..].iter().take_while(|pair| pair.0 == row);
-                hits.extend(others.filter_map(|(_, other)| {
-                    Hit::foresee((row.min(*other), row.max(*other)), ways, time, period)
+                meetings.extend(Meeting::at_wall(row, paths, bends));
+                // Meetings with this marble change.
+                let first = candidates.partition_point(|pair| pair.0 < row);
+                let others = candidates[first..].iter().take_while(|pair| pair.0 == row);
+                meetings.extend(others.filter_map(|(_, other)| {
+                    Meeting::predict((row.min(*other), row.max(*other)), paths, time, period)
                 }));
             }
         }
     }
 
-    /// Bends the way of a marble at the wall that it comes to next.
+    /// Bends the path of a marble at its next wall.
     fn bend_at_wall(&mut self, row: usize) {
-        let Sweep { ways, bends, .. } = &mut self.sweep;
-        let way = &mut ways[row];
+        let Continuous { paths, bends, .. } = &mut self.continuous;
+        let way = &mut paths[row];
         let Some(index) = way.next else { return };
         let bend = bends[index as usize];
         let per_substep = if bend.left > S::zero() { bend.left.recip() } else { S::zero() };
-        *way = Way {
+        *way = Path {
             sphere: Sphere { center: bend.center, ..way.sphere },
             since: S::one() - bend.left,
             motion: bend.way * per_substep,
@@ -187,35 +189,39 @@ impl<S: Scalar> World<S> {
             ..*way
         };
         self.marbles.velocity[row] -= bend.stop.change;
-        self.sweep.stop(bend.stop, bend.along);
+        self.continuous.stop(bend.stop, bend.along);
     }
 
-    /// Bends the ways of two marbles where they meet. Those that come together faster than `slow`,
-    /// in metres per substep, stop, so that they bounce along the normal that they have there; those
-    /// that lie on each other go on along the surface. Who is held by a wall gives way to nobody.
+    /// Bends the paths of two marbles where they meet. Marbles that approach faster than `slow`, in
+    /// metres per substep, stop, so that they bounce along the normal of that moment; resting ones
+    /// continue along the surface. A marble held by a wall inverse_masses to none.
     fn meet(&mut self, pair: (u32, u32), time: S, slow: S) {
         let rows = [pair.0 as usize, pair.1 as usize];
-        let old = rows.map(|row| self.sweep.ways[row]);
+        let old = rows.map(|row| self.continuous.paths[row]);
         let [x, y] = old.map(|way| way.at(time));
-        let normal = normal_of(&x, &y.beside(&x, self.marbles.period)).0;
-        let yields = [0, 1].map(|side| {
+        let normal = normal_of(&x, &y.nearest_image(&x, self.marbles.period)).0;
+        let inverse_masses = [0, 1].map(|side| {
             let mass = self.marbles.mass(rows[side]);
             if old[side].held { S::zero() } else { mass.recip() }
         });
-        let total = yields[0] + yields[1];
+        let total = inverse_masses[0] + inverse_masses[1];
         let closing = (y.motion - x.motion).dot(normal);
-        let again = x.bends.max(y.bends) + 1 < MOST_BENDS;
+        let again = x.bends.max(y.bends) + 1 < MAX_BENDS;
         let stopped = [x, y].iter().any(|way| way.met && way.motion == Vec3::zero());
         let slides = -closing <= slow && again && !stopped && total > S::zero();
-        // What each loses of what both change: the part along the normal, or all.
+        // Loss of each: its share along the normal, or everything.
         let lost = |of: [Vec3<S>; 2]| {
             let both = normal * (of[1] - of[0]).dot(normal);
-            if slides { [both * (-yields[0] / total), both * (yields[1] / total)] } else { of }
+            if slides {
+                [both * (-inverse_masses[0] / total), both * (inverse_masses[1] / total)]
+            } else {
+                of
+            }
         };
         let (motion, change) = (lost([x.motion, y.motion]), lost([x.change, y.change]));
         let rest = S::one() - time;
         let end = (self.marbles.velocity[rows[1]] - self.marbles.velocity[rows[0]]).dot(normal);
-        let part = felt((change[1] - change[0]).dot(normal) * rest, end);
+        let part = lost_fraction((change[1] - change[0]).dot(normal) * rest, end);
         let plane = Mat3::from_value(S::one()) - outer(normal);
         for (side, way) in [x, y].into_iter().enumerate() {
             if motion[side] == Vec3::zero() && change[side] == Vec3::zero() {
@@ -231,8 +237,8 @@ impl<S: Scalar> World<S> {
             let along =
                 if slides && left > S::zero() { plane * (rest / left) } else { Mat3::zero() };
             self.marbles.velocity[rows[side]] -= stop.change;
-            self.sweep.stop(stop, along);
-            self.sweep.ways[rows[side]] = Way {
+            self.continuous.stop(stop, along);
+            self.continuous.paths[rows[side]] = Path {
                 motion: way.motion - motion[side],
                 change: way.change - change[side],
                 bends: way.bends + 1,
@@ -243,98 +249,97 @@ impl<S: Scalar> World<S> {
             };
         }
         // Rounding may leave a gap.
-        self.sweep.grazes.push(pair);
+        self.continuous.grazes.push(pair);
     }
 
-    /// Puts a marble whose way has bent to the end of it, or to the wall that another one pushed it
-    /// to.
+    /// Moves a marble whose path has bent to its end, or to the wall that another one pushed it to.
     fn arrive(&mut self, row: usize) {
-        let Way { sphere, bends, met, .. } = self.sweep.ways[row].at(S::one());
+        let Path { sphere, bends, met, .. } = self.continuous.paths[row].at(S::one());
         if bends == 0 {
             return;
         }
         self.marbles.position[row] = sphere.center;
-        let start = Sphere { center: self.sweep.start[row], ..self.marbles.sphere(row) };
+        let start = Sphere { center: self.continuous.start[row], ..self.marbles.sphere(row) };
         let way = sphere.center - start.center;
-        let looks = met && !self.walls.are_planes();
-        let stop = if looks { self.first_wall(&start, way) } else { None };
-        let Some(Stop { time, wall, .. }) = stop else { return };
+        let looks = met && !self.walls.are_half_spaces();
+        let stop = if looks { self.first_wall_impact(&start, way) } else { None };
+        let Some(WallImpact { time, wall, .. }) = stop else { return };
         self.marbles.position[row] = start.center + way * time;
         let by = By::Wall(wall);
         let (way, change) = (way * (S::one() - time), Vec3::zero());
-        self.sweep.stop(Stopped { row: row as u32, by, way, change }, Mat3::zero());
+        self.continuous.stop(Stopped { row: row as u32, by, way, change }, Mat3::zero());
     }
 }
 
-impl<S: Scalar> Sweep<S> {
-    /// Names those that graze each other on the way, though neither was stopped.
-    fn name_grazes(&mut self, period: Period<S>) {
-        let Self { near, ways, grazes, .. } = self;
-        grazes.extend(near.iter().filter(|(a, b)| {
-            let [x, y] = [*a, *b].map(|row| &ways[row as usize]);
+impl<S: Scalar> Continuous<S> {
+    /// Lists pairs that graze each other within the substep though neither was stopped.
+    fn collect_grazes(&mut self, period: Period<S>) {
+        let Self { candidates, paths, grazes, .. } = self;
+        grazes.extend(candidates.iter().filter(|(a, b)| {
+            let [x, y] = [*a, *b].map(|row| &paths[row as usize]);
             let straight = x.bends == 0 && y.bends == 0;
-            a < b && straight && x.time_of_impact(&y.beside(x, period)).is_some()
+            a < b && straight && x.time_of_impact(&y.nearest_image(x, period)).is_some()
         }));
     }
 }
 
-impl<S: Scalar> Way<S> {
-    /// The way from where the marble is at a time.
+impl<S: Scalar> Path<S> {
+    /// Advances the path to a time.
     fn at(&self, time: S) -> Self {
         let center = self.sphere.center + self.motion * (time - self.since);
         Self { sphere: Sphere { center, ..self.sphere }, since: time, ..*self }
     }
 
-    /// Its image that is nearest to another way.
-    fn beside(&self, other: &Self, period: Period<S>) -> Self {
+    /// Periodic image nearest to another path.
+    fn nearest_image(&self, other: &Self, period: Period<S>) -> Self {
         let center = period.image(self.sphere.center, other.sphere.center);
         Self { sphere: Sphere { center, ..self.sphere }, ..*self }
     }
 
-    /// Way to the end of the substep, in metres.
+    /// Remaining displacement, in metres.
     fn rest(&self) -> Vec3<S> {
         self.motion * (S::one() - self.since)
     }
 
-    /// Time of impact with another from the same moment on, as a part of the rest.
+    /// Time of impact with another path from the current time on, as a fraction of the rest.
     fn time_of_impact(&self, other: &Self) -> Option<S> {
         time_of_impact_sphere_sphere(&self.sphere, self.rest(), &other.sphere, other.rest())
     }
 }
 
-/// The unit vector from one marble to another, and how far their centers are apart, in metres.
-fn normal_of<S: Scalar>(x: &Way<S>, y: &Way<S>) -> (Vec3<S>, S) {
+/// Unit vector between two marbles and the distance of their centers, in metres.
+fn normal_of<S: Scalar>(x: &Path<S>, y: &Path<S>) -> (Vec3<S>, S) {
     let apart = direction_and_length(y.sphere.center - x.sphere.center);
     apart.unwrap_or((Vec3::unit_x(), S::zero()))
 }
 
-impl<S: Scalar> Hit<S> {
-    /// Next bend of a row at a wall.
-    fn at_wall(row: u32, ways: &[Way<S>], bends: &[Bend<S>]) -> Option<Reverse<Self>> {
-        let way = &ways[row as usize];
+impl<S: Scalar> Meeting<S> {
+    /// Next bend of a marble at a wall.
+    fn at_wall(row: u32, paths: &[Path<S>], bends: &[Bend<S>]) -> Option<Reverse<Self>> {
+        let way = &paths[row as usize];
         let time = S::one() - bends[way.next? as usize].left;
         Some(Reverse(Self { time, pair: (row, row), bends: (way.bends, way.bends) }))
     }
 
-    /// Next meeting of two marbles from `now` on, if they are fast.
-    fn foresee(
+    /// Predicts the next meeting of two marbles from `now` on, if they are fast.
+    fn predict(
         pair: (u32, u32),
-        ways: &[Way<S>],
+        paths: &[Path<S>],
         now: S,
         period: Period<S>,
     ) -> Option<Reverse<Self>> {
-        let [x, y] = [pair.0, pair.1].map(|row| ways[row as usize].at(now));
-        let y = y.beside(&x, period);
+        let [x, y] = [pair.0, pair.1].map(|row| paths[row as usize].at(now));
+        let y = y.nearest_image(&x, period);
         let radius = x.sphere.radius.min(y.sphere.radius);
         let closing = x.rest() - y.rest();
-        if length(closing) <= radius * S::constant(FAST) {
+        if length(closing) <= radius * S::constant(MAX_FREE_MOTION) {
             return None;
         }
         let (normal, distance) = normal_of(&x, &y);
         let after = if distance > x.sphere.radius + y.sphere.radius {
             x.time_of_impact(&y)?
         } else {
-            // They touch. Only what would pass right through is stopped there.
+            // They touch: stop only if they would pass right through.
             (closing.dot(normal) > radius).then_some(S::zero())?
         };
         let time = now + after * (S::one() - now);

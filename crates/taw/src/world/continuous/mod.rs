@@ -1,0 +1,154 @@
+//! Continuous collision detection: marbles that would tunnel within a substep stop at the time of
+//! impact with the velocity of that moment; resting and sliding ones continue along the surface.
+//! Slower ones that only graze each other within the substep are listed as contacts.
+
+mod marbles;
+mod walls;
+
+use std::cmp::Reverse;
+use std::collections::{BinaryHeap, HashSet};
+
+use super::{Detection, World};
+use crate::contact::Contact;
+use crate::math::{Mat3, Point3, Scalar, Vec3, length};
+use marbles::{Meeting, Path};
+use walls::Bend;
+
+/// Penetration of marbles that are stopped at each other, relative to the sum of their radii: a
+/// merely touching pair would be missed by a response that needs overlap.
+const OVERLAP: f64 = 1e-5;
+
+/// Relative motion beyond this fraction of the smaller radius may tunnel, or be resolved to the
+/// wrong side, because the end of a step no longer tells where they met. Such marbles are stopped.
+const MAX_FREE_MOTION: f64 = 0.5;
+
+/// Maximum number of bends of a path in a substep: two surfaces hold a marble to an edge, three to
+/// a corner, and a bowl of triangles has one after the other.
+const MAX_BENDS: u32 = 4;
+
+/// State and scratch memory of continuous collision detection in a substep.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Continuous<S> {
+    /// Positions before the substep in metres, and velocities in m/s.
+    pub start: Vec<Point3<S>>,
+    pub velocity: Vec<Vec3<S>>,
+    /// Stops of this substep; and by index, if stopped, the projection by which a position still
+    /// follows a velocity: the free directions, times the remaining fraction of the substep.
+    stops: Vec<Stopped<S>>,
+    pub stands: Vec<Option<Mat3<S>>>,
+    /// Pairs that meet within the substep, stopped or not.
+    pub grazes: Vec<(u32, u32)>,
+    middle: Vec<Point3<S>>,
+    reach: Vec<S>,
+    /// Candidate pairs in both orders, sorted.
+    candidates: Vec<(u32, u32)>,
+    meetings: BinaryHeap<Reverse<Meeting<S>>>,
+    paths: Vec<Path<S>>,
+    /// Bends at walls by marble, in the order of time.
+    bends: Vec<Bend<S>>,
+    /// Positions before they follow the velocity changes of contacts, in metres.
+    bounced_from: Vec<Point3<S>>,
+}
+
+/// WallImpact of a marble.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Stopped<S> {
+    pub row: u32,
+    /// Index of the wall or marble that stopped it.
+    by: By,
+    /// Lost displacement in metres, and lost velocity change by forces in m/s.
+    way: Vec3<S>,
+    change: Vec3<S>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum By {
+    Wall(u32),
+    Marble(u32),
+}
+
+impl<S: Scalar> World<S> {
+    /// Stores the positions before marbles move, if the model has continuous detection.
+    pub(super) fn begin_continuous(&mut self) {
+        self.continuous.clear();
+        if self.model.detection == Detection::Swept {
+            self.continuous.start.extend_from_slice(&self.marbles.position);
+            self.continuous.velocity.extend_from_slice(&self.marbles.velocity);
+        }
+    }
+
+    /// Drops stops of marbles that have slid off: their lost motion stays lost.
+    pub(super) fn drop_separated_stops(&mut self) {
+        if !self.continuous.stops.is_empty() {
+            let touches = self.touches();
+            self.continuous.stops.retain(touches);
+        }
+    }
+
+    /// Releases marbles whose stopping contact the user has removed.
+    pub(super) fn release_separated_stops(&mut self) {
+        if self.continuous.start.len() != self.marbles.len() {
+            self.continuous.clear(); // rows have changed
+        }
+        if self.continuous.stops.is_empty() {
+            return;
+        }
+        let touches = self.touches();
+        self.continuous.stops.retain(|stop| {
+            let row = stop.row as usize;
+            if !touches(stop) {
+                self.marbles.position[row] += stop.way;
+                self.marbles.velocity[row] += stop.change;
+                self.continuous.stands[row] = None;
+            }
+            touches(stop)
+        });
+    }
+
+    /// Predicate: the two bodies of a stop have a contact.
+    fn touches(&self) -> impl Fn(&Stopped<S>) -> bool + use<S> {
+        let walls = self.contacts.wm.iter().map(|c| (By::Wall(c.a), c.b));
+        let both = |c: &Contact<S>| [(By::Marble(c.a), c.b), (By::Marble(c.b), c.a)];
+        let touches: HashSet<_> = walls.chain(self.contacts.mm.iter().flat_map(both)).collect();
+        move |stop| touches.contains(&(stop.by, stop.row))
+    }
+
+    /// Largest approach in metres per substep of a resting contact: that of gravity in two
+    /// substeps.
+    fn resting_approach(&self, dt: S) -> S {
+        length(self.gravity) * dt * dt * S::constant(2.0)
+    }
+}
+
+impl<S: Scalar> Continuous<S> {
+    /// Records a stop and the remaining freedom of the marble.
+    fn stop(&mut self, stopped: Stopped<S>, along: Mat3<S>) {
+        self.stands.resize(self.start.len(), None);
+        let free = &mut self.stands[stopped.row as usize];
+        *free = Some(free.map_or(along, |free| along * free));
+        self.stops.push(stopped);
+    }
+
+    /// Stores the positions before they follow the velocity changes of contacts.
+    pub fn begin_bounces(&mut self, position: &[Point3<S>]) {
+        if self.start.len() == position.len() {
+            self.bounced_from.extend_from_slice(position);
+        }
+    }
+
+    /// Clears the state of the last substep.
+    fn clear(&mut self) {
+        self.start.clear();
+        self.velocity.clear();
+        self.stops.clear();
+        self.stands.clear();
+        self.grazes.clear();
+        self.bends.clear();
+        self.bounced_from.clear();
+    }
+}
+
+/// Outer product: projection onto a unit vector.
+fn outer<S: Scalar>(v: Vec3<S>) -> Mat3<S> {
+    Mat3::from_cols(v * v.x, v * v.y, v * v.z)
+}

@@ -1,0 +1,160 @@
+//! Energy audit of a step: work of forces and walls, dissipation by mechanism, and the error of the
+//! solver.
+
+use cgmath::{InnerSpace, Zero};
+
+use super::World;
+use crate::math::{Scalar, Vec3, length};
+use crate::response::{Response, Work};
+
+/// Energy audit of a step, in joules. Dissipated energy counts positive.
+///
+/// The energy ([`World::energy`]) after the step is that before it, plus `forces` and `walls`,
+/// minus the dissipation by friction, restitution, resistance and the solver.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct EnergyAudit {
+    /// Work of force fields, applied forces and damping; zero where only gravity acts.
+    pub forces: f64,
+    /// Work of moving walls and marbles of infinite mass.
+    pub walls: f64,
+    /// Dissipation by sliding friction.
+    pub friction: f64,
+    /// Dissipation by collisions along their normals. For [`Response::Penalty`], including energy
+    /// stored in contact springs, which is returned later.
+    ///
+    /// [`Response::Penalty`]: crate::response::Response::Penalty
+    pub restitution: f64,
+    /// Dissipation by rolling and torsional resistance.
+    pub resistance: f64,
+    /// Numerical error: energy lost without a physical cause. The error of the integrator, the lift
+    /// by position correction, everything that [`Response::Displacement`] does; for
+    /// [`Response::EventDriven`], also the dissipation of resting contacts.
+    ///
+    /// [`Response::Displacement`]: crate::response::Response::Displacement
+    /// [`Response::EventDriven`]: crate::response::Response::EventDriven
+    pub solver: f64,
+    /// Momentum error in kg m/s: change of the total momentum beyond the impulses of walls and
+    /// forces, from pairs without equal and opposite impulses.
+    pub momentum: f64,
+    /// Largest penetration when contacts were found, in metres.
+    pub max_penetration: f64,
+    /// Number of collisions. For [`Response::Displacement`] and [`Response::Penalty`], which have
+    /// no single collisions: number of contacts in all substeps.
+    ///
+    /// [`Response::Displacement`]: crate::response::Response::Displacement
+    /// [`Response::Penalty`]: crate::response::Response::Penalty
+    pub collisions: u32,
+}
+
+/// State of the energy audit.
+#[derive(Clone, Debug)]
+pub(super) struct AuditState<S> {
+    audit: EnergyAudit,
+    residual: Vec3<f64>,
+    /// Velocities and angular velocities by index, and the energy, at the start of the substep.
+    pub velocity: Vec<Vec3<S>>,
+    pub angular_velocity: Vec<Vec3<S>>,
+    energy: f64,
+    /// Potential energy and momentum after contacts were generated.
+    potential: f64,
+    moment: Vec3<f64>,
+    pub work: Work,
+}
+
+impl<S: Scalar> World<S> {
+    /// Switches the [energy audit](Self::energy_audit) of every step on or off. Off by default, at no
+    /// cost.
+    pub fn enable_energy_audit(&mut self, keep: bool) {
+        if keep != self.audit_state.is_some() {
+            self.audit_state = keep.then(|| {
+                Box::new(AuditState {
+                    audit: EnergyAudit::default(),
+                    residual: Vec3::zero(),
+                    velocity: Vec::new(),
+                    angular_velocity: Vec::new(),
+                    energy: 0.0,
+                    potential: 0.0,
+                    moment: Vec3::zero(),
+                    work: Work::default(),
+                })
+            });
+        }
+    }
+
+    /// Energy audit of the last step, if [enabled](Self::enable_energy_audit). Counts marbles, not swarms.
+    #[must_use]
+    pub fn energy_audit(&self) -> Option<EnergyAudit> {
+        self.audit_state.as_ref().map(|audit_state| audit_state.audit)
+    }
+
+    /// Resets the audit at the start of a step.
+    pub(super) fn reset_audit(&mut self) {
+        if let Some(audit_state) = &mut self.audit_state {
+            audit_state.audit = EnergyAudit::default();
+            audit_state.residual = Vec3::zero();
+        }
+    }
+
+    /// Records the state before integration.
+    pub(super) fn audit_before(&mut self) {
+        let Some(mut audit_state) = self.audit_state.take() else { return };
+        audit_state.energy = self.energy().total();
+        audit_state.velocity.clear();
+        audit_state.velocity.extend_from_slice(self.marbles.velocity());
+        audit_state.angular_velocity.clear();
+        audit_state.angular_velocity.extend_from_slice(self.marbles.angular_velocity());
+        self.audit_state = Some(audit_state);
+    }
+
+    /// Returns true if anything besides gravity acts.
+    fn has_forces(&self) -> bool {
+        !self.forces.is_empty() || self.marbles.has_external_forces()
+    }
+
+    /// Records the work of forces after integration.
+    pub(super) fn audit_forces(&mut self) {
+        if self.audit_state.is_none() || !self.has_forces() {
+            return;
+        }
+        let energy = self.energy().total();
+        if let Some(audit_state) = &mut self.audit_state {
+            audit_state.audit.forces += energy - audit_state.energy;
+            audit_state.energy = energy;
+        }
+    }
+
+    /// Records the state before the contacts are solved.
+    pub(super) fn audit_contacts(&mut self) {
+        let Some(mut audit_state) = self.audit_state.take() else { return };
+        let contacts = self.contacts.wm.iter().chain(&self.contacts.mm);
+        let max_penetration =
+            contacts.map(|contact| length(contact.mtv).as_f64()).fold(0.0, f64::max);
+        audit_state.audit.max_penetration = audit_state.audit.max_penetration.max(max_penetration);
+        audit_state.potential = self.energy().potential;
+        audit_state.moment = self.momentum();
+        audit_state.work = Work::default();
+        self.audit_state = Some(audit_state);
+    }
+
+    /// Completes the audit of a substep.
+    pub(super) fn audit_after(&mut self) {
+        let Some(mut audit_state) = self.audit_state.take() else { return };
+        let AuditState { audit, residual, energy, potential, moment, work, .. } = &mut *audit_state;
+        let now = self.energy();
+        // Work of forces without that of gravity, for a response that moves marbles itself.
+        let moves = self.model.response == Response::EventDriven && self.has_forces();
+        let forces = if moves { work.forces - (*potential - now.potential) } else { 0.0 };
+        let expected =
+            *energy + forces + work.walls - work.friction - work.restitution - work.resistance;
+        audit.forces += forces;
+        audit.walls += work.walls;
+        audit.friction += work.friction;
+        audit.restitution += work.restitution;
+        audit.resistance += work.resistance;
+        audit.solver += expected - now.total();
+        audit.collisions += work.collisions;
+        *residual += self.momentum() - *moment - work.momentum;
+        audit.momentum = residual.magnitude();
+        self.audit_state = Some(audit_state);
+    }
+}

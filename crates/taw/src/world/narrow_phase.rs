@@ -1,0 +1,360 @@
+//! Narrow phase: contact generation, and the removal of ghost collisions at internal edges.
+
+use std::collections::HashSet;
+
+use cgmath::{InnerSpace, Zero};
+use smallvec::SmallVec;
+
+use super::walls::{SubShape, Walls};
+use super::{WallShape, World};
+use crate::contact::{Contact, mtv_sphere_plane, mtv_sphere_sphere};
+use crate::math::{Scalar, Vec3, direction_and_length, length};
+use crate::response::Response;
+use crate::shape::{Aabb, BoundedShape, Plane, PointProjection, Shape, Sphere};
+
+/// Tolerance of internal edges, as a fraction of the radius: a point this far outside of another
+/// wall still counts as on it. It would tilt a normal by less than 1e-5 rad, and flush walls are no
+/// farther apart or askew.
+const INTERNAL_EDGE_TOLERANCE: f64 = 5e-6;
+
+/// Candidate sub-shape of a wall near a marble, with the projected center.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Candidate<S> {
+    pub part: SubShape,
+    pub nearest: PointProjection<S>,
+}
+
+impl<S: Scalar> World<S> {
+    /// Collides walls with marbles, up to a contact distance of `reach` metres.
+    pub(super) fn collide_walls(&mut self, reach: S) {
+        if self.marbles.has_capsules() {
+            self.collide_half_spaces_with_capsules(reach);
+        } else {
+            self.collide_half_spaces(reach);
+        }
+        self.walls.update_tree();
+        if self.walls.are_half_spaces() {
+            return;
+        }
+        let mut candidates = std::mem::take(&mut self.near_walls);
+        for b in 0..self.marbles.len() {
+            let sphere = self.marbles.sphere(b);
+            if self.marbles.half_length(b) == S::zero() {
+                self.collide_sub_shapes(b, &sphere, S::zero(), reach, &mut candidates);
+                continue;
+            }
+            for along in self.sample_points(b, reach) {
+                let center = sphere.center + self.marbles.axis(b) * along;
+                self.collide_sub_shapes(
+                    b,
+                    &Sphere { center, ..sphere },
+                    along,
+                    reach,
+                    &mut candidates,
+                );
+            }
+        }
+        self.near_walls = candidates;
+    }
+
+    fn collide_half_spaces(&mut self, reach: S) {
+        for (a, plane) in self.walls.planes() {
+            for b in 0..self.marbles.len() {
+                if let Some(mtv) = penetration_of_half_space(plane, &self.marbles.sphere(b), reach)
+                {
+                    let along = [S::zero(); 2];
+                    self.contacts.wm.push(Contact { a, b: b as u32, part: 0, along, mtv });
+                }
+            }
+        }
+    }
+
+    /// Collides half-spaces with marbles and capsules, which touch with their ends.
+    fn collide_half_spaces_with_capsules(&mut self, reach: S) {
+        for (a, plane) in self.walls.planes() {
+            for b in 0..self.marbles.len() {
+                let (sphere, half) = (self.marbles.sphere(b), self.marbles.half_length(b));
+                let ends = [-half, half].into_iter().take(if half > S::zero() { 2 } else { 1 });
+                for along in ends {
+                    let center = sphere.center + self.marbles.axis(b) * along;
+                    let mtv = penetration_of_half_space(plane, &Sphere { center, ..sphere }, reach);
+                    if let Some(mtv) = mtv {
+                        let along = [S::zero(), along];
+                        self.contacts.wm.push(Contact { a, b: b as u32, part: 0, along, mtv });
+                    }
+                }
+            }
+        }
+    }
+
+    /// Collides a marble, or a sample sphere of a capsule at `along` on its axis, with sub-shapes
+    /// of walls.
+    fn collide_sub_shapes(
+        &mut self,
+        b: usize,
+        sphere: &Sphere<S>,
+        along: S,
+        reach: S,
+        candidates: &mut Vec<Candidate<S>>,
+    ) {
+        candidates.clear();
+        candidate_sub_shapes(&self.walls, sphere, reach, candidates);
+        if candidates.len() > 1 {
+            remove_ghost_collisions(&self.walls, sphere, candidates);
+        }
+        for Candidate { part: SubShape { wall, part }, nearest } in candidates.iter() {
+            let depth = (sphere.radius - nearest.distance).max(S::zero());
+            let (mtv, along) = (nearest.normal * depth, [S::zero(), along]);
+            self.contacts.wm.push(Contact { a: *wall, b: b as u32, part: *part, along, mtv });
+        }
+    }
+
+    /// Contact sample points of a capsule on its axis: both ends, and where it is nearest to an
+    /// edge or a corner between them.
+    fn sample_points(&self, b: usize, reach: S) -> SmallVec<[S; 4]> {
+        let half = self.marbles.half_length(b);
+        let mut samples = SmallVec::from_slice(&[-half, half]);
+        let shape = self.marbles.shape_of_row(b);
+        let Shape::Capsule(capsule) = &shape else { return samples };
+        let more = Vec3::new(reach, reach, reach);
+        let Aabb { min, max } = capsule.bounding_box();
+        let (center, axis) = (self.marbles.sphere(b).center, self.marbles.axis(b));
+        self.walls.for_each_in_box(&Aabb { min: min - more, max: max + more }, |part| {
+            let Some(touch) = self.walls.closest_points(part, capsule) else { return };
+            let along = (touch.on_b - center).dot(axis);
+            let inside = along.abs() < half * S::constant(0.999);
+            let new = |other: &S| (along - *other).abs() > capsule.radius * S::constant(0.01);
+            if inside && touch.distance <= reach && samples.iter().all(new) {
+                samples.push(along);
+            }
+        });
+        samples
+    }
+
+    /// Contact normal from the wall to the marble of a contact of `contacts.wm`, if they touch
+    /// within 5e-6 radii, the gap that rounding may leave under a resting marble. None beyond that,
+    /// and for invalid indices.
+    #[must_use]
+    pub fn wall_contact_normal(&self, contact: &Contact<S>) -> Option<Vec3<S>> {
+        let Contact { a, b, part, along: [_, along], mtv } = *contact;
+        let near = || {
+            let Sphere { center, radius } = self.sample_sphere(b, along)?;
+            let wall = self.walls.shapes().get(a as usize)?;
+            let PointProjection { normal, distance, .. } = wall.project_point_on(part, center);
+            (distance - radius <= radius * S::constant(INTERNAL_EDGE_TOLERANCE)).then_some(normal)
+        };
+        direction_and_length(mtv).map(|(normal, _)| normal).or_else(near)
+    }
+
+    /// Contact normal from the first to the second marble of a contact of `contacts.mm`, if they
+    /// touch within 5e-6 of the smaller radius. None beyond that, and for invalid indices.
+    #[must_use]
+    pub fn marble_contact_normal(&self, contact: &Contact<S>) -> Option<Vec3<S>> {
+        let Contact { a, b, along, mtv, .. } = *contact;
+        let near = || {
+            let (first, second) =
+                (self.sample_sphere(a, along[0])?, self.sample_sphere(b, along[1])?);
+            let apart = self.marbles.period.nearest(second.center - first.center);
+            let (normal, distance) = direction_and_length(apart)?;
+            let flush = first.radius.min(second.radius) * S::constant(INTERNAL_EDGE_TOLERANCE);
+            (distance - first.radius - second.radius <= flush).then_some(normal)
+        };
+        direction_and_length(mtv).map(|(normal, _)| normal).or_else(near)
+    }
+
+    /// Sample sphere of a marble at this distance along its axis from the center, in metres.
+    fn sample_sphere(&self, row: u32, along: S) -> Option<Sphere<S>> {
+        let row = row as usize;
+        let center = *self.marbles.position().get(row)? + self.marbles.axis(row) * along;
+        Some(Sphere { center, radius: self.marbles.radius()[row] })
+    }
+
+    /// Collides marbles with each other, up to a contact distance of `reach` metres.
+    pub(super) fn collide_marbles(&mut self, reach: S) {
+        let center = self.marbles.position();
+        self.contact_limit.begin(center.len());
+        if !self.marbles.has_capsules() {
+            let (spheres, period) = ((center, self.marbles.radius()), self.marbles.period);
+            self.images.pairs(&mut self.grid, spheres, reach, period, |a, b| {
+                let (first, second) = (a as usize, b as usize);
+                let (first, mut second) = (self.marbles.sphere(first), self.marbles.sphere(second));
+                second.center = period.image(second.center, first.center);
+                if let Some(mtv) = penetration_of_spheres(&first, &second, reach) {
+                    let along = [S::zero(); 2];
+                    let contact = Contact { a, b, part: 0, along, mtv };
+                    self.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
+                }
+            });
+            self.contact_limit.drop_excess(&mut self.contacts.mm, &self.marbles);
+            return;
+        }
+        self.reaches.clear();
+        let far = |row: usize| self.marbles.radius()[row] + self.marbles.half_length(row);
+        self.reaches.extend((0..self.marbles.len()).map(far));
+        self.grid.rebuild(center, &self.reaches, reach);
+        self.grid.pairs(center, |a, b| {
+            let line = |row: u32| {
+                let row = row as usize;
+                (self.marbles.sphere(row), self.marbles.axis(row), self.marbles.half_length(row))
+            };
+            let (first, second) = (line(a), line(b));
+            for along in closest_points_of_segments(first, second) {
+                let sample_sphere = |(sphere, axis, _): (Sphere<S>, Vec3<S>, S), along: S| Sphere {
+                    center: sphere.center + axis * along,
+                    ..sphere
+                };
+                let (x, y) = (sample_sphere(first, along[0]), sample_sphere(second, along[1]));
+                if let Some(mtv) = penetration_of_spheres(&x, &y, reach) {
+                    let contact = Contact { a, b, part: 0, along, mtv };
+                    self.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
+                }
+            }
+        });
+        self.contact_limit.drop_excess(&mut self.contacts.mm, &self.marbles);
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// Adds pairs that met within the substep, though they are apart at its end.
+    pub(super) fn add_grazing_contacts(&mut self) {
+        let looks = matches!(self.model.response, Response::Displacement | Response::Impulse);
+        if self.continuous.grazes.is_empty() || !looks {
+            return;
+        }
+        let mut listed: HashSet<_> = self.contacts.mm.iter().map(|c| (c.a, c.b)).collect();
+        for (a, b) in self.continuous.grazes.iter().copied().filter(|pair| listed.insert(*pair)) {
+            let (along, mtv) = ([S::zero(); 2], Vec3::zero());
+            self.contacts.mm.push(Contact { a, b, part: 0, along, mtv });
+        }
+    }
+}
+
+/// Penetration vector of a sphere and a half-space in metres: zero within `reach` metres outside,
+/// none beyond.
+#[inline]
+fn penetration_of_half_space<S: Scalar>(
+    plane: &Plane<S>,
+    sphere: &Sphere<S>,
+    reach: S,
+) -> Option<Vec3<S>> {
+    let gap = || plane.signed_distance(sphere.center) - sphere.radius;
+    let near = || reach > S::zero() && gap() <= reach;
+    mtv_sphere_plane(sphere, plane).or_else(|| near().then(Vec3::zero))
+}
+
+/// Penetration vector of two spheres in metres: zero within `reach` metres, none beyond.
+#[inline]
+fn penetration_of_spheres<S: Scalar>(
+    first: &Sphere<S>,
+    second: &Sphere<S>,
+    reach: S,
+) -> Option<Vec3<S>> {
+    let near = || {
+        let gap = length(second.center - first.center) - first.radius - second.radius;
+        reach > S::zero() && gap <= reach
+    };
+    mtv_sphere_sphere(first, second).or_else(|| near().then(Vec3::zero))
+}
+
+/// Closest points of two segments, as positions along their axes; for parallel ones, both ends of
+/// their overlap.
+fn closest_points_of_segments<S: Scalar>(
+    (first, x, half_x): (Sphere<S>, Vec3<S>, S),
+    (second, y, half_y): (Sphere<S>, Vec3<S>, S),
+) -> SmallVec<[[S; 2]; 2]> {
+    let apart = second.center - first.center;
+    let clamp = |along: S, half: S| along.max(-half).min(half);
+    let (cos, on_x, on_y) = (x.dot(y), apart.dot(x), apart.dot(y));
+    let squared_sin = x.cross(y).magnitude2();
+    // Nearly parallel segments have no stable closest point. They are not parallel if their ends
+    // deviate by a good fraction of their radii.
+    let slim = ((first.radius + second.radius) / half_x.min(half_y)).min(S::one());
+    let parallel = squared_sin < slim * slim * S::constant(1e-3);
+    if half_x > S::zero() && half_y > S::zero() && parallel {
+        let ends = [-half_y, half_y].map(|end| clamp(on_x + cos * end, half_x));
+        let samples = ends.map(|along| [along, clamp(cos * along - on_y, half_y)]);
+        let mut both = SmallVec::from_slice(&samples[..1]);
+        if samples[1] != samples[0] {
+            both.push(samples[1]);
+        }
+        return both;
+    }
+    let start = if squared_sin > S::zero() { (on_x - cos * on_y) / squared_sin } else { S::zero() };
+    let on_second = clamp(cos * clamp(start, half_x) - on_y, half_y);
+    let on_first = clamp(on_x + cos * on_second, half_x);
+    SmallVec::from_slice(&[[on_first, on_second]])
+}
+
+/// Collects the sub-shapes of walls, except half-spaces, within `reach` metres of a sphere, in
+/// order.
+pub(super) fn candidate_sub_shapes<S: Scalar>(
+    walls: &Walls<S>,
+    sphere: &Sphere<S>,
+    reach: S,
+    candidates: &mut Vec<Candidate<S>>,
+) {
+    let far = sphere.radius + reach;
+    let more = Vec3::new(far, far, far);
+    let bounds = Aabb { min: sphere.center - more, max: sphere.center + more };
+    walls.for_each_in_box(&bounds, |part| {
+        let nearest = walls.project_point(part, sphere.center);
+        if nearest.distance <= far {
+            candidates.push(Candidate { part, nearest });
+        }
+    });
+    candidates.sort_unstable_by_key(|near| near.part);
+    candidates.dedup_by_key(|near| near.part);
+    // Below a height field, only the nearest triangle gives the depth.
+    let under = |it: &Candidate<S>| {
+        let landscape = matches!(walls.shapes()[it.part.wall as usize], WallShape::HeightField(..));
+        landscape && it.nearest.distance < S::zero()
+    };
+    if candidates.iter().any(under) {
+        let all = candidates.clone();
+        candidates.retain(|it| {
+            let nearer = |other: &Candidate<S>| {
+                other.part.wall == it.part.wall
+                    && (-other.nearest.distance, other.part) < (-it.nearest.distance, it.part)
+            };
+            !(under(it) && all.iter().any(nearer))
+        });
+    }
+}
+
+/// Removes ghost collisions at internal edges: keeps the contacts that a sphere would have if all
+/// walls were one piece.
+///
+/// A contact whose nearest point lies in or on another wall is dropped: the other one is nearer,
+/// and covers it. That holds for internal edges of flush boxes, of the triangles of a surface, and
+/// of intersecting walls, whichever body they belong to. Two that cover each other have equal
+/// nearest points, and one suffices.
+pub(super) fn remove_ghost_collisions<S: Scalar>(
+    walls: &Walls<S>,
+    sphere: &Sphere<S>,
+    candidates: &mut Vec<Candidate<S>>,
+) {
+    let largest = [sphere.center.x, sphere.center.y, sphere.center.z]
+        .iter()
+        .fold(sphere.radius, |most, x| most.max(x.abs()));
+    let rounding = S::epsilon() * S::constant(4.0) * largest;
+    let flush = (sphere.radius * S::constant(INTERNAL_EDGE_TOLERANCE)).max(rounding);
+    let on = |point: &Candidate<S>, other: &Candidate<S>| {
+        walls.project_point(other.part, point.nearest.point).distance <= flush
+    };
+    let before = |x: &Candidate<S>, y: &Candidate<S>| {
+        (x.nearest.distance, x.part) < (y.nearest.distance, y.part)
+    };
+    let ghosts = |it: &Candidate<S>| {
+        let others = candidates.iter().filter(|other| other.part != it.part);
+        let on_planes =
+            || walls.planes().any(|(_, plane)| plane.signed_distance(it.nearest.point) <= flush);
+        let covers = |other: &Candidate<S>| on(it, other) && (before(other, it) || !on(other, it));
+        others.into_iter().any(covers) || on_planes()
+    };
+    let ghosts: Vec<bool> = candidates.iter().map(ghosts).collect();
+    let mut row = 0;
+    candidates.retain(|_| {
+        row += 1;
+        !ghosts[row - 1]
+    });
+}
