@@ -128,7 +128,7 @@ pub fn marbles(
     let begins_to_turn = last.rotation == Rotation::None && model.rotation != Rotation::None;
     // What could be no marble may be one now.
     let knows_capsules =
-        last.response == Response::EventDriven && model.response != Response::EventDriven;
+        !last.response.knows_capsules() && model.response.knows_capsules();
     *last = Settings { rotation: model.rotation, response: model.response };
     // Looking at all is for all threads; then there are few or none, and they go in order.
     let any = AtomicBool::new(false);
@@ -212,7 +212,7 @@ fn take_over(
         rotation_model: seen.rotation_model,
         material: material.map(|m| (*m).into()),
     };
-    let balls_only = world.model().response == Response::EventDriven && half_length > 0.0;
+    let balls_only = !world.model().response.knows_capsules() && half_length > 0.0;
     let check = |result: Result<(), Refusal>| refusals.check(Some(entity), result);
     if let Some(id) = state.id {
         let all = world.just_restored;

@@ -166,7 +166,7 @@ impl Plugin for TawPlugin {
 }
 
 fn run_substeps(world: &mut World) {
-    let substeps = world.resource::<TawWorld>().model().substeps;
+    let substeps = world.resource::<TawWorld>().model().passes();
     let delta = world.resource::<Time>().delta_secs() / substeps as f32;
     world.resource_mut::<SubstepDelta>().0 = delta;
     // Only a substep of this very schedule could be without it.

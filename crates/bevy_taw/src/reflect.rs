@@ -34,6 +34,7 @@ pub enum RotationReflect {
 pub enum ResponseReflect {
     Displacement,
     Impulse,
+    SoftStep,
     Penalty(#[reflect(remote = ContactLawReflect)] taw::response::ContactLaw),
     EventDriven,
 }

@@ -101,6 +101,48 @@ fn world_of((balls, half): (Vec<Ball>, f32), tier: Tier, threads: u32) -> World<
     world
 }
 
+/// As many marbles in the same box, which never sleep.
+fn marbles(count: usize, response: Response, threads: u32) -> World<f32> {
+    let (balls, half) = balls(count, alike);
+    let mut world = world_of((Vec::new(), half), Tier::Full, threads);
+    let model = Model {
+        response,
+        rotation: Rotation::Dynamic,
+        substeps: if response == Response::SoftStep { 2 } else { 1 },
+        ..Model::default()
+    };
+    world.set_model(model).expect("a model");
+    for Ball { position, radius, mass, .. } in balls {
+        let material = Some(world.swarm.model().material);
+        let marble = taw::world::Marble { mass, material, ..Marble::new(position, radius) };
+        world.marbles.insert(marble).expect("a marble");
+    }
+    world
+}
+
+fn bench_marbles(bencher: Bencher, mut world: World<f32>) {
+    for _ in 0..180 {
+        world.step(DT).expect("a step");
+    }
+    let count = ItemsCount::new(world.marbles.len());
+    bencher.counter(count).bench_local(|| world.step(DT).expect("a step"));
+}
+
+#[divan::bench(args = [20, 1_000, 10_000, 100_000], sample_count = 30, sample_size = 1)]
+fn marbles_soft_step(bencher: Bencher, count: usize) {
+    bench_marbles(bencher, marbles(count, Response::SoftStep, 2));
+}
+
+#[divan::bench(args = [20, 1_000, 10_000, 100_000], sample_count = 30, sample_size = 1)]
+fn marbles_soft_step_one_thread(bencher: Bencher, count: usize) {
+    bench_marbles(bencher, marbles(count, Response::SoftStep, 1));
+}
+
+#[divan::bench(args = [20, 1_000, 10_000], sample_count = 30, sample_size = 1)]
+fn marbles_impulse(bencher: Bencher, count: usize) {
+    bench_marbles(bencher, marbles(count, Response::Impulse, 1));
+}
+
 /// Goes on from step to step: the mean over some steps is what they cost, also that some of
 /// them seek pairs anew and others do not.
 fn bench(bencher: Bencher, count: usize, tier: Tier, threads: u32, after: u32) {

@@ -47,14 +47,14 @@ fn measure_in<S: Scalar>(
     let mut times = [0; 3].map(|_| Vec::with_capacity(steps));
     let before = allocated();
     let mut running = scene.run::<S>(model)?;
-    let (step, substep) = (S::constant(step), S::constant(step / f64::from(model.substeps)));
+    let (step, substep) = (S::constant(step), S::constant(step / f64::from(model.passes())));
     let mut contacts = 0;
     for _ in 0..steps {
         running.move_walls(step)?;
         let world = &mut running.world;
         world.begin_step();
         let mut taken = [0.0; 3];
-        for _ in 0..model.substeps {
+        for _ in 0..model.passes() {
             let begin = Instant::now();
             world.integrate(substep)?;
             let integrated = Instant::now();

@@ -47,6 +47,7 @@ pub fn model(ui: &mut Ui, model: &mut ResMut<TawModel>) {
             Response::Penalty(ContactLaw::SpringDashpot),
             Response::Penalty(ContactLaw::HertzMindlin),
             Response::EventDriven,
+            Response::SoftStep,
         ];
         choice(ui, "Response", &mut chosen.response, &responses, response_name);
         let rotations = [Rotation::None, Rotation::Rolling, Rotation::Dynamic];
@@ -319,6 +320,7 @@ fn response_name(response: Response) -> &'static str {
         Response::Penalty(ContactLaw::SpringDashpot) => "Penalty: spring–dashpot",
         Response::Penalty(ContactLaw::HertzMindlin) => "Penalty: Hertz–Mindlin",
         Response::EventDriven => "Event-driven",
+        Response::SoftStep => "Soft step",
     }
 }
 

@@ -54,6 +54,7 @@ use cgmath::{EuclideanSpace, Zero};
 use crate::Error;
 use crate::error::{finite_point, finite_vector, positive, within};
 use crate::math::{Point3, Vec3};
+use crate::response::Material;
 use crate::world::MarbleId;
 use batches::pairs_in;
 use grid::Grid;
@@ -365,6 +366,12 @@ impl Swarm {
     /// True in the tier with friction, bounce and spin.
     fn rough(&self) -> bool {
         self.tier() == Tier::Full
+    }
+
+    /// Material of all pairs that have no [numbers](kernels::Pushes::numbers) of their own.
+    fn common_material(&self) -> Material<f32> {
+        let model = self.model.material;
+        self.surfaces.common(model, self.len()).unwrap_or(model)
     }
 
     /// Surfaces by row.

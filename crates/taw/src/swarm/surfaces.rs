@@ -26,6 +26,8 @@ impl Surface {
 pub(super) struct Surfaces {
     /// Different ones, in the order in which they came.
     list: Vec<Surface>,
+    /// Number of slots of each.
+    counts: Vec<u32>,
     /// One more than the place in the list, by slot; zero for the model's surface.
     of_slot: Vec<u32>,
 }
@@ -37,6 +39,7 @@ impl Surfaces {
             let known = self.list.iter().rposition(|known| *known == surface);
             let index = known.unwrap_or_else(|| {
                 self.list.push(surface);
+                self.counts.push(0);
                 self.list.len() - 1
             });
             index as u32 + 1
@@ -48,17 +51,40 @@ impl Surfaces {
         if self.of_slot.len() <= slot {
             self.of_slot.resize(slot + 1, 0);
         }
-        std::mem::replace(&mut self.of_slot[slot], index) != index
+        let before = std::mem::replace(&mut self.of_slot[slot], index);
+        for (index, more) in [(before, false), (index, true)] {
+            if let Some(count) =
+                (index as usize).checked_sub(1).and_then(|i| self.counts.get_mut(i))
+            {
+                *count = if more { *count + 1 } else { *count - 1 };
+            }
+        }
+        before != index
+    }
+
+    /// Material of all balls, of which there are so many, where one is; and nobody's rotation is
+    /// locked.
+    pub fn common(&self, model: Material<f32>, balls: usize) -> Option<Material<f32>> {
+        let used = || self.counts.iter().zip(&self.list).filter(|(count, _)| **count > 0);
+        match used().next() {
+            None => Some(model),
+            Some((count, surface)) => {
+                let all = *count as usize == balls && !surface.rotation_locked;
+                all.then_some(surface.material)
+            }
+        }
     }
 
     /// Drops what no slot has any more.
     pub fn clear(&mut self) {
         self.list.clear();
+        self.counts.clear();
         self.of_slot.clear();
     }
 
     pub fn bytes(&self) -> usize {
-        self.list.capacity() * size_of::<Surface>() + self.of_slot.capacity() * size_of::<u32>()
+        self.list.capacity() * size_of::<Surface>()
+            + (self.counts.capacity() + self.of_slot.capacity()) * size_of::<u32>()
     }
 }
 
@@ -85,8 +111,9 @@ impl SurfaceOf<'_> {
 
     /// True if pairs need numbers of their own.
     pub fn differ(&self) -> bool {
-        let resists = |m: &Material<f32>| m.rolling_resistance > 0.0 || m.spinning_resistance > 0.0;
-        resists(&self.model) || !self.surfaces.list.is_empty()
+        self.surfaces.common(self.model, self.slots.len()).is_none_or(|common| {
+            common.rolling_resistance > 0.0 || common.spinning_resistance > 0.0
+        })
     }
 
     /// Fills in the numbers of the pairs of some batches; none, if all balls have one surface that

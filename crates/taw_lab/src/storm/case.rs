@@ -92,6 +92,9 @@ impl Case {
         let mut running = self.scene.run::<S>(self.model)?;
         if let Some(swarm) = &self.swarm {
             swarm.fill(&mut running.world.swarm)?;
+        } else {
+            let model = SwarmModel { threads: 1, ..SwarmModel::default() };
+            running.world.swarm.set_model(model)?;
         }
         running.world.enable_energy_audit(true);
         Ok(running)
@@ -150,6 +153,8 @@ pub enum Kind {
     HertzMindlin,
     /// [`Response::EventDriven`].
     EventDriven,
+    /// [`Response::SoftStep`], with or without a swarm beside marbles.
+    SoftStep,
     /// A swarm of the lab's tier, with marbles by displacement.
     SwarmLab,
     /// A swarm of the full tier, with marbles by impulses.
@@ -158,7 +163,7 @@ pub enum Kind {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Displacement,
         Self::DisplacementSwept,
         Self::Impulse,
@@ -166,6 +171,7 @@ impl Kind {
         Self::SpringDashpot,
         Self::HertzMindlin,
         Self::EventDriven,
+        Self::SoftStep,
         Self::SwarmLab,
         Self::SwarmFull,
     ];
@@ -181,6 +187,7 @@ impl Kind {
             Self::SpringDashpot => "spring-dashpot",
             Self::HertzMindlin => "hertz-mindlin",
             Self::EventDriven => "event-driven",
+            Self::SoftStep => "soft-step",
             Self::SwarmLab => "swarm/lab",
             Self::SwarmFull => "swarm/full",
         }
@@ -189,6 +196,9 @@ impl Kind {
     /// That of a case.
     #[must_use]
     pub fn of(case: &Case) -> Self {
+        if case.model.response == Response::SoftStep {
+            return Self::SoftStep;
+        }
         if let Some(swarm) = &case.swarm {
             return if swarm.full { Self::SwarmFull } else { Self::SwarmLab };
         }
@@ -200,6 +210,7 @@ impl Kind {
             (Response::Penalty(ContactLaw::SpringDashpot), _) => Self::SpringDashpot,
             (Response::Penalty(ContactLaw::HertzMindlin), _) => Self::HertzMindlin,
             (Response::EventDriven, _) => Self::EventDriven,
+            (Response::SoftStep, _) => Self::SoftStep,
         }
     }
 }

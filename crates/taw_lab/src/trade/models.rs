@@ -37,7 +37,7 @@ const fn meets(name: &'static str, model: Model, iterates: bool) -> Named {
 }
 
 /// All of them: the integrators where nothing touches, the responses where something does.
-pub static MODELS: [Named; 14] = [
+pub static MODELS: [Named; 15] = [
     flies("explicit Euler", Integrator::ExplicitEuler),
     flies("semi-implicit Euler", Integrator::SemiImplicitEuler),
     flies("velocity Verlet", Integrator::VelocityVerlet),
@@ -49,6 +49,7 @@ pub static MODELS: [Named; 14] = [
     meets("displacement, swept", Model { detection: Detection::Swept, ..PLAIN }, false),
     meets("impulse", IMPULSE, true),
     meets("impulse, swept", Model { detection: Detection::Swept, ..IMPULSE }, true),
+    meets("soft step", Model { response: Response::SoftStep, ..IMPULSE }, false),
     meets(
         "spring and dashpot",
         Model { response: Response::Penalty(ContactLaw::SpringDashpot), ..IMPULSE },

@@ -157,7 +157,7 @@ impl Swarm {
         self.look_at_walls(walls, dt, times, all, false);
         // What gravity makes of rest in two steps is no impact.
         let speed = 2.0 * length(gravity) * dt;
-        let restitution = self.model.material.restitution;
+        let restitution = self.common_material().restitution;
         // What lies on others is borne by pushes; all else
         // that overlaps is moved apart. Where nothing has weight, overlap makes no speed at all.
         let soft = soft(h, length(gravity));
@@ -441,7 +441,7 @@ impl Swarm {
     /// condition holds, given how fast a ball of the next one is.
     fn pass(&mut self, pass: Pass, condition: impl Fn(&Slab, f32) -> bool + Sync) {
         let instructions = self.instructions;
-        let friction = self.model.material.friction;
+        let friction = self.common_material().friction;
         let mut strays = std::mem::take(&mut self.strays);
         self.each_slab(|next, columns, slab| {
             if slab.asleep && next.is_none_or(|(asleep, _)| asleep)

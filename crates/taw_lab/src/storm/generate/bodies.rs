@@ -92,8 +92,11 @@ impl Crowd {
                 ball.angular_velocity = [0.0; 3];
             }
         }
-        let swarm = matches!(self.kind, Kind::SwarmLab | Kind::SwarmFull);
-        if self.kind == Kind::EventDriven || swarm || dice.chance(0.8) {
+        let knows_balls_only = matches!(
+            self.kind,
+            Kind::EventDriven | Kind::SoftStep | Kind::SwarmLab | Kind::SwarmFull
+        );
+        if knows_balls_only || dice.chance(0.8) {
             for ball in balls.iter_mut() {
                 ball.half_length = 0.0;
             }

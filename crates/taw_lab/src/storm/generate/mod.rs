@@ -55,6 +55,7 @@ fn setting(kind: Kind, dice: &mut Dice) -> Case {
         Kind::SpringDashpot => (Response::Penalty(ContactLaw::SpringDashpot), Detection::Discrete),
         Kind::HertzMindlin => (Response::Penalty(ContactLaw::HertzMindlin), Detection::Discrete),
         Kind::EventDriven => (Response::EventDriven, Detection::Discrete),
+        Kind::SoftStep => (Response::SoftStep, Detection::Swept),
     };
     let dynamic = Rotation::Dynamic;
     let plain = Integrator::SemiImplicitEuler;
@@ -74,8 +75,10 @@ fn setting(kind: Kind, dice: &mut Dice) -> Case {
     let model = Model { substeps, ..model };
     let steps: &[f64] =
         if springs { &[240.0, 120.0] } else { &[240.0, 120.0, 64.0, 60.0, 60.0, 30.0] };
-    let full = kind == Kind::SwarmFull;
-    let swarm = (full || kind == Kind::SwarmLab).then(|| SwarmPart {
+    let soft_step = kind == Kind::SoftStep;
+    let full = kind == Kind::SwarmFull || soft_step;
+    let has_swarm = if soft_step { dice.chance(0.4) } else { full || kind == Kind::SwarmLab };
+    let swarm = has_swarm.then(|| SwarmPart {
         full,
         substeps: dice.pick(&[1, 2, 2, 4, 8]),
         sleeps: dice.chance(0.7),

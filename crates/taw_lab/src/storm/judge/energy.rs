@@ -86,7 +86,11 @@ impl Ledger {
     ) -> Vec<Finding> {
         let uncounted = matches!(
             rules.kind,
-            Kind::Displacement | Kind::DisplacementSwept | Kind::SwarmLab | Kind::SwarmFull
+            Kind::Displacement
+                | Kind::DisplacementSwept
+                | Kind::SoftStep
+                | Kind::SwarmLab
+                | Kind::SwarmFull
         );
         if rules.moving && uncounted {
             return Vec::new(); // nobody counts what walls do there

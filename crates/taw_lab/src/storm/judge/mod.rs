@@ -154,10 +154,12 @@ impl Rules {
         // In the lab's tier of swarms, balls move once in a step, and its parts are how often they
         // are moved apart: iterations.
         let lab = kind == Kind::SwarmLab;
-        let swarm = case.swarm.is_some().then_some(if lab { 1.0 } else { parts });
+        let soft_step = kind == Kind::SoftStep; // one solve of both
+        let own_parts = case.swarm.is_some() && !soft_step;
+        let swarm = own_parts.then_some(if lab { 1.0 } else { parts });
         let iterations = f64::from(case.model.iterations).min(if lab { parts } else { f64::MAX });
         let marbles = f64::from(case.model.substeps);
-        let single = case.number == Number::F32 || swarm.is_some();
+        let single = case.number == Number::F32 || case.swarm.is_some() || soft_step;
         Self {
             kind,
             step: case.step,
@@ -175,7 +177,7 @@ impl Rules {
     /// energy and gives it back.
     #[must_use]
     pub fn soft(&self) -> bool {
-        self.springs() || self.kind == Kind::SwarmFull
+        self.springs() || matches!(self.kind, Kind::SoftStep | Kind::SwarmFull)
     }
 
     /// Whether contacts are springs, which store energy and give it back.
