@@ -127,8 +127,7 @@ pub fn marbles(
     // The world's own columns for it begin unturned; the components know better.
     let begins_to_turn = last.rotation == Rotation::None && model.rotation != Rotation::None;
     // What could be no marble may be one now.
-    let knows_capsules =
-        !last.response.knows_capsules() && model.response.knows_capsules();
+    let knows_capsules = !last.response.knows_capsules() && model.response.knows_capsules();
     *last = Settings { rotation: model.rotation, response: model.response };
     // Looking at all is for all threads; then there are few or none, and they go in order.
     let any = AtomicBool::new(false);

@@ -589,6 +589,10 @@ fn meeting<L: Lanes>(
     let apart = (way.dot(way) - reach * reach).max(zero);
     let square = approach * approach - relative.dot(relative) * apart;
     let time = approach.pick_above(zero, apart / (approach + square.max(zero).sqrt()), zero);
+    // Of what does not meet, any time will do: what hardly moves would take longer than a number is.
+    let limit = L::splat(impact.time);
+    let meets = limit.pick_above(time, one, zero);
+    let time = limit.pick_above(time, time, zero);
     let then = way.plus(relative.times(time));
     let length = then.dot(then).sqrt();
     let inverse = length.pick_above(zero, one / length, zero);
@@ -596,7 +600,7 @@ fn meeting<L: Lanes>(
     let closing = zero - relative.dot(normal);
     let closing = closing.pick_above(L::splat(impact.speed), closing, zero);
     let closing = square.pick_above(zero, closing, zero);
-    (normal, L::splat(impact.time).pick_above(time, closing, zero))
+    (normal, meets.pick_above(zero, closing, zero))
 }
 
 /// Velocity at which the surfaces of two balls slide over each other.
