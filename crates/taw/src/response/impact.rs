@@ -6,37 +6,37 @@ use crate::response::Material;
 /// How easily a contact's two points come apart: the change of their relative
 /// velocity per impulse, in 1/kg.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Mobility<S> {
+pub struct InverseEffectiveMass<S> {
     /// Along the normal.
     pub normal: S,
     /// Across it.
     pub tangent: S,
 }
 
-impl<S: Scalar> Mobility<S> {
+impl<S: Scalar> InverseEffectiveMass<S> {
     /// Of two balls with these inverse masses (1/kg); zero for a wall.
     ///
     /// The normal goes through the centers, so spin counts only across it: a solid
     /// ball's point gives way by `1/m + r²/I = 7/2 · 1/m`.
     #[must_use]
-    pub fn of_balls(inverse_mass_a: S, inverse_mass_b: S, spin: BallSpin) -> Self {
+    pub fn of_balls(inverse_mass_a: S, inverse_mass_b: S, spin: BallRotation) -> Self {
         Self::of([(inverse_mass_a, spin), (inverse_mass_b, spin)])
     }
 
     /// That of two ends together.
-    pub(super) fn and(self, other: Self) -> Self {
+    pub(super) fn plus(self, other: Self) -> Self {
         Self { normal: self.normal + other.normal, tangent: self.tangent + other.tangent }
     }
 
     /// That of so many ends in one place.
-    pub(super) fn times(self, count: S) -> Self {
+    pub(super) fn scaled(self, count: S) -> Self {
         Self { normal: self.normal * count, tangent: self.tangent * count }
     }
 
     /// The same of balls of which one may spin and the other not.
-    pub(super) fn of(balls: [(S, BallSpin); 2]) -> Self {
-        let tangent = |(inverse_mass, spin): (S, BallSpin)| {
-            inverse_mass * (S::one() + spin.of_solid_ball::<S>())
+    pub(super) fn of(balls: [(S, BallRotation); 2]) -> Self {
+        let tangent = |(inverse_mass, spin): (S, BallRotation)| {
+            inverse_mass * (S::one() + spin.inverse_inertia_factor::<S>())
         };
         let [a, b] = balls;
         Self { normal: a.0 + b.0, tangent: tangent(a) + tangent(b) }
@@ -45,19 +45,19 @@ impl<S: Scalar> Mobility<S> {
 
 /// Whether an impulse can set balls spinning.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum BallSpin {
+pub enum BallRotation {
     /// No: friction acts on the velocity alone.
-    Ignored,
+    Locked,
     /// Yes, as solid balls of even density.
     Free,
 }
 
-impl BallSpin {
+impl BallRotation {
     /// `m r² / I`: how easily the rim gives way by spinning, over how easily the center
     /// does.
-    pub(super) fn of_solid_ball<S: Scalar>(self) -> S {
+    pub(super) fn inverse_inertia_factor<S: Scalar>(self) -> S {
         match self {
-            Self::Ignored => S::zero(),
+            Self::Locked => S::zero(),
             Self::Free => S::constant(2.5),
         }
     }
@@ -66,7 +66,7 @@ impl BallSpin {
 /// The impulse (N s) that ends the approach of a contact's two points, as the second
 /// one feels it; the first feels the opposite.
 ///
-/// `closing` is the velocity of the second's touching point relative to the first's,
+/// `relative_velocity` is the velocity of the second's touching point relative to the first's,
 /// in m/s; `normal` points from the first to the second. Newton's restitution along
 /// the normal; across it, what friction can do at most is bounded by *all* of the
 /// normal impulse, that of the restitution included (Chung and Ooi 2011; Cross,
@@ -74,25 +74,27 @@ impl BallSpin {
 #[must_use]
 pub fn impact<S: Scalar>(
     normal: Vec3<S>,
-    closing: Vec3<S>,
-    mobility: Mobility<S>,
+    relative_velocity: Vec3<S>,
+    inverse_effective_mass: InverseEffectiveMass<S>,
     material: Material<S>,
 ) -> Vec3<S> {
-    let approach = -closing.dot(normal);
-    if approach <= S::zero() || mobility.normal <= S::zero() {
+    let approach = -relative_velocity.dot(normal);
+    if approach <= S::zero() || inverse_effective_mass.normal <= S::zero() {
         return Vec3::zero();
     }
-    let pressure = (S::one() + material.restitution) * approach / mobility.normal;
-    let sliding = closing + normal * approach;
-    let stop = sliding * (-(S::one() + material.tangential_restitution) / mobility.tangent);
-    normal * pressure + at_most(stop, material.friction * pressure)
+    let normal_impulse =
+        (S::one() + material.restitution) * approach / inverse_effective_mass.normal;
+    let tangent_velocity = relative_velocity + normal * approach;
+    let stopping_impulse = tangent_velocity
+        * (-(S::one() + material.tangential_restitution) / inverse_effective_mass.tangent);
+    normal * normal_impulse + clamp_length(stopping_impulse, material.friction * normal_impulse)
 }
 
 /// The vector, shortened to this length if it is longer. Impulses of small marbles are
 /// so small that their squares vanish.
-pub(super) fn at_most<S: Scalar>(v: Vec3<S>, most: S) -> Vec3<S> {
+pub(super) fn clamp_length<S: Scalar>(v: Vec3<S>, max: S) -> Vec3<S> {
     let length = length(v);
-    if length > most { v * (most / length) } else { v }
+    if length > max { v * (max / length) } else { v }
 }
 
 #[cfg(test)]
@@ -105,9 +107,10 @@ mod tests {
     /// `vx + rim` along x.
     fn bounce<S: Scalar>(v: [f64; 2], rim: f64, material: Material<S>) -> ([f64; 2], f64) {
         let number = S::constant;
-        let closing = Vec3::new(number(v[0]) + number(rim), number(v[1]), S::zero());
-        let mobility = Mobility::of_balls(S::zero(), S::one(), BallSpin::Free);
-        let j = impact(Vec3::unit_y(), closing, mobility, material);
+        let relative_velocity = Vec3::new(number(v[0]) + number(rim), number(v[1]), S::zero());
+        let inverse_effective_mass =
+            InverseEffectiveMass::of_balls(S::zero(), S::one(), BallRotation::Free);
+        let j = impact(Vec3::unit_y(), relative_velocity, inverse_effective_mass, material);
         // m = 1; r ω changes by r² j / I = 5/2 j.
         let after = [number(v[0]) + j.x, number(v[1]) + j.y];
         (after.map(Scalar::as_f64), (number(rim) + number(2.5) * j.x).as_f64())
@@ -197,20 +200,20 @@ mod tests {
         fn impacts_conserve_momentum_and_create_no_energy(
             mass_exponents in [-3.0..3.0_f64, -3.0..3.0],
             normal in [-1.0..1.0_f64, -1.0..1.0, 0.1..1.0],
-            closing in [-1.0..1.0_f64, -1.0..1.0, -1.0..1.0],
+            relative_velocity in [-1.0..1.0_f64, -1.0..1.0, -1.0..1.0],
             e in 0.0..1.0_f64,
             mu in 0.0..2.0_f64,
             beta in -1.0..1.0_f64,
         ) {
             let masses = mass_exponents.map(|x| 10.0_f64.powf(x));
             let normal = Vec3::from(normal).normalize();
-            let closing = Vec3::from(closing);
+            let relative_velocity = Vec3::from(relative_velocity);
             let surface = material::<f32>(e, mu, beta);
             let inverse = masses.map(|m| (1.0 / m) as f32);
-            let mobility = Mobility::of_balls(inverse[0], inverse[1], BallSpin::Free);
-            let j = impact(normal.map(|x| x as f32), closing.map(|x| x as f32), mobility, surface)
+            let inverse_effective_mass = InverseEffectiveMass::of_balls(inverse[0], inverse[1], BallRotation::Free);
+            let j = impact(normal.map(|x| x as f32), relative_velocity.map(|x| x as f32), inverse_effective_mass, surface)
                 .map(f64::from);
-            let approach = -closing.dot(normal);
+            let approach = -relative_velocity.dot(normal);
             if approach < 1e-6 {
                 // Parting, or too close to it for f32 to say.
                 prop_assert!(approach > -1e-6 || j == Vec3::zero());
@@ -219,16 +222,16 @@ mod tests {
             // Momentum is conserved by construction: one feels j, the other −j, in one
             // point. Restitution and Coulomb:
             let give = 1.0 / masses[0] + 1.0 / masses[1];
-            let pressure = j.dot(normal);
-            let after = closing + normal * (pressure * give)
-                + (j - normal * pressure) * (3.5 * give);
-            prop_assert!((after.dot(normal) - e * approach).abs() < 1e-6 * closing.magnitude());
-            let friction = (j - normal * pressure).magnitude();
-            prop_assert!(friction <= mu * pressure * (1.0 + 1e-6) + 1e-6 * pressure);
+            let normal_impulse = j.dot(normal);
+            let after = relative_velocity + normal * (normal_impulse * give)
+                + (j - normal * normal_impulse) * (3.5 * give);
+            prop_assert!((after.dot(normal) - e * approach).abs() < 1e-6 * relative_velocity.magnitude());
+            let friction = (j - normal * normal_impulse).magnitude();
+            prop_assert!(friction <= mu * normal_impulse * (1.0 + 1e-6) + 1e-6 * normal_impulse);
             // The energy of the relative motion of the two points: what was lost is
             // j · (closing + after) / 2, which must not be a gain.
-            let gained = 0.5 * j.dot(closing + after);
-            let energy = 0.5 * closing.magnitude2() / give;
+            let gained = 0.5 * j.dot(relative_velocity + after);
+            let energy = 0.5 * relative_velocity.magnitude2() / give;
             prop_assert!(gained <= 1e-6 * energy, "{gained} of {energy}");
         }
     }

@@ -3,7 +3,7 @@ use crate::error::{positive, within};
 use crate::math::Scalar;
 
 /// What a surface is made of, as far as a contact can tell. Where a wall has none of its
-/// own, the marble's counts; else what [`Material::against`] says.
+/// own, the marble's counts; else what [`Material::combined_with`] says.
 ///
 /// [`Response::Displacement`] knows neither bounce nor friction and does not read it.
 ///
@@ -69,7 +69,7 @@ impl<S: Scalar> Elasticity<S> {
 }
 
 impl<S: Scalar> Compliance<S> {
-    pub(super) fn and(self, other: Self) -> Self {
+    pub(super) fn plus(self, other: Self) -> Self {
         Self { normal: self.normal + other.normal, tangent: self.tangent + other.tangent }
     }
 }
@@ -81,23 +81,23 @@ impl<S: Scalar> Compliance<S> {
 pub enum Combine {
     /// Half of the sum.
     #[default]
-    Mean,
+    Average,
     /// The smaller number.
-    Smallest,
+    Min,
     /// One times the other. Of two negative tangential restitutions, minus that.
-    Product,
+    Multiply,
     /// The larger number.
-    Largest,
+    Max,
 }
 
 impl Combine {
     fn of<S: Scalar>(self, a: S, b: S) -> S {
         match self {
-            Self::Mean => a + (b - a) * S::constant(0.5),
-            Self::Smallest => a.min(b),
-            Self::Product if a < S::zero() && b < S::zero() => -(a * b),
-            Self::Product => a * b,
-            Self::Largest => a.max(b),
+            Self::Average => a + (b - a) * S::constant(0.5),
+            Self::Min => a.min(b),
+            Self::Multiply if a < S::zero() && b < S::zero() => -(a * b),
+            Self::Multiply => a * b,
+            Self::Max => a.max(b),
         }
     }
 }
@@ -112,7 +112,7 @@ impl<S: Scalar> Default for Material<S> {
             rolling_resistance: S::zero(),
             spinning_resistance: S::zero(),
             elasticity: Elasticity::default(),
-            combine: Combine::Mean,
+            combine: Combine::Average,
         }
     }
 }
@@ -135,7 +135,7 @@ impl<S: Scalar> Material<S> {
 
     /// What counts between two surfaces.
     #[must_use]
-    pub fn against(self, other: Self) -> Self {
+    pub fn combined_with(self, other: Self) -> Self {
         let combine = self.combine.max(other.combine);
         let of = |number: fn(&Self) -> S| combine.of(number(&self), number(&other));
         Self {
@@ -175,13 +175,13 @@ mod tests {
     #[test]
     fn the_rule_further_down_counts() {
         let material = |friction, combine| Material { friction, combine, ..Material::default() };
-        let rules = [Combine::Mean, Combine::Smallest, Combine::Product, Combine::Largest];
+        let rules = [Combine::Average, Combine::Min, Combine::Multiply, Combine::Max];
         let expected = [1.0, 0.5, 0.75, 1.5];
         for (i, a) in rules.into_iter().enumerate() {
             for (j, b) in rules.into_iter().enumerate() {
-                let pair = material(0.5, a).against(material(1.5, b));
+                let pair = material(0.5, a).combined_with(material(1.5, b));
                 assert_eq!(pair.friction, expected[i.max(j)], "{a:?} against {b:?}");
-                assert_eq!(pair, material(1.5, b).against(material(0.5, a)));
+                assert_eq!(pair, material(1.5, b).combined_with(material(0.5, a)));
             }
         }
     }
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn what_two_materials_give_is_a_material() {
         let ends = [-1.0, -0.5, 0.0, 0.5, 1.0_f64];
-        for combine in [Combine::Mean, Combine::Smallest, Combine::Product, Combine::Largest] {
+        for combine in [Combine::Average, Combine::Min, Combine::Multiply, Combine::Max] {
             for (a, b) in ends.into_iter().flat_map(|a| ends.map(|b| (a, b))) {
                 let of = |beta: f64| Material {
                     restitution: beta.abs(),
@@ -197,7 +197,7 @@ mod tests {
                     combine,
                     ..Material::default()
                 };
-                of(a).against(of(b)).checked().unwrap();
+                of(a).combined_with(of(b)).checked().unwrap();
             }
         }
     }

@@ -1,26 +1,23 @@
 //! What a touch does to those who touch. One method a file; all of them take the
 //! same columns and the same contacts.
 
+mod bodies;
 pub(crate) mod displacement;
+mod energy_ledger;
 pub(crate) mod event;
 mod impact;
 pub(crate) mod impulse;
 mod material;
 pub(crate) mod penalty;
-mod work;
 
+pub(crate) use bodies::{CapsuleInertia, SolverBodies};
+pub(crate) use energy_ledger::{EnergyLedger, ImpulseSample};
 pub use event::Impact;
-pub use impact::{BallSpin, Mobility, impact};
-pub(crate) use impulse::Walls;
+pub use impact::{BallRotation, InverseEffectiveMass, impact};
+pub(crate) use impulse::Colliders;
 pub use material::{Combine, Elasticity, Material};
 pub use penalty::ContactLaw;
-pub(crate) use penalty::Shear;
-pub(crate) use work::{Push, Work};
-
-use cgmath::{InnerSpace, Zero};
-
-use crate::broad::Period;
-use crate::math::{Point3, Scalar, Vec3};
+pub(crate) use penalty::SpringHistory;
 
 /// The method that restitutes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
@@ -77,7 +74,7 @@ pub enum Response {
     /// more. Bounces end when the rest of them would take less than
     /// a few thousandths of a substep.
     ///
-    /// A wall that was [set](crate::world::Walls::set) to another place since the last step,
+    /// A wall that was [set](crate::world::Colliders::set) to another place since the last step,
     /// and has a [motion](crate::world::WallMotion), goes through the step by that motion, and
     /// is at its end where it was set to. One that only has a motion stays, and carries along
     /// its surface what lies on it.
@@ -98,175 +95,5 @@ impl Response {
     /// Whether it acts only on what overlaps.
     pub(crate) fn needs_overlap(self) -> bool {
         matches!(self, Self::Penalty(_))
-    }
-}
-
-/// The columns that a response works on; all of one length.
-#[derive(Debug)]
-pub(crate) struct Columns<'a, S> {
-    pub period: Period<S>,
-    /// Centers, in metres.
-    pub position: &'a mut [Point3<S>],
-    /// In metres per second.
-    pub velocity: &'a mut [Vec3<S>],
-    /// In metres.
-    pub radius: &'a [S],
-    /// In 1/kg; zero for what cannot be moved. Empty for a response that has no use
-    /// for it.
-    pub inverse_mass: &'a [S],
-    /// In rad/s; empty where contacts neither feel nor change it.
-    pub spin: &'a mut [Vec3<S>],
-    /// Which rows contacts cannot set spinning; empty if there are none.
-    pub held: &'a [bool],
-    /// What is long about each row; empty if all are balls.
-    pub rods: &'a [Rod<S>],
-}
-
-/// What makes a capsule of a ball.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rod<S> {
-    /// A unit vector in world space, and half the length of the line, in metres; zero for a
-    /// ball.
-    pub axis: Vec3<S>,
-    pub half: S,
-    /// The mass over the moments of inertia along the axis and across it, in 1/m²; nothing for
-    /// what contacts cannot set spinning.
-    pub whirl: [S; 2],
-}
-
-impl<S: Scalar> Rod<S> {
-    /// The moments of inertia along the axis and across it over the mass, in m²: of a
-    /// cylinder with half a ball at each end, of even density.
-    pub fn moments(radius: S, half: S) -> [S; 2] {
-        let number = S::constant;
-        let squared = radius * radius;
-        // As parts of all: the cylinder has π r² 2 h, the two halves 4/3 π r³.
-        let cylinder = half / (half + radius * number(2.0 / 3.0));
-        let ends = S::one() - cylinder;
-        let along = cylinder * squared * number(0.5) + ends * squared * number(0.4);
-        // The middle of half a ball is 3/8 r from its flat side (Steiner).
-        let cylinder_across = squared * number(0.25) + half * half / number(3.0);
-        let ends_across = squared * number(0.4) + half * half + half * radius * number(0.75);
-        [along, cylinder * cylinder_across + ends * ends_across]
-    }
-
-    /// A torque about its middle over the mass, as the change of spin that it makes.
-    pub fn whirl_of(&self, torque: Vec3<S>) -> Vec3<S> {
-        let [along, across] = self.whirl;
-        let part = self.axis * torque.dot(self.axis);
-        part * along + (torque - part) * across
-    }
-}
-
-impl<S: Scalar> Columns<'_, S> {
-    /// Whether an impulse can set the marble in a row spinning.
-    #[inline]
-    fn ball_spin(&self, row: usize) -> BallSpin {
-        let held = self.held.get(row).copied().unwrap_or(false);
-        if held || self.spin.is_empty() { BallSpin::Ignored } else { BallSpin::Free }
-    }
-
-    /// The spin in a row, in rad/s, as far as contacts feel it.
-    #[inline]
-    fn felt_spin(&self, row: usize) -> Vec3<S> {
-        match self.ball_spin(row) {
-            BallSpin::Free => self.spin[row],
-            BallSpin::Ignored => Vec3::zero(),
-        }
-    }
-
-    /// Radius times spin, in m/s.
-    #[inline]
-    fn rim(&self, row: usize) -> Vec3<S> {
-        self.felt_spin(row) * self.radius[row]
-    }
-
-    /// In 1/(kg m²), of a capsule the greatest; zero for what cannot be turned.
-    fn inverse_inertia(&self, row: usize) -> S {
-        if let Some(Rod { whirl: [along, across], .. }) = self.rod(row) {
-            return along.max(*across) * self.inverse_mass[row];
-        }
-        let whirl = self.ball_spin(row).of_solid_ball::<S>();
-        whirl * self.inverse_mass[row] / (self.radius[row] * self.radius[row])
-    }
-
-    /// From the middle of a row to the point of its axis that a contact is about.
-    #[inline]
-    fn offset(&self, row: usize, along: S) -> Vec3<S> {
-        self.rods.get(row).map_or_else(Vec3::zero, |rod| rod.axis * along)
-    }
-
-    /// What is long about a row that can be set spinning, if anything is.
-    #[inline]
-    fn rod(&self, row: usize) -> Option<&Rod<S>> {
-        self.rods.get(row).filter(|rod| rod.half > S::zero())
-    }
-
-    /// How easily a row gives way where it is touched, with its center that way; in 1/kg.
-    fn mobility(&self, row: usize, along: S, normal: Vec3<S>) -> Mobility<S> {
-        let inverse_mass = self.inverse_mass[row];
-        let Some(rod) = self.rod(row) else {
-            return Mobility::of([
-                (S::zero(), BallSpin::Ignored),
-                (inverse_mass, self.ball_spin(row)),
-            ]);
-        };
-        let arm = rod.axis * along - normal * self.radius[row];
-        let lever = arm.cross(normal);
-        let [most, across] = rod.whirl;
-        let most = most.max(across);
-        Mobility {
-            normal: inverse_mass * (S::one() + lever.dot(rod.whirl_of(lever))),
-            // At most; so a step across never goes too far.
-            tangent: inverse_mass * (S::one() + most * arm.magnitude2()),
-        }
-    }
-
-    /// The velocity that its spin gives to the point of a row's axis that a contact is about.
-    #[inline]
-    fn swing(&self, row: usize, along: S) -> Vec3<S> {
-        match self.rod(row) {
-            Some(rod) => self.felt_spin(row).cross(rod.axis * along),
-            None => Vec3::zero(),
-        }
-    }
-
-    /// Changes a velocity by a hit where a marble is touched, and its spin with it;
-    /// `normal` points to its center, or to the point `along` its axis.
-    #[inline]
-    fn hit(&mut self, row: usize, change: Vec3<S>, normal: Vec3<S>, along: S) {
-        self.velocity[row] += change;
-        if !self.rods.is_empty() && self.hit_rod(row, change, normal, along) {
-            return;
-        }
-        let whirl = self.ball_spin(row).of_solid_ball::<S>();
-        if let Some(spin) = self.spin.get_mut(row) {
-            *spin -= normal.cross(change) * (whirl / self.radius[row]);
-        }
-    }
-
-    /// Changes the spin of what is long, if it is.
-    fn hit_rod(&mut self, row: usize, change: Vec3<S>, normal: Vec3<S>, along: S) -> bool {
-        let Some(rod) = self.rod(row).copied() else { return false };
-        let arm = rod.axis * along - normal * self.radius[row];
-        if let Some(spin) = self.spin.get_mut(row) {
-            *spin += rod.whirl_of(arm.cross(change));
-        }
-        true
-    }
-
-    /// Changes a spin by an angular impulse, in kg m²/s.
-    fn twist(&mut self, row: usize, twist: Vec3<S>) {
-        let inverse = self.inverse_inertia(row);
-        if let Some(rod) = self.rod(row).copied() {
-            let inverse_mass = self.inverse_mass[row];
-            if let Some(spin) = self.spin.get_mut(row) {
-                *spin += rod.whirl_of(twist * inverse_mass);
-            }
-            return;
-        }
-        if let Some(spin) = self.spin.get_mut(row) {
-            *spin += twist * inverse;
-        }
     }
 }

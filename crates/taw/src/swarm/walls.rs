@@ -79,7 +79,7 @@ pub(super) fn half_spaces(
 }
 
 fn against(walls: &dyn Surroundings, wall: u32, material: Material<f32>) -> Material<f32> {
-    walls.material(wall).map_or(material, |its| material.against(its))
+    walls.material(wall).map_or(material, |its| material.combined_with(its))
 }
 
 fn center(at: &Row) -> Point3<f32> {

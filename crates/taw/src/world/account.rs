@@ -4,7 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::World;
 use crate::math::{Scalar, Vec3, length};
-use crate::response::{Response, Work};
+use crate::response::{EnergyLedger, Response};
 
 /// Where the energy of a step went. Joules; what was *taken* is gone, and negative where it was
 /// given.
@@ -58,7 +58,7 @@ pub(super) struct Accounting<S> {
     /// When contacts have been found.
     potential: f64,
     moment: Vec3<f64>,
-    pub work: Work,
+    pub work: EnergyLedger,
 }
 
 impl<S: Scalar> World<S> {
@@ -75,7 +75,7 @@ impl<S: Scalar> World<S> {
                     energy: 0.0,
                     potential: 0.0,
                     moment: Vec3::zero(),
-                    work: Work::default(),
+                    work: EnergyLedger::default(),
                 })
             });
         }
@@ -132,7 +132,7 @@ impl<S: Scalar> World<S> {
         accounting.account.deepest = accounting.account.deepest.max(deepest);
         accounting.potential = self.energy().potential;
         accounting.moment = self.momentum();
-        accounting.work = Work::default();
+        accounting.work = EnergyLedger::default();
         self.accounting = Some(accounting);
     }
 

@@ -5,7 +5,7 @@ use cgmath::{InnerSpace, Zero};
 use super::marbles::{Marbles, Rest};
 use crate::math::{Quat, Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
 use crate::motion::{Force, Integrator, Motion, Rotation, turned};
-use crate::response::Rod;
+use crate::response::CapsuleInertia;
 
 /// What moves all marbles.
 #[derive(Clone, Copy)]
@@ -228,7 +228,8 @@ impl<S: Scalar> Marbles<S> {
         let (spin, dt) = (self.exact_spin(row), dt.as_f64());
         let rotation = exact(rotation);
         let axis = (rotation * Vec3::unit_y()).normalize();
-        let [along, across] = Rod::moments(self.radius[row].as_f64(), half.as_f64());
+        let [along, across] =
+            CapsuleInertia::unit_inertia(self.radius[row].as_f64(), half.as_f64());
         // Angular momentum over the moment across: how fast the axis goes around it.
         let about_axis = spin.dot(axis);
         let precession = spin + axis * (about_axis * (along / across - 1.0));

@@ -7,7 +7,7 @@ use crate::contact::{Closest, closest, parts_of};
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
-use crate::response::event::Form;
+use crate::response::event::WallCollider;
 use crate::shape::{
     Box3, Capsule, Compound, HeightField, Hull, Mesh, Nearest, Obb, Plane, Shape, Solid, Sphere,
     Surface, Triangle,
@@ -195,7 +195,7 @@ impl<S: Scalar> WallShape<S> {
     }
 
     /// A part in `f64`, for a response that counts so.
-    pub(super) fn exact(&self, part: u32) -> Option<Form> {
+    pub(super) fn exact(&self, part: u32) -> Option<WallCollider> {
         let triangle = |triangle: Option<Triangle<S>>, pose: &Pose<S>| {
             let corners = triangle?.corners;
             Some(Triangle { corners: corners.map(|corner| cast_point(pose.point(corner))) })
@@ -206,12 +206,14 @@ impl<S: Scalar> WallShape<S> {
                 let normal = cast_vector::<S, f64>(plane.normal());
                 let length = normal.magnitude();
                 let (normal, offset) = (normal / length, plane.offset().as_f64() / length);
-                Some(Form::Plane { normal, offset })
+                Some(WallCollider::Plane { normal, offset })
             }
-            Self::Solid(_) => self.part(part).map(|shape| Form::Solid(shape.in_scalar())),
-            Self::Mesh(mesh, pose) => triangle(mesh.triangle(part), pose).map(Form::Triangle),
+            Self::Solid(_) => self.part(part).map(|shape| WallCollider::Solid(shape.in_scalar())),
+            Self::Mesh(mesh, pose) => {
+                triangle(mesh.triangle(part), pose).map(WallCollider::Triangle)
+            }
             Self::HeightField(field, pose) => {
-                triangle(field.triangle(part), pose).map(Form::SolidBelow)
+                triangle(field.triangle(part), pose).map(WallCollider::OneSidedTriangle)
             }
         }
     }

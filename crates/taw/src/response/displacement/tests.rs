@@ -2,10 +2,10 @@ use super::*;
 use crate::broad::Period;
 use crate::contact::Contact;
 use crate::math::Point3;
-use crate::response::impulse::{Settings, Start};
+use crate::response::impulse::{SolverSettings, SubstepStart};
 use crate::shape::Plane;
 
-impl<S: Scalar> Walls<S> for Vec<Plane<S>> {
+impl<S: Scalar> Colliders<S> for Vec<Plane<S>> {
     fn normal_and_distance(&self, wall: usize, _: u32, point: Point3<S>) -> (Vec3<S>, S) {
         (self[wall].normal(), self[wall].signed_distance(point))
     }
@@ -33,43 +33,43 @@ fn restituted<S: Scalar>(
     let contact = |a, b| Contact { a, b, part: 0, along: [S::zero(); 2], mtv: all };
     let mut contacts = Contacts { wm: (0..count).map(|b| contact(0, b)).collect(), mm: vec![] };
     crate::broad::all_pairs(count, |a, b| contacts.mm.push(contact(a, b)));
-    let mut columns = Columns {
+    let mut columns = SolverBodies {
         period: Period::default(),
         position: &mut position,
         velocity: &mut velocity,
         radius: &radius,
         inverse_mass: &[],
         spin: &mut [],
-        held: &[],
-        rods: &[],
+        rotation_locked: &[],
+        capsules: &[],
     };
     let zero = S::zero();
-    let settings = Settings {
+    let settings = SolverSettings {
         iterations: 8,
         dt,
-        bounce_speed: zero,
-        enough: zero,
+        restitution_threshold: zero,
+        tolerance: zero,
         slop: zero,
-        largest_slop: zero,
+        max_relative_slop: zero,
     };
-    let around = Around {
+    let context = Context {
         walls: &floor,
         material: |_| Material::default(),
-        follow: |_| S::one(),
-        start: Start { position: &[], velocity: &[], stands: &[] },
+        position_weight: |_| S::one(),
+        start: SubstepStart { position: &[], velocity: &[], ccd_stops: &[] },
         settings: &settings,
     };
-    let (mut scratch, mut warm, mut stopped) = (Scratch::default(), vec![], vec![]);
-    displacement(
+    let (mut scratch, mut cache, mut quarantined) = (Scratch::default(), vec![], vec![]);
+    solve_displacement(
         &mut columns,
         &mut contacts,
-        &around,
+        &context,
         &mut scratch,
-        &mut warm,
-        &mut stopped,
+        &mut cache,
+        &mut quarantined,
         |_, _| (),
     );
-    (position, velocity, stopped)
+    (position, velocity, quarantined)
 }
 
 const STILL: Vec3<f64> = Vec3::new(0.0, 0.0, 0.0);
@@ -140,9 +140,9 @@ fn coincident_marbles_part_completely_each_pair_its_own_way() {
 fn two_whose_speeds_overflow_disturb_no_other() {
     let fast = |y, vy| (Point3::new(0.0, y, 0.0), 1.0, Vec3::new(0.0, vy, 0.0));
     let low = (Point3::new(9.0, 0.5, 0.0), 1.0, Vec3::new(0.0, -0.25, 0.0));
-    let (position, velocity, stopped) =
+    let (position, velocity, quarantined) =
         restituted(&[fast(5.0, f32::MAX), fast(6.0, f32::MIN), low], 2.0);
-    assert_eq!(stopped, [] as [u32; 0]);
+    assert_eq!(quarantined, [] as [u32; 0]);
     assert!(velocity.iter().all(|v| is_finite(*v)), "{velocity:?}");
     assert!(position.iter().all(|at| is_finite_point(*at)), "{position:?}");
     assert_eq!((position[2].y, velocity[2].y), (1.0, 0.0));

@@ -9,10 +9,10 @@ use crate::math::Point3;
 pub(super) type Cell = [i64; 3];
 
 /// Not a row.
-const NONE: u32 = u32::MAX;
+const EMPTY: u32 = u32::MAX;
 
 /// Buckets there are at least: of fewer, the cells around a ball would share many.
-const LEAST_BUCKETS: usize = 1024;
+const MIN_BUCKETS: usize = 1024;
 
 /// The rows in each cell, as chains through buckets that the cells are hashed to.
 #[derive(Clone, Debug, Default)]
@@ -38,12 +38,12 @@ impl Cells {
             self.width[axis] = length.map_or(width, |length| length / count);
         }
         self.head.clear();
-        self.head.resize((2 * rows).next_power_of_two().max(LEAST_BUCKETS), NONE);
+        self.head.resize((2 * rows).next_power_of_two().max(MIN_BUCKETS), EMPTY);
         self.cell.clear();
         self.cell.resize(rows, [0; 3]);
         for list in [&mut self.next, &mut self.previous, &mut self.bucket] {
             list.clear();
-            list.resize(rows, NONE);
+            list.resize(rows, EMPTY);
         }
     }
 
@@ -53,7 +53,7 @@ impl Cells {
     }
 
     /// Along the axis where it is least, in metres.
-    pub fn least_width(&self) -> f64 {
+    pub fn min_width(&self) -> f64 {
         self.width.into_iter().fold(f64::INFINITY, f64::min)
     }
 
@@ -74,9 +74,9 @@ impl Cells {
         let bucket = self.bucket_of(cell);
         let first = std::mem::replace(&mut self.head[bucket], row);
         let index = row as usize;
-        (self.next[index], self.previous[index]) = (first, NONE);
+        (self.next[index], self.previous[index]) = (first, EMPTY);
         (self.bucket[index], self.cell[index]) = (bucket as u32, cell);
-        if first != NONE {
+        if first != EMPTY {
             self.previous[first as usize] = row;
         }
     }
@@ -85,26 +85,26 @@ impl Cells {
     pub fn remove(&mut self, row: u32) {
         let index = row as usize;
         let (next, previous) = (self.next[index], self.previous[index]);
-        if previous == NONE {
+        if previous == EMPTY {
             self.head[self.bucket[index] as usize] = next;
         } else {
             self.next[previous as usize] = next;
         }
-        if next != NONE {
+        if next != EMPTY {
             self.previous[next as usize] = previous;
         }
     }
 
     /// Names the rows in a cell and the 26 around it.
-    pub fn near(&self, [x, y, z]: Cell, mut name: impl FnMut(usize)) {
+    pub fn for_each_near(&self, [x, y, z]: Cell, mut visit: impl FnMut(usize)) {
         for dz in -1..=1 {
             for dy in -1..=1 {
                 for dx in -1..=1 {
                     let cell = self.image([x + dx, y + dy, z + dz]);
                     let mut row = self.head[self.bucket_of(cell)];
-                    while row != NONE {
+                    while row != EMPTY {
                         if self.cell[row as usize] == cell {
-                            name(row as usize);
+                            visit(row as usize);
                         }
                         row = self.next[row as usize];
                     }
@@ -135,10 +135,10 @@ mod tests {
             (0..rows).for_each(|row| cells.insert(row, cell(row)));
             for at in (0..rows).map(cell) {
                 let mut named = Vec::new();
-                cells.near(at, |row| named.push(row as u32));
+                cells.for_each_near(at, |row| named.push(row as u32));
                 named.sort_unstable();
-                let near = |row: &u32| (0..3).all(|i| (cell(*row)[i] - at[i]).abs() <= 1);
-                assert_eq!(named, (0..rows).filter(near).collect::<Vec<_>>());
+                let for_each_near = |row: &u32| (0..3).all(|i| (cell(*row)[i] - at[i]).abs() <= 1);
+                assert_eq!(named, (0..rows).filter(for_each_near).collect::<Vec<_>>());
             }
         }
     }

@@ -1,7 +1,7 @@
 //! How a contact's force follows from its overlap: stiffness, damping, and what a substep
 //! bears of both.
 
-use super::Touch;
+use super::PenaltyContact;
 use crate::math::Scalar;
 use crate::response::Elasticity;
 
@@ -39,14 +39,14 @@ impl ContactLaw {
 /// Stiffness and damping of a touch: what is along the normal and what across it.
 pub(super) struct Springs<S> {
     /// The elastic force of the overlap, in newtons.
-    pub push: S,
+    pub elastic_force: S,
     /// How it grows with the overlap, in N/m.
-    pub slope: S,
+    pub stiffness: S,
     /// In N s/m.
     pub damping: S,
     /// In N/m and N s/m.
-    pub across: S,
-    pub across_damping: S,
+    pub tangent_stiffness: S,
+    pub tangent_damping: S,
 }
 
 /// What a collision loses as a part of critical damping, where no contact pulls back
@@ -54,7 +54,7 @@ pub(super) struct Springs<S> {
 /// −ln e as y, that is cos ψ where ψ cot ψ = y, beyond y = 1 cosh η where η coth η = y. The
 /// polynomial meets both to 3e-4. It holds for [`ContactLaw::HertzMindlin`] too, whose time
 /// runs otherwise (Antypov and Elliott 2011).
-pub(super) fn loss<S: Scalar>(restitution: S) -> S {
+pub(super) fn damping_ratio<S: Scalar>(restitution: S) -> S {
     // Nothing at all would take endless damping to lose.
     let y = restitution.max(S::constant(0.006)).ln_portable() * S::constant(-0.5);
     let terms = [0.01166, 0.00267, 0.09554, 0.25344, 0.63683];
@@ -63,40 +63,55 @@ pub(super) fn loss<S: Scalar>(restitution: S) -> S {
 
 impl ContactLaw {
     /// What a touch has at this overlap in a substep of `dt` seconds.
-    pub(super) fn springs<S: Scalar>(self, touch: &Touch<S>, overlap: S, dt: S) -> Springs<S> {
+    pub(super) fn springs<S: Scalar>(
+        self,
+        contact: &PenaltyContact<S>,
+        penetration: S,
+        dt: S,
+    ) -> Springs<S> {
         let number = S::constant;
-        let (normal, tangent) = (touch.give().normal, touch.give().tangent);
-        let two_loss = number(2.0) * loss(touch.material.restitution);
-        // The stiffest, which both laws share.
-        let most = number(Self::ANGLE_2) / (dt * dt);
-        let (stiffest, stiffest_across) = (most / normal, most / tangent);
-        let damped = |stiffness: S, give: S| two_loss * (stiffness / give).sqrt();
-        let (push, slope, across) = match self {
-            Self::SpringDashpot => (stiffest * overlap, stiffest, stiffest_across),
+        let (normal, tangent) =
+            (contact.inverse_effective_mass().normal, contact.inverse_effective_mass().tangent);
+        let two_ratios = number(2.0) * damping_ratio(contact.material.restitution);
+        // The max_stiffness, which both laws share.
+        let stiffness_per_mass = number(Self::ANGLE_2) / (dt * dt);
+        let (max_stiffness, max_tangent_stiffness) =
+            (stiffness_per_mass / normal, stiffness_per_mass / tangent);
+        let damping =
+            |stiffness: S, inverse_mass: S| two_ratios * (stiffness / inverse_mass).sqrt();
+        let (elastic_force, stiffness, tangent_stiffness) = match self {
+            Self::SpringDashpot => {
+                (max_stiffness * penetration, max_stiffness, max_tangent_stiffness)
+            }
             Self::HertzMindlin => {
                 let two = number(2.0);
-                let contact_radius = (overlap / touch.curvature).sqrt();
-                let stiffness = two * contact_radius / touch.compliance.normal;
-                let across = number(8.0) * contact_radius / touch.compliance.tangent;
-                let hertz = number(2.0 / 3.0) * stiffness.min(stiffest);
-                let push = if stiffness <= stiffest {
-                    hertz * overlap
+                let contact_radius = (penetration / contact.curvature).sqrt();
+                let stiffness = two * contact_radius / contact.compliance.normal;
+                let tangent_stiffness = number(8.0) * contact_radius / contact.compliance.tangent;
+                let hertz = number(2.0 / 3.0) * stiffness.min(max_stiffness);
+                let elastic_force = if stiffness <= max_stiffness {
+                    hertz * penetration
                 } else {
                     // As stiff from here on as it was at this part of the overlap.
-                    let part = stiffest / stiffness;
-                    (hertz * part * part + stiffest * (S::one() - part * part)) * overlap
+                    let fraction = max_stiffness / stiffness;
+                    (hertz * fraction * fraction + max_stiffness * (S::one() - fraction * fraction))
+                        * penetration
                 };
-                (push, stiffness.min(stiffest), across.min(stiffest_across))
+                (
+                    elastic_force,
+                    stiffness.min(max_stiffness),
+                    tangent_stiffness.min(max_tangent_stiffness),
+                )
             }
         };
         // Of Hertz's spring it is 5/6 (Tsuji, Tanaka and Ishida 1992), of a linear one all.
-        let bend = (S::one() + push / (slope * overlap)) * number(0.5);
+        let hertz_correction = (S::one() + elastic_force / (stiffness * penetration)) * number(0.5);
         Springs {
-            push,
-            slope,
-            damping: damped(slope * bend, normal),
-            across,
-            across_damping: damped(across * bend, tangent),
+            elastic_force,
+            stiffness,
+            damping: damping(stiffness * hertz_correction, normal),
+            tangent_stiffness,
+            tangent_damping: damping(tangent_stiffness * hertz_correction, tangent),
         }
     }
 }
@@ -113,8 +128,8 @@ impl<S: Scalar> Elasticity<S> {
         let modulus = (self.compliance().normal * number(2.0)).recip();
         // Hertz: the largest overlap is (15/16 m v² / (E √R))^(2/5).
         let squared = number(15.0 / 16.0) * mass * speed * speed / (modulus * radius.sqrt());
-        let overlap = (squared.ln_portable() * number(0.4)).exp_portable();
-        let stiffness = number(2.0) * modulus * (radius * overlap).sqrt();
+        let penetration = (squared.ln_portable() * number(0.4)).exp_portable();
+        let stiffness = number(2.0) * modulus * (radius * penetration).sqrt();
         (number(ContactLaw::ANGLE_2) * mass / stiffness).sqrt()
     }
 }

@@ -7,25 +7,25 @@ use crate::response::Elasticity;
 /// contact time, largest overlap, largest force (by the change of velocity).
 fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -> [f64; 3] {
     let mass = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3) * density;
-    let shear = elasticity.youngs_modulus / (2.0 + 2.0 * elasticity.poissons_ratio);
-    let rayleigh = std::f64::consts::PI * radius * (density / shear).sqrt()
+    let shear_modulus = elasticity.youngs_modulus / (2.0 + 2.0 * elasticity.poissons_ratio);
+    let rayleigh = std::f64::consts::PI * radius * (density / shear_modulus).sqrt()
         / (0.1631 * elasticity.poissons_ratio + 0.8766);
     let dt = 0.01 * rayleigh;
     let mut position = [Point3::new(-radius, 0.0, 0.0), Point3::new(radius, 0.0, 0.0)];
     let mut velocity = [Vec3::new(speed, 0.0, 0.0), Vec3::new(-speed, 0.0, 0.0)];
     let own = Material { restitution: 1.0, elasticity, ..Material::default() };
-    let (mut time, mut overlap, mut force) = (0.0_f64, 0.0_f64, 0.0_f64);
-    let mut shear = Vec::new();
+    let (mut time, mut penetration, mut force) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut histories = Vec::new();
     let walls: Vec<crate::shape::Plane<f64>> = Vec::new();
     loop {
         for (position, velocity) in position.iter_mut().zip(velocity) {
             *position += velocity * dt;
         }
-        let apart = position[1].x - position[0].x - 2.0 * radius;
-        if apart > 0.0 {
+        let separation = position[1].x - position[0].x - 2.0 * radius;
+        if separation > 0.0 {
             // They parted within this step.
-            time += dt - apart / (velocity[1].x - velocity[0].x);
-            return [time, overlap, force];
+            time += dt - separation / (velocity[1].x - velocity[0].x);
+            return [time, penetration, force];
         }
         let mut contacts = Contacts::default();
         contacts.mm.push(crate::contact::Contact {
@@ -36,22 +36,30 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
             mtv: Vec3::zero(),
         });
         let before = velocity[1].x;
-        let mut columns = Columns {
+        let mut columns = SolverBodies {
             period: Period::default(),
             position: &mut position,
             velocity: &mut velocity,
             radius: &[radius, radius],
             inverse_mass: &[1.0 / mass, 1.0 / mass],
             spin: &mut [],
-            held: &[],
-            rods: &[],
+            rotation_locked: &[],
+            capsules: &[],
         };
         let law = ContactLaw::HertzMindlin;
-        let setting = Setting { law, dt, material: |_| own, follow: |_| 0.0 };
-        let mut stopped = vec![];
-        penalty(&setting, &mut columns, &mut contacts, &walls, &mut shear, &mut stopped, None);
+        let settings = PenaltySettings { law, dt, material: |_| own, position_weight: |_| 0.0 };
+        let mut quarantined = vec![];
+        apply_penalty_forces(
+            &settings,
+            &mut columns,
+            &mut contacts,
+            &walls,
+            &mut histories,
+            &mut quarantined,
+            None,
+        );
         time += dt;
-        overlap = overlap.max(-apart);
+        penetration = penetration.max(-separation);
         force = force.max((velocity[1].x - before) * mass / dt);
     }
 }

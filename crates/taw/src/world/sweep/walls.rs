@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 
 use super::{By, FAST, INTO, MOST_BENDS, Stopped, outer};
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
-use crate::response::Walls as _;
+use crate::response::Colliders as _;
 use crate::shape::{Aabb, Nearest, Sphere};
 use crate::world::World;
 use crate::world::walls::{Part, Walls};

@@ -1,6 +1,6 @@
 //! How the contacts of one marble share it.
 
-use super::Touch;
+use super::PenaltyContact;
 use super::law::Springs;
 use crate::math::Scalar;
 
@@ -12,47 +12,55 @@ use crate::math::Scalar;
 /// directions and masses, are no more than that of one contact at its limit. Where N
 /// contacts ask for less than that limit, none is softened.
 #[derive(Clone, Copy)]
-pub(super) struct Load<S> {
+pub(super) struct ContactLoad<S> {
     /// Of dashpots: the part of the velocity that all take in a substep; more than one would turn
     /// it back.
-    damped: S,
+    damping: S,
     /// Of springs alone.
-    sprung: S,
+    stiffness: S,
     /// How many contacts there are.
     pub count: S,
 }
 
-impl<S: Scalar> Load<S> {
+impl<S: Scalar> ContactLoad<S> {
     pub const fn none(zero: S) -> Self {
-        Self { damped: zero, sprung: zero, count: zero }
+        Self { damping: zero, stiffness: zero, count: zero }
     }
 
     pub fn add(&mut self, other: &Self) {
-        self.damped += other.damped;
-        self.sprung += other.sprung;
+        self.damping += other.damping;
+        self.stiffness += other.stiffness;
         self.count += other.count;
     }
 
     /// Of one contact, along the normal and across it.
-    pub fn of(touch: &Touch<S>, springs: &Springs<S>, dt: S, drags: [S; 2]) -> Self {
+    pub fn of(
+        contact: &PenaltyContact<S>,
+        springs: &Springs<S>,
+        dt: S,
+        half_damping: [S; 2],
+    ) -> Self {
         let number = S::constant;
-        let give = touch.give();
-        let asked = [(springs.slope, give.normal), (springs.across, give.tangent)];
-        let sprung = asked.map(|(stiffness, give)| stiffness * give * dt * dt);
-        let damped = drags.map(|drag| number(2.0) * drag / (S::one() + drag));
+        let inverse_mass = contact.inverse_effective_mass();
+        let limits = [
+            (springs.stiffness, inverse_mass.normal),
+            (springs.tangent_stiffness, inverse_mass.tangent),
+        ];
+        let stiffness = limits.map(|(stiffness, inverse_mass)| stiffness * inverse_mass * dt * dt);
+        let damping = half_damping.map(|half| number(2.0) * half / (S::one() + half));
         // Of a ball, what is along and what is across are apart.
-        let both = |[along, across]: [S; 2]| {
-            if touch.is_of_rods { along + across } else { along.max(across) }
+        let total = |[normal, tangent]: [S; 2]| {
+            if contact.has_capsule { normal + tangent } else { normal.max(tangent) }
         };
-        Self { damped: both(damped), sprung: both(sprung), count: S::one() }
+        Self { damping: total(damping), stiffness: total(stiffness), count: S::one() }
     }
 
     /// Into how many marbles one is split, at least one.
-    pub fn parts(&self) -> S {
+    pub fn split_count(&self) -> S {
         // Stable is what has (ω dt)² and twice the part that dashpots take below 4. And a marble
         // with all its contacts goes through an eighth of a turn of its oscillation in a
         // substep at most, so that it is still one.
-        S::one().max(self.damped).max(self.sprung / S::constant(RESOLVED))
+        S::one().max(self.damping).max(self.stiffness / S::constant(RESOLVED))
     }
 }
 

@@ -1,0 +1,81 @@
+//! Account of what happens to balls between two events, for those who ask.
+
+use cgmath::InnerSpace;
+
+use super::{Ball, EventDriven};
+use crate::response::{BallRotation, EnergyLedger};
+
+impl EventDriven {
+    /// Lets a ball's path begin at a later time.
+    pub(super) fn advance(&mut self, row: usize, time: f64) {
+        if let Some(mut work) = self.work.take() {
+            self.record_motion(&self.balls[row], time, &mut work);
+            self.work = Some(work);
+        }
+        self.balls[row].advance(time);
+    }
+
+    /// Counts what forces, and the wall that it lies on, do to a ball until then.
+    fn record_motion(&self, ball: &Ball, time: f64, work: &mut EnergyLedger) {
+        let dt = time - ball.trajectory.start;
+        if dt <= 0.0 || ball.inverse_mass == 0.0 {
+            return;
+        }
+        let mass = 1.0 / ball.inverse_mass;
+        let mut later = *ball;
+        later.advance(time);
+        let is_curved = ball.trajectory.end_state.is_some();
+        let displacement = if is_curved {
+            later.position - ball.position
+        } else {
+            (ball.velocity + ball.trajectory.acceleration * (0.5 * dt)) * dt
+        };
+        work.forces += mass * ball.external_acceleration.dot(displacement);
+        let impulse = ball.external_acceleration * (mass * dt);
+        work.momentum += impulse;
+        let velocity_change = if is_curved {
+            later.velocity - ball.velocity
+        } else {
+            ball.trajectory.acceleration * dt
+        };
+        let constraint_impulse = velocity_change * mass - impulse;
+        if ball.trajectory.clustered {
+            // Pairs cancel; what it takes is the solver's.
+            work.momentum += constraint_impulse;
+            work.walls += ball.trajectory.wall_power * dt;
+            return;
+        }
+        let Some(wall) = ball.trajectory.support else { return };
+        work.momentum += constraint_impulse;
+        let wall = &self.walls[wall];
+        // The velocity of the surface below it, and its own over that.
+        let surface_and_slip = |ball: &Ball| {
+            let normal = wall.nearest(ball.position, ball.trajectory.start).normal;
+            let contact_point = ball.position - normal * ball.radius;
+            let surface = wall.surface_velocity(normal, contact_point, ball.trajectory.start);
+            (surface, ball.velocity + ball.spin_velocity(normal) - surface)
+        };
+        let [(surface, slip), (later_surface, later_slip)] =
+            [surface_and_slip(ball), surface_and_slip(&later)];
+        let surface = (surface + later_surface) * 0.5;
+        let friction = -0.5 * constraint_impulse.dot(slip + later_slip);
+        let inertia = match ball.rotation {
+            BallRotation::Free => 0.4 * mass * ball.radius * ball.radius,
+            BallRotation::Locked => 0.0,
+        };
+        let rotation = later.rotation_increment - ball.rotation_increment;
+        let ball_work = if is_curved {
+            let energy = |ball: &Ball| {
+                0.5 * (mass * ball.velocity.magnitude2() + inertia * ball.spin.magnitude2())
+            };
+            energy(&later) - energy(ball) - mass * ball.external_acceleration.dot(displacement)
+        } else {
+            constraint_impulse.dot(displacement) / dt
+                + inertia * ball.trajectory.spin_acceleration.dot(rotation)
+        };
+        let wall_work = constraint_impulse.dot(surface);
+        work.friction += friction;
+        work.walls += wall_work;
+        work.resistance += wall_work - friction - ball_work;
+    }
+}

@@ -1,0 +1,474 @@
+//! Prediction of a ball's next event.
+
+use std::cmp::Reverse;
+use std::f64::consts::SQRT_2;
+
+use cgmath::{InnerSpace, Zero};
+
+use super::toi::{SeparationMotion, time_of_impact_plane, time_of_impact_spheres};
+use super::{
+    CellSlot, Event, EventDriven, EventKind, EventSettings, PRESS_SPEED, REST_SPEED,
+    SEAM_TOLERANCE, SLOP, WallCollider,
+};
+use crate::math::{Point3, Vec3, direction_and_length, is_finite};
+use crate::shape::Nearest;
+
+/// Steps enough for a ball to come to any wall but one that it only grazes; then it looks
+/// again.
+const MAX_ADVANCES: u32 = 64;
+/// The part of a substep after which a ball that touches a wall, and is neither pressed there
+/// nor comes nearer, looks again.
+const RECHECK_TIME: f64 = 1.0 / 64.0;
+/// A pressure below this part of the pull is none but for rounding.
+const MIN_NORMAL_ACCELERATION: f64 = 1e-9;
+
+impl EventDriven {
+    /// Finds the next event of a ball and puts it in the queue.
+    pub(super) fn predict(&mut self, row: usize, now: f64, settings: &EventSettings) {
+        self.update_cell(row, now, settings.dt);
+        let refresh = self.candidates_expiry(row, now, settings);
+        let walls = self.half_spaces().len() + self.parts_of(row).len();
+        settings.add_cost(1 + walls as u64);
+        let ball = &self.balls[row];
+        let remaining = settings.dt - now;
+        let mut next = (ball.trajectory.regime_end.max(now), EventKind::RegimeChange);
+        let mut simultaneous = false;
+        let mut consider = |after: Option<f64>, kind: EventKind| {
+            // What lies behind by rounding is now.
+            let Some(after) = after.filter(|after| !after.is_nan()) else { return };
+            let time = now + after.max(0.0);
+            match (next.1, kind) {
+                (EventKind::BallImpact(a, _), EventKind::BallImpact(b, _))
+                    if a != b && time == next.0 =>
+                {
+                    simultaneous = true
+                }
+                _ if time < next.0 => (next, simultaneous) = ((time, kind), false),
+                _ => {}
+            }
+        };
+        consider(refresh, EventKind::RefreshCandidates);
+        // Beyond that, no wall that stays can matter in the rest of the substep.
+        let at = ball.position_at(now);
+        let speed = ball.velocity_at(now).magnitude();
+        let acceleration = ball.trajectory.acceleration.magnitude();
+        let max_distance =
+            ball.radius + ball.position_error + (speed + acceleration * remaining) * remaining;
+        let max_distance = max_distance * (1.0 + 1e-9);
+        self.for_each_wall(row, |wall| {
+            let near = self.walls[wall].motion_at(now).is_some()
+                || self.walls[wall].distance_lower_bound(at, now) <= max_distance;
+            if near
+                && ball.trajectory.support != Some(wall)
+                && let Some((after, kind)) = self.predict_wall(row, wall, now, settings)
+            {
+                consider(Some(after), kind);
+            }
+        });
+        let mut other = |other: usize| {
+            settings.add_cost(1);
+            if other != row
+                && let Some((after, kind)) = self.predict_ball(row, other, now, settings)
+            {
+                consider(Some(after), kind);
+            }
+        };
+        self.for_each_near(row, &mut other);
+        match ball.trajectory.cell_slot {
+            CellSlot::Cell(cell) => {
+                let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
+                for (axis, width) in self.cells.width().into_iter().enumerate() {
+                    let border = cell[axis] as f64 * width;
+                    let (x, v, a) =
+                        (position[axis], velocity[axis], ball.trajectory.acceleration[axis]);
+                    let above = SeparationMotion {
+                        distance: border + width - x,
+                        speed: -v,
+                        acceleration: -a,
+                    };
+                    let below =
+                        SeparationMotion { distance: x - border, speed: v, acceleration: a };
+                    for (separation, step) in [(above, 1), (below, -1)] {
+                        let to = cell[axis] + step;
+                        consider(crossing_time(separation), EventKind::CellCrossing { axis, to });
+                    }
+                }
+            }
+            CellSlot::Unbounded => {}
+        }
+        let (time, kind) = next;
+        if time <= now + remaining && time.is_finite() {
+            let version = ball.trajectory.version;
+            self.queue.push(Reverse(Event { time, row, version, kind, simultaneous }));
+        }
+    }
+
+    /// Names those that a ball may touch soon, itself among them.
+    pub(super) fn for_each_near(&self, row: usize, mut visit: impl FnMut(usize)) {
+        match self.balls[row].trajectory.cell_slot {
+            CellSlot::Cell(cell) => {
+                self.cells.for_each_near(cell, &mut visit);
+                self.unbounded.iter().copied().for_each(visit);
+            }
+            CellSlot::Unbounded => (0..self.balls.len()).for_each(visit),
+        }
+    }
+
+    /// When and how a ball meets a wall next, in seconds from now.
+    fn predict_wall(
+        &self,
+        row: usize,
+        wall: usize,
+        now: f64,
+        settings: &EventSettings,
+    ) -> Option<(f64, EventKind)> {
+        let ball = &self.balls[row];
+        if ball.inverse_mass <= 0.0 || ball.is_frozen() {
+            return None; // no wall holds it
+        }
+        let WallCollider::Plane { offset, .. } = self.walls[wall].collider else {
+            return self.predict_wall_part(row, wall, now, settings);
+        };
+        if !self.has_fixed_normal(wall) {
+            return self.predict_wall_part(row, wall, now, settings);
+        }
+        let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
+        let Nearest { normal, distance, .. } = self.walls[wall].nearest(position, now);
+        let separation = SeparationMotion {
+            distance: distance - ball.radius,
+            speed: (velocity - self.walls[wall].velocity_at(position, now)).dot(normal),
+            acceleration: ball.trajectory.acceleration.dot(normal),
+        };
+        let size = ball.radius + distance.abs() + offset.abs();
+        let tolerance = f64::EPSILON * 16.0 * size;
+        let is_resting = ball.trajectory.support.is_some() || ball.trajectory.clustered;
+        let impact_threshold =
+            self.impact_threshold(row, is_resting, settings).max(1e-14 * velocity.magnitude());
+        // A heap that is held takes an approach as slow as that until the end of the substep.
+        let end_speed = separation.speed + separation.acceleration * (settings.dt - now);
+        let rest_threshold = self.impact_threshold(row, false, settings);
+        if ball.trajectory.clustered
+            && separation.speed >= -impact_threshold
+            && separation.acceleration > 0.0
+            && end_speed >= -rest_threshold
+        {
+            return None;
+        }
+        Self::wall_event(wall, separation, tolerance, is_resting, impact_threshold)
+    }
+
+    /// Slower than this, a ball that meets a wall begins to rest on it, or to be pressed.
+    fn impact_threshold(&self, row: usize, is_resting: bool, settings: &EventSettings) -> f64 {
+        let fall_speed = self.balls[row].external_acceleration.magnitude() * settings.dt;
+        if is_resting { PRESS_SPEED * fall_speed } else { REST_SPEED * fall_speed }
+    }
+
+    /// Next event of a ball and a plane by their gap, and the seconds until it.
+    fn wall_event(
+        wall: usize,
+        separation: SeparationMotion,
+        tolerance: f64,
+        is_resting: bool,
+        impact_threshold: f64,
+    ) -> Option<(f64, EventKind)> {
+        let pressed = separation.acceleration < 0.0;
+        if separation.distance > tolerance {
+            let after = time_of_impact_plane(separation)?;
+            let speed = separation.speed + separation.acceleration * after;
+            return Some(if speed < -impact_threshold || !pressed {
+                (after, EventKind::WallImpact(wall))
+            } else if is_resting {
+                (
+                    after + (-impact_threshold * 1.01 - speed) / separation.acceleration,
+                    EventKind::WallImpact(wall),
+                )
+            } else {
+                (after, EventKind::RestOnWall(wall))
+            });
+        }
+        if separation.speed < -impact_threshold {
+            Some((0.0, EventKind::WallImpact(wall)))
+        } else if !pressed {
+            None
+        } else if separation.speed > impact_threshold {
+            Some((-2.0 * separation.speed / separation.acceleration, EventKind::WallImpact(wall)))
+        } else if is_resting {
+            Some((
+                (-impact_threshold * 1.01 - separation.speed) / separation.acceleration,
+                EventKind::WallImpact(wall),
+            ))
+        } else {
+            Some((0.0, EventKind::RestOnWall(wall)))
+        }
+    }
+
+    /// Next event of a ball and a wall that is no half-space, or turns: for as long as the plane
+    /// across the nearest point keeps them apart, they do not meet; then there is another one
+    /// (conservative advancement; Mirtich 1996).
+    fn predict_wall_part(
+        &self,
+        row: usize,
+        wall: usize,
+        now: f64,
+        settings: &EventSettings,
+    ) -> Option<(f64, EventKind)> {
+        let (ball, number, wall) = (&self.balls[row], wall, &self.walls[wall]);
+        let (mut time, mut step) = (now, 0);
+        let is_resting = ball.trajectory.support.is_some() || ball.trajectory.clustered;
+        let rest_threshold = self.impact_threshold(row, false, settings);
+        // The face that holds it may end under it before the substep does; it must not go deep
+        // into the next one.
+        let impact_threshold = self.impact_threshold(row, is_resting, settings);
+        let impact_threshold = if ball.trajectory.touches_balls {
+            impact_threshold
+        } else {
+            impact_threshold.min(SLOP * ball.radius / settings.dt).max(rest_threshold)
+        };
+        loop {
+            if step == MAX_ADVANCES {
+                return Some((time - now, EventKind::RefreshCandidates));
+            }
+            settings.add_cost(super::PART_COST);
+            let (position, velocity) = (ball.position_at(time), ball.velocity_at(time));
+            let Nearest { normal, distance, .. } = wall.nearest(position, time);
+            let relative_velocity = velocity - wall.velocity_at(position, time);
+            let separation = SeparationMotion {
+                distance: distance - ball.radius,
+                speed: relative_velocity.dot(normal),
+                acceleration: ball.trajectory.acceleration.dot(normal)
+                    - self.max_rotation_acceleration(row, number, time, settings),
+            };
+            // Time has no digits for a gap that closes sooner than that.
+            let time_rounding = f64::EPSILON * time * separation.speed.abs();
+            let tolerance = f64::EPSILON * 16.0 * (ball.radius + distance.abs())
+                + ball.position_error
+                + time_rounding;
+            let [rest_threshold, impact_threshold] = [rest_threshold, impact_threshold]
+                .map(|threshold| threshold.max(1e-14 * velocity.magnitude()));
+            let after = if separation.distance > tolerance {
+                time_of_impact_plane(separation)?
+            } else if separation.speed < -impact_threshold {
+                let seam = self.is_seam(row, number, position, time, settings);
+                return (!seam).then_some((time - now, EventKind::WallImpact(number)));
+            } else {
+                let normal_acceleration =
+                    self.normal_acceleration(row, number, time, ball.trajectory.acceleration);
+                // What came off just now has nothing that presses it, whatever rounding says.
+                let just_left = step == 0 && ball.trajectory.left_wall == Some(number);
+                let pressed = !just_left
+                    && normal_acceleration
+                        > MIN_NORMAL_ACCELERATION * ball.external_acceleration.magnitude();
+                if pressed && separation.speed <= impact_threshold {
+                    if self.is_seam(row, number, position, time, settings) {
+                        return None;
+                    }
+                    return Some(if ball.trajectory.clustered {
+                        let after =
+                            (impact_threshold * 1.01 + separation.speed) / normal_acceleration;
+                        (time - now + after, EventKind::WallImpact(number))
+                    } else {
+                        (time - now, EventKind::RestOnWall(number))
+                    });
+                }
+                // What nothing presses is not at rest there until it has no approach; but what is
+                // held takes its own until the end of the substep.
+                let end_speed = separation.speed + separation.acceleration * (settings.dt - time);
+                let is_held_to_end = ball.trajectory.touches_balls
+                    || ball.trajectory.clustered && end_speed >= -rest_threshold;
+                if !pressed && separation.speed < -rest_threshold && !is_held_to_end {
+                    let seam = self.is_seam(row, number, position, time, settings);
+                    return (!seam).then_some((time - now, EventKind::WallImpact(number)));
+                }
+                if separation.speed > 0.0 && separation.acceleration < 0.0 {
+                    // It comes back to this plane, or later.
+                    (-2.0 * separation.speed / separation.acceleration)
+                        .max(RECHECK_TIME * RECHECK_TIME * settings.dt)
+                } else {
+                    RECHECK_TIME * settings.dt
+                }
+            };
+            step += 1;
+            time += after;
+            if !time.is_finite() || time > settings.dt {
+                return None;
+            }
+        }
+    }
+
+    /// Upper bound of a ball's acceleration toward a wall because that turns, in m/s².
+    fn max_rotation_acceleration(
+        &self,
+        row: usize,
+        wall: usize,
+        time: f64,
+        settings: &EventSettings,
+    ) -> f64 {
+        let Some((motion, remaining)) = self.walls[wall].motion_at(time) else { return 0.0 };
+        let angular_speed = motion.spin.magnitude();
+        if angular_speed == 0.0 {
+            return 0.0;
+        }
+        let ball = &self.balls[row];
+        let time_left = settings.dt - time;
+        let speed_gain = ball.trajectory.acceleration.magnitude() * time_left;
+        let speed = (ball.velocity_at(time) - motion.velocity).magnitude() + speed_gain;
+        let pivot = motion.pivot - motion.velocity * remaining;
+        let arm = (ball.position_at(time) - pivot).magnitude() + speed * time_left;
+        // Of a plane that turns: what Coriolis and the turn itself do.
+        angular_speed * (2.0 * speed + angular_speed * arm)
+    }
+
+    /// When and how two balls meet next, in seconds from now.
+    pub(super) fn predict_ball(
+        &self,
+        a: usize,
+        b: usize,
+        now: f64,
+        settings: &EventSettings,
+    ) -> Option<(f64, EventKind)> {
+        let (first, second) = (&self.balls[a], &self.balls[b]);
+        let remaining = settings.dt - now;
+        let (from, to) = (first.position_at(now), second.position_at(now));
+        let center_offset = self.period.nearest(to - from);
+        let velocity = second.velocity_at(now) - first.velocity_at(now);
+        let acceleration = second.trajectory.acceleration - first.trajectory.acceleration;
+        if first.inverse_mass + second.inverse_mass <= 0.0
+            || first.is_frozen()
+            || second.is_frozen()
+        {
+            return None; // nothing could come of it
+        }
+        if !is_finite(center_offset) || !is_finite(velocity) || !is_finite(acceleration) {
+            return None; // what is nowhere is nobody's concern
+        }
+        let radius_sum = first.radius + second.radius;
+        // Most are too far away, which needs no exact distance.
+        let displacement =
+            (velocity.magnitude() + 0.5 * acceleration.magnitude() * remaining) * remaining;
+        let max_distance = (radius_sum + displacement) * (1.0 + 1e-12);
+        if center_offset.magnitude2() > max_distance * max_distance {
+            return None;
+        }
+        settings.add_cost(if acceleration.is_zero() { 1 } else { super::QUARTIC_COST });
+        let (normal, distance) =
+            direction_and_length(center_offset).unwrap_or((Vec3::unit_x(), 0.0));
+        let separation = distance - radius_sum;
+        let version = second.trajectory.version;
+        let press_speed = self.pressing_speed(a, b, settings);
+        let ball_impact = |after: f64| (after, EventKind::BallImpact(b, version));
+        let coordinates = [from.x, from.y, from.z, to.x, to.y, to.z].map(f64::abs);
+        let size = coordinates.into_iter().fold(radius_sum, f64::max);
+        if separation > f64::EPSILON * 8.0 * size {
+            let after = time_of_impact_spheres(
+                center_offset,
+                velocity,
+                acceleration,
+                radius_sum,
+                [0.0, remaining],
+            )?;
+            let offset_at_impact =
+                center_offset + (velocity + acceleration * (0.5 * after)) * after;
+            let normal = offset_at_impact / offset_at_impact.magnitude();
+            let speed = (velocity + acceleration * after).dot(normal);
+            let normal_acceleration = acceleration.dot(normal);
+            return if speed < -press_speed {
+                Some(ball_impact(after))
+            } else if normal_acceleration < 0.0 {
+                // They touch so slowly that they only begin to press each other.
+                Some((
+                    after + (-press_speed * 1.01 - speed) / normal_acceleration,
+                    EventKind::RestOnBall(b, version),
+                ))
+            } else {
+                None
+            };
+        }
+        let speed = velocity.dot(normal);
+        let normal_acceleration = acceleration.dot(normal);
+        if speed < -press_speed {
+            return Some(ball_impact(0.0));
+        }
+        if normal_acceleration >= 0.0 {
+            return None;
+        }
+        // If they part and come free, they meet again; else they press in the end.
+        let apex = -speed / normal_acceleration;
+        let offset_at_impact = center_offset + (velocity + acceleration * (0.5 * apex)) * apex;
+        if speed > press_speed && offset_at_impact.magnitude() > radius_sum {
+            return time_of_impact_spheres(
+                center_offset,
+                velocity,
+                acceleration,
+                radius_sum,
+                [apex, remaining],
+            )
+            .map(ball_impact);
+        }
+        Some((
+            (-press_speed * 1.01 - speed) / normal_acceleration,
+            EventKind::RestOnBall(b, version),
+        ))
+    }
+
+    /// Tests if the point where a wall is nearest to a ball is on another wall that is as
+    /// near, which is then the one that counts.
+    pub(super) fn is_seam(
+        &self,
+        row: usize,
+        wall: usize,
+        at: Point3<f64>,
+        time: f64,
+        settings: &EventSettings,
+    ) -> bool {
+        settings.add_cost(self.wall_cost(row));
+        let ball = &self.balls[row];
+        let tolerance = (SEAM_TOLERANCE * ball.radius).max(ball.position_error);
+        let nearest = |wall: usize, point: Point3<f64>| self.walls[wall].nearest(point, time);
+        let nearest_here = nearest(wall, at);
+        let mut covered = false;
+        self.for_each_wall(row, |other| {
+            if !covered
+                && other != wall
+                && self.walls[other].distance_lower_bound(nearest_here.point, time) <= tolerance
+                && nearest(other, nearest_here.point).distance <= tolerance
+            {
+                let nearest_other = nearest(other, at);
+                let before = (nearest_other.distance, other) < (nearest_here.distance, wall);
+                covered = before || nearest(wall, nearest_other.point).distance > tolerance;
+            }
+        });
+        covered
+    }
+
+    /// The speed that two balls that press each other gain before they touch anew.
+    ///
+    /// Where collisions take energy, chains of touching balls would come to rest among
+    /// themselves only after endlessly many (inelastic collapse; `McNamara` and Young
+    /// 1992), so there it is also what counts as rest.
+    pub(super) fn pressing_speed(&self, a: usize, b: usize, settings: &EventSettings) -> f64 {
+        let (first, second) = (&self.balls[a], &self.balls[b]);
+        let relative_acceleration =
+            (second.trajectory.acceleration - first.trajectory.acceleration).magnitude();
+        let max_acceleration =
+            first.external_acceleration.magnitude().max(second.external_acceleration.magnitude());
+        let loss = 1.0 - first.material.combined_with(second.material).restitution;
+        let speeds = first.velocity.magnitude() + second.velocity.magnitude();
+        let freeze_count = first.trajectory.freeze_count.max(second.trajectory.freeze_count);
+        let press_speed = PRESS_SPEED * SQRT_2.powi(freeze_count) * settings.dt;
+        (press_speed * relative_acceleration.max(loss * max_acceleration))
+            .max((1e-13 + 1e-6 * loss) * speeds)
+    }
+}
+
+/// Time until something leaves its cell through a border, which it may lie on, in seconds.
+fn crossing_time(separation: SeparationMotion) -> Option<f64> {
+    if separation.distance > 0.0 {
+        time_of_impact_plane(separation)
+    } else if separation.speed < 0.0 || (separation.speed == 0.0 && separation.acceleration < 0.0) {
+        Some(0.0)
+    } else if separation.acceleration < 0.0 {
+        Some(-2.0 * separation.speed / separation.acceleration)
+    } else {
+        None
+    }
+}

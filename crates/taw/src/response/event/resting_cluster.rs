@@ -1,0 +1,288 @@
+//! Rest that begins within a substep, and the accelerations that hold it.
+
+use cgmath::{InnerSpace, Zero};
+
+use super::cluster::{Cluster, ClusterBodies};
+use super::wall::MovingWalls;
+use super::{EventDriven, EventSettings, MAX_CONTACTS, Trajectory};
+use crate::contact::{Contact, Contacts};
+use crate::math::Vec3;
+use crate::response::impulse::CachedImpulse;
+
+/// Balls that rest together from now on.
+pub(super) struct RestingCluster {
+    pub rows: Vec<usize>,
+    pub pressed_by: PressedBy,
+}
+
+/// Causes that may bring balls together again that have come to rest among each other.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum PressedBy {
+    /// Nothing: all of them fall alike, and touch nobody else.
+    Nothing,
+    /// Forces that are not the same for all.
+    Forces,
+    /// A wall, or a ball that nothing moves.
+    FixedBody,
+}
+
+impl EventDriven {
+    /// Lets balls, and all that touch them and each other, rest together from now on. What parts
+    /// faster than `max_separation_speed`, in m/s, and than what counts as rest does not touch.
+    /// Gives them; their events are to be foreseen anew.
+    pub(super) fn rest_cluster(
+        &mut self,
+        seeds: [usize; 2],
+        max_separation_speed: f64,
+        now: f64,
+        settings: &EventSettings,
+    ) -> RestingCluster {
+        let (found, mut contacts) =
+            self.connected_component(seeds, max_separation_speed, now, settings);
+        let max_acceleration = found
+            .iter()
+            .map(|row| self.balls[*row].external_acceleration.magnitude())
+            .fold(0.0, f64::max);
+        // First what the collision does.
+        self.cluster.gather(&mut contacts, &self.balls, self.period);
+        let remaining = settings.dt - now;
+        self.solve_inelastic_impact(&mut contacts, now, max_acceleration, settings);
+        if max_separation_speed == f64::INFINITY {
+            let tolerance = self.cluster.tolerance(max_acceleration, settings);
+            self.end_remaining_approach(&contacts, now, tolerance, settings);
+        }
+        for (local, row) in self.cluster.rows.iter().enumerate() {
+            let ball = &mut self.balls[*row as usize];
+            if !ball.is_frozen() {
+                (ball.velocity, ball.spin) =
+                    (self.cluster.bodies.velocity[local], self.cluster.bodies.spin[local]);
+            }
+        }
+        let row_of = |local: u32| self.cluster.rows[local as usize];
+        contacts.wm.iter_mut().for_each(|c| c.b = row_of(c.b));
+        contacts.mm.iter_mut().for_each(|c| (c.a, c.b) = (row_of(c.a), row_of(c.b)));
+        // Then what holds it from there on, if that is needed, for any time at all.
+        let pressed_by = self.find_pressed_by(&found, &contacts);
+        let is_free = max_separation_speed == f64::INFINITY && pressed_by == PressedBy::Nothing;
+        if contacts.is_empty() || is_free {
+            // Nothing presses them any more.
+        } else if remaining > 1e-6 * settings.dt {
+            self.solve_resting(&mut contacts, now, settings, &mut Vec::new());
+        } else {
+            self.keep_velocity(&found);
+        }
+        RestingCluster { rows: found, pressed_by }
+    }
+
+    /// Ends the approach of what the heap has taken over, all of it at once and without rebound;
+    /// `max_acceleration` is the strongest acceleration, in m/s².
+    pub(super) fn solve_inelastic_impact(
+        &mut self,
+        contacts: &mut Contacts<f64>,
+        now: f64,
+        max_acceleration: f64,
+        settings: &EventSettings,
+    ) {
+        for material in &mut self.cluster.material {
+            (material.restitution, material.tangential_restitution) = (0.0, 0.0);
+        }
+        let walls = MovingWalls { walls: &self.walls, start: now, end: now };
+        let before = self
+            .work
+            .map(|_| (self.cluster.bodies.velocity.clone(), self.cluster.bodies.spin.clone()));
+        self.cluster.solve(contacts, &walls, max_acceleration, 0.0, settings, &mut Vec::new());
+        if let (Some(work), Some((mut velocity, mut spin))) = (&mut self.work, before) {
+            self.cluster.record_energy(&mut velocity, &mut spin, work);
+        }
+    }
+
+    /// Lets balls keep their velocity, for so short a time that nothing presses them noticeably.
+    fn keep_velocity(&mut self, rows: &[usize]) {
+        for row in rows {
+            let trajectory = &mut self.balls[*row].trajectory;
+            (trajectory.acceleration, trajectory.clustered) = (Vec3::zero(), true);
+        }
+    }
+
+    fn find_pressed_by(&self, rows: &[usize], contacts: &Contacts<f64>) -> PressedBy {
+        let is_fixed = |row: &usize| {
+            let ball = &self.balls[*row];
+            ball.inverse_mass <= 0.0 || ball.is_frozen()
+        };
+        if !contacts.wm.is_empty() || rows.iter().any(is_fixed) {
+            return PressedBy::FixedBody;
+        }
+        let is_uniform = rows.windows(2).all(|two| {
+            self.balls[two[0]].external_acceleration == self.balls[two[1]].external_acceleration
+        });
+        if is_uniform { PressedBy::Nothing } else { PressedBy::Forces }
+    }
+
+    /// These balls, those that they touch, and so on, all of them released at this time;
+    /// and the contacts between them.
+    fn connected_component(
+        &mut self,
+        seeds: [usize; 2],
+        max_separation_speed: f64,
+        now: f64,
+        settings: &EventSettings,
+    ) -> (Vec<usize>, Contacts<f64>) {
+        let mut contacts = Contacts::default();
+        // The place of each ball in `found`, plus one.
+        let mut index = std::mem::take(&mut self.cluster.contact_counts);
+        index.clear();
+        index.resize(self.balls.len(), 0);
+        let mut found = Vec::new();
+        let add = |row: usize, index: &mut Vec<u32>, found: &mut Vec<usize>| {
+            if index[row] == 0 {
+                found.push(row);
+                index[row] = found.len() as u32;
+            }
+        };
+        for row in seeds {
+            add(row, &mut index, &mut found);
+        }
+        let mut next = 0;
+        let mut contact_counts = vec![0_u32; self.balls.len()];
+        let mut near = Vec::new();
+        let mtv = Vec3::zero();
+        while let Some(row) = found.get(next).copied() {
+            next += 1;
+            self.advance(row, now);
+            let frozen = self.balls[row].is_frozen();
+            self.balls[row].fly_free();
+            if frozen {
+                self.balls[row].freeze();
+            }
+            settings.add_cost(1 + self.wall_cost(row));
+            let at = self.balls[row].position;
+            self.for_each_wall(row, |wall| {
+                let contact =
+                    Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
+                if self.wall_contact(&contact, now, max_separation_speed, settings).is_some()
+                    && (self.parts_of(row).is_empty()
+                        || !self.is_seam(row, wall, at, now, settings))
+                {
+                    contacts.wm.push(contact);
+                }
+            });
+            near.clear();
+            self.for_each_near(row, |other| near.push(other));
+            settings.add_cost(near.len() as u64);
+            near.sort_unstable();
+            near.dedup();
+            for other in near.iter().copied().filter(|other| *other != row) {
+                // What had its turn has named this one already.
+                if index[other] != 0 && index[other] <= next as u32 {
+                    continue;
+                }
+                let before = self.balls[other];
+                self.balls[other].advance(now);
+                let (a, b) = (row.min(other) as u32, row.max(other) as u32);
+                let contact = Contact { a, b, part: 0, along: [0.0; 2], mtv };
+                // The two that it is about touch, whatever rounding says.
+                let is_seed = seeds.contains(&row) && seeds.contains(&other);
+                let is_full = contact_counts[row].min(contact_counts[other]) >= MAX_CONTACTS;
+                if !is_full
+                    && (is_seed
+                        || self.ball_contact(&contact, max_separation_speed, settings).is_some())
+                {
+                    contact_counts[row] += 1;
+                    contact_counts[other] += 1;
+                    contacts.mm.push(contact);
+                    add(other, &mut index, &mut found);
+                }
+                self.balls[other] = before;
+            }
+        }
+        self.cluster.contact_counts = index;
+        (found, contacts)
+    }
+
+    /// Finds the accelerations that hold these contacts from `now` to the end of the
+    /// substep.
+    pub(super) fn solve_resting(
+        &mut self,
+        contacts: &mut Contacts<f64>,
+        now: f64,
+        settings: &EventSettings,
+        impulse_cache: &mut Vec<CachedImpulse<f64>>,
+    ) {
+        let remaining = settings.dt - now;
+        self.cluster.gather(contacts, &self.balls, self.period);
+        let Cluster { rows, local, bodies: ClusterBodies { position, velocity, .. }, .. } =
+            &mut self.cluster;
+        let mut max_acceleration: f64 = 0.0;
+        // Where each would be at the end of the substep if nothing held it.
+        for (at, row) in rows.iter().enumerate() {
+            let ball = &self.balls[*row as usize];
+            if ball.is_frozen() {
+                continue;
+            }
+            position[at] +=
+                (ball.velocity + ball.external_acceleration * (0.5 * remaining)) * remaining;
+            velocity[at] += ball.external_acceleration * remaining;
+            max_acceleration = max_acceleration.max(ball.external_acceleration.magnitude());
+        }
+        impulse_cache.retain_mut(|entry| {
+            entry.remap(|row| {
+                let at = *local.get(row)? as usize;
+                (rows.get(at).copied() == Some(row as u32)).then_some(at)
+            })
+        });
+        let mut touches_balls = vec![false; rows.len()];
+        for local in contacts.mm.iter().flat_map(|c| [c.a, c.b]) {
+            touches_balls[local as usize] = true;
+        }
+        let walls = MovingWalls { walls: &self.walls, start: now, end: settings.dt };
+        self.cluster.solve(contacts, &walls, max_acceleration, remaining, settings, impulse_cache);
+        let Cluster { rows, bodies, sets, scratch, .. } = &mut self.cluster;
+        let ClusterBodies { position, velocity, spin, inverse_mass, .. } = bodies;
+        impulse_cache.retain_mut(|entry| entry.remap(|at| rows.get(at).map(|row| *row as usize)));
+        let mut wall_power = self.work.map(|_| vec![0.0; rows.len()]);
+        if let Some(wall_power) = &mut wall_power {
+            scratch.for_each_supplied_energy(velocity, inverse_mass, |at, energy| {
+                wall_power[at] += energy / remaining;
+            });
+        }
+        // What the method pushed apart, besides; not so far that one were on the other side of a
+        // thin wall then, and all that touch each other by the same part, so that their common
+        // center stays where it is.
+        sets.build(contacts.mm.iter().map(|c| (Some(c.a as usize), c.b as usize)), rows.len());
+        let (mut corrections, mut fractions) =
+            (vec![Vec3::zero(); rows.len()], vec![1.0_f64; rows.len()]);
+        for (at, row) in rows.iter().enumerate() {
+            let ball = &mut self.balls[*row as usize];
+            if ball.is_frozen() {
+                continue;
+            }
+            let end = ball.position + (ball.velocity + velocity[at]) * (0.5 * remaining);
+            ball.trajectory = Trajectory {
+                acceleration: (velocity[at] - ball.velocity) / remaining,
+                spin_acceleration: (spin[at] - ball.spin) / remaining,
+                clustered: true,
+                touches_balls: touches_balls[at],
+                wall_power: wall_power.as_ref().map_or(0.0, |power| power[at]),
+                version: ball.trajectory.version + 1,
+                ..ball.trajectory
+            };
+            corrections[at] = position[at] - end;
+            let (set, distance) = (sets.set_of(at) as usize, corrections[at].magnitude());
+            if distance > 0.5 * ball.radius {
+                fractions[set] = fractions[set].min(0.5 * ball.radius / distance);
+            }
+        }
+        for (at, correction) in corrections.into_iter().enumerate() {
+            self.balls[rows[at] as usize].position +=
+                correction * fractions[sets.set_of(at) as usize];
+        }
+        // It pushed out of what they touched, and maybe into what they did not.
+        for at in 0..self.cluster.rows.len() {
+            let row = self.cluster.rows[at] as usize;
+            if !self.balls[row].is_frozen() {
+                self.ensure_candidates(row, now, settings);
+                self.push_out_of_walls(row, now);
+            }
+        }
+    }
+}
