@@ -1,4 +1,4 @@
-//! Columns that the solvers work on, and how impulses change them.
+//! Bodies as the solvers see them: columns of state, inverse masses, and impulses applied to them.
 
 use cgmath::{InnerSpace, Zero};
 
@@ -6,7 +6,7 @@ use super::{BallRotation, InverseEffectiveMass};
 use crate::broad::Period;
 use crate::math::{Point3, Scalar, Vec3};
 
-/// The columns that a response works on; all of one length.
+/// Columns of the bodies that a solver works on; all of one length.
 #[derive(Debug)]
 pub(crate) struct SolverBodies<'a, S> {
     pub period: Period<S>,
@@ -16,47 +16,47 @@ pub(crate) struct SolverBodies<'a, S> {
     pub velocity: &'a mut [Vec3<S>],
     /// In metres.
     pub radius: &'a [S],
-    /// In 1/kg; zero for what cannot be moved. Empty for a response that has no use
-    /// for it.
+    /// Inverse masses, in 1/kg; zero for a body of infinite mass. Empty for a method that ignores
+    /// masses.
     pub inverse_mass: &'a [S],
-    /// In rad/s; empty where contacts neither feel nor change it.
+    /// Angular velocities, in rad/s; empty where contacts neither read nor change them.
     pub spin: &'a mut [Vec3<S>],
-    /// Which rows contacts cannot set spinning; empty if there are none.
+    /// Rows whose rotation is locked: contacts cannot spin them. Empty if there are none.
     pub rotation_locked: &'a [bool],
-    /// What is long about each row; empty if all are balls.
+    /// Capsule axis and inertia per body; empty if all are spheres.
     pub capsules: &'a [CapsuleInertia<S>],
 }
 
-/// What makes a capsule of a ball.
+/// Axis and inertia of a capsule.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct CapsuleInertia<S> {
-    /// A unit vector in world space, and half the length of the line, in metres; zero for a
-    /// ball.
+    /// Unit axis in world space, and half the length of the core segment, in metres; zero for a
+    /// sphere.
     pub axis: Vec3<S>,
     pub half_length: S,
-    /// The mass over the moments of inertia along the axis and across it, in 1/m²; nothing for
-    /// what contacts cannot set spinning.
+    /// Mass over the axial and the transverse moment of inertia, in 1/m²; zero if the rotation is
+    /// locked.
     pub inverse_unit_inertia: [S; 2],
 }
 
 impl<S: Scalar> CapsuleInertia<S> {
-    /// The moments of inertia along the axis and across it over the mass, in m²: of a
-    /// cylinder with half a ball at each end, of even density.
+    /// Axial and transverse moment of inertia per mass, in m²: a cylinder with a hemisphere at each
+    /// end, of uniform density.
     pub fn unit_inertia(radius: S, half_length: S) -> [S; 2] {
         let number = S::constant;
         let squared = radius * radius;
-        // As parts of all: the cylinder has π r² 2 h, the two halves 4/3 π r³.
+        // Fractions of the mass: the cylinder has volume π r² 2 h, the two hemispheres 4/3 π r³.
         let cylinder = half_length / (half_length + radius * number(2.0 / 3.0));
         let ends = S::one() - cylinder;
         let axial = cylinder * squared * number(0.5) + ends * squared * number(0.4);
-        // The middle of half a ball is 3/8 r from its flat side (Steiner).
+        // The centroid of a hemisphere is 3/8 r from its flat side (Steiner).
         let cylinder_transverse = squared * number(0.25) + half_length * half_length / number(3.0);
         let ends_transverse =
             squared * number(0.4) + half_length * half_length + half_length * radius * number(0.75);
         [axial, cylinder * cylinder_transverse + ends * ends_transverse]
     }
 
-    /// A torque about its middle over the mass, as the change of spin that it makes.
+    /// Change of angular velocity by a torque impulse per mass about the center.
     pub fn apply_inverse_inertia(&self, torque: Vec3<S>) -> Vec3<S> {
         let [axial, transverse] = self.inverse_unit_inertia;
         let part = self.axis * torque.dot(self.axis);
@@ -65,14 +65,14 @@ impl<S: Scalar> CapsuleInertia<S> {
 }
 
 impl<S: Scalar> SolverBodies<'_, S> {
-    /// Whether an impulse can set the marble in a row spinning.
+    /// Tells if contacts can spin a row.
     #[inline]
     pub(super) fn ball_rotation(&self, row: usize) -> BallRotation {
         let locked = self.rotation_locked.get(row).copied().unwrap_or(false);
         if locked || self.spin.is_empty() { BallRotation::Locked } else { BallRotation::Free }
     }
 
-    /// The spin in a row, in rad/s, as far as contacts feel it.
+    /// Angular velocity of a row, in rad/s; zero if its rotation is locked.
     #[inline]
     pub(super) fn unlocked_spin(&self, row: usize) -> Vec3<S> {
         match self.ball_rotation(row) {
@@ -81,13 +81,14 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Radius times spin, in m/s.
+    /// Radius times angular velocity, in m/s; crossed with the normal, the surface speed.
     #[inline]
     pub(super) fn radius_times_spin(&self, row: usize) -> Vec3<S> {
         self.unlocked_spin(row) * self.radius[row]
     }
 
-    /// In 1/(kg m²), of a capsule the greatest; zero for what cannot be turned.
+    /// Inverse moment of inertia, in 1/(kg m²), the largest one of a capsule; zero if the rotation
+    /// is locked.
     pub(super) fn inverse_inertia(&self, row: usize) -> S {
         if let Some(CapsuleInertia { inverse_unit_inertia: [axial, transverse], .. }) =
             self.capsule(row)
@@ -98,19 +99,19 @@ impl<S: Scalar> SolverBodies<'_, S> {
         factor * self.inverse_mass[row] / (self.radius[row] * self.radius[row])
     }
 
-    /// From the middle of a row to the point of its axis that a contact is about.
+    /// Vector from the center of a row to the point of its axis that a contact refers to.
     #[inline]
     pub(super) fn anchor(&self, row: usize, axis_offset: S) -> Vec3<S> {
         self.capsules.get(row).map_or_else(Vec3::zero, |capsule| capsule.axis * axis_offset)
     }
 
-    /// What is long about a row that can be set spinning, if anything is.
+    /// Capsule data of a row; none for a sphere.
     #[inline]
     pub(super) fn capsule(&self, row: usize) -> Option<&CapsuleInertia<S>> {
         self.capsules.get(row).filter(|capsule| capsule.half_length > S::zero())
     }
 
-    /// How easily a row gives way where it is touched, with its center that way; in 1/kg.
+    /// Inverse effective mass of one body at a contact whose normal points to its center, in 1/kg.
     pub(super) fn inverse_effective_mass(
         &self,
         row: usize,
@@ -130,12 +131,12 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let max_inverse = axial.max(transverse);
         InverseEffectiveMass {
             normal: inverse_mass * (S::one() + lever.dot(capsule.apply_inverse_inertia(lever))),
-            // At most; so a step across never goes too far.
+            // Upper bound, so that a tangential step never overshoots.
             tangent: inverse_mass * (S::one() + max_inverse * arm.magnitude2()),
         }
     }
 
-    /// The velocity that its spin gives to the point of a row's axis that a contact is about.
+    /// Velocity of that axis point relative to the center, by the spin, in m/s.
     #[inline]
     pub(super) fn anchor_spin_velocity(&self, row: usize, axis_offset: S) -> Vec3<S> {
         match self.capsule(row) {
@@ -144,8 +145,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Changes a velocity by a hit where a marble is touched, and its spin with it;
-    /// `normal` points to its center, or to the point `axis_offset` its axis.
+    /// Applies an impulse, given as a velocity change of the center, at the contact point: `normal`
+    /// points from there to the center, or to the point `axis_offset` along the axis.
     #[inline]
     pub(super) fn apply_impulse(
         &mut self,
@@ -165,7 +166,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Changes the spin of what is long, if it is.
+    /// Applies the angular part to a capsule. False if the body is a sphere.
     pub(super) fn spin_capsule(
         &mut self,
         row: usize,
@@ -181,7 +182,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         true
     }
 
-    /// Changes a spin by an angular impulse, in kg m²/s.
+    /// Applies an angular impulse, in kg m²/s.
     pub(super) fn apply_angular_impulse(&mut self, row: usize, angular_impulse: Vec3<S>) {
         let inverse = self.inverse_inertia(row);
         if let Some(capsule) = self.capsule(row).copied() {

@@ -2,22 +2,22 @@ use cgmath::{InnerSpace, Zero};
 
 use crate::math::Vec3;
 
-/// What contacts did to marbles, counted only where somebody asks. Energies in joules.
+/// Energy bookkeeping of contacts, kept only for the energy audit. Energies in joules.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct EnergyLedger {
-    /// What sliding took.
+    /// Loss by sliding friction.
     pub friction: f64,
-    /// What collisions took along their normals.
+    /// Loss by collisions along their normals.
     pub restitution: f64,
-    /// What rolling and spinning resistance took.
+    /// Loss by rolling and torsional friction.
     pub resistance: f64,
-    /// What moving walls and marbles of infinite mass brought in.
+    /// Energy supplied by moving walls and marbles of infinite mass.
     pub walls: f64,
-    /// What forces brought in, where the response moves marbles by itself.
+    /// Energy supplied by forces, where the response moves marbles by itself.
     pub forces: f64,
-    /// The momentum that came in by both, in kg m/s.
+    /// Momentum supplied by both, in kg m/s.
     pub momentum: Vec3<f64>,
-    /// How many collisions there were.
+    /// Number of collisions.
     pub collisions: u32,
 }
 
@@ -35,22 +35,23 @@ impl Default for EnergyLedger {
     }
 }
 
-/// An impulse through a contact.
+/// Impulse at a contact, for the bookkeeping.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ImpulseSample {
-    /// What the second one feels, in N s.
+    /// Impulse on the second body, in N s.
     pub impulse: Vec3<f64>,
     /// From the first to the second.
     pub normal: Vec3<f64>,
-    /// The mean of the velocities of the second's point relative to the first's before and
-    /// after, in m/s: times the impulse, that is the work.
+    /// Mean relative velocity of the contact points before and after, in m/s: times the impulse, it
+    /// is the work.
     pub mean_velocity: Vec3<f64>,
-    /// Which of the two nothing can move, and how its point moves, in m/s.
+    /// Velocity of the contact point of each body of infinite mass, in m/s; none for a movable
+    /// body.
     pub fixed_velocity: [Option<Vec3<f64>>; 2],
 }
 
 impl EnergyLedger {
-    /// Counts an impulse.
+    /// Books an impulse.
     pub fn record_impulse(
         &mut self,
         ImpulseSample { impulse, normal, mean_velocity, fixed_velocity }: ImpulseSample,
@@ -68,8 +69,7 @@ impl EnergyLedger {
         }
     }
 
-    /// Counts an angular impulse (in kg m²/s) between two that turn against each other so fast
-    /// before and after, in rad/s.
+    /// Books an angular impulse (in kg m²/s), with the relative spin before and after, in rad/s.
     pub fn record_angular_impulse(
         &mut self,
         angular_impulse: Vec3<f64>,

@@ -3,37 +3,37 @@ use cgmath::{InnerSpace, Zero};
 use crate::math::{Scalar, Vec3, length};
 use crate::response::Material;
 
-/// How easily a contact's two points come apart: the change of their relative
-/// velocity per impulse, in 1/kg.
+/// Inverse effective mass of a contact: change of the relative velocity of its two points per
+/// impulse, in 1/kg (the diagonal of `K` in constraint solvers).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseEffectiveMass<S> {
     /// Along the normal.
     pub normal: S,
-    /// Across it.
+    /// Along the tangents.
     pub tangent: S,
 }
 
 impl<S: Scalar> InverseEffectiveMass<S> {
-    /// Of two balls with these inverse masses (1/kg); zero for a wall.
+    /// Inverse effective mass of two balls with these inverse masses (1/kg); zero for a wall.
     ///
-    /// The normal goes through the centers, so spin counts only across it: a solid
-    /// ball's point gives way by `1/m + r²/I = 7/2 · 1/m`.
+    /// The normal passes through the centers, so spin counts only tangentially: `1/m + r²/I = 7/2 ·
+    /// 1/m` for a solid ball.
     #[must_use]
     pub fn of_balls(inverse_mass_a: S, inverse_mass_b: S, spin: BallRotation) -> Self {
         Self::of([(inverse_mass_a, spin), (inverse_mass_b, spin)])
     }
 
-    /// That of two ends together.
+    /// Sum over two bodies.
     pub(super) fn plus(self, other: Self) -> Self {
         Self { normal: self.normal + other.normal, tangent: self.tangent + other.tangent }
     }
 
-    /// That of so many ends in one place.
+    /// Sum over `count` equal bodies.
     pub(super) fn scaled(self, count: S) -> Self {
         Self { normal: self.normal * count, tangent: self.tangent * count }
     }
 
-    /// The same of balls of which one may spin and the other not.
+    /// Inverse effective mass of two balls whose rotation may be locked one by one.
     pub(super) fn of(balls: [(S, BallRotation); 2]) -> Self {
         let tangent = |(inverse_mass, spin): (S, BallRotation)| {
             inverse_mass * (S::one() + spin.inverse_inertia_factor::<S>())
@@ -43,18 +43,17 @@ impl<S: Scalar> InverseEffectiveMass<S> {
     }
 }
 
-/// Whether an impulse can set balls spinning.
+/// Rotation lock of balls.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum BallRotation {
-    /// No: friction acts on the velocity alone.
+    /// Impulses change the velocity alone.
     Locked,
-    /// Yes, as solid balls of even density.
+    /// Impulses also spin the balls: solid, of uniform density.
     Free,
 }
 
 impl BallRotation {
-    /// `m r² / I`: how easily the rim gives way by spinning, over how easily the center
-    /// does.
+    /// Inertia factor `m r² / I`: tangential compliance by spinning over that by translation.
     pub(super) fn inverse_inertia_factor<S: Scalar>(self) -> S {
         match self {
             Self::Locked => S::zero(),
@@ -63,14 +62,12 @@ impl BallRotation {
     }
 }
 
-/// The impulse (N s) that ends the approach of a contact's two points, as the second
-/// one feels it; the first feels the opposite.
+/// Impulse (N s) of a collision on the second body; the first one feels the opposite.
 ///
-/// `relative_velocity` is the velocity of the second's touching point relative to the first's,
-/// in m/s; `normal` points from the first to the second. Newton's restitution along
-/// the normal; across it, what friction can do at most is bounded by *all* of the
-/// normal impulse, that of the restitution included (Chung and Ooi 2011; Cross,
-/// *Grip-slip behavior of a bouncing ball*, 2002). Zero if the points are parting.
+/// `relative_velocity` is that of the second's contact point relative to the first's, in m/s;
+/// `normal` points from the first to the second. Newton's restitution along the normal; friction is
+/// bounded by *all* of the normal impulse, that of the restitution included (Chung and Ooi 2011;
+/// Cross, *Grip-slip behavior of a bouncing ball*, 2002). Zero if the points separate.
 #[must_use]
 pub fn impact<S: Scalar>(
     normal: Vec3<S>,
@@ -90,8 +87,7 @@ pub fn impact<S: Scalar>(
     normal * normal_impulse + clamp_length(stopping_impulse, material.friction * normal_impulse)
 }
 
-/// The vector, shortened to this length if it is longer. Impulses of small marbles are
-/// so small that their squares vanish.
+/// Clamps the length of a vector. Impulses of small marbles are so small that their squares vanish.
 pub(super) fn clamp_length<S: Scalar>(v: Vec3<S>, max: S) -> Vec3<S> {
     let length = length(v);
     if length > max { v * (max / length) } else { v }
@@ -102,9 +98,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A ball against a wall at rest whose normal is +y: velocity and rim speed
-    /// (radius times spin about z) after a bounce. The touching point moves by
-    /// `vx + rim` along x.
+    /// A ball against a wall at rest whose normal is +y: velocity and rim speed (radius times spin
+    /// about z) after a bounce. The contact point moves by `vx + rim` along x.
     fn bounce<S: Scalar>(v: [f64; 2], rim: f64, material: Material<S>) -> ([f64; 2], f64) {
         let number = S::constant;
         let relative_velocity = Vec3::new(number(v[0]) + number(rim), number(v[1]), S::zero());
@@ -125,9 +120,9 @@ mod tests {
         }
     }
 
-    /// Chung and Ooi (2011), test 4: a rigid ball at 3.9 m/s, e = 0.98, µ = 0.092, at
-    /// these angles from the normal (degrees): tangential restitution of the center,
-    /// spin for a radius of 2.5 mm (rad/s), angle of the contact point's rebound.
+    /// Chung and Ooi (2011), test 4: a rigid ball at 3.9 m/s, e = 0.98, µ = 0.092, at these angles
+    /// from the normal (degrees): tangential restitution of the center, spin for a radius of 2.5 mm
+    /// (rad/s), angle of the contact point's rebound.
     #[rustfmt::skip]
     const OBLIQUE: [(f64, f64, f64, f64); 10] = [
         (5.0, 0.71429, -97.116, 0.0), (10.0, 0.71429, -193.494, 0.0),
@@ -195,7 +190,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(20_000))]
 
-        /// Two free balls, masses over six decades: what has to be conserved is.
+        /// Two free balls, masses over six decades: conservation laws hold.
         #[test]
         fn impacts_conserve_momentum_and_create_no_energy(
             mass_exponents in [-3.0..3.0_f64, -3.0..3.0],
@@ -215,12 +210,12 @@ mod tests {
                 .map(f64::from);
             let approach = -relative_velocity.dot(normal);
             if approach < 1e-6 {
-                // Parting, or too close to it for f32 to say.
+                // Separating, or too close to it for f32 to say.
                 prop_assert!(approach > -1e-6 || j == Vec3::zero());
                 return Ok(());
             }
-            // Momentum is conserved by construction: one feels j, the other −j, in one
-            // point. Restitution and Coulomb:
+            // Momentum is conserved by construction: the impulses are j and −j, at one point.
+            // Restitution and Coulomb:
             let give = 1.0 / masses[0] + 1.0 / masses[1];
             let normal_impulse = j.dot(normal);
             let after = relative_velocity + normal * (normal_impulse * give)
@@ -228,8 +223,8 @@ mod tests {
             prop_assert!((after.dot(normal) - e * approach).abs() < 1e-6 * relative_velocity.magnitude());
             let friction = (j - normal * normal_impulse).magnitude();
             prop_assert!(friction <= mu * normal_impulse * (1.0 + 1e-6) + 1e-6 * normal_impulse);
-            // The energy of the relative motion of the two points: what was lost is
-            // j · (closing + after) / 2, which must not be a gain.
+            // Energy of the relative motion of the two points: the loss is j · (before + after) /
+            // 2, which must not be a gain.
             let gained = 0.5 * j.dot(relative_velocity + after);
             let energy = 0.5 * relative_velocity.magnitude2() / give;
             prop_assert!(gained <= 1e-6 * energy, "{gained} of {energy}");

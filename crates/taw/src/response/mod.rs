@@ -1,5 +1,5 @@
-//! What a touch does to those who touch. One method a file; all of them take the
-//! same columns and the same contacts.
+//! Collision response: methods that change positions and velocities where bodies are in contact.
+//! One method per file; all take the same columns and the same contacts.
 
 mod bodies;
 pub(crate) mod displacement;
@@ -19,81 +19,77 @@ pub use material::{Combine, Elasticity, Material};
 pub use penalty::ContactLaw;
 pub(crate) use penalty::SpringHistory;
 
-/// The method that restitutes.
+/// Collision response (lecture: restitution), the solver of a world's contacts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Response {
-    /// The lab's method: what moved into each other is moved back (a wall stays, marbles take
-    /// half each), the largest displacement first, and velocities change by that displacement
-    /// per step. What overlapped before (spawned, grown, put there) is moved apart afterwards,
-    /// and no velocity changes: overlap is no energy.
+    /// Position projection (the lecture's method; engines call it position-based). Bodies that
+    /// penetrated in this substep are moved apart, deepest contact first (a wall stays, marbles
+    /// take half each), and velocities change by that displacement per step. Penetration from
+    /// before the substep (spawned, grown or placed bodies) is resolved afterwards without a change
+    /// of velocity: penetration is no energy.
     ///
-    /// The bottom of the ladder. The same push whatever the masses, so momentum is kept only
-    /// where they are equal; no friction, no restitution, no spin. Changes begin with those of
-    /// the last substep and go over all contacts [`Model::iterations`] times at most, so that
-    /// what lies reports no speed; tall heaps sag until they agree.
+    /// The simplest method. The correction ignores masses, so momentum is conserved only where they
+    /// are equal; no friction, no restitution coefficient, no spin. A warm start and at most
+    /// [`Model::iterations`] passes over all contacts, so that resting marbles report no speed;
+    /// tall heaps sag until the contacts converge.
     ///
     /// [`Model::iterations`]: crate::world::Model::iterations
     #[default]
     Displacement,
-    /// Impulses, contact by contact and round after round
-    /// ([`Model::iterations`](crate::world::Model::iterations)): masses, restitution
-    /// and friction as the [`Material`] says, spin if the model's rotation is dynamic,
-    /// walls that carry along what lies on them; rolling and spinning resistance. Sweeps
-    /// that go on along their way until the contacts agree
+    /// Sequential impulses, at most [`Model::iterations`](crate::world::Model::iterations) passes
+    /// over the contacts: masses, restitution and friction of the [`Material`], spin if the model's
+    /// rotation is dynamic, moving walls that carry what lies on them; rolling and torsional
+    /// friction. Passes are accelerated by a conjugate search until the contacts converge
     /// ([`World::residual`](crate::world::World::residual)).
     ///
-    /// A bounce happens at the end of the substep in which it falls due, so its height
-    /// is right only to the first order in the substep; slower than what gravity does
-    /// in two substeps nothing bounces. What overlaps is pushed apart by the masses
-    /// without a change of velocity.
+    /// A bounce acts at the end of its substep, so its height is exact only to first order in the
+    /// substep. The restitution threshold is the speed that gravity adds in two substeps.
+    /// Penetration is resolved by mass, without a change of velocity.
     Impulse,
-    /// Forces that grow with the overlap: touches take time, many marbles can push at
-    /// once, and what a contact bears is a force in newtons.
+    /// Penalty method: forces that grow with penetration. Contacts last for a finite time, many
+    /// marbles can push at once, and the load of a contact is a force in newtons.
     ///
-    /// For engineers (with [`ContactLaw::HertzMindlin`]), and to see why games do without:
-    /// a marble sinks in by what the stiffness gives, and a stiffer contact needs shorter
-    /// substeps: what bears m times its own weight by [`ContactLaw::SpringDashpot`] sinks in by
-    /// 26 m g dt², for substeps of dt. No contact gives more energy than it took, and what
-    /// overlaps from the start parts at a radius a second at most.
+    /// For engineers (with [`ContactLaw::HertzMindlin`]), and to see why games do without: a marble
+    /// penetrates as far as the stiffness allows, and a stiffer contact needs shorter substeps. A
+    /// contact that bears m times its marble's weight by [`ContactLaw::SpringDashpot`] penetrates
+    /// by 26 m g dt², for substeps of dt. No contact releases more energy than it absorbed, and
+    /// penetration from the start separates at one radius per second at most.
     Penalty(ContactLaw),
-    /// Collision after collision in the order of time: each with its own normal, at its
-    /// own moment, thousands in one substep if need be. Nothing tunnels at any speed, and
-    /// bounces lose no height that restitution does not take.
+    /// Event-driven: collisions in the order of time, each with its own normal at its own time of
+    /// impact, thousands in one substep if need be. Nothing tunnels at any speed, and bounces lose
+    /// no height except by restitution.
     ///
-    /// In between marbles fly along parabolas, with the mean acceleration of the substep
-    /// by the integrator; exact for gravity. What lies on one wall of whatever form rests,
-    /// rolls or slides as the equations of a rolling ball say, and changes over at its moment.
-    /// On half-spaces and flat faces they are solved in closed form. On what bends (spheres,
-    /// capsules, edges and corners) and on walls that tilt they are integrated in steps by
-    /// which the normal turns by 0.02 rad at most, and a marble leaves where nothing presses it
-    /// any more. What touches several walls, or other marbles, is held as by
-    /// [`Response::Impulse`], in as many iterations as it takes, for 4,000 contacts altogether;
-    /// only in heaps of more do the [iterations](crate::world::Model::iterations) count. Give it
-    /// 50 or more there: a contact that they leave undecided is one more event, which costs
-    /// more. Bounces end when the rest of them would take less than
-    /// a few thousandths of a substep.
+    /// Between events marbles fly along parabolas, with the integrator's mean acceleration of the
+    /// substep; exact for gravity. A marble on one wall of any shape rests, rolls or slides by the
+    /// equations of a rolling ball, and changes regime at the exact time. On half-spaces and flat
+    /// faces these are solved in closed form. On curved surfaces (spheres, capsules, edges and
+    /// corners) and on tilting walls they are integrated in steps in which the normal turns by 0.02
+    /// rad at most, and a marble leaves where the normal force vanishes. Marbles that touch several
+    /// walls, or other marbles, are solved as by [`Response::Impulse`], with as many iterations as
+    /// needed for up to 4,000 contact solves altogether; only in larger heaps do the
+    /// [iterations](crate::world::Model::iterations) count. Give it 50 or more there: an
+    /// unconverged contact becomes one more event, which costs more. A series of bounces ends when
+    /// the rest of it would take less than a few thousandths of a substep.
     ///
-    /// A wall that was [set](crate::world::Colliders::set) to another place since the last step,
-    /// and has a [motion](crate::world::WallMotion), goes through the step by that motion, and
-    /// is at its end where it was set to. One that only has a motion stays, and carries along
-    /// its surface what lies on it.
+    /// A wall that was [set](crate::world::Walls::set) to another pose since the last step, and has
+    /// a [motion](crate::world::WallMotion), moves through the step by that motion, and ends where
+    /// it was set. A wall that only has a motion stays, and its surface carries what lies on it.
     ///
-    /// A substep has a budget: 32 million looks at one wall or one other marble, and 20,000 for
-    /// each marble besides, about a second for a few hundred. What is not at the end of the
-    /// substep then stays where it is, loses its velocity, and is named by
+    /// A substep has a budget: 32 million tests against one wall or one other marble, plus 20,000
+    /// per marble, about a second for a few hundred. A marble that has not finished the substep by
+    /// then stays where it is, loses its velocity, and is listed by
     /// [`World::stopped`](crate::world::World::stopped).
     ///
-    /// Counts in `f64` also in a world of `f32`; see
-    /// [`Precision`](crate::world::Precision) for what such a world remembers of it. It
-    /// finds its collisions by itself, so taking contacts out of the world's lists does
-    /// not keep marbles apart.
+    /// Computes in `f64` also in a world of `f32`; see [`Precision`](crate::world::Precision) for
+    /// what such a world stores of it. It detects its own collisions, so removing contacts from the
+    /// world's lists does not keep marbles apart.
     EventDriven,
 }
 
 impl Response {
-    /// Whether it acts only on what overlaps.
-    pub(crate) fn needs_overlap(self) -> bool {
+    /// True if only contacts with penetration matter: no speculative margin.
+    pub(crate) fn needs_penetration(self) -> bool {
         matches!(self, Self::Penalty(_))
     }
 }

@@ -1,6 +1,7 @@
-//! The lab's method, which [`Response::Displacement`](super::Response::Displacement) is: what a
-//! substep moved into each other is moved back, and velocities change by that way per substep;
-//! what overlapped before is moved apart afterwards, and no velocity changes.
+//! Position projection (the lecture's method): the solver of
+//! [`Response::Displacement`](super::Response::Displacement). Penetration of this substep is
+//! undone, and velocities change by the displacement per substep; older penetration is resolved
+//! afterwards without a change of velocity.
 
 #[cfg(test)]
 mod tests;
@@ -21,16 +22,16 @@ pub(crate) struct Scratch<S> {
     warm_starts: Vec<WarmStartSums<S>>,
 }
 
-/// Sums that scale the warm start of one group of marbles that touch each other, in m²/s².
+/// Sums that scale the warm start of one island, in m²/s².
 #[derive(Clone, Copy, Debug)]
 struct WarmStartSums<S> {
-    /// Cached change times the change that is wanted, and times the change that it makes.
+    /// Cached change times the requested one, and times the achieved one.
     requested: S,
     achieved: S,
 }
 
 impl<S: Scalar> WarmStartSums<S> {
-    /// Part of the changes that brings all nearest to what is asked for.
+    /// Fraction of the warm start that comes closest to the requested changes.
     fn fraction(self) -> S {
         let fraction = self.requested / self.achieved;
         if self.achieved > S::zero() {
@@ -43,37 +44,35 @@ impl<S: Scalar> WarmStartSums<S> {
     }
 }
 
-/// A contact while it is solved.
+/// Contact constraint: lower bound of a separation speed.
 #[derive(Clone, Copy, Debug)]
 struct ApproachConstraint<S> {
     a: BodyA,
     b: usize,
-    /// Index of its group of marbles that touch each other. Groups do not change each other, to the
-    /// bit.
+    /// Index of its island. Islands do not influence each other, to the bit.
     island: u32,
     axis_offset: [S; 2],
     /// From a to b.
     normal: Vec3<S>,
     /// Speed of the wall's surface along the normal, in m/s; zero between marbles.
     surface_speed: S,
-    /// The least speed of parting that is asked for, in m/s: zero, or negative for two that
-    /// still have a way to go.
+    /// Lower bound of the separation speed, in m/s: zero, or negative where a separation is still
+    /// open.
     min_separation_speed: S,
-    /// By how much the contact has changed that speed, in m/s.
+    /// Change of the separation speed accumulated in this substep, in m/s.
     velocity_change: S,
 }
 
-/// The lecture's restitution, contact by contact, the deepest first, each tested again: a wall
-/// stays, marbles take half each. The lecture takes all overlap for motion of this frame, so that
-/// what was there before becomes speed; here only approach ends. Changes are accumulated, so that
-/// a contact can take back what another one made superfluous, and begin with those of the last
-/// substep (Catto, *Iterative dynamics with temporal coherence*, 2005). What overlaps then is
-/// moved apart without a change of velocity, as Macklin et al. do (*Unified particle physics for
-/// real-time applications*, 2014, §4.4).
+/// Solves contacts as the lecture restitutes, deepest first, each tested again: a wall stays,
+/// marbles take half each. The lecture takes all penetration for motion of this frame, so that
+/// older penetration turns into speed; here only approach is stopped. Changes accumulate, so that a
+/// contact can take back what another one made superfluous, with a warm start (Catto, *Iterative
+/// dynamics with temporal coherence*, 2005). Remaining penetration is resolved without a change of
+/// velocity (Macklin et al., *Unified particle physics for real-time applications*, 2014, §4.4).
 ///
-/// The contacts' rows exist. A row that would become infinite or NaN keeps its place,
-/// loses its velocity, and is added to `quarantined`. `on_wall_impulse` hears by how much a wall changed a
-/// velocity.
+/// The contacts' rows exist. A row that would become infinite or NaN keeps its position, loses its
+/// velocity, and is added to `quarantined`. `on_wall_impulse` receives the velocity changes by
+/// walls.
 pub(crate) fn solve_displacement<S: Scalar>(
     marbles: &mut SolverBodies<S>,
     contacts: &mut Contacts<S>,
@@ -114,7 +113,7 @@ pub(crate) fn solve_displacement<S: Scalar>(
             break;
         }
     }
-    // Walls have the last word: through the floor nothing goes.
+    // Walls come last, so that nothing is pushed through the floor.
     for c in constraints.iter().filter(|c| c.a.marble().is_none()) {
         marbles.separate(c, context);
     }
@@ -126,8 +125,8 @@ pub(crate) fn solve_displacement<S: Scalar>(
 }
 
 impl<S: Scalar> SolverBodies<'_, S> {
-    /// Finds what a contact asks for: no approach, but for the way that was still free when the
-    /// substep began.
+    /// Constraint of a contact: no approach beyond the separation that was open at the start of the
+    /// substep.
     fn approach_constraint(
         &self,
         a: BodyA,
@@ -156,7 +155,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             velocity_change: zero,
         };
         let follow_time = context.follow_time(a, b);
-        // What was stopped on its way touches, whatever rounding says.
+        // A body stopped by continuous detection is in contact, whatever rounding says.
         let is_ccd_stopped =
             context.is_ccd_stopped(b) || a.marble().is_some_and(|a| context.is_ccd_stopped(a));
         if follow_time > S::zero() && !is_ccd_stopped {
@@ -166,14 +165,14 @@ impl<S: Scalar> SolverBodies<'_, S> {
         Some(c)
     }
 
-    /// Separating speed of the two of a contact along its normal, in m/s.
+    /// Separation speed along the normal, in m/s.
     fn separation_speed(&self, c: &ApproachConstraint<S>) -> S {
         let first = c.a.marble().map_or_else(Vec3::zero, |a| self.velocity[a]);
         (self.velocity[c.b] - first).dot(c.normal) - c.surface_speed
     }
 
-    /// Overlap that stays, in metres, so that what rests keeps touching where positions do not
-    /// follow a change of velocity within the substep; none where they do.
+    /// Allowed penetration (slop), in metres, so that resting contacts persist where positions do
+    /// not follow velocity changes within the substep; zero where they do.
     fn slop(
         &self,
         c: &ApproachConstraint<S>,
@@ -187,7 +186,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         context.settings.slop.min(min_radius * context.settings.max_relative_slop)
     }
 
-    /// Changes the speed at which the two of a contact part.
+    /// Changes the separation speed of a contact.
     fn apply_velocity_change(&mut self, c: &ApproachConstraint<S>, velocity_change: S) {
         let velocity_change = c.normal * velocity_change;
         match c.a {
@@ -200,10 +199,10 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Begins with the changes of the last substep, or with that part of them which brings those
-    /// that touch each other nearest to what is asked for: so they give no energy. What the sweeps
-    /// do afterwards takes some only, as each of them lowers `½ f·A f − f·w`, with `f` the changes,
-    /// `A f` what they make of the speeds, and `w` what is wanted of these.
+    /// Warm start: applies the changes of the last substep, scaled per island to the fraction that
+    /// comes closest to the requested changes, so that they give no energy. The iterations only
+    /// take energy, as each lowers `½ f·A f − f·w`, with `f` the changes, `A f` their effect on the
+    /// separation speeds, and `w` the requested one.
     fn warm_start_scaled(
         &mut self,
         constraints: &mut [ApproachConstraint<S>],
@@ -240,8 +239,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Ends the approach of two, or takes back what did so and is no longer needed. False if that
-    /// is less than `rounding`, in m/s.
+    /// Stops an approach, or takes back a superfluous change. False if the change is below
+    /// `rounding`, in m/s.
     fn solve_approach(&mut self, c: &mut ApproachConstraint<S>, rounding: S) -> bool {
         let requested = c.min_separation_speed - self.separation_speed(c);
         let velocity_change = (c.velocity_change + requested).max(S::zero()) - c.velocity_change;
@@ -253,7 +252,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         true
     }
 
-    /// Moves marbles by what changed of their velocities.
+    /// Moves marbles by their velocity changes.
     fn follow_velocity_changes(
         &mut self,
         initial_velocity: &[Vec3<S>],
@@ -273,7 +272,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Moves the two of a contact apart. False if they do not overlap any more.
+    /// Resolves the penetration of a contact. False if there is none.
     fn separate(
         &mut self,
         c: &ApproachConstraint<S>,
@@ -299,7 +298,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
 }
 
 impl<S: Scalar> ApproachConstraint<S> {
-    /// The part that the second takes.
+    /// Fraction of a change that the second body takes.
     fn fraction_b(&self) -> S {
         if self.a.marble().is_none() { S::one() } else { S::constant(0.5) }
     }

@@ -19,8 +19,8 @@ impl<S: Scalar> Colliders<S> for Vec<Plane<S>> {
     }
 }
 
-/// Runs one restitution of a substep of `dt` over all contacts among `spheres` (center, radius,
-/// velocity) and a floor at zero, without gravity. Gives positions, velocities and the stopped.
+/// Solves one substep of `dt` seconds over all contacts among `spheres` (center, radius, velocity)
+/// and a floor at zero, without gravity. Returns positions, velocities and quarantined rows.
 fn restituted<S: Scalar>(
     spheres: &[(Point3<S>, S, Vec3<S>)],
     dt: S,
@@ -84,7 +84,7 @@ fn a_wall_pushes_out_and_adds_the_displacement_per_step() {
 
 #[test]
 fn marbles_take_half_each() {
-    // Each came 0.5 m; so a half of the overlap of 0.5 m was before.
+    // Each moved 0.5 m, so half a metre of penetration is older.
     let (position, velocity, _) = restituted(
         &[
             (Point3::new(0.0, 5.0, 0.0), 1.0, Vec3::new(0.25, 0.0, 0.0)),
@@ -112,7 +112,7 @@ fn what_overlaps_at_rest_parts_and_stays_at_rest() {
 
 #[test]
 fn a_contact_that_an_earlier_one_settled_does_nothing() {
-    // The first pushes the second out of reach of the third, which it touched.
+    // The first pushes the second out of contact with the third.
     let third = Point3::new(-0.6, 6.58, 0.0);
     let (position, velocity, _) = restituted(
         &[

@@ -1,7 +1,7 @@
-//! No energy from nothing. Newton's restitution and friction, each right in its own contact,
-//! can together gain energy in several contacts at once (Kane and Levinson, *Dynamics: theory
-//! and applications*, 1985): such collisions rebound less. And what iterations leave undone, or
-//! remember wrongly from the last substep, must not gain either.
+//! Energy guard: contacts must not create energy. Newton's restitution and friction, each right in
+//! its own contact, can together gain energy in several contacts at once (Kane and Levinson,
+//! *Dynamics: theory and applications*, 1985): such collisions get less restitution. Unconverged
+//! iterations and an outdated warm start must not gain energy either.
 
 use cgmath::{InnerSpace, Zero};
 
@@ -11,18 +11,19 @@ use super::{Constraint, SolverSettings};
 use crate::math::{Scalar, Vec3};
 use crate::response::SolverBodies;
 
-/// A gain below this part of what the impulses exchange is what the sweeps left over.
+/// A gain below this fraction of the exchanged energy is the residual of the iterations.
 const GAIN_TOLERANCE: f64 = 1e-5;
 
 /// Energy balance of an island's impulses, in units of the island.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct IslandEnergy<S> {
     bounces: bool,
-    /// The energy that came in by the impulses as they are.
+    /// Energy that the impulses bring in as they are.
     work: S,
     /// Energy exchanged through the contacts, the scale for `work`.
     exchanged: S,
-    /// Coefficients of the energy `linear x + quadratic x²` that comes in with a part `x` of something.
+    /// Coefficients of the energy `linear x + quadratic x²` that a fraction `x` of some impulses
+    /// brings in.
     linear: S,
     quadratic: S,
 }
@@ -37,11 +38,11 @@ impl<S: Scalar> IslandEnergy<S> {
         self.work > self.exchanged * S::constant(GAIN_TOLERANCE)
     }
 
-    /// The largest part of the rebound that gains nothing.
+    /// Largest fraction of the restitution that gains no energy.
     fn max_restitution_fraction(&self) -> S {
         let Self { work, linear, quadratic, .. } = *self;
         let root = (linear * linear - S::constant(4.0) * quadratic * work).sqrt();
-        // Of the two forms of the solution, the one that subtracts nothing.
+        // Root of the quadratic equation in the form without cancellation.
         let fraction = if linear > S::zero() {
             work * S::constant(-2.0) / (linear + root)
         } else {
@@ -50,28 +51,28 @@ impl<S: Scalar> IslandEnergy<S> {
         if fraction > S::zero() { fraction.min(S::one()) } else { S::zero() }
     }
 
-    /// The part of all impulses that leaves the least energy.
+    /// Fraction of all impulses that leaves the least energy.
     fn min_energy_fraction(&self) -> S {
         let fraction = -self.linear / (self.quadratic * S::constant(2.0));
         if fraction > S::zero() && fraction.is_finite() { fraction } else { S::zero() }
     }
 }
 
-/// State of a contact with full restitution.
+/// Solution of a contact with full restitution.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FullRestitution<S> {
     impulse: Vec3<S>,
     angular_impulse: Vec3<S>,
-    /// The relative velocity of the two points afterwards, in m/s, and how they turn, in rad/s.
+    /// Relative velocity of the two points, in m/s, and relative spin, in rad/s, after the impulse.
     relative_velocity: Vec3<S>,
     relative_spin: Vec3<S>,
 }
 
 impl<S: Scalar> SolverBodies<'_, S> {
-    /// Finds the islands whose solution gained energy, solves them without rebound, which
-    /// hardly ever does, and puts as much of the rebound back as gains nothing. Both keep to
-    /// the contacts and to the cones of friction, so what is between them does, too. Where
-    /// the sweeps ended too soon even for that, they begin anew, [pushes before
+    /// Limits the energy of islands whose solution gained some: solves them without restitution,
+    /// which hardly ever gains, and adds the largest fraction of the restitution that gains
+    /// nothing. Both solutions satisfy contacts and friction cones, so every mixture does, too.
+    /// Where the iterations ended too soon even for that, solves again, [normals before
     /// friction](Self::solve_normals_before_friction).
     pub(super) fn limit_energy(
         &mut self,
@@ -92,10 +93,10 @@ impl<S: Scalar> SolverBodies<'_, S> {
         self.stop_approaches(constraints, islands);
     }
 
-    /// Pushes, without more friction, at what still approaches. Two walls whose friction presses a
-    /// ball into the other have no solution that sweeps could reach; and a ball that went on into
-    /// one of them would be lifted out, which is energy. To end an approach only lowers it. Walls,
-    /// which come first, have the last word.
+    /// Stops remaining approaches by normal impulses alone. Two walls whose friction presses a ball
+    /// into each other have no solution that iterations could reach; and a ball that went on into a
+    /// wall would be lifted out again, which is energy. Stopping an approach only lowers it. Walls
+    /// come first, so the backward pass ends with them.
     fn stop_approaches(&mut self, constraints: &mut [Constraint<S>], islands: &Islands<S>) {
         let indices = 0..constraints.len();
         for index in indices.clone().chain(indices.rev()) {
@@ -168,11 +169,11 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Solves islands that gain energy in a way that never does, however few the sweeps. First
-    /// all pushes, without friction: each step of a sweep lowers the energy, from none. They
-    /// rebound as Poisson says, by their impulses, no further than energy allows. Then friction,
-    /// within the bounds that these pushes give, beside pushes that only grow: again each step
-    /// lowers the energy.
+    /// Solves gaining islands in an order that cannot gain, however few the iterations. First the
+    /// normal impulses, without friction: each step lowers the energy. Then restitution by
+    /// Poisson's hypothesis, no further than energy allows. Then friction, with cones fixed by
+    /// these normal impulses, while normal impulses may only grow: again each step lowers the
+    /// energy.
     fn solve_normals_before_friction(
         &mut self,
         constraints: &mut [Constraint<S>],
@@ -211,8 +212,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         iterate(self, constraints, islands, settings);
     }
 
-    /// Makes pushes that ended approaches as much larger as restitution says (Poisson 1838): the
-    /// least restitution of the bounces in an island, and no more than gains nothing.
+    /// Scales the normal impulses by Poisson's hypothesis (1838): by the least restitution of the
+    /// bounces in an island, and no further than gains nothing.
     fn apply_poisson_restitution(
         &mut self,
         constraints: &mut [Constraint<S>],
@@ -230,14 +231,14 @@ impl<S: Scalar> SolverBodies<'_, S> {
         for c in constraints.iter_mut().filter(|c| gaining[c.island as usize]) {
             let island = c.island as usize;
             let best = energies[island].min_energy_fraction();
-            // Between nothing and twice the best part, energy is lost.
+            // Fractions between zero and twice the best one lose energy.
             let fraction = (S::one() + min_restitution[island]).min(best + best).max(S::zero());
             self.add_impulse(c, c.impulse() * (fraction - S::one()));
         }
     }
 
-    /// Shortens all impulses of an island, alike, to what leaves the least energy, where they
-    /// bring some in: a guess that no longer fits.
+    /// Scales the warm start of an island down to the fraction that leaves the least energy, where
+    /// it would bring energy in: the guess no longer fits.
     pub(super) fn limit_warm_start(
         &mut self,
         constraints: &mut [Constraint<S>],
@@ -257,7 +258,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Counts what a part of all impulses would do to the energy.
+    /// Measures the energy that a fraction of all impulses would bring in.
     fn measure_scaling(
         &self,
         constraints: &[Constraint<S>],
@@ -279,7 +280,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Adds to what a contact bears, within its cone.
+    /// Adds an impulse to a contact; the caller keeps it within the friction cone.
     fn add_impulse(&mut self, c: &mut Constraint<S>, impulse: Vec3<S>) {
         self.apply_impulse_pair(c, impulse);
         let axis_offset = impulse.dot(c.normal);
@@ -294,8 +295,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Counts what the impulses did to the energy: an impulse times the mean of the
-    /// velocities before and after.
+    /// Measures the energy of all impulses: impulse times mean velocity before and after.
     fn measure_energy(
         &self,
         constraints: &[Constraint<S>],
@@ -319,7 +319,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
 }
 
 impl<S: Scalar> Constraint<S> {
-    /// The speed along the normal that is asked for without a rebound, in m/s.
+    /// Target normal velocity without restitution, in m/s.
     fn target_without_restitution(&self) -> S {
         if self.bounces {
             self.velocity_since_impact.dot(self.normal)
@@ -328,8 +328,7 @@ impl<S: Scalar> Constraint<S> {
         }
     }
 
-    /// The mean of the relative velocities before and after an impulse at the moment when it
-    /// acted, in m/s.
+    /// Mean of the relative velocities before and after the impulse, at the time of impact, in m/s.
     fn mean_velocity(&self, after: Vec3<S>) -> Vec3<S> {
         (self.initial_relative_velocity + after) * S::constant(0.5) - self.velocity_since_impact
     }

@@ -1,39 +1,37 @@
-//! Islands: groups of marbles that touch each other, and how far each is from agreeing.
+//! Islands: connected groups of marbles, each with its own convergence state and search.
 
 use cgmath::InnerSpace;
 
 use super::Constraint;
 use crate::math::{Scalar, Vec3, direction_and_length};
 
-/// How much a contact gives way beyond what its marbles do, as a part of that, in units of the
-/// scalar's rounding. So a search never goes far along impulses that cancel in all but rounding:
-/// two walls that press a ball from both sides, each with friction. Sixteen roundings are what
-/// a velocity has after a few contacts; a marble is held that is a million times as heavy as
-/// what carries it.
+/// Regularization of the search: additional compliance of a contact, relative to its own, in units
+/// of the scalar's rounding. It limits impulses that cancel except for rounding: two walls that
+/// press a ball from both sides, each with friction. Sixteen roundings are the error of a velocity
+/// after a few contacts; a marble a million times as heavy as the one below it is still held.
 const REGULARIZATION: f64 = 16.0;
 
-/// Groups of marbles that touch each other. What happens in one is nothing to the others,
-/// to the bit.
+/// Islands of marbles in contact. They do not influence each other, to the bit.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Islands<S> {
     sets: UnionFind,
     pub list: Vec<Island<S>>,
-    /// Number of times that a contact was solved.
+    /// Number of contact solves, over all iterations.
     pub solve_count: u64,
 }
 
-/// Which marbles touch each other, over how many others.
+/// Disjoint sets of rows that contacts connect (union-find).
 #[derive(Clone, Debug, Default)]
 pub(crate) struct UnionFind {
-    /// For each row, one of its group that is nearer to its first.
+    /// Parent of each row in its tree.
     parent: Vec<u32>,
-    /// For each row that is the first of a group, which one.
+    /// Island of each row that is a root; `u32::MAX` for none yet.
     island_of_root: Vec<u32>,
     count: u32,
 }
 
 impl UnionFind {
-    /// Finds who touches whom (Tarjan 1975).
+    /// Joins the rows of all pairs (Tarjan 1975).
     pub fn build(&mut self, pairs: impl Iterator<Item = (Option<usize>, usize)>, rows: usize) {
         self.parent.clear();
         self.parent.extend(0..rows as u32);
@@ -47,7 +45,7 @@ impl UnionFind {
         self.count = 0;
     }
 
-    /// Number of a row's group, by the order in which they are asked for.
+    /// Index of a row's set, in the order of the calls.
     pub fn set_of(&mut self, row: usize) -> u32 {
         let root = self.root(row);
         if self.island_of_root[root] == u32::MAX {
@@ -57,7 +55,7 @@ impl UnionFind {
         self.island_of_root[root]
     }
 
-    /// First row of a row's group. Halves the way there for the next time.
+    /// Root of a row's tree, with path halving.
     fn root(&mut self, row: usize) -> usize {
         let mut row = row as u32;
         while self.parent[row as usize] != row {
@@ -69,81 +67,81 @@ impl UnionFind {
     }
 }
 
-/// A group of marbles that touch each other, while it is solved.
+/// Island: marbles connected by contacts, while it is solved.
 #[derive(Clone, Copy, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a question of its own")]
 pub(super) struct Island<S> {
-    /// Units of energy, so that squares do not vanish: 1/kg and m/s.
+    /// Energy units, so that squares do not underflow: 1/kg and m/s.
     inverse_mass_unit: S,
     speed_unit: S,
-    /// Whether one of its contacts bounces, and one does not; and the time since the first bounce in this
-    /// substep, in seconds.
+    /// True if one of its contacts bounces; true if one rests; and the time since the first bounce
+    /// in this substep, in seconds.
     pub bounces: bool,
     pub has_resting_contact: bool,
     pub time_since_impact: S,
-    /// The largest change of a velocity in this sweep and in the last, in m/s.
+    /// Largest velocity change in this iteration and in the last one, in m/s.
     pub change: S,
     residual: S,
-    /// True once the contacts have what they ask for.
+    /// True once the velocity changes are within the tolerance.
     pub converged: bool,
-    /// True if iterations ended before that, even if a later solution agreed.
+    /// True if an earlier solution ended before convergence.
     pub incomplete: bool,
-    /// True where it pays to go further.
+    /// True where acceleration pays.
     pub accelerating: bool,
     search: Search<S>,
 }
 
-/// Directions that a search looks along: the last sweep, and the ways that it went before.
+/// Number of search directions: the last iteration, and the accelerated steps before it.
 pub(super) const DIRECTIONS: usize = 3;
 
-/// A search for the impulses, of all that are some of each direction, that bring an island nearest
-/// to what its contacts ask for.
+/// Subspace search: the combination of directions that brings an island nearest to the target
+/// velocities of its contacts.
 #[derive(Clone, Copy, Debug)]
 struct Search<S> {
-    /// The energy that a unit of each direction gains at first, and what each costs beside each.
+    /// Linear and quadratic terms of the energy over the directions.
     gradient: [S; DIRECTIONS],
     curvature: [[S; DIRECTIONS]; DIRECTIONS],
-    /// Coefficients of the directions.
+    /// Coefficient of each direction.
     weights: [S; DIRECTIONS],
-    /// Part of that way up to where the first contact comes to bear nothing.
+    /// Fraction of the step at which the first normal impulse vanishes.
     cone_exit: S,
-    /// True if the bounds of friction bend the way.
+    /// True if friction cones clamp the step.
     friction_clamped: bool,
-    /// The energy that a unit of the way within the cones gains at first, and what it costs.
+    /// Linear and quadratic term of the energy along the step projected to the cones.
     projected_gradient: S,
     projected_curvature: S,
 }
 
 impl<S: Scalar> Islands<S> {
-    /// The largest change of a velocity in the last sweep, in m/s.
+    /// Largest velocity change in the last iteration, in m/s.
     pub fn residual(&self) -> S {
         self.list.iter().fold(S::zero(), |max, island| max.max(island.residual))
     }
 
-    /// The number of islands.
+    /// Number of islands.
     pub fn len(&self) -> usize {
         self.list.len()
     }
 
-    /// The island of a contact.
+    /// Island of a contact.
     #[inline]
     pub fn of(&self, c: &Constraint<S>) -> &Island<S> {
         &self.list[c.island as usize]
     }
 
-    /// The island of a contact.
+    /// Island of a contact.
     #[inline]
     pub fn of_mut(&mut self, c: &Constraint<S>) -> &mut Island<S> {
         &mut self.list[c.island as usize]
     }
 
-    /// The island of a contact, if it searches.
+    /// Island of a contact, if it is accelerated.
     #[inline]
     pub fn accelerating(&mut self, c: &Constraint<S>) -> Option<&mut Island<S>> {
         Some(self.of_mut(c)).filter(|island| island.accelerating)
     }
 
-    /// Sets some islands back to where the sweeps begin, and none of the others.
+    /// Restarts the iterations of some islands; all others count as converged.
     pub fn restart(&mut self, which: impl Fn(usize) -> bool) {
         for (number, island) in self.list.iter_mut().enumerate() {
             island.incomplete |= !island.converged;
@@ -152,7 +150,7 @@ impl<S: Scalar> Islands<S> {
         }
     }
 
-    /// Finds which contacts are of one island.
+    /// Assigns contacts to islands.
     pub fn build(&mut self, constraints: &mut [Constraint<S>], rows: usize, speed_unit: S) {
         self.sets.build(constraints.iter().map(|c| (c.a.marble(), c.b)), rows);
         self.list.clear();
@@ -165,12 +163,12 @@ impl<S: Scalar> Islands<S> {
         }
     }
 
-    /// Looks back at a sweep. True if all islands agree.
+    /// Ends an iteration. True if all islands have converged.
     pub fn end_iteration(&mut self, restitution_threshold: S, tolerance: S) -> bool {
         for island in self.list.iter_mut().filter(|island| !island.converged) {
-            // What is left is beyond what the next sweep could still see.
+            // The rest is below what the next iteration could resolve.
             island.converged = island.change <= tolerance;
-            // Near the end the sweeps alone come to rest, which the search does not quite.
+            // Close to convergence plain iterations come to rest, which the search does not quite.
             island.accelerating =
                 !island.converged && island.change > restitution_threshold * S::constant(1e-5);
             island.residual = island.change;
@@ -198,26 +196,26 @@ impl<S: Scalar> Island<S> {
         }
     }
 
-    /// An impulse (as a speed, times the mobility) on a contact times a velocity there, in
-    /// units of the island.
+    /// Product of an impulse (as a speed: times the inverse effective mass) and a velocity at a
+    /// contact, in units of the island.
     #[inline]
     pub fn energy(&self, c: &Constraint<S>, impulse: Vec3<S>, velocity: Vec3<S>) -> S {
         let weight = self.inverse_mass_unit / c.inverse_effective_mass.normal;
         (impulse / self.speed_unit).dot(velocity / self.speed_unit) * weight
     }
 
-    /// An angular impulse (in kg m²/s) times a spin, in units of the island.
+    /// Product of an angular impulse (in kg m²/s) and a spin, in units of the island.
     pub fn angular_energy(&self, angular_impulse: Vec3<S>, spin: Vec3<S>) -> S {
         (angular_impulse / self.speed_unit).dot(spin / self.speed_unit) * self.inverse_mass_unit
     }
 
-    /// Begins a search.
+    /// Resets the search.
     pub fn begin_search(&mut self) {
         self.search = Search::new();
     }
 
-    /// Adds what a contact's part of each direction gains and costs, if the velocities that it gives
-    /// are known to this rounding, in m/s.
+    /// Adds the terms of one contact for each direction; `rounding` is the error of its velocities,
+    /// in m/s.
     pub fn add_directions(&mut self, c: &Constraint<S>, rounding: S) {
         let regularization = S::epsilon() * S::constant(REGULARIZATION);
         for (row, direction) in c.search_directions.iter().enumerate() {
@@ -231,39 +229,38 @@ impl<S: Scalar> Island<S> {
         }
     }
 
-    /// Finds how much of each direction is best.
+    /// Solves for the weights of the directions.
     pub fn solve_weights(&mut self) {
         self.search.solve_weights();
     }
 
-    /// Those parts of some vectors, one for each direction.
+    /// Weighted sum of one vector per direction.
     pub fn combine(&self, vectors: &[Vec3<S>; DIRECTIONS]) -> Vec3<S> {
         let weights = self.search.weights;
         vectors[0] * weights[0] + vectors[1] * weights[1] + vectors[2] * weights[2]
     }
 
-    /// Notes that the way leaves a contact's cone at this part of it, or that friction bends it.
+    /// Records where the step leaves a contact's cone, and if friction clamps it.
     pub fn add_cone_limit(&mut self, cone_exit: S, friction_clamped: bool) {
         self.search.cone_exit = self.search.cone_exit.min(cone_exit);
         self.search.friction_clamped |= friction_clamped;
     }
 
-    /// Adds what a contact's part of the way within the cones gains and costs, if it gives this
-    /// velocity.
+    /// Adds the terms of one contact for the projected step, which changes its velocity by this.
     pub fn add_projected(&mut self, c: &Constraint<S>, direction: Vec3<S>, velocity: Vec3<S>) {
         self.search.projected_gradient += self.energy(c, direction, c.velocity_error);
         let regularization = direction * (S::epsilon() * S::constant(REGULARIZATION));
         self.search.projected_curvature += self.energy(c, direction, velocity + regularization);
     }
 
-    /// Part to go of the way within the cones, or of the straight way to where the first
-    /// contact bears nothing any more: whichever lowers the energy more.
+    /// Chooses between the projected step and the straight step up to the exit from the first cone:
+    /// the one that lowers the energy more.
     pub fn choose_step(&self) -> SearchStep<S> {
         self.search.choose_step()
     }
 }
 
-/// How far to go, as a part.
+/// Chosen step, with the fraction of it to take.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum SearchStep<S> {
     Projected(S),
@@ -284,8 +281,8 @@ impl<S: Scalar> Search<S> {
         }
     }
 
-    /// Solves `curvature · weights = gradient` (Cholesky 1910), without directions that say nothing that others
-    /// do not.
+    /// Solves `curvature · weights = gradient` (Cholesky 1910), without directions that depend on
+    /// others.
     fn solve_weights(&mut self) {
         let (curvature, zero) = (self.curvature, S::zero());
         let mut factor = [[zero; DIRECTIONS]; DIRECTIONS];
@@ -301,7 +298,7 @@ impl<S: Scalar> Search<S> {
             }
             let known = (0..row).fold(zero, |sum, k| sum + factor[row][k] * factor[row][k]);
             let pivot = curvature[row][row] - known;
-            // Half of the digits are left to what a direction says that others do not.
+            // A direction counts if half of the digits of its pivot are its own.
             if pivot > curvature[row][row] * S::epsilon().sqrt() && pivot.is_finite() {
                 let known = (0..row).fold(zero, |sum, k| sum + factor[row][k] * weights[k]);
                 factor[row][row] = pivot.sqrt();

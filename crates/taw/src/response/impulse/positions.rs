@@ -1,15 +1,15 @@
-//! Positions, once velocities are solved.
+//! Position update and position correction, after velocities are solved.
 
 use super::{Colliders, Constraint, Context};
 use crate::math::{Point3, Scalar, Vec3, is_finite_point};
 use crate::response::{Material, SolverBodies};
 
-/// How often overlap that is left after the velocities are solved is pushed out.
+/// Iterations of the position solver over penetrating contacts.
 const POSITION_ITERATIONS: u32 = 3;
 
 impl<S: Scalar> SolverBodies<'_, S> {
-    /// Lets positions follow what contacts changed of the velocities `initial_velocity`: what a bounce
-    /// changed from its moment on, all else for as long as the integrator does.
+    /// Updates positions by the solver's velocity changes since `initial_velocity`: those of a
+    /// bounce from its time of impact on, all others with the integrator's position weight.
     pub(super) fn update_positions(
         &mut self,
         initial_velocity: &[Vec3<S>],
@@ -37,8 +37,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Moves what overlaps too deep apart, sweep after sweep half of the way, the lighter one
-    /// further; but nothing deeper into a wall than it was.
+    /// Solves positions (nonlinear Gauss–Seidel): resolves half of the penetration beyond the slop
+    /// per iteration, by mass, without pushing anything deeper into a wall than it was.
     pub(super) fn solve_positions(
         &mut self,
         constraints: &[Constraint<S>],
@@ -58,8 +58,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Separation of a marble and a wall that pushing must not make smaller, in metres: below zero, at
-    /// least as deep as may stay.
+    /// Lower bound of a wall contact's separation during the position solve, in metres: the present
+    /// penetration, or the slop.
     fn min_separation(
         &self,
         c: &Constraint<S>,
@@ -72,7 +72,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         })
     }
 
-    /// Moves a marble back out of a wall that others have pushed it into.
+    /// Moves a marble back out of a wall that others pushed it into.
     fn restore_wall_separation(
         &mut self,
         c: &Constraint<S>,
@@ -87,7 +87,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Overlap that stays, in metres: what rests then need not fall back in every substep.
+    /// Allowed penetration (slop), in metres, so that resting marbles need not fall back in every
+    /// substep.
     fn allowed_penetration(
         &self,
         c: &Constraint<S>,

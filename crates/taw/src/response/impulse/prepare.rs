@@ -1,4 +1,4 @@
-//! From contacts to constraints: what each asks for.
+//! Preparation: contacts become constraints with target velocities.
 
 use cgmath::{InnerSpace, Zero};
 
@@ -8,7 +8,7 @@ use crate::contact::Contacts;
 use crate::math::{Mat3, Scalar, Vec3, direction_and_length};
 use crate::response::{Material, SolverBodies};
 
-/// Finds what each contact asks for, those with walls first, and which are of one island.
+/// Prepares a constraint per contact, walls first, and assigns islands.
 pub(super) fn prepare<S: Scalar>(
     marbles: &SolverBodies<S>,
     contacts: &Contacts<S>,
@@ -28,7 +28,7 @@ pub(super) fn prepare<S: Scalar>(
     for c in constraints.iter() {
         let island = islands.of_mut(c);
         island.bounces |= c.bounces;
-        // What turns on its way follows for the whole substep, too.
+        // A rotating capsule's position follows for the whole substep, too.
         island.has_resting_contact |= !c.bounces || c.axis_offset != [S::zero(); 2];
         if c.bounces {
             island.time_since_impact = island
@@ -42,7 +42,7 @@ pub(super) fn prepare<S: Scalar>(
 }
 
 impl<S: Scalar> SolverBodies<'_, S> {
-    /// What a contact asks for that does not bounce, and whether it does.
+    /// Constraint of a contact without restitution, and the decision if it bounces.
     fn constraint(
         &self,
         a: BodyA,
@@ -62,8 +62,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let inverse_effective_mass = self.pair_inverse_effective_mass(a, b, axis_offset, normal);
         let relative_velocity = self.relative_velocity(a, b, axis_offset, normal, surface_velocity);
         let approach_speed = -relative_velocity.dot(normal);
-        // The positions have moved on already, and will follow what changes now. So
-        // this speed is just enough to keep the gap from closing.
+        // Positions have moved already, and will follow the velocity changes. This target velocity
+        // just keeps the separation from closing.
         let (follow_time, dt) = (context.follow_time(a, b), context.settings.dt);
         let is_fast = approach_speed > context.settings.restitution_threshold;
         let target_normal_velocity = if dt == S::zero() {
@@ -106,12 +106,12 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let since_start = context.follow_time(a, b) - context.integrator_lead(&constraint);
         constraint.velocity_since_impact =
             self.relative_acceleration(&constraint, context) * since_start;
-        // What was stopped on its way touches, whatever rounding says.
+        // A body stopped by continuous detection is in contact, whatever rounding says.
         let ccd_stopped =
             context.is_ccd_stopped(b) || a.marble().is_some_and(|a| context.is_ccd_stopped(a));
         if is_fast && (separation < S::zero() || ccd_stopped) && dt > S::zero() {
             let time_since_impact = self.time_since_impact_of(&constraint, separation, context);
-            // Unless it is back on the ground before the substep ends.
+            // Only if it is not back on the surface before the substep ends.
             let relative_acceleration = self.relative_acceleration(&constraint, context);
             let speed =
                 material.restitution * self.approach_speed(&constraint, time_since_impact, context);
@@ -125,8 +125,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         (inverse_effective_mass.normal > S::zero()).then_some(constraint)
     }
 
-    /// The normal of a contact, and how far the two are apart along it, at the end of the
-    /// substep.
+    /// Normal and separation of a contact at the end of the substep.
     fn contact_geometry(
         &self,
         a: BodyA,
@@ -136,8 +135,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
     ) -> Option<(Vec3<S>, S)> {
         let (normal, separation) =
             self.normal_and_separation(self.position, a, b, axis_offset, context.walls)?;
-        // What pushes along the mean normal of a step does no work, and neither does
-        // an overlap that stays what it was.
+        // An impulse along the mean normal of the substep does no work, and constant penetration
+        // does none either.
         let walls_at_start = &WallsAtStart(context.walls);
         let start =
             self.normal_and_separation(context.start.position, a, b, axis_offset, walls_at_start);
@@ -152,8 +151,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }))
     }
 
-    /// The normal of two marbles where they met on their way through this substep, and how far
-    /// they are past that now, if they come together too fast for their place now to tell.
+    /// Normal and separation of two marbles at their time of impact within this substep, if they
+    /// approach too fast for their present positions to tell.
     fn contact_at_impact(
         &self,
         a: BodyA,
@@ -166,7 +165,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let dt = context.settings.dt;
         let velocity = self.velocity[b] - self.velocity[a];
         let threshold = context.settings.restitution_threshold;
-        // A capsule also turns on its way.
+        // A capsule rotates on its way.
         let is_sphere_contact = axis_offset == [S::zero(); 2];
         if context.start.velocity.is_empty()
             || velocity.magnitude2() <= threshold * threshold
@@ -176,7 +175,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
         let center_offset = self.period.nearest(self.position[b] - self.position[a]);
         let radius_sum = self.radius[a] + self.radius[b];
-        // Back along the way: |apart − velocity t| = reach.
+        // Backward time of impact: |center_offset − velocity t| = radius_sum.
         let (radial, speed_squared) = (center_offset.dot(velocity), velocity.magnitude2());
         let gap_squared =
             (center_offset.magnitude() - radius_sum) * (center_offset.magnitude() + radius_sum);
@@ -189,14 +188,14 @@ impl<S: Scalar> SolverBodies<'_, S> {
             direction_and_length(center_offset - velocity * time_since_impact)?;
         let is_valid =
             time_since_impact > S::zero() && time_since_impact <= dt && distance.is_finite();
-        // What pushes one of them otherwise, or rounding, may say that they never came together.
+        // Other contacts, or rounding, may imply that the two never came together.
         (is_valid
             && offset_at_impact.dot(velocity) < S::zero()
             && offset_at_impact.dot(normal) > -S::one())
         .then(|| (offset_at_impact, offset_at_impact.dot(center_offset) - radius_sum))
     }
 
-    /// The time since two met that overlap now, in seconds.
+    /// Time since the impact of a penetrating contact, in seconds.
     fn time_since_impact_of(
         &self,
         c: &Constraint<S>,
@@ -204,8 +203,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> S {
         let normal_acceleration = self.relative_acceleration(c, context).dot(c.normal);
-        // Under an even pull, positions lie on a parabola whose speed is that of the
-        // integrator at another moment.
+        // Under constant acceleration positions lie on a parabola, with the integrator's velocity
+        // at another time.
         let end_speed = -c.initial_relative_velocity.dot(c.normal)
             - normal_acceleration * context.integrator_lead(c);
         let speed_squared = (end_speed * end_speed
@@ -215,7 +214,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         time_since_impact.max(S::zero()).min(context.settings.dt)
     }
 
-    /// The speed of approach this long ago, in m/s.
+    /// Approach speed at the time of impact, in m/s.
     fn approach_speed(
         &self,
         c: &Constraint<S>,
@@ -227,10 +226,10 @@ impl<S: Scalar> SolverBodies<'_, S> {
         (velocity_since_impact - c.initial_relative_velocity).dot(c.normal).max(S::zero())
     }
 
-    /// What a contact asks for that bounces: at the moment of its island's first bounce, with
-    /// the speed of that moment, and positions follow from then on. So no height is won or
-    /// lost by when in a substep a bounce falls due. What bounces among others that rest
-    /// follows for the whole substep, as they do.
+    /// Sets the restitution target: at the time of the island's first impact, with the approach
+    /// speed of that time, and positions follow from then on. So the height of a bounce does not
+    /// depend on when it happens within a substep. A bounce among resting contacts follows for the
+    /// whole substep, as they do.
     fn set_restitution(
         &self,
         c: &mut Constraint<S>,
@@ -255,7 +254,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             (target_velocity - c.normal * target_velocity.dot(c.normal), velocity_since_impact);
     }
 
-    /// How forces pull the second of a contact from the first in this substep, in m/s².
+    /// Relative acceleration of a contact by forces in this substep, in m/s².
     fn relative_acceleration(
         &self,
         c: &Constraint<S>,
@@ -265,7 +264,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         self.acceleration(c.b, context) - first
     }
 
-    /// By forces in this substep, in m/s²; nothing where nobody knows.
+    /// Acceleration by forces in this substep, in m/s²; zero where unknown.
     fn acceleration(
         &self,
         row: usize,
@@ -295,24 +294,23 @@ where
         }
     }
 
-    /// Whether a row was stopped within the substep.
+    /// Tells if continuous collision detection stopped a row within the substep.
     pub(in crate::response) fn is_ccd_stopped(&self, row: usize) -> bool {
         self.ccd_stop(row).is_some()
     }
 
-    /// For a row that was stopped within the substep, the part of a change of velocity that its
-    /// position still follows, per substep.
+    /// Fraction of a velocity change that the position of a stopped row still follows, as a matrix.
     fn ccd_stop(&self, row: usize) -> Option<Mat3<S>> {
         self.start.ccd_stops.get(row).copied().flatten()
     }
 
-    /// Way by which a position follows a change of velocity, in metres.
+    /// Displacement of a row by a velocity change, in metres.
     pub(in crate::response) fn displacement_of(&self, row: usize, change: Vec3<S>) -> Vec3<S> {
         let displacement = change * (self.position_weight)(row) * self.settings.dt;
         self.ccd_stop(row).map_or(displacement, |projection| projection * displacement)
     }
 
-    /// The time for which a position follows a change of velocity, in seconds.
+    /// Time for which the position of a row follows a velocity change, in seconds.
     pub(in crate::response) fn follow_time_of(&self, row: usize) -> S {
         if self.is_ccd_stopped(row) {
             S::zero()
@@ -321,20 +319,19 @@ where
         }
     }
 
-    /// The time for which a gap follows a change of its speed, in seconds.
+    /// Time for which a separation follows a change of its speed, in seconds.
     pub(in crate::response) fn follow_time(&self, a: BodyA, b: usize) -> S {
         mean(a, b, |row| self.follow_time_of(row))
     }
 
-    /// By how much the velocities that the integrator keeps are ahead of those of the path, in
-    /// seconds.
+    /// Lead of the integrator's velocities over those of the path, in seconds.
     fn integrator_lead(&self, c: &Constraint<S>) -> S {
         let position_weight = mean(c.a, c.b, |row| (self.position_weight)(row));
         (position_weight - S::constant(0.5)) * self.settings.dt
     }
 }
 
-/// The mean over the marbles of a contact.
+/// Mean over the marbles of a contact.
 fn mean<S: Scalar>(a: BodyA, b: usize, of: impl Fn(usize) -> S) -> S {
     a.marble().map_or_else(|| of(b), |a| (of(a) + of(b)) * S::constant(0.5))
 }

@@ -1,4 +1,4 @@
-//! The iterations of the impulse method: velocities that all contacts agree on.
+//! Iterations of sequential impulses, and their acceleration.
 
 use cgmath::{InnerSpace, Zero};
 
@@ -8,19 +8,19 @@ use crate::math::{Scalar, Vec3, is_finite, length};
 use crate::response::SolverBodies;
 use crate::response::impact::clamp_length;
 
-/// Sweeps over the contacts until they agree, or as often as the settings allow, in those
-/// islands that do not agree yet.
+/// Iterates over the contacts of islands that have not converged, until they do or the iterations
+/// are used up.
 ///
-/// Sweep by sweep alone (Gauss and Seidel), a heavy marble on a light one would take as
-/// many sweeps as it is times as heavy. So after each sweep the solver looks, of all impulses that
-/// are some of this sweep and some of the ways that it went before, for the best ones: sweeps as
-/// preconditioner of a search in a small subspace, as in Anderson's mixing (*Iterative procedures
-/// for nonlinear integral equations*, 1965) and, for contacts, Silcowitz, Niebe and Erleben, *A
-/// nonsmooth nonlinear conjugate gradient method for interactive contact force problems*, 2010.
+/// Plain Gauss–Seidel passes would need as many iterations as a marble is heavier than the one
+/// below it. So after each pass the solver searches the best combination of this pass and the
+/// accelerated steps before it: the pass is the preconditioner of a search in a small subspace, as
+/// in Anderson mixing (*Iterative procedures for nonlinear integral equations*, 1965) and, for
+/// contacts, Silcowitz, Niebe and Erleben, *A nonsmooth nonlinear conjugate gradient method for
+/// interactive contact force problems*, 2010.
 ///
-/// With `f` the impulses, `A f` the change of velocity that they make at the contacts and `w`
-/// the change that the contacts ask for, sweeps and searches lower `½ f·A f − f·w`, the
-/// energy of what is still wanted. Sweeps end the iterations, never a search.
+/// With `f` the impulses, `A f` the velocity change that they cause at the contacts and `w` the
+/// requested one, passes and searches lower `½ f·A f − f·w`, the energy of the remaining error. A
+/// pass ends the iterations, never a search.
 pub(super) fn iterate<S: Scalar>(
     marbles: &mut SolverBodies<S>,
     constraints: &mut [Constraint<S>],
@@ -50,8 +50,8 @@ pub(super) fn iterate<S: Scalar>(
 }
 
 impl<S: Scalar> Constraint<S> {
-    /// The impulse along the normal and across it that is next to this one and that a contact
-    /// can bear: nothing pulls, and friction is bounded by Coulomb's cone.
+    /// Projection of an impulse to the friction cone, as normal and tangential impulse: no tension,
+    /// and Coulomb friction.
     fn project_to_cone(&self, impulse: Vec3<S>) -> (S, Vec3<S>) {
         let normal_part = impulse.dot(self.normal);
         let normal_impulse = normal_part.max(self.min_normal_impulse);
@@ -61,14 +61,14 @@ impl<S: Scalar> Constraint<S> {
         )
     }
 
-    /// As much of a change of its impulse as it can bear.
+    /// Change of the impulse, clamped to the cone.
     fn clamp_to_cone(&self, direction: Vec3<S>) -> Vec3<S> {
         let (normal_impulse, tangent_impulse) = self.project_to_cone(self.impulse() + direction);
         self.normal * (normal_impulse - self.normal_impulse)
             + (tangent_impulse - self.tangent_impulse)
     }
 
-    /// Up to which part of a change of its impulse it still pushes.
+    /// Largest fraction of a change for which the normal impulse stays admissible.
     fn max_fraction(&self, direction: Vec3<S>) -> S {
         let normal_part = direction.dot(self.normal);
         if normal_part < S::zero() {
@@ -78,32 +78,32 @@ impl<S: Scalar> Constraint<S> {
         }
     }
 
-    /// What friction can be at most beside this pressure.
+    /// Friction bound for a normal impulse.
     fn max_friction(&self, normal_impulse: S) -> S {
         self.friction * normal_impulse + self.friction_bound
     }
 }
 
 impl<S: Scalar> SolverBodies<'_, S> {
-    /// The relative velocity of a contact's two points, in m/s.
+    /// Relative velocity of a contact's two points, in m/s.
     pub(super) fn relative_velocity_of(&self, c: &Constraint<S>) -> Vec3<S> {
         self.relative_velocity(c.a, c.b, c.axis_offset, c.normal, c.surface_velocity)
     }
 
-    /// Rounding of the velocities that a contact sees, in m/s. Below it, sweeps would only push
-    /// what is fast to one side.
+    /// Rounding of the velocities at a contact, in m/s. Smaller changes would only push fast bodies
+    /// to one side.
     pub(super) fn velocity_rounding(&self, c: &Constraint<S>) -> S {
         let speed = |row: usize| self.velocity[row].magnitude();
         (speed(c.b) + c.a.marble().map_or_else(S::zero, speed)) * S::epsilon()
     }
 
-    /// The change of relative velocity that a contact still asks for, in m/s.
+    /// Velocity error: target minus relative velocity, in m/s.
     fn velocity_error_of(&self, c: &Constraint<S>) -> Vec3<S> {
         c.normal * c.target_normal_velocity + c.target_tangent_velocity
             - self.relative_velocity_of(c)
     }
 
-    /// One step toward what a contact asks for. Gives the change of velocity.
+    /// Solves one contact point. Returns the velocity change, in m/s.
     fn solve_point(&mut self, c: &mut Constraint<S>) -> S {
         let velocity_error = self.velocity_error_of(c);
         let normal_part = velocity_error.dot(c.normal);
@@ -123,8 +123,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         change.magnitude()
     }
 
-    /// Goes on from a sweep: along it and the ways before, as far along each as brings the contacts
-    /// of each island nearest to what they ask for.
+    /// Accelerates a pass: extends it, together with the steps before, to the combination that
+    /// brings each island nearest to its target velocities.
     fn accelerate(&mut self, constraints: &mut [Constraint<S>], islands: &mut Islands<S>) {
         islands.list.iter_mut().for_each(Island::begin_search);
         for c in constraints.iter_mut() {
@@ -135,8 +135,9 @@ impl<S: Scalar> SolverBodies<'_, S> {
                 || length(c.tangent_impulse)
                     >= c.max_friction(c.normal_impulse) * (S::one() - S::epsilon())
             {
-                // It slides, whichever way it does. Or rebounds ask for what friction in a
-                // corner cannot give, and both would grow against each other without end.
+                // Sliding friction stays at the cone, whichever way it slides. And restitution can
+                // ask for more than friction in a corner can give, so that both would grow without
+                // end.
                 c.search_directions =
                     c.search_directions.map(|direction| c.normal * direction.dot(c.normal));
             }
@@ -151,7 +152,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             island.add_directions(c, self.velocity_rounding(c));
         }
         islands.list.iter_mut().for_each(Island::solve_weights);
-        // Within the cones: what a contact cannot bear would throw others about.
+        // Projected to the cones: inadmissible impulses would throw other marbles about.
         for c in constraints.iter_mut() {
             let Some(island) = islands.accelerating(c) else { continue };
             let (straight, direction_velocities) =
@@ -162,7 +163,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             let rounding = (c.normal_impulse + length(straight)) * S::epsilon();
             island.add_cone_limit(c.max_fraction(straight), length(tangential) > rounding);
             self.apply_impulse_pair(c, direction - c.search_directions[0]);
-            // The oldest way makes room.
+            // The oldest direction is dropped.
             (c.search_directions, c.direction_velocities) = (
                 [straight, direction, c.search_directions[1]],
                 [direction_velocities, Vec3::zero(), c.direction_velocities[1]],
@@ -184,13 +185,13 @@ impl<S: Scalar> SolverBodies<'_, S> {
                 }
             };
             self.apply_impulse_pair(c, direction - c.search_directions[1]);
-            // Between two points of a cone lies nothing outside of it, but for rounding.
+            // Cones are convex, so only rounding can lie outside.
             (c.normal_impulse, c.tangent_impulse) = c.project_to_cone(c.impulse() + direction);
             (c.search_directions[1], c.direction_velocities[1]) = (direction, direction_velocities);
         }
     }
 
-    /// One step toward no relative spin, as far as the resistances can.
+    /// Solves rolling and torsional friction: one step toward zero relative spin.
     fn solve_rolling(&mut self, c: &mut Constraint<S>) {
         let Some(rolling) = c.rolling else { return };
         let wanted = rolling.angular_impulse - self.relative_spin(c) / rolling.inverse_inertia;
@@ -205,7 +206,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// How the second of a contact turns against the first, in rad/s.
+    /// Relative spin of a contact, in rad/s.
     pub(super) fn relative_spin(&self, c: &Constraint<S>) -> Vec3<S> {
         let first = c.a.marble().map_or_else(Vec3::zero, |a| self.unlocked_spin(a));
         self.unlocked_spin(c.b) - first

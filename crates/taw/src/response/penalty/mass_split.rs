@@ -1,24 +1,24 @@
-//! How the contacts of one marble share it.
+//! Mass splitting: the contacts of one marble share its mass.
 
-use super::PenaltyContact;
+use super::contact::PenaltyContact;
 use super::law::Springs;
 use crate::math::Scalar;
 
-/// What the contacts of a marble ask of a substep, all together.
+/// Stiffness and damping demand of a marble's contacts in a substep.
 ///
 /// A marble of N contacts is split into N marbles that share its mass (Tonge, Benevolenski and
-/// Voroshilov, *Mass splitting for jitter-free parallel rigid body simulation*, 2012), each by
-/// what its contact asks for: then the stiffnesses of all contacts together, whatever their
-/// directions and masses, are no more than that of one contact at its limit. Where N
-/// contacts ask for less than that limit, none is softened.
+/// Voroshilov, *Mass splitting for jitter-free parallel rigid body simulation*, 2012), in
+/// proportion to the demand: then the stiffness of all contacts together, whatever their directions
+/// and masses, is at most that of one contact at its limit. Where the total stays below the limit,
+/// no contact is softened.
 #[derive(Clone, Copy)]
 pub(super) struct ContactLoad<S> {
-    /// Of dashpots: the part of the velocity that all take in a substep; more than one would turn
-    /// it back.
+    /// Fraction of the velocity that all dashpots take in a substep; more than one would reverse
+    /// it.
     damping: S,
-    /// Of springs alone.
+    /// Stiffness of the springs, as (ω dt)².
     stiffness: S,
-    /// How many contacts there are.
+    /// Number of contacts.
     pub count: S,
 }
 
@@ -33,7 +33,7 @@ impl<S: Scalar> ContactLoad<S> {
         self.count += other.count;
     }
 
-    /// Of one contact, along the normal and across it.
+    /// Demand of one contact, normal and tangential.
     pub fn of(
         contact: &PenaltyContact<S>,
         springs: &Springs<S>,
@@ -48,21 +48,21 @@ impl<S: Scalar> ContactLoad<S> {
         ];
         let stiffness = limits.map(|(stiffness, inverse_mass)| stiffness * inverse_mass * dt * dt);
         let damping = half_damping.map(|half| number(2.0) * half / (S::one() + half));
-        // Of a ball, what is along and what is across are apart.
+        // Normal and tangential motion of a sphere are independent.
         let total = |[normal, tangent]: [S; 2]| {
             if contact.has_capsule { normal + tangent } else { normal.max(tangent) }
         };
         Self { damping: total(damping), stiffness: total(stiffness), count: S::one() }
     }
 
-    /// Into how many marbles one is split, at least one.
+    /// Number of marbles that one is split into, at least one.
     pub fn split_count(&self) -> S {
-        // Stable is what has (ω dt)² and twice the part that dashpots take below 4. And a marble
-        // with all its contacts goes through an eighth of a turn of its oscillation in a
-        // substep at most, so that it is still one.
+        // Stable is (ω dt)² plus twice the damped fraction below 4. And a marble with all its
+        // contacts goes through at most an eighth of its oscillation per substep, so that the
+        // motion is resolved.
         S::one().max(self.damping).max(self.stiffness / S::constant(RESOLVED))
     }
 }
 
-/// The square of π/4.
+/// Square of π/4.
 const RESOLVED: f64 = std::f64::consts::PI * std::f64::consts::PI / 16.0;

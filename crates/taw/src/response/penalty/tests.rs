@@ -3,8 +3,8 @@ use crate::broad::Period;
 use crate::math::Point3;
 use crate::response::Elasticity;
 
-/// Two balls of this elasticity meet head-on at `speed` each, with gravity off:
-/// contact time, largest overlap, largest force (by the change of velocity).
+/// Head-on collision of two balls at `speed` each, without gravity: contact time, maximum
+/// penetration, maximum force (by the velocity change).
 fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -> [f64; 3] {
     let mass = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3) * density;
     let shear_modulus = elasticity.youngs_modulus / (2.0 + 2.0 * elasticity.poissons_ratio);
@@ -23,7 +23,7 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
         }
         let separation = position[1].x - position[0].x - 2.0 * radius;
         if separation > 0.0 {
-            // They parted within this step.
+            // They separated within this step.
             time += dt - separation / (velocity[1].x - velocity[0].x);
             return [time, penetration, force];
         }
@@ -73,7 +73,7 @@ fn elastic_balls_collide_as_hertz_says() {
     ] {
         let elasticity = Elasticity { youngs_modulus: modulus, poissons_ratio: ratio };
         let found = head_on(elasticity, density, 0.01, 10.0);
-        // The end of the contact is seen only at the end of a step, of 1 %.
+        // The end of the contact shows only at the end of a step, of 1 %.
         for ((found, exact), tolerance) in found.into_iter().zip(exact).zip([1e-2, 1e-3, 1e-3]) {
             assert!((found / exact - 1.0).abs() < tolerance, "{found}, not {exact}");
         }

@@ -104,7 +104,7 @@ impl<S: Scalar> World<S> {
             ways[bend.stop.row as usize].next = Some(index as u32);
         }
         hits.extend((0..start.len() as u32).filter_map(|row| Hit::at_wall(row, ways, bends)));
-        if !self.model.response.needs_overlap() {
+        if !self.model.response.needs_penetration() {
             self.find_who_may_meet(slow);
         }
         self.bend_in_order(self.slow(dt));

@@ -147,7 +147,7 @@ impl<S: Scalar> World<S> {
         if !passes {
             return None;
         }
-        let part_of_it = if self.model.response.needs_overlap() { half } else { into };
+        let part_of_it = if self.model.response.needs_penetration() { half } else { into };
         let all = Sphere { radius: sphere.radius * part_of_it, ..*sphere };
         let mut best: Option<Stop<S>> = None;
         self.walls.near(&bounds, |part| {
