@@ -1,10 +1,10 @@
-//! The end of a knot. Where light balls are between heavy ones, sweeps over contacts with friction
-//! may take as many rounds as one is times as heavy as the other. What they leave is solved here
-//! at once: impulses along the normals, by which balls that touch come no nearer to each other.
+//! Active-set solver for the approach that iterations leave. Where light balls are between heavy
+//! ones, iterations over contacts with friction need as many rounds as the ratio of masses. The
+//! rest is solved here directly: normal impulses after which no pair in contact approaches.
 //!
-//! Of all motions in which nothing comes nearer it is the next one, counted by kinetic energy of
-//! the difference (Moreau, *Unilateral contact and dry friction in finite freedom dynamics*, 1988).
-//! So among walls at rest energy only gets less; and each impulse has its opposite.
+//! Of all such velocities it finds the nearest one, in the metric of kinetic energy (Moreau,
+//! *Unilateral contact and dry friction in finite freedom dynamics*, 1988). So among walls at rest
+//! it only loses energy, and momentum is conserved.
 
 use cgmath::InnerSpace;
 
@@ -16,19 +16,19 @@ use crate::contact::Contacts;
 use crate::math::{Point3, Vec3, direction_and_length};
 use crate::response::{Colliders, ImpulseSample};
 
-/// Impulses at once, at most: so many take some ten milliseconds. What a larger knot leaves meets
-/// again.
+/// Maximum number of active constraints, which take some ten milliseconds. Pairs beyond that
+/// collide again.
 const MAX_ACTIVE: usize = 100;
-/// A tie whose direction is this near to one that others make together (as the square of a sine)
-/// adds nothing but rounding.
+/// A constraint is dependent if the squared sine of its angle to the span of the active ones is
+/// below this: it would add rounding only.
 const DEPENDENCE: f64 = 1e-14;
-/// Rounding of the first solution is solved again, and once more.
+/// Number of passes; the later ones solve for the rounding of the first.
 const PASSES: u32 = 3;
 
-/// Products of two ties that take the time of a look: three nanoseconds each, of twenty.
+/// Products of two constraints per unit of cost: three nanoseconds each, of twenty.
 const PRODUCTS_PER_COST: u64 = 7;
 
-/// Two that touch and shall come no nearer.
+/// Constraint of a pair in contact: no approach along the normal.
 #[derive(Clone, Copy, Debug)]
 struct NormalConstraint {
     /// None for a wall.
@@ -36,7 +36,7 @@ struct NormalConstraint {
     b: usize,
     /// From a to b.
     normal: Vec3<f64>,
-    /// The velocity of the wall's surface, in m/s.
+    /// Velocity of the wall's surface, in m/s.
     surface_velocity: Vec3<f64>,
 }
 
@@ -49,7 +49,7 @@ impl NormalConstraint {
         self.relative_velocity(velocity).dot(self.normal)
     }
 
-    /// Pushes the two apart, by an impulse in N s.
+    /// Applies an impulse, in N s, that separates the two.
     fn apply_impulse(&self, impulse: f64, inverse_mass: &[f64], velocity: &mut [Vec3<f64>]) {
         velocity[self.b] += self.normal * (impulse * inverse_mass[self.b]);
         if let Some(a) = self.a {
@@ -57,7 +57,7 @@ impl NormalConstraint {
         }
     }
 
-    /// The speed that an impulse of one at the other tie gives to this one.
+    /// Coupling: separation speed of this constraint per impulse at the other one, in 1/kg.
     fn coupling(&self, other: &Self, inverse_mass: &[f64]) -> f64 {
         let ends = |c: &Self| [(Some(c.b), 1.0), (c.a, -1.0)];
         let mut shared = 0.0;
@@ -74,26 +74,26 @@ impl NormalConstraint {
     }
 }
 
-/// Active set method for impulses that only push (Lawson and Hanson, *Solving least squares
+/// Active-set method for non-negative least squares (Lawson and Hanson, *Solving least squares
 /// problems*, 1974, chapter 23).
 struct ActiveSet<'a> {
     constraints: &'a [NormalConstraint],
     inverse_mass: &'a [f64],
-    /// Before any of them pushes, in m/s.
+    /// Velocities before the impulses, in m/s.
     velocity: &'a [Vec3<f64>],
-    /// Those that push.
+    /// Indices of the constraints with an impulse.
     active: Vec<usize>,
-    /// Rows of the Cholesky factor of what they give each other.
+    /// Rows of the Cholesky factor of their coupling matrix.
     factor: Vec<Vec<f64>>,
-    /// In N s.
+    /// Impulses, in N s.
     impulse: Vec<f64>,
-    /// Those that others determine already.
+    /// Constraints that depend on active ones.
     dependent: Vec<bool>,
     settings: &'a EventSettings<'a>,
 }
 
 impl ActiveSet<'_> {
-    /// Impulses after which no tie closes faster than `tolerance`, in m/s.
+    /// Impulses after which no constraint approaches faster than `tolerance`, in m/s.
     fn solve_active_set(mut self, separation_speeds: &[f64], tolerance: f64) -> Vec<f64> {
         for _ in 0..3 * self.constraints.len() {
             if self.active.len() >= MAX_ACTIVE {
@@ -106,7 +106,8 @@ impl ActiveSet<'_> {
                 self.dependent[next] = true;
                 continue;
             };
-            // As far as nothing would pull; what would is let go.
+            // Steps only as far as all impulses stay positive; constraints that would pull leave
+            // the active set.
             while full.iter().any(|impulse| *impulse <= 0.0) {
                 let fraction = self.active.iter().zip(&full).filter(|(_, target)| **target <= 0.0);
                 let fraction =
@@ -137,12 +138,12 @@ impl ActiveSet<'_> {
         self.impulse
     }
 
-    /// Adds products of ties to the cost of the substep.
+    /// Adds to the cost of the substep, in products.
     fn add_cost(&self, products: usize) {
         self.settings.add_cost(products as u64 / PRODUCTS_PER_COST);
     }
 
-    /// The tie that closes fastest beside those that push.
+    /// Constraint with the fastest approach outside of the active set.
     fn most_violated(&self, tolerance: f64) -> Option<usize> {
         self.add_cost(self.velocity.len() + self.constraints.len());
         let mut velocity = self.velocity.to_vec();
@@ -162,8 +163,8 @@ impl ActiveSet<'_> {
         most_violated.1
     }
 
-    /// Impulses of those that push, after which none of them closes or parts (Cholesky). None if
-    /// the last one is determined by the others.
+    /// Impulses after which the separation speeds of all active constraints vanish (Cholesky). None
+    /// if the last one depends on the others.
     fn solve_active(&mut self, separation_speeds: &[f64]) -> Option<Vec<f64>> {
         let count = self.active.len();
         for i in self.factor.len()..count {
@@ -199,7 +200,7 @@ impl ActiveSet<'_> {
 }
 
 impl EventDriven {
-    /// Ends what a heap that was solved at once has left of its approach, above `tolerance`, in m/s.
+    /// Ends the approach that a cluster's instantaneous solve has left, above `tolerance`, in m/s.
     pub(super) fn end_remaining_approach(
         &mut self,
         contacts: &Contacts<f64>,

@@ -1,4 +1,4 @@
-//! A ball on its path between two events.
+//! Ball with its trajectory between two events.
 
 use cgmath::Zero;
 
@@ -8,71 +8,71 @@ use super::{EventSettings, MAX_FREEZES, SIMULTANEOUS};
 use crate::math::{Point3, Vec3};
 use crate::response::{BallRotation, Material};
 
-/// A ball: what the world tells of it, and how it moves just now.
+/// Ball: state from the world, and its present trajectory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ball {
-    /// In metres, when its path began.
+    /// Center at the start of the trajectory, in metres.
     pub position: Point3<f64>,
-    /// In m/s, when its path began.
+    /// Velocity at the start of the trajectory, in m/s.
     pub velocity: Vec3<f64>,
-    /// In rad/s, when its path began.
+    /// Angular velocity at the start of the trajectory, in rad/s.
     pub spin: Vec3<f64>,
-    /// The acceleration by all forces, in m/s².
+    /// Acceleration by all external forces, in m/s².
     pub external_acceleration: Vec3<f64>,
     /// In metres.
     pub radius: f64,
     /// In 1/kg.
     pub inverse_mass: f64,
     pub material: Material<f64>,
-    /// Tells if friction sets it spinning.
+    /// Rotation lock: tells if friction spins it.
     pub rotation: BallRotation,
-    /// Part of a gap that may be due to the rounding of the position, in metres.
+    /// Position error by rounding, in metres.
     pub position_error: f64,
-    /// Turn so far in this substep, as an axial vector in radians.
+    /// Rotation so far in this substep, as an axial vector in radians.
     pub rotation_increment: Vec3<f64>,
     pub trajectory: Trajectory,
 }
 
-/// Motion of a ball from its last event on.
+/// Motion of a ball since its last event.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Trajectory {
-    /// When it began, in seconds from the start of the substep.
+    /// Start time, in seconds from the start of the substep.
     pub(super) start: f64,
     pub(super) acceleration: Vec3<f64>,
     pub(super) spin_acceleration: Vec3<f64>,
-    /// The wall that it lies on.
+    /// Wall that supports it.
     pub(super) support: Option<usize>,
-    /// Where it is when its path changes by itself, if that is known better than by the
-    /// acceleration.
+    /// State at the end, where that is known more precisely than by the acceleration.
     pub(super) end_state: Option<BallState>,
-    /// True if what it lies on ends there, or bends away from under it.
+    /// True if the support ends there, or curves away from under it.
     pub(super) leaves_support: bool,
-    /// The wall that it has just come off.
+    /// Wall that it has just left.
     pub(super) left_wall: Option<usize>,
-    /// True if its acceleration holds it in a heap.
+    /// True if it rests in a cluster, with the acceleration of that.
     pub(super) clustered: bool,
-    /// True if other balls are in that heap.
+    /// True if there are other balls in that cluster.
     pub(super) touches_balls: bool,
-    /// Power that walls bring in there, in watts, for those who ask.
+    /// Power supplied by walls there, in watts, for the energy audit.
     pub(super) wall_power: f64,
-    /// Loss by the collisions of this substep, in parts of their approach; all of
-    /// it where no time went by since the one before.
+    /// Dissipation count: sum of the relative losses of approach speed in this substep; a whole one
+    /// for a collision without time since the one before.
     pub(super) dissipation_count: f64,
-    /// When the last one was.
+    /// Time of the last collision.
     pub(super) last_collision: f64,
-    /// Number of times that it was brought to rest because it had too many. Each time it takes twice
-    /// the energy to wake it.
+    /// Number of times that it was put to rest for too many collisions. Each time doubles the
+    /// energy that wakes it.
     pub(super) freeze_count: i32,
-    /// Number of steps in this substep over what is no half-space.
+    /// Number of steps in this substep on curved or bounded walls.
     pub(super) support_steps: u32,
-    /// When its acceleration changes by itself.
+    /// Time of the next change of regime.
     pub(super) regime_end: f64,
-    /// Counts its paths, so that what was foreseen of an old one is known to be void.
+    /// Version, incremented with each new trajectory: events predicted for another version are
+    /// void.
     pub(super) version: u32,
     pub(super) cell_slot: CellSlot,
 }
 
-/// Where others find a ball.
+/// Place of a ball in the broad phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum CellSlot {
     Cell(Cell),
@@ -113,7 +113,7 @@ impl Ball {
         self.velocity + self.trajectory.acceleration * (time - self.trajectory.start)
     }
 
-    /// Lets its path begin at a later time.
+    /// Advances the start of its trajectory to a later time.
     pub(super) fn advance(&mut self, time: f64) {
         let t = time - self.trajectory.start;
         let start = self.position;
@@ -124,7 +124,7 @@ impl Ball {
         };
         let duration = end.time - self.trajectory.start;
         let fraction = if duration > 0.0 && time < end.time { t / duration } else { 1.0 };
-        // A velocity that is right at both ends and leads from place to place.
+        // Velocity that is exact at both ends and integrates to the displacement.
         let mean = if duration > 0.0 { (end.position - start) / duration } else { end.velocity };
         let correction =
             (mean - (self.velocity + end.velocity) * 0.5) * (6.0 * fraction * (1.0 - fraction));
@@ -141,7 +141,7 @@ impl Ball {
                 self.advance_free(time);
             }
         } else if let Some(end_state) = &mut self.trajectory.end_state {
-            // The rest of the same path.
+            // Remainder of the same trajectory.
             *end_state = end;
         }
         self.trajectory.start = time;
@@ -155,7 +155,7 @@ impl Ball {
         self.trajectory.start = time;
     }
 
-    /// Lets it stay where it is for the rest of the substep.
+    /// Freezes it for the rest of the substep.
     pub(super) fn freeze(&mut self) {
         self.fly_free();
         self.velocity = Vec3::zero();
@@ -163,12 +163,12 @@ impl Ball {
         self.trajectory.freeze_count = self.trajectory.freeze_count.max(MAX_FREEZES);
     }
 
-    /// True if it stays where it is for the rest of the substep.
+    /// True if it is frozen for the rest of the substep.
     pub(super) fn is_frozen(&self) -> bool {
         self.trajectory.freeze_count >= MAX_FREEZES
     }
 
-    /// Lets go of whatever held it.
+    /// Starts free flight: leaves supports and clusters.
     pub(super) fn fly_free(&mut self) {
         self.trajectory = Trajectory {
             start: self.trajectory.start,
@@ -183,7 +183,7 @@ impl Ball {
         };
     }
 
-    /// Notes a collision, now.
+    /// Records a collision at the present time.
     pub(super) fn collide(&mut self, material: Material<f64>, settings: &EventSettings) {
         let is_simultaneous =
             self.trajectory.start - self.trajectory.last_collision <= SIMULTANEOUS * settings.dt;
@@ -192,14 +192,14 @@ impl Ball {
         self.trajectory.last_collision = self.trajectory.start;
     }
 
-    /// Applies an impulse at the point where `normal` comes from to the center.
+    /// Applies an impulse at the contact point; `normal` points from there to the center.
     pub(super) fn apply_impulse(&mut self, impulse: Vec3<f64>, normal: Vec3<f64>) {
         self.velocity += impulse * self.inverse_mass;
         let factor: f64 = self.rotation.inverse_inertia_factor();
         self.spin -= normal.cross(impulse) * (factor * self.inverse_mass / self.radius);
     }
 
-    /// The velocity of its point toward `-normal` by its spin alone.
+    /// Velocity of the contact point by spin alone; `normal` points from there to the center.
     pub(super) fn spin_velocity(&self, normal: Vec3<f64>) -> Vec3<f64> {
         match self.rotation {
             BallRotation::Free => normal.cross(self.spin) * self.radius,

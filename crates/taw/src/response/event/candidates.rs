@@ -1,5 +1,6 @@
-//! Which walls a ball can come to. Found ball by ball, by how far it can go, so that one on a
-//! large mesh knows some of its triangles only; looked for again when it gets farther.
+//! Candidate walls: the walls that a ball may touch. Searched ball by ball, within the distance
+//! that it can travel, so that a ball on a large mesh gets only some of its triangles; searched
+//! again when it gets further.
 
 use std::collections::BTreeMap;
 
@@ -8,35 +9,34 @@ use cgmath::InnerSpace;
 use super::{Ball, EventDriven, EventSettings, SEAM_TOLERANCE, Wall};
 use crate::math::Point3;
 
-/// A ball that knows the walls this many cells around needs to know no more yet.
+/// Search range in cells of the grid; enough for most balls.
 const MAX_CELLS_AROUND: f64 = 4.0;
-/// A ball looks farther than that for as long as it finds no more parts of walls.
+/// Number of sub-shapes up to which a ball searches further than that.
 const FEW_PARTS: usize = 32;
-/// A ball that looks around counts as so many looks, besides the parts that it finds.
+/// Cost of a search, besides the sub-shapes found.
 const SEARCH_COST: u64 = 64;
-/// After this part of how far it may go, a ball looks around anew.
+/// Fraction of the searched range after which a ball searches again.
 const REFRESH_FRACTION: f64 = 0.9;
-/// A part of a radius that is added to how far a ball can go, so that one at rest need not
-/// look again.
+/// Extra range over the radius, so that a ball at rest need not search again.
 const EXTRA_RANGE: f64 = 1e-3;
 
-/// Where walls come from.
+/// Walls of the world, as the event-driven solver reads them.
 pub(crate) trait WallSource {
-    /// Names all half-spaces.
+    /// Visits all half-spaces.
     fn planes(&self, visit: &mut dyn FnMut(u32));
-    /// Tests for walls other than half-spaces.
+    /// True if there are walls other than half-spaces.
     fn has_parts(&self) -> bool;
-    /// Names the parts of other walls that may come within `range` metres of a point in this
+    /// Visits sub-shapes of other walls that may come within `range` metres of a point in this
     /// substep.
     fn near(&self, point: Point3<f64>, range: f64, visit: &mut dyn FnMut(u32, u32));
-    /// A part of a wall.
+    /// Returns a sub-shape of a wall.
     fn wall(&self, row: u32, part: u32) -> Option<Wall>;
 }
 
 /// Candidate walls of all balls in a substep.
 #[derive(Clone, Debug, Default)]
 pub(super) struct WallCandidates {
-    /// The places in the list of walls of all that are known, by row and part.
+    /// Index in the list of walls, by row and sub-shape.
     index: BTreeMap<(u32, u32), u32>,
     ids: Vec<(u32, u32)>,
     previous_ids: Vec<(u32, u32)>,
@@ -47,18 +47,19 @@ pub(super) struct WallCandidates {
     per_ball: Vec<BallCandidates>,
 }
 
-/// Candidate walls of a ball: all within its radius of any point at most `covered` metres from `center`.
+/// Candidate walls of one ball: all within its radius of any point at most `covered` metres from
+/// `center`.
 #[derive(Clone, Copy, Debug)]
 struct BallCandidates {
     center: Point3<f64>,
-    /// Distance of that place from the center, at most, in metres.
+    /// Range that was searched, in metres.
     covered: f64,
-    /// Where its walls are in the lists.
+    /// Range of its walls in `lists`.
     walls: [usize; 2],
 }
 
 impl EventDriven {
-    /// Finds the walls that balls may come to.
+    /// Finds the candidate walls of all balls at the start of a substep.
     pub(super) fn find_candidates(&mut self, settings: &EventSettings) {
         let source = settings.source;
         let mut candidates = std::mem::take(&mut self.candidates);
@@ -107,7 +108,8 @@ impl EventDriven {
         }
     }
 
-    /// Has a ball know all walls that it may come to from now on, or as far as those are few.
+    /// Searches the candidate walls of a ball, up to the distance that it can travel, or as far as
+    /// they are few.
     pub(super) fn refresh_candidates(&mut self, row: usize, now: f64, settings: &EventSettings) {
         let (center, max_range) = self.position_and_range(row, now, settings);
         let margin = self.margin(row);
@@ -142,8 +144,8 @@ impl EventDriven {
         per_ball[row] = BallCandidates { center, covered, walls: [start, lists.len()] };
     }
 
-    /// When a ball may come to walls that it does not know, in seconds from now; none if it
-    /// cannot in this substep. It looks around before.
+    /// Time until a ball may leave the range of its candidates, in seconds from now; none within
+    /// this substep. Searches first if needed.
     pub(super) fn candidates_expiry(
         &mut self,
         row: usize,
@@ -155,17 +157,17 @@ impl EventDriven {
         let (at, remaining) = (ball.position_at(now), settings.dt - now);
         let BallCandidates { center, covered, .. } = *self.candidates.per_ball.get(row)?;
         let travelled = (at - center).magnitude();
-        // Between the two, so that each look brings it on.
+        // Between refresh and end of the range, so that each search makes progress.
         let distance = 0.5 * (1.0 + REFRESH_FRACTION) * covered - travelled;
         let speed = ball.velocity_at(now).magnitude();
-        // The earliest end of a way at that speed and strongest acceleration.
+        // Lower bound of the travel time at this speed and the largest acceleration.
         let time = 2.0 * distance
             / (speed + (speed * speed + 2.0 * max_acceleration(ball) * distance).sqrt());
-        // What is not finite knows what it knows.
+        // Non-finite balls keep their candidates.
         (time > 0.0 && time < remaining).then_some(time)
     }
 
-    /// Has a ball look around that came to where walls may be that it does not know.
+    /// Searches again if a ball is close to the end of its range.
     pub(super) fn ensure_candidates(&mut self, row: usize, now: f64, settings: &EventSettings) {
         let at = self.balls[row].position_at(now);
         let Some(BallCandidates { center, covered, .. }) = self.candidates.per_ball.get(row) else {
@@ -176,7 +178,7 @@ impl EventDriven {
         }
     }
 
-    /// Position of a ball, and the farthest that it can go in the rest of the substep, in metres.
+    /// Position of a ball, and an upper bound of its travel in the rest of the substep, in metres.
     fn position_and_range(
         &self,
         row: usize,
@@ -194,13 +196,13 @@ impl EventDriven {
         ball.radius * (1.0 + SEAM_TOLERANCE) + ball.position_error
     }
 
-    /// Names the walls that a ball may touch before its reach ends.
+    /// Visits the candidate walls of a ball.
     pub(super) fn for_each_wall(&self, row: usize, mut visit: impl FnMut(usize)) {
         self.candidates.planes.iter().for_each(|wall| visit(*wall as usize));
         self.parts_of(row).iter().for_each(|wall| visit(*wall as usize));
     }
 
-    /// Candidate walls of a ball, but for half-spaces.
+    /// Candidate walls of a ball other than half-spaces.
     pub(super) fn parts_of(&self, row: usize) -> &[u32] {
         let [start, end] = self.candidates.per_ball.get(row).map_or([0; 2], |known| known.walls);
         &self.candidates.lists[start..end]
@@ -211,7 +213,7 @@ impl EventDriven {
         &self.candidates.planes
     }
 
-    /// Cost of testing a ball against all its candidate walls, in looks.
+    /// Cost of testing a ball against all its candidate walls.
     pub(super) fn wall_cost(&self, row: usize) -> u64 {
         self.candidates.planes.len() as u64 + super::PART_COST * self.parts_of(row).len() as u64
     }
@@ -222,7 +224,7 @@ fn max_speed(ball: &Ball, now: f64, remaining: f64) -> f64 {
     ball.velocity_at(now).magnitude() + max_acceleration(ball) * remaining
 }
 
-/// Acceleration of a ball that nothing hits, at most, in m/s².
+/// Upper bound of a ball's acceleration without contacts, in m/s².
 fn max_acceleration(ball: &Ball) -> f64 {
     ball.external_acceleration.magnitude().max(ball.trajectory.acceleration.magnitude())
 }
@@ -236,7 +238,7 @@ mod tests {
     use crate::shape::{Shape, Sphere};
     use cgmath::Zero;
 
-    /// Ten thousand parts, all of them so many metres away.
+    /// Ten thousand sub-shapes, all at the same distance in metres.
     struct Crowd(f64);
 
     impl WallSource for Crowd {

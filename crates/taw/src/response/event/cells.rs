@@ -1,25 +1,24 @@
-//! Who is near, while everything moves: each center is in one cell of a uniform grid,
-//! and tells when it leaves it. Cells are as wide as the largest ball, so those that
-//! touch are in neighbouring ones.
+//! Broad phase for moving balls: each center is in one cell of a uniform grid until an event moves
+//! it. Cells are as wide as the largest ball, so balls in contact are in neighbouring cells.
 
 use crate::broad::Period;
 use crate::math::Point3;
 
-/// The coordinates of a cell.
+/// Coordinates of a cell.
 pub(super) type Cell = [i64; 3];
 
-/// Not a row.
+/// End of a chain.
 const EMPTY: u32 = u32::MAX;
 
-/// Buckets there are at least: of fewer, the cells around a ball would share many.
+/// Minimum number of buckets: of fewer, the neighbours of a cell would share many.
 const MIN_BUCKETS: usize = 1024;
 
-/// The rows in each cell, as chains through buckets that the cells are hashed to.
+/// Spatial hash: rows per cell, as doubly linked chains of buckets.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cells {
-    /// Along each axis, in metres.
+    /// Cell width along each axis, in metres.
     width: [f64; 3],
-    /// Cells of a period along each axis; zero along one that has none.
+    /// Number of cells per period along each axis; zero for an axis without a period.
     count: Cell,
     head: Vec<u32>,
     next: Vec<u32>,
@@ -29,8 +28,8 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Empties the grid, for this many rows and cells of this width in metres, or a little wider,
-    /// so that a period has a whole number of them.
+    /// Empties the grid and sets the number of rows and the cell width in metres, widened so that a
+    /// period has a whole number of cells.
     pub fn reset(&mut self, rows: usize, width: f64, period: Period<f64>) {
         for (axis, length) in period.lengths.iter().enumerate() {
             let count = length.map_or(0.0, |length| (length / width).floor());
@@ -47,28 +46,28 @@ impl Cells {
         }
     }
 
-    /// Along each axis, in metres.
+    /// Cell width along each axis, in metres.
     pub fn width(&self) -> [f64; 3] {
         self.width
     }
 
-    /// Along the axis where it is least, in metres.
+    /// Smallest cell width, in metres.
     pub fn min_width(&self) -> f64 {
         self.width.into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// The cell that a point is in.
+    /// Cell of a point.
     pub fn cell(&self, point: Point3<f64>) -> Cell {
         [0, 1, 2].map(|axis| (point[axis] / self.width[axis]).floor() as i64)
     }
 
-    /// The image of a cell in the period.
+    /// Periodic image of a cell.
     fn image(&self, cell: Cell) -> Cell {
         let wrap = |x: i64, count: i64| if count > 0 { x.rem_euclid(count) } else { x };
         [0, 1, 2].map(|axis| wrap(cell[axis], self.count[axis]))
     }
 
-    /// Puts a row, which is in none, into a cell.
+    /// Inserts a row that is in no cell.
     pub fn insert(&mut self, row: u32, cell: Cell) {
         let cell = self.image(cell);
         let bucket = self.bucket_of(cell);
@@ -81,7 +80,7 @@ impl Cells {
         }
     }
 
-    /// Takes a row out of its cell.
+    /// Removes a row from its cell.
     pub fn remove(&mut self, row: u32) {
         let index = row as usize;
         let (next, previous) = (self.next[index], self.previous[index]);
@@ -95,7 +94,7 @@ impl Cells {
         }
     }
 
-    /// Names the rows in a cell and the 26 around it.
+    /// Visits the rows in a cell and the 26 around it.
     pub fn for_each_near(&self, [x, y, z]: Cell, mut visit: impl FnMut(usize)) {
         for dz in -1..=1 {
             for dy in -1..=1 {
@@ -113,7 +112,7 @@ impl Cells {
         }
     }
 
-    /// Teschner et al., *Optimized spatial hashing*, 2003.
+    /// Hash of a cell (Teschner et al., *Optimized spatial hashing*, 2003).
     fn bucket_of(&self, [x, y, z]: Cell) -> usize {
         let hash =
             x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663) ^ z.wrapping_mul(83_492_791);

@@ -1,4 +1,4 @@
-//! Balls that touch each other, as columns that the impulse method solves.
+//! Contact clusters: balls in contact, as columns that the impulse solver works on.
 
 use cgmath::InnerSpace;
 
@@ -12,37 +12,36 @@ use crate::response::impulse::{
 };
 use crate::response::{BallRotation, EnergyLedger, Material, SolverBodies};
 
-/// A heap agrees where a sweep changes no velocity by more than this part of what gravity does in
-/// a substep: a hundredth of what counts as rest.
+/// Convergence tolerance over the speed that gravity adds in a substep: a hundredth of the rest
+/// threshold.
 const TOLERANCE: f64 = 0.01 * REST_SPEED;
-/// Or by more than this part of its largest speed, where nothing pulls: a hundred roundings.
+/// Convergence tolerance over the largest speed, for clusters without gravity: a hundred roundings.
 const ROUNDING: f64 = 100.0 * f64::EPSILON;
-/// Whatever the model's iterations, a heap is swept until it agrees, or for as long as no more
-/// contacts are solved than this, all sweeps together: half a millisecond. What a heap of few
-/// leaves undecided costs more, as events.
+/// Minimum budget of contact solves, over all iterations, whatever the model's iterations: half a
+/// millisecond. Small clusters converge within it; unconverged contacts cost more, as events.
 const MAX_SOLVES: usize = 4_000;
-/// And no more often than this, which is the most that a model may have.
+/// Maximum number of iterations, the same as for a model.
 const MAX_ITERATIONS: u32 = 1000;
 
-/// Balls that rest on each other, as the impulse method sees them.
+/// Cluster of balls in contact, as the impulse solver sees it.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cluster {
-    /// Whose turn it is: the balls' rows, in order.
+    /// Rows of the balls, sorted.
     pub rows: Vec<u32>,
-    /// Where in `rows` a ball is.
+    /// Local index of each ball, its place in `rows`.
     pub local: Vec<u32>,
-    /// Number of things that each ball touches.
+    /// Number of contacts of each ball.
     pub contact_counts: Vec<u32>,
     pub bodies: ClusterBodies,
-    /// Where each was before the step.
+    /// Positions at the start of the substep.
     pub start: Vec<Point3<f64>>,
     pub material: Vec<Material<f64>>,
-    /// Who touches whom, over how many others.
+    /// Connected components.
     pub sets: UnionFind,
     pub scratch: impulse::Scratch<f64>,
 }
 
-/// The balls of a heap, a column for each property.
+/// Columns of the cluster's balls.
 #[derive(Clone, Debug, Default)]
 pub(super) struct ClusterBodies {
     pub period: Period<f64>,
@@ -70,8 +69,7 @@ impl ClusterBodies {
 }
 
 impl Cluster {
-    /// Takes over those balls that the contacts are about, and names them by their place
-    /// here.
+    /// Gathers the balls of some contacts, and renumbers the contacts to local indices.
     pub fn gather(&mut self, contacts: &mut Contacts<f64>, balls: &[Ball], period: Period<f64>) {
         self.bodies.period = period;
         self.rows.clear();
@@ -102,13 +100,13 @@ impl Cluster {
         fill(&mut bodies.rotation_locked, each().map(|b| b.rotation == BallRotation::Locked));
     }
 
-    /// The speed, in m/s, below which those that come together agree.
+    /// Convergence tolerance, in m/s.
     pub fn tolerance(&self, acceleration: f64, settings: &EventSettings) -> f64 {
         let max_speed = self.bodies.velocity.iter().map(|v| v.magnitude()).fold(0.0, f64::max);
         (TOLERANCE * acceleration * settings.dt).max(ROUNDING * max_speed)
     }
 
-    /// Solves the contacts over `dt` seconds, or with zero what happens at once.
+    /// Solves the contacts over `dt` seconds; zero for an instantaneous collision.
     pub fn solve(
         &mut self,
         contacts: &mut Contacts<f64>,
@@ -124,7 +122,7 @@ impl Cluster {
             dt,
             restitution_threshold: 2.0 * acceleration * settings.dt,
             tolerance: self.tolerance(acceleration, settings),
-            // As deep as a gap may be wide that counts as touching.
+            // As deep as the largest separation that counts as contact.
             slop: 0.5 * PRESS_SPEED * PRESS_SPEED * acceleration * settings.dt * settings.dt,
             max_relative_slop: SLOP,
         };
@@ -147,7 +145,7 @@ impl Cluster {
         settings.add_cost(2 * self.scratch.solve_count());
     }
 
-    /// Counts what contacts did at once, to balls that moved and turned so before.
+    /// Books the energy of an instantaneous solve, with the velocities before it.
     pub fn record_energy(
         &mut self,
         velocity: &mut [Vec3<f64>],
@@ -160,7 +158,7 @@ impl Cluster {
     }
 }
 
-/// Sets a column.
+/// Replaces a column.
 fn fill<T>(column: &mut Vec<T>, values: impl Iterator<Item = T>) {
     column.clear();
     column.extend(values);

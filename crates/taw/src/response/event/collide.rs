@@ -1,4 +1,4 @@
-//! Effect of a collision: on two balls, on several at one moment, on a ball and a wall.
+//! Collisions: of two balls, of several at the same time, of a ball and a wall.
 
 use std::cmp::Reverse;
 
@@ -10,20 +10,20 @@ use crate::math::{Vec3, direction_and_length};
 use crate::response::impact::clamp_length;
 use crate::response::{ImpulseSample, InverseEffectiveMass, Material, impact};
 
-/// Rounds that collisions at one moment have to agree.
+/// Maximum number of iterations for simultaneous collisions.
 const MAX_ROUNDS: u32 = 1000;
 
-/// Events of one moment.
+/// Scratch buffers for collisions at the same time.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SimultaneousImpacts {
     pairs: Vec<(usize, usize)>,
-    /// Events other than collisions.
+    /// Events at that time other than collisions.
     deferred: Vec<Event>,
     rows: Vec<usize>,
     collisions: Vec<Collision>,
 }
 
-/// Two balls that collide.
+/// Collision of two balls.
 #[derive(Clone, Copy, Debug)]
 struct Collision {
     a: usize,
@@ -31,20 +31,21 @@ struct Collision {
     impact: Impact<f64>,
     inverse_effective_mass: InverseEffectiveMass<f64>,
     material: Material<f64>,
-    /// Part of what it asks for that it may take at once, beside others.
+    /// Relaxation factor, beside the other collisions of the two balls.
     relaxation: f64,
-    /// Impulse on the second one, in N s.
+    /// Impulse on the second ball, in N s.
     impulse: Vec3<f64>,
 }
 
 impl EventDriven {
-    /// Tests if a ball has had so many collisions that took energy that they will not end.
+    /// Detects inelastic collapse: collisions that would not end.
     pub(super) fn is_collapsing(&self, row: usize) -> bool {
         self.balls[row].trajectory.dissipation_count >= MAX_DISSIPATIONS
     }
 
-    /// Brings balls to rest that collide without end, and all that touch them, however fast they
-    /// part just now: between a wall and a heavy ball, a light one parts from one of them always.
+    /// Ends an inelastic collapse: puts the balls to rest with all that touch them, however fast
+    /// they separate just now. Between a wall and a heavy ball, a light one always separates from
+    /// one of them.
     pub(super) fn stop_collapse(&mut self, rows: [usize; 2], time: f64, settings: &EventSettings) {
         let RestingCluster { rows, pressed_by } =
             self.rest_cluster(rows, f64::INFINITY, time, settings);
@@ -58,8 +59,8 @@ impl EventDriven {
         }
     }
 
-    /// Counts that a ball was brought to rest. True if something presses it that will not end:
-    /// only what is outside could take its momentum.
+    /// Counts a freeze. True if the pressure on the ball will not end: only a body outside of its
+    /// cluster could take the momentum.
     fn count_freeze(&mut self, row: usize, pressed_by: PressedBy) -> bool {
         let freeze_count = &mut self.balls[row].trajectory.freeze_count;
         let max = match pressed_by {
@@ -70,10 +71,10 @@ impl EventDriven {
         *freeze_count == MAX_FREEZES
     }
 
-    /// Lets two balls bounce off each other, and whoever else meets at the same moment.
+    /// Collides two balls, and all others that collide at the same time.
     ///
-    /// All that happens at one moment happens at once, so that no order is preferred:
-    /// the mirror image of a scene has the mirror image of its future, to the bit.
+    /// Simultaneous collisions are solved together, so that no order is preferred: the mirror image
+    /// of a scene has the mirror image of its future, to the bit.
     pub(super) fn collide_balls(
         &mut self,
         first: Event,
@@ -153,7 +154,7 @@ impl EventDriven {
         self.simultaneous_impacts = SimultaneousImpacts { pairs, deferred, rows, collisions };
     }
 
-    /// Collision of two balls that touch, before its impulse.
+    /// Collision of two balls in contact, before its impulse.
     fn collision(&mut self, a: usize, b: usize, settings: &EventSettings) -> Collision {
         let threshold = self.pressing_speed(a, b, settings);
         let (first, second) = (&self.balls[a], &self.balls[b]);
@@ -182,7 +183,7 @@ impl EventDriven {
         }
     }
 
-    /// The velocity of the second's touching point relative to the first's, in m/s.
+    /// Relative velocity of the contact points, in m/s.
     fn relative_velocity(&self, c: &Collision) -> Vec3<f64> {
         let (first, second) = (&self.balls[c.a], &self.balls[c.b]);
         let spin_velocities =
@@ -190,9 +191,9 @@ impl EventDriven {
         second.velocity - first.velocity + spin_velocities
     }
 
-    /// Finds the impulses of collisions that share balls: each has the restitution and
-    /// friction of its own, with all others going on (Newton's law, simultaneously). All
-    /// change together, round by round (Jacobi), so that their order is nothing to them.
+    /// Solves simultaneous collisions with shared balls: each keeps its own restitution and
+    /// friction while all others act (Newton's law). Jacobi iterations, so that the result does not
+    /// depend on the order.
     fn solve_simultaneous(&mut self, collisions: &mut [Collision], rows: &[usize]) {
         let initial_velocity: Vec<_> =
             collisions.iter().map(|c| self.relative_velocity(c)).collect();
@@ -253,7 +254,7 @@ impl EventDriven {
         }
     }
 
-    /// Counts what a collision did with this impulse, of points that came together so.
+    /// Books the energy of a collision; `before` is the relative velocity before it.
     fn record_impact(&mut self, c: &Collision, impulse: Vec3<f64>, before: Vec3<f64>) {
         if self.work.is_none() {
             return;
@@ -271,7 +272,7 @@ impl EventDriven {
         }
     }
 
-    /// Lets a ball that touches a wall bounce off it.
+    /// Collides a ball with a wall.
     pub(super) fn collide_with_wall(
         &mut self,
         row: usize,

@@ -1,11 +1,11 @@
-//! A ball on a surface that bends or turns under it: a sphere, an edge, a tilting board.
+//! Motion of a ball on a curved or rotating surface: a sphere, an edge, a tilting board.
 //!
-//! The center moves over the surface that is a radius away from the wall's. With `n` the
-//! normal where the ball is, `w` the velocity of the wall there, and `v` that of the ball
-//! relative to it, touching on means `n · v = 0` all the time; so the acceleration along the
-//! normal is known, and with it the pressure: on a sphere, `N = g cos θ − v² / (R + r)`. The
-//! rest is as on a plane, see [`support`](super::flat_support). Integrated in short steps (Kutta
-//! 1901), which end where the pressure does.
+//! The center moves on the offset surface, one radius away from the wall. With `n` the normal, `w`
+//! the velocity of the wall and `v` that of the ball relative to it, contact means `n · v = 0` at
+//! all times; so the normal acceleration is known, and with it the normal force: on a sphere, `N =
+//! g cos θ − v² / (R + r)` per mass. Tangentially as on a plane, see
+//! [`flat_support`](super::flat_support). Integrated in short steps (Kutta 1901) that end where the
+//! normal force vanishes.
 
 use std::cell::Cell;
 
@@ -17,47 +17,45 @@ use crate::math::{Point3, Vec3, direction_and_length};
 use crate::response::{BallRotation, Material};
 use crate::shape::Nearest;
 
-/// By what angle the normal may turn in one step, in radians: what a step leaves out is of
-/// its fifth power.
+/// Largest rotation of the normal in one step, in radians: the error of a step is of the fifth
+/// power.
 const MAX_TURN: f64 = 0.02;
-/// A step is not shorter than this part of a substep.
+/// Minimum step over the substep.
 const MIN_STEP: f64 = 1.0 / 4096.0;
-/// After so many steps in one substep a ball takes longer ones, twice as long each time that it
-/// took [`STEPS_PER_DOUBLING`] more, so that it comes to the end. So many go over 2.5 radians, and over
-/// more borders of faces than one substep has for what it should show.
+/// Number of steps in one substep before they get longer, doubling every [`STEPS_PER_DOUBLING`]
+/// steps, so that the substep ends. They suffice for 2.5 radians, and for more borders of faces
+/// than a substep should have.
 const MAX_FINE_STEPS: u32 = 128;
-/// Thus 12 times as many steps more end every substep.
+/// Steps per doubling; 12 doublings end every substep.
 const STEPS_PER_DOUBLING: u32 = 8;
-/// Over a way shorter than this part of the radius a ball is where it was: its direction is
-/// rounding, and nothing bends otherwise.
+/// Smallest displacement over the radius that has a direction; less is rounding.
 const MIN_DISPLACEMENT: f64 = 1e-9;
-/// Distance beside a point, over the radius, at which the normal is looked at again, to see how it
-/// turns.
-/// The rounding of one over the other is a hundred billionth.
+/// Distance over the radius at which the normal is probed for its rate. Its rounding over this
+/// distance is 1e-11.
 const PROBE_DISTANCE: f64 = 1e-5;
-/// Another face, edge or corner bends by so much more or less, over a radius.
+/// Change of curvature times radius that tells one face, edge or corner from another.
 const CURVATURE_TOLERANCE: f64 = 0.1;
-/// Number of halvings of a time to find the moment when something ends.
+/// Bisections of a time to find the end of a condition.
 const BISECTIONS: u32 = 24;
-/// Flat is a surface that turns by less than this over a radius: that is rounding.
+/// Rotation of the normal over a radius below which a surface is flat: rounding.
 const FLATNESS: f64 = 1e-9;
 
-/// Surface below a ball, and how it is pulled there.
+/// Surface below a ball, and the forces.
 pub(super) struct CurvedSupport<'a> {
     pub walls: &'a [Wall],
-    /// The walls that it may be on before the step is over.
+    /// Walls that may support it before the step is over.
     pub candidates: &'a [u32],
     pub external_acceleration: Vec3<f64>,
     pub radius: f64,
     pub rotation: BallRotation,
     pub material: Material<f64>,
-    /// No step is shorter, in seconds.
+    /// Minimum step, in seconds.
     pub min_step: f64,
-    /// Cost so far, in looks.
+    /// Cost so far, in tests.
     pub cost: Cell<u64>,
 }
 
-/// Where a ball is and how it moves.
+/// State of a ball at a time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct BallState {
     pub time: f64,
@@ -89,32 +87,32 @@ struct Rate {
     spin: Vec3<f64>,
 }
 
-/// Touch of a ball and what it lies on.
+/// Contact of a ball with its support.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SupportContact {
     pub wall: usize,
     pub normal: Vec3<f64>,
-    /// The normal force over the mass that keeps it touching, in m/s²; below zero, it leaves.
+    /// Normal force per mass, in m/s²; negative if the ball leaves.
     pub normal_acceleration: f64,
-    /// The velocity of the touching point along the surface, in m/s.
+    /// Slip: tangential velocity of the contact point over the surface, in m/s.
     pub slip: Vec3<f64>,
     /// Rate of change of the normal, in 1/s.
     pub normal_rate: Vec3<f64>,
-    /// Rate of change of the surface's velocity under the touching point, in m/s².
+    /// Rate of change of the surface velocity at the contact point, in m/s².
     surface_acceleration: Vec3<f64>,
     material: Material<f64>,
 }
 
-/// Where a step ends.
+/// Integration step.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Step {
     pub end: BallState,
-    /// True if it ends because the ball comes off.
+    /// True if the ball leaves the surface at its end.
     pub leaves: bool,
 }
 
 impl CurvedSupport<'_> {
-    /// The wall that a ball there would be on: the nearest, and of several the first.
+    /// Nearest wall, the first of several.
     fn nearest(&self, at: Point3<f64>, time: f64) -> (usize, Nearest<f64>) {
         self.cost.set(self.cost.get() + super::PART_COST * self.candidates.len() as u64);
         let nowhere = Nearest { point: at, normal: Vec3::zero(), distance: f64::INFINITY };
@@ -129,7 +127,7 @@ impl CurvedSupport<'_> {
         })
     }
 
-    /// Rate of change of the normal for a point that goes over the wall, in 1/s.
+    /// Rate of change of the normal for a point that moves over the wall, in 1/s.
     fn normal_rate_over(
         &self,
         at: Point3<f64>,
@@ -149,7 +147,7 @@ impl CurvedSupport<'_> {
         normal_change * (speed / probe)
     }
 
-    /// Tests if the surface is flat around a point, and does not turn but about its normal.
+    /// Tests if the surface is flat around a point, and rotates about its normal at most.
     pub fn is_flat(&self, state: &BallState) -> bool {
         let (wall, Nearest { normal, .. }) = self.nearest(state.position, state.time);
         let Some(wall) = self.walls.get(wall) else { return false };
@@ -166,12 +164,12 @@ impl CurvedSupport<'_> {
             || ![x, -x, y, -y].into_iter().any(is_curved)
     }
 
-    /// Tests if the normal at a place is this one.
+    /// Tests if the surface has this normal at a point.
     pub fn has_normal(&self, at: Point3<f64>, time: f64, normal: Vec3<f64>) -> bool {
         (self.nearest(at, time).1.normal - normal).magnitude() <= FLATNESS
     }
 
-    /// Touch of a ball and what it is nearest to.
+    /// Contact of a ball with the nearest wall.
     pub fn contact(&self, state: &BallState) -> Option<SupportContact> {
         let BallState { time, position, velocity, spin } = *state;
         let (number, Nearest { normal, .. }) = self.nearest(position, time);
@@ -215,7 +213,7 @@ impl CurvedSupport<'_> {
         })
     }
 
-    /// Resistance to rolling, as a change of the touching point's velocity by the spin.
+    /// Rolling resistance, as a rate of the contact point's velocity by spin.
     fn rolling_resistance(&self, contact: &SupportContact, spin: Vec3<f64>) -> Vec3<f64> {
         if self.rotation == BallRotation::Locked || contact.material.rolling_resistance == 0.0 {
             return Vec3::zero();
@@ -233,12 +231,12 @@ impl CurvedSupport<'_> {
             })
     }
 
-    /// By how much a friction of one changes the touching point's velocity.
+    /// Tangential inverse effective mass per inverse mass: slip rate per friction.
     fn tangent_inverse_mass(&self) -> f64 {
         1.0 + self.rotation.inverse_inertia_factor::<f64>()
     }
 
-    /// The friction that keeps the slip what it is, over the mass.
+    /// Friction per mass that keeps the slip constant.
     fn static_friction(&self, contact: &SupportContact, spin: Vec3<f64>) -> Vec3<f64> {
         let normal = contact.normal;
         let tangential = |x: Vec3<f64>| x - normal * x.dot(normal);
@@ -303,13 +301,13 @@ impl CurvedSupport<'_> {
         Some(Rate { velocity: state.velocity, acceleration, spin })
     }
 
-    /// Takes a slip that is hardly one, and puts the ball where it touches.
+    /// Removes a residual slip, with its effect on velocity and spin.
     pub fn without_residual_slip(&self, mut state: BallState) -> Option<BallState> {
         let contact = self.contact(&state)?;
         let slip_rate = self.tangent_inverse_mass()
             * contact.material.friction
             * contact.normal_acceleration.max(0.0);
-        // What friction takes in less than a shortest step: a step more would turn it around.
+        // Friction removes it in less than a minimum step, which would reverse it.
         if contact.slip.magnitude() <= 2.0 * self.min_step * slip_rate {
             let correction = contact.slip / self.tangent_inverse_mass();
             state.velocity -= correction;
@@ -320,7 +318,7 @@ impl CurvedSupport<'_> {
         Some(state)
     }
 
-    /// Goes on from where a ball touches, for `remaining` seconds at most.
+    /// Integrates a step of at most `remaining` seconds.
     pub fn step(&self, start: &BallState, remaining: f64) -> Option<Step> {
         let contact = self.contact(start)?;
         if contact.normal_acceleration <= 0.0 {
@@ -335,7 +333,7 @@ impl CurvedSupport<'_> {
         }
         let end = |duration: f64| self.runge_kutta(start, duration, regime);
         let mut state = end(duration)?;
-        // A step ends where one face, edge or corner does, for the next one bends otherwise.
+        // A step ends at the border of a face, edge or corner, where the curvature changes.
         if duration > min_step && !self.has_same_curvature(start, &state, &contact) {
             let is_same = |duration: f64| {
                 end(duration).is_some_and(|end| self.has_same_curvature(start, &end, &contact))
@@ -348,7 +346,7 @@ impl CurvedSupport<'_> {
         };
         let leaves = !is_pressed(&state);
         if leaves {
-            // Just after, so that nothing presses it there any more.
+            // Just after that time, so that no normal force is left there.
             duration =
                 bisect_end(duration, |duration| end(duration).is_some_and(|end| is_pressed(&end)))
                     [1];
@@ -357,8 +355,8 @@ impl CurvedSupport<'_> {
         Some(Step { end: BallState { time: start.time + duration, ..state }, leaves })
     }
 
-    /// Tests if a ball that went from one place to another is still on the same face, edge or
-    /// corner: it bends there as here, along the way between.
+    /// Tests if a ball is still on the same face, edge or corner: same curvature at start and end
+    /// along the displacement.
     fn has_same_curvature(
         &self,
         start: &BallState,
@@ -375,7 +373,7 @@ impl CurvedSupport<'_> {
         if distance <= MIN_DISPLACEMENT * self.radius {
             return true;
         }
-        // From rest it goes where it comes to.
+        // From rest, the direction of the displacement counts.
         let start_direction = relative_velocity(start);
         let start_direction = if start_direction.magnitude() * dt < 1e-3 * distance {
             displacement
@@ -387,7 +385,7 @@ impl CurvedSupport<'_> {
         curvature_change.abs() * self.radius <= CURVATURE_TOLERANCE
     }
 
-    /// Curvature of the surface from where a ball is that way, in 1/m.
+    /// Curvature of the surface in a direction, in 1/m.
     fn curvature(&self, state: &BallState, direction: Vec3<f64>) -> f64 {
         let normal = self.nearest(state.position, state.time).1.normal;
         let direction = direction - normal * direction.dot(normal);
@@ -395,7 +393,7 @@ impl CurvedSupport<'_> {
         self.normal_rate_over(state.position, state.time, normal, direction).magnitude()
     }
 
-    /// Longest step in which the normal turns by little.
+    /// Largest step in which the normal rotates little.
     fn max_step(&self, start: &BallState, contact: &SupportContact, rate: Rate) -> f64 {
         let (x, y) = tangent_basis(contact.normal);
         let directions = [x, -x, y, -y];
@@ -410,11 +408,11 @@ impl CurvedSupport<'_> {
         if let Some((motion, _)) = wall.motion_at(0.0) {
             max_step = max_step.min(MAX_TURN / motion.spin.magnitude());
         }
-        // What looks flat may bend farther on.
+        // A locally flat surface may be curved further on.
         max_step.min(super::SUPPORT_CHECK * self.radius / speed)
     }
 
-    /// When a slip is over, or a part of what is left of one that bends.
+    /// Time until the slip ends, or a fraction of it if the slip changes its direction.
     fn time_to_roll(&self, start: &BallState, contact: &SupportContact, rate: Rate) -> f64 {
         let dt = 1e-6 * self.radius / (1.0 + start.velocity.magnitude());
         let later = self.contact(&start.after(rate, dt));
@@ -440,7 +438,8 @@ impl CurvedSupport<'_> {
             spin: mean(|k| k.spin),
         };
         let mut end = start.after(mean, dt);
-        // What is left out goes, lest it add up.
+        // Removes the integration error in position and normal velocity, so that it does not
+        // accumulate.
         let (wall, Nearest { normal, distance, .. }) = self.nearest(end.position, end.time);
         end.position += normal * (self.radius - distance);
         let wall_velocity = self.walls.get(wall)?.velocity_at(end.position, end.time);
@@ -449,14 +448,14 @@ impl CurvedSupport<'_> {
     }
 }
 
-/// The shortest step of a ball that took so many in this substep, in seconds.
+/// Minimum step after a number of steps in this substep, in seconds.
 pub(super) fn min_step_at(steps: u32, dt: f64) -> f64 {
     let doublings = steps.saturating_sub(MAX_FINE_STEPS) / STEPS_PER_DOUBLING;
     (MIN_STEP * dt * f64::from(1_u32 << doublings.min(12))).min(dt)
 }
 
-/// The last time before a condition ends, which holds at zero and not at `hi`, and the first
-/// after it.
+/// Bisects for the end of a condition that holds at zero and not at `hi`: last time that it holds,
+/// first time that it does not.
 fn bisect_end(mut hi: f64, holds: impl Fn(f64) -> bool) -> [f64; 2] {
     let mut lo = 0.0;
     for _ in 0..BISECTIONS {
@@ -466,7 +465,7 @@ fn bisect_end(mut hi: f64, holds: impl Fn(f64) -> bool) -> [f64; 2] {
     [lo, hi]
 }
 
-/// Two unit vectors across one, and across each other.
+/// Orthonormal basis of the tangent plane.
 fn tangent_basis(normal: Vec3<f64>) -> (Vec3<f64>, Vec3<f64>) {
     let x = crate::shape::across(normal);
     (x, normal.cross(x))

@@ -1,45 +1,45 @@
-//! A ball that lies on one surface: it rests, rolls or slides, and its acceleration is
-//! known in closed form until that changes.
+//! Motion of a ball on a flat surface: resting, rolling or sliding, with an acceleration in closed
+//! form until the regime changes.
 //!
-//! With `u` the velocity of the touching point, `p` the part of it that comes from the
-//! spin (`radius · normal × spin`), `f` the friction and `N` the pressure, both per mass:
-//! `v' = tangential_acceleration + f` and `p' = 5/2 (f − c N p/|p|)`, where `c` is the rolling resistance.
-//! Sliding, `f = −µ N u/|u|`; rolling, `f` is what keeps `u` at zero.
+//! With `u` the velocity of the contact point, `p` the part of it by spin (`radius · normal ×
+//! spin`), `f` the friction and `N` the normal force, both per mass: `v' = tangential_acceleration
+//! + f` and `p' = 5/2 (f − c N p/|p|)`, where `c` is the rolling resistance. Sliding, `f = −µ N
+//! u/|u|`; rolling, `f` keeps `u` at zero.
 
 use cgmath::{InnerSpace, Zero};
 
 use crate::math::{Vec3, direction_and_length};
 
-/// By what angle a surface may turn in one go, in radians.
+/// Largest rotation of the surface in one step, in radians.
 const MAX_TURN: f64 = 4e-3;
-/// Rest of a slide that bends, over the substep, when its end goes straight.
+/// A curved slide shorter than this, over the substep, ends on a straight line.
 const MIN_SLIDE: f64 = 1.0 / 256.0;
 
-/// Surface below a ball, how it is pulled there, and what it is made of.
+/// Flat surface below a ball, its material, and the forces.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct FlatSupport {
     pub normal: Vec3<f64>,
-    /// Of the surface where the ball touches it, in m/s.
+    /// Surface velocity at the contact point, in m/s.
     pub surface_velocity: Vec3<f64>,
-    /// Of the surface, in rad/s.
+    /// Angular velocity of the surface, in rad/s.
     pub angular_velocity: Vec3<f64>,
-    /// By all forces, along the surface, in m/s².
+    /// Tangential part of the external acceleration, in m/s².
     pub tangential_acceleration: Vec3<f64>,
-    /// The normal force per mass, in m/s².
+    /// Normal force per mass, in m/s².
     pub normal_acceleration: f64,
     pub radius: f64,
     pub friction: f64,
     pub rolling_resistance: f64,
     pub spinning_resistance: f64,
-    /// True if friction sets the ball spinning.
+    /// True if friction spins the ball.
     pub rotates: bool,
 }
 
-/// Accelerations that last for a while.
+/// Segment of constant accelerations.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct MotionSegment {
-    /// Changes that friction makes to velocity and spin at once, in less than a millionth of a
-    /// step: it takes a slip that is hardly one. In m/s and rad/s.
+    /// Changes of velocity and spin by friction at the start, in m/s and rad/s: they remove a slip
+    /// that would last for less than a millionth of a step.
     pub velocity_change: Vec3<f64>,
     pub spin_change: Vec3<f64>,
     /// In m/s².
@@ -50,8 +50,7 @@ pub(super) struct MotionSegment {
     pub duration: f64,
 }
 
-/// The velocities along the surface that a stretch is about: of the center, and of the
-/// touching point by the spin alone.
+/// Tangential velocities of the center, and of the contact point by spin.
 #[derive(Clone, Copy, Debug)]
 struct TangentialState {
     v: Vec3<f64>,
@@ -64,7 +63,7 @@ impl TangentialState {
     }
 }
 
-/// Motion of the touching point.
+/// Contact regime of a ball on a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Regime {
     Sliding,
@@ -73,7 +72,7 @@ pub(super) enum Regime {
 }
 
 impl FlatSupport {
-    /// Motion of a ball with this velocity and spin, for `dt` seconds at most.
+    /// Segment of the motion with this velocity and spin, for `dt` seconds at most.
     pub fn segment(&self, velocity: Vec3<f64>, spin: Vec3<f64>, dt: f64) -> MotionSegment {
         let n = self.normal;
         let tangential = |x: Vec3<f64>| x - n * x.dot(n);
@@ -125,7 +124,7 @@ impl FlatSupport {
         }
     }
 
-    /// By how much a friction of one changes the touching point's velocity.
+    /// Tangential inverse effective mass per inverse mass: slip rate per friction.
     fn tangent_inverse_mass(&self) -> f64 {
         if self.rotates { 3.5 } else { 1.0 }
     }
@@ -138,7 +137,7 @@ impl FlatSupport {
         if slip.magnitude() <= rounding { Vec3::zero() } else { slip }
     }
 
-    /// Rate of change of the surface's velocity under a ball that moves over it.
+    /// Rate of change of the surface velocity below the moving ball, in m/s².
     fn surface_rate(&self, at: TangentialState) -> Vec3<f64> {
         let rate = self.angular_velocity.cross(at.v);
         rate - self.normal * rate.dot(self.normal)
@@ -165,16 +164,16 @@ impl FlatSupport {
         }
     }
 
-    /// Resistance to rolling, as a change of `p`.
+    /// Rolling resistance, as a rate of `p`.
     fn rolling_resistance_rate(&self, at: TangentialState) -> Vec3<f64> {
-        // A ball that just begins will roll down the pull, against which `p` turns.
+        // A ball that starts to move will roll along the tangential acceleration, against `p`.
         let direction = direction_and_length(at.p)
             .or_else(|| direction_and_length(self.surface_rate(at) - self.tangential_acceleration))
             .map_or_else(Vec3::zero, |(direction, _)| direction);
         direction * (-2.5 * self.rolling_resistance * self.normal_acceleration)
     }
 
-    /// The friction that keeps the touching point at rest while the ball rolls.
+    /// Friction per mass that keeps the contact point at rest while the ball rolls.
     fn static_friction(&self, at: TangentialState) -> Vec3<f64> {
         let rolling_resistance_rate =
             if self.rotates { self.rolling_resistance_rate(at) } else { Vec3::zero() };
@@ -191,7 +190,7 @@ impl FlatSupport {
             Regime::Rolling => self.static_friction(at),
             Regime::Sliding => {
                 let slip = self.slip(at);
-                // At the moment of slipping, against what would have kept it.
+                // When slipping starts, opposite to the friction that would have prevented it.
                 let direction =
                     if slip.magnitude2() > 0.0 { -slip } else { self.static_friction(at) };
                 direction_and_length(direction).map_or_else(Vec3::zero, |(d, _)| d * limit)
@@ -205,7 +204,7 @@ impl FlatSupport {
         TangentialState { v: self.tangential_acceleration + friction, p }
     }
 
-    /// Tests if the rate stays the same until the regime changes: nothing turns.
+    /// Tests if the rate is constant until the regime changes: no direction rotates.
     fn is_steady(&self, now: TangentialState, rate: TangentialState, regime: Regime) -> bool {
         // A difference of speeds has the rounding of the speeds.
         let rounding =
@@ -219,8 +218,8 @@ impl FlatSupport {
             && (self.rolling_resistance == 0.0 || is_straight(now.p, rate.p))
     }
 
-    /// Tests if what is left of a slide is so little that it may go straight. What that
-    /// neglects is left over, as a slide that is shorter still.
+    /// Tests if the rest of a slide is short enough for a straight line. The error remains as an
+    /// even shorter slide.
     fn is_last_slide(
         &self,
         now: TangentialState,
@@ -234,7 +233,7 @@ impl FlatSupport {
             && slip.dot(rate) < -0.9 * slip.magnitude() * rate.magnitude()
     }
 
-    /// The time until the slip, or the rolling that is resisted, comes to its end.
+    /// Time until slip, or rolling with resistance, ends.
     fn time_to_regime_change(
         &self,
         now: TangentialState,
@@ -253,9 +252,9 @@ impl FlatSupport {
         slip.min(rolling_end)
     }
 
-    /// A step so short that the directions of slip and spin change little within it.
+    /// Largest step in which the directions of slip and spin change little.
     fn max_step(&self, now: TangentialState, regime: Regime, dt: f64) -> f64 {
-        // The surface must not turn by much meanwhile.
+        // The surface must not rotate by much in one step.
         let mut step = (MAX_TURN / self.angular_velocity.magnitude()).clamp(dt / 8.0, dt);
         if regime == Regime::Sliding {
             let rate = self.tangent_inverse_mass() * self.friction * self.normal_acceleration;
@@ -265,11 +264,11 @@ impl FlatSupport {
             let rate = 10.0 * self.rolling_resistance * self.normal_acceleration;
             step = step.min(now.p.magnitude() / rate);
         }
-        // Never so short that a substep takes more than a thousand of them.
+        // At most about a thousand steps per substep.
         step.max(0.25 * MIN_SLIDE * dt)
     }
 
-    /// The mean over a short step (Kutta 1901).
+    /// Mean rate over a short step (Kutta 1901).
     fn mean_rate(&self, now: TangentialState, regime: Regime, dt: f64) -> TangentialState {
         let k1 = self.rate(now, regime);
         let k2 = self.rate(now.after(k1, 0.5 * dt), regime);

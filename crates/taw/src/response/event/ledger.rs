@@ -1,4 +1,4 @@
-//! Account of what happens to balls between two events, for those who ask.
+//! Energy bookkeeping of balls between two events.
 
 use cgmath::InnerSpace;
 
@@ -6,7 +6,7 @@ use super::{Ball, EventDriven};
 use crate::response::{BallRotation, EnergyLedger};
 
 impl EventDriven {
-    /// Lets a ball's path begin at a later time.
+    /// Advances a ball's trajectory, and books the energy of the motion.
     pub(super) fn advance(&mut self, row: usize, time: f64) {
         if let Some(mut work) = self.work.take() {
             self.record_motion(&self.balls[row], time, &mut work);
@@ -15,7 +15,7 @@ impl EventDriven {
         self.balls[row].advance(time);
     }
 
-    /// Counts what forces, and the wall that it lies on, do to a ball until then.
+    /// Books the work of forces and of the supporting wall up to a time.
     fn record_motion(&self, ball: &Ball, time: f64, work: &mut EnergyLedger) {
         let dt = time - ball.trajectory.start;
         if dt <= 0.0 || ball.inverse_mass == 0.0 {
@@ -40,7 +40,7 @@ impl EventDriven {
         };
         let constraint_impulse = velocity_change * mass - impulse;
         if ball.trajectory.clustered {
-            // Pairs cancel; what it takes is the solver's.
+            // Pair forces cancel; the solver knows the dissipation.
             work.momentum += constraint_impulse;
             work.walls += ball.trajectory.wall_power * dt;
             return;
@@ -48,7 +48,7 @@ impl EventDriven {
         let Some(wall) = ball.trajectory.support else { return };
         work.momentum += constraint_impulse;
         let wall = &self.walls[wall];
-        // The velocity of the surface below it, and its own over that.
+        // Velocity of the surface at the contact point, and slip over it.
         let surface_and_slip = |ball: &Ball| {
             let normal = wall.nearest(ball.position, ball.trajectory.start).normal;
             let contact_point = ball.position - normal * ball.radius;

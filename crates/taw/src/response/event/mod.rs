@@ -1,10 +1,10 @@
-//! [`Response::EventDriven`](super::Response::EventDriven): what happens within a
-//! substep happens one after the other, each at its time (Alder and Wainwright 1959;
-//! Lubachevsky, *How to simulate billiards and similar systems*, 1991).
+//! Event-driven simulation, the method of [`Response::EventDriven`](super::Response::EventDriven):
+//! the events of a substep are processed one after the other, each at its time (Alder and
+//! Wainwright 1959; Lubachevsky, *How to simulate billiards and similar systems*, 1991).
 //!
-//! Between two events a ball moves on a parabola. Its next event is the first of: it
-//! meets a wall or a ball, it leaves its cell of the grid, or what it lies on makes it
-//! roll instead of slide. All of it is counted in `f64`, whatever the world counts in.
+//! Between two events a ball moves on a parabola. Its next event is the earliest of: impact on a
+//! wall or ball, crossing into another grid cell, or change of regime (sliding to rolling, end of a
+//! support). Computed in `f64`, whatever the world's scalar.
 
 mod active_set;
 mod ball;
@@ -42,60 +42,60 @@ use cluster::Cluster;
 use collide::SimultaneousImpacts;
 pub(crate) use wall::{Wall, WallCollider};
 
-/// A wall is left or met again only faster than this part of what gravity does to a
-/// speed in a substep. Slower, a ball rests on it: the bounces that it still had ahead
-/// would have taken a few thousandths of a substep.
+/// Rest threshold over the speed that gravity adds in a substep. A slower ball rests on the wall:
+/// its remaining bounces would have taken a few thousandths of a substep.
 const REST_SPEED: f64 = 1e-3;
-/// That part for balls that press each other, which touch anew each time that they have
-/// gained so much. Ten times a substep, until the next one knows that they rest.
+/// Same fraction for two balls pressed together: they collide again whenever they have regained
+/// this speed, about ten times per substep, until the next substep treats them as resting.
 const PRESS_SPEED: f64 = 0.1;
-/// Balls that cross more cells than this in a substep are looked for everywhere.
+/// Maximum number of cells that a ball may cross in a substep; a faster one is tested against all
+/// others.
 const MAX_CELLS: f64 = 1000.0;
-/// After collisions in one substep that took the whole of an approach so many times over (two
-/// of restitution a half count as one, and so does one that took no time), a ball is at
-/// rest among those that it touches: what is left would take endlessly many.
+/// Guard against inelastic collapse. Each collision adds `1 − e` (or 1 if no time has passed since
+/// the last one); a ball whose sum within one substep reaches this is put to rest with whatever it
+/// touches.
 const MAX_DISSIPATIONS: f64 = 64.0;
-/// Number of collisions that it counts for that a ball begins to rest on another, which takes
-/// about as long.
+/// Cost of starting to rest on another ball, in such collisions, which take about as long.
 const REST_COST: f64 = 8.0;
-/// After so many times at rest and out of it again, something presses a ball that nothing
-/// can stop. For the rest of the substep it stays where it is; the next one pushes it out.
+/// Maximum number of freezes. A ball frozen this often in one substep is squeezed by something
+/// immovable: it stays where it is for the rest of the substep; the next one pushes it out.
 const MAX_FREEZES: i32 = 10;
-/// A shorter time between two collisions is none, over the substep.
+/// Largest time between simultaneous collisions, over the substep.
 const SIMULTANEOUS: f64 = 1e-13;
-/// A ball that is this part of a radius outside of another wall is still on it; see `world::touch`.
+/// Seam tolerance: a ball at most this fraction of its radius away from another wall still touches
+/// that wall; see `world::touch`.
 const SEAM_TOLERANCE: f64 = 5e-6;
-/// Overlap that may stay, over the radius: pushing it out would lift what lies on it, and
-/// create energy.
+/// Allowed penetration over the radius: pushing it out would lift what rests on it, and create
+/// energy.
 const SLOP: f64 = 4e-3;
-/// A ball on a wall that is no half-space looks where it is after this part of its
-/// radius, though not more often than after this part of a substep.
+/// Support check on a curved or bounded wall: after rolling this fraction of its radius, at most
+/// once per this fraction of a substep.
 const SUPPORT_CHECK: f64 = 0.05;
-/// Cost that a substep may have, and for each ball besides, in looks at one half-space or one
-/// other ball, of which a processor does some fifty million in a second. Whatever is not at its
-/// end then stays where it is, and is named.
+/// Cost limit of a substep, and per ball, in tests of one ball against one half-space or ball (some
+/// fifty million per second). A ball that has not finished by then stays where it is, and is
+/// reported.
 const MAX_COST: u64 = 32_000_000;
 const COST_PER_BALL: u64 = 20_000;
-/// So many touches are enough to hold a ball, of which one of its size has twelve at most. Of
-/// those between two that both have as many already, no more are taken.
+/// Maximum number of contacts of a ball in a cluster; equal balls have twelve at most. Contacts
+/// between two balls that both have as many are dropped.
 pub(crate) const MAX_CONTACTS: u32 = 64;
-/// A look at a part of a wall that is no half-space counts as so many.
+/// Cost of a test against a sub-shape that is no half-space.
 const PART_COST: u64 = 8;
-/// The time at which two balls meet that are not equally accelerated counts as so many looks.
+/// Cost of a time of impact of two balls with different accelerations (a quartic).
 const QUARTIC_COST: u64 = 16;
 
-/// A collision that a substep went through.
+/// Collision that a substep processed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact<S> {
-    /// The row of the first: a marble, or of a wall if `on_wall`.
+    /// Row of the first body: a marble, or a wall if `on_wall`.
     pub a: u32,
-    /// True if the first is a wall.
+    /// True if the first body is a wall.
     pub on_wall: bool,
-    /// The row of the second, a marble.
+    /// Row of the second body, a marble.
     pub b: u32,
-    /// The unit vector from the first to the second.
+    /// Unit normal from the first to the second.
     pub normal: Vec3<S>,
-    /// Speed at which they came together along it, in m/s.
+    /// Approach speed along the normal, in m/s.
     pub approach_speed: S,
 }
 
@@ -112,7 +112,7 @@ impl Impact<f64> {
     }
 }
 
-/// Possible events of a ball.
+/// Kinds of events of a ball.
 #[derive(Clone, Copy, Debug)]
 enum EventKind {
     /// Collision with a wall, by index.
@@ -133,14 +133,14 @@ enum EventKind {
     RefreshCandidates,
 }
 
-/// Something that will happen, unless something else happens first.
+/// Predicted event; void once the trajectory has another version.
 #[derive(Clone, Copy, Debug)]
 struct Event {
     time: f64,
     row: usize,
     version: u32,
     kind: EventKind,
-    /// True if it meets another one at the very same time.
+    /// True if the ball collides with another one at the very same time.
     simultaneous: bool,
 }
 
@@ -164,15 +164,15 @@ impl PartialEq for Event {
 
 impl Eq for Event {}
 
-/// Input of the method, besides balls and walls.
+/// Settings of a substep, besides balls and walls.
 pub(crate) struct EventSettings<'a> {
-    /// The length of the substep, in seconds.
+    /// Substep, in seconds.
     pub dt: f64,
-    /// For what rests in heaps.
+    /// Iterations for clusters of resting balls.
     pub iterations: u32,
-    /// The walls.
+    /// Walls of the world.
     pub source: &'a dyn WallSource,
-    /// Cost of the substep so far, in looks.
+    /// Cost of the substep so far, in tests.
     pub cost: Counter<u64>,
 }
 
@@ -183,20 +183,20 @@ impl EventSettings<'_> {
     }
 }
 
-/// The method, with what it scribbles on.
+/// Event-driven solver, with its scratch buffers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct EventDriven {
-    /// To be filled by the caller, who finds them there afterwards.
+    /// Balls, filled in and read back by the caller.
     pub balls: Vec<Ball>,
-    /// Of the world.
+    /// Period of the world.
     pub period: Period<f64>,
-    /// Those that balls may come to.
+    /// Candidate walls.
     walls: Vec<Wall>,
-    /// Pairs of balls that may touch at the start.
+    /// Pairs of balls that may be in contact at the start.
     pub near: Contacts<f64>,
-    /// Impulses that the heaps' contacts bore in the last substep.
+    /// Impulses of the clusters' contacts in the last substep, for the warm start.
     pub impulse_cache: Vec<CachedImpulse<f64>>,
-    /// Work done on the balls, if somebody asks.
+    /// Energy bookkeeping, for the energy audit only.
     pub work: Option<EnergyLedger>,
     candidates: WallCandidates,
     cells: Cells,
@@ -207,8 +207,8 @@ pub(crate) struct EventDriven {
 }
 
 impl EventDriven {
-    /// Goes through a substep. Adds to `impacts` in the order of time, and gives the
-    /// rows that became infinite or NaN, which are as they were.
+    /// Simulates a substep. Appends to `impacts` in the order of time, and returns the rows that
+    /// became infinite or NaN or did not finish; the former keep their initial positions.
     pub fn run(&mut self, settings: &EventSettings, impacts: &mut Vec<Impact<f64>>) -> Vec<u32> {
         let dt = settings.dt;
         let initial_positions: Vec<_> = self.balls.iter().map(|b| b.position).collect();
@@ -249,8 +249,8 @@ impl EventDriven {
         stopped
     }
 
-    /// Lets every ball that still has something ahead of it stay where it is, if nothing
-    /// else will happen in this substep. Gives their rows.
+    /// Freezes balls that still have events at the end of the budget, at the time of the first of
+    /// these. Returns their rows.
     fn stop_unfinished(&mut self) -> Vec<u32> {
         let mut stopped = Vec::new();
         let first = self.queue.peek().map_or(0.0, |Reverse(event)| event.time);
@@ -298,7 +298,7 @@ impl EventDriven {
             EventKind::RestOnWall(wall) => {
                 self.advance(row, time);
                 let trajectory = &mut self.balls[row].trajectory;
-                // One that lies on another one may go to and fro between them.
+                // A ball between two supports might alternate between them.
                 trajectory.dissipation_count +=
                     if trajectory.support.is_some() { REST_COST } else { 0.0 };
                 if self.is_collapsing(row) {
@@ -326,15 +326,15 @@ impl EventDriven {
         }
     }
 
-    /// The way from one ball to another, in metres.
+    /// Vector between the centers of two balls, in metres.
     fn center_offset(&self, first: &Ball, second: &Ball) -> Vec3<f64> {
         self.period.nearest(second.position - first.position)
     }
 
-    /// Puts every ball where others find it.
+    /// Assigns balls to cells of the grid.
     fn assign_cells(&mut self, dt: f64) {
         let largest = self.balls.iter().fold(0.0_f64, |max, ball| max.max(ball.radius));
-        // Rounding must not take a ball that touches out of the neighbouring cell.
+        // Rounding must not move a touching ball out of the neighbouring cell.
         self.cells.reset(self.balls.len(), 2.001 * largest, self.period);
         self.unbounded.clear();
         for row in 0..self.balls.len() {
@@ -351,18 +351,18 @@ impl EventDriven {
     fn exceeds_cell_limit(&self, row: usize, remaining: f64) -> bool {
         let Ball { velocity, trajectory, .. } = &self.balls[row];
         let max_speed = velocity.magnitude() + trajectory.acceleration.magnitude() * remaining;
-        // Also what has no finite cell at all.
+        // Non-finite cells fail the test, too.
         let cells = max_speed * remaining / self.cells.min_width();
         let coordinate = self.balls[row].position;
         let coordinate = [coordinate.x, coordinate.y, coordinate.z]
             .iter()
             .fold(0.0_f64, |max, x| max.max(x.abs()));
-        // In a period, only who is in its cell knows which image of another one is the next.
+        // In a period, only cells tell which image of another ball is the nearest.
         let cells = if cells.is_finite() && !self.period.is_open() { 0.0 } else { cells };
         !(cells <= MAX_CELLS && coordinate / self.cells.min_width() < 1e15)
     }
 
-    /// Has a ball that became too fast looked for everywhere.
+    /// Moves a ball that became too fast out of the grid.
     fn update_cell(&mut self, row: usize, now: f64, dt: f64) {
         if self.balls[row].trajectory.cell_slot != CellSlot::Unbounded
             && self.exceeds_cell_limit(row, dt - now)

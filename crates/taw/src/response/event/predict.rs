@@ -13,17 +13,17 @@ use super::{
 use crate::math::{Point3, Vec3, direction_and_length, is_finite};
 use crate::shape::Nearest;
 
-/// Steps enough for a ball to come to any wall but one that it only grazes; then it looks
-/// again.
+/// Maximum number of conservative advancement steps; only a grazing ball needs more, and is
+/// predicted again from there.
 const MAX_ADVANCES: u32 = 64;
-/// The part of a substep after which a ball that touches a wall, and is neither pressed there
-/// nor comes nearer, looks again.
+/// Time until a ball that touches a wall, without pressing and without approach, is tested again,
+/// over the substep.
 const RECHECK_TIME: f64 = 1.0 / 64.0;
-/// A pressure below this part of the pull is none but for rounding.
+/// A normal acceleration below this fraction of the external one is rounding.
 const MIN_NORMAL_ACCELERATION: f64 = 1e-9;
 
 impl EventDriven {
-    /// Finds the next event of a ball and puts it in the queue.
+    /// Predicts the next event of a ball and queues it.
     pub(super) fn predict(&mut self, row: usize, now: f64, settings: &EventSettings) {
         self.update_cell(row, now, settings.dt);
         let refresh = self.candidates_expiry(row, now, settings);
@@ -34,7 +34,7 @@ impl EventDriven {
         let mut next = (ball.trajectory.regime_end.max(now), EventKind::RegimeChange);
         let mut simultaneous = false;
         let mut consider = |after: Option<f64>, kind: EventKind| {
-            // What lies behind by rounding is now.
+            // An event in the past by rounding happens now.
             let Some(after) = after.filter(|after| !after.is_nan()) else { return };
             let time = now + after.max(0.0);
             match (next.1, kind) {
@@ -48,7 +48,7 @@ impl EventDriven {
             }
         };
         consider(refresh, EventKind::RefreshCandidates);
-        // Beyond that, no wall that stays can matter in the rest of the substep.
+        // Walls at rest beyond this distance cannot matter in the rest of the substep.
         let at = ball.position_at(now);
         let speed = ball.velocity_at(now).magnitude();
         let acceleration = ball.trajectory.acceleration.magnitude();
@@ -103,7 +103,7 @@ impl EventDriven {
         }
     }
 
-    /// Names those that a ball may touch soon, itself among them.
+    /// Visits balls that a ball may touch soon, itself among them.
     pub(super) fn for_each_near(&self, row: usize, mut visit: impl FnMut(usize)) {
         match self.balls[row].trajectory.cell_slot {
             CellSlot::Cell(cell) => {
@@ -114,7 +114,7 @@ impl EventDriven {
         }
     }
 
-    /// When and how a ball meets a wall next, in seconds from now.
+    /// Next event with a wall, and the seconds until it.
     fn predict_wall(
         &self,
         row: usize,
@@ -144,7 +144,7 @@ impl EventDriven {
         let is_resting = ball.trajectory.support.is_some() || ball.trajectory.clustered;
         let impact_threshold =
             self.impact_threshold(row, is_resting, settings).max(1e-14 * velocity.magnitude());
-        // A heap that is held takes an approach as slow as that until the end of the substep.
+        // A resting cluster absorbs such a slow approach until the end of the substep.
         let end_speed = separation.speed + separation.acceleration * (settings.dt - now);
         let rest_threshold = self.impact_threshold(row, false, settings);
         if ball.trajectory.clustered
@@ -157,13 +157,13 @@ impl EventDriven {
         Self::wall_event(wall, separation, tolerance, is_resting, impact_threshold)
     }
 
-    /// Slower than this, a ball that meets a wall begins to rest on it, or to be pressed.
+    /// Approach speed below which a ball starts to rest on a wall, in m/s.
     fn impact_threshold(&self, row: usize, is_resting: bool, settings: &EventSettings) -> f64 {
         let fall_speed = self.balls[row].external_acceleration.magnitude() * settings.dt;
         if is_resting { PRESS_SPEED * fall_speed } else { REST_SPEED * fall_speed }
     }
 
-    /// Next event of a ball and a plane by their gap, and the seconds until it.
+    /// Next event of a ball and a plane, and the seconds until it.
     fn wall_event(
         wall: usize,
         separation: SeparationMotion,
@@ -202,9 +202,9 @@ impl EventDriven {
         }
     }
 
-    /// Next event of a ball and a wall that is no half-space, or turns: for as long as the plane
-    /// across the nearest point keeps them apart, they do not meet; then there is another one
-    /// (conservative advancement; Mirtich 1996).
+    /// Next event with a rotating wall or a sub-shape that is no half-space, by conservative
+    /// advancement (Mirtich 1996): while the plane at the nearest point separates them, there is no
+    /// impact; then the plane is updated.
     fn predict_wall_part(
         &self,
         row: usize,
@@ -216,8 +216,8 @@ impl EventDriven {
         let (mut time, mut step) = (now, 0);
         let is_resting = ball.trajectory.support.is_some() || ball.trajectory.clustered;
         let rest_threshold = self.impact_threshold(row, false, settings);
-        // The face that holds it may end under it before the substep does; it must not go deep
-        // into the next one.
+        // The supporting face may end before the substep does; the ball must not penetrate the next
+        // one deeply.
         let impact_threshold = self.impact_threshold(row, is_resting, settings);
         let impact_threshold = if ball.trajectory.touches_balls {
             impact_threshold
@@ -238,7 +238,7 @@ impl EventDriven {
                 acceleration: ball.trajectory.acceleration.dot(normal)
                     - self.max_rotation_acceleration(row, number, time, settings),
             };
-            // Time has no digits for a gap that closes sooner than that.
+            // Separations that close sooner are below the resolution of time.
             let time_rounding = f64::EPSILON * time * separation.speed.abs();
             let tolerance = f64::EPSILON * 16.0 * (ball.radius + distance.abs())
                 + ball.position_error
@@ -253,7 +253,7 @@ impl EventDriven {
             } else {
                 let normal_acceleration =
                     self.normal_acceleration(row, number, time, ball.trajectory.acceleration);
-                // What came off just now has nothing that presses it, whatever rounding says.
+                // A wall that the ball has just left does not press it, whatever rounding says.
                 let just_left = step == 0 && ball.trajectory.left_wall == Some(number);
                 let pressed = !just_left
                     && normal_acceleration
@@ -270,8 +270,8 @@ impl EventDriven {
                         (time - now, EventKind::RestOnWall(number))
                     });
                 }
-                // What nothing presses is not at rest there until it has no approach; but what is
-                // held takes its own until the end of the substep.
+                // Without pressure any approach is an impact; but a resting cluster absorbs its own
+                // until the end of the substep.
                 let end_speed = separation.speed + separation.acceleration * (settings.dt - time);
                 let is_held_to_end = ball.trajectory.touches_balls
                     || ball.trajectory.clustered && end_speed >= -rest_threshold;
@@ -280,7 +280,7 @@ impl EventDriven {
                     return (!seam).then_some((time - now, EventKind::WallImpact(number)));
                 }
                 if separation.speed > 0.0 && separation.acceleration < 0.0 {
-                    // It comes back to this plane, or later.
+                    // Earliest return to this plane.
                     (-2.0 * separation.speed / separation.acceleration)
                         .max(RECHECK_TIME * RECHECK_TIME * settings.dt)
                 } else {
@@ -295,7 +295,7 @@ impl EventDriven {
         }
     }
 
-    /// Upper bound of a ball's acceleration toward a wall because that turns, in m/s².
+    /// Upper bound of a ball's acceleration toward a wall by the wall's rotation, in m/s².
     fn max_rotation_acceleration(
         &self,
         row: usize,
@@ -314,11 +314,11 @@ impl EventDriven {
         let speed = (ball.velocity_at(time) - motion.velocity).magnitude() + speed_gain;
         let pivot = motion.pivot - motion.velocity * remaining;
         let arm = (ball.position_at(time) - pivot).magnitude() + speed * time_left;
-        // Of a plane that turns: what Coriolis and the turn itself do.
+        // Coriolis and centripetal acceleration of a rotating plane.
         angular_speed * (2.0 * speed + angular_speed * arm)
     }
 
-    /// When and how two balls meet next, in seconds from now.
+    /// Next event of two balls, and the seconds until it.
     pub(super) fn predict_ball(
         &self,
         a: usize,
@@ -342,7 +342,7 @@ impl EventDriven {
             return None; // what is nowhere is nobody's concern
         }
         let radius_sum = first.radius + second.radius;
-        // Most are too far away, which needs no exact distance.
+        // Quick rejection without the exact distance.
         let displacement =
             (velocity.magnitude() + 0.5 * acceleration.magnitude() * remaining) * remaining;
         let max_distance = (radius_sum + displacement) * (1.0 + 1e-12);
@@ -374,7 +374,7 @@ impl EventDriven {
             return if speed < -press_speed {
                 Some(ball_impact(after))
             } else if normal_acceleration < 0.0 {
-                // They touch so slowly that they only begin to press each other.
+                // Impact so slow that they only start to press each other.
                 Some((
                     after + (-press_speed * 1.01 - speed) / normal_acceleration,
                     EventKind::RestOnBall(b, version),
@@ -391,7 +391,7 @@ impl EventDriven {
         if normal_acceleration >= 0.0 {
             return None;
         }
-        // If they part and come free, they meet again; else they press in the end.
+        // Balls that separate completely collide again; others press each other in the end.
         let apex = -speed / normal_acceleration;
         let offset_at_impact = center_offset + (velocity + acceleration * (0.5 * apex)) * apex;
         if speed > press_speed && offset_at_impact.magnitude() > radius_sum {
@@ -410,8 +410,8 @@ impl EventDriven {
         ))
     }
 
-    /// Tests if the point where a wall is nearest to a ball is on another wall that is as
-    /// near, which is then the one that counts.
+    /// Tests for an internal edge (ghost collision): the nearest point of a wall lies on another
+    /// wall that is at least as near, and takes precedence.
     pub(super) fn is_seam(
         &self,
         row: usize,
@@ -440,11 +440,10 @@ impl EventDriven {
         covered
     }
 
-    /// The speed that two balls that press each other gain before they touch anew.
+    /// Speed that two balls pressed together regain before they collide again, in m/s.
     ///
-    /// Where collisions take energy, chains of touching balls would come to rest among
-    /// themselves only after endlessly many (inelastic collapse; `McNamara` and Young
-    /// 1992), so there it is also what counts as rest.
+    /// With inelastic collisions, chains of touching balls would need infinitely many to come to
+    /// rest (inelastic collapse; `McNamara` and Young 1992), so for these it also counts as rest.
     pub(super) fn pressing_speed(&self, a: usize, b: usize, settings: &EventSettings) -> f64 {
         let (first, second) = (&self.balls[a], &self.balls[b]);
         let relative_acceleration =
@@ -460,7 +459,7 @@ impl EventDriven {
     }
 }
 
-/// Time until something leaves its cell through a border, which it may lie on, in seconds.
+/// Time until a center leaves its cell through a border, on which it may lie, in seconds.
 fn crossing_time(separation: SeparationMotion) -> Option<f64> {
     if separation.distance > 0.0 {
         time_of_impact_plane(separation)

@@ -1,5 +1,5 @@
-//! Rest at the start of a substep: on one wall, which [`support`](super::flat_support) knows in
-//! closed form, or in heaps, which are held by the [impulse method](super::resting_cluster).
+//! Rest at the start of a substep: on one wall, in [closed form](super::flat_support), or in
+//! clusters, by the [impulse solver](super::resting_cluster).
 
 use std::collections::BTreeSet;
 
@@ -11,12 +11,12 @@ use crate::contact::{Contact, Contacts};
 use crate::math::{Vec3, direction_and_length};
 use crate::shape::Nearest;
 
-/// Number of times that a ball is moved out of the wall that it is deepest in; of two that meet at
-/// a right angle or more, it is out after two.
+/// Maximum number of projections out of the deepest wall; between two walls at a right angle or
+/// more, two suffice.
 const MAX_MOVES: u32 = 16;
 
 impl EventDriven {
-    /// Finds what rests at the start of a substep.
+    /// Finds balls at rest at the start of a substep.
     pub(super) fn find_resting(&mut self, settings: &EventSettings) {
         self.near.wm.clear();
         for row in 0..self.balls.len() {
@@ -49,13 +49,13 @@ impl EventDriven {
         self.near = near;
     }
 
-    /// Ends what is left of the approach of a ball to walls that it rests between, with no other
-    /// ball. They would only hold it at the end of the substep, and by then it would be in them.
+    /// Ends the remaining approach of a ball to the walls between which it rests alone. The solver
+    /// would only stop it at the end of the substep, when the ball would have penetrated them.
     fn end_approach_to_walls(&mut self, near: &Contacts<f64>, settings: &EventSettings) {
         let in_pairs: BTreeSet<u32> = near.mm.iter().flat_map(|c| [c.a, c.b]).collect();
         for walls in near.wm.chunk_by(|c, next| c.b == next.b) {
             let row = walls[0].b;
-            // What a wall is moved by it takes along in the course of the substep.
+            // A moving wall carries the ball in the course of the substep.
             if in_pairs.contains(&row) || walls.iter().any(|c| self.is_moving(c.a as usize)) {
                 continue;
             }
@@ -75,8 +75,8 @@ impl EventDriven {
         }
     }
 
-    /// Finds the walls that a ball touches at the start. Out of what it overlaps, but by what
-    /// others may press it there, it is moved at once: overlap is not energy.
+    /// Finds the walls that a ball touches at the start. Penetration, beyond the slop, is resolved
+    /// at once: it is no energy.
     fn find_wall_contacts(&mut self, row: usize, settings: &EventSettings) {
         self.push_out_of_walls(row, 0.0);
         let mut near = std::mem::take(&mut self.near.wm);
@@ -97,13 +97,13 @@ impl EventDriven {
         self.near.wm = near;
     }
 
-    /// Moves a ball out of the walls that it is in.
+    /// Pushes a ball out of the walls that it penetrates.
     pub(super) fn push_out_of_walls(&mut self, row: usize, now: f64) {
         if self.balls[row].inverse_mass <= 0.0 {
             return; // no wall holds it
         }
         self.push_out(row, now, self.parts_of(row).to_vec());
-        // Half-spaces have the last word, and those that stay: behind them there is nothing.
+        // Half-spaces come last, and static ones after moving ones: behind them there is nothing.
         for is_moving in [true, false] {
             let planes = self.half_spaces().iter().copied();
             let planes =
@@ -112,9 +112,8 @@ impl EventDriven {
         }
     }
 
-    /// Moves a ball out of the wall that it is deepest in, until it is in none of these or, as
-    /// between two that leave it no room, was moved often enough (von Neumann 1933, alternating
-    /// projections).
+    /// Projects a ball out of the deepest wall, again and again until it penetrates none, or too
+    /// often, as in a gap that is too narrow (von Neumann 1933, alternating projections).
     fn push_out(&mut self, row: usize, now: f64, walls: Vec<u32>) {
         for _ in 0..MAX_MOVES {
             let ball = &self.balls[row];
@@ -137,7 +136,7 @@ impl EventDriven {
         }
     }
 
-    /// Tests if a wall goes through the substep.
+    /// Tests if a wall moves through the substep.
     fn is_moving(&self, wall: usize) -> bool {
         self.walls[wall].arrival_time.is_some()
     }
@@ -148,8 +147,7 @@ impl EventDriven {
         let ball = &self.balls[contact.b as usize];
         let fall_speed = ball.external_acceleration.magnitude() * settings.dt;
         let wall = &self.walls[contact.a as usize];
-        // The speed of a wall that is moved from place to place jumps at the start; what lies
-        // on it does not jump with it.
+        // The velocity of a moved wall jumps at the start; a ball on it does not jump with it.
         let rest_threshold =
             if self.is_moving(contact.a as usize) { fall_speed } else { REST_SPEED * fall_speed };
         let tolerance = 0.5 * REST_SPEED * REST_SPEED * fall_speed * settings.dt;
@@ -163,8 +161,8 @@ impl EventDriven {
         is_pressed && separation <= tolerance && speed.abs() <= rest_threshold
     }
 
-    /// Speed by which a ball and a wall come together slower than what counts as rest, or
-    /// nothing if they do not touch.
+    /// Margin of the approach speed of a ball and a wall below the resting speed, in m/s; none if
+    /// they are not in contact.
     pub(super) fn wall_contact(
         &self,
         contact: &Contact<f64>,
@@ -187,7 +185,8 @@ impl EventDriven {
             .then_some(threshold + speed)
     }
 
-    /// Speed by which two balls come together slower than what counts as rest, in the same way.
+    /// Margin of the approach speed of two balls below the resting speed, in m/s; none if they are
+    /// not in contact.
     pub(super) fn ball_contact(
         &self,
         contact: &Contact<f64>,
@@ -209,8 +208,8 @@ impl EventDriven {
             .then_some(threshold + speed)
     }
 
-    /// Tests if a ball is too deep in another one that it does not come nearer to: the two are
-    /// pushed apart, however fast they part.
+    /// Tests for penetration beyond the slop: such balls are separated, however fast they move
+    /// apart.
     fn is_deep_in_ball(&self, contact: &Contact<f64>) -> bool {
         let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
         let center_offset = self.center_offset(first, second);
@@ -218,8 +217,8 @@ impl EventDriven {
         center_offset.magnitude() < first.radius + second.radius - slop
     }
 
-    /// The widest gap that still counts as touching, in metres: a fall from this height
-    /// gives the speed that counts as rest.
+    /// Largest separation that counts as contact, in metres: the height of a fall that reaches the
+    /// resting speed.
     fn contact_tolerance(&self, row: u32, settings: &EventSettings) -> f64 {
         let ball = &self.balls[row as usize];
         0.5 * PRESS_SPEED
@@ -230,7 +229,7 @@ impl EventDriven {
             + ball.position_error
     }
 
-    /// The gap between a wall and a ball, and how fast it grows.
+    /// Separation of a wall and a ball, in metres, and its rate, in m/s.
     fn wall_separation(&self, contact: &Contact<f64>, now: f64) -> (f64, f64) {
         let ball = &self.balls[contact.b as usize];
         let wall: &Wall = &self.walls[contact.a as usize];

@@ -1,4 +1,4 @@
-//! A ball that lies on a wall: how it comes to lie there, how it goes on, and where that ends.
+//! Rest on a single wall: start, motion along the wall, and end of support.
 
 use std::cell::Cell;
 
@@ -13,22 +13,23 @@ use crate::math::Vec3;
 use crate::response::{BallRotation, ImpulseSample};
 use crate::shape::Nearest;
 
-/// Number of halvings of a time to find where a face ends.
+/// Bisections of a time to find the end of a face.
 const BISECTIONS: u32 = 24;
 
-/// A wall that rises by less than this angle, in radians, goes on like the one before.
+/// A neighbouring face that rises by less than this angle, in radians, continues the supporting
+/// one.
 const MIN_RISE: f64 = 1e-6;
 
 impl EventDriven {
-    /// Lets a ball that touches a wall lie on it from now on.
+    /// Starts the rest of a ball on a wall that it touches.
     pub(super) fn start_resting(&mut self, row: usize, wall: usize, settings: &EventSettings) {
         let ball = &mut self.balls[row];
         let surface = &self.walls[wall];
         let now = ball.trajectory.start;
         let Nearest { normal, distance, .. } = surface.nearest(ball.position, now);
         ball.fly_free();
-        // The rounding of the place goes too, lest it add up. Overlap is not energy: it goes
-        // without a change of velocity.
+        // Removes the rounding of the position, so that it does not accumulate; and penetration,
+        // which is no energy, without a change of velocity.
         let penetration = ball.radius - distance;
         let fall_distance = ball.external_acceleration.magnitude() * settings.dt * settings.dt;
         if -penetration
@@ -57,8 +58,8 @@ impl EventDriven {
         self.update_support_motion(row, settings);
     }
 
-    /// A ball on a wall that is no half-space may have come to where another goes on, or
-    /// none: then it flies.
+    /// Rechecks the support on a curved or bounded wall: another face may have taken over, or none,
+    /// and then the ball flies.
     pub(super) fn recheck_support(&mut self, row: usize, settings: &EventSettings) {
         let Some(support) = self.balls[row].trajectory.support else { return };
         if self.balls[row].trajectory.leaves_support {
@@ -88,7 +89,7 @@ impl EventDriven {
         }
     }
 
-    /// Tests if a wall is a half-space that turns about its normal at most.
+    /// Tests for a half-space that does not rotate, or about its normal only.
     pub(super) fn has_fixed_normal(&self, wall: usize) -> bool {
         let wall = &self.walls[wall];
         let WallCollider::Plane { normal, .. } = wall.collider else { return false };
@@ -97,8 +98,8 @@ impl EventDriven {
         })
     }
 
-    /// With what force over its mass a wall keeps a ball on it that has this acceleration
-    /// otherwise, at a time of its path, in m/s²; below zero, it comes off.
+    /// Normal force per mass that a wall exerts on a ball with this external acceleration, at a
+    /// time of its trajectory, in m/s²; negative if the ball would leave.
     pub(super) fn normal_acceleration(
         &self,
         row: usize,
@@ -118,7 +119,7 @@ impl EventDriven {
         ground.contact(&BallState::of(&ball)).map_or(0.0, |contact| contact.normal_acceleration)
     }
 
-    /// Finds out how a ball moves on that lies on a wall.
+    /// Updates the motion of a ball on a wall: starts its next segment.
     pub(super) fn update_support_motion(&mut self, row: usize, settings: &EventSettings) {
         let Some(support) = self.balls[row].trajectory.support else { return };
         settings.add_cost(self.wall_cost(row));
@@ -139,8 +140,8 @@ impl EventDriven {
         settings.add_cost(ground.cost.get());
     }
 
-    /// The walls that a ball may be on soon, besides the one that it is on: those that are
-    /// near and not in front of it. (What is in front, it hits.)
+    /// Walls that may support a ball soon: the present one, and those near that do not rise in
+    /// front of it. (Walls in front are collided with.)
     fn support_candidates(&self, row: usize, support: usize) -> Vec<u32> {
         let ball = &self.balls[row];
         let (at, now) = (ball.position, ball.trajectory.start);
@@ -161,7 +162,7 @@ impl EventDriven {
         candidates
     }
 
-    /// On what is flat it is known in closed form.
+    /// Starts a segment on a flat surface, in closed form.
     fn start_flat_segment(
         ground: &CurvedSupport,
         ball: &mut Ball,
@@ -193,7 +194,7 @@ impl EventDriven {
         ball.trajectory.spin_acceleration = segment.spin_acceleration;
         let mut duration = segment.duration;
         if !is_fixed {
-            // Before it is far, it must be seen whether what it lies on goes on like this.
+            // The support is rechecked before the ball has rolled far.
             let relative_speed = (ball.velocity - wall.velocity_at(ball.position, now)).magnitude();
             let max_distance = SUPPORT_CHECK * ball.radius;
             let check_time = (max_distance / relative_speed)
@@ -201,8 +202,8 @@ impl EventDriven {
             let min_step = ground.min_step.min(settings.dt - now);
             let check_time =
                 check_time.max(SUPPORT_CHECK * settings.dt).max(min_step).min(settings.dt - now);
-            // A slide ends at its moment, however soon: a shortest step would turn it around, and
-            // the next one back.
+            // A slide ends at its exact time, however soon: a minimum step would reverse it, and
+            // the next one back again.
             let face_end = end_of_face(ground, ball, normal, duration.min(check_time));
             duration = duration.min(face_end.max(min_step));
         }
@@ -210,7 +211,8 @@ impl EventDriven {
         ball.trajectory.regime_end = if end < settings.dt { end } else { f64::INFINITY };
     }
 
-    /// On what bends it is integrated. False if nothing presses it there.
+    /// Starts a segment on a curved surface, integrated numerically. False if there is no normal
+    /// force.
     fn start_curved_segment(
         ground: &CurvedSupport,
         ball: &mut Ball,
@@ -239,7 +241,7 @@ impl EventDriven {
 }
 
 impl Ball {
-    /// Lets go of a wall that does not press it any more.
+    /// Starts free flight from a wall that does not press any more.
     fn leave_wall(&mut self, wall: usize) {
         self.fly_free();
         self.trajectory.left_wall = Some(wall);
@@ -265,8 +267,8 @@ fn support_of<'a>(
     }
 }
 
-/// After which part of a time a ball that goes straight comes to the end of the face that it
-/// is on, or to another one: all of it, if the face goes on.
+/// Time until a ball on a flat face reaches the end of it, or another face; `duration` if the face
+/// continues.
 fn end_of_face(ground: &CurvedSupport, ball: &Ball, normal: Vec3<f64>, duration: f64) -> f64 {
     let now = ball.trajectory.start;
     let is_on_face = |t: f64| ground.has_normal(ball.position_at(now + t), now + t, normal);
@@ -289,7 +291,7 @@ mod tests {
     use crate::response::Material;
     use crate::shape::Triangle;
 
-    /// A large triangle, of a mesh.
+    /// Large triangle of a mesh.
     struct Face;
 
     impl WallSource for Face {
@@ -347,7 +349,7 @@ mod tests {
             assert!((ball.velocity.x - (1.0 + slip * 5.0 / 7.0)).abs() < 1e-12, "{ball:?}");
             counts.push(ball.trajectory.support_steps);
         }
-        // It looks where it is each 0.01 m, and once where it begins to roll.
+        // Support checks after each 0.01 m, and one at the start of rolling.
         assert!(counts.iter().all(|count| *count <= 5), "{counts:?}");
     }
 }

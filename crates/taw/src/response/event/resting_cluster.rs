@@ -1,4 +1,4 @@
-//! Rest that begins within a substep, and the accelerations that hold it.
+//! Clusters that come to rest within a substep, and the accelerations that keep them at rest.
 
 use cgmath::{InnerSpace, Zero};
 
@@ -15,21 +15,21 @@ pub(super) struct RestingCluster {
     pub pressed_by: PressedBy,
 }
 
-/// Causes that may bring balls together again that have come to rest among each other.
+/// Causes that may press resting balls together again.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum PressedBy {
-    /// Nothing: all of them fall alike, and touch nobody else.
+    /// None: all balls accelerate alike, and touch nothing else.
     Nothing,
-    /// Forces that are not the same for all.
+    /// Forces that differ between balls.
     Forces,
-    /// A wall, or a ball that nothing moves.
+    /// A wall, or a ball of infinite mass.
     FixedBody,
 }
 
 impl EventDriven {
-    /// Lets balls, and all that touch them and each other, rest together from now on. What parts
-    /// faster than `max_separation_speed`, in m/s, and than what counts as rest does not touch.
-    /// Gives them; their events are to be foreseen anew.
+    /// Puts balls to rest, with all that touch them and each other. Pairs that separate faster than
+    /// `max_separation_speed`, in m/s, and than the rest threshold do not count as touching. The
+    /// caller predicts their events again.
     pub(super) fn rest_cluster(
         &mut self,
         seeds: [usize; 2],
@@ -43,7 +43,7 @@ impl EventDriven {
             .iter()
             .map(|row| self.balls[*row].external_acceleration.magnitude())
             .fold(0.0, f64::max);
-        // First what the collision does.
+        // First the collision.
         self.cluster.gather(&mut contacts, &self.balls, self.period);
         let remaining = settings.dt - now;
         self.solve_inelastic_impact(&mut contacts, now, max_acceleration, settings);
@@ -61,11 +61,11 @@ impl EventDriven {
         let row_of = |local: u32| self.cluster.rows[local as usize];
         contacts.wm.iter_mut().for_each(|c| c.b = row_of(c.b));
         contacts.mm.iter_mut().for_each(|c| (c.a, c.b) = (row_of(c.a), row_of(c.b)));
-        // Then what holds it from there on, if that is needed, for any time at all.
+        // Then the accelerations that keep it at rest, if there is any pressure and time left.
         let pressed_by = self.find_pressed_by(&found, &contacts);
         let is_free = max_separation_speed == f64::INFINITY && pressed_by == PressedBy::Nothing;
         if contacts.is_empty() || is_free {
-            // Nothing presses them any more.
+            // No pressure any more.
         } else if remaining > 1e-6 * settings.dt {
             self.solve_resting(&mut contacts, now, settings, &mut Vec::new());
         } else {
@@ -74,8 +74,8 @@ impl EventDriven {
         RestingCluster { rows: found, pressed_by }
     }
 
-    /// Ends the approach of what the heap has taken over, all of it at once and without rebound;
-    /// `max_acceleration` is the strongest acceleration, in m/s².
+    /// Solves the approach of a gathered cluster as one collision without restitution;
+    /// `max_acceleration` in m/s².
     pub(super) fn solve_inelastic_impact(
         &mut self,
         contacts: &mut Contacts<f64>,
@@ -96,7 +96,7 @@ impl EventDriven {
         }
     }
 
-    /// Lets balls keep their velocity, for so short a time that nothing presses them noticeably.
+    /// Keeps velocities constant, for a time too short for forces to matter.
     fn keep_velocity(&mut self, rows: &[usize]) {
         for row in rows {
             let trajectory = &mut self.balls[*row].trajectory;
@@ -118,8 +118,8 @@ impl EventDriven {
         if is_uniform { PressedBy::Nothing } else { PressedBy::Forces }
     }
 
-    /// These balls, those that they touch, and so on, all of them released at this time;
-    /// and the contacts between them.
+    /// Connected component of contacts around some balls, all in free flight at this time, and its
+    /// contacts.
     fn connected_component(
         &mut self,
         seeds: [usize; 2],
@@ -128,7 +128,7 @@ impl EventDriven {
         settings: &EventSettings,
     ) -> (Vec<usize>, Contacts<f64>) {
         let mut contacts = Contacts::default();
-        // The place of each ball in `found`, plus one.
+        // Index of each ball in `found`, plus one.
         let mut index = std::mem::take(&mut self.cluster.contact_counts);
         index.clear();
         index.resize(self.balls.len(), 0);
@@ -172,7 +172,7 @@ impl EventDriven {
             near.sort_unstable();
             near.dedup();
             for other in near.iter().copied().filter(|other| *other != row) {
-                // What had its turn has named this one already.
+                // Visited balls have listed this contact already.
                 if index[other] != 0 && index[other] <= next as u32 {
                     continue;
                 }
@@ -180,7 +180,7 @@ impl EventDriven {
                 self.balls[other].advance(now);
                 let (a, b) = (row.min(other) as u32, row.max(other) as u32);
                 let contact = Contact { a, b, part: 0, along: [0.0; 2], mtv };
-                // The two that it is about touch, whatever rounding says.
+                // The colliding two are in contact, whatever rounding says.
                 let is_seed = seeds.contains(&row) && seeds.contains(&other);
                 let is_full = contact_counts[row].min(contact_counts[other]) >= MAX_CONTACTS;
                 if !is_full
@@ -199,7 +199,7 @@ impl EventDriven {
         (found, contacts)
     }
 
-    /// Finds the accelerations that hold these contacts from `now` to the end of the
+    /// Solves for the accelerations that keep contacts at rest from `now` to the end of the
     /// substep.
     pub(super) fn solve_resting(
         &mut self,
@@ -213,7 +213,7 @@ impl EventDriven {
         let Cluster { rows, local, bodies: ClusterBodies { position, velocity, .. }, .. } =
             &mut self.cluster;
         let mut max_acceleration: f64 = 0.0;
-        // Where each would be at the end of the substep if nothing held it.
+        // Free positions at the end of the substep.
         for (at, row) in rows.iter().enumerate() {
             let ball = &self.balls[*row as usize];
             if ball.is_frozen() {
@@ -245,9 +245,8 @@ impl EventDriven {
                 wall_power[at] += energy / remaining;
             });
         }
-        // What the method pushed apart, besides; not so far that one were on the other side of a
-        // thin wall then, and all that touch each other by the same part, so that their common
-        // center stays where it is.
+        // Position corrections of the solver, scaled so that no ball jumps through a thin wall, by
+        // the same factor for a connected component, so that its center of mass stays.
         sets.build(contacts.mm.iter().map(|c| (Some(c.a as usize), c.b as usize)), rows.len());
         let (mut corrections, mut fractions) =
             (vec![Vec3::zero(); rows.len()], vec![1.0_f64; rows.len()]);
@@ -276,7 +275,7 @@ impl EventDriven {
             self.balls[rows[at] as usize].position +=
                 correction * fractions[sets.set_of(at) as usize];
         }
-        // It pushed out of what they touched, and maybe into what they did not.
+        // Corrections may push balls into walls that they did not touch.
         for at in 0..self.cluster.rows.len() {
             let row = self.cluster.rows[at] as usize;
             if !self.balls[row].is_frozen() {

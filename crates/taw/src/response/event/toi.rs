@@ -1,12 +1,11 @@
-//! When two paths meet. Within a substep every path is a parabola, so a distance to a
-//! plane is a quadratic in time and a squared distance between centers a quartic.
+//! Time of impact. Within a substep every trajectory is a parabola, so the distance to a plane is a
+//! quadratic in time, and the squared distance of two centers a quartic.
 
 use cgmath::InnerSpace;
 
 use crate::math::Vec3;
 
-/// Distance of two things along the line that they would touch on, how fast that
-/// grows, and how fast the growth does: m, m/s, m/s².
+/// Separation along a normal, its rate and the rate of that: m, m/s, m/s².
 #[derive(Clone, Copy, Debug)]
 pub(super) struct SeparationMotion {
     pub distance: f64,
@@ -14,7 +13,7 @@ pub(super) struct SeparationMotion {
     pub acceleration: f64,
 }
 
-/// After how many seconds a gap that is open closes, if ever.
+/// Time of impact on a plane, in seconds, from a positive separation; none if there is no impact.
 pub(super) fn time_of_impact_plane(separation: SeparationMotion) -> Option<f64> {
     let SeparationMotion { distance, speed, acceleration } = separation;
     let discriminant = speed * speed - 2.0 * acceleration * distance;
@@ -22,13 +21,12 @@ pub(super) fn time_of_impact_plane(separation: SeparationMotion) -> Option<f64> 
         return None;
     }
     let root = discriminant.sqrt();
-    // Of the two forms of the solution, the one that subtracts nothing.
+    // Root of the quadratic equation in the form without cancellation.
     Some(if speed < 0.0 { 2.0 * distance / (root - speed) } else { (speed + root) / -acceleration })
 }
 
-/// After how many seconds, from `start` to `end`, two centers come within `radius_sum` of each
-/// other. They are `center_offset`, with this relative velocity and acceleration; at `start` they
-/// are outside.
+/// Time of impact of two spheres between `start` and `end`, in seconds, from the offset of their
+/// centers, relative velocity and relative acceleration; they are separated at `start`.
 pub(super) fn time_of_impact_spheres(
     center_offset: Vec3<f64>,
     velocity: Vec3<f64>,
@@ -37,11 +35,11 @@ pub(super) fn time_of_impact_spheres(
     [start, end]: [f64; 2],
 ) -> Option<f64> {
     let distance = center_offset.magnitude();
-    // A difference of squares that keeps its digits where they are nearly equal.
+    // Difference of squares without cancellation for nearly equal ones.
     let gap_squared = (distance - radius_sum) * (distance + radius_sum);
     let (radial, squared) = (center_offset.dot(velocity), velocity.magnitude2());
     if acceleration.magnitude2() == 0.0 {
-        // Relative motion along a line: |apart + velocity t|² = reach².
+        // Relative motion along a line: |center_offset + velocity t|² = radius_sum².
         let discriminant = radial * radial - squared * gap_squared;
         if radial >= 0.0 || discriminant < 0.0 {
             return None;
@@ -59,10 +57,10 @@ pub(super) fn time_of_impact_spheres(
     first_root(quartic, start, end)
 }
 
-/// Where a quartic (lowest coefficient first) first falls from above zero to zero.
+/// First root of a quartic (lowest coefficient first) with a sign change from positive to negative.
 ///
-/// Between the zeros of its second derivative the first is monotone, and between the
-/// zeros of that the quartic itself, so nothing is missed however close two zeros are.
+/// Between the roots of its second derivative the first is monotone, and between the roots of that
+/// the quartic itself, so no root is missed, however close two are.
 fn first_root(c: [f64; 5], start: f64, end: f64) -> Option<f64> {
     let value = |t: f64| (((c[4] * t + c[3]) * t + c[2]) * t + c[1]) * t + c[0];
     let slope = |t: f64| ((4.0 * c[4] * t + 3.0 * c[3]) * t + 2.0 * c[2]) * t + c[1];
@@ -86,13 +84,13 @@ fn first_root(c: [f64; 5], start: f64, end: f64) -> Option<f64> {
     None
 }
 
-/// Where the curvature of a quartic changes its sign, in order, and then `end`.
+/// Inflection points of a quartic, in order, and then `end`.
 fn inflections(c: [f64; 5], start: f64, end: f64) -> impl Iterator<Item = f64> {
     // 12 c4 t² + 6 c3 t + 2 c2, halved. c4 is above zero.
     let (a, half_b) = (6.0 * c[4], 1.5 * c[3]);
     let discriminant = half_b * half_b - a * c[2];
     let zeros = if discriminant > 0.0 {
-        // A sum without cancellation, and the other zero by the product.
+        // Sum without cancellation, and the other root by the product.
         let q = -(half_b + half_b.signum() * discriminant.sqrt());
         let (x, y) = (q / a, c[2] / q);
         [x.min(y), x.max(y)]
@@ -102,8 +100,8 @@ fn inflections(c: [f64; 5], start: f64, end: f64) -> impl Iterator<Item = f64> {
     zeros.into_iter().filter(move |t| *t > start && *t < end).chain([end])
 }
 
-/// A zero of a function that has different signs at both ends: by the secant where
-/// that narrows the bracket well, else by halving it (Illinois, Dowell and Jarratt 1971).
+/// Root of a function with different signs at both ends: by the secant where that narrows the
+/// bracket well, else by bisection (Illinois, Dowell and Jarratt 1971).
 fn bisect(f: impl Fn(f64) -> f64, mut lo: f64, mut hi: f64) -> f64 {
     let (mut f_lo, mut f_hi) = (f(lo), f(hi));
     let falling = f_lo > 0.0;
@@ -125,7 +123,7 @@ fn bisect(f: impl Fn(f64) -> f64, mut lo: f64, mut hi: f64) -> f64 {
             return middle;
         }
     }
-    // The side before the touch: what is found there is not inside yet.
+    // The side before the impact, without penetration.
     if falling { lo } else { hi }
 }
 
@@ -170,7 +168,7 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2_000))]
 
-        /// Against a walk in small steps.
+        /// Compared with a search in small steps.
         #[test]
         fn the_first_meeting_is_found(
             center_offset in [-3.0..3.0_f64, -3.0..3.0, -3.0..3.0],
@@ -187,7 +185,7 @@ mod tests {
                     prop_assert!(found <= walked && found >= walked - 1e-4 - 1e-12);
                     prop_assert!((distance(found) - 1.0).abs() < 1e-12);
                 }
-                // A walk may step over a short visit.
+                // The search may step over a short contact.
                 (Some(found), None) => prop_assert!((distance(found) - 1.0).abs() < 1e-12),
                 (None, walked) => prop_assert_eq!(walked, None),
             }

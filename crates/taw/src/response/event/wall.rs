@@ -1,4 +1,4 @@
-//! A wall within a substep: where it is at each moment, and how it moves there.
+//! Walls within a substep, static or kinematic: shape, motion, and pose at each time.
 
 use cgmath::{InnerSpace, One, Rotation as _, Zero};
 
@@ -7,31 +7,30 @@ use crate::motion::{WallMotion, turned};
 use crate::response::{Colliders, Material};
 use crate::shape::{Box3, Nearest, Shape, Solid, Triangle};
 
-/// Error of a distance by rounding, over itself and the coordinates: many times what
-/// a handful of operations leave.
+/// Rounding error of a distance, relative to it and the coordinates: many times that of a few
+/// operations.
 const ROUNDING: f64 = 1e-12;
 
-/// A wall, or a part of one, and how it moves.
+/// Wall, or a sub-shape of one (static or kinematic collider).
 #[derive(Clone, Debug)]
 pub(crate) struct Wall {
-    /// As it is at the time that `arrival_time` says, or always.
+    /// Shape at `arrival_time`, or at all times.
     pub collider: WallCollider,
-    /// Around the form, if it has an end.
+    /// Bounding box of the shape, if it is bounded.
     pub bounds: Option<Box3<f64>>,
-    /// Row in the world.
+    /// Row of the wall in the world.
     pub row: u32,
     pub motion: Option<WallMotion<f64>>,
-    /// Of one that was moved to where it is: how many seconds after the begin of the substep
-    /// it comes there. Before, it is where its motion, undone, puts it. None for one that
-    /// stays, and only carries along what lies on it, like a conveyor.
+    /// Time after the start of the substep when a moving wall reaches its pose, in seconds; before,
+    /// its motion is rewound. None for a static wall, whose motion only moves the surface, like a
+    /// conveyor.
     pub arrival_time: Option<f64>,
     pub material: Option<Material<f64>>,
-    /// Error of a point of it by the rounding of its place, over
-    /// its coordinates.
+    /// Rounding error of its points, relative to their coordinates.
     pub relative_rounding: f64,
 }
 
-/// Kinds of a [`Wall`].
+/// Shapes of a [`Wall`].
 #[derive(Clone, Debug)]
 pub(crate) enum WallCollider {
     Plane {
@@ -40,12 +39,12 @@ pub(crate) enum WallCollider {
     },
     Solid(Shape<f64>),
     Triangle(Triangle<f64>),
-    /// Of a height field.
+    /// Triangle of a height field, solid below.
     OneSidedTriangle(Triangle<f64>),
 }
 
 impl WallCollider {
-    /// The box around it, if it has an end.
+    /// Bounding box, if the shape is bounded.
     pub fn bounds(&self) -> Option<Box3<f64>> {
         match self {
             Self::Plane { .. } => None,
@@ -70,17 +69,17 @@ impl WallCollider {
 }
 
 impl Wall {
-    /// Material that counts between this wall and a ball of that material.
+    /// Combined material of this wall and a ball.
     pub fn combined_with(&self, ball: Material<f64>) -> Material<f64> {
         self.material.map_or(ball, |its| ball.combined_with(its))
     }
 
-    /// The motion of one that goes through the substep, and the time that it still has to go.
+    /// Motion of a moving wall, and the time until it reaches its pose, in seconds.
     pub fn motion_at(&self, time: f64) -> Option<(WallMotion<f64>, f64)> {
         Some((self.motion?, self.arrival_time? - time))
     }
 
-    /// Where its surface is nearest to a point at a time.
+    /// Nearest point of the surface at a time.
     pub fn nearest(&self, point: Point3<f64>, time: f64) -> Nearest<f64> {
         let Some((WallMotion { velocity, spin, pivot }, remaining)) = self.motion_at(time) else {
             return self.collider.nearest(point);
@@ -97,8 +96,8 @@ impl Wall {
         Nearest { point, normal: inverse.rotate_vector(nearest.normal), ..nearest }
     }
 
-    /// Lower bound of the distance that [`nearest`](Self::nearest) gives, at the cost of a few
-    /// comparisons; minus infinity where none is known so cheaply.
+    /// Lower bound of the distance of [`nearest`](Self::nearest), by a few comparisons; minus
+    /// infinity where there is no cheap one.
     pub fn distance_lower_bound(&self, point: Point3<f64>, time: f64) -> f64 {
         let Some(bounds) = &self.bounds else { return f64::NEG_INFINITY };
         let shifted = match self.motion_at(time) {
@@ -115,15 +114,13 @@ impl Wall {
         distance - ROUNDING * (distance + shifted.x.abs().max(shifted.y.abs()).max(shifted.z.abs()))
     }
 
-    /// The velocity of a point that goes with the wall through its step; zero for one that
-    /// stays.
+    /// Velocity of a point that moves with the wall; zero for a static one.
     pub fn velocity_at(&self, point: Point3<f64>, time: f64) -> Vec3<f64> {
         let Some((motion, remaining)) = self.motion_at(time) else { return Vec3::zero() };
         motion.velocity_at(point + motion.velocity * remaining)
     }
 
-    /// The velocity of its surface, which points that way, at a point. What stays has none
-    /// across its surface.
+    /// Surface velocity at a point with this normal; tangential for a static wall.
     pub fn surface_velocity(&self, normal: Vec3<f64>, point: Point3<f64>, time: f64) -> Vec3<f64> {
         let Some(motion) = self.motion else { return Vec3::zero() };
         if self.arrival_time.is_some() {
@@ -133,7 +130,7 @@ impl Wall {
         velocity - normal * velocity.dot(normal)
     }
 
-    /// Part of a gap to a point that may be due to the rounding of the wall's place.
+    /// Error of a distance to the wall by the rounding of its pose, in metres.
     pub fn position_error(&self, point: Point3<f64>) -> f64 {
         let Some((motion, _)) = self.motion_at(0.0) else { return 0.0 };
         let coordinates = [point, motion.pivot].map(|p| p.x.abs().max(p.y.abs()).max(p.z.abs()));
@@ -141,7 +138,7 @@ impl Wall {
     }
 }
 
-/// Walls while things rest on them, from one time to a later one.
+/// Moving walls between two times, as the impulse solver reads them.
 pub(super) struct MovingWalls<'a> {
     pub walls: &'a [Wall],
     pub start: f64,
