@@ -16,8 +16,8 @@ pub struct InverseEffectiveMass<S> {
 impl<S: Scalar> InverseEffectiveMass<S> {
     /// Inverse effective mass of two balls with these inverse masses (1/kg); zero for a wall.
     ///
-    /// The normal passes through the centers, so spin counts only tangentially: `1/m + r²/I = 7/2 ·
-    /// 1/m` for a solid ball.
+    /// The normal passes through the centers, so spin counts only tangentially:
+    /// `1/m + r²/I = 7/2 · 1/m` for a solid ball.
     #[must_use]
     pub fn of_balls(inverse_mass_a: S, inverse_mass_b: S, spin: BallRotation) -> Self {
         Self::of([(inverse_mass_a, spin), (inverse_mass_b, spin)])

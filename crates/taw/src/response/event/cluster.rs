@@ -100,6 +100,12 @@ impl Cluster {
         fill(&mut bodies.rotation_locked, each().map(|b| b.rotation == BallRotation::Locked));
     }
 
+    /// Local index of a ball, if it is in the cluster.
+    pub fn local_index(&self, row: usize) -> Option<usize> {
+        let local = *self.local.get(row)? as usize;
+        (self.rows.get(local).copied() == Some(row as u32)).then_some(local)
+    }
+
     /// Convergence tolerance, in m/s.
     pub fn tolerance(&self, acceleration: f64, settings: &EventSettings) -> f64 {
         let max_speed = self.bodies.velocity.iter().map(|v| v.magnitude()).fold(0.0, f64::max);

@@ -87,36 +87,7 @@ impl EventDriven {
             std::mem::take(&mut self.simultaneous_impacts);
         pairs.clear();
         pairs.push((row.min(other), row.max(other)));
-        let mut add_all_of = |row: usize| {
-            self.for_each_near(row, |other| {
-                let event = (other != row).then(|| self.predict_ball(row, other, time, settings));
-                if let Some(Some((after, EventKind::BallImpact(..)))) = event
-                    && time + after <= time
-                {
-                    pairs.push((row.min(other), row.max(other)));
-                }
-            });
-        };
-        if first.simultaneous {
-            add_all_of(row);
-        }
-        while let Some(Reverse(event)) = self.queue.peek().copied()
-            && event.time == time
-        {
-            self.queue.pop();
-            let valid = self.balls[event.row].trajectory.version == event.version;
-            match event.kind {
-                EventKind::BallImpact(other, version)
-                    if valid
-                        && self.balls[other].trajectory.version == version
-                        && !self.is_collapsing(event.row) =>
-                {
-                    pairs.push((event.row.min(other), event.row.max(other)));
-                }
-                _ => deferred.push(event),
-            }
-        }
-        self.queue.extend(deferred.drain(..).map(Reverse));
+        self.add_simultaneous(first, &mut pairs, &mut deferred, settings);
         pairs.sort_unstable();
         pairs.dedup();
         rows.clear();
@@ -152,6 +123,47 @@ impl EventDriven {
             self.predict(*row, time, settings);
         }
         self.simultaneous_impacts = SimultaneousImpacts { pairs, deferred, rows, collisions };
+    }
+
+    /// Adds the pairs of all other collisions at the time of an event.
+    fn add_simultaneous(
+        &mut self,
+        first: Event,
+        pairs: &mut Vec<(usize, usize)>,
+        deferred: &mut Vec<Event>,
+        settings: &EventSettings,
+    ) {
+        let Event { time, row, .. } = first;
+        let mut add_all_of = |row: usize| {
+            self.for_each_near(row, |other| {
+                let event = (other != row).then(|| self.predict_ball(row, other, time, settings));
+                if let Some(Some((after, EventKind::BallImpact(..)))) = event
+                    && time + after <= time
+                {
+                    pairs.push((row.min(other), row.max(other)));
+                }
+            });
+        };
+        if first.simultaneous {
+            add_all_of(row);
+        }
+        while let Some(Reverse(event)) = self.queue.peek().copied()
+            && event.time == time
+        {
+            self.queue.pop();
+            let valid = self.balls[event.row].trajectory.version == event.version;
+            match event.kind {
+                EventKind::BallImpact(other, version)
+                    if valid
+                        && self.balls[other].trajectory.version == version
+                        && !self.is_collapsing(event.row) =>
+                {
+                    pairs.push((event.row.min(other), event.row.max(other)));
+                }
+                _ => deferred.push(event),
+            }
+        }
+        self.queue.extend(deferred.drain(..).map(Reverse));
     }
 
     /// Collision of two balls in contact, before its impulse.

@@ -2,8 +2,8 @@
 //!
 //! The center moves on the offset surface, one radius away from the wall. With `n` the normal, `w`
 //! the velocity of the wall and `v` that of the ball relative to it, contact means `n · v = 0` at
-//! all times; so the normal acceleration is known, and with it the normal force: on a sphere, `N =
-//! g cos θ − v² / (R + r)` per mass. Tangentially as on a plane, see
+//! all times; so the normal acceleration is known, and with it the normal force: on a sphere,
+//! `N = g cos θ − v² / (R + r)` per mass. Tangentially as on a plane, see
 //! [`flat_support`](super::flat_support). Integrated in short steps (Kutta 1901) that end where the
 //! normal force vanishes.
 

@@ -1,10 +1,10 @@
 //! Motion of a ball on a flat surface: resting, rolling or sliding, with an acceleration in closed
 //! form until the regime changes.
 //!
-//! With `u` the velocity of the contact point, `p` the part of it by spin (`radius · normal ×
-//! spin`), `f` the friction and `N` the normal force, both per mass: `v' = tangential_acceleration
-//! + f` and `p' = 5/2 (f − c N p/|p|)`, where `c` is the rolling resistance. Sliding, `f = −µ N
-//! u/|u|`; rolling, `f` keeps `u` at zero.
+//! With `u` the velocity of the contact point, `p` the part of it by spin
+//! (`radius · normal × spin`), `f` the friction and `N` the normal force, both per mass:
+//! `v' = tangential_acceleration + f` and `p' = 5/2 (f − c N p/|p|)`, where `c` is the rolling
+//! resistance. Sliding, `f = −µ N u/|u|`; rolling, `f` keeps `u` at zero.
 
 use cgmath::{InnerSpace, Zero};
 

@@ -2,7 +2,8 @@
 
 use cgmath::InnerSpace;
 
-use super::{Ball, EventDriven};
+use super::{Ball, EventDriven, Wall};
+use crate::math::Vec3;
 use crate::response::{BallRotation, EnergyLedger};
 
 impl EventDriven {
@@ -47,16 +48,8 @@ impl EventDriven {
         }
         let Some(wall) = ball.trajectory.support else { return };
         work.momentum += constraint_impulse;
-        let wall = &self.walls[wall];
-        // Velocity of the surface at the contact point, and slip over it.
-        let surface_and_slip = |ball: &Ball| {
-            let normal = wall.nearest(ball.position, ball.trajectory.start).normal;
-            let contact_point = ball.position - normal * ball.radius;
-            let surface = wall.surface_velocity(normal, contact_point, ball.trajectory.start);
-            (surface, ball.velocity + ball.spin_velocity(normal) - surface)
-        };
         let [(surface, slip), (later_surface, later_slip)] =
-            [surface_and_slip(ball), surface_and_slip(&later)];
+            [ball, &later].map(|ball| surface_and_slip(ball, &self.walls[wall]));
         let surface = (surface + later_surface) * 0.5;
         let friction = -0.5 * constraint_impulse.dot(slip + later_slip);
         let inertia = match ball.rotation {
@@ -78,4 +71,12 @@ impl EventDriven {
         work.walls += wall_work;
         work.resistance += wall_work - friction - ball_work;
     }
+}
+
+/// Velocity of the surface at the contact point, and slip over it.
+fn surface_and_slip(ball: &Ball, wall: &Wall) -> (Vec3<f64>, Vec3<f64>) {
+    let normal = wall.nearest(ball.position, ball.trajectory.start).normal;
+    let contact_point = ball.position - normal * ball.radius;
+    let surface = wall.surface_velocity(normal, contact_point, ball.trajectory.start);
+    (surface, ball.velocity + ball.spin_velocity(normal) - surface)
 }

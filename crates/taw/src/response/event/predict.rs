@@ -2,12 +2,13 @@
 
 use std::cmp::Reverse;
 use std::f64::consts::SQRT_2;
+use std::ops::ControlFlow;
 
 use cgmath::{InnerSpace, Zero};
 
 use super::toi::{SeparationMotion, time_of_impact_plane, time_of_impact_spheres};
 use super::{
-    CellSlot, Event, EventDriven, EventKind, EventSettings, PRESS_SPEED, REST_SPEED,
+    Ball, CellSlot, Event, EventDriven, EventKind, EventSettings, PRESS_SPEED, REST_SPEED,
     SEAM_TOLERANCE, SLOP, WallCollider,
 };
 use crate::math::{Point3, Vec3, direction_and_length, is_finite};
@@ -21,6 +22,25 @@ const MAX_ADVANCES: u32 = 64;
 const RECHECK_TIME: f64 = 1.0 / 64.0;
 /// A normal acceleration below this fraction of the external one is rounding.
 const MIN_NORMAL_ACCELERATION: f64 = 1e-9;
+
+/// Relative motion of two balls, of the second to the first.
+struct RelativeMotion {
+    center_offset: Vec3<f64>,
+    velocity: Vec3<f64>,
+    acceleration: Vec3<f64>,
+    radius_sum: f64,
+}
+
+impl RelativeMotion {
+    fn offset_after(&self, time: f64) -> Vec3<f64> {
+        self.center_offset + (self.velocity + self.acceleration * (0.5 * time)) * time
+    }
+
+    fn time_of_impact(&self, range: [f64; 2]) -> Option<f64> {
+        let Self { center_offset, velocity, acceleration, radius_sum } = *self;
+        time_of_impact_spheres(center_offset, velocity, acceleration, radius_sum, range)
+    }
+}
 
 impl EventDriven {
     /// Predicts the next event of a ball and queues it.
@@ -41,7 +61,7 @@ impl EventDriven {
                 (EventKind::BallImpact(a, _), EventKind::BallImpact(b, _))
                     if a != b && time == next.0 =>
                 {
-                    simultaneous = true
+                    simultaneous = true;
                 }
                 _ if time < next.0 => (next, simultaneous) = ((time, kind), false),
                 _ => {}
@@ -74,32 +94,33 @@ impl EventDriven {
             }
         };
         self.for_each_near(row, &mut other);
-        match ball.trajectory.cell_slot {
-            CellSlot::Cell(cell) => {
-                let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
-                for (axis, width) in self.cells.width().into_iter().enumerate() {
-                    let border = cell[axis] as f64 * width;
-                    let (x, v, a) =
-                        (position[axis], velocity[axis], ball.trajectory.acceleration[axis]);
-                    let above = SeparationMotion {
-                        distance: border + width - x,
-                        speed: -v,
-                        acceleration: -a,
-                    };
-                    let below =
-                        SeparationMotion { distance: x - border, speed: v, acceleration: a };
-                    for (separation, step) in [(above, 1), (below, -1)] {
-                        let to = cell[axis] + step;
-                        consider(crossing_time(separation), EventKind::CellCrossing { axis, to });
-                    }
-                }
-            }
-            CellSlot::Unbounded => {}
-        }
+        self.for_each_crossing(ball, now, consider);
         let (time, kind) = next;
         if time <= now + remaining && time.is_finite() {
             let version = ball.trajectory.version;
             self.queue.push(Reverse(Event { time, row, version, kind, simultaneous }));
+        }
+    }
+
+    /// Visits the crossings of the borders of a ball's cell, with the seconds until them.
+    fn for_each_crossing(
+        &self,
+        ball: &Ball,
+        now: f64,
+        mut visit: impl FnMut(Option<f64>, EventKind),
+    ) {
+        let CellSlot::Cell(cell) = ball.trajectory.cell_slot else { return };
+        let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
+        for (axis, width) in self.cells.width().into_iter().enumerate() {
+            let border = cell[axis] as f64 * width;
+            let (x, v, a) = (position[axis], velocity[axis], ball.trajectory.acceleration[axis]);
+            let above =
+                SeparationMotion { distance: border + width - x, speed: -v, acceleration: -a };
+            let below = SeparationMotion { distance: x - border, speed: v, acceleration: a };
+            for (separation, step) in [(above, 1), (below, -1)] {
+                let to = cell[axis] + step;
+                visit(crossing_time(separation), EventKind::CellCrossing { axis, to });
+            }
         }
     }
 
@@ -247,44 +268,16 @@ impl EventDriven {
                 .map(|threshold| threshold.max(1e-14 * velocity.magnitude()));
             let after = if separation.distance > tolerance {
                 time_of_impact_plane(separation)?
-            } else if separation.speed < -impact_threshold {
-                let seam = self.is_seam(row, number, position, time, settings);
-                return (!seam).then_some((time - now, EventKind::WallImpact(number)));
             } else {
-                let normal_acceleration =
-                    self.normal_acceleration(row, number, time, ball.trajectory.acceleration);
-                // A wall that the ball has just left does not press it, whatever rounding says.
                 let just_left = step == 0 && ball.trajectory.left_wall == Some(number);
-                let pressed = !just_left
-                    && normal_acceleration
-                        > MIN_NORMAL_ACCELERATION * ball.external_acceleration.magnitude();
-                if pressed && separation.speed <= impact_threshold {
-                    if self.is_seam(row, number, position, time, settings) {
-                        return None;
+                let thresholds = [rest_threshold, impact_threshold];
+                match self
+                    .predict_contact(row, number, time, separation, thresholds, just_left, settings)
+                {
+                    ControlFlow::Continue(after) => after,
+                    ControlFlow::Break(event) => {
+                        return event.map(|(after, kind)| (time - now + after, kind));
                     }
-                    return Some(if ball.trajectory.clustered {
-                        let after =
-                            (impact_threshold * 1.01 + separation.speed) / normal_acceleration;
-                        (time - now + after, EventKind::WallImpact(number))
-                    } else {
-                        (time - now, EventKind::RestOnWall(number))
-                    });
-                }
-                // Without pressure any approach is an impact; but a resting cluster absorbs its own
-                // until the end of the substep.
-                let end_speed = separation.speed + separation.acceleration * (settings.dt - time);
-                let is_held_to_end = ball.trajectory.touches_balls
-                    || ball.trajectory.clustered && end_speed >= -rest_threshold;
-                if !pressed && separation.speed < -rest_threshold && !is_held_to_end {
-                    let seam = self.is_seam(row, number, position, time, settings);
-                    return (!seam).then_some((time - now, EventKind::WallImpact(number)));
-                }
-                if separation.speed > 0.0 && separation.acceleration < 0.0 {
-                    // Earliest return to this plane.
-                    (-2.0 * separation.speed / separation.acceleration)
-                        .max(RECHECK_TIME * RECHECK_TIME * settings.dt)
-                } else {
-                    RECHECK_TIME * settings.dt
                 }
             };
             step += 1;
@@ -293,6 +286,58 @@ impl EventDriven {
                 return None;
             }
         }
+    }
+
+    /// Event of a ball in contact with a wall, and the seconds until it, or the seconds after which
+    /// the contact is to be tested again.
+    fn predict_contact(
+        &self,
+        row: usize,
+        wall: usize,
+        time: f64,
+        separation: SeparationMotion,
+        [rest_threshold, impact_threshold]: [f64; 2],
+        just_left: bool,
+        settings: &EventSettings,
+    ) -> ControlFlow<Option<(f64, EventKind)>, f64> {
+        let ball = &self.balls[row];
+        let is_seam = || self.is_seam(row, wall, ball.position_at(time), time, settings);
+        let impact = |is_seam: bool| (!is_seam).then_some((0.0, EventKind::WallImpact(wall)));
+        if separation.speed < -impact_threshold {
+            return ControlFlow::Break(impact(is_seam()));
+        }
+        let normal_acceleration =
+            self.normal_acceleration(row, wall, time, ball.trajectory.acceleration);
+        // A wall that the ball has just left does not press it, whatever rounding says.
+        let is_pressed = !just_left
+            && normal_acceleration
+                > MIN_NORMAL_ACCELERATION * ball.external_acceleration.magnitude();
+        if is_pressed && separation.speed <= impact_threshold {
+            if is_seam() {
+                return ControlFlow::Break(None);
+            }
+            return ControlFlow::Break(Some(if ball.trajectory.clustered {
+                let after = (impact_threshold * 1.01 + separation.speed) / normal_acceleration;
+                (after, EventKind::WallImpact(wall))
+            } else {
+                (0.0, EventKind::RestOnWall(wall))
+            }));
+        }
+        // Without a normal force any approach is an impact; but a resting cluster absorbs its own
+        // until the end of the substep.
+        let end_speed = separation.speed + separation.acceleration * (settings.dt - time);
+        let is_held_to_end = ball.trajectory.touches_balls
+            || ball.trajectory.clustered && end_speed >= -rest_threshold;
+        if !is_pressed && separation.speed < -rest_threshold && !is_held_to_end {
+            return ControlFlow::Break(impact(is_seam()));
+        }
+        ControlFlow::Continue(if separation.speed > 0.0 && separation.acceleration < 0.0 {
+            // Earliest return to this plane.
+            (-2.0 * separation.speed / separation.acceleration)
+                .max(RECHECK_TIME * RECHECK_TIME * settings.dt)
+        } else {
+            RECHECK_TIME * settings.dt
+        })
     }
 
     /// Upper bound of a ball's acceleration toward a wall by the wall's rotation, in m/s².
@@ -355,30 +400,21 @@ impl EventDriven {
         let separation = distance - radius_sum;
         let version = second.trajectory.version;
         let press_speed = self.pressing_speed(a, b, settings);
-        let ball_impact = |after: f64| (after, EventKind::BallImpact(b, version));
+        let [impact, rest] = [EventKind::BallImpact(b, version), EventKind::RestOnBall(b, version)];
+        let motion = RelativeMotion { center_offset, velocity, acceleration, radius_sum };
         let coordinates = [from.x, from.y, from.z, to.x, to.y, to.z].map(f64::abs);
         let size = coordinates.into_iter().fold(radius_sum, f64::max);
         if separation > f64::EPSILON * 8.0 * size {
-            let after = time_of_impact_spheres(
-                center_offset,
-                velocity,
-                acceleration,
-                radius_sum,
-                [0.0, remaining],
-            )?;
-            let offset_at_impact =
-                center_offset + (velocity + acceleration * (0.5 * after)) * after;
+            let after = motion.time_of_impact([0.0, remaining])?;
+            let offset_at_impact = motion.offset_after(after);
             let normal = offset_at_impact / offset_at_impact.magnitude();
             let speed = (velocity + acceleration * after).dot(normal);
             let normal_acceleration = acceleration.dot(normal);
             return if speed < -press_speed {
-                Some(ball_impact(after))
+                Some((after, impact))
             } else if normal_acceleration < 0.0 {
                 // Impact so slow that they only start to press each other.
-                Some((
-                    after + (-press_speed * 1.01 - speed) / normal_acceleration,
-                    EventKind::RestOnBall(b, version),
-                ))
+                Some((after + (-press_speed * 1.01 - speed) / normal_acceleration, rest))
             } else {
                 None
             };
@@ -386,28 +422,17 @@ impl EventDriven {
         let speed = velocity.dot(normal);
         let normal_acceleration = acceleration.dot(normal);
         if speed < -press_speed {
-            return Some(ball_impact(0.0));
+            return Some((0.0, impact));
         }
         if normal_acceleration >= 0.0 {
             return None;
         }
         // Balls that separate completely collide again; others press each other in the end.
         let apex = -speed / normal_acceleration;
-        let offset_at_impact = center_offset + (velocity + acceleration * (0.5 * apex)) * apex;
-        if speed > press_speed && offset_at_impact.magnitude() > radius_sum {
-            return time_of_impact_spheres(
-                center_offset,
-                velocity,
-                acceleration,
-                radius_sum,
-                [apex, remaining],
-            )
-            .map(ball_impact);
+        if speed > press_speed && motion.offset_after(apex).magnitude() > radius_sum {
+            return motion.time_of_impact([apex, remaining]).map(|after| (after, impact));
         }
-        Some((
-            (-press_speed * 1.01 - speed) / normal_acceleration,
-            EventKind::RestOnBall(b, version),
-        ))
+        Some(((-press_speed * 1.01 - speed) / normal_acceleration, rest))
     }
 
     /// Tests for an internal edge (ghost collision): the nearest point of a wall lies on another

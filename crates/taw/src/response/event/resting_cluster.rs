@@ -145,27 +145,10 @@ impl EventDriven {
         let mut next = 0;
         let mut contact_counts = vec![0_u32; self.balls.len()];
         let mut near = Vec::new();
-        let mtv = Vec3::zero();
         while let Some(row) = found.get(next).copied() {
             next += 1;
-            self.advance(row, now);
-            let frozen = self.balls[row].is_frozen();
-            self.balls[row].fly_free();
-            if frozen {
-                self.balls[row].freeze();
-            }
-            settings.add_cost(1 + self.wall_cost(row));
-            let at = self.balls[row].position;
-            self.for_each_wall(row, |wall| {
-                let contact =
-                    Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
-                if self.wall_contact(&contact, now, max_separation_speed, settings).is_some()
-                    && (self.parts_of(row).is_empty()
-                        || !self.is_seam(row, wall, at, now, settings))
-                {
-                    contacts.wm.push(contact);
-                }
-            });
+            self.release(row, now);
+            self.add_wall_contacts(row, max_separation_speed, now, settings, &mut contacts.wm);
             near.clear();
             self.for_each_near(row, |other| near.push(other));
             settings.add_cost(near.len() as u64);
@@ -179,7 +162,7 @@ impl EventDriven {
                 let before = self.balls[other];
                 self.balls[other].advance(now);
                 let (a, b) = (row.min(other) as u32, row.max(other) as u32);
-                let contact = Contact { a, b, part: 0, along: [0.0; 2], mtv };
+                let contact = Contact { a, b, part: 0, along: [0.0; 2], mtv: Vec3::zero() };
                 // The colliding two are in contact, whatever rounding says.
                 let is_seed = seeds.contains(&row) && seeds.contains(&other);
                 let is_full = contact_counts[row].min(contact_counts[other]) >= MAX_CONTACTS;
@@ -199,6 +182,37 @@ impl EventDriven {
         (found, contacts)
     }
 
+    /// Starts free flight of a ball at a time, except if it is frozen.
+    fn release(&mut self, row: usize, now: f64) {
+        self.advance(row, now);
+        let frozen = self.balls[row].is_frozen();
+        self.balls[row].fly_free();
+        if frozen {
+            self.balls[row].freeze();
+        }
+    }
+
+    fn add_wall_contacts(
+        &self,
+        row: usize,
+        max_separation_speed: f64,
+        now: f64,
+        settings: &EventSettings,
+        contacts: &mut Vec<Contact<f64>>,
+    ) {
+        settings.add_cost(1 + self.wall_cost(row));
+        let at = self.balls[row].position;
+        self.for_each_wall(row, |wall| {
+            let mtv = Vec3::zero();
+            let contact = Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
+            if self.wall_contact(&contact, now, max_separation_speed, settings).is_some()
+                && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, now, settings))
+            {
+                contacts.push(contact);
+            }
+        });
+    }
+
     /// Solves for the accelerations that keep contacts at rest from `now` to the end of the
     /// substep.
     pub(super) fn solve_resting(
@@ -210,27 +224,9 @@ impl EventDriven {
     ) {
         let remaining = settings.dt - now;
         self.cluster.gather(contacts, &self.balls, self.period);
-        let Cluster { rows, local, bodies: ClusterBodies { position, velocity, .. }, .. } =
-            &mut self.cluster;
-        let mut max_acceleration: f64 = 0.0;
-        // Free positions at the end of the substep.
-        for (at, row) in rows.iter().enumerate() {
-            let ball = &self.balls[*row as usize];
-            if ball.is_frozen() {
-                continue;
-            }
-            position[at] +=
-                (ball.velocity + ball.external_acceleration * (0.5 * remaining)) * remaining;
-            velocity[at] += ball.external_acceleration * remaining;
-            max_acceleration = max_acceleration.max(ball.external_acceleration.magnitude());
-        }
-        impulse_cache.retain_mut(|entry| {
-            entry.remap(|row| {
-                let at = *local.get(row)? as usize;
-                (rows.get(at).copied() == Some(row as u32)).then_some(at)
-            })
-        });
-        let mut touches_balls = vec![false; rows.len()];
+        let max_acceleration = self.move_cluster_freely(remaining);
+        impulse_cache.retain_mut(|entry| entry.remap(|row| self.cluster.local_index(row)));
+        let mut touches_balls = vec![false; self.cluster.rows.len()];
         for local in contacts.mm.iter().flat_map(|c| [c.a, c.b]) {
             touches_balls[local as usize] = true;
         }
@@ -275,7 +271,29 @@ impl EventDriven {
             self.balls[rows[at] as usize].position +=
                 correction * fractions[sets.set_of(at) as usize];
         }
-        // Corrections may push balls into walls that they did not touch.
+        self.push_cluster_out_of_walls(now, settings);
+    }
+
+    /// Moves a gathered cluster by external forces alone. Returns the largest acceleration, in
+    /// m/s².
+    fn move_cluster_freely(&mut self, time: f64) -> f64 {
+        let Cluster { rows, bodies: ClusterBodies { position, velocity, .. }, .. } =
+            &mut self.cluster;
+        let mut max_acceleration: f64 = 0.0;
+        for (at, row) in rows.iter().enumerate() {
+            let ball = &self.balls[*row as usize];
+            if ball.is_frozen() {
+                continue;
+            }
+            position[at] += (ball.velocity + ball.external_acceleration * (0.5 * time)) * time;
+            velocity[at] += ball.external_acceleration * time;
+            max_acceleration = max_acceleration.max(ball.external_acceleration.magnitude());
+        }
+        max_acceleration
+    }
+
+    /// Pushes balls out of walls that they did not touch before the position corrections.
+    fn push_cluster_out_of_walls(&mut self, now: f64, settings: &EventSettings) {
         for at in 0..self.cluster.rows.len() {
             let row = self.cluster.rows[at] as usize;
             if !self.balls[row].is_frozen() {

@@ -52,13 +52,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     ) -> Option<Constraint<S>> {
         let (normal, separation) = self.contact_geometry(a, b, axis_offset, context)?;
         let material = context.material_of(a, b);
-        let surface_velocity = match a {
-            BodyA::Wall(wall, _) => {
-                let arm = self.anchor(b, axis_offset[1]) - normal * self.radius[b];
-                context.walls.surface_velocity(wall as usize, self.position[b] + arm)
-            }
-            BodyA::Marble(_) => Vec3::zero(),
-        };
+        let surface_velocity = self.surface_velocity(a, b, axis_offset, normal, context);
         let inverse_effective_mass = self.pair_inverse_effective_mass(a, b, axis_offset, normal);
         let relative_velocity = self.relative_velocity(a, b, axis_offset, normal, surface_velocity);
         let approach_speed = -relative_velocity.dot(normal);
@@ -106,23 +100,51 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let since_start = context.follow_time(a, b) - context.integrator_lead(&constraint);
         constraint.velocity_since_impact =
             self.relative_acceleration(&constraint, context) * since_start;
-        // A body stopped by continuous detection is in contact, whatever rounding says.
-        let ccd_stopped =
-            context.is_ccd_stopped(b) || a.marble().is_some_and(|a| context.is_ccd_stopped(a));
-        if is_fast && (separation < S::zero() || ccd_stopped) && dt > S::zero() {
-            let time_since_impact = self.time_since_impact_of(&constraint, separation, context);
-            // Only if it is not back on the surface before the substep ends.
-            let relative_acceleration = self.relative_acceleration(&constraint, context);
-            let speed =
-                material.restitution * self.approach_speed(&constraint, time_since_impact, context);
-            if speed + relative_acceleration.dot(normal) * time_since_impact * S::constant(0.5)
-                >= S::zero()
-            {
-                (constraint.bounces, constraint.time_since_impact) =
-                    (true, Some(time_since_impact));
-            }
+        if is_fast {
+            self.detect_bounce(&mut constraint, separation, context);
         }
         (inverse_effective_mass.normal > S::zero()).then_some(constraint)
+    }
+
+    /// Velocity of the wall's surface at a contact, in m/s; zero between marbles.
+    fn surface_velocity(
+        &self,
+        a: BodyA,
+        b: usize,
+        axis_offset: [S; 2],
+        normal: Vec3<S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) -> Vec3<S> {
+        match a {
+            BodyA::Wall(wall, _) => {
+                let arm = self.anchor(b, axis_offset[1]) - normal * self.radius[b];
+                context.walls.surface_velocity(wall as usize, self.position[b] + arm)
+            }
+            BodyA::Marble(_) => Vec3::zero(),
+        }
+    }
+
+    /// Marks a fast contact as bouncing if the impact happened within the substep.
+    fn detect_bounce(
+        &self,
+        c: &mut Constraint<S>,
+        separation: S,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) {
+        // A body stopped by continuous detection is in contact, whatever rounding says.
+        let ccd_stopped =
+            context.is_ccd_stopped(c.b) || c.a.marble().is_some_and(|a| context.is_ccd_stopped(a));
+        if (separation < S::zero() || ccd_stopped) && context.settings.dt > S::zero() {
+            let time_since_impact = self.time_since_impact_of(c, separation, context);
+            // Only if it is not back on the surface before the substep ends.
+            let relative_acceleration = self.relative_acceleration(c, context);
+            let speed = c.restitution * self.approach_speed(c, time_since_impact, context);
+            if speed + relative_acceleration.dot(c.normal) * time_since_impact * S::constant(0.5)
+                >= S::zero()
+            {
+                (c.bounces, c.time_since_impact) = (true, Some(time_since_impact));
+            }
+        }
     }
 
     /// Normal and separation of a contact at the end of the substep.

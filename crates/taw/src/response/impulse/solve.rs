@@ -78,6 +78,22 @@ impl<S: Scalar> Constraint<S> {
         }
     }
 
+    /// Restricts the search directions to those that the contact can follow.
+    fn restrict_directions(&mut self, island_bounces: bool) {
+        if self.normal_impulse <= S::zero() {
+            self.search_directions = [Vec3::zero(); DIRECTIONS]; // an open contact has no impulse
+        } else if island_bounces
+            || length(self.tangent_impulse)
+                >= self.max_friction(self.normal_impulse) * (S::one() - S::epsilon())
+        {
+            // Sliding friction stays at the cone, whichever way it slides. And restitution can ask
+            // for more than friction in a corner can give, so that both would grow without end.
+            let normal = self.normal;
+            self.search_directions =
+                self.search_directions.map(|direction| normal * direction.dot(normal));
+        }
+    }
+
     /// Friction bound for a normal impulse.
     fn max_friction(&self, normal_impulse: S) -> S {
         self.friction * normal_impulse + self.friction_bound
@@ -129,18 +145,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         islands.list.iter_mut().for_each(Island::begin_search);
         for c in constraints.iter_mut() {
             let Some(island) = islands.accelerating(c) else { continue };
-            if c.normal_impulse <= S::zero() {
-                c.search_directions = [Vec3::zero(); DIRECTIONS]; // it parts, and bears nothing
-            } else if island.bounces
-                || length(c.tangent_impulse)
-                    >= c.max_friction(c.normal_impulse) * (S::one() - S::epsilon())
-            {
-                // Sliding friction stays at the cone, whichever way it slides. And restitution can
-                // ask for more than friction in a corner can give, so that both would grow without
-                // end.
-                c.search_directions =
-                    c.search_directions.map(|direction| c.normal * direction.dot(c.normal));
-            }
+            c.restrict_directions(island.bounces);
             c.velocity_error = self.velocity_error_of(c);
         }
         for c in constraints.iter().filter(|c| islands.of(c).accelerating) {

@@ -55,17 +55,15 @@ pub(super) fn find_contact<S: Scalar>(
     let moved =
         |row: usize| marbles.velocity[row] * (settings.dt * (settings.position_weight)(row));
     let mut displacement = moved(b);
-    let own = (settings.material)(b);
     let mut relative_velocity =
         marbles.velocity[b] + marbles.anchor_spin_velocity(b, axis_offset[1]);
     let mut radius_times_spin = marbles.radius_times_spin(b);
     let center = anchor_position(b, axis_offset[1]);
     let mut curvature = S::one() / marbles.radius[b];
-    let mut compliance = own.elasticity.compliance();
     let mut surface_velocity = Vec3::zero();
-    let (normal, distance, material);
+    let (material, compliance) = surfaces(settings, walls, two_marbles.then_some(a), a, b);
+    let (normal, distance);
     if two_marbles {
-        let other = (settings.material)(a);
         displacement -= moved(a);
         let center_offset = marbles.period.nearest(center - anchor_position(a, axis_offset[0]));
         let direction = direction_and_length(center_offset);
@@ -74,18 +72,10 @@ pub(super) fn find_contact<S: Scalar>(
         relative_velocity -= marbles.velocity[a] + marbles.anchor_spin_velocity(a, axis_offset[0]);
         radius_times_spin += marbles.radius_times_spin(a);
         curvature += S::one() / marbles.radius[a];
-        compliance = compliance.plus(other.elasticity.compliance());
-        material = own.combined_with(other);
     } else {
         (normal, distance) = walls.normal_and_distance(a, part, center);
         surface_velocity = walls.surface_velocity(a, center - normal * marbles.radius[b]);
         relative_velocity -= surface_velocity;
-        let its = walls.material(a);
-        material = its.map_or(own, |its| own.combined_with(its));
-        // A wall without a material of its own is rigid.
-        if let Some(its) = its {
-            compliance = compliance.plus(its.elasticity.compliance());
-        }
     }
     let none = InverseEffectiveMass { normal: S::zero(), tangent: S::zero() };
     let first =
@@ -114,6 +104,22 @@ pub(super) fn find_contact<S: Scalar>(
         && contact.inverse_effective_mass().normal > S::zero()
         && is_finite(contact.relative_velocity))
     .then_some(contact)
+}
+
+/// Combined material and compliance of the surfaces of a contact.
+fn surfaces<S: Scalar>(
+    settings: &PenaltySettings<S, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    walls: &impl Colliders<S>,
+    marble_a: Option<usize>,
+    a: usize,
+    b: usize,
+) -> (Material<S>, Compliance<S>) {
+    let own = (settings.material)(b);
+    let compliance = own.elasticity.compliance();
+    let other = marble_a.map_or_else(|| walls.material(a), |a| Some((settings.material)(a)));
+    // A wall without a material of its own is rigid.
+    let Some(other) = other else { return (own, compliance) };
+    (own.combined_with(other), compliance.plus(other.elasticity.compliance()))
 }
 
 impl<S: Scalar> PenaltyContact<S> {
