@@ -245,7 +245,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let requested = c.min_separation_speed - self.separation_speed(c);
         let velocity_change = (c.velocity_change + requested).max(S::zero()) - c.velocity_change;
         if !velocity_change.is_finite() || velocity_change.abs() <= rounding {
-            return false; // an overflow here must not reach the other one
+            return false; // an overflow must not reach the other body
         }
         c.velocity_change += velocity_change;
         self.apply_velocity_change(c, velocity_change);

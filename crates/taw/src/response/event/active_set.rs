@@ -122,7 +122,7 @@ impl ActiveSet<'_> {
                 }
                 let Self { active, impulse, factor, .. } = &mut self;
                 let Some(first) = active.iter().position(|c| impulse[*c] <= 0.0) else {
-                    return self.impulse; // rounding has the last word
+                    return self.impulse; // only rounding is left
                 };
                 active.retain(|c| impulse[*c] > 0.0);
                 factor.truncate(first);

@@ -88,7 +88,7 @@ impl EventDriven {
             .ids
             .retain(|(row, part)| source.wall(*row, *part).map(|wall| walls.push(wall)).is_some());
         if candidates.ids != candidates.previous_ids {
-            self.impulse_cache.clear(); // it knows walls by their places
+            self.impulse_cache.clear(); // its keys are indices of walls
         }
         candidates.index.clear();
         candidates.index.extend(candidates.ids.iter().copied().zip(0..));

@@ -132,7 +132,7 @@ impl Cluster {
             slop: 0.5 * PRESS_SPEED * PRESS_SPEED * acceleration * settings.dt * settings.dt,
             max_relative_slop: SLOP,
         };
-        let mut quarantined = Vec::new(); // whoever it is will be stopped at the end, too
+        let mut quarantined = Vec::new(); // non-finite balls are quarantined after the substep
         let context = Context {
             walls,
             material: |local: usize| self.material[local],
@@ -160,7 +160,7 @@ impl Cluster {
     ) {
         let collisions = work.collisions;
         self.scratch.record_energy(&mut self.bodies.columns(), velocity, spin, work);
-        work.collisions = collisions; // it is none: they lie there
+        work.collisions = collisions; // resting contacts are no collisions
     }
 }
 

@@ -16,6 +16,8 @@ mod curved_support;
 mod flat_support;
 mod ledger;
 mod predict;
+mod predict_ball;
+mod predict_wall;
 mod rest_at_start;
 mod rest_on_wall;
 mod resting_cluster;

@@ -100,7 +100,7 @@ impl EventDriven {
     /// Pushes a ball out of the walls that it penetrates.
     pub(super) fn push_out_of_walls(&mut self, row: usize, now: f64) {
         if self.balls[row].inverse_mass <= 0.0 {
-            return; // no wall holds it
+            return; // infinite mass: walls do not stop it
         }
         self.push_out(row, now, self.parts_of(row).to_vec());
         // Half-spaces come last, and static ones after moving ones: behind them there is nothing.

@@ -109,7 +109,7 @@ impl Wall {
         let may_be_inside = matches!(self.collider, WallCollider::OneSidedTriangle(_))
             && distance <= (bounds.max - bounds.min).magnitude() * (1.0 + ROUNDING);
         if may_be_inside {
-            return f64::NEG_INFINITY; // it may be inside
+            return f64::NEG_INFINITY; // negative if it is inside
         }
         distance - ROUNDING * (distance + shifted.x.abs().max(shifted.y.abs()).max(shifted.z.abs()))
     }

@@ -143,7 +143,7 @@ impl<S: Scalar> Scratch<S> {
         work: &mut EnergyLedger,
     ) {
         if velocity.len() != marbles.velocity.len() || spin.len() < marbles.spin.len() {
-            return; // the first step with an account of it
+            return; // first step of the audit
         }
         let spins = marbles.spin.len();
         let relative_motions = |marbles: &SolverBodies<S>| -> Vec<_> {

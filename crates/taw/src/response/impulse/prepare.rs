@@ -65,7 +65,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         } else if follow_time > S::zero() {
             -approach_speed - separation / follow_time
         } else if is_fast && separation > S::zero() {
-            -approach_speed - separation / dt // it will bounce in the next substep
+            -approach_speed - separation / dt // to bounce in the next substep
         } else {
             -separation / dt
         };
@@ -97,7 +97,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             rolling: self.rolling_constraint(a, b, material),
         };
         constraint.initial_relative_spin = self.relative_spin(&constraint);
-        let since_start = context.follow_time(a, b) - context.integrator_lead(&constraint);
+        let since_start = follow_time - context.integrator_lead(&constraint);
         constraint.velocity_since_impact =
             self.relative_acceleration(&constraint, context) * since_start;
         if is_fast {

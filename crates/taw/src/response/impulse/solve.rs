@@ -131,7 +131,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let change =
             c.normal * (normal_impulse - c.normal_impulse) + (tangent_impulse - c.tangent_impulse);
         if !is_finite(change) {
-            return S::zero(); // an overflow here must not reach the other one
+            return S::zero(); // an overflow must not reach the other body
         }
         (c.normal_impulse, c.tangent_impulse) = (normal_impulse, tangent_impulse);
         self.apply_impulse_pair(c, change);

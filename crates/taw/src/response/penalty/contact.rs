@@ -98,12 +98,7 @@ pub(super) fn find_contact<S: Scalar>(
         material,
         compliance,
     };
-    let is_contact = marbles.radius[b] > distance && contact.penetration > S::zero();
-    let is_contact = is_contact && contact.penetration.is_finite();
-    (is_contact
-        && contact.inverse_effective_mass().normal > S::zero()
-        && is_finite(contact.relative_velocity))
-    .then_some(contact)
+    (marbles.radius[b] > distance && contact.is_active()).then_some(contact)
 }
 
 /// Combined material and compliance of the surfaces of a contact.
@@ -123,6 +118,14 @@ fn surfaces<S: Scalar>(
 }
 
 impl<S: Scalar> PenaltyContact<S> {
+    /// True if there is a finite penetration, and a body that can move.
+    fn is_active(&self) -> bool {
+        self.penetration > S::zero()
+            && self.penetration.is_finite()
+            && self.inverse_effective_mass().normal > S::zero()
+            && is_finite(self.relative_velocity)
+    }
+
     pub fn inverse_effective_mass(&self) -> InverseEffectiveMass<S> {
         self.inverse_effective_masses[0].plus(self.inverse_effective_masses[1])
     }
