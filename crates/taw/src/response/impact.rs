@@ -19,8 +19,8 @@ impl<S: Scalar> InverseEffectiveMass<S> {
     /// The normal passes through the centers, so spin counts only tangentially:
     /// `1/m + r²/I = 7/2 · 1/m` for a solid ball.
     #[must_use]
-    pub fn of_balls(inverse_mass_a: S, inverse_mass_b: S, spin: BallRotation) -> Self {
-        Self::of([(inverse_mass_a, spin), (inverse_mass_b, spin)])
+    pub fn of_balls(inverse_mass_a: S, inverse_mass_b: S, rotation: BallRotation) -> Self {
+        Self::of([(inverse_mass_a, rotation), (inverse_mass_b, rotation)])
     }
 
     /// Sum over two bodies.
@@ -35,8 +35,8 @@ impl<S: Scalar> InverseEffectiveMass<S> {
 
     /// Inverse effective mass of two balls whose rotation may be locked one by one.
     pub(super) fn of(balls: [(S, BallRotation); 2]) -> Self {
-        let tangent = |(inverse_mass, spin): (S, BallRotation)| {
-            inverse_mass * (S::one() + spin.inverse_inertia_factor::<S>())
+        let tangent = |(inverse_mass, rotation): (S, BallRotation)| {
+            inverse_mass * (S::one() + rotation.inverse_inertia_factor::<S>())
         };
         let [a, b] = balls;
         Self { normal: a.0 + b.0, tangent: tangent(a) + tangent(b) }
@@ -98,17 +98,18 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A ball against a wall at rest whose normal is +y: velocity and rim speed (radius times spin
-    /// about z) after a bounce. The contact point moves by `vx + rim` along x.
-    fn bounce<S: Scalar>(v: [f64; 2], rim: f64, material: Material<S>) -> ([f64; 2], f64) {
+    /// A ball against a wall at rest whose normal is +y: velocity and spin speed (radius times spin
+    /// about z) after a bounce. The contact point moves by `vx + spin_speed` along x.
+    fn bounce<S: Scalar>(v: [f64; 2], spin_speed: f64, material: Material<S>) -> ([f64; 2], f64) {
         let number = S::constant;
-        let relative_velocity = Vec3::new(number(v[0]) + number(rim), number(v[1]), S::zero());
+        let relative_velocity =
+            Vec3::new(number(v[0]) + number(spin_speed), number(v[1]), S::zero());
         let inverse_effective_mass =
             InverseEffectiveMass::of_balls(S::zero(), S::one(), BallRotation::Free);
         let j = impact(Vec3::unit_y(), relative_velocity, inverse_effective_mass, material);
         // m = 1; r ω changes by r² j / I = 5/2 j.
         let after = [number(v[0]) + j.x, number(v[1]) + j.y];
-        (after.map(Scalar::as_f64), (number(rim) + number(2.5) * j.x).as_f64())
+        (after.map(Scalar::as_f64), (number(spin_speed) + number(2.5) * j.x).as_f64())
     }
 
     fn material<S: Scalar>(e: f64, mu: f64, beta: f64) -> Material<S> {
@@ -136,17 +137,23 @@ mod tests {
     fn oblique_impacts_match_the_rigid_solution() {
         for (degrees, e_t, spin, rebound) in OBLIQUE {
             let (sin, cos) = degrees.to_radians().sin_cos();
-            let (v, rim) = bounce::<f64>([3.9 * sin, -3.9 * cos], 0.0, material(0.98, 0.092, 0.0));
+            let (v, spin_speed) =
+                bounce::<f64>([3.9 * sin, -3.9 * cos], 0.0, material(0.98, 0.092, 0.0));
             assert!((v[0] / (3.9 * sin) - e_t).abs() < 6e-6, "{degrees}°: {}", v[0] / (3.9 * sin));
             assert!((v[1] - 0.98 * 3.9 * cos).abs() < 1e-14, "{degrees}°");
             // About z, forward rolling is negative: the table's sign.
-            assert!((rim / 2.5e-3 - spin).abs() < 6e-4, "{degrees}°: {}", rim / 2.5e-3);
-            let angle = (v[0] + rim).atan2(v[1]).to_degrees();
+            assert!(
+                (spin_speed / 2.5e-3 - spin).abs() < 6e-4,
+                "{degrees}°: {}",
+                spin_speed / 2.5e-3
+            );
+            let angle = (v[0] + spin_speed).atan2(v[1]).to_degrees();
             assert!((angle - rebound).abs() < 6e-4, "{degrees}°: {angle}");
             // The target for f32: 2e-6 of the speed.
-            let (v32, rim32) =
+            let (v32, spin32) =
                 bounce::<f32>([3.9 * sin, -3.9 * cos], 0.0, material(0.98, 0.092, 0.0));
-            let worst = (v32[0] - v[0]).abs().max((v32[1] - v[1]).abs()).max((rim32 - rim).abs());
+            let worst =
+                (v32[0] - v[0]).abs().max((v32[1] - v[1]).abs()).max((spin32 - spin_speed).abs());
             assert!(worst / 3.9 < 2e-6, "{degrees}° in f32: {worst}");
         }
     }
@@ -155,16 +162,16 @@ mod tests {
     fn fast_sliding_follows_chung_and_ooi_tests_5_and_6() {
         // V'st / (µ V'cn) = Vt / (µ Vn) − 7 and r w' / (µ Vn) = −5, for e = 1.
         for vt in [36.0, 40.0, 70.0, 300.0] {
-            let (v, rim) = bounce::<f64>([vt, -5.0], 0.0, material(1.0, 0.3, 0.0));
-            assert!(((v[0] + rim) / (0.3 * v[1]) - (vt / 1.5 - 7.0)).abs() < 1e-12);
-            assert!((rim / 1.5 + 5.0).abs() < 1e-12);
+            let (v, spin_speed) = bounce::<f64>([vt, -5.0], 0.0, material(1.0, 0.3, 0.0));
+            assert!(((v[0] + spin_speed) / (0.3 * v[1]) - (vt / 1.5 - 7.0)).abs() < 1e-12);
+            assert!((spin_speed / 1.5 + 5.0).abs() < 1e-12);
         }
         // With the slip against the approach: −V'st / V'cn = Vst / (e Vcn) − 7/2 µ (1 + 1/e).
         for spin in [4.5, 5.5, 10.0, 22.86] {
             let slip = 0.1 * spin;
-            let (v, rim) = bounce::<f64>([0.0, -0.2], slip, material(0.5, 0.4, 0.0));
+            let (v, spin_speed) = bounce::<f64>([0.0, -0.2], slip, material(0.5, 0.4, 0.0));
             let exact = slip / (0.5 * 0.2) - 3.5 * 0.4 * 3.0;
-            assert!(((v[0] + rim) / v[1] - exact).abs() < 1e-12, "{spin} rad/s");
+            assert!(((v[0] + spin_speed) / v[1] - exact).abs() < 1e-12, "{spin} rad/s");
         }
     }
 
@@ -172,15 +179,16 @@ mod tests {
     fn a_superball_comes_back_from_under_a_table() {
         // Garwin (1969): floor, table from below, floor; all in 343rds.
         fn check<S: Scalar>(tolerance: f64) {
-            let (mut v, mut rim) = (1.0, 0.0);
-            for (flip, speed, rim_speed) in
+            let (mut v, mut spin_speed) = (1.0, 0.0);
+            for (flip, speed, table_speed) in
                 [(1.0, 147.0, -490.0), (-1.0, -217.0, 420.0), (1.0, -333.0, 130.0)]
             {
                 // Under the table the ball is seen upside down, so its spin is too.
-                let ([x, _], turned) = bounce::<S>([v, -1.0], flip * rim, material(1.0, 1e9, 1.0));
-                (v, rim) = (x, flip * turned);
+                let ([x, _], turned) =
+                    bounce::<S>([v, -1.0], flip * spin_speed, material(1.0, 1e9, 1.0));
+                (v, spin_speed) = (x, flip * turned);
                 assert!((v - speed / 343.0).abs() < tolerance, "{v}");
-                assert!((rim - rim_speed / 343.0).abs() < tolerance, "{rim}");
+                assert!((spin_speed - table_speed / 343.0).abs() < tolerance, "{spin_speed}");
             }
         }
         check::<f32>(1e-6);
@@ -216,17 +224,17 @@ mod tests {
             }
             // Momentum is conserved by construction: the impulses are j and −j, at one point.
             // Restitution and Coulomb:
-            let give = 1.0 / masses[0] + 1.0 / masses[1];
+            let inverse_mass = 1.0 / masses[0] + 1.0 / masses[1];
             let normal_impulse = j.dot(normal);
-            let after = relative_velocity + normal * (normal_impulse * give)
-                + (j - normal * normal_impulse) * (3.5 * give);
+            let after = relative_velocity + normal * (normal_impulse * inverse_mass)
+                + (j - normal * normal_impulse) * (3.5 * inverse_mass);
             prop_assert!((after.dot(normal) - e * approach).abs() < 1e-6 * relative_velocity.magnitude());
             let friction = (j - normal * normal_impulse).magnitude();
             prop_assert!(friction <= mu * normal_impulse * (1.0 + 1e-6) + 1e-6 * normal_impulse);
             // Energy of the relative motion of the two points: the loss is j · (before + after) /
             // 2, which must not be a gain.
             let gained = 0.5 * j.dot(relative_velocity + after);
-            let energy = 0.5 * relative_velocity.magnitude2() / give;
+            let energy = 0.5 * relative_velocity.magnitude2() / inverse_mass;
             prop_assert!(gained <= 1e-6 * energy, "{gained} of {energy}");
         }
     }

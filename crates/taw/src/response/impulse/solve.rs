@@ -199,11 +199,12 @@ impl<S: Scalar> SolverBodies<'_, S> {
     /// Solves rolling and torsional friction: one step toward zero relative spin.
     fn solve_rolling(&mut self, c: &mut Constraint<S>) {
         let Some(rolling) = c.rolling else { return };
-        let wanted = rolling.angular_impulse - self.relative_spin(c) / rolling.inverse_inertia;
-        let max_force = c.normal_impulse / c.inverse_effective_mass.normal;
-        let torsional = c.normal * wanted.dot(c.normal);
-        let angular_impulse = clamp_length(wanted - torsional, rolling.rolling_lever * max_force)
-            + clamp_length(torsional, rolling.torsional_lever * max_force);
+        let target = rolling.angular_impulse - self.relative_spin(c) / rolling.inverse_inertia;
+        let normal_impulse = c.normal_impulse / c.inverse_effective_mass.normal;
+        let torsional = c.normal * target.dot(c.normal);
+        let angular_impulse =
+            clamp_length(target - torsional, rolling.rolling_lever * normal_impulse)
+                + clamp_length(torsional, rolling.torsional_lever * normal_impulse);
         let change = angular_impulse - rolling.angular_impulse;
         if is_finite(change) {
             c.rolling = Some(super::RollingConstraint { angular_impulse, ..rolling });

@@ -14,24 +14,24 @@ use crate::response::Elasticity;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum ContactLaw {
     /// Linear spring and dashpot (Cundall and Strack 1979), as stiff as the substep can resolve: an
-    /// elastic collision takes [16](ContactLaw::STEPS) substeps, whatever the masses.
+    /// elastic collision takes [16](ContactLaw::SUBSTEPS_PER_COLLISION) substeps, whatever the masses.
     #[default]
     SpringDashpot,
     /// Elastic balls: Hertz (1882) along the normal, Mindlin (1949) tangentially, with the damping
     /// of Tsuji, Tanaka and Ishida (1992). The stiffness follows from the materials'
     /// [`Elasticity`](crate::response::Elasticity), but is never above that of
-    /// [`ContactLaw::SpringDashpot`]: substeps longer than [`Elasticity::longest_substep`] soften
+    /// [`ContactLaw::SpringDashpot`]: substeps longer than [`Elasticity::max_substep`] soften
     /// the contact.
     HertzMindlin,
 }
 
 impl ContactLaw {
     /// Number of substeps of an elastic collision by [`ContactLaw::SpringDashpot`].
-    pub const STEPS: u32 = 16;
+    pub const SUBSTEPS_PER_COLLISION: u32 = 16;
 
     /// Square of the phase angle of a contact's oscillation per substep.
     pub(super) const ANGLE_2: f64 = {
-        let angle = std::f64::consts::PI / Self::STEPS as f64;
+        let angle = std::f64::consts::PI / Self::SUBSTEPS_PER_COLLISION as f64;
         angle * angle
     };
 }
@@ -123,7 +123,7 @@ impl<S: Scalar> Elasticity<S> {
     /// this mass and radius (kg, m). In a longer one they are as stiff as by
     /// [`ContactLaw::SpringDashpot`]. Balls that bear others need a shorter one.
     #[must_use]
-    pub fn longest_substep(self, mass: S, radius: S, speed: S) -> S {
+    pub fn max_substep(self, mass: S, radius: S, speed: S) -> S {
         let number = S::constant;
         let (mass, radius) = (mass * number(0.5), radius * number(0.5));
         let modulus = (self.compliance().normal * number(2.0)).recip();
