@@ -12,9 +12,9 @@ pub(crate) struct SolverBodies<'a, S> {
     pub period: Period<S>,
     /// Centers, in metres.
     pub position: &'a mut [Point3<S>],
-    /// In metres per second.
+    /// Velocities, in m/s.
     pub velocity: &'a mut [Vec3<S>],
-    /// In metres.
+    /// Radii, in metres.
     pub radius: &'a [S],
     /// Inverse masses, in 1/kg; zero for a body of infinite mass. Empty for a method that ignores
     /// masses.

@@ -40,7 +40,7 @@ impl Default for EnergyLedger {
 pub(crate) struct ImpulseSample {
     /// Impulse on the second body, in N s.
     pub impulse: Vec3<f64>,
-    /// From the first to the second.
+    /// Unit normal from the first body to the second.
     pub normal: Vec3<f64>,
     /// Mean relative velocity of the contact points before and after, in m/s: times the impulse, it
     /// is the work.

@@ -7,9 +7,9 @@ use crate::response::Material;
 /// impulse, in 1/kg (the diagonal of `K` in constraint solvers).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InverseEffectiveMass<S> {
-    /// Along the normal.
+    /// Component along the normal.
     pub normal: S,
-    /// Along the tangents.
+    /// Component along the tangents.
     pub tangent: S,
 }
 
@@ -98,8 +98,8 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// A ball against a wall at rest whose normal is +y: velocity and spin speed (radius times spin
-    /// about z) after a bounce. The contact point moves by `vx + spin_speed` along x.
+    /// Bounce of a ball off a wall at rest whose normal is +y: velocity and spin speed (radius
+    /// times spin about z) afterwards. The contact point moves by `vx + spin_speed` along x.
     fn bounce<S: Scalar>(v: [f64; 2], spin_speed: f64, material: Material<S>) -> ([f64; 2], f64) {
         let number = S::constant;
         let relative_velocity =
@@ -213,8 +213,10 @@ mod tests {
             let relative_velocity = Vec3::from(relative_velocity);
             let surface = material::<f32>(e, mu, beta);
             let inverse = masses.map(|m| (1.0 / m) as f32);
-            let inverse_effective_mass = InverseEffectiveMass::of_balls(inverse[0], inverse[1], BallRotation::Free);
-            let j = impact(normal.map(|x| x as f32), relative_velocity.map(|x| x as f32), inverse_effective_mass, surface)
+            let inverse_effective_mass =
+                InverseEffectiveMass::of_balls(inverse[0], inverse[1], BallRotation::Free);
+            let cast = |v: Vec3<f64>| v.map(|x| x as f32);
+            let j = impact(cast(normal), cast(relative_velocity), inverse_effective_mass, surface)
                 .map(f64::from);
             let approach = -relative_velocity.dot(normal);
             if approach < 1e-6 {
@@ -228,7 +230,8 @@ mod tests {
             let normal_impulse = j.dot(normal);
             let after = relative_velocity + normal * (normal_impulse * inverse_mass)
                 + (j - normal * normal_impulse) * (3.5 * inverse_mass);
-            prop_assert!((after.dot(normal) - e * approach).abs() < 1e-6 * relative_velocity.magnitude());
+            let tolerance = 1e-6 * relative_velocity.magnitude();
+            prop_assert!((after.dot(normal) - e * approach).abs() < tolerance);
             let friction = (j - normal * normal_impulse).magnitude();
             prop_assert!(friction <= mu * normal_impulse * (1.0 + 1e-6) + 1e-6 * normal_impulse);
             // Energy of the relative motion of the two points: the loss is j · (before + after) /

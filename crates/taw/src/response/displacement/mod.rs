@@ -52,7 +52,7 @@ struct ApproachConstraint<S> {
     /// Index of its island. Islands do not influence each other, to the bit.
     island: u32,
     axis_offset: [S; 2],
-    /// From a to b.
+    /// Unit normal from a to b.
     normal: Vec3<S>,
     /// Speed of the wall's surface along the normal, in m/s; zero between marbles.
     surface_speed: S,

@@ -31,10 +31,10 @@ const PRODUCTS_PER_COST: u64 = 7;
 /// Constraint of a pair in contact: no approach along the normal.
 #[derive(Clone, Copy, Debug)]
 struct NormalConstraint {
-    /// None for a wall.
+    /// First body; none for a wall.
     a: Option<usize>,
     b: usize,
-    /// From a to b.
+    /// Unit normal from a to b.
     normal: Vec3<f64>,
     /// Velocity of the wall's surface, in m/s.
     surface_velocity: Vec3<f64>,

@@ -19,9 +19,9 @@ pub(crate) struct Ball {
     pub spin: Vec3<f64>,
     /// Acceleration by all external forces, in m/s².
     pub external_acceleration: Vec3<f64>,
-    /// In metres.
+    /// Radius, in metres.
     pub radius: f64,
-    /// In 1/kg.
+    /// Inverse mass, in 1/kg.
     pub inverse_mass: f64,
     pub material: Material<f64>,
     /// Rotation lock: tells if friction spins it.

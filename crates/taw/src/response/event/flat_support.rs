@@ -42,11 +42,11 @@ pub(super) struct MotionSegment {
     /// that would last for less than a millionth of a step.
     pub velocity_change: Vec3<f64>,
     pub spin_change: Vec3<f64>,
-    /// In m/s².
+    /// Acceleration of the center, in m/s².
     pub acceleration: Vec3<f64>,
-    /// In rad/s².
+    /// Angular acceleration, in rad/s².
     pub spin_acceleration: Vec3<f64>,
-    /// In seconds.
+    /// Duration, in seconds.
     pub duration: f64,
 }
 

@@ -39,11 +39,10 @@ pub(crate) struct Context<'a, S, W, M, F> {
 #[derive(Clone, Copy)]
 pub(crate) struct SubstepStart<'a, S> {
     pub position: &'a [Point3<S>],
-    /// Before forces changed them, in m/s.
+    /// Velocities before forces changed them, in m/s.
     pub velocity: &'a [Vec3<S>],
-    /// For rows that continuous collision detection stopped within the substep, the fraction of a
-    /// velocity change that their positions still follow, as a matrix, per substep; empty if none
-    /// was.
+    /// Fraction of a velocity change that the position of a row still follows per substep, as a
+    /// matrix, where continuous collision detection stopped the row; empty if it stopped none.
     pub ccd_stops: &'a [Option<Mat3<S>>],
 }
 
@@ -185,7 +184,7 @@ pub(super) struct Constraint<S> {
     axis_offset: [S; 2],
     /// Index of its island.
     island: u32,
-    /// From a to b.
+    /// Unit normal from a to b.
     normal: Vec3<S>,
     /// Velocity of the wall's surface, in m/s; zero between marbles.
     surface_velocity: Vec3<S>,

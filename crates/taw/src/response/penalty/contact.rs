@@ -16,12 +16,12 @@ pub(super) type SpringKey = (bool, u32, u32, u32, [i8; 2]);
 /// Penalty contact: bodies, geometry and relative motion.
 pub(super) struct PenaltyContact<S> {
     pub key: SpringKey,
-    /// None for a wall.
+    /// First body; none for a wall.
     pub a: Option<usize>,
     pub b: usize,
     /// Offset along the axis of each capsule, in metres.
     pub axis_offset: [S; 2],
-    /// From a to b.
+    /// Unit normal from a to b.
     pub normal: Vec3<S>,
     pub penetration: S,
     /// Velocity of b's contact point relative to a's, and of the wall's surface, in m/s.
