@@ -59,9 +59,9 @@ impl UnionFind {
     fn root(&mut self, row: usize) -> usize {
         let mut row = row as u32;
         while self.parent[row as usize] != row {
-            let grandparent = self.parent[row as usize];
-            self.parent[row as usize] = self.parent[grandparent as usize];
-            row = grandparent;
+            let parent = self.parent[row as usize];
+            self.parent[row as usize] = self.parent[parent as usize];
+            row = parent;
         }
         row as usize
     }

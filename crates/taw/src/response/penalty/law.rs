@@ -19,7 +19,7 @@ pub enum ContactLaw {
     SpringDashpot,
     /// Elastic balls: Hertz (1882) along the normal, Mindlin (1949) tangentially, with the damping
     /// of Tsuji, Tanaka and Ishida (1992). The stiffness follows from the materials'
-    /// [`Elasticity`](crate::response::Elasticity), but is never above that of
+    /// [`Elasticity`], but is never above that of
     /// [`ContactLaw::SpringDashpot`]: substeps longer than [`Elasticity::max_substep`] soften
     /// the contact.
     HertzMindlin,

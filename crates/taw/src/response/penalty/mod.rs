@@ -146,13 +146,13 @@ fn quarantine_if_non_finite<S: Scalar>(
     row: u32,
     quarantined: &mut Vec<u32>,
 ) {
-    let row_in = row as usize;
-    let spin = marbles.spin.get(row_in).copied().unwrap_or_else(Vec3::zero);
-    if is_finite(marbles.velocity[row_in]) && is_finite(spin) {
+    let index = row as usize;
+    let spin = marbles.spin.get(index).copied().unwrap_or_else(Vec3::zero);
+    if is_finite(marbles.velocity[index]) && is_finite(spin) {
         return;
     }
-    marbles.velocity[row_in] = Vec3::zero();
-    if let Some(spin) = marbles.spin.get_mut(row_in) {
+    marbles.velocity[index] = Vec3::zero();
+    if let Some(spin) = marbles.spin.get_mut(index) {
         *spin = Vec3::zero();
     }
     quarantined.push(row);
