@@ -146,7 +146,7 @@ fn rack(
             SurfaceMaterial {
                 restitution: 0.95,
                 friction: 0.06,
-                combine: Combine::Mean,
+                combine: Combine::Average,
                 ..default()
             },
             Velocity::default(),

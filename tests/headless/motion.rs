@@ -257,7 +257,7 @@ fn a_wall_may_have_a_material_of_its_own() {
     assert!((bounced(None) - 3.2).abs() < 1e-6);
     let dead = SurfaceMaterial { restitution: 0.0, ..default() };
     assert!((bounced(Some(dead)) - 1.6).abs() < 1e-6, "the mean of the two");
-    let deadest = SurfaceMaterial { combine: Combine::Smallest, ..dead };
+    let deadest = SurfaceMaterial { combine: Combine::Min, ..dead };
     assert_eq!(bounced(Some(deadest)), 0.0);
 }
 

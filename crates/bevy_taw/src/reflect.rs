@@ -53,10 +53,10 @@ pub enum ContactLawReflect {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[reflect(Debug, PartialEq)]
 pub enum CombineReflect {
-    Mean,
-    Smallest,
-    Product,
-    Largest,
+    Average,
+    Min,
+    Multiply,
+    Max,
 }
 
 /// Mirrors [`taw::world::Detection`].

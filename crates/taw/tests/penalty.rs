@@ -58,7 +58,7 @@ fn a_collision_gives_back_the_restitution_that_is_asked_for() {
                             ContactLaw::SpringDashpot => 1e-3,
                             ContactLaw::HertzMindlin => {
                                 let longest =
-                                    own.elasticity.longest_substep(2.0 * shared, radius, speed);
+                                    own.elasticity.max_substep(2.0 * shared, radius, speed);
                                 longest.min(1e-3)
                             }
                         };

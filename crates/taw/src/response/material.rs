@@ -2,58 +2,58 @@ use crate::Error;
 use crate::error::{positive, within};
 use crate::math::Scalar;
 
-/// What a surface is made of, as far as a contact can tell. Where a wall has none of its
-/// own, the marble's counts; else what [`Material::against`] says.
+/// Surface material of a contact. The marble's material counts where a wall has none of its own;
+/// otherwise [`Material::combined_with`] mixes both.
 ///
-/// [`Response::Displacement`] knows neither bounce nor friction and does not read it.
+/// [`Response::Displacement`] has neither restitution nor friction and ignores it.
 ///
 /// [`Response::Displacement`]: super::Response::Displacement
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material<S> {
-    /// The part of the approach speed that a bounce gives back, in `[0, 1]`.
+    /// Coefficient of restitution: separation speed over approach speed, in `[0, 1]`.
     pub restitution: S,
-    /// The largest friction force over the normal force (Coulomb), at least zero.
+    /// Coefficient of friction (Coulomb): largest friction force over the normal force, at least
+    /// zero.
     pub friction: S,
-    /// The part of the sliding speed of the touching points that a bounce turns
-    /// round, in `[-1, 1]`, as far as friction can: 0 stops them, 1 is a superball
-    /// (Garwin 1969), −1 slides freely.
+    /// Tangential restitution: fraction of the sliding speed that a bounce reverses, in `[-1, 1]`,
+    /// as far as friction can: 0 stops sliding, 1 is a superball (Garwin 1969), −1 slides freely.
     pub tangential_restitution: S,
-    /// The torque that resists rolling, over normal force times radius, at least zero. A
-    /// marble rests on slopes up to this tangent, and rolling on a floor it loses
-    /// `5/7 · rolling_resistance · g` of its speed a second.
+    /// Rolling friction: resisting torque over normal force times radius, at least zero. A marble
+    /// rests on slopes up to this tangent, and on a floor it loses `5/7 · rolling_resistance · g`
+    /// of its speed per second.
     pub rolling_resistance: S,
-    /// The torque that resists spinning on the spot, over normal force times radius, at
-    /// least zero. It takes `5/2 · spinning_resistance · g / radius` a second.
+    /// Torsional (spinning) friction: torque that resists spin about the normal, over normal force
+    /// times radius, at least zero. It takes `5/2 · spinning_resistance · g / radius` per second.
     pub spinning_resistance: S,
-    /// How stiff it is; counts for [`ContactLaw::HertzMindlin`](super::ContactLaw) only.
+    /// Stiffness; only [`ContactLaw::HertzMindlin`](super::ContactLaw) uses it.
     pub elasticity: Elasticity<S>,
-    /// What counts against another material.
+    /// Rule that combines it with another material.
     pub combine: Combine,
 }
 
-/// How a solid gives way elastically.
+/// Elastic constants of a solid.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Elasticity<S> {
-    /// In pascals, above zero.
+    /// Young's modulus, in pascals, above zero.
     pub youngs_modulus: S,
-    /// In `[0, 0.5]`.
+    /// Poisson's ratio, in `[0, 0.5]`.
     pub poissons_ratio: S,
 }
 
 impl<S: Scalar> Default for Elasticity<S> {
-    /// A firm rubber, which marbles of glass's density and some centimetres bear at a
-    /// millisecond's step: 10 megapascals and 0.25. Glass itself has 70,000.
+    /// Firm rubber, 10 megapascals and 0.25: the stiffest that marbles of glass's density and a few
+    /// centimetres bear at steps of a millisecond. Glass itself has 70,000 megapascals.
     fn default() -> Self {
         Self { youngs_modulus: S::constant(1e7), poissons_ratio: S::constant(0.25) }
     }
 }
 
-/// How much two surfaces that are pressed together give way, in 1/Pa.
+/// Compliance of two surfaces in contact, in 1/Pa.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Compliance<S> {
-    /// `(1 − ν²) / E`, added up.
+    /// Sum of `(1 − ν²) / E`.
     pub normal: S,
-    /// `(2 − ν) / G`, added up.
+    /// Sum of `(2 − ν) / G`.
     pub tangent: S,
 }
 
@@ -69,41 +69,41 @@ impl<S: Scalar> Elasticity<S> {
 }
 
 impl<S: Scalar> Compliance<S> {
-    pub(super) fn and(self, other: Self) -> Self {
+    pub(super) fn plus(self, other: Self) -> Self {
         Self { normal: self.normal + other.normal, tangent: self.tangent + other.tangent }
     }
 }
 
-/// How two materials become that of a contact, number by number.
+/// Combination rule of two materials, coefficient by coefficient.
 ///
-/// Of two surfaces with different rules the one further down in this list is taken.
+/// Of two different rules the one further down in this list wins.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Combine {
-    /// Half of the sum.
+    /// Arithmetic mean.
     #[default]
-    Mean,
-    /// The smaller number.
-    Smallest,
-    /// One times the other. Of two negative tangential restitutions, minus that.
-    Product,
-    /// The larger number.
-    Largest,
+    Average,
+    /// Smaller coefficient.
+    Min,
+    /// Product. Of two negative tangential restitutions, minus the product.
+    Multiply,
+    /// Larger coefficient.
+    Max,
 }
 
 impl Combine {
     fn of<S: Scalar>(self, a: S, b: S) -> S {
         match self {
-            Self::Mean => a + (b - a) * S::constant(0.5),
-            Self::Smallest => a.min(b),
-            Self::Product if a < S::zero() && b < S::zero() => -(a * b),
-            Self::Product => a * b,
-            Self::Largest => a.max(b),
+            Self::Average => a + (b - a) * S::constant(0.5),
+            Self::Min => a.min(b),
+            Self::Multiply if a < S::zero() && b < S::zero() => -(a * b),
+            Self::Multiply => a * b,
+            Self::Max => a.max(b),
         }
     }
 }
 
 impl<S: Scalar> Default for Material<S> {
-    /// Somewhat bouncy, somewhat rough: 0.5 and 0.3. Nothing resists rolling.
+    /// Medium restitution and friction: 0.5 and 0.3. No rolling friction.
     fn default() -> Self {
         Self {
             restitution: S::constant(0.5),
@@ -112,13 +112,13 @@ impl<S: Scalar> Default for Material<S> {
             rolling_resistance: S::zero(),
             spinning_resistance: S::zero(),
             elasticity: Elasticity::default(),
-            combine: Combine::Mean,
+            combine: Combine::Average,
         }
     }
 }
 
 impl<S: Scalar> Material<S> {
-    /// This material, if its numbers can be right.
+    /// Returns the material if its numbers are in range.
     ///
     /// # Errors
     /// [`Error::OutOfRange`], or [`Error::NotPositive`] for Young's modulus.
@@ -133,9 +133,9 @@ impl<S: Scalar> Material<S> {
         Ok(self)
     }
 
-    /// What counts between two surfaces.
+    /// Combined material of two surfaces.
     #[must_use]
-    pub fn against(self, other: Self) -> Self {
+    pub fn combined_with(self, other: Self) -> Self {
         let combine = self.combine.max(other.combine);
         let of = |number: fn(&Self) -> S| combine.of(number(&self), number(&other));
         Self {
@@ -144,13 +144,13 @@ impl<S: Scalar> Material<S> {
             tangential_restitution: of(|m| m.tangential_restitution),
             rolling_resistance: of(|m| m.rolling_resistance),
             spinning_resistance: of(|m| m.spinning_resistance),
-            // Two surfaces give way together whatever the rule; see `Compliance`.
+            // Compliances add up whatever the rule; see `Compliance`.
             elasticity: self.elasticity,
             combine,
         }
     }
 
-    /// The same numbers in another scalar.
+    /// Converts to another scalar.
     pub(crate) fn cast<T: Scalar>(self) -> Material<T> {
         let number = |x: S| T::constant(x.as_f64());
         Material {
@@ -175,13 +175,13 @@ mod tests {
     #[test]
     fn the_rule_further_down_counts() {
         let material = |friction, combine| Material { friction, combine, ..Material::default() };
-        let rules = [Combine::Mean, Combine::Smallest, Combine::Product, Combine::Largest];
+        let rules = [Combine::Average, Combine::Min, Combine::Multiply, Combine::Max];
         let expected = [1.0, 0.5, 0.75, 1.5];
         for (i, a) in rules.into_iter().enumerate() {
             for (j, b) in rules.into_iter().enumerate() {
-                let pair = material(0.5, a).against(material(1.5, b));
+                let pair = material(0.5, a).combined_with(material(1.5, b));
                 assert_eq!(pair.friction, expected[i.max(j)], "{a:?} against {b:?}");
-                assert_eq!(pair, material(1.5, b).against(material(0.5, a)));
+                assert_eq!(pair, material(1.5, b).combined_with(material(0.5, a)));
             }
         }
     }
@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn what_two_materials_give_is_a_material() {
         let ends = [-1.0, -0.5, 0.0, 0.5, 1.0_f64];
-        for combine in [Combine::Mean, Combine::Smallest, Combine::Product, Combine::Largest] {
+        for combine in [Combine::Average, Combine::Min, Combine::Multiply, Combine::Max] {
             for (a, b) in ends.into_iter().flat_map(|a| ends.map(|b| (a, b))) {
                 let of = |beta: f64| Material {
                     restitution: beta.abs(),
@@ -197,7 +197,7 @@ mod tests {
                     combine,
                     ..Material::default()
                 };
-                of(a).against(of(b)).checked().unwrap();
+                of(a).combined_with(of(b)).checked().unwrap();
             }
         }
     }

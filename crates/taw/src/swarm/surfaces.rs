@@ -146,7 +146,7 @@ pub(super) struct PairNumbers {
 
 impl PairNumbers {
     fn set(&mut self, lane: usize, [a, b]: [Surface; 2]) {
-        let material = a.material.against(b.material);
+        let material = a.material.combined_with(b.material);
         self.friction[lane] = material.friction;
         self.restitution[lane] = material.restitution;
         self.rolling_resistance[lane] = material.rolling_resistance;
@@ -172,7 +172,7 @@ pub(super) struct WallNumbers {
 impl WallNumbers {
     /// Numbers of a ball on a wall, which may have a material of its own.
     pub fn new(ball: Surface, wall: Option<Material<f32>>) -> Self {
-        let material = wall.map_or(ball.material, |wall| ball.material.against(wall));
+        let material = wall.map_or(ball.material, |wall| ball.material.combined_with(wall));
         Self {
             friction: material.friction,
             restitution: material.restitution,

@@ -5,7 +5,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::World;
 use crate::math::{Scalar, Vec3, length};
-use crate::response::{Response, Work};
+use crate::response::{EnergyLedger, Response};
 
 /// Energy audit of a step, in joules. Dissipated energy counts positive.
 ///
@@ -13,9 +13,9 @@ use crate::response::{Response, Work};
 /// minus the dissipation by friction, restitution, resistance and the solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergyAudit {
-    /// Work of force fields, applied forces and damping; zero where only gravity acts.
+    /// EnergyLedger of force fields, applied forces and damping; zero where only gravity acts.
     pub forces: f64,
-    /// Work of moving walls and marbles of infinite mass.
+    /// EnergyLedger of moving walls and marbles of infinite mass.
     pub walls: f64,
     /// Dissipation by sliding friction.
     pub friction: f64,
@@ -58,7 +58,7 @@ pub(super) struct AuditState<S> {
     /// Potential energy and momentum after contacts were generated.
     potential: f64,
     moment: Vec3<f64>,
-    pub work: Work,
+    pub work: EnergyLedger,
 }
 
 impl<S: Scalar> World<S> {
@@ -75,7 +75,7 @@ impl<S: Scalar> World<S> {
                     energy: 0.0,
                     potential: 0.0,
                     moment: Vec3::zero(),
-                    work: Work::default(),
+                    work: EnergyLedger::default(),
                 })
             });
         }
@@ -132,7 +132,7 @@ impl<S: Scalar> World<S> {
         audit_state.audit.max_penetration = audit_state.audit.max_penetration.max(max_penetration);
         audit_state.potential = self.energy().potential;
         audit_state.moment = self.momentum();
-        audit_state.work = Work::default();
+        audit_state.work = EnergyLedger::default();
         self.audit_state = Some(audit_state);
     }
 
@@ -141,7 +141,7 @@ impl<S: Scalar> World<S> {
         let Some(mut audit_state) = self.audit_state.take() else { return };
         let AuditState { audit, residual, energy, potential, moment, work, .. } = &mut *audit_state;
         let now = self.energy();
-        // Work of forces without that of gravity, for a response that moves marbles itself.
+        // EnergyLedger of forces without that of gravity, for a response that moves marbles itself.
         let moves = self.model.response == Response::EventDriven && self.has_forces();
         let forces = if moves { work.forces - (*potential - now.potential) } else { 0.0 };
         let expected =

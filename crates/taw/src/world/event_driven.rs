@@ -9,8 +9,8 @@ use crate::broad::Period;
 use crate::contact::Contact;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::motion::{Motion, Rotation, WallMotion};
-use crate::response::event::{self, Ball, Path, Settings, Wall};
-use crate::response::{BallSpin, Impact, Material, Work};
+use crate::response::event::{self, Ball, EventSettings, Trajectory, Wall};
+use crate::response::{BallRotation, EnergyLedger, Impact, Material};
 
 impl<S: Scalar> World<S> {
     /// Runs the event-driven solver for a substep of `dt` seconds. `rest` is the time of the step
@@ -31,17 +31,21 @@ impl<S: Scalar> World<S> {
                 position,
                 velocity,
                 spin: marbles.angular_velocity_f64(row),
-                pull: self.accelerations.get(row).copied().unwrap_or(Vec3::new(0.0, 0.0, 0.0)),
+                external_acceleration: self
+                    .accelerations
+                    .get(row)
+                    .copied()
+                    .unwrap_or(Vec3::new(0.0, 0.0, 0.0)),
                 radius,
                 inverse_mass: 1.0 / marbles.mass(row).as_f64(),
                 material: marbles.material.get(row).unwrap_or_default().cast(),
-                spins: match self.model.rotation {
-                    Rotation::Dynamic if !marbles.is_rotation_locked(row) => BallSpin::Free,
-                    _ => BallSpin::Ignored,
+                rotation: match self.model.rotation {
+                    Rotation::Dynamic if !marbles.is_rotation_locked(row) => BallRotation::Free,
+                    _ => BallRotation::Locked,
                 },
-                rounding: 4.0 * digit * (largest + radius),
-                turned: Vec3::new(0.0, 0.0, 0.0),
-                path: Path::default(),
+                position_error: 4.0 * digit * (largest + radius),
+                rotation_increment: Vec3::new(0.0, 0.0, 0.0),
+                trajectory: Trajectory::default(),
             }
         }));
         let cast = |contact: &Contact<S>| Contact {
@@ -55,7 +59,7 @@ impl<S: Scalar> World<S> {
         let mut touches = vec![0; marbles.len()];
         let wanted = self.contacts.mm.iter().filter(|contact| {
             let (a, b) = (contact.a as usize, contact.b as usize);
-            let wanted = touches[a].min(touches[b]) < event::MOST_TOUCHES;
+            let wanted = touches[a].min(touches[b]) < event::MAX_CONTACTS;
             touches[a] += 1;
             touches[b] += 1;
             wanted
@@ -63,8 +67,8 @@ impl<S: Scalar> World<S> {
         events.near.mm.extend(wanted.map(cast));
         let source = &Source::new(&self.walls, [dt.as_f64(), rest.as_f64()]);
         let iterations = self.model.iterations;
-        let settings = Settings { dt: dt.as_f64(), iterations, source, looks: 0.into() };
-        events.work = self.audit_state.is_some().then(Work::default);
+        let settings = EventSettings { dt: dt.as_f64(), iterations, source, cost: 0.into() };
+        events.work = self.audit_state.is_some().then(EnergyLedger::default);
         let mut impacts = Vec::new();
         self.stopped.extend(events.run(&settings, &mut impacts));
         self.impacts.extend(impacts.into_iter().map(Impact::cast));
@@ -76,7 +80,7 @@ impl<S: Scalar> World<S> {
             let mut whole = self.marbles.set_motion_f64(row, Motion { position, velocity });
             if self.model.rotation == Rotation::Dynamic {
                 whole &= self.marbles.set_angular_velocity_f64(row, ball.spin);
-                self.marbles.rotate_by(row, cast_vector(ball.turned));
+                self.marbles.rotate_by(row, cast_vector(ball.rotation_increment));
             }
             if !whole && !self.stopped.contains(&(row as u32)) {
                 self.stopped.push(row as u32);
@@ -120,7 +124,7 @@ impl<'a, S: Scalar> Source<'a, S> {
     }
 }
 
-impl<S: Scalar> event::Source for Source<'_, S> {
+impl<S: Scalar> event::WallSource for Source<'_, S> {
     fn planes(&self, name: &mut dyn FnMut(u32)) {
         self.walls.planes().for_each(|(row, _)| name(row));
     }
@@ -151,12 +155,12 @@ impl<S: Scalar> event::Source for Source<'_, S> {
         let form = self.walls.shapes().get(place)?.sub_shape_f64(part)?;
         Some(Wall {
             bounds: form.bounds(),
-            form,
+            collider: form,
             row,
             motion,
-            there: moved.then_some(self.there),
+            arrival_time: moved.then_some(self.there),
             material: self.walls.material_of_row(place).map(Material::cast),
-            digit: 8.0 * S::epsilon().as_f64(),
+            relative_rounding: 8.0 * S::epsilon().as_f64(),
         })
     }
 }

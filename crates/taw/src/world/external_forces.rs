@@ -7,7 +7,7 @@ use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Bivector;
 use crate::math::{Point3, Scalar, Vec3, cast_vector};
-use crate::response::Rod;
+use crate::response::CapsuleInertia;
 
 const FORCE: [&str; 3] = ["force.x", "force.y", "force.z"];
 const IMPULSE: [&str; 3] = ["impulse.x", "impulse.y", "impulse.z"];
@@ -187,7 +187,7 @@ impl<S: Scalar> Marbles<S> {
         if half == 0.0 {
             return 0.4 * (angular_velocity * radius).magnitude2();
         }
-        let [along, across] = Rod::moments(radius, half);
+        let [along, across] = CapsuleInertia::unit_inertia(radius, half);
         let axis = cast_vector::<S, f64>(self.axis(row)).normalize();
         let about_axis = angular_velocity.dot(axis);
         about_axis * about_axis * along
@@ -207,7 +207,7 @@ impl<S: Scalar> Marbles<S> {
         if half == S::zero() {
             return v * of(S::constant(0.4) * radius * radius);
         }
-        let [along, across] = Rod::moments(radius, half).map(of);
+        let [along, across] = CapsuleInertia::unit_inertia(radius, half).map(of);
         let axis = self.axis(row);
         let part = axis * v.dot(axis);
         part * along + (v - part) * across

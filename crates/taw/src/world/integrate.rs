@@ -5,7 +5,7 @@ use cgmath::{InnerSpace, Zero};
 use super::marbles::{Compensation, Marbles};
 use crate::math::{Quat, Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
 use crate::motion::{ForceField, Integrator, Motion, Rotation, integrate_rotation};
-use crate::response::Rod;
+use crate::response::CapsuleInertia;
 
 /// Step context: integrator, gravity, force fields and time step.
 #[derive(Clone, Copy)]
@@ -234,7 +234,8 @@ impl<S: Scalar> Marbles<S> {
         let (angular_velocity, dt) = (self.angular_velocity_f64(row), dt.as_f64());
         let rotation = exact(rotation);
         let axis = (rotation * Vec3::unit_y()).normalize();
-        let [along, across] = Rod::moments(self.radius[row].as_f64(), half.as_f64());
+        let [along, across] =
+            CapsuleInertia::unit_inertia(self.radius[row].as_f64(), half.as_f64());
         // Precession rate: angular momentum over the moment across the axis.
         let about_axis = angular_velocity.dot(axis);
         let precession = angular_velocity + axis * (about_axis * (along / across - 1.0));

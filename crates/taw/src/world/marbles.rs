@@ -8,7 +8,7 @@ use crate::error::{finite, finite_point, finite_vector, positive, within};
 use crate::frame::Bivector;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite, is_finite_point};
 use crate::motion::{Integrator, Mass, Motion, Rotation};
-use crate::response::{Columns, Material, Rod};
+use crate::response::{CapsuleInertia, Material, SolverBodies};
 use crate::shape::{Capsule, Shape, Sphere};
 use crate::swarm::BodyColumns;
 
@@ -606,7 +606,7 @@ impl<S: Scalar> Marbles<S> {
     }
 
     /// Capsule axes and inertia of all marbles, if any is a capsule, in a world of this model.
-    pub(super) fn rods(&self, model: Rotation, rods: &mut Vec<Rod<S>>) {
+    pub(super) fn rods(&self, model: Rotation, rods: &mut Vec<CapsuleInertia<S>>) {
         rods.clear();
         if !self.has_capsules() {
             return;
@@ -614,9 +614,9 @@ impl<S: Scalar> Marbles<S> {
         rods.extend((0..self.len()).map(|row| {
             let (axis, half) = (self.axis(row), self.half_length(row));
             let turns = self.rotation_of(row, model) == Rotation::Dynamic;
-            let moments = Rod::moments(self.radius[row], half);
+            let moments = CapsuleInertia::unit_inertia(self.radius[row], half);
             let whirl = moments.map(|moment| if turns { moment.recip() } else { S::zero() });
-            Rod { axis, half, whirl }
+            CapsuleInertia { axis, half_length: half, inverse_unit_inertia: whirl }
         }));
     }
 
@@ -689,17 +689,17 @@ impl<S: Scalar> Marbles<S> {
         &'a mut self,
         inverse_mass: &'a [S],
         held: &'a [bool],
-        rods: &'a [Rod<S>],
-    ) -> (Columns<'a, S>, &'a SparseColumn<Material<S>>, &'a SparseColumn<Integrator>) {
-        let columns = Columns {
+        rods: &'a [CapsuleInertia<S>],
+    ) -> (SolverBodies<'a, S>, &'a SparseColumn<Material<S>>, &'a SparseColumn<Integrator>) {
+        let columns = SolverBodies {
             period: self.period,
             position: &mut self.position,
             velocity: &mut self.velocity,
             radius: &self.radius,
             inverse_mass,
             spin: &mut self.angular_velocity,
-            held,
-            rods,
+            rotation_locked: held,
+            capsules: rods,
         };
         (columns, &self.material, &self.integrator)
     }

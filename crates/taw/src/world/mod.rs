@@ -39,11 +39,13 @@ use crate::error::{finite, finite_vector, positive};
 use crate::math::{Point3, Scalar, Vec3, cast_vector, length};
 use crate::motion::{ForceField, Rotation};
 use crate::response::event::EventDriven;
-use crate::response::impulse::{self, Around, Settings, Start, Warm, impulse};
+use crate::response::impulse::{
+    self, CachedImpulse, Context, SolverSettings, SubstepStart, solve_contacts,
+};
 use crate::response::{
-    Impact, Response, Rod, Shear,
-    displacement::{self, displacement},
-    penalty::{self, penalty},
+    CapsuleInertia, Impact, Response, SpringHistory,
+    displacement::{self, solve_displacement},
+    penalty::{PenaltySettings, apply_penalty_forces},
 };
 use crate::swarm::Swarm;
 use contact_limit::ContactLimit;
@@ -99,8 +101,8 @@ pub struct World<S> {
     impulse: impulse::Scratch<S>,
     /// What the contacts of the last substep bore, and the removals until then: they
     /// move rows, after which nothing here has the right name any more.
-    warm: Vec<Warm<S>>,
-    shear: Vec<Shear<S>>,
+    warm: Vec<CachedImpulse<S>>,
+    shear: Vec<SpringHistory<S>>,
     warm_removals: [u64; 2],
     /// For a response that moves marbles by itself: how each is to be accelerated.
     accelerations: Vec<Vec3<f64>>,
@@ -111,7 +113,7 @@ pub struct World<S> {
     continuous: Continuous<S>,
     near_walls: Vec<Candidate<S>>,
     /// What is long about marbles, and how far they reach.
-    rods: Vec<Rod<S>>,
+    rods: Vec<CapsuleInertia<S>>,
     reaches: Vec<S>,
     audit_state: Option<Box<AuditState<S>>>,
 }
@@ -197,7 +199,7 @@ impl<S: Scalar> PartialEq for World<S> {
             && *forces == other.forces
             && *limits == other.limits
             && *impacts == other.impacts
-            && events.warm == other.events.warm
+            && events.impulse_cache == other.events.impulse_cache
             && *marbles == other.marbles
             && *walls == other.walls
             && *swarm == other.swarm
@@ -446,25 +448,27 @@ impl<S: Scalar> World<S> {
         let (mut columns, material, integrator) =
             self.marbles.columns(&self.inverse_mass, &self.held, &self.rods);
         if self.model.rotation != Rotation::Dynamic {
-            columns.spin = &mut []; // what is only shown is not felt
+            columns.spin = &mut []; // cosmetic rotation does not affect contacts
         }
-        let bounce_speed = length(self.gravity) * dt * S::constant(2.0);
-        let settings = Settings {
+        let restitution_threshold = length(self.gravity) * dt * S::constant(2.0);
+        let settings = SolverSettings {
             iterations: self.model.iterations,
             dt,
-            bounce_speed,
-            enough: bounce_speed * S::epsilon(),
+            restitution_threshold,
+            tolerance: restitution_threshold * S::epsilon(),
             slop: length(self.gravity) * dt * dt,
-            largest_slop: S::constant(0.001),
+            max_relative_slop: S::constant(0.001),
         };
-        let around = Around {
+        let context = Context {
             walls: &self.walls,
             material: |row| material.get(row).unwrap_or_default(),
-            follow: |row| integrator.get(row).unwrap_or(self.model.integrator).position_weight(),
-            start: Start {
+            position_weight: |row| {
+                integrator.get(row).unwrap_or(self.model.integrator).position_weight()
+            },
+            start: SubstepStart {
                 position: &[],
                 velocity: &self.velocity_before,
-                stands: &self.continuous.stands,
+                ccd_stops: &self.continuous.stands,
             },
             settings: &settings,
         };
@@ -472,10 +476,10 @@ impl<S: Scalar> World<S> {
             Response::Displacement => {
                 let contacts = self.contacts.len() as u32;
                 let mut pushes = self.audit_state.as_ref().map(|_| Vec::new());
-                displacement(
+                solve_displacement(
                     &mut columns,
                     &mut self.contacts,
-                    &around,
+                    &context,
                     &mut self.displacement,
                     &mut self.warm,
                     &mut self.stopped,
@@ -490,25 +494,25 @@ impl<S: Scalar> World<S> {
                 }
             }
             Response::Impulse => {
-                impulse(
+                solve_contacts(
                     &mut columns,
                     &mut self.contacts,
-                    &around,
+                    &context,
                     &mut self.impulse,
                     &mut self.warm,
                     &mut self.stopped,
                 );
                 if let Some(audit_state) = &mut self.audit_state {
                     let AuditState { velocity, angular_velocity, work, .. } = &mut **audit_state;
-                    self.impulse.count(&mut columns, velocity, angular_velocity, work);
+                    self.impulse.record_energy(&mut columns, velocity, angular_velocity, work);
                 }
             }
-            Response::Penalty(law) => penalty(
-                &penalty::Setting {
+            Response::Penalty(law) => apply_penalty_forces(
+                &PenaltySettings {
                     law,
                     dt,
                     material: |row| material.get(row).unwrap_or_default(),
-                    follow: |row| {
+                    position_weight: |row| {
                         integrator.get(row).unwrap_or(self.model.integrator).position_weight()
                     },
                 },
@@ -572,7 +576,7 @@ impl<S: Scalar> World<S> {
     fn forget_contacts(&mut self) {
         self.warm.clear();
         self.shear.clear();
-        self.events.warm.clear();
+        self.events.impulse_cache.clear();
     }
 
     /// The marbles that the last step stopped because their motion overflowed, each once.

@@ -121,8 +121,8 @@ impl<S: Scalar> World<S> {
             self.marbles.stop(row);
         }
         let stays = |row: usize| rows.binary_search(&(row as u32)).is_err().then_some(row);
-        self.warm.retain_mut(|warm| warm.rename(stays));
-        self.events.warm.retain_mut(|warm| warm.rename(stays));
+        self.warm.retain_mut(|warm| warm.remap(stays));
+        self.events.impulse_cache.retain_mut(|warm| warm.remap(stays));
         self.shear
             .retain(|shear| shear.rows().into_iter().flatten().all(|row| stays(row).is_some()));
         self.quarantine

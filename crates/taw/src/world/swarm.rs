@@ -181,7 +181,7 @@ impl<S: Scalar> Surroundings for Walls<S> {
     }
 
     fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32> {
-        cast_vector(crate::response::Walls::surface_velocity(
+        cast_vector(crate::response::Colliders::surface_velocity(
             self,
             wall as usize,
             cast_point(point),

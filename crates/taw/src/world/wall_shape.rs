@@ -7,7 +7,7 @@ use crate::contact::{ClosestPoints, closest_points, sub_shapes};
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
-use crate::response::event::Form;
+use crate::response::event::WallCollider;
 use crate::shape::{
     Aabb3, BoundedShape, Capsule, Compound, HeightField, Hull, Mesh, Obb, Plane, PointProjection,
     Shape, Sphere, Surface, Triangle,
@@ -211,7 +211,7 @@ impl<S: Scalar> WallShape<S> {
     }
 
     /// Sub-shape in `f64`.
-    pub(super) fn sub_shape_f64(&self, part: u32) -> Option<Form> {
+    pub(super) fn sub_shape_f64(&self, part: u32) -> Option<WallCollider> {
         let triangle = |triangle: Option<Triangle<S>>, pose: &Pose<S>| {
             let corners = triangle?.corners;
             Some(Triangle {
@@ -224,12 +224,14 @@ impl<S: Scalar> WallShape<S> {
                 let normal = cast_vector::<S, f64>(plane.normal());
                 let length = normal.magnitude();
                 let (normal, offset) = (normal / length, plane.offset().as_f64() / length);
-                Some(Form::Plane { normal, offset })
+                Some(WallCollider::Plane { normal, offset })
             }
-            Self::Solid(_) => self.sub_shape(part).map(|shape| Form::Solid(shape.cast())),
-            Self::Mesh(mesh, pose) => triangle(mesh.triangle(part), pose).map(Form::Triangle),
+            Self::Solid(_) => self.sub_shape(part).map(|shape| WallCollider::Solid(shape.cast())),
+            Self::Mesh(mesh, pose) => {
+                triangle(mesh.triangle(part), pose).map(WallCollider::Triangle)
+            }
             Self::HeightField(field, pose) => {
-                triangle(field.triangle(part), pose).map(Form::SolidBelow)
+                triangle(field.triangle(part), pose).map(WallCollider::OneSidedTriangle)
             }
         }
     }

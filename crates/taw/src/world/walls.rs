@@ -388,7 +388,7 @@ impl<S: Scalar> Walls<S> {
     }
 }
 
-impl<S: Scalar> response::Walls<S> for Walls<S> {
+impl<S: Scalar> response::Colliders<S> for Walls<S> {
     fn normal_and_distance(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S) {
         let PointProjection { normal, distance, .. } =
             self.shapes[wall].project_point_on(part, point);

@@ -393,7 +393,7 @@ fn restitution_sweep(meter: &mut Meter) -> f64 {
 /// A million impacts of two balls: what must be conserved is, and what must not grow does
 /// not; the largest relative violation.
 fn fuzz(_: &mut Meter) -> f64 {
-    use taw::response::{BallSpin, Mobility, impact};
+    use taw::response::{BallRotation, InverseEffectiveMass, impact};
     let mut random = fastrand::Rng::with_seed(12);
     let mut worst: f64 = 0.0;
     for _ in 0..1_000_000 {
@@ -417,7 +417,7 @@ fn fuzz(_: &mut Meter) -> f64 {
             tangential_restitution: number(-1.0, 1.0) as f32,
             ..Material::default()
         };
-        let mobility = Mobility::of_balls(inverse[0], inverse[1], BallSpin::Free);
+        let mobility = InverseEffectiveMass::of_balls(inverse[0], inverse[1], BallRotation::Free);
         let j = impact(normal, closing, mobility, material).map(f64::from);
         // In f64, with the f32 numbers that it was given.
         let (n, c) = (normal.map(f64::from), closing.map(f64::from));

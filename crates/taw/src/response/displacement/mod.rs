@@ -1,41 +1,42 @@
-//! The lab's method, which [`Response::Displacement`](super::Response::Displacement) is: what a
-//! substep moved into each other is moved back, and velocities change by that way per substep;
-//! what overlapped before is moved apart afterwards, and no velocity changes.
+//! Position projection (the lecture's method): the solver of
+//! [`Response::Displacement`](super::Response::Displacement). Penetration of this substep is
+//! undone, and velocities change by the displacement per substep; older penetration is resolved
+//! afterwards without a change of velocity.
 
 #[cfg(test)]
 mod tests;
 
 use cgmath::{InnerSpace, Zero};
 
-use super::impulse::{Around, First, Groups, Warm, key_of};
-use super::{Columns, Material, Walls};
+use super::impulse::{BodyA, CachedImpulse, Context, UnionFind, contact_key};
+use super::{Colliders, Material, SolverBodies};
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, is_finite, is_finite_point};
 
 /// Scratch buffers, kept for their memory.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scratch<S> {
-    touches: Vec<Touch<S>>,
-    before: Vec<Vec3<S>>,
-    groups: Groups,
-    starts: Vec<Start<S>>,
+    constraints: Vec<ApproachConstraint<S>>,
+    initial_velocity: Vec<Vec3<S>>,
+    islands: UnionFind,
+    warm_starts: Vec<WarmStartSums<S>>,
 }
 
-/// Sums that scale the warm start of one group of marbles that touch each other, in m²/s².
+/// Sums that scale the warm start of one island, in m²/s².
 #[derive(Clone, Copy, Debug)]
-struct Start<S> {
-    /// Cached change times the change that is wanted, and times the change that it makes.
-    wanted: S,
-    made: S,
+struct WarmStartSums<S> {
+    /// Cached change times the requested one, and times the achieved one.
+    requested: S,
+    achieved: S,
 }
 
-impl<S: Scalar> Start<S> {
-    /// Part of the changes that brings all nearest to what is asked for.
-    fn part(self) -> S {
-        let part = self.wanted / self.made;
-        if self.made > S::zero() {
-            part.max(S::zero()).min(S::one())
-        } else if self.made.is_nan() {
+impl<S: Scalar> WarmStartSums<S> {
+    /// Fraction of the warm start that comes closest to the requested changes.
+    fn fraction(self) -> S {
+        let fraction = self.requested / self.achieved;
+        if self.achieved > S::zero() {
+            fraction.max(S::zero()).min(S::one())
+        } else if self.achieved.is_nan() {
             S::zero() // energies overflowed
         } else {
             S::one()
@@ -43,235 +44,251 @@ impl<S: Scalar> Start<S> {
     }
 }
 
-/// A contact while it is solved.
+/// Contact constraint: lower bound of a separation speed.
 #[derive(Clone, Copy, Debug)]
-struct Touch<S> {
-    a: First,
+struct ApproachConstraint<S> {
+    a: BodyA,
     b: usize,
-    /// Index of its group of marbles that touch each other. Groups do not change each other, to the
-    /// bit.
-    group: u32,
-    along: [S; 2],
-    /// From a to b.
+    /// Index of its island. Islands do not influence each other, to the bit.
+    island: u32,
+    axis_offset: [S; 2],
+    /// Unit normal from a to b.
     normal: Vec3<S>,
     /// Speed of the wall's surface along the normal, in m/s; zero between marbles.
-    surface: S,
-    /// The least speed of parting that is asked for, in m/s: zero, or negative for two that
-    /// still have a way to go.
-    least: S,
-    /// By how much the contact has changed that speed, in m/s.
-    change: S,
+    surface_speed: S,
+    /// Lower bound of the separation speed, in m/s: zero, or negative where a separation is still
+    /// open.
+    min_separation_speed: S,
+    /// Change of the separation speed accumulated in this substep, in m/s.
+    velocity_change: S,
 }
 
-/// The lecture's restitution, contact by contact, the deepest first, each tested again: a wall
-/// stays, marbles take half each. The lecture takes all overlap for motion of this frame, so that
-/// what was there before becomes speed; here only approach ends. Changes are accumulated, so that
-/// a contact can take back what another one made superfluous, and begin with those of the last
-/// substep (Catto, *Iterative dynamics with temporal coherence*, 2005). What overlaps then is
-/// moved apart without a change of velocity, as Macklin et al. do (*Unified particle physics for
-/// real-time applications*, 2014, §4.4).
+/// Solves contacts as the lecture restitutes, deepest first, each tested again: a wall stays,
+/// marbles take half each. The lecture takes all penetration for motion of this frame, so that
+/// older penetration turns into speed; here only approach is stopped. Changes accumulate, so that a
+/// contact can take back what another one made superfluous, with a warm start (Catto, *Iterative
+/// dynamics with temporal coherence*, 2005). Remaining penetration is resolved without a change of
+/// velocity (Macklin et al., *Unified particle physics for real-time applications*, 2014, §4.4).
 ///
-/// The contacts' rows exist. A row that would become infinite or NaN keeps its place,
-/// loses its velocity, and is added to `stopped`. `by_walls` hears by how much a wall changed a
-/// velocity.
-pub(crate) fn displacement<S: Scalar>(
-    marbles: &mut Columns<S>,
+/// The contacts' rows exist. A row that would become infinite or NaN keeps its position, loses its
+/// velocity, and is added to `quarantined`. `on_wall_impulse` receives the velocity changes by
+/// walls.
+pub(crate) fn solve_displacement<S: Scalar>(
+    marbles: &mut SolverBodies<S>,
     contacts: &mut Contacts<S>,
-    around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     scratch: &mut Scratch<S>,
-    warm: &mut Vec<Warm<S>>,
-    stopped: &mut Vec<u32>,
-    mut by_walls: impl FnMut(u32, Vec3<S>),
+    cache: &mut Vec<CachedImpulse<S>>,
+    quarantined: &mut Vec<u32>,
+    mut on_wall_impulse: impl FnMut(u32, Vec3<S>),
 ) {
     contacts.sort();
-    let Scratch { touches, before, groups, starts } = scratch;
-    before.clear();
-    before.extend_from_slice(marbles.velocity);
-    touches.clear();
-    touches.extend(
-        First::of_each(contacts)
-            .filter_map(|(a, c)| marbles.look(a, c.b as usize, c.along, around)),
+    let Scratch { constraints, initial_velocity, islands, warm_starts } = scratch;
+    initial_velocity.clear();
+    initial_velocity.extend_from_slice(marbles.velocity);
+    constraints.clear();
+    constraints.extend(
+        BodyA::of_each(contacts)
+            .filter_map(|(a, c)| marbles.approach_constraint(a, c.b as usize, c.along, context)),
     );
-    groups.find(touches.iter().map(|t| (t.a.marble(), t.b)), marbles.velocity.len());
-    for touch in touches.iter_mut() {
-        touch.group = groups.of(touch.b);
+    islands.build(constraints.iter().map(|t| (t.a.marble(), t.b)), marbles.velocity.len());
+    for c in constraints.iter_mut() {
+        c.island = islands.set_of(c.b);
     }
-    marbles.begin_as_last_time(touches, warm, starts);
-    let rounding = around.settings.bounce_speed * S::epsilon();
-    for _ in 0..around.settings.iterations {
-        let end = |changed: bool, touch| marbles.end_approach(touch, rounding) || changed;
-        if !touches.iter_mut().fold(false, end) {
+    marbles.warm_start_scaled(constraints, cache, warm_starts);
+    let rounding = context.settings.restitution_threshold * S::epsilon();
+    for _ in 0..context.settings.iterations {
+        let solve = |any_changed: bool, c| marbles.solve_approach(c, rounding) || any_changed;
+        if !constraints.iter_mut().fold(false, solve) {
             break;
         }
     }
-    for touch in touches.iter().filter(|touch| touch.a.marble().is_none()) {
-        by_walls(touch.b as u32, touch.normal * touch.change);
+    for c in constraints.iter().filter(|c| c.a.marble().is_none()) {
+        on_wall_impulse(c.b as u32, c.normal * c.velocity_change);
     }
-    marbles.move_back(before, around, stopped);
-    for _ in 0..around.settings.iterations {
-        let apart = |moved: bool, touch| marbles.move_apart(touch, around) || moved;
-        if !touches.iter().fold(false, apart) {
+    marbles.follow_velocity_changes(initial_velocity, context, quarantined);
+    for _ in 0..context.settings.iterations {
+        let separate = |any_moved: bool, c| marbles.separate(c, context) || any_moved;
+        if !constraints.iter().fold(false, separate) {
             break;
         }
     }
-    // Walls have the last word: through the floor nothing goes.
-    for touch in touches.iter().filter(|touch| touch.a.marble().is_none()) {
-        marbles.move_apart(touch, around);
+    // Walls come last, so that nothing is pushed through the floor.
+    for c in constraints.iter().filter(|c| c.a.marble().is_none()) {
+        marbles.separate(c, context);
     }
-    warm.clear();
-    warm.extend(touches.iter().map(|t| Warm::of_pressure(key_of(t.a, t.b, t.along), t.change)));
-    warm.sort_unstable_by_key(Warm::key);
+    cache.clear();
+    cache.extend(constraints.iter().map(|t| {
+        CachedImpulse::of_normal_impulse(contact_key(t.a, t.b, t.axis_offset), t.velocity_change)
+    }));
+    cache.sort_unstable_by_key(CachedImpulse::key);
 }
 
-impl<S: Scalar> Columns<'_, S> {
-    /// Finds what a contact asks for: no approach, but for the way that was still free when the
-    /// substep began.
-    fn look(
+impl<S: Scalar> SolverBodies<'_, S> {
+    /// Constraint of a contact: no approach beyond the separation that was open at the start of the
+    /// substep.
+    fn approach_constraint(
         &self,
-        a: First,
+        a: BodyA,
         b: usize,
-        along: [S; 2],
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
-    ) -> Option<Touch<S>> {
-        let (normal, gap) = self.normal_and_gap(self.position, a, b, along, around.walls)?;
-        let surface = match a {
-            First::Wall(wall, _) => {
-                let arm = self.offset(b, along[1]) - normal * self.radius[b];
-                around.walls.surface_velocity(wall as usize, self.position[b] + arm).dot(normal)
+        axis_offset: [S; 2],
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) -> Option<ApproachConstraint<S>> {
+        let (normal, separation) =
+            self.normal_and_separation(self.position, a, b, axis_offset, context.walls)?;
+        let surface_speed = match a {
+            BodyA::Wall(wall, _) => {
+                let arm = self.anchor(b, axis_offset[1]) - normal * self.radius[b];
+                context.walls.surface_velocity(wall as usize, self.position[b] + arm).dot(normal)
             }
-            First::Marble(_) => S::zero(),
+            BodyA::Marble(_) => S::zero(),
         };
         let zero = S::zero();
-        let mut touch = Touch { a, b, group: 0, along, normal, surface, least: zero, change: zero };
-        let follows = around.follows(a, b);
-        // What was stopped on its way touches, whatever rounding says.
-        let stands = around.stands(b) || a.marble().is_some_and(|a| around.stands(a));
-        if follows > S::zero() && !stands {
-            touch.least = (self.parting(&touch) - gap / follows).min(S::zero());
+        let mut c = ApproachConstraint {
+            a,
+            b,
+            island: 0,
+            axis_offset,
+            normal,
+            surface_speed,
+            min_separation_speed: zero,
+            velocity_change: zero,
+        };
+        let follow_time = context.follow_time(a, b);
+        // A body stopped by continuous detection is in contact, whatever rounding says.
+        let is_ccd_stopped =
+            context.is_ccd_stopped(b) || a.marble().is_some_and(|a| context.is_ccd_stopped(a));
+        if follow_time > S::zero() && !is_ccd_stopped {
+            c.min_separation_speed =
+                (self.separation_speed(&c) - separation / follow_time).min(S::zero());
         }
-        Some(touch)
+        Some(c)
     }
 
-    /// Separating speed of the two of a contact along its normal, in m/s.
-    fn parting(&self, touch: &Touch<S>) -> S {
-        let first = touch.a.marble().map_or_else(Vec3::zero, |a| self.velocity[a]);
-        (self.velocity[touch.b] - first).dot(touch.normal) - touch.surface
+    /// Separation speed along the normal, in m/s.
+    fn separation_speed(&self, c: &ApproachConstraint<S>) -> S {
+        let first = c.a.marble().map_or_else(Vec3::zero, |a| self.velocity[a]);
+        (self.velocity[c.b] - first).dot(c.normal) - c.surface_speed
     }
 
-    /// Overlap that stays, in metres, so that what rests keeps touching where positions do not
-    /// follow a change of velocity within the substep; none where they do.
+    /// Allowed penetration (slop), in metres, so that resting contacts persist where positions do
+    /// not follow velocity changes within the substep; zero where they do.
     fn slop(
         &self,
-        touch: &Touch<S>,
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        c: &ApproachConstraint<S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> S {
-        if around.follows(touch.a, touch.b) > S::zero() {
+        if context.follow_time(c.a, c.b) > S::zero() {
             return S::zero();
         }
-        let second = self.radius[touch.b];
-        let smaller = touch.a.marble().map_or(second, |a| self.radius[a].min(second));
-        around.settings.slop.min(smaller * around.settings.largest_slop)
+        let radius_b = self.radius[c.b];
+        let min_radius = c.a.marble().map_or(radius_b, |a| self.radius[a].min(radius_b));
+        context.settings.slop.min(min_radius * context.settings.max_relative_slop)
     }
 
-    /// Changes the speed at which the two of a contact part.
-    fn change_parting(&mut self, touch: &Touch<S>, change: S) {
-        let change = touch.normal * change;
-        match touch.a {
-            First::Wall(..) => self.velocity[touch.b] += change,
-            First::Marble(a) => {
-                let half = change * S::constant(0.5);
+    /// Changes the separation speed of a contact.
+    fn apply_velocity_change(&mut self, c: &ApproachConstraint<S>, velocity_change: S) {
+        let velocity_change = c.normal * velocity_change;
+        match c.a {
+            BodyA::Wall(..) => self.velocity[c.b] += velocity_change,
+            BodyA::Marble(a) => {
+                let half = velocity_change * S::constant(0.5);
                 self.velocity[a as usize] -= half;
-                self.velocity[touch.b] += half;
+                self.velocity[c.b] += half;
             }
         }
     }
 
-    /// Begins with the changes of the last substep, or with that part of them which brings those
-    /// that touch each other nearest to what is asked for: so they give no energy. What the sweeps
-    /// do afterwards takes some only, as each of them lowers `½ f·A f − f·w`, with `f` the changes,
-    /// `A f` what they make of the speeds, and `w` what is wanted of these.
-    fn begin_as_last_time(
+    /// Warm start: applies the changes of the last substep, scaled per island to the fraction that
+    /// comes closest to the requested changes, so that they give no energy. The iterations only
+    /// take energy, as each lowers `½ f·A f − f·w`, with `f` the changes, `A f` their effect on the
+    /// separation speeds, and `w` the requested one.
+    fn warm_start_scaled(
         &mut self,
-        touches: &mut [Touch<S>],
-        warm: &[Warm<S>],
-        starts: &mut Vec<Start<S>>,
+        constraints: &mut [ApproachConstraint<S>],
+        cache: &[CachedImpulse<S>],
+        warm_starts: &mut Vec<WarmStartSums<S>>,
     ) {
-        starts.clear();
-        starts.resize(touches.len(), Start { wanted: S::zero(), made: S::zero() });
-        for touch in touches.iter_mut() {
-            let Ok(at) =
-                warm.binary_search_by_key(&key_of(touch.a, touch.b, touch.along), Warm::key)
+        warm_starts.clear();
+        warm_starts
+            .resize(constraints.len(), WarmStartSums { requested: S::zero(), achieved: S::zero() });
+        for c in constraints.iter_mut() {
+            let Ok(at) = cache
+                .binary_search_by_key(&contact_key(c.a, c.b, c.axis_offset), CachedImpulse::key)
             else {
                 continue;
             };
-            touch.change = warm[at].pressure();
-            let (push, parting) = (touch.change * touch.share(), self.parting(touch));
-            let start = &mut starts[touch.group as usize];
-            start.wanted += push * (touch.least - parting);
-            start.made -= push * parting;
+            c.velocity_change = cache[at].normal_impulse();
+            let (weighted_change, separation_speed) =
+                (c.velocity_change * c.fraction_b(), self.separation_speed(c));
+            let warm_start = &mut warm_starts[c.island as usize];
+            warm_start.requested += weighted_change * (c.min_separation_speed - separation_speed);
+            warm_start.achieved -= weighted_change * separation_speed;
         }
-        for touch in touches.iter() {
-            self.change_parting(touch, touch.change);
+        for c in constraints.iter() {
+            self.apply_velocity_change(c, c.velocity_change);
         }
-        for touch in touches.iter() {
-            starts[touch.group as usize].made += touch.change * touch.share() * self.parting(touch);
+        for c in constraints.iter() {
+            warm_starts[c.island as usize].achieved +=
+                c.velocity_change * c.fraction_b() * self.separation_speed(c);
         }
-        for touch in touches.iter_mut() {
-            let part = starts[touch.group as usize].part();
-            self.change_parting(touch, touch.change * (part - S::one()));
-            touch.change *= part;
+        for c in constraints.iter_mut() {
+            let fraction = warm_starts[c.island as usize].fraction();
+            self.apply_velocity_change(c, c.velocity_change * (fraction - S::one()));
+            c.velocity_change *= fraction;
         }
     }
 
-    /// Ends the approach of two, or takes back what did so and is no longer needed. False if that
-    /// is less than `rounding`, in m/s.
-    fn end_approach(&mut self, touch: &mut Touch<S>, rounding: S) -> bool {
-        let wanted = touch.least - self.parting(touch);
-        let change = (touch.change + wanted).max(S::zero()) - touch.change;
-        if !change.is_finite() || change.abs() <= rounding {
-            return false; // an overflow here must not reach the other one
+    /// Stops an approach, or takes back a superfluous change. False if the change is below
+    /// `rounding`, in m/s.
+    fn solve_approach(&mut self, c: &mut ApproachConstraint<S>, rounding: S) -> bool {
+        let requested = c.min_separation_speed - self.separation_speed(c);
+        let velocity_change = (c.velocity_change + requested).max(S::zero()) - c.velocity_change;
+        if !velocity_change.is_finite() || velocity_change.abs() <= rounding {
+            return false; // an overflow must not reach the other body
         }
-        touch.change += change;
-        self.change_parting(touch, change);
+        c.velocity_change += velocity_change;
+        self.apply_velocity_change(c, velocity_change);
         true
     }
 
-    /// Moves marbles by what changed of their velocities.
-    fn move_back(
+    /// Moves marbles by their velocity changes.
+    fn follow_velocity_changes(
         &mut self,
-        before: &[Vec3<S>],
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
-        stopped: &mut Vec<u32>,
+        initial_velocity: &[Vec3<S>],
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        quarantined: &mut Vec<u32>,
     ) {
-        for (row, before) in before.iter().enumerate() {
+        for (row, initial_velocity) in initial_velocity.iter().enumerate() {
             let velocity = self.velocity[row];
-            let position = self.position[row] + (velocity - before) * around.follows_row(row);
+            let position =
+                self.position[row] + (velocity - initial_velocity) * context.follow_time_of(row);
             if is_finite_point(position) && is_finite(velocity) {
                 self.position[row] = position;
             } else {
                 self.velocity[row] = Vec3::zero();
-                stopped.push(row as u32);
+                quarantined.push(row as u32);
             }
         }
     }
 
-    /// Moves the two of a contact apart. False if they do not overlap any more.
-    fn move_apart(
+    /// Resolves the penetration of a contact. False if there is none.
+    fn separate(
         &mut self,
-        touch: &Touch<S>,
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        c: &ApproachConstraint<S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> bool {
-        let Touch { a, b, along, .. } = *touch;
-        let now = self.normal_and_gap(self.position, a, b, along, around.walls);
-        let Some((normal, gap)) = now else { return false };
-        let excess = -gap - self.slop(touch, around);
+        let ApproachConstraint { a, b, axis_offset, .. } = *c;
+        let contact = self.normal_and_separation(self.position, a, b, axis_offset, context.walls);
+        let Some((normal, separation)) = contact else { return false };
+        let excess = -separation - self.slop(c, context);
         if excess <= S::zero() {
             return false;
         }
-        let by = normal * (excess * touch.share());
-        for (row, by) in [(Some(b), by), (a.marble(), -by)] {
+        let displacement = normal * (excess * c.fraction_b());
+        for (row, displacement) in [(Some(b), displacement), (a.marble(), -displacement)] {
             let Some(row) = row else { continue };
-            let position = self.position[row] + by;
+            let position = self.position[row] + displacement;
             if is_finite_point(position) {
                 self.position[row] = position;
             }
@@ -280,9 +297,9 @@ impl<S: Scalar> Columns<'_, S> {
     }
 }
 
-impl<S: Scalar> Touch<S> {
-    /// The part that the second takes.
-    fn share(&self) -> S {
+impl<S: Scalar> ApproachConstraint<S> {
+    /// Fraction of a change that the second body takes.
+    fn fraction_b(&self) -> S {
         if self.a.marble().is_none() { S::one() } else { S::constant(0.5) }
     }
 }

@@ -2,10 +2,10 @@ use super::*;
 use crate::broad::Period;
 use crate::contact::Contact;
 use crate::math::Point3;
-use crate::response::impulse::{Settings, Start};
+use crate::response::impulse::{SolverSettings, SubstepStart};
 use crate::shape::Plane;
 
-impl<S: Scalar> Walls<S> for Vec<Plane<S>> {
+impl<S: Scalar> Colliders<S> for Vec<Plane<S>> {
     fn normal_and_distance(&self, wall: usize, _: u32, point: Point3<S>) -> (Vec3<S>, S) {
         (self[wall].normal(), self[wall].signed_distance(point))
     }
@@ -19,8 +19,8 @@ impl<S: Scalar> Walls<S> for Vec<Plane<S>> {
     }
 }
 
-/// Runs one restitution of a substep of `dt` over all contacts among `spheres` (center, radius,
-/// velocity) and a floor at zero, without gravity. Gives positions, velocities and the stopped.
+/// Solves one substep of `dt` seconds over all contacts among `spheres` (center, radius, velocity)
+/// and a floor at zero, without gravity. Returns positions, velocities and quarantined rows.
 fn restituted<S: Scalar>(
     spheres: &[(Point3<S>, S, Vec3<S>)],
     dt: S,
@@ -33,43 +33,43 @@ fn restituted<S: Scalar>(
     let contact = |a, b| Contact { a, b, part: 0, along: [S::zero(); 2], mtv: all };
     let mut contacts = Contacts { wm: (0..count).map(|b| contact(0, b)).collect(), mm: vec![] };
     crate::broad::brute_force_pairs(count, |a, b| contacts.mm.push(contact(a, b)));
-    let mut columns = Columns {
+    let mut columns = SolverBodies {
         period: Period::default(),
         position: &mut position,
         velocity: &mut velocity,
         radius: &radius,
         inverse_mass: &[],
         spin: &mut [],
-        held: &[],
-        rods: &[],
+        rotation_locked: &[],
+        capsules: &[],
     };
     let zero = S::zero();
-    let settings = Settings {
+    let settings = SolverSettings {
         iterations: 8,
         dt,
-        bounce_speed: zero,
-        enough: zero,
+        restitution_threshold: zero,
+        tolerance: zero,
         slop: zero,
-        largest_slop: zero,
+        max_relative_slop: zero,
     };
-    let around = Around {
+    let context = Context {
         walls: &floor,
         material: |_| Material::default(),
-        follow: |_| S::one(),
-        start: Start { position: &[], velocity: &[], stands: &[] },
+        position_weight: |_| S::one(),
+        start: SubstepStart { position: &[], velocity: &[], ccd_stops: &[] },
         settings: &settings,
     };
-    let (mut scratch, mut warm, mut stopped) = (Scratch::default(), vec![], vec![]);
-    displacement(
+    let (mut scratch, mut cache, mut quarantined) = (Scratch::default(), vec![], vec![]);
+    solve_displacement(
         &mut columns,
         &mut contacts,
-        &around,
+        &context,
         &mut scratch,
-        &mut warm,
-        &mut stopped,
+        &mut cache,
+        &mut quarantined,
         |_, _| (),
     );
-    (position, velocity, stopped)
+    (position, velocity, quarantined)
 }
 
 const STILL: Vec3<f64> = Vec3::new(0.0, 0.0, 0.0);
@@ -84,7 +84,7 @@ fn a_wall_pushes_out_and_adds_the_displacement_per_step() {
 
 #[test]
 fn marbles_take_half_each() {
-    // Each came 0.5 m; so a half of the overlap of 0.5 m was before.
+    // Each moved 0.5 m, so half a metre of penetration is older.
     let (position, velocity, _) = restituted(
         &[
             (Point3::new(0.0, 5.0, 0.0), 1.0, Vec3::new(0.25, 0.0, 0.0)),
@@ -112,7 +112,7 @@ fn what_overlaps_at_rest_parts_and_stays_at_rest() {
 
 #[test]
 fn a_contact_that_an_earlier_one_settled_does_nothing() {
-    // The first pushes the second out of reach of the third, which it touched.
+    // The first pushes the second out of contact with the third.
     let third = Point3::new(-0.6, 6.58, 0.0);
     let (position, velocity, _) = restituted(
         &[
@@ -140,9 +140,9 @@ fn coincident_marbles_part_completely_each_pair_its_own_way() {
 fn two_whose_speeds_overflow_disturb_no_other() {
     let fast = |y, vy| (Point3::new(0.0, y, 0.0), 1.0, Vec3::new(0.0, vy, 0.0));
     let low = (Point3::new(9.0, 0.5, 0.0), 1.0, Vec3::new(0.0, -0.25, 0.0));
-    let (position, velocity, stopped) =
+    let (position, velocity, quarantined) =
         restituted(&[fast(5.0, f32::MAX), fast(6.0, f32::MIN), low], 2.0);
-    assert_eq!(stopped, [] as [u32; 0]);
+    assert_eq!(quarantined, [] as [u32; 0]);
     assert!(velocity.iter().all(|v| is_finite(*v)), "{velocity:?}");
     assert!(position.iter().all(|at| is_finite_point(*at)), "{position:?}");
     assert_eq!((position[2].y, velocity[2].y), (1.0, 0.0));

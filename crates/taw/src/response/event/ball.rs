@@ -1,206 +1,209 @@
-//! A ball on its path between two events.
+//! Ball with its trajectory between two events.
 
 use cgmath::Zero;
 
-use super::bend::State;
 use super::cells::Cell;
-use super::{MOST_SURRENDERS, NO_TIME, Settings};
+use super::curved_support::BallState;
+use super::{EventSettings, MAX_FREEZES, SIMULTANEOUS};
 use crate::math::{Point3, Vec3};
-use crate::response::{BallSpin, Material};
+use crate::response::{BallRotation, Material};
 
-/// A ball: what the world tells of it, and how it moves just now.
+/// Ball: state from the world, and its present trajectory.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Ball {
-    /// In metres, when its path began.
+    /// Center at the start of the trajectory, in metres.
     pub position: Point3<f64>,
-    /// In m/s, when its path began.
+    /// Velocity at the start of the trajectory, in m/s.
     pub velocity: Vec3<f64>,
-    /// In rad/s, when its path began.
+    /// Angular velocity at the start of the trajectory, in rad/s.
     pub spin: Vec3<f64>,
-    /// The acceleration by all forces, in m/s².
-    pub pull: Vec3<f64>,
-    /// In metres.
+    /// Acceleration by all external forces, in m/s².
+    pub external_acceleration: Vec3<f64>,
+    /// Radius, in metres.
     pub radius: f64,
-    /// In 1/kg.
+    /// Inverse mass, in 1/kg.
     pub inverse_mass: f64,
     pub material: Material<f64>,
-    /// Tells if friction sets it spinning.
-    pub spins: BallSpin,
-    /// Part of a gap that may be due to the rounding of the position, in metres.
-    pub rounding: f64,
-    /// Turn so far in this substep, as an axial vector in radians.
-    pub turned: Vec3<f64>,
-    pub path: Path,
+    /// Rotation lock: tells if friction spins it.
+    pub rotation: BallRotation,
+    /// Position error by rounding, in metres.
+    pub position_error: f64,
+    /// Rotation so far in this substep, as an axial vector in radians.
+    pub rotation_increment: Vec3<f64>,
+    pub trajectory: Trajectory,
 }
 
-/// Motion of a ball from its last event on.
+/// Motion of a ball since its last event.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Path {
-    /// When it began, in seconds from the start of the substep.
-    pub(super) begin: f64,
+pub(crate) struct Trajectory {
+    /// Start time, in seconds from the start of the substep.
+    pub(super) start: f64,
     pub(super) acceleration: Vec3<f64>,
     pub(super) spin_acceleration: Vec3<f64>,
-    /// The wall that it lies on.
+    /// Wall that supports it.
     pub(super) support: Option<usize>,
-    /// Where it is when its path changes by itself, if that is known better than by the
-    /// acceleration.
-    pub(super) arrival: Option<State>,
-    /// True if what it lies on ends there, or bends away from under it.
-    pub(super) leaves: bool,
-    /// The wall that it has just come off.
-    pub(super) off: Option<usize>,
-    /// True if its acceleration holds it in a heap.
-    pub(super) heaped: bool,
-    /// True if other balls are in that heap.
-    pub(super) among: bool,
-    /// Power that walls bring in there, in watts, for those who ask.
-    pub(super) power: f64,
-    /// Loss by the collisions of this substep, in parts of their approach; all of
-    /// it where no time went by since the one before.
-    pub(super) losses: f64,
-    /// When the last one was.
-    pub(super) collided: f64,
-    /// Number of times that it was brought to rest because it had too many. Each time it takes twice
-    /// the energy to wake it.
-    pub(super) surrenders: i32,
-    /// Number of steps in this substep over what is no half-space.
-    pub(super) steps: u32,
-    /// When its acceleration changes by itself.
-    pub(super) change: f64,
-    /// Counts its paths, so that what was foreseen of an old one is known to be void.
-    pub(super) stamp: u32,
-    pub(super) home: Home,
+    /// State at the end, where that is known more precisely than by the acceleration.
+    pub(super) end_state: Option<BallState>,
+    /// True if the support ends there, or curves away from under it.
+    pub(super) leaves_support: bool,
+    /// Wall that it has just left.
+    pub(super) left_wall: Option<usize>,
+    /// True if it rests in a cluster, with the acceleration of that.
+    pub(super) clustered: bool,
+    /// True if there are other balls in that cluster.
+    pub(super) touches_balls: bool,
+    /// Power supplied by walls there, in watts, for the energy audit.
+    pub(super) wall_power: f64,
+    /// Dissipation count: sum of the relative losses of approach speed in this substep; a whole one
+    /// for a collision without time since the one before.
+    pub(super) dissipation_count: f64,
+    /// Time of the last collision.
+    pub(super) last_collision: f64,
+    /// Number of times that it was put to rest for too many collisions. Each time doubles the
+    /// energy that wakes it.
+    pub(super) freeze_count: i32,
+    /// Number of steps in this substep on curved or bounded walls.
+    pub(super) support_steps: u32,
+    /// Time of the next change of regime.
+    pub(super) regime_end: f64,
+    /// Version, incremented with each new trajectory: events predicted for another version are
+    /// void.
+    pub(super) version: u32,
+    pub(super) cell_slot: CellSlot,
 }
 
-/// Where others find a ball.
+/// Place of a ball in the broad phase.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) enum Home {
+pub(super) enum CellSlot {
     Cell(Cell),
-    Anywhere,
+    Unbounded,
 }
 
-impl Default for Path {
+impl Default for Trajectory {
     fn default() -> Self {
         Self {
-            begin: 0.0,
+            start: 0.0,
             acceleration: Vec3::zero(),
             spin_acceleration: Vec3::zero(),
             support: None,
-            arrival: None,
-            leaves: false,
-            off: None,
-            heaped: false,
-            among: false,
-            power: 0.0,
-            losses: 0.0,
-            collided: f64::NEG_INFINITY,
-            surrenders: 0,
-            steps: 0,
-            change: f64::INFINITY,
-            stamp: 0,
-            home: Home::Anywhere,
+            end_state: None,
+            leaves_support: false,
+            left_wall: None,
+            clustered: false,
+            touches_balls: false,
+            wall_power: 0.0,
+            dissipation_count: 0.0,
+            last_collision: f64::NEG_INFINITY,
+            freeze_count: 0,
+            support_steps: 0,
+            regime_end: f64::INFINITY,
+            version: 0,
+            cell_slot: CellSlot::Unbounded,
         }
     }
 }
 
 impl Ball {
     pub(super) fn position_at(&self, time: f64) -> Point3<f64> {
-        let t = time - self.path.begin;
-        self.position + (self.velocity + self.path.acceleration * (0.5 * t)) * t
+        let t = time - self.trajectory.start;
+        self.position + (self.velocity + self.trajectory.acceleration * (0.5 * t)) * t
     }
 
     pub(super) fn velocity_at(&self, time: f64) -> Vec3<f64> {
-        self.velocity + self.path.acceleration * (time - self.path.begin)
+        self.velocity + self.trajectory.acceleration * (time - self.trajectory.start)
     }
 
-    /// Lets its path begin at a later time.
+    /// Advances the start of its trajectory to a later time.
     pub(super) fn advance(&mut self, time: f64) {
-        let t = time - self.path.begin;
-        let begin = self.position;
+        let t = time - self.trajectory.start;
+        let start = self.position;
         self.position = self.position_at(time);
-        let Some(end) = self.path.arrival else {
-            self.go_on(time);
+        let Some(end) = self.trajectory.end_state else {
+            self.advance_free(time);
             return;
         };
-        let whole = end.time - self.path.begin;
-        let part = if whole > 0.0 && time < end.time { t / whole } else { 1.0 };
-        // A velocity that is right at both ends and leads from place to place.
-        let mean = if whole > 0.0 { (end.position - begin) / whole } else { end.velocity };
-        let bow = (mean - (self.velocity + end.velocity) * 0.5) * (6.0 * part * (1.0 - part));
+        let duration = end.time - self.trajectory.start;
+        let fraction = if duration > 0.0 && time < end.time { t / duration } else { 1.0 };
+        // Velocity that is exact at both ends and integrates to the displacement.
+        let mean = if duration > 0.0 { (end.position - start) / duration } else { end.velocity };
+        let correction =
+            (mean - (self.velocity + end.velocity) * 0.5) * (6.0 * fraction * (1.0 - fraction));
         let (velocity, spin) = (end.velocity - self.velocity, end.spin - self.spin);
-        self.turned += (self.spin + spin * (0.5 * part)) * t;
-        self.velocity += velocity * part + bow;
-        self.spin += spin * part;
-        if part >= 1.0 {
+        self.rotation_increment += (self.spin + spin * (0.5 * fraction)) * t;
+        self.velocity += velocity * fraction + correction;
+        self.spin += spin * fraction;
+        if fraction >= 1.0 {
             (self.position, self.velocity, self.spin) = (end.position, end.velocity, end.spin);
-            self.path.arrival = None;
+            self.trajectory.end_state = None;
             if time > end.time {
-                self.path.begin = end.time;
+                self.trajectory.start = end.time;
                 self.position = self.position_at(time);
-                self.go_on(time);
+                self.advance_free(time);
             }
-        } else if let Some(left) = &mut self.path.arrival {
-            // The rest of the same path.
-            *left = end;
+        } else if let Some(end_state) = &mut self.trajectory.end_state {
+            // Remainder of the same trajectory.
+            *end_state = end;
         }
-        self.path.begin = time;
+        self.trajectory.start = time;
     }
 
-    fn go_on(&mut self, time: f64) {
-        let t = time - self.path.begin;
+    fn advance_free(&mut self, time: f64) {
+        let t = time - self.trajectory.start;
         self.velocity = self.velocity_at(time);
-        self.turned += (self.spin + self.path.spin_acceleration * (0.5 * t)) * t;
-        self.spin += self.path.spin_acceleration * t;
-        self.path.begin = time;
+        self.rotation_increment += (self.spin + self.trajectory.spin_acceleration * (0.5 * t)) * t;
+        self.spin += self.trajectory.spin_acceleration * t;
+        self.trajectory.start = time;
     }
 
-    /// Lets it stay where it is for the rest of the substep.
+    /// Freezes it for the rest of the substep.
     pub(super) fn freeze(&mut self) {
-        self.release();
+        self.fly_free();
         self.velocity = Vec3::zero();
-        self.path.acceleration = Vec3::zero();
-        self.path.surrenders = self.path.surrenders.max(MOST_SURRENDERS);
+        self.trajectory.acceleration = Vec3::zero();
+        self.trajectory.freeze_count = self.trajectory.freeze_count.max(MAX_FREEZES);
     }
 
-    /// True if it stays where it is for the rest of the substep.
+    /// True if it is frozen for the rest of the substep.
     pub(super) fn is_frozen(&self) -> bool {
-        self.path.surrenders >= MOST_SURRENDERS
+        self.trajectory.freeze_count >= MAX_FREEZES
     }
 
-    /// Lets go of whatever held it.
-    pub(super) fn release(&mut self) {
-        self.path = Path {
-            begin: self.path.begin,
-            acceleration: self.pull,
-            stamp: self.path.stamp + 1,
-            losses: self.path.losses,
-            collided: self.path.collided,
-            surrenders: self.path.surrenders,
-            steps: self.path.steps,
-            home: self.path.home,
-            ..Path::default()
+    /// Starts free flight: leaves supports and clusters.
+    pub(super) fn fly_free(&mut self) {
+        self.trajectory = Trajectory {
+            start: self.trajectory.start,
+            acceleration: self.external_acceleration,
+            version: self.trajectory.version + 1,
+            dissipation_count: self.trajectory.dissipation_count,
+            last_collision: self.trajectory.last_collision,
+            freeze_count: self.trajectory.freeze_count,
+            support_steps: self.trajectory.support_steps,
+            cell_slot: self.trajectory.cell_slot,
+            ..Trajectory::default()
         };
     }
 
-    /// Notes a collision, now.
-    pub(super) fn collide(&mut self, material: Material<f64>, settings: &Settings) {
-        let at_once = self.path.begin - self.path.collided <= NO_TIME * settings.dt;
-        self.path.losses += if at_once { 1.0 } else { 1.0 - material.restitution };
-        self.path.collided = self.path.begin;
+    /// Records a collision at the present time.
+    pub(super) fn collide(&mut self, material: Material<f64>, settings: &EventSettings) {
+        let is_simultaneous =
+            self.trajectory.start - self.trajectory.last_collision <= SIMULTANEOUS * settings.dt;
+        self.trajectory.dissipation_count +=
+            if is_simultaneous { 1.0 } else { 1.0 - material.restitution };
+        self.trajectory.last_collision = self.trajectory.start;
     }
 
-    /// Applies an impulse at the point where `normal` comes from to the center.
-    pub(super) fn hit(&mut self, impulse: Vec3<f64>, normal: Vec3<f64>) {
+    /// Applies an impulse at the contact point; `normal` points from there to the center.
+    pub(super) fn apply_impulse(&mut self, impulse: Vec3<f64>, normal: Vec3<f64>) {
         self.velocity += impulse * self.inverse_mass;
-        let whirl: f64 = self.spins.of_solid_ball();
-        self.spin -= normal.cross(impulse) * (whirl * self.inverse_mass / self.radius);
+        let factor: f64 = self.rotation.inverse_inertia_factor();
+        self.spin -= normal.cross(impulse) * (factor * self.inverse_mass / self.radius);
     }
 
-    /// The velocity of its point toward `-normal` by its spin alone.
-    pub(super) fn rim(&self, normal: Vec3<f64>) -> Vec3<f64> {
-        match self.spins {
-            BallSpin::Free => normal.cross(self.spin) * self.radius,
-            BallSpin::Ignored => Vec3::zero(),
+    /// Velocity of the contact point by spin alone; `normal` points from there to the center.
+    pub(super) fn spin_velocity(&self, normal: Vec3<f64>) -> Vec3<f64> {
+        match self.rotation {
+            BallRotation::Free => normal.cross(self.spin) * self.radius,
+            BallRotation::Locked => Vec3::zero(),
         }
     }
 }

@@ -1,25 +1,24 @@
-//! Who is near, while everything moves: each center is in one cell of a uniform grid,
-//! and tells when it leaves it. Cells are as wide as the largest ball, so those that
-//! touch are in neighbouring ones.
+//! Broad phase for moving balls: each center is in one cell of a uniform grid until an event moves
+//! it. Cells are as wide as the largest ball, so balls in contact are in neighbouring cells.
 
 use crate::broad::Period;
 use crate::math::Point3;
 
-/// The coordinates of a cell.
+/// Coordinates of a cell.
 pub(super) type Cell = [i64; 3];
 
-/// Not a row.
-const NONE: u32 = u32::MAX;
+/// End of a chain.
+const EMPTY: u32 = u32::MAX;
 
-/// Buckets there are at least: of fewer, the cells around a ball would share many.
-const LEAST_BUCKETS: usize = 1024;
+/// Minimum number of buckets: of fewer, the neighbours of a cell would share many.
+const MIN_BUCKETS: usize = 1024;
 
-/// The rows in each cell, as chains through buckets that the cells are hashed to.
+/// Spatial hash: rows per cell, as doubly linked chains of buckets.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Cells {
-    /// Along each axis, in metres.
+    /// Cell width along each axis, in metres.
     width: [f64; 3],
-    /// Cells of a period along each axis; zero along one that has none.
+    /// Number of cells per period along each axis; zero for an axis without a period.
     count: Cell,
     head: Vec<u32>,
     next: Vec<u32>,
@@ -29,8 +28,8 @@ pub(super) struct Cells {
 }
 
 impl Cells {
-    /// Empties the grid, for this many rows and cells of this width in metres, or a little wider,
-    /// so that a period has a whole number of them.
+    /// Empties the grid and sets the number of rows and the cell width in metres, widened so that a
+    /// period has a whole number of cells.
     pub fn reset(&mut self, rows: usize, width: f64, period: Period<f64>) {
         for (axis, length) in period.lengths.iter().enumerate() {
             let count = length.map_or(0.0, |length| (length / width).floor());
@@ -38,73 +37,73 @@ impl Cells {
             self.width[axis] = length.map_or(width, |length| length / count);
         }
         self.head.clear();
-        self.head.resize((2 * rows).next_power_of_two().max(LEAST_BUCKETS), NONE);
+        self.head.resize((2 * rows).next_power_of_two().max(MIN_BUCKETS), EMPTY);
         self.cell.clear();
         self.cell.resize(rows, [0; 3]);
         for list in [&mut self.next, &mut self.previous, &mut self.bucket] {
             list.clear();
-            list.resize(rows, NONE);
+            list.resize(rows, EMPTY);
         }
     }
 
-    /// Along each axis, in metres.
+    /// Cell width along each axis, in metres.
     pub fn width(&self) -> [f64; 3] {
         self.width
     }
 
-    /// Along the axis where it is least, in metres.
-    pub fn least_width(&self) -> f64 {
+    /// Smallest cell width, in metres.
+    pub fn min_width(&self) -> f64 {
         self.width.into_iter().fold(f64::INFINITY, f64::min)
     }
 
-    /// The cell that a point is in.
+    /// Cell of a point.
     pub fn cell(&self, point: Point3<f64>) -> Cell {
         [0, 1, 2].map(|axis| (point[axis] / self.width[axis]).floor() as i64)
     }
 
-    /// The image of a cell in the period.
+    /// Periodic image of a cell.
     fn image(&self, cell: Cell) -> Cell {
         let wrap = |x: i64, count: i64| if count > 0 { x.rem_euclid(count) } else { x };
         [0, 1, 2].map(|axis| wrap(cell[axis], self.count[axis]))
     }
 
-    /// Puts a row, which is in none, into a cell.
+    /// Inserts a row that is in no cell.
     pub fn insert(&mut self, row: u32, cell: Cell) {
         let cell = self.image(cell);
         let bucket = self.bucket_of(cell);
         let first = std::mem::replace(&mut self.head[bucket], row);
         let index = row as usize;
-        (self.next[index], self.previous[index]) = (first, NONE);
+        (self.next[index], self.previous[index]) = (first, EMPTY);
         (self.bucket[index], self.cell[index]) = (bucket as u32, cell);
-        if first != NONE {
+        if first != EMPTY {
             self.previous[first as usize] = row;
         }
     }
 
-    /// Takes a row out of its cell.
+    /// Removes a row from its cell.
     pub fn remove(&mut self, row: u32) {
         let index = row as usize;
         let (next, previous) = (self.next[index], self.previous[index]);
-        if previous == NONE {
+        if previous == EMPTY {
             self.head[self.bucket[index] as usize] = next;
         } else {
             self.next[previous as usize] = next;
         }
-        if next != NONE {
+        if next != EMPTY {
             self.previous[next as usize] = previous;
         }
     }
 
-    /// Names the rows in a cell and the 26 around it.
-    pub fn near(&self, [x, y, z]: Cell, mut name: impl FnMut(usize)) {
+    /// Visits the rows in a cell and the 26 around it.
+    pub fn for_each_near(&self, [x, y, z]: Cell, mut visit: impl FnMut(usize)) {
         for dz in -1..=1 {
             for dy in -1..=1 {
                 for dx in -1..=1 {
                     let cell = self.image([x + dx, y + dy, z + dz]);
                     let mut row = self.head[self.bucket_of(cell)];
-                    while row != NONE {
+                    while row != EMPTY {
                         if self.cell[row as usize] == cell {
-                            name(row as usize);
+                            visit(row as usize);
                         }
                         row = self.next[row as usize];
                     }
@@ -113,7 +112,7 @@ impl Cells {
         }
     }
 
-    /// Teschner et al., *Optimized spatial hashing*, 2003.
+    /// Hash of a cell (Teschner et al., *Optimized spatial hashing*, 2003).
     fn bucket_of(&self, [x, y, z]: Cell) -> usize {
         let hash =
             x.wrapping_mul(73_856_093) ^ y.wrapping_mul(19_349_663) ^ z.wrapping_mul(83_492_791);
@@ -135,10 +134,10 @@ mod tests {
             (0..rows).for_each(|row| cells.insert(row, cell(row)));
             for at in (0..rows).map(cell) {
                 let mut named = Vec::new();
-                cells.near(at, |row| named.push(row as u32));
+                cells.for_each_near(at, |row| named.push(row as u32));
                 named.sort_unstable();
-                let near = |row: &u32| (0..3).all(|i| (cell(*row)[i] - at[i]).abs() <= 1);
-                assert_eq!(named, (0..rows).filter(near).collect::<Vec<_>>());
+                let for_each_near = |row: &u32| (0..3).all(|i| (cell(*row)[i] - at[i]).abs() <= 1);
+                assert_eq!(named, (0..rows).filter(for_each_near).collect::<Vec<_>>());
             }
         }
     }

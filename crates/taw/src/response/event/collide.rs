@@ -1,119 +1,93 @@
-//! Effect of a collision: on two balls, on several at one moment, on a ball and a wall.
+//! Collisions: of two balls, of several at the same time, of a ball and a wall.
 
 use std::cmp::Reverse;
 
 use cgmath::{InnerSpace, Zero};
 
-use super::hold::{Held, Pressed};
-use super::{Event, EventDriven, Impact, MOST_LOSSES, MOST_SURRENDERS, Settings, What};
+use super::resting_cluster::{PressedBy, RestingCluster};
+use super::{Event, EventDriven, EventKind, EventSettings, Impact, MAX_DISSIPATIONS, MAX_FREEZES};
 use crate::math::{Vec3, direction_and_length};
-use crate::response::impact::at_most;
-use crate::response::{Material, Mobility, Push, impact};
+use crate::response::impact::clamp_length;
+use crate::response::{ImpulseSample, InverseEffectiveMass, Material, impact};
 
-/// Rounds that collisions at one moment have to agree.
-const MOST_ROUNDS: u32 = 1000;
+/// Maximum number of iterations for simultaneous collisions.
+const MAX_ROUNDS: u32 = 1000;
 
-/// Events of one moment.
+/// Scratch buffers for collisions at the same time.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Moment {
+pub(super) struct SimultaneousImpacts {
     pairs: Vec<(usize, usize)>,
-    /// Events other than collisions.
-    rest: Vec<Event>,
+    /// Events at that time other than collisions.
+    deferred: Vec<Event>,
     rows: Vec<usize>,
     collisions: Vec<Collision>,
 }
 
-/// Two balls that collide.
+/// Collision of two balls.
 #[derive(Clone, Copy, Debug)]
 struct Collision {
     a: usize,
     b: usize,
     impact: Impact<f64>,
-    mobility: Mobility<f64>,
+    inverse_effective_mass: InverseEffectiveMass<f64>,
     material: Material<f64>,
-    /// Part of what it asks for that it may take at once, beside others.
-    share: f64,
-    /// Impulse on the second one, in N s.
+    /// Relaxation factor, beside the other collisions of the two balls.
+    relaxation: f64,
+    /// Impulse on the second ball, in N s.
     impulse: Vec3<f64>,
 }
 
 impl EventDriven {
-    /// Tests if a ball has had so many collisions that took energy that they will not end.
-    pub(super) fn loses(&self, row: usize) -> bool {
-        self.balls[row].path.losses >= MOST_LOSSES
+    /// Detects inelastic collapse: collisions that would not end.
+    pub(super) fn is_collapsing(&self, row: usize) -> bool {
+        self.balls[row].trajectory.dissipation_count >= MAX_DISSIPATIONS
     }
 
-    /// Brings balls to rest that collide without end, and all that touch them, however fast they
-    /// part just now: between a wall and a heavy ball, a light one parts from one of them always.
-    pub(super) fn surrender(&mut self, rows: [usize; 2], time: f64, settings: &Settings) {
-        let Held { rows, pressed } = self.hold_from_now_on(rows, f64::INFINITY, time, settings);
+    /// Ends an inelastic collapse: puts the balls to rest with all that touch them, however fast
+    /// they separate just now. Between a wall and a heavy ball, a light one always separates from
+    /// one of them.
+    pub(super) fn stop_collapse(&mut self, rows: [usize; 2], time: f64, settings: &EventSettings) {
+        let RestingCluster { rows, pressed_by } =
+            self.rest_cluster(rows, f64::INFINITY, time, settings);
         for row in rows {
-            let path = &mut self.balls[row].path;
-            path.losses = 0.0;
-            if !self.balls[row].is_frozen() && self.gives_up(row, pressed) {
+            let trajectory = &mut self.balls[row].trajectory;
+            trajectory.dissipation_count = 0.0;
+            if !self.balls[row].is_frozen() && self.count_freeze(row, pressed_by) {
                 self.balls[row].freeze();
             }
-            self.foresee(row, time, settings);
+            self.predict(row, time, settings);
         }
     }
 
-    /// Counts that a ball was brought to rest. True if something presses it that will not end:
-    /// only what is outside could take its momentum.
-    fn gives_up(&mut self, row: usize, pressed: Pressed) -> bool {
-        let surrenders = &mut self.balls[row].path.surrenders;
-        let most = match pressed {
-            Pressed::FromOutside => MOST_SURRENDERS,
-            Pressed::ByForces | Pressed::No => MOST_SURRENDERS - 1,
+    /// Counts a freeze. True if the pressure on the ball will not end: only a body outside of its
+    /// cluster could take the momentum.
+    fn count_freeze(&mut self, row: usize, pressed_by: PressedBy) -> bool {
+        let freeze_count = &mut self.balls[row].trajectory.freeze_count;
+        let max = match pressed_by {
+            PressedBy::FixedBody => MAX_FREEZES,
+            PressedBy::Forces | PressedBy::Nothing => MAX_FREEZES - 1,
         };
-        *surrenders = (*surrenders + 1).min(most);
-        *surrenders == MOST_SURRENDERS
+        *freeze_count = (*freeze_count + 1).min(max);
+        *freeze_count == MAX_FREEZES
     }
 
-    /// Lets two balls bounce off each other, and whoever else meets at the same moment.
+    /// Collides two balls, and all others that collide at the same time.
     ///
-    /// All that happens at one moment happens at once, so that no order is preferred:
-    /// the mirror image of a scene has the mirror image of its future, to the bit.
-    pub(super) fn meet(
+    /// Simultaneous collisions are solved together, so that no order is preferred: the mirror image
+    /// of a scene has the mirror image of its future, to the bit.
+    pub(super) fn collide_balls(
         &mut self,
         first: Event,
         other: usize,
-        settings: &Settings,
+        settings: &EventSettings,
         impacts: &mut Vec<Impact<f64>>,
     ) {
         let Event { time, row, .. } = first;
-        let Moment { mut pairs, mut rest, mut rows, mut collisions } =
-            std::mem::take(&mut self.moment);
+        let SimultaneousImpacts { mut pairs, mut deferred, mut rows, mut collisions } =
+            std::mem::take(&mut self.simultaneous_impacts);
         pairs.clear();
         pairs.push((row.min(other), row.max(other)));
-        let mut with_all = |row: usize| {
-            self.name_near(row, |other| {
-                let meeting =
-                    (other != row).then(|| self.foresee_meeting(row, other, time, settings));
-                if let Some(Some((after, What::Meets(..)))) = meeting
-                    && time + after <= time
-                {
-                    pairs.push((row.min(other), row.max(other)));
-                }
-            });
-        };
-        if first.tied {
-            with_all(row);
-        }
-        while let Some(Reverse(event)) = self.queue.peek().copied()
-            && event.time == time
-        {
-            self.queue.pop();
-            let valid = self.balls[event.row].path.stamp == event.stamp;
-            match event.what {
-                What::Meets(other, stamp)
-                    if valid && self.balls[other].path.stamp == stamp && !self.loses(event.row) =>
-                {
-                    pairs.push((event.row.min(other), event.row.max(other)));
-                }
-                _ => rest.push(event),
-            }
-        }
-        self.queue.extend(rest.drain(..).map(Reverse));
+        self.add_simultaneous(first, &mut pairs, &mut deferred, settings);
         pairs.sort_unstable();
         pairs.dedup();
         rows.clear();
@@ -126,142 +100,217 @@ impl EventDriven {
         collisions.clear();
         collisions.extend(pairs.iter().map(|(a, b)| self.collision(*a, *b, settings)));
         for row in &rows {
-            self.balls[*row].release();
+            self.balls[*row].fly_free();
         }
         impacts.extend(collisions.iter().map(|c| c.impact));
         if rows.len() == 2 * pairs.len() {
             for c in &collisions {
-                let approach = self.closing(c);
-                let impulse = impact(c.impact.normal, approach, c.mobility, c.material);
-                self.balls[c.a].hit(-impulse, -c.impact.normal);
-                self.balls[c.b].hit(impulse, c.impact.normal);
-                self.count_meeting(c, impulse, approach);
+                let relative_velocity = self.relative_velocity(c);
+                let impulse = impact(
+                    c.impact.normal,
+                    relative_velocity,
+                    c.inverse_effective_mass,
+                    c.material,
+                );
+                self.balls[c.a].apply_impulse(-impulse, -c.impact.normal);
+                self.balls[c.b].apply_impulse(impulse, c.impact.normal);
+                self.record_impact(c, impulse, relative_velocity);
             }
         } else {
-            self.collide_at_once(&mut collisions, &rows);
+            self.solve_simultaneous(&mut collisions, &rows);
         }
         for row in &rows {
-            self.foresee(*row, time, settings);
+            self.predict(*row, time, settings);
         }
-        self.moment = Moment { pairs, rest, rows, collisions };
+        self.simultaneous_impacts = SimultaneousImpacts { pairs, deferred, rows, collisions };
     }
 
-    /// Collision of two balls that touch, before its impulse.
-    fn collision(&mut self, a: usize, b: usize, settings: &Settings) -> Collision {
-        let press = self.press_speed(a, b, settings);
+    /// Adds the pairs of all other collisions at the time of an event.
+    fn add_simultaneous(
+        &mut self,
+        first: Event,
+        pairs: &mut Vec<(usize, usize)>,
+        deferred: &mut Vec<Event>,
+        settings: &EventSettings,
+    ) {
+        let Event { time, row, .. } = first;
+        let mut add_all_of = |row: usize| {
+            self.for_each_near(row, |other| {
+                let event = (other != row).then(|| self.predict_ball(row, other, time, settings));
+                if let Some(Some((after, EventKind::BallImpact(..)))) = event
+                    && time + after <= time
+                {
+                    pairs.push((row.min(other), row.max(other)));
+                }
+            });
+        };
+        if first.simultaneous {
+            add_all_of(row);
+        }
+        while let Some(Reverse(event)) = self.queue.peek().copied()
+            && event.time == time
+        {
+            self.queue.pop();
+            let valid = self.balls[event.row].trajectory.version == event.version;
+            match event.kind {
+                EventKind::BallImpact(other, version)
+                    if valid
+                        && self.balls[other].trajectory.version == version
+                        && !self.is_collapsing(event.row) =>
+                {
+                    pairs.push((event.row.min(other), event.row.max(other)));
+                }
+                _ => deferred.push(event),
+            }
+        }
+        self.queue.extend(deferred.drain(..).map(Reverse));
+    }
+
+    /// Collision of two balls in contact, before its impulse.
+    fn collision(&mut self, a: usize, b: usize, settings: &EventSettings) -> Collision {
+        let threshold = self.pressing_speed(a, b, settings);
         let (first, second) = (&self.balls[a], &self.balls[b]);
-        let (normal, _) =
-            direction_and_length(self.apart(first, second)).unwrap_or((Vec3::unit_x(), 0.0));
+        let (normal, _) = direction_and_length(self.center_offset(first, second))
+            .unwrap_or((Vec3::unit_x(), 0.0));
         let approach_speed = -(second.velocity - first.velocity).dot(normal);
-        let mut material = first.material.against(second.material);
-        if approach_speed <= 2.0 * press {
+        let mut material = first.material.combined_with(second.material);
+        if approach_speed <= 2.0 * threshold {
             material.restitution = 0.0;
         }
-        let mobility = Mobility::of([first, second].map(|ball| (ball.inverse_mass, ball.spins)));
+        let inverse_effective_mass = InverseEffectiveMass::of(
+            [first, second].map(|ball| (ball.inverse_mass, ball.rotation)),
+        );
         self.balls[a].collide(material, settings);
         self.balls[b].collide(material, settings);
         let (first, second) = (a as u32, b as u32);
         let impact = Impact { a: first, on_wall: false, b: second, normal, approach_speed };
-        Collision { a, b, impact, mobility, material, share: 1.0, impulse: Vec3::zero() }
+        Collision {
+            a,
+            b,
+            impact,
+            inverse_effective_mass,
+            material,
+            relaxation: 1.0,
+            impulse: Vec3::zero(),
+        }
     }
 
-    /// The velocity of the second's touching point relative to the first's, in m/s.
-    fn closing(&self, c: &Collision) -> Vec3<f64> {
+    /// Relative velocity of the contact points, in m/s.
+    fn relative_velocity(&self, c: &Collision) -> Vec3<f64> {
         let (first, second) = (&self.balls[c.a], &self.balls[c.b]);
-        let rims = first.rim(c.impact.normal) + second.rim(c.impact.normal);
-        second.velocity - first.velocity + rims
+        let spin_velocities =
+            first.spin_velocity(c.impact.normal) + second.spin_velocity(c.impact.normal);
+        second.velocity - first.velocity + spin_velocities
     }
 
-    /// Finds the impulses of collisions that share balls: each has the restitution and
-    /// friction of its own, with all others going on (Newton's law, simultaneously). All
-    /// change together, round by round (Jacobi), so that their order is nothing to them.
-    fn collide_at_once(&mut self, collisions: &mut [Collision], rows: &[usize]) {
-        let begin: Vec<_> = collisions.iter().map(|c| self.closing(c)).collect();
-        let shared = |row: usize| collisions.iter().filter(|c| c.a == row || c.b == row).count();
-        let shares: Vec<_> =
-            collisions.iter().map(|c| 1.0 / shared(c.a).max(shared(c.b)) as f64).collect();
-        collisions.iter_mut().zip(shares).for_each(|(c, share)| c.share = share);
-        let fastest = begin.iter().map(|v| v.magnitude()).fold(0.0, f64::max);
-        for _ in 0..MOST_ROUNDS {
+    /// Solves simultaneous collisions with shared balls: each keeps its own restitution and
+    /// friction while all others act (Newton's law). Jacobi iterations, so that the result does not
+    /// depend on the order.
+    fn solve_simultaneous(&mut self, collisions: &mut [Collision], rows: &[usize]) {
+        let initial_velocity: Vec<_> =
+            collisions.iter().map(|c| self.relative_velocity(c)).collect();
+        let count_shared =
+            |row: usize| collisions.iter().filter(|c| c.a == row || c.b == row).count();
+        let shares: Vec<_> = collisions
+            .iter()
+            .map(|c| 1.0 / count_shared(c.a).max(count_shared(c.b)) as f64)
+            .collect();
+        collisions.iter_mut().zip(shares).for_each(|(c, relaxation)| c.relaxation = relaxation);
+        let max_speed = initial_velocity.iter().map(|v| v.magnitude()).fold(0.0, f64::max);
+        for _ in 0..MAX_ROUNDS {
             let mut largest: f64 = 0.0;
             let mut changes = vec![[Vec3::zero(); 2]; rows.len()];
-            let closing: Vec<_> = collisions.iter().map(|c| self.closing(c)).collect();
-            for ((c, closing), begin) in collisions.iter_mut().zip(closing).zip(&begin) {
+            let relative_velocity: Vec<_> =
+                collisions.iter().map(|c| self.relative_velocity(c)).collect();
+            for ((c, relative_velocity), initial_velocity) in
+                collisions.iter_mut().zip(relative_velocity).zip(&initial_velocity)
+            {
                 let normal = c.impact.normal;
                 let (Material { restitution, friction, tangential_restitution, .. }, before) =
                     (c.material, c.impulse);
-                let along = |v: Vec3<f64>| v.dot(normal);
-                let across = |v: Vec3<f64>| v - normal * v.dot(normal);
-                let wanted = restitution * (-along(*begin)).max(0.0);
-                let pressure =
-                    along(before) + c.share * (wanted - along(closing)) / c.mobility.normal;
-                let pressure = pressure.max(0.0);
-                let slide = across(*begin) * -tangential_restitution;
-                let grip =
-                    across(before) + (slide - across(closing)) * (c.share / c.mobility.tangent);
-                c.impulse = normal * pressure + at_most(grip, friction * pressure);
+                let normal_part = |v: Vec3<f64>| v.dot(normal);
+                let tangential_part = |v: Vec3<f64>| v - normal * v.dot(normal);
+                let target_speed = restitution * (-normal_part(*initial_velocity)).max(0.0);
+                let normal_impulse = normal_part(before)
+                    + c.relaxation * (target_speed - normal_part(relative_velocity))
+                        / c.inverse_effective_mass.normal;
+                let normal_impulse = normal_impulse.max(0.0);
+                let target_tangent_velocity =
+                    tangential_part(*initial_velocity) * -tangential_restitution;
+                let tangent_impulse = tangential_part(before)
+                    + (target_tangent_velocity - tangential_part(relative_velocity))
+                        * (c.relaxation / c.inverse_effective_mass.tangent);
+                c.impulse = normal * normal_impulse
+                    + clamp_length(tangent_impulse, friction * normal_impulse);
                 let change = c.impulse - before;
-                largest = largest.max(change.magnitude() * c.mobility.normal);
+                largest = largest.max(change.magnitude() * c.inverse_effective_mass.normal);
                 for (row, impulse, normal) in [(c.a, -change, -normal), (c.b, change, normal)] {
-                    if let Ok(at) = rows.binary_search(&row) {
-                        changes[at][0] += impulse;
-                        changes[at][1] += normal.cross(impulse);
+                    if let Ok(index) = rows.binary_search(&row) {
+                        changes[index][0] += impulse;
+                        changes[index][1] += normal.cross(impulse);
                     }
                 }
             }
-            for (row, [impulse, twist]) in rows.iter().zip(changes) {
+            for (row, [impulse, angular_impulse]) in rows.iter().zip(changes) {
                 let ball = &mut self.balls[*row];
                 ball.velocity += impulse * ball.inverse_mass;
-                let whirl: f64 = ball.spins.of_solid_ball();
-                ball.spin -= twist * (whirl * ball.inverse_mass / ball.radius);
+                let factor: f64 = ball.rotation.inverse_inertia_factor();
+                ball.spin -= angular_impulse * (factor * ball.inverse_mass / ball.radius);
             }
-            if largest <= 1e-15 * fastest {
+            if largest <= 1e-15 * max_speed {
                 break;
             }
         }
-        for (c, begin) in collisions.iter().zip(begin) {
-            self.count_meeting(c, c.impulse, begin);
+        for (c, initial_velocity) in collisions.iter().zip(initial_velocity) {
+            self.record_impact(c, c.impulse, initial_velocity);
         }
     }
 
-    /// Counts what a collision did with this impulse, of points that came together so.
-    fn count_meeting(&mut self, c: &Collision, impulse: Vec3<f64>, before: Vec3<f64>) {
+    /// Books the energy of a collision; `before` is the relative velocity before it.
+    fn record_impact(&mut self, c: &Collision, impulse: Vec3<f64>, before: Vec3<f64>) {
         if self.work.is_none() {
             return;
         }
-        let after = self.closing(c);
-        let fixed = |row: usize| {
+        let after = self.relative_velocity(c);
+        let fixed_velocity = |row: usize| {
             let ball = &self.balls[row];
             (ball.inverse_mass == 0.0).then_some(ball.velocity)
         };
-        let fixed = [fixed(c.a), fixed(c.b)];
+        let fixed_velocity = [fixed_velocity(c.a), fixed_velocity(c.b)];
         if let Some(work) = &mut self.work {
-            let (normal, mean) = (c.impact.normal, (before + after) * 0.5);
-            work.push(Push { impulse, normal, mean, fixed });
+            let (normal, mean_velocity) = (c.impact.normal, (before + after) * 0.5);
+            work.record_impulse(ImpulseSample { impulse, normal, mean_velocity, fixed_velocity });
             work.collisions += 1;
         }
     }
 
-    /// Lets a ball that touches a wall bounce off it.
-    pub(super) fn hit_wall(&mut self, row: usize, wall: usize, settings: &Settings) -> Impact<f64> {
+    /// Collides a ball with a wall.
+    pub(super) fn collide_with_wall(
+        &mut self,
+        row: usize,
+        wall: usize,
+        settings: &EventSettings,
+    ) -> Impact<f64> {
         let ball = &mut self.balls[row];
-        ball.release();
-        let now = ball.path.begin;
+        ball.fly_free();
+        let now = ball.trajectory.start;
         let normal = self.walls[wall].nearest(ball.position, now).normal;
-        let touch = ball.position - normal * ball.radius;
-        let surface = self.walls[wall].surface_velocity(normal, touch, now);
-        let closing = ball.velocity - surface + ball.rim(normal);
-        let approach_speed = -closing.dot(normal);
-        let mobility = Mobility::of_balls(0.0, ball.inverse_mass, ball.spins);
-        let material = self.walls[wall].against(ball.material);
+        let contact_point = ball.position - normal * ball.radius;
+        let surface_velocity = self.walls[wall].surface_velocity(normal, contact_point, now);
+        let relative_velocity = ball.velocity - surface_velocity + ball.spin_velocity(normal);
+        let approach_speed = -relative_velocity.dot(normal);
+        let inverse_effective_mass =
+            InverseEffectiveMass::of_balls(0.0, ball.inverse_mass, ball.rotation);
+        let material = self.walls[wall].combined_with(ball.material);
         ball.collide(material, settings);
-        let impulse = impact(normal, closing, mobility, material);
-        ball.hit(impulse, normal);
+        let impulse = impact(normal, relative_velocity, inverse_effective_mass, material);
+        ball.apply_impulse(impulse, normal);
         if let Some(work) = &mut self.work {
-            let after = ball.velocity - surface + ball.rim(normal);
-            let mean = (closing + after) * 0.5;
-            let fixed = [Some(surface), (ball.inverse_mass == 0.0).then_some(ball.velocity)];
-            work.push(Push { impulse, normal, mean, fixed });
+            let after = ball.velocity - surface_velocity + ball.spin_velocity(normal);
+            let mean_velocity = (relative_velocity + after) * 0.5;
+            let fixed_velocity =
+                [Some(surface_velocity), (ball.inverse_mass == 0.0).then_some(ball.velocity)];
+            work.record_impulse(ImpulseSample { impulse, normal, mean_velocity, fixed_velocity });
             work.collisions += 1;
         }
         Impact { a: self.walls[wall].row, on_wall: true, b: row as u32, normal, approach_speed }

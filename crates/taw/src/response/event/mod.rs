@@ -1,25 +1,27 @@
-//! [`Response::EventDriven`](super::Response::EventDriven): what happens within a
-//! substep happens one after the other, each at its time (Alder and Wainwright 1959;
-//! Lubachevsky, *How to simulate billiards and similar systems*, 1991).
+//! Event-driven simulation, the method of [`Response::EventDriven`](super::Response::EventDriven):
+//! the events of a substep are processed one after the other, each at its time (Alder and
+//! Wainwright 1959; Lubachevsky, *How to simulate billiards and similar systems*, 1991).
 //!
-//! Between two events a ball moves on a parabola. Its next event is the first of: it
-//! meets a wall or a ball, it leaves its cell of the grid, or what it lies on makes it
-//! roll instead of slide. All of it is counted in `f64`, whatever the world counts in.
+//! Between two events a ball moves on a parabola. Its next event is the earliest of: impact on a
+//! wall or ball, crossing into another grid cell, or change of regime (sliding to rolling, end of a
+//! support). Computed in `f64`, whatever the world's scalar.
 
+mod active_set;
 mod ball;
-mod bend;
+mod candidates;
 mod cells;
+mod cluster;
 mod collide;
-mod count;
-mod foresee;
-mod heap;
-mod hold;
-mod knot;
-mod lie;
-mod reach;
-mod rest;
-mod support;
-mod time;
+mod curved_support;
+mod flat_support;
+mod ledger;
+mod predict;
+mod predict_ball;
+mod predict_wall;
+mod rest_at_start;
+mod rest_on_wall;
+mod resting_cluster;
+mod toi;
 mod wall;
 
 use std::cell::Cell as Counter;
@@ -31,71 +33,71 @@ use cgmath::{InnerSpace, Zero};
 use crate::broad::Period;
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, cast_vector, is_finite, is_finite_point};
-use crate::response::Work;
-use crate::response::impulse::Warm;
-use ball::Home;
-pub(crate) use ball::{Ball, Path};
+use crate::response::EnergyLedger;
+use crate::response::impulse::CachedImpulse;
+use ball::CellSlot;
+pub(crate) use ball::{Ball, Trajectory};
+use candidates::WallCandidates;
+pub(crate) use candidates::WallSource;
 use cells::Cells;
-use collide::Moment;
-use heap::Heap;
-use reach::Reach;
-pub(crate) use reach::Source;
-pub(crate) use wall::{Form, Wall};
+use cluster::Cluster;
+use collide::SimultaneousImpacts;
+pub(crate) use wall::{Wall, WallCollider};
 
-/// A wall is left or met again only faster than this part of what gravity does to a
-/// speed in a substep. Slower, a ball rests on it: the bounces that it still had ahead
-/// would have taken a few thousandths of a substep.
-const REST: f64 = 1e-3;
-/// That part for balls that press each other, which touch anew each time that they have
-/// gained so much. Ten times a substep, until the next one knows that they rest.
-const PRESS: f64 = 0.1;
-/// Balls that cross more cells than this in a substep are looked for everywhere.
-const FAR: f64 = 1000.0;
-/// After collisions in one substep that took the whole of an approach so many times over (two
-/// of restitution a half count as one, and so does one that took no time), a ball is at
-/// rest among those that it touches: what is left would take endlessly many.
-const MOST_LOSSES: f64 = 64.0;
-/// Number of collisions that it counts for that a ball begins to rest on another, which takes
-/// about as long.
-const LEAN: f64 = 8.0;
-/// After so many times at rest and out of it again, something presses a ball that nothing
-/// can stop. For the rest of the substep it stays where it is; the next one pushes it out.
-const MOST_SURRENDERS: i32 = 10;
-/// A shorter time between two collisions is none, over the substep.
-const NO_TIME: f64 = 1e-13;
-/// A ball that is this part of a radius outside of another wall is still on it; see `world::touch`.
-const FLUSH: f64 = 5e-6;
-/// Overlap that may stay, over the radius: pushing it out would lift what lies on it, and
-/// create energy.
+/// Rest threshold over the speed that gravity adds in a substep. A slower ball rests on the wall:
+/// its remaining bounces would have taken a few thousandths of a substep.
+const REST_SPEED: f64 = 1e-3;
+/// Same fraction for two balls pressed together: they collide again whenever they have regained
+/// this speed, about ten times per substep, until the next substep treats them as resting.
+const PRESS_SPEED: f64 = 0.1;
+/// Maximum number of cells that a ball may cross in a substep; a faster one is tested against all
+/// others.
+const MAX_CELLS: f64 = 1000.0;
+/// Guard against inelastic collapse. Each collision adds `1 − e` (or 1 if no time has passed since
+/// the last one); a ball whose sum within one substep reaches this is put to rest with whatever it
+/// touches.
+const MAX_DISSIPATIONS: f64 = 64.0;
+/// Cost of starting to rest on another ball, in such collisions, which take about as long.
+const REST_COST: f64 = 8.0;
+/// Maximum number of freezes. A ball frozen this often in one substep is squeezed by something
+/// immovable: it stays where it is for the rest of the substep; the next one pushes it out.
+const MAX_FREEZES: i32 = 10;
+/// Largest time between simultaneous collisions, over the substep.
+const SIMULTANEOUS: f64 = 1e-13;
+/// Seam tolerance: a ball at most this fraction of its radius away from another wall still touches
+/// that wall; see `world::touch`.
+const SEAM_TOLERANCE: f64 = 5e-6;
+/// Allowed penetration over the radius: pushing it out would lift what rests on it, and create
+/// energy.
 const SLOP: f64 = 4e-3;
-/// A ball on a wall that is no half-space looks where it is after this part of its
-/// radius, though not more often than after this part of a substep.
-const LOOK: f64 = 0.05;
-/// Cost that a substep may have, and for each ball besides, in looks at one half-space or one
-/// other ball, of which a processor does some fifty million in a second. Whatever is not at its
-/// end then stays where it is, and is named.
-const MOST_LOOKS: u64 = 32_000_000;
-const LOOKS_A_BALL: u64 = 20_000;
-/// So many touches are enough to hold a ball, of which one of its size has twelve at most. Of
-/// those between two that both have as many already, no more are taken.
-pub(crate) const MOST_TOUCHES: u32 = 64;
-/// A look at a part of a wall that is no half-space counts as so many.
-const PART_LOOKS: u64 = 8;
-/// The time at which two balls meet that are not equally accelerated counts as so many looks.
-const QUARTIC_LOOKS: u64 = 16;
+/// Support check on a curved or bounded wall: after rolling this fraction of its radius, at most
+/// once per this fraction of a substep.
+const SUPPORT_CHECK: f64 = 0.05;
+/// Cost limit of a substep, and per ball, in tests of one ball against one half-space or ball (some
+/// fifty million per second). A ball that has not finished by then stays where it is, and is
+/// reported.
+const MAX_COST: u64 = 32_000_000;
+const COST_PER_BALL: u64 = 20_000;
+/// Maximum number of contacts of a ball in a cluster; equal balls have twelve at most. Contacts
+/// between two balls that both have as many are dropped.
+pub(crate) const MAX_CONTACTS: u32 = 64;
+/// Cost of a test against a sub-shape that is no half-space.
+const PART_COST: u64 = 8;
+/// Cost of a time of impact of two balls with different accelerations (a quartic).
+const QUARTIC_COST: u64 = 16;
 
-/// A collision that a substep went through.
+/// Collision that a substep processed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact<S> {
-    /// The row of the first: a marble, or of a wall if `on_wall`.
+    /// Row of the first body: a marble, or a wall if `on_wall`.
     pub a: u32,
-    /// True if the first is a wall.
+    /// True if the first body is a wall.
     pub on_wall: bool,
-    /// The row of the second, a marble.
+    /// Row of the second body, a marble.
     pub b: u32,
-    /// The unit vector from the first to the second.
+    /// Unit normal from the first to the second.
     pub normal: Vec3<S>,
-    /// Speed at which they came together along it, in m/s.
+    /// Approach speed along the normal, in m/s.
     pub approach_speed: S,
 }
 
@@ -112,33 +114,36 @@ impl Impact<f64> {
     }
 }
 
-/// Possible events of a ball.
+/// Kinds of events of a ball.
 #[derive(Clone, Copy, Debug)]
-enum What {
-    Hits(usize),
-    SettlesOn(usize),
-    Meets(usize, u32),
-    /// It begins to rest on another, whose path has that stamp.
-    Leans(usize, u32),
-    LeavesCell {
+enum EventKind {
+    /// Collision with a wall, by index.
+    WallImpact(usize),
+    /// Start of rest on a wall.
+    RestOnWall(usize),
+    /// Collision with a ball whose trajectory has that version.
+    BallImpact(usize, u32),
+    /// Start of rest on a ball whose trajectory has that version.
+    RestOnBall(usize, u32),
+    CellCrossing {
         axis: usize,
         to: i64,
     },
-    Changes,
-    /// It comes to where walls may be that it does not know yet, or that it looked at as
-    /// often as it may.
-    Looks,
+    /// End of the current trajectory: sliding turns into rolling, or the support ends.
+    RegimeChange,
+    /// End of the range for which the candidate walls are known, or of the steps of a prediction.
+    RefreshCandidates,
 }
 
-/// Something that will happen, unless something else happens first.
+/// Predicted event; void once the trajectory has another version.
 #[derive(Clone, Copy, Debug)]
 struct Event {
     time: f64,
     row: usize,
-    stamp: u32,
-    what: What,
-    /// True if it meets another one at the very same time.
-    tied: bool,
+    version: u32,
+    kind: EventKind,
+    /// True if the ball collides with another one at the very same time.
+    simultaneous: bool,
 }
 
 impl Ord for Event {
@@ -161,79 +166,82 @@ impl PartialEq for Event {
 
 impl Eq for Event {}
 
-/// Input of the method, besides balls and walls.
-pub(crate) struct Settings<'a> {
-    /// The length of the substep, in seconds.
+/// Settings of a substep, besides balls and walls.
+pub(crate) struct EventSettings<'a> {
+    /// Substep, in seconds.
     pub dt: f64,
-    /// For what rests in heaps.
+    /// Iterations for clusters of resting balls.
     pub iterations: u32,
-    /// The walls.
-    pub source: &'a dyn Source,
-    /// Cost of the substep so far, in looks.
-    pub looks: Counter<u64>,
+    /// Walls of the world.
+    pub source: &'a dyn WallSource,
+    /// Cost of the substep so far, in tests.
+    pub cost: Counter<u64>,
 }
 
-impl Settings<'_> {
+impl EventSettings<'_> {
     /// Adds to the cost of the substep.
-    fn count(&self, looks: u64) {
-        self.looks.set(self.looks.get() + looks);
+    fn add_cost(&self, cost: u64) {
+        self.cost.set(self.cost.get() + cost);
     }
 }
 
-/// The method, with what it scribbles on.
+/// Event-driven solver, with its scratch buffers.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct EventDriven {
-    /// To be filled by the caller, who finds them there afterwards.
+    /// Balls, filled in and read back by the caller.
     pub balls: Vec<Ball>,
-    /// Of the world.
+    /// Period of the world.
     pub period: Period<f64>,
-    /// Those that balls may come to.
+    /// Candidate walls.
     walls: Vec<Wall>,
-    /// Pairs of balls that may touch at the start.
+    /// Pairs of balls that may be in contact at the start.
     pub near: Contacts<f64>,
-    /// Impulses that the heaps' contacts bore in the last substep.
-    pub warm: Vec<Warm<f64>>,
-    /// Work done on the balls, if somebody asks.
-    pub work: Option<Work>,
-    reach: Reach,
+    /// Impulses of the clusters' contacts in the last substep, for the warm start.
+    pub impulse_cache: Vec<CachedImpulse<f64>>,
+    /// Energy bookkeeping, for the energy audit only.
+    pub work: Option<EnergyLedger>,
+    candidates: WallCandidates,
     cells: Cells,
-    anywhere: Vec<usize>,
+    unbounded: Vec<usize>,
     queue: BinaryHeap<Reverse<Event>>,
-    moment: Moment,
-    heap: Heap,
+    simultaneous_impacts: SimultaneousImpacts,
+    cluster: Cluster,
 }
 
 impl EventDriven {
-    /// Goes through a substep. Adds to `impacts` in the order of time, and gives the
-    /// rows that became infinite or NaN, which are as they were.
-    pub fn run(&mut self, settings: &Settings, impacts: &mut Vec<Impact<f64>>) -> Vec<u32> {
+    /// Simulates a substep. Appends to `impacts` in the order of time, and returns the rows that
+    /// became infinite or NaN or did not finish; the former keep their initial positions.
+    pub fn run(&mut self, settings: &EventSettings, impacts: &mut Vec<Impact<f64>>) -> Vec<u32> {
         let dt = settings.dt;
-        let before: Vec<_> = self.balls.iter().map(|b| b.position).collect();
+        let initial_positions: Vec<_> = self.balls.iter().map(|b| b.position).collect();
         for ball in &mut self.balls {
-            ball.path = Path { acceleration: ball.pull, ..Path::default() };
-            ball.turned = Vec3::zero();
+            ball.trajectory =
+                Trajectory { acceleration: ball.external_acceleration, ..Trajectory::default() };
+            ball.rotation_increment = Vec3::zero();
         }
-        self.find_homes(dt);
-        self.find_walls(settings);
-        self.begin_at_rest(settings);
+        self.assign_cells(dt);
+        self.find_candidates(settings);
+        self.find_resting(settings);
         self.queue.clear();
         for row in 0..self.balls.len() {
-            self.foresee(row, 0.0, settings);
+            self.predict(row, 0.0, settings);
         }
-        let most = MOST_LOOKS + LOOKS_A_BALL * self.balls.len() as u64;
-        while settings.looks.get() < most {
+        let max_cost = MAX_COST + COST_PER_BALL * self.balls.len() as u64;
+        while settings.cost.get() < max_cost {
             let Some(Reverse(event)) = self.queue.pop() else { break };
-            if self.balls[event.row].path.stamp == event.stamp {
-                self.happen(event, settings, impacts);
+            if self.balls[event.row].trajectory.version == event.version {
+                self.process(event, settings, impacts);
             }
         }
-        let mut stopped = self.stop_what_is_left();
+        let mut stopped = self.stop_unfinished();
         (0..self.balls.len()).for_each(|row| self.advance(row, dt));
-        for (row, (ball, before)) in self.balls.iter_mut().zip(before).enumerate() {
+        for (row, (ball, initial_positions)) in
+            self.balls.iter_mut().zip(initial_positions).enumerate()
+        {
             if !is_finite_point(ball.position) || !is_finite(ball.velocity) || !is_finite(ball.spin)
             {
-                ball.position = before;
-                (ball.velocity, ball.spin, ball.turned) =
+                ball.position = initial_positions;
+                (ball.velocity, ball.spin, ball.rotation_increment) =
                     (Vec3::zero(), Vec3::zero(), Vec3::zero());
                 stopped.push(row as u32);
             }
@@ -243,14 +251,14 @@ impl EventDriven {
         stopped
     }
 
-    /// Lets every ball that still has something ahead of it stay where it is, if nothing
-    /// else will happen in this substep. Gives their rows.
-    fn stop_what_is_left(&mut self) -> Vec<u32> {
+    /// Freezes balls that still have events at the end of the budget, at the time of the first of
+    /// these. Returns their rows.
+    fn stop_unfinished(&mut self) -> Vec<u32> {
         let mut stopped = Vec::new();
         let first = self.queue.peek().map_or(0.0, |Reverse(event)| event.time);
-        for Reverse(Event { row, stamp, .. }) in std::mem::take(&mut self.queue) {
-            if self.balls[row].path.stamp == stamp {
-                self.advance(row, first.max(self.balls[row].path.begin));
+        for Reverse(Event { row, version, .. }) in std::mem::take(&mut self.queue) {
+            if self.balls[row].trajectory.version == version {
+                self.advance(row, first.max(self.balls[row].trajectory.start));
                 self.balls[row].freeze();
                 self.balls[row].spin = Vec3::zero();
                 stopped.push(row as u32);
@@ -259,104 +267,111 @@ impl EventDriven {
         stopped
     }
 
-    fn happen(&mut self, event: Event, settings: &Settings, impacts: &mut Vec<Impact<f64>>) {
-        let Event { time, row, what, .. } = event;
-        match what {
-            What::Meets(other, stamp) | What::Leans(other, stamp)
-                if self.balls[other].path.stamp != stamp =>
+    fn process(&mut self, event: Event, settings: &EventSettings, impacts: &mut Vec<Impact<f64>>) {
+        let Event { time, row, kind, .. } = event;
+        match kind {
+            EventKind::BallImpact(other, version) | EventKind::RestOnBall(other, version)
+                if self.balls[other].trajectory.version != version =>
             {
-                self.foresee(row, time, settings);
+                self.predict(row, time, settings);
             }
-            What::Meets(other, _) if self.loses(row) && self.loses(other) => {
-                self.surrender([row, other], time, settings);
+            EventKind::BallImpact(other, _)
+                if self.is_collapsing(row) && self.is_collapsing(other) =>
+            {
+                self.stop_collapse([row, other], time, settings);
             }
-            What::Meets(other, _) => self.meet(event, other, settings, impacts),
-            What::Leans(other, _) => {
+            EventKind::BallImpact(other, _) => self.collide_balls(event, other, settings, impacts),
+            EventKind::RestOnBall(other, _) => {
                 for row in [row, other] {
-                    self.balls[row].path.losses += LEAN;
+                    self.balls[row].trajectory.dissipation_count += REST_COST;
                 }
-                for row in self.hold_from_now_on([row, other], 0.0, time, settings).rows {
-                    self.foresee(row, time, settings);
+                for row in self.rest_cluster([row, other], 0.0, time, settings).rows {
+                    self.predict(row, time, settings);
                 }
             }
-            What::Hits(_) if self.loses(row) => {
-                self.surrender([row, row], time, settings);
+            EventKind::WallImpact(_) if self.is_collapsing(row) => {
+                self.stop_collapse([row, row], time, settings);
             }
-            What::Hits(wall) => {
+            EventKind::WallImpact(wall) => {
                 self.advance(row, time);
-                impacts.push(self.hit_wall(row, wall, settings));
-                self.foresee(row, time, settings);
+                impacts.push(self.collide_with_wall(row, wall, settings));
+                self.predict(row, time, settings);
             }
-            What::SettlesOn(wall) => {
+            EventKind::RestOnWall(wall) => {
                 self.advance(row, time);
-                let path = &mut self.balls[row].path;
-                // One that lies on another one may go to and fro between them.
-                path.losses += if path.support.is_some() { LEAN } else { 0.0 };
-                if self.loses(row) {
-                    self.surrender([row, row], time, settings);
+                let trajectory = &mut self.balls[row].trajectory;
+                // A ball between two supports might alternate between them.
+                trajectory.dissipation_count +=
+                    if trajectory.support.is_some() { REST_COST } else { 0.0 };
+                if self.is_collapsing(row) {
+                    self.stop_collapse([row, row], time, settings);
                 } else {
-                    self.settle(row, wall, settings);
-                    self.foresee(row, time, settings);
+                    self.start_resting(row, wall, settings);
+                    self.predict(row, time, settings);
                 }
             }
-            What::Changes => {
+            EventKind::RegimeChange => {
                 self.advance(row, time);
-                self.look_what_it_lies_on(row, settings);
-                self.foresee(row, time, settings);
+                self.recheck_support(row, settings);
+                self.predict(row, time, settings);
             }
-            What::Looks => self.foresee(row, time, settings),
-            What::LeavesCell { axis, to } => {
-                if let Home::Cell(mut cell) = self.balls[row].path.home {
+            EventKind::RefreshCandidates => self.predict(row, time, settings),
+            EventKind::CellCrossing { axis, to } => {
+                if let CellSlot::Cell(mut cell) = self.balls[row].trajectory.cell_slot {
                     self.cells.remove(row as u32);
                     cell[axis] = to;
                     self.cells.insert(row as u32, cell);
-                    self.balls[row].path.home = Home::Cell(cell);
+                    self.balls[row].trajectory.cell_slot = CellSlot::Cell(cell);
                 }
-                self.foresee(row, time, settings);
+                self.predict(row, time, settings);
             }
         }
     }
 
-    /// The way from one ball to another, in metres.
-    fn apart(&self, first: &Ball, second: &Ball) -> Vec3<f64> {
+    /// Vector between the centers of two balls, in metres.
+    fn center_offset(&self, first: &Ball, second: &Ball) -> Vec3<f64> {
         self.period.nearest(second.position - first.position)
     }
 
-    /// Puts every ball where others find it.
-    fn find_homes(&mut self, dt: f64) {
+    /// Assigns balls to cells of the grid.
+    fn assign_cells(&mut self, dt: f64) {
         let largest = self.balls.iter().fold(0.0_f64, |max, ball| max.max(ball.radius));
-        // Rounding must not take a ball that touches out of the neighbouring cell.
+        // Rounding must not move a touching ball out of the neighbouring cell.
         self.cells.reset(self.balls.len(), 2.001 * largest, self.period);
-        self.anywhere.clear();
+        self.unbounded.clear();
         for row in 0..self.balls.len() {
-            if self.crosses_too_many(row, dt) {
-                self.anywhere.push(row);
+            if self.exceeds_cell_limit(row, dt) {
+                self.unbounded.push(row);
             } else {
                 let cell = self.cells.cell(self.balls[row].position);
                 self.cells.insert(row as u32, cell);
-                self.balls[row].path.home = Home::Cell(cell);
+                self.balls[row].trajectory.cell_slot = CellSlot::Cell(cell);
             }
         }
     }
 
-    fn crosses_too_many(&self, row: usize, left: f64) -> bool {
-        let Ball { velocity, path, .. } = &self.balls[row];
-        let fastest = velocity.magnitude() + path.acceleration.magnitude() * left;
-        // Also what has no finite cell at all.
-        let cells = fastest * left / self.cells.least_width();
-        let far = self.balls[row].position;
-        let far = [far.x, far.y, far.z].iter().fold(0.0_f64, |max, x| max.max(x.abs()));
-        // In a period, only who is in its cell knows which image of another one is the next.
+    fn exceeds_cell_limit(&self, row: usize, remaining: f64) -> bool {
+        let Ball { velocity, trajectory, .. } = &self.balls[row];
+        let max_speed = velocity.magnitude() + trajectory.acceleration.magnitude() * remaining;
+        // Non-finite cells fail the test, too.
+        let cells = max_speed * remaining / self.cells.min_width();
+        let coordinate = self.balls[row].position;
+        let coordinate = [coordinate.x, coordinate.y, coordinate.z]
+            .iter()
+            .fold(0.0_f64, |max, x| max.max(x.abs()));
+        // In a period, only cells tell which image of another ball is the nearest.
         let cells = if cells.is_finite() && !self.period.is_open() { 0.0 } else { cells };
-        !(cells <= FAR && far / self.cells.least_width() < 1e15)
+        !(cells <= MAX_CELLS && coordinate / self.cells.min_width() < 1e15)
     }
 
-    /// Has a ball that became too fast looked for everywhere.
-    fn go_home(&mut self, row: usize, now: f64, dt: f64) {
-        if self.balls[row].path.home != Home::Anywhere && self.crosses_too_many(row, dt - now) {
+    /// Moves a ball that became too fast out of the grid.
+    fn update_cell(&mut self, row: usize, now: f64, dt: f64) {
+        if self.balls[row].trajectory.cell_slot != CellSlot::Unbounded
+            && self.exceeds_cell_limit(row, dt - now)
+        {
             self.cells.remove(row as u32);
-            self.anywhere.push(row);
-            self.balls[row].path.home = Home::Anywhere;
+            self.unbounded.push(row);
+            self.balls[row].trajectory.cell_slot = CellSlot::Unbounded;
         }
     }
 }

@@ -1,56 +1,57 @@
-//! A wall within a substep: where it is at each moment, and how it moves there.
+//! Walls within a substep, static or kinematic: shape, motion, and pose at each time.
 
 use cgmath::{InnerSpace, One, Rotation as _, Zero};
 
 use crate::math::{Point3, Quat, Vec3};
 use crate::motion::{WallMotion, integrate_rotation};
-use crate::response::{Material, Walls};
+use crate::response::{Colliders, Material};
 use crate::shape::{Aabb3, BoundedShape, PointProjection, Shape, Triangle};
 
-/// Error of a distance by rounding, over itself and the coordinates: many times what
-/// a handful of operations leave.
+/// Rounding error of a distance, relative to it and the coordinates: many times that of a few
+/// operations.
 const ROUNDING: f64 = 1e-12;
 
-/// A wall, or a part of one, and how it moves.
+/// Wall, or a sub-shape of one (static or kinematic collider).
 #[derive(Clone, Debug)]
 pub(crate) struct Wall {
-    /// As it is at the time that `there` says, or always.
-    pub form: Form,
-    /// Around the form, if it has an end.
+    /// Shape at `arrival_time`, or at all times.
+    pub collider: WallCollider,
+    /// Bounding box of the shape, if it is bounded.
     pub bounds: Option<Aabb3<f64>>,
-    /// Row in the world.
+    /// Row of the wall in the world.
     pub row: u32,
     pub motion: Option<WallMotion<f64>>,
-    /// Of one that was moved to where it is: how many seconds after the begin of the substep
-    /// it comes there. Before, it is where its motion, undone, puts it. None for one that
-    /// stays, and only carries along what lies on it, like a conveyor.
-    pub there: Option<f64>,
+    /// Time after the start of the substep when a moving wall reaches its pose, in seconds; before,
+    /// its motion is rewound. None for a static wall, whose motion only moves the surface, like a
+    /// conveyor.
+    pub arrival_time: Option<f64>,
     pub material: Option<Material<f64>>,
-    /// Error of a point of it by the rounding of its place, over
-    /// its coordinates.
-    pub digit: f64,
+    /// Rounding error of its points, relative to their coordinates.
+    pub relative_rounding: f64,
 }
 
-/// Kinds of a [`Wall`].
+/// Shapes of a [`Wall`].
 #[derive(Clone, Debug)]
-pub(crate) enum Form {
+pub(crate) enum WallCollider {
     Plane {
         normal: Vec3<f64>,
         offset: f64,
     },
     Solid(Shape<f64>),
     Triangle(Triangle<f64>),
-    /// Of a height field.
-    SolidBelow(Triangle<f64>),
+    /// Triangle of a height field, solid below.
+    OneSidedTriangle(Triangle<f64>),
 }
 
-impl Form {
-    /// The box around it, if it has an end.
+impl WallCollider {
+    /// Bounding box, if the shape is bounded.
     pub fn bounds(&self) -> Option<Aabb3<f64>> {
         match self {
             Self::Plane { .. } => None,
             Self::Solid(shape) => Some(shape.bounding_box()),
-            Self::Triangle(triangle) | Self::SolidBelow(triangle) => Some(triangle.bounding_box()),
+            Self::Triangle(triangle) | Self::OneSidedTriangle(triangle) => {
+                Some(triangle.bounding_box())
+            }
         }
     }
 
@@ -62,104 +63,103 @@ impl Form {
             }
             Self::Solid(shape) => shape.project_point(point),
             Self::Triangle(triangle) => triangle.project_point(point),
-            Self::SolidBelow(triangle) => triangle.project_point_one_sided(point),
+            Self::OneSidedTriangle(triangle) => triangle.project_point_one_sided(point),
         }
     }
 }
 
 impl Wall {
-    /// Material that counts between this wall and a ball of that material.
-    pub fn against(&self, ball: Material<f64>) -> Material<f64> {
-        self.material.map_or(ball, |its| ball.against(its))
+    /// Combined material of this wall and a ball.
+    pub fn combined_with(&self, ball: Material<f64>) -> Material<f64> {
+        self.material.map_or(ball, |its| ball.combined_with(its))
     }
 
-    /// The motion of one that goes through the substep, and the time that it still has to go.
-    pub fn going(&self, time: f64) -> Option<(WallMotion<f64>, f64)> {
-        Some((self.motion?, self.there? - time))
+    /// Motion of a moving wall, and the time until it reaches its pose, in seconds.
+    pub fn motion_at(&self, time: f64) -> Option<(WallMotion<f64>, f64)> {
+        Some((self.motion?, self.arrival_time? - time))
     }
 
-    /// Where its surface is nearest to a point at a time.
+    /// PointProjection point of the surface at a time.
     pub fn nearest(&self, point: Point3<f64>, time: f64) -> PointProjection<f64> {
-        let Some((WallMotion { velocity, angular_velocity: spin, pivot }, left)) = self.going(time)
+        let Some((WallMotion { velocity, angular_velocity: spin, pivot }, remaining)) =
+            self.motion_at(time)
         else {
-            return self.form.nearest(point);
+            return self.collider.nearest(point);
         };
-        let on = point + velocity * left;
+        let shifted = point + velocity * remaining;
         if spin.is_zero() {
-            let near = self.form.nearest(on);
-            return PointProjection { point: near.point - velocity * left, ..near };
+            let nearest = self.collider.nearest(shifted);
+            return PointProjection { point: nearest.point - velocity * remaining, ..nearest };
         }
-        let turn = integrate_rotation(Quat::one(), spin, left);
-        let near = self.form.nearest(pivot + turn.rotate_vector(on - pivot));
-        let back = turn.conjugate();
-        let point = pivot - velocity * left + back.rotate_vector(near.point - pivot);
-        PointProjection { point, normal: back.rotate_vector(near.normal), ..near }
+        let rotation = integrate_rotation(Quat::one(), spin, remaining);
+        let nearest = self.collider.nearest(pivot + rotation.rotate_vector(shifted - pivot));
+        let inverse = rotation.conjugate();
+        let point = pivot - velocity * remaining + inverse.rotate_vector(nearest.point - pivot);
+        PointProjection { point, normal: inverse.rotate_vector(nearest.normal), ..nearest }
     }
 
-    /// Lower bound of the distance that [`nearest`](Self::nearest) gives, at the cost of a few
-    /// comparisons; minus infinity where none is known so cheaply.
-    pub fn at_least(&self, point: Point3<f64>, time: f64) -> f64 {
+    /// Lower bound of the distance of [`nearest`](Self::nearest), by a few comparisons; minus
+    /// infinity where there is no cheap one.
+    pub fn distance_lower_bound(&self, point: Point3<f64>, time: f64) -> f64 {
         let Some(bounds) = &self.bounds else { return f64::NEG_INFINITY };
-        let on = match self.going(time) {
+        let shifted = match self.motion_at(time) {
             Some((motion, _)) if !motion.angular_velocity.is_zero() => return f64::NEG_INFINITY,
-            Some((motion, left)) => point + motion.velocity * left,
+            Some((motion, remaining)) => point + motion.velocity * remaining,
             None => point,
         };
-        let gap = bounds.distance_to_point(on);
-        let deep = matches!(self.form, Form::SolidBelow(_))
-            && gap <= (bounds.max - bounds.min).magnitude() * (1.0 + ROUNDING);
-        if deep {
-            return f64::NEG_INFINITY; // it may be inside
+        let distance = bounds.distance_to_point(shifted);
+        let may_be_inside = matches!(self.collider, WallCollider::OneSidedTriangle(_))
+            && distance <= (bounds.max - bounds.min).magnitude() * (1.0 + ROUNDING);
+        if may_be_inside {
+            return f64::NEG_INFINITY; // negative if it is inside
         }
-        gap - ROUNDING * (gap + on.x.abs().max(on.y.abs()).max(on.z.abs()))
+        distance - ROUNDING * (distance + shifted.x.abs().max(shifted.y.abs()).max(shifted.z.abs()))
     }
 
-    /// The velocity of a point that goes with the wall through its step; zero for one that
-    /// stays.
-    pub fn way(&self, point: Point3<f64>, time: f64) -> Vec3<f64> {
-        let Some((motion, left)) = self.going(time) else { return Vec3::zero() };
-        motion.velocity_at(point + motion.velocity * left)
+    /// Velocity of a point that moves with the wall; zero for a static one.
+    pub fn velocity_at(&self, point: Point3<f64>, time: f64) -> Vec3<f64> {
+        let Some((motion, remaining)) = self.motion_at(time) else { return Vec3::zero() };
+        motion.velocity_at(point + motion.velocity * remaining)
     }
 
-    /// The velocity of its surface, which points that way, at a point. What stays has none
-    /// across its surface.
+    /// Surface velocity at a point with this normal; tangential for a static wall.
     pub fn surface_velocity(&self, normal: Vec3<f64>, point: Point3<f64>, time: f64) -> Vec3<f64> {
         let Some(motion) = self.motion else { return Vec3::zero() };
-        if self.there.is_some() {
-            return self.way(point, time);
+        if self.arrival_time.is_some() {
+            return self.velocity_at(point, time);
         }
         let velocity = motion.velocity_at(point);
         velocity - normal * velocity.dot(normal)
     }
 
-    /// Part of a gap to a point that may be due to the rounding of the wall's place.
-    pub fn rounding(&self, point: Point3<f64>) -> f64 {
-        let Some((motion, _)) = self.going(0.0) else { return 0.0 };
+    /// Error of a distance to the wall by the rounding of its pose, in metres.
+    pub fn position_error(&self, point: Point3<f64>) -> f64 {
+        let Some((motion, _)) = self.motion_at(0.0) else { return 0.0 };
         let coordinates = [point, motion.pivot].map(|p| p.x.abs().max(p.y.abs()).max(p.z.abs()));
-        self.digit * (coordinates[0] + coordinates[1])
+        self.relative_rounding * (coordinates[0] + coordinates[1])
     }
 }
 
-/// Walls while things rest on them, from one time to a later one.
-pub(super) struct Between<'a> {
+/// Moving walls between two times, as the impulse solver reads them.
+pub(super) struct MovingWalls<'a> {
     pub walls: &'a [Wall],
-    pub begin: f64,
+    pub start: f64,
     pub end: f64,
 }
 
-impl Walls<f64> for Between<'_> {
+impl Colliders<f64> for MovingWalls<'_> {
     fn normal_and_distance(&self, wall: usize, _: u32, point: Point3<f64>) -> (Vec3<f64>, f64) {
         let PointProjection { normal, distance, .. } = self.walls[wall].nearest(point, self.end);
         (normal, distance)
     }
 
-    fn normal_and_distance_before(
+    fn normal_and_distance_at_start(
         &self,
         wall: usize,
         _: u32,
         point: Point3<f64>,
     ) -> (Vec3<f64>, f64) {
-        let PointProjection { normal, distance, .. } = self.walls[wall].nearest(point, self.begin);
+        let PointProjection { normal, distance, .. } = self.walls[wall].nearest(point, self.start);
         (normal, distance)
     }
 

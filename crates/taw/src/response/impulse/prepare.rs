@@ -1,305 +1,359 @@
-//! From contacts to constraints: what each asks for.
+//! Preparation: contacts become constraints with target velocities.
 
 use cgmath::{InnerSpace, Zero};
 
 use super::islands::{DIRECTIONS, Island, Islands};
-use super::{Around, Before, Constraint, First, Walls};
+use super::{BodyA, Colliders, Constraint, Context, WallsAtStart};
 use crate::contact::Contacts;
 use crate::math::{Mat3, Scalar, Vec3, direction_and_length};
-use crate::response::{Columns, Material};
+use crate::response::{Material, SolverBodies};
 
-/// Finds what each contact asks for, those with walls first, and which are of one island.
+/// Prepares a constraint per contact, walls first, and assigns islands.
 pub(super) fn prepare<S: Scalar>(
-    marbles: &Columns<S>,
+    marbles: &SolverBodies<S>,
     contacts: &Contacts<S>,
-    around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     constraints: &mut Vec<Constraint<S>>,
     islands: &mut Islands<S>,
 ) {
     constraints.clear();
     constraints.extend(
-        First::of_each(contacts)
-            .filter_map(|(a, c)| marbles.constraint(a, c.b as usize, c.along, around)),
+        BodyA::of_each(contacts)
+            .filter_map(|(a, c)| marbles.constraint(a, c.b as usize, c.along, context)),
     );
-    islands.find(constraints, marbles.velocity.len(), around.settings.bounce_speed);
+    islands.build(constraints, marbles.velocity.len(), context.settings.restitution_threshold);
     if !constraints.iter().any(|c| c.bounces) {
         return;
     }
     for c in constraints.iter() {
         let island = islands.of_mut(c);
         island.bounces |= c.bounces;
-        // What turns on its way follows for the whole substep, too.
-        island.leans |= !c.bounces || c.along != [S::zero(); 2];
+        // A rotating capsule's position follows for the whole substep, too.
+        island.has_resting_contact |= !c.bounces || c.axis_offset != [S::zero(); 2];
         if c.bounces {
-            island.since = island.since.max(c.since.unwrap_or(island.since));
+            island.time_since_impact = island
+                .time_since_impact
+                .max(c.time_since_impact.unwrap_or(island.time_since_impact));
         }
     }
     for c in constraints.iter_mut().filter(|c| c.bounces) {
-        marbles.bounce(c, islands.of(c), around);
+        marbles.set_restitution(c, islands.of(c), context);
     }
 }
 
-impl<S: Scalar> Columns<'_, S> {
-    /// What a contact asks for that does not bounce, and whether it does.
+impl<S: Scalar> SolverBodies<'_, S> {
+    /// Constraint of a contact without restitution, and the decision if it bounces.
     fn constraint(
         &self,
-        a: First,
+        a: BodyA,
         b: usize,
-        along: [S; 2],
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        axis_offset: [S; 2],
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> Option<Constraint<S>> {
-        let (normal, gap) = self.touch(a, b, along, around)?;
-        let material = around.material_of(a, b);
-        let surface = match a {
-            First::Wall(wall, _) => {
-                let arm = self.offset(b, along[1]) - normal * self.radius[b];
-                around.walls.surface_velocity(wall as usize, self.position[b] + arm)
-            }
-            First::Marble(_) => Vec3::zero(),
-        };
-        let mobility = self.mobility_of_both(a, b, along, normal);
-        let closing = self.closing(a, b, along, normal, surface);
-        let approach = -closing.dot(normal);
-        // The positions have moved on already, and will follow what changes now. So
-        // this speed is just enough to keep the gap from closing.
-        let (follow, dt) = (around.follows(a, b), around.settings.dt);
-        let fast = approach > around.settings.bounce_speed;
-        let closed = if dt == S::zero() {
+        let (normal, separation) = self.contact_geometry(a, b, axis_offset, context)?;
+        let material = context.material_of(a, b);
+        let surface_velocity = self.surface_velocity(a, b, axis_offset, normal, context);
+        let inverse_effective_mass = self.pair_inverse_effective_mass(a, b, axis_offset, normal);
+        let relative_velocity = self.relative_velocity(a, b, axis_offset, normal, surface_velocity);
+        let approach_speed = -relative_velocity.dot(normal);
+        // Positions have moved already, and will follow the velocity changes. This target velocity
+        // just keeps the separation from closing.
+        let (follow_time, dt) = (context.follow_time(a, b), context.settings.dt);
+        let is_fast = approach_speed > context.settings.restitution_threshold;
+        let target_normal_velocity = if dt == S::zero() {
             S::zero()
-        } else if follow > S::zero() {
-            -approach - gap / follow
-        } else if fast && gap > S::zero() {
-            -approach - gap / dt // it will bounce in the next substep
+        } else if follow_time > S::zero() {
+            -approach_speed - separation / follow_time
+        } else if is_fast && separation > S::zero() {
+            -approach_speed - separation / dt // to bounce in the next substep
         } else {
-            -gap / dt
+            -separation / dt
         };
         let zero = Vec3::zero();
         let mut constraint = Constraint {
             a,
             b,
-            along,
+            axis_offset,
             island: 0,
             normal,
-            surface,
-            mobility,
+            surface_velocity,
+            inverse_effective_mass,
             restitution: material.restitution,
             friction: material.friction,
-            bound: S::zero(),
-            least: S::zero(),
-            begin: closing,
-            begin_turning: zero,
-            bounces: fast && dt == S::zero(),
-            since: None,
-            lag: zero,
-            rebound: closed.min(S::zero()),
-            slide: zero,
-            pressure: S::zero(),
-            grip: zero,
-            ways: [zero; DIRECTIONS],
-            given: [zero; DIRECTIONS],
-            wanted: zero,
-            resistance: self.resistance(a, b, material),
+            friction_bound: S::zero(),
+            min_normal_impulse: S::zero(),
+            initial_relative_velocity: relative_velocity,
+            initial_relative_spin: zero,
+            bounces: is_fast && dt == S::zero(),
+            time_since_impact: None,
+            velocity_since_impact: zero,
+            target_normal_velocity: target_normal_velocity.min(S::zero()),
+            target_tangent_velocity: zero,
+            normal_impulse: S::zero(),
+            tangent_impulse: zero,
+            search_directions: [zero; DIRECTIONS],
+            direction_velocities: [zero; DIRECTIONS],
+            velocity_error: zero,
+            rolling: self.rolling_constraint(a, b, material),
         };
-        constraint.begin_turning = self.turning(&constraint);
-        let since = around.follows(a, b) - around.ahead(&constraint);
-        constraint.lag = self.pull(&constraint, around) * since;
-        // What was stopped on its way touches, whatever rounding says.
-        let stands = around.stands(b) || a.marble().is_some_and(|a| around.stands(a));
-        if fast && (gap < S::zero() || stands) && dt > S::zero() {
-            let since = self.since(&constraint, gap, around);
-            // Unless it is back on the ground before the substep ends.
-            let pull = self.pull(&constraint, around);
-            let speed = material.restitution * self.approach(&constraint, since, around);
-            if speed + pull.dot(normal) * since * S::constant(0.5) >= S::zero() {
-                (constraint.bounces, constraint.since) = (true, Some(since));
-            }
+        constraint.initial_relative_spin = self.relative_spin(&constraint);
+        let since_start = follow_time - context.integrator_lead(&constraint);
+        constraint.velocity_since_impact =
+            self.relative_acceleration(&constraint, context) * since_start;
+        if is_fast {
+            self.detect_bounce(&mut constraint, separation, context);
         }
-        (mobility.normal > S::zero()).then_some(constraint)
+        (inverse_effective_mass.normal > S::zero()).then_some(constraint)
     }
 
-    /// The normal of a contact, and how far the two are apart along it, at the end of the
-    /// substep.
-    fn touch(
+    /// Velocity of the wall's surface at a contact, in m/s; zero between marbles.
+    fn surface_velocity(
         &self,
-        a: First,
+        a: BodyA,
         b: usize,
-        along: [S; 2],
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
-    ) -> Option<(Vec3<S>, S)> {
-        let (normal, gap) = self.normal_and_gap(self.position, a, b, along, around.walls)?;
-        // What pushes along the mean normal of a step does no work, and neither does
-        // an overlap that stays what it was.
-        let before = &Before(around.walls);
-        let start = self.normal_and_gap(around.start.position, a, b, along, before);
-        if let (None, Some(met)) = (start, self.met(a, b, along, normal, around)) {
-            return Some(met);
+        axis_offset: [S; 2],
+        normal: Vec3<S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) -> Vec3<S> {
+        match a {
+            BodyA::Wall(wall, _) => {
+                let arm = self.anchor(b, axis_offset[1]) - normal * self.radius[b];
+                context.walls.surface_velocity(wall as usize, self.position[b] + arm)
+            }
+            BodyA::Marble(_) => Vec3::zero(),
         }
-        Some(start.map_or((normal, gap), |(earlier, overlap)| {
-            let mean = direction_and_length(normal + earlier);
-            (mean.map_or(normal, |(mean, _)| mean), gap - overlap.min(S::zero()))
+    }
+
+    /// Marks a fast contact as bouncing if the impact happened within the substep.
+    fn detect_bounce(
+        &self,
+        c: &mut Constraint<S>,
+        separation: S,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) {
+        // A body stopped by continuous detection is in contact, whatever rounding says.
+        let ccd_stopped =
+            context.is_ccd_stopped(c.b) || c.a.marble().is_some_and(|a| context.is_ccd_stopped(a));
+        if (separation < S::zero() || ccd_stopped) && context.settings.dt > S::zero() {
+            let time_since_impact = self.time_since_impact_of(c, separation, context);
+            // Only if it is not back on the surface before the substep ends.
+            let relative_acceleration = self.relative_acceleration(c, context);
+            let speed = c.restitution * self.approach_speed(c, time_since_impact, context);
+            if speed + relative_acceleration.dot(c.normal) * time_since_impact * S::constant(0.5)
+                >= S::zero()
+            {
+                (c.bounces, c.time_since_impact) = (true, Some(time_since_impact));
+            }
+        }
+    }
+
+    /// Normal and separation of a contact at the end of the substep.
+    fn contact_geometry(
+        &self,
+        a: BodyA,
+        b: usize,
+        axis_offset: [S; 2],
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) -> Option<(Vec3<S>, S)> {
+        let (normal, separation) =
+            self.normal_and_separation(self.position, a, b, axis_offset, context.walls)?;
+        // An impulse along the mean normal of the substep does no work, and constant penetration
+        // does none either.
+        let walls_at_start = &WallsAtStart(context.walls);
+        let start =
+            self.normal_and_separation(context.start.position, a, b, axis_offset, walls_at_start);
+        if let (None, Some(geometry)) =
+            (start, self.contact_at_impact(a, b, axis_offset, normal, context))
+        {
+            return Some(geometry);
+        }
+        Some(start.map_or((normal, separation), |(normal_at_start, separation_at_start)| {
+            let mean = direction_and_length(normal + normal_at_start);
+            (mean.map_or(normal, |(mean, _)| mean), separation - separation_at_start.min(S::zero()))
         }))
     }
 
-    /// The normal of two marbles where they met on their way through this substep, and how far
-    /// they are past that now, if they come together too fast for their place now to tell.
-    fn met(
+    /// Normal and separation of two marbles at their time of impact within this substep, if they
+    /// approach too fast for their present positions to tell.
+    fn contact_at_impact(
         &self,
-        a: First,
+        a: BodyA,
         b: usize,
-        along: [S; 2],
+        axis_offset: [S; 2],
         normal: Vec3<S>,
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> Option<(Vec3<S>, S)> {
         let a = a.marble()?;
-        let dt = around.settings.dt;
+        let dt = context.settings.dt;
         let velocity = self.velocity[b] - self.velocity[a];
-        let slow = around.settings.bounce_speed;
-        // A capsule also turns on its way.
-        let round = along == [S::zero(); 2];
-        if around.start.velocity.is_empty() || velocity.magnitude2() <= slow * slow || !round {
+        let threshold = context.settings.restitution_threshold;
+        // A capsule rotates on its way.
+        let is_sphere_contact = axis_offset == [S::zero(); 2];
+        if context.start.velocity.is_empty()
+            || velocity.magnitude2() <= threshold * threshold
+            || !is_sphere_contact
+        {
             return None;
         }
-        let apart = self.period.nearest(self.position[b] - self.position[a]);
-        let reach = self.radius[a] + self.radius[b];
-        // Back along the way: |apart − velocity t| = reach.
-        let (slope, squared) = (apart.dot(velocity), velocity.magnitude2());
-        let open = (apart.magnitude() - reach) * (apart.magnitude() + reach);
-        let root = slope * slope - squared * open;
+        let center_offset = self.period.nearest(self.position[b] - self.position[a]);
+        let radius_sum = self.radius[a] + self.radius[b];
+        // Backward time of impact: |center_offset − velocity t| = radius_sum.
+        let (radial, speed_squared) = (center_offset.dot(velocity), velocity.magnitude2());
+        let gap_squared =
+            (center_offset.magnitude() - radius_sum) * (center_offset.magnitude() + radius_sum);
+        let root = radial * radial - speed_squared * gap_squared;
         if root < S::zero() {
             return None;
         }
-        let since = (slope + root.sqrt()) / squared;
-        let (there, distance) = direction_and_length(apart - velocity * since)?;
-        let right = since > S::zero() && since <= dt && distance.is_finite();
-        // What pushes one of them otherwise, or rounding, may say that they never came together.
-        (right && there.dot(velocity) < S::zero() && there.dot(normal) > -S::one())
-            .then(|| (there, there.dot(apart) - reach))
+        let time_since_impact = (radial + root.sqrt()) / speed_squared;
+        let (offset_at_impact, distance) =
+            direction_and_length(center_offset - velocity * time_since_impact)?;
+        let is_valid =
+            time_since_impact > S::zero() && time_since_impact <= dt && distance.is_finite();
+        // Other contacts, or rounding, may imply that the two never came together.
+        (is_valid
+            && offset_at_impact.dot(velocity) < S::zero()
+            && offset_at_impact.dot(normal) > -S::one())
+        .then(|| (offset_at_impact, offset_at_impact.dot(center_offset) - radius_sum))
     }
 
-    /// The time since two met that overlap now, in seconds.
-    fn since(
+    /// Time since the impact of a penetrating contact, in seconds.
+    fn time_since_impact_of(
         &self,
         c: &Constraint<S>,
-        gap: S,
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        separation: S,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> S {
-        let down = self.pull(c, around).dot(c.normal);
-        // Under an even pull, positions lie on a parabola whose speed is that of the
-        // integrator at another moment.
-        let end = -c.begin.dot(c.normal) - down * around.ahead(c);
-        let squared = (end * end - down * gap * S::constant(2.0)).max(S::zero());
-        let since = gap * S::constant(-2.0) / (end + squared.sqrt());
-        since.max(S::zero()).min(around.settings.dt)
+        let normal_acceleration = self.relative_acceleration(c, context).dot(c.normal);
+        // Under constant acceleration positions lie on a parabola, with the integrator's velocity
+        // at another time.
+        let end_speed = -c.initial_relative_velocity.dot(c.normal)
+            - normal_acceleration * context.integrator_lead(c);
+        let speed_squared = (end_speed * end_speed
+            - normal_acceleration * separation * S::constant(2.0))
+        .max(S::zero());
+        let time_since_impact = separation * S::constant(-2.0) / (end_speed + speed_squared.sqrt());
+        time_since_impact.max(S::zero()).min(context.settings.dt)
     }
 
-    /// The speed of approach this long ago, in m/s.
-    fn approach(
+    /// Approach speed at the time of impact, in m/s.
+    fn approach_speed(
         &self,
         c: &Constraint<S>,
-        since: S,
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        time_since_impact: S,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> S {
-        let lag = self.pull(c, around) * (since - around.ahead(c));
-        (lag - c.begin).dot(c.normal).max(S::zero())
+        let velocity_since_impact = self.relative_acceleration(c, context)
+            * (time_since_impact - context.integrator_lead(c));
+        (velocity_since_impact - c.initial_relative_velocity).dot(c.normal).max(S::zero())
     }
 
-    /// What a contact asks for that bounces: at the moment of its island's first bounce, with
-    /// the speed of that moment, and positions follow from then on. So no height is won or
-    /// lost by when in a substep a bounce falls due. What bounces among others that rest
-    /// follows for the whole substep, as they do.
-    fn bounce(
+    /// Sets the restitution target: at the time of the island's first impact, with the approach
+    /// speed of that time, and positions follow from then on. So the height of a bounce does not
+    /// depend on when it happens within a substep. A bounce among resting contacts follows for the
+    /// whole substep, as they do.
+    fn set_restitution(
         &self,
         c: &mut Constraint<S>,
         island: &Island<S>,
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) {
-        let since = if island.leans { around.follows(c.a, c.b) } else { island.since };
-        let lag = self.pull(c, around) * (since - around.ahead(c));
-        let speed = c.restitution * self.approach(c, since, around);
-        let before = c.begin - lag;
-        let slip = before - c.normal * before.dot(c.normal);
-        let after = lag - slip * around.material_of(c.a, c.b).tangential_restitution;
-        c.since = c.since.map(|_| since);
-        c.rebound = speed + after.dot(c.normal);
-        (c.slide, c.lag) = (after - c.normal * after.dot(c.normal), lag);
+        let time_since_impact = if island.has_resting_contact {
+            context.follow_time(c.a, c.b)
+        } else {
+            island.time_since_impact
+        };
+        let velocity_since_impact = self.relative_acceleration(c, context)
+            * (time_since_impact - context.integrator_lead(c));
+        let speed = c.restitution * self.approach_speed(c, time_since_impact, context);
+        let velocity_at_impact = c.initial_relative_velocity - velocity_since_impact;
+        let tangent_velocity = velocity_at_impact - c.normal * velocity_at_impact.dot(c.normal);
+        let target_velocity = velocity_since_impact
+            - tangent_velocity * context.material_of(c.a, c.b).tangential_restitution;
+        c.time_since_impact = c.time_since_impact.map(|_| time_since_impact);
+        c.target_normal_velocity = speed + target_velocity.dot(c.normal);
+        (c.target_tangent_velocity, c.velocity_since_impact) =
+            (target_velocity - c.normal * target_velocity.dot(c.normal), velocity_since_impact);
     }
 
-    /// How forces pull the second of a contact from the first in this substep, in m/s².
-    fn pull(
+    /// Relative acceleration of a contact by forces in this substep, in m/s².
+    fn relative_acceleration(
         &self,
         c: &Constraint<S>,
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> Vec3<S> {
-        let first = c.a.marble().map_or_else(Vec3::zero, |a| self.acceleration(a, around));
-        self.acceleration(c.b, around) - first
+        let first = c.a.marble().map_or_else(Vec3::zero, |a| self.acceleration(a, context));
+        self.acceleration(c.b, context) - first
     }
 
-    /// By forces in this substep, in m/s²; nothing where nobody knows.
+    /// Acceleration by forces in this substep, in m/s²; zero where unknown.
     fn acceleration(
         &self,
         row: usize,
-        around: &Around<S, impl Walls<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> Vec3<S> {
-        let change = around.start.velocity.get(row).map(|before| self.velocity[row] - before);
+        let change = context.start.velocity.get(row).map(|before| self.velocity[row] - before);
         change
-            .filter(|_| around.settings.dt > S::zero())
-            .map_or_else(Vec3::zero, |change| change / around.settings.dt)
+            .filter(|_| context.settings.dt > S::zero())
+            .map_or_else(Vec3::zero, |change| change / context.settings.dt)
     }
 }
 
-impl<S, W, M, F> Around<'_, S, W, M, F>
+impl<S, W, M, F> Context<'_, S, W, M, F>
 where
     S: Scalar,
-    W: Walls<S>,
+    W: Colliders<S>,
     M: Fn(usize) -> Material<S>,
     F: Fn(usize) -> S,
 {
-    fn material_of(&self, a: First, b: usize) -> Material<S> {
+    fn material_of(&self, a: BodyA, b: usize) -> Material<S> {
         let own = (self.material)(b);
         match a {
-            First::Wall(wall, _) => {
-                self.walls.material(wall as usize).map_or(own, |its| own.against(its))
+            BodyA::Wall(wall, _) => {
+                self.walls.material(wall as usize).map_or(own, |its| own.combined_with(its))
             }
-            First::Marble(a) => own.against((self.material)(a as usize)),
+            BodyA::Marble(a) => own.combined_with((self.material)(a as usize)),
         }
     }
 
-    /// Whether a row was stopped within the substep.
-    pub(in crate::response) fn stands(&self, row: usize) -> bool {
-        self.stopped(row).is_some()
+    /// Tells if continuous collision detection stopped a row within the substep.
+    pub(in crate::response) fn is_ccd_stopped(&self, row: usize) -> bool {
+        self.ccd_stop(row).is_some()
     }
 
-    /// For a row that was stopped within the substep, the part of a change of velocity that its
-    /// position still follows, per substep.
-    fn stopped(&self, row: usize) -> Option<Mat3<S>> {
-        self.start.stands.get(row).copied().flatten()
+    /// Fraction of a velocity change that the position of a stopped row still follows, as a matrix.
+    fn ccd_stop(&self, row: usize) -> Option<Mat3<S>> {
+        self.start.ccd_stops.get(row).copied().flatten()
     }
 
-    /// Way by which a position follows a change of velocity, in metres.
-    pub(in crate::response) fn follow(&self, row: usize, change: Vec3<S>) -> Vec3<S> {
-        let way = change * (self.follow)(row) * self.settings.dt;
-        self.stopped(row).map_or(way, |along| along * way)
+    /// Displacement of a row by a velocity change, in metres.
+    pub(in crate::response) fn displacement_of(&self, row: usize, change: Vec3<S>) -> Vec3<S> {
+        let displacement = change * (self.position_weight)(row) * self.settings.dt;
+        self.ccd_stop(row).map_or(displacement, |projection| projection * displacement)
     }
 
-    /// The time for which a position follows a change of velocity, in seconds.
-    pub(in crate::response) fn follows_row(&self, row: usize) -> S {
-        if self.stands(row) { S::zero() } else { (self.follow)(row) * self.settings.dt }
+    /// Time for which the position of a row follows a velocity change, in seconds.
+    pub(in crate::response) fn follow_time_of(&self, row: usize) -> S {
+        if self.is_ccd_stopped(row) {
+            S::zero()
+        } else {
+            (self.position_weight)(row) * self.settings.dt
+        }
     }
 
-    /// The time for which a gap follows a change of its speed, in seconds.
-    pub(in crate::response) fn follows(&self, a: First, b: usize) -> S {
-        mean(a, b, |row| self.follows_row(row))
+    /// Time for which a separation follows a change of its speed, in seconds.
+    pub(in crate::response) fn follow_time(&self, a: BodyA, b: usize) -> S {
+        mean(a, b, |row| self.follow_time_of(row))
     }
 
-    /// By how much the velocities that the integrator keeps are ahead of those of the path, in
-    /// seconds.
-    fn ahead(&self, c: &Constraint<S>) -> S {
-        let follow = mean(c.a, c.b, |row| (self.follow)(row));
-        (follow - S::constant(0.5)) * self.settings.dt
+    /// Lead of the integrator's velocities over those of the path, in seconds.
+    fn integrator_lead(&self, c: &Constraint<S>) -> S {
+        let position_weight = mean(c.a, c.b, |row| (self.position_weight)(row));
+        (position_weight - S::constant(0.5)) * self.settings.dt
     }
 }
 
-/// The mean over the marbles of a contact.
-fn mean<S: Scalar>(a: First, b: usize, of: impl Fn(usize) -> S) -> S {
+/// Mean over the marbles of a contact.
+fn mean<S: Scalar>(a: BodyA, b: usize, of: impl Fn(usize) -> S) -> S {
     a.marble().map_or_else(|| of(b), |a| (of(a) + of(b)) * S::constant(0.5))
 }

@@ -1,191 +1,220 @@
-//! The iterations of the impulse method: velocities that all contacts agree on.
+//! Iterations of sequential impulses, and their acceleration.
 
 use cgmath::{InnerSpace, Zero};
 
-use super::islands::{DIRECTIONS, Go, Island, Islands};
-use super::{Constraint, Settings};
+use super::islands::{DIRECTIONS, Island, Islands, SearchStep};
+use super::{Constraint, SolverSettings};
 use crate::math::{Scalar, Vec3, is_finite, length};
-use crate::response::Columns;
-use crate::response::impact::at_most;
+use crate::response::SolverBodies;
+use crate::response::impact::clamp_length;
 
-/// Sweeps over the contacts until they agree, or as often as the settings allow, in those
-/// islands that do not agree yet.
+/// Iterates over the contacts of islands that have not converged, until they do or the iterations
+/// are used up.
 ///
-/// Sweep by sweep alone (Gauss and Seidel), a heavy marble on a light one would take as
-/// many sweeps as it is times as heavy. So after each sweep the solver looks, of all impulses that
-/// are some of this sweep and some of the ways that it went before, for the best ones: sweeps as
-/// preconditioner of a search in a small subspace, as in Anderson's mixing (*Iterative procedures
-/// for nonlinear integral equations*, 1965) and, for contacts, Silcowitz, Niebe and Erleben, *A
-/// nonsmooth nonlinear conjugate gradient method for interactive contact force problems*, 2010.
+/// Plain Gauss–Seidel passes would need as many iterations as a marble is heavier than the one
+/// below it. So after each pass the solver searches the best combination of this pass and the
+/// accelerated steps before it: the pass is the preconditioner of a search in a small subspace, as
+/// in Anderson mixing (*Iterative procedures for nonlinear integral equations*, 1965) and, for
+/// contacts, Silcowitz, Niebe and Erleben, *A nonsmooth nonlinear conjugate gradient method for
+/// interactive contact force problems*, 2010.
 ///
-/// With `f` the impulses, `A f` the change of velocity that they make at the contacts and `w`
-/// the change that the contacts ask for, sweeps and searches lower `½ f·A f − f·w`, the
-/// energy of what is still wanted. Sweeps end the iterations, never a search.
-pub(super) fn solve<S: Scalar>(
-    marbles: &mut Columns<S>,
+/// With `f` the impulses, `A f` the velocity change that they cause at the contacts and `w` the
+/// requested one, passes and searches lower `½ f·A f − f·w`, the energy of the remaining error. A
+/// pass ends the iterations, never a search.
+pub(super) fn iterate<S: Scalar>(
+    marbles: &mut SolverBodies<S>,
     constraints: &mut [Constraint<S>],
     islands: &mut Islands<S>,
-    settings: &Settings<S>,
+    settings: &SolverSettings<S>,
 ) {
-    for sweep in 0..settings.iterations {
+    for iteration in 0..settings.iterations {
         for c in constraints.iter_mut() {
-            if islands.of(c).agrees {
+            if islands.of(c).converged {
                 continue;
             }
-            islands.solved += 1;
-            let before = c.impulse();
-            let change = marbles.solve(c);
-            c.ways[0] = c.impulse() - before;
+            islands.solve_count += 1;
+            let previous_impulse = c.impulse();
+            let change = marbles.solve_point(c);
+            c.search_directions[0] = c.impulse() - previous_impulse;
             let island = islands.of_mut(c);
-            if change > island.change && change > marbles.rounding(c) {
+            if change > island.change && change > marbles.velocity_rounding(c) {
                 island.change = change;
             }
         }
-        let last = sweep + 1 == settings.iterations;
-        if islands.end_sweep(settings.bounce_speed, settings.enough) || last {
+        let is_last = iteration + 1 == settings.iterations;
+        if islands.end_iteration(settings.restitution_threshold, settings.tolerance) || is_last {
             break;
         }
-        marbles.go_on(constraints, islands);
+        marbles.accelerate(constraints, islands);
     }
 }
 
 impl<S: Scalar> Constraint<S> {
-    /// The impulse along the normal and across it that is next to this one and that a contact
-    /// can bear: nothing pulls, and friction is bounded by Coulomb's cone.
-    fn within_cone(&self, impulse: Vec3<S>) -> (S, Vec3<S>) {
-        let along = impulse.dot(self.normal);
-        let pressure = along.max(self.least);
-        (pressure, at_most(impulse - self.normal * along, self.hold(pressure)))
+    /// Projection of an impulse to the friction cone, as normal and tangential impulse: no tension,
+    /// and Coulomb friction.
+    fn project_to_cone(&self, impulse: Vec3<S>) -> (S, Vec3<S>) {
+        let normal_part = impulse.dot(self.normal);
+        let normal_impulse = normal_part.max(self.min_normal_impulse);
+        (
+            normal_impulse,
+            clamp_length(impulse - self.normal * normal_part, self.max_friction(normal_impulse)),
+        )
     }
 
-    /// As much of a change of its impulse as it can bear.
-    fn way_within_cone(&self, way: Vec3<S>) -> Vec3<S> {
-        let (pressure, grip) = self.within_cone(self.impulse() + way);
-        self.normal * (pressure - self.pressure) + (grip - self.grip)
+    /// Change of the impulse, clamped to the cone.
+    fn clamp_to_cone(&self, direction: Vec3<S>) -> Vec3<S> {
+        let (normal_impulse, tangent_impulse) = self.project_to_cone(self.impulse() + direction);
+        self.normal * (normal_impulse - self.normal_impulse)
+            + (tangent_impulse - self.tangent_impulse)
     }
 
-    /// Up to which part of a change of its impulse it still pushes.
-    fn bears_until(&self, way: Vec3<S>) -> S {
-        let along = way.dot(self.normal);
-        if along < S::zero() { (self.least - self.pressure) / along } else { S::infinity() }
+    /// Largest fraction of a change for which the normal impulse stays admissible.
+    fn max_fraction(&self, direction: Vec3<S>) -> S {
+        let normal_part = direction.dot(self.normal);
+        if normal_part < S::zero() {
+            (self.min_normal_impulse - self.normal_impulse) / normal_part
+        } else {
+            S::infinity()
+        }
     }
 
-    /// What friction can be at most beside this pressure.
-    fn hold(&self, pressure: S) -> S {
-        self.friction * pressure + self.bound
+    /// Restricts the search directions to those that the contact can follow.
+    fn restrict_directions(&mut self, island_bounces: bool) {
+        if self.normal_impulse <= S::zero() {
+            self.search_directions = [Vec3::zero(); DIRECTIONS]; // an open contact has no impulse
+        } else if island_bounces
+            || length(self.tangent_impulse)
+                >= self.max_friction(self.normal_impulse) * (S::one() - S::epsilon())
+        {
+            // Sliding friction stays at the cone, whichever way it slides. And restitution can ask
+            // for more than friction in a corner can give, so that both would grow without end.
+            let normal = self.normal;
+            self.search_directions =
+                self.search_directions.map(|direction| normal * direction.dot(normal));
+        }
+    }
+
+    /// Friction bound for a normal impulse.
+    fn max_friction(&self, normal_impulse: S) -> S {
+        self.friction * normal_impulse + self.friction_bound
     }
 }
 
-impl<S: Scalar> Columns<'_, S> {
-    /// The relative velocity of a contact's two points, in m/s.
-    pub(super) fn closing_of(&self, c: &Constraint<S>) -> Vec3<S> {
-        self.closing(c.a, c.b, c.along, c.normal, c.surface)
+impl<S: Scalar> SolverBodies<'_, S> {
+    /// Relative velocity of a contact's two points, in m/s.
+    pub(super) fn relative_velocity_of(&self, c: &Constraint<S>) -> Vec3<S> {
+        self.relative_velocity(c.a, c.b, c.axis_offset, c.normal, c.surface_velocity)
     }
 
-    /// Rounding of the velocities that a contact sees, in m/s. Below it, sweeps would only push
-    /// what is fast to one side.
-    pub(super) fn rounding(&self, c: &Constraint<S>) -> S {
+    /// Rounding of the velocities at a contact, in m/s. Smaller changes would only push fast bodies
+    /// to one side.
+    pub(super) fn velocity_rounding(&self, c: &Constraint<S>) -> S {
         let speed = |row: usize| self.velocity[row].magnitude();
         (speed(c.b) + c.a.marble().map_or_else(S::zero, speed)) * S::epsilon()
     }
 
-    /// The change of relative velocity that a contact still asks for, in m/s.
-    fn wanted(&self, c: &Constraint<S>) -> Vec3<S> {
-        c.normal * c.rebound + c.slide - self.closing_of(c)
+    /// Velocity error: target minus relative velocity, in m/s.
+    fn velocity_error_of(&self, c: &Constraint<S>) -> Vec3<S> {
+        c.normal * c.target_normal_velocity + c.target_tangent_velocity
+            - self.relative_velocity_of(c)
     }
 
-    /// One step toward what a contact asks for. Gives the change of velocity.
-    fn solve(&mut self, c: &mut Constraint<S>) -> S {
-        let wanted = self.wanted(c);
-        let along = wanted.dot(c.normal);
-        let pressure = (c.pressure + along).max(c.least);
-        let across = (wanted - c.normal * along) * (c.mobility.normal / c.mobility.tangent);
-        let grip = at_most(c.grip + across, c.hold(pressure));
-        let change = c.normal * (pressure - c.pressure) + (grip - c.grip);
+    /// Solves one contact point. Returns the velocity change, in m/s.
+    fn solve_point(&mut self, c: &mut Constraint<S>) -> S {
+        let velocity_error = self.velocity_error_of(c);
+        let normal_part = velocity_error.dot(c.normal);
+        let normal_impulse = (c.normal_impulse + normal_part).max(c.min_normal_impulse);
+        let tangential = (velocity_error - c.normal * normal_part)
+            * (c.inverse_effective_mass.normal / c.inverse_effective_mass.tangent);
+        let tangent_impulse =
+            clamp_length(c.tangent_impulse + tangential, c.max_friction(normal_impulse));
+        let change =
+            c.normal * (normal_impulse - c.normal_impulse) + (tangent_impulse - c.tangent_impulse);
         if !is_finite(change) {
-            return S::zero(); // an overflow here must not reach the other one
+            return S::zero(); // an overflow must not reach the other body
         }
-        (c.pressure, c.grip) = (pressure, grip);
-        self.hit_both(c, change);
-        self.resist(c);
+        (c.normal_impulse, c.tangent_impulse) = (normal_impulse, tangent_impulse);
+        self.apply_impulse_pair(c, change);
+        self.solve_rolling(c);
         change.magnitude()
     }
 
-    /// Goes on from a sweep: along it and the ways before, as far along each as brings the contacts
-    /// of each island nearest to what they ask for.
-    fn go_on(&mut self, constraints: &mut [Constraint<S>], islands: &mut Islands<S>) {
+    /// Accelerates a pass: extends it, together with the steps before, to the combination that
+    /// brings each island nearest to its target velocities.
+    fn accelerate(&mut self, constraints: &mut [Constraint<S>], islands: &mut Islands<S>) {
         islands.list.iter_mut().for_each(Island::begin_search);
         for c in constraints.iter_mut() {
-            let Some(island) = islands.searching(c) else { continue };
-            if c.pressure <= S::zero() {
-                c.ways = [Vec3::zero(); DIRECTIONS]; // it parts, and bears nothing
-            } else if island.bounces
-                || length(c.grip) >= c.hold(c.pressure) * (S::one() - S::epsilon())
-            {
-                // It slides, whichever way it does. Or rebounds ask for what friction in a
-                // corner cannot give, and both would grow against each other without end.
-                c.ways = c.ways.map(|way| c.normal * way.dot(c.normal));
-            }
-            c.wanted = self.wanted(c);
+            let Some(island) = islands.accelerating(c) else { continue };
+            c.restrict_directions(island.bounces);
+            c.velocity_error = self.velocity_error_of(c);
         }
-        for c in constraints.iter().filter(|c| islands.of(c).searches) {
-            self.hit_both(c, c.ways[0]);
+        for c in constraints.iter().filter(|c| islands.of(c).accelerating) {
+            self.apply_impulse_pair(c, c.search_directions[0]);
         }
         for c in constraints.iter_mut() {
-            let Some(island) = islands.searching(c) else { continue };
-            c.given[0] = c.wanted - self.wanted(c);
-            island.count_directions(c, self.rounding(c));
+            let Some(island) = islands.accelerating(c) else { continue };
+            c.direction_velocities[0] = c.velocity_error - self.velocity_error_of(c);
+            island.add_directions(c, self.velocity_rounding(c));
         }
-        islands.list.iter_mut().for_each(Island::choose_parts);
-        // Within the cones: what a contact cannot bear would throw others about.
+        islands.list.iter_mut().for_each(Island::solve_weights);
+        // Projected to the cones: inadmissible impulses would throw other marbles about.
         for c in constraints.iter_mut() {
-            let Some(island) = islands.searching(c) else { continue };
-            let (far, given) = (island.combine(&c.ways), island.combine(&c.given));
-            let way = c.way_within_cone(far);
-            let bend = way - far;
-            let across = bend - c.normal * bend.dot(c.normal);
-            let rounding = (c.pressure + length(far)) * S::epsilon();
-            island.count_cone(c.bears_until(far), length(across) > rounding);
-            self.hit_both(c, way - c.ways[0]);
-            // The oldest way makes room.
-            (c.ways, c.given) = ([far, way, c.ways[1]], [given, Vec3::zero(), c.given[1]]);
+            let Some(island) = islands.accelerating(c) else { continue };
+            let (straight, direction_velocities) =
+                (island.combine(&c.search_directions), island.combine(&c.direction_velocities));
+            let direction = c.clamp_to_cone(straight);
+            let clamped = direction - straight;
+            let tangential = clamped - c.normal * clamped.dot(c.normal);
+            let rounding = (c.normal_impulse + length(straight)) * S::epsilon();
+            island.add_cone_limit(c.max_fraction(straight), length(tangential) > rounding);
+            self.apply_impulse_pair(c, direction - c.search_directions[0]);
+            // The oldest direction is dropped.
+            (c.search_directions, c.direction_velocities) = (
+                [straight, direction, c.search_directions[1]],
+                [direction_velocities, Vec3::zero(), c.direction_velocities[1]],
+            );
         }
         for c in constraints.iter_mut() {
-            let Some(island) = islands.searching(c) else { continue };
-            c.given[1] = c.wanted - self.wanted(c);
-            island.count_bent(c, c.ways[1], c.given[1]);
+            let Some(island) = islands.accelerating(c) else { continue };
+            c.direction_velocities[1] = c.velocity_error - self.velocity_error_of(c);
+            island.add_projected(c, c.search_directions[1], c.direction_velocities[1]);
         }
         for c in constraints.iter_mut() {
-            let Some(island) = islands.searching(c) else { continue };
-            let (way, given) = match island.go() {
-                Go::Bent(part) => (c.ways[1] * part, c.given[1] * part),
-                Go::Straight(part) => (c.ways[0] * part, c.given[0] * part),
+            let Some(island) = islands.accelerating(c) else { continue };
+            let (direction, direction_velocities) = match island.choose_step() {
+                SearchStep::Projected(fraction) => {
+                    (c.search_directions[1] * fraction, c.direction_velocities[1] * fraction)
+                }
+                SearchStep::Straight(fraction) => {
+                    (c.search_directions[0] * fraction, c.direction_velocities[0] * fraction)
+                }
             };
-            self.hit_both(c, way - c.ways[1]);
-            // Between two points of a cone lies nothing outside of it, but for rounding.
-            (c.pressure, c.grip) = c.within_cone(c.impulse() + way);
-            (c.ways[1], c.given[1]) = (way, given);
+            self.apply_impulse_pair(c, direction - c.search_directions[1]);
+            // Cones are convex, so only rounding can lie outside.
+            (c.normal_impulse, c.tangent_impulse) = c.project_to_cone(c.impulse() + direction);
+            (c.search_directions[1], c.direction_velocities[1]) = (direction, direction_velocities);
         }
     }
 
-    /// One step toward no relative spin, as far as the resistances can.
-    fn resist(&mut self, c: &mut Constraint<S>) {
-        let Some(resistance) = c.resistance else { return };
-        let wanted = resistance.twist - self.turning(c) / resistance.give;
-        let force = c.pressure / c.mobility.normal;
-        let about = c.normal * wanted.dot(c.normal);
-        let twist = at_most(wanted - about, resistance.rolling * force)
-            + at_most(about, resistance.spinning * force);
-        let change = twist - resistance.twist;
+    /// Solves rolling and torsional friction: one step toward zero relative spin.
+    fn solve_rolling(&mut self, c: &mut Constraint<S>) {
+        let Some(rolling) = c.rolling else { return };
+        let target = rolling.angular_impulse - self.relative_spin(c) / rolling.inverse_inertia;
+        let normal_impulse = c.normal_impulse / c.inverse_effective_mass.normal;
+        let torsional = c.normal * target.dot(c.normal);
+        let angular_impulse =
+            clamp_length(target - torsional, rolling.rolling_lever * normal_impulse)
+                + clamp_length(torsional, rolling.torsional_lever * normal_impulse);
+        let change = angular_impulse - rolling.angular_impulse;
         if is_finite(change) {
-            c.resistance = Some(super::Resistance { twist, ..resistance });
-            self.twist_both(c, change);
+            c.rolling = Some(super::RollingConstraint { angular_impulse, ..rolling });
+            self.apply_angular_impulse_pair(c, change);
         }
     }
 
-    /// How the second of a contact turns against the first, in rad/s.
-    pub(super) fn turning(&self, c: &Constraint<S>) -> Vec3<S> {
-        let first = c.a.marble().map_or_else(Vec3::zero, |a| self.felt_spin(a));
-        self.felt_spin(c.b) - first
+    /// Relative spin of a contact, in rad/s.
+    pub(super) fn relative_spin(&self, c: &Constraint<S>) -> Vec3<S> {
+        let first = c.a.marble().map_or_else(Vec3::zero, |a| self.unlocked_spin(a));
+        self.unlocked_spin(c.b) - first
     }
 }

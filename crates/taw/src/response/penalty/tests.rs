@@ -3,29 +3,29 @@ use crate::broad::Period;
 use crate::math::Point3;
 use crate::response::Elasticity;
 
-/// Two balls of this elasticity meet head-on at `speed` each, with gravity off:
-/// contact time, largest overlap, largest force (by the change of velocity).
+/// Head-on collision of two balls at `speed` each, without gravity: contact time, maximum
+/// penetration, maximum force (by the velocity change).
 fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -> [f64; 3] {
     let mass = 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3) * density;
-    let shear = elasticity.youngs_modulus / (2.0 + 2.0 * elasticity.poissons_ratio);
-    let rayleigh = std::f64::consts::PI * radius * (density / shear).sqrt()
+    let shear_modulus = elasticity.youngs_modulus / (2.0 + 2.0 * elasticity.poissons_ratio);
+    let rayleigh = std::f64::consts::PI * radius * (density / shear_modulus).sqrt()
         / (0.1631 * elasticity.poissons_ratio + 0.8766);
     let dt = 0.01 * rayleigh;
     let mut position = [Point3::new(-radius, 0.0, 0.0), Point3::new(radius, 0.0, 0.0)];
     let mut velocity = [Vec3::new(speed, 0.0, 0.0), Vec3::new(-speed, 0.0, 0.0)];
     let own = Material { restitution: 1.0, elasticity, ..Material::default() };
-    let (mut time, mut overlap, mut force) = (0.0_f64, 0.0_f64, 0.0_f64);
-    let mut shear = Vec::new();
+    let (mut time, mut penetration, mut force) = (0.0_f64, 0.0_f64, 0.0_f64);
+    let mut histories = Vec::new();
     let walls: Vec<crate::shape::Plane<f64>> = Vec::new();
     loop {
         for (position, velocity) in position.iter_mut().zip(velocity) {
             *position += velocity * dt;
         }
-        let apart = position[1].x - position[0].x - 2.0 * radius;
-        if apart > 0.0 {
-            // They parted within this step.
-            time += dt - apart / (velocity[1].x - velocity[0].x);
-            return [time, overlap, force];
+        let separation = position[1].x - position[0].x - 2.0 * radius;
+        if separation > 0.0 {
+            // They separated within this step.
+            time += dt - separation / (velocity[1].x - velocity[0].x);
+            return [time, penetration, force];
         }
         let mut contacts = Contacts::default();
         contacts.mm.push(crate::contact::Contact {
@@ -36,22 +36,30 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
             mtv: Vec3::zero(),
         });
         let before = velocity[1].x;
-        let mut columns = Columns {
+        let mut columns = SolverBodies {
             period: Period::default(),
             position: &mut position,
             velocity: &mut velocity,
             radius: &[radius, radius],
             inverse_mass: &[1.0 / mass, 1.0 / mass],
             spin: &mut [],
-            held: &[],
-            rods: &[],
+            rotation_locked: &[],
+            capsules: &[],
         };
         let law = ContactLaw::HertzMindlin;
-        let setting = Setting { law, dt, material: |_| own, follow: |_| 0.0 };
-        let mut stopped = vec![];
-        penalty(&setting, &mut columns, &mut contacts, &walls, &mut shear, &mut stopped, None);
+        let settings = PenaltySettings { law, dt, material: |_| own, position_weight: |_| 0.0 };
+        let mut quarantined = vec![];
+        apply_penalty_forces(
+            &settings,
+            &mut columns,
+            &mut contacts,
+            &walls,
+            &mut histories,
+            &mut quarantined,
+            None,
+        );
         time += dt;
-        overlap = overlap.max(-apart);
+        penetration = penetration.max(-separation);
         force = force.max((velocity[1].x - before) * mass / dt);
     }
 }
@@ -65,7 +73,7 @@ fn elastic_balls_collide_as_hertz_says() {
     ] {
         let elasticity = Elasticity { youngs_modulus: modulus, poissons_ratio: ratio };
         let found = head_on(elasticity, density, 0.01, 10.0);
-        // The end of the contact is seen only at the end of a step, of 1 %.
+        // The end of the contact shows only at the end of a step, of 1 %.
         for ((found, exact), tolerance) in found.into_iter().zip(exact).zip([1e-2, 1e-3, 1e-3]) {
             assert!((found / exact - 1.0).abs() < tolerance, "{found}, not {exact}");
         }

@@ -106,7 +106,7 @@ impl<S: Scalar> World<S> {
         }
         meetings
             .extend((0..start.len() as u32).filter_map(|row| Meeting::at_wall(row, paths, bends)));
-        if !self.model.response.needs_overlap() {
+        if !self.model.response.needs_penetration() {
             self.predict_meetings(slow);
         }
         self.bend_in_order(self.resting_approach(dt));

@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 
 use super::{By, MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Stopped, outer};
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
-use crate::response::Walls as _;
+use crate::response::Colliders as _;
 use crate::shape::{Aabb, PointProjection, Sphere};
 use crate::world::World;
 use crate::world::walls::{SubShape, Walls};
@@ -161,7 +161,7 @@ impl<S: Scalar> World<S> {
         if !passes {
             return None;
         }
-        let scale = if self.model.response.needs_overlap() { half } else { into };
+        let scale = if self.model.response.needs_penetration() { half } else { into };
         let all = Sphere { radius: sphere.radius * scale, ..*sphere };
         let mut best: Option<WallImpact<S>> = None;
         self.walls.for_each_in_box(&bounds, |part| {

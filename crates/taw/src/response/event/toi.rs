@@ -1,83 +1,81 @@
-//! When two paths meet. Within a substep every path is a parabola, so a distance to a
-//! plane is a quadratic in time and a squared distance between centers a quartic.
+//! Time of impact. Within a substep every trajectory is a parabola, so the distance to a plane is a
+//! quadratic in time, and the squared distance of two centers a quartic.
 
 use cgmath::InnerSpace;
 
 use crate::math::Vec3;
 
-/// Distance of two things along the line that they would touch on, how fast that
-/// grows, and how fast the growth does: m, m/s, m/s².
+/// Separation along a normal, its rate and the rate of that: m, m/s, m/s².
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Gap {
-    pub now: f64,
+pub(super) struct SeparationMotion {
+    pub distance: f64,
     pub speed: f64,
     pub acceleration: f64,
 }
 
-/// After how many seconds a gap that is open closes, if ever.
-pub(super) fn closing_time(gap: Gap) -> Option<f64> {
-    let Gap { now, speed, acceleration } = gap;
-    let discriminant = speed * speed - 2.0 * acceleration * now;
+/// Time of impact on a plane, in seconds, from a positive separation; none if there is no impact.
+pub(super) fn time_of_impact_plane(separation: SeparationMotion) -> Option<f64> {
+    let SeparationMotion { distance, speed, acceleration } = separation;
+    let discriminant = speed * speed - 2.0 * acceleration * distance;
     if discriminant < 0.0 || (speed >= 0.0 && acceleration >= 0.0) {
         return None;
     }
     let root = discriminant.sqrt();
-    // Of the two forms of the solution, the one that subtracts nothing.
-    Some(if speed < 0.0 { 2.0 * now / (root - speed) } else { (speed + root) / -acceleration })
+    // Root of the quadratic equation in the form without cancellation.
+    Some(if speed < 0.0 { 2.0 * distance / (root - speed) } else { (speed + root) / -acceleration })
 }
 
-/// After how many seconds, from `from` to `to`, two centers come within `reach` of each
-/// other. They are `apart`, with this relative velocity and acceleration; at `from` they
-/// are outside.
-pub(super) fn meeting_time(
-    apart: Vec3<f64>,
+/// Time of impact of two spheres between `start` and `end`, in seconds, from the offset of their
+/// centers, relative velocity and relative acceleration; they are separated at `start`.
+pub(super) fn time_of_impact_spheres(
+    center_offset: Vec3<f64>,
     velocity: Vec3<f64>,
     acceleration: Vec3<f64>,
-    reach: f64,
-    [from, to]: [f64; 2],
+    radius_sum: f64,
+    [start, end]: [f64; 2],
 ) -> Option<f64> {
-    let distance = apart.magnitude();
-    // A difference of squares that keeps its digits where they are nearly equal.
-    let open = (distance - reach) * (distance + reach);
-    let (slope, squared) = (apart.dot(velocity), velocity.magnitude2());
+    let distance = center_offset.magnitude();
+    // Difference of squares without cancellation for nearly equal ones.
+    let gap_squared = (distance - radius_sum) * (distance + radius_sum);
+    let (radial, squared) = (center_offset.dot(velocity), velocity.magnitude2());
     if acceleration.magnitude2() == 0.0 {
-        // Relative motion along a line: |apart + velocity t|² = reach².
-        let discriminant = slope * slope - squared * open;
-        if slope >= 0.0 || discriminant < 0.0 {
+        // Relative motion along a line: |center_offset + velocity t|² = radius_sum².
+        let discriminant = radial * radial - squared * gap_squared;
+        if radial >= 0.0 || discriminant < 0.0 {
             return None;
         }
-        let time = open / (discriminant.sqrt() - slope);
-        return (time >= from && time <= to).then_some(time);
+        let time = gap_squared / (discriminant.sqrt() - radial);
+        return (time >= start && time <= end).then_some(time);
     }
     let quartic = [
-        open,
-        2.0 * slope,
-        squared + apart.dot(acceleration),
+        gap_squared,
+        2.0 * radial,
+        squared + center_offset.dot(acceleration),
         velocity.dot(acceleration),
         0.25 * acceleration.magnitude2(),
     ];
-    first_fall_to_zero(quartic, from, to)
+    first_root(quartic, start, end)
 }
 
-/// Where a quartic (lowest coefficient first) first falls from above zero to zero.
+/// First root of a quartic (lowest coefficient first) with a sign change from positive to negative.
 ///
-/// Between the zeros of its second derivative the first is monotone, and between the
-/// zeros of that the quartic itself, so nothing is missed however close two zeros are.
-fn first_fall_to_zero(c: [f64; 5], from: f64, to: f64) -> Option<f64> {
+/// Between the roots of its second derivative the first is monotone, and between the roots of that
+/// the quartic itself, so no root is missed, however close two are.
+fn first_root(c: [f64; 5], start: f64, end: f64) -> Option<f64> {
     let value = |t: f64| (((c[4] * t + c[3]) * t + c[2]) * t + c[1]) * t + c[0];
     let slope = |t: f64| ((4.0 * c[4] * t + 3.0 * c[3]) * t + 2.0 * c[2]) * t + c[1];
-    let mut turns = [to; 3]; // of the quartic
+    let mut extrema = [end; 3]; // of the quartic
     let mut count = 0;
-    let mut lo = from;
-    for hi in inflections(c, from, to) {
+    let mut lo = start;
+    for hi in inflections(c, start, end) {
         if (slope(lo) < 0.0) != (slope(hi) < 0.0) && count < 3 {
-            turns[count] = bisect(slope, lo, hi);
+            extrema[count] = bisect(slope, lo, hi);
             count += 1;
         }
         lo = hi;
     }
-    let mut lo = from;
-    for hi in turns.into_iter().take(count).chain([to]) {
+    let mut lo = start;
+    for hi in extrema.into_iter().take(count).chain([end]) {
         if value(lo) > 0.0 && value(hi) <= 0.0 {
             return Some(bisect(value, lo, hi));
         }
@@ -86,24 +84,24 @@ fn first_fall_to_zero(c: [f64; 5], from: f64, to: f64) -> Option<f64> {
     None
 }
 
-/// Where the curvature of a quartic changes its sign, in order, and then `to`.
-fn inflections(c: [f64; 5], from: f64, to: f64) -> impl Iterator<Item = f64> {
+/// Inflection points of a quartic, in order, and then `end`.
+fn inflections(c: [f64; 5], start: f64, end: f64) -> impl Iterator<Item = f64> {
     // 12 c4 t² + 6 c3 t + 2 c2, halved. c4 is above zero.
     let (a, half_b) = (6.0 * c[4], 1.5 * c[3]);
     let discriminant = half_b * half_b - a * c[2];
     let zeros = if discriminant > 0.0 {
-        // A sum without cancellation, and the other zero by the product.
+        // Sum without cancellation, and the other root by the product.
         let q = -(half_b + half_b.signum() * discriminant.sqrt());
         let (x, y) = (q / a, c[2] / q);
         [x.min(y), x.max(y)]
     } else {
-        [to; 2]
+        [end; 2]
     };
-    zeros.into_iter().filter(move |t| *t > from && *t < to).chain([to])
+    zeros.into_iter().filter(move |t| *t > start && *t < end).chain([end])
 }
 
-/// A zero of a function that has different signs at both ends: by the secant where
-/// that narrows the bracket well, else by halving it (Illinois, Dowell and Jarratt 1971).
+/// Root of a function with different signs at both ends: by the secant where that narrows the
+/// bracket well, else by bisection (Illinois, Dowell and Jarratt 1971).
 fn bisect(f: impl Fn(f64) -> f64, mut lo: f64, mut hi: f64) -> f64 {
     let (mut f_lo, mut f_hi) = (f(lo), f(hi));
     let falling = f_lo > 0.0;
@@ -125,7 +123,7 @@ fn bisect(f: impl Fn(f64) -> f64, mut lo: f64, mut hi: f64) -> f64 {
             return middle;
         }
     }
-    // The side before the touch: what is found there is not inside yet.
+    // The side before the impact, without penetration.
     if falling { lo } else { hi }
 }
 
@@ -137,7 +135,9 @@ mod tests {
 
     #[test]
     fn a_fall_takes_the_square_root_of_twice_its_height() {
-        let gap = |now, speed, acceleration| closing_time(Gap { now, speed, acceleration });
+        let gap = |distance, speed, acceleration| {
+            time_of_impact_plane(SeparationMotion { distance, speed, acceleration })
+        };
         assert_eq!(gap(8.0, 0.0, -4.0), Some(2.0));
         assert_eq!(gap(3.0, -1.0, -4.0), Some(1.0));
         assert_eq!(gap(0.0, 3.0, -2.0), Some(3.0), "up and down again");
@@ -150,9 +150,16 @@ mod tests {
 
     #[test]
     fn balls_on_lines_meet_when_the_distance_says() {
-        let apart = Vec3::new(5.0, 3.0, 0.0);
-        let meet =
-            |v: f64| meeting_time(apart, Vec3::new(-v, 0.0, 0.0), Vec3::zero(), 5.0, [0.0, 9.0]);
+        let center_offset = Vec3::new(5.0, 3.0, 0.0);
+        let meet = |v: f64| {
+            time_of_impact_spheres(
+                center_offset,
+                Vec3::new(-v, 0.0, 0.0),
+                Vec3::zero(),
+                5.0,
+                [0.0, 9.0],
+            )
+        };
         assert!((meet(0.5).unwrap() - 2.0).abs() < 1e-15);
         assert_eq!(meet(-1.0), None);
         assert_eq!(meet(0.1), None, "too late");
@@ -161,24 +168,24 @@ mod tests {
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(2_000))]
 
-        /// Against a walk in small steps.
+        /// Compared with a search in small steps.
         #[test]
         fn the_first_meeting_is_found(
-            apart in [-3.0..3.0_f64, -3.0..3.0, -3.0..3.0],
+            center_offset in [-3.0..3.0_f64, -3.0..3.0, -3.0..3.0],
             velocity in [-3.0..3.0_f64, -3.0..3.0, -3.0..3.0],
             acceleration in [-9.0..9.0_f64, -9.0..9.0, -9.0..9.0],
         ) {
-            let [d, v, a] = [apart, velocity, acceleration].map(Vec3::from);
+            let [d, v, a] = [center_offset, velocity, acceleration].map(Vec3::from);
             prop_assume!(d.magnitude() > 1.01);
             let distance = |t: f64| (d + v * t + a * (0.5 * t * t)).magnitude();
-            let found = meeting_time(d, v, a, 1.0, [0.0, 2.0]);
+            let found = time_of_impact_spheres(d, v, a, 1.0, [0.0, 2.0]);
             let walked = (0..=20_000).map(|i| f64::from(i) * 1e-4).find(|t| distance(*t) <= 1.0);
             match (found, walked) {
                 (Some(found), Some(walked)) => {
                     prop_assert!(found <= walked && found >= walked - 1e-4 - 1e-12);
                     prop_assert!((distance(found) - 1.0).abs() < 1e-12);
                 }
-                // A walk may step over a short visit.
+                // The search may step over a short contact.
                 (Some(found), None) => prop_assert!((distance(found) - 1.0).abs() < 1e-12),
                 (None, walked) => prop_assert_eq!(walked, None),
             }

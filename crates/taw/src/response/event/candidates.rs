@@ -1,0 +1,301 @@
+//! Candidate walls: the walls that a ball may touch. Searched ball by ball, within the distance
+//! that it can travel, so that a ball on a large mesh gets only some of its triangles; searched
+//! again when it gets further.
+
+use std::collections::BTreeMap;
+
+use cgmath::InnerSpace;
+
+use super::{Ball, EventDriven, EventSettings, SEAM_TOLERANCE, Wall};
+use crate::math::Point3;
+
+/// Search range in cells of the grid; enough for most balls.
+const MAX_CELLS_AROUND: f64 = 4.0;
+/// Number of sub-shapes up to which a ball searches further than that.
+const FEW_PARTS: usize = 32;
+/// Cost of a search, besides the sub-shapes found.
+const SEARCH_COST: u64 = 64;
+/// Fraction of the searched range after which a ball searches again.
+const REFRESH_FRACTION: f64 = 0.9;
+/// Extra range over the radius, so that a ball at rest need not search again.
+const EXTRA_RANGE: f64 = 1e-3;
+
+/// Walls of the world, as the event-driven solver reads them.
+pub(crate) trait WallSource {
+    /// Visits all half-spaces.
+    fn planes(&self, visit: &mut dyn FnMut(u32));
+    /// True if there are walls other than half-spaces.
+    fn has_parts(&self) -> bool;
+    /// Visits sub-shapes of other walls that may come within `range` metres of a point in this
+    /// substep.
+    fn near(&self, point: Point3<f64>, range: f64, visit: &mut dyn FnMut(u32, u32));
+    /// Returns a sub-shape of a wall.
+    fn wall(&self, row: u32, part: u32) -> Option<Wall>;
+}
+
+/// Candidate walls of all balls in a substep.
+#[derive(Clone, Debug, Default)]
+pub(super) struct WallCandidates {
+    /// Index in the list of walls, by row and sub-shape.
+    index: BTreeMap<(u32, u32), u32>,
+    ids: Vec<(u32, u32)>,
+    previous_ids: Vec<(u32, u32)>,
+    planes: Vec<u32>,
+    has_parts: bool,
+    /// Indices of candidate walls, ball after ball.
+    lists: Vec<u32>,
+    per_ball: Vec<BallCandidates>,
+}
+
+/// Candidate walls of one ball: all within its radius of any point at most `covered` metres from
+/// `center`.
+#[derive(Clone, Copy, Debug)]
+struct BallCandidates {
+    center: Point3<f64>,
+    /// Range that was searched, in metres.
+    covered: f64,
+    /// Range of its walls in `lists`.
+    walls: [usize; 2],
+}
+
+impl EventDriven {
+    /// Finds the candidate walls of all balls at the start of a substep.
+    pub(super) fn find_candidates(&mut self, settings: &EventSettings) {
+        let source = settings.source;
+        let mut candidates = std::mem::take(&mut self.candidates);
+        std::mem::swap(&mut candidates.ids, &mut candidates.previous_ids);
+        candidates.ids.clear();
+        candidates.lists.clear();
+        candidates.per_ball.clear();
+        candidates.has_parts = source.has_parts();
+        source.planes(&mut |row| candidates.ids.push((row, 0)));
+        let planes = candidates.ids.len();
+        if candidates.has_parts {
+            for row in 0..self.balls.len() {
+                let (center, covered) = self.position_and_range(row, 0.0, settings);
+                let visit = &mut |row, part| candidates.ids.push((row, part));
+                let covered = covered.min(MAX_CELLS_AROUND * self.cells.min_width());
+                source.near(center, covered + self.margin(row), visit);
+            }
+        }
+        let mut flat = candidates.ids[..planes].to_vec();
+        flat.sort_unstable();
+        candidates.ids.sort_unstable();
+        candidates.ids.dedup();
+        self.walls.clear();
+        let walls = &mut self.walls;
+        candidates
+            .ids
+            .retain(|(row, part)| source.wall(*row, *part).map(|wall| walls.push(wall)).is_some());
+        if candidates.ids != candidates.previous_ids {
+            self.impulse_cache.clear(); // its keys are indices of walls
+        }
+        candidates.index.clear();
+        candidates.index.extend(candidates.ids.iter().copied().zip(0..));
+        candidates.planes.clear();
+        candidates.planes.extend(flat.iter().filter_map(|id| candidates.index.get(id).copied()));
+        self.candidates = candidates;
+        if self.candidates.has_parts {
+            for row in 0..self.balls.len() {
+                let none = BallCandidates {
+                    center: self.balls[row].position,
+                    covered: -1.0,
+                    walls: [0; 2],
+                };
+                self.candidates.per_ball.push(none);
+                self.refresh_candidates(row, 0.0, settings);
+            }
+        }
+    }
+
+    /// Searches the candidate walls of a ball, up to the distance that it can travel, or as far as
+    /// they are few.
+    pub(super) fn refresh_candidates(&mut self, row: usize, now: f64, settings: &EventSettings) {
+        let (center, max_range) = self.position_and_range(row, now, settings);
+        let margin = self.margin(row);
+        let mut covered = max_range.min(MAX_CELLS_AROUND * self.cells.min_width());
+        let ids_within = |range: f64| {
+            let mut ids = Vec::new();
+            settings.source.near(center, range + margin, &mut |row, part| ids.push((row, part)));
+            settings.add_cost(ids.len() as u64 + SEARCH_COST);
+            ids
+        };
+        let mut ids = ids_within(covered);
+        while ids.len() <= FEW_PARTS && covered < max_range {
+            let next_range = max_range.min(2.0 * covered);
+            let next_ids = ids_within(next_range);
+            if next_ids.len() > FEW_PARTS {
+                break;
+            }
+            (covered, ids) = (next_range, next_ids);
+        }
+        let Self { candidates: WallCandidates { index, lists, per_ball, .. }, walls, .. } = self;
+        let start = lists.len();
+        lists.extend(ids.into_iter().filter_map(|(row, part)| {
+            index.get(&(row, part)).copied().or_else(|| {
+                walls.push(settings.source.wall(row, part)?);
+                let wall = walls.len() as u32 - 1;
+                index.insert((row, part), wall);
+                Some(wall)
+            })
+        }));
+        settings.add_cost((lists.len() - start) as u64 * super::PART_COST);
+        lists[start..].sort_unstable();
+        per_ball[row] = BallCandidates { center, covered, walls: [start, lists.len()] };
+    }
+
+    /// Time until a ball may leave the range of its candidates, in seconds from now; none within
+    /// this substep. Searches first if needed.
+    pub(super) fn candidates_expiry(
+        &mut self,
+        row: usize,
+        now: f64,
+        settings: &EventSettings,
+    ) -> Option<f64> {
+        self.ensure_candidates(row, now, settings);
+        let ball = &self.balls[row];
+        let (at, remaining) = (ball.position_at(now), settings.dt - now);
+        let BallCandidates { center, covered, .. } = *self.candidates.per_ball.get(row)?;
+        let travelled = (at - center).magnitude();
+        // Between refresh and end of the range, so that each search makes progress.
+        let distance = 0.5 * (1.0 + REFRESH_FRACTION) * covered - travelled;
+        let speed = ball.velocity_at(now).magnitude();
+        // Lower bound of the travel time at this speed and the largest acceleration.
+        let time = 2.0 * distance
+            / (speed + (speed * speed + 2.0 * max_acceleration(ball) * distance).sqrt());
+        // Non-finite balls keep their candidates.
+        (time > 0.0 && time < remaining).then_some(time)
+    }
+
+    /// Searches again if a ball is close to the end of its range.
+    pub(super) fn ensure_candidates(&mut self, row: usize, now: f64, settings: &EventSettings) {
+        let at = self.balls[row].position_at(now);
+        let Some(BallCandidates { center, covered, .. }) = self.candidates.per_ball.get(row) else {
+            return;
+        };
+        if (at - *center).magnitude() >= REFRESH_FRACTION * covered {
+            self.refresh_candidates(row, now, settings);
+        }
+    }
+
+    /// Position of a ball, and an upper bound of its travel in the rest of the substep, in metres.
+    fn position_and_range(
+        &self,
+        row: usize,
+        now: f64,
+        settings: &EventSettings,
+    ) -> (Point3<f64>, f64) {
+        let ball = &self.balls[row];
+        let remaining = settings.dt - now;
+        let range = 2.0 * max_speed(ball, now, remaining) * remaining + EXTRA_RANGE * ball.radius;
+        (ball.position_at(now), range)
+    }
+
+    fn margin(&self, row: usize) -> f64 {
+        let ball = &self.balls[row];
+        ball.radius * (1.0 + SEAM_TOLERANCE) + ball.position_error
+    }
+
+    /// Visits the candidate walls of a ball.
+    pub(super) fn for_each_wall(&self, row: usize, mut visit: impl FnMut(usize)) {
+        self.candidates.planes.iter().for_each(|wall| visit(*wall as usize));
+        self.parts_of(row).iter().for_each(|wall| visit(*wall as usize));
+    }
+
+    /// Candidate walls of a ball other than half-spaces.
+    pub(super) fn parts_of(&self, row: usize) -> &[u32] {
+        let [start, end] = self.candidates.per_ball.get(row).map_or([0; 2], |known| known.walls);
+        &self.candidates.lists[start..end]
+    }
+
+    /// Indices of all half-spaces.
+    pub(super) fn half_spaces(&self) -> &[u32] {
+        &self.candidates.planes
+    }
+
+    /// Cost of testing a ball against all its candidate walls.
+    pub(super) fn wall_cost(&self, row: usize) -> u64 {
+        self.candidates.planes.len() as u64 + super::PART_COST * self.parts_of(row).len() as u64
+    }
+}
+
+/// Upper bound of a ball's speed over the next `remaining` seconds without an event, in m/s.
+fn max_speed(ball: &Ball, now: f64, remaining: f64) -> f64 {
+    ball.velocity_at(now).magnitude() + max_acceleration(ball) * remaining
+}
+
+/// Upper bound of a ball's acceleration without contacts, in m/s².
+fn max_acceleration(ball: &Ball) -> f64 {
+    ball.external_acceleration.magnitude().max(ball.trajectory.acceleration.magnitude())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::Vec3;
+    use crate::response::event::{Trajectory, WallCollider};
+    use crate::response::{BallRotation, Material};
+    use crate::shape::{Shape, Sphere};
+    use cgmath::Zero;
+
+    /// Ten thousand sub-shapes, all at the same distance in metres.
+    struct Crowd(f64);
+
+    impl WallSource for Crowd {
+        fn planes(&self, _: &mut dyn FnMut(u32)) {}
+
+        fn has_parts(&self) -> bool {
+            true
+        }
+
+        fn near(&self, _: Point3<f64>, range: f64, visit: &mut dyn FnMut(u32, u32)) {
+            (0..10_000).filter(|_| range >= self.0).for_each(|part| visit(0, part));
+        }
+
+        fn wall(&self, row: u32, _: u32) -> Option<Wall> {
+            let sphere = Sphere::new(Point3::new(self.0, 0.0, 0.0), 1e-3).ok()?;
+            let collider = WallCollider::Solid(Shape::Sphere(sphere));
+            let bounds = collider.bounds();
+            let (motion, arrival_time, material) = (None, None, None);
+            Some(Wall {
+                collider,
+                bounds,
+                row,
+                motion,
+                arrival_time,
+                material,
+                relative_rounding: 0.0,
+            })
+        }
+    }
+
+    #[test]
+    fn a_fast_ball_looks_as_far_as_walls_are_few_and_no_farther() {
+        let ball = Ball {
+            position: Point3::new(0.0, 0.0, 0.0),
+            velocity: Vec3::unit_x() * 1e6,
+            spin: Vec3::zero(),
+            external_acceleration: Vec3::zero(),
+            radius: 0.1,
+            inverse_mass: 1.0,
+            material: Material::default(),
+            rotation: BallRotation::Free,
+            position_error: 0.0,
+            rotation_increment: Vec3::zero(),
+            trajectory: Trajectory::default(),
+        };
+        for (distance, covered) in [(10.0, 5.0..10.0), (1e9, 2e4..1e9)] {
+            let mut method = EventDriven { balls: vec![ball], ..EventDriven::default() };
+            let source = &Crowd(distance);
+            let settings = EventSettings { dt: 0.01, iterations: 8, source, cost: 0.into() };
+            method.assign_cells(settings.dt);
+            method.find_candidates(&settings);
+            assert!(
+                covered.contains(&method.candidates.per_ball[0].covered),
+                "{:?}",
+                method.candidates.per_ball
+            );
+            assert_eq!(method.parts_of(0).len(), 0);
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! Contact clusters: balls in contact, as columns that the impulse solver works on.
+
+use cgmath::InnerSpace;
+
+use super::wall::MovingWalls;
+use super::{Ball, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
+use crate::broad::Period;
+use crate::contact::Contacts;
+use crate::math::{Point3, Vec3};
+use crate::response::impulse::{
+    self, CachedImpulse, Context, SubstepStart, UnionFind, solve_contacts,
+};
+use crate::response::{BallRotation, EnergyLedger, Material, SolverBodies};
+
+/// Convergence tolerance over the speed that gravity adds in a substep: a hundredth of the rest
+/// threshold.
+const TOLERANCE: f64 = 0.01 * REST_SPEED;
+/// Convergence tolerance over the largest speed, for clusters without gravity: a hundred roundings.
+const ROUNDING: f64 = 100.0 * f64::EPSILON;
+/// Minimum budget of contact solves, over all iterations, whatever the model's iterations: half a
+/// millisecond. Small clusters converge within it; unconverged contacts cost more, as events.
+const MAX_SOLVES: usize = 4_000;
+/// Maximum number of iterations, the same as for a model.
+const MAX_ITERATIONS: u32 = 1000;
+
+/// Cluster of balls in contact, as the impulse solver sees it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Cluster {
+    /// Rows of the balls, sorted.
+    pub rows: Vec<u32>,
+    /// Local index of each ball, its place in `rows`.
+    pub local: Vec<u32>,
+    /// Number of contacts of each ball.
+    pub contact_counts: Vec<u32>,
+    pub bodies: ClusterBodies,
+    /// Positions at the start of the substep.
+    pub start: Vec<Point3<f64>>,
+    pub material: Vec<Material<f64>>,
+    /// Connected components.
+    pub sets: UnionFind,
+    pub scratch: impulse::Scratch<f64>,
+}
+
+/// Columns of the cluster's balls.
+#[derive(Clone, Debug, Default)]
+pub(super) struct ClusterBodies {
+    pub period: Period<f64>,
+    pub position: Vec<Point3<f64>>,
+    pub velocity: Vec<Vec3<f64>>,
+    pub spin: Vec<Vec3<f64>>,
+    radius: Vec<f64>,
+    pub inverse_mass: Vec<f64>,
+    rotation_locked: Vec<bool>,
+}
+
+impl ClusterBodies {
+    fn columns(&mut self) -> SolverBodies<'_, f64> {
+        SolverBodies {
+            period: self.period,
+            position: &mut self.position,
+            velocity: &mut self.velocity,
+            radius: &self.radius,
+            inverse_mass: &self.inverse_mass,
+            spin: &mut self.spin,
+            rotation_locked: &self.rotation_locked,
+            capsules: &[],
+        }
+    }
+}
+
+impl Cluster {
+    /// Gathers the balls of some contacts, and renumbers the contacts to local indices.
+    pub fn gather(&mut self, contacts: &mut Contacts<f64>, balls: &[Ball], period: Period<f64>) {
+        self.bodies.period = period;
+        self.rows.clear();
+        self.rows.extend(contacts.wm.iter().map(|c| c.b));
+        self.rows.extend(contacts.mm.iter().flat_map(|c| [c.a, c.b]));
+        self.rows.sort_unstable();
+        self.rows.dedup();
+        self.local.resize(balls.len(), 0);
+        for (local, row) in self.rows.iter().enumerate() {
+            self.local[*row as usize] = local as u32;
+        }
+        contacts.wm.iter_mut().for_each(|c| c.b = self.local[c.b as usize]);
+        for c in &mut contacts.mm {
+            (c.a, c.b) = (self.local[c.a as usize], self.local[c.b as usize]);
+        }
+        let (rows, bodies) = (&self.rows, &mut self.bodies);
+        let each = || rows.iter().map(|row| &balls[*row as usize]);
+        fill(&mut bodies.position, each().map(|b| b.position));
+        fill(&mut self.start, each().map(|b| b.position));
+        fill(&mut bodies.velocity, each().map(|b| b.velocity));
+        fill(&mut bodies.spin, each().map(|b| b.spin));
+        fill(&mut bodies.radius, each().map(|b| b.radius));
+        fill(
+            &mut bodies.inverse_mass,
+            each().map(|b| if b.is_frozen() { 0.0 } else { b.inverse_mass }),
+        );
+        fill(&mut self.material, each().map(|b| b.material));
+        fill(&mut bodies.rotation_locked, each().map(|b| b.rotation == BallRotation::Locked));
+    }
+
+    /// Local index of a ball, if it is in the cluster.
+    pub fn local_index(&self, row: usize) -> Option<usize> {
+        let local = *self.local.get(row)? as usize;
+        (self.rows.get(local).copied() == Some(row as u32)).then_some(local)
+    }
+
+    /// Convergence tolerance, in m/s.
+    pub fn tolerance(&self, acceleration: f64, settings: &EventSettings) -> f64 {
+        let max_speed = self.bodies.velocity.iter().map(|v| v.magnitude()).fold(0.0, f64::max);
+        (TOLERANCE * acceleration * settings.dt).max(ROUNDING * max_speed)
+    }
+
+    /// Solves the contacts over `dt` seconds; zero for an instantaneous collision.
+    pub fn solve(
+        &mut self,
+        contacts: &mut Contacts<f64>,
+        walls: &MovingWalls,
+        acceleration: f64,
+        dt: f64,
+        settings: &EventSettings,
+        impulse_cache: &mut Vec<CachedImpulse<f64>>,
+    ) {
+        let iterations = (MAX_SOLVES / contacts.len().max(1)) as u32;
+        let settings_ = impulse::SolverSettings {
+            iterations: settings.iterations.max(iterations.min(MAX_ITERATIONS)),
+            dt,
+            restitution_threshold: 2.0 * acceleration * settings.dt,
+            tolerance: self.tolerance(acceleration, settings),
+            // As deep as the largest separation that counts as contact.
+            slop: 0.5 * PRESS_SPEED * PRESS_SPEED * acceleration * settings.dt * settings.dt,
+            max_relative_slop: SLOP,
+        };
+        let mut quarantined = Vec::new(); // non-finite balls are quarantined after the substep
+        let context = Context {
+            walls,
+            material: |local: usize| self.material[local],
+            position_weight: |_| 0.5,
+            start: SubstepStart { position: &self.start, velocity: &[], ccd_stops: &[] },
+            settings: &settings_,
+        };
+        solve_contacts(
+            &mut self.bodies.columns(),
+            contacts,
+            &context,
+            &mut self.scratch,
+            impulse_cache,
+            &mut quarantined,
+        );
+        settings.add_cost(2 * self.scratch.solve_count());
+    }
+
+    /// Books the energy of an instantaneous solve, with the velocities before it.
+    pub fn record_energy(
+        &mut self,
+        velocity: &mut [Vec3<f64>],
+        spin: &mut [Vec3<f64>],
+        work: &mut EnergyLedger,
+    ) {
+        let collisions = work.collisions;
+        self.scratch.record_energy(&mut self.bodies.columns(), velocity, spin, work);
+        work.collisions = collisions; // resting contacts are no collisions
+    }
+}
+
+/// Replaces a column.
+fn fill<T>(column: &mut Vec<T>, values: impl Iterator<Item = T>) {
+    column.clear();
+    column.extend(values);
+}

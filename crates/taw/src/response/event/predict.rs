@@ -1,0 +1,115 @@
+//! Prediction of a ball's next event.
+
+use std::cmp::Reverse;
+
+use cgmath::InnerSpace;
+
+use super::toi::{SeparationMotion, time_of_impact_plane};
+use super::{Ball, CellSlot, Event, EventDriven, EventKind, EventSettings};
+
+impl EventDriven {
+    /// Predicts the next event of a ball and queues it.
+    pub(super) fn predict(&mut self, row: usize, now: f64, settings: &EventSettings) {
+        self.update_cell(row, now, settings.dt);
+        let refresh = self.candidates_expiry(row, now, settings);
+        let walls = self.half_spaces().len() + self.parts_of(row).len();
+        settings.add_cost(1 + walls as u64);
+        let ball = &self.balls[row];
+        let remaining = settings.dt - now;
+        let mut next = (ball.trajectory.regime_end.max(now), EventKind::RegimeChange);
+        let mut simultaneous = false;
+        let mut consider = |after: Option<f64>, kind: EventKind| {
+            // An event in the past by rounding happens now.
+            let Some(after) = after.filter(|after| !after.is_nan()) else { return };
+            let time = now + after.max(0.0);
+            match (next.1, kind) {
+                (EventKind::BallImpact(a, _), EventKind::BallImpact(b, _))
+                    if a != b && time == next.0 =>
+                {
+                    simultaneous = true;
+                }
+                _ if time < next.0 => (next, simultaneous) = ((time, kind), false),
+                _ => {}
+            }
+        };
+        consider(refresh, EventKind::RefreshCandidates);
+        // Walls at rest beyond this distance cannot matter in the rest of the substep.
+        let at = ball.position_at(now);
+        let speed = ball.velocity_at(now).magnitude();
+        let acceleration = ball.trajectory.acceleration.magnitude();
+        let max_distance =
+            ball.radius + ball.position_error + (speed + acceleration * remaining) * remaining;
+        let max_distance = max_distance * (1.0 + 1e-9);
+        self.for_each_wall(row, |wall| {
+            let near = self.walls[wall].motion_at(now).is_some()
+                || self.walls[wall].distance_lower_bound(at, now) <= max_distance;
+            if near
+                && ball.trajectory.support != Some(wall)
+                && let Some((after, kind)) = self.predict_wall(row, wall, now, settings)
+            {
+                consider(Some(after), kind);
+            }
+        });
+        let mut other = |other: usize| {
+            settings.add_cost(1);
+            if other != row
+                && let Some((after, kind)) = self.predict_ball(row, other, now, settings)
+            {
+                consider(Some(after), kind);
+            }
+        };
+        self.for_each_near(row, &mut other);
+        self.for_each_crossing(ball, now, consider);
+        let (time, kind) = next;
+        if time <= now + remaining && time.is_finite() {
+            let version = ball.trajectory.version;
+            self.queue.push(Reverse(Event { time, row, version, kind, simultaneous }));
+        }
+    }
+
+    /// Visits the crossings of the borders of a ball's cell, with the seconds until them.
+    fn for_each_crossing(
+        &self,
+        ball: &Ball,
+        now: f64,
+        mut visit: impl FnMut(Option<f64>, EventKind),
+    ) {
+        let CellSlot::Cell(cell) = ball.trajectory.cell_slot else { return };
+        let (position, velocity) = (ball.position_at(now), ball.velocity_at(now));
+        for (axis, width) in self.cells.width().into_iter().enumerate() {
+            let border = cell[axis] as f64 * width;
+            let (x, v, a) = (position[axis], velocity[axis], ball.trajectory.acceleration[axis]);
+            let above =
+                SeparationMotion { distance: border + width - x, speed: -v, acceleration: -a };
+            let below = SeparationMotion { distance: x - border, speed: v, acceleration: a };
+            for (separation, step) in [(above, 1), (below, -1)] {
+                let to = cell[axis] + step;
+                visit(crossing_time(separation), EventKind::CellCrossing { axis, to });
+            }
+        }
+    }
+
+    /// Visits balls that a ball may touch soon, itself among them.
+    pub(super) fn for_each_near(&self, row: usize, mut visit: impl FnMut(usize)) {
+        match self.balls[row].trajectory.cell_slot {
+            CellSlot::Cell(cell) => {
+                self.cells.for_each_near(cell, &mut visit);
+                self.unbounded.iter().copied().for_each(visit);
+            }
+            CellSlot::Unbounded => (0..self.balls.len()).for_each(visit),
+        }
+    }
+}
+
+/// Time until a center leaves its cell through a border, on which it may lie, in seconds.
+fn crossing_time(separation: SeparationMotion) -> Option<f64> {
+    if separation.distance > 0.0 {
+        time_of_impact_plane(separation)
+    } else if separation.speed < 0.0 || (separation.speed == 0.0 && separation.acceleration < 0.0) {
+        Some(0.0)
+    } else if separation.acceleration < 0.0 {
+        Some(-2.0 * separation.speed / separation.acceleration)
+    } else {
+        None
+    }
+}

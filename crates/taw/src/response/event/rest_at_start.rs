@@ -1,0 +1,240 @@
+//! Rest at the start of a substep: on one wall, in [closed form](super::flat_support), or in
+//! clusters, by the [impulse solver](super::resting_cluster).
+
+use std::collections::BTreeSet;
+
+use cgmath::{InnerSpace, Zero};
+
+use super::wall::Wall;
+use super::{EventDriven, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
+use crate::contact::{Contact, Contacts};
+use crate::math::{Vec3, direction_and_length};
+use crate::shape::PointProjection;
+
+/// Maximum number of projections out of the deepest wall; between two walls at a right angle or
+/// more, two suffice.
+const MAX_MOVES: u32 = 16;
+
+impl EventDriven {
+    /// Finds balls at rest at the start of a substep.
+    pub(super) fn find_resting(&mut self, settings: &EventSettings) {
+        self.near.wm.clear();
+        for row in 0..self.balls.len() {
+            self.find_wall_contacts(row, settings);
+        }
+        let mut near = std::mem::take(&mut self.near);
+        near.mm.retain(|c| {
+            self.ball_contact(c, 0.0, settings)
+                .map_or(self.is_deep_in_ball(c), |speed| speed >= 0.0)
+        });
+        let mut contact_counts = std::mem::take(&mut self.cluster.contact_counts);
+        contact_counts.clear();
+        contact_counts.resize(self.balls.len(), 0);
+        near.wm.iter().for_each(|c| contact_counts[c.b as usize] += 1);
+        near.mm.iter().flat_map(|c| [c.a, c.b]).for_each(|row| contact_counts[row as usize] += 2);
+        near.wm.retain(|c| {
+            let is_alone = contact_counts[c.b as usize] == 1;
+            if is_alone && self.rests_on(c, settings) {
+                self.start_resting(c.b as usize, c.a as usize, settings);
+            }
+            !is_alone
+        });
+        self.cluster.contact_counts = contact_counts;
+        self.end_approach_to_walls(&near, settings);
+        if !near.is_empty() {
+            let mut impulse_cache = std::mem::take(&mut self.impulse_cache);
+            self.solve_resting(&mut near, 0.0, settings, &mut impulse_cache);
+            self.impulse_cache = impulse_cache;
+        }
+        self.near = near;
+    }
+
+    /// Ends the remaining approach of a ball to the walls between which it rests alone. The solver
+    /// would only stop it at the end of the substep, when the ball would have penetrated them.
+    fn end_approach_to_walls(&mut self, near: &Contacts<f64>, settings: &EventSettings) {
+        let in_pairs: BTreeSet<u32> = near.mm.iter().flat_map(|c| [c.a, c.b]).collect();
+        for walls in near.wm.chunk_by(|c, next| c.b == next.b) {
+            let row = walls[0].b;
+            // A moving wall carries the ball in the course of the substep.
+            if in_pairs.contains(&row) || walls.iter().any(|c| self.is_moving(c.a as usize)) {
+                continue;
+            }
+            let mut contacts = Contacts { wm: walls.to_vec(), ..Contacts::default() };
+            self.cluster.gather(&mut contacts, &self.balls, self.period);
+            let max_acceleration = self.balls[row as usize].external_acceleration.magnitude();
+            self.solve_inelastic_impact(&mut contacts, 0.0, max_acceleration, settings);
+            self.end_remaining_approach(
+                &contacts,
+                0.0,
+                REST_SPEED * max_acceleration * settings.dt,
+                settings,
+            );
+            let ball = &mut self.balls[row as usize];
+            (ball.velocity, ball.spin) =
+                (self.cluster.bodies.velocity[0], self.cluster.bodies.spin[0]);
+        }
+    }
+
+    /// Finds the walls that a ball touches at the start. Penetration, beyond the slop, is resolved
+    /// at once: it is no energy.
+    fn find_wall_contacts(&mut self, row: usize, settings: &EventSettings) {
+        self.push_out_of_walls(row, 0.0);
+        let mut near = std::mem::take(&mut self.near.wm);
+        let at = self.balls[row].position;
+        self.for_each_wall(row, |wall| {
+            let mtv = Vec3::zero();
+            let contact = Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
+            let min_speed = if self.is_moving(wall) { f64::NEG_INFINITY } else { 0.0 };
+            if self
+                .wall_contact(&contact, 0.0, 0.0, settings)
+                .is_some_and(|speed| speed >= min_speed)
+                && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, 0.0, settings))
+            {
+                near.push(contact);
+            }
+        });
+        settings.add_cost(2 * self.wall_cost(row));
+        self.near.wm = near;
+    }
+
+    /// Pushes a ball out of the walls that it penetrates.
+    pub(super) fn push_out_of_walls(&mut self, row: usize, now: f64) {
+        if self.balls[row].inverse_mass <= 0.0 {
+            return; // infinite mass: walls do not stop it
+        }
+        self.push_out(row, now, self.parts_of(row).to_vec());
+        // Half-spaces come last, and static ones after moving ones: behind them there is nothing.
+        for is_moving in [true, false] {
+            let planes = self.half_spaces().iter().copied();
+            let planes =
+                planes.filter(|wall| self.is_moving(*wall as usize) == is_moving).collect();
+            self.push_out(row, now, planes);
+        }
+    }
+
+    /// Projects a ball out of the deepest wall, again and again until it penetrates none, or too
+    /// often, as in a gap that is too narrow (von Neumann 1933, alternating projections).
+    fn push_out(&mut self, row: usize, now: f64, walls: Vec<u32>) {
+        for _ in 0..MAX_MOVES {
+            let ball = &self.balls[row];
+            let mut deepest = (SLOP * ball.radius, Vec3::zero());
+            for wall in &walls {
+                let wall = &self.walls[*wall as usize];
+                if wall.distance_lower_bound(ball.position, now) >= ball.radius {
+                    continue;
+                }
+                let near = wall.nearest(ball.position, now);
+                let penetration = ball.radius - near.distance;
+                if penetration > deepest.0 {
+                    deepest = (penetration, near.normal * penetration);
+                }
+            }
+            if deepest.1.is_zero() {
+                break;
+            }
+            self.balls[row].position += deepest.1;
+        }
+    }
+
+    /// Tests if a wall moves through the substep.
+    fn is_moving(&self, wall: usize) -> bool {
+        self.walls[wall].arrival_time.is_some()
+    }
+
+    /// Tests if a ball that touches one wall and nothing else rests on it.
+    fn rests_on(&self, contact: &Contact<f64>, settings: &EventSettings) -> bool {
+        let (separation, speed) = self.wall_separation(contact, 0.0);
+        let ball = &self.balls[contact.b as usize];
+        let fall_speed = ball.external_acceleration.magnitude() * settings.dt;
+        let wall = &self.walls[contact.a as usize];
+        // The velocity of a moved wall jumps at the start; a ball on it does not jump with it.
+        let rest_threshold =
+            if self.is_moving(contact.a as usize) { fall_speed } else { REST_SPEED * fall_speed };
+        let tolerance = 0.5 * REST_SPEED * REST_SPEED * fall_speed * settings.dt;
+        let tolerance = tolerance + ball.position_error + wall.position_error(ball.position);
+        let is_pressed = self.normal_acceleration(
+            contact.b as usize,
+            contact.a as usize,
+            0.0,
+            ball.external_acceleration,
+        ) > 0.0;
+        is_pressed && separation <= tolerance && speed.abs() <= rest_threshold
+    }
+
+    /// Margin of the approach speed of a ball and a wall below the resting speed, in m/s; none if
+    /// they are not in contact.
+    pub(super) fn wall_contact(
+        &self,
+        contact: &Contact<f64>,
+        now: f64,
+        max_separation_speed: f64,
+        settings: &EventSettings,
+    ) -> Option<f64> {
+        let ball = &self.balls[contact.b as usize];
+        let wall = &self.walls[contact.a as usize];
+        let tolerance =
+            self.contact_tolerance(contact.b, settings) + wall.position_error(ball.position);
+        if wall.distance_lower_bound(ball.position, now) > ball.radius + tolerance {
+            return None;
+        }
+        let (separation, speed) = self.wall_separation(contact, now);
+        let fall_speed = ball.external_acceleration.magnitude() * settings.dt;
+        let is_moving = self.is_moving(contact.a as usize) && now == 0.0;
+        let threshold = if is_moving { fall_speed } else { PRESS_SPEED * fall_speed };
+        (separation <= tolerance && speed <= threshold.max(max_separation_speed))
+            .then_some(threshold + speed)
+    }
+
+    /// Margin of the approach speed of two balls below the resting speed, in m/s; none if they are
+    /// not in contact.
+    pub(super) fn ball_contact(
+        &self,
+        contact: &Contact<f64>,
+        max_separation_speed: f64,
+        settings: &EventSettings,
+    ) -> Option<f64> {
+        let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
+        let center_offset = direction_and_length(self.center_offset(first, second));
+        let (normal, distance) = center_offset.unwrap_or((Vec3::unit_x(), 0.0));
+        let speed = (second.velocity - first.velocity).dot(normal);
+        let max_acceleration =
+            first.external_acceleration.magnitude().max(second.external_acceleration.magnitude());
+        let threshold = PRESS_SPEED * max_acceleration * settings.dt;
+        let tolerance = self
+            .contact_tolerance(contact.a, settings)
+            .max(self.contact_tolerance(contact.b, settings));
+        let separation = distance - first.radius - second.radius;
+        (separation <= tolerance && speed <= threshold.max(max_separation_speed))
+            .then_some(threshold + speed)
+    }
+
+    /// Tests for penetration beyond the slop: such balls are separated, however fast they move
+    /// apart.
+    fn is_deep_in_ball(&self, contact: &Contact<f64>) -> bool {
+        let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
+        let center_offset = self.center_offset(first, second);
+        let slop = SLOP * first.radius.min(second.radius);
+        center_offset.magnitude() < first.radius + second.radius - slop
+    }
+
+    /// Largest separation that counts as contact, in metres: the height of a fall that reaches the
+    /// resting speed.
+    fn contact_tolerance(&self, row: u32, settings: &EventSettings) -> f64 {
+        let ball = &self.balls[row as usize];
+        0.5 * PRESS_SPEED
+            * PRESS_SPEED
+            * ball.external_acceleration.magnitude()
+            * settings.dt
+            * settings.dt
+            + ball.position_error
+    }
+
+    /// Separation of a wall and a ball, in metres, and its rate, in m/s.
+    fn wall_separation(&self, contact: &Contact<f64>, now: f64) -> (f64, f64) {
+        let ball = &self.balls[contact.b as usize];
+        let wall: &Wall = &self.walls[contact.a as usize];
+        let PointProjection { normal, distance, .. } = wall.nearest(ball.position, now);
+        let wall_velocity = wall.velocity_at(ball.position, now);
+        (distance - ball.radius, (ball.velocity - wall_velocity).dot(normal))
+    }
+}

@@ -1,0 +1,97 @@
+//! Impulse cache: the impulses of the last substep, for the warm start of the next one.
+
+use cgmath::{InnerSpace, Zero};
+
+use super::{BodyA, Constraint};
+use crate::math::{Scalar, Vec3};
+use crate::response::SolverBodies;
+
+/// Identity of a contact across substeps; sorts walls first, then by rows.
+pub(in crate::response) type ContactKey = (bool, usize, usize, u32, [i8; 2]);
+
+/// Impulse cache entry: the impulses of a contact in the last substep, for the warm start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct CachedImpulse<S> {
+    key: ContactKey,
+    normal_impulse: S,
+    tangent_impulse: Vec3<S>,
+    angular_impulse: Vec3<S>,
+}
+
+/// Key of a contact.
+pub(in crate::response) fn contact_key<S: Scalar>(
+    a: BodyA,
+    b: usize,
+    axis_offset: [S; 2],
+) -> ContactKey {
+    let zero = S::zero();
+    // The ends of capsules, because one capsule often touches with both.
+    let side = axis_offset.map(|offset| if offset > zero { 2 } else { i8::from(offset < zero) });
+    match a {
+        BodyA::Wall(wall, part) => (false, wall as usize, b, part, side),
+        BodyA::Marble(a) => (true, a as usize, b, 0, side),
+    }
+}
+
+impl<S: Scalar> CachedImpulse<S> {
+    /// Entry without friction, from a normal impulse as a change of speed, in m/s.
+    pub(in crate::response) fn of_normal_impulse(key: ContactKey, normal_impulse: S) -> Self {
+        Self { key, normal_impulse, tangent_impulse: Vec3::zero(), angular_impulse: Vec3::zero() }
+    }
+
+    pub(in crate::response) fn key(&self) -> ContactKey {
+        self.key
+    }
+
+    pub(in crate::response) fn normal_impulse(&self) -> S {
+        self.normal_impulse
+    }
+}
+
+impl<S> CachedImpulse<S> {
+    /// Maps its rows to new ones. False if one has none.
+    pub fn remap(&mut self, map_row: impl Fn(usize) -> Option<usize>) -> bool {
+        let (two_marbles, a, b, part, side) = self.key;
+        let a = if two_marbles { map_row(a) } else { Some(a) };
+        let (Some(a), Some(b)) = (a, map_row(b)) else { return false };
+        self.key = (two_marbles, a, b, part, side);
+        true
+    }
+}
+
+/// Stores the impulses for the next substep's warm start.
+pub(super) fn store_impulses<S: Scalar>(
+    constraints: &[Constraint<S>],
+    cache: &mut Vec<CachedImpulse<S>>,
+) {
+    cache.clear();
+    cache.extend(constraints.iter().map(|c| CachedImpulse {
+        key: c.key(),
+        normal_impulse: c.normal_impulse,
+        tangent_impulse: c.tangent_impulse,
+        angular_impulse: c.angular_impulse(),
+    }));
+    cache.sort_unstable_by_key(|entry| entry.key);
+}
+
+impl<S: Scalar> SolverBodies<'_, S> {
+    /// Warm start: applies the impulses of the last substep. Bouncing contacts are new and have
+    /// none.
+    pub(super) fn warm_start(
+        &mut self,
+        constraints: &mut [Constraint<S>],
+        cache: &[CachedImpulse<S>],
+    ) {
+        for c in constraints.iter_mut().filter(|c| !c.bounces) {
+            let Ok(at) = cache.binary_search_by_key(&c.key(), |entry| entry.key) else { continue };
+            let CachedImpulse { normal_impulse, tangent_impulse, angular_impulse, .. } = cache[at];
+            c.normal_impulse = normal_impulse;
+            c.tangent_impulse = tangent_impulse - c.normal * tangent_impulse.dot(c.normal);
+            self.apply_impulse_pair(c, c.impulse());
+            if let Some(rolling) = &mut c.rolling {
+                rolling.angular_impulse = angular_impulse;
+                self.apply_angular_impulse_pair(c, angular_impulse);
+            }
+        }
+    }
+}

@@ -1,0 +1,169 @@
+//! Contact kinematics: separation, relative velocity and effective mass of two bodies, and impulses
+//! applied to both.
+
+use cgmath::Zero;
+
+use super::{BodyA, Colliders, Constraint, RollingConstraint};
+use crate::math::{
+    Point3, Scalar, Vec3, any_direction, cast_vector, direction_and_length, is_finite,
+};
+use crate::response::{BallRotation, InverseEffectiveMass, Material, SolverBodies};
+
+impl<S: Scalar> SolverBodies<'_, S> {
+    /// Normal of a contact, from first to second, and separation of the surfaces, in metres
+    /// (negative: penetration). Coincident centers get an arbitrary direction, different for each
+    /// pair. None where the column of positions is empty, or for a separation that is not finite.
+    pub(in crate::response) fn normal_and_separation(
+        &self,
+        position: &[Point3<S>],
+        a: BodyA,
+        b: usize,
+        axis_offset: [S; 2],
+        walls: &impl Colliders<S>,
+    ) -> Option<(Vec3<S>, S)> {
+        let second = *position.get(b)? + self.anchor(b, axis_offset[1]);
+        let (normal, distance) = match a {
+            BodyA::Wall(wall, part) => walls.normal_and_distance(wall as usize, part, second),
+            BodyA::Marble(a) => {
+                let a = a as usize;
+                let first = *position.get(a)? + self.anchor(a, axis_offset[0]);
+                let direction = direction_and_length(self.period.nearest(second - first));
+                let (normal, distance) =
+                    direction.unwrap_or_else(|| (any_direction(a as u32, b as u32), S::zero()));
+                (normal, distance - self.radius[a])
+            }
+        };
+        let separation = distance - self.radius[b];
+        separation.is_finite().then_some((normal, separation))
+    }
+
+    /// Inverse effective mass of a contact, over both bodies.
+    pub(super) fn pair_inverse_effective_mass(
+        &self,
+        a: BodyA,
+        b: usize,
+        axis_offset: [S; 2],
+        normal: Vec3<S>,
+    ) -> InverseEffectiveMass<S> {
+        if self.capsules.is_empty() {
+            let first = a.marble().map_or((S::zero(), BallRotation::Locked), |a| {
+                (self.inverse_mass[a], self.ball_rotation(a))
+            });
+            return InverseEffectiveMass::of([
+                first,
+                (self.inverse_mass[b], self.ball_rotation(b)),
+            ]);
+        }
+        let second = self.inverse_effective_mass(b, axis_offset[1], normal);
+        a.marble().map_or(second, |a| {
+            second.plus(self.inverse_effective_mass(a, axis_offset[0], -normal))
+        })
+    }
+
+    /// Relative velocity at a contact: that of the second's contact point minus the first's, in
+    /// m/s.
+    pub(in crate::response) fn relative_velocity(
+        &self,
+        a: BodyA,
+        b: usize,
+        axis_offset: [S; 2],
+        normal: Vec3<S>,
+        surface_velocity: Vec3<S>,
+    ) -> Vec3<S> {
+        let mut velocity = self.velocity[b] - surface_velocity;
+        let mut radius_times_spin = self.radius_times_spin(b);
+        if let Some(a) = a.marble() {
+            velocity -= self.velocity[a];
+            radius_times_spin += self.radius_times_spin(a);
+        }
+        if !self.capsules.is_empty() {
+            velocity += self.anchor_spin_velocity(b, axis_offset[1]);
+            if let Some(a) = a.marble() {
+                velocity -= self.anchor_spin_velocity(a, axis_offset[0]);
+            }
+        }
+        velocity + normal.cross(radius_times_spin)
+    }
+
+    /// Relative velocity of the contact points, in m/s, and relative spin, in rad/s.
+    pub(super) fn relative_motion(&self, c: &Constraint<S>) -> [Vec3<f64>; 2] {
+        let first = c.a.marble().map_or_else(Vec3::zero, |a| self.unlocked_spin(a));
+        let relative_velocity =
+            self.relative_velocity(c.a, c.b, c.axis_offset, c.normal, c.surface_velocity);
+        [cast_vector(relative_velocity), cast_vector(self.unlocked_spin(c.b) - first)]
+    }
+
+    /// Velocity of a body of infinite mass; none for a movable one.
+    pub(in crate::response) fn fixed_velocity(&self, row: usize) -> Option<Vec3<f64>> {
+        let is_fixed = self.inverse_mass[row] == S::zero();
+        is_fixed.then(|| cast_vector(self.velocity[row]))
+    }
+
+    /// Rolling and torsional friction of a contact; none for coefficients of zero.
+    pub(super) fn rolling_constraint(
+        &self,
+        a: BodyA,
+        b: usize,
+        material: Material<S>,
+    ) -> Option<RollingConstraint<S>> {
+        let Material { rolling_resistance, spinning_resistance, .. } = material;
+        let is_zero = rolling_resistance == S::zero() && spinning_resistance == S::zero();
+        if is_zero {
+            return None;
+        }
+        let inverse_inertia = |row: usize| self.inverse_inertia(row);
+        let (radius, inverse_inertia) = match a {
+            BodyA::Wall(..) => (self.radius[b], inverse_inertia(b)),
+            BodyA::Marble(a) => {
+                let a = a as usize;
+                let (r, s) = (self.radius[a], self.radius[b]);
+                (r * s / (r + s), inverse_inertia(a) + inverse_inertia(b))
+            }
+        };
+        (inverse_inertia > S::zero()).then(|| RollingConstraint {
+            rolling_lever: rolling_resistance * radius,
+            torsional_lever: spinning_resistance * radius,
+            inverse_inertia,
+            angular_impulse: Vec3::zero(),
+        })
+    }
+
+    /// Zeroes velocities that are infinite or NaN, and lists their rows.
+    pub(super) fn quarantine_non_finite(
+        &mut self,
+        constraints: &[Constraint<S>],
+        quarantined: &mut Vec<u32>,
+    ) {
+        for row in constraints.iter().flat_map(|c| [Some(c.b), c.a.marble()]).flatten() {
+            if !is_finite(self.velocity[row]) {
+                self.velocity[row] = Vec3::zero();
+                quarantined.push(row as u32);
+            }
+        }
+    }
+
+    /// Applies an angular impulse to the second body, its opposite to the first.
+    pub(super) fn apply_angular_impulse_pair(
+        &mut self,
+        c: &Constraint<S>,
+        angular_impulse: Vec3<S>,
+    ) {
+        self.apply_angular_impulse(c.b, angular_impulse);
+        if let Some(a) = c.a.marble() {
+            self.apply_angular_impulse(a, -angular_impulse);
+        }
+    }
+
+    /// Applies an impulse to the second body, its opposite to the first; `impulse_speed` is the
+    /// impulse times the normal inverse effective mass.
+    pub(super) fn apply_impulse_pair(&mut self, c: &Constraint<S>, impulse_speed: Vec3<S>) {
+        // The impulse of a pebble may be too small for the scalar.
+        let fraction = |row: usize| self.inverse_mass[row] / c.inverse_effective_mass.normal;
+        let second = impulse_speed * fraction(c.b);
+        if let Some(a) = c.a.marble() {
+            let first = -impulse_speed * fraction(a);
+            self.apply_impulse(a, first, -c.normal, c.axis_offset[0]);
+        }
+        self.apply_impulse(c.b, second, c.normal, c.axis_offset[1]);
+    }
+}

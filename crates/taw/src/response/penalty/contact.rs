@@ -1,0 +1,215 @@
+//! Geometry and relative motion of a penalty contact.
+
+use cgmath::{InnerSpace, Zero};
+
+use super::PenaltySettings;
+use crate::math::{Scalar, Vec3, cast_vector, direction_and_length, is_finite};
+use crate::response::impulse::BodyA;
+use crate::response::material::Compliance;
+use crate::response::{
+    Colliders, EnergyLedger, ImpulseSample, InverseEffectiveMass, Material, SolverBodies,
+};
+
+/// Identity of a contact: two marbles or not, rows, sub-shape of the wall, ends of capsules.
+pub(super) type SpringKey = (bool, u32, u32, u32, [i8; 2]);
+
+/// Penalty contact: bodies, geometry and relative motion.
+pub(super) struct PenaltyContact<S> {
+    pub key: SpringKey,
+    /// First body; none for a wall.
+    pub a: Option<usize>,
+    pub b: usize,
+    /// Offset along the axis of each capsule, in metres.
+    pub axis_offset: [S; 2],
+    /// Unit normal from a to b.
+    pub normal: Vec3<S>,
+    pub penetration: S,
+    /// Velocity of b's contact point relative to a's, and of the wall's surface, in m/s.
+    pub relative_velocity: Vec3<S>,
+    pub surface_velocity: Vec3<S>,
+    /// Inverse effective mass of each body, a first.
+    pub inverse_effective_masses: [InverseEffectiveMass<S>; 2],
+    pub has_capsule: bool,
+    /// Sum of the curvatures, in 1/m.
+    pub curvature: S,
+    pub material: Material<S>,
+    /// Sum of the compliances.
+    pub compliance: Compliance<S>,
+}
+
+pub(super) fn find_contact<S: Scalar>(
+    settings: &PenaltySettings<S, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    marbles: &SolverBodies<S>,
+    walls: &impl Colliders<S>,
+    (two_marbles, a, b, part): (bool, u32, u32, u32),
+    axis_offset: [S; 2],
+) -> Option<PenaltyContact<S>> {
+    // The ends of capsules.
+    let side = axis_offset.map(|x| if x > S::zero() { 2 } else { i8::from(x < S::zero()) });
+    let key = (two_marbles, a, b, part, side);
+    let (a, b) = (a as usize, b as usize);
+    let anchor_position =
+        |row: usize, axis_offset: S| marbles.position[row] + marbles.anchor(row, axis_offset);
+    // Displacement since the position of the step's own kick; see this module's docs. Along the
+    // present normal, because internal edges are known for that one.
+    let moved =
+        |row: usize| marbles.velocity[row] * (settings.dt * (settings.position_weight)(row));
+    let mut displacement = moved(b);
+    let mut relative_velocity =
+        marbles.velocity[b] + marbles.anchor_spin_velocity(b, axis_offset[1]);
+    let mut radius_times_spin = marbles.radius_times_spin(b);
+    let center = anchor_position(b, axis_offset[1]);
+    let mut curvature = S::one() / marbles.radius[b];
+    let mut surface_velocity = Vec3::zero();
+    let (material, compliance) = surfaces(settings, walls, two_marbles.then_some(a), a, b);
+    let (normal, distance);
+    if two_marbles {
+        displacement -= moved(a);
+        let center_offset = marbles.period.nearest(center - anchor_position(a, axis_offset[0]));
+        let direction = direction_and_length(center_offset);
+        let (direction, centers) = direction.unwrap_or((Vec3::unit_x(), S::zero()));
+        (normal, distance) = (direction, centers - marbles.radius[a]);
+        relative_velocity -= marbles.velocity[a] + marbles.anchor_spin_velocity(a, axis_offset[0]);
+        radius_times_spin += marbles.radius_times_spin(a);
+        curvature += S::one() / marbles.radius[a];
+    } else {
+        (normal, distance) = walls.normal_and_distance(a, part, center);
+        surface_velocity = walls.surface_velocity(a, center - normal * marbles.radius[b]);
+        relative_velocity -= surface_velocity;
+    }
+    let none = InverseEffectiveMass { normal: S::zero(), tangent: S::zero() };
+    let first =
+        if two_marbles { marbles.inverse_effective_mass(a, axis_offset[0], -normal) } else { none };
+    let contact = PenaltyContact {
+        key,
+        a: two_marbles.then_some(a),
+        b,
+        axis_offset,
+        normal,
+        penetration: marbles.radius[b] - distance + displacement.dot(normal),
+        relative_velocity: relative_velocity + normal.cross(radius_times_spin),
+        surface_velocity,
+        inverse_effective_masses: [
+            first,
+            marbles.inverse_effective_mass(b, axis_offset[1], normal),
+        ],
+        has_capsule: marbles.capsule(b).is_some() || two_marbles && marbles.capsule(a).is_some(),
+        curvature,
+        material,
+        compliance,
+    };
+    (marbles.radius[b] > distance && contact.is_active()).then_some(contact)
+}
+
+/// Combined material and compliance of the surfaces of a contact.
+fn surfaces<S: Scalar>(
+    settings: &PenaltySettings<S, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    walls: &impl Colliders<S>,
+    marble_a: Option<usize>,
+    a: usize,
+    b: usize,
+) -> (Material<S>, Compliance<S>) {
+    let own = (settings.material)(b);
+    let compliance = own.elasticity.compliance();
+    let other = marble_a.map_or_else(|| walls.material(a), |a| Some((settings.material)(a)));
+    // A wall without a material of its own is rigid.
+    let Some(other) = other else { return (own, compliance) };
+    (own.combined_with(other), compliance.plus(other.elasticity.compliance()))
+}
+
+impl<S: Scalar> PenaltyContact<S> {
+    /// True if there is a finite penetration, and a body that can move.
+    fn is_active(&self) -> bool {
+        self.penetration > S::zero()
+            && self.penetration.is_finite()
+            && self.inverse_effective_mass().normal > S::zero()
+            && is_finite(self.relative_velocity)
+    }
+
+    pub fn inverse_effective_mass(&self) -> InverseEffectiveMass<S> {
+        self.inverse_effective_masses[0].plus(self.inverse_effective_masses[1])
+    }
+
+    pub fn velocities(&self, marbles: &SolverBodies<S>) -> [Vec3<S>; 2] {
+        [self.a.map_or_else(Vec3::zero, |a| marbles.velocity[a]), marbles.velocity[self.b]]
+    }
+
+    /// Relative velocity of the contact points now, in m/s.
+    pub fn relative_velocity(&self, marbles: &SolverBodies<S>) -> Vec3<S> {
+        let first = self.a.map_or(BodyA::Wall(0, 0), |a| BodyA::Marble(a as u32));
+        marbles.relative_velocity(
+            first,
+            self.b,
+            self.axis_offset,
+            self.normal,
+            self.surface_velocity,
+        )
+    }
+
+    pub fn separation_speed(&self, marbles: &SolverBodies<S>) -> S {
+        self.relative_velocity(marbles).dot(self.normal)
+    }
+
+    /// Books the energy of an impulse, after all were applied.
+    pub fn record_energy(
+        &self,
+        marbles: &SolverBodies<S>,
+        impulse: Vec3<S>,
+        work: &mut EnergyLedger,
+    ) {
+        let mean_velocity =
+            cast_vector::<S, f64>(self.relative_velocity + self.relative_velocity(marbles)) * 0.5;
+        self.record_impulse(marbles, impulse, mean_velocity, work);
+        work.collisions += 1;
+    }
+
+    pub fn record_impulse(
+        &self,
+        marbles: &SolverBodies<S>,
+        impulse: Vec3<S>,
+        mean_velocity: Vec3<f64>,
+        work: &mut EnergyLedger,
+    ) {
+        let surface_velocity = Some(cast_vector(self.surface_velocity));
+        let fixed_velocity = [
+            self.a.map_or(surface_velocity, |a| marbles.fixed_velocity(a)),
+            marbles.fixed_velocity(self.b),
+        ];
+        let (impulse, normal) = (cast_vector(impulse), cast_vector(self.normal));
+        work.record_impulse(ImpulseSample { impulse, normal, mean_velocity, fixed_velocity });
+    }
+
+    pub fn apply_impulse(&self, marbles: &mut SolverBodies<S>, impulse: Vec3<S>) {
+        let [first, second] = self.axis_offset;
+        for (row, impulse, normal, axis_offset) in
+            [(Some(self.b), impulse, self.normal, second), (self.a, -impulse, -self.normal, first)]
+        {
+            let Some(row) = row else { continue };
+            marbles.apply_impulse(row, impulse * marbles.inverse_mass[row], normal, axis_offset);
+        }
+    }
+
+    /// Angular impulse that would stop the relative spin, in kg m²/s, if `counts` contacts share
+    /// each body; zero without rolling or torsional friction.
+    pub fn rolling_impulse(&self, marbles: &SolverBodies<S>, counts: [S; 2]) -> Vec3<S> {
+        let Material { rolling_resistance, spinning_resistance, .. } = self.material;
+        if rolling_resistance == S::zero() && spinning_resistance == S::zero() {
+            return Vec3::zero();
+        }
+        let mut inverse_inertia = marbles.inverse_inertia(self.b) * counts[1];
+        if let Some(a) = self.a {
+            inverse_inertia += marbles.inverse_inertia(a) * counts[0];
+        }
+        if inverse_inertia > S::zero() {
+            self.relative_spin(marbles) / inverse_inertia
+        } else {
+            Vec3::zero()
+        }
+    }
+
+    /// Relative spin, in rad/s.
+    pub fn relative_spin(&self, marbles: &SolverBodies<S>) -> Vec3<S> {
+        let first = self.a.map_or_else(Vec3::zero, |a| marbles.unlocked_spin(a));
+        marbles.unlocked_spin(self.b) - first
+    }
+}
