@@ -10,7 +10,7 @@ use std::fmt::Write;
 use std::future::Future;
 
 use taw::prelude::*;
-use taw::scene::{Running, Scene};
+use taw::scene::{Scene, Simulation};
 use web_time::Instant;
 
 use crate::scene::{EXACT, IMPULSE};
@@ -62,11 +62,11 @@ pub trait Source: Sync {
 
 impl Source for Scene {
     fn seconds(&self) -> f64 {
-        self.seconds
+        self.duration
     }
 
     fn smallest(&self) -> f64 {
-        self.balls().map(|ball| ball.radius).fold(f64::MAX, f64::min)
+        self.all_marbles().map(|ball| ball.radius).fold(f64::MAX, f64::min)
     }
 
     fn numbers(&self) -> &'static [Number] {
@@ -79,7 +79,7 @@ impl Source for Scene {
 
     async fn film(&self, setting: Setting, nudged: bool, every: f64) -> Option<Film> {
         if nudged {
-            let marbles = self.balls().map(|mut ball| {
+            let marbles = self.all_marbles().map(|mut ball| {
                 ball.position = ball.position.map(up);
                 ball
             });
@@ -151,7 +151,7 @@ impl Source for Snapshot {
                 world.marbles.set_position(id, position).ok()?;
             }
         }
-        film(Running::from(world), [self.seconds, setting.step, every]).await
+        film(Simulation::from(world), [self.seconds, setting.step, every]).await
     }
 }
 

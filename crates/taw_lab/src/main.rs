@@ -263,7 +263,7 @@ fn bench(file: &Path, model: &str, number: Number, step: f64) -> Result<ExitCode
     ] {
         println!("| {name} | {:.1} | {:.0} % |", time * 1e6, 100.0 * time / all);
     }
-    let marbles = scene.balls().count();
+    let marbles = scene.all_marbles().count();
     println!("\n{marbles} marbles, {contacts:.1} contacts in the mean");
     println!("{bytes} bytes, {:.0} for each marble", bytes as f64 / marbles.max(1) as f64);
     Ok(ExitCode::SUCCESS)

@@ -43,7 +43,7 @@ fn measure_in<S: Scalar>(
     Setting { model, step, .. }: Setting,
     allocated: impl Fn() -> usize,
 ) -> Result<Stages, Error> {
-    let steps = (scene.seconds / step).round() as usize;
+    let steps = (scene.duration / step).round() as usize;
     let mut times = [0; 3].map(|_| Vec::with_capacity(steps));
     let before = allocated();
     let mut running = scene.run::<S>(model)?;

@@ -28,17 +28,17 @@ fn the_documented_model_is_picked_on_three_scenes() {
         let wish = Wish { most: Some(1e-3), ..NOTHING };
         let (scene, advice) = on(text, wish);
         let best = advice.best(wish).unwrap();
-        assert_eq!(best.setting.model.response, response, "{}", scene.about);
+        assert_eq!(best.setting.model.response, response, "{}", scene.description);
         assert!(best.wrong() <= 1e-3);
         // On a busy machine, two short substeps may measure as cheap as one.
         let suffices = |choice: &Choice| {
             let Model { response: by, substeps, .. } = choice.setting.model;
             by == response && substeps == 1 && choice.wrong() <= 1e-3
         };
-        assert!(advice.choices.iter().any(suffices), "one substep suffices: {}", scene.about);
+        assert!(advice.choices.iter().any(suffices), "one substep suffices: {}", scene.description);
         let cheaper = advice.choices.iter().take_while(|choice| choice.cost < best.cost);
         assert!(cheaper.into_iter().all(|choice| choice.wrong() > 1e-3));
-        assert!((advice.told - scene.seconds).abs() < 1e-9, "{} s", advice.told);
+        assert!((advice.told - scene.duration).abs() < 1e-9, "{} s", advice.told);
         let said = advice.text(wish);
         assert!(said.contains(&format!("response: Response::{response:?}")), "{said}");
     }
@@ -77,23 +77,23 @@ fn advice_is_in_the_numbers_that_were_asked_for() {
 #[test]
 fn chaos_is_noticed() {
     let text = "(
-        seconds: 8,
+        duration: 8,
         gravity: (0, 0, 0),
-        surface: (restitution: 1, friction: 0),
+        material: (restitution: 1, friction: 0),
         walls: [
-            (shape: HalfSpace(normal: (1, 0, 0), through: (-1, 0, 0))),
-            (shape: HalfSpace(normal: (-1, 0, 0), through: (1, 0, 0))),
-            (shape: HalfSpace(normal: (0, 1, 0), through: (0, -1, 0))),
-            (shape: HalfSpace(normal: (0, -1, 0), through: (0, 1, 0))),
-            (shape: HalfSpace(normal: (0, 0, 1), through: (0, 0, -0.2))),
-            (shape: HalfSpace(normal: (0, 0, -1), through: (0, 0, 0.2))),
+            (shape: HalfSpace(normal: (1, 0, 0), point: (-1, 0, 0))),
+            (shape: HalfSpace(normal: (-1, 0, 0), point: (1, 0, 0))),
+            (shape: HalfSpace(normal: (0, 1, 0), point: (0, -1, 0))),
+            (shape: HalfSpace(normal: (0, -1, 0), point: (0, 1, 0))),
+            (shape: HalfSpace(normal: (0, 0, 1), point: (0, 0, -0.2))),
+            (shape: HalfSpace(normal: (0, 0, -1), point: (0, 0, 0.2))),
         ],
         marbles: [(position: (-0.9, 0.31, 0), radius: 0.05, velocity: (40, 3, 0))],
         lattices: [(
             first: (position: (-0.5, -0.5, 0), radius: 0.1),
             count: (4, 4, 1),
             pitch: (0.3, 0.3, 1),
-            disorder: 0.2,
+            jitter: 0.2,
         )],
     )";
     let (_, advice) = on(text, NOTHING);
@@ -108,9 +108,9 @@ fn bad_scenes_are_refused_with_line_and_field() {
         let error = read_scene(&MAZE.replacen(from, to, 1)).unwrap_err();
         assert!(say.iter().all(|word| error.contains(word)), "{error}");
     };
-    refused("seconds: 3", "seconds: 0", &["4:", "seconds", "above zero", "is 0"]);
+    refused("duration: 3", "duration: 0", &["4:", "duration", "above zero", "is 0"]);
     refused("restitution: 0.4", "restitution: 1.4", &["5:", "surface.restitution", "[0, 1]"]);
-    refused("at: 1.5", "at: NaN", &["9:", "tilts[2].at", "NaN"]);
+    refused("time: 1.5", "time: NaN", &["9:", "gravity_keyframes[2].time", "NaN"]);
     refused("radius: 0.03", "radius: -0.03", &["18:", "walls[5].shape.Capsule.radius", "-0.03"]);
     refused("radius: 0.01", "radius: 0.01, mass: 3", &["20:", "mass"]);
     refused("marbles: [", "marbles: ", &["20:"]);
@@ -229,8 +229,8 @@ fn only_overlap_beyond_that_of_the_reference_counts() {
 /// touch.
 #[test]
 fn energy_is_of_gravity_as_it_is() {
-    let text = "(seconds: 1, marbles: [(position: (1, 2, 3), radius: 0.1, density: 1000)],
-        tilts: [(at: 0, gravity: (0, -9, 0)), (at: 1, gravity: (4, -8, 0))])";
+    let text = "(duration: 1, marbles: [(position: (1, 2, 3), radius: 0.1, density: 1000)],
+        gravity_keyframes: [(time: 0, gravity: (0, -9, 0)), (time: 1, gravity: (4, -8, 0))])";
     let scene = read_scene(text).unwrap();
     let mass = 4.0 / 3.0 * std::f64::consts::PI;
     for step in [1.0 / 10.0, 1.0 / 20.0] {

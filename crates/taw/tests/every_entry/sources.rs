@@ -34,8 +34,17 @@ const TAKEN: &[(&str, &[&str])] = &[
     (
         "scene/mod.rs",
         &[
-            "Scene", "Tilt", "Gate", "Field", "Surface", "Wall", "Form", "Turn", "Movement",
-            "Ball", "Lattice",
+            "Scene",
+            "GravityKeyframe",
+            "SensorPlane",
+            "ForceFieldDesc",
+            "MaterialDesc",
+            "WallDesc",
+            "ShapeDesc",
+            "RotationDesc",
+            "KinematicMotion",
+            "MarbleDesc",
+            "Lattice",
         ],
     ),
 ];

@@ -5,7 +5,7 @@ use std::fmt;
 use ron::ser::PrettyConfig;
 use serde::{Deserialize, Serialize};
 use taw::prelude::*;
-use taw::scene::{Ball, Running, Scene, Surface};
+use taw::scene::{MarbleDesc, MaterialDesc, Scene, Simulation};
 use taw::swarm::{SwarmModel, Tier};
 
 use super::judge::Invariant;
@@ -51,9 +51,9 @@ pub struct SwarmPart {
     /// Whether balls may fall asleep.
     pub sleeps: bool,
     /// Of all its balls.
-    pub surface: Surface,
+    pub material: MaterialDesc,
     /// Its balls; what they are made of is the swarm's.
-    pub balls: Vec<Ball>,
+    pub balls: Vec<MarbleDesc>,
 }
 
 impl SwarmPart {
@@ -69,7 +69,7 @@ impl SwarmPart {
             substeps: self.substeps,
             // Threads change no bit, and the storm has one thread a scene.
             threads: 1,
-            material: self.surface.material(),
+            material: self.material.to_material(),
             sleeps: self.sleeps,
         })?;
         let balls = self.balls.iter().map(|ball| taw::swarm::Ball {
@@ -88,7 +88,7 @@ impl Case {
     ///
     /// # Errors
     /// What the world refuses.
-    pub fn begin<S: Scalar>(&self) -> Result<Running<S>, taw::Error> {
+    pub fn begin<S: Scalar>(&self) -> Result<Simulation<S>, taw::Error> {
         let mut running = self.scene.run::<S>(self.model)?;
         if let Some(swarm) = &self.swarm {
             swarm.fill(&mut running.world.swarm)?;
@@ -100,7 +100,7 @@ impl Case {
     /// How many bodies there are.
     #[must_use]
     pub fn bodies(&self) -> usize {
-        self.scene.balls().count() + self.swarm.as_ref().map_or(0, |swarm| swarm.balls.len())
+        self.scene.all_marbles().count() + self.swarm.as_ref().map_or(0, |swarm| swarm.balls.len())
     }
 
     /// The substep of the marbles, in seconds.
@@ -112,8 +112,8 @@ impl Case {
     /// Whether a wall moves.
     #[must_use]
     pub fn has_moving_walls(&self) -> bool {
-        self.scene.walls.iter().any(|wall| wall.moves.is_some())
-            || self.scene.structures.iter().any(|wall| wall.moves.is_some())
+        self.scene.walls.iter().any(|wall| wall.motion.is_some())
+            || self.scene.structures.iter().any(|wall| wall.motion.is_some())
     }
 
     /// The case as a file.

@@ -7,7 +7,7 @@ use std::time::{Duration, Instant};
 
 use taw::frame::Pose;
 use taw::prelude::*;
-use taw::scene::{Movement, Running};
+use taw::scene::{KinematicMotion, Simulation};
 
 use super::case::Case;
 use super::judge::{Bench, Finding, Invariant};
@@ -190,7 +190,7 @@ fn go<S: Scalar>(case: &Case, only: Option<Invariant>, pulse: &Pulse, verdict: &
 }
 
 /// A clone steps on with the same bits.
-fn clones_go_on_alike<S: Scalar>(case: &Case, running: &Running<S>) -> bool {
+fn clones_go_on_alike<S: Scalar>(case: &Case, running: &Simulation<S>) -> bool {
     let (mut one, mut other) = (running.clone(), running.clone());
     for _ in 0..3 {
         if advance(case, &mut one).is_err() || advance(case, &mut other).is_err() {
@@ -201,17 +201,17 @@ fn clones_go_on_alike<S: Scalar>(case: &Case, running: &Running<S>) -> bool {
 }
 
 /// One step.
-pub fn advance<S: Scalar>(case: &Case, running: &mut Running<S>) -> Result<(), taw::Error> {
+pub fn advance<S: Scalar>(case: &Case, running: &mut Simulation<S>) -> Result<(), taw::Error> {
     let dt = S::constant(case.step);
     let from = running.time();
     running.move_walls(dt)?;
     if case.differenced {
         let to = running.time();
-        let walls = case.scene.walls.iter().map(|wall| wall.moves);
-        let moves = walls.chain(case.scene.structures.iter().map(|wall| wall.moves));
-        for (row, moves) in moves.enumerate() {
-            if let (Some(moves), Some(id)) = (moves, running.world.walls.id(row)) {
-                let motion = difference(case, row, moves, [from, to])?;
+        let walls = case.scene.walls.iter().map(|wall| wall.motion);
+        let motion = walls.chain(case.scene.structures.iter().map(|wall| wall.motion));
+        for (row, motion) in motion.enumerate() {
+            if let (Some(motion), Some(id)) = (motion, running.world.walls.id(row)) {
+                let motion = difference(case, row, motion, [from, to])?;
                 running.world.walls.set_motion(id, motion)?;
             }
         }
@@ -224,11 +224,11 @@ pub fn advance<S: Scalar>(case: &Case, running: &mut Running<S>) -> Result<(), t
 fn difference<S: Scalar>(
     case: &Case,
     row: usize,
-    moves: Movement,
+    motion: KinematicMotion,
     [from, to]: [f64; 2],
 ) -> Result<Option<taw::motion::WallMotion<S>>, taw::Error> {
     let middle = match case.scene.walls.get(row).map(|wall| wall.shape) {
-        Some(taw::scene::Form::Box { center, .. }) => Point3::from(center),
+        Some(taw::scene::ShapeDesc::Box { center, .. }) => Point3::from(center),
         _ => Point3::origin(),
     };
     let single = |pose: Pose<f64>| {
@@ -238,7 +238,7 @@ fn difference<S: Scalar>(
         let [x, y, z] = [turn.v.x, turn.v.y, turn.v.z].map(|x| x as f32);
         (place, taw::math::Quat::new(turn.s as f32, x, y, z))
     };
-    let (last, now) = (single(moves.pose(from)?), single(moves.pose(to)?));
+    let (last, now) = (single(motion.pose(from)?), single(motion.pose(to)?));
     if last == now {
         return Ok(None);
     }

@@ -184,10 +184,10 @@ fn write(
 #[must_use]
 pub fn replay(case: &Case) -> String {
     let verdict = run_for(case, case.broke, &Pulse::default());
-    let mut text = format!("{}\n", case.scene.about);
+    let mut text = format!("{}\n", case.scene.description);
     let _ = writeln!(text, "{:?} {} step {} s", case.model, case.number, case.step);
     if let Some(swarm) = &case.swarm {
-        let (marbles, balls) = (case.scene.balls().count(), swarm.balls.len());
+        let (marbles, balls) = (case.scene.all_marbles().count(), swarm.balls.len());
         let _ = writeln!(text, "{marbles} marbles, then {balls} balls in {} parts", swarm.substeps);
     }
     for Finding { invariant, value, bound, body } in &verdict.worst {

@@ -240,7 +240,7 @@ fn describe(text: &mut String, scene: &str, folder: &str, curves: &[Curve]) -> s
     let judged = SCENES.iter().find(|judged| judged.name == scene);
     writeln!(text, "\n## {scene}\n")?;
     if let Some(judged) = judged {
-        write!(text, "{}. Error: {}.", judged.scene().about, judged.metric)?;
+        write!(text, "{}. Error: {}.", judged.scene().description, judged.metric)?;
         if judged.chance() > 0.0 {
             let chance = judged.chance();
             write!(text, " The last bit of where marbles begin makes {chance:.1e} of it.")?;

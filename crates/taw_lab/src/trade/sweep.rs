@@ -69,13 +69,13 @@ impl Plan {
     fn settings(&self, scene: &'static Judged, model: Named, number: Number, jobs: &mut Vec<Job>) {
         let counts: &[u32] = if self.quick { &QUICK_COUNTS } else { &COUNTS };
         let iterations: &[u32] = if model.iterates { counts } else { &[model.model.iterations] };
-        let marbles = scene.scene().balls().count() as f64;
+        let marbles = scene.scene().all_marbles().count() as f64;
         for (i, (name, step)) in STEPS.iter().enumerate() {
             if self.quick && !QUICK_STEPS.contains(&i) {
                 continue;
             }
             for substeps in counts {
-                let runs = scene.scene().seconds / step * f64::from(*substeps) * marbles;
+                let runs = scene.scene().duration / step * f64::from(*substeps) * marbles;
                 if runs > if self.quick { QUICK_MOST } else { MOST } {
                     continue;
                 }
@@ -131,7 +131,8 @@ impl Job {
                 }
             }
         }
-        let (seconds, marbles) = (self.scene.scene().seconds, self.scene.scene().balls().count());
+        let (seconds, marbles) =
+            (self.scene.scene().duration, self.scene.scene().all_marbles().count());
         let taken = clock(self);
         point.cost = digits(taken * 1e9 / seconds / marbles as f64);
         point.real_time = digits(seconds / taken);

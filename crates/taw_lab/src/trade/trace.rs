@@ -4,7 +4,7 @@ use std::time::Duration;
 
 use futures_lite::future::{block_on, yield_now};
 use taw::prelude::*;
-use taw::scene::{Running, Scene};
+use taw::scene::{Scene, Simulation};
 use web_time::Instant;
 
 /// In which numbers a world counts.
@@ -75,7 +75,7 @@ const TURN: Duration = Duration::from_millis(1);
 /// left all numbers behind, or a step is refused. Pauses every millisecond, so that it can share
 /// a thread.
 pub async fn film<S: Scalar>(
-    mut running: Running<S>,
+    mut running: Simulation<S>,
     [seconds, step, every]: [f64; 3],
 ) -> Option<Film> {
     let ids: Vec<MarbleId> =
@@ -102,14 +102,14 @@ pub async fn film<S: Scalar>(
                 frame.at.push(marble.position.to_vec());
                 frame.velocity.push(marble.velocity);
             }
-            if !running.scene().tilts.is_empty() {
+            if !running.scene().gravity_keyframes.is_empty() {
                 // Steps have left that of their middle.
                 let gravity = running.scene().gravity_at(frame.time).map(S::constant);
                 running.world.set_gravity(gravity.into()).ok()?;
             }
             frame.energy = running.world.energy().total();
             frame.momentum = running.world.momentum().into();
-            frame.passed = running.passed();
+            frame.passed = running.sensor_count();
             frame.overlap = crate::scene::overlaps(&running.world).iter().sum();
             film.frames.push(frame);
         }
@@ -133,7 +133,7 @@ pub fn trace(scene: &Scene, setting: Setting) -> Option<Vec<Frame>> {
 /// [Films](film) a scene to its end. `None` also if the scene cannot be run.
 pub async fn film_of(scene: &Scene, setting: Setting, every: f64) -> Option<Film> {
     let Setting { model, number, step } = setting;
-    let times = [scene.seconds, step, every];
+    let times = [scene.duration, step, every];
     match number {
         Number::F32 => film(scene.run::<f32>(model).ok()?, times).await,
         Number::F64 => film(scene.run::<f64>(model).ok()?, times).await,
@@ -154,7 +154,7 @@ pub fn time(scene: &Scene, setting: Setting) -> f64 {
 
 fn time_in<S: Scalar>(scene: &Scene, Setting { model, step, .. }: Setting) -> f64 {
     let mut running = scene.run::<S>(model).expect("scenes are checked before");
-    let (dt, steps) = (S::constant(step), (scene.seconds / step).round() as u64);
+    let (dt, steps) = (S::constant(step), (scene.duration / step).round() as u64);
     let begin = Instant::now();
     for _ in 0..steps {
         running.step(dt).expect("steps are above zero");

@@ -206,10 +206,10 @@ impl Rules {
 
 fn softest(case: &Case) -> f64 {
     let scene = &case.scene;
-    let walls = scene.walls.iter().map(|wall| wall.surface);
-    let structures = scene.structures.iter().map(|wall| wall.surface);
-    let balls = scene.marbles.iter().map(|ball| ball.surface);
-    let all = walls.chain(structures).chain(balls).flatten().chain([scene.surface]);
+    let walls = scene.walls.iter().map(|wall| wall.material);
+    let structures = scene.structures.iter().map(|wall| wall.material);
+    let balls = scene.marbles.iter().map(|ball| ball.material);
+    let all = walls.chain(structures).chain(balls).flatten().chain([scene.material]);
     let modulus = all.map(|surface| {
         0.5 * surface.youngs_modulus / (1.0 - surface.poissons_ratio * surface.poissons_ratio)
     });
