@@ -10,7 +10,7 @@ use crate::shape::{Aabb3, BoundedShape, Capsule, Face, Hull, Obb, Sphere, Triang
 #[derive(Clone, Copy, Debug)]
 pub struct Core<'a> {
     pub(super) kind: Kind<'a>,
-    /// In metres.
+    /// Rounding radius, in metres.
     pub(super) radius: f64,
 }
 

@@ -145,25 +145,25 @@ pub enum ForceFieldDesc {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
 pub struct MaterialDesc {
-    /// In `[0, 1]`.
+    /// Coefficient of restitution, in `[0, 1]`.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::part"))]
     pub restitution: f64,
-    /// At least zero.
+    /// Coefficient of friction, at least zero.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::not_negative"))]
     pub friction: f64,
-    /// In `[-1, 1]`.
+    /// Tangential coefficient of restitution, in `[-1, 1]`.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::signed_part"))]
     pub tangential_restitution: f64,
-    /// At least zero.
+    /// Coefficient of rolling resistance, at least zero.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::not_negative"))]
     pub rolling_resistance: f64,
-    /// At least zero.
+    /// Coefficient of torsional (spinning) resistance, at least zero.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::not_negative"))]
     pub spinning_resistance: f64,
-    /// In pascals, above zero.
+    /// Young's modulus in pascals, above zero.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::positive"))]
     pub youngs_modulus: f64,
-    /// In `[0, 0.5]`.
+    /// Poisson's ratio, in `[0, 0.5]`.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::half"))]
     pub poissons_ratio: f64,
 }
@@ -199,7 +199,7 @@ pub enum ShapeDesc {
     },
     /// A box.
     Box {
-        /// In metres.
+        /// Center, in metres.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         center: [f64; 3],
         /// Side lengths in metres, above zero.
@@ -211,10 +211,10 @@ pub enum ShapeDesc {
     },
     /// A ball.
     Ball {
-        /// In metres.
+        /// Center, in metres.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         center: [f64; 3],
-        /// In metres, above zero.
+        /// Radius in metres, above zero.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::positive"))]
         radius: f64,
     },
@@ -226,7 +226,7 @@ pub enum ShapeDesc {
         /// Second end of the segment, in metres.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         to: [f64; 3],
-        /// In metres, above zero.
+        /// Radius in metres, above zero.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::positive"))]
         radius: f64,
     },
@@ -302,7 +302,7 @@ pub struct MarbleDesc {
     /// Center, in metres.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
     pub position: [f64; 3],
-    /// In metres, above zero.
+    /// Radius in metres, above zero.
     #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::positive"))]
     pub radius: f64,
     /// Velocity, in m/s.

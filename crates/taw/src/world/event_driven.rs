@@ -71,6 +71,14 @@ impl<S: Scalar> World<S> {
         if let (Some(audit_state), Some(work)) = (&mut self.audit_state, self.events.work) {
             audit_state.work = work;
         }
+        self.write_back_balls();
+        if rest <= S::zero() {
+            self.walls.finish_step();
+        }
+    }
+
+    /// Writes the balls of the event-driven solver back to the columns.
+    fn write_back_balls(&mut self) {
         for (row, ball) in self.events.balls.iter().enumerate() {
             let (position, velocity) = (ball.position, ball.velocity);
             let mut whole = self.marbles.set_motion_f64(row, Motion { position, velocity });
@@ -81,9 +89,6 @@ impl<S: Scalar> World<S> {
             if !whole && !self.stopped.contains(&(row as u32)) {
                 self.stopped.push(row as u32);
             }
-        }
-        if rest <= S::zero() {
-            self.walls.finish_step();
         }
     }
 

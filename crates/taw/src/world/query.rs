@@ -235,29 +235,9 @@ impl<S: Scalar> Queries<'_, S> {
                         Some(shape_cast_of_shapes(&marble, still, shape, translation)?.result)
                     });
                 }
-                Item::Wall(SubShape { wall, part: number }) => {
-                    match &self.world.walls.shapes()[wall as usize] {
-                        WallShape::Plane(_) => {}
-                        solid @ WallShape::Solid(_) => offer(item, &|| {
-                            let touch = shape_cast_of_shapes(
-                                solid.sub_shape(number)?,
-                                still,
-                                shape,
-                                translation,
-                            )?;
-                            Some(touch.result)
-                        }),
-                        WallShape::Mesh(mesh, pose) => {
-                            offer(item, &|| {
-                                shape_cast_transformed(&**mesh, *pose, shape, translation)
-                            });
-                        }
-                        WallShape::HeightField(field, pose) => {
-                            offer(item, &|| {
-                                shape_cast_transformed(&**field, *pose, shape, translation)
-                            });
-                        }
-                    }
+                Item::Wall(SubShape { wall, part }) => {
+                    let wall = &self.world.walls.shapes()[wall as usize];
+                    offer(item, &|| cast_shape_on_wall(wall, part, shape, translation));
                 }
             }
         });
@@ -404,6 +384,26 @@ fn cast_ray_on_wall<S: Scalar>(
         }
         WallShape::HeightField(field, pose) => {
             to_world(ray_cast_on_surface(&**field, &local(pose), max_distance), pose)
+        }
+    }
+}
+
+fn cast_shape_on_wall<S: Scalar>(
+    wall: &WallShape<S>,
+    part: u32,
+    shape: &Shape<S>,
+    translation: Vec3<S>,
+) -> Option<ShapeCastHit<S>> {
+    let still = Vec3::new(S::zero(), S::zero(), S::zero());
+    match wall {
+        WallShape::Plane(_) => None,
+        WallShape::Solid(_) => {
+            let hit = shape_cast_of_shapes(wall.sub_shape(part)?, still, shape, translation);
+            hit.map(|hit| hit.result)
+        }
+        WallShape::Mesh(mesh, pose) => shape_cast_transformed(&**mesh, *pose, shape, translation),
+        WallShape::HeightField(field, pose) => {
+            shape_cast_transformed(&**field, *pose, shape, translation)
         }
     }
 }

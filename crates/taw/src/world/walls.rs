@@ -381,7 +381,7 @@ impl<S: Scalar> Walls<S> {
         self.shapes.len()
     }
 
-    /// Whether there are no walls.
+    /// Returns true without any wall.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.shapes.is_empty()

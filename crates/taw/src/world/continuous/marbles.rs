@@ -148,7 +148,7 @@ impl<S: Scalar> World<S> {
             let Meeting { time, pair, bends } = hit;
             let bent = |row: u32| self.continuous.paths[row as usize].bends;
             if bends != (bent(pair.0), bent(pair.1)) {
-                continue; // it was foreseen anew
+                continue; // superseded by a newer prediction
             }
             if pair.0 == pair.1 {
                 self.bend_at_wall(pair.0 as usize);
