@@ -145,8 +145,9 @@ impl<S: Scalar> event::Source for Source<'_, S> {
         let digits =
             8.0 * S::epsilon().as_f64() * point.x.abs().max(point.y.abs()).max(point.z.abs());
         let reach = S::constant((reach + way) * (1.0 + 1e-6) + digits);
-        self.walls
-            .for_each_near(cast_point(point), reach, |SubShape { wall, part }| name(wall, part));
+        self.walls.for_each_near(cast_point(point), reach, |SubShape { wall, index: part }| {
+            name(wall, part)
+        });
     }
 
     fn wall(&self, row: u32, part: u32) -> Option<Wall> {

@@ -66,7 +66,7 @@ impl<S: Scalar> QueryTree<S> {
         }
         for (wall, shape) in (0..).zip(world.walls.shapes()) {
             shape.for_each_box(|part, bounds| {
-                self.items.push(Item::Wall(SubShape { wall, part }));
+                self.items.push(Item::Wall(SubShape { wall, index: part }));
                 self.boxes.push(bounds);
             });
         }
@@ -90,8 +90,8 @@ pub struct Queries<'a, S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// Updates the tree to the current state. Large translation since the last build slow queries down,
-    /// and never make them wrong.
+    /// Updates the tree to the current state. Large translation since the last build slow queries
+    /// down, and never make them wrong.
     ///
     /// ```
     /// use taw::frame::Ray;
@@ -148,7 +148,7 @@ impl<S: Scalar> Queries<'_, S> {
     }
 
     fn planes(&self) -> impl Iterator<Item = (Item, &Plane<S>)> {
-        let item = |wall| Item::Wall(SubShape { wall, part: 0 });
+        let item = |wall| Item::Wall(SubShape { wall, index: 0 });
         self.world.walls.planes().map(move |(row, plane)| (item(row), plane))
     }
 
@@ -235,7 +235,7 @@ impl<S: Scalar> Queries<'_, S> {
                         Some(shape_cast_of_shapes(&marble, still, shape, translation)?.result)
                     });
                 }
-                Item::Wall(SubShape { wall, part }) => {
+                Item::Wall(SubShape { wall, index: part }) => {
                     let wall = &self.world.walls.shapes()[wall as usize];
                     offer(item, &|| cast_shape_on_wall(wall, part, shape, translation));
                 }
@@ -266,7 +266,7 @@ impl<S: Scalar> Queries<'_, S> {
                     let near = || closest_points_of_shapes(&marble, shape);
                     offer(item, &|| near().is_some_and(|near| near.result.touching()));
                 }
-                Item::Wall(SubShape { wall, part: number }) => {
+                Item::Wall(SubShape { wall, index: number }) => {
                     match &self.world.walls.shapes()[wall as usize] {
                         WallShape::Plane(_) => {}
                         solid @ WallShape::Solid(_) => offer(item, &|| {
@@ -324,7 +324,7 @@ impl<S: Scalar> Queries<'_, S> {
                 Item::Marble(row) => {
                     self.world.marbles.shape_of_row(row as usize).project_point(point)
                 }
-                Item::Wall(SubShape { wall, part }) => match &walls[wall as usize] {
+                Item::Wall(SubShape { wall, index: part }) => match &walls[wall as usize] {
                     solid @ WallShape::Solid(_) => solid.project_point_on(part, point),
                     other => other.project_point(point),
                 },
@@ -365,7 +365,7 @@ impl<S: Scalar, F: Fn(ColliderId) -> bool> Hits<'_, S, F> {
 
 fn cast_ray_on_wall<S: Scalar>(
     wall: &WallShape<S>,
-    SubShape { part, .. }: SubShape,
+    SubShape { index: part, .. }: SubShape,
     ray: &Ray<S>,
     max_distance: S,
 ) -> Option<RayHit<S>> {
