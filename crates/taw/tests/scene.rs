@@ -136,7 +136,7 @@ fn what_a_world_refuses_a_scene_refuses_by_name() {
     let error = run(Scene { marbles: vec![ball], ..Scene::default() });
     assert_eq!(error, Error::NotPositive { field: "radius", value: -1.0 });
     let error = run(Scene { duration: f64::NAN, ..Scene::default() });
-    assert!(matches!(error, Error::NotPositive { field: "seconds", .. }));
+    assert!(matches!(error, Error::NotPositive { field: "duration", .. }));
     let shape = ShapeDesc::HalfSpace { normal: [0.0; 3], point: [0.0; 3] };
     let error = run(Scene { walls: vec![WallDesc { shape, ..floor() }], ..Scene::default() });
     assert!(matches!(error, Error::NotUnit { .. }), "{error}");
@@ -155,7 +155,7 @@ mod files {
 
     const TEXT: &str = "(
     description: \"one of each\",
-    seconds: 2,
+    duration: 2,
     gravity: (0, -1, 0),
     gravity_keyframes: [(time: 0.5, gravity: (1, 0, 0))],
     force_fields: [Drag(linear: 0.1), Attraction(center: (0, 0, 0), strength: -1)],
@@ -196,7 +196,7 @@ mod files {
             assert_eq!(error.span.start.line, line, "{error}");
             assert!(error.to_string().contains(why), "{error}");
         };
-        refused("seconds: 2", "seconds: 0", 3, "above zero");
+        refused("duration: 2", "duration: 0", 3, "above zero");
         refused("linear: 0.1", "linear: -0.1", 6, "at least zero");
         refused("friction: 0.2", "frition: 0.2", 7, "frition");
         refused("normal: (0, 1, 0)", "normal: (0, 0, 0)", 9, "not zero");

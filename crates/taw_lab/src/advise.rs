@@ -15,8 +15,10 @@ use web_time::Instant;
 
 use crate::scene::{EXACT, IMPULSE};
 use crate::trade::COUNTS;
-use crate::trade::models::{MODELS, Named};
-use crate::trade::trace::{FRAME, Film, Frame, Number, Setting, film, film_of};
+use crate::trade::models::{MODELS, Preset};
+use crate::trade::trace::{
+    Frame, Recording, RunConfig, SAMPLE_INTERVAL, ScalarType, record, record_scene,
+};
 
 /// Reads a scene.
 ///
@@ -40,27 +42,27 @@ pub fn read_scene(text: &str) -> Result<Scene, String> {
 }
 
 /// What can be run again and again from the same beginning.
-pub trait Source: Sync {
+pub trait ReplayableScene: Sync {
     /// For how long, in seconds.
     fn seconds(&self) -> f64;
     /// The radius of the smallest marble, in metres.
     fn smallest(&self) -> f64;
     /// In which numbers it can be run, the most exact ones last.
-    fn numbers(&self) -> &'static [Number];
+    fn numbers(&self) -> &'static [ScalarType];
     /// The models that are worth a try.
-    fn models(&self) -> impl Iterator<Item = &'static Named> + Send;
+    fn models(&self) -> impl Iterator<Item = &'static Preset> + Send;
     /// Runs it, with a frame in every `every` seconds; if `nudged`, after every marble was moved
     /// by the last bit of its place. `None` if that cannot be done, or a marble left all numbers
     /// behind.
-    fn film(
+    fn record(
         &self,
-        setting: Setting,
-        nudged: bool,
+        setting: RunConfig,
+        perturbed: bool,
         every: f64,
-    ) -> impl Future<Output = Option<Film>> + Send;
+    ) -> impl Future<Output = Option<Recording>> + Send;
 }
 
-impl Source for Scene {
+impl ReplayableScene for Scene {
     fn seconds(&self) -> f64 {
         self.duration
     }
@@ -69,24 +71,24 @@ impl Source for Scene {
         self.all_marbles().map(|ball| ball.radius).fold(f64::MAX, f64::min)
     }
 
-    fn numbers(&self) -> &'static [Number] {
-        &[Number::F32, Number::F64]
+    fn numbers(&self) -> &'static [ScalarType] {
+        &[ScalarType::F32, ScalarType::F64]
     }
 
-    fn models(&self) -> impl Iterator<Item = &'static Named> + Send {
+    fn models(&self) -> impl Iterator<Item = &'static Preset> + Send {
         MODELS.iter()
     }
 
-    async fn film(&self, setting: Setting, nudged: bool, every: f64) -> Option<Film> {
-        if nudged {
+    async fn record(&self, setting: RunConfig, perturbed: bool, every: f64) -> Option<Recording> {
+        if perturbed {
             let marbles = self.all_marbles().map(|mut ball| {
                 ball.position = ball.position.map(up);
                 ball
             });
             let scene = Scene { marbles: marbles.collect(), lattices: Vec::new(), ..self.clone() };
-            film_of(&scene, setting, every).await
+            record_scene(&scene, setting, every).await
         } else {
-            film_of(self, setting, every).await
+            record_scene(self, setting, every).await
         }
     }
 }
@@ -124,7 +126,7 @@ impl Snapshot {
     }
 }
 
-impl Source for Snapshot {
+impl ReplayableScene for Snapshot {
     fn seconds(&self) -> f64 {
         self.seconds
     }
@@ -133,69 +135,69 @@ impl Source for Snapshot {
         self.world.marbles.radius().iter().map(|radius| f64::from(*radius)).fold(f64::MAX, f64::min)
     }
 
-    fn numbers(&self) -> &'static [Number] {
-        &[Number::F32]
+    fn numbers(&self) -> &'static [ScalarType] {
+        &[ScalarType::F32]
     }
 
-    fn models(&self) -> impl Iterator<Item = &'static Named> + Send {
-        MODELS.iter().filter(|named| named.touches)
+    fn models(&self) -> impl Iterator<Item = &'static Preset> + Send {
+        MODELS.iter().filter(|named| named.has_contacts)
     }
 
-    async fn film(&self, setting: Setting, nudged: bool, every: f64) -> Option<Film> {
+    async fn record(&self, setting: RunConfig, perturbed: bool, every: f64) -> Option<Recording> {
         let mut world = self.world.clone();
         world.set_model(setting.model).ok()?;
-        if nudged {
+        if perturbed {
             for row in 0..world.marbles.len() {
                 let id = world.marbles.id(row)?;
                 let position = world.marbles.position()[row].map(f32::next_up);
                 world.marbles.set_position(id, position).ok()?;
             }
         }
-        film(Simulation::from(world), [self.seconds, setting.step, every]).await
+        record(Simulation::from(world), [self.seconds, setting.step, every]).await
     }
 }
 
 /// What is asked for.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Wish {
+pub struct Requirements {
     /// How wrong places may be, in metres.
-    pub most: Option<f64>,
+    pub max_error: Option<f64>,
     /// How long a step may take, in seconds.
-    pub budget: Option<f64>,
+    pub max_cost: Option<f64>,
     /// In which numbers; in all that there are, if it is not said.
-    pub number: Option<Number>,
+    pub number: Option<ScalarType>,
     /// The step of the game, in seconds.
     pub step: f64,
     /// A model that takes longer for the scene, in seconds, is not tried with more substeps; a
     /// reference that takes thirty times as long is not refined any more.
-    pub patience: f64,
+    pub time_limit: f64,
 }
 
-impl Default for Wish {
+impl Default for Requirements {
     /// Nothing but to know what there is, at 60 steps a second and with a second's patience.
     fn default() -> Self {
-        Self { most: None, budget: None, number: None, step: 1.0 / 60.0, patience: 1.0 }
+        Self { max_error: None, max_cost: None, number: None, step: 1.0 / 60.0, time_limit: 1.0 }
     }
 }
 
 /// How a setting did.
 #[derive(Clone, Debug)]
-pub struct Choice {
+pub struct Candidate {
     /// The name of the model.
     pub name: &'static str,
     /// All of it.
-    pub setting: Setting,
+    pub setting: RunConfig,
     /// The furthest that a marble was from where it should be while that can be told, in metres.
     pub error: f64,
     /// What remains meaningful at any time.
-    pub whole: Whole,
+    pub whole: AggregateError,
     /// Seconds for a step.
     pub cost: f64,
 }
 
 /// How far all marbles together are from the reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Whole {
+pub struct AggregateError {
     /// Of the heights, from the lowest to the highest marble: the mean difference, in metres.
     pub heights: f64,
     /// The same of the speeds, in m/s.
@@ -214,96 +216,104 @@ pub struct Whole {
 #[derive(Clone, Debug, Default)]
 pub struct Advice {
     /// Until when places can be told, in seconds; the scene's length if always.
-    pub told: f64,
+    pub horizon: f64,
     /// For how long it was run, in seconds.
     pub seconds: f64,
     /// Up to how much the references agree until then, in metres.
     pub sure: f64,
     /// How the reference was run, if it could be.
-    pub reference: Option<Setting>,
+    pub reference: Option<RunConfig>,
     /// All settings, the cheapest first.
-    pub choices: Vec<Choice>,
+    pub candidates: Vec<Candidate>,
 }
 
 /// Steps of the reference, as parts of the game's, the longest first.
-const REFINED: [f64; 4] = [1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0];
+const REFINEMENT_STEPS: [f64; 4] = [1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0];
 /// How much more patience there is with a reference.
-const REFERENCES: f64 = 30.0;
+const REFERENCE_TIME_FACTOR: f64 = 30.0;
 /// What counts as the same place, as a part of the smallest radius.
-const SAME: f64 = 0.01;
+const SAME_PLACE: f64 = 0.01;
 
 /// Measures all models on a scene. `tell` hears how many groups of settings are done, how many
 /// there are, and what is known so far.
 pub async fn advise(
-    source: &impl Source,
-    wish: Wish,
-    mut tell: impl FnMut(usize, usize, &Advice),
+    source: &impl ReplayableScene,
+    wish: Requirements,
+    mut report: impl FnMut(usize, usize, &Advice),
 ) -> Advice {
     let seconds = source.seconds();
-    let same = wish.most.map_or(f64::MAX, |most| 0.25 * most).min(SAME * source.smallest());
+    let same =
+        wish.max_error.map_or(f64::MAX, |most| 0.25 * most).min(SAME_PLACE * source.smallest());
     // Frames of all steps are of the same moments.
-    let every = (FRAME / wish.step).round().max(1.0) * wish.step;
-    let number = source.numbers().last().copied().unwrap_or(Number::F32);
+    let every = (SAMPLE_INTERVAL / wish.step).round().max(1.0) * wish.step;
+    let number = source.numbers().last().copied().unwrap_or(ScalarType::F32);
     let mut advice = Advice { seconds, ..Advice::default() };
     let mut reference = Vec::new();
     // Not every scene can be run by events.
     for model in [EXACT, Model { detection: Detection::Swept, substeps: 4, ..IMPULSE }] {
-        for part in REFINED {
-            let setting = Setting { model, number, step: part * wish.step };
+        for part in REFINEMENT_STEPS {
+            let setting = RunConfig { model, number, step: part * wish.step };
             let begin = Instant::now();
-            let Some(finer) = source.film(setting, false, every).await else { break };
-            let before = advice.told;
+            let Some(finer) = source.record(setting, false, every).await else { break };
+            let before = advice.horizon;
             if !reference.is_empty() {
-                (advice.told, advice.sure) = agreement(&reference, &finer.frames, same);
+                (advice.horizon, advice.sure) =
+                    predictability_horizon(&reference, &finer.frames, same);
             }
             (reference, advice.reference) = (finer.frames, Some(setting));
             // What is chaotic does not become less so.
-            let told = advice.told;
-            let long = begin.elapsed().as_secs_f64() > REFERENCES * wish.patience;
-            if long || told >= seconds || told > 0.0 && told < 1.2 * before {
+            let horizon = advice.horizon;
+            let long = begin.elapsed().as_secs_f64() > REFERENCE_TIME_FACTOR * wish.time_limit;
+            if long || horizon >= seconds || horizon > 0.0 && horizon < 1.2 * before {
                 break;
             }
         }
         if let Some(setting) = advice.reference {
-            let nudged = source.film(setting, true, every).await.unwrap_or_default();
-            advice.told = advice.told.min(agreement(&reference, &nudged.frames, same).0);
+            let perturbed = source.record(setting, true, every).await.unwrap_or_default();
+            advice.horizon =
+                advice.horizon.min(predictability_horizon(&reference, &perturbed.frames, same).0);
             break;
         }
     }
     let groups = settings(source, wish);
     let count = groups.len();
     for (i, (name, settings)) in groups.into_iter().enumerate() {
-        tell(i, count, &advice);
+        report(i, count, &advice);
         for setting in settings {
             let begin = Instant::now();
-            let Some(Film { frames, cost }) = source.film(setting, false, every).await else {
+            let Some(Recording { frames, cost }) = source.record(setting, false, every).await
+            else {
                 continue;
             };
-            let until = frames.iter().take_while(|frame| frame.time <= advice.told + 1e-9).count();
+            let until =
+                frames.iter().take_while(|frame| frame.time <= advice.horizon + 1e-9).count();
             let error = distances(&frames[..until], &reference).fold(0.0, f64::max);
-            let whole = Whole::between(&frames, &reference);
-            advice.choices.push(Choice { name, setting, error, whole, cost });
-            if begin.elapsed().as_secs_f64() > wish.patience {
+            let whole = AggregateError::between(&frames, &reference);
+            advice.candidates.push(Candidate { name, setting, error, whole, cost });
+            if begin.elapsed().as_secs_f64() > wish.time_limit {
                 break;
             }
         }
     }
-    advice.choices.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    advice.candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
     advice
 }
 
 /// For each model, number and count of iterations, its settings from the cheapest on.
-fn settings(source: &impl Source, wish: Wish) -> Vec<(&'static str, Vec<Setting>)> {
+fn settings(
+    source: &impl ReplayableScene,
+    wish: Requirements,
+) -> Vec<(&'static str, Vec<RunConfig>)> {
     let mut groups = Vec::new();
     for named in source.models() {
         let iterations: &[u32] =
             if named.iterates { &[1, 2, 4, 8, 32] } else { &[named.model.iterations] };
-        let wanted = |number: &&Number| wish.number.is_none_or(|wish| wish == **number);
+        let wanted = |number: &&ScalarType| wish.number.is_none_or(|wish| wish == **number);
         for number in source.numbers().iter().filter(wanted) {
             for iterations in iterations {
                 let setting = |substeps| {
                     let model = Model { substeps, iterations: *iterations, ..named.model };
-                    Setting { model, number: *number, step: wish.step }
+                    RunConfig { model, number: *number, step: wish.step }
                 };
                 groups.push((named.name, COUNTS.map(setting).to_vec()));
             }
@@ -313,31 +323,31 @@ fn settings(source: &impl Source, wish: Wish) -> Vec<(&'static str, Vec<Setting>
 }
 
 /// Until when two runs agree, and up to how much until then.
-fn agreement(a: &[Frame], b: &[Frame], same: f64) -> (f64, f64) {
-    let (mut told, mut sure) = (0.0, 0.0);
+fn predictability_horizon(a: &[Frame], b: &[Frame], same: f64) -> (f64, f64) {
+    let (mut horizon, mut sure) = (0.0, 0.0);
     for (a, b) in a.iter().zip(b) {
         let apart = distances(std::slice::from_ref(a), std::slice::from_ref(b)).fold(0.0, f64::max);
         if apart > same {
             break;
         }
-        (told, sure) = (a.time, f64::max(sure, apart));
+        (horizon, sure) = (a.time, f64::max(sure, apart));
     }
-    (told, sure)
+    (horizon, sure)
 }
 
 fn distances<'a>(a: &'a [Frame], b: &'a [Frame]) -> impl Iterator<Item = f64> + 'a {
     a.iter().zip(b).flat_map(|(a, b)| a.at.iter().zip(&b.at).map(|(a, b)| a.distance(*b)))
 }
 
-impl Whole {
+impl AggregateError {
     fn between(a: &[Frame], b: &[Frame]) -> Self {
         let frames = a.len().min(b.len()).max(1) as f64;
         let mut whole = Self::default();
         for (a, b) in a.iter().zip(b) {
             let heights = |frame: &Frame| frame.at.iter().map(|at| at.y).collect();
             let speeds = |frame: &Frame| frame.velocity.iter().map(|v| v.magnitude()).collect();
-            whole.heights += apart(heights(a), heights(b)) / frames;
-            whole.speeds += apart(speeds(a), speeds(b)) / frames;
+            whole.heights += wasserstein_distance(heights(a), heights(b)) / frames;
+            whole.speeds += wasserstein_distance(speeds(a), speeds(b)) / frames;
             whole.overlap += (a.overlap - b.overlap) / a.at.len().max(1) as f64 / frames;
             whole.energy += (a.energy - b.energy).abs() / frames;
             whole.momentum += Vec3::from(a.momentum).distance(b.momentum.into()) / frames;
@@ -349,17 +359,17 @@ impl Whole {
 }
 
 /// How far two distributions are apart: what has to be moved how far (Wasserstein).
-fn apart(mut a: Vec<f64>, mut b: Vec<f64>) -> f64 {
+fn wasserstein_distance(mut a: Vec<f64>, mut b: Vec<f64>) -> f64 {
     a.sort_unstable_by(f64::total_cmp);
     b.sort_unstable_by(f64::total_cmp);
     a.iter().zip(&b).map(|(a, b)| (a - b).abs()).sum::<f64>() / a.len().max(1) as f64
 }
 
-impl Choice {
+impl Candidate {
     /// How wrong it is, in metres: of places while these can be told, of heights and overlaps
     /// always.
     #[must_use]
-    pub fn wrong(&self) -> f64 {
+    pub fn total_error(&self) -> f64 {
         self.error.max(self.whole.heights).max(self.whole.overlap)
     }
 }
@@ -367,51 +377,54 @@ impl Choice {
 impl Advice {
     /// The cheapest that is right enough, or the most exact that is cheap enough.
     #[must_use]
-    pub fn best(&self, wish: Wish) -> Option<&Choice> {
-        let affordable =
-            self.choices.iter().filter(|choice| wish.budget.is_none_or(|most| choice.cost <= most));
-        let right = affordable.filter(|choice| wish.most.is_none_or(|most| choice.wrong() <= most));
-        match wish.most {
+    pub fn best(&self, wish: Requirements) -> Option<&Candidate> {
+        let affordable = self
+            .candidates
+            .iter()
+            .filter(|choice| wish.max_cost.is_none_or(|most| choice.cost <= most));
+        let right = affordable
+            .filter(|choice| wish.max_error.is_none_or(|most| choice.total_error() <= most));
+        match wish.max_error {
             Some(_) => right.min_by(|a, b| a.cost.total_cmp(&b.cost)),
-            None => right.min_by(|a, b| a.wrong().total_cmp(&b.wrong())),
+            None => right.min_by(|a, b| a.total_error().total_cmp(&b.total_error())),
         }
     }
 
     /// Those that no other one beats in both.
     #[must_use]
-    pub fn front(&self) -> Vec<&Choice> {
+    pub fn front(&self) -> Vec<&Candidate> {
         let mut best = f64::MAX;
-        let better = |choice: &&Choice| {
-            let better = choice.wrong() < 0.99 * best;
+        let better = |choice: &&Candidate| {
+            let better = choice.total_error() < 0.99 * best;
             if better {
-                best = choice.wrong();
+                best = choice.total_error();
             }
             better
         };
-        self.choices.iter().filter(better).collect()
+        self.candidates.iter().filter(better).collect()
     }
 
     /// All of it in words.
     #[must_use]
-    pub fn text(&self, wish: Wish) -> String {
+    pub fn text(&self, wish: Requirements) -> String {
         let mut text = String::new();
         let _ = self.write(&mut text, wish);
         text
     }
 
-    fn write(&self, text: &mut String, wish: Wish) -> std::fmt::Result {
-        let Self { told, seconds, sure, reference, choices } = self;
-        let Some(Setting { model, number, step }) = reference else {
+    fn write(&self, text: &mut String, wish: Requirements) -> std::fmt::Result {
+        let Self { horizon, seconds, sure, reference, candidates } = self;
+        let Some(RunConfig { model, number, step }) = reference else {
             return writeln!(text, "no reference: the scene runs out of all numbers");
         };
         let by = if model.response == EXACT.response { "event-driven" } else { "impulse, swept" };
         writeln!(text, "reference: {by}, {number}, {:.2} ms a step", step * 1e3)?;
-        if *told >= seconds - 1e-9 {
+        if *horizon >= seconds - 1e-9 {
             writeln!(text, "places can be told to the end; references agree to {sure:.1e} m")?;
         } else {
             writeln!(
                 text,
-                "chaotic: places can be told for {told:.1} of {seconds:.1} s (to {sure:.1e} m); \
+                "chaotic: places can be told for {horizon:.1} of {seconds:.1} s (to {sure:.1e} m); \
                  after that heights, speeds and overlaps of all marbles are compared"
             )?;
         }
@@ -422,30 +435,32 @@ impl Advice {
         )?;
         writeln!(text, "|---|---|---|---|---|---|---|---|---|---|---|")?;
         for choice in self.front() {
-            let Choice { name, setting, error, whole, cost } = choice;
+            let Candidate { name, setting, error, whole, cost } = choice;
             let Model { substeps, iterations, .. } = setting.model;
-            let Whole { heights, overlap, speeds, energy, momentum, passed } = whole;
+            let AggregateError { heights, overlap, speeds, energy, momentum, passed } = whole;
             write!(text, "| {name} | {} | {substeps} × {iterations} |", setting.number)?;
             write!(text, " {:.1} | {error:.1e} | {heights:.1e} | {overlap:.1e} |", cost * 1e6)?;
             writeln!(text, " {speeds:.1e} | {energy:.1e} | {momentum:.1e} | {passed:.1} |")?;
         }
-        if wish.most.is_none() && wish.budget.is_none() {
+        if wish.max_error.is_none() && wish.max_cost.is_none() {
             return Ok(());
         }
         match self.best(wish) {
             Some(choice) => {
-                let Choice { name, setting, cost, .. } = choice;
+                let Candidate { name, setting, cost, .. } = choice;
                 writeln!(
                     text,
                     "\n{name} in {}: {:.1e} m for {:.1} µs a step of {:.2} ms\n\n{}",
                     setting.number,
-                    choice.wrong(),
+                    choice.total_error(),
                     cost * 1e6,
                     wish.step * 1e3,
                     literal(setting.model)
                 )
             }
-            None => writeln!(text, "\nnone of {} settings does what was asked for", choices.len()),
+            None => {
+                writeln!(text, "\nnone of {} settings does what was asked for", candidates.len())
+            }
         }
     }
 }

@@ -10,12 +10,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use peak_alloc::PeakAlloc;
 use taw::scene::Scene;
 use taw::world::Model;
-use taw_lab::advise::{Wish, advise, quantity, read_scene};
+use taw_lab::advise::{Requirements, advise, quantity, read_scene};
 use taw_lab::stages::{self, Stages};
 use taw_lab::storm::{self, Case};
-use taw_lab::suite::{self, Effort, Row};
+use taw_lab::suite::{self, CostClass, SuiteCase};
 use taw_lab::trade::sweep::{Job, Plan, by_the_clock, in_order, read_points, sweep, write_points};
-use taw_lab::trade::trace::{Number, Setting};
+use taw_lab::trade::trace::{RunConfig, ScalarType};
 use taw_lab::trade::{Point, write_report, write_tables};
 
 /// Counts what is allocated.
@@ -90,7 +90,7 @@ enum Command {
         budget: Option<f64>,
         /// Only models in these numbers; worlds of Bevy games are f32.
         #[arg(long, value_enum)]
-        number: Option<Number>,
+        number: Option<ScalarType>,
         /// The step of the game.
         #[arg(long, value_parser = duration, default_value = "16.666667ms")]
         step: f64,
@@ -104,7 +104,7 @@ enum Command {
         model: String,
         /// In which numbers.
         #[arg(long, value_enum, default_value = "f32")]
-        number: Number,
+        number: ScalarType,
         /// The step of the game.
         #[arg(long, value_parser = duration, default_value = "16.666667ms")]
         step: f64,
@@ -179,19 +179,20 @@ fn duration(text: &str) -> Result<f64, String> {
 fn main() -> ExitCode {
     let outcome = match Options::parse().command {
         Command::Suite { filter, model, quick, short, json, jobs } => {
-            let wanted = |row: &&Row| {
+            let wanted = |row: &&SuiteCase| {
                 row.name.contains(&filter)
                     && row.model.contains(&model)
-                    && (!quick || row.effort == Effort::Quick)
+                    && (!quick || row.effort == CostClass::Quick)
             };
             run_suite(&suite::rows().filter(wanted).collect::<Vec<_>>(), short, json, jobs)
         }
         Command::Trade { out, report, quick, scene, model, shard, with } => {
             trade(&out, report, &Plan { quick, scene, model }, shard, &with)
         }
-        Command::Advise { scene, max_error: most, budget, number, step } => {
-            print_advice(&scene, Wish { most, budget, number, step, ..Wish::default() })
-        }
+        Command::Advise { scene, max_error, budget: max_cost, number, step } => print_advice(
+            &scene,
+            Requirements { max_error, max_cost, number, step, ..Requirements::default() },
+        ),
         Command::Bench { scene, model, number, step } => bench(&scene, &model, number, step),
         Command::Storm(options) => storm(options),
         Command::Merge { out, report, files } => merge(&out, report, &files),
@@ -247,10 +248,15 @@ fn read(file: &Path) -> Result<Scene, Box<dyn Error>> {
     Ok(read_scene(&text).map_err(|error| format!("{name}:{error}"))?)
 }
 
-fn bench(file: &Path, model: &str, number: Number, step: f64) -> Result<ExitCode, Box<dyn Error>> {
+fn bench(
+    file: &Path,
+    model: &str,
+    number: ScalarType,
+    step: f64,
+) -> Result<ExitCode, Box<dyn Error>> {
     let scene = read(file)?;
     let model: Model = ron::from_str(model).map_err(|error| format!("--model: {error}"))?;
-    let setting = Setting { model, number, step };
+    let setting = RunConfig { model, number, step };
     let Stages { integrate, generate_contacts, restitute, contacts, bytes } =
         stages::measure(&scene, setting, || MEMORY.current_usage())?;
     let all = integrate + generate_contacts + restitute;
@@ -269,7 +275,7 @@ fn bench(file: &Path, model: &str, number: Number, step: f64) -> Result<ExitCode
     Ok(ExitCode::SUCCESS)
 }
 
-fn print_advice(file: &Path, wish: Wish) -> Result<ExitCode, Box<dyn Error>> {
+fn print_advice(file: &Path, wish: Requirements) -> Result<ExitCode, Box<dyn Error>> {
     let scene = read(file)?;
     let bar = ProgressBar::new(0);
     let advice = block_on(advise(&scene, wish, |done, all, _| {
@@ -278,7 +284,7 @@ fn print_advice(file: &Path, wish: Wish) -> Result<ExitCode, Box<dyn Error>> {
     }));
     bar.finish_and_clear();
     print!("{}", advice.text(wish));
-    let asked = wish.most.is_some() || wish.budget.is_some();
+    let asked = wish.max_error.is_some() || wish.max_cost.is_some();
     let found = !asked || advice.best(wish).is_some();
     Ok(if found { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -352,7 +358,7 @@ fn report(out: &Path, to: Option<PathBuf>, points: Vec<Point>) -> Result<ExitCod
 }
 
 fn run_suite(
-    rows: &[&'static Row],
+    rows: &[&'static SuiteCase],
     short: bool,
     json: Option<PathBuf>,
     jobs: usize,
@@ -366,7 +372,7 @@ fn run_suite(
     suite::measure(rows, jobs, |row, outcome| {
         let verdict = if outcome.reached { "reached" } else { "**missed**" };
         let (figure, cost) = (outcome.figure, outcome.cost);
-        let Row { name, model, target, best, setup, metric, source, .. } = row;
+        let SuiteCase { name, model, target, best, setup, metric, source, .. } = row;
         print!(
             "| {name} | {model} | {figure:.2e} | {target:.0e} | {verdict} | {best} | {cost:.0} |"
         );

@@ -25,12 +25,12 @@ pub const IMPULSE: Model =
 
 /// Counts what stepping a world takes.
 #[derive(Debug, Default)]
-pub struct Meter {
+pub struct Stopwatch {
     time: Duration,
     ball_steps: u64,
 }
 
-impl Meter {
+impl Stopwatch {
     /// Steps a world. A step that is refused is a mistake of the suite.
     ///
     /// # Panics

@@ -6,7 +6,7 @@ use taw::Error;
 use taw::prelude::*;
 use taw::scene::Scene;
 
-use crate::trade::trace::{Number, Setting};
+use crate::trade::trace::{RunConfig, ScalarType};
 
 /// Medians over all steps, in seconds a step, and what else there is to know.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,18 +29,18 @@ pub struct Stages {
 /// What the world refuses.
 pub fn measure(
     scene: &Scene,
-    setting: Setting,
+    setting: RunConfig,
     allocated: impl Fn() -> usize,
 ) -> Result<Stages, Error> {
     match setting.number {
-        Number::F32 => measure_in::<f32>(scene, setting, allocated),
-        Number::F64 => measure_in::<f64>(scene, setting, allocated),
+        ScalarType::F32 => measure_in::<f32>(scene, setting, allocated),
+        ScalarType::F64 => measure_in::<f64>(scene, setting, allocated),
     }
 }
 
 fn measure_in<S: Scalar>(
     scene: &Scene,
-    Setting { model, step, .. }: Setting,
+    RunConfig { model, step, .. }: RunConfig,
     allocated: impl Fn() -> usize,
 ) -> Result<Stages, Error> {
     let steps = (scene.duration / step).round() as usize;

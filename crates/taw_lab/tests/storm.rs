@@ -10,7 +10,7 @@ use taw_lab::storm::{
     Bench, Body, Case, Finding, Invariant, Kind, Name, Plan, Pulse, Snapshot, generate, run,
     shrink_by, weather,
 };
-use taw_lab::trade::trace::Number;
+use taw_lab::trade::trace::ScalarType;
 
 const STEP: f64 = 1.0 / 60.0;
 const G: f64 = 9.81;
@@ -81,7 +81,7 @@ fn case(scene: Scene) -> Case {
     Case {
         broke: None,
         model: Model { response, rotation: Rotation::Dynamic, ..Model::default() },
-        number: Number::F64,
+        number: ScalarType::F64,
         step: STEP,
         steps: 60,
         differenced: false,

@@ -14,9 +14,9 @@ use bevy::time::TimeUpdateStrategy;
 use rapier3d::prelude as rapier;
 use taw::math::Vec3 as Exact;
 use taw::scene::{MarbleDesc, ForceFieldDesc, ShapeDesc, KinematicMotion, Scene, MaterialDesc, WallDesc};
-use taw_lab::trade::scenes::{Judged, SCENES};
+use taw_lab::trade::scenes::{ReferenceCase, SCENES};
 use taw_lab::trade::sweep::{STEPS, digits, write_points};
-use taw_lab::trade::trace::{FRAME, Frame};
+use taw_lab::trade::trace::{SAMPLE_INTERVAL, Frame};
 use taw_lab::trade::{COUNTS, Failure, Point};
 
 /// A scene in an engine.
@@ -314,11 +314,11 @@ fn overlap(scene: &Scene, balls: &[MarbleDesc], state: &[[Vec3; 2]]) -> f64 {
         .map_or(f64::NAN, |running| taw_lab::scene::overlaps(&running.world).iter().sum())
 }
 
-fn run<E: Engine>(judged: &Judged, step: (&str, f64), count: u32) -> Point {
+fn run<E: Engine>(judged: &ReferenceCase, step: (&str, f64), count: u32) -> Point {
     let scene = judged.scene();
     let balls: Vec<_> = scene.all_marbles().collect();
     let steps = (scene.duration / step.1).round() as u64;
-    let every = (FRAME / step.1).round() as u64;
+    let every = (SAMPLE_INTERVAL / step.1).round() as u64;
     let go = |mut watch: Option<&mut Vec<Frame>>| {
         let mut engine = E::new(scene, step.1 as f32, count);
         let still = |ball: &MarbleDesc| [vec(ball.position), vec(ball.velocity)];

@@ -9,7 +9,7 @@ use taw::scene::{MarbleDesc, MaterialDesc, Scene, Simulation};
 use taw::swarm::{SwarmModel, Tier};
 
 use super::judge::Invariant;
-use crate::trade::trace::Number;
+use crate::trade::trace::ScalarType;
 
 /// A scene, how it is stepped, and what is known of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,7 +21,7 @@ pub struct Case {
     /// By which model marbles are stepped.
     pub model: Model,
     /// In which numbers.
-    pub number: Number,
+    pub number: ScalarType,
     /// In seconds.
     pub step: f64,
     /// How many steps.

@@ -13,7 +13,7 @@ use super::case::Case;
 use super::judge::{Bench, Finding, Invariant};
 use super::observe::{Body, Snapshot};
 use super::symmetry::{self, Symmetry};
-use crate::trade::trace::Number;
+use crate::trade::trace::ScalarType;
 
 /// What came of a case.
 #[derive(Clone, Debug, PartialEq)]
@@ -90,8 +90,8 @@ pub fn run(case: &Case, pulse: &Pulse) -> Verdict {
 pub fn run_for(case: &Case, only: Option<Invariant>, pulse: &Pulse) -> Verdict {
     let mut verdict = Verdict { worst: Vec::new(), failures: Vec::new(), slowest: 0.0 };
     let caught = catch_unwind(AssertUnwindSafe(|| match case.number {
-        Number::F32 => go::<f32>(case, only, pulse, &mut verdict),
-        Number::F64 => go::<f64>(case, only, pulse, &mut verdict),
+        ScalarType::F32 => go::<f32>(case, only, pulse, &mut verdict),
+        ScalarType::F64 => go::<f64>(case, only, pulse, &mut verdict),
     }));
     pulse.rest();
     if let Err(panic) = caught {
@@ -177,7 +177,7 @@ fn go<S: Scalar>(case: &Case, only: Option<Invariant>, pulse: &Pulse, verdict: &
             return;
         }
     }
-    if case.number == Number::F64 {
+    if case.number == ScalarType::F64 {
         for symmetry in [Symmetry::Mirror, Symmetry::Turn] {
             if only.is_none_or(|only| only == symmetry.invariant()) {
                 let Some(finding) = symmetry::compare(case, symmetry) else { continue };
@@ -262,8 +262,8 @@ const TRAIL: u32 = 12;
 /// Where a body was in the steps until this one, and the energy of all: lines to read.
 pub fn trail(case: &Case, body: usize, until: u32) -> String {
     match case.number {
-        Number::F32 => trail_in::<f32>(case, body, until),
-        Number::F64 => trail_in::<f64>(case, body, until),
+        ScalarType::F32 => trail_in::<f32>(case, body, until),
+        ScalarType::F64 => trail_in::<f64>(case, body, until),
     }
 }
 

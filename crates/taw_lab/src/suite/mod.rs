@@ -16,10 +16,10 @@ mod swarms;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 
-use crate::scene::Meter;
+use crate::scene::Stopwatch;
 
 /// One thing to measure.
-pub struct Row {
+pub struct SuiteCase {
     /// Its name, as `family/case`.
     pub name: &'static str,
     /// What is set up and what is the answer.
@@ -35,14 +35,14 @@ pub struct Row {
     /// Where the answer is from.
     pub source: &'static str,
     /// How long it takes.
-    pub effort: Effort,
+    pub effort: CostClass,
     /// Measures it.
-    pub measure: fn(&mut Meter) -> f64,
+    pub measure: fn(&mut Stopwatch) -> f64,
 }
 
 /// How long a row takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effort {
+pub enum CostClass {
     /// Up to a few seconds: also a test.
     Quick,
     /// Longer.
@@ -51,7 +51,7 @@ pub enum Effort {
 
 /// What a row gave.
 #[derive(Debug)]
-pub struct Outcome {
+pub struct Measurement {
     /// How far off the answer is.
     pub figure: f64,
     /// Whether that is within the target.
@@ -62,22 +62,22 @@ pub struct Outcome {
     pub seconds: f64,
 }
 
-impl Row {
+impl SuiteCase {
     /// Measures this row.
     #[must_use]
-    pub fn run(&self) -> Outcome {
-        let mut meter = Meter::default();
-        let figure = (self.measure)(&mut meter);
+    pub fn run(&self) -> Measurement {
+        let mut stopwatch = Stopwatch::default();
+        let figure = (self.measure)(&mut stopwatch);
         // NaN is no figure at all.
         let reached = figure <= self.target;
-        Outcome { figure, reached, cost: meter.cost(), seconds: meter.seconds() }
+        Measurement { figure, reached, cost: stopwatch.cost(), seconds: stopwatch.seconds() }
     }
 }
 
 /// A row and its outcome, for other programs.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Report {
-    /// See [`Row`].
+    /// See [`SuiteCase`].
     pub name: &'static str,
     /// What is set up and what is the answer.
     pub setup: &'static str,
@@ -104,15 +104,15 @@ pub struct Report {
 impl Report {
     /// What there is to say of a row.
     #[must_use]
-    pub fn new(row: &Row, outcome: &Outcome) -> Self {
-        let Row { name, setup, metric, model, target, best, source, .. } = *row;
-        let Outcome { figure, reached, cost, seconds } = *outcome;
+    pub fn new(row: &SuiteCase, outcome: &Measurement) -> Self {
+        let SuiteCase { name, setup, metric, model, target, best, source, .. } = *row;
+        let Measurement { figure, reached, cost, seconds } = *outcome;
         let figure = figure.is_finite().then_some(figure);
         Self { name, setup, metric, model, figure, target, reached, best, source, cost, seconds }
     }
 }
 
-impl Row {
+impl SuiteCase {
     /// Whether it measures time, and so wants no others beside it.
     #[must_use]
     pub fn is_time(&self) -> bool {
@@ -121,8 +121,12 @@ impl Row {
 }
 
 /// Measures rows, some at a time, and tells the outcomes in the order of the rows.
-pub fn measure(rows: &[&'static Row], jobs: usize, mut tell: impl FnMut(&'static Row, Outcome)) {
-    let mut outcomes: Vec<Option<Outcome>> = Vec::new();
+pub fn measure(
+    rows: &[&'static SuiteCase],
+    jobs: usize,
+    mut tell: impl FnMut(&'static SuiteCase, Measurement),
+) {
+    let mut outcomes: Vec<Option<Measurement>> = Vec::new();
     outcomes.resize_with(rows.len(), || None);
     for (i, row) in rows.iter().enumerate().filter(|(_, row)| row.is_time()) {
         outcomes[i] = Some(row.run());
@@ -145,7 +149,7 @@ pub fn measure(rows: &[&'static Row], jobs: usize, mut tell: impl FnMut(&'static
         }
         drop(send);
         let mut told = 0;
-        let mut tell_ready = |outcomes: &mut [Option<Outcome>]| {
+        let mut tell_ready = |outcomes: &mut [Option<Measurement>]| {
             while let Some(outcome) = outcomes.get_mut(told).and_then(Option::take) {
                 tell(rows[told], outcome);
                 told += 1;
@@ -160,7 +164,7 @@ pub fn measure(rows: &[&'static Row], jobs: usize, mut tell: impl FnMut(&'static
 }
 
 /// Every row, in the order of `references.md`.
-pub fn rows() -> impl Iterator<Item = &'static Row> {
+pub fn rows() -> impl Iterator<Item = &'static SuiteCase> {
     let families = [rolling::ROWS, bouncing::ROWS, impacts::ROWS, gas::ROWS, granular::ROWS];
     families.into_iter().chain([ordinary::ROWS, swarms::ROWS, numbers::ROWS]).flatten()
 }

@@ -241,9 +241,9 @@ fn describe(text: &mut String, scene: &str, folder: &str, curves: &[Curve]) -> s
     writeln!(text, "\n## {scene}\n")?;
     if let Some(judged) = judged {
         write!(text, "{}. Error: {}.", judged.scene().description, judged.metric)?;
-        if judged.chance() > 0.0 {
-            let chance = judged.chance();
-            write!(text, " The last bit of where marbles begin makes {chance:.1e} of it.")?;
+        if judged.noise_floor() > 0.0 {
+            let noise_floor = judged.noise_floor();
+            write!(text, " The last bit of where marbles begin makes {noise_floor:.1e} of it.")?;
         }
         writeln!(text, "\n")?;
     }

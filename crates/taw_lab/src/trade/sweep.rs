@@ -7,9 +7,9 @@ use std::path::Path;
 
 use taw::world::Model;
 
-use super::models::{MODELS, Named};
-use super::scenes::{Judged, SCENES};
-use super::trace::{Number, Setting, time, trace};
+use super::models::{MODELS, Preset};
+use super::scenes::{ReferenceCase, SCENES};
+use super::trace::{RunConfig, ScalarType, time, trace};
 use super::{COUNTS, Failure, Point};
 
 /// The steps, with their names.
@@ -43,11 +43,11 @@ pub struct Plan {
 #[derive(Clone, Copy, Debug)]
 pub struct Job {
     /// What is run.
-    pub scene: &'static Judged,
+    pub scene: &'static ReferenceCase,
     /// By what.
-    pub model: Named,
+    pub model: Preset,
     /// With which step, substeps and iterations.
-    pub setting: Setting,
+    pub setting: RunConfig,
     step: &'static str,
 }
 
@@ -56,9 +56,9 @@ impl Plan {
     pub fn jobs(&self) -> Vec<Job> {
         let mut jobs = Vec::new();
         for scene in SCENES.iter().filter(|scene| scene.name.contains(&self.scene)) {
-            let named = MODELS.iter().filter(|named| named.touches == scene.touches);
+            let named = MODELS.iter().filter(|named| named.has_contacts == scene.has_contacts);
             for model in named.filter(|named| named.name.contains(&self.model)) {
-                for number in [Number::F32, Number::F64] {
+                for number in [ScalarType::F32, ScalarType::F64] {
                     self.settings(scene, *model, number, &mut jobs);
                 }
             }
@@ -66,7 +66,13 @@ impl Plan {
         jobs
     }
 
-    fn settings(&self, scene: &'static Judged, model: Named, number: Number, jobs: &mut Vec<Job>) {
+    fn settings(
+        &self,
+        scene: &'static ReferenceCase,
+        model: Preset,
+        number: ScalarType,
+        jobs: &mut Vec<Job>,
+    ) {
         let counts: &[u32] = if self.quick { &QUICK_COUNTS } else { &COUNTS };
         let iterations: &[u32] = if model.iterates { counts } else { &[model.model.iterations] };
         let marbles = scene.scene().all_marbles().count() as f64;
@@ -82,7 +88,7 @@ impl Plan {
                 for iterations in iterations {
                     let (substeps, iterations) = (*substeps, *iterations);
                     let model_now = Model { substeps, iterations, ..model.model };
-                    let setting = Setting { model: model_now, number, step: *step };
+                    let setting = RunConfig { model: model_now, number, step: *step };
                     jobs.push(Job { scene, model, setting, step: name });
                 }
             }
@@ -98,7 +104,7 @@ impl Job {
     }
 
     fn point(&self) -> Point {
-        let Setting { model, number, step } = self.setting;
+        let RunConfig { model, number, step } = self.setting;
         Point {
             engine: "taw".into(),
             scene: self.scene.name.into(),

@@ -12,14 +12,14 @@ use web_time::Instant;
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
 )]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum Number {
+pub enum ScalarType {
     /// Single precision, as games do.
     F32,
     /// Double precision.
     F64,
 }
 
-impl std::fmt::Display for Number {
+impl std::fmt::Display for ScalarType {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.write_str(if *self == Self::F32 { "f32" } else { "f64" })
     }
@@ -27,11 +27,11 @@ impl std::fmt::Display for Number {
 
 /// How a scene is stepped.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setting {
+pub struct RunConfig {
     /// By which model.
     pub model: Model,
     /// In which numbers.
-    pub number: Number,
+    pub number: ScalarType,
     /// In seconds.
     pub step: f64,
 }
@@ -57,11 +57,11 @@ pub struct Frame {
 
 /// Every so many seconds what there is to see. A divisor of it must be a whole number of any step
 /// of a sweep.
-pub const FRAME: f64 = 0.1;
+pub const SAMPLE_INTERVAL: f64 = 0.1;
 
 /// A run: what there was to see, and what it cost.
 #[derive(Clone, Debug, Default)]
-pub struct Film {
+pub struct Recording {
     /// The first one at the beginning, the last one at the end.
     pub frames: Vec<Frame>,
     /// The median time of a step, in seconds.
@@ -69,21 +69,21 @@ pub struct Film {
 }
 
 /// What a run does not go on for, without a look at what else is to be done.
-const TURN: Duration = Duration::from_millis(1);
+const YIELD_INTERVAL: Duration = Duration::from_millis(1);
 
 /// Runs something for so many seconds, with a frame in every `every` of them. `None` if a marble
 /// left all numbers behind, or a step is refused. Pauses every millisecond, so that it can share
 /// a thread.
-pub async fn film<S: Scalar>(
+pub async fn record<S: Scalar>(
     mut running: Simulation<S>,
     [seconds, step, every]: [f64; 3],
-) -> Option<Film> {
+) -> Option<Recording> {
     let ids: Vec<MarbleId> =
         (0..running.world.marbles.len()).filter_map(|row| running.world.marbles.id(row)).collect();
     let steps = (seconds / step).round() as u64;
     let every = (every / step).round().max(1.0) as u64;
     let dt = S::constant(step);
-    let mut film = Film::default();
+    let mut recording = Recording::default();
     let mut times = Vec::new();
     let mut turn = Instant::now();
     for i in 0..=steps {
@@ -111,32 +111,32 @@ pub async fn film<S: Scalar>(
             frame.momentum = running.world.momentum().into();
             frame.passed = running.sensor_count();
             frame.overlap = crate::scene::overlaps(&running.world).iter().sum();
-            film.frames.push(frame);
+            recording.frames.push(frame);
         }
-        if turn.elapsed() > TURN {
+        if turn.elapsed() > YIELD_INTERVAL {
             yield_now().await;
             turn = Instant::now();
         }
     }
     times.sort_unstable();
-    film.cost = times.get(times.len() / 2).map_or(0.0, Duration::as_secs_f64);
-    Some(film)
+    recording.cost = times.get(times.len() / 2).map_or(0.0, Duration::as_secs_f64);
+    Some(recording)
 }
 
 /// Runs a scene to its end and keeps its frames, the first one at the beginning. `None` if a
 /// marble left all numbers behind.
 #[must_use]
-pub fn trace(scene: &Scene, setting: Setting) -> Option<Vec<Frame>> {
-    block_on(film_of(scene, setting, FRAME)).map(|film| film.frames)
+pub fn trace(scene: &Scene, setting: RunConfig) -> Option<Vec<Frame>> {
+    block_on(record_scene(scene, setting, SAMPLE_INTERVAL)).map(|recording| recording.frames)
 }
 
-/// [Films](film) a scene to its end. `None` also if the scene cannot be run.
-pub async fn film_of(scene: &Scene, setting: Setting, every: f64) -> Option<Film> {
-    let Setting { model, number, step } = setting;
+/// [Records](record) a scene to its end. `None` also if the scene cannot be run.
+pub async fn record_scene(scene: &Scene, setting: RunConfig, every: f64) -> Option<Recording> {
+    let RunConfig { model, number, step } = setting;
     let times = [scene.duration, step, every];
     match number {
-        Number::F32 => film(scene.run::<f32>(model).ok()?, times).await,
-        Number::F64 => film(scene.run::<f64>(model).ok()?, times).await,
+        ScalarType::F32 => record(scene.run::<f32>(model).ok()?, times).await,
+        ScalarType::F64 => record(scene.run::<f64>(model).ok()?, times).await,
     }
 }
 
@@ -145,14 +145,14 @@ pub async fn film_of(scene: &Scene, setting: Setting, every: f64) -> Option<Film
 /// # Panics
 /// If the scene cannot be run.
 #[must_use]
-pub fn time(scene: &Scene, setting: Setting) -> f64 {
+pub fn time(scene: &Scene, setting: RunConfig) -> f64 {
     match setting.number {
-        Number::F32 => time_in::<f32>(scene, setting),
-        Number::F64 => time_in::<f64>(scene, setting),
+        ScalarType::F32 => time_in::<f32>(scene, setting),
+        ScalarType::F64 => time_in::<f64>(scene, setting),
     }
 }
 
-fn time_in<S: Scalar>(scene: &Scene, Setting { model, step, .. }: Setting) -> f64 {
+fn time_in<S: Scalar>(scene: &Scene, RunConfig { model, step, .. }: RunConfig) -> f64 {
     let mut running = scene.run::<S>(model).expect("scenes are checked before");
     let (dt, steps) = (S::constant(step), (scene.duration / step).round() as u64);
     let begin = Instant::now();

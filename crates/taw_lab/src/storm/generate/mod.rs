@@ -8,7 +8,7 @@ use taw::prelude::*;
 use taw::scene::{MaterialDesc, Scene};
 
 use super::case::{Case, Kind, Name, SwarmPart};
-use crate::trade::trace::Number;
+use crate::trade::trace::ScalarType;
 use bodies::Crowd;
 use dice::Dice;
 
@@ -85,7 +85,7 @@ fn setting(kind: Kind, dice: &mut Dice) -> Case {
     Case {
         broke: None,
         model,
-        number: if dice.chance(0.6) { Number::F32 } else { Number::F64 },
+        number: if dice.chance(0.6) { ScalarType::F32 } else { ScalarType::F64 },
         step: 1.0 / dice.pick(steps),
         steps: 1,
         differenced: false,

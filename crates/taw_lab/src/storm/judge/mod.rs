@@ -13,7 +13,7 @@ use taw::prelude::*;
 
 use super::case::{Case, Kind};
 use super::observe::Snapshot;
-use crate::trade::trace::Number;
+use crate::trade::trace::ScalarType;
 
 /// What must hold.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
@@ -157,7 +157,7 @@ impl Rules {
         let swarm = case.swarm.is_some().then_some(if lab { 1.0 } else { parts });
         let iterations = f64::from(case.model.iterations).min(if lab { parts } else { f64::MAX });
         let marbles = f64::from(case.model.substeps);
-        let single = case.number == Number::F32 || swarm.is_some();
+        let single = case.number == ScalarType::F32 || swarm.is_some();
         Self {
             kind,
             step: case.step,
