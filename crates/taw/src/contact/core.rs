@@ -197,7 +197,7 @@ impl Core<'_> {
                 cuboid.axes.iter_mut().for_each(|axis| *axis = by * *axis);
             }
             Kind::Hull { rotation, translation, .. } => {
-                (*rotation, *translation) = (by * *rotation, by * *translation)
+                (*rotation, *translation) = (by * *rotation, by * *translation);
             }
         }
         self

@@ -252,7 +252,7 @@ pub struct RotationDesc {
 pub enum KinematicMotion {
     /// Conveyor belt: the wall stays in place, and its surface moves.
     Conveyor {
-        /// MaterialDesc velocity, in m/s.
+        /// Surface velocity, in m/s.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         velocity: [f64; 3],
     },

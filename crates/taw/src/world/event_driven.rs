@@ -146,7 +146,7 @@ impl<S: Scalar> event::Source for Source<'_, S> {
             8.0 * S::epsilon().as_f64() * point.x.abs().max(point.y.abs()).max(point.z.abs());
         let reach = S::constant((reach + way) * (1.0 + 1e-6) + digits);
         self.walls.for_each_near(cast_point(point), reach, |SubShape { wall, index: part }| {
-            name(wall, part)
+            name(wall, part);
         });
     }
 
