@@ -1,10 +1,9 @@
-//! Which model for a scene of one's own, from a file or as it is in a game.
+//! Recommendation of a model for a scene from a file, or for the current state of a game.
 //!
-//! The reference is the scene by the most exact model (in `f64`, if it is from a file), in steps
-//! that are halved until two runs agree. How long places can be told beforehand is measured too:
-//! by two references that differ in the last bit. Until then places are compared, marble by
-//! marble; after it what remains meaningful: heights and speeds of all together, the energy, how
-//! deep things overlap.
+//! The reference is a run of the most accurate model (in `f64`, if the scene is from a file), in
+//! steps that are halved until two runs agree. The predictability horizon is measured by two
+//! references that differ in the last bit. Up to it positions are compared, marble by marble; after
+//! it aggregate values: heights and speeds of all marbles, energy, and overlap.
 
 use std::fmt::Write;
 use std::future::Future;
@@ -20,7 +19,7 @@ use crate::trade::trace::{
     Frame, Recording, RunConfig, SAMPLE_INTERVAL, ScalarType, record, record_scene,
 };
 
-/// Reads a scene.
+/// Reads a scene from RON text.
 ///
 /// # Errors
 /// Line, column, field and reason, as text.
@@ -36,24 +35,23 @@ pub fn read_scene(text: &str) -> Result<Scene, String> {
         format!("{line}:{col}: {field}: {}", spanned.code)
     })?;
     reader.end().map_err(|error| reader.span_error(error).to_string())?;
-    // What no single number shows: a world tells.
+    // Errors across fields show when a world is built.
     scene.run::<f64>(Model::default()).map_err(|error| error.to_string())?;
     Ok(scene)
 }
 
-/// What can be run again and again from the same beginning.
+/// A replayable scene: runs repeatedly from the same initial state.
 pub trait ReplayableScene: Sync {
-    /// For how long, in seconds.
+    /// Duration, in seconds.
     fn seconds(&self) -> f64;
-    /// The radius of the smallest marble, in metres.
+    /// Radius of the smallest marble, in metres.
     fn smallest(&self) -> f64;
-    /// In which numbers it can be run, the most exact ones last.
+    /// Available floating-point types, the most accurate last.
     fn numbers(&self) -> &'static [ScalarType];
-    /// The models that are worth a try.
+    /// Models to try.
     fn models(&self) -> impl Iterator<Item = &'static Preset> + Send;
-    /// Runs it, with a frame in every `every` seconds; if `nudged`, after every marble was moved
-    /// by the last bit of its place. `None` if that cannot be done, or a marble left all numbers
-    /// behind.
+    /// Records a run with a frame every `every` seconds; if `perturbed`, after every marble was
+    /// moved by one ulp. `None` if it cannot be run, or the state of a marble becomes non-finite.
     fn record(
         &self,
         setting: RunConfig,
@@ -93,13 +91,12 @@ impl ReplayableScene for Scene {
     }
 }
 
-/// The next number.
+/// Next representable number.
 fn up(x: f64) -> f64 {
     if x == 0.0 { 1e-17 } else { x.next_up() }
 }
 
-/// A world of a game, as it is now. Whatever moves walls does not move them in it: they stand
-/// still.
+/// Snapshot of a game's world, in which walls stand still.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     world: World<f32>,
@@ -107,18 +104,18 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
-    /// Of this world, to be run for so many seconds. Balls in bulk are left out. (The world is
-    /// as before afterwards.)
+    /// Creates a snapshot of a world, to be run for a duration in seconds. Swarms are left out.
+    /// (The world is unchanged afterwards.)
     #[must_use]
     pub fn new(of: &mut World<f32>, seconds: f64) -> Self {
         let swarm = std::mem::take(&mut of.swarm);
         let mut world = of.clone();
-        // Costs are those of a game that keeps none.
+        // The cost is measured without the energy audit.
         world.enable_energy_audit(false);
         of.swarm = swarm;
         for row in 0..world.walls.len() {
             if let Some(id) = world.walls.id(row) {
-                // A wall that is there can be told to stand still.
+                // An existing wall accepts this.
                 let _ = world.walls.set_motion(id, None);
             }
         }
@@ -157,85 +154,85 @@ impl ReplayableScene for Snapshot {
     }
 }
 
-/// What is asked for.
+/// Requirements on a model.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Requirements {
-    /// How wrong places may be, in metres.
+    /// Maximum position error, in metres.
     pub max_error: Option<f64>,
-    /// How long a step may take, in seconds.
+    /// Maximum cost of a step, in seconds.
     pub max_cost: Option<f64>,
-    /// In which numbers; in all that there are, if it is not said.
+    /// Floating-point type; all available ones by default.
     pub number: Option<ScalarType>,
-    /// The step of the game, in seconds.
+    /// Time step of the game, in seconds.
     pub step: f64,
-    /// A model that takes longer for the scene, in seconds, is not tried with more substeps; a
-    /// reference that takes thirty times as long is not refined any more.
+    /// Time limit in seconds: a model that takes longer for the scene is not tried with more
+    /// substeps; a reference that takes thirty times as long is not refined further.
     pub time_limit: f64,
 }
 
 impl Default for Requirements {
-    /// Nothing but to know what there is, at 60 steps a second and with a second's patience.
+    /// No limits, at 60 steps per second and with a time limit of a second.
     fn default() -> Self {
         Self { max_error: None, max_cost: None, number: None, step: 1.0 / 60.0, time_limit: 1.0 }
     }
 }
 
-/// How a setting did.
+/// A candidate: a run configuration with its errors and cost.
 #[derive(Clone, Debug)]
 pub struct Candidate {
-    /// The name of the model.
+    /// Name of the model.
     pub name: &'static str,
-    /// All of it.
+    /// Run configuration.
     pub setting: RunConfig,
-    /// The furthest that a marble was from where it should be while that can be told, in metres.
+    /// Largest position error up to the predictability horizon, in metres.
     pub error: f64,
-    /// What remains meaningful at any time.
+    /// Aggregate error, meaningful at any time.
     pub whole: AggregateError,
-    /// Seconds for a step.
+    /// Cost of a step, in seconds.
     pub cost: f64,
 }
 
-/// How far all marbles together are from the reference.
+/// Aggregate difference of all marbles from the reference.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct AggregateError {
-    /// Of the heights, from the lowest to the highest marble: the mean difference, in metres.
+    /// Mean difference of the sorted heights, in metres.
     pub heights: f64,
-    /// The same of the speeds, in m/s.
+    /// Mean difference of the sorted speeds, in m/s.
     pub speeds: f64,
-    /// The mean overlap of a marble, beyond that of the reference, in metres.
+    /// Mean overlap per marble beyond that of the reference, in metres.
     pub overlap: f64,
-    /// The mean difference of the energies, in joules.
+    /// Mean difference of the energies, in joules.
     pub energy: f64,
-    /// That of the momenta, in kg m/s.
+    /// Mean difference of the momenta, in kg m/s.
     pub momentum: f64,
-    /// That of how many passed the scene's gates.
+    /// Mean difference of the numbers of marbles behind sensor planes.
     pub passed: f64,
 }
 
-/// What came out.
+/// Result of the recommendation.
 #[derive(Clone, Debug, Default)]
 pub struct Advice {
-    /// Until when places can be told, in seconds; the scene's length if always.
+    /// Predictability horizon in seconds; the scene's duration if not chaotic.
     pub horizon: f64,
-    /// For how long it was run, in seconds.
+    /// Simulated duration, in seconds.
     pub seconds: f64,
-    /// Up to how much the references agree until then, in metres.
+    /// Reference uncertainty: largest difference of the references up to the horizon, in metres.
     pub sure: f64,
-    /// How the reference was run, if it could be.
+    /// Run configuration of the reference, if it could be run.
     pub reference: Option<RunConfig>,
-    /// All settings, the cheapest first.
+    /// All candidates, the cheapest first.
     pub candidates: Vec<Candidate>,
 }
 
-/// Steps of the reference, as parts of the game's, the longest first.
+/// Refinement ladder: steps of the reference as fractions of the game's, the longest first.
 const REFINEMENT_STEPS: [f64; 4] = [1.0 / 4.0, 1.0 / 8.0, 1.0 / 16.0, 1.0 / 32.0];
-/// How much more patience there is with a reference.
+/// Time limit of a reference, in multiples of that of a model.
 const REFERENCE_TIME_FACTOR: f64 = 30.0;
-/// What counts as the same place, as a part of the smallest radius.
+/// Distance that counts as the same position, as a fraction of the smallest radius.
 const SAME_PLACE: f64 = 0.01;
 
-/// Measures all models on a scene. `tell` hears how many groups of settings are done, how many
-/// there are, and what is known so far.
+/// Measures all models on a scene. `report` is called with the number of finished groups, the
+/// number of all groups, and the result so far.
 pub async fn advise(
     source: &impl ReplayableScene,
     wish: Requirements,
@@ -244,12 +241,12 @@ pub async fn advise(
     let seconds = source.seconds();
     let same =
         wish.max_error.map_or(f64::MAX, |most| 0.25 * most).min(SAME_PLACE * source.smallest());
-    // Frames of all steps are of the same moments.
+    // Frames of all steps are at common times.
     let every = (SAMPLE_INTERVAL / wish.step).round().max(1.0) * wish.step;
     let number = source.numbers().last().copied().unwrap_or(ScalarType::F32);
     let mut advice = Advice { seconds, ..Advice::default() };
     let mut reference = Vec::new();
-    // Not every scene can be run by events.
+    // Not every scene suits the event-driven response.
     for model in [EXACT, Model { detection: Detection::Swept, substeps: 4, ..IMPULSE }] {
         for part in REFINEMENT_STEPS {
             let setting = RunConfig { model, number, step: part * wish.step };
@@ -261,7 +258,7 @@ pub async fn advise(
                     predictability_horizon(&reference, &finer.frames, same);
             }
             (reference, advice.reference) = (finer.frames, Some(setting));
-            // What is chaotic does not become less so.
+            // Chaos does not vanish by refinement.
             let horizon = advice.horizon;
             let long = begin.elapsed().as_secs_f64() > REFERENCE_TIME_FACTOR * wish.time_limit;
             if long || horizon >= seconds || horizon > 0.0 && horizon < 1.2 * before {
@@ -299,7 +296,7 @@ pub async fn advise(
     advice
 }
 
-/// For each model, number and count of iterations, its settings from the cheapest on.
+/// Run configurations per model, floating-point type and iteration count, from the cheapest on.
 fn settings(
     source: &impl ReplayableScene,
     wish: Requirements,
@@ -322,7 +319,7 @@ fn settings(
     groups
 }
 
-/// Until when two runs agree, and up to how much until then.
+/// Time up to which two runs agree, and their largest difference until then.
 fn predictability_horizon(a: &[Frame], b: &[Frame], same: f64) -> (f64, f64) {
     let (mut horizon, mut sure) = (0.0, 0.0);
     for (a, b) in a.iter().zip(b) {
@@ -358,7 +355,7 @@ impl AggregateError {
     }
 }
 
-/// How far two distributions are apart: what has to be moved how far (Wasserstein).
+/// Wasserstein distance of two distributions.
 fn wasserstein_distance(mut a: Vec<f64>, mut b: Vec<f64>) -> f64 {
     a.sort_unstable_by(f64::total_cmp);
     b.sort_unstable_by(f64::total_cmp);
@@ -366,8 +363,7 @@ fn wasserstein_distance(mut a: Vec<f64>, mut b: Vec<f64>) -> f64 {
 }
 
 impl Candidate {
-    /// How wrong it is, in metres: of places while these can be told, of heights and overlaps
-    /// always.
+    /// Total error in metres: of positions up to the horizon, of heights and overlaps always.
     #[must_use]
     pub fn total_error(&self) -> f64 {
         self.error.max(self.whole.heights).max(self.whole.overlap)
@@ -375,7 +371,7 @@ impl Candidate {
 }
 
 impl Advice {
-    /// The cheapest that is right enough, or the most exact that is cheap enough.
+    /// The cheapest candidate within the error limit, or the most accurate within the cost limit.
     #[must_use]
     pub fn best(&self, wish: Requirements) -> Option<&Candidate> {
         let affordable = self
@@ -390,7 +386,7 @@ impl Advice {
         }
     }
 
-    /// Those that no other one beats in both.
+    /// Pareto front of error and cost.
     #[must_use]
     pub fn front(&self) -> Vec<&Candidate> {
         let mut best = f64::MAX;
@@ -404,7 +400,7 @@ impl Advice {
         self.candidates.iter().filter(better).collect()
     }
 
-    /// All of it in words.
+    /// Report as text.
     #[must_use]
     pub fn text(&self, wish: Requirements) -> String {
         let mut text = String::new();

@@ -1,18 +1,18 @@
-//! The models that are compared.
+//! Presets of compared models.
 
 use taw::prelude::*;
 use taw::response::ContactLaw;
 
-/// A model with a name: substeps and iterations are still open.
+/// A named model preset with open substeps and iterations.
 #[derive(Clone, Copy, Debug)]
 pub struct Preset {
-    /// What it is called in reports.
+    /// Name in reports.
     pub name: &'static str,
     /// The model.
     pub model: Model,
-    /// Whether iterations change anything.
+    /// Iterations affect the result.
     pub iterates: bool,
-    /// Whether it is compared where marbles touch, or else where nothing does.
+    /// Compared on scenes with contacts, or else on contact-free ones.
     pub has_contacts: bool,
 }
 
@@ -37,7 +37,7 @@ const fn with_contacts(name: &'static str, model: Model, iterates: bool) -> Pres
     Preset { name, model, iterates, has_contacts: true }
 }
 
-/// All of them: the integrators where nothing touches, the responses where something does.
+/// All presets: integrators for contact-free scenes, responses for scenes with contacts.
 pub static MODELS: [Preset; 14] = [
     contact_free("explicit Euler", Integrator::ExplicitEuler),
     contact_free("semi-implicit Euler", Integrator::SemiImplicitEuler),

@@ -1,4 +1,4 @@
-//! The scenes that models are compared on, and what each of them should come to.
+//! Reference cases: scenes with a known outcome and an error metric.
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -11,14 +11,14 @@ use super::trace::{Frame, RunConfig, SAMPLE_INTERVAL, ScalarType};
 use crate::advise::ReplayableScene;
 use crate::scene::{EXACT, G};
 
-/// A scene with a judge.
+/// A reference case: a scene with an error metric.
 #[derive(Debug)]
 pub struct ReferenceCase {
-    /// Its name, that of its file.
+    /// Name, that of its file.
     pub name: &'static str,
-    /// What its error is.
+    /// Description of the error metric.
     pub metric: &'static str,
-    /// Whether marbles touch anything in it.
+    /// The scene has contacts.
     pub has_contacts: bool,
     text: &'static str,
     comparison: Metric,
@@ -27,17 +27,16 @@ pub struct ReferenceCase {
     noise_floor: OnceLock<f64>,
 }
 
-/// How wrong frames are, as a part of what the scene is about.
+/// Error metric, relative to the size of the scene.
 #[derive(Clone, Copy, Debug)]
 enum Metric {
-    /// Where marbles should be is known: their mean square distance from it, over this length in
-    /// metres.
+    /// Analytic solution: root mean square distance from it, over this length in metres.
     Analytic(fn(f64) -> Vec<Vec3<f64>>, f64),
-    /// As the most exact model has it in fine steps.
+    /// Comparison with a reference recording of the most accurate model in fine steps.
     Reference(fn(&[Frame], &[Frame]) -> f64),
 }
 
-/// All of them.
+/// All reference cases.
 pub static SCENES: [ReferenceCase; 12] = [
     case(
         "throw",
@@ -153,7 +152,7 @@ impl ReferenceCase {
         self.scene.get_or_init(|| crate::advise::read_scene(self.text).expect("a shipped scene"))
     }
 
-    /// How wrong frames of it are: 0 is right, 1 is as wrong as the scene is large.
+    /// Relative error of a recording: 0 is exact, 1 is as wrong as the scene is large.
     pub fn error(&self, frames: &[Frame]) -> f64 {
         match self.comparison {
             Metric::Analytic(known, size) => {
@@ -167,8 +166,8 @@ impl ReferenceCase {
         }
     }
 
-    /// How far the reference is from itself with every marble moved by the last bit: a smaller
-    /// error says nothing. Zero where the outcome is known.
+    /// Noise floor: error of the reference against itself with every marble perturbed by one ulp.
+    /// Smaller errors are meaningless. Zero for an analytic solution.
     pub fn noise_floor(&self) -> f64 {
         *self.noise_floor.get_or_init(|| match self.comparison {
             Metric::Analytic(..) => 0.0,
@@ -176,7 +175,7 @@ impl ReferenceCase {
         })
     }
 
-    /// Its gravity at the beginning, in m/s².
+    /// Initial gravity, in m/s².
     pub fn scene_gravity(&self) -> Vec3<f64> {
         Vec3::from(self.scene().gravity)
     }

@@ -1,4 +1,4 @@
-//! What happened in a scene, whatever stepped it.
+//! Recordings of runs of a scene.
 
 use std::time::Duration;
 
@@ -7,13 +7,13 @@ use taw::prelude::*;
 use taw::scene::{Scene, Simulation};
 use web_time::Instant;
 
-/// In which numbers a world counts.
+/// Floating-point type of a world.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
 )]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
 pub enum ScalarType {
-    /// Single precision, as games do.
+    /// Single precision.
     F32,
     /// Double precision.
     F64,
@@ -25,54 +25,54 @@ impl std::fmt::Display for ScalarType {
     }
 }
 
-/// How a scene is stepped.
+/// Configuration of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct RunConfig {
-    /// By which model.
+    /// Model.
     pub model: Model,
-    /// In which numbers.
+    /// Floating-point type.
     pub number: ScalarType,
-    /// In seconds.
+    /// Time step, in seconds.
     pub step: f64,
 }
 
-/// A scene at a moment: one entry for each marble, in the order of the scene.
+/// State of a scene at one time, with one entry per marble in the order of the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
-    /// In seconds.
+    /// Time, in seconds.
     pub time: f64,
-    /// In metres.
+    /// Positions, in metres.
     pub at: Vec<Vec3<f64>>,
-    /// In m/s.
+    /// Velocities, in m/s.
     pub velocity: Vec<Vec3<f64>>,
-    /// How deep all contacts overlap together, in metres.
+    /// Total penetration of all contacts, in metres.
     pub overlap: f64,
-    /// Of all marbles in gravity, in joules.
+    /// Total energy of all marbles, in joules.
     pub energy: f64,
-    /// Of all marbles, in kg m/s.
+    /// Total momentum of all marbles, in kg m/s.
     pub momentum: [f64; 3],
-    /// How many marbles are behind the scene's gates.
+    /// Number of marbles behind the scene's sensor planes.
     pub passed: usize,
 }
 
-/// Every so many seconds what there is to see. A divisor of it must be a whole number of any step
-/// of a sweep.
+/// Sample interval of recordings in seconds. Every step of a sweep must divide it by a whole
+/// number.
 pub const SAMPLE_INTERVAL: f64 = 0.1;
 
-/// A run: what there was to see, and what it cost.
+/// Recording of a run with its cost.
 #[derive(Clone, Debug, Default)]
 pub struct Recording {
-    /// The first one at the beginning, the last one at the end.
+    /// Frames from the start to the end.
     pub frames: Vec<Frame>,
-    /// The median time of a step, in seconds.
+    /// Median duration of a step, in seconds.
     pub cost: f64,
 }
 
-/// What a run does not go on for, without a look at what else is to be done.
+/// Longest time a run keeps the thread before it yields.
 const YIELD_INTERVAL: Duration = Duration::from_millis(1);
 
-/// Runs something for so many seconds, with a frame in every `every` of them. `None` if a marble
-/// left all numbers behind, or a step is refused. Pauses every millisecond, so that it can share
+/// Records a run of a given duration with a frame every `every` seconds. `None` if the state of a
+/// marble becomes non-finite, or a step is rejected. Yields every millisecond, so that it can share
 /// a thread.
 pub async fn record<S: Scalar>(
     mut running: Simulation<S>,
@@ -103,7 +103,7 @@ pub async fn record<S: Scalar>(
                 frame.velocity.push(marble.velocity);
             }
             if !running.scene().gravity_keyframes.is_empty() {
-                // Steps have left that of their middle.
+                // The steps have set the gravity of their midpoint.
                 let gravity = running.scene().gravity_at(frame.time).map(S::constant);
                 running.world.set_gravity(gravity.into()).ok()?;
             }
@@ -123,8 +123,7 @@ pub async fn record<S: Scalar>(
     Some(recording)
 }
 
-/// Runs a scene to its end and keeps its frames, the first one at the beginning. `None` if a
-/// marble left all numbers behind.
+/// Records a scene to its end. `None` if the state of a marble becomes non-finite.
 #[must_use]
 pub fn trace(scene: &Scene, setting: RunConfig) -> Option<Vec<Frame>> {
     block_on(record_scene(scene, setting, SAMPLE_INTERVAL)).map(|recording| recording.frames)
@@ -140,7 +139,7 @@ pub async fn record_scene(scene: &Scene, setting: RunConfig, every: f64) -> Opti
     }
 }
 
-/// How many seconds of the wall's clock a scene takes, from the first step to the last one.
+/// Wall-clock time of a scene in seconds, from the first step to the last one.
 ///
 /// # Panics
 /// If the scene cannot be run.
