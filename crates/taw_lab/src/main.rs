@@ -48,7 +48,7 @@ enum Command {
         /// Where all of it goes besides, as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
-        /// How many rows are measured at a time. (Rows that measure time are measured alone.)
+        /// Number of cases measured in parallel. (Time measurements run alone.)
         #[arg(long, default_value_t = std::thread::available_parallelism().map_or(1, usize::from))]
         jobs: usize,
     },
@@ -82,10 +82,10 @@ enum Command {
     Advise {
         /// A scene in RON (see `crates/taw_lab/scenes`).
         scene: PathBuf,
-        /// How wrong places may be: 1mm.
+        /// Maximum position error: 1mm.
         #[arg(long, value_parser = length)]
         max_error: Option<f64>,
-        /// How long a step may take: 2ms.
+        /// Maximum cost of a step: 2ms.
         #[arg(long, value_parser = duration)]
         budget: Option<f64>,
         /// Only models in these numbers; worlds of Bevy games are f32.
@@ -128,13 +128,13 @@ enum Command {
 
 #[derive(clap::Args)]
 struct Storm {
-    /// How many scenes, of all models in turn.
+    /// Number of scenes, of all models in turn.
     #[arg(long, default_value_t = 900)]
     scenes: u64,
     /// Of the random numbers: the same scenes for the same seed, whatever else is asked for.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How many scenes run at a time.
+    /// Number of scenes run in parallel.
     #[arg(long, default_value_t = std::thread::available_parallelism().map_or(1, usize::from))]
     jobs: usize,
     /// Only models whose name contains this: impulse/swept.
@@ -146,10 +146,10 @@ struct Storm {
     /// Writes failures as they are.
     #[arg(long)]
     no_shrink: bool,
-    /// How many failures of one model and invariant are written.
+    /// Number of failures of one model and invariant to write.
     #[arg(long, default_value_t = 3)]
     keep: u64,
-    /// How long a step may take before it counts as one that does not end.
+    /// Time limit of a step, after which it counts as hung.
     #[arg(long, value_parser = duration, default_value = "30s")]
     patience: f64,
     /// Does not count an invariant of a model, as MODEL:INVARIANT: impulse/swept:speed.

@@ -121,7 +121,7 @@ pub struct Ball {
     pub angular_velocity: [f64; 3],
     /// In kilograms.
     pub mass: f64,
-    /// What it is made of.
+    /// Material.
     pub material: Material<f64>,
 }
 
@@ -193,7 +193,7 @@ pub fn energy<S: Scalar>(world: &World<S>) -> f64 {
     world.energy().total()
 }
 
-/// How deep pairs of balls, and balls and walls, overlap: each one's, in metres.
+/// Penetration of each pair of balls, and of balls and walls, in metres.
 pub fn overlaps<S: Scalar>(world: &World<S>) -> Vec<f64> {
     let mut touched = world.clone();
     touched.generate_contacts();

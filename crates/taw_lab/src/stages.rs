@@ -1,4 +1,4 @@
-//! What each stage of a scene's steps takes.
+//! Cost of each stage of a scene's steps.
 
 use std::time::Instant;
 
@@ -17,16 +17,16 @@ pub struct Stages {
     pub generate_contacts: f64,
     /// The third verb.
     pub restitute: f64,
-    /// How many contacts the last substep of a step had, in the mean.
+    /// Mean number of contacts of the last substep of a step.
     pub contacts: f64,
-    /// How much more memory was allocated at the end than before there was a world.
+    /// Memory allocated by the world, in bytes.
     pub bytes: usize,
 }
 
 /// Runs a scene to its end. `allocated` says how many bytes are.
 ///
 /// # Errors
-/// What the world refuses.
+/// Errors of the world.
 pub fn measure(
     scene: &Scene,
     setting: RunConfig,

@@ -15,12 +15,12 @@ use super::observe::{Body, Snapshot};
 use super::symmetry::{self, Symmetry};
 use crate::trade::trace::ScalarType;
 
-/// What came of a case.
+/// Result of a case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     /// For each invariant that was judged, how near it came to its bound.
     pub worst: Vec<Finding>,
-    /// What did not hold, each invariant once, in the order of time.
+    /// Violated invariants, each once, in the order of time.
     pub failures: Vec<Failure>,
     /// The slowest step, in seconds.
     pub slowest: f64,
@@ -33,7 +33,7 @@ pub struct Failure {
     pub finding: Finding,
     /// In which step, counted from one; zero before the first.
     pub step: u32,
-    /// What else there is to say.
+    /// Details.
     pub what: String,
 }
 
@@ -219,8 +219,8 @@ pub fn advance<S: Scalar>(case: &Case, running: &mut Simulation<S>) -> Result<()
     running.world.step(dt)
 }
 
-/// How a wall moves by its poses in `f32` before and after a step, about its middle: nothing, if
-/// they are the same.
+/// Motion of a wall by finite differences of its poses in `f32` about its center; none if they are
+/// equal.
 fn difference<S: Scalar>(
     case: &Case,
     row: usize,
@@ -256,7 +256,7 @@ fn difference<S: Scalar>(
     }))
 }
 
-/// How many steps a [`trail`] shows.
+/// Number of steps of a [`trail`].
 const TRAIL: u32 = 12;
 
 /// Where a body was in the steps until this one, and the energy of all: lines to read.

@@ -7,7 +7,7 @@ use super::case::Case;
 use super::judge::Invariant;
 use super::run::{Pulse, run_for};
 
-/// How many runs a shrinking takes at most: it ends when nothing can be left out, but bodies in a
+/// Maximum number of runs of a shrinking: it ends when nothing can be left out, but bodies in a
 /// heap can be left out in many ways.
 const MOST_RUNS: u32 = 1500;
 
@@ -115,7 +115,7 @@ fn thin<T: Clone>(
     }
 }
 
-/// What may be simpler, all at once.
+/// Simplifications, each applied as a whole.
 const SIMPLER: [fn(&mut Case); 15] = [
     |case| case.model.substeps = 1,
     |case| case.model.iterations = 8,

@@ -17,19 +17,18 @@ pub enum Symmetry {
     Turn,
 }
 
-/// How many steps are compared, and how many in which something touches: chaos multiplies a
-/// difference in each bounce, and does not make a part in a million of the last bits of `f64` in
-/// so few.
+/// Number of compared steps, and of those with contacts: chaos multiplies a difference in each
+/// bounce, and does not make a part in a million of the last bits of `f64` in that number.
 const STEPS: u32 = 200;
 const TOUCHED: u32 = 10;
-/// What differs by less than this part of the distances in the scene is rounding.
+/// Differences below this fraction of the distances in the scene are rounding.
 const ALIKE: f64 = 1e-6;
 /// With more bodies than this, the order of contacts that are equally deep decides, which is a
 /// matter of the last bit.
 const MOST: usize = 2;
 
 impl Symmetry {
-    /// What it is judged as.
+    /// Invariant of the symmetry.
     #[must_use]
     pub fn invariant(self) -> Invariant {
         match self {
@@ -188,8 +187,8 @@ pub fn compare(case: &Case, symmetry: Symmetry) -> Option<Finding> {
     Some(worst)
 }
 
-/// Whether it begins in a state where any direction is as good as any other: bodies at one
-/// point, or in walls, or one on the very edge of something.
+/// Returns true for an initial state without a unique direction: bodies at one point, or in walls,
+/// or on the edge of something.
 fn is_singular(case: &Case) -> bool {
     let balls: Vec<MarbleDesc> = case.scene.all_marbles().collect();
     let apart = |a: &MarbleDesc, b: &MarbleDesc| {

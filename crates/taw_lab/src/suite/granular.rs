@@ -18,14 +18,14 @@ fn once<T: Copy>(cell: &OnceLock<T>, measure: impl FnOnce() -> T) -> T {
     *cell.get_or_init(measure)
 }
 
-/// How densely frictionless balls of diameter one pack when they settle in a box, how
-/// many each touches, and the deepest overlap: off 0.64, off 6, and in metres.
+/// Packing of frictionless balls of diameter one in a box: density off 0.64, contacts per ball off
+/// 6, and deepest overlap in metres.
 fn packing(stopwatch: &mut Stopwatch) -> [f64; 3] {
     static PACKED: OnceLock<[f64; 3]> = OnceLock::new();
     once(&PACKED, || pack(stopwatch))
 }
 
-/// How many random points tell how much is filled.
+/// Number of random points that measure the filling.
 const POINTS: u32 = 200_000;
 
 fn pack(stopwatch: &mut Stopwatch) -> [f64; 3] {

@@ -8,8 +8,7 @@ use crate::scene::{
     Ball, EXACT, IMPULSE, Stopwatch, slope, state, surface, vector, wall, weightless, world,
 };
 
-/// How a ball leaves a wall whose normal is +y that it met with this velocity and spin
-/// about z: velocity along x and y, and spin.
+/// Velocity along x and y, and spin about z, of a ball after an impact on a wall with normal +y.
 fn bounce(
     stopwatch: &mut Stopwatch,
     model: Model,
@@ -39,8 +38,8 @@ fn bounce(
     [v.x, v.y, w.z]
 }
 
-/// The same for a rigid ball (Chung and Ooi 2011): its point sticks, or slides with all
-/// the friction that the whole impact allows.
+/// Analytic impact of a rigid ball (Chung and Ooi 2011): its contact point sticks, or slides with
+/// all the friction that the whole impact allows.
 fn rigid(v: [f64; 2], spin: f64, radius: f64, material: Material<f64>) -> [f64; 3] {
     let pressure = (1.0 + material.restitution) * -v[1];
     let slip = v[0] + radius * spin;
@@ -261,7 +260,7 @@ fn graze(stopwatch: &mut Stopwatch, model: Model, parts: &[f64]) -> f64 {
     worst
 }
 
-/// Whether the place after an impact counts, too.
+/// Position after an impact, compared or not.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Places {
     Compared,

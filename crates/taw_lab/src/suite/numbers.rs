@@ -1,4 +1,4 @@
-//! What rounding, scale and extremes do.
+//! Rounding, scale and extreme values.
 
 use taw::math::Quat;
 use taw::motion::FreeRotation;
@@ -59,7 +59,7 @@ fn small_scene(stopwatch: &mut Stopwatch, model: Model, scale: f64) -> [Vec3<f64
     ids.map(|id| state(&world, id)[0] / scale)
 }
 
-/// How far the scene's outcome depends on its scale, from a millimetre to a kilometre.
+/// Dependence of the outcome on the scale of the scene, from a millimetre to a kilometre.
 fn scale_free(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let exact = small_scene(stopwatch, model, 1.0);
     let mut worst: f64 = 0.0;
@@ -116,7 +116,7 @@ fn extremes(stopwatch: &mut Stopwatch, model: Model) -> f64 {
             }
         }
     }
-    // What cannot be right is refused.
+    // Invalid values are rejected.
     let mut world = weightless::<f32>(EXACT);
     for dt in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         failures += f64::from(u8::from(world.step(dt).is_ok()));

@@ -16,8 +16,7 @@ fn on_slope(degrees: f64, friction: f64) -> Ball {
     Ball { at: [0.5 * sin, 0.5 * cos, 0.0], material: surface(0.0, friction), ..Ball::default() }
 }
 
-/// How far off speed, way and spin are after four seconds on a slope; the largest
-/// relative error.
+/// Largest relative error of speed, distance and spin after four seconds on a slope.
 fn incline(stopwatch: &mut Stopwatch, model: Model, dt: f64, degrees: f64, friction: f64) -> f64 {
     let mut world = slope::<f32>(model, degrees);
     let ball = on_slope(degrees, friction);
@@ -223,8 +222,7 @@ fn resistances(stopwatch: &mut Stopwatch, model: Model, dt: f64) -> f64 {
         .fold(0.0, f64::max)
 }
 
-/// How far the heading of a ball that first slides and then rolls turns, at 24 angles to
-/// the axes, in rad.
+/// Change of heading in rad of a ball that first slides and then rolls, at 24 angles to the axes.
 fn heading(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut worst: f64 = 0.0;
     for i in 0..24 {

@@ -28,7 +28,7 @@ const QUICK_COUNTS: [u32; 2] = [1, 8];
 const MOST: f64 = 2e6;
 const QUICK_MOST: f64 = 5e4;
 
-/// What to go through.
+/// Selection of a sweep.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
     /// Only some settings, for a look.
@@ -42,7 +42,7 @@ pub struct Plan {
 /// One run of a sweep.
 #[derive(Clone, Copy, Debug)]
 pub struct Job {
-    /// What is run.
+    /// Reference case.
     pub scene: &'static ReferenceCase,
     /// By what.
     pub model: Preset,
@@ -97,7 +97,7 @@ impl Plan {
 }
 
 impl Job {
-    /// What tells it from the others.
+    /// Unique key.
     #[must_use]
     pub fn key(&self) -> String {
         self.point().key()
@@ -170,7 +170,7 @@ pub fn by_the_clock(job: &Job) -> f64 {
 /// has none.
 ///
 /// # Errors
-/// What reading reports, and a line that is no point.
+/// Errors of reading, and malformed lines.
 pub fn read_points(file: &Path) -> std::io::Result<Vec<Point>> {
     let reader = match File::open(file) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
@@ -194,7 +194,7 @@ pub fn read_points(file: &Path) -> std::io::Result<Vec<Point>> {
 /// Writes points, one to a line.
 ///
 /// # Errors
-/// What writing reports.
+/// Errors of writing.
 pub fn write_points(file: &Path, points: &[Point]) -> std::io::Result<()> {
     let mut to = std::io::BufWriter::new(File::create(file)?);
     for point in points {
@@ -208,7 +208,7 @@ pub fn write_points(file: &Path, points: &[Point]) -> std::io::Result<()> {
 /// file has already. Every point is in the file as soon as it is measured.
 ///
 /// # Errors
-/// What reading and writing report.
+/// Errors of reading and writing.
 pub fn sweep(
     plan: &Plan,
     [number, of]: [usize; 2],

@@ -1,4 +1,4 @@
-//! What falls, flies, lies and is squeezed.
+//! Random bodies.
 
 use taw::math::{Point3, Vec3};
 use taw::prelude::*;
@@ -7,7 +7,7 @@ use taw::scene::{MarbleDesc, RotationDesc};
 use super::{Dice, surface};
 use crate::storm::case::{Case, Kind};
 
-/// Who comes, and where to.
+/// Number, kind and placement of bodies.
 pub struct Crowd {
     pub kind: Kind,
     /// True where contacts feel spins.
@@ -18,7 +18,7 @@ pub struct Crowd {
     pub high: [f64; 3],
 }
 
-/// How bodies begin.
+/// Initial state of bodies.
 #[derive(Clone, Copy, PartialEq)]
 enum Start {
     /// At rest, apart.
@@ -143,7 +143,7 @@ impl Crowd {
             ball.position = position;
             if start == Start::Thrown {
                 let fast = if dice.chance(0.1) { 50.0 } else { dice.between(0.0, 8.0) };
-                // What springs do not hold, they are not asked to.
+                // Springs are not tested beyond their limits.
                 let speed = if self.springs() { fast.min(4.0 * self.size) } else { fast };
                 ball.velocity = (dice.direction() * speed).into();
             }
@@ -189,7 +189,7 @@ impl Crowd {
     }
 }
 
-/// How far the nearest wall is from a point, in metres; below zero inside.
+/// Signed distance of a point from the nearest wall, in metres; negative inside.
 fn distances(case: &Case) -> impl Fn([f64; 3]) -> f64 + use<> {
     let running = case.scene.run::<f64>(Model::default());
     let shapes = running.map(|running| running.world.walls.shapes().to_vec()).unwrap_or_default();

@@ -12,7 +12,7 @@ use crate::trade::trace::ScalarType;
 use bodies::Crowd;
 use dice::Dice;
 
-/// How many body-substeps a scene has at most, so that many scenes run.
+/// Maximum number of body-substeps of a scene, so that many scenes run.
 const MOST_WORK: f64 = 60_000.0;
 /// In seconds: long enough to fall, bounce and come to rest.
 const LONGEST: f64 = 5.0;
@@ -95,7 +95,7 @@ fn setting(kind: Kind, dice: &mut Dice) -> Case {
     }
 }
 
-/// What something is made of.
+/// Random material.
 fn surface(dice: &mut Dice) -> MaterialDesc {
     let restitution = match dice.below(4) {
         0 => 0.0,

@@ -1,4 +1,4 @@
-//! What bodies fall on, and into.
+//! Random walls.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
@@ -13,7 +13,7 @@ pub struct Arena {
     pub about: &'static str,
     /// The length that everything is measured by, in metres.
     pub size: f64,
-    /// Whether there is a level floor at height zero.
+    /// A level floor exists at height zero.
     pub floor: bool,
     /// Where bodies begin.
     pub low: [f64; 3],
