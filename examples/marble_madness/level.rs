@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use bevy::color::palettes::tailwind;
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
-use taw::scene::{Ball, Form, Movement, Scene, Surface};
+use taw::scene::{KinematicMotion, MarbleDesc, MaterialDesc, Scene, ShapeDesc};
 
 use crate::board::{Board, HalfWidth};
 
@@ -18,7 +18,7 @@ pub struct Level(pub Option<Scene>);
 /// How a wall of it moves, from where it began.
 #[derive(Component)]
 struct Moves {
-    movement: Movement,
+    movement: KinematicMotion,
     begin: Transform,
 }
 
@@ -36,16 +36,20 @@ impl Level {
     fn from_text(text: &str) -> Result<Self, String> {
         let scene = taw_lab::advise::read_scene(text)?;
         half_width(&scene)?;
-        if scene.walls.iter().any(|wall| matches!(wall.moves, Some(Movement::Conveys { .. }))) {
+        if scene
+            .walls
+            .iter()
+            .any(|wall| matches!(wall.motion, Some(KinematicMotion::Conveyor { .. })))
+        {
             return Err(" walls that convey cannot be played yet".into());
         }
-        if !scene.fields.is_empty() {
+        if !scene.force_fields.is_empty() {
             return Err(" force fields cannot be played yet".into());
         }
         if !scene.structures.is_empty() {
             return Err(" walls of many parts cannot be played yet".into());
         }
-        if scene.balls().any(|ball| ball.half_length > 0.0) {
+        if scene.all_marbles().any(|ball| ball.half_length > 0.0) {
             return Err(" capsules cannot be played yet".into());
         }
         Ok(Self(Some(scene)))
@@ -57,13 +61,13 @@ impl Level {
     }
 
     /// The marbles of the level, if it brings any.
-    pub fn balls(&self) -> Vec<Ball> {
-        self.0.iter().flat_map(Scene::balls).collect()
+    pub fn balls(&self) -> Vec<MarbleDesc> {
+        self.0.iter().flat_map(Scene::all_marbles).collect()
     }
 
     /// What its marbles are made of.
-    pub fn material(&self, ball: &Ball) -> Option<SurfaceMaterial> {
-        Some(material(ball.surface.unwrap_or(self.0.as_ref()?.surface)))
+    pub fn material(&self, ball: &MarbleDesc) -> Option<SurfaceMaterial> {
+        Some(material(ball.material.unwrap_or(self.0.as_ref()?.material)))
     }
 }
 
@@ -72,7 +76,7 @@ fn half_width(scene: &Scene) -> Result<f32, String> {
     let mut sides = Vec::new();
     let mut floor = false;
     for wall in &scene.walls {
-        let Form::HalfSpace { normal, through } = wall.shape else { continue };
+        let ShapeDesc::HalfSpace { normal, point: through } = wall.shape else { continue };
         let (normal, through) = (point(normal).normalize(), point(through));
         let distance = -normal.dot(through);
         if normal.distance(Vec3::Y) < 1e-6 && distance.abs() < 1e-6 {
@@ -99,7 +103,7 @@ fn point(at: [f64; 3]) -> Vec3 {
     Vec3::from_array(at.map(|x| x as f32))
 }
 
-fn material(surface: Surface) -> SurfaceMaterial {
+fn material(surface: MaterialDesc) -> SurfaceMaterial {
     SurfaceMaterial {
         restitution: surface.restitution as f32,
         friction: surface.friction as f32,
@@ -132,19 +136,19 @@ fn build(
     });
     for wall in &scene.walls {
         let (solid, mesh, place): (Wall, Mesh, _) = match wall.shape {
-            Form::HalfSpace { .. } => continue,
-            Form::Box { center, size, turned } => {
+            ShapeDesc::HalfSpace { .. } => continue,
+            ShapeDesc::Box { center, size, rotation } => {
                 let cuboid = Cuboid::from_size(point(size));
-                let (axis, angle) = (point(turned.axis).normalize(), turned.degrees as f32);
+                let (axis, angle) = (point(rotation.axis).normalize(), rotation.degrees as f32);
                 let turn = Quat::from_axis_angle(axis, angle.to_radians());
                 let place = Transform::from_translation(point(center)).with_rotation(turn);
                 (cuboid.into(), cuboid.into(), place)
             }
-            Form::Ball { center, radius } => {
+            ShapeDesc::Ball { center, radius } => {
                 let ball = Sphere::new(radius as f32);
                 (ball.into(), ball.into(), Transform::from_translation(point(center)))
             }
-            Form::Capsule { from, to, radius } => {
+            ShapeDesc::Capsule { from, to, radius } => {
                 let (from, to) = (point(from), point(to));
                 let capsule = Capsule3d::new(radius as f32, from.distance(to));
                 let turn = Quat::from_rotation_arc(Vec3::Y, (to - from).normalize_or(Vec3::Y));
@@ -152,11 +156,11 @@ fn build(
                 (capsule.into(), capsule.into(), place)
             }
         };
-        let made_of = material(wall.surface.unwrap_or(scene.surface));
+        let made_of = material(wall.material.unwrap_or(scene.material));
         let mesh = Mesh3d(meshes.add(mesh));
         let look = MeshMaterial3d(look.clone());
         let mut wall_entity = commands.spawn((ChildOf(*board), solid, made_of, mesh, look, place));
-        if let Some(movement) = wall.moves {
+        if let Some(movement) = wall.motion {
             wall_entity.insert(Moves { movement, begin: place });
         }
     }
@@ -199,20 +203,20 @@ mod tests {
 
     #[test]
     fn what_is_no_board_is_refused() {
-        let board = "(seconds: 1, walls: [
+        let board = "(duration: 1, walls: [
             (shape: HalfSpace(normal: (0, 1, 0))),
-            (shape: HalfSpace(normal: (1, 0, 0), through: (-5, 0, 0))),
-            (shape: HalfSpace(normal: (-1, 0, 0), through: (5, 0, 0))),
-            (shape: HalfSpace(normal: (0, 0, 1), through: (0, 0, -5))),
-            (shape: HalfSpace(normal: (0, 0, -1), through: (0, 0, 5))),
+            (shape: HalfSpace(normal: (1, 0, 0), point: (-5, 0, 0))),
+            (shape: HalfSpace(normal: (-1, 0, 0), point: (5, 0, 0))),
+            (shape: HalfSpace(normal: (0, 0, 1), point: (0, 0, -5))),
+            (shape: HalfSpace(normal: (0, 0, -1), point: (0, 0, 5))),
         ])";
         assert_eq!(Level::from_text(board).unwrap().half_width(), Some(5.0));
         for (from, to) in [
-            ("through: (5, 0, 0)", "through: (6, 0, 0)"),
+            ("point: (5, 0, 0)", "point: (6, 0, 0)"),
             ("normal: (0, 1, 0)", "normal: (1, 1, 0)"),
             ("(shape: HalfSpace(normal: (0, 1, 0))),", ""),
-            ("seconds: 1", "seconds: -1"),
-            ("seconds: 1", "seconds: 1, fields: [Drag(linear: 1)]"),
+            ("duration: 1", "duration: -1"),
+            ("duration: 1", "duration: 1, force_fields: [Drag(linear: 1)]"),
         ] {
             assert!(Level::from_text(&board.replace(from, to)).is_err(), "{to}");
         }

@@ -3,7 +3,7 @@
 use bevy::color::palettes::tailwind;
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
-use taw::scene::Ball;
+use taw::scene::MarbleDesc;
 
 use crate::Options;
 use crate::board::{HalfWidth, Tilt};
@@ -197,7 +197,7 @@ impl Lattice {
 }
 
 /// A marble of a level, of any colour.
-fn marble_of(ball: &Ball, bag: &mut Bag, look: &Look) -> impl Bundle + use<> {
+fn marble_of(ball: &MarbleDesc, bag: &mut Bag, look: &Look) -> impl Bundle + use<> {
     let place = |at: [f64; 3]| Vec3::from_array(at.map(|x| x as f32));
     let (at, radius) = (place(ball.position), ball.radius as f32);
     let velocity = place(ball.velocity);

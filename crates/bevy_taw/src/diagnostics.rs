@@ -58,8 +58,8 @@ pub const POTENTIAL_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/ener
 pub const MOMENTUM: DiagnosticPath = DiagnosticPath::const_new("taw/momentum");
 
 /// What sliding took in a step, in joules. This and the next eight are off until
-/// [`enable_energy_audit`]; each is the field of an [`EnergyAudit`] by that name. Marbles count, swarms do
-/// not.
+/// [`enable_energy_audit`]; each is the field of an [`EnergyAudit`] by that name. Marbles count,
+/// swarms do not.
 pub const FRICTION_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/friction");
 /// What collisions took along their normals, in joules.
 pub const RESTITUTION_LOSS: DiagnosticPath =

@@ -29,9 +29,9 @@ use std::time::Duration;
 
 use bevy::prelude::*;
 use bevy::tasks::{AsyncComputeTaskPool, Task, TaskPool};
-use taw_lab::advise::{Advice, Snapshot, Wish, advise};
+use taw_lab::advise::{Advice, Requirements, Snapshot, advise};
 
-pub use taw_lab::advise::Choice;
+pub use taw_lab::advise::Candidate;
 
 use crate::governor::{self, Governor, ModelGoverned};
 use crate::resources::TawWorld;
@@ -100,7 +100,7 @@ impl TawTrade {
         }
         let snapshot = Snapshot::new(world, self.seconds);
         let step = step.as_secs_f64();
-        let wish = Wish { step, patience: self.patience, ..Wish::default() };
+        let wish = Requirements { step, time_limit: self.patience, ..Requirements::default() };
         let told = Arc::new(Mutex::new(Told::default()));
         let ours = told.clone();
         let task = AsyncComputeTaskPool::get_or_init(TaskPool::default).spawn(async move {
@@ -132,7 +132,7 @@ impl TawTrade {
     }
 
     /// The settings that no other one beats in both, the cheapest first.
-    pub fn front(&self) -> impl Iterator<Item = &Choice> {
+    pub fn front(&self) -> impl Iterator<Item = &Candidate> {
         self.advice.front().into_iter()
     }
 }
@@ -144,7 +144,7 @@ fn take_in(mut trade: ResMut<TawTrade>, mut done: MessageWriter<TradeMeasured>) 
     let mut told = measuring.told.lock().unwrap_or_else(PoisonError::into_inner);
     measuring.part = told.part;
     if let Some(mut news) = told.news.take() {
-        news.choices.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        news.candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
         trade.advice = news;
     }
     drop(told);

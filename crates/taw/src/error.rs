@@ -79,7 +79,7 @@ pub enum Error {
     /// A node would become its own ancestor.
     #[error("the node {0:?} carries its new parent")]
     Cycle(NodeId),
-    /// All 2³² indices of a handle are taken.
+    /// Indices of 32 bits are exhausted.
     #[error("the world holds {0} rows already, which is all that a handle can name")]
     Full(usize),
 }
@@ -118,8 +118,8 @@ pub(crate) fn within<S: Scalar>(field: &'static str, value: S, min: S, max: S) -
 
 /// Validates a rotation of about unit length and normalizes it if it drifted.
 ///
-/// Within 1e-5 it is used unchanged: that would shift a point a hundred metres away by a
-/// millimetre. Up to 1e-3 is the drift of a few thousand products in `f32`.
+/// Deviations within 1e-5 are kept: that would shift a point a hundred metres away by a millimetre.
+/// Up to 1e-3 is the drift of a few thousand products in `f32`.
 pub(crate) fn rotation<S: Scalar>(field: &'static str, q: Quat<S>) -> Result<Quat<S>, Error> {
     let norm = q.s.as_f64().hypot(length(q.v).as_f64());
     let off = (norm - 1.0).abs();

@@ -7,7 +7,9 @@ use taw::Error;
 use taw::frame::Pose;
 use taw::math::Quat;
 use taw::prelude::*;
-use taw::scene::{Ball, Form, Lattice, Movement, Scene, Tilt, Wall};
+use taw::scene::{
+    GravityKeyframe, KinematicMotion, Lattice, MarbleDesc, Scene, ShapeDesc, WallDesc,
+};
 use taw::shape::{Aabb, Capsule, Compound, HeightField, Mesh, Obb, Shape};
 
 const RESPONSES: [Response; 5] = [
@@ -277,42 +279,45 @@ fn compounds_are_nested_up_to_a_limit() {
 }
 
 /// A scene with this wall.
-fn with_wall(shape: Form, moves: Option<Movement>) -> Scene {
-    Scene { walls: vec![Wall { shape, surface: None, moves }], ..Scene::default() }
+fn with_wall(shape: ShapeDesc, motion: Option<KinematicMotion>) -> Scene {
+    Scene { walls: vec![WallDesc { shape, material: None, motion }], ..Scene::default() }
 }
 
 #[test]
 fn a_scene_that_cannot_go_on_is_refused_when_its_world_is_built() {
-    let ball = Ball { radius: 0.5, ..Ball::default() };
-    let lattice = |count, pitch| Lattice { first: ball, count, pitch, disorder: 0.0 };
+    let ball = MarbleDesc { radius: 0.5, ..MarbleDesc::default() };
+    let lattice = |count, pitch| Lattice { first: ball, count, pitch, jitter: 0.0 };
     let lattices = |lattice| Scene { lattices: vec![lattice], ..Scene::default() };
     let tilted = |gravity| Scene {
-        tilts: vec![Tilt { at: 0.0, gravity: [0.0; 3] }, Tilt { at: 1.0, gravity }],
+        gravity_keyframes: vec![
+            GravityKeyframe { time: 0.0, gravity: [0.0; 3] },
+            GravityKeyframe { time: 1.0, gravity },
+        ],
         ..Scene::default()
     };
-    let half_space = |normal| Form::HalfSpace { normal, through: [0.0; 3] };
-    let swings = |way, period| Movement::Swings {
-        way,
+    let half_space = |normal| ShapeDesc::HalfSpace { normal, point: [0.0; 3] };
+    let swings = |amplitude, period| KinematicMotion::Oscillate {
+        amplitude,
         pivot: [0.0; 3],
         axis: [0.0, 1.0, 0.0],
         degrees: 0.0,
         period,
     };
     let floor = half_space([0.0, 1.0, 0.0]);
-    let tiny = Ball { radius: 1e-50, ..ball };
+    let tiny = MarbleDesc { radius: 1e-50, ..ball };
     let bad = [
         ("gravity.y", 1e39, tilted([0.0, 1e39, 0.0])),
         ("gravity.y", -1e39, Scene { gravity: [0.0, -1e39, 0.0], ..Scene::default() }),
         ("lattices.count", 65535.0_f64.powi(3), lattices(lattice([65535; 3], [1.0; 3]))),
         ("pitch.z", 1e38, lattices(lattice([2, 2, 9], [1.0, 1.0, 1e38]))),
         ("radius", 1e-50, Scene { marbles: vec![tiny], ..Scene::default() }),
-        ("way / period", 1e30 * std::f64::consts::TAU / 1e-30, {
+        ("amplitude / period", 1e30 * std::f64::consts::TAU / 1e-30, {
             with_wall(floor, Some(swings([1e30, 0.0, 0.0], 1e-30)))
         }),
         ("period", 1e-50, with_wall(floor, Some(swings([1.0, 0.0, 0.0], 1e-50)))),
         ("the reach of a wall", 3.3e38, {
             with_wall(
-                Form::Ball { center: [2e38, 0.0, 0.0], radius: 1.0 },
+                ShapeDesc::Ball { center: [2e38, 0.0, 0.0], radius: 1.0 },
                 Some(swings([1.3e38, 0.0, 0.0], 60.0)),
             )
         }),
@@ -331,17 +336,17 @@ fn a_scene_that_cannot_go_on_is_refused_when_its_world_is_built() {
 
 #[test]
 fn a_scene_that_refuses_a_step_has_moved_no_wall() {
-    let moves = Movement::Conveys { velocity: [1.0, 0.0, 0.0] };
-    let floor = Form::HalfSpace { normal: [0.0, 1.0, 0.0], through: [0.0; 3] };
-    let swing = Movement::Swings {
-        way: [1.0, 0.0, 0.0],
+    let motion = KinematicMotion::Conveyor { velocity: [1.0, 0.0, 0.0] };
+    let floor = ShapeDesc::HalfSpace { normal: [0.0, 1.0, 0.0], point: [0.0; 3] };
+    let swing = KinematicMotion::Oscillate {
+        amplitude: [1.0, 0.0, 0.0],
         pivot: [0.0; 3],
         axis: [0.0, 1.0, 0.0],
         degrees: 3.0,
         period: 1.0,
     };
-    let mut scene = with_wall(floor, Some(moves));
-    scene.walls.push(Wall { moves: Some(swing), ..scene.walls[0] });
+    let mut scene = with_wall(floor, Some(motion));
+    scene.walls.push(WallDesc { motion: Some(swing), ..scene.walls[0] });
     let mut running = scene.run::<f64>(Model::default()).unwrap();
     running.step(0.1).unwrap();
     let before = running.clone();

@@ -15,7 +15,7 @@ use std::time::{Duration, Instant};
 
 use taw::Error;
 use taw::prelude::*;
-use taw::scene::{Ball, Scene};
+use taw::scene::{MarbleDesc, Scene};
 
 /// How long ten steps of four balls may take, in a build without optimization on a machine that
 /// does other things too. It is a few microseconds a step.
@@ -281,7 +281,7 @@ fn a_scene_without_anything_nasty_runs() {
     for model in models() {
         scenes::one_of_each().run::<f32>(model).unwrap().step(0.01).unwrap();
     }
-    let ball = Ball { position: [0.0; 3], ..Ball::default() };
+    let ball = MarbleDesc { position: [0.0; 3], ..MarbleDesc::default() };
     Scene { marbles: vec![ball], ..Scene::default() }.run::<f64>(Model::default()).unwrap();
 }
 

@@ -2,7 +2,9 @@
 
 use taw::Error;
 use taw::prelude::*;
-use taw::scene::{Ball, Form, Lattice, Movement, Scene, Surface, Tilt, Wall};
+use taw::scene::{
+    GravityKeyframe, KinematicMotion, Lattice, MarbleDesc, MaterialDesc, Scene, ShapeDesc, WallDesc,
+};
 
 const DT: f64 = 1.0 / 240.0;
 
@@ -10,18 +12,18 @@ fn impulse() -> Model {
     Model { response: Response::Impulse, rotation: Rotation::Dynamic, ..Model::default() }
 }
 
-fn floor() -> Wall {
-    let shape = Form::HalfSpace { normal: [0.0, 2.0, 0.0], through: [0.0; 3] };
-    Wall { shape, surface: None, moves: None }
+fn floor() -> WallDesc {
+    let shape = ShapeDesc::HalfSpace { normal: [0.0, 2.0, 0.0], point: [0.0; 3] };
+    WallDesc { shape, material: None, motion: None }
 }
 
-fn rough() -> Surface {
-    Surface { friction: 0.5, restitution: 0.0, ..Surface::default() }
+fn rough() -> MaterialDesc {
+    MaterialDesc { friction: 0.5, restitution: 0.0, ..MaterialDesc::default() }
 }
 
-fn after(scene: &Scene) -> taw::scene::Running<f64> {
+fn after(scene: &Scene) -> taw::scene::Simulation<f64> {
     let mut running = scene.run(impulse()).unwrap();
-    while running.time() < scene.seconds - 0.5 * DT {
+    while running.time() < scene.duration - 0.5 * DT {
         running.step(DT).unwrap();
     }
     running
@@ -30,20 +32,20 @@ fn after(scene: &Scene) -> taw::scene::Running<f64> {
 #[test]
 fn marbles_and_lattices_come_in_order_and_in_any_scalar() {
     let lattice = Lattice {
-        first: Ball { radius: 0.4, ..Ball::default() },
+        first: MarbleDesc { radius: 0.4, ..MarbleDesc::default() },
         count: [3, 2, 4],
         pitch: [1.0, 1.1, 1.2],
-        disorder: 0.1,
+        jitter: 0.1,
     };
-    let single = Ball { position: [9.0, 9.0, 9.0], ..Ball::default() };
+    let single = MarbleDesc { position: [9.0, 9.0, 9.0], ..MarbleDesc::default() };
     let scene = Scene { marbles: vec![single], lattices: vec![lattice], ..Scene::default() };
-    let balls: Vec<_> = scene.balls().collect();
+    let balls: Vec<_> = scene.all_marbles().collect();
     assert_eq!((balls.len(), balls[0]), (25, single));
     for ball in &balls[1..] {
         assert!(ball.radius <= 0.4 && ball.radius > 0.36);
         for other in &balls[1..] {
-            let way = Vec3::from(ball.position) - Vec3::from(other.position);
-            assert!(ball == other || way.magnitude() > 0.8);
+            let apart = Vec3::from(ball.position) - Vec3::from(other.position);
+            assert!(ball == other || apart.magnitude() > 0.8);
         }
     }
     let (f32s, f64s) = (scene.run::<f32>(impulse()).unwrap(), scene.run::<f64>(impulse()).unwrap());
@@ -58,10 +60,12 @@ fn marbles_and_lattices_come_in_order_and_in_any_scalar() {
 
 #[test]
 fn gravity_tilts_over_time() {
-    let ball = Ball { position: [0.0, 100.0, 0.0], ..Ball::default() };
-    let tilts =
-        vec![Tilt { at: 1.0, gravity: [0.0; 3] }, Tilt { at: 2.0, gravity: [6.0, 0.0, 0.0] }];
-    let scene = Scene { seconds: 3.0, tilts, marbles: vec![ball], ..Scene::default() };
+    let ball = MarbleDesc { position: [0.0, 100.0, 0.0], ..MarbleDesc::default() };
+    let gravity_keyframes = vec![
+        GravityKeyframe { time: 1.0, gravity: [0.0; 3] },
+        GravityKeyframe { time: 2.0, gravity: [6.0, 0.0, 0.0] },
+    ];
+    let scene = Scene { duration: 3.0, gravity_keyframes, marbles: vec![ball], ..Scene::default() };
     let running = after(&scene);
     // Nothing, then 6 t, then 6: a speed of 3 + 6, and 1 + 3 + 3 metres.
     let marble = running.world.marbles.get(running.world.marbles.id(0).unwrap()).unwrap();
@@ -71,33 +75,33 @@ fn gravity_tilts_over_time() {
 
 #[test]
 fn walls_convey_turn_and_swing() {
-    let on = |position: [f64; 3]| Ball { position, radius: 0.1, ..Ball::default() };
-    let moved = |moves: Movement, ball: Ball, seconds: f64| {
+    let on = |position: [f64; 3]| MarbleDesc { position, radius: 0.1, ..MarbleDesc::default() };
+    let moved = |motion: KinematicMotion, ball: MarbleDesc, seconds: f64| {
         let center = [0.0, -0.5, 0.0];
         let size = [20.0, 1.0, 20.0];
-        let shape = Form::Box { center, size, turned: taw::scene::Turn::default() };
-        let wall = Wall { shape, surface: None, moves: Some(moves) };
+        let shape = ShapeDesc::Box { center, size, rotation: taw::scene::RotationDesc::default() };
+        let wall = WallDesc { shape, material: None, motion: Some(motion) };
         after(&Scene {
-            seconds,
-            surface: rough(),
+            duration: seconds,
+            material: rough(),
             walls: vec![wall],
             marbles: vec![ball],
             ..Scene::default()
         })
     };
-    let first = |running: &taw::scene::Running<f64>| {
+    let first = |running: &taw::scene::Simulation<f64>| {
         running.world.marbles.get(running.world.marbles.id(0).unwrap()).unwrap()
     };
 
     // A ball that is put on a belt ends up rolling at two sevenths of its speed.
-    let belt = Movement::Conveys { velocity: [1.0, 0.0, 0.0] };
+    let belt = KinematicMotion::Conveyor { velocity: [1.0, 0.0, 0.0] };
     let running = moved(belt, on([0.0, 0.1, 0.0]), 1.0);
     let speed = first(&running).velocity.x;
     assert!((speed - 2.0 / 7.0).abs() < 1e-3, "{speed} m/s");
 
     // A lift takes it along, and is where it should be.
-    let lift = Movement::Swings {
-        way: [0.0, 0.3, 0.0],
+    let lift = KinematicMotion::Oscillate {
+        amplitude: [0.0, 0.3, 0.0],
         pivot: [0.0; 3],
         axis: [0.0, 1.0, 0.0],
         degrees: 0.0,
@@ -108,8 +112,11 @@ fn walls_convey_turn_and_swing() {
     assert!((height - 0.4).abs() < 1e-3, "{height} m");
 
     // A turntable about a pivot: the wall comes round.
-    let table =
-        Movement::Turns { pivot: [1.0, 0.0, 0.0], axis: [0.0, 3.0, 0.0], degrees_per_second: 90.0 };
+    let table = KinematicMotion::Rotate {
+        pivot: [1.0, 0.0, 0.0],
+        axis: [0.0, 3.0, 0.0],
+        degrees_per_second: 90.0,
+    };
     let running = moved(table, on([0.0, 5.0, 0.0]), 2.0);
     let WallShape::Solid(taw::shape::Shape::Obb(obb)) = running.world.walls.shapes()[0] else {
         panic!("it is a box")
@@ -125,20 +132,20 @@ fn walls_convey_turn_and_swing() {
 #[test]
 fn what_a_world_refuses_a_scene_refuses_by_name() {
     let run = |scene: Scene| scene.run::<f64>(impulse()).unwrap_err();
-    let ball = Ball { radius: -1.0, ..Ball::default() };
+    let ball = MarbleDesc { radius: -1.0, ..MarbleDesc::default() };
     let error = run(Scene { marbles: vec![ball], ..Scene::default() });
     assert_eq!(error, Error::NotPositive { field: "radius", value: -1.0 });
-    let error = run(Scene { seconds: f64::NAN, ..Scene::default() });
-    assert!(matches!(error, Error::NotPositive { field: "seconds", .. }));
-    let shape = Form::HalfSpace { normal: [0.0; 3], through: [0.0; 3] };
-    let error = run(Scene { walls: vec![Wall { shape, ..floor() }], ..Scene::default() });
+    let error = run(Scene { duration: f64::NAN, ..Scene::default() });
+    assert!(matches!(error, Error::NotPositive { field: "duration", .. }));
+    let shape = ShapeDesc::HalfSpace { normal: [0.0; 3], point: [0.0; 3] };
+    let error = run(Scene { walls: vec![WallDesc { shape, ..floor() }], ..Scene::default() });
     assert!(matches!(error, Error::NotUnit { .. }), "{error}");
     let axis = [0.0; 3];
-    let moves = Some(Movement::Turns { pivot: [0.0; 3], axis, degrees_per_second: 1.0 });
-    let error = run(Scene { walls: vec![Wall { moves, ..floor() }], ..Scene::default() });
+    let motion = Some(KinematicMotion::Rotate { pivot: [0.0; 3], axis, degrees_per_second: 1.0 });
+    let error = run(Scene { walls: vec![WallDesc { motion, ..floor() }], ..Scene::default() });
     assert!(matches!(error, Error::NotUnit { field: "axis", .. }), "{error}");
-    let surface = Surface { restitution: 2.0, ..Surface::default() };
-    let error = run(Scene { surface, walls: vec![floor()], ..Scene::default() });
+    let material = MaterialDesc { restitution: 2.0, ..MaterialDesc::default() };
+    let error = run(Scene { material, walls: vec![floor()], ..Scene::default() });
     assert!(matches!(error, Error::OutOfRange { field: "restitution", .. }), "{error}");
 }
 
@@ -147,19 +154,19 @@ mod files {
     use super::*;
 
     const TEXT: &str = "(
-    about: \"one of each\",
-    seconds: 2,
+    description: \"one of each\",
+    duration: 2,
     gravity: (0, -1, 0),
-    tilts: [(at: 0.5, gravity: (1, 0, 0))],
-    fields: [Drag(linear: 0.1), Attraction(center: (0, 0, 0), strength: -1)],
-    surface: (friction: 0.2),
+    gravity_keyframes: [(time: 0.5, gravity: (1, 0, 0))],
+    force_fields: [Drag(linear: 0.1), Attraction(center: (0, 0, 0), strength: -1)],
+    material: (friction: 0.2),
     walls: [
         (shape: HalfSpace(normal: (0, 1, 0))),
-        (shape: Ball(center: (0, 0, 0), radius: 1), moves: Some(Conveys(velocity: (1, 0, 0)))),
+        (shape: Ball(center: (0, 0, 0), radius: 1), motion: Some(Conveyor(velocity: (1, 0, 0)))),
         (shape: Capsule(from: (0, 0, 0), to: (0, 1, 0), radius: 1)),
         (
-            shape: Box(center: (0, 0, 0), size: (1, 1, 1), turned: (axis: (0, 0, 1), degrees: 30)),
-            moves: Some(Swings(way: (1, 0, 0), period: 2)),
+            shape: Box(center: (0, 0, 0), size: (1, 1, 1), rotation: (axis: (0, 0, 1), degrees: 30)),
+            motion: Some(Oscillate(amplitude: (1, 0, 0), period: 2)),
         ),
     ],
     marbles: [(position: (0, 5, 0), radius: 0.5, angular_velocity: (0, 0, 1))],
@@ -173,8 +180,8 @@ mod files {
     #[test]
     fn come_back_as_they_were() {
         let scene: Scene = ron::from_str(TEXT).unwrap();
-        assert_eq!(scene.balls().count(), 9);
-        assert_eq!(scene.surface.friction, 0.2);
+        assert_eq!(scene.all_marbles().count(), 9);
+        assert_eq!(scene.material.friction, 0.2);
         assert_eq!(scene.marbles[0].density, 2500.0);
         let text = ron::to_string(&scene).unwrap();
         assert_eq!(ron::from_str::<Scene>(&text).unwrap(), scene);
@@ -189,7 +196,7 @@ mod files {
             assert_eq!(error.span.start.line, line, "{error}");
             assert!(error.to_string().contains(why), "{error}");
         };
-        refused("seconds: 2", "seconds: 0", 3, "above zero");
+        refused("duration: 2", "duration: 0", 3, "above zero");
         refused("linear: 0.1", "linear: -0.1", 6, "at least zero");
         refused("friction: 0.2", "frition: 0.2", 7, "frition");
         refused("normal: (0, 1, 0)", "normal: (0, 0, 0)", 9, "not zero");

@@ -10,12 +10,12 @@ use indicatif::{ProgressBar, ProgressStyle};
 use peak_alloc::PeakAlloc;
 use taw::scene::Scene;
 use taw::world::Model;
-use taw_lab::advise::{Wish, advise, quantity, read_scene};
+use taw_lab::advise::{Requirements, advise, quantity, read_scene};
 use taw_lab::stages::{self, Stages};
 use taw_lab::storm::{self, Case};
-use taw_lab::suite::{self, Effort, Row};
+use taw_lab::suite::{self, CostClass, SuiteCase};
 use taw_lab::trade::sweep::{Job, Plan, by_the_clock, in_order, read_points, sweep, write_points};
-use taw_lab::trade::trace::{Number, Setting};
+use taw_lab::trade::trace::{RunConfig, ScalarType};
 use taw_lab::trade::{Point, write_report, write_tables};
 
 /// Counts what is allocated.
@@ -48,7 +48,7 @@ enum Command {
         /// Where all of it goes besides, as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
-        /// How many rows are measured at a time. (Rows that measure time are measured alone.)
+        /// Number of cases measured in parallel. (Time measurements run alone.)
         #[arg(long, default_value_t = std::thread::available_parallelism().map_or(1, usize::from))]
         jobs: usize,
     },
@@ -82,15 +82,15 @@ enum Command {
     Advise {
         /// A scene in RON (see `crates/taw_lab/scenes`).
         scene: PathBuf,
-        /// How wrong places may be: 1mm.
+        /// Maximum position error: 1mm.
         #[arg(long, value_parser = length)]
         max_error: Option<f64>,
-        /// How long a step may take: 2ms.
+        /// Maximum cost of a step: 2ms.
         #[arg(long, value_parser = duration)]
         budget: Option<f64>,
         /// Only models in these numbers; worlds of Bevy games are f32.
         #[arg(long, value_enum)]
-        number: Option<Number>,
+        number: Option<ScalarType>,
         /// The step of the game.
         #[arg(long, value_parser = duration, default_value = "16.666667ms")]
         step: f64,
@@ -104,7 +104,7 @@ enum Command {
         model: String,
         /// In which numbers.
         #[arg(long, value_enum, default_value = "f32")]
-        number: Number,
+        number: ScalarType,
         /// The step of the game.
         #[arg(long, value_parser = duration, default_value = "16.666667ms")]
         step: f64,
@@ -128,13 +128,13 @@ enum Command {
 
 #[derive(clap::Args)]
 struct Storm {
-    /// How many scenes, of all models in turn.
+    /// Number of scenes, of all models in turn.
     #[arg(long, default_value_t = 900)]
     scenes: u64,
     /// Of the random numbers: the same scenes for the same seed, whatever else is asked for.
     #[arg(long, default_value_t = 1)]
     seed: u64,
-    /// How many scenes run at a time.
+    /// Number of scenes run in parallel.
     #[arg(long, default_value_t = std::thread::available_parallelism().map_or(1, usize::from))]
     jobs: usize,
     /// Only models whose name contains this: impulse/swept.
@@ -146,10 +146,10 @@ struct Storm {
     /// Writes failures as they are.
     #[arg(long)]
     no_shrink: bool,
-    /// How many failures of one model and invariant are written.
+    /// Number of failures of one model and invariant to write.
     #[arg(long, default_value_t = 3)]
     keep: u64,
-    /// How long a step may take before it counts as one that does not end.
+    /// Time limit of a step, after which it counts as hung.
     #[arg(long, value_parser = duration, default_value = "30s")]
     patience: f64,
     /// Does not count an invariant of a model, as MODEL:INVARIANT: impulse/swept:speed.
@@ -179,19 +179,20 @@ fn duration(text: &str) -> Result<f64, String> {
 fn main() -> ExitCode {
     let outcome = match Options::parse().command {
         Command::Suite { filter, model, quick, short, json, jobs } => {
-            let wanted = |row: &&Row| {
+            let wanted = |row: &&SuiteCase| {
                 row.name.contains(&filter)
                     && row.model.contains(&model)
-                    && (!quick || row.effort == Effort::Quick)
+                    && (!quick || row.effort == CostClass::Quick)
             };
             run_suite(&suite::rows().filter(wanted).collect::<Vec<_>>(), short, json, jobs)
         }
         Command::Trade { out, report, quick, scene, model, shard, with } => {
             trade(&out, report, &Plan { quick, scene, model }, shard, &with)
         }
-        Command::Advise { scene, max_error: most, budget, number, step } => {
-            print_advice(&scene, Wish { most, budget, number, step, ..Wish::default() })
-        }
+        Command::Advise { scene, max_error, budget: max_cost, number, step } => print_advice(
+            &scene,
+            Requirements { max_error, max_cost, number, step, ..Requirements::default() },
+        ),
         Command::Bench { scene, model, number, step } => bench(&scene, &model, number, step),
         Command::Storm(options) => storm(options),
         Command::Merge { out, report, files } => merge(&out, report, &files),
@@ -247,10 +248,15 @@ fn read(file: &Path) -> Result<Scene, Box<dyn Error>> {
     Ok(read_scene(&text).map_err(|error| format!("{name}:{error}"))?)
 }
 
-fn bench(file: &Path, model: &str, number: Number, step: f64) -> Result<ExitCode, Box<dyn Error>> {
+fn bench(
+    file: &Path,
+    model: &str,
+    number: ScalarType,
+    step: f64,
+) -> Result<ExitCode, Box<dyn Error>> {
     let scene = read(file)?;
     let model: Model = ron::from_str(model).map_err(|error| format!("--model: {error}"))?;
-    let setting = Setting { model, number, step };
+    let setting = RunConfig { model, number, step };
     let Stages { integrate, generate_contacts, restitute, contacts, bytes } =
         stages::measure(&scene, setting, || MEMORY.current_usage())?;
     let all = integrate + generate_contacts + restitute;
@@ -263,13 +269,13 @@ fn bench(file: &Path, model: &str, number: Number, step: f64) -> Result<ExitCode
     ] {
         println!("| {name} | {:.1} | {:.0} % |", time * 1e6, 100.0 * time / all);
     }
-    let marbles = scene.balls().count();
+    let marbles = scene.all_marbles().count();
     println!("\n{marbles} marbles, {contacts:.1} contacts in the mean");
     println!("{bytes} bytes, {:.0} for each marble", bytes as f64 / marbles.max(1) as f64);
     Ok(ExitCode::SUCCESS)
 }
 
-fn print_advice(file: &Path, wish: Wish) -> Result<ExitCode, Box<dyn Error>> {
+fn print_advice(file: &Path, wish: Requirements) -> Result<ExitCode, Box<dyn Error>> {
     let scene = read(file)?;
     let bar = ProgressBar::new(0);
     let advice = block_on(advise(&scene, wish, |done, all, _| {
@@ -278,7 +284,7 @@ fn print_advice(file: &Path, wish: Wish) -> Result<ExitCode, Box<dyn Error>> {
     }));
     bar.finish_and_clear();
     print!("{}", advice.text(wish));
-    let asked = wish.most.is_some() || wish.budget.is_some();
+    let asked = wish.max_error.is_some() || wish.max_cost.is_some();
     let found = !asked || advice.best(wish).is_some();
     Ok(if found { ExitCode::SUCCESS } else { ExitCode::FAILURE })
 }
@@ -352,7 +358,7 @@ fn report(out: &Path, to: Option<PathBuf>, points: Vec<Point>) -> Result<ExitCod
 }
 
 fn run_suite(
-    rows: &[&'static Row],
+    rows: &[&'static SuiteCase],
     short: bool,
     json: Option<PathBuf>,
     jobs: usize,
@@ -366,7 +372,7 @@ fn run_suite(
     suite::measure(rows, jobs, |row, outcome| {
         let verdict = if outcome.reached { "reached" } else { "**missed**" };
         let (figure, cost) = (outcome.figure, outcome.cost);
-        let Row { name, model, target, best, setup, metric, source, .. } = row;
+        let SuiteCase { name, model, target, best, setup, metric, source, .. } = row;
         print!(
             "| {name} | {model} | {figure:.2e} | {target:.0e} | {verdict} | {best} | {cost:.0} |"
         );

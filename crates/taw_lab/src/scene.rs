@@ -1,14 +1,14 @@
-//! What the suite's scenes are made of.
+//! Building blocks of the suite's scenes.
 
 use std::time::Duration;
 
 use taw::prelude::*;
 use web_time::Instant;
 
-/// Earth's, in m/s².
+/// Earth's gravity, in m/s².
 pub const G: f64 = 9.81;
 
-/// The most exact model: [`Response::EventDriven`], compensated, with angular momentum.
+/// Most accurate model: [`Response::EventDriven`], compensated, with angular momentum.
 pub const EXACT: Model = Model {
     integrator: Integrator::VelocityVerlet,
     response: Response::EventDriven,
@@ -19,19 +19,19 @@ pub const EXACT: Model = Model {
     iterations: 200,
 };
 
-/// The model of games: [`Response::Impulse`] with angular momentum.
+/// Typical game model: [`Response::Impulse`] with angular momentum.
 pub const IMPULSE: Model =
     Model { response: Response::Impulse, precision: Precision::Plain, ..EXACT };
 
-/// Counts what stepping a world takes.
+/// Stopwatch for stepping worlds.
 #[derive(Debug, Default)]
-pub struct Meter {
+pub struct Stopwatch {
     time: Duration,
     ball_steps: u64,
 }
 
-impl Meter {
-    /// Steps a world. A step that is refused is a mistake of the suite.
+impl Stopwatch {
+    /// Steps a world. A rejected step is a bug of the suite.
     ///
     /// # Panics
     /// If the world refuses the step.
@@ -42,8 +42,7 @@ impl Meter {
         self.ball_steps += (world.marbles.len() + world.swarm.len()) as u64;
     }
 
-    /// Steps a world for so many seconds, in whole steps; gives how many seconds that
-    /// took by its own count.
+    /// Steps a world for a duration in seconds, in whole steps; returns the simulated time.
     pub fn run<S: Scalar>(&mut self, world: &mut World<S>, dt: f64, seconds: f64) -> f64 {
         let steps = (seconds / dt).round();
         for _ in 0..steps as u64 {
@@ -52,13 +51,13 @@ impl Meter {
         steps * S::constant(dt).as_f64()
     }
 
-    /// Nanoseconds per ball and step.
+    /// Cost in nanoseconds per ball and step.
     #[must_use]
     pub fn cost(&self) -> f64 {
         self.time.as_nanos() as f64 / self.ball_steps.max(1) as f64
     }
 
-    /// All of the time that stepping took, in seconds.
+    /// Total duration of stepping, in seconds.
     #[must_use]
     pub fn seconds(&self) -> f64 {
         self.time.as_secs_f64()
@@ -122,7 +121,7 @@ pub struct Ball {
     pub angular_velocity: [f64; 3],
     /// In kilograms.
     pub mass: f64,
-    /// What it is made of.
+    /// Material.
     pub material: Material<f64>,
 }
 
@@ -194,7 +193,7 @@ pub fn energy<S: Scalar>(world: &World<S>) -> f64 {
     world.energy().total()
 }
 
-/// How deep pairs of balls, and balls and walls, overlap: each one's, in metres.
+/// Penetration of each pair of balls, and of balls and walls, in metres.
 pub fn overlaps<S: Scalar>(world: &World<S>) -> Vec<f64> {
     let mut touched = world.clone();
     touched.generate_contacts();

@@ -1,4 +1,4 @@
-//! What each stage of a scene's steps takes.
+//! Cost of each stage of a scene's steps.
 
 use std::time::Instant;
 
@@ -6,7 +6,7 @@ use taw::Error;
 use taw::prelude::*;
 use taw::scene::Scene;
 
-use crate::trade::trace::{Number, Setting};
+use crate::trade::trace::{RunConfig, ScalarType};
 
 /// Medians over all steps, in seconds a step, and what else there is to know.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -17,33 +17,33 @@ pub struct Stages {
     pub generate_contacts: f64,
     /// The third verb.
     pub restitute: f64,
-    /// How many contacts the last substep of a step had, in the mean.
+    /// Mean number of contacts of the last substep of a step.
     pub contacts: f64,
-    /// How much more memory was allocated at the end than before there was a world.
+    /// Memory allocated by the world, in bytes.
     pub bytes: usize,
 }
 
 /// Runs a scene to its end. `allocated` says how many bytes are.
 ///
 /// # Errors
-/// What the world refuses.
+/// Errors of the world.
 pub fn measure(
     scene: &Scene,
-    setting: Setting,
+    setting: RunConfig,
     allocated: impl Fn() -> usize,
 ) -> Result<Stages, Error> {
     match setting.number {
-        Number::F32 => measure_in::<f32>(scene, setting, allocated),
-        Number::F64 => measure_in::<f64>(scene, setting, allocated),
+        ScalarType::F32 => measure_in::<f32>(scene, setting, allocated),
+        ScalarType::F64 => measure_in::<f64>(scene, setting, allocated),
     }
 }
 
 fn measure_in<S: Scalar>(
     scene: &Scene,
-    Setting { model, step, .. }: Setting,
+    RunConfig { model, step, .. }: RunConfig,
     allocated: impl Fn() -> usize,
 ) -> Result<Stages, Error> {
-    let steps = (scene.seconds / step).round() as usize;
+    let steps = (scene.duration / step).round() as usize;
     let mut times = [0; 3].map(|_| Vec::with_capacity(steps));
     let before = allocated();
     let mut running = scene.run::<S>(model)?;

@@ -3,17 +3,23 @@
 use futures_lite::future::block_on;
 use taw::prelude::*;
 use taw_lab::advise::{
-    Advice, Choice, Snapshot, Source, Wish, advise, literal, quantity, read_scene,
+    Advice, Candidate, ReplayableScene, Requirements, Snapshot, advise, literal, quantity,
+    read_scene,
 };
-use taw_lab::trade::trace::{Number, Setting};
+use taw_lab::trade::trace::{RunConfig, ScalarType};
 
 const BOUNCE: &str = include_str!("../scenes/bounce.ron");
 const MAZE: &str = include_str!("../scenes/maze.ron");
 const CRADLE: &str = include_str!("../scenes/cradle.ron");
-const NOTHING: Wish =
-    Wish { most: None, budget: None, number: None, step: 1.0 / 60.0, patience: 1.0 };
+const NOTHING: Requirements = Requirements {
+    max_error: None,
+    max_cost: None,
+    number: None,
+    step: 1.0 / 60.0,
+    time_limit: 1.0,
+};
 
-fn on(text: &str, wish: Wish) -> (taw::scene::Scene, Advice) {
+fn on(text: &str, wish: Requirements) -> (taw::scene::Scene, Advice) {
     let scene = read_scene(text).unwrap();
     let advice = block_on(advise(&scene, wish, |_, _, _| ()));
     (scene, advice)
@@ -25,20 +31,24 @@ fn on(text: &str, wish: Wish) -> (taw::scene::Scene, Advice) {
 fn the_documented_model_is_picked_on_three_scenes() {
     let exact = Response::EventDriven;
     for (text, response) in [(BOUNCE, Response::Impulse), (MAZE, exact), (CRADLE, exact)] {
-        let wish = Wish { most: Some(1e-3), ..NOTHING };
+        let wish = Requirements { max_error: Some(1e-3), ..NOTHING };
         let (scene, advice) = on(text, wish);
         let best = advice.best(wish).unwrap();
-        assert_eq!(best.setting.model.response, response, "{}", scene.about);
-        assert!(best.wrong() <= 1e-3);
+        assert_eq!(best.setting.model.response, response, "{}", scene.description);
+        assert!(best.total_error() <= 1e-3);
         // On a busy machine, two short substeps may measure as cheap as one.
-        let suffices = |choice: &Choice| {
+        let suffices = |choice: &Candidate| {
             let Model { response: by, substeps, .. } = choice.setting.model;
-            by == response && substeps == 1 && choice.wrong() <= 1e-3
+            by == response && substeps == 1 && choice.total_error() <= 1e-3
         };
-        assert!(advice.choices.iter().any(suffices), "one substep suffices: {}", scene.about);
-        let cheaper = advice.choices.iter().take_while(|choice| choice.cost < best.cost);
-        assert!(cheaper.into_iter().all(|choice| choice.wrong() > 1e-3));
-        assert!((advice.told - scene.seconds).abs() < 1e-9, "{} s", advice.told);
+        assert!(
+            advice.candidates.iter().any(suffices),
+            "one substep suffices: {}",
+            scene.description
+        );
+        let cheaper = advice.candidates.iter().take_while(|choice| choice.cost < best.cost);
+        assert!(cheaper.into_iter().all(|choice| choice.total_error() > 1e-3));
+        assert!((advice.horizon - scene.duration).abs() < 1e-9, "{} s", advice.horizon);
         let said = advice.text(wish);
         assert!(said.contains(&format!("response: Response::{response:?}")), "{said}");
     }
@@ -50,14 +60,16 @@ fn a_budget_is_kept_and_the_impossible_is_said() {
     let front = advice.front();
     assert!(front.len() >= 3);
     assert!(
-        front.windows(2).all(|two| two[0].cost <= two[1].cost && two[0].wrong() > two[1].wrong())
+        front
+            .windows(2)
+            .all(|two| two[0].cost <= two[1].cost && two[0].total_error() > two[1].total_error())
     );
     // Between two of the front, the cheaper one is the best that fits.
     let budget = 0.5 * (front[0].cost + front[1].cost);
-    let wish = Wish { budget: Some(budget), ..NOTHING };
+    let wish = Requirements { max_cost: Some(budget), ..NOTHING };
     let best = advice.best(wish).unwrap();
-    assert!(best.cost <= budget && best.wrong() <= front[0].wrong());
-    let wish = Wish { budget: Some(1e-12), ..NOTHING };
+    assert!(best.cost <= budget && best.total_error() <= front[0].total_error());
+    let wish = Requirements { max_cost: Some(1e-12), ..NOTHING };
     assert!(advice.best(wish).is_none());
     assert!(advice.text(wish).contains("none of"));
 }
@@ -65,11 +77,11 @@ fn a_budget_is_kept_and_the_impossible_is_said() {
 /// Worlds of Bevy games are `f32`: advice for one is not measured in anything else.
 #[test]
 fn advice_is_in_the_numbers_that_were_asked_for() {
-    for number in [Number::F32, Number::F64] {
-        let (_, advice) = on(BOUNCE, Wish { number: Some(number), ..NOTHING });
-        assert!(!advice.choices.is_empty());
-        assert!(advice.choices.iter().all(|choice| choice.setting.number == number));
-        assert_eq!(advice.reference.unwrap().number, Number::F64);
+    for number in [ScalarType::F32, ScalarType::F64] {
+        let (_, advice) = on(BOUNCE, Requirements { number: Some(number), ..NOTHING });
+        assert!(!advice.candidates.is_empty());
+        assert!(advice.candidates.iter().all(|choice| choice.setting.number == number));
+        assert_eq!(advice.reference.unwrap().number, ScalarType::F64);
     }
 }
 
@@ -77,27 +89,27 @@ fn advice_is_in_the_numbers_that_were_asked_for() {
 #[test]
 fn chaos_is_noticed() {
     let text = "(
-        seconds: 8,
+        duration: 8,
         gravity: (0, 0, 0),
-        surface: (restitution: 1, friction: 0),
+        material: (restitution: 1, friction: 0),
         walls: [
-            (shape: HalfSpace(normal: (1, 0, 0), through: (-1, 0, 0))),
-            (shape: HalfSpace(normal: (-1, 0, 0), through: (1, 0, 0))),
-            (shape: HalfSpace(normal: (0, 1, 0), through: (0, -1, 0))),
-            (shape: HalfSpace(normal: (0, -1, 0), through: (0, 1, 0))),
-            (shape: HalfSpace(normal: (0, 0, 1), through: (0, 0, -0.2))),
-            (shape: HalfSpace(normal: (0, 0, -1), through: (0, 0, 0.2))),
+            (shape: HalfSpace(normal: (1, 0, 0), point: (-1, 0, 0))),
+            (shape: HalfSpace(normal: (-1, 0, 0), point: (1, 0, 0))),
+            (shape: HalfSpace(normal: (0, 1, 0), point: (0, -1, 0))),
+            (shape: HalfSpace(normal: (0, -1, 0), point: (0, 1, 0))),
+            (shape: HalfSpace(normal: (0, 0, 1), point: (0, 0, -0.2))),
+            (shape: HalfSpace(normal: (0, 0, -1), point: (0, 0, 0.2))),
         ],
         marbles: [(position: (-0.9, 0.31, 0), radius: 0.05, velocity: (40, 3, 0))],
         lattices: [(
             first: (position: (-0.5, -0.5, 0), radius: 0.1),
             count: (4, 4, 1),
             pitch: (0.3, 0.3, 1),
-            disorder: 0.2,
+            jitter: 0.2,
         )],
     )";
     let (_, advice) = on(text, NOTHING);
-    assert!(advice.told > 0.05 && advice.told < 7.0, "{} s", advice.told);
+    assert!(advice.horizon > 0.05 && advice.horizon < 7.0, "{} s", advice.horizon);
     assert!(advice.text(NOTHING).contains("chaotic"));
 }
 
@@ -108,9 +120,9 @@ fn bad_scenes_are_refused_with_line_and_field() {
         let error = read_scene(&MAZE.replacen(from, to, 1)).unwrap_err();
         assert!(say.iter().all(|word| error.contains(word)), "{error}");
     };
-    refused("seconds: 3", "seconds: 0", &["4:", "seconds", "above zero", "is 0"]);
+    refused("duration: 3", "duration: 0", &["4:", "duration", "above zero", "is 0"]);
     refused("restitution: 0.4", "restitution: 1.4", &["5:", "surface.restitution", "[0, 1]"]);
-    refused("at: 1.5", "at: NaN", &["9:", "tilts[2].at", "NaN"]);
+    refused("time: 1.5", "time: NaN", &["9:", "gravity_keyframes[2].time", "NaN"]);
     refused("radius: 0.03", "radius: -0.03", &["18:", "walls[5].shape.Capsule.radius", "-0.03"]);
     refused("radius: 0.01", "radius: 0.01, mass: 3", &["20:", "mass"]);
     refused("marbles: [", "marbles: ", &["20:"]);
@@ -148,7 +160,7 @@ fn world(half_length: f32) -> World<f32> {
 
 fn of_snapshot(mut world: World<f32>) -> Advice {
     let before = world.clone();
-    let wish = Wish { step: 1.0 / 64.0, patience: 0.1, ..NOTHING };
+    let wish = Requirements { step: 1.0 / 64.0, time_limit: 0.1, ..NOTHING };
     let advice = block_on(advise(&Snapshot::new(&mut world, 1.0), wish, |_, _, _| ()));
     assert!(world == before, "the game goes on as it was");
     advice
@@ -157,25 +169,25 @@ fn of_snapshot(mut world: World<f32>) -> Advice {
 #[test]
 fn a_world_of_a_game_is_measured_as_it_is() {
     let advice = of_snapshot(world(0.0));
-    assert!((advice.told - 1.0).abs() < 1e-9, "{} s", advice.told);
-    let of = |response| move |choice: &&Choice| choice.setting.model.response == response;
-    let plain = |choice: &&Choice| choice.setting.model.substeps == 1;
-    let choices = || advice.choices.iter().filter(plain);
-    let exact = choices().find(of(Response::EventDriven)).unwrap();
-    assert!(exact.wrong() < 1e-5, "{:.1e}", exact.wrong());
+    assert!((advice.horizon - 1.0).abs() < 1e-9, "{} s", advice.horizon);
+    let of = |response| move |choice: &&Candidate| choice.setting.model.response == response;
+    let plain = |choice: &&Candidate| choice.setting.model.substeps == 1;
+    let candidates = || advice.candidates.iter().filter(plain);
+    let exact = candidates().find(of(Response::EventDriven)).unwrap();
+    assert!(exact.total_error() < 1e-5, "{:.1e}", exact.total_error());
     // Touches at 0.45 s, and then goes up 4/5 as fast; or sinks in, and stays.
-    for choice in choices().filter(of(Response::Displacement)) {
-        assert!(choice.wrong() > 0.05, "{}: {}", choice.name, choice.wrong());
+    for choice in candidates().filter(of(Response::Displacement)) {
+        assert!(choice.total_error() > 0.05, "{}: {}", choice.name, choice.total_error());
     }
-    assert!(advice.choices.iter().all(|choice| choice.cost > 0.0));
+    assert!(advice.candidates.iter().all(|choice| choice.cost > 0.0));
 }
 
 /// What the exact model cannot do is compared with what comes next.
 #[test]
 fn capsules_are_measured_without_events() {
     let advice = of_snapshot(world(0.1));
-    let by_events = |c: &Choice| c.setting.model.response == Response::EventDriven;
-    assert!(!advice.choices.is_empty() && !advice.choices.iter().any(by_events));
+    let by_events = |c: &Candidate| c.setting.model.response == Response::EventDriven;
+    assert!(!advice.candidates.is_empty() && !advice.candidates.iter().any(by_events));
     assert_eq!(advice.reference.unwrap().model.response, Response::Impulse);
     assert!(advice.text(NOTHING).contains("reference: impulse, swept"));
 }
@@ -194,8 +206,9 @@ fn a_snapshot_stands_still() {
     world.walls.set_motion(id, Some(motion)).unwrap();
     let snapshot = Snapshot::new(&mut world, 1.0);
     assert_eq!(world.walls.motion(id).unwrap(), Some(motion));
-    let setting = Setting { model: taw_lab::scene::EXACT, number: Number::F32, step: 1.0 / 64.0 };
-    let film = block_on(snapshot.film(setting, false, 0.25)).unwrap();
+    let setting =
+        RunConfig { model: taw_lab::scene::EXACT, number: ScalarType::F32, step: 1.0 / 64.0 };
+    let film = block_on(snapshot.record(setting, false, 0.25)).unwrap();
     let last = film.frames.last().unwrap();
     assert_eq!((film.frames.len(), last.time), (5, 1.0));
     assert_eq!(last.at[0].x, 0.0);
@@ -206,20 +219,21 @@ fn a_snapshot_stands_still() {
 #[test]
 fn only_overlap_beyond_that_of_the_reference_counts() {
     let depth = |advice: &Advice| {
-        let still = |c: &&Choice| {
+        let still = |c: &&Candidate| {
             let Model { response, rotation, substeps, .. } = c.setting.model;
             (response, rotation, substeps) == (Response::EventDriven, Rotation::Dynamic, 1)
         };
-        advice.choices.iter().find(still).unwrap().whole.overlap
+        advice.candidates.iter().find(still).unwrap().whole.overlap
     };
     let mut world = world(0.0);
     let id = world.marbles.id(0).unwrap();
     world.marbles.set_position(id, Point3::new(0.0, 0.0999, 0.0)).unwrap();
-    let mean = |film: &taw_lab::trade::trace::Film| {
+    let mean = |film: &taw_lab::trade::trace::Recording| {
         film.frames.iter().map(|frame| frame.overlap).sum::<f64>() / film.frames.len() as f64
     };
-    let setting = Setting { model: taw_lab::scene::EXACT, number: Number::F32, step: 1.0 / 64.0 };
-    let film = block_on(Snapshot::new(&mut world, 1.0).film(setting, false, 0.1)).unwrap();
+    let setting =
+        RunConfig { model: taw_lab::scene::EXACT, number: ScalarType::F32, step: 1.0 / 64.0 };
+    let film = block_on(Snapshot::new(&mut world, 1.0).record(setting, false, 0.1)).unwrap();
     assert!(mean(&film) > 5e-6, "there is some: {:.1e}", mean(&film));
     let advice = of_snapshot(world);
     assert!(depth(&advice) < 1e-6, "{:.1e}", depth(&advice));
@@ -229,13 +243,13 @@ fn only_overlap_beyond_that_of_the_reference_counts() {
 /// touch.
 #[test]
 fn energy_is_of_gravity_as_it_is() {
-    let text = "(seconds: 1, marbles: [(position: (1, 2, 3), radius: 0.1, density: 1000)],
-        tilts: [(at: 0, gravity: (0, -9, 0)), (at: 1, gravity: (4, -8, 0))])";
+    let text = "(duration: 1, marbles: [(position: (1, 2, 3), radius: 0.1, density: 1000)],
+        gravity_keyframes: [(time: 0, gravity: (0, -9, 0)), (time: 1, gravity: (4, -8, 0))])";
     let scene = read_scene(text).unwrap();
     let mass = 4.0 / 3.0 * std::f64::consts::PI;
     for step in [1.0 / 10.0, 1.0 / 20.0] {
-        let setting = Setting { model: taw_lab::scene::EXACT, number: Number::F64, step };
-        for frame in block_on(scene.film(setting, false, 0.1)).unwrap().frames {
+        let setting = RunConfig { model: taw_lab::scene::EXACT, number: ScalarType::F64, step };
+        for frame in block_on(scene.record(setting, false, 0.1)).unwrap().frames {
             let gravity = Vec3::new(4.0 * frame.time, frame.time - 9.0, 0.0);
             let kinetic = 0.5 * frame.velocity[0].magnitude2();
             let energy = mass * (kinetic - gravity.dot(frame.at[0]));
@@ -247,21 +261,21 @@ fn energy_is_of_gravity_as_it_is() {
 #[test]
 fn what_is_told_on_the_way_grows() {
     let scene = read_scene(BOUNCE).unwrap();
-    let mut told = Vec::new();
+    let mut horizon = Vec::new();
     let advice = block_on(advise(&scene, NOTHING, |done, all, advice| {
-        told.push((done, all, advice.choices.len()));
+        horizon.push((done, all, advice.candidates.len()));
     }));
-    assert!(told.windows(2).all(|two| two[1].0 == two[0].0 + 1 && two[1].2 >= two[0].2));
-    let (done, all, choices) = *told.last().unwrap();
-    assert!(done + 1 == all && choices < advice.choices.len());
+    assert!(horizon.windows(2).all(|two| two[1].0 == two[0].0 + 1 && two[1].2 >= two[0].2));
+    let (done, all, candidates) = *horizon.last().unwrap();
+    assert!(done + 1 == all && candidates < advice.candidates.len());
 }
 
 #[test]
 fn what_passes_a_gate_is_counted() {
     let scene = read_scene(include_str!("../scenes/hopper.ron")).unwrap();
     let setting =
-        Setting { model: taw_lab::scene::IMPULSE, number: Number::F64, step: 1.0 / 240.0 };
-    let film = block_on(scene.film(setting, false, 0.1)).unwrap();
+        RunConfig { model: taw_lab::scene::IMPULSE, number: ScalarType::F64, step: 1.0 / 240.0 };
+    let film = block_on(scene.record(setting, false, 0.1)).unwrap();
     let passed: Vec<_> = film.frames.iter().map(|frame| frame.passed).collect();
     assert_eq!(passed[0], 0);
     assert!(passed.windows(2).all(|two| two[0] <= two[1]), "none comes back: {passed:?}");

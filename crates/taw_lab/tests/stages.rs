@@ -5,12 +5,12 @@ use std::cell::Cell;
 use taw::prelude::*;
 use taw_lab::advise::read_scene;
 use taw_lab::stages::measure;
-use taw_lab::trade::trace::{Number, Setting};
+use taw_lab::trade::trace::{RunConfig, ScalarType};
 
 const TOWER: &str = include_str!("../scenes/tower.ron");
 
-fn setting(model: Model, number: Number) -> Setting {
-    Setting { model, number, step: 1.0 / 60.0 }
+fn setting(model: Model, number: ScalarType) -> RunConfig {
+    RunConfig { model, number, step: 1.0 / 60.0 }
 }
 
 #[test]
@@ -25,7 +25,7 @@ fn a_tower_of_six_has_six_contacts_and_all_stages_take_time() {
             looks.set(looks.get() + 1000);
             looks.get()
         };
-        let stages = measure(&scene, setting(model, Number::F64), allocated).unwrap();
+        let stages = measure(&scene, setting(model, ScalarType::F64), allocated).unwrap();
         assert_eq!((stages.contacts, stages.bytes), (6.0, 1000));
         assert!(stages.integrate > 0.0 && stages.generate_contacts > 0.0);
         assert!(stages.restitute > 0.0);
@@ -36,6 +36,6 @@ fn a_tower_of_six_has_six_contacts_and_all_stages_take_time() {
 fn what_a_world_refuses_is_refused() {
     let scene = read_scene(TOWER).unwrap();
     let model = Model { substeps: 0, ..Model::default() };
-    let error = measure(&scene, setting(model, Number::F32), || 0).unwrap_err();
+    let error = measure(&scene, setting(model, ScalarType::F32), || 0).unwrap_err();
     assert!(matches!(error, taw::Error::OutOfRange { field: "substeps", .. }), "{error}");
 }

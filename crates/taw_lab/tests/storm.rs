@@ -5,12 +5,12 @@ use std::path::PathBuf;
 use std::time::Duration;
 
 use taw::prelude::*;
-use taw::scene::{Ball, Form, Scene, Surface, Wall};
+use taw::scene::{MarbleDesc, MaterialDesc, Scene, ShapeDesc, WallDesc};
 use taw_lab::storm::{
     Bench, Body, Case, Finding, Invariant, Kind, Name, Plan, Pulse, Snapshot, generate, run,
     shrink_by, weather,
 };
-use taw_lab::trade::trace::Number;
+use taw_lab::trade::trace::ScalarType;
 
 const STEP: f64 = 1.0 / 60.0;
 const G: f64 = 9.81;
@@ -70,7 +70,7 @@ fn what_boards_bring_in_is_counted() {
     for number in [63, 297] {
         let case = generate(Name { kind: Kind::EventDriven, seed: 2, number });
         let verdict = run(&case, &Pulse::default());
-        assert!(case.scene.about.contains("board"), "{}", case.scene.about);
+        assert!(case.scene.description.contains("board"), "{}", case.scene.description);
         assert!(verdict.failures.is_empty(), "{number}: {:?}", verdict.failures);
     }
 }
@@ -81,7 +81,7 @@ fn case(scene: Scene) -> Case {
     Case {
         broke: None,
         model: Model { response, rotation: Rotation::Dynamic, ..Model::default() },
-        number: Number::F64,
+        number: ScalarType::F64,
         step: STEP,
         steps: 60,
         differenced: false,
@@ -274,20 +274,20 @@ fn sinking_leaving_and_numbers_that_are_none_are_seen() {
     assert!(!bench.judge(&snapshot(vec![lying()]), &stopped)[0].holds());
 }
 
-fn floor() -> Wall {
-    let shape = Form::HalfSpace { normal: [0.0, 1.0, 0.0], through: [0.0; 3] };
-    Wall { shape, surface: None, moves: None }
+fn floor() -> WallDesc {
+    let shape = ShapeDesc::HalfSpace { normal: [0.0, 1.0, 0.0], point: [0.0; 3] };
+    WallDesc { shape, material: None, motion: None }
 }
 
-fn ball(position: [f64; 3]) -> Ball {
-    Ball { position, radius: 0.1, ..Ball::default() }
+fn ball(position: [f64; 3]) -> MarbleDesc {
+    MarbleDesc { position, radius: 0.1, ..MarbleDesc::default() }
 }
 
 #[test]
 fn a_scene_that_is_right_holds() {
     let marbles = vec![ball([0.3, 0.5, 0.0]), ball([0.35, 0.9, 0.0])];
-    let surface = Surface { restitution: 0.3, friction: 0.5, ..Surface::default() };
-    let scene = Scene { walls: vec![floor()], marbles, surface, ..Scene::default() };
+    let surface = MaterialDesc { restitution: 0.3, friction: 0.5, ..MaterialDesc::default() };
+    let scene = Scene { walls: vec![floor()], marbles, material: surface, ..Scene::default() };
     let verdict = run(&case(scene), &Pulse::default());
     assert_eq!(verdict.failures, []);
     let judged = |invariant| verdict.worst.iter().any(|worst| worst.invariant == invariant);
@@ -299,7 +299,7 @@ fn a_scene_that_is_right_holds() {
 #[test]
 fn a_scene_that_is_refused_fails() {
     let scene =
-        Scene { marbles: vec![Ball { radius: -1.0, ..ball([0.0; 3]) }], ..Scene::default() };
+        Scene { marbles: vec![MarbleDesc { radius: -1.0, ..ball([0.0; 3]) }], ..Scene::default() };
     let verdict = run(&case(scene), &Pulse::default());
     assert_eq!(verdict.failure().unwrap().finding.invariant, Invariant::Refused);
 }

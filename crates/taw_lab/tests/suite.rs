@@ -1,6 +1,6 @@
 //! The quick rows of the reference suite, as tests.
 
-use taw_lab::suite::{Effort, Report, measure, rows};
+use taw_lab::suite::{CostClass, Report, measure, rows};
 
 /// What is known to be missed, as name and model, with what stops it.
 const MISSED: &[(&str, &str)] = &[
@@ -18,7 +18,7 @@ const MISSED: &[(&str, &str)] = &[
 #[test]
 fn quick_rows_are_reached_but_those_that_are_known_not_to_be() {
     let mut wrong = Vec::new();
-    for row in rows().filter(|row| row.effort == Effort::Quick) {
+    for row in rows().filter(|row| row.effort == CostClass::Quick) {
         if row.is_time() {
             continue; // how fast this machine is, is not for a test to say
         }
@@ -45,7 +45,7 @@ fn every_row_says_what_it_is() {
 #[test]
 fn rows_measured_at_a_time_come_in_order_and_are_the_same() {
     let some: Vec<_> =
-        rows().filter(|row| row.effort == Effort::Quick && !row.is_time()).take(7).collect();
+        rows().filter(|row| row.effort == CostClass::Quick && !row.is_time()).take(7).collect();
     let figures = |jobs| {
         let mut reports = Vec::new();
         measure(&some, jobs, |row, outcome| reports.push(Report::new(row, &outcome)));

@@ -3,20 +3,20 @@
 use std::path::PathBuf;
 
 use taw::prelude::*;
-use taw_lab::trade::scenes::{Judged, SCENES};
+use taw_lab::trade::scenes::{ReferenceCase, SCENES};
 use taw_lab::trade::sweep::{Job, Plan, in_order, read_points, sweep, write_points};
-use taw_lab::trade::trace::{Frame, Number, Setting, trace};
+use taw_lab::trade::trace::{Frame, RunConfig, ScalarType, trace};
 use taw_lab::trade::{Failure, Point, curves, front, write_report, write_tables};
 
 const EXACT: Model = taw_lab::scene::EXACT;
 
-fn scene(name: &str) -> &'static Judged {
+fn scene(name: &str) -> &'static ReferenceCase {
     SCENES.iter().find(|scene| scene.name == name).unwrap()
 }
 
-fn error(name: &str, model: Model, number: Number, step: f64) -> f64 {
+fn error(name: &str, model: Model, number: ScalarType, step: f64) -> f64 {
     let judged = scene(name);
-    judged.error(&trace(judged.scene(), Setting { model, number, step }).unwrap())
+    judged.error(&trace(judged.scene(), RunConfig { model, number, step }).unwrap())
 }
 
 /// A folder of this test alone.
@@ -34,8 +34,8 @@ fn clock(job: &Job) -> f64 {
 
 #[test]
 fn the_exact_model_is_right_wherever_the_outcome_is_known() {
-    for judged in SCENES.iter().filter(|judged| judged.touches) {
-        let error = error(judged.name, EXACT, Number::F64, 1.0 / 240.0);
+    for judged in SCENES.iter().filter(|judged| judged.has_contacts) {
+        let error = error(judged.name, EXACT, ScalarType::F64, 1.0 / 240.0);
         let most = match judged.name {
             "pit" => 0.3,
             // Compared with itself in shorter steps, of which the tilt takes notice.
@@ -47,7 +47,7 @@ fn the_exact_model_is_right_wherever_the_outcome_is_known() {
     }
     for name in ["throw", "orbit"] {
         let rk4 = Model { integrator: Integrator::Rk4, ..Model::default() };
-        assert!(error(name, rk4, Number::F64, 0.001) < 1e-8, "{name}");
+        assert!(error(name, rk4, ScalarType::F64, 0.001) < 1e-8, "{name}");
     }
 }
 
@@ -68,20 +68,21 @@ fn metrics_give_the_known_answer_on_what_is_wrong() {
     }
     let by_hand = scene("throw").error(&frames);
     let euler = Model { integrator: Integrator::ExplicitEuler, ..Model::default() };
-    let measured = error("throw", euler, Number::F64, h);
+    let measured = error("throw", euler, ScalarType::F64, h);
     assert!((measured / by_hand - 1.0).abs() < 1e-9, "{measured:e}, {by_hand:e}");
     assert!(by_hand > 1e-3);
 
     // Displacement knows no restitution: of a bounce of 0.8 it shows the fall alone.
     let judged = scene("bounce");
     let mut frames =
-        trace(judged.scene(), Setting { model: EXACT, number: Number::F64, step: h }).unwrap();
+        trace(judged.scene(), RunConfig { model: EXACT, number: ScalarType::F64, step: h })
+            .unwrap();
     assert!(judged.error(&frames) < 1e-9);
     for frame in frames.iter_mut().filter(|frame| frame.time > 0.45) {
         frame.at[0].y = 0.05;
     }
     let without = judged.error(&frames);
-    let lab = error("bounce", Model::default(), Number::F64, 0.001);
+    let lab = error("bounce", Model::default(), ScalarType::F64, 0.001);
     assert!((lab - without).abs() < 0.01, "{lab}, {without}");
 
     // A marble that slides down a slope instead of rolling is 7/5 as far.
@@ -91,7 +92,7 @@ fn metrics_give_the_known_answer_on_what_is_wrong() {
         let squares: f64 = (0..=10).map(|i| way(f64::from(i) * 0.1).powi(2)).sum();
         (squares / 11.0).sqrt() / 2.0
     };
-    let measured = error("ramp", slides, Number::F64, 0.001);
+    let measured = error("ramp", slides, ScalarType::F64, 0.001);
     assert!((measured / expected - 1.0).abs() < 0.01, "{measured}, {expected}");
 
     // A marble that a turning disc does not turn goes straight on: 0.2 m/s for 4 s, which the
@@ -106,13 +107,13 @@ fn metrics_give_the_known_answer_on_what_is_wrong() {
         let squares: f64 = (0..=40).map(|i| apart(f64::from(i) * 0.1)).sum();
         (squares / 41.0).sqrt() / radius
     };
-    let measured = error("turntable", slides, Number::F64, 0.001);
+    let measured = error("turntable", slides, ScalarType::F64, 0.001);
     assert!((measured / expected - 1.0).abs() < 0.01, "{measured}, {expected}");
 
     // Balls that pass through each other, and towers that fall.
     for (name, least) in [("carom", 0.2), ("cradle", 0.2), ("tower", 10.0), ("skid", 0.05)] {
         let judged = scene(name);
-        let setting = Setting { model: EXACT, number: Number::F64, step: h };
+        let setting = RunConfig { model: EXACT, number: ScalarType::F64, step: h };
         let mut frames = trace(judged.scene(), setting).unwrap();
         let (at, velocity) = (frames[0].at.clone(), frames[0].velocity.clone());
         for frame in &mut frames {
@@ -127,10 +128,10 @@ fn metrics_give_the_known_answer_on_what_is_wrong() {
 
     // A heap that is 1 mm too high everywhere is a tenth of a radius off.
     let judged = scene("pit");
-    let setting = Setting { model: EXACT, number: Number::F64, step: 1.0 / 480.0 };
+    let setting = RunConfig { model: EXACT, number: ScalarType::F64, step: 1.0 / 480.0 };
     let mut frames = trace(judged.scene(), setting).unwrap();
-    assert_eq!(judged.error(&frames), judged.chance(), "the reference itself");
-    assert!(judged.chance() < 0.01);
+    assert_eq!(judged.error(&frames), judged.noise_floor(), "the reference itself");
+    assert!(judged.noise_floor() < 0.01);
     for at in frames.iter_mut().flat_map(|frame| &mut frame.at) {
         at.y += 0.001;
     }
@@ -141,7 +142,7 @@ fn metrics_give_the_known_answer_on_what_is_wrong() {
     // Pachinko that falls 3 cm behind all the time is a tenth off.
     let judged = scene("pachinko");
     let mut frames = trace(judged.scene(), setting).unwrap();
-    assert!(judged.error(&frames) <= judged.chance() && judged.chance() < 1e-2);
+    assert!(judged.error(&frames) <= judged.noise_floor() && judged.noise_floor() < 1e-2);
     for at in frames.iter_mut().flat_map(|frame| &mut frame.at) {
         at.y += 0.03;
     }

@@ -13,10 +13,10 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use rapier3d::prelude as rapier;
 use taw::math::Vec3 as Exact;
-use taw::scene::{Ball, Field, Form, Movement, Scene, Surface, Wall};
-use taw_lab::trade::scenes::{Judged, SCENES};
+use taw::scene::{MarbleDesc, ForceFieldDesc, ShapeDesc, KinematicMotion, Scene, MaterialDesc, WallDesc};
+use taw_lab::trade::scenes::{ReferenceCase, SCENES};
 use taw_lab::trade::sweep::{STEPS, digits, write_points};
-use taw_lab::trade::trace::{FRAME, Frame};
+use taw_lab::trade::trace::{SAMPLE_INTERVAL, Frame};
 use taw_lab::trade::{COUNTS, Failure, Point};
 
 /// A scene in an engine.
@@ -39,15 +39,15 @@ fn vec(v: [f64; 3]) -> Vec3 {
     Vec3::from_array(v.map(|x| x as f32))
 }
 
-fn surface_of(ball: &Ball, scene: &Scene) -> Surface {
-    ball.surface.unwrap_or(scene.surface)
+fn surface_of(ball: &MarbleDesc, scene: &Scene) -> MaterialDesc {
+    ball.material.unwrap_or(scene.material)
 }
 
 /// How a wall turns about its place, in rad/s.
-fn turning(wall: &Wall) -> Option<Vec3> {
-    match (wall.moves?, wall.shape) {
-        (Movement::Turns { pivot, axis, degrees_per_second }, Form::HalfSpace { through, .. })
-            if pivot == through =>
+fn turning(wall: &WallDesc) -> Option<Vec3> {
+    match (wall.motion?, wall.shape) {
+        (KinematicMotion::Rotate { pivot, axis, degrees_per_second }, ShapeDesc::HalfSpace { point, .. })
+            if pivot == point =>
         {
             Some(vec(axis).normalize() * degrees_per_second.to_radians() as f32)
         }
@@ -71,29 +71,29 @@ impl Engine for Rapier {
         let mut world = rapier::PhysicsWorld::default();
         world.integration_parameters.dt = step;
         world.integration_parameters.num_solver_iterations = count as usize;
-        let with = |collider: rapier::ColliderBuilder, surface: Surface| {
+        let with = |collider: rapier::ColliderBuilder, surface: MaterialDesc| {
             let (friction, restitution) = (surface.friction as f32, surface.restitution as f32);
             collider.friction(friction).restitution(restitution).build()
         };
         for wall in &scene.walls {
             let collider = match wall.shape {
-                Form::HalfSpace { normal, through } => {
+                ShapeDesc::HalfSpace { normal, point } => {
                     let shape = rapier::SharedShape::halfspace(theirs(vec(normal).normalize()));
-                    rapier::ColliderBuilder::new(shape).translation(theirs(vec(through)))
+                    rapier::ColliderBuilder::new(shape).translation(theirs(vec(point)))
                 }
-                Form::Capsule { from, to, radius } => {
+                ShapeDesc::Capsule { from, to, radius } => {
                     rapier::ColliderBuilder::capsule_from_endpoints(
                         theirs(vec(from)),
                         theirs(vec(to)),
                         radius as f32,
                     )
                 }
-                Form::Ball { center, radius } => {
+                ShapeDesc::Ball { center, radius } => {
                     rapier::ColliderBuilder::ball(radius as f32).translation(theirs(vec(center)))
                 }
-                Form::Box { .. } => panic!("no scene of the sweep has a box"),
+                ShapeDesc::Box { .. } => panic!("no scene of the sweep has a box"),
             };
-            let surface = wall.surface.unwrap_or(scene.surface);
+            let surface = wall.material.unwrap_or(scene.material);
             let collider = with(collider, surface);
             match turning(wall) {
                 None => {
@@ -106,7 +106,7 @@ impl Engine for Rapier {
             }
         }
         let mut balls = Vec::new();
-        for ball in scene.balls() {
+        for ball in scene.all_marbles() {
             let body = rapier::RigidBodyBuilder::dynamic()
                 .translation(theirs(vec(ball.position)))
                 .linvel(theirs(vec(ball.velocity)))
@@ -184,25 +184,25 @@ impl Engine for Avian {
         app.finish();
         app.update();
         let world = app.world_mut();
-        let made_of = |surface: Surface| {
+        let made_of = |surface: MaterialDesc| {
             let (friction, restitution) = (surface.friction as f32, surface.restitution as f32);
             (avian::Friction::new(friction), avian::Restitution::new(restitution))
         };
         for wall in &scene.walls {
             let (shape, place) = match wall.shape {
-                Form::HalfSpace { normal, through } => {
-                    (avian::Collider::half_space(vec(normal).normalize()), vec(through))
+                ShapeDesc::HalfSpace { normal, point } => {
+                    (avian::Collider::half_space(vec(normal).normalize()), vec(point))
                 }
-                Form::Capsule { from, to, radius } => {
+                ShapeDesc::Capsule { from, to, radius } => {
                     let (from, to) = (vec(from), vec(to));
                     (avian::Collider::capsule_endpoints(radius as f32, from, to), Vec3::ZERO)
                 }
-                Form::Ball { center, radius } => {
+                ShapeDesc::Ball { center, radius } => {
                     (avian::Collider::sphere(radius as f32), vec(center))
                 }
-                Form::Box { .. } => panic!("no scene of the sweep has a box"),
+                ShapeDesc::Box { .. } => panic!("no scene of the sweep has a box"),
             };
-            let surface = made_of(wall.surface.unwrap_or(scene.surface));
+            let surface = made_of(wall.material.unwrap_or(scene.material));
             let place = Transform::from_translation(place);
             let mut entity = world.spawn((shape, place, surface));
             match turning(wall) {
@@ -214,7 +214,7 @@ impl Engine for Avian {
                 )),
             };
         }
-        let balls = scene.balls().map(|ball| {
+        let balls = scene.all_marbles().map(|ball| {
             let shape = avian::Collider::sphere(ball.radius as f32);
             let density = avian::ColliderDensity(ball.density as f32);
             let place = Transform::from_translation(vec(ball.position));
@@ -271,24 +271,24 @@ impl Engine for Avian {
 }
 
 /// The forces of the scene's fields.
-fn forces(scene: &Scene, balls: &[Ball], state: &[[Vec3; 2]]) -> Vec<Vec3> {
-    let of = |(ball, [at, velocity]): (&Ball, &[Vec3; 2])| {
+fn forces(scene: &Scene, balls: &[MarbleDesc], state: &[[Vec3; 2]]) -> Vec<Vec3> {
+    let of = |(ball, [at, velocity]): (&MarbleDesc, &[Vec3; 2])| {
         let mass = ball.density * 4.0 / 3.0 * std::f64::consts::PI * ball.radius.powi(3);
-        let force = |field: &Field| match *field {
-            Field::Drag { velocity: wind, linear, quadratic } => {
+        let force = |field: &ForceFieldDesc| match *field {
+            ForceFieldDesc::Drag { velocity: wind, linear, quadratic } => {
                 let relative = vec(wind) - *velocity;
                 relative * (linear as f32 + quadratic as f32 * relative.length())
             }
-            Field::Attraction { center, strength } => {
+            ForceFieldDesc::Attraction { center, strength } => {
                 let way = vec(center) - *at;
                 way * ((strength * mass) as f32 / way.length().powi(3))
             }
-            Field::Spring { anchor, rest_length, stiffness } => {
+            ForceFieldDesc::Spring { anchor, rest_length, stiffness } => {
                 let way = vec(anchor) - *at;
                 way.normalize_or_zero() * (stiffness as f32 * (way.length() - rest_length as f32))
             }
         };
-        scene.fields.iter().map(force).sum()
+        scene.force_fields.iter().map(force).sum()
     };
     balls.iter().zip(state).map(of).collect()
 }
@@ -301,10 +301,10 @@ fn frame(time: f64, state: &[[Vec3; 2]]) -> Frame {
 }
 
 /// How deep balls are in each other and in walls, all together.
-fn overlap(scene: &Scene, balls: &[Ball], state: &[[Vec3; 2]]) -> f64 {
+fn overlap(scene: &Scene, balls: &[MarbleDesc], state: &[[Vec3; 2]]) -> f64 {
     let mut there = scene.clone();
     there.lattices.clear();
-    let place = |(ball, [at, _]): (&Ball, &[Vec3; 2])| Ball {
+    let place = |(ball, [at, _]): (&MarbleDesc, &[Vec3; 2])| MarbleDesc {
         position: at.to_array().map(f64::from),
         ..*ball
     };
@@ -314,14 +314,14 @@ fn overlap(scene: &Scene, balls: &[Ball], state: &[[Vec3; 2]]) -> f64 {
         .map_or(f64::NAN, |running| taw_lab::scene::overlaps(&running.world).iter().sum())
 }
 
-fn run<E: Engine>(judged: &Judged, step: (&str, f64), count: u32) -> Point {
+fn run<E: Engine>(judged: &ReferenceCase, step: (&str, f64), count: u32) -> Point {
     let scene = judged.scene();
-    let balls: Vec<_> = scene.balls().collect();
-    let steps = (scene.seconds / step.1).round() as u64;
-    let every = (FRAME / step.1).round() as u64;
+    let balls: Vec<_> = scene.all_marbles().collect();
+    let steps = (scene.duration / step.1).round() as u64;
+    let every = (SAMPLE_INTERVAL / step.1).round() as u64;
     let go = |mut watch: Option<&mut Vec<Frame>>| {
         let mut engine = E::new(scene, step.1 as f32, count);
-        let still = |ball: &Ball| [vec(ball.position), vec(ball.velocity)];
+        let still = |ball: &MarbleDesc| [vec(ball.position), vec(ball.velocity)];
         let mut state: Vec<_> = balls.iter().map(still).collect();
         let mut taken = Duration::ZERO;
         for i in 0..=steps {
@@ -337,7 +337,7 @@ fn run<E: Engine>(judged: &Judged, step: (&str, f64), count: u32) -> Point {
                 let gravity = vec(scene.gravity_at(now));
                 let begin = Instant::now();
                 let forces =
-                    if scene.fields.is_empty() { vec![] } else { forces(scene, &balls, &state) };
+                    if scene.force_fields.is_empty() { vec![] } else { forces(scene, &balls, &state) };
                 engine.step(gravity, &forces);
                 taken += begin.elapsed();
                 state = engine.state();
@@ -367,8 +367,8 @@ fn run<E: Engine>(judged: &Judged, step: (&str, f64), count: u32) -> Point {
         iterations,
         error: error.is_finite().then_some(digits(error.max(1e-16))),
         failure,
-        cost: digits(times[1] * 1e9 / scene.seconds / balls.len() as f64),
-        real_time: digits(scene.seconds / times[1]),
+        cost: digits(times[1] * 1e9 / scene.duration / balls.len() as f64),
+        real_time: digits(scene.duration / times[1]),
         note: E::defaults(),
     }
 }

@@ -10,7 +10,7 @@ use taw_lab::advise::Advice;
 
 use crate::governor::Governor;
 use crate::resources::{TawModel, TawWorld};
-use crate::trade::{Choice, TawTrade};
+use crate::trade::{Candidate, TawTrade};
 
 /// How near to a point one has to click, in points of the screen.
 const REACH: f32 = 12.0;
@@ -40,7 +40,7 @@ pub fn trade(
             }
         }
     });
-    if !trade.advice().choices.is_empty() {
+    if !trade.advice().candidates.is_empty() {
         if let Some(chosen) = chart(ui, trade.advice(), model.0) {
             model.set_if_neq(TawModel(chosen));
         }
@@ -52,13 +52,13 @@ pub fn trade(
 
 /// How sure it is, in words.
 fn sure(advice: &Advice) -> String {
-    let Advice { told, seconds, sure, .. } = advice;
+    let Advice { horizon, seconds, sure, .. } = advice;
     let sure = sure * 1e3;
-    if *told >= seconds - 1e-9 {
+    if *horizon >= seconds - 1e-9 {
         format!("Places compared for all of {seconds:.1} s, known to {sure:.1e} mm.")
     } else {
         format!(
-            "Places compared for the {told:.1} of {seconds:.1} s that can be told (to {sure:.1e} \
+            "Places compared for the {horizon:.1} of {seconds:.1} s that can be told (to {sure:.1e} \
              mm), heights and overlaps for all of it."
         )
     }
@@ -66,7 +66,7 @@ fn sure(advice: &Advice) -> String {
 
 /// What the model that is used came to, if it was measured.
 fn current(ui: &mut Ui, advice: &Advice, model: Model) {
-    match advice.choices.iter().find(|choice| choice.setting.model == model) {
+    match advice.candidates.iter().find(|choice| choice.setting.model == model) {
         Some(choice) => ui.label(format!("Now: {}", describe(choice))),
         None => ui.label("Now: a model that was not measured"),
     };
@@ -91,21 +91,21 @@ fn govern(ui: &mut Ui, governor: &mut ResMut<Governor>, model: Model, advice: &A
 }
 
 /// The choices of a name.
-fn of<'a>(advice: &'a Advice, name: &'a str) -> impl Iterator<Item = &'a Choice> {
-    advice.choices.iter().filter(move |choice| choice.name == name)
+fn of<'a>(advice: &'a Advice, name: &'a str) -> impl Iterator<Item = &'a Candidate> {
+    advice.candidates.iter().filter(move |choice| choice.name == name)
 }
 
 /// Upward and to the right is better; what is below a nanometre or a nanosecond is as good as that.
-fn place(choice: &Choice) -> [f64; 2] {
-    [-choice.cost.max(1e-9).log10(), -choice.wrong().max(1e-9).log10()]
+fn place(choice: &Candidate) -> [f64; 2] {
+    [-choice.cost.max(1e-9).log10(), -choice.total_error().max(1e-9).log10()]
 }
 
-fn describe(choice: &Choice) -> String {
+fn describe(choice: &Candidate) -> String {
     let Model { substeps, iterations, .. } = choice.setting.model;
     format!(
         "{}, {substeps} substeps, {iterations} iterations: {}, {} a step",
         choice.name,
-        metres(choice.wrong()),
+        metres(choice.total_error()),
         seconds(choice.cost)
     )
 }
@@ -129,7 +129,7 @@ fn in_units(number: f64, units: &[(&str, f64)]) -> String {
 
 /// Draws the chart; gives the model that was clicked.
 fn chart(ui: &mut Ui, advice: &Advice, now: Model) -> Option<Model> {
-    let mut names: Vec<&str> = advice.choices.iter().map(|choice| choice.name).collect();
+    let mut names: Vec<&str> = advice.candidates.iter().map(|choice| choice.name).collect();
     names.sort_unstable();
     names.dedup();
     let label = |at: &HoverPosition| match at {
@@ -157,7 +157,7 @@ fn chart(ui: &mut Ui, advice: &Advice, now: Model) -> Option<Model> {
             let points: Vec<_> = of(advice, name).map(place).collect();
             plot.points(Points::new(*name, points).radius(3.5).color(color(name, &names)));
         }
-        if let Some(choice) = advice.choices.iter().find(|choice| choice.setting.model == now) {
+        if let Some(choice) = advice.candidates.iter().find(|choice| choice.setting.model == now) {
             let ring = Points::new("now", vec![place(choice)]).shape(MarkerShape::Circle);
             plot.points(ring.filled(false).radius(9.0).color(Color32::WHITE).allow_hover(false));
         }
@@ -171,10 +171,10 @@ fn chart(ui: &mut Ui, advice: &Advice, now: Model) -> Option<Model> {
     });
     let pointer =
         response.response.clicked().then(|| response.response.interact_pointer_pos())??;
-    let distance = |choice: &Choice| {
+    let distance = |choice: &Candidate| {
         response.transform.position_from_point(&PlotPoint::from(place(choice))).distance(pointer)
     };
-    let nearest = advice.choices.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
+    let nearest = advice.candidates.iter().min_by(|a, b| distance(a).total_cmp(&distance(b)))?;
     (distance(nearest) <= REACH).then_some(nearest.setting.model)
 }
 
@@ -195,22 +195,22 @@ mod tests {
     use super::*;
     use egui::{Event, PointerButton, Pos2, RawInput, Rect};
     use taw::response::Response;
-    use taw_lab::advise::Whole;
-    use taw_lab::trade::trace::{Number, Setting};
+    use taw_lab::advise::AggregateError;
+    use taw_lab::trade::trace::{RunConfig, ScalarType};
 
     /// A player who clicks everywhere, eight points apart.
     #[test]
     fn a_click_on_a_point_chooses_its_model_and_one_beside_it_nothing() {
         let choice = |name, response, cost, error| {
             let model = Model { response, ..Model::default() };
-            let setting = Setting { model, number: Number::F32, step: 1.0 / 60.0 };
-            Choice { name, setting, error, whole: Whole::default(), cost }
+            let setting = RunConfig { model, number: ScalarType::F32, step: 1.0 / 60.0 };
+            Candidate { name, setting, error, whole: AggregateError::default(), cost }
         };
-        let choices = vec![
+        let candidates = vec![
             choice("cheap", Response::Displacement, 1e-5, 0.1),
             choice("exact", Response::EventDriven, 1e-3, 1e-5),
         ];
-        let advice = Advice { choices, told: 1.0, seconds: 1.0, ..Advice::default() };
+        let advice = Advice { candidates, horizon: 1.0, seconds: 1.0, ..Advice::default() };
         let context = egui::Context::default();
         let click = |at: Pos2| {
             let mut chosen = None;

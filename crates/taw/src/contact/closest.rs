@@ -16,9 +16,9 @@ pub struct ClosestPoints<S> {
     pub distance: S,
     /// Unit vector from the first to the second.
     pub normal: Vec3<S>,
-    /// On the surface of the first.
+    /// Closest point on the first.
     pub on_a: Point3<S>,
-    /// On the surface of the second: `on_a + normal * distance`.
+    /// Closest point on the second: `on_a + normal * distance`.
     pub on_b: Point3<S>,
 }
 

@@ -74,7 +74,7 @@ pub fn manifolds_of_shapes<S: Scalar>(
 }
 
 /// First contact of two shapes that translate along straight lines, if any; as [`shape_cast`] of
-/// query_pairs pair of sub-shapes.
+/// each pair of sub-shapes.
 #[must_use]
 pub fn shape_cast_of_shapes<S: Scalar>(
     a: &Shape<S>,

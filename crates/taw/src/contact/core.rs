@@ -10,7 +10,7 @@ use crate::shape::{Aabb3, BoundedShape, Capsule, Face, Hull, Obb, Sphere, Triang
 #[derive(Clone, Copy, Debug)]
 pub struct Core<'a> {
     pub(super) kind: Kind<'a>,
-    /// In metres.
+    /// Rounding radius, in metres.
     pub(super) radius: f64,
 }
 
@@ -197,7 +197,7 @@ impl Core<'_> {
                 cuboid.axes.iter_mut().for_each(|axis| *axis = by * *axis);
             }
             Kind::Hull { rotation, translation, .. } => {
-                (*rotation, *translation) = (by * *rotation, by * *translation)
+                (*rotation, *translation) = (by * *rotation, by * *translation);
             }
         }
         self

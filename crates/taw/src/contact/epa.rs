@@ -11,7 +11,7 @@ use crate::math::{Vec3, direction_and_length};
 
 /// A face of the polytope.
 #[derive(Clone, Copy)]
-struct Face {
+struct PolytopeFace {
     corners: [usize; 3],
     /// Outward unit normal.
     normal: Vec3<f64>,
@@ -49,7 +49,7 @@ pub(super) fn penetration(
         // Faces that see the new vertex are removed; their horizon is joined to the vertex.
         horizon.clear();
         let above = 1e-14 * size;
-        faces.retain(|face: &Face| {
+        faces.retain(|face: &PolytopeFace| {
             let seen = next.difference.dot(face.normal) - face.height > above;
             if seen {
                 let [i, j, k] = face.corners;
@@ -75,12 +75,12 @@ pub(super) fn penetration(
 }
 
 /// A face, unless it is degenerate or has the origin in front of it.
-fn face(vertices: &[Vertex], corners: [usize; 3]) -> Option<Face> {
+fn face(vertices: &[Vertex], corners: [usize; 3]) -> Option<PolytopeFace> {
     let [p, q, r] = corners.map(|i| vertices[i].difference);
     let (normal, twice) = direction_and_length((q - p).cross(r - p))?;
     let longest = (q - p).magnitude2().max((r - q).magnitude2()).max((p - r).magnitude2());
     let height = (p + q + r).dot(normal) / 3.0;
-    (twice > 1e-10 * longest && height > -1e-13 * longest.sqrt()).then_some(Face {
+    (twice > 1e-10 * longest && height > -1e-13 * longest.sqrt()).then_some(PolytopeFace {
         corners,
         normal,
         height,
@@ -91,12 +91,12 @@ fn face(vertices: &[Vertex], corners: [usize; 3]) -> Option<Face> {
 /// projection of the origin.
 fn closest_points_on(
     vertices: &[Vertex],
-    faces: &[Face],
-    nearest: &Face,
+    faces: &[PolytopeFace],
+    nearest: &PolytopeFace,
     reach: f64,
     size: f64,
 ) -> LocalClosestPoints {
-    let weights = |face: &Face| {
+    let weights = |face: &PolytopeFace| {
         let [p, q, r] = face.corners.map(|i| vertices[i].difference);
         let below = face.normal * face.height;
         let part = |x: Vec3<f64>, y: Vec3<f64>| (x - below).cross(y - below).dot(face.normal);
@@ -104,7 +104,7 @@ fn closest_points_on(
         let all: f64 = parts.iter().sum();
         parts.map(|part| part / all)
     };
-    let least = |face: &Face| weights(face).into_iter().fold(f64::INFINITY, f64::min);
+    let least = |face: &PolytopeFace| weights(face).into_iter().fold(f64::INFINITY, f64::min);
     let mut best = (least(nearest), nearest);
     for face in faces {
         let same = face.height <= nearest.height + 4.0 * TOLERANCE * size;

@@ -22,9 +22,9 @@ pub type Points<S> = SmallVec<[ManifoldPoint<S>; 4]>;
 /// One point of a [`Manifold`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ManifoldPoint<S> {
-    /// On the surface of the first.
+    /// Point on the surface of the first.
     pub on_a: Point3<S>,
-    /// On the surface of the second.
+    /// Point on the surface of the second.
     pub on_b: Point3<S>,
     /// Separation at this point, in metres; negative for a penetration.
     pub distance: S,

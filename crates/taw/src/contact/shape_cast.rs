@@ -55,7 +55,7 @@ pub fn shape_cast<S: Scalar>(
         }
         if distance <= near {
             if approach_speed <= SLIDING * motion.magnitude() {
-                return None; // but for rounding, one slides along the other
+                return None; // one slides along the other, to within rounding
             }
             return Some(ShapeCastHit {
                 time: S::constant(time),

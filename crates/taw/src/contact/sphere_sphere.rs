@@ -14,8 +14,8 @@ pub fn touching_sphere_sphere<S: Scalar>(a: &Sphere<S>, b: &Sphere<S>) -> bool {
 
 /// Minimum translation vector of `b` out of `a`, or `None` if they do not touch.
 ///
-/// It points from the center of `a` to that of `b`. Where the centers coincide
-/// every direction is equally short; then it is **+x**.
+/// Direction from the center of `a` to that of `b`. For coincident centers every direction is
+/// equally short; then it is **+x**.
 #[must_use]
 #[inline]
 pub fn mtv_sphere_sphere<S: Scalar>(a: &Sphere<S>, b: &Sphere<S>) -> Option<Vec3<S>> {

@@ -127,8 +127,7 @@ pub fn time_of_impact<S: Scalar>(
         if separation(left) > 0.0 {
             return None;
         }
-        // Root if the closest points stay the same, in the form without cancellation. From there
-        // on, the root of a chord is before that of the function.
+        // Root if the closest points stay the same, in the form without cancellation.
         let curvature = x.curvature + y.curvature;
         let root = (approach_speed * approach_speed + 4.0 * curvature * lower_bound).sqrt();
         let guess = if approach_speed > 0.0 {
@@ -136,19 +135,31 @@ pub fn time_of_impact<S: Scalar>(
         } else {
             (root - approach_speed) / (2.0 * curvature)
         };
-        let (mut safe, mut far) = ((0.0, lower_bound), (left, separation(left)));
-        for iteration in 0..MAX_ROOT_ITERATIONS {
-            let chord = safe.0 + (far.0 - safe.0) * (safe.1 / (safe.1 - far.1));
-            let after = if iteration == 0 && guess < left { guess } else { chord };
-            let there = separation(after);
-            // Below zero by rounding only.
-            if there >= -0.01 * near {
-                safe = (after, there.max(0.0));
-            } else {
-                far = (after, there);
-            }
-        }
-        time += safe.0;
+        time += safe_advance(separation, lower_bound, guess, left, near);
     }
     None
+}
+
+/// Time for which a concave `separation`, zero before `left`, stays positive, at most: from `guess`
+/// on, the root of a chord is before that of the function.
+fn safe_advance(
+    separation: impl Fn(f64) -> f64,
+    start: f64,
+    guess: f64,
+    left: f64,
+    near: f64,
+) -> f64 {
+    let (mut safe, mut far) = ((0.0, start), (left, separation(left)));
+    for iteration in 0..MAX_ROOT_ITERATIONS {
+        let chord = safe.0 + (far.0 - safe.0) * (safe.1 / (safe.1 - far.1));
+        let after = if iteration == 0 && guess < left { guess } else { chord };
+        let there = separation(after);
+        // Below zero by rounding only.
+        if there >= -0.01 * near {
+            safe = (after, there.max(0.0));
+        } else {
+            far = (after, there);
+        }
+    }
+    safe.0
 }

@@ -162,7 +162,7 @@ mod tests {
 
     /// The box of the Dzhanibekov effect: turns about its middle axis, with a bit of
     /// the others. Gives (worst relative energy error, times at which the body's own
-    /// angular_velocity about y changed its sign).
+    /// angular velocity about y changed its sign).
     fn dzhanibekov<S: Scalar>(dt: f64) -> (f64, Vec<f64>) {
         let inertia = Vec3::new(1.6, 4.16, 5.44).map(S::constant);
         let angular_velocity = Vec3::new(0.01, 5.0, 0.01).map(S::constant);

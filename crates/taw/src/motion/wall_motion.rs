@@ -6,11 +6,11 @@ use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
 
 /// Rigid motion of a kinematic wall: a velocity, and an angular velocity about a pivot.
 ///
-/// It gives the surface velocity that drags what lies on the wall, and not where the wall is at the
-/// end of a step: a conveyor belt stays in place and has a motion. For a wall that was set to
-/// another place since the last step, [`World::step`](crate::world::World::step) interpolates its
-/// path through all substeps with this motion: velocity and angular velocity are then the means
-/// over the step, and the pivot is at its position at the end.
+/// Surface velocity that drags what lies on the wall; it does not move the wall: a conveyor belt
+/// stays in place and has a motion. For a wall that was set to another place since the last step,
+/// [`World::step`](crate::world::World::step) interpolates its path through all substeps with this
+/// motion: velocity and angular velocity are then the means over the step, and the pivot is at its
+/// position at the end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct WallMotion<S> {
     /// Velocity of the pivot, in m/s.

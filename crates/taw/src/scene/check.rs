@@ -3,7 +3,8 @@
 use cgmath::InnerSpace;
 
 use super::{
-    Ball, Build, Field, Form, Gate, Lattice, Movement, Scene, Structure, Surface, Tilt, Turn, Wall,
+    Build, ForceFieldDesc, GravityKeyframe, KinematicMotion, Lattice, MarbleDesc, MaterialDesc,
+    RotationDesc, Scene, SensorPlane, ShapeDesc, Structure, WallDesc,
 };
 use crate::Error;
 use crate::error::{finite, positive, within};
@@ -54,22 +55,22 @@ impl Scene {
     /// Limits of single properties, such as a restitution of at most one, are checked when the
     /// world is built.
     pub(super) fn check(&self) -> Result<(), Error> {
-        above_zero("seconds", self.seconds)?;
+        above_zero("duration", self.duration)?;
         gravity(self.gravity)?;
         let mut before = 0.0;
-        for Tilt { at, gravity: tilted } in &self.tilts {
-            before = within("tilts.at", *at, before, LARGEST)?;
+        for GravityKeyframe { time, gravity: tilted } in &self.gravity_keyframes {
+            before = within("gravity_keyframes.time", *time, before, LARGEST)?;
             gravity(*tilted)?;
         }
-        self.fields.iter().try_for_each(|field| field.check())?;
-        self.surface.check()?;
-        self.walls.iter().try_for_each(Wall::check)?;
+        self.force_fields.iter().try_for_each(|field| field.check())?;
+        self.material.check()?;
+        self.walls.iter().try_for_each(WallDesc::check)?;
         self.structures.iter().try_for_each(Structure::check)?;
-        for Gate { normal, through } in &self.gates {
+        for SensorPlane { normal, point } in &self.sensor_planes {
             direction("normal", ["normal.x", "normal.y", "normal.z"], *normal)?;
-            vector(["through.x", "through.y", "through.z"], *through)?;
+            vector(["point.x", "point.y", "point.z"], *point)?;
         }
-        self.marbles.iter().try_for_each(Ball::check)?;
+        self.marbles.iter().try_for_each(MarbleDesc::check)?;
         self.lattices.iter().try_for_each(Lattice::check)?;
         let counts = self.lattices.iter().map(|lattice| lattice.count.map(f64::from));
         let marbles = counts.fold(self.marbles.len() as f64, |sum, [x, y, z]| sum + x * y * z);
@@ -77,7 +78,7 @@ impl Scene {
     }
 }
 
-impl Field {
+impl ForceFieldDesc {
     fn check(self) -> Result<(), Error> {
         match self {
             Self::Drag { velocity, linear, quadratic } => {
@@ -99,7 +100,7 @@ impl Field {
     }
 }
 
-impl Surface {
+impl MaterialDesc {
     fn check(&self) -> Result<(), Error> {
         within("restitution", self.restitution, 0.0, 1.0)?;
         not_negative("friction", self.friction)?;
@@ -111,24 +112,24 @@ impl Surface {
     }
 }
 
-impl Wall {
+impl WallDesc {
     fn check(&self) -> Result<(), Error> {
-        self.surface.iter().try_for_each(Surface::check)?;
-        stays_somewhere(self.shape.check()?, self.moves)
+        self.material.iter().try_for_each(MaterialDesc::check)?;
+        stays_somewhere(self.shape.check()?, self.motion)
     }
 }
 
 impl Structure {
     fn check(&self) -> Result<(), Error> {
-        self.surface.iter().try_for_each(Surface::check)?;
-        stays_somewhere(self.shape.check()?, self.moves)
+        self.material.iter().try_for_each(MaterialDesc::check)?;
+        stays_somewhere(self.shape.check()?, self.motion)
     }
 }
 
 /// Checks that a wall stays representable along its whole motion, at half of the number range
 /// because it rotates about a pivot.
-fn stays_somewhere(far: f64, moves: Option<Movement>) -> Result<(), Error> {
-    let far = far + moves.map_or(Ok(0.0), Movement::check)?;
+fn stays_somewhere(far: f64, motion: Option<KinematicMotion>) -> Result<(), Error> {
+    let far = far + motion.map_or(Ok(0.0), KinematicMotion::check)?;
     within("the reach of a wall", far, 0.0, LARGEST / 2.0).map(|_| ())
 }
 
@@ -157,27 +158,27 @@ impl Build {
     }
 }
 
-impl Turn {
+impl RotationDesc {
     fn check(self) -> Result<(), Error> {
         direction("axis", ["axis.x", "axis.y", "axis.z"], self.axis)?;
         number("degrees", self.degrees).map(|_| ())
     }
 }
 
-impl Form {
+impl ShapeDesc {
     /// Largest distance from the origin, in metres; for a half-space, that of its given point.
     fn check(self) -> Result<f64, Error> {
         const CENTER: [&str; 3] = ["center.x", "center.y", "center.z"];
         Ok(match self {
-            Self::HalfSpace { normal, through } => {
+            Self::HalfSpace { normal, point } => {
                 direction("normal", ["normal.x", "normal.y", "normal.z"], normal)?;
-                vector(["through.x", "through.y", "through.z"], through)?.magnitude()
+                vector(["point.x", "point.y", "point.z"], point)?.magnitude()
             }
-            Self::Box { center, size, turned } => {
+            Self::Box { center, size, rotation } => {
                 for (field, side) in ["size.x", "size.y", "size.z"].into_iter().zip(size) {
                     above_zero(field, side)?;
                 }
-                turned.check()?;
+                rotation.check()?;
                 vector(CENTER, center)?.magnitude() + Vec3::from(size).magnitude()
             }
             Self::Ball { center, radius } => {
@@ -192,34 +193,35 @@ impl Form {
     }
 }
 
-impl Movement {
+impl KinematicMotion {
     /// Largest displacement of a wall, in metres.
     fn check(self) -> Result<f64, Error> {
         const PIVOT: [&str; 3] = ["pivot.x", "pivot.y", "pivot.z"];
         const AXIS: [&str; 3] = ["axis.x", "axis.y", "axis.z"];
         Ok(match self {
-            Self::Conveys { velocity } => {
+            Self::Conveyor { velocity } => {
                 vector(["velocity.x", "velocity.y", "velocity.z"], velocity)?;
                 0.0
             }
-            Self::Turns { pivot, axis, degrees_per_second } => {
+            Self::Rotate { pivot, axis, degrees_per_second } => {
                 direction("axis", AXIS, axis)?;
                 number("degrees_per_second", degrees_per_second)?;
                 2.0 * vector(PIVOT, pivot)?.magnitude()
             }
-            Self::Swings { way, pivot, axis, degrees, period } => {
+            Self::Oscillate { amplitude, pivot, axis, degrees, period } => {
                 direction("axis", AXIS, axis)?;
-                let way = vector(["way.x", "way.y", "way.z"], way)?.magnitude();
+                let amplitude =
+                    vector(["amplitude.x", "amplitude.y", "amplitude.z"], amplitude)?.magnitude();
                 let often = std::f64::consts::TAU / above_zero("period", period)?;
-                number("way / period", way * often)?;
+                number("amplitude / period", amplitude * often)?;
                 number("degrees / period", number("degrees", degrees)?.to_radians() * often)?;
-                way + 2.0 * vector(PIVOT, pivot)?.magnitude()
+                amplitude + 2.0 * vector(PIVOT, pivot)?.magnitude()
             }
         })
     }
 }
 
-impl Ball {
+impl MarbleDesc {
     fn check(&self) -> Result<(), Error> {
         vector(["position.x", "position.y", "position.z"], self.position)?;
         above_zero("radius", self.radius)?;
@@ -230,15 +232,15 @@ impl Ball {
         )?;
         above_zero("density", self.density)?;
         not_negative("half_length", self.half_length)?;
-        self.turned.check()?;
-        self.surface.iter().try_for_each(Surface::check)
+        self.rotation.check()?;
+        self.material.iter().try_for_each(MaterialDesc::check)
     }
 }
 
 impl Lattice {
     fn check(&self) -> Result<(), Error> {
         self.first.check()?;
-        within("disorder", self.disorder, 0.0, 1.0)?;
+        within("jitter", self.jitter, 0.0, 1.0)?;
         vector(["pitch.x", "pitch.y", "pitch.z"], self.pitch)?;
         for ((field, pitch), (first, count)) in ["pitch.x", "pitch.y", "pitch.z"]
             .into_iter()

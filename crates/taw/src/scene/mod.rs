@@ -6,12 +6,12 @@
 //! line and field (see [`Scene`] for an example).
 
 mod check;
-#[cfg(feature = "serde")]
-mod number;
-mod running;
+mod simulation;
 mod structure;
+#[cfg(feature = "serde")]
+mod validate;
 
-pub use running::Running;
+pub use simulation::Simulation;
 pub use structure::{Build, Structure};
 
 /// Scene description; see the [module](self). All in `f64`; metres, seconds, kilograms.
@@ -21,9 +21,9 @@ pub use structure::{Build, Structure};
 /// use taw::scene::Scene;
 ///
 /// let text = "(
-///     seconds: 2,
+///     duration: 2,
 ///     walls: [(shape: HalfSpace(normal: (0, 1, 0)))],
-///     marbles: [(position: (0, 3, 0), radius: 0.5, surface: Some((restitution: 0.8)))],
+///     marbles: [(position: (0, 3, 0), radius: 0.5, material: Some((restitution: 0.8)))],
 /// )";
 /// let scene: Scene = ron::from_str(text)?;
 /// assert_eq!(scene.marbles[0].radius, 0.5);
@@ -39,34 +39,34 @@ pub use structure::{Build, Structure};
 pub struct Scene {
     /// Human-readable description.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub about: String,
+    pub description: String,
     /// Simulated time in seconds, above zero.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::positive"))]
-    pub seconds: f64,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::positive"))]
+    pub duration: f64,
     /// Gravity, in m/s².
-    #[cfg_attr(feature = "serde", serde(default = "earth", deserialize_with = "number::vector"))]
+    #[cfg_attr(feature = "serde", serde(default = "earth", deserialize_with = "validate::vector"))]
     pub gravity: [f64; 3],
     /// Gravity over time, if it changes: as seen in the frame of a tilted scene.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub tilts: Vec<Tilt>,
+    pub gravity_keyframes: Vec<GravityKeyframe>,
     /// Force fields besides gravity.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub fields: Vec<Field>,
+    pub force_fields: Vec<ForceFieldDesc>,
     /// Default material of marbles and walls.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub surface: Surface,
+    pub material: MaterialDesc,
     /// Walls (static or kinematic colliders) of one simple shape.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub walls: Vec<Wall>,
+    pub walls: Vec<WallDesc>,
     /// Walls of composite shapes.
     #[cfg_attr(feature = "serde", serde(default))]
     pub structures: Vec<Structure>,
     /// Sensor planes, behind which marbles are counted.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub gates: Vec<Gate>,
+    pub sensor_planes: Vec<SensorPlane>,
     /// Single marbles.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub marbles: Vec<Ball>,
+    pub marbles: Vec<MarbleDesc>,
     /// Lattices of marbles.
     #[cfg_attr(feature = "serde", serde(default))]
     pub lattices: Vec<Lattice>,
@@ -77,12 +77,12 @@ pub struct Scene {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Tilt {
+pub struct GravityKeyframe {
     /// Time, in seconds.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::not_negative"))]
-    pub at: f64,
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::not_negative"))]
+    pub time: f64,
     /// Gravity, in m/s².
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
     pub gravity: [f64; 3],
 }
 
@@ -91,51 +91,51 @@ pub struct Tilt {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Gate {
+pub struct SensorPlane {
     /// Normal toward the side that marbles come from; of any length but zero.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::direction"))]
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::direction"))]
     pub normal: [f64; 3],
     /// A point of the plane.
-    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
-    pub through: [f64; 3],
+    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::vector"))]
+    pub point: [f64; 3],
 }
 
 /// Description of a [force field](crate::motion::ForceField).
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub enum Field {
+pub enum ForceFieldDesc {
     /// Drag of a medium at rest or in motion.
     Drag {
         /// Velocity of the medium, in m/s.
-        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
+        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::vector"))]
         velocity: [f64; 3],
         /// Linear drag in N s/m, at least zero.
-        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::not_negative"))]
+        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::not_negative"))]
         linear: f64,
         /// Quadratic drag in N s²/m², at least zero.
-        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::not_negative"))]
+        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::not_negative"))]
         quadratic: f64,
     },
     /// A spring from each marble to a fixed point.
     Spring {
         /// Anchor point, in metres.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         anchor: [f64; 3],
         /// Rest length in metres, at least zero.
-        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::not_negative"))]
+        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::not_negative"))]
         rest_length: f64,
         /// Spring constant in N/m, at least zero.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::not_negative"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::not_negative"))]
         stiffness: f64,
     },
     /// A point that attracts with the inverse square of the distance.
     Attraction {
         /// Center, in metres.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         center: [f64; 3],
         /// Strength in m³/s²; negative repels.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::any"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::any"))]
         strength: f64,
     },
 }
@@ -144,27 +144,27 @@ pub enum Field {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields, default))]
-pub struct Surface {
-    /// In `[0, 1]`.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::part"))]
+pub struct MaterialDesc {
+    /// Coefficient of restitution, in `[0, 1]`.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::part"))]
     pub restitution: f64,
-    /// At least zero.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::not_negative"))]
+    /// Coefficient of friction, at least zero.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::not_negative"))]
     pub friction: f64,
-    /// In `[-1, 1]`.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::signed_part"))]
+    /// Tangential coefficient of restitution, in `[-1, 1]`.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::signed_part"))]
     pub tangential_restitution: f64,
-    /// At least zero.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::not_negative"))]
+    /// Coefficient of rolling resistance, at least zero.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::not_negative"))]
     pub rolling_resistance: f64,
-    /// At least zero.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::not_negative"))]
+    /// Coefficient of torsional (spinning) resistance, at least zero.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::not_negative"))]
     pub spinning_resistance: f64,
-    /// In pascals, above zero.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::positive"))]
+    /// Young's modulus in pascals, above zero.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::positive"))]
     pub youngs_modulus: f64,
-    /// In `[0, 0.5]`.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::half"))]
+    /// Poisson's ratio, in `[0, 0.5]`.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::half"))]
     pub poissons_ratio: f64,
 }
 
@@ -172,62 +172,62 @@ pub struct Surface {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Wall {
+pub struct WallDesc {
     /// Shape and initial pose.
-    pub shape: Form,
+    pub shape: ShapeDesc,
     /// Own material instead of the scene's.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub surface: Option<Surface>,
+    pub material: Option<MaterialDesc>,
     /// Kinematic motion, if any.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub moves: Option<Movement>,
+    pub motion: Option<KinematicMotion>,
 }
 
 /// Description of a simple shape.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub enum Form {
+pub enum ShapeDesc {
     /// A half-space behind a plane.
     HalfSpace {
         /// Normal toward the free side; of any length but zero.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::direction"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::direction"))]
         normal: [f64; 3],
         /// A point of the plane.
-        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
-        through: [f64; 3],
+        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::vector"))]
+        point: [f64; 3],
     },
     /// A box.
     Box {
-        /// In metres.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+        /// Center, in metres.
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         center: [f64; 3],
         /// Side lengths in metres, above zero.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::sides"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::sides"))]
         size: [f64; 3],
         /// Rotation about the center.
         #[cfg_attr(feature = "serde", serde(default))]
-        turned: Turn,
+        rotation: RotationDesc,
     },
     /// A ball.
     Ball {
-        /// In metres.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+        /// Center, in metres.
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         center: [f64; 3],
-        /// In metres, above zero.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::positive"))]
+        /// Radius in metres, above zero.
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::positive"))]
         radius: f64,
     },
     /// A capsule.
     Capsule {
         /// First end of the segment, in metres.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         from: [f64; 3],
         /// Second end of the segment, in metres.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         to: [f64; 3],
-        /// In metres, above zero.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::positive"))]
+        /// Radius in metres, above zero.
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::positive"))]
         radius: f64,
     },
 }
@@ -236,12 +236,12 @@ pub enum Form {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Turn {
+pub struct RotationDesc {
     /// Axis of any length but zero.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::direction"))]
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::direction"))]
     pub axis: [f64; 3],
     /// Angle in degrees, by the right hand.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::any"))]
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::any"))]
     pub degrees: f64,
 }
 
@@ -249,47 +249,47 @@ pub struct Turn {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub enum Movement {
+pub enum KinematicMotion {
     /// Conveyor belt: the wall stays in place, and its surface moves.
-    Conveys {
+    Conveyor {
         /// Surface velocity, in m/s.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
         velocity: [f64; 3],
     },
     /// Constant rotation.
-    Turns {
+    Rotate {
         /// A point of the axis.
-        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
+        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::vector"))]
         pivot: [f64; 3],
         /// Axis of any length but zero.
         #[cfg_attr(
             feature = "serde",
-            serde(default = "up", deserialize_with = "number::direction")
+            serde(default = "up", deserialize_with = "validate::direction")
         )]
         axis: [f64; 3],
         /// Angular speed in degrees per second.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::any"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::any"))]
         degrees_per_second: f64,
     },
     /// Harmonic oscillation.
-    Swings {
+    Oscillate {
         /// Amplitude of the translation, in metres.
-        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
-        way: [f64; 3],
+        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::vector"))]
+        amplitude: [f64; 3],
         /// A point of the axis.
-        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
+        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::vector"))]
         pivot: [f64; 3],
         /// Axis of any length but zero.
         #[cfg_attr(
             feature = "serde",
-            serde(default = "up", deserialize_with = "number::direction")
+            serde(default = "up", deserialize_with = "validate::direction")
         )]
         axis: [f64; 3],
         /// Amplitude of the rotation about the axis, in degrees.
-        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::any"))]
+        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::any"))]
         degrees: f64,
         /// Period in seconds, above zero.
-        #[cfg_attr(feature = "serde", serde(deserialize_with = "number::positive"))]
+        #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::positive"))]
         period: f64,
     },
 }
@@ -298,31 +298,34 @@ pub enum Movement {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
-pub struct Ball {
+pub struct MarbleDesc {
     /// Center, in metres.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
     pub position: [f64; 3],
-    /// In metres, above zero.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::positive"))]
+    /// Radius in metres, above zero.
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::positive"))]
     pub radius: f64,
     /// Velocity, in m/s.
-    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
+    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::vector"))]
     pub velocity: [f64; 3],
     /// Angular velocity, in rad/s.
-    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::vector"))]
+    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::vector"))]
     pub angular_velocity: [f64; 3],
     /// Density in kg/m³, above zero.
-    #[cfg_attr(feature = "serde", serde(default = "glass", deserialize_with = "number::positive"))]
+    #[cfg_attr(
+        feature = "serde",
+        serde(default = "glass", deserialize_with = "validate::positive")
+    )]
     pub density: f64,
     /// Half length of a capsule's segment along its own y axis, in metres; zero for a ball.
-    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::not_negative"))]
+    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::not_negative"))]
     pub half_length: f64,
     /// Initial rotation.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub turned: Turn,
+    pub rotation: RotationDesc,
     /// Own material instead of the scene's.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub surface: Option<Surface>,
+    pub material: Option<MaterialDesc>,
 }
 
 /// Marbles at the points of a lattice.
@@ -331,16 +334,16 @@ pub struct Ball {
 #[cfg_attr(feature = "serde", serde(deny_unknown_fields))]
 pub struct Lattice {
     /// The first marble, of which the others are copies.
-    pub first: Ball,
+    pub first: MarbleDesc,
     /// Number of marbles along each axis.
     pub count: [u16; 3],
     /// Spacing along each axis, in metres.
-    #[cfg_attr(feature = "serde", serde(deserialize_with = "number::vector"))]
+    #[cfg_attr(feature = "serde", serde(deserialize_with = "validate::vector"))]
     pub pitch: [f64; 3],
     /// Random displacement of each marble up to this fraction of the pitch, and shrinking up to
     /// this fraction of the radius; deterministic.
-    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "number::part"))]
-    pub disorder: f64,
+    #[cfg_attr(feature = "serde", serde(default, deserialize_with = "validate::part"))]
+    pub jitter: f64,
 }
 
 #[cfg(feature = "serde")]
@@ -355,29 +358,29 @@ fn up() -> [f64; 3] {
 
 #[cfg(feature = "serde")]
 fn glass() -> f64 {
-    Ball::default().density
+    MarbleDesc::default().density
 }
 
 impl Default for Scene {
     /// An empty scene of one second with Earth's gravity.
     fn default() -> Self {
         Self {
-            about: String::new(),
-            seconds: 1.0,
+            description: String::new(),
+            duration: 1.0,
             gravity: [0.0, -9.81, 0.0],
-            tilts: Vec::new(),
-            fields: Vec::new(),
-            surface: Surface::default(),
+            gravity_keyframes: Vec::new(),
+            force_fields: Vec::new(),
+            material: MaterialDesc::default(),
             walls: Vec::new(),
             structures: Vec::new(),
-            gates: Vec::new(),
+            sensor_planes: Vec::new(),
             marbles: Vec::new(),
             lattices: Vec::new(),
         }
     }
 }
 
-impl Default for Surface {
+impl Default for MaterialDesc {
     /// The default [`Material`](crate::response::Material).
     fn default() -> Self {
         let material = crate::response::Material::<f64>::default();
@@ -393,14 +396,14 @@ impl Default for Surface {
     }
 }
 
-impl Default for Turn {
+impl Default for RotationDesc {
     /// No rotation.
     fn default() -> Self {
         Self { axis: [0.0, 1.0, 0.0], degrees: 0.0 }
     }
 }
 
-impl Default for Ball {
+impl Default for MarbleDesc {
     /// A marble of glass at the origin, a centimetre across, at rest.
     fn default() -> Self {
         Self {
@@ -410,16 +413,16 @@ impl Default for Ball {
             angular_velocity: [0.0; 3],
             density: 2500.0,
             half_length: 0.0,
-            turned: Turn::default(),
-            surface: None,
+            rotation: RotationDesc::default(),
+            material: None,
         }
     }
 }
 
 impl Lattice {
     /// Lists the marbles.
-    pub fn balls(&self) -> impl Iterator<Item = Ball> + use<> {
-        let Self { first, count, pitch, disorder } = *self;
+    pub fn marbles(&self) -> impl Iterator<Item = MarbleDesc> + use<> {
+        let Self { first, count, pitch, jitter } = *self;
         let [nx, ny, nz] = count.map(u64::from);
         (0..nx * ny * nz).map(move |i| {
             let cell = [i % nx, i / nx / nz, i / nx % nz].map(|n| n as f64);
@@ -432,10 +435,10 @@ impl Lattice {
             };
             let mut ball = first;
             for axis in 0..3 {
-                let aside = (random(axis) - 0.5) * disorder;
+                let aside = (random(axis) - 0.5) * jitter;
                 ball.position[axis] += (cell[axis] + aside) * pitch[axis];
             }
-            ball.radius *= 1.0 - disorder * random(3);
+            ball.radius *= 1.0 - jitter * random(3);
             ball
         })
     }

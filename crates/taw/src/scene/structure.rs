@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::{Form, Movement, Surface};
+use super::{KinematicMotion, MaterialDesc, ShapeDesc};
 use crate::Error;
 use crate::frame::Pose;
 use crate::math::{Point3, Quat, Scalar, cast_vector};
@@ -18,10 +18,10 @@ pub struct Structure {
     pub shape: Build,
     /// Own material instead of the scene's.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub surface: Option<Surface>,
+    pub material: Option<MaterialDesc>,
     /// Kinematic motion, if any.
     #[cfg_attr(feature = "serde", serde(default))]
-    pub moves: Option<Movement>,
+    pub motion: Option<KinematicMotion>,
 }
 
 /// Shape of a [`Structure`].
@@ -40,7 +40,10 @@ pub enum Build {
     /// A [height field](crate::shape::HeightField), solid below.
     HeightField {
         /// Corner of the first column and row, at height zero, in metres.
-        #[cfg_attr(feature = "serde", serde(default, deserialize_with = "super::number::vector"))]
+        #[cfg_attr(
+            feature = "serde",
+            serde(default, deserialize_with = "super::validate::vector")
+        )]
         corner: [f64; 3],
         /// Spacing of columns along x and of rows along z, in metres, above zero.
         #[cfg_attr(feature = "serde", serde(deserialize_with = "files::cell"))]
@@ -54,7 +57,7 @@ pub enum Build {
     /// A [compound](crate::shape::Compound) of bounded simple shapes.
     Compound {
         /// Sub-shapes: at least one, and no half-space.
-        parts: Vec<Form>,
+        parts: Vec<ShapeDesc>,
     },
 }
 
@@ -77,7 +80,7 @@ impl Build {
                 WallShape::HeightField(Arc::new(field), cast_pose(pose))
             }
             Self::Compound { parts } => {
-                let solid = |form: &Form| match form.wall(pose)? {
+                let solid = |form: &ShapeDesc| match form.wall(pose)? {
                     WallShape::Solid(shape) => Ok(shape),
                     // Unbounded.
                     _ => Err(Error::NotFinite { field: "parts", value: f64::INFINITY }),

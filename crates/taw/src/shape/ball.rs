@@ -5,12 +5,12 @@ use crate::Error;
 use crate::error::{coordinates, positive};
 use crate::math::{Point3, Scalar, Vec3, direction_and_length};
 
-/// All points within `radius` of `center`, in a space of two or three dimensions.
+/// Ball: all points within `radius` of `center`, in two or three dimensions.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball<P, S> {
     /// Center, in metres.
     pub center: P,
-    /// In metres, finite and above zero.
+    /// Radius in metres, finite and above zero.
     pub radius: S,
 }
 

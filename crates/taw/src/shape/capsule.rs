@@ -14,7 +14,7 @@ pub struct Capsule<S> {
     pub a: Point3<S>,
     /// Second end of the segment, in metres.
     pub b: Point3<S>,
-    /// In metres, finite and above zero.
+    /// Radius in metres, finite and above zero.
     pub radius: S,
 }
 

@@ -62,8 +62,8 @@ pub(super) struct AuditState<S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// Switches the [energy audit](Self::energy_audit) of every step on or off. Off by default, at no
-    /// cost.
+    /// Switches the [energy audit](Self::energy_audit) of every step on or off. Off by default, at
+    /// no cost.
     pub fn enable_energy_audit(&mut self, keep: bool) {
         if keep != self.audit_state.is_some() {
             self.audit_state = keep.then(|| {
@@ -81,7 +81,8 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Energy audit of the last step, if [enabled](Self::enable_energy_audit). Counts marbles, not swarms.
+    /// Energy audit of the last step, if [enabled](Self::enable_energy_audit). Counts marbles, not
+    /// swarms.
     #[must_use]
     pub fn energy_audit(&self) -> Option<EnergyAudit> {
         self.audit_state.as_ref().map(|audit_state| audit_state.audit)

@@ -75,6 +75,14 @@ impl<S: Scalar> World<S> {
         if let (Some(audit_state), Some(work)) = (&mut self.audit_state, self.events.work) {
             audit_state.work = work;
         }
+        self.write_back_balls();
+        if rest <= S::zero() {
+            self.walls.finish_step();
+        }
+    }
+
+    /// Writes the balls of the event-driven solver back to the columns.
+    fn write_back_balls(&mut self) {
         for (row, ball) in self.events.balls.iter().enumerate() {
             let (position, velocity) = (ball.position, ball.velocity);
             let mut whole = self.marbles.set_motion_f64(row, Motion { position, velocity });
@@ -85,9 +93,6 @@ impl<S: Scalar> World<S> {
             if !whole && !self.stopped.contains(&(row as u32)) {
                 self.stopped.push(row as u32);
             }
-        }
-        if rest <= S::zero() {
-            self.walls.finish_step();
         }
     }
 
@@ -144,8 +149,9 @@ impl<S: Scalar> event::WallSource for Source<'_, S> {
         let digits =
             8.0 * S::epsilon().as_f64() * point.x.abs().max(point.y.abs()).max(point.z.abs());
         let reach = S::constant((reach + way) * (1.0 + 1e-6) + digits);
-        self.walls
-            .for_each_near(cast_point(point), reach, |SubShape { wall, part }| name(wall, part));
+        self.walls.for_each_near(cast_point(point), reach, |SubShape { wall, index: part }| {
+            name(wall, part);
+        });
     }
 
     fn wall(&self, row: u32, part: u32) -> Option<Wall> {

@@ -28,10 +28,6 @@ struct Slot {
 }
 
 impl Handles {
-    pub fn len(&self) -> usize {
-        self.rows.len()
-    }
-
     /// Number of removals so far.
     pub fn removals(&self) -> u64 {
         self.removals
@@ -116,7 +112,7 @@ mod tests {
                 removed.push(handle);
             }
             if i % 97 == 0 {
-                assert_eq!(handles.len(), expected.len());
+                assert_eq!(handles.rows.len(), expected.len());
                 for (handle, value) in &expected {
                     let row = handles.row(*handle).unwrap();
                     assert_eq!(values[row], *value);

@@ -1,11 +1,10 @@
 //! Time integration of the marble columns.
 
-use cgmath::{InnerSpace, Zero};
+use cgmath::Zero;
 
 use super::marbles::{Compensation, Marbles};
-use crate::math::{Quat, Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
-use crate::motion::{ForceField, Integrator, Motion, Rotation, integrate_rotation};
-use crate::response::CapsuleInertia;
+use crate::math::{Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
+use crate::motion::{ForceField, Integrator, Motion};
 
 /// Step context: integrator, gravity, force fields and time step.
 #[derive(Clone, Copy)]
@@ -137,123 +136,9 @@ impl<S: Scalar> Marbles<S> {
         true
     }
 
-    /// Angular velocity in high precision, in rad/s.
-    pub(super) fn angular_velocity_f64(&self, row: usize) -> Vec3<f64> {
-        let low = self.compensation.get(row).copied().unwrap_or_default();
-        let angular_velocity = self.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero);
-        cast_vector::<S, f64>(angular_velocity) + cast_vector(low.angular_velocity)
-    }
-
-    /// Splits the angular velocity likewise. Does nothing in a model without rotation.
-    pub(super) fn set_angular_velocity_f64(
-        &mut self,
-        row: usize,
-        angular_velocity: Vec3<f64>,
-    ) -> bool {
-        if let Some(slot) = self.angular_velocity.get_mut(row) {
-            *slot = cast_vector(angular_velocity);
-            if !is_finite(*slot) {
-                *slot = Vec3::zero();
-                if let Some(low) = self.compensation.get_mut(row) {
-                    low.angular_velocity = Vec3::zero();
-                }
-                return false;
-            }
-            if let Some(low) = self.compensation.get_mut(row) {
-                low.angular_velocity = cast_vector(angular_velocity - cast_vector(*slot));
-            }
-        }
-        true
-    }
-
     /// Fraction of the velocity left by damping after `dt` seconds.
     fn damping_factor(&self, row: usize, dt: S) -> S {
         self.damping.get(row).map_or(S::one(), |damping| (-damping.linear * dt).exp_portable())
-    }
-
-    /// Integrates torques and angular damping over `dt` seconds.
-    pub(super) fn integrate_angular_velocity(&mut self, dt: S) {
-        if self.torque.is_empty() && self.damping.is_empty() {
-            return;
-        }
-        for row in 0..self.angular_velocity.len() {
-            if self.is_rotation_locked(row) {
-                continue;
-            }
-            let mut angular_velocity = self.angular_velocity[row];
-            if let Some(torque) = self.torque.get(row) {
-                angular_velocity += self.apply_inverse_inertia(row, torque.dual()) * dt;
-            }
-            if let Some(damping) = self.damping.get(row) {
-                angular_velocity *= (-damping.angular * dt).exp_portable();
-            }
-            if is_finite(angular_velocity) && angular_velocity != self.angular_velocity[row] {
-                self.angular_velocity[row] = angular_velocity;
-            }
-        }
-    }
-
-    /// Integrates rotations over `dt` seconds. Capsules without dynamic rotation in a world of this
-    /// `rotation` rotate about their axes only: otherwise they would rotate into walls and be
-    /// lifted out, which gains energy.
-    pub(super) fn integrate_rotations(&mut self, dt: S, rotation: Rotation) {
-        if self.has_capsules() {
-            for row in 0..self.angular_velocity.len() {
-                let own = self.rotation_model.get(row).unwrap_or(rotation);
-                if own.min(rotation) == Rotation::Dynamic || self.half_length(row) == S::zero() {
-                    self.integrate_symmetric_top(row, dt);
-                } else {
-                    let axis = self.rotation[row] * Vec3::unit_y();
-                    let angular_velocity = axis * self.angular_velocity[row].dot(axis);
-                    self.rotation[row] =
-                        integrate_rotation(self.rotation[row], angular_velocity, dt);
-                }
-            }
-            return;
-        }
-        for (rotation, angular_velocity) in self.rotation.iter_mut().zip(&self.angular_velocity) {
-            *rotation = integrate_rotation(*rotation, *angular_velocity, dt);
-        }
-    }
-
-    /// Rotates a capsule as the symmetric top that it is: steadily about its axis, and the axis
-    /// about the conserved angular momentum (Landau and Lifshitz, *Mechanics*, §33).
-    ///
-    /// Computed in `f64` and rounded once. In `f32` a quaternion and its axis are normalized only
-    /// to 1e-7: the angular velocity along the axis would grow by that in every substep, always in
-    /// the same direction.
-    fn integrate_symmetric_top(&mut self, row: usize, dt: S) {
-        let (rotation, half) = (self.rotation[row], self.half_length(row));
-        if half == S::zero() || self.angular_velocity[row].is_zero() {
-            self.rotation[row] = integrate_rotation(rotation, self.angular_velocity[row], dt);
-            return;
-        }
-        let exact = |rotation: Quat<S>| {
-            Quat::from_sv(rotation.s.as_f64(), cast_vector(rotation.v)).normalize()
-        };
-        let (angular_velocity, dt) = (self.angular_velocity_f64(row), dt.as_f64());
-        let rotation = exact(rotation);
-        let axis = (rotation * Vec3::unit_y()).normalize();
-        let [along, across] =
-            CapsuleInertia::unit_inertia(self.radius[row].as_f64(), half.as_f64());
-        // Precession rate: angular momentum over the moment across the axis.
-        let about_axis = angular_velocity.dot(axis);
-        let precession = angular_velocity + axis * (about_axis * (along / across - 1.0));
-        let own = axis * (about_axis - precession.dot(axis));
-        let rotation = integrate_rotation(integrate_rotation(rotation, own, dt), precession, dt);
-        self.rotation[row] = Quat::from_sv(S::constant(rotation.s), cast_vector(rotation.v));
-        // Relative to the stored, rounded axis, so that the angular velocity along it, and with it
-        // the energy of thin capsules, does not change.
-        let axis = (exact(self.rotation[row]) * Vec3::unit_y()).normalize();
-        let next = precession + axis * (about_axis - precession.dot(axis));
-        self.set_angular_velocity_f64(row, next);
-    }
-
-    /// Rotates a marble by an angle, an axial vector in radians.
-    pub(super) fn rotate_by(&mut self, row: usize, angle: Vec3<S>) {
-        if let Some(rotation) = self.rotation.get_mut(row) {
-            *rotation = integrate_rotation(*rotation, angle, S::one());
-        }
     }
 
     /// Adds or drops the compensation column.

@@ -9,6 +9,10 @@ mod external_forces;
 mod handles;
 mod integrate;
 mod limits;
+mod marble;
+mod marble_rotation;
+mod marble_setters;
+mod marble_shapes;
 mod marbles;
 mod model;
 mod narrow_phase;
@@ -26,7 +30,8 @@ pub use crate::motion::{Mass, WallMotion};
 pub use energy::Energy;
 pub use energy_audit::EnergyAudit;
 pub use limits::SpeedLimits;
-pub use marbles::{Damping, Marble, MarbleId, Marbles};
+pub use marble::{Damping, Marble};
+pub use marbles::{MarbleId, Marbles};
 pub use model::{Detection, Model, Precision};
 pub use query::{ColliderId, Queries, QueryHit, QueryTree};
 pub use wall_shape::WallShape;
@@ -281,8 +286,8 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a length of less than 8.02 radii of the largest marble;
-    /// [`Error::NotPositive`] for one that is no length; [`Error::UnsupportedShape`] if a marble is a
-    /// capsule; [`Error::Unsupported`] for [`Response::SoftStep`]. Steps refuse marbles that came later in the same way.
+    /// [`Error::NotPositive`] for one that is no length; [`Error::UnsupportedShape`] if a marble is
+    /// a capsule; [`Error::Unsupported`] for [`Response::SoftStep`]. Steps refuse marbles that came later in the same way.
     pub fn set_period(&mut self, lengths: [Option<S>; 3]) -> Result<(), Error> {
         for (length, field) in lengths.iter().zip(["period.x", "period.y", "period.z"]) {
             length.map(|length| positive(field, length)).transpose()?;
@@ -339,10 +344,10 @@ impl<S: Scalar> World<S> {
     /// and is named by [`World::stopped`]; no marble that does not touch it is affected.
     ///
     /// # Errors
-    /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not
-    /// in [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven
-    /// or periodic; [`Error::OutOfRange`] for a marble too large for its [period](Self::set_period).
-    /// Then nothing has changed.
+    /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not in
+    /// [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven
+    /// or periodic; [`Error::OutOfRange`] for a marble too large for its
+    /// [period](Self::set_period). Then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
         let substep = self.validated_substep(dt)?;
         self.begin_step();
@@ -468,7 +473,7 @@ impl<S: Scalar> World<S> {
             start: SubstepStart {
                 position: &[],
                 velocity: &self.velocity_before,
-                ccd_stops: &self.continuous.stands,
+                ccd_stops: &self.continuous.projections,
             },
             settings: &settings,
         };
@@ -542,7 +547,7 @@ impl<S: Scalar> World<S> {
         }
         // The deepest contact comes first in the list, so it has the last word.
         for contact in self.contacts.wm.iter().rev() {
-            let part = SubShape { wall: contact.a, part: contact.part };
+            let part = SubShape { wall: contact.a, index: contact.part };
             let row = contact.b as usize;
             let normal = self.walls.project_point(part, self.marbles.position()[row]).normal;
             if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Rolling {

@@ -25,12 +25,12 @@ pub(super) struct Candidate<S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// Collides walls with marbles, up to a contact distance of `reach` metres.
-    pub(super) fn collide_walls(&mut self, reach: S) {
+    /// Collides walls with marbles, up to a contact distance of `contact_distance` metres.
+    pub(super) fn collide_walls(&mut self, contact_distance: S) {
         if self.marbles.has_capsules() {
-            self.collide_half_spaces_with_capsules(reach);
+            self.collide_half_spaces_with_capsules(contact_distance);
         } else {
-            self.collide_half_spaces(reach);
+            self.collide_half_spaces(contact_distance);
         }
         self.walls.update_tree();
         if self.walls.are_half_spaces() {
@@ -40,16 +40,16 @@ impl<S: Scalar> World<S> {
         for b in 0..self.marbles.len() {
             let sphere = self.marbles.sphere(b);
             if self.marbles.half_length(b) == S::zero() {
-                self.collide_sub_shapes(b, &sphere, S::zero(), reach, &mut candidates);
+                self.collide_sub_shapes(b, &sphere, S::zero(), contact_distance, &mut candidates);
                 continue;
             }
-            for along in self.sample_points(b, reach) {
+            for along in self.sample_points(b, contact_distance) {
                 let center = sphere.center + self.marbles.axis(b) * along;
                 self.collide_sub_shapes(
                     b,
                     &Sphere { center, ..sphere },
                     along,
-                    reach,
+                    contact_distance,
                     &mut candidates,
                 );
             }
@@ -57,10 +57,11 @@ impl<S: Scalar> World<S> {
         self.near_walls = candidates;
     }
 
-    fn collide_half_spaces(&mut self, reach: S) {
+    fn collide_half_spaces(&mut self, contact_distance: S) {
         for (a, plane) in self.walls.planes() {
             for b in 0..self.marbles.len() {
-                if let Some(mtv) = penetration_of_half_space(plane, &self.marbles.sphere(b), reach)
+                if let Some(mtv) =
+                    penetration_of_half_space(plane, &self.marbles.sphere(b), contact_distance)
                 {
                     let along = [S::zero(); 2];
                     self.contacts.wm.push(Contact { a, b: b as u32, part: 0, along, mtv });
@@ -70,14 +71,18 @@ impl<S: Scalar> World<S> {
     }
 
     /// Collides half-spaces with marbles and capsules, which touch with their ends.
-    fn collide_half_spaces_with_capsules(&mut self, reach: S) {
+    fn collide_half_spaces_with_capsules(&mut self, contact_distance: S) {
         for (a, plane) in self.walls.planes() {
             for b in 0..self.marbles.len() {
                 let (sphere, half) = (self.marbles.sphere(b), self.marbles.half_length(b));
                 let ends = [-half, half].into_iter().take(if half > S::zero() { 2 } else { 1 });
                 for along in ends {
                     let center = sphere.center + self.marbles.axis(b) * along;
-                    let mtv = penetration_of_half_space(plane, &Sphere { center, ..sphere }, reach);
+                    let mtv = penetration_of_half_space(
+                        plane,
+                        &Sphere { center, ..sphere },
+                        contact_distance,
+                    );
                     if let Some(mtv) = mtv {
                         let along = [S::zero(), along];
                         self.contacts.wm.push(Contact { a, b: b as u32, part: 0, along, mtv });
@@ -94,15 +99,15 @@ impl<S: Scalar> World<S> {
         b: usize,
         sphere: &Sphere<S>,
         along: S,
-        reach: S,
+        contact_distance: S,
         candidates: &mut Vec<Candidate<S>>,
     ) {
         candidates.clear();
-        candidate_sub_shapes(&self.walls, sphere, reach, candidates);
+        candidate_sub_shapes(&self.walls, sphere, contact_distance, candidates);
         if candidates.len() > 1 {
             remove_ghost_collisions(&self.walls, sphere, candidates);
         }
-        for Candidate { part: SubShape { wall, part }, nearest } in candidates.iter() {
+        for Candidate { part: SubShape { wall, index: part }, nearest } in candidates.iter() {
             let depth = (sphere.radius - nearest.distance).max(S::zero());
             let (mtv, along) = (nearest.normal * depth, [S::zero(), along]);
             self.contacts.wm.push(Contact { a: *wall, b: b as u32, part: *part, along, mtv });
@@ -111,20 +116,20 @@ impl<S: Scalar> World<S> {
 
     /// Contact sample points of a capsule on its axis: both ends, and where it is nearest to an
     /// edge or a corner between them.
-    fn sample_points(&self, b: usize, reach: S) -> SmallVec<[S; 4]> {
+    fn sample_points(&self, b: usize, contact_distance: S) -> SmallVec<[S; 4]> {
         let half = self.marbles.half_length(b);
         let mut samples = SmallVec::from_slice(&[-half, half]);
         let shape = self.marbles.shape_of_row(b);
         let Shape::Capsule(capsule) = &shape else { return samples };
-        let more = Vec3::new(reach, reach, reach);
+        let margin = Vec3::new(contact_distance, contact_distance, contact_distance);
         let Aabb { min, max } = capsule.bounding_box();
         let (center, axis) = (self.marbles.sphere(b).center, self.marbles.axis(b));
-        self.walls.for_each_in_box(&Aabb { min: min - more, max: max + more }, |part| {
+        self.walls.for_each_in_box(&Aabb { min: min - margin, max: max + margin }, |part| {
             let Some(touch) = self.walls.closest_points(part, capsule) else { return };
             let along = (touch.on_b - center).dot(axis);
             let inside = along.abs() < half * S::constant(0.999);
             let new = |other: &S| (along - *other).abs() > capsule.radius * S::constant(0.01);
-            if inside && touch.distance <= reach && samples.iter().all(new) {
+            if inside && touch.distance <= contact_distance && samples.iter().all(new) {
                 samples.push(along);
             }
         });
@@ -169,17 +174,17 @@ impl<S: Scalar> World<S> {
         Some(Sphere { center, radius: self.marbles.radius()[row] })
     }
 
-    /// Collides marbles with each other, up to a contact distance of `reach` metres.
-    pub(super) fn collide_marbles(&mut self, reach: S) {
+    /// Collides marbles with each other, up to a contact distance of `contact_distance` metres.
+    pub(super) fn collide_marbles(&mut self, contact_distance: S) {
         let center = self.marbles.position();
         self.contact_limit.begin(center.len());
         if !self.marbles.has_capsules() {
             let (spheres, period) = ((center, self.marbles.radius()), self.marbles.period);
-            self.images.pairs(&mut self.grid, spheres, reach, period, |a, b| {
+            self.images.pairs(&mut self.grid, spheres, contact_distance, period, |a, b| {
                 let (first, second) = (a as usize, b as usize);
                 let (first, mut second) = (self.marbles.sphere(first), self.marbles.sphere(second));
                 second.center = period.image(second.center, first.center);
-                if let Some(mtv) = penetration_of_spheres(&first, &second, reach) {
+                if let Some(mtv) = penetration_of_spheres(&first, &second, contact_distance) {
                     let along = [S::zero(); 2];
                     let contact = Contact { a, b, part: 0, along, mtv };
                     self.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
@@ -191,7 +196,7 @@ impl<S: Scalar> World<S> {
         self.reaches.clear();
         let far = |row: usize| self.marbles.radius()[row] + self.marbles.half_length(row);
         self.reaches.extend((0..self.marbles.len()).map(far));
-        self.grid.rebuild(center, &self.reaches, reach);
+        self.grid.rebuild(center, &self.reaches, contact_distance);
         self.grid.pairs(center, |a, b| {
             let line = |row: u32| {
                 let row = row as usize;
@@ -204,7 +209,7 @@ impl<S: Scalar> World<S> {
                     ..sphere
                 };
                 let (x, y) = (sample_sphere(first, along[0]), sample_sphere(second, along[1]));
-                if let Some(mtv) = penetration_of_spheres(&x, &y, reach) {
+                if let Some(mtv) = penetration_of_spheres(&x, &y, contact_distance) {
                     let contact = Contact { a, b, part: 0, along, mtv };
                     self.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
                 }
@@ -229,29 +234,29 @@ impl<S: Scalar> World<S> {
     }
 }
 
-/// Penetration vector of a sphere and a half-space in metres: zero within `reach` metres outside,
-/// none beyond.
+/// Penetration vector of a sphere and a half-space in metres: zero within `contact_distance` metres
+/// outside, none beyond.
 #[inline]
 fn penetration_of_half_space<S: Scalar>(
     plane: &Plane<S>,
     sphere: &Sphere<S>,
-    reach: S,
+    contact_distance: S,
 ) -> Option<Vec3<S>> {
     let gap = || plane.signed_distance(sphere.center) - sphere.radius;
-    let near = || reach > S::zero() && gap() <= reach;
+    let near = || contact_distance > S::zero() && gap() <= contact_distance;
     mtv_sphere_plane(sphere, plane).or_else(|| near().then(Vec3::zero))
 }
 
-/// Penetration vector of two spheres in metres: zero within `reach` metres, none beyond.
+/// Penetration vector of two spheres in metres: zero within `contact_distance` metres, none beyond.
 #[inline]
 fn penetration_of_spheres<S: Scalar>(
     first: &Sphere<S>,
     second: &Sphere<S>,
-    reach: S,
+    contact_distance: S,
 ) -> Option<Vec3<S>> {
     let near = || {
         let gap = length(second.center - first.center) - first.radius - second.radius;
-        reach > S::zero() && gap <= reach
+        contact_distance > S::zero() && gap <= contact_distance
     };
     mtv_sphere_sphere(first, second).or_else(|| near().then(Vec3::zero))
 }
@@ -285,17 +290,17 @@ fn closest_points_of_segments<S: Scalar>(
     SmallVec::from_slice(&[[on_first, on_second]])
 }
 
-/// Collects the sub-shapes of walls, except half-spaces, within `reach` metres of a sphere, in
-/// order.
+/// Collects the sub-shapes of walls, except half-spaces, within `contact_distance` metres of a
+/// sphere, in order.
 pub(super) fn candidate_sub_shapes<S: Scalar>(
     walls: &Walls<S>,
     sphere: &Sphere<S>,
-    reach: S,
+    contact_distance: S,
     candidates: &mut Vec<Candidate<S>>,
 ) {
-    let far = sphere.radius + reach;
-    let more = Vec3::new(far, far, far);
-    let bounds = Aabb { min: sphere.center - more, max: sphere.center + more };
+    let far = sphere.radius + contact_distance;
+    let margin = Vec3::new(far, far, far);
+    let bounds = Aabb { min: sphere.center - margin, max: sphere.center + margin };
     walls.for_each_in_box(&bounds, |part| {
         let nearest = walls.project_point(part, sphere.center);
         if nearest.distance <= far {

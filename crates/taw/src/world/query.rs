@@ -66,7 +66,7 @@ impl<S: Scalar> QueryTree<S> {
         }
         for (wall, shape) in (0..).zip(world.walls.shapes()) {
             shape.for_each_box(|part, bounds| {
-                self.items.push(Item::Wall(SubShape { wall, part }));
+                self.items.push(Item::Wall(SubShape { wall, index: part }));
                 self.boxes.push(bounds);
             });
         }
@@ -90,8 +90,8 @@ pub struct Queries<'a, S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// Updates the tree to the current state. Large translation since the last build slow queries down,
-    /// and never make them wrong.
+    /// Updates the tree to the current state. Large translation since the last build slow queries
+    /// down, and never make them wrong.
     ///
     /// ```
     /// use taw::frame::Ray;
@@ -148,7 +148,7 @@ impl<S: Scalar> Queries<'_, S> {
     }
 
     fn planes(&self) -> impl Iterator<Item = (Item, &Plane<S>)> {
-        let item = |wall| Item::Wall(SubShape { wall, part: 0 });
+        let item = |wall| Item::Wall(SubShape { wall, index: 0 });
         self.world.walls.planes().map(move |(row, plane)| (item(row), plane))
     }
 
@@ -235,29 +235,9 @@ impl<S: Scalar> Queries<'_, S> {
                         Some(shape_cast_of_shapes(&marble, still, shape, translation)?.result)
                     });
                 }
-                Item::Wall(SubShape { wall, part: number }) => {
-                    match &self.world.walls.shapes()[wall as usize] {
-                        WallShape::Plane(_) => {}
-                        solid @ WallShape::Solid(_) => offer(item, &|| {
-                            let touch = shape_cast_of_shapes(
-                                solid.sub_shape(number)?,
-                                still,
-                                shape,
-                                translation,
-                            )?;
-                            Some(touch.result)
-                        }),
-                        WallShape::Mesh(mesh, pose) => {
-                            offer(item, &|| {
-                                shape_cast_transformed(&**mesh, *pose, shape, translation)
-                            });
-                        }
-                        WallShape::HeightField(field, pose) => {
-                            offer(item, &|| {
-                                shape_cast_transformed(&**field, *pose, shape, translation)
-                            });
-                        }
-                    }
+                Item::Wall(SubShape { wall, index: part }) => {
+                    let wall = &self.world.walls.shapes()[wall as usize];
+                    offer(item, &|| cast_shape_on_wall(wall, part, shape, translation));
                 }
             }
         });
@@ -286,7 +266,7 @@ impl<S: Scalar> Queries<'_, S> {
                     let near = || closest_points_of_shapes(&marble, shape);
                     offer(item, &|| near().is_some_and(|near| near.result.touching()));
                 }
-                Item::Wall(SubShape { wall, part: number }) => {
+                Item::Wall(SubShape { wall, index: number }) => {
                     match &self.world.walls.shapes()[wall as usize] {
                         WallShape::Plane(_) => {}
                         solid @ WallShape::Solid(_) => offer(item, &|| {
@@ -344,7 +324,7 @@ impl<S: Scalar> Queries<'_, S> {
                 Item::Marble(row) => {
                     self.world.marbles.shape_of_row(row as usize).project_point(point)
                 }
-                Item::Wall(SubShape { wall, part }) => match &walls[wall as usize] {
+                Item::Wall(SubShape { wall, index: part }) => match &walls[wall as usize] {
                     solid @ WallShape::Solid(_) => solid.project_point_on(part, point),
                     other => other.project_point(point),
                 },
@@ -385,7 +365,7 @@ impl<S: Scalar, F: Fn(ColliderId) -> bool> Hits<'_, S, F> {
 
 fn cast_ray_on_wall<S: Scalar>(
     wall: &WallShape<S>,
-    SubShape { part, .. }: SubShape,
+    SubShape { index: part, .. }: SubShape,
     ray: &Ray<S>,
     max_distance: S,
 ) -> Option<RayHit<S>> {
@@ -404,6 +384,26 @@ fn cast_ray_on_wall<S: Scalar>(
         }
         WallShape::HeightField(field, pose) => {
             to_world(ray_cast_on_surface(&**field, &local(pose), max_distance), pose)
+        }
+    }
+}
+
+fn cast_shape_on_wall<S: Scalar>(
+    wall: &WallShape<S>,
+    part: u32,
+    shape: &Shape<S>,
+    translation: Vec3<S>,
+) -> Option<ShapeCastHit<S>> {
+    let still = Vec3::new(S::zero(), S::zero(), S::zero());
+    match wall {
+        WallShape::Plane(_) => None,
+        WallShape::Solid(_) => {
+            let hit = shape_cast_of_shapes(wall.sub_shape(part)?, still, shape, translation);
+            hit.map(|hit| hit.result)
+        }
+        WallShape::Mesh(mesh, pose) => shape_cast_transformed(&**mesh, *pose, shape, translation),
+        WallShape::HeightField(field, pose) => {
+            shape_cast_transformed(&**field, *pose, shape, translation)
         }
     }
 }

@@ -143,7 +143,7 @@ impl<S: Scalar> Surroundings for Walls<S> {
         if near.len() > 1 {
             remove_ghost_collisions(self, &sphere, &mut near);
         }
-        for Candidate { part: SubShape { wall, part }, nearest } in near {
+        for Candidate { part: SubShape { wall, index: part }, nearest } in near {
             let normal: Vec3<f32> = cast_vector(nearest.normal);
             name([wall, part], normal, nearest.distance.as_f64() as f32);
         }
@@ -177,7 +177,7 @@ impl<S: Scalar> Surroundings for Walls<S> {
         let nearest = self.project_point(part, center + way * time);
         let distance = nearest.distance - way.dot(nearest.normal) * time;
         let normal: Vec3<f32> = cast_vector(nearest.normal);
-        Some(([part.wall, part.part], normal, distance.as_f64() as f32))
+        Some(([part.wall, part.index], normal, distance.as_f64() as f32))
     }
 
     fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32> {

@@ -57,7 +57,7 @@ impl<S: Scalar> WallShape<S> {
             Self::Solid(shape) => visit(0, shape.bounding_box()),
             Self::Mesh(mesh, pose) => visit(0, transformed_box(&mesh.bounds(), *pose)),
             Self::HeightField(field, pose) => {
-                visit(0, transformed_box(&solid_bounds(field), *pose))
+                visit(0, transformed_box(&solid_bounds(field), *pose));
             }
         }
     }
@@ -68,7 +68,7 @@ impl<S: Scalar> WallShape<S> {
         match self {
             Self::Plane(_) | Self::Solid(_) => visit(part),
             Self::Mesh(mesh, pose) => {
-                mesh.for_each_in_box(&transformed_box(bounds, pose.inverse()), visit)
+                mesh.for_each_in_box(&transformed_box(bounds, pose.inverse()), visit);
             }
             Self::HeightField(field, pose) => {
                 // A ball below the surface touches the triangles above it.
@@ -95,7 +95,7 @@ impl<S: Scalar> WallShape<S> {
         match self {
             Self::Plane(_) | Self::Solid(_) => visit(part),
             Self::Mesh(mesh, pose) => {
-                mesh.for_each_near(pose.inverse_transform_point(point), reach, &mut each)
+                mesh.for_each_near(pose.inverse_transform_point(point), reach, &mut each);
             }
             Self::HeightField(field, pose) => {
                 // A point below the surface is at most this far from it.
@@ -159,10 +159,10 @@ impl<S: Scalar> WallShape<S> {
             Self::Plane(_) => self.project_point_on(0, point),
             Self::Solid(shape) => shape.project_point(point),
             Self::Mesh(mesh, pose) => on(&|visit| {
-                mesh.for_each_near(pose.inverse_transform_point(point), S::infinity(), visit)
+                mesh.for_each_near(pose.inverse_transform_point(point), S::infinity(), visit);
             }),
             Self::HeightField(field, pose) => on(&|visit| {
-                field.for_each_near(pose.inverse_transform_point(point), S::infinity(), visit)
+                field.for_each_near(pose.inverse_transform_point(point), S::infinity(), visit);
             }),
         }
     }

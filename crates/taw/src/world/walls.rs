@@ -19,7 +19,7 @@ pub struct WallId(Handle);
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(super) struct SubShape {
     pub wall: u32,
-    pub part: u32,
+    pub index: u32,
 }
 
 /// Walls: static and kinematic colliders, which no contact moves.
@@ -183,7 +183,7 @@ impl<S: Scalar> Walls<S> {
         self.sub_shapes.clear();
         for (wall, shape) in (0..).zip(&self.shapes) {
             shape.for_each_box(|part, bounds| {
-                self.sub_shapes.push(SubShape { wall, part });
+                self.sub_shapes.push(SubShape { wall, index: part });
                 self.boxes.push(bounds);
             });
         }
@@ -203,9 +203,9 @@ impl<S: Scalar> Walls<S> {
     /// Visits the sub-shapes of walls, except half-spaces, that may overlap a box.
     pub(super) fn for_each_in_box(&self, bounds: &Aabb3<S>, mut visit: impl FnMut(SubShape)) {
         self.tree.for_each_in_box(bounds, |item| {
-            let SubShape { wall, part } = self.sub_shapes[item as usize];
+            let SubShape { wall, index: part } = self.sub_shapes[item as usize];
             self.shapes[wall as usize]
-                .for_each_in_box(part, bounds, |part| visit(SubShape { wall, part }));
+                .for_each_in_box(part, bounds, |part| visit(SubShape { wall, index: part }));
         });
     }
 
@@ -218,9 +218,9 @@ impl<S: Scalar> Walls<S> {
         mut visit: impl FnMut(SubShape),
     ) {
         self.tree.for_each_near(point, reach, |item| {
-            let SubShape { wall, part } = self.sub_shapes[item as usize];
+            let SubShape { wall, index: part } = self.sub_shapes[item as usize];
             self.shapes[wall as usize]
-                .for_each_near(part, point, reach, |part| visit(SubShape { wall, part }));
+                .for_each_near(part, point, reach, |part| visit(SubShape { wall, index: part }));
             reach
         });
     }
@@ -228,7 +228,7 @@ impl<S: Scalar> Walls<S> {
     /// Projects a point onto a sub-shape.
     pub(super) fn project_point(
         &self,
-        SubShape { wall, part }: SubShape,
+        SubShape { wall, index: part }: SubShape,
         point: Point3<S>,
     ) -> PointProjection<S> {
         self.shapes[wall as usize].project_point_on(part, point)
@@ -237,7 +237,7 @@ impl<S: Scalar> Walls<S> {
     /// Closest points of a sub-shape and a capsule, except for half-spaces.
     pub(super) fn closest_points(
         &self,
-        SubShape { wall, part }: SubShape,
+        SubShape { wall, index: part }: SubShape,
         capsule: &Capsule<S>,
     ) -> Option<ClosestPoints<S>> {
         self.shapes[wall as usize].closest_points(part, capsule)
@@ -381,7 +381,7 @@ impl<S: Scalar> Walls<S> {
         self.shapes.len()
     }
 
-    /// Whether there are no walls.
+    /// Returns true without any wall.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.shapes.is_empty()

@@ -8,7 +8,7 @@ use taw::math::Quat;
 use taw::motion::{Medium, WallMotion};
 use taw::prelude::*;
 use taw::response::Elasticity;
-use taw::scene::{Movement, Running};
+use taw::scene::{KinematicMotion, Simulation};
 use taw::shape::{Aabb, Aabb3, Capsule, Compound, HeightField, Hull, Mesh, Obb, Shape};
 use taw::swarm;
 use taw::world::{Damping, SpeedLimits};
@@ -250,10 +250,10 @@ fn worlds<S: Scalar>() -> Vec<Row<S>> {
         World 1 "World::integrate": |p, x| p.world.integrate(x);
         World 1 "World::restitute": |p, x| p.world.restitute(x);
         World 1 "World::step_swarm": |p, x| p.world.step_swarm(x, &mut |_| ());
-        World 1 "Running::step": |p, x| Running::from(p.world.clone()).step(x);
-        World 1 "Running::move_walls": |p, x| Running::from(p.world.clone()).move_walls(x);
-        World 1 "Movement::pose": |_, x| {
-            let moves = Movement::Turns { pivot: [0.0; 3], axis: [0.0, 1.0, 0.0], degrees_per_second: 1.0 };
+        World 1 "Simulation::step": |p, x| Simulation::from(p.world.clone()).step(x);
+        World 1 "Simulation::move_walls": |p, x| Simulation::from(p.world.clone()).move_walls(x);
+        World 1 "KinematicMotion::pose": |_, x| {
+            let moves = KinematicMotion::Rotate { pivot: [0.0; 3], axis: [0.0, 1.0, 0.0], degrees_per_second: 1.0 };
             moves.pose(x.as_f64()).map(|_| ())
         };
         World 3 "Material.restitution Material::checked Walls::set_material": |p, x| material(p, x, |m, x| m.restitution = x);
@@ -433,7 +433,7 @@ fn constructors<S: Scalar>() -> Vec<Row<S>> {
             quaternions(x).into_iter().try_for_each(|q| tree.set_local(root, pose(q, vector(zero(), zero(), zero()))))
         };
         World 1 "Scene::run": |_, x| {
-            let scene = taw::scene::Scene { seconds: x.as_f64(), ..taw::scene::Scene::default() };
+            let scene = taw::scene::Scene { duration: x.as_f64(), ..taw::scene::Scene::default() };
             scene.run::<S>(Model::default()).map(|_| ())
         };
     }

@@ -19,7 +19,7 @@ const NAMES: &[&str] = &[
 
 /// Types of which all numbers come in through functions, and where they are written down.
 const TAKEN: &[(&str, &[&str])] = &[
-    ("world/marbles.rs", &["Marble", "Damping"]),
+    ("world/marble.rs", &["Marble", "Damping"]),
     ("world/limits.rs", &["SpeedLimits"]),
     ("world/model.rs", &["Model"]),
     ("motion/mass.rs", &["Mass"]),
@@ -34,8 +34,17 @@ const TAKEN: &[(&str, &[&str])] = &[
     (
         "scene/mod.rs",
         &[
-            "Scene", "Tilt", "Gate", "Field", "Surface", "Wall", "Form", "Turn", "Movement",
-            "Ball", "Lattice",
+            "Scene",
+            "GravityKeyframe",
+            "SensorPlane",
+            "ForceFieldDesc",
+            "MaterialDesc",
+            "WallDesc",
+            "ShapeDesc",
+            "RotationDesc",
+            "KinematicMotion",
+            "MarbleDesc",
+            "Lattice",
         ],
     ),
 ];

@@ -5,11 +5,11 @@ use std::fmt;
 use ron::ser::PrettyConfig;
 use serde::{Deserialize, Serialize};
 use taw::prelude::*;
-use taw::scene::{Ball, Running, Scene, Surface};
+use taw::scene::{MarbleDesc, MaterialDesc, Scene, Simulation};
 use taw::swarm::{SwarmModel, Tier};
 
 use super::judge::Invariant;
-use crate::trade::trace::Number;
+use crate::trade::trace::ScalarType;
 
 /// A scene, how it is stepped, and what is known of it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -21,13 +21,13 @@ pub struct Case {
     /// By which model marbles are stepped.
     pub model: Model,
     /// In which numbers.
-    pub number: Number,
+    pub number: ScalarType,
     /// In seconds.
     pub step: f64,
-    /// How many steps.
+    /// Number of steps.
     pub steps: u32,
-    /// Whether walls have the motions that differences of their poses in `f32` give, each about
-    /// its own middle, as the plugin's have.
+    /// Walls have the motions of finite differences of their poses in `f32`, each about its own
+    /// center, as the plugin's have.
     #[serde(default)]
     pub differenced: bool,
     /// The corners of a box that nothing leaves.
@@ -44,16 +44,16 @@ pub struct Case {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SwarmPart {
-    /// Whether there is friction, bounce and spin.
+    /// Full tier: friction, restitution and rotation.
     pub full: bool,
     /// From 1 to 1,000.
     pub substeps: u32,
-    /// Whether balls may fall asleep.
+    /// Balls may fall asleep.
     pub sleeps: bool,
     /// Of all its balls.
-    pub surface: Surface,
+    pub material: MaterialDesc,
     /// Its balls; what they are made of is the swarm's.
-    pub balls: Vec<Ball>,
+    pub balls: Vec<MarbleDesc>,
 }
 
 impl SwarmPart {
@@ -69,7 +69,7 @@ impl SwarmPart {
             substeps: self.substeps,
             // Threads change no bit, and the storm has one thread a scene.
             threads: 1,
-            material: self.surface.material(),
+            material: self.material.to_material(),
             sleeps: self.sleeps,
         })?;
         let balls = self.balls.iter().map(|ball| taw::swarm::Ball {
@@ -87,8 +87,8 @@ impl Case {
     /// The scene at its beginning, with its account kept.
     ///
     /// # Errors
-    /// What the world refuses.
-    pub fn begin<S: Scalar>(&self) -> Result<Running<S>, taw::Error> {
+    /// Errors of the world.
+    pub fn begin<S: Scalar>(&self) -> Result<Simulation<S>, taw::Error> {
         let mut running = self.scene.run::<S>(self.model)?;
         if let Some(swarm) = &self.swarm {
             swarm.fill(&mut running.world.swarm)?;
@@ -100,10 +100,10 @@ impl Case {
         Ok(running)
     }
 
-    /// How many bodies there are.
+    /// Number of bodies.
     #[must_use]
     pub fn bodies(&self) -> usize {
-        self.scene.balls().count() + self.swarm.as_ref().map_or(0, |swarm| swarm.balls.len())
+        self.scene.all_marbles().count() + self.swarm.as_ref().map_or(0, |swarm| swarm.balls.len())
     }
 
     /// The substep of the marbles, in seconds.
@@ -112,17 +112,17 @@ impl Case {
         self.step / f64::from(self.model.substeps)
     }
 
-    /// Whether a wall moves.
+    /// Returns true if a wall moves.
     #[must_use]
     pub fn has_moving_walls(&self) -> bool {
-        self.scene.walls.iter().any(|wall| wall.moves.is_some())
-            || self.scene.structures.iter().any(|wall| wall.moves.is_some())
+        self.scene.walls.iter().any(|wall| wall.motion.is_some())
+            || self.scene.structures.iter().any(|wall| wall.motion.is_some())
     }
 
     /// The case as a file.
     ///
     /// # Errors
-    /// What the serializer refuses.
+    /// Errors of the serializer.
     pub fn to_text(&self) -> Result<String, ron::Error> {
         ron::ser::to_string_pretty(self, PrettyConfig::new().depth_limit(4))
     }
@@ -130,13 +130,13 @@ impl Case {
     /// The case of a file.
     ///
     /// # Errors
-    /// What is wrong, with line and field.
+    /// Parse errors, with line and field.
     pub fn from_text(text: &str) -> Result<Self, Box<dyn std::error::Error>> {
         Ok(ron::from_str(text)?)
     }
 }
 
-/// What scenes are sorted by: a response, how it detects, or a tier of swarms.
+/// Kind of a scene: a response, its detection, or a tier of swarms.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Kind {
     /// [`Response::Displacement`], discrete.
@@ -193,7 +193,7 @@ impl Kind {
         }
     }
 
-    /// That of a case.
+    /// Kind of a case.
     #[must_use]
     pub fn of(case: &Case) -> Self {
         if case.model.response == Response::SoftStep {
@@ -221,7 +221,7 @@ impl fmt::Display for Kind {
     }
 }
 
-/// Names a scene of the storm: its kind, the seed of the storm, and which one of that kind it is.
+/// Identifier of a scene of the storm: its kind, the seed of the storm, and its number.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Name {
     /// By what it is stepped.

@@ -1,4 +1,4 @@
-//! What there is to see of a world, counted by nobody but the storm.
+//! Observables of a world, computed independently of the world.
 
 use taw::prelude::*;
 
@@ -17,9 +17,9 @@ pub struct Body {
     pub radius: f64,
     /// Half of a capsule's line with its direction, in metres; zero for a ball.
     pub half: Vec3<f64>,
-    /// How far its surface is from the nearest wall, in metres; below zero inside.
+    /// Signed distance of its surface from the nearest wall, in metres; negative inside.
     pub wall_gap: f64,
-    /// How fast the fastest moving wall would carry it along where it is, in m/s.
+    /// Largest velocity of a moving wall at its position, in m/s.
     pub carried: f64,
 }
 
@@ -62,7 +62,7 @@ impl Body {
         self.radius + self.half.magnitude()
     }
 
-    /// Whether all its numbers are finite.
+    /// Returns true if its state is finite.
     #[must_use]
     pub fn is_finite(&self) -> bool {
         [self.at, self.velocity, self.angular_velocity].iter().all(|v| v.magnitude2().is_finite())
@@ -76,9 +76,9 @@ pub struct Snapshot {
     pub bodies: Vec<Body>,
     /// In m/s².
     pub gravity: [f64; 3],
-    /// What moving walls brought in by the account of the step, in joules.
+    /// Work of moving walls by the energy audit of the step, in joules.
     pub walls_work: f64,
-    /// How many bodies the step stopped.
+    /// Number of bodies stopped by the step.
     pub stopped: usize,
 }
 
@@ -114,7 +114,7 @@ impl Snapshot {
         self.bodies.iter().map(|body| -body.mass * gravity.dot(body.at)).sum()
     }
 
-    /// How deep two bodies are in each other, in metres; below zero, how far apart, at least.
+    /// Penetration of two bodies in metres; if negative, a lower bound of their distance.
     #[must_use]
     pub fn depth(&self, a: usize, b: usize) -> f64 {
         let (a, b) = (&self.bodies[a], &self.bodies[b]);

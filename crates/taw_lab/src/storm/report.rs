@@ -1,4 +1,4 @@
-//! What a storm found, as a table.
+//! Results of a storm as a table.
 
 use std::collections::BTreeMap;
 use std::fmt::Write;
@@ -7,10 +7,10 @@ use super::case::{Kind, Name};
 use super::judge::Invariant;
 use super::run::Verdict;
 
-/// What is counted of the scenes of a kind.
+/// Statistics of the scenes of a kind.
 #[derive(Clone, Debug, Default)]
 pub struct Tally {
-    /// How many there were, and in how many all invariants held.
+    /// Number of scenes, and of those in which all invariants held.
     pub scenes: u64,
     /// In how many all held.
     pub held: u64,

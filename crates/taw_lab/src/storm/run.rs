@@ -7,20 +7,20 @@ use std::time::{Duration, Instant};
 
 use taw::frame::Pose;
 use taw::prelude::*;
-use taw::scene::{Movement, Running};
+use taw::scene::{KinematicMotion, Simulation};
 
 use super::case::Case;
 use super::judge::{Bench, Finding, Invariant};
 use super::observe::{Body, Snapshot};
 use super::symmetry::{self, Symmetry};
-use crate::trade::trace::Number;
+use crate::trade::trace::ScalarType;
 
-/// What came of a case.
+/// Result of a case.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Verdict {
     /// For each invariant that was judged, how near it came to its bound.
     pub worst: Vec<Finding>,
-    /// What did not hold, each invariant once, in the order of time.
+    /// Violated invariants, each once, in the order of time.
     pub failures: Vec<Failure>,
     /// The slowest step, in seconds.
     pub slowest: f64,
@@ -33,7 +33,7 @@ pub struct Failure {
     pub finding: Finding,
     /// In which step, counted from one; zero before the first.
     pub step: u32,
-    /// What else there is to say.
+    /// Details.
     pub what: String,
 }
 
@@ -90,8 +90,8 @@ pub fn run(case: &Case, pulse: &Pulse) -> Verdict {
 pub fn run_for(case: &Case, only: Option<Invariant>, pulse: &Pulse) -> Verdict {
     let mut verdict = Verdict { worst: Vec::new(), failures: Vec::new(), slowest: 0.0 };
     let caught = catch_unwind(AssertUnwindSafe(|| match case.number {
-        Number::F32 => go::<f32>(case, only, pulse, &mut verdict),
-        Number::F64 => go::<f64>(case, only, pulse, &mut verdict),
+        ScalarType::F32 => go::<f32>(case, only, pulse, &mut verdict),
+        ScalarType::F64 => go::<f64>(case, only, pulse, &mut verdict),
     }));
     pulse.rest();
     if let Err(panic) = caught {
@@ -177,7 +177,7 @@ fn go<S: Scalar>(case: &Case, only: Option<Invariant>, pulse: &Pulse, verdict: &
             return;
         }
     }
-    if case.number == Number::F64 {
+    if case.number == ScalarType::F64 {
         for symmetry in [Symmetry::Mirror, Symmetry::Turn] {
             if only.is_none_or(|only| only == symmetry.invariant()) {
                 let Some(finding) = symmetry::compare(case, symmetry) else { continue };
@@ -190,7 +190,7 @@ fn go<S: Scalar>(case: &Case, only: Option<Invariant>, pulse: &Pulse, verdict: &
 }
 
 /// A clone steps on with the same bits.
-fn clones_go_on_alike<S: Scalar>(case: &Case, running: &Running<S>) -> bool {
+fn clones_go_on_alike<S: Scalar>(case: &Case, running: &Simulation<S>) -> bool {
     let (mut one, mut other) = (running.clone(), running.clone());
     for _ in 0..3 {
         if advance(case, &mut one).is_err() || advance(case, &mut other).is_err() {
@@ -201,17 +201,17 @@ fn clones_go_on_alike<S: Scalar>(case: &Case, running: &Running<S>) -> bool {
 }
 
 /// One step.
-pub fn advance<S: Scalar>(case: &Case, running: &mut Running<S>) -> Result<(), taw::Error> {
+pub fn advance<S: Scalar>(case: &Case, running: &mut Simulation<S>) -> Result<(), taw::Error> {
     let dt = S::constant(case.step);
     let from = running.time();
     running.move_walls(dt)?;
     if case.differenced {
         let to = running.time();
-        let walls = case.scene.walls.iter().map(|wall| wall.moves);
-        let moves = walls.chain(case.scene.structures.iter().map(|wall| wall.moves));
-        for (row, moves) in moves.enumerate() {
-            if let (Some(moves), Some(id)) = (moves, running.world.walls.id(row)) {
-                let motion = difference(case, row, moves, [from, to])?;
+        let walls = case.scene.walls.iter().map(|wall| wall.motion);
+        let motion = walls.chain(case.scene.structures.iter().map(|wall| wall.motion));
+        for (row, motion) in motion.enumerate() {
+            if let (Some(motion), Some(id)) = (motion, running.world.walls.id(row)) {
+                let motion = difference(case, row, motion, [from, to])?;
                 running.world.walls.set_motion(id, motion)?;
             }
         }
@@ -219,16 +219,16 @@ pub fn advance<S: Scalar>(case: &Case, running: &mut Running<S>) -> Result<(), t
     running.world.step(dt)
 }
 
-/// How a wall moves by its poses in `f32` before and after a step, about its middle: nothing, if
-/// they are the same.
+/// Motion of a wall by finite differences of its poses in `f32` about its center; none if they are
+/// equal.
 fn difference<S: Scalar>(
     case: &Case,
     row: usize,
-    moves: Movement,
+    motion: KinematicMotion,
     [from, to]: [f64; 2],
 ) -> Result<Option<taw::motion::WallMotion<S>>, taw::Error> {
     let middle = match case.scene.walls.get(row).map(|wall| wall.shape) {
-        Some(taw::scene::Form::Box { center, .. }) => Point3::from(center),
+        Some(taw::scene::ShapeDesc::Box { center, .. }) => Point3::from(center),
         _ => Point3::origin(),
     };
     let single = |pose: Pose<f64>| {
@@ -238,7 +238,7 @@ fn difference<S: Scalar>(
         let [x, y, z] = [turn.v.x, turn.v.y, turn.v.z].map(|x| x as f32);
         (place, taw::math::Quat::new(turn.s as f32, x, y, z))
     };
-    let (last, now) = (single(moves.pose(from)?), single(moves.pose(to)?));
+    let (last, now) = (single(motion.pose(from)?), single(motion.pose(to)?));
     if last == now {
         return Ok(None);
     }
@@ -256,14 +256,14 @@ fn difference<S: Scalar>(
     }))
 }
 
-/// How many steps a [`trail`] shows.
+/// Number of steps of a [`trail`].
 const TRAIL: u32 = 12;
 
 /// Where a body was in the steps until this one, and the energy of all: lines to read.
 pub fn trail(case: &Case, body: usize, until: u32) -> String {
     match case.number {
-        Number::F32 => trail_in::<f32>(case, body, until),
-        Number::F64 => trail_in::<f64>(case, body, until),
+        ScalarType::F32 => trail_in::<f32>(case, body, until),
+        ScalarType::F64 => trail_in::<f64>(case, body, until),
     }
 }
 

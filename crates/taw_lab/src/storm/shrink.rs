@@ -1,13 +1,13 @@
 //! The smallest case that still fails.
 
 use taw::prelude::*;
-use taw::scene::{Build, Surface};
+use taw::scene::{Build, MaterialDesc};
 
 use super::case::Case;
 use super::judge::Invariant;
 use super::run::{Pulse, run_for};
 
-/// How many runs a shrinking takes at most: it ends when nothing can be left out, but bodies in a
+/// Maximum number of runs of a shrinking: it ends when nothing can be left out, but bodies in a
 /// heap can be left out in many ways.
 const MOST_RUNS: u32 = 1500;
 
@@ -43,7 +43,7 @@ pub fn shrink_by(case: &Case, fails: &mut dyn FnMut(&Case) -> Option<u32>) -> Ca
         }
         round(&mut best, fails);
         if best == before {
-            best.scene.seconds = best.step * f64::from(best.steps);
+            best.scene.duration = best.step * f64::from(best.steps);
             return best;
         }
     }
@@ -77,8 +77,8 @@ fn leave_out(best: &mut Case, fails: &mut dyn FnMut(&Case) -> Option<u32>) {
     }
     thin(best, fails, |case| Some(&mut case.scene.walls));
     thin(best, fails, |case| Some(&mut case.scene.structures));
-    thin(best, fails, |case| Some(&mut case.scene.fields));
-    thin(best, fails, |case| Some(&mut case.scene.tilts));
+    thin(best, fails, |case| Some(&mut case.scene.force_fields));
+    thin(best, fails, |case| Some(&mut case.scene.gravity_keyframes));
     for number in 0..best.scene.structures.len() {
         thin(best, fails, |case| match &mut case.scene.structures.get_mut(number)?.shape {
             Build::Mesh { triangles, .. } if triangles.len() > 1 => Some(triangles),
@@ -115,7 +115,7 @@ fn thin<T: Clone>(
     }
 }
 
-/// What may be simpler, all at once.
+/// Simplifications, each applied as a whole.
 const SIMPLER: [fn(&mut Case); 15] = [
     |case| case.model.substeps = 1,
     |case| case.model.iterations = 8,
@@ -126,15 +126,15 @@ const SIMPLER: [fn(&mut Case); 15] = [
     |case| case.closed = None,
     |case| case.step = 1.0 / 60.0,
     |case| case.scene.gravity = [0.0, -9.81, 0.0],
-    |case| case.scene.marbles.iter_mut().for_each(|ball| ball.surface = None),
+    |case| case.scene.marbles.iter_mut().for_each(|ball| ball.material = None),
     |case| case.scene.marbles.iter_mut().for_each(|ball| ball.angular_velocity = [0.0; 3]),
     |case| case.scene.marbles.iter_mut().for_each(|ball| ball.half_length = 0.0),
     |case| case.scene.marbles.iter_mut().for_each(|ball| ball.density = 1000.0),
     |case| {
-        let Surface { restitution, friction, .. } = case.scene.surface;
-        let youngs_modulus = case.scene.surface.youngs_modulus;
-        case.scene.surface =
-            Surface { restitution, friction, youngs_modulus, ..Surface::default() };
+        let MaterialDesc { restitution, friction, .. } = case.scene.material;
+        let youngs_modulus = case.scene.material.youngs_modulus;
+        case.scene.material =
+            MaterialDesc { restitution, friction, youngs_modulus, ..MaterialDesc::default() };
     },
     |case| {
         if let Some(swarm) = &mut case.swarm {
@@ -146,10 +146,10 @@ const SIMPLER: [fn(&mut Case); 15] = [
 /// Leaves out digits, and numbers.
 fn round(best: &mut Case, fails: &mut dyn FnMut(&Case) -> Option<u32>) {
     for friction in [0.0, 0.5, 1.0] {
-        attempt(best, fails, |case| case.scene.surface.friction = friction);
+        attempt(best, fails, |case| case.scene.material.friction = friction);
     }
     for restitution in [0.0, 1.0, 0.5] {
-        attempt(best, fails, |case| case.scene.surface.restitution = restitution);
+        attempt(best, fails, |case| case.scene.material.restitution = restitution);
     }
     let count = best.scene.marbles.len();
     if count > 40 {

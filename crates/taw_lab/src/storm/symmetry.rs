@@ -1,7 +1,7 @@
 //! Nature knows neither left nor right, and no compass.
 
 use taw::prelude::*;
-use taw::scene::{Ball, Build, Form, Movement, Scene, Turn};
+use taw::scene::{Build, KinematicMotion, MarbleDesc, RotationDesc, Scene, ShapeDesc};
 
 use super::case::Case;
 use super::judge::{Finding, Invariant};
@@ -17,19 +17,18 @@ pub enum Symmetry {
     Turn,
 }
 
-/// How many steps are compared, and how many in which something touches: chaos multiplies a
-/// difference in each bounce, and does not make a part in a million of the last bits of `f64` in
-/// so few.
+/// Number of compared steps, and of those with contacts: chaos multiplies a difference in each
+/// bounce, and does not make a part in a million of the last bits of `f64` in that number.
 const STEPS: u32 = 200;
 const TOUCHED: u32 = 10;
-/// What differs by less than this part of the distances in the scene is rounding.
+/// Differences below this fraction of the distances in the scene are rounding.
 const ALIKE: f64 = 1e-6;
 /// With more bodies than this, the order of contacts that are equally deep decides, which is a
 /// matter of the last bit.
 const MOST: usize = 2;
 
 impl Symmetry {
-    /// What it is judged as.
+    /// Invariant of the symmetry.
     #[must_use]
     pub fn invariant(self) -> Invariant {
         match self {
@@ -55,55 +54,63 @@ impl Symmetry {
         }
     }
 
-    fn turn(self, turned: Turn) -> Turn {
-        Turn { axis: self.axial(turned.axis), ..turned }
+    fn turn(self, rotation: RotationDesc) -> RotationDesc {
+        RotationDesc { axis: self.axial(rotation.axis), ..rotation }
     }
 
     /// A box is turned with all of its sides, so a turned one has the sides of the other's.
-    fn form(self, form: Form) -> Form {
+    fn form(self, form: ShapeDesc) -> ShapeDesc {
         match form {
-            Form::HalfSpace { normal, through } => {
-                Form::HalfSpace { normal: self.of(normal), through: self.of(through) }
+            ShapeDesc::HalfSpace { normal, point } => {
+                ShapeDesc::HalfSpace { normal: self.of(normal), point: self.of(point) }
             }
-            Form::Box { center, size, turned } => {
-                let upright = turned.degrees == 0.0;
+            ShapeDesc::Box { center, size, rotation } => {
+                let upright = rotation.degrees == 0.0;
                 let size = match self {
                     Self::Turn if upright => [size[2], size[1], size[0]],
                     _ => size,
                 };
-                Form::Box { center: self.of(center), size, turned: self.turn(turned) }
+                ShapeDesc::Box { center: self.of(center), size, rotation: self.turn(rotation) }
             }
-            Form::Ball { center, radius } => Form::Ball { center: self.of(center), radius },
-            Form::Capsule { from, to, radius } => {
-                Form::Capsule { from: self.of(from), to: self.of(to), radius }
+            ShapeDesc::Ball { center, radius } => {
+                ShapeDesc::Ball { center: self.of(center), radius }
+            }
+            ShapeDesc::Capsule { from, to, radius } => {
+                ShapeDesc::Capsule { from: self.of(from), to: self.of(to), radius }
             }
         }
     }
 
-    fn movement(self, movement: Movement) -> Movement {
+    fn movement(self, movement: KinematicMotion) -> KinematicMotion {
         match movement {
-            Movement::Conveys { velocity } => Movement::Conveys { velocity: self.of(velocity) },
-            Movement::Turns { pivot, axis, degrees_per_second } => Movement::Turns {
-                pivot: self.of(pivot),
-                axis: self.axial(axis),
-                degrees_per_second,
-            },
-            Movement::Swings { way, pivot, axis, degrees, period } => Movement::Swings {
-                way: self.of(way),
-                pivot: self.of(pivot),
-                axis: self.axial(axis),
-                degrees,
-                period,
-            },
+            KinematicMotion::Conveyor { velocity } => {
+                KinematicMotion::Conveyor { velocity: self.of(velocity) }
+            }
+            KinematicMotion::Rotate { pivot, axis, degrees_per_second } => {
+                KinematicMotion::Rotate {
+                    pivot: self.of(pivot),
+                    axis: self.axial(axis),
+                    degrees_per_second,
+                }
+            }
+            KinematicMotion::Oscillate { amplitude, pivot, axis, degrees, period } => {
+                KinematicMotion::Oscillate {
+                    amplitude: self.of(amplitude),
+                    pivot: self.of(pivot),
+                    axis: self.axial(axis),
+                    degrees,
+                    period,
+                }
+            }
         }
     }
 
-    fn ball(self, ball: Ball) -> Ball {
-        Ball {
+    fn ball(self, ball: MarbleDesc) -> MarbleDesc {
+        MarbleDesc {
             position: self.of(ball.position),
             velocity: self.of(ball.velocity),
             angular_velocity: self.axial(ball.angular_velocity),
-            turned: self.turn(ball.turned),
+            rotation: self.turn(ball.rotation),
             ..ball
         }
     }
@@ -116,15 +123,16 @@ impl Symmetry {
         let mut other = scene.clone();
         other.gravity = self.of(scene.gravity);
         for wall in &mut other.walls {
-            let slanted = matches!(wall.shape, Form::Box { turned, .. } if turned.degrees != 0.0);
+            let slanted =
+                matches!(wall.shape, ShapeDesc::Box { rotation, .. } if rotation.degrees != 0.0);
             if self == Self::Turn && slanted {
                 return None;
             }
             wall.shape = self.form(wall.shape);
-            wall.moves = wall.moves.map(|moves| self.movement(moves));
+            wall.motion = wall.motion.map(|motion| self.movement(motion));
         }
         for structure in &mut other.structures {
-            structure.moves = structure.moves.map(|moves| self.movement(moves));
+            structure.motion = structure.motion.map(|motion| self.movement(motion));
             match &mut structure.shape {
                 Build::Mesh { points, .. } => {
                     for point in points {
@@ -139,10 +147,10 @@ impl Symmetry {
                 Build::HeightField { .. } => return None,
             }
         }
-        if self == Self::Turn && scene.balls().any(|ball| ball.half_length > 0.0) {
+        if self == Self::Turn && scene.all_marbles().any(|ball| ball.half_length > 0.0) {
             return None;
         }
-        other.marbles = scene.balls().map(|ball| self.ball(ball)).collect();
+        other.marbles = scene.all_marbles().map(|ball| self.ball(ball)).collect();
         other.lattices.clear();
         Some(other)
     }
@@ -179,11 +187,11 @@ pub fn compare(case: &Case, symmetry: Symmetry) -> Option<Finding> {
     Some(worst)
 }
 
-/// Whether it begins in a state where any direction is as good as any other: bodies at one
-/// point, or in walls, or one on the very edge of something.
+/// Returns true for an initial state without a unique direction: bodies at one point, or in walls,
+/// or on the edge of something.
 fn is_singular(case: &Case) -> bool {
-    let balls: Vec<Ball> = case.scene.balls().collect();
-    let apart = |a: &Ball, b: &Ball| {
+    let balls: Vec<MarbleDesc> = case.scene.all_marbles().collect();
+    let apart = |a: &MarbleDesc, b: &MarbleDesc| {
         (Vec3::from(a.position) - Vec3::from(b.position)).magnitude() > a.radius + b.radius
     };
     let pairs = balls.iter().enumerate().all(|(i, a)| balls[..i].iter().all(|b| apart(a, b)));

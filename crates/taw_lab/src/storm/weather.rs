@@ -15,37 +15,37 @@ use super::report::Tally;
 use super::run::{Failure, Pulse, Verdict, run, run_for, trail};
 use super::shrink::shrink;
 
-/// What is to be done.
+/// Plan of a storm.
 #[derive(Clone, Debug)]
 pub struct Plan {
-    /// How many scenes, of all kinds together.
+    /// Number of scenes, of all kinds together.
     pub scenes: u64,
     /// Of all random numbers.
     pub seed: u64,
     /// Only kinds whose name contains this.
     pub only: String,
-    /// How many scenes run at a time.
+    /// Number of scenes run in parallel.
     pub jobs: usize,
     /// Where failures go, if anywhere.
     pub out: Option<PathBuf>,
-    /// Whether failures are made small.
+    /// Failures are shrunk.
     pub shrink: bool,
-    /// How many failures of one kind and invariant are written and made small.
+    /// Number of failures of one kind and invariant to write and shrink.
     pub keep: u64,
-    /// How long a step may take before it counts as one that does not end.
+    /// Time limit of a step, after which it counts as hung.
     pub patience: Duration,
 }
 
-/// What came of it.
+/// Result of a storm.
 #[derive(Clone, Debug, Default)]
 pub struct Storm {
     /// By kind.
     pub tallies: BTreeMap<Kind, Tally>,
-    /// What did not hold, and the files that were written.
+    /// Violated invariants and the written files.
     pub failures: Vec<(Name, Failure, Option<PathBuf>)>,
 }
 
-/// How long a failure is made smaller, at most.
+/// Maximum duration of shrinking a failure.
 const SHRINK_FOR: Duration = Duration::from_secs(20);
 
 /// A thread that runs scenes, seen from outside.
@@ -169,7 +169,7 @@ fn write(
     let invariant = failure.finding.invariant;
     let mut case = Case { broke: Some(invariant), ..generate(name) };
     case.steps = failure.step.max(1);
-    // What does not end cannot be tried again.
+    // A hung case cannot be run again.
     if plan.shrink && invariant != Invariant::Ends {
         case = shrink(&case, invariant, SHRINK_FOR);
     }
@@ -184,10 +184,10 @@ fn write(
 #[must_use]
 pub fn replay(case: &Case) -> String {
     let verdict = run_for(case, case.broke, &Pulse::default());
-    let mut text = format!("{}\n", case.scene.about);
+    let mut text = format!("{}\n", case.scene.description);
     let _ = writeln!(text, "{:?} {} step {} s", case.model, case.number, case.step);
     if let Some(swarm) = &case.swarm {
-        let (marbles, balls) = (case.scene.balls().count(), swarm.balls.len());
+        let (marbles, balls) = (case.scene.all_marbles().count(), swarm.balls.len());
         let _ = writeln!(text, "{marbles} marbles, then {balls} balls in {} parts", swarm.substeps);
     }
     for Finding { invariant, value, bound, body } in &verdict.worst {

@@ -2,8 +2,8 @@
 
 use taw::prelude::*;
 
-use super::{Effort, Row};
-use crate::scene::{Ball, EXACT, Meter, box_around, energy, surface, wall, weightless};
+use super::{CostClass, SuiteCase};
+use crate::scene::{Ball, EXACT, Stopwatch, box_around, energy, surface, wall, weightless};
 
 /// Elastic balls of diameter one without gravity that fill this part of a cube around the
 /// origin, on a lattice, with random velocities whose components have this deviation; and half
@@ -36,13 +36,13 @@ fn boxed(count: u32, filling: f64, speed: f64) -> (World<f32>, f64) {
 }
 
 /// The energy after 60,000 collisions or more.
-fn energy_kept(meter: &mut Meter) -> f64 {
+fn energy_kept(stopwatch: &mut Stopwatch) -> f64 {
     let (mut world, _) = boxed(216, 0.22, 10.0);
     let start = energy(&world);
     let mut collisions = 0;
     let mut seconds = 0.0;
     while collisions < 60_000 || seconds < 10.0 {
-        meter.step(&mut world, 1.0 / 60.0);
+        stopwatch.step(&mut world, 1.0 / 60.0);
         collisions += world.impacts().len();
         seconds += 1.0 / 60.0;
     }
@@ -59,7 +59,7 @@ fn compressibility(filling: f64) -> f64 {
 /// Relative error of the pressure in the middle of a box, against the hard-sphere fluid at the
 /// density there. `margin` is what counts as wall.
 fn pressure_in_the_middle(
-    meter: &mut Meter,
+    stopwatch: &mut Stopwatch,
     count: u32,
     filling: f64,
     margin: f64,
@@ -68,13 +68,13 @@ fn pressure_in_the_middle(
     let (mut world, half) = boxed(count, filling, 1.0);
     let inner = half - margin;
     let dt = 0.02;
-    meter.run(&mut world, dt, 0.1 * seconds + 5.0); // until the lattice is forgotten
+    stopwatch.run(&mut world, dt, 0.1 * seconds + 5.0); // until the lattice is forgotten
     let temperature = 2.0 * energy(&world) / (3.0 * f64::from(count));
     let inside = |p: &Point3<f32>| [p.x, p.y, p.z].iter().all(|x| f64::from(x.abs()) < inner);
     let (mut virial, mut balls) = (0.0, 0.0);
     let steps = (seconds / dt).round() as u32;
     for _ in 0..steps {
-        meter.step(&mut world, dt);
+        stopwatch.step(&mut world, dt);
         let position = world.marbles.position();
         for impact in world.impacts().iter().filter(|impact| !impact.on_wall) {
             // Half of it belongs to each ball.
@@ -93,12 +93,12 @@ fn pressure_in_the_middle(
 }
 
 /// Relative error of the pressure of a gas without walls, against the hard-sphere fluid.
-fn pressure(meter: &mut Meter, count: u32, filling: f64, seconds: f64) -> f64 {
+fn pressure(stopwatch: &mut Stopwatch, count: u32, filling: f64, seconds: f64) -> f64 {
     let (mut world, half) = gas(count, filling, 1.0);
     let side = Some((2.0 * half) as f32);
     world.set_period([side; 3]).expect("far larger than a ball");
     let dt = 0.02;
-    meter.run(&mut world, dt, 0.1 * seconds + 5.0); // until the lattice is forgotten
+    stopwatch.run(&mut world, dt, 0.1 * seconds + 5.0); // until the lattice is forgotten
     // Without walls momentum stays, and is no heat.
     let drift = world.momentum() / f64::from(count);
     let heat = energy(&world) - 0.5 * f64::from(count) * drift.magnitude2();
@@ -106,7 +106,7 @@ fn pressure(meter: &mut Meter, count: u32, filling: f64, seconds: f64) -> f64 {
     let mut virial = 0.0;
     let steps = (seconds / dt).round() as u32;
     for _ in 0..steps {
-        meter.step(&mut world, dt);
+        stopwatch.step(&mut world, dt);
         virial += world.impacts().iter().map(|i| f64::from(i.approach_speed)).sum::<f64>();
     }
     let time = f64::from(steps) * dt;
@@ -114,8 +114,8 @@ fn pressure(meter: &mut Meter, count: u32, filling: f64, seconds: f64) -> f64 {
     (found / compressibility(filling) - 1.0).abs()
 }
 
-pub const ROWS: &[Row] = &[
-    Row {
+pub const ROWS: &[SuiteCase] = &[
+    SuiteCase {
         name: "gas/energy",
         setup: "216 balls fill 0.22 of a box, over 60,000 collisions in 10 s at 1/60 s",
         metric: "relative error of the energy",
@@ -123,10 +123,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-5,
         best: "0.74 Box3D, 0.79 Rapier lost",
         source: "references 4.22",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: energy_kept,
     },
-    Row {
+    SuiteCase {
         name: "gas/pressure/1000",
         setup: "1,000 balls fill 0.05 and 0.1: PV/NkT in the middle (denser, the walls order too much of so small a box)",
         metric: "worst relative error",
@@ -134,15 +134,15 @@ pub const ROWS: &[Row] = &[
         target: 1e-2,
         best: "none published; our prototype 0.7e-2",
         source: "Boublik and Nezbeda 1986; references 4.24",
-        effort: Effort::Quick,
-        measure: |meter| {
+        effort: CostClass::Quick,
+        measure: |stopwatch| {
             [0.05, 0.1]
-                .map(|filling| pressure_in_the_middle(meter, 1000, filling, 2.0, 150.0))
+                .map(|filling| pressure_in_the_middle(stopwatch, 1000, filling, 2.0, 150.0))
                 .into_iter()
                 .fold(0.0, f64::max)
         },
     },
-    Row {
+    SuiteCase {
         name: "gas/pressure/4096",
         setup: "4,096 balls fill 0.1, 0.3 and 0.45 of a periodic cube: PV/NkT",
         metric: "worst relative error",
@@ -150,10 +150,10 @@ pub const ROWS: &[Row] = &[
         target: 2e-3,
         best: "none published",
         source: "Boublik and Nezbeda 1986; references 4.24",
-        effort: Effort::Long,
-        measure: |meter| {
+        effort: CostClass::Long,
+        measure: |stopwatch| {
             [(0.1, 200.0), (0.3, 100.0), (0.45, 80.0)]
-                .map(|(filling, seconds)| pressure(meter, 4096, filling, seconds))
+                .map(|(filling, seconds)| pressure(stopwatch, 4096, filling, seconds))
                 .into_iter()
                 .fold(0.0, f64::max)
         },

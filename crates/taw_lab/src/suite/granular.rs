@@ -6,8 +6,8 @@ use std::sync::{Mutex, OnceLock};
 use taw::prelude::*;
 use taw::shape::Mesh;
 
-use super::{Effort, Row};
-use crate::scene::{Ball, IMPULSE, Meter, box_around, overlaps, surface, wall, world};
+use super::{CostClass, SuiteCase};
+use crate::scene::{Ball, IMPULSE, Stopwatch, box_around, overlaps, surface, wall, world};
 
 /// Impulses in substeps so short that what they let overlap is a few hundred-thousandths
 /// of a ball.
@@ -18,17 +18,17 @@ fn once<T: Copy>(cell: &OnceLock<T>, measure: impl FnOnce() -> T) -> T {
     *cell.get_or_init(measure)
 }
 
-/// How densely frictionless balls of diameter one pack when they settle in a box, how
-/// many each touches, and the deepest overlap: off 0.64, off 6, and in metres.
-fn packing(meter: &mut Meter) -> [f64; 3] {
+/// Packing of frictionless balls of diameter one in a box: density off 0.64, contacts per ball off
+/// 6, and deepest overlap in metres.
+fn packing(stopwatch: &mut Stopwatch) -> [f64; 3] {
     static PACKED: OnceLock<[f64; 3]> = OnceLock::new();
-    once(&PACKED, || pack(meter))
+    once(&PACKED, || pack(stopwatch))
 }
 
-/// How many random points tell how much is filled.
+/// Number of random points that measure the filling.
 const POINTS: u32 = 200_000;
 
-fn pack(meter: &mut Meter) -> [f64; 3] {
+fn pack(stopwatch: &mut Stopwatch) -> [f64; 3] {
     let mut packed = world::<f32>(FINE);
     let half = 6.03; // not a whole number of balls, which would order them
     wall(&mut packed, [0.0, 1.0, 0.0], 0.0);
@@ -40,7 +40,7 @@ fn pack(meter: &mut Meter) -> [f64; 3] {
         let at = [(x - 4.0) * 1.25 + jitter(), 0.7 + y * 1.25, (z - 4.0) * 1.25 + jitter()];
         Ball { at, ..Ball::default() }.insert(&mut packed);
     }
-    meter.run(&mut packed, 1.0 / 60.0, 25.0);
+    stopwatch.run(&mut packed, 1.0 / 60.0, 25.0);
     let position: Vec<_> = packed.marbles.position().iter().map(|p| p.map(f64::from)).collect();
     let top = position.iter().map(|p| p.y).fold(0.0, f64::max);
     let inner = |p: &Point3<f64>| {
@@ -66,11 +66,11 @@ fn pack(meter: &mut Meter) -> [f64; 3] {
 
 /// Slope at which a layer creeps down a rough incline, neither faster nor slower, in degrees. Each
 /// is measured once, however many rows ask.
-fn repose(meter: &mut Meter, seed: u64, rolling_resistance: f64) -> f64 {
+fn repose(stopwatch: &mut Stopwatch, seed: u64, rolling_resistance: f64) -> f64 {
     static MEASURED: Mutex<BTreeMap<(u64, u64), f64>> = Mutex::new(BTreeMap::new());
     let key = (seed, rolling_resistance.to_bits());
     let mut measured = MEASURED.lock().expect("nobody panics while it flows");
-    *measured.entry(key).or_insert_with(|| creep(meter, seed, rolling_resistance))
+    *measured.entry(key).or_insert_with(|| creep(stopwatch, seed, rolling_resistance))
 }
 
 /// Width of the layer, in balls, along the slope and across it; it has no ends.
@@ -86,7 +86,7 @@ const LIFTS: [f64; 2] = [36.0, 18.0];
 /// Lays about a thousand balls on a floor of glued ones in a box that is periodic but for its
 /// height, and lifts and lowers the slope so that they creep: where flow begins and where it ends
 /// (Silbert et al., *Granular flow down an inclined plane*, 2001, §III).
-fn creep(meter: &mut Meter, seed: u64, rolling_resistance: f64) -> f64 {
+fn creep(stopwatch: &mut Stopwatch, seed: u64, rolling_resistance: f64) -> f64 {
     let mut layer = world::<f32>(Model { rotation: Rotation::Dynamic, substeps: 2, ..FINE });
     let side = Some(ACROSS as f32);
     layer.set_period([side, None, side]).expect("far larger than a ball");
@@ -111,7 +111,7 @@ fn creep(meter: &mut Meter, seed: u64, rolling_resistance: f64) -> f64 {
         let slope = lifted + LIFTS[0] * lacks;
         let (sin, cos) = slope.to_radians().sin_cos();
         layer.set_gravity(Vec3::new(sin, -cos, 0.0).map(|g| (9.81 * g) as f32)).expect("finite");
-        meter.step(&mut layer, 1.0 / 60.0);
+        stopwatch.step(&mut layer, 1.0 / 60.0);
         if step < begins {
             continue; // they come to lie
         }
@@ -135,7 +135,7 @@ const FILL: u32 = 2_900;
 /// Rates at which balls of diameter one fall through a round hole of this diameter in the middle
 /// of a bin, in balls a second, in the first and in the second half of the time. What has fallen
 /// comes in again at the top, so that the bin stays full.
-fn discharge(meter: &mut Meter, diameter: f64) -> [f64; 2] {
+fn discharge(stopwatch: &mut Stopwatch, diameter: f64) -> [f64; 2] {
     let mut bin = world::<f32>(Model { rotation: Rotation::Dynamic, substeps: 2, ..FINE });
     box_around(&mut bin, BIN / 2.0);
     let (height, floor) = (17.0, -7.5);
@@ -149,22 +149,22 @@ fn discharge(meter: &mut Meter, diameter: f64) -> [f64; 2] {
         let at = [(x - 6.0) * 1.13, floor + 0.6 + y * 1.05, (z - 6.0) * 1.13];
         Ball { at: at.map(|x| x + jitter()), material, ..Ball::default() }.insert(&mut bin);
     }
-    meter.run(&mut bin, 1.0 / 60.0, 3.0);
+    stopwatch.run(&mut bin, 1.0 / 60.0, 3.0);
     bin.walls.remove(plug).expect("it is there");
     bin.set_period([None, Some(height as f32), None]).expect("far larger than a ball");
-    let mut rate = |meter: &mut Meter, seconds: f64| {
+    let mut rate = |stopwatch: &mut Stopwatch, seconds: f64| {
         let mut fallen = 0_u32;
         for _ in 0..(seconds * 60.0) as u32 {
             let before: Vec<f32> = bin.marbles.position().iter().map(|p| p.y).collect();
-            meter.step(&mut bin, 1.0 / 60.0);
+            stopwatch.step(&mut bin, 1.0 / 60.0);
             let position = bin.marbles.position().iter();
             let rose = position.zip(before).filter(|(p, y)| p.y > y + 0.5 * height as f32);
             fallen += rose.count() as u32;
         }
         f64::from(fallen) / seconds
     };
-    rate(meter, 3.0); // until it flows
-    [rate(meter, 15.0), rate(meter, 15.0)]
+    rate(stopwatch, 3.0); // until it flows
+    [rate(stopwatch, 15.0), rate(stopwatch, 15.0)]
 }
 
 /// A round plate at this height with a round hole in the middle; radii in metres.
@@ -186,10 +186,10 @@ fn plate(hole: f64, radius: f64, height: f64) -> Mesh<f32> {
 
 /// The exponent by which the rate grows with the hole less 1.4 balls, off 2.5; and the
 /// largest change of a rate from the first half to the second, relatively.
-fn beverloo(meter: &mut Meter) -> [f64; 2] {
+fn beverloo(stopwatch: &mut Stopwatch) -> [f64; 2] {
     static FLOWED: OnceLock<[f64; 2]> = OnceLock::new();
     once(&FLOWED, || {
-        let rates = [4.0, 5.0, 6.0].map(|d| (f64::ln(d - 1.4), discharge(meter, d)));
+        let rates = [4.0, 5.0, 6.0].map(|d| (f64::ln(d - 1.4), discharge(stopwatch, d)));
         let n = rates.len() as f64;
         let log = |[a, b]: [f64; 2]| (0.5 * (a + b)).ln();
         let mx = rates.iter().map(|(x, _)| x / n).sum::<f64>();
@@ -203,7 +203,7 @@ fn beverloo(meter: &mut Meter) -> [f64; 2] {
 
 /// The time by which everything in one spot came apart again: the smallest distance left
 /// over the diameter, as a part missing from one; NaN if something is not finite.
-fn all_in_one_spot(meter: &mut Meter, model: Model, count: u32, seconds: f64) -> f64 {
+fn all_in_one_spot(stopwatch: &mut Stopwatch, model: Model, count: u32, seconds: f64) -> f64 {
     let mut world = crate::scene::weightless::<f32>(model);
     for _ in 0..count {
         Ball { at: [0.3, 0.2, 0.1], ..Ball::default() }.insert(&mut world);
@@ -215,7 +215,7 @@ fn all_in_one_spot(meter: &mut Meter, model: Model, count: u32, seconds: f64) ->
     if named.len() != count as usize {
         return f64::NAN;
     }
-    meter.run(&mut world, 1.0 / 60.0, seconds);
+    stopwatch.run(&mut world, 1.0 / 60.0, seconds);
     let fastest = world.marbles.velocity().iter().map(|v| v.magnitude()).fold(0.0_f32, f32::max);
     if !fastest.is_finite() || world.stopped().count() > 0 {
         return f64::NAN;
@@ -227,7 +227,7 @@ fn all_in_one_spot(meter: &mut Meter, model: Model, count: u32, seconds: f64) ->
 /// five seconds: the farthest that one moves if they just touch (`overlap` 0), else the
 /// deepest overlap that is left of this part of a diameter; in diameters. NaN if the
 /// recovery throws one faster than a diameter a step.
-fn lattice(meter: &mut Meter, model: Model, overlap: f64) -> f64 {
+fn lattice(stopwatch: &mut Stopwatch, model: Model, overlap: f64) -> f64 {
     let mut packed = crate::scene::weightless::<f32>(model);
     let pitch = (1.0 - overlap) * 2.0_f64.sqrt();
     for i in 0..27_u32 {
@@ -238,7 +238,7 @@ fn lattice(meter: &mut Meter, model: Model, overlap: f64) -> f64 {
         }
     }
     let start = packed.marbles.position().to_vec();
-    meter.run(&mut packed, 1.0 / 60.0, 5.0);
+    stopwatch.run(&mut packed, 1.0 / 60.0, 5.0);
     let fastest = packed.marbles.velocity().iter().map(|v| v.magnitude()).fold(0.0, f32::max);
     if fastest.is_nan() || fastest > 60.0 {
         return f64::NAN;
@@ -250,8 +250,8 @@ fn lattice(meter: &mut Meter, model: Model, overlap: f64) -> f64 {
     f64::from(moved.fold(0.0, f32::max))
 }
 
-pub const ROWS: &[Row] = &[
-    Row {
+pub const ROWS: &[SuiteCase] = &[
+    SuiteCase {
         name: "granular/packing/density",
         setup: "1,800 frictionless balls settle in a box: 0.64 of the bulk filled",
         metric: "off 0.64",
@@ -259,10 +259,10 @@ pub const ROWS: &[Row] = &[
         target: 5e-3,
         best: "over-pack by three times their overlap",
         source: "Scott and Kilgour 1969; references 4.27",
-        effort: Effort::Long,
-        measure: |meter| packing(meter)[0],
+        effort: CostClass::Long,
+        measure: |stopwatch| packing(stopwatch)[0],
     },
-    Row {
+    SuiteCase {
         name: "granular/packing/touches",
         setup: "the same: each ball touches 6",
         metric: "off 6",
@@ -270,10 +270,10 @@ pub const ROWS: &[Row] = &[
         target: 0.1,
         best: "–",
         source: "isostatic; references 4.27",
-        effort: Effort::Long,
-        measure: |meter| packing(meter)[1],
+        effort: CostClass::Long,
+        measure: |stopwatch| packing(stopwatch)[1],
     },
-    Row {
+    SuiteCase {
         name: "granular/packing/overlap",
         setup: "the same",
         metric: "deepest overlap over the diameter",
@@ -281,10 +281,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "2.4e-2 Rapier (pour, 10,000)",
         source: "references 4.27",
-        effort: Effort::Long,
-        measure: |meter| packing(meter)[2],
+        effort: CostClass::Long,
+        measure: |stopwatch| packing(stopwatch)[2],
     },
-    Row {
+    SuiteCase {
         name: "granular/repose/repeatable",
         setup: "972 balls creep down a rough incline without ends at 0.1 √(g d), µ 0.5: three seeds need the same slope",
         metric: "spread of the angle, degrees",
@@ -292,15 +292,15 @@ pub const ROWS: &[Row] = &[
         target: 2.0,
         best: "–",
         source: "references 4.29 (±1°)",
-        effort: Effort::Long,
-        measure: |meter| {
-            let angles = [1, 2, 3].map(|seed| repose(meter, seed, 0.0));
+        effort: CostClass::Long,
+        measure: |stopwatch| {
+            let angles = [1, 2, 3].map(|seed| repose(stopwatch, seed, 0.0));
             let (low, high) =
                 angles.iter().fold((f64::MAX, f64::MIN), |(l, h), a| (l.min(*a), h.max(*a)));
             high - low
         },
     },
-    Row {
+    SuiteCase {
         name: "granular/repose/angle",
         setup: "the same without rolling resistance: 20 to 24°",
         metric: "off 22°",
@@ -308,10 +308,10 @@ pub const ROWS: &[Row] = &[
         target: 2.0,
         best: "–",
         source: "references 4.29",
-        effort: Effort::Long,
-        measure: |meter| (repose(meter, 1, 0.0) - 22.0).abs(),
+        effort: CostClass::Long,
+        measure: |stopwatch| (repose(stopwatch, 1, 0.0) - 22.0).abs(),
     },
-    Row {
+    SuiteCase {
         name: "granular/repose/rolling",
         setup: "with a rolling resistance of 0.1 and 0.3 it is steeper, and steeper again",
         metric: "degrees missing from a rise of one each",
@@ -319,13 +319,13 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "–",
         source: "references 4.29",
-        effort: Effort::Long,
-        measure: |meter| {
-            let [none, some, more] = [0.0, 0.1, 0.3].map(|c| repose(meter, 1, c));
+        effort: CostClass::Long,
+        measure: |stopwatch| {
+            let [none, some, more] = [0.0, 0.1, 0.3].map(|c| repose(stopwatch, 1, c));
             (1.0 - (some - none)).max(1.0 - (more - some)).max(0.0)
         },
     },
-    Row {
+    SuiteCase {
         name: "granular/beverloo/exponent",
         setup: "2,900 balls flow out of a bin that stays full through holes of 4, 5 and 6 balls: W ~ (D − 1.4 d)^2.5",
         metric: "off 2.5",
@@ -333,10 +333,10 @@ pub const ROWS: &[Row] = &[
         target: 5e-2,
         best: "–",
         source: "Beverloo 1961; references 4.31",
-        effort: Effort::Long,
-        measure: |meter| beverloo(meter)[0],
+        effort: CostClass::Long,
+        measure: |stopwatch| beverloo(stopwatch)[0],
     },
-    Row {
+    SuiteCase {
         name: "granular/beverloo/steady",
         setup: "the same: the rate of 15 s is that of the next 15 s",
         metric: "largest relative change",
@@ -344,10 +344,10 @@ pub const ROWS: &[Row] = &[
         target: 2e-2,
         best: "–",
         source: "Beverloo 1961; references 4.31",
-        effort: Effort::Long,
-        measure: |meter| beverloo(meter)[1],
+        effort: CostClass::Long,
+        measure: |stopwatch| beverloo(stopwatch)[1],
     },
-    Row {
+    SuiteCase {
         name: "granular/one-spot/20",
         setup: "20 balls in one spot, 10 s without gravity: all part, none is dropped",
         metric: "deepest overlap left, m (r 0.5)",
@@ -355,10 +355,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-2,
         best: "thrown up to 78 m: Rapier; 2.4 m/s PyBullet",
         source: "references §6.3, §6.4 family 10",
-        effort: Effort::Quick,
-        measure: |meter| all_in_one_spot(meter, crate::scene::EXACT, 20, 10.0),
+        effort: CostClass::Quick,
+        measure: |stopwatch| all_in_one_spot(stopwatch, crate::scene::EXACT, 20, 10.0),
     },
-    Row {
+    SuiteCase {
         name: "granular/one-spot/20",
         setup: "20 balls in one spot, 10 s without gravity: all part, none is dropped",
         metric: "deepest overlap left, m (r 0.5)",
@@ -366,10 +366,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-2,
         best: "thrown up to 78 m: Rapier; 2.4 m/s PyBullet",
         source: "references §6.3, §6.4 family 10",
-        effort: Effort::Quick,
-        measure: |meter| all_in_one_spot(meter, IMPULSE, 20, 10.0),
+        effort: CostClass::Quick,
+        measure: |stopwatch| all_in_one_spot(stopwatch, IMPULSE, 20, 10.0),
     },
-    Row {
+    SuiteCase {
         name: "granular/one-spot/1000",
         setup: "1,000 balls in one spot: each has contacts, and all are finite after 0.5 s",
         metric: "1 if a ball is without contact, stopped, or not finite",
@@ -377,12 +377,12 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "buffers overflow elsewhere",
         source: "references §6.4 family 10, issue 4",
-        effort: Effort::Quick,
-        measure: |meter| {
-            if all_in_one_spot(meter, IMPULSE, 1000, 0.5).is_nan() { 1.0 } else { 0.0 }
+        effort: CostClass::Quick,
+        measure: |stopwatch| {
+            if all_in_one_spot(stopwatch, IMPULSE, 1000, 0.5).is_nan() { 1.0 } else { 0.0 }
         },
     },
-    Row {
+    SuiteCase {
         name: "granular/lattice/touching",
         setup: "108 balls in a face-centred lattice, each touches twelve, 5 s without gravity: nothing moves",
         metric: "farthest moved, diameters",
@@ -390,10 +390,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "–",
         source: "references §6.4, family 10",
-        effort: Effort::Quick,
-        measure: |meter| lattice(meter, crate::scene::EXACT, 0.0),
+        effort: CostClass::Quick,
+        measure: |stopwatch| lattice(stopwatch, crate::scene::EXACT, 0.0),
     },
-    Row {
+    SuiteCase {
         name: "granular/lattice/touching",
         setup: "the same",
         metric: "farthest moved, diameters",
@@ -401,10 +401,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "–",
         source: "references §6.4, family 10",
-        effort: Effort::Quick,
-        measure: |meter| lattice(meter, IMPULSE, 0.0),
+        effort: CostClass::Quick,
+        measure: |stopwatch| lattice(stopwatch, IMPULSE, 0.0),
     },
-    Row {
+    SuiteCase {
         name: "granular/lattice/overlapping",
         setup: "the same with each overlapping twelve by a tenth: they part",
         metric: "deepest overlap left, diameters",
@@ -412,10 +412,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-2,
         best: "–",
         source: "references §6.4, family 10",
-        effort: Effort::Quick,
-        measure: |meter| lattice(meter, crate::scene::EXACT, 0.1),
+        effort: CostClass::Quick,
+        measure: |stopwatch| lattice(stopwatch, crate::scene::EXACT, 0.1),
     },
-    Row {
+    SuiteCase {
         name: "granular/lattice/overlapping",
         setup: "the same",
         metric: "deepest overlap left, diameters",
@@ -423,7 +423,7 @@ pub const ROWS: &[Row] = &[
         target: 1e-2,
         best: "–",
         source: "references §6.4, family 10",
-        effort: Effort::Quick,
-        measure: |meter| lattice(meter, IMPULSE, 0.1),
+        effort: CostClass::Quick,
+        measure: |stopwatch| lattice(stopwatch, IMPULSE, 0.1),
     },
 ];

@@ -3,15 +3,14 @@
 use taw::prelude::*;
 use taw::response::{ContactLaw, Elasticity};
 
-use super::{Effort, Row};
+use super::{CostClass, SuiteCase};
 use crate::scene::{
-    Ball, EXACT, IMPULSE, Meter, slope, state, surface, vector, wall, weightless, world,
+    Ball, EXACT, IMPULSE, Stopwatch, slope, state, surface, vector, wall, weightless, world,
 };
 
-/// How a ball leaves a wall whose normal is +y that it met with this velocity and spin
-/// about z: velocity along x and y, and spin.
+/// Velocity along x and y, and spin about z, of a ball after an impact on a wall with normal +y.
 fn bounce(
-    meter: &mut Meter,
+    stopwatch: &mut Stopwatch,
     model: Model,
     v: [f64; 2],
     spin: f64,
@@ -33,14 +32,14 @@ fn bounce(
     };
     let id = ball.insert(&mut world);
     for _ in 0..4 {
-        meter.step(&mut world, dt);
+        stopwatch.step(&mut world, dt);
     }
     let [_, v, w] = state(&world, id);
     [v.x, v.y, w.z]
 }
 
-/// The same for a rigid ball (Chung and Ooi 2011): its point sticks, or slides with all
-/// the friction that the whole impact allows.
+/// Analytic impact of a rigid ball (Chung and Ooi 2011): its contact point sticks, or slides with
+/// all the friction that the whole impact allows.
 fn rigid(v: [f64; 2], spin: f64, radius: f64, material: Material<f64>) -> [f64; 3] {
     let pressure = (1.0 + material.restitution) * -v[1];
     let slip = v[0] + radius * spin;
@@ -52,7 +51,7 @@ fn rigid(v: [f64; 2], spin: f64, radius: f64, material: Material<f64>) -> [f64; 
 
 /// The worst of velocity and rim speed over the speed, over all cases, steps and radii.
 fn oblique(
-    meter: &mut Meter,
+    stopwatch: &mut Stopwatch,
     cases: &[([f64; 2], f64)],
     rim: bool,
     material: Material<f64>,
@@ -63,7 +62,7 @@ fn oblique(
             // A second's flight must not be longer than f32 can place a ball of that size.
             let spin = if rim { spin / radius } else { *spin };
             for dt in [1.0 / 30.0, 1.0 / 60.0, 1e-3, 1e-4] {
-                let found = bounce(meter, EXACT, *v, spin, radius, material, dt);
+                let found = bounce(stopwatch, EXACT, *v, spin, radius, material, dt);
                 let exact = rigid(*v, spin, radius, material);
                 let speed = v[0].hypot(v[1]).max((radius * spin).abs());
                 let off =
@@ -86,7 +85,7 @@ fn angles() -> Vec<([f64; 2], f64)> {
 
 /// Collisions of elastic spheres by Hertz: contact time, largest overlap and force of two
 /// materials, worst relative error.
-fn hertz(meter: &mut Meter, with_wall: bool) -> f64 {
+fn hertz(stopwatch: &mut Stopwatch, with_wall: bool) -> f64 {
     let cases = if with_wall {
         [
             (7.0e10, 0.30, 2699.0, 0.1, 0.2, [731.59e-6, 49.717e-6, 11_369.9]),
@@ -133,7 +132,7 @@ fn hertz(meter: &mut Meter, with_wall: bool) -> f64 {
         let (mut time, mut overlap, mut force): (f64, f64, f64) = (0.0, 0.0, 0.0);
         loop {
             let before = state(&world, id)[1].x;
-            meter.step(&mut world, dt);
+            stopwatch.step(&mut world, dt);
             let [x, v, _] = state(&world, id);
             let apart = x.x - radius; // half of it, for two balls
             if apart > 0.0 || time > 1.0 {
@@ -155,7 +154,7 @@ fn hertz(meter: &mut Meter, with_wall: bool) -> f64 {
 }
 
 /// Five balls in a row, the first at 1 m/s: the largest error of a speed.
-fn cradle(meter: &mut Meter, gap: f64) -> f64 {
+fn cradle(stopwatch: &mut Stopwatch, gap: f64) -> f64 {
     let mut world = weightless::<f32>(EXACT);
     let ids = [0, 1, 2, 3, 4].map(|i| {
         let first = if i == 0 { 1.0 } else { 0.0 };
@@ -163,7 +162,7 @@ fn cradle(meter: &mut Meter, gap: f64) -> f64 {
         Ball { at, velocity: [first, 0.0, 0.0], material: surface(1.0, 0.0), ..Ball::default() }
             .insert(&mut world)
     });
-    meter.run(&mut world, 1.0 / 60.0, 1.0);
+    stopwatch.run(&mut world, 1.0 / 60.0, 1.0);
     let exact = [0.0, 0.0, 0.0, 0.0, 1.0];
     ids.iter()
         .zip(exact)
@@ -173,7 +172,7 @@ fn cradle(meter: &mut Meter, gap: f64) -> f64 {
 
 /// Counts the collisions of Galperin's billiard with masses 1 and 100^n; gives by how many
 /// it is off the digits of π.
-fn galperin<S: Scalar>(meter: &mut Meter, n: i32) -> f64 {
+fn galperin<S: Scalar>(stopwatch: &mut Stopwatch, n: i32) -> f64 {
     let mut world = weightless::<S>(Model { rotation: Rotation::None, ..EXACT });
     wall(&mut world, [1.0, 0.0, 0.0], 0.0);
     let elastic = surface(1.0, 0.0);
@@ -188,7 +187,7 @@ fn galperin<S: Scalar>(meter: &mut Meter, n: i32) -> f64 {
     .insert(&mut world);
     let mut count = 0.0;
     for _ in 0..600 {
-        meter.step(&mut world, 1.0 / 60.0);
+        stopwatch.step(&mut world, 1.0 / 60.0);
         count += world.impacts().len() as f64;
     }
     let digits = (std::f64::consts::PI * 10_f64.powi(n)).floor();
@@ -197,7 +196,7 @@ fn galperin<S: Scalar>(meter: &mut Meter, n: i32) -> f64 {
 
 /// Garwin's superball under a table, and 10,000 bounces between floor and ceiling for the
 /// energy.
-fn superball(meter: &mut Meter) -> f64 {
+fn superball(stopwatch: &mut Stopwatch) -> f64 {
     let rubber = Material { tangential_restitution: 1.0, ..surface(1.0, 1e6) };
     let mut world = weightless::<f32>(EXACT);
     wall(&mut world, [0.0, 1.0, 0.0], 0.0);
@@ -213,7 +212,7 @@ fn superball(meter: &mut Meter) -> f64 {
     let mut worst: f64 = 0.0;
     let start = 0.5 * (1.0 + 4.0);
     while bounces < 10_000 {
-        meter.step(&mut world, 1.0 / 60.0);
+        stopwatch.step(&mut world, 1.0 / 60.0);
         let [_, v, w] = state(&world, id);
         if !world.impacts().is_empty() {
             bounces += world.impacts().len();
@@ -235,7 +234,7 @@ fn superball(meter: &mut Meter) -> f64 {
 
 /// A ball passes one at rest and grazes it: the largest error of a velocity over the
 /// speed, for impact parameters of a diameter less this part.
-fn graze(meter: &mut Meter, model: Model, parts: &[f64]) -> f64 {
+fn graze(stopwatch: &mut Stopwatch, model: Model, parts: &[f64]) -> f64 {
     let mut worst: f64 = 0.0;
     for part in parts {
         // A power of two of speed and radius, so that the set-up itself rounds nothing.
@@ -250,7 +249,7 @@ fn graze(meter: &mut Meter, model: Model, parts: &[f64]) -> f64 {
         let first = moving.insert(&mut world);
         let second = Ball { at: [0.0; 3], material: surface(1.0, 0.0), ..Ball::default() }
             .insert(&mut world);
-        meter.run(&mut world, 1.0 / 60.0, 1.0);
+        stopwatch.run(&mut world, 1.0 / 60.0, 1.0);
         let normal = Vec3::new((1.0 - b * b).sqrt(), -b, 0.0);
         let given = normal * (10.0 * normal.x);
         let off = (state(&world, second)[1] - given)
@@ -261,7 +260,7 @@ fn graze(meter: &mut Meter, model: Model, parts: &[f64]) -> f64 {
     worst
 }
 
-/// Whether the place after an impact counts, too.
+/// Position after an impact, compared or not.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Places {
     Compared,
@@ -271,7 +270,7 @@ enum Places {
 /// Two balls at 300 m/s head on; a ball at 300 m/s against one of a tenth of its radius;
 /// and a thousand grazing passes at 300 m/s: the largest error of velocity over the speed
 /// and of the place a second later over the way.
-fn fast(meter: &mut Meter, model: Model, compare_places: Places) -> f64 {
+fn fast(stopwatch: &mut Stopwatch, model: Model, compare_places: Places) -> f64 {
     let mut worst: f64 = 0.0;
     let elastic = surface(1.0, 0.0);
     let model = Model { rotation: Rotation::None, ..model };
@@ -287,7 +286,7 @@ fn fast(meter: &mut Meter, model: Model, compare_places: Places) -> f64 {
         let second =
             Ball { radius, mass, velocity: [-300.0, 0.0, 0.0], at: [10.0, 0.0, 0.0], ..ball }
                 .insert(&mut world);
-        let t = meter.run(&mut world, 1.0 / 60.0, 1.0);
+        let t = stopwatch.run(&mut world, 1.0 / 60.0, 1.0);
         let meet = (20.0 - 0.5 - radius) / 600.0;
         let common = 300.0 * (1.0 - mass) / (1.0 + mass);
         for (id, start, v) in [(first, -10.0, 300.0), (second, 10.0, -300.0)] {
@@ -313,7 +312,7 @@ fn fast(meter: &mut Meter, model: Model, compare_places: Places) -> f64 {
         }
         .insert(&mut world);
         Ball { at: [0.0; 3], material: elastic, ..Ball::default() }.insert(&mut world);
-        meter.run(&mut world, 1.0 / 60.0, 0.1);
+        stopwatch.run(&mut world, 1.0 / 60.0, 0.1);
         let normal = Vec3::new((1.0 - b * b).sqrt(), -b, 0.0);
         let exact = Vec3::new(300.0, 0.0, 0.0) - normal * (300.0 * normal.x);
         worst = worst.max((state(&world, first)[1] - exact).magnitude() / 300.0);
@@ -323,7 +322,7 @@ fn fast(meter: &mut Meter, model: Model, compare_places: Places) -> f64 {
 
 /// A rack of fifteen, mirrored about the cue ball's way: the largest deviation of a ball
 /// from its mirror image after the break, in metres.
-fn rack(meter: &mut Meter) -> f64 {
+fn rack(stopwatch: &mut Stopwatch) -> f64 {
     let mut world = slope::<f32>(EXACT, 0.0);
     let r = 0.028_575;
     let material = surface(0.95, 0.06);
@@ -345,7 +344,7 @@ fn rack(meter: &mut Meter) -> f64 {
         ..Ball::default()
     };
     cue.insert(&mut world);
-    meter.run(&mut world, 1.0 / 60.0, 2.0);
+    stopwatch.run(&mut world, 1.0 / 60.0, 2.0);
     let at = |row: u32, i: u32| {
         let id = ids.iter().find(|(r, j, _)| *r == row && *j == i).expect("a ball").2;
         state(&world, id)[0]
@@ -360,14 +359,14 @@ fn rack(meter: &mut Meter) -> f64 {
 
 /// Flight under gravity for four seconds in steps of every length: relative error of way
 /// and velocity.
-fn flight(meter: &mut Meter, model: Model) -> f64 {
+fn flight(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut worst: f64 = 0.0;
     for dt in [0.5, 1.0 / 30.0, 1.0 / 60.0, 1e-3, 1e-4] {
         let mut world = world::<f32>(model);
         let start = Vec3::new(1.0, 2.0, -3.0);
         let id = Ball { at: start.into(), velocity: [3.0, 4.0, 5.0], ..Ball::default() }
             .insert(&mut world);
-        let t = meter.run(&mut world, dt, 4.0);
+        let t = stopwatch.run(&mut world, dt, 4.0);
         let v0 = Vec3::new(3.0, 4.0, 5.0);
         let g = vector::<f64>([0.0, -crate::scene::G, 0.0]);
         let [x, v, _] = state(&world, id);
@@ -379,11 +378,11 @@ fn flight(meter: &mut Meter, model: Model) -> f64 {
 }
 
 /// Restitution of 0 to 1 head on, two materials' worth of density: the largest error of e.
-fn restitution_sweep(meter: &mut Meter) -> f64 {
+fn restitution_sweep(stopwatch: &mut Stopwatch) -> f64 {
     let mut worst: f64 = 0.0;
     for e in [0.0, 0.2, 0.4, 0.6, 0.8, 1.0] {
         for dt in [1.0 / 30.0, 1.0 / 60.0, 1e-3] {
-            let [_, v, _] = bounce(meter, EXACT, [0.0, -3.9], 0.0, 2.5e-3, surface(e, 0.0), dt);
+            let [_, v, _] = bounce(stopwatch, EXACT, [0.0, -3.9], 0.0, 2.5e-3, surface(e, 0.0), dt);
             worst = worst.max((v / 3.9 - e).abs());
         }
     }
@@ -392,7 +391,7 @@ fn restitution_sweep(meter: &mut Meter) -> f64 {
 
 /// A million impacts of two balls: what must be conserved is, and what must not grow does
 /// not; the largest relative violation.
-fn fuzz(_: &mut Meter) -> f64 {
+fn fuzz(_: &mut Stopwatch) -> f64 {
     use taw::response::{BallRotation, InverseEffectiveMass, impact};
     let mut random = fastrand::Rng::with_seed(12);
     let mut worst: f64 = 0.0;
@@ -440,8 +439,8 @@ fn fuzz(_: &mut Meter) -> f64 {
     worst
 }
 
-pub const ROWS: &[Row] = &[
-    Row {
+pub const ROWS: &[SuiteCase] = &[
+    SuiteCase {
         name: "impact/hertz/balls",
         setup: "Chung & Ooi 1: glass and limestone balls head on, 10 m/s, step 1 % of Rayleigh's",
         metric: "worst relative error of time, overlap and force",
@@ -449,10 +448,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-3,
         best: "1e-3 EDEM, PFC3D",
         source: "Chung and Ooi 2011; references §2",
-        effort: Effort::Quick,
-        measure: |meter| hertz(meter, false),
+        effort: CostClass::Quick,
+        measure: |stopwatch| hertz(stopwatch, false),
     },
-    Row {
+    SuiteCase {
         name: "impact/hertz/wall",
         setup: "Chung & Ooi 2: aluminium and magnesium alloy balls on a plane, 0.2 m/s",
         metric: "worst relative error of time, overlap and force",
@@ -460,10 +459,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-3,
         best: "1e-3 EDEM, PFC3D",
         source: "Chung and Ooi 2011; references §2",
-        effort: Effort::Quick,
-        measure: |meter| hertz(meter, true),
+        effort: CostClass::Quick,
+        measure: |stopwatch| hertz(stopwatch, true),
     },
-    Row {
+    SuiteCase {
         name: "impact/restitution-sweep",
         setup: "Chung & Ooi 3: e 0 to 1 at 3.9 m/s, r 2.5 mm, three steps",
         metric: "error of e",
@@ -471,10 +470,10 @@ pub const ROWS: &[Row] = &[
         target: 2e-6,
         best: "5e-5 Rapier, Box3D",
         source: "Chung and Ooi 2011; references §2",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: restitution_sweep,
     },
-    Row {
+    SuiteCase {
         name: "impact/oblique",
         setup: "Chung & Ooi 4: 17 angles at 3.9 m/s, µ 0.092, e 0.98; r 1e-5 to 1e3, 1/30 s to 0.1 ms",
         metric: "worst of velocity and rim speed over the speed",
@@ -482,10 +481,10 @@ pub const ROWS: &[Row] = &[
         target: 2e-6,
         best: "0.18 Rapier and Box3D",
         source: "Chung and Ooi 2011; references §2",
-        effort: Effort::Quick,
-        measure: |meter| oblique(meter, &angles(), false, surface(0.98, 0.092)),
+        effort: CostClass::Quick,
+        measure: |stopwatch| oblique(stopwatch, &angles(), false, surface(0.98, 0.092)),
     },
-    Row {
+    SuiteCase {
         name: "impact/oblique/speeds",
         setup: "Chung & Ooi 5: 5 m/s onto it, 0.1 to 70 along, µ 0.3, e 1",
         metric: "worst of velocity and rim speed over the speed",
@@ -493,14 +492,14 @@ pub const ROWS: &[Row] = &[
         target: 2e-6,
         best: "the same defect",
         source: "Chung and Ooi 2011; references §2",
-        effort: Effort::Quick,
-        measure: |meter| {
+        effort: CostClass::Quick,
+        measure: |stopwatch| {
             let cases = [0.1, 0.5, 1.0, 2.0, 5.0, 8.0, 10.0, 12.0, 20.0, 40.0, 70.0]
                 .map(|vt| ([vt, -5.0], 0.0));
-            oblique(meter, &cases, false, surface(1.0, 0.3))
+            oblique(stopwatch, &cases, false, surface(1.0, 0.3))
         },
     },
-    Row {
+    SuiteCase {
         name: "impact/spin",
         setup: "Chung & Ooi 6: 0.2 m/s onto it, spin 0.175 to 22.86 rad/s at r 0.1, µ 0.4, e 0.5",
         metric: "worst of velocity and rim speed over the speed",
@@ -508,14 +507,14 @@ pub const ROWS: &[Row] = &[
         target: 2e-6,
         best: "the same defect",
         source: "Chung and Ooi 2011; references §2",
-        effort: Effort::Quick,
-        measure: |meter| {
+        effort: CostClass::Quick,
+        measure: |stopwatch| {
             let cases = [0.175, 0.5, 1.0, 2.0, 3.0, 3.5, 4.0, 4.5, 5.0, 6.0, 10.0, 22.86]
                 .map(|w| ([0.0, -0.2], 0.1 * w));
-            oblique(meter, &cases, true, surface(0.5, 0.4))
+            oblique(stopwatch, &cases, true, surface(0.5, 0.4))
         },
     },
-    Row {
+    SuiteCase {
         name: "impact/superball",
         setup: "Garwin: three bounces under a table, and the energy after 10,000",
         metric: "worst error of speed and rim speed, and relative of the energy",
@@ -523,10 +522,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "no engine has the material",
         source: "Garwin 1969; references 4.16",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: superball,
     },
-    Row {
+    SuiteCase {
         name: "impact/spin-bounce",
         setup: "Cross: 17 angles with spin, tangential restitution −1 to 1",
         metric: "worst of velocity and rim speed over the speed",
@@ -534,8 +533,8 @@ pub const ROWS: &[Row] = &[
         target: 2e-6,
         best: "0.18 Rapier and Box3D at 0",
         source: "Cross 2002; references 4.17",
-        effort: Effort::Quick,
-        measure: |meter| {
+        effort: CostClass::Quick,
+        measure: |stopwatch| {
             let cases: Vec<_> = angles()
                 .into_iter()
                 .zip([3.0, -5.0, 0.5].into_iter().cycle())
@@ -544,7 +543,7 @@ pub const ROWS: &[Row] = &[
             [-1.0, -0.4, 0.3, 1.0]
                 .map(|beta| {
                     oblique(
-                        meter,
+                        stopwatch,
                         &cases,
                         true,
                         Material { tangential_restitution: beta, ..surface(0.7, 0.4) },
@@ -554,7 +553,7 @@ pub const ROWS: &[Row] = &[
                 .fold(0.0, f64::max)
         },
     },
-    Row {
+    SuiteCase {
         name: "impact/conservation",
         setup: "a million impacts, masses 1e-3 to 1e3, all e, µ and β",
         metric: "worst relative violation of restitution, Coulomb and energy",
@@ -562,10 +561,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "–",
         source: "references §6.4, family 12",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: fuzz,
     },
-    Row {
+    SuiteCase {
         name: "impact/cradle/0",
         setup: "five balls that touch, the first at 1 m/s, 1/60 s: 0 0 0 0 1",
         metric: "largest error of a speed, m/s",
@@ -573,10 +572,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-5,
         best: "0.48 Rapier, 0.57 Box3D",
         source: "references 4.10",
-        effort: Effort::Quick,
-        measure: |meter| cradle(meter, 0.0),
+        effort: CostClass::Quick,
+        measure: |stopwatch| cradle(stopwatch, 0.0),
     },
-    Row {
+    SuiteCase {
         name: "impact/cradle/gaps",
         setup: "the same with gaps of 0.1 mm and 1 cm",
         metric: "largest error of a speed, m/s",
@@ -584,10 +583,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-5,
         best: "6e-2 Box3D (0.1 mm), exact (1 cm)",
         source: "references 4.10",
-        effort: Effort::Quick,
-        measure: |meter| cradle(meter, 1e-4).max(cradle(meter, 1e-2)),
+        effort: CostClass::Quick,
+        measure: |stopwatch| cradle(stopwatch, 1e-4).max(cradle(stopwatch, 1e-2)),
     },
-    Row {
+    SuiteCase {
         name: "impact/galperin/f32",
         setup: "masses 1 and 100^n, n 0 to 4: 3, 31, 314, 3141, 31415 collisions",
         metric: "collisions off",
@@ -595,10 +594,10 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "n = 1",
         source: "Galperin 2003; references 4.11",
-        effort: Effort::Quick,
-        measure: |meter| (0..=4).map(|n| galperin::<f32>(meter, n)).sum(),
+        effort: CostClass::Quick,
+        measure: |stopwatch| (0..=4).map(|n| galperin::<f32>(stopwatch, n)).sum(),
     },
-    Row {
+    SuiteCase {
         name: "impact/galperin/f64",
         setup: "the same in f64, n = 5 and 6: 314159, 3141592",
         metric: "collisions off",
@@ -606,10 +605,10 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "n = 1",
         source: "Galperin 2003; references 4.11",
-        effort: Effort::Quick,
-        measure: |meter| galperin::<f64>(meter, 5) + galperin::<f64>(meter, 6),
+        effort: CostClass::Quick,
+        measure: |stopwatch| galperin::<f64>(stopwatch, 5) + galperin::<f64>(stopwatch, 6),
     },
-    Row {
+    SuiteCase {
         name: "impact/graze",
         setup: "10 m/s past a ball at rest, by a diameter less 0.5 to 1e-3 of it",
         metric: "error of velocity over the speed",
@@ -617,10 +616,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "1.4e-3 to 0.15 Rapier",
         source: "references §6.3",
-        effort: Effort::Quick,
-        measure: |meter| graze(meter, EXACT, &[0.5, 0.1, 0.01, 1e-3]),
+        effort: CostClass::Quick,
+        measure: |stopwatch| graze(stopwatch, EXACT, &[0.5, 0.1, 0.01, 1e-3]),
     },
-    Row {
+    SuiteCase {
         name: "impact/graze/1e-4",
         setup: "the same by a diameter less 1e-4 of it",
         metric: "error of velocity over the speed",
@@ -628,10 +627,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-3,
         best: "0.18 Rapier; Bullet misses",
         source: "references §6.3",
-        effort: Effort::Quick,
-        measure: |meter| graze(meter, EXACT, &[1e-4]),
+        effort: CostClass::Quick,
+        measure: |stopwatch| graze(stopwatch, EXACT, &[1e-4]),
     },
-    Row {
+    SuiteCase {
         name: "impact/fast",
         setup: "300 m/s head on, against a ball of a tenth, and 1,000 grazing passes, 1/60 s",
         metric: "error of velocity over the speed, and of the place over the way",
@@ -639,10 +638,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "1.8e-3 Avian; 2.0 and 4.0 Rapier, ccd on or off: through (`peers`)",
         source: "issue 4",
-        effort: Effort::Quick,
-        measure: |meter| fast(meter, EXACT, Places::Compared),
+        effort: CostClass::Quick,
+        measure: |stopwatch| fast(stopwatch, EXACT, Places::Compared),
     },
-    Row {
+    SuiteCase {
         name: "impact/fast",
         setup: "the same; what is left of a step after a hit is lost, so places are not compared",
         metric: "error of velocity over the speed",
@@ -650,12 +649,12 @@ pub const ROWS: &[Row] = &[
         target: 1e-3,
         best: "1.8e-3 Avian; 2.0 and 4.0 Rapier, ccd on or off: through (`peers`)",
         source: "issue 4",
-        effort: Effort::Quick,
-        measure: |meter| {
-            fast(meter, Model { detection: Detection::Swept, ..IMPULSE }, Places::Ignored)
+        effort: CostClass::Quick,
+        measure: |stopwatch| {
+            fast(stopwatch, Model { detection: Detection::Swept, ..IMPULSE }, Places::Ignored)
         },
     },
-    Row {
+    SuiteCase {
         name: "impact/graze",
         setup: "10 m/s past a ball at rest, by a diameter less 0.5 to 1e-3 of it",
         metric: "error of velocity over the speed",
@@ -663,13 +662,13 @@ pub const ROWS: &[Row] = &[
         target: 1e-2,
         best: "1.4e-3 to 0.15 Rapier",
         source: "references §6.3",
-        effort: Effort::Quick,
-        measure: |meter| {
+        effort: CostClass::Quick,
+        measure: |stopwatch| {
             let swept = Model { detection: Detection::Swept, ..IMPULSE };
-            graze(meter, swept, &[0.5, 0.1, 0.01, 1e-3])
+            graze(stopwatch, swept, &[0.5, 0.1, 0.01, 1e-3])
         },
     },
-    Row {
+    SuiteCase {
         name: "impact/rack",
         setup: "fifteen balls and a cue ball at 8 m/s, mirrored about its way, 2 s",
         metric: "deviation from the mirror image, m",
@@ -677,10 +676,10 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "depends on the order of solving",
         source: "references 4.20",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: rack,
     },
-    Row {
+    SuiteCase {
         name: "impact/flight",
         setup: "4 s in steps of 0.5 s to 0.1 ms: x0 + v0 t + g t²/2",
         metric: "worst relative error of way and velocity",
@@ -688,10 +687,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "g dt t / 2 off: semi-implicit Euler",
         source: "references 4.32",
-        effort: Effort::Quick,
-        measure: |meter| flight(meter, EXACT),
+        effort: CostClass::Quick,
+        measure: |stopwatch| flight(stopwatch, EXACT),
     },
-    Row {
+    SuiteCase {
         name: "impact/flight",
         setup: "4 s in steps of 0.5 s to 0.1 ms: x0 + v0 t + g t²/2",
         metric: "worst relative error of way and velocity",
@@ -699,7 +698,7 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "g dt t / 2 off: semi-implicit Euler",
         source: "references 4.32",
-        effort: Effort::Quick,
-        measure: |meter| flight(meter, Model { response: Response::Impulse, ..EXACT }),
+        effort: CostClass::Quick,
+        measure: |stopwatch| flight(stopwatch, Model { response: Response::Impulse, ..EXACT }),
     },
 ];

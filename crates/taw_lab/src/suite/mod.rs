@@ -1,8 +1,8 @@
-//! The reference suite: one row for each thing that physics knows the answer to.
+//! Reference suite: one case per known result of physics.
 //!
-//! A row measures how far a model is from the answer. What it must reach, and what
-//! today's engines reach (measured in the same set-up, with their defaults), stand beside
-//! it. A row that is not reached stays in the suite and fails.
+//! A case measures the error of a model. Its target, and the results of today's engines (measured
+//! in the same set-up, with their defaults), stand beside it. A case that misses its target stays
+//! in the suite and fails.
 
 mod bouncing;
 mod gas;
@@ -16,113 +16,117 @@ mod swarms;
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::mpsc::channel;
 
-use crate::scene::Meter;
+use crate::scene::Stopwatch;
 
-/// One thing to measure.
-pub struct Row {
-    /// Its name, as `family/case`.
+/// A case of the suite.
+pub struct SuiteCase {
+    /// Name, as `family/case`.
     pub name: &'static str,
-    /// What is set up and what is the answer.
+    /// Set-up and expected result.
     pub setup: &'static str,
-    /// What measures how far off the answer is, with its unit.
+    /// Error metric, with its unit.
     pub metric: &'static str,
-    /// The model that is measured.
+    /// Measured model.
     pub model: &'static str,
-    /// The most that it may be.
+    /// Largest passing error.
     pub target: f64,
-    /// The same of today's best engine.
+    /// Error of today's best engine.
     pub best: &'static str,
-    /// Where the answer is from.
+    /// Source of the expected result.
     pub source: &'static str,
-    /// How long it takes.
-    pub effort: Effort,
-    /// Measures it.
-    pub measure: fn(&mut Meter) -> f64,
+    /// Cost class.
+    pub effort: CostClass,
+    /// Runs the case and returns the error.
+    pub measure: fn(&mut Stopwatch) -> f64,
 }
 
-/// How long a row takes.
+/// Cost class of a case.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Effort {
-    /// Up to a few seconds: also a test.
+pub enum CostClass {
+    /// Up to a few seconds: also run as a test.
     Quick,
     /// Longer.
     Long,
 }
 
-/// What a row gave.
+/// Measurement of a case.
 #[derive(Debug)]
-pub struct Outcome {
-    /// How far off the answer is.
+pub struct Measurement {
+    /// Error.
     pub figure: f64,
-    /// Whether that is within the target.
+    /// The error is within the target.
     pub reached: bool,
-    /// Nanoseconds per ball and step.
+    /// Cost in nanoseconds per ball and step.
     pub cost: f64,
-    /// Seconds that stepping took.
+    /// Duration of stepping, in seconds.
     pub seconds: f64,
 }
 
-impl Row {
-    /// Measures this row.
+impl SuiteCase {
+    /// Runs this case.
     #[must_use]
-    pub fn run(&self) -> Outcome {
-        let mut meter = Meter::default();
-        let figure = (self.measure)(&mut meter);
-        // NaN is no figure at all.
+    pub fn run(&self) -> Measurement {
+        let mut stopwatch = Stopwatch::default();
+        let figure = (self.measure)(&mut stopwatch);
+        // NaN fails.
         let reached = figure <= self.target;
-        Outcome { figure, reached, cost: meter.cost(), seconds: meter.seconds() }
+        Measurement { figure, reached, cost: stopwatch.cost(), seconds: stopwatch.seconds() }
     }
 }
 
-/// A row and its outcome, for other programs.
+/// A case with its measurement, for other programs.
 #[derive(Clone, Debug, PartialEq, serde::Serialize)]
 pub struct Report {
-    /// See [`Row`].
+    /// See [`SuiteCase`].
     pub name: &'static str,
-    /// What is set up and what is the answer.
+    /// Set-up and expected result.
     pub setup: &'static str,
-    /// What the figure is, with its unit.
+    /// Error metric, with its unit.
     pub metric: &'static str,
-    /// The model that is measured.
+    /// Measured model.
     pub model: &'static str,
-    /// How far off the answer is; nothing if that is no number.
+    /// Error; none if not finite.
     pub figure: Option<f64>,
-    /// The most that it may be.
+    /// Largest passing error.
     pub target: f64,
-    /// Whether it is no more.
+    /// The error is within the target.
     pub reached: bool,
-    /// The same of today's best engine.
+    /// Error of today's best engine.
     pub best: &'static str,
-    /// Where the answer is from.
+    /// Source of the expected result.
     pub source: &'static str,
-    /// Nanoseconds per ball and step.
+    /// Cost in nanoseconds per ball and step.
     pub cost: f64,
-    /// Seconds that stepping took.
+    /// Duration of stepping, in seconds.
     pub seconds: f64,
 }
 
 impl Report {
-    /// What there is to say of a row.
+    /// Creates the report of a case.
     #[must_use]
-    pub fn new(row: &Row, outcome: &Outcome) -> Self {
-        let Row { name, setup, metric, model, target, best, source, .. } = *row;
-        let Outcome { figure, reached, cost, seconds } = *outcome;
+    pub fn new(row: &SuiteCase, outcome: &Measurement) -> Self {
+        let SuiteCase { name, setup, metric, model, target, best, source, .. } = *row;
+        let Measurement { figure, reached, cost, seconds } = *outcome;
         let figure = figure.is_finite().then_some(figure);
         Self { name, setup, metric, model, figure, target, reached, best, source, cost, seconds }
     }
 }
 
-impl Row {
-    /// Whether it measures time, and so wants no others beside it.
+impl SuiteCase {
+    /// Returns true for a time measurement, which runs alone.
     #[must_use]
     pub fn is_time(&self) -> bool {
         self.name.ends_with("/time")
     }
 }
 
-/// Measures rows, some at a time, and tells the outcomes in the order of the rows.
-pub fn measure(rows: &[&'static Row], jobs: usize, mut tell: impl FnMut(&'static Row, Outcome)) {
-    let mut outcomes: Vec<Option<Outcome>> = Vec::new();
+/// Runs cases in parallel jobs, and reports the measurements in the order of the cases.
+pub fn measure(
+    rows: &[&'static SuiteCase],
+    jobs: usize,
+    mut tell: impl FnMut(&'static SuiteCase, Measurement),
+) {
+    let mut outcomes: Vec<Option<Measurement>> = Vec::new();
     outcomes.resize_with(rows.len(), || None);
     for (i, row) in rows.iter().enumerate().filter(|(_, row)| row.is_time()) {
         outcomes[i] = Some(row.run());
@@ -136,7 +140,7 @@ pub fn measure(rows: &[&'static Row], jobs: usize, mut tell: impl FnMut(&'static
                 loop {
                     let i = next.fetch_add(1, Ordering::Relaxed);
                     let Some(row) = rows.get(i) else { break };
-                    // Nobody listens any more only if the other side panicked.
+                    // The receiver is gone only if the other side panicked.
                     if !row.is_time() && send.send((i, row.run())).is_err() {
                         break;
                     }
@@ -145,7 +149,7 @@ pub fn measure(rows: &[&'static Row], jobs: usize, mut tell: impl FnMut(&'static
         }
         drop(send);
         let mut told = 0;
-        let mut tell_ready = |outcomes: &mut [Option<Outcome>]| {
+        let mut tell_ready = |outcomes: &mut [Option<Measurement>]| {
             while let Some(outcome) = outcomes.get_mut(told).and_then(Option::take) {
                 tell(rows[told], outcome);
                 told += 1;
@@ -159,8 +163,8 @@ pub fn measure(rows: &[&'static Row], jobs: usize, mut tell: impl FnMut(&'static
     });
 }
 
-/// Every row, in the order of `references.md`.
-pub fn rows() -> impl Iterator<Item = &'static Row> {
+/// All cases, in the order of `references.md`.
+pub fn rows() -> impl Iterator<Item = &'static SuiteCase> {
     let families = [rolling::ROWS, bouncing::ROWS, impacts::ROWS, gas::ROWS, granular::ROWS];
     families.into_iter().chain([ordinary::ROWS, swarms::ROWS, numbers::ROWS]).flatten()
 }

@@ -1,12 +1,12 @@
-//! What rounding, scale and extremes do.
+//! Rounding, scale and extreme values.
 
 use taw::math::Quat;
 use taw::motion::FreeRotation;
 use taw::prelude::*;
 
-use super::{Effort, Row};
+use super::{CostClass, SuiteCase};
 use crate::scene::{
-    Ball, EXACT, IMPULSE, Meter, energy, state, surface, vector, wall, weightless, world,
+    Ball, EXACT, IMPULSE, Stopwatch, energy, state, surface, vector, wall, weightless, world,
 };
 
 /// The box of Dzhanibekov for a hundred seconds in f32: relative errors of energy and
@@ -40,7 +40,7 @@ fn dzhanibekov_worst(part: usize) -> f64 {
 
 /// A ball that rolls down a slope into a wall and another ball, at this scale of length
 /// (and time by the root): positions over the scale.
-fn small_scene(meter: &mut Meter, model: Model, scale: f64) -> [Vec3<f64>; 2] {
+fn small_scene(stopwatch: &mut Stopwatch, model: Model, scale: f64) -> [Vec3<f64>; 2] {
     let mut world = world::<f32>(model);
     let time = scale.sqrt();
     let (sin, cos) = 10_f64.to_radians().sin_cos();
@@ -54,17 +54,17 @@ fn small_scene(meter: &mut Meter, model: Model, scale: f64) -> [Vec3<f64>; 2] {
     let ids = [ball(-3.0, 0.0), ball(1.0, 0.7)].map(|ball| ball.insert(&mut world));
     let dt = time / 64.0;
     for _ in 0..128 {
-        meter.step(&mut world, dt);
+        stopwatch.step(&mut world, dt);
     }
     ids.map(|id| state(&world, id)[0] / scale)
 }
 
-/// How far the scene's outcome depends on its scale, from a millimetre to a kilometre.
-fn scale_free(meter: &mut Meter, model: Model) -> f64 {
-    let exact = small_scene(meter, model, 1.0);
+/// Dependence of the outcome on the scale of the scene, from a millimetre to a kilometre.
+fn scale_free(stopwatch: &mut Stopwatch, model: Model) -> f64 {
+    let exact = small_scene(stopwatch, model, 1.0);
     let mut worst: f64 = 0.0;
     for scale in [1e-3, 1e-2, 0.1, 0.3, 10.0, 100.0, 1e3] {
-        let scaled = small_scene(meter, model, scale);
+        let scaled = small_scene(stopwatch, model, scale);
         for (a, b) in exact.iter().zip(scaled) {
             worst = worst.max((a - b).magnitude());
         }
@@ -74,7 +74,7 @@ fn scale_free(meter: &mut Meter, model: Model) -> f64 {
 
 /// Balls of extreme masses, spins, steps and materials collide: how many runs end with
 /// something that is not finite, or with energy that was gained.
-fn extremes(meter: &mut Meter, model: Model) -> f64 {
+fn extremes(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut failures = 0.0;
     for mass in [1e-30, 1.0, 1e30, f64::INFINITY] {
         for spin in [0.0, 1e5] {
@@ -96,7 +96,7 @@ fn extremes(meter: &mut Meter, model: Model) -> f64 {
                             .insert(&mut world);
                     let before = energy(&world);
                     for _ in 0..20 {
-                        meter.step(&mut world, dt);
+                        stopwatch.step(&mut world, dt);
                     }
                     let finite = [first, second].iter().all(|id| {
                         state(&world, *id)
@@ -116,7 +116,7 @@ fn extremes(meter: &mut Meter, model: Model) -> f64 {
             }
         }
     }
-    // What cannot be right is refused.
+    // Invalid values are rejected.
     let mut world = weightless::<f32>(EXACT);
     for dt in [0.0, -1.0, f32::NAN, f32::INFINITY] {
         failures += f64::from(u8::from(world.step(dt).is_ok()));
@@ -140,7 +140,7 @@ fn extremes(meter: &mut Meter, model: Model) -> f64 {
 
 /// NaN and infinity in each field are refused, and a force that returns NaN for one ball
 /// stops that one alone: how many of these fail.
-fn not_finite(meter: &mut Meter) -> f64 {
+fn not_finite(stopwatch: &mut Stopwatch) -> f64 {
     let mut failures = 0.0;
     let good = Marble::new(Point3::new(0.0, 2.0, 0.0), 0.5_f32);
     for bad in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
@@ -160,7 +160,7 @@ fn not_finite(meter: &mut Meter) -> f64 {
         }
     }
     for model in [EXACT, IMPULSE, Model { response: Response::Displacement, ..IMPULSE }] {
-        let run = |meter: &mut Meter, sick: bool| {
+        let run = |stopwatch: &mut Stopwatch, sick: bool| {
             let mut world = world::<f32>(model);
             wall(&mut world, [0.0, 1.0, 0.0], 0.0);
             for i in 0..20_u32 {
@@ -185,13 +185,13 @@ fn not_finite(meter: &mut Meter) -> f64 {
             }
             let mut stopped = 0;
             for _ in 0..60 {
-                meter.step(&mut world, 1.0 / 60.0);
+                stopwatch.step(&mut world, 1.0 / 60.0);
                 stopped += world.stopped().count();
             }
             (world.marbles.position()[..20].to_vec(), stopped, world.marbles.position()[20])
         };
-        let (healthy, none, _) = run(meter, false);
-        let (others, stopped, at) = run(meter, true);
+        let (healthy, none, _) = run(stopwatch, false);
+        let (others, stopped, at) = run(stopwatch, true);
         if healthy != others || none != 0 || stopped != 60 || !at.x.is_finite() {
             failures += 1.0;
         }
@@ -199,8 +199,8 @@ fn not_finite(meter: &mut Meter) -> f64 {
     failures
 }
 
-pub const ROWS: &[Row] = &[
-    Row {
+pub const ROWS: &[SuiteCase] = &[
+    SuiteCase {
         name: "numbers/dzhanibekov/energy",
         setup: "box turning about its middle axis, 100 s at 1/60, 1/240 and 1 ms, f32",
         metric: "largest relative error of the energy",
@@ -208,10 +208,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "1.9e-3 Rapier (1/60), 2.8e-2 (1 ms)",
         source: "Euler; references 4.8",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: |_| dzhanibekov_worst(0),
     },
-    Row {
+    SuiteCase {
         name: "numbers/dzhanibekov/momentum",
         setup: "the same",
         metric: "relative error of the angular momentum, a vector",
@@ -219,10 +219,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-5,
         best: "–",
         source: "Euler; references 4.8",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: |_| dzhanibekov_worst(1),
     },
-    Row {
+    SuiteCase {
         name: "numbers/dzhanibekov/flips",
         setup: "the same: 20 flips",
         metric: "flips off",
@@ -230,10 +230,10 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "3 Rapier, 1 Box3D (1/60)",
         source: "Euler; references 4.8",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: |_| dzhanibekov_worst(2),
     },
-    Row {
+    SuiteCase {
         name: "numbers/dzhanibekov/last",
         setup: "the same: the last at 98.3135 s",
         metric: "seconds off",
@@ -241,10 +241,10 @@ pub const ROWS: &[Row] = &[
         target: 0.3,
         best: "–",
         source: "Euler; references 4.8",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: |_| dzhanibekov_worst(3),
     },
-    Row {
+    SuiteCase {
         name: "numbers/scale-free",
         setup: "a slope, a wall and two balls at scales of 1e-3 to 1e3, 2 s of its own time",
         metric: "deviation of a place over the scale",
@@ -252,10 +252,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-5,
         best: "2.9e-2 Avian, 4e-2 Rapier, their length unit or not (`peers`)",
         source: "issue 4",
-        effort: Effort::Quick,
-        measure: |meter| scale_free(meter, EXACT),
+        effort: CostClass::Quick,
+        measure: |stopwatch| scale_free(stopwatch, EXACT),
     },
-    Row {
+    SuiteCase {
         name: "numbers/scale-free",
         setup: "a slope, a wall and two balls at scales of 1e-3 to 1e3, 2 s of its own time",
         metric: "deviation of a place over the scale",
@@ -263,10 +263,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "2.9e-2 Avian, 4e-2 Rapier, their length unit or not (`peers`)",
         source: "issue 4",
-        effort: Effort::Quick,
-        measure: |meter| scale_free(meter, IMPULSE),
+        effort: CostClass::Quick,
+        measure: |stopwatch| scale_free(stopwatch, IMPULSE),
     },
-    Row {
+    SuiteCase {
         name: "numbers/extremes",
         setup: "masses 1e-30 to infinity, 1e5 rad/s, steps 1 ns to 1 s, e and µ at their ends",
         metric: "runs with energy gained or something not finite, and bad input taken",
@@ -274,10 +274,10 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "–",
         source: "references §6.4, family 7",
-        effort: Effort::Quick,
-        measure: |meter| extremes(meter, EXACT),
+        effort: CostClass::Quick,
+        measure: |stopwatch| extremes(stopwatch, EXACT),
     },
-    Row {
+    SuiteCase {
         name: "numbers/extremes",
         setup: "the same; masses 1e-30 to infinity, 1e5 rad/s, steps 1 ns to 1 s, e and µ at their ends",
         metric: "runs with energy gained or something not finite, and bad input taken",
@@ -285,10 +285,10 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "–",
         source: "references §6.4, family 7",
-        effort: Effort::Quick,
-        measure: |meter| extremes(meter, IMPULSE),
+        effort: CostClass::Quick,
+        measure: |stopwatch| extremes(stopwatch, IMPULSE),
     },
-    Row {
+    SuiteCase {
         name: "numbers/not-finite",
         setup: "NaN and infinity in each field; a force that is NaN for one of 21 balls",
         metric: "not refused, or more than that ball changed by a bit",
@@ -296,7 +296,7 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "Rapier stops that body: the bar",
         source: "references §6.4, family 8",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: not_finite,
     },
 ];

@@ -8,9 +8,9 @@ use taw::motion::{WallMotion, integrate_rotation};
 use taw::prelude::*;
 use taw::shape::Mesh;
 
-use super::{Effort, Row};
+use super::{CostClass, SuiteCase};
 use crate::scene::{
-    Ball, EXACT, G, IMPULSE, Meter, energy, overlaps, slope, state, surface, vector, wall,
+    Ball, EXACT, G, IMPULSE, Stopwatch, energy, overlaps, slope, state, surface, vector, wall,
     weightless, world,
 };
 
@@ -35,7 +35,7 @@ impl Random {
 
 /// Energy gained in one step, as a part of the motion's, by balls that go into a corner of floor
 /// and wall at 1 to 19 iterations: the most of 2,000.
-fn corner(meter: &mut Meter, model: Model) -> f64 {
+fn corner(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut random = Random(fastrand::Rng::with_seed(1));
     let mut worst = f64::NEG_INFINITY;
     for _ in 0..2000 {
@@ -60,25 +60,25 @@ fn corner(meter: &mut Meter, model: Model) -> f64 {
         ball.insert(&mut world);
         let at_rest = G * ball.at[1];
         let before = energy(&world);
-        meter.step(&mut world, DT);
+        stopwatch.step(&mut world, DT);
         worst = worst.max((energy(&world) - before) / (before - at_rest));
     }
     worst
 }
 
 /// Energy gained over `seconds`, as a height in metres.
-fn gained_height(meter: &mut Meter, world: &mut World<f32>, seconds: f64) -> f64 {
+fn gained_height(stopwatch: &mut Stopwatch, world: &mut World<f32>, seconds: f64) -> f64 {
     let begin = energy(world);
     let mut most = begin;
     for _ in 0..(seconds / DT) as u32 {
-        meter.step(world, DT);
+        stopwatch.step(world, DT);
         most = most.max(energy(world));
     }
     (most - begin) / G
 }
 
 /// A ball that is thrown about on the vertex of a mesh cone; the most of 40 cones.
-fn cone(meter: &mut Meter, model: Model) -> f64 {
+fn cone(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut random = Random(fastrand::Rng::with_seed(2));
     let mut worst: f64 = 0.0;
     for _ in 0..40 {
@@ -104,13 +104,13 @@ fn cone(meter: &mut Meter, model: Model) -> f64 {
             ..Ball::default()
         };
         ball.insert(&mut world);
-        worst = worst.max(gained_height(meter, &mut world, 4.0));
+        worst = worst.max(gained_height(stopwatch, &mut world, 4.0));
     }
     worst
 }
 
 /// A ball that is thrown into a groove of two half-spaces; the most of 40 grooves.
-fn groove(meter: &mut Meter, model: Model) -> f64 {
+fn groove(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut random = Random(fastrand::Rng::with_seed(3));
     let mut worst: f64 = 0.0;
     for _ in 0..40 {
@@ -128,7 +128,7 @@ fn groove(meter: &mut Meter, model: Model) -> f64 {
             ..Ball::default()
         };
         ball.insert(&mut world);
-        worst = worst.max(gained_height(meter, &mut world, 4.0));
+        worst = worst.max(gained_height(stopwatch, &mut world, 4.0));
     }
     worst
 }
@@ -168,7 +168,7 @@ impl Moving {
 
 /// Gain of speed in one step of balls on a board with rails that tilts by .05 rad at .25 Hz, in
 /// m/s: the most of ten boards in 20 s.
-fn tilting_board(meter: &mut Meter, model: Model) -> f64 {
+fn tilting_board(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut random = Random(fastrand::Rng::with_seed(4));
     let mut worst: f64 = 0.0;
     for _ in 0..10 {
@@ -191,7 +191,7 @@ fn tilting_board(meter: &mut Meter, model: Model) -> f64 {
                 wall.go(&mut world, pose);
             }
             let before = world.marbles.velocity().to_vec();
-            meter.step(&mut world, DT);
+            stopwatch.step(&mut world, DT);
             for (after, before) in world.marbles.velocity().iter().zip(before) {
                 worst = worst.max(f64::from(after.magnitude() - before.magnitude()));
             }
@@ -202,7 +202,7 @@ fn tilting_board(meter: &mut Meter, model: Model) -> f64 {
 
 /// Distance of a ball from a lift that it stands on, which rises or sinks at 3 m/s, in metres, at
 /// the most.
-fn lift(meter: &mut Meter, model: Model) -> f64 {
+fn lift(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut worst: f64 = 0.0;
     for (speed, substeps) in [(3.0, 1), (-3.0, 1), (3.0, 4), (-3.0, 4)] {
         let mut world = world::<f32>(Model { substeps, ..model });
@@ -213,7 +213,7 @@ fn lift(meter: &mut Meter, model: Model) -> f64 {
             let height = speed * DT * f64::from(step);
             let translation = vector([0.0, height, 0.0]);
             floor.go(&mut world, Pose { translation, ..Pose::identity() });
-            meter.step(&mut world, DT);
+            stopwatch.step(&mut world, DT);
             worst = worst.max((state(&world, id)[0].y - height - 0.1).abs());
         }
     }
@@ -223,7 +223,7 @@ fn lift(meter: &mut Meter, model: Model) -> f64 {
 /// Error of the angle at which a ball that starts a thousandth beside the top of a fixed sphere
 /// leaves it, in degrees. It leaves where nothing presses any more, at `v² = g R cos θ`, and then
 /// keeps its speed across, `v cos θ`.
-fn off_a_sphere(meter: &mut Meter, model: Model, friction: f64, cosine: f64) -> f64 {
+fn off_a_sphere(stopwatch: &mut Stopwatch, model: Model, friction: f64, cosine: f64) -> f64 {
     let mut world = world::<f64>(model);
     let sphere = Sphere::new(Point3::new(0.0, 0.0, 0.0), 1.0).expect("a metre");
     world.walls.insert(sphere).expect("finite");
@@ -231,7 +231,7 @@ fn off_a_sphere(meter: &mut Meter, model: Model, friction: f64, cosine: f64) -> 
     let ball = Ball { at: [far * sin, far * cos, 0.0], radius: 0.1, ..Ball::default() };
     let id = Ball { material: surface(0.0, friction), ..ball }.insert(&mut world);
     while state(&world, id)[0].y > -1.0 {
-        meter.step(&mut world, DT);
+        stopwatch.step(&mut world, DT);
     }
     let across = state(&world, id)[1].x;
     let left = (across * across / (G * far)).cbrt();
@@ -241,12 +241,12 @@ fn off_a_sphere(meter: &mut Meter, model: Model, friction: f64, cosine: f64) -> 
 
 /// Speed of balls that overlap by a fifth of their radius, when they are apart or after two
 /// seconds, without gravity, in m/s.
-fn overlap(meter: &mut Meter, model: Model) -> f64 {
+fn overlap(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut world = weightless::<f32>(model);
     for x in [0.0, 0.9] {
         Ball { at: [x, 0.0, 0.0], ..Ball::default() }.insert(&mut world);
     }
-    meter.run(&mut world, DT, 2.0);
+    stopwatch.run(&mut world, DT, 2.0);
     let deepest = overlaps(&world).into_iter().fold(0.0, f64::max);
     if deepest > 0.01 {
         return f64::NAN;
@@ -255,13 +255,13 @@ fn overlap(meter: &mut Meter, model: Model) -> f64 {
 }
 
 /// Speed that balls report which lie: one on the floor, five on each other, in m/s.
-fn rest(meter: &mut Meter, model: Model) -> f64 {
+fn rest(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut world = slope::<f32>(model, 0.0);
     Ball { at: [5.0, 0.5, 0.0], ..Ball::default() }.insert(&mut world);
     for i in 0..5 {
         Ball { at: [0.0, 0.5 + f64::from(i), 0.0], ..Ball::default() }.insert(&mut world);
     }
-    meter.run(&mut world, DT, 5.0);
+    stopwatch.run(&mut world, DT, 5.0);
     world.marbles.velocity().iter().map(|v| f64::from(v.magnitude())).fold(0.0, f64::max)
 }
 
@@ -271,10 +271,20 @@ const fn row(
     [setup, metric]: [&'static str; 2],
     model: &'static str,
     target: f64,
-    measure: fn(&mut Meter) -> f64,
-) -> Row {
+    measure: fn(&mut Stopwatch) -> f64,
+) -> SuiteCase {
     let (best, source) = ("–", "energy from nothing is an error");
-    Row { name, setup, metric, model, target, best, source, effort: Effort::Quick, measure }
+    SuiteCase {
+        name,
+        setup,
+        metric,
+        model,
+        target,
+        best,
+        source,
+        effort: CostClass::Quick,
+        measure,
+    }
 }
 
 const CORNER: [&str; 2] = [
@@ -306,29 +316,37 @@ const OVERLAP: [&str; 2] = [
 const REST: [&str; 2] =
     ["a ball on the floor and a tower of five, after 5 s", "most speed reported, m/s"];
 
-pub const ROWS: &[Row] = &[
-    row("ordinary/corner", CORNER, "impulse", 1e-4, |meter| corner(meter, IMPULSE)),
-    row("ordinary/corner", CORNER, "event-driven", 1e-4, |meter| corner(meter, EXACT)),
-    row("ordinary/cone", CONE, "impulse", 0.01, |meter| cone(meter, IMPULSE)),
-    row("ordinary/cone", CONE, "event-driven", 1e-3, |meter| cone(meter, EXACT)),
-    row("ordinary/groove", GROOVE, "impulse", 0.01, |meter| groove(meter, IMPULSE)),
-    row("ordinary/groove", GROOVE, "event-driven", 1e-3, |meter| groove(meter, EXACT)),
-    row("ordinary/tilting-board", BOARD, "impulse", 0.8, |meter| tilting_board(meter, IMPULSE)),
-    row("ordinary/tilting-board", BOARD, "event-driven", 0.8, |meter| tilting_board(meter, EXACT)),
-    row("ordinary/lift", LIFT, "impulse", 1e-3, |meter| lift(meter, IMPULSE)),
-    row("ordinary/lift", LIFT, "event-driven", 1e-3, |meter| lift(meter, EXACT)),
-    row("ordinary/off-a-sphere/rolls", ROLLS_OFF, "event-driven", 0.05, |meter| {
-        off_a_sphere(meter, EXACT, 1e6, 10.0 / 17.0)
+pub const ROWS: &[SuiteCase] = &[
+    row("ordinary/corner", CORNER, "impulse", 1e-4, |stopwatch| corner(stopwatch, IMPULSE)),
+    row("ordinary/corner", CORNER, "event-driven", 1e-4, |stopwatch| corner(stopwatch, EXACT)),
+    row("ordinary/cone", CONE, "impulse", 0.01, |stopwatch| cone(stopwatch, IMPULSE)),
+    row("ordinary/cone", CONE, "event-driven", 1e-3, |stopwatch| cone(stopwatch, EXACT)),
+    row("ordinary/groove", GROOVE, "impulse", 0.01, |stopwatch| groove(stopwatch, IMPULSE)),
+    row("ordinary/groove", GROOVE, "event-driven", 1e-3, |stopwatch| groove(stopwatch, EXACT)),
+    row("ordinary/tilting-board", BOARD, "impulse", 0.8, |stopwatch| {
+        tilting_board(stopwatch, IMPULSE)
     }),
-    row("ordinary/off-a-sphere/slides", SLIDES_OFF, "event-driven", 0.05, |meter| {
-        off_a_sphere(meter, EXACT, 0.0, 2.0 / 3.0)
+    row("ordinary/tilting-board", BOARD, "event-driven", 0.8, |stopwatch| {
+        tilting_board(stopwatch, EXACT)
     }),
-    row("ordinary/overlap", OVERLAP, "displacement", 1e-3, |meter| overlap(meter, DISPLACEMENT)),
-    row("ordinary/overlap", OVERLAP, "impulse", 1e-3, |meter| overlap(meter, IMPULSE)),
-    row("ordinary/overlap", OVERLAP, "event-driven", 1e-3, |meter| overlap(meter, EXACT)),
-    row("ordinary/overlap", OVERLAP, "spring and dashpot", 0.1, |meter| overlap(meter, SPRING)),
-    row("ordinary/rest", REST, "displacement", 1e-3, |meter| rest(meter, DISPLACEMENT)),
-    row("ordinary/rest", REST, "impulse", 1e-3, |meter| rest(meter, IMPULSE)),
-    row("ordinary/rest", REST, "event-driven", 1e-3, |meter| rest(meter, EXACT)),
-    row("ordinary/rest", REST, "spring and dashpot", 1e-3, |meter| rest(meter, SPRING)),
+    row("ordinary/lift", LIFT, "impulse", 1e-3, |stopwatch| lift(stopwatch, IMPULSE)),
+    row("ordinary/lift", LIFT, "event-driven", 1e-3, |stopwatch| lift(stopwatch, EXACT)),
+    row("ordinary/off-a-sphere/rolls", ROLLS_OFF, "event-driven", 0.05, |stopwatch| {
+        off_a_sphere(stopwatch, EXACT, 1e6, 10.0 / 17.0)
+    }),
+    row("ordinary/off-a-sphere/slides", SLIDES_OFF, "event-driven", 0.05, |stopwatch| {
+        off_a_sphere(stopwatch, EXACT, 0.0, 2.0 / 3.0)
+    }),
+    row("ordinary/overlap", OVERLAP, "displacement", 1e-3, |stopwatch| {
+        overlap(stopwatch, DISPLACEMENT)
+    }),
+    row("ordinary/overlap", OVERLAP, "impulse", 1e-3, |stopwatch| overlap(stopwatch, IMPULSE)),
+    row("ordinary/overlap", OVERLAP, "event-driven", 1e-3, |stopwatch| overlap(stopwatch, EXACT)),
+    row("ordinary/overlap", OVERLAP, "spring and dashpot", 0.1, |stopwatch| {
+        overlap(stopwatch, SPRING)
+    }),
+    row("ordinary/rest", REST, "displacement", 1e-3, |stopwatch| rest(stopwatch, DISPLACEMENT)),
+    row("ordinary/rest", REST, "impulse", 1e-3, |stopwatch| rest(stopwatch, IMPULSE)),
+    row("ordinary/rest", REST, "event-driven", 1e-3, |stopwatch| rest(stopwatch, EXACT)),
+    row("ordinary/rest", REST, "spring and dashpot", 1e-3, |stopwatch| rest(stopwatch, SPRING)),
 ];

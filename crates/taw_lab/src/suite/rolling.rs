@@ -3,8 +3,10 @@
 use taw::motion::WallMotion;
 use taw::prelude::*;
 
-use super::{Effort, Row};
-use crate::scene::{Ball, EXACT, G, IMPULSE, Meter, slope, state, surface, vector, wall, world};
+use super::{CostClass, SuiteCase};
+use crate::scene::{
+    Ball, EXACT, G, IMPULSE, Stopwatch, slope, state, surface, vector, wall, world,
+};
 
 const STEPS: [f64; 5] = [1.0 / 30.0, 1.0 / 60.0, 1.0 / 120.0, 1.0 / 240.0, 1e-3];
 
@@ -14,13 +16,12 @@ fn on_slope(degrees: f64, friction: f64) -> Ball {
     Ball { at: [0.5 * sin, 0.5 * cos, 0.0], material: surface(0.0, friction), ..Ball::default() }
 }
 
-/// How far off speed, way and spin are after four seconds on a slope; the largest
-/// relative error.
-fn incline(meter: &mut Meter, model: Model, dt: f64, degrees: f64, friction: f64) -> f64 {
+/// Largest relative error of speed, distance and spin after four seconds on a slope.
+fn incline(stopwatch: &mut Stopwatch, model: Model, dt: f64, degrees: f64, friction: f64) -> f64 {
     let mut world = slope::<f32>(model, degrees);
     let ball = on_slope(degrees, friction);
     let id = ball.insert(&mut world);
-    let t = meter.run(&mut world, dt, 4.0);
+    let t = stopwatch.run(&mut world, dt, 4.0);
     let (sin, cos) = degrees.to_radians().sin_cos();
     let slips = friction < 2.0 / 7.0 * sin / cos;
     let pull = if slips { G * (sin - friction * cos) } else { 5.0 / 7.0 * G * sin };
@@ -38,13 +39,13 @@ fn worst(steps: &[f64], mut error: impl FnMut(f64) -> f64) -> f64 {
 
 /// Slip to roll from 5 m/s with friction 0.3, after 2 s: relative errors of speed, way,
 /// and of the moment at which it rolls, as the way and the speed give it away.
-fn slip_to_roll(meter: &mut Meter, model: Model, dt: f64) -> [f64; 3] {
+fn slip_to_roll(stopwatch: &mut Stopwatch, model: Model, dt: f64) -> [f64; 3] {
     let mut world = slope::<f32>(model, 0.0);
     let heading = 0.6_f64;
     let toward = Vec3::new(heading.cos(), 0.0, heading.sin());
     let velocity = (toward * 5.0).into();
     let id = Ball { velocity, ..on_slope(0.0, 0.3) }.insert(&mut world);
-    let t = meter.run(&mut world, dt, 2.0);
+    let t = stopwatch.run(&mut world, dt, 2.0);
     let [x, v, _] = state(&world, id);
     let (start, end, slowing) = (5.0, 25.0 / 7.0, 0.3 * G);
     let stop = (start - end) / slowing;
@@ -56,7 +57,7 @@ fn slip_to_roll(meter: &mut Meter, model: Model, dt: f64) -> [f64; 3] {
     let (mut now, mut rolls) = (0.0, f64::NAN);
     let mut before = 5.0;
     while now < 1.0 {
-        meter.step(&mut world, dt);
+        stopwatch.step(&mut world, dt);
         now += f64::from(dt as f32);
         let speed = state(&world, id)[1].magnitude();
         if rolls.is_nan() && (speed - end).abs() < 1e-6 * end {
@@ -71,7 +72,7 @@ fn slip_to_roll(meter: &mut Meter, model: Model, dt: f64) -> [f64; 3] {
 
 /// A ball that rolls on a turntable: errors of the rate at which it goes round, of its
 /// speed, and of the radius of its circle (worst over the run), all relative.
-fn turntable(meter: &mut Meter, dt: f64) -> [f64; 3] {
+fn turntable(stopwatch: &mut Stopwatch, dt: f64) -> [f64; 3] {
     let omega = 2.0;
     let mut world = slope::<f32>(EXACT, 0.0);
     let table = world.walls.id(0).expect("the floor");
@@ -101,7 +102,7 @@ fn turntable(meter: &mut Meter, dt: f64) -> [f64; 3] {
     let steps = (30.0 / dt).round() as u32;
     let (mut angle, mut last) = (0.0, v);
     for _ in 0..steps {
-        meter.step(&mut world, dt);
+        stopwatch.step(&mut world, dt);
         let [x, v, _] = state(&world, id);
         speed_error = speed_error.max((v.magnitude() / 0.5 - 1.0).abs());
         radius_error = radius_error.max(((x - center).magnitude() / radius - 1.0).abs());
@@ -118,7 +119,7 @@ fn turntable(meter: &mut Meter, dt: f64) -> [f64; 3] {
 ///
 /// The box is a wall that moves. In each step its speed is the one at which its momentum
 /// and the balls' change by what the force and the ground give them.
-fn box_with_balls(meter: &mut Meter, degrees: f64, dt: f64) -> f64 {
+fn box_with_balls(stopwatch: &mut Stopwatch, degrees: f64, dt: f64) -> f64 {
     let toward = Vec3::new(degrees.to_radians().cos(), 0.0, degrees.to_radians().sin());
     let mut world = slope::<f32>(EXACT, 0.0);
     let top = world.walls.id(0).expect("the top of the box");
@@ -149,7 +150,7 @@ fn box_with_balls(meter: &mut Meter, degrees: f64, dt: f64) -> f64 {
                 pivot: Point3::new(0.0, 0.0, 0.0),
             };
             next.walls.set_motion(top, Some(motion)).expect("finite");
-            meter.step(&mut next, dt);
+            stopwatch.step(&mut next, dt);
             next
         };
         let imbalance =
@@ -175,7 +176,7 @@ fn box_with_balls(meter: &mut Meter, degrees: f64, dt: f64) -> f64 {
 /// Stopping distance of a rolling ball, time until a ball that spins on the spot stands,
 /// and how far a ball moves that lies on a slope below its rolling angle; relative errors,
 /// and metres.
-fn resistances(meter: &mut Meter, model: Model, dt: f64) -> f64 {
+fn resistances(stopwatch: &mut Stopwatch, model: Model, dt: f64) -> f64 {
     let rough = |rolling, spinning| Material {
         rolling_resistance: rolling,
         spinning_resistance: spinning,
@@ -201,7 +202,7 @@ fn resistances(meter: &mut Meter, model: Model, dt: f64) -> f64 {
     let mut spin_time = f64::NAN;
     let mut before = 10.0;
     for _ in 0..(15.0 / dt).round() as u32 {
-        meter.step(&mut world, dt);
+        stopwatch.step(&mut world, dt);
         let now = state(&world, spinning)[2].y;
         if now.abs() < 1e-6 && spin_time.is_nan() {
             // Within this step it lost what it had before.
@@ -214,23 +215,22 @@ fn resistances(meter: &mut Meter, model: Model, dt: f64) -> f64 {
     let mut slope = slope::<f32>(model, 2.8); // tan = 0.0489
     let start = on_slope(2.8, 0.5);
     let lying = Ball { material: rough(0.05, 0.0), ..start }.insert(&mut slope);
-    meter.run(&mut slope, dt, 10.0);
+    stopwatch.run(&mut slope, dt, 10.0);
     let crept = (state(&slope, lying)[0] - Vec3::from(start.at)).magnitude();
     [(way / exact - 1.0).abs(), (spin_time / still - 1.0).abs(), crept]
         .into_iter()
         .fold(0.0, f64::max)
 }
 
-/// How far the heading of a ball that first slides and then rolls turns, at 24 angles to
-/// the axes, in rad.
-fn heading(meter: &mut Meter, model: Model) -> f64 {
+/// Change of heading in rad of a ball that first slides and then rolls, at 24 angles to the axes.
+fn heading(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut worst: f64 = 0.0;
     for i in 0..24 {
         let mut world = slope::<f32>(model, 0.0);
         let angle = f64::from(i) * 0.2617 + 0.01;
         let toward = Vec3::new(angle.cos(), 0.0, angle.sin());
         let id = Ball { velocity: (toward * 5.0).into(), ..on_slope(0.0, 0.3) }.insert(&mut world);
-        meter.run(&mut world, 1.0 / 60.0, 2.0);
+        stopwatch.run(&mut world, 1.0 / 60.0, 2.0);
         let [x, v, _] = state(&world, id);
         let off = |d: Vec3<f64>| {
             let along = Vec3::new(d.x, 0.0, d.z);
@@ -242,18 +242,18 @@ fn heading(meter: &mut Meter, model: Model) -> f64 {
 }
 
 /// A ball of 8 mm on ten degrees, up to 5 m/s: relative error of its speed.
-fn no_spin_cap(meter: &mut Meter, model: Model) -> f64 {
+fn no_spin_cap(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let mut world = slope::<f32>(model, 10.0);
     let (sin, cos) = 10_f64.to_radians().sin_cos();
     let id = Ball { radius: 8e-3, at: [8e-3 * sin, 8e-3 * cos, 0.0], ..on_slope(10.0, 0.5) }
         .insert(&mut world);
     let pull = 5.0 / 7.0 * G * sin;
-    let t = meter.run(&mut world, 1.0 / 60.0, 5.0 / pull);
+    let t = stopwatch.run(&mut world, 1.0 / 60.0, 5.0 / pull);
     (state(&world, id)[1].magnitude() / (pull * t) - 1.0).abs()
 }
 
 /// Five seconds at 1 m/s far out: relative error of the way.
-fn far_roll(meter: &mut Meter, model: Model, far: f64) -> f64 {
+fn far_roll(stopwatch: &mut Stopwatch, model: Model, far: f64) -> f64 {
     let mut world = slope::<f32>(model, 0.0);
     let id = Ball {
         at: [far, 0.5, 0.0],
@@ -262,33 +262,33 @@ fn far_roll(meter: &mut Meter, model: Model, far: f64) -> f64 {
         ..on_slope(0.0, 0.5)
     }
     .insert(&mut world);
-    let t = meter.run(&mut world, 1.0 / 60.0, 5.0);
+    let t = stopwatch.run(&mut world, 1.0 / 60.0, 5.0);
     ((state(&world, id)[0].x - far) / t - 1.0).abs()
 }
 
 /// A ball on a slope whose angle is just below or above that at which it begins to slip:
 /// the largest error of the friction at which it changes over.
-fn critical_friction(meter: &mut Meter) -> f64 {
+fn critical_friction(stopwatch: &mut Stopwatch) -> f64 {
     let degrees = 60.0_f64;
     let exact = 2.0 / 7.0 * degrees.to_radians().tan();
-    let slips = |meter: &mut Meter, friction: f64| {
+    let slips = |stopwatch: &mut Stopwatch, friction: f64| {
         let mut world = slope::<f32>(EXACT, degrees);
         let id = on_slope(degrees, friction).insert(&mut world);
-        meter.run(&mut world, 1.0 / 60.0, 1.0);
+        stopwatch.run(&mut world, 1.0 / 60.0, 1.0);
         let [_, v, w] = state(&world, id);
         (v.magnitude() - 0.5 * w.magnitude()) / v.magnitude() > 1e-7
     };
     let (mut slipping, mut rolling) = (0.4, 0.6);
     while rolling - slipping > 1e-8 {
         let middle = 0.5 * (slipping + rolling);
-        if slips(meter, middle) { slipping = middle } else { rolling = middle }
+        if slips(stopwatch, middle) { slipping = middle } else { rolling = middle }
     }
     (0.5 * (slipping + rolling) - exact).abs()
 }
 
 /// A ball that rests on a conveyor, a lift and beside a moving wall: the largest error of
 /// its velocity, in m/s.
-fn carried(meter: &mut Meter, model: Model) -> f64 {
+fn carried(stopwatch: &mut Stopwatch, model: Model) -> f64 {
     let motion = |velocity: [f64; 3]| {
         Some(WallMotion {
             velocity: vector(velocity),
@@ -300,7 +300,7 @@ fn carried(meter: &mut Meter, model: Model) -> f64 {
     let belt = wall(&mut conveyor, [0.0, 1.0, 0.0], 0.0);
     conveyor.walls.set_motion(belt, motion([0.7, 0.0, 0.0])).expect("finite");
     let id = on_slope(0.0, 0.3).insert(&mut conveyor);
-    meter.run(&mut conveyor, 1.0 / 60.0, 1.0);
+    stopwatch.run(&mut conveyor, 1.0 / 60.0, 1.0);
     let off_belt = (state(&conveyor, id)[1] - Vec3::new(0.7, 0.0, 0.0)).magnitude();
     let mut lift = world::<f32>(model);
     let floor = wall(&mut lift, [0.0, 1.0, 0.0], 0.0);
@@ -311,7 +311,7 @@ fn carried(meter: &mut Meter, model: Model) -> f64 {
         let plane =
             Plane::new(Vec3::unit_y(), 2.0 * f32::from(step) / 60.0).expect("a unit vector");
         lift.walls.set(floor, plane).expect("it is there");
-        meter.step(&mut lift, 1.0 / 60.0);
+        stopwatch.step(&mut lift, 1.0 / 60.0);
         let [x, v, _] = state(&lift, id);
         if step > 5 {
             off_lift =
@@ -323,16 +323,16 @@ fn carried(meter: &mut Meter, model: Model) -> f64 {
 
 /// By how much a shorter step is worse, at most, than a longer one: errors of slip to
 /// roll, incline and far roll over steps of 1/30 s to 1 ms, where they are above `floor`.
-fn never_worse(meter: &mut Meter, model: Model, floor: f64) -> f64 {
+fn never_worse(stopwatch: &mut Stopwatch, model: Model, floor: f64) -> f64 {
     let mut worst: f64 = 0.0;
-    let curves: [&mut dyn FnMut(&mut Meter, f64) -> f64; 4] = [
-        &mut |meter, dt| slip_to_roll(meter, model, dt)[0],
-        &mut |meter, dt| slip_to_roll(meter, model, dt)[1],
-        &mut |meter, dt| incline(meter, model, dt, 20.0, 0.5),
-        &mut |meter, dt| incline(meter, model, dt, 60.0, 0.45),
+    let curves: [&mut dyn FnMut(&mut Stopwatch, f64) -> f64; 4] = [
+        &mut |stopwatch, dt| slip_to_roll(stopwatch, model, dt)[0],
+        &mut |stopwatch, dt| slip_to_roll(stopwatch, model, dt)[1],
+        &mut |stopwatch, dt| incline(stopwatch, model, dt, 20.0, 0.5),
+        &mut |stopwatch, dt| incline(stopwatch, model, dt, 60.0, 0.45),
     ];
     for curve in curves {
-        let errors = STEPS.map(|dt| curve(meter, dt).max(floor));
+        let errors = STEPS.map(|dt| curve(stopwatch, dt).max(floor));
         for (i, longer) in errors.iter().enumerate() {
             worst =
                 errors[i..].iter().fold(worst, |worst, shorter| worst.max(shorter / longer - 1.0));
@@ -341,8 +341,8 @@ fn never_worse(meter: &mut Meter, model: Model, floor: f64) -> f64 {
     worst
 }
 
-pub const ROWS: &[Row] = &[
-    Row {
+pub const ROWS: &[SuiteCase] = &[
+    SuiteCase {
         name: "rolling/box/1ms",
         setup: "box of 10 kg pushed by 150 N carries 25 balls, heading 60°",
         metric: "mean squared velocity error, m²/s²",
@@ -350,10 +350,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-8,
         best: "2.5e-6 Box3D (RaiSim f64 4.1e-7)",
         source: "SimBenchmark; references §1.1",
-        effort: Effort::Quick,
-        measure: |meter| box_with_balls(meter, 60.0, 1e-3),
+        effort: CostClass::Quick,
+        measure: |stopwatch| box_with_balls(stopwatch, 60.0, 1e-3),
     },
-    Row {
+    SuiteCase {
         name: "rolling/box/60Hz",
         setup: "the same in steps of 1/60 s",
         metric: "mean squared velocity error, m²/s²",
@@ -361,10 +361,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "5.7e-5 Box3D",
         source: "SimBenchmark; references §1.1",
-        effort: Effort::Quick,
-        measure: |meter| box_with_balls(meter, 60.0, 1.0 / 60.0),
+        effort: CostClass::Quick,
+        measure: |stopwatch| box_with_balls(stopwatch, 60.0, 1.0 / 60.0),
     },
-    Row {
+    SuiteCase {
         name: "rolling/box/isotropy",
         setup: "the same at headings 0, 15, 30 and 45°",
         metric: "largest mean squared error where it is above the f32 floor of 1e-12, as a spread",
@@ -372,16 +372,16 @@ pub const ROWS: &[Row] = &[
         target: 0.1,
         best: "sticks or errs by 0.39–3.1: ODE, DART, Rapier-Coulomb",
         source: "SimBenchmark; references §1.1, §7",
-        effort: Effort::Quick,
-        measure: |meter| {
-            let errors =
-                [0.0, 15.0, 30.0, 45.0].map(|degrees| box_with_balls(meter, degrees, 1.0 / 60.0));
+        effort: CostClass::Quick,
+        measure: |stopwatch| {
+            let errors = [0.0, 15.0, 30.0, 45.0]
+                .map(|degrees| box_with_balls(stopwatch, degrees, 1.0 / 60.0));
             let (low, high) =
                 errors.iter().fold((f64::MAX, 0.0_f64), |(l, h), e| (l.min(*e), h.max(*e)));
             if high < 1e-12 { 0.0 } else { high / low - 1.0 }
         },
     },
-    Row {
+    SuiteCase {
         name: "rolling/slip-to-roll/speed",
         setup: "5 m/s, friction 0.3, 2 s: 5/7 of the speed; worst of 1/30 s to 1 ms",
         metric: "relative error of the speed",
@@ -389,10 +389,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "6.1e-4 Box3D (1/60)",
         source: "MFiX DEM04; references §3",
-        effort: Effort::Quick,
-        measure: |meter| worst(&STEPS, |dt| slip_to_roll(meter, EXACT, dt)[0]),
+        effort: CostClass::Quick,
+        measure: |stopwatch| worst(&STEPS, |dt| slip_to_roll(stopwatch, EXACT, dt)[0]),
     },
-    Row {
+    SuiteCase {
         name: "rolling/slip-to-roll/way",
         setup: "the same",
         metric: "relative error of the way",
@@ -400,10 +400,10 @@ pub const ROWS: &[Row] = &[
         target: 2e-6,
         best: "4.5e-4 Box3D (1/60)",
         source: "MFiX DEM04; references §3",
-        effort: Effort::Quick,
-        measure: |meter| worst(&STEPS, |dt| slip_to_roll(meter, EXACT, dt)[1]),
+        effort: CostClass::Quick,
+        measure: |stopwatch| worst(&STEPS, |dt| slip_to_roll(stopwatch, EXACT, dt)[1]),
     },
-    Row {
+    SuiteCase {
         name: "rolling/slip-to-roll/moment",
         setup: "the same: it rolls after 2 v / (7 µ g)",
         metric: "relative error of the moment",
@@ -411,10 +411,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-5,
         best: "4e-4 MFiX; Rapier and Box3D never quite roll",
         source: "MFiX DEM04; references §3",
-        effort: Effort::Quick,
-        measure: |meter| worst(&STEPS, |dt| slip_to_roll(meter, EXACT, dt)[2]),
+        effort: CostClass::Quick,
+        measure: |stopwatch| worst(&STEPS, |dt| slip_to_roll(stopwatch, EXACT, dt)[2]),
     },
-    Row {
+    SuiteCase {
         name: "rolling/slip-to-roll/speed",
         setup: "5 m/s, friction 0.3, 2 s; worst of 1/30 s to 1 ms",
         metric: "relative error of the speed",
@@ -422,10 +422,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "6.1e-4 Box3D (1/60)",
         source: "MFiX DEM04; references §3",
-        effort: Effort::Quick,
-        measure: |meter| worst(&STEPS, |dt| slip_to_roll(meter, IMPULSE, dt)[0]),
+        effort: CostClass::Quick,
+        measure: |stopwatch| worst(&STEPS, |dt| slip_to_roll(stopwatch, IMPULSE, dt)[0]),
     },
-    Row {
+    SuiteCase {
         name: "rolling/incline",
         setup: "20°, friction 0.5, 4 s: 5/7 g sin; worst of 1/30 s to 1 ms",
         metric: "largest relative error of speed, way and spin",
@@ -433,10 +433,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "9e-4 Rapier, 7e-4 Box3D (1/60)",
         source: "rigid ball; references 4.1",
-        effort: Effort::Quick,
-        measure: |meter| worst(&STEPS, |dt| incline(meter, EXACT, dt, 20.0, 0.5)),
+        effort: CostClass::Quick,
+        measure: |stopwatch| worst(&STEPS, |dt| incline(stopwatch, EXACT, dt, 20.0, 0.5)),
     },
-    Row {
+    SuiteCase {
         name: "rolling/incline/slipping",
         setup: "60°, friction 0.45, 4 s: g (sin − µ cos), 5 µ g cos t / 2r; worst of 1/30 s to 1 ms",
         metric: "largest relative error of speed, way and spin",
@@ -444,13 +444,13 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "7e-3 Rapier, 6e-3 Box3D (1/60)",
         source: "rigid ball; references 4.2",
-        effort: Effort::Quick,
-        measure: |meter| {
-            worst(&STEPS, |dt| incline(meter, EXACT, dt, 60.0, 0.45))
-                .max(worst(&STEPS, |dt| incline(meter, EXACT, dt, 60.0, 0.55)))
+        effort: CostClass::Quick,
+        measure: |stopwatch| {
+            worst(&STEPS, |dt| incline(stopwatch, EXACT, dt, 60.0, 0.45))
+                .max(worst(&STEPS, |dt| incline(stopwatch, EXACT, dt, 60.0, 0.55)))
         },
     },
-    Row {
+    SuiteCase {
         name: "rolling/incline/critical",
         setup: "60°: slips below a friction of 2/7 tan, rolls above",
         metric: "error of that friction",
@@ -458,10 +458,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "Rapier's spin is 3.4 % off at 0.55",
         source: "rigid ball; references 4.2",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: critical_friction,
     },
-    Row {
+    SuiteCase {
         name: "rolling/turntable/rate",
         setup: "2 rad/s, ball at 2 m with 0.5 m/s, 30 s at 1/60: circles at 2/7 of the rate",
         metric: "relative error of the rate",
@@ -469,10 +469,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-5,
         best: "1.4e-3 Box3D",
         source: "Weltner 1979; references 4.3",
-        effort: Effort::Quick,
-        measure: |meter| turntable(meter, 1.0 / 60.0)[0],
+        effort: CostClass::Quick,
+        measure: |stopwatch| turntable(stopwatch, 1.0 / 60.0)[0],
     },
-    Row {
+    SuiteCase {
         name: "rolling/turntable/speed",
         setup: "the same",
         metric: "relative drift of the speed",
@@ -480,10 +480,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "8.8e-2 Rapier and Box3D",
         source: "Weltner 1979; references 4.3",
-        effort: Effort::Quick,
-        measure: |meter| turntable(meter, 1.0 / 60.0)[1],
+        effort: CostClass::Quick,
+        measure: |stopwatch| turntable(stopwatch, 1.0 / 60.0)[1],
     },
-    Row {
+    SuiteCase {
         name: "rolling/turntable/radius",
         setup: "the same",
         metric: "relative error of the radius",
@@ -491,10 +491,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "–",
         source: "Weltner 1979; references 4.3",
-        effort: Effort::Quick,
-        measure: |meter| turntable(meter, 1.0 / 60.0)[2],
+        effort: CostClass::Quick,
+        measure: |stopwatch| turntable(stopwatch, 1.0 / 60.0)[2],
     },
-    Row {
+    SuiteCase {
         name: "rolling/carried",
         setup: "a ball on a conveyor of 0.7 m/s, and on a lift of 2 m/s",
         metric: "largest error of velocity and place, m/s and m",
@@ -502,10 +502,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "–",
         source: "kinematics",
-        effort: Effort::Quick,
-        measure: |meter| carried(meter, EXACT),
+        effort: CostClass::Quick,
+        measure: |stopwatch| carried(stopwatch, EXACT),
     },
-    Row {
+    SuiteCase {
         name: "rolling/no-spin-cap",
         setup: "radius 8 mm on 10° up to 5 m/s (625 rad/s)",
         metric: "relative error of the speed",
@@ -513,10 +513,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "0.19 Avian; 0.93 Rapier: stops at 47.1 rad/s (`peers`)",
         source: "rigid ball; issue 4",
-        effort: Effort::Quick,
-        measure: |meter| no_spin_cap(meter, EXACT),
+        effort: CostClass::Quick,
+        measure: |stopwatch| no_spin_cap(stopwatch, EXACT),
     },
-    Row {
+    SuiteCase {
         name: "rolling/no-spin-cap",
         setup: "radius 8 mm on 10° up to 5 m/s (625 rad/s)",
         metric: "relative error of the speed",
@@ -524,10 +524,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "0.19 Avian; 0.93 Rapier: stops at 47.1 rad/s (`peers`)",
         source: "rigid ball; issue 4",
-        effort: Effort::Quick,
-        measure: |meter| no_spin_cap(meter, IMPULSE),
+        effort: CostClass::Quick,
+        measure: |stopwatch| no_spin_cap(stopwatch, IMPULSE),
     },
-    Row {
+    SuiteCase {
         name: "rolling/resistances",
         setup: "v²/(2·5/7·c g) to a stop, spin gone in ω r/(5/2 c g), at rest below atan c; worst of 1/30 s to 1 ms",
         metric: "largest relative error, and metres crept",
@@ -535,10 +535,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "–",
         source: "rigid ball; issue 4",
-        effort: Effort::Quick,
-        measure: |meter| worst(&STEPS, |dt| resistances(meter, EXACT, dt)),
+        effort: CostClass::Quick,
+        measure: |stopwatch| worst(&STEPS, |dt| resistances(stopwatch, EXACT, dt)),
     },
-    Row {
+    SuiteCase {
         name: "rolling/resistances",
         setup: "the same at 1/240 s",
         metric: "largest relative error, and metres crept",
@@ -546,10 +546,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-2,
         best: "–",
         source: "rigid ball; issue 4",
-        effort: Effort::Quick,
-        measure: |meter| resistances(meter, IMPULSE, 1.0 / 240.0),
+        effort: CostClass::Quick,
+        measure: |stopwatch| resistances(stopwatch, IMPULSE, 1.0 / 240.0),
     },
-    Row {
+    SuiteCase {
         name: "rolling/straight",
         setup: "slides, then rolls, at 24 angles to the axes",
         metric: "turn of its heading, rad",
@@ -557,10 +557,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-6,
         best: "1.0e-6 Rapier, 1.4e-6 Avian (`peers`)",
         source: "issue 4",
-        effort: Effort::Quick,
-        measure: |meter| heading(meter, EXACT),
+        effort: CostClass::Quick,
+        measure: |stopwatch| heading(stopwatch, EXACT),
     },
-    Row {
+    SuiteCase {
         name: "rolling/straight",
         setup: "slides, then rolls, at 24 angles to the axes",
         metric: "turn of its heading, rad",
@@ -568,10 +568,10 @@ pub const ROWS: &[Row] = &[
         target: 2e-6,
         best: "1.0e-6 Rapier, 1.4e-6 Avian (`peers`)",
         source: "issue 4",
-        effort: Effort::Quick,
-        measure: |meter| heading(meter, IMPULSE),
+        effort: CostClass::Quick,
+        measure: |stopwatch| heading(stopwatch, IMPULSE),
     },
-    Row {
+    SuiteCase {
         name: "rolling/far/1e4",
         setup: "1 m/s for 5 s from x = 1e4 m",
         metric: "relative error of the way",
@@ -579,10 +579,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-5,
         best: "4e-3 Box3D",
         source: "references §6.3",
-        effort: Effort::Quick,
-        measure: |meter| far_roll(meter, EXACT, 1e4),
+        effort: CostClass::Quick,
+        measure: |stopwatch| far_roll(stopwatch, EXACT, 1e4),
     },
-    Row {
+    SuiteCase {
         name: "rolling/far/1e6",
         setup: "1 m/s for 5 s from x = 1e6 m; the world's own f32 cannot show better than 6e-3",
         metric: "relative error of the way",
@@ -590,10 +590,10 @@ pub const ROWS: &[Row] = &[
         target: 1e-4,
         best: "stuck: all",
         source: "references §6.3",
-        effort: Effort::Quick,
-        measure: |meter| far_roll(meter, EXACT, 1e6),
+        effort: CostClass::Quick,
+        measure: |stopwatch| far_roll(stopwatch, EXACT, 1e6),
     },
-    Row {
+    SuiteCase {
         name: "rolling/far/1e4",
         setup: "1 m/s for 5 s from x = 1e4 m",
         metric: "relative error of the way",
@@ -601,12 +601,12 @@ pub const ROWS: &[Row] = &[
         target: 1e-5,
         best: "4e-3 Box3D",
         source: "references §6.3",
-        effort: Effort::Quick,
-        measure: |meter| {
-            far_roll(meter, Model { precision: Precision::Compensated, ..IMPULSE }, 1e4)
+        effort: CostClass::Quick,
+        measure: |stopwatch| {
+            far_roll(stopwatch, Model { precision: Precision::Compensated, ..IMPULSE }, 1e4)
         },
     },
-    Row {
+    SuiteCase {
         name: "rolling/never-worse",
         setup: "speed and way of slip to roll and inclines, 1/30 s to 1 ms: shorter steps are no worse above a floor of 1e-7",
         metric: "how much worse a shorter step is, relatively",
@@ -614,10 +614,10 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "non-monotone: Rapier, Box3D",
         source: "design, rule 3",
-        effort: Effort::Quick,
-        measure: |meter| never_worse(meter, EXACT, 1e-7),
+        effort: CostClass::Quick,
+        measure: |stopwatch| never_worse(stopwatch, EXACT, 1e-7),
     },
-    Row {
+    SuiteCase {
         name: "rolling/never-worse",
         setup: "the same above a floor of 5e-5, which plain f32 has",
         metric: "how much worse a shorter step is, relatively",
@@ -625,7 +625,7 @@ pub const ROWS: &[Row] = &[
         target: 0.0,
         best: "non-monotone: Rapier, Box3D",
         source: "design, rule 3",
-        effort: Effort::Quick,
-        measure: |meter| never_worse(meter, IMPULSE, 5e-5),
+        effort: CostClass::Quick,
+        measure: |stopwatch| never_worse(stopwatch, IMPULSE, 5e-5),
     },
 ];

@@ -4,9 +4,9 @@ use taw::broad::Grid;
 use taw::prelude::*;
 use taw::swarm::{Ball, BallId, SwarmModel};
 
-use super::{Effort, Row};
+use super::{CostClass, SuiteCase};
 use crate::scene::G;
-use crate::scene::Meter;
+use crate::scene::Stopwatch;
 
 const DT: f64 = 1.0 / 60.0;
 
@@ -57,7 +57,7 @@ fn kinetic(world: &World<f32>) -> f64 {
 }
 
 /// The gas of `gas/energy`: how far its energy is off at the end, or was above the begin's.
-fn gas(meter: &mut Meter) -> f64 {
+fn gas(stopwatch: &mut Stopwatch) -> f64 {
     let mut world = swarm(0.0, 1.0, Vec3::new(0.0, 0.0, 0.0));
     for axis in [Vec3::unit_x(), Vec3::unit_y(), Vec3::unit_z()] {
         for inward in [axis, -axis] {
@@ -75,38 +75,38 @@ fn gas(meter: &mut Meter) -> f64 {
     insert(&mut world, &balls.collect::<Vec<_>>());
     let (begin, mut worst) = (kinetic(&world), 0.0_f64);
     for _ in 0..600 {
-        meter.step(&mut world, DT);
+        stopwatch.step(&mut world, DT);
         worst = worst.max(kinetic(&world) / begin - 1.0);
     }
     worst.max((kinetic(&world) / begin - 1.0).abs())
 }
 
-fn slip_to_roll(meter: &mut Meter) -> f64 {
+fn slip_to_roll(stopwatch: &mut Stopwatch) -> f64 {
     let mut world = swarm(0.3, 0.0, down());
     let id = insert(&mut world, &[ball(0.5, 1.0, 7.0)])[0];
-    meter.run(&mut world, DT, 2.0);
+    stopwatch.run(&mut world, DT, 2.0);
     (f64::from(state(&world, id).1.x) / 5.0 - 1.0).abs()
 }
 
-fn incline(meter: &mut Meter) -> f64 {
+fn incline(stopwatch: &mut Stopwatch) -> f64 {
     let angle = 10_f64.to_radians();
     let pull = Vec3::new((G * angle.sin()) as f32, (-G * angle.cos()) as f32, 0.0);
     let mut world = swarm(0.5, 0.0, pull);
     let id = insert(&mut world, &[ball(0.5, 1.0, 0.0)])[0];
-    meter.run(&mut world, DT, 2.0);
+    stopwatch.run(&mut world, DT, 2.0);
     let exact = G * angle.sin() * 5.0 / 7.0 * 2.0;
     (f64::from(state(&world, id).1.x) / exact - 1.0).abs()
 }
 
 /// Drops from a metre: the worst error of the first rebound's height, over the drop's.
-fn bounce(meter: &mut Meter) -> f64 {
+fn bounce(stopwatch: &mut Stopwatch) -> f64 {
     let mut worst = 0.0_f64;
     for e in [0.3_f32, 0.5, 0.8, 1.0] {
         let mut world = swarm(0.0, e, down());
         let id = insert(&mut world, &[ball(1.5, 1.0, 0.0)])[0];
         let (mut rises, mut apex) = (false, 0.0_f64);
         for _ in 0..120 {
-            meter.step(&mut world, DT);
+            stopwatch.step(&mut world, DT);
             let (height, velocity) = state(&world, id);
             if rises && velocity.y < 0.0 {
                 break;
@@ -120,7 +120,7 @@ fn bounce(meter: &mut Meter) -> f64 {
 }
 
 /// A heap of 600 in a box, poured and left alone for 10 s: its fastest ball.
-fn heap(meter: &mut Meter) -> f64 {
+fn heap(stopwatch: &mut Stopwatch) -> f64 {
     let mut world = swarm(0.3, 0.2, down());
     for inward in [Vec3::unit_x(), -Vec3::unit_x(), Vec3::unit_z(), -Vec3::unit_z()] {
         plane(&mut world, inward, -5.25);
@@ -132,18 +132,18 @@ fn heap(meter: &mut Meter) -> f64 {
         Ball::new(place, 0.3 + 0.2 * random(0))
     });
     insert(&mut world, &balls.collect::<Vec<_>>());
-    meter.run(&mut world, DT, 10.0);
+    stopwatch.run(&mut world, DT, 10.0);
     let speeds = world.swarm.velocities().iter().map(|v| f64::from(v[0].hypot(v[1]).hypot(v[2])));
     speeds.fold(0.0, f64::max)
 }
 
 /// The deepest that a ball a thousand times as heavy is in a light one within 5 s, in radii.
-fn heavy(meter: &mut Meter) -> f64 {
+fn heavy(stopwatch: &mut Stopwatch) -> f64 {
     let mut world = swarm(0.3, 0.2, down());
     let ids = insert(&mut world, &[ball(0.5, 1.0, 0.0), ball(1.5, 1000.0, 0.0)]);
     let mut worst = 0.0_f64;
     for _ in 0..300 {
-        meter.step(&mut world, DT);
+        stopwatch.step(&mut world, DT);
         let [low, high] = [0, 1].map(|i| state(&world, ids[i]).0);
         worst = worst.max((low + 1.0 - high) / 0.5).max((0.5 - low) / 0.5);
     }
@@ -151,7 +151,7 @@ fn heavy(meter: &mut Meter) -> f64 {
 }
 
 /// The hopper of the race after its 240 steps: the deepest overlap in metres.
-fn hopper(meter: &mut Meter) -> f64 {
+fn hopper(stopwatch: &mut Stopwatch) -> f64 {
     let mut world = swarm(0.3, 0.2, down());
     for inward in [Vec3::unit_x(), -Vec3::unit_x(), Vec3::unit_z(), -Vec3::unit_z()] {
         plane(&mut world, inward, -16.0);
@@ -188,7 +188,7 @@ fn hopper(meter: &mut Meter) -> f64 {
         ball.position.z += (random() - 0.5) * 0.042;
     }
     insert(&mut world, &balls);
-    meter.run(&mut world, DT, 4.0);
+    stopwatch.run(&mut world, DT, 4.0);
     deepest(&world)
 }
 
@@ -211,8 +211,8 @@ const MODEL: &str = "swarm, full";
 const NONE: &str = "none measured";
 
 /// See the module.
-pub static ROWS: &[Row] = &[
-    Row {
+pub static ROWS: &[SuiteCase] = &[
+    SuiteCase {
         name: "swarm/gas",
         setup: "216 elastic balls of 0.3 m in a box of 6 m for 10 s at 1/60 s",
         metric: "relative error of the energy, or the most that it rose",
@@ -220,10 +220,10 @@ pub static ROWS: &[Row] = &[
         target: 1e-2,
         best: "0.74 Box3D, 0.79 Rapier lost",
         source: "conservation of energy; references 4.22",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: gas,
     },
-    Row {
+    SuiteCase {
         name: "swarm/slip-to-roll",
         setup: "a ball slides at 7 m/s on a floor of friction 0.3: rolls with 5/7 of it",
         metric: "relative error of the speed",
@@ -231,10 +231,10 @@ pub static ROWS: &[Row] = &[
         target: 2e-3,
         best: NONE,
         source: "Coulomb friction on a solid ball: 5/7, whatever the friction",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: slip_to_roll,
     },
-    Row {
+    SuiteCase {
         name: "swarm/incline",
         setup: "a ball rolls down 10 degrees for 2 s: with 5/7 of the pull",
         metric: "relative error of the speed",
@@ -242,10 +242,10 @@ pub static ROWS: &[Row] = &[
         target: 2e-3,
         best: NONE,
         source: "rolling without slip of a solid ball",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: incline,
     },
-    Row {
+    SuiteCase {
         name: "swarm/bounce",
         setup: "drops from 1 m at restitution 0.3, 0.5, 0.8 and 1: comes up to its square",
         metric: "worst error of the height over the drop's",
@@ -253,10 +253,10 @@ pub static ROWS: &[Row] = &[
         target: 5e-2,
         best: NONE,
         source: "Newton's restitution; a substep is 3.7 cm at 4.4 m/s",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: bounce,
     },
-    Row {
+    SuiteCase {
         name: "swarm/heap",
         setup: "600 balls of 0.3 to 0.5 m poured into a box, after 10 s: all lie",
         metric: "speed of the fastest in m/s",
@@ -264,10 +264,10 @@ pub static ROWS: &[Row] = &[
         target: 5e-2,
         best: NONE,
         source: "friction holds a heap",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: heap,
     },
-    Row {
+    SuiteCase {
         name: "swarm/heavy-on-light",
         setup: "a ball 1,000 times as heavy on one of 0.5 m, within 5 s: sinks in by nothing",
         metric: "deepest overlap in radii",
@@ -275,10 +275,10 @@ pub static ROWS: &[Row] = &[
         target: 1e-2,
         best: NONE,
         source: "rigid bodies",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: heavy,
     },
-    Row {
+    SuiteCase {
         name: "swarm/hopper",
         setup: "3,000 balls of 0.3 to 0.5 m fall 10 m into a hopper, after 4 s",
         metric: "deepest overlap in metres",
@@ -286,7 +286,7 @@ pub static ROWS: &[Row] = &[
         target: 4.4e-2,
         best: "0.044 Rapier",
         source: "rigid bodies; the race in peers/",
-        effort: Effort::Quick,
+        effort: CostClass::Quick,
         measure: hopper,
     },
 ];

@@ -62,7 +62,7 @@ where
     // Below an error of one there is the strip of failures.
     let strip = -0.05 * (top + 1.0);
     let about = SCENES.iter().find(|judged| judged.name == scene);
-    let about = about.map_or(String::new(), |judged| format!(": {}", judged.scene().about));
+    let about = about.map_or(String::new(), |judged| format!(": {}", judged.scene().description));
     let mut chart = ChartBuilder::on(&plot)
         .caption(format!("{scene}{about}"), (FONT, 24))
         .margin(14)

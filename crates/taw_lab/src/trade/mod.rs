@@ -1,5 +1,5 @@
-//! Error against cost: every model, in both scalars, by many settings, on scenes whose outcome is
-//! known.
+//! Accuracy–cost profiles: every model, in both scalars, with many settings, on scenes of known
+//! outcome.
 
 #[cfg(feature = "cli")]
 mod chart;
@@ -14,59 +14,59 @@ pub mod trace;
 #[cfg(feature = "cli")]
 pub use report::{Curve, curves, front, write_report, write_tables};
 
-/// Substeps, and iterations where they count.
+/// Tested counts of substeps, and of iterations where they matter.
 pub const COUNTS: [u32; 6] = [1, 2, 4, 8, 16, 32];
 
-/// What one setting came to on one scene.
+/// Result of one run configuration on one scene.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Point {
-    /// Whose it is: `taw`, or another engine with its version.
+    /// Engine: `taw`, or another one with its version.
     pub engine: String,
-    /// The scene.
+    /// Name of the scene.
     pub scene: String,
-    /// The model's name.
+    /// Name of the model.
     pub model: String,
     /// `f32` or `f64`.
     pub number: String,
-    /// The step's name, and its length.
+    /// Name of the step, and its length in seconds.
     pub step: String,
-    /// In seconds.
+    /// Length of the step, in seconds.
     pub seconds: f64,
     /// Substeps in a step.
     pub substeps: u32,
     /// Iterations in a substep.
     pub iterations: u32,
-    /// As a part of what the scene is about; nothing if there is no telling.
+    /// Error relative to the size of the scene; none if undefined.
     pub error: Option<f64>,
-    /// Why it does not count, if it does not.
+    /// Reason of a failed run.
     pub failure: Option<Failure>,
-    /// Nanoseconds for each marble and simulated second.
+    /// Cost in nanoseconds per marble and simulated second.
     pub cost: f64,
-    /// Simulated seconds in a second.
+    /// Real-time factor: simulated seconds per second.
     pub real_time: f64,
-    /// What else there is to know: another engine's defaults.
+    /// Remarks: another engine's defaults.
     #[serde(default)]
     pub note: String,
 }
 
-/// Why a point does not count.
+/// Reason of a failed run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize, serde::Deserialize)]
 pub enum Failure {
-    /// A marble left all numbers behind.
+    /// The state of a marble became non-finite.
     Overflow,
     /// An error of more than one.
     Wrong,
 }
 
 impl Point {
-    /// What tells it from others.
+    /// Unique key.
     #[must_use]
     pub fn key(&self) -> String {
         let Self { engine, scene, model, number, step, substeps, iterations, .. } = self;
         format!("{engine}|{scene}|{model}|{number}|{step}|{substeps}|{iterations}")
     }
 
-    /// Its setting, in a few characters: the step, and substeps and iterations if there are any.
+    /// Short description of the run configuration: the step, and substeps and iterations.
     #[must_use]
     pub fn setting(&self) -> String {
         format!("{} × {} × {}", self.step, self.substeps, self.iterations)

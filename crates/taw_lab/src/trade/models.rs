@@ -1,22 +1,22 @@
-//! The models that are compared.
+//! Presets of compared models.
 
 use taw::prelude::*;
 use taw::response::ContactLaw;
 
-/// A model with a name: substeps and iterations are still open.
+/// A named model preset with open substeps and iterations.
 #[derive(Clone, Copy, Debug)]
-pub struct Named {
-    /// What it is called in reports.
+pub struct Preset {
+    /// Name in reports.
     pub name: &'static str,
     /// The model.
     pub model: Model,
-    /// Whether iterations change anything.
+    /// Iterations affect the result.
     pub iterates: bool,
-    /// Whether it is compared where marbles touch, or else where nothing does.
-    pub touches: bool,
+    /// Compared on scenes with contacts, or else on contact-free ones.
+    pub has_contacts: bool,
 }
 
-const PLAIN: Model = Model {
+const BASELINE: Model = Model {
     integrator: Integrator::VelocityVerlet,
     response: Response::Displacement,
     rotation: Rotation::None,
@@ -25,42 +25,51 @@ const PLAIN: Model = Model {
     substeps: 1,
     iterations: 8,
 };
-const IMPULSE: Model = Model { response: Response::Impulse, rotation: Rotation::Dynamic, ..PLAIN };
+const IMPULSE: Model =
+    Model { response: Response::Impulse, rotation: Rotation::Dynamic, ..BASELINE };
 
-const fn flies(name: &'static str, integrator: Integrator) -> Named {
-    let model = Model { integrator, ..PLAIN };
-    Named { name, model, iterates: false, touches: false }
+const fn contact_free(name: &'static str, integrator: Integrator) -> Preset {
+    let model = Model { integrator, ..BASELINE };
+    Preset { name, model, iterates: false, has_contacts: false }
 }
 
-const fn meets(name: &'static str, model: Model, iterates: bool) -> Named {
-    Named { name, model, iterates, touches: true }
+const fn with_contacts(name: &'static str, model: Model, iterates: bool) -> Preset {
+    Preset { name, model, iterates, has_contacts: true }
 }
 
-/// All of them: the integrators where nothing touches, the responses where something does.
-pub static MODELS: [Named; 15] = [
-    flies("explicit Euler", Integrator::ExplicitEuler),
-    flies("semi-implicit Euler", Integrator::SemiImplicitEuler),
-    flies("velocity Verlet", Integrator::VelocityVerlet),
-    flies("leapfrog", Integrator::Leapfrog),
-    flies("Runge-Kutta 4", Integrator::Rk4),
-    meets("displacement", Model { integrator: Integrator::SemiImplicitEuler, ..PLAIN }, false),
-    meets("displacement, Verlet", PLAIN, false),
-    meets("displacement, rolling", Model { rotation: Rotation::Rolling, ..PLAIN }, false),
-    meets("displacement, swept", Model { detection: Detection::Swept, ..PLAIN }, false),
-    meets("impulse", IMPULSE, true),
-    meets("impulse, swept", Model { detection: Detection::Swept, ..IMPULSE }, true),
-    meets("soft step", Model { response: Response::SoftStep, ..IMPULSE }, false),
-    meets(
+/// All presets: integrators for contact-free scenes, responses for scenes with contacts.
+pub static MODELS: [Preset; 15] = [
+    contact_free("explicit Euler", Integrator::ExplicitEuler),
+    contact_free("semi-implicit Euler", Integrator::SemiImplicitEuler),
+    contact_free("velocity Verlet", Integrator::VelocityVerlet),
+    contact_free("leapfrog", Integrator::Leapfrog),
+    contact_free("Runge-Kutta 4", Integrator::Rk4),
+    with_contacts(
+        "displacement",
+        Model { integrator: Integrator::SemiImplicitEuler, ..BASELINE },
+        false,
+    ),
+    with_contacts("displacement, Verlet", BASELINE, false),
+    with_contacts(
+        "displacement, rolling",
+        Model { rotation: Rotation::Rolling, ..BASELINE },
+        false,
+    ),
+    with_contacts("displacement, swept", Model { detection: Detection::Swept, ..BASELINE }, false),
+    with_contacts("impulse", IMPULSE, true),
+    with_contacts("impulse, swept", Model { detection: Detection::Swept, ..IMPULSE }, true),
+    with_contacts("soft step", Model { response: Response::SoftStep, ..IMPULSE }, false),
+    with_contacts(
         "spring and dashpot",
         Model { response: Response::Penalty(ContactLaw::SpringDashpot), ..IMPULSE },
         false,
     ),
-    meets(
+    with_contacts(
         "Hertz and Mindlin",
         Model { response: Response::Penalty(ContactLaw::HertzMindlin), ..IMPULSE },
         false,
     ),
-    meets(
+    with_contacts(
         "event-driven",
         Model { response: Response::EventDriven, iterations: 50, ..IMPULSE },
         false,

@@ -1,4 +1,4 @@
-//! What the points say.
+//! Summary of points.
 
 use std::collections::BTreeSet;
 use std::fmt::Write;
@@ -14,10 +14,10 @@ pub struct Curve {
     pub name: String,
     /// By cost.
     pub points: Vec<Point>,
-    /// How the error falls with the length of the substep: the slope on logarithmic axes, if
-    /// it falls over three lengths at least, from the longest one on.
+    /// Order of convergence: slope of the error over the length of the substep on logarithmic axes,
+    /// if it falls over at least three lengths, from the longest one on.
     pub order: Option<f64>,
-    /// Whether a shorter substep was never worse by more than a hundredth.
+    /// The error never grew by more than a hundredth for a shorter substep.
     pub monotone: bool,
 }
 
@@ -72,7 +72,7 @@ fn convergence(points: &[Point]) -> (Option<f64>, bool) {
     (slope(&line), monotone)
 }
 
-/// That of the best line through the logarithms.
+/// Slope of the regression line of the logarithms.
 fn slope(line: &[(f64, f64)]) -> Option<f64> {
     if line.len() < 3 {
         return None;
@@ -110,7 +110,7 @@ pub fn front<'a>(points: impl IntoIterator<Item = &'a Point>) -> Vec<&'a Point> 
 /// Writes `points.csv` and `points.json` into a folder.
 ///
 /// # Errors
-/// What writing reports.
+/// Errors of writing.
 pub fn write_tables(points: &[Point], folder: &Path) -> Result<(), Box<dyn std::error::Error>> {
     std::fs::create_dir_all(folder)?;
     let mut csv = csv::Writer::from_path(folder.join("points.csv"))?;
@@ -126,7 +126,7 @@ pub fn write_tables(points: &[Point], folder: &Path) -> Result<(), Box<dyn std::
 /// SVG and PNG.
 ///
 /// # Errors
-/// What writing and drawing report.
+/// Errors of writing and drawing.
 pub fn write_report(points: &[Point], file: &Path) -> Result<(), Box<dyn std::error::Error>> {
     let folder = file.with_extension("");
     let name = folder.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -240,10 +240,10 @@ fn describe(text: &mut String, scene: &str, folder: &str, curves: &[Curve]) -> s
     let judged = SCENES.iter().find(|judged| judged.name == scene);
     writeln!(text, "\n## {scene}\n")?;
     if let Some(judged) = judged {
-        write!(text, "{}. Error: {}.", judged.scene().about, judged.metric)?;
-        if judged.chance() > 0.0 {
-            let chance = judged.chance();
-            write!(text, " The last bit of where marbles begin makes {chance:.1e} of it.")?;
+        write!(text, "{}. Error: {}.", judged.scene().description, judged.metric)?;
+        if judged.noise_floor() > 0.0 {
+            let noise_floor = judged.noise_floor();
+            write!(text, " The last bit of where marbles begin makes {noise_floor:.1e} of it.")?;
         }
         writeln!(text, "\n")?;
     }

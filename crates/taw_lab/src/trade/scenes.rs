@@ -1,4 +1,4 @@
-//! The scenes that models are compared on, and what each of them should come to.
+//! Reference cases: scenes with a known outcome and an error metric.
 
 use std::f64::consts::PI;
 use std::sync::OnceLock;
@@ -7,144 +7,143 @@ use futures_lite::future::block_on;
 use taw::prelude::*;
 use taw::scene::Scene;
 
-use super::trace::{FRAME, Frame, Number, Setting};
-use crate::advise::Source;
+use super::trace::{Frame, RunConfig, SAMPLE_INTERVAL, ScalarType};
+use crate::advise::ReplayableScene;
 use crate::scene::{EXACT, G};
 
-/// A scene with a judge.
+/// A reference case: a scene with an error metric.
 #[derive(Debug)]
-pub struct Judged {
-    /// Its name, that of its file.
+pub struct ReferenceCase {
+    /// Name, that of its file.
     pub name: &'static str,
-    /// What its error is.
+    /// Description of the error metric.
     pub metric: &'static str,
-    /// Whether marbles touch anything in it.
-    pub touches: bool,
+    /// The scene has contacts.
+    pub has_contacts: bool,
     text: &'static str,
-    judge: Judge,
+    comparison: Metric,
     scene: OnceLock<Scene>,
     reference: OnceLock<Vec<Frame>>,
-    chance: OnceLock<f64>,
+    noise_floor: OnceLock<f64>,
 }
 
-/// How wrong frames are, as a part of what the scene is about.
+/// Error metric, relative to the size of the scene.
 #[derive(Clone, Copy, Debug)]
-enum Judge {
-    /// Where marbles should be is known: their mean square distance from it, over this length in
-    /// metres.
-    Known(fn(f64) -> Vec<Vec3<f64>>, f64),
-    /// As the most exact model has it in fine steps.
-    Compared(fn(&[Frame], &[Frame]) -> f64),
+enum Metric {
+    /// Analytic solution: root mean square distance from it, over this length in metres.
+    Analytic(fn(f64) -> Vec<Vec3<f64>>, f64),
+    /// Comparison with a reference recording of the most accurate model in fine steps.
+    Reference(fn(&[Frame], &[Frame]) -> f64),
 }
 
-/// All of them.
-pub static SCENES: [Judged; 12] = [
-    judged(
+/// All reference cases.
+pub static SCENES: [ReferenceCase; 12] = [
+    case(
         "throw",
         "place, over 4 m",
         include_str!("../../scenes/throw.ron"),
         false,
-        Judge::Known(thrown, 4.0),
+        Metric::Analytic(thrown, 4.0),
     ),
-    judged(
+    case(
         "orbit",
         "place, over the larger half axis",
         include_str!("../../scenes/orbit.ron"),
         false,
-        Judge::Known(orbited, 1.0),
+        Metric::Analytic(orbited, 1.0),
     ),
-    judged(
+    case(
         "bounce",
         "place, over the height of the fall",
         include_str!("../../scenes/bounce.ron"),
         true,
-        Judge::Known(bounced, 1.0),
+        Metric::Analytic(bounced, 1.0),
     ),
-    judged(
+    case(
         "skid",
         "place, over 2 m",
         include_str!("../../scenes/skid.ron"),
         true,
-        Judge::Known(skidded, 2.0),
+        Metric::Analytic(skidded, 2.0),
     ),
-    judged(
+    case(
         "ramp",
         "place, over 2 m",
         include_str!("../../scenes/ramp.ron"),
         true,
-        Judge::Known(rolled, 2.0),
+        Metric::Analytic(rolled, 2.0),
     ),
-    judged(
+    case(
         "turntable",
         "place, over the radius of the circle",
         include_str!("../../scenes/turntable.ron"),
         true,
-        Judge::Known(circled, 0.7 / PI),
+        Metric::Analytic(circled, 0.7 / PI),
     ),
-    judged(
+    case(
         "carom",
         "place, over 1 m",
         include_str!("../../scenes/carom.ron"),
         true,
-        Judge::Known(parted, 1.0),
+        Metric::Analytic(parted, 1.0),
     ),
-    judged(
+    case(
         "cradle",
         "place, over 0.3 m",
         include_str!("../../scenes/cradle.ron"),
         true,
-        Judge::Known(passed_on, 0.3),
+        Metric::Analytic(passed_on, 0.3),
     ),
-    judged(
+    case(
         "tower",
         "place, over the radius",
         include_str!("../../scenes/tower.ron"),
         true,
-        Judge::Known(stood, 0.05),
+        Metric::Analytic(stood, 0.05),
     ),
-    judged(
+    case(
         "maze",
         "place, over the side of the box",
         include_str!("../../scenes/maze.ron"),
         true,
-        Judge::Compared(places_in_maze),
+        Metric::Reference(places_in_maze),
     ),
-    judged(
+    case(
         "pachinko",
         "mean height over time, over 0.3 m",
         include_str!("../../scenes/pachinko.ron"),
         true,
-        Judge::Compared(fall),
+        Metric::Reference(fall),
     ),
-    judged(
+    case(
         "pit",
         "mean height and mean overlap, over the radius",
         include_str!("../../scenes/pit.ron"),
         true,
-        Judge::Compared(heap),
+        Metric::Reference(heap),
     ),
 ];
 
-const fn judged(
+const fn case(
     name: &'static str,
     metric: &'static str,
     text: &'static str,
-    touches: bool,
-    judge: Judge,
-) -> Judged {
-    Judged {
+    has_contacts: bool,
+    comparison: Metric,
+) -> ReferenceCase {
+    ReferenceCase {
         name,
         metric,
-        touches,
+        has_contacts,
         text,
-        judge,
+        comparison,
         scene: OnceLock::new(),
         reference: OnceLock::new(),
-        chance: OnceLock::new(),
+        noise_floor: OnceLock::new(),
     }
 }
 
-impl Judged {
+impl ReferenceCase {
     /// The scene.
     ///
     /// # Panics
@@ -153,30 +152,30 @@ impl Judged {
         self.scene.get_or_init(|| crate::advise::read_scene(self.text).expect("a shipped scene"))
     }
 
-    /// How wrong frames of it are: 0 is right, 1 is as wrong as the scene is large.
+    /// Relative error of a recording: 0 is exact, 1 is as wrong as the scene is large.
     pub fn error(&self, frames: &[Frame]) -> f64 {
-        match self.judge {
-            Judge::Known(known, size) => {
+        match self.comparison {
+            Metric::Analytic(known, size) => {
                 let squares = frames.iter().flat_map(|frame| {
                     let should = known(frame.time).into_iter();
                     frame.at.iter().zip(should).map(|(at, should)| (at - should).magnitude2())
                 });
                 mean(squares).sqrt() / size
             }
-            Judge::Compared(compare) => compare(frames, self.reference()).max(self.chance()),
+            Metric::Reference(compare) => compare(frames, self.reference()).max(self.noise_floor()),
         }
     }
 
-    /// How far the reference is from itself with every marble moved by the last bit: a smaller
-    /// error says nothing. Zero where the outcome is known.
-    pub fn chance(&self) -> f64 {
-        *self.chance.get_or_init(|| match self.judge {
-            Judge::Known(..) => 0.0,
-            Judge::Compared(compare) => compare(&exact(self.scene(), true), self.reference()),
+    /// Noise floor: error of the reference against itself with every marble perturbed by one ulp.
+    /// Smaller errors are meaningless. Zero for an analytic solution.
+    pub fn noise_floor(&self) -> f64 {
+        *self.noise_floor.get_or_init(|| match self.comparison {
+            Metric::Analytic(..) => 0.0,
+            Metric::Reference(compare) => compare(&exact(self.scene(), true), self.reference()),
         })
     }
 
-    /// Its gravity at the beginning, in m/s².
+    /// Initial gravity, in m/s².
     pub fn scene_gravity(&self) -> Vec3<f64> {
         Vec3::from(self.scene().gravity)
     }
@@ -186,9 +185,9 @@ impl Judged {
     }
 }
 
-fn exact(scene: &Scene, nudged: bool) -> Vec<Frame> {
-    let setting = Setting { model: EXACT, number: Number::F64, step: 1.0 / 480.0 };
-    block_on(scene.film(setting, nudged, FRAME)).unwrap_or_default().frames
+fn exact(scene: &Scene, perturbed: bool) -> Vec<Frame> {
+    let setting = RunConfig { model: EXACT, number: ScalarType::F64, step: 1.0 / 480.0 };
+    block_on(scene.record(setting, perturbed, SAMPLE_INTERVAL)).unwrap_or_default().frames
 }
 
 fn mean(numbers: impl Iterator<Item = f64>) -> f64 {

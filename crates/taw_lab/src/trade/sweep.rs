@@ -7,9 +7,9 @@ use std::path::Path;
 
 use taw::world::Model;
 
-use super::models::{MODELS, Named};
-use super::scenes::{Judged, SCENES};
-use super::trace::{Number, Setting, time, trace};
+use super::models::{MODELS, Preset};
+use super::scenes::{ReferenceCase, SCENES};
+use super::trace::{RunConfig, ScalarType, time, trace};
 use super::{COUNTS, Failure, Point};
 
 /// The steps, with their names.
@@ -28,7 +28,7 @@ const QUICK_COUNTS: [u32; 2] = [1, 8];
 const MOST: f64 = 2e6;
 const QUICK_MOST: f64 = 5e4;
 
-/// What to go through.
+/// Selection of a sweep.
 #[derive(Clone, Debug, Default)]
 pub struct Plan {
     /// Only some settings, for a look.
@@ -42,12 +42,12 @@ pub struct Plan {
 /// One run of a sweep.
 #[derive(Clone, Copy, Debug)]
 pub struct Job {
-    /// What is run.
-    pub scene: &'static Judged,
+    /// Reference case.
+    pub scene: &'static ReferenceCase,
     /// By what.
-    pub model: Named,
+    pub model: Preset,
     /// With which step, substeps and iterations.
-    pub setting: Setting,
+    pub setting: RunConfig,
     step: &'static str,
 }
 
@@ -56,9 +56,9 @@ impl Plan {
     pub fn jobs(&self) -> Vec<Job> {
         let mut jobs = Vec::new();
         for scene in SCENES.iter().filter(|scene| scene.name.contains(&self.scene)) {
-            let named = MODELS.iter().filter(|named| named.touches == scene.touches);
+            let named = MODELS.iter().filter(|named| named.has_contacts == scene.has_contacts);
             for model in named.filter(|named| named.name.contains(&self.model)) {
-                for number in [Number::F32, Number::F64] {
+                for number in [ScalarType::F32, ScalarType::F64] {
                     self.settings(scene, *model, number, &mut jobs);
                 }
             }
@@ -66,23 +66,29 @@ impl Plan {
         jobs
     }
 
-    fn settings(&self, scene: &'static Judged, model: Named, number: Number, jobs: &mut Vec<Job>) {
+    fn settings(
+        &self,
+        scene: &'static ReferenceCase,
+        model: Preset,
+        number: ScalarType,
+        jobs: &mut Vec<Job>,
+    ) {
         let counts: &[u32] = if self.quick { &QUICK_COUNTS } else { &COUNTS };
         let iterations: &[u32] = if model.iterates { counts } else { &[model.model.iterations] };
-        let marbles = scene.scene().balls().count() as f64;
+        let marbles = scene.scene().all_marbles().count() as f64;
         for (i, (name, step)) in STEPS.iter().enumerate() {
             if self.quick && !QUICK_STEPS.contains(&i) {
                 continue;
             }
             for substeps in counts {
-                let runs = scene.scene().seconds / step * f64::from(*substeps) * marbles;
+                let runs = scene.scene().duration / step * f64::from(*substeps) * marbles;
                 if runs > if self.quick { QUICK_MOST } else { MOST } {
                     continue;
                 }
                 for iterations in iterations {
                     let (substeps, iterations) = (*substeps, *iterations);
                     let model_now = Model { substeps, iterations, ..model.model };
-                    let setting = Setting { model: model_now, number, step: *step };
+                    let setting = RunConfig { model: model_now, number, step: *step };
                     jobs.push(Job { scene, model, setting, step: name });
                 }
             }
@@ -91,14 +97,14 @@ impl Plan {
 }
 
 impl Job {
-    /// What tells it from the others.
+    /// Unique key.
     #[must_use]
     pub fn key(&self) -> String {
         self.point().key()
     }
 
     fn point(&self) -> Point {
-        let Setting { model, number, step } = self.setting;
+        let RunConfig { model, number, step } = self.setting;
         Point {
             engine: "taw".into(),
             scene: self.scene.name.into(),
@@ -131,7 +137,8 @@ impl Job {
                 }
             }
         }
-        let (seconds, marbles) = (self.scene.scene().seconds, self.scene.scene().balls().count());
+        let (seconds, marbles) =
+            (self.scene.scene().duration, self.scene.scene().all_marbles().count());
         let taken = clock(self);
         point.cost = digits(taken * 1e9 / seconds / marbles as f64);
         point.real_time = digits(seconds / taken);
@@ -163,7 +170,7 @@ pub fn by_the_clock(job: &Job) -> f64 {
 /// has none.
 ///
 /// # Errors
-/// What reading reports, and a line that is no point.
+/// Errors of reading, and malformed lines.
 pub fn read_points(file: &Path) -> std::io::Result<Vec<Point>> {
     let reader = match File::open(file) {
         Err(error) if error.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
@@ -187,7 +194,7 @@ pub fn read_points(file: &Path) -> std::io::Result<Vec<Point>> {
 /// Writes points, one to a line.
 ///
 /// # Errors
-/// What writing reports.
+/// Errors of writing.
 pub fn write_points(file: &Path, points: &[Point]) -> std::io::Result<()> {
     let mut to = std::io::BufWriter::new(File::create(file)?);
     for point in points {
@@ -201,7 +208,7 @@ pub fn write_points(file: &Path, points: &[Point]) -> std::io::Result<()> {
 /// file has already. Every point is in the file as soon as it is measured.
 ///
 /// # Errors
-/// What reading and writing report.
+/// Errors of reading and writing.
 pub fn sweep(
     plan: &Plan,
     [number, of]: [usize; 2],

@@ -1,89 +1,89 @@
-//! What happened in a scene, whatever stepped it.
+//! Recordings of runs of a scene.
 
 use std::time::Duration;
 
 use futures_lite::future::{block_on, yield_now};
 use taw::prelude::*;
-use taw::scene::{Running, Scene};
+use taw::scene::{Scene, Simulation};
 use web_time::Instant;
 
-/// In which numbers a world counts.
+/// Floating-point type of a world.
 #[derive(
     Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, serde::Serialize, serde::Deserialize,
 )]
 #[cfg_attr(feature = "cli", derive(clap::ValueEnum))]
-pub enum Number {
-    /// Single precision, as games do.
+pub enum ScalarType {
+    /// Single precision.
     F32,
     /// Double precision.
     F64,
 }
 
-impl std::fmt::Display for Number {
+impl std::fmt::Display for ScalarType {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         f.write_str(if *self == Self::F32 { "f32" } else { "f64" })
     }
 }
 
-/// How a scene is stepped.
+/// Configuration of a run.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Setting {
-    /// By which model.
+pub struct RunConfig {
+    /// Model.
     pub model: Model,
-    /// In which numbers.
-    pub number: Number,
-    /// In seconds.
+    /// Floating-point type.
+    pub number: ScalarType,
+    /// Time step, in seconds.
     pub step: f64,
 }
 
-/// A scene at a moment: one entry for each marble, in the order of the scene.
+/// State of a scene at one time, with one entry per marble in the order of the scene.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Frame {
-    /// In seconds.
+    /// Time, in seconds.
     pub time: f64,
-    /// In metres.
+    /// Positions, in metres.
     pub at: Vec<Vec3<f64>>,
-    /// In m/s.
+    /// Velocities, in m/s.
     pub velocity: Vec<Vec3<f64>>,
-    /// How deep all contacts overlap together, in metres.
+    /// Total penetration of all contacts, in metres.
     pub overlap: f64,
-    /// Of all marbles in gravity, in joules.
+    /// Total energy of all marbles, in joules.
     pub energy: f64,
-    /// Of all marbles, in kg m/s.
+    /// Total momentum of all marbles, in kg m/s.
     pub momentum: [f64; 3],
-    /// How many marbles are behind the scene's gates.
+    /// Number of marbles behind the scene's sensor planes.
     pub passed: usize,
 }
 
-/// Every so many seconds what there is to see. A divisor of it must be a whole number of any step
-/// of a sweep.
-pub const FRAME: f64 = 0.1;
+/// Sample interval of recordings in seconds. Every step of a sweep must divide it by a whole
+/// number.
+pub const SAMPLE_INTERVAL: f64 = 0.1;
 
-/// A run: what there was to see, and what it cost.
+/// Recording of a run with its cost.
 #[derive(Clone, Debug, Default)]
-pub struct Film {
-    /// The first one at the beginning, the last one at the end.
+pub struct Recording {
+    /// Frames from the start to the end.
     pub frames: Vec<Frame>,
-    /// The median time of a step, in seconds.
+    /// Median duration of a step, in seconds.
     pub cost: f64,
 }
 
-/// What a run does not go on for, without a look at what else is to be done.
-const TURN: Duration = Duration::from_millis(1);
+/// Longest time a run keeps the thread before it yields.
+const YIELD_INTERVAL: Duration = Duration::from_millis(1);
 
-/// Runs something for so many seconds, with a frame in every `every` of them. `None` if a marble
-/// left all numbers behind, or a step is refused. Pauses every millisecond, so that it can share
+/// Records a run of a given duration with a frame every `every` seconds. `None` if the state of a
+/// marble becomes non-finite, or a step is rejected. Yields every millisecond, so that it can share
 /// a thread.
-pub async fn film<S: Scalar>(
-    mut running: Running<S>,
+pub async fn record<S: Scalar>(
+    mut running: Simulation<S>,
     [seconds, step, every]: [f64; 3],
-) -> Option<Film> {
+) -> Option<Recording> {
     let ids: Vec<MarbleId> =
         (0..running.world.marbles.len()).filter_map(|row| running.world.marbles.id(row)).collect();
     let steps = (seconds / step).round() as u64;
     let every = (every / step).round().max(1.0) as u64;
     let dt = S::constant(step);
-    let mut film = Film::default();
+    let mut recording = Recording::default();
     let mut times = Vec::new();
     let mut turn = Instant::now();
     for i in 0..=steps {
@@ -102,59 +102,58 @@ pub async fn film<S: Scalar>(
                 frame.at.push(marble.position.to_vec());
                 frame.velocity.push(marble.velocity);
             }
-            if !running.scene().tilts.is_empty() {
-                // Steps have left that of their middle.
+            if !running.scene().gravity_keyframes.is_empty() {
+                // The steps have set the gravity of their midpoint.
                 let gravity = running.scene().gravity_at(frame.time).map(S::constant);
                 running.world.set_gravity(gravity.into()).ok()?;
             }
             frame.energy = running.world.energy().total();
             frame.momentum = running.world.momentum().into();
-            frame.passed = running.passed();
+            frame.passed = running.sensor_count();
             frame.overlap = crate::scene::overlaps(&running.world).iter().sum();
-            film.frames.push(frame);
+            recording.frames.push(frame);
         }
-        if turn.elapsed() > TURN {
+        if turn.elapsed() > YIELD_INTERVAL {
             yield_now().await;
             turn = Instant::now();
         }
     }
     times.sort_unstable();
-    film.cost = times.get(times.len() / 2).map_or(0.0, Duration::as_secs_f64);
-    Some(film)
+    recording.cost = times.get(times.len() / 2).map_or(0.0, Duration::as_secs_f64);
+    Some(recording)
 }
 
-/// Runs a scene to its end and keeps its frames, the first one at the beginning. `None` if a
-/// marble left all numbers behind.
+/// Records a scene to its end. `None` if the state of a marble becomes non-finite.
 #[must_use]
-pub fn trace(scene: &Scene, setting: Setting) -> Option<Vec<Frame>> {
-    block_on(film_of(scene, setting, FRAME)).map(|film| film.frames)
+pub fn trace(scene: &Scene, setting: RunConfig) -> Option<Vec<Frame>> {
+    block_on(record_scene(scene, setting, SAMPLE_INTERVAL)).map(|recording| recording.frames)
 }
 
-/// [Films](film) a scene to its end. `None` also if the scene cannot be run.
-pub async fn film_of(scene: &Scene, setting: Setting, every: f64) -> Option<Film> {
-    let Setting { model, number, step } = setting;
-    let times = [scene.seconds, step, every];
+/// [Records](record) a scene to its end. `None` also if the scene cannot be run.
+pub async fn record_scene(scene: &Scene, setting: RunConfig, every: f64) -> Option<Recording> {
+    let RunConfig { model, number, step } = setting;
+    let times = [scene.duration, step, every];
     match number {
-        Number::F32 => film(scene.run::<f32>(model).ok()?, times).await,
-        Number::F64 => film(scene.run::<f64>(model).ok()?, times).await,
+        ScalarType::F32 => record(scene.run::<f32>(model).ok()?, times).await,
+        ScalarType::F64 => record(scene.run::<f64>(model).ok()?, times).await,
     }
 }
 
-/// How many seconds of the wall's clock a scene takes, from the first step to the last one.
+/// Wall-clock time of a scene in seconds, from the first step to the last one.
 ///
 /// # Panics
 /// If the scene cannot be run.
 #[must_use]
-pub fn time(scene: &Scene, setting: Setting) -> f64 {
+pub fn time(scene: &Scene, setting: RunConfig) -> f64 {
     match setting.number {
-        Number::F32 => time_in::<f32>(scene, setting),
-        Number::F64 => time_in::<f64>(scene, setting),
+        ScalarType::F32 => time_in::<f32>(scene, setting),
+        ScalarType::F64 => time_in::<f64>(scene, setting),
     }
 }
 
-fn time_in<S: Scalar>(scene: &Scene, Setting { model, step, .. }: Setting) -> f64 {
+fn time_in<S: Scalar>(scene: &Scene, RunConfig { model, step, .. }: RunConfig) -> f64 {
     let mut running = scene.run::<S>(model).expect("scenes are checked before");
-    let (dt, steps) = (S::constant(step), (scene.seconds / step).round() as u64);
+    let (dt, steps) = (S::constant(step), (scene.duration / step).round() as u64);
     let begin = Instant::now();
     for _ in 0..steps {
         running.step(dt).expect("steps are above zero");

@@ -68,8 +68,8 @@ pub(in crate::contact) fn axis_of_max_separation(a: &Features, b: &Features) -> 
 
 /// The unit vector perpendicular to two others, unless they are parallel.
 ///
-/// For nearly parallel vectors the cross product has few digits left, so it is corrected until it
-/// is perpendicular to within rounding.
+/// Nearly parallel vectors leave few digits in the cross product, so it is corrected until it is
+/// perpendicular to within rounding.
 pub(in crate::contact) fn at_right_angles(d: Vec3<f64>, e: Vec3<f64>) -> Option<Vec3<f64>> {
     let cross = d.cross(e);
     let sin = cross.magnitude();

@@ -5,7 +5,7 @@ use std::cmp::{Ordering, Reverse};
 use cgmath::{InnerSpace, SquareMatrix, Zero};
 
 use super::walls::{Bend, WallImpact, lost_fraction};
-use super::{By, Continuous, MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Stopped, outer};
+use super::{Continuous, MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::broad::Period;
 use crate::contact::time_of_impact_sphere_sphere;
 use crate::math::{Mat3, Scalar, Vec3, direction_and_length, length};
@@ -60,8 +60,8 @@ pub(super) struct Path<S> {
     change: Vec3<S>,
     /// Number of bends so far, and whether a wall or another marble caused one.
     bends: u32,
-    held: bool,
-    met: bool,
+    held_by_wall: bool,
+    met_marble: bool,
     /// Index of the next bend at a wall.
     next: Option<u32>,
 }
@@ -80,24 +80,24 @@ impl<S: Scalar> World<S> {
             &mut self.continuous;
         let displaces = self.model.response == Response::Displacement;
         // Displacement changes along the path by itself, and has no normals to get right.
-        let slow = S::constant(if displaces { MAX_FREE_MOTION } else { MIN_GRAZING_MOTION });
+        let min_motion = S::constant(if displaces { MAX_FREE_MOTION } else { MIN_GRAZING_MOTION });
         let smallest = marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
         let moved = |row: usize| marbles.position[row] - start[row];
-        let fast = |row: usize| length(moved(row)) > smallest * slow * S::constant(0.5);
+        let fast = |row: usize| length(moved(row)) > smallest * min_motion * S::constant(0.5);
         candidates.clear();
         if !(0..start.len()).any(fast) {
             return;
         }
-        let into = S::one() - S::constant(OVERLAP);
+        let shrink = S::one() - S::constant(OVERLAP);
         paths.clear();
         paths.extend((0..start.len()).map(|row| Path {
-            sphere: Sphere { center: start[row], radius: marbles.radius[row] * into },
+            sphere: Sphere { center: start[row], radius: marbles.radius[row] * shrink },
             since: S::zero(),
             motion: moved(row),
             change: marbles.velocity[row] - velocity[row],
             bends: 0,
-            held: false,
-            met: false,
+            held_by_wall: false,
+            met_marble: false,
             next: None,
         }));
         meetings.clear();
@@ -107,7 +107,7 @@ impl<S: Scalar> World<S> {
         meetings
             .extend((0..start.len() as u32).filter_map(|row| Meeting::at_wall(row, paths, bends)));
         if !self.model.response.needs_penetration() {
-            self.predict_meetings(slow);
+            self.predict_meetings(min_motion);
         }
         self.bend_in_order(self.resting_approach(dt));
         if !displaces {
@@ -118,18 +118,24 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Finds candidate pairs and predicts their first meetings; `slow` is the fraction of the
+    /// Finds candidate pairs and predicts their first meetings; `min_motion` is the fraction of the
     /// smallest radius that twice a motion must exceed.
-    fn predict_meetings(&mut self, slow: S) {
+    fn predict_meetings(&mut self, min_motion: S) {
         let Continuous { middle, reach, candidates, meetings, paths, .. } = &mut self.continuous;
         let half = S::constant(0.5);
         let smallest = self.marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
-        let fast = |row: u32| length(paths[row as usize].motion) > smallest * slow * half;
+        let fast = |row: u32| length(paths[row as usize].motion) > smallest * min_motion * half;
         middle.clear();
-        middle.extend(paths.iter().map(|way| way.sphere.center + way.motion * half));
+        middle.extend(
+            paths
+                .iter()
+                .map(|displacement| displacement.sphere.center + displacement.motion * half),
+        );
         reach.clear();
         let reaches = paths.iter().zip(&self.marbles.radius);
-        reach.extend(reaches.map(|(way, radius)| *radius + length(way.motion) * half));
+        reach.extend(
+            reaches.map(|(displacement, radius)| *radius + length(displacement.motion) * half),
+        );
         let spheres = (&middle[..], &reach[..]);
         self.images.pairs(&mut self.grid, spheres, S::zero(), self.marbles.period, |a, b| {
             if fast(a) || fast(b) {
@@ -143,17 +149,17 @@ impl<S: Scalar> World<S> {
     }
 
     /// Processes bends at walls and meetings of marbles in the order of time.
-    fn bend_in_order(&mut self, slow: S) {
+    fn bend_in_order(&mut self, resting_approach: S) {
         while let Some(Reverse(hit)) = self.continuous.meetings.pop() {
             let Meeting { time, pair, bends } = hit;
             let bent = |row: u32| self.continuous.paths[row as usize].bends;
             if bends != (bent(pair.0), bent(pair.1)) {
-                continue; // it was foreseen anew
+                continue; // superseded by a newer prediction
             }
             if pair.0 == pair.1 {
                 self.bend_at_wall(pair.0 as usize);
             } else {
-                self.meet(pair, time, slow);
+                self.meet(pair, time, resting_approach);
             }
             let Continuous { candidates, meetings, paths, bends, .. } = &mut self.continuous;
             let period = self.marbles.period;
@@ -172,43 +178,46 @@ impl<S: Scalar> World<S> {
     /// Bends the path of a marble at its next wall.
     fn bend_at_wall(&mut self, row: usize) {
         let Continuous { paths, bends, .. } = &mut self.continuous;
-        let way = &mut paths[row];
-        let Some(index) = way.next else { return };
+        let displacement = &mut paths[row];
+        let Some(index) = displacement.next else { return };
         let bend = bends[index as usize];
         let per_substep = if bend.left > S::zero() { bend.left.recip() } else { S::zero() };
-        *way = Path {
-            sphere: Sphere { center: bend.center, ..way.sphere },
+        *displacement = Path {
+            sphere: Sphere { center: bend.center, ..displacement.sphere },
             since: S::one() - bend.left,
-            motion: bend.way * per_substep,
+            motion: bend.displacement * per_substep,
             change: bend.change * per_substep,
-            bends: way.bends + 1,
-            held: true,
+            bends: displacement.bends + 1,
+            held_by_wall: true,
             next: Some(index + 1).filter(|next| {
                 bends.get(*next as usize).is_some_and(|it| it.stop.row == bend.stop.row)
             }),
-            ..*way
+            ..*displacement
         };
         self.marbles.velocity[row] -= bend.stop.change;
         self.continuous.stop(bend.stop, bend.along);
     }
 
-    /// Bends the paths of two marbles where they meet. Marbles that approach faster than `slow`, in
-    /// metres per substep, stop, so that they bounce along the normal of that moment; resting ones
-    /// continue along the surface. A marble held by a wall inverse_masses to none.
-    fn meet(&mut self, pair: (u32, u32), time: S, slow: S) {
+    /// Bends the paths of two marbles where they meet. Marbles that approach faster than
+    /// `resting_approach`, in metres per substep, stop, so that they bounce along the normal of
+    /// that moment; resting ones continue along the surface. A marble held by a wall yields to
+    /// none.
+    fn meet(&mut self, pair: (u32, u32), time: S, resting_approach: S) {
         let rows = [pair.0 as usize, pair.1 as usize];
         let old = rows.map(|row| self.continuous.paths[row]);
-        let [x, y] = old.map(|way| way.at(time));
+        let [x, y] = old.map(|displacement| displacement.at(time));
         let normal = normal_of(&x, &y.nearest_image(&x, self.marbles.period)).0;
         let inverse_masses = [0, 1].map(|side| {
             let mass = self.marbles.mass(rows[side]);
-            if old[side].held { S::zero() } else { mass.recip() }
+            if old[side].held_by_wall { S::zero() } else { mass.recip() }
         });
         let total = inverse_masses[0] + inverse_masses[1];
         let closing = (y.motion - x.motion).dot(normal);
         let again = x.bends.max(y.bends) + 1 < MAX_BENDS;
-        let stopped = [x, y].iter().any(|way| way.met && way.motion == Vec3::zero());
-        let slides = -closing <= slow && again && !stopped && total > S::zero();
+        let stopped = [x, y]
+            .iter()
+            .any(|displacement| displacement.met_marble && displacement.motion == Vec3::zero());
+        let slides = -closing <= resting_approach && again && !stopped && total > S::zero();
         // Loss of each: its share along the normal, or everything.
         let lost = |of: [Vec3<S>; 2]| {
             let both = normal * (of[1] - of[0]).dot(normal);
@@ -223,14 +232,14 @@ impl<S: Scalar> World<S> {
         let end = (self.marbles.velocity[rows[1]] - self.marbles.velocity[rows[0]]).dot(normal);
         let part = lost_fraction((change[1] - change[0]).dot(normal) * rest, end);
         let plane = Mat3::from_value(S::one()) - outer(normal);
-        for (side, way) in [x, y].into_iter().enumerate() {
+        for (side, displacement) in [x, y].into_iter().enumerate() {
             if motion[side] == Vec3::zero() && change[side] == Vec3::zero() {
                 continue;
             }
-            let stop = Stopped {
+            let stop = StoppedMarble {
                 row: rows[side] as u32,
-                by: By::Marble(rows[1 - side] as u32),
-                way: motion[side] * rest,
+                obstacle: Obstacle::Marble(rows[1 - side] as u32),
+                displacement: motion[side] * rest,
                 change: if slides { Vec3::zero() } else { change[side] * (rest * part) },
             };
             let left = S::one() - old[side].since;
@@ -239,13 +248,13 @@ impl<S: Scalar> World<S> {
             self.marbles.velocity[rows[side]] -= stop.change;
             self.continuous.stop(stop, along);
             self.continuous.paths[rows[side]] = Path {
-                motion: way.motion - motion[side],
-                change: way.change - change[side],
-                bends: way.bends + 1,
-                held: way.held || !slides,
-                met: true,
+                motion: displacement.motion - motion[side],
+                change: displacement.change - change[side],
+                bends: displacement.bends + 1,
+                held_by_wall: displacement.held_by_wall || !slides,
+                met_marble: true,
                 next: None,
-                ..way
+                ..displacement
             };
         }
         // Rounding may leave a gap.
@@ -254,20 +263,21 @@ impl<S: Scalar> World<S> {
 
     /// Moves a marble whose path has bent to its end, or to the wall that another one pushed it to.
     fn arrive(&mut self, row: usize) {
-        let Path { sphere, bends, met, .. } = self.continuous.paths[row].at(S::one());
+        let Path { sphere, bends, met_marble, .. } = self.continuous.paths[row].at(S::one());
         if bends == 0 {
             return;
         }
         self.marbles.position[row] = sphere.center;
         let start = Sphere { center: self.continuous.start[row], ..self.marbles.sphere(row) };
-        let way = sphere.center - start.center;
-        let looks = met && !self.walls.are_half_spaces();
-        let stop = if looks { self.first_wall_impact(&start, way) } else { None };
+        let displacement = sphere.center - start.center;
+        let looks = met_marble && !self.walls.are_half_spaces();
+        let stop = if looks { self.first_wall_impact(&start, displacement) } else { None };
         let Some(WallImpact { time, wall, .. }) = stop else { return };
-        self.marbles.position[row] = start.center + way * time;
-        let by = By::Wall(wall);
-        let (way, change) = (way * (S::one() - time), Vec3::zero());
-        self.continuous.stop(Stopped { row: row as u32, by, way, change }, Mat3::zero());
+        self.marbles.position[row] = start.center + displacement * time;
+        let obstacle = Obstacle::Wall(wall);
+        let (displacement, change) = (displacement * (S::one() - time), Vec3::zero());
+        self.continuous
+            .stop(StoppedMarble { row: row as u32, obstacle, displacement, change }, Mat3::zero());
     }
 }
 
@@ -316,9 +326,13 @@ fn normal_of<S: Scalar>(x: &Path<S>, y: &Path<S>) -> (Vec3<S>, S) {
 impl<S: Scalar> Meeting<S> {
     /// Next bend of a marble at a wall.
     fn at_wall(row: u32, paths: &[Path<S>], bends: &[Bend<S>]) -> Option<Reverse<Self>> {
-        let way = &paths[row as usize];
-        let time = S::one() - bends[way.next? as usize].left;
-        Some(Reverse(Self { time, pair: (row, row), bends: (way.bends, way.bends) }))
+        let displacement = &paths[row as usize];
+        let time = S::one() - bends[displacement.next? as usize].left;
+        Some(Reverse(Self {
+            time,
+            pair: (row, row),
+            bends: (displacement.bends, displacement.bends),
+        }))
     }
 
     /// Predicts the next meeting of two marbles from `now` on, if they are fast.

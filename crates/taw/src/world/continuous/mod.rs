@@ -34,8 +34,8 @@ pub(super) struct Continuous<S> {
     pub velocity: Vec<Vec3<S>>,
     /// Stops of this substep; and by index, if stopped, the projection by which a position still
     /// follows a velocity: the free directions, times the remaining fraction of the substep.
-    stops: Vec<Stopped<S>>,
-    pub stands: Vec<Option<Mat3<S>>>,
+    stops: Vec<StoppedMarble<S>>,
+    pub projections: Vec<Option<Mat3<S>>>,
     /// Pairs that meet within the substep, stopped or not.
     pub grazes: Vec<(u32, u32)>,
     middle: Vec<Point3<S>>,
@@ -50,19 +50,19 @@ pub(super) struct Continuous<S> {
     bounced_from: Vec<Point3<S>>,
 }
 
-/// WallImpact of a marble.
+/// A marble that was stopped.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Stopped<S> {
+pub(super) struct StoppedMarble<S> {
     pub row: u32,
     /// Index of the wall or marble that stopped it.
-    by: By,
+    obstacle: Obstacle,
     /// Lost displacement in metres, and lost velocity change by forces in m/s.
-    way: Vec3<S>,
+    displacement: Vec3<S>,
     change: Vec3<S>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-enum By {
+enum Obstacle {
     Wall(u32),
     Marble(u32),
 }
@@ -97,20 +97,20 @@ impl<S: Scalar> World<S> {
         self.continuous.stops.retain(|stop| {
             let row = stop.row as usize;
             if !touches(stop) {
-                self.marbles.position[row] += stop.way;
+                self.marbles.position[row] += stop.displacement;
                 self.marbles.velocity[row] += stop.change;
-                self.continuous.stands[row] = None;
+                self.continuous.projections[row] = None;
             }
             touches(stop)
         });
     }
 
     /// Predicate: the two bodies of a stop have a contact.
-    fn touches(&self) -> impl Fn(&Stopped<S>) -> bool + use<S> {
-        let walls = self.contacts.wm.iter().map(|c| (By::Wall(c.a), c.b));
-        let both = |c: &Contact<S>| [(By::Marble(c.a), c.b), (By::Marble(c.b), c.a)];
+    fn touches(&self) -> impl Fn(&StoppedMarble<S>) -> bool + use<S> {
+        let walls = self.contacts.wm.iter().map(|c| (Obstacle::Wall(c.a), c.b));
+        let both = |c: &Contact<S>| [(Obstacle::Marble(c.a), c.b), (Obstacle::Marble(c.b), c.a)];
         let touches: HashSet<_> = walls.chain(self.contacts.mm.iter().flat_map(both)).collect();
-        move |stop| touches.contains(&(stop.by, stop.row))
+        move |stop| touches.contains(&(stop.obstacle, stop.row))
     }
 
     /// Largest approach in metres per substep of a resting contact: that of gravity in two
@@ -122,9 +122,9 @@ impl<S: Scalar> World<S> {
 
 impl<S: Scalar> Continuous<S> {
     /// Records a stop and the remaining freedom of the marble.
-    fn stop(&mut self, stopped: Stopped<S>, along: Mat3<S>) {
-        self.stands.resize(self.start.len(), None);
-        let free = &mut self.stands[stopped.row as usize];
+    fn stop(&mut self, stopped: StoppedMarble<S>, along: Mat3<S>) {
+        self.projections.resize(self.start.len(), None);
+        let free = &mut self.projections[stopped.row as usize];
         *free = Some(free.map_or(along, |free| along * free));
         self.stops.push(stopped);
     }
@@ -141,7 +141,7 @@ impl<S: Scalar> Continuous<S> {
         self.start.clear();
         self.velocity.clear();
         self.stops.clear();
-        self.stands.clear();
+        self.projections.clear();
         self.grazes.clear();
         self.bends.clear();
         self.bounced_from.clear();

@@ -3,7 +3,7 @@
 use cgmath::{InnerSpace, SquareMatrix, Zero};
 use smallvec::SmallVec;
 
-use super::{By, MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Stopped, outer};
+use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
 use crate::response::Colliders as _;
 use crate::shape::{Aabb, PointProjection, Sphere};
@@ -26,12 +26,12 @@ pub(in crate::world) struct WallImpact<S> {
 /// Bend of a path at a wall.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Bend<S> {
-    pub stop: Stopped<S>,
+    pub stop: StoppedMarble<S>,
     pub center: Point3<S>,
     /// Remaining fraction of the substep, remaining displacement in metres, and remaining velocity
     /// change by forces in m/s.
     pub left: S,
-    pub way: Vec3<S>,
+    pub displacement: Vec3<S>,
     pub change: Vec3<S>,
     /// Projection by which the position still follows the velocity.
     pub along: Mat3<S>,
@@ -45,11 +45,11 @@ impl<S: Scalar> World<S> {
         if self.walls.are_half_spaces() {
             return;
         }
-        let slow = self.resting_approach(dt);
+        let resting_approach = self.resting_approach(dt);
         for row in 0..self.marbles.len() {
             let motion = self.marbles.position[row] - self.continuous.start[row];
             if length(motion) > self.marbles.radius[row] * S::constant(MAX_FREE_MOTION) {
-                self.slide_along_walls(row, slow);
+                self.slide_along_walls(row, resting_approach);
             }
         }
     }
@@ -58,53 +58,53 @@ impl<S: Scalar> World<S> {
     /// [`Response::Penalty`](crate::response::Response::Penalty), whose forces need an overlap,
     /// when half of its radius is inside. The remaining motion and velocity change by forces
     /// continue along the surface ("collide and slide"; Fauerby, *Improved collision detection and
-    /// response*, 2003). A marble that approaches faster than `slow`, in metres per substep, keeps
-    /// the velocity of the impact, with which it bounces; if it would slide off the wall, it stays,
-    /// since there it could not bounce. A resting one keeps its velocity: friction needs its
-    /// weight.
-    fn slide_along_walls(&mut self, row: usize, slow: S) {
+    /// response*, 2003). A marble that approaches faster than `resting_approach`, in metres per
+    /// substep, keeps the velocity of the impact, with which it bounces; if it would slide off the
+    /// wall, it stays, since there it could not bounce. A resting one keeps its velocity: friction
+    /// needs its weight.
+    fn slide_along_walls(&mut self, row: usize, resting_approach: S) {
         let mut sphere = Sphere { center: self.continuous.start[row], ..self.marbles.sphere(row) };
-        let mut way = self.marbles.position[row] - sphere.center;
+        let mut displacement = self.marbles.position[row] - sphere.center;
         let mut velocity = self.marbles.velocity[row];
         let mut change = velocity - self.continuous.velocity[row];
         let mut left = S::one();
         let mut surfaces: SmallVec<[Vec3<S>; MAX_BENDS as usize]> = SmallVec::new();
-        while length(way) > sphere.radius * S::constant(MAX_FREE_MOTION)
+        while length(displacement) > sphere.radius * S::constant(MAX_FREE_MOTION)
             && let Some(WallImpact { time, wall, normal, .. }) =
-                self.first_wall_impact(&sphere, way)
+                self.first_wall_impact(&sphere, displacement)
         {
-            sphere.center += way * time;
+            sphere.center += displacement * time;
             let rest = S::one() - time;
-            (way, change, left) = (way * rest, change * rest, left * rest);
-            let mut along = along_surfaces(way, normal, &surfaces);
+            (displacement, change, left) = (displacement * rest, change * rest, left * rest);
+            let mut along = along_surfaces(displacement, normal, &surfaces);
             surfaces.push(normal);
-            let there = sphere.center + along * way;
+            let there = sphere.center + along * displacement;
             let slides_off = || {
                 let wall = &self.walls.shapes()[wall as usize];
                 wall.project_point(there).distance > sphere.radius
             };
-            let fast = -way.dot(normal) > slow * left;
+            let fast = -displacement.dot(normal) > resting_approach * left;
             if surfaces.len() == MAX_BENDS as usize || (fast && slides_off()) {
                 along = Mat3::from_value(S::zero());
             }
-            let (slid, kept) = (along * way, along * change);
+            let (slid, kept) = (along * displacement, along * change);
             let surface = self.walls.surface_velocity(wall as usize, sphere.center);
             let closing = (velocity - surface).dot(normal);
             let part = lost_fraction((change - kept).dot(normal), closing);
-            let stop = Stopped {
+            let stop = StoppedMarble {
                 row: row as u32,
-                by: By::Wall(wall),
-                way: way - slid,
+                obstacle: Obstacle::Wall(wall),
+                displacement: displacement - slid,
                 change: if fast { (change - kept) * part } else { Vec3::zero() },
             };
             velocity -= stop.change;
-            (way, change) = (slid, kept);
+            (displacement, change) = (slid, kept);
             let center = sphere.center;
             self.continuous.bends.push(Bend {
                 stop,
                 center,
                 left,
-                way,
+                displacement,
                 change,
                 along: along * rest,
             });
@@ -117,23 +117,23 @@ impl<S: Scalar> World<S> {
         for row in 0..self.continuous.bounced_from.len().min(self.marbles.len()) {
             let sphere =
                 Sphere { center: self.continuous.bounced_from[row], ..self.marbles.sphere(row) };
-            let way = self.marbles.position[row] - sphere.center;
-            if length(way) <= sphere.radius * S::constant(MAX_FREE_MOTION) {
+            let displacement = self.marbles.position[row] - sphere.center;
+            if length(displacement) <= sphere.radius * S::constant(MAX_FREE_MOTION) {
                 continue;
             }
             let planes = self.walls.planes().filter_map(|(_, plane)| {
                 let (gap, closing) = (
                     plane.signed_distance(sphere.center) - sphere.radius,
-                    -way.dot(plane.normal()),
+                    -displacement.dot(plane.normal()),
                 );
                 let passes = closing > S::zero()
                     && closing > gap + sphere.radius * S::constant(MAX_FREE_MOTION);
                 passes.then(|| (gap / closing).max(S::zero()))
             });
-            let other = self.first_wall_impact(&sphere, way).map(|stop| stop.time);
+            let other = self.first_wall_impact(&sphere, displacement).map(|stop| stop.time);
             let first = planes.chain(other).fold(S::one(), S::min);
             if first < S::one() {
-                self.marbles.position[row] = sphere.center + way * first;
+                self.marbles.position[row] = sphere.center + displacement * first;
             }
         }
     }
@@ -144,12 +144,12 @@ impl<S: Scalar> World<S> {
         sphere: &Sphere<S>,
         motion: Vec3<S>,
     ) -> Option<WallImpact<S>> {
-        let (half, into) = (S::constant(0.5), S::one() - S::constant(OVERLAP));
+        let (half, shrink) = (S::constant(0.5), S::one() - S::constant(OVERLAP));
         let (start, more) = (sphere.center, sphere.radius);
         let more = Vec3::new(more, more, more);
-        let way = Aabb { min: start, max: start }
+        let displacement = Aabb { min: start, max: start }
             .union(&Aabb { min: start + motion, max: start + motion });
-        let bounds = Aabb { min: way.min - more, max: way.max + more };
+        let bounds = Aabb { min: displacement.min - more, max: displacement.max + more };
         // The core (half the radius) decides whether it passes into a wall, the full sphere when:
         // first wherever it touches, so that at the internal edge of two flush parts the one below
         // counts.
@@ -161,7 +161,7 @@ impl<S: Scalar> World<S> {
         if !passes {
             return None;
         }
-        let scale = if self.model.response.needs_penetration() { half } else { into };
+        let scale = if self.model.response.needs_penetration() { half } else { shrink };
         let all = Sphere { radius: sphere.radius * scale, ..*sphere };
         let mut best: Option<WallImpact<S>> = None;
         self.walls.for_each_in_box(&bounds, |part| {
@@ -216,10 +216,14 @@ pub(super) fn lost_fraction<S: Scalar>(change: S, end: S) -> S {
 
 /// Projection of a motion onto the surface that it reaches: onto its plane, onto the edge with
 /// another touched surface in the way, or zero in a corner.
-fn along_surfaces<S: Scalar>(way: Vec3<S>, normal: Vec3<S>, others: &[Vec3<S>]) -> Mat3<S> {
+fn along_surfaces<S: Scalar>(
+    displacement: Vec3<S>,
+    normal: Vec3<S>,
+    others: &[Vec3<S>],
+) -> Mat3<S> {
     let plane = Mat3::from_value(S::one()) - outer(normal);
-    let slid = plane * way;
-    let blocks = |other: &&Vec3<S>, way: Vec3<S>| way.dot(**other) < S::zero();
+    let slid = plane * displacement;
+    let blocks = |other: &&Vec3<S>, displacement: Vec3<S>| displacement.dot(**other) < S::zero();
     let Some(other) = others.iter().find(|other| blocks(other, slid)) else { return plane };
     let edge = normal.cross(*other);
     // The edge between nearly parallel surfaces is undefined.
@@ -227,7 +231,7 @@ fn along_surfaces<S: Scalar>(way: Vec3<S>, normal: Vec3<S>, others: &[Vec3<S>]) 
         return plane;
     }
     let along = outer(edge.normalize());
-    if others.iter().any(|it| it != other && blocks(&it, along * way)) {
+    if others.iter().any(|it| it != other && blocks(&it, along * displacement)) {
         return Mat3::from_value(S::zero());
     }
     along

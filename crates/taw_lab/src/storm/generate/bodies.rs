@@ -1,13 +1,13 @@
-//! What falls, flies, lies and is squeezed.
+//! Random bodies.
 
 use taw::math::{Point3, Vec3};
 use taw::prelude::*;
-use taw::scene::{Ball, Turn};
+use taw::scene::{MarbleDesc, RotationDesc};
 
 use super::{Dice, surface};
 use crate::storm::case::{Case, Kind};
 
-/// Who comes, and where to.
+/// Number, kind and placement of bodies.
 pub struct Crowd {
     pub kind: Kind,
     /// True where contacts feel spins.
@@ -18,7 +18,7 @@ pub struct Crowd {
     pub high: [f64; 3],
 }
 
-/// How bodies begin.
+/// Initial state of bodies.
 #[derive(Clone, Copy, PartialEq)]
 enum Start {
     /// At rest, apart.
@@ -75,7 +75,7 @@ impl Crowd {
     }
 
     /// Makes masses and shapes such as the kind knows.
-    fn alike(&self, balls: &mut [Ball], dice: &mut Dice) {
+    fn alike(&self, balls: &mut [MarbleDesc], dice: &mut Dice) {
         let massless =
             matches!(self.kind, Kind::Displacement | Kind::DisplacementSwept | Kind::SwarmLab);
         if massless {
@@ -109,7 +109,7 @@ impl Crowd {
         start: Start,
         dice: &mut Dice,
         walls: &dyn Fn([f64; 3]) -> f64,
-    ) -> Vec<Ball> {
+    ) -> Vec<MarbleDesc> {
         // As many as there are, they have room to fall.
         let room = (0..3).map(|i| self.high[i] - self.low[i]).fold(f64::INFINITY, f64::min);
         let room = room.max(0.2 * self.size);
@@ -119,11 +119,11 @@ impl Crowd {
         let one_radius = largest * dice.magnitude(0.2, 1.0);
         let own_surfaces = dice.chance(0.3);
         let together = dice.inside(self.low, self.high);
-        let mut balls: Vec<Ball> = Vec::new();
+        let mut balls: Vec<MarbleDesc> = Vec::new();
         let mut top = 0.0;
         for number in 0..count {
             let radius = one_radius * dice.magnitude(1.0 / ratio, 1.0);
-            let mut ball = Ball { radius, ..Ball::default() };
+            let mut ball = MarbleDesc { radius, ..MarbleDesc::default() };
             ball.density = if density > 0.0 { density } else { dice.magnitude(1.0, 10_000.0) };
             let position = match start {
                 Start::Stacked => {
@@ -146,7 +146,7 @@ impl Crowd {
             ball.position = position;
             if start == Start::Thrown {
                 let fast = if dice.chance(0.1) { 50.0 } else { dice.between(0.0, 8.0) };
-                // What springs do not hold, they are not asked to.
+                // Springs are not tested beyond their limits.
                 let speed = if self.springs() { fast.min(4.0 * self.size) } else { fast };
                 ball.velocity = (dice.direction() * speed).into();
             }
@@ -154,7 +154,7 @@ impl Crowd {
                 ball.angular_velocity = (dice.direction() * dice.between(0.0, 50.0)).into();
             }
             if own_surfaces {
-                ball.surface = Some(surface(dice));
+                ball.material = Some(surface(dice));
             }
             if start != Start::Stacked {
                 ball.half_length = radius * dice.between(0.1, 1.0);
@@ -162,7 +162,8 @@ impl Crowd {
                 ball.radius = radius - 0.5 * ball.half_length;
                 ball.half_length *= 0.5;
                 let axis = Vec3::from(dice.direction());
-                ball.turned = Turn { axis: axis.into(), degrees: dice.between(0.0, 180.0) };
+                ball.rotation =
+                    RotationDesc { axis: axis.into(), degrees: dice.between(0.0, 180.0) };
             }
             balls.push(ball);
         }
@@ -172,14 +173,14 @@ impl Crowd {
     /// A place where nothing is.
     fn free(
         &self,
-        balls: &[Ball],
+        balls: &[MarbleDesc],
         radius: f64,
         dice: &mut Dice,
         walls: &dyn Fn([f64; 3]) -> f64,
     ) -> Option<[f64; 3]> {
         for _ in 0..60 {
             let at = dice.inside(self.low, self.high);
-            let apart = |ball: &Ball| {
+            let apart = |ball: &MarbleDesc| {
                 let way = Vec3::from(ball.position) - Vec3::from(at);
                 way.magnitude() > ball.radius + ball.half_length + radius
             };
@@ -191,7 +192,7 @@ impl Crowd {
     }
 }
 
-/// How far the nearest wall is from a point, in metres; below zero inside.
+/// Signed distance of a point from the nearest wall, in metres; negative inside.
 fn distances(case: &Case) -> impl Fn([f64; 3]) -> f64 + use<> {
     let running = case.scene.run::<f64>(Model::default());
     let shapes = running.map(|running| running.world.walls.shapes().to_vec()).unwrap_or_default();

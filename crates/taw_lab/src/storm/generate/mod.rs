@@ -5,14 +5,14 @@ mod dice;
 mod walls;
 
 use taw::prelude::*;
-use taw::scene::{Scene, Surface};
+use taw::scene::{MaterialDesc, Scene};
 
 use super::case::{Case, Kind, Name, SwarmPart};
-use crate::trade::trace::Number;
+use crate::trade::trace::ScalarType;
 use bodies::Crowd;
 use dice::Dice;
 
-/// How many body-substeps a scene has at most, so that many scenes run.
+/// Maximum number of body-substeps of a scene, so that many scenes run.
 const MOST_WORK: f64 = 60_000.0;
 /// In seconds: long enough to fall, bounce and come to rest.
 const LONGEST: f64 = 5.0;
@@ -26,7 +26,7 @@ pub fn generate(name: Name) -> Case {
     case.scene = arena.scene;
     case.closed = arena.closed;
     case.differenced = arena.differenced;
-    case.scene.surface = surface(&mut dice);
+    case.scene.material = surface(&mut dice);
     let crowd = Crowd {
         kind: name.kind,
         spins: case.model.rotation == Rotation::Dynamic,
@@ -40,8 +40,8 @@ pub fn generate(name: Name) -> Case {
     let count = case.bodies().max(1) as f64 * f64::from(case.model.substeps);
     let steps = (LONGEST / case.step).min(MOST_WORK / count).max(20.0);
     case.steps = (steps * dice.between(0.3, 1.0)).max(10.0) as u32;
-    case.scene.seconds = case.step * f64::from(case.steps);
-    case.scene.about = format!("{name}: {}", arena.about);
+    case.scene.duration = case.step * f64::from(case.steps);
+    case.scene.description = format!("{name}: {}", arena.about);
     case
 }
 
@@ -82,13 +82,13 @@ fn setting(kind: Kind, dice: &mut Dice) -> Case {
         full,
         substeps: dice.pick(&[1, 2, 2, 4, 8]),
         sleeps: dice.chance(0.7),
-        surface: surface(dice),
+        material: surface(dice),
         balls: Vec::new(),
     });
     Case {
         broke: None,
         model,
-        number: if dice.chance(0.6) { Number::F32 } else { Number::F64 },
+        number: if dice.chance(0.6) { ScalarType::F32 } else { ScalarType::F64 },
         step: 1.0 / dice.pick(steps),
         steps: 1,
         differenced: false,
@@ -98,15 +98,15 @@ fn setting(kind: Kind, dice: &mut Dice) -> Case {
     }
 }
 
-/// What something is made of.
-fn surface(dice: &mut Dice) -> Surface {
+/// Random material.
+fn surface(dice: &mut Dice) -> MaterialDesc {
     let restitution = match dice.below(4) {
         0 => 0.0,
         1 => 1.0,
         _ => dice.between(0.0, 1.0),
     };
     let friction = if dice.chance(0.2) { 0.0 } else { dice.between(0.0, 1.5) };
-    let mut surface = Surface { restitution, friction, ..Surface::default() };
+    let mut surface = MaterialDesc { restitution, friction, ..MaterialDesc::default() };
     if dice.chance(0.2) {
         surface.rolling_resistance = dice.between(0.0, 0.2);
     }
@@ -126,19 +126,19 @@ fn soften(case: &mut Case) {
     if case.model.response != Response::Penalty(ContactLaw::HertzMindlin) {
         return;
     }
-    let radius = case.scene.balls().map(|ball| ball.radius).fold(f64::INFINITY, f64::min);
-    let density = case.scene.balls().map(|ball| ball.density).fold(f64::INFINITY, f64::min);
+    let radius = case.scene.all_marbles().map(|ball| ball.radius).fold(f64::INFINITY, f64::min);
+    let density = case.scene.all_marbles().map(|ball| ball.density).fold(f64::INFINITY, f64::min);
     if !radius.is_finite() {
         return;
     }
-    let poissons_ratio = case.scene.surface.poissons_ratio;
+    let poissons_ratio = case.scene.material.poissons_ratio;
     let time = 8.0 * case.substep();
     let root = std::f64::consts::PI * radius / (time * (0.163 * poissons_ratio + 0.877));
     let youngs_modulus = 2.0 * (1.0 + poissons_ratio) * density * root * root;
-    let surfaces = case.scene.walls.iter_mut().filter_map(|wall| wall.surface.as_mut());
-    let structures = case.scene.structures.iter_mut().filter_map(|wall| wall.surface.as_mut());
-    let balls = case.scene.marbles.iter_mut().filter_map(|ball| ball.surface.as_mut());
-    for surface in surfaces.chain(structures).chain(balls).chain([&mut case.scene.surface]) {
+    let surfaces = case.scene.walls.iter_mut().filter_map(|wall| wall.material.as_mut());
+    let structures = case.scene.structures.iter_mut().filter_map(|wall| wall.material.as_mut());
+    let balls = case.scene.marbles.iter_mut().filter_map(|ball| ball.material.as_mut());
+    for surface in surfaces.chain(structures).chain(balls).chain([&mut case.scene.material]) {
         surface.youngs_modulus = youngs_modulus;
     }
 }

@@ -1,9 +1,9 @@
-//! What bodies fall on, and into.
+//! Random walls.
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
 use taw::math::Vec3;
-use taw::scene::{Build, Form, Movement, Scene, Structure, Turn, Wall};
+use taw::scene::{Build, KinematicMotion, RotationDesc, Scene, ShapeDesc, Structure, WallDesc};
 
 use super::Dice;
 
@@ -13,7 +13,7 @@ pub struct Arena {
     pub about: &'static str,
     /// The length that everything is measured by, in metres.
     pub size: f64,
-    /// Whether there is a level floor at height zero.
+    /// A level floor exists at height zero.
     pub floor: bool,
     /// Where bodies begin.
     pub low: [f64; 3],
@@ -65,24 +65,30 @@ pub fn arena(dice: &mut Dice) -> Arena {
 }
 
 impl Arena {
-    fn wall(&mut self, shape: Form, moves: Option<Movement>) {
-        self.scene.walls.push(Wall { shape, surface: None, moves });
+    fn wall(&mut self, shape: ShapeDesc, motion: Option<KinematicMotion>) {
+        self.scene.walls.push(WallDesc { shape, material: None, motion });
     }
 
-    fn plane(&mut self, normal: Vec3<f64>, through: [f64; 3]) {
-        self.wall(Form::HalfSpace { normal: normal.into(), through }, None);
+    fn plane(&mut self, normal: Vec3<f64>, point: [f64; 3]) {
+        self.wall(ShapeDesc::HalfSpace { normal: normal.into(), point }, None);
     }
 
     fn ground(&mut self) {
         self.plane(Vec3::unit_y(), [0.0; 3]);
     }
 
-    fn block(&mut self, center: [f64; 3], size: [f64; 3], turned: Turn, moves: Option<Movement>) {
-        self.wall(Form::Box { center, size, turned }, moves);
+    fn block(
+        &mut self,
+        center: [f64; 3],
+        size: [f64; 3],
+        rotation: RotationDesc,
+        motion: Option<KinematicMotion>,
+    ) {
+        self.wall(ShapeDesc::Box { center, size, rotation }, motion);
     }
 
     fn build(&mut self, shape: Build) {
-        self.scene.structures.push(Structure { shape, surface: None, moves: None });
+        self.scene.structures.push(Structure { shape, material: None, motion: None });
     }
 }
 
@@ -191,9 +197,9 @@ fn block(arena: &mut Arena, dice: &mut Dice) {
         let center = dice.inside([-size, 0.0, -size], [size, 0.5 * size, size]);
         let sides = dice.inside([0.05 * size; 3], [size; 3]);
         let turned = if dice.chance(0.5) {
-            Turn::default()
+            RotationDesc::default()
         } else {
-            Turn { axis: dice.direction().into(), degrees: dice.between(0.0, 360.0) }
+            RotationDesc { axis: dice.direction().into(), degrees: dice.between(0.0, 360.0) }
         };
         arena.block(center, sides, turned, None);
     }
@@ -224,7 +230,7 @@ fn box_of_boxes(arena: &mut Arena, dice: &mut Dice) {
             let (mut center, mut sides) = ([0.0, half, 0.0], [2.0 * (half + thick); 3]);
             center[axis] += side * (half + 0.5 * thick);
             sides[axis] = thick;
-            arena.block(center, sides, Turn::default(), None);
+            arena.block(center, sides, RotationDesc::default(), None);
         }
     }
     close(arena, half);
@@ -242,10 +248,10 @@ fn stairs(arena: &mut Arena, dice: &mut Dice) {
     let (size, steps) = (arena.size, 2 + dice.below(5));
     let part = |i: usize| {
         let (deep, high) = (2.0 * size / steps as f64, 0.5 * size / steps as f64);
-        Form::Box {
+        ShapeDesc::Box {
             center: [-size + deep * (i as f64 + 0.5), -high * i as f64 - 0.5 * size, 0.0],
             size: [deep, size, 2.0 * size],
-            turned: Turn::default(),
+            rotation: RotationDesc::default(),
         }
     };
     arena.build(Build::Compound { parts: (0..steps).map(part).collect() });
@@ -266,9 +272,9 @@ fn round(arena: &mut Arena, dice: &mut Dice) {
     arena.ground();
     let size = arena.size;
     let radius = size * dice.between(0.1, 0.8);
-    arena.wall(Form::Ball { center: [0.0, 0.5 * radius, 0.0], radius }, None);
+    arena.wall(ShapeDesc::Ball { center: [0.0, 0.5 * radius, 0.0], radius }, None);
     let (from, to) = (dice.inside([-size; 3], [size; 3]), dice.inside([-size; 3], [size; 3]));
-    arena.wall(Form::Capsule { from, to, radius: size * dice.between(0.05, 0.3) }, None);
+    arena.wall(ShapeDesc::Capsule { from, to, radius: size * dice.between(0.05, 0.3) }, None);
     (arena.low[1], arena.floor) = (1.5 * radius, false);
 }
 
@@ -278,7 +284,7 @@ fn sheet(arena: &mut Arena, dice: &mut Dice) {
     let (size, thick) = (arena.size, 0.02);
     let axis = Vec3::new(dice.between(-1.0, 1.0), 0.0, dice.between(-1.0, 1.0)).into();
     let degrees = if dice.chance(0.5) { 0.0 } else { dice.between(-40.0, 40.0) };
-    let turned = Turn { axis, degrees };
+    let turned = RotationDesc { axis, degrees };
     let center = [0.0, 0.5 * size, 0.0];
     if dice.chance(0.5) {
         arena.block(center, [2.0 * size, thick * size, 2.0 * size], turned, None);
@@ -303,7 +309,7 @@ fn hopper(arena: &mut Arena, dice: &mut Dice) {
         let far = mouth + size * slope.cos();
         let center = [out[0] * far, size + size * slope.sin(), out[1] * far];
         // A plate that leans outward, turned about the horizontal across.
-        let turned = Turn { axis: [-out[1], 0.0, out[0]], degrees: slope.to_degrees() };
+        let turned = RotationDesc { axis: [-out[1], 0.0, out[0]], degrees: slope.to_degrees() };
         let sides = if i % 2 == 0 {
             [2.0 * size, 0.1 * size, 4.0 * size]
         } else {
@@ -317,8 +323,8 @@ fn hopper(arena: &mut Arena, dice: &mut Dice) {
     arena.floor = false;
 }
 
-fn swing(way: [f64; 3], degrees: f64, axis: [f64; 3], period: f64) -> Movement {
-    Movement::Swings { way, pivot: [0.0; 3], axis, degrees, period }
+fn swing(way: [f64; 3], degrees: f64, axis: [f64; 3], period: f64) -> KinematicMotion {
+    KinematicMotion::Oscillate { amplitude: way, pivot: [0.0; 3], axis, degrees, period }
 }
 
 fn lift(arena: &mut Arena, dice: &mut Dice) {
@@ -331,7 +337,7 @@ fn lift(arena: &mut Arena, dice: &mut Dice) {
     arena.block(
         [0.0, -0.25 * size, 0.0],
         sides,
-        Turn::default(),
+        RotationDesc::default(),
         Some(swing([0.0, way, 0.0], 0.0, [0.0, 1.0, 0.0], period)),
     );
     arena.differenced = dice.chance(0.5);
@@ -340,9 +346,15 @@ fn lift(arena: &mut Arena, dice: &mut Dice) {
 fn disc(arena: &mut Arena, dice: &mut Dice) {
     arena.about = "a turning disc";
     let (size, degrees_per_second) = (arena.size, dice.between(-180.0, 180.0));
-    let moves = Movement::Turns { pivot: [0.0; 3], axis: [0.0, 1.0, 0.0], degrees_per_second };
+    let motion =
+        KinematicMotion::Rotate { pivot: [0.0; 3], axis: [0.0, 1.0, 0.0], degrees_per_second };
     let center = [0.0, -0.25 * size, 0.0];
-    arena.block(center, [3.0 * size, 0.5 * size, 3.0 * size], Turn::default(), Some(moves));
+    arena.block(
+        center,
+        [3.0 * size, 0.5 * size, 3.0 * size],
+        RotationDesc::default(),
+        Some(motion),
+    );
     arena.differenced = dice.chance(0.5);
 }
 
@@ -351,11 +363,16 @@ fn board(arena: &mut Arena, dice: &mut Dice) {
     let (size, period) = (arena.size, dice.between(2.0, 8.0));
     let tilt = Some(swing([0.0; 3], dice.between(1.0, 8.0), [0.0, 0.0, 1.0], period));
     let thick = 0.2 * size;
-    arena.block([0.0, -0.5 * thick, 0.0], [2.4 * size, thick, 2.4 * size], Turn::default(), tilt);
+    arena.block(
+        [0.0, -0.5 * thick, 0.0],
+        [2.4 * size, thick, 2.4 * size],
+        RotationDesc::default(),
+        tilt,
+    );
     for side in [-1.0, 1.0] {
         let (at, height) = (side * (1.1 * size), 0.5 * thick);
-        arena.block([at, height, 0.0], [thick, thick, 2.4 * size], Turn::default(), tilt);
-        arena.block([0.0, height, at], [2.4 * size, thick, thick], Turn::default(), tilt);
+        arena.block([at, height, 0.0], [thick, thick, 2.4 * size], RotationDesc::default(), tilt);
+        arena.block([0.0, height, at], [2.4 * size, thick, thick], RotationDesc::default(), tilt);
     }
     (arena.low, arena.high) =
         ([-0.8 * size, 0.05 * size, -0.8 * size], [0.8 * size, size, 0.8 * size]);
@@ -365,6 +382,6 @@ fn board(arena: &mut Arena, dice: &mut Dice) {
 fn belt(arena: &mut Arena, dice: &mut Dice) {
     arena.about = "a belt";
     let way = Vec3::new(dice.between(-3.0, 3.0), 0.0, dice.between(-3.0, 3.0));
-    let shape = Form::HalfSpace { normal: [0.0, 1.0, 0.0], through: [0.0; 3] };
-    arena.wall(shape, Some(Movement::Conveys { velocity: way.into() }));
+    let shape = ShapeDesc::HalfSpace { normal: [0.0, 1.0, 0.0], point: [0.0; 3] };
+    arena.wall(shape, Some(KinematicMotion::Conveyor { velocity: way.into() }));
 }

@@ -7,16 +7,16 @@ use super::{Finding, Invariant, Rules, overlap};
 use crate::storm::case::Kind;
 use crate::storm::observe::Snapshot;
 
-/// What is remembered of the energy of a run, in joules.
+/// Energy record of a run, in joules.
 #[derive(Clone, Debug)]
 pub struct Ledger {
     /// Energy less what walls brought in: now at the beginning, and the least since.
     begin: f64,
     least: f64,
-    /// What walls brought in, and how much of it went either way.
+    /// Work of walls, and its absolute sum.
     walls: f64,
     walls_moved: f64,
-    /// What the beginning's overlap may lift, and what has been lifted so far.
+    /// Energy that the initial overlap may lift, and the energy lifted so far.
     overlap: f64,
     lifted: f64,
     /// The largest fluctuation that a step may have, what all may have together by an integrator
@@ -30,7 +30,7 @@ pub struct Ledger {
     sunk: f64,
 }
 
-/// What a step may gain, in joules.
+/// Allowed energy gain of a step, in joules.
 struct Allowance {
     /// By being of the first order.
     fluctuation: f64,

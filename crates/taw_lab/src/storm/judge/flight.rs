@@ -6,7 +6,7 @@ use super::{Finding, Invariant, Rules};
 use crate::storm::case::Kind;
 use crate::storm::observe::{Body, Snapshot};
 
-/// Who may have touched whom in a step.
+/// Possible contacts of a step.
 #[derive(Clone, Debug)]
 pub struct Near {
     /// For each body, the first of its cluster.

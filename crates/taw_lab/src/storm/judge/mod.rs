@@ -1,4 +1,4 @@
-//! What holds in every ordinary scene. One invariant a function, with its bound and the reason
+//! Invariants of every ordinary scene. One function per invariant, with its bound and the reason
 //! for the bound.
 
 mod energy;
@@ -13,9 +13,9 @@ use taw::prelude::*;
 
 use super::case::{Case, Kind};
 use super::observe::Snapshot;
-use crate::trade::trace::Number;
+use crate::trade::trace::ScalarType;
 
-/// What must hold.
+/// An invariant.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub enum Invariant {
     /// A scene and a step that are right are not refused.
@@ -30,9 +30,9 @@ pub enum Invariant {
     EnergyOfStep,
     /// No run makes energy.
     EnergyOfRun,
-    /// What touches no wall keeps its momentum but for gravity.
+    /// Momentum is conserved without wall contacts, except for gravity.
     Momentum,
-    /// What nothing supports falls.
+    /// Unsupported bodies fall.
     Support,
     /// The speed reported is the speed moved.
     Speed,
@@ -89,14 +89,14 @@ impl Invariant {
     }
 }
 
-/// How near to its bound an invariant came.
+/// Value of an invariant and its bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Finding {
     /// Which one.
     pub invariant: Invariant,
     /// In the unit of the invariant.
     pub value: f64,
-    /// What the value may be at most.
+    /// Largest allowed value.
     pub bound: f64,
     /// The body that it is about, if it is about one.
     pub body: Option<usize>,
@@ -115,14 +115,14 @@ impl Finding {
         }
     }
 
-    /// Whether it holds.
+    /// Returns true if the invariant holds.
     #[must_use]
     pub fn holds(&self) -> bool {
         self.ratio() <= 1.0
     }
 }
 
-/// What all judges know of a case.
+/// Properties of a case that all invariants use.
 #[derive(Clone, Copy, Debug)]
 pub struct Rules {
     /// By what it is stepped.
@@ -131,17 +131,17 @@ pub struct Rules {
     pub step: f64,
     /// The longest substep of marbles and swarm, in seconds, and the most of them in a step.
     pub substep: f64,
-    /// How many in a step, at most.
+    /// Maximum number of substeps per step.
     pub substeps: f64,
     /// Of the scalar that the state is kept in.
     pub epsilon: f64,
-    /// How velocities become places.
+    /// Integrator.
     pub integrator: Integrator,
-    /// Whether walls move.
+    /// Walls move.
     pub moving: bool,
     /// The softest contact's modulus: `E / (2 (1 − ν²))` of the softest material, in pascals.
     pub modulus: f64,
-    /// How many times more heaps sag than with eight iterations.
+    /// Sag of heaps relative to that of eight iterations.
     pub sag: f64,
 }
 
@@ -159,7 +159,7 @@ impl Rules {
         let swarm = own_parts.then_some(if lab { 1.0 } else { parts });
         let iterations = f64::from(case.model.iterations).min(if lab { parts } else { f64::MAX });
         let marbles = f64::from(case.model.substeps);
-        let single = case.number == Number::F32 || case.swarm.is_some() || soft_step;
+        let single = case.number == ScalarType::F32 || case.swarm.is_some() || soft_step;
         Self {
             kind,
             step: case.step,
@@ -173,14 +173,14 @@ impl Rules {
         }
     }
 
-    /// Whether contacts are soft, so that a collision takes several steps, in which it stores
-    /// energy and gives it back.
+    /// Returns true if contacts are soft, so that a collision takes several steps, in which it
+    /// stores energy and releases it.
     #[must_use]
     pub fn soft(&self) -> bool {
         self.springs() || matches!(self.kind, Kind::SoftStep | Kind::SwarmFull)
     }
 
-    /// Whether contacts are springs, which store energy and give it back.
+    /// Returns true if contacts are springs, which store energy and release it.
     #[must_use]
     pub fn springs(&self) -> bool {
         matches!(self.kind, Kind::SpringDashpot | Kind::HertzMindlin)
@@ -192,7 +192,7 @@ impl Rules {
         matches!(self.kind, Kind::Displacement | Kind::Impulse)
     }
 
-    /// Whether what meets on the way stops there and loses the rest of its way.
+    /// Returns true if marbles stop at the time of impact and lose the rest of their motion.
     #[must_use]
     pub fn swept(&self) -> bool {
         matches!(self.kind, Kind::ImpulseSwept | Kind::DisplacementSwept)
@@ -208,10 +208,10 @@ impl Rules {
 
 fn softest(case: &Case) -> f64 {
     let scene = &case.scene;
-    let walls = scene.walls.iter().map(|wall| wall.surface);
-    let structures = scene.structures.iter().map(|wall| wall.surface);
-    let balls = scene.marbles.iter().map(|ball| ball.surface);
-    let all = walls.chain(structures).chain(balls).flatten().chain([scene.surface]);
+    let walls = scene.walls.iter().map(|wall| wall.material);
+    let structures = scene.structures.iter().map(|wall| wall.material);
+    let balls = scene.marbles.iter().map(|ball| ball.material);
+    let all = walls.chain(structures).chain(balls).flatten().chain([scene.material]);
     let modulus = all.map(|surface| {
         0.5 * surface.youngs_modulus / (1.0 - surface.poissons_ratio * surface.poissons_ratio)
     });
@@ -223,7 +223,7 @@ fn softest(case: &Case) -> f64 {
 pub struct Bench {
     rules: Rules,
     closed: Option<[[f64; 3]; 2]>,
-    /// Who may be outside of the closed box.
+    /// Bodies that may be outside of the closed box.
     outside: Vec<bool>,
     energy: energy::Ledger,
     flight: flight::Falls,

@@ -30,7 +30,7 @@ pub fn deepest(snapshot: &Snapshot) -> (f64, f64) {
     depth.fold((0.0, 0.0), |(deepest, sum), depth| (depth.max(deepest), sum + depth))
 }
 
-/// How deep springs sink, as documented, in metres.
+/// Penetration of springs, as documented, in metres.
 ///
 /// A collision of 16 substeps goes as deep as `v T / π` for `T` = 16 substeps, and what rests on
 /// it by its weight over the stiffness `m π² / T²`. Balls by Hertz go as deep as their energy

@@ -1,4 +1,4 @@
-//! What lies.
+//! Resting bodies.
 
 use taw::prelude::*;
 
@@ -25,9 +25,9 @@ impl Lies {
     ///   themselves);
     /// - rounding: that of the velocity, and of two places by the step.
     ///
-    /// What touches nothing within a fiftieth of its radius before and after, and is so fast that it
-    /// comes to the next thing within the step, may bounce there and back and is not judged. The
-    /// figure is for how many steps in a row that is not so.
+    /// Counts consecutive steps at rest. A body that touches nothing within a fiftieth of its
+    /// radius before and after, and is fast enough to reach the next body within the step, may
+    /// bounce there and back and is not judged.
     pub fn judge(&mut self, rules: &Rules, before: &Snapshot, after: &Snapshot) -> Vec<Finding> {
         self.wrong.resize(after.bodies.len(), 0);
         let gravity = after.gravity().magnitude();
@@ -69,10 +69,10 @@ impl Lies {
         gaps.fold(snapshot.bodies[body].wall_gap, f64::min)
     }
 
-    /// What does not fall is held by something that it touches: before and after a step, there is
-    /// something within a fiftieth of the radius, or within what gravity does in three substeps,
-    /// where contacts are made already, or on its way: what flies to and fro between walls turns
-    /// back in every step, far from where it is seen. Only among balls, whose gaps are exact.
+    /// A body that does not fall is supported by a contact: before and after a step, a body or wall
+    /// is within a fiftieth of the radius, or within the fall of three substeps, where contacts
+    /// exist already, or on its way: a body that bounces between walls turns back in every step,
+    /// far from where it is seen. Only among balls, whose gaps are exact.
     ///
     /// The figure is for how many steps in a row that is not so: a bounce in the middle of a step
     /// takes one, and what is held without a touch is held in all.

@@ -4,7 +4,10 @@ use std::sync::Arc;
 use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
 use super::structure::cast_pose;
-use super::{Ball, Field, Form, Gate, Movement, Scene, Structure, Surface, Turn, Wall};
+use super::{
+    ForceFieldDesc, KinematicMotion, MarbleDesc, MaterialDesc, RotationDesc, Scene, SensorPlane,
+    ShapeDesc, Structure, WallDesc,
+};
 use crate::Error;
 use crate::error::finite_vector;
 use crate::frame::{AxisAngle, Pose};
@@ -16,18 +19,18 @@ use crate::world::{Marble, Model, WallId, WallShape, World};
 
 /// Running simulation of a [`Scene`]: its world and kinematic motions.
 #[derive(Clone, Debug)]
-pub struct Running<S> {
+pub struct Simulation<S> {
     /// The world, with marbles in the order of the scene.
     pub world: World<S>,
     scene: Scene,
-    moving: Vec<(WallId, Shape, Movement)>,
+    moving: Vec<(WallId, Shape, KinematicMotion)>,
     time: f64,
 }
 
 /// Initial shape of a kinematic wall.
 #[derive(Clone, Debug)]
 enum Shape {
-    Form(Form),
+    ShapeDesc(ShapeDesc),
     /// Index of a structure.
     Structure(usize),
 }
@@ -39,53 +42,57 @@ impl Scene {
     /// Errors of the world: [`Error::NotFinite`], [`Error::NotPositive`], [`Error::OutOfRange`],
     /// [`Error::NotUnit`], [`Error::UnsupportedShape`]. Also numbers beyond those of `f32` in any
     /// world, and more than [`MAX_MARBLES`](Self::MAX_MARBLES).
-    pub fn run<S: Scalar>(&self, model: Model) -> Result<Running<S>, Error> {
+    pub fn run<S: Scalar>(&self, model: Model) -> Result<Simulation<S>, Error> {
         self.check()?;
         let mut world = World::default();
         world.set_model(model)?;
         world.set_gravity(vector(self.gravity_at(0.0)))?;
-        world.set_forces(self.fields.iter().map(|field| field.force()).collect())?;
+        world.set_forces(self.force_fields.iter().map(|field| field.force()).collect())?;
         let mut moving = Vec::new();
-        let mut insert =
-            |wall: WallShape<S>, surface: &Option<Surface>, moves: &Option<Movement>, shape| {
-                let id = world.walls.insert(wall)?;
-                let surface = surface.unwrap_or(self.surface);
-                world.walls.set_material(id, Some(surface.material()))?;
-                if let Some(movement) = moves {
-                    let motion = movement.at(0.0, 0.0)?.1;
-                    world.walls.set_motion(id, Some(motion))?;
-                    moving.push((id, shape, *movement));
-                }
-                Ok::<_, Error>(())
-            };
-        for Wall { shape, surface, moves } in &self.walls {
-            insert(shape.wall(Pose::identity())?, surface, moves, Shape::Form(*shape))?;
+        let mut insert = |wall: WallShape<S>,
+                          material: &Option<MaterialDesc>,
+                          motion: &Option<KinematicMotion>,
+                          shape| {
+            let id = world.walls.insert(wall)?;
+            let material = material.unwrap_or(self.material);
+            world.walls.set_material(id, Some(material.to_material()))?;
+            if let Some(movement) = motion {
+                let motion = movement.at(0.0, 0.0)?.1;
+                world.walls.set_motion(id, Some(motion))?;
+                moving.push((id, shape, *movement));
+            }
+            Ok::<_, Error>(())
+        };
+        for WallDesc { shape, material, motion } in &self.walls {
+            insert(shape.wall(Pose::identity())?, material, motion, Shape::ShapeDesc(*shape))?;
         }
-        for (number, Structure { shape, surface, moves }) in self.structures.iter().enumerate() {
+        for (number, Structure { shape, material, motion }) in self.structures.iter().enumerate() {
             let wall = shape.wall(Pose::identity())?;
-            insert(wall, surface, moves, Shape::Structure(number))?;
+            insert(wall, material, motion, Shape::Structure(number))?;
         }
-        for ball in self.balls() {
-            world.marbles.insert(ball.marble(self.surface)?)?;
+        for ball in self.all_marbles() {
+            world.marbles.insert(ball.marble(self.material)?)?;
         }
         world.check_shapes()?;
-        Ok(Running { world, scene: self.clone(), moving, time: 0.0 })
+        Ok(Simulation { world, scene: self.clone(), moving, time: 0.0 })
     }
 
     /// Interpolated gravity at a time, in m/s².
     #[must_use]
     pub fn gravity_at(&self, time: f64) -> [f64; 3] {
-        let (Some(first), Some(last)) = (self.tilts.first(), self.tilts.last()) else {
+        let (Some(first), Some(last)) =
+            (self.gravity_keyframes.first(), self.gravity_keyframes.last())
+        else {
             return self.gravity;
         };
-        if time <= first.at {
+        if time <= first.time {
             return first.gravity;
         }
-        for pair in self.tilts.windows(2) {
+        for pair in self.gravity_keyframes.windows(2) {
             if let [before, after] = pair
-                && time < after.at
+                && time < after.time
             {
-                let part = (time - before.at) / (after.at - before.at);
+                let part = (time - before.time) / (after.time - before.time);
                 let axis =
                     |i: usize| before.gravity[i] + (after.gravity[i] - before.gravity[i]) * part;
                 return [axis(0), axis(1), axis(2)];
@@ -95,20 +102,20 @@ impl Scene {
     }
 
     /// All marbles: single ones first.
-    pub fn balls(&self) -> impl Iterator<Item = Ball> + '_ {
-        let lattices = self.lattices.iter().flat_map(super::Lattice::balls);
+    pub fn all_marbles(&self) -> impl Iterator<Item = MarbleDesc> + '_ {
+        let lattices = self.lattices.iter().flat_map(super::Lattice::marbles);
         self.marbles.iter().copied().chain(lattices)
     }
 }
 
-impl<S> From<World<S>> for Running<S> {
+impl<S> From<World<S>> for Simulation<S> {
     /// Wraps an existing world without kinematic motions.
     fn from(world: World<S>) -> Self {
         Self { world, scene: Scene::default(), moving: Vec::new(), time: 0.0 }
     }
 }
 
-impl<S: Scalar> Running<S> {
+impl<S: Scalar> Simulation<S> {
     /// Steps by `dt` seconds: gravity of the midpoint, walls at their poses of the end.
     ///
     /// # Errors
@@ -126,27 +133,27 @@ impl<S: Scalar> Running<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
     /// [`Error::NoSuchWall`] if a kinematic wall was removed; then nothing has changed.
     pub fn move_walls(&mut self, dt: S) -> Result<(), Error> {
-        let seconds = World::validated_dt(dt)?.as_f64();
+        let duration = World::validated_dt(dt)?.as_f64();
         self.moving.iter().try_for_each(|(id, ..)| self.world.walls.row(*id).map(|_| ()))?;
-        if !self.scene.tilts.is_empty() {
-            let gravity = self.scene.gravity_at(self.time + 0.5 * seconds);
+        if !self.scene.gravity_keyframes.is_empty() {
+            let gravity = self.scene.gravity_at(self.time + 0.5 * duration);
             self.world.set_gravity(vector(gravity))?;
         }
         for (id, shape, movement) in &self.moving {
-            let (pose, motion) = movement.at(self.time, self.time + seconds)?;
+            let (pose, motion) = movement.at(self.time, self.time + duration)?;
             let wall = match (self.world.walls.get(*id)?, shape) {
                 // Copies share the built geometry.
                 (WallShape::Mesh(mesh, _), _) => WallShape::Mesh(Arc::clone(mesh), cast_pose(pose)),
                 (WallShape::HeightField(field, _), _) => {
                     WallShape::HeightField(Arc::clone(field), cast_pose(pose))
                 }
-                (_, Shape::Form(form)) => form.wall(pose)?,
+                (_, Shape::ShapeDesc(form)) => form.wall(pose)?,
                 (_, Shape::Structure(number)) => self.scene.structures[*number].shape.wall(pose)?,
             };
             self.world.walls.set(*id, wall)?;
             self.world.walls.set_motion(*id, Some(motion))?;
         }
-        self.time += seconds;
+        self.time += duration;
         Ok(())
     }
 
@@ -158,13 +165,13 @@ impl<S: Scalar> Running<S> {
 
     /// Number of marbles behind a sensor plane; those behind several count several times.
     #[must_use]
-    pub fn passed(&self) -> usize {
-        let behind = |gate: &Gate| {
-            let (normal, through) = (Vec3::from(gate.normal), Vec3::from(gate.through));
+    pub fn sensor_count(&self) -> usize {
+        let behind = |gate: &SensorPlane| {
+            let (normal, point) = (Vec3::from(gate.normal), Vec3::from(gate.point));
             let at = self.world.marbles.position().iter().map(|at| cast_vector(at.to_vec()));
-            at.filter(|at: &Vec3<f64>| normal.dot(at - through) < 0.0).count()
+            at.filter(|at: &Vec3<f64>| normal.dot(at - point) < 0.0).count()
         };
-        self.scene.gates.iter().map(behind).sum()
+        self.scene.sensor_planes.iter().map(behind).sum()
     }
 
     /// The initial scene.
@@ -174,7 +181,7 @@ impl<S: Scalar> Running<S> {
     }
 }
 
-impl Field {
+impl ForceFieldDesc {
     fn force<S: Scalar>(self) -> ForceField<S> {
         match self {
             Self::Drag { velocity, linear, quadratic } => ForceField::Drag(Medium {
@@ -194,10 +201,10 @@ impl Field {
     }
 }
 
-impl Surface {
+impl MaterialDesc {
     /// Converts to a material.
     #[must_use]
-    pub fn material<S: Scalar>(self) -> Material<S> {
+    pub fn to_material<S: Scalar>(self) -> Material<S> {
         Material {
             restitution: S::constant(self.restitution),
             friction: S::constant(self.friction),
@@ -213,32 +220,32 @@ impl Surface {
     }
 }
 
-impl Ball {
-    fn marble<S: Scalar>(self, surface: Surface) -> Result<Marble<S>, Error> {
-        let turned = self.turned.rotation()?;
+impl MarbleDesc {
+    fn marble<S: Scalar>(self, material: MaterialDesc) -> Result<Marble<S>, Error> {
+        let rotation = self.rotation.quaternion()?;
         Ok(Marble {
             velocity: vector(self.velocity),
-            rotation: Quat::from_sv(S::constant(turned.s), cast_vector(turned.v)),
+            rotation: Quat::from_sv(S::constant(rotation.s), cast_vector(rotation.v)),
             angular_velocity: vector(self.angular_velocity),
             half_length: S::constant(self.half_length),
             mass: Mass::Density(S::constant(self.density)),
-            material: Some(self.surface.unwrap_or(surface).material()),
+            material: Some(self.material.unwrap_or(material).to_material()),
             ..Marble::new(point(self.position), S::constant(self.radius))
         })
     }
 }
 
-impl Form {
+impl ShapeDesc {
     /// The wall shape, transformed by a pose.
     pub(super) fn wall<S: Scalar>(self, pose: Pose<f64>) -> Result<WallShape<S>, Error> {
         let place = |at: [f64; 3]| point(pose.transform_point(Point3::from(at)).into());
         Ok(match self {
-            Self::HalfSpace { normal, through } => {
-                Plane::through(place(through), vector(pose.transform_vector(normal.into()).into()))?
+            Self::HalfSpace { normal, point } => {
+                Plane::through(place(point), vector(pose.transform_vector(normal.into()).into()))?
                     .into()
             }
-            Self::Box { center, size, turned } => {
-                let turn = pose.rotation * turned.rotation()?;
+            Self::Box { center, size, rotation } => {
+                let turn = pose.rotation * rotation.quaternion()?;
                 let rotation = Quat::from_sv(S::constant(turn.s), cast_vector(turn.v));
                 Obb::new(place(center), rotation, vector(size.map(|side| 0.5 * side)))?.into()
             }
@@ -252,8 +259,8 @@ impl Form {
     }
 }
 
-impl Turn {
-    fn rotation(self) -> Result<Quat<f64>, Error> {
+impl RotationDesc {
+    fn quaternion(self) -> Result<Quat<f64>, Error> {
         axis_angle(self.axis, self.degrees.to_radians())
     }
 }
@@ -262,7 +269,7 @@ fn axis_angle(axis: [f64; 3], radians: f64) -> Result<Quat<f64>, Error> {
     Ok(AxisAngle::new(Vec3::from(axis), radians)?.into())
 }
 
-impl Movement {
+impl KinematicMotion {
     /// Pose of a wall after a time in seconds, relative to its initial one.
     ///
     /// # Errors
@@ -275,8 +282,8 @@ impl Movement {
     /// time `from`.
     fn at<S: Scalar>(self, from: f64, to: f64) -> Result<(Pose<f64>, WallMotion<S>), Error> {
         let middle = 0.5 * (from + to);
-        let (way, velocity, pivot, axis, angle, rate) = match self {
-            Self::Conveys { velocity } => {
+        let (translation, velocity, pivot, axis, angle, rate) = match self {
+            Self::Conveyor { velocity } => {
                 let motion = WallMotion {
                     velocity: vector(velocity),
                     angular_velocity: Vec3::zero(),
@@ -284,20 +291,20 @@ impl Movement {
                 };
                 return Ok((Pose::identity(), motion));
             }
-            Self::Turns { pivot, axis, degrees_per_second } => {
+            Self::Rotate { pivot, axis, degrees_per_second } => {
                 let rate = degrees_per_second.to_radians();
                 (Vec3::zero(), Vec3::zero(), pivot, axis, rate * to, rate)
             }
-            Self::Swings { way, pivot, axis, degrees, period } => {
+            Self::Oscillate { amplitude, pivot, axis, degrees, period } => {
                 let (part, _) = (TAU * (to / period)).sin_cos_portable();
                 let (_, rate) = (TAU * (middle / period)).sin_cos_portable();
                 // sin a − sin b = 2 cos((a + b) / 2) sin((a − b) / 2): the mean rate, also over
                 // many periods.
                 let half = 0.5 * TAU * ((to - from) / period);
                 let mean = if half == 0.0 { 1.0 } else { half.sin_cos_portable().0 / half };
-                let (way, rate) = (Vec3::from(way), rate * mean * TAU / period);
+                let (amplitude, rate) = (Vec3::from(amplitude), rate * mean * TAU / period);
                 let angle = degrees.to_radians();
-                (way * part, way * rate, pivot, axis, angle * part, angle * rate)
+                (amplitude * part, amplitude * rate, pivot, axis, angle * part, angle * rate)
             }
         };
         let pivot = Point3::from(pivot);
@@ -307,11 +314,11 @@ impl Movement {
         let rotation = axis_angle(axis, angle)?;
         // Rotation about the pivot, then translation.
         let turned_pivot = Pose { rotation, translation: Vec3::zero() }.transform_point(pivot);
-        let pose = Pose { rotation, translation: pivot - turned_pivot + way };
+        let pose = Pose { rotation, translation: pivot - turned_pivot + translation };
         let motion = WallMotion {
             velocity: cast_vector(velocity),
             angular_velocity: cast_vector(direction * rate),
-            pivot: point((pivot + way).into()),
+            pivot: point((pivot + translation).into()),
         };
         Ok((pose, motion))
     }

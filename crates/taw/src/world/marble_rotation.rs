@@ -1,0 +1,162 @@
+//! Rotation of marbles: models, visual rolling, and integration.
+
+use cgmath::{InnerSpace, One, Zero};
+
+use super::marbles::Marbles;
+use crate::math::{Quat, Scalar, Vec3, cast_vector, is_finite};
+use crate::motion::{Rotation, integrate_rotation};
+use crate::response::CapsuleInertia;
+
+impl<S: Scalar> Marbles<S> {
+    /// Rotation model of a marble in a world of this model.
+    pub(super) fn rotation_of(&self, row: usize, world: Rotation) -> Rotation {
+        self.rotation_model.get(row).map_or(world, |own| own.min(world))
+    }
+
+    /// Returns true if contacts and torques do not affect the marble's rotation.
+    pub(super) fn is_rotation_locked(&self, row: usize) -> bool {
+        self.rotation_of(row, Rotation::Dynamic) != Rotation::Dynamic
+    }
+
+    /// Returns true if any marble has its own rotation model.
+    pub(super) fn has_rotation_locks(&self) -> bool {
+        !self.rotation_model.is_empty()
+    }
+
+    /// Adds or drops the columns for rotation. New ones start with no rotation, at rest.
+    pub(super) fn enable_rotation(&mut self, enable: bool) {
+        if enable != self.has_rotation {
+            self.has_rotation = enable;
+            let rows = if enable { self.position.len() } else { 0 };
+            self.rotation = vec![Quat::one(); rows];
+            self.angular_velocity = vec![Vec3::zero(); rows];
+        }
+    }
+
+    /// Sets the angular velocity of rolling without slip over a surface at rest with this normal.
+    pub(super) fn roll_without_slip(&mut self, row: usize, normal: Vec3<S>) {
+        let angular_velocity = normal.cross(self.velocity[row]) / self.radius[row];
+        if self.half_length.get(row).is_some() {
+            return; // it does not roll whichever way it goes
+        }
+        if let Some(slot) = self.angular_velocity.get_mut(row)
+            && is_finite(angular_velocity)
+        {
+            *slot = angular_velocity;
+        }
+    }
+
+    /// Angular velocity in high precision, in rad/s.
+    pub(super) fn angular_velocity_f64(&self, row: usize) -> Vec3<f64> {
+        let low = self.compensation.get(row).copied().unwrap_or_default();
+        let angular_velocity = self.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero);
+        cast_vector::<S, f64>(angular_velocity) + cast_vector(low.angular_velocity)
+    }
+
+    /// Splits the angular velocity likewise. Does nothing in a model without rotation.
+    pub(super) fn set_angular_velocity_f64(
+        &mut self,
+        row: usize,
+        angular_velocity: Vec3<f64>,
+    ) -> bool {
+        if let Some(slot) = self.angular_velocity.get_mut(row) {
+            *slot = cast_vector(angular_velocity);
+            if !is_finite(*slot) {
+                *slot = Vec3::zero();
+                if let Some(low) = self.compensation.get_mut(row) {
+                    low.angular_velocity = Vec3::zero();
+                }
+                return false;
+            }
+            if let Some(low) = self.compensation.get_mut(row) {
+                low.angular_velocity = cast_vector(angular_velocity - cast_vector(*slot));
+            }
+        }
+        true
+    }
+
+    /// Integrates torques and angular damping over `dt` seconds.
+    pub(super) fn integrate_angular_velocity(&mut self, dt: S) {
+        if self.torque.is_empty() && self.damping.is_empty() {
+            return;
+        }
+        for row in 0..self.angular_velocity.len() {
+            if self.is_rotation_locked(row) {
+                continue;
+            }
+            let mut angular_velocity = self.angular_velocity[row];
+            if let Some(torque) = self.torque.get(row) {
+                angular_velocity += self.apply_inverse_inertia(row, torque.dual()) * dt;
+            }
+            if let Some(damping) = self.damping.get(row) {
+                angular_velocity *= (-damping.angular * dt).exp_portable();
+            }
+            if is_finite(angular_velocity) && angular_velocity != self.angular_velocity[row] {
+                self.angular_velocity[row] = angular_velocity;
+            }
+        }
+    }
+
+    /// Integrates rotations over `dt` seconds. Capsules without dynamic rotation in a world of this
+    /// `rotation` rotate about their axes only: otherwise they would rotate into walls and be
+    /// lifted out, which gains energy.
+    pub(super) fn integrate_rotations(&mut self, dt: S, rotation: Rotation) {
+        if self.has_capsules() {
+            for row in 0..self.angular_velocity.len() {
+                let own = self.rotation_model.get(row).unwrap_or(rotation);
+                if own.min(rotation) == Rotation::Dynamic || self.half_length(row) == S::zero() {
+                    self.integrate_symmetric_top(row, dt);
+                } else {
+                    let axis = self.rotation[row] * Vec3::unit_y();
+                    let angular_velocity = axis * self.angular_velocity[row].dot(axis);
+                    self.rotation[row] =
+                        integrate_rotation(self.rotation[row], angular_velocity, dt);
+                }
+            }
+            return;
+        }
+        for (rotation, angular_velocity) in self.rotation.iter_mut().zip(&self.angular_velocity) {
+            *rotation = integrate_rotation(*rotation, *angular_velocity, dt);
+        }
+    }
+
+    /// Rotates a capsule as the symmetric top that it is: steadily about its axis, and the axis
+    /// about the conserved angular momentum (Landau and Lifshitz, *Mechanics*, §33).
+    ///
+    /// Computed in `f64` and rounded once. In `f32` a quaternion and its axis are normalized only
+    /// to 1e-7: the angular velocity along the axis would grow by that in every substep, always in
+    /// the same direction.
+    fn integrate_symmetric_top(&mut self, row: usize, dt: S) {
+        let (rotation, half) = (self.rotation[row], self.half_length(row));
+        if half == S::zero() || self.angular_velocity[row].is_zero() {
+            self.rotation[row] = integrate_rotation(rotation, self.angular_velocity[row], dt);
+            return;
+        }
+        let exact = |rotation: Quat<S>| {
+            Quat::from_sv(rotation.s.as_f64(), cast_vector(rotation.v)).normalize()
+        };
+        let (angular_velocity, dt) = (self.angular_velocity_f64(row), dt.as_f64());
+        let rotation = exact(rotation);
+        let axis = (rotation * Vec3::unit_y()).normalize();
+        let [along, across] =
+            CapsuleInertia::unit_inertia(self.radius[row].as_f64(), half.as_f64());
+        // Precession rate: angular momentum over the moment across the axis.
+        let about_axis = angular_velocity.dot(axis);
+        let precession = angular_velocity + axis * (about_axis * (along / across - 1.0));
+        let own = axis * (about_axis - precession.dot(axis));
+        let rotation = integrate_rotation(integrate_rotation(rotation, own, dt), precession, dt);
+        self.rotation[row] = Quat::from_sv(S::constant(rotation.s), cast_vector(rotation.v));
+        // Relative to the stored, rounded axis, so that the angular velocity along it, and with it
+        // the energy of thin capsules, does not change.
+        let axis = (exact(self.rotation[row]) * Vec3::unit_y()).normalize();
+        let next = precession + axis * (about_axis - precession.dot(axis));
+        self.set_angular_velocity_f64(row, next);
+    }
+
+    /// Rotates a marble by an angle, an axial vector in radians.
+    pub(super) fn rotate_by(&mut self, row: usize, angle: Vec3<S>) {
+        if let Some(rotation) = self.rotation.get_mut(row) {
+            *rotation = integrate_rotation(*rotation, angle, S::one());
+        }
+    }
+}
