@@ -61,9 +61,9 @@ fn models_are_measured_beside_the_game_and_do_not_disturb_it() {
     let front: Vec<_> = trade.front().collect();
     assert!(front.len() > 1);
     assert!(front.windows(2).all(|two| two[0].cost < two[1].cost));
-    assert!(front.windows(2).all(|two| two[0].wrong() > two[1].wrong()));
-    let all = &trade.advice().choices;
-    let worst = all.iter().max_by(|a, b| a.wrong().total_cmp(&b.wrong())).unwrap();
+    assert!(front.windows(2).all(|two| two[0].total_error() > two[1].total_error()));
+    let all = &trade.advice().candidates;
+    let worst = all.iter().max_by(|a, b| a.total_error().total_cmp(&b.total_error())).unwrap();
     assert_ne!(worst.setting.model.response, Response::EventDriven);
 }
 
@@ -80,7 +80,7 @@ fn a_measurement_can_be_given_up() {
     measure(&mut app);
     measure(&mut app);
     wait(&mut app);
-    assert!(!app.world().resource::<TawTrade>().advice().choices.is_empty());
+    assert!(!app.world().resource::<TawTrade>().advice().candidates.is_empty());
 }
 
 #[test]

@@ -1,8 +1,10 @@
-//! Balls in bulk, by the default model of a swarm: the full tier, two substeps of 1/60 s.
+//! Balls of a swarm by its default model, the full tier, and marbles by [`Response::SoftStep`], the
+//! same solver: two substeps of 1/60 s.
 
 use taw::broad::Grid;
 use taw::prelude::*;
 use taw::swarm::{Ball, BallId, SwarmModel};
+use taw::world::Energy;
 
 use super::{CostClass, SuiteCase};
 use crate::scene::G;
@@ -10,9 +12,29 @@ use crate::scene::Stopwatch;
 
 const DT: f64 = 1.0 / 60.0;
 
-/// A swarm of this friction and restitution that never sleeps, above a floor if there is gravity.
-fn swarm(friction: f32, restitution: f32, gravity: Vec3<f32>) -> World<f32> {
+/// Owner of the bodies of a case.
+#[derive(Clone, Copy, PartialEq)]
+enum Owner {
+    Swarm,
+    Marbles,
+}
+
+/// Handle of a body.
+#[derive(Clone, Copy)]
+enum Body {
+    Ball(BallId),
+    Marble(MarbleId),
+}
+
+/// A world of this friction and restitution where nothing sleeps, above a floor if there is
+/// gravity.
+fn world(owner: Owner, friction: f32, restitution: f32, gravity: Vec3<f32>) -> World<f32> {
     let mut world = World::default();
+    if owner == Owner::Marbles {
+        let (response, rotation) = (Response::SoftStep, Rotation::Dynamic);
+        let model = Model { response, rotation, substeps: 2, ..Model::default() };
+        world.set_model(model).expect("a model");
+    }
     let material = Material { friction, restitution, ..Material::default() };
     let model = SwarmModel { material, threads: 1, sleeps: false, ..SwarmModel::default() };
     world.swarm.set_model(model).expect("a model");
@@ -31,8 +53,17 @@ fn plane(world: &mut World<f32>, inward: Vec3<f32>, offset: f32) {
     world.walls.insert(Plane::new(inward, offset).expect("a unit vector")).expect("a wall");
 }
 
-fn insert(world: &mut World<f32>, balls: &[Ball]) -> Vec<BallId> {
-    world.swarm.insert(balls).expect("balls")
+fn insert(world: &mut World<f32>, balls: &[Ball]) -> Vec<Body> {
+    if world.model().response != Response::SoftStep {
+        return world.swarm.insert(balls).expect("balls").into_iter().map(Body::Ball).collect();
+    }
+    let material = Some(world.swarm.model().material);
+    let marbles = balls.iter().map(|ball| {
+        let &Ball { position, radius, velocity, mass } = ball;
+        let marble = Marble { velocity, mass, material, ..Marble::new(position, radius) };
+        Body::Marble(world.marbles.insert(marble).expect("a marble"))
+    });
+    marbles.collect()
 }
 
 /// A ball of a metre, moving along x.
@@ -43,22 +74,34 @@ fn ball(height: f32, mass: f32, speed: f32) -> Ball {
 }
 
 /// Height and velocity.
-fn state(world: &World<f32>, id: BallId) -> (f64, Vec3<f32>) {
-    let row = world.swarm.row(id).expect("it is there");
-    let [u, v, w, _] = world.swarm.velocities()[row];
-    (f64::from(world.swarm.balls()[row][1]), Vec3::new(u, v, w))
+fn state(world: &World<f32>, body: Body) -> (f64, Vec3<f32>) {
+    match body {
+        Body::Ball(id) => {
+            let row = world.swarm.row(id).expect("it is there");
+            let [u, v, w, _] = world.swarm.velocities()[row];
+            (f64::from(world.swarm.balls()[row][1]), Vec3::new(u, v, w))
+        }
+        Body::Marble(id) => {
+            let marble = world.marbles.get(id).expect("it is there");
+            (f64::from(marble.position.y), marble.velocity)
+        }
+    }
 }
 
 /// Of motion and spin, in joules.
 fn kinetic(world: &World<f32>) -> f64 {
+    if !world.marbles.is_empty() {
+        let Energy { potential, .. } = world.energy();
+        return world.energy().total() - potential;
+    }
     let square = |v: &[f32; 4]| v[..3].iter().map(|x| f64::from(*x).powi(2)).sum::<f64>();
     let rows = world.swarm.velocities().iter().zip(world.swarm.rims());
     rows.map(|(v, rim)| (0.5 * square(v) + 0.2 * square(rim)) / f64::from(v[3].abs())).sum()
 }
 
 /// The gas of `gas/energy`: how far its energy is off at the end, or was above the begin's.
-fn gas(stopwatch: &mut Stopwatch) -> f64 {
-    let mut world = swarm(0.0, 1.0, Vec3::new(0.0, 0.0, 0.0));
+fn gas(stopwatch: &mut Stopwatch, owner: Owner) -> f64 {
+    let mut world = world(owner, 0.0, 1.0, Vec3::new(0.0, 0.0, 0.0));
     for axis in [Vec3::unit_x(), Vec3::unit_y(), Vec3::unit_z()] {
         for inward in [axis, -axis] {
             plane(&mut world, inward, -3.0);
@@ -81,17 +124,17 @@ fn gas(stopwatch: &mut Stopwatch) -> f64 {
     worst.max((kinetic(&world) / begin - 1.0).abs())
 }
 
-fn slip_to_roll(stopwatch: &mut Stopwatch) -> f64 {
-    let mut world = swarm(0.3, 0.0, down());
+fn slip_to_roll(stopwatch: &mut Stopwatch, owner: Owner) -> f64 {
+    let mut world = world(owner, 0.3, 0.0, down());
     let id = insert(&mut world, &[ball(0.5, 1.0, 7.0)])[0];
     stopwatch.run(&mut world, DT, 2.0);
     (f64::from(state(&world, id).1.x) / 5.0 - 1.0).abs()
 }
 
-fn incline(stopwatch: &mut Stopwatch) -> f64 {
+fn incline(stopwatch: &mut Stopwatch, owner: Owner) -> f64 {
     let angle = 10_f64.to_radians();
     let pull = Vec3::new((G * angle.sin()) as f32, (-G * angle.cos()) as f32, 0.0);
-    let mut world = swarm(0.5, 0.0, pull);
+    let mut world = world(owner, 0.5, 0.0, pull);
     let id = insert(&mut world, &[ball(0.5, 1.0, 0.0)])[0];
     stopwatch.run(&mut world, DT, 2.0);
     let exact = G * angle.sin() * 5.0 / 7.0 * 2.0;
@@ -99,10 +142,10 @@ fn incline(stopwatch: &mut Stopwatch) -> f64 {
 }
 
 /// Drops from a metre: the worst error of the first rebound's height, over the drop's.
-fn bounce(stopwatch: &mut Stopwatch) -> f64 {
+fn bounce(stopwatch: &mut Stopwatch, owner: Owner) -> f64 {
     let mut worst = 0.0_f64;
     for e in [0.3_f32, 0.5, 0.8, 1.0] {
-        let mut world = swarm(0.0, e, down());
+        let mut world = world(owner, 0.0, e, down());
         let id = insert(&mut world, &[ball(1.5, 1.0, 0.0)])[0];
         let (mut rises, mut apex) = (false, 0.0_f64);
         for _ in 0..120 {
@@ -120,8 +163,8 @@ fn bounce(stopwatch: &mut Stopwatch) -> f64 {
 }
 
 /// A heap of 600 in a box, poured and left alone for 10 s: its fastest ball.
-fn heap(stopwatch: &mut Stopwatch) -> f64 {
-    let mut world = swarm(0.3, 0.2, down());
+fn heap(stopwatch: &mut Stopwatch, owner: Owner) -> f64 {
+    let mut world = world(owner, 0.3, 0.2, down());
     for inward in [Vec3::unit_x(), -Vec3::unit_x(), Vec3::unit_z(), -Vec3::unit_z()] {
         plane(&mut world, inward, -5.25);
     }
@@ -131,15 +174,18 @@ fn heap(stopwatch: &mut Stopwatch) -> f64 {
         let place = Point3::new(at(i % 10, 1), 0.5 + f32::from(i / 100) * 1.05, at(i / 10 % 10, 2));
         Ball::new(place, 0.3 + 0.2 * random(0))
     });
-    insert(&mut world, &balls.collect::<Vec<_>>());
+    let bodies = insert(&mut world, &balls.collect::<Vec<_>>());
     stopwatch.run(&mut world, DT, 10.0);
-    let speeds = world.swarm.velocities().iter().map(|v| f64::from(v[0].hypot(v[1]).hypot(v[2])));
+    let speeds = bodies.into_iter().map(|body| {
+        let Vec3 { x, y, z } = state(&world, body).1;
+        f64::from(x.hypot(y).hypot(z))
+    });
     speeds.fold(0.0, f64::max)
 }
 
 /// The deepest that a ball a thousand times as heavy is in a light one within 5 s, in radii.
-fn heavy(stopwatch: &mut Stopwatch) -> f64 {
-    let mut world = swarm(0.3, 0.2, down());
+fn heavy(stopwatch: &mut Stopwatch, owner: Owner) -> f64 {
+    let mut world = world(owner, 0.3, 0.2, down());
     let ids = insert(&mut world, &[ball(0.5, 1.0, 0.0), ball(1.5, 1000.0, 0.0)]);
     let mut worst = 0.0_f64;
     for _ in 0..300 {
@@ -151,8 +197,8 @@ fn heavy(stopwatch: &mut Stopwatch) -> f64 {
 }
 
 /// The hopper of the race after its 240 steps: the deepest overlap in metres.
-fn hopper(stopwatch: &mut Stopwatch) -> f64 {
-    let mut world = swarm(0.3, 0.2, down());
+fn hopper(stopwatch: &mut Stopwatch, owner: Owner) -> f64 {
+    let mut world = world(owner, 0.3, 0.2, down());
     for inward in [Vec3::unit_x(), -Vec3::unit_x(), Vec3::unit_z(), -Vec3::unit_z()] {
         plane(&mut world, inward, -16.0);
     }
@@ -208,6 +254,7 @@ fn deepest(world: &World<f32>) -> f64 {
 }
 
 const MODEL: &str = "swarm, full";
+const SOFT_STEP: &str = "soft step, 2 substeps";
 const NONE: &str = "none measured";
 
 /// See the module.
@@ -221,7 +268,7 @@ pub static ROWS: &[SuiteCase] = &[
         best: "0.74 Box3D, 0.79 Rapier lost",
         source: "conservation of energy; references 4.22",
         effort: CostClass::Quick,
-        measure: gas,
+        measure: |stopwatch| gas(stopwatch, Owner::Swarm),
     },
     SuiteCase {
         name: "swarm/slip-to-roll",
@@ -232,7 +279,7 @@ pub static ROWS: &[SuiteCase] = &[
         best: NONE,
         source: "Coulomb friction on a solid ball: 5/7, whatever the friction",
         effort: CostClass::Quick,
-        measure: slip_to_roll,
+        measure: |stopwatch| slip_to_roll(stopwatch, Owner::Swarm),
     },
     SuiteCase {
         name: "swarm/incline",
@@ -243,7 +290,7 @@ pub static ROWS: &[SuiteCase] = &[
         best: NONE,
         source: "rolling without slip of a solid ball",
         effort: CostClass::Quick,
-        measure: incline,
+        measure: |stopwatch| incline(stopwatch, Owner::Swarm),
     },
     SuiteCase {
         name: "swarm/bounce",
@@ -254,7 +301,7 @@ pub static ROWS: &[SuiteCase] = &[
         best: NONE,
         source: "Newton's restitution; a substep is 3.7 cm at 4.4 m/s",
         effort: CostClass::Quick,
-        measure: bounce,
+        measure: |stopwatch| bounce(stopwatch, Owner::Swarm),
     },
     SuiteCase {
         name: "swarm/heap",
@@ -265,7 +312,7 @@ pub static ROWS: &[SuiteCase] = &[
         best: NONE,
         source: "friction holds a heap",
         effort: CostClass::Quick,
-        measure: heap,
+        measure: |stopwatch| heap(stopwatch, Owner::Swarm),
     },
     SuiteCase {
         name: "swarm/heavy-on-light",
@@ -276,7 +323,7 @@ pub static ROWS: &[SuiteCase] = &[
         best: NONE,
         source: "rigid bodies",
         effort: CostClass::Quick,
-        measure: heavy,
+        measure: |stopwatch| heavy(stopwatch, Owner::Swarm),
     },
     SuiteCase {
         name: "swarm/hopper",
@@ -287,6 +334,83 @@ pub static ROWS: &[SuiteCase] = &[
         best: "0.044 Rapier",
         source: "rigid bodies; the race in peers/",
         effort: CostClass::Quick,
-        measure: hopper,
+        measure: |stopwatch| hopper(stopwatch, Owner::Swarm),
+    },
+    SuiteCase {
+        name: "soft-step/gas",
+        setup: "216 elastic balls of 0.3 m in a box of 6 m for 10 s at 1/60 s",
+        metric: "relative error of the energy, or the most that it rose",
+        model: SOFT_STEP,
+        target: 1e-2,
+        best: "0.74 Box3D, 0.79 Rapier lost",
+        source: "conservation of energy; references 4.22",
+        effort: CostClass::Quick,
+        measure: |stopwatch| gas(stopwatch, Owner::Marbles),
+    },
+    SuiteCase {
+        name: "soft-step/slip-to-roll",
+        setup: "a ball slides at 7 m/s on a floor of friction 0.3: rolls with 5/7 of it",
+        metric: "relative error of the speed",
+        model: SOFT_STEP,
+        target: 2e-3,
+        best: NONE,
+        source: "Coulomb friction on a solid ball: 5/7, whatever the friction",
+        effort: CostClass::Quick,
+        measure: |stopwatch| slip_to_roll(stopwatch, Owner::Marbles),
+    },
+    SuiteCase {
+        name: "soft-step/incline",
+        setup: "a ball rolls down 10 degrees for 2 s: with 5/7 of the pull",
+        metric: "relative error of the speed",
+        model: SOFT_STEP,
+        target: 2e-3,
+        best: NONE,
+        source: "rolling without slip of a solid ball",
+        effort: CostClass::Quick,
+        measure: |stopwatch| incline(stopwatch, Owner::Marbles),
+    },
+    SuiteCase {
+        name: "soft-step/bounce",
+        setup: "drops from 1 m at restitution 0.3, 0.5, 0.8 and 1: comes up to its square",
+        metric: "worst error of the height over the drop's",
+        model: SOFT_STEP,
+        target: 2e-2,
+        best: NONE,
+        source: "Newton's restitution; a substep is 3.7 cm at 4.4 m/s",
+        effort: CostClass::Quick,
+        measure: |stopwatch| bounce(stopwatch, Owner::Marbles),
+    },
+    SuiteCase {
+        name: "soft-step/heap",
+        setup: "600 balls of 0.3 to 0.5 m poured into a box, after 10 s: all lie",
+        metric: "speed of the fastest in m/s",
+        model: SOFT_STEP,
+        target: 5e-2,
+        best: NONE,
+        source: "friction holds a heap",
+        effort: CostClass::Quick,
+        measure: |stopwatch| heap(stopwatch, Owner::Marbles),
+    },
+    SuiteCase {
+        name: "soft-step/heavy-on-light",
+        setup: "a ball 1,000 times as heavy on one of 0.5 m, within 5 s: sinks in by nothing",
+        metric: "deepest overlap in radii",
+        model: SOFT_STEP,
+        target: 1e-2,
+        best: NONE,
+        source: "rigid bodies",
+        effort: CostClass::Quick,
+        measure: |stopwatch| heavy(stopwatch, Owner::Marbles),
+    },
+    SuiteCase {
+        name: "soft-step/hopper",
+        setup: "3,000 balls of 0.3 to 0.5 m fall 10 m into a hopper, after 4 s",
+        metric: "deepest overlap in metres",
+        model: SOFT_STEP,
+        target: 4.4e-2,
+        best: "0.044 Rapier",
+        source: "rigid bodies; the race in peers/",
+        effort: CostClass::Quick,
+        measure: |stopwatch| hopper(stopwatch, Owner::Marbles),
     },
 ];
