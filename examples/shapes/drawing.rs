@@ -51,7 +51,7 @@ pub fn draw(scene: Res<Scene>, mut gizmos: Gizmos) {
 }
 
 fn draw_surface(surface: &impl Surface<f32>, gizmos: &mut Gizmos, colour: Srgba) {
-    surface.near(&surface.bounds(), |number| {
+    surface.for_each_in_box(&surface.bounds(), |number| {
         if let Some(triangle) = surface.triangle(number) {
             let [a, b, c] = triangle.corners.map(bevy_point);
             gizmos.linestrip([a, b, c, a], colour.with_alpha(0.6));

@@ -121,7 +121,7 @@ fn bad_scenes_are_refused_with_line_and_field() {
         assert!(say.iter().all(|word| error.contains(word)), "{error}");
     };
     refused("duration: 3", "duration: 0", &["4:", "duration", "above zero", "is 0"]);
-    refused("restitution: 0.4", "restitution: 1.4", &["5:", "surface.restitution", "[0, 1]"]);
+    refused("restitution: 0.4", "restitution: 1.4", &["5:", "material.restitution", "[0, 1]"]);
     refused("time: 1.5", "time: NaN", &["9:", "gravity_keyframes[2].time", "NaN"]);
     refused("radius: 0.03", "radius: -0.03", &["18:", "walls[5].shape.Capsule.radius", "-0.03"]);
     refused("radius: 0.01", "radius: 0.01, mass: 3", &["20:", "mass"]);

@@ -11,7 +11,10 @@ use divan::counter::ItemsCount;
 use parry3d::glamx::{Pose3, Quat as ParryQuat, Vec3 as ParryVec3};
 use parry3d::query::{ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher, contact};
 use parry3d::shape as parry;
-use taw::contact::{ClosestPoints, Convex, closest_points, closest_points_of_surface, closest_points_of_plane, manifold};
+use taw::contact::{
+    ClosestPoints, Convex, closest_points, closest_points_of_plane, closest_points_of_surface,
+    manifold,
+};
 use taw::math::{Point3, Quat, Vec3};
 use taw::shape::{Aabb3, Capsule, HeightField, Hull, Mesh, Obb, Plane, Sphere, Surface};
 
@@ -174,7 +177,6 @@ fn in_parry<A: Kind, B: Kind>(
         .bench_local(|| pairs.iter().map(|(p, a, q, b)| ask(p, a, q, b)).fold(0.0, f32::max));
 }
 
-
 /// One line for taw and one for parry.
 macro_rules! pairs {
     ($($name:ident: $a:ty, $b:ty, $closest:expr;)*) => { $(
@@ -330,8 +332,7 @@ where
 }
 
 fn on_parry<A: Kind>(bencher: Bencher, surface: &impl parry::Shape) {
-    let shapes: Vec<_> =
-        over_hills().iter().map(|of| (pose(of, A::TURNS), A::parry(of))).collect();
+    let shapes: Vec<_> = over_hills().iter().map(|of| (pose(of, A::TURNS), A::parry(of))).collect();
     let ask = |(place, shape): &(Pose3, A::Parry)| {
         let found = contact(&Pose3::IDENTITY, surface, place, shape, NEAR);
         found.ok().flatten().map_or(0.0, |found| found.dist)

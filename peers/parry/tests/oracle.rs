@@ -10,7 +10,7 @@ use parry3d::query::contact;
 use parry3d::shape as parry;
 use taw::contact::{ClosestPoints, closest_points};
 use taw::math::{Point3, Quat, Vec3};
-use taw::shape::{Capsule, Hull, Obb, BoundedShape, Sphere};
+use taw::shape::{BoundedShape, Capsule, Hull, Obb, Sphere};
 
 /// Pairs of each two kinds.
 const PAIRS: u32 = 4_000;
@@ -146,7 +146,9 @@ fn searched(a: &Taw<f64>, b: &Taw<f64>, hints: [Vec3<f64>; 2]) -> f64 {
 #[test]
 fn where_taw_and_parry_differ_taw_is_right() {
     let mut generator = fastrand::Rng::with_seed(42);
-    println!("| pair | parry differs by more than {ROUNDING:.0e} m | worst of parry | worst of taw there |");
+    println!(
+        "| pair | parry differs by more than {ROUNDING:.0e} m | worst of parry | worst of taw there |"
+    );
     println!("|---|---|---|---|");
     for first in 0..KINDS.len() {
         for second in first..KINDS.len() {

@@ -206,7 +206,11 @@ impl Engine for Taw {
         if from != to {
             let spin = vector((to * from.inverse()).to_scaled_axis() / DT);
             let pivot = taw::math::Point3::new(0.0, 0.0, 0.0);
-            let motion = taw::motion::WallMotion { velocity: vector(Vec3::ZERO), angular_velocity: spin, pivot };
+            let motion = taw::motion::WallMotion {
+                velocity: vector(Vec3::ZERO),
+                angular_velocity: spin,
+                pivot,
+            };
             for (id, up, at) in &self.planes {
                 self.world.walls.set(*id, plane(to * *up, to * *at)).expect("a wall");
                 self.world.walls.set_motion(*id, Some(motion)).expect("a wall");

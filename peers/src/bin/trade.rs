@@ -13,10 +13,12 @@ use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
 use rapier3d::prelude as rapier;
 use taw::math::Vec3 as Exact;
-use taw::scene::{MarbleDesc, ForceFieldDesc, ShapeDesc, KinematicMotion, Scene, MaterialDesc, WallDesc};
+use taw::scene::{
+    ForceFieldDesc, KinematicMotion, MarbleDesc, MaterialDesc, Scene, ShapeDesc, WallDesc,
+};
 use taw_lab::trade::scenes::{ReferenceCase, SCENES};
 use taw_lab::trade::sweep::{STEPS, digits, write_points};
-use taw_lab::trade::trace::{SAMPLE_INTERVAL, Frame};
+use taw_lab::trade::trace::{Frame, SAMPLE_INTERVAL};
 use taw_lab::trade::{COUNTS, Failure, Point};
 
 /// A scene in an engine.
@@ -46,11 +48,10 @@ fn surface_of(ball: &MarbleDesc, scene: &Scene) -> MaterialDesc {
 /// How a wall turns about its place, in rad/s.
 fn turning(wall: &WallDesc) -> Option<Vec3> {
     match (wall.motion?, wall.shape) {
-        (KinematicMotion::Rotate { pivot, axis, degrees_per_second }, ShapeDesc::HalfSpace { point, .. })
-            if pivot == point =>
-        {
-            Some(vec(axis).normalize() * degrees_per_second.to_radians() as f32)
-        }
+        (
+            KinematicMotion::Rotate { pivot, axis, degrees_per_second },
+            ShapeDesc::HalfSpace { point, .. },
+        ) if pivot == point => Some(vec(axis).normalize() * degrees_per_second.to_radians() as f32),
         other => panic!("no scene of the sweep has {other:?}"),
     }
 }
@@ -336,8 +337,11 @@ fn run<E: Engine>(judged: &ReferenceCase, step: (&str, f64), count: u32) -> Poin
                 let now = (i as f64 + 0.5) * step.1;
                 let gravity = vec(scene.gravity_at(now));
                 let begin = Instant::now();
-                let forces =
-                    if scene.force_fields.is_empty() { vec![] } else { forces(scene, &balls, &state) };
+                let forces = if scene.force_fields.is_empty() {
+                    vec![]
+                } else {
+                    forces(scene, &balls, &state)
+                };
                 engine.step(gravity, &forces);
                 taken += begin.elapsed();
                 state = engine.state();
