@@ -18,7 +18,7 @@ pub type Mat4<S> = cgmath::Matrix4<S>;
 pub trait Scalar: BaseFloat + Default + Send + Sync + 'static {
     /// Rounds a constant to this type.
     #[must_use]
-    fn constant(value: f64) -> Self {
+    fn from_f64(value: f64) -> Self {
         // Both implementors convert every f64; NaN is unreachable.
         num_traits::cast(value).unwrap_or_else(Self::nan)
     }
@@ -87,14 +87,14 @@ impl Scalar for f64 {
 #[must_use]
 #[inline]
 pub fn cast_vector<S: Scalar, T: Scalar>(v: Vec3<S>) -> Vec3<T> {
-    v.map(|x| T::constant(x.as_f64()))
+    v.map(|x| T::from_f64(x.as_f64()))
 }
 
 /// Converts a point to another scalar.
 #[must_use]
 #[inline]
 pub fn cast_point<S: Scalar, T: Scalar>(p: Point3<S>) -> Point3<T> {
-    p.map(|x| T::constant(x.as_f64()))
+    p.map(|x| T::from_f64(x.as_f64()))
 }
 
 /// Length of `v` without overflow or underflow of squares. Infinite only if a component is, or if
@@ -119,7 +119,7 @@ pub fn length<S: Scalar>(v: Vec3<S>) -> S {
 /// infinite or NaN.
 #[must_use]
 #[inline]
-pub fn direction_and_length<S: Scalar>(v: Vec3<S>) -> Option<(Vec3<S>, S)> {
+pub fn normalize_and_length<S: Scalar>(v: Vec3<S>) -> Option<(Vec3<S>, S)> {
     let squared = v.magnitude2();
     if squared_is_exact(squared) {
         let length = squared.sqrt();
@@ -187,7 +187,7 @@ mod tests {
             // Denormals carry fewer digits, so allow their spacing as well.
             let tolerance = 4e-7 * expected + 3e-45;
             assert!((f64::from(length(v)) - expected).abs() <= tolerance, "{scale}");
-            let (unit, l) = direction_and_length(v).unwrap();
+            let (unit, l) = normalize_and_length(v).unwrap();
             assert_eq!(l.to_bits(), length(v).to_bits(), "{scale}");
             assert!((unit.magnitude() - 1.0).abs() < 3e-7, "{scale}");
         }
@@ -201,7 +201,7 @@ mod tests {
             Vec3::new(f64::NAN, 1.0, 0.0),
             Vec3::new(1.0, f64::INFINITY, 0.0),
         ] {
-            assert_eq!(direction_and_length(v), None, "{v:?}");
+            assert_eq!(normalize_and_length(v), None, "{v:?}");
         }
     }
 

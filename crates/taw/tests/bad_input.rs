@@ -32,11 +32,11 @@ fn on_a_floor<S: Scalar>(model: Model) -> World<S> {
 }
 
 fn at<S: Scalar>(x: f64, y: f64, z: f64) -> Point3<S> {
-    Point3::new(S::constant(x), S::constant(y), S::constant(z))
+    Point3::new(S::from_f64(x), S::from_f64(y), S::from_f64(z))
 }
 
 fn number<S: Scalar>(x: f64) -> S {
-    S::constant(x)
+    S::from_f64(x)
 }
 
 fn is_sane<S: Scalar>(marble: &Marble<S>) -> bool {

@@ -298,13 +298,13 @@ fn drift_in_flight<S: Scalar>(spin: [f64; 3], shape: [f64; 2], substeps: u32) ->
     world.set_gravity(Vec3::zero()).unwrap();
     let rotation = taw::math::Quat::new(0.8, 0.36, -0.48, 0.0);
     let rotation = taw::math::Quat::new(
-        S::constant(rotation.s),
-        S::constant(rotation.v.x),
-        S::constant(rotation.v.y),
-        S::constant(rotation.v.z),
+        S::from_f64(rotation.s),
+        S::from_f64(rotation.v.x),
+        S::from_f64(rotation.v.y),
+        S::from_f64(rotation.v.z),
     );
-    let [radius, half_length] = shape.map(S::constant);
-    let spin = Vec3::from(spin.map(S::constant));
+    let [radius, half_length] = shape.map(S::from_f64);
+    let spin = Vec3::from(spin.map(S::from_f64));
     let origin = Point3::new(S::zero(), S::zero(), S::zero());
     let id = world
         .marbles
@@ -322,7 +322,7 @@ fn drift_in_flight<S: Scalar>(spin: [f64; 3], shape: [f64; 2], substeps: u32) ->
     let (before, energy) = (momentum(&world), world.energy().rotational);
     let mut worst = [0.0_f64; 2];
     for _ in 0..6_000 {
-        world.step(S::constant(DT)).unwrap();
+        world.step(S::from_f64(DT)).unwrap();
         let off = (momentum(&world) - before).magnitude() / before.magnitude();
         let gained = (world.energy().rotational / energy - 1.0).abs();
         worst = [worst[0].max(gained), worst[1].max(off)];

@@ -58,7 +58,7 @@ impl Place {
 
     fn point<S: Scalar>(&self, p: [f64; 3]) -> Point3<S> {
         let offset = Vec3::new(self.offset, -self.offset, self.offset);
-        Point3::from_vec((self.vector(p) + offset).map(S::constant))
+        Point3::from_vec((self.vector(p) + offset).map(S::from_f64))
     }
 
     /// What rounding of the input and of the answer can do, for things of this size.
@@ -86,7 +86,7 @@ const O: [f64; 3] = [0.0; 3];
 
 impl Def {
     fn thing<S: Scalar>(self, place: &Place) -> Thing<S> {
-        let length = |x: f64| S::constant(x * place.scale);
+        let length = |x: f64| S::from_f64(x * place.scale);
         match self {
             Ball(at, radius) => {
                 Thing::Sphere(Sphere::new(place.point(at), length(radius)).unwrap())
@@ -97,7 +97,7 @@ impl Def {
             Block(at, half, (axis, angle)) => {
                 let own: Quat<f64> = AxisAngle::new(Vec3::from(axis), angle).unwrap().into();
                 let turn = place.pose.rotation * own;
-                let turn = Quat::from_sv(S::constant(turn.s), turn.v.map(S::constant));
+                let turn = Quat::from_sv(S::from_f64(turn.s), turn.v.map(S::from_f64));
                 let half = Vec3::from(half.map(length));
                 Thing::Obb(Obb::new(place.point(at), turn, half).unwrap())
             }
@@ -544,9 +544,9 @@ impl Tally {
         place: &Place,
     ) {
         let thing = def.thing::<S>(place);
-        let direction = place.pose.transform_vector(Vec3::from(along)).map(S::constant);
+        let direction = place.pose.transform_vector(Vec3::from(along)).map(S::from_f64);
         let ray = Ray { origin: place.point(from), direction };
-        let found = cast(&thing, &ray, S::constant(longest * place.scale));
+        let found = cast(&thing, &ray, S::from_f64(longest * place.scale));
         let far = Vec3::from(from).magnitude() + def.size();
         // A ray at a slant comes to the surface later than it is off.
         let tolerance = 64.0 * place.tolerance::<S>(far);
@@ -612,7 +612,7 @@ fn rays() {
 }
 
 fn bad_rotations<S: Scalar + Debug>(tally: &mut Tally) {
-    let q = |s: f64, x: f64| Quat::new(S::constant(s), S::constant(x), S::zero(), S::zero());
+    let q = |s: f64, x: f64| Quat::new(S::from_f64(s), S::from_f64(x), S::zero(), S::zero());
     let origin = Point3::new(S::zero(), S::zero(), S::zero());
     let half = Vec3::new(S::one(), S::one(), S::one());
     for (s, x) in [
@@ -628,14 +628,14 @@ fn bad_rotations<S: Scalar + Debug>(tally: &mut Tally) {
         tally.check(refused, || format!("({s}, {x}) is no rotation"));
     }
     for axis in [[0.0; 3], [f64::NAN, 0.0, 0.0], [f64::INFINITY, 0.0, 0.0]] {
-        let axis = Vec3::from(axis.map(S::constant));
+        let axis = Vec3::from(axis.map(S::from_f64));
         tally.check(AxisAngle::new(axis, S::one()).is_err(), || format!("an axis of {axis:?}"));
     }
     for speed in [0.0, 1e-45, 1e-40, 1e-30, 1e-20, 1.0, 1e5] {
-        let spin = Vec3::new(S::zero(), S::constant(speed), S::constant(speed * 1e-3));
+        let spin = Vec3::new(S::zero(), S::from_f64(speed), S::from_f64(speed * 1e-3));
         let mut rotation = q(1.0, 0.0);
         for _ in 0..100 {
-            rotation = integrate_rotation(rotation, spin, S::constant(1.0 / 60.0));
+            rotation = integrate_rotation(rotation, spin, S::from_f64(1.0 / 60.0));
         }
         let length = rotation.s.as_f64().hypot(cast_vector::<S, f64>(rotation.v).magnitude());
         tally.check((length - 1.0).abs() < 1e-5, || format!("{spin:?} makes {rotation:?}"));
@@ -645,7 +645,7 @@ fn bad_rotations<S: Scalar + Debug>(tally: &mut Tally) {
     }
     // Axes too short and too long to be squared.
     for length in [1e-38, 1e-20, 1e20, 1e38] {
-        let axis = Vec3::new(S::constant(length), S::zero(), S::zero());
+        let axis = Vec3::new(S::from_f64(length), S::zero(), S::zero());
         let turn = AxisAngle::new(axis, S::one());
         let unit = turn.is_ok_and(|turn| (turn.axis().x.as_f64() - 1.0).abs() < 1e-6);
         tally.check(unit, || format!("an axis {length} long"));

@@ -23,7 +23,7 @@ fn world<S: Scalar>(model: Model) -> World<S> {
 }
 
 fn vector<S: Scalar>(v: [f64; 3]) -> Vec3<S> {
-    Vec3::new(S::constant(v[0]), S::constant(v[1]), S::constant(v[2]))
+    Vec3::new(S::from_f64(v[0]), S::from_f64(v[1]), S::from_f64(v[2]))
 }
 
 fn plane<S: Scalar>(normal: [f64; 3], through: [f64; 3]) -> Plane<S> {
@@ -31,12 +31,12 @@ fn plane<S: Scalar>(normal: [f64; 3], through: [f64; 3]) -> Plane<S> {
 }
 
 fn surface<S: Scalar>(friction: f64, restitution: f64) -> Material<S> {
-    let (friction, restitution) = (S::constant(friction), S::constant(restitution));
+    let (friction, restitution) = (S::from_f64(friction), S::from_f64(restitution));
     Material { friction, restitution, ..Material::default() }
 }
 
 fn marble<S: Scalar>(at: [f64; 3], radius: f64, velocity: [f64; 3], m: Material<S>) -> Marble<S> {
-    let marble = Marble::new(Point3::from_vec(vector(at)), S::constant(radius));
+    let marble = Marble::new(Point3::from_vec(vector(at)), S::from_f64(radius));
     Marble { velocity: vector(velocity), material: Some(m), ..marble }
 }
 

@@ -27,13 +27,13 @@ fn floor<S: Scalar>(rotation: Rotation) -> World<S> {
 }
 
 fn surface<S: Scalar>(restitution: f64, friction: f64) -> Material<S> {
-    let (restitution, friction) = (S::constant(restitution), S::constant(friction));
+    let (restitution, friction) = (S::from_f64(restitution), S::from_f64(friction));
     Material { restitution, friction, ..Material::default() }
 }
 
 fn run<S: Scalar>(world: &mut World<S>, dt: f64, seconds: f64) {
     for _ in 0..(seconds / dt).round() as u32 {
-        world.step(S::constant(dt)).unwrap();
+        world.step(S::from_f64(dt)).unwrap();
     }
 }
 
@@ -96,7 +96,7 @@ fn galperin_counts_the_digits_of_pi() {
 
 /// How many collisions a ball has with a wall and one that is 100^n times as heavy.
 fn galperin<S: Scalar>(n: i32) -> usize {
-    let number = S::constant;
+    let number = S::from_f64;
     let mut world = world::<S>(Rotation::None);
     world.set_gravity(Vec3::new(S::zero(), S::zero(), S::zero())).unwrap();
     world.walls.insert(Plane::new(Vec3::unit_x(), S::zero()).unwrap()).unwrap();

@@ -20,7 +20,7 @@ fn world<S: Scalar>() -> World<S> {
 }
 
 fn surface<S: Scalar>(restitution: f64, friction: f64) -> Material<S> {
-    let (restitution, friction) = (S::constant(restitution), S::constant(friction));
+    let (restitution, friction) = (S::from_f64(restitution), S::from_f64(friction));
     Material { restitution, friction, ..Material::default() }
 }
 
@@ -60,7 +60,7 @@ fn a_ball_on_a_large_mesh_costs_little() {
 /// Balls of many sizes over hills of that scale: every step ends, and nobody falls through.
 fn over_hills<S: Scalar>(scale: f64) {
     for (radius, height) in [(0.2, 1.0), (0.2, 0.5), (1e-3, 0.5), (0.2 / scale, 1.0 / scale)] {
-        let number = |x: f64| S::constant(x * scale);
+        let number = |x: f64| S::from_f64(x * scale);
         let mut world = world::<S>();
         let heights = (0..49).map(|i| number(0.3 * f64::from(i % 3))).collect();
         let corner = Point3::new(number(-9.0), number(-0.3), number(-9.0));
@@ -76,7 +76,7 @@ fn over_hills<S: Scalar>(scale: f64) {
         }
         for step in 0..60 {
             let begin = Instant::now();
-            world.step(S::constant(DT)).unwrap();
+            world.step(S::from_f64(DT)).unwrap();
             let took = begin.elapsed();
             assert!(took < Duration::from_secs(5), "{scale:e}, {radius}, step {step}: {took:?}");
             let at = world.marbles.position()[0];

@@ -28,16 +28,16 @@ fn world<S: Scalar>(rotation: Rotation, substeps: u32) -> World<S> {
 }
 
 fn surface<S: Scalar>(restitution: f64, friction: f64) -> Material<S> {
-    let (restitution, friction) = (S::constant(restitution), S::constant(friction));
+    let (restitution, friction) = (S::from_f64(restitution), S::from_f64(friction));
     Material { restitution, friction, ..Material::default() }
 }
 
 fn point<S: Scalar>(x: f64, y: f64, z: f64) -> Point3<S> {
-    Point3::new(S::constant(x), S::constant(y), S::constant(z))
+    Point3::new(S::from_f64(x), S::from_f64(y), S::from_f64(z))
 }
 
 fn vector<S: Scalar>(x: f64, y: f64, z: f64) -> Vec3<S> {
-    Vec3::new(S::constant(x), S::constant(y), S::constant(z))
+    Vec3::new(S::from_f64(x), S::from_f64(y), S::from_f64(z))
 }
 
 /// A board with its top at y = 0, of every kind that a wall may be of.
@@ -57,7 +57,7 @@ fn boards<S: Scalar>() -> Vec<(&'static str, WallShape<S>)> {
         ("hull", Hull::new(&hull).unwrap().into()),
         (
             "field",
-            HeightField::new(point(-9.0, 0.0, -9.0), [S::constant(3.0); 2], 7, heights)
+            HeightField::new(point(-9.0, 0.0, -9.0), [S::from_f64(3.0); 2], 7, heights)
                 .unwrap()
                 .into(),
         ),
@@ -78,7 +78,7 @@ impl<S: Scalar> Mover<S> {
     }
 
     fn pose(height: f64, angle: f64) -> Pose<S> {
-        let turn = AxisAngle::new(vector(0.0, 0.0, 1.0), S::constant(angle)).unwrap();
+        let turn = AxisAngle::new(vector(0.0, 0.0, 1.0), S::from_f64(angle)).unwrap();
         Pose { rotation: turn.into(), translation: vector(0.0, height, 0.0) }
     }
 
@@ -115,12 +115,12 @@ fn a_lift<S: Scalar>(rounding: f64) {
                 let marble = Marble {
                     velocity: vector(0.0, speed, 0.0),
                     material: Some(surface(0.5, 0.5)),
-                    ..Marble::new(point(0.5, 0.1, 0.3), S::constant(0.1))
+                    ..Marble::new(point(0.5, 0.1, 0.3), S::from_f64(0.1))
                 };
                 world.marbles.insert(marble).unwrap();
                 for step in 1..=120 {
                     lift.go(&mut world, speed * DT * f64::from(step), 0.0, DT);
-                    world.step(S::constant(DT)).unwrap();
+                    world.step(S::from_f64(DT)).unwrap();
                     let gap = lift.gap(&world, 0);
                     assert!(
                         gap.abs() < rounding,
@@ -345,14 +345,14 @@ fn two_balls_that_overlap_a_little_part_without_energy() {
 fn hopper<S: Scalar>(askew: f64, substeps: u32) -> World<S> {
     let mut world = world::<S>(Rotation::Dynamic, substeps);
     let mut plane = |normal: Vec3<S>, offset: f64| {
-        world.walls.insert(Plane::new(normal, S::constant(offset)).unwrap()).unwrap()
+        world.walls.insert(Plane::new(normal, S::from_f64(offset)).unwrap()).unwrap()
     };
     plane(vector(0.0, 1.0, 0.0), -0.3);
     plane(vector(0.0, askew, 1.0), -0.012);
     plane(vector(0.0, 0.0, -1.0), -0.012);
     for side in [-1.0, 1.0] {
         let turn =
-            AxisAngle::new(vector(0.0, 0.0, 1.0), S::constant(-side * std::f64::consts::FRAC_PI_4));
+            AxisAngle::new(vector(0.0, 0.0, 1.0), S::from_f64(-side * std::f64::consts::FRAC_PI_4));
         let center = point(0.145 * side, 0.1, 0.0);
         let half = vector(0.01, 0.15, 0.025);
         world.walls.insert(Obb::new(center, turn.unwrap().into(), half).unwrap()).unwrap();
@@ -363,7 +363,7 @@ fn hopper<S: Scalar>(askew: f64, substeps: u32) -> World<S> {
         let mut off = || draw.between(-0.0008, 0.0008);
         let at = point(-0.055 + 0.022 * column + off(), 0.13 + 0.022 * row + off(), 0.2 * off());
         let marble =
-            Marble { material: Some(surface(0.3, 0.3)), ..Marble::new(at, S::constant(0.01)) };
+            Marble { material: Some(surface(0.3, 0.3)), ..Marble::new(at, S::from_f64(0.01)) };
         world.marbles.insert(marble).unwrap();
     }
     world

@@ -19,11 +19,11 @@ impl Draw {
 }
 
 fn point<S: Scalar>(p: [f64; 3]) -> Point3<S> {
-    Point3::from(p.map(S::constant))
+    Point3::from(p.map(S::from_f64))
 }
 
 fn vector<S: Scalar>(p: [f64; 3]) -> Vec3<S> {
-    Vec3::from(p.map(S::constant))
+    Vec3::from(p.map(S::from_f64))
 }
 
 /// Half the width of the box that all is in.
@@ -64,7 +64,7 @@ fn scene<S: Scalar>(seed: u64) -> Scene<S> {
         for side in [-1.0, 1.0] {
             let mut normal = [0.0; 3];
             normal[axis] = side;
-            let plane = Plane::new(vector(normal), S::constant(-ROOM)).unwrap();
+            let plane = Plane::new(vector(normal), S::from_f64(-ROOM)).unwrap();
             world.walls.insert(plane).unwrap();
         }
     }
@@ -74,7 +74,7 @@ fn scene<S: Scalar>(seed: u64) -> Scene<S> {
             0 => {
                 let normal = [draw.between(-1.0, 1.0), 1.0, draw.between(-1.0, 1.0)];
                 let normal = Vec3::from(normal).normalize();
-                Plane::new(vector(normal.into()), S::constant(-1.2)).unwrap().into()
+                Plane::new(vector(normal.into()), S::from_f64(-1.2)).unwrap().into()
             }
             1 => {
                 let at =
@@ -82,7 +82,7 @@ fn scene<S: Scalar>(seed: u64) -> Scene<S> {
                 let axis = [draw.between(-1.0, 1.0), draw.between(-1.0, 1.0), 1.0];
                 let axis = Vec3::from(axis).normalize();
                 let turn =
-                    AxisAngle::new(vector(axis.into()), S::constant(draw.between(-3.0, 3.0)));
+                    AxisAngle::new(vector(axis.into()), S::from_f64(draw.between(-3.0, 3.0)));
                 let half =
                     [draw.between(0.05, 1.0), draw.between(0.02, 1.0), draw.between(0.05, 1.0)];
                 Obb::new(point(at), turn.unwrap().into(), vector(half)).unwrap().into()
@@ -90,13 +90,13 @@ fn scene<S: Scalar>(seed: u64) -> Scene<S> {
             2 => {
                 let at =
                     [draw.between(-1.0, 1.0), draw.between(-2.0, 0.0), draw.between(-1.0, 1.0)];
-                Sphere::new(point(at), S::constant(draw.between(0.1, 1.0))).unwrap().into()
+                Sphere::new(point(at), S::from_f64(draw.between(0.1, 1.0))).unwrap().into()
             }
             3 => {
                 let mut end =
                     || [draw.between(-1.5, 1.5), draw.between(-2.0, 0.0), draw.between(-1.5, 1.5)];
                 let ends = [end(), end()];
-                let radius = S::constant(draw.between(0.05, 0.4));
+                let radius = S::from_f64(draw.between(0.05, 0.4));
                 Capsule::new(point(ends[0]), point(ends[1]), radius).unwrap().into()
             }
             4 => cone(draw.one_of(&[3, 4, 6, 16, 60]), &mut draw).into(),
@@ -114,8 +114,8 @@ fn scene<S: Scalar>(seed: u64) -> Scene<S> {
         }
     }
     let material = Material {
-        restitution: S::constant(draw.one_of(&[0.0, 0.0, 0.3, 0.5, 0.9, 1.0])),
-        friction: S::constant(draw.one_of(&[0.0, 0.1, 0.3, 0.5, 0.9, 1.5])),
+        restitution: S::from_f64(draw.one_of(&[0.0, 0.0, 0.3, 0.5, 0.9, 1.0])),
+        friction: S::from_f64(draw.one_of(&[0.0, 0.1, 0.3, 0.5, 0.9, 1.5])),
         ..Material::default()
     };
     let largest = draw.one_of(&[0.05, 0.1, 0.25]);
@@ -157,9 +157,9 @@ fn scene<S: Scalar>(seed: u64) -> Scene<S> {
             .insert(Marble {
                 velocity: vector(velocity),
                 angular_velocity: vector(spin),
-                mass: Mass::Density(S::constant(draw.one_of(&[1000.0, 1000.0, 10.0, 8000.0]))),
+                mass: Mass::Density(S::from_f64(draw.one_of(&[1000.0, 1000.0, 10.0, 8000.0]))),
                 material: Some(material),
-                ..Marble::new(point(position), S::constant(radius))
+                ..Marble::new(point(position), S::from_f64(radius))
             })
             .unwrap();
     }
@@ -174,7 +174,7 @@ impl<S: Scalar> Scene<S> {
                 (far * phase, wide * phase)
             };
             let (before, after) = (at(self.time), at(self.time + dt));
-            let turn = AxisAngle::new(vector([0.0, 0.0, 1.0]), S::constant(after.1)).unwrap();
+            let turn = AxisAngle::new(vector([0.0, 0.0, 1.0]), S::from_f64(after.1)).unwrap();
             let translation = vector([0.0, after.0, 0.0]);
             let pose = Pose { rotation: turn.into(), translation };
             let motion = WallMotion {
@@ -186,7 +186,7 @@ impl<S: Scalar> Scene<S> {
             self.world.walls.set_motion(*id, Some(motion)).unwrap();
         }
         self.time += dt;
-        self.world.step(S::constant(dt)).unwrap();
+        self.world.step(S::from_f64(dt)).unwrap();
     }
 
     /// How deep anything is in a wall, over its radius.

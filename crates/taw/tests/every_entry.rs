@@ -24,11 +24,11 @@ const PATIENCE: Duration = Duration::from_secs(5);
 /// What nobody means, besides a number of no scalar at all: the least one of the scalar itself,
 /// and its largest.
 fn nasty<S: Scalar>() -> Vec<S> {
-    let subnormal = S::min_positive_value() / S::constant(1024.0);
+    let subnormal = S::min_positive_value() / S::from_f64(1024.0);
     let constants =
         [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 0.0, -0.0, -1.0, 1e-30, 1e30, -1e30];
-    let all = constants.into_iter().map(S::constant);
-    all.chain([subnormal, S::constant(f64::from(f32::MAX)), S::max_value(), S::min_value()])
+    let all = constants.into_iter().map(S::from_f64);
+    all.chain([subnormal, S::from_f64(f64::from(f32::MAX)), S::max_value(), S::min_value()])
         .collect()
 }
 
@@ -68,13 +68,13 @@ struct Place<S> {
 
 impl<S: Scalar> Place<S> {
     fn new(model: Model) -> Self {
-        let point = |x: f64, y: f64, z: f64| Point3::new(x, y, z).map(S::constant);
+        let point = |x: f64, y: f64, z: f64| Point3::new(x, y, z).map(S::from_f64);
         let mut world = World::default();
         world.set_model(model).unwrap();
         let floor = Plane::new(Vec3::unit_y(), S::zero()).unwrap();
         let wall = world.walls.insert(floor).unwrap();
         let mut ball = |x: f64, y: f64, z: f64| {
-            world.marbles.insert(Marble::new(point(x, y, z), S::constant(0.5))).unwrap()
+            world.marbles.insert(Marble::new(point(x, y, z), S::from_f64(0.5))).unwrap()
         };
         let subject = ball(0.0, 0.5, 0.0);
         ball(0.9, 0.6, 0.1);
@@ -83,7 +83,7 @@ impl<S: Scalar> Place<S> {
     }
 
     fn step(&mut self) {
-        self.world.step(S::constant(1.0 / 64.0)).unwrap();
+        self.world.step(S::from_f64(1.0 / 64.0)).unwrap();
     }
 
     /// Whether all is finite, and whatever was stopped is named.
@@ -175,7 +175,7 @@ fn each_row_is_refused_or_harmless<S: Scalar>() {
 /// Whether so much at once would bring a collision every few nanoseconds, which this response
 /// goes through one by one up to its cap of millions: half a minute for a step.
 fn goes_from_event_to_event<S: Scalar>(model: Model, x: S) -> bool {
-    let huge = x.is_finite() && x.abs() > S::constant(1e20);
+    let huge = x.is_finite() && x.abs() > S::from_f64(1e20);
     model.response == Response::EventDriven && huge
 }
 
@@ -253,7 +253,7 @@ fn scenes_are_refused_or_run<S: Scalar>() {
                     }
                 };
                 for _ in 0..10 {
-                    running.step(S::constant(1.0 / 64.0)).unwrap_or_else(|error| {
+                    running.step(S::from_f64(1.0 / 64.0)).unwrap_or_else(|error| {
                         panic!("{name} = {x:?} in {model:?} is refused on the way: {error}")
                     });
                     let positions = running.world.marbles.position().iter();

@@ -29,7 +29,7 @@ fn rotation() -> impl Strategy<Value = Quat<f64>> {
 }
 
 fn cast<S: Scalar>(q: Quat<f64>) -> Quat<S> {
-    Quat::new(S::constant(q.s), S::constant(q.v.x), S::constant(q.v.y), S::constant(q.v.z))
+    Quat::new(S::from_f64(q.s), S::from_f64(q.v.x), S::from_f64(q.v.y), S::from_f64(q.v.z))
         .normalize()
 }
 

@@ -16,27 +16,27 @@ fn world<S: Scalar>(rotation: Rotation) -> World<S> {
 fn slope<S: Scalar>(degrees: f64, rotation: Rotation) -> (World<S>, Vec3<S>, WallId) {
     let mut world = world(rotation);
     let (sin, cos) = degrees.to_radians().sin_cos();
-    let normal = Vec3::new(S::constant(sin), S::constant(cos), S::zero());
+    let normal = Vec3::new(S::from_f64(sin), S::from_f64(cos), S::zero());
     let wall = Plane::through(Point3::new(S::zero(), S::zero(), S::zero()), normal).unwrap();
     let id = world.walls.insert(wall).unwrap();
     (world, wall.normal(), id)
 }
 
 fn surface<S: Scalar>(restitution: f64, friction: f64) -> Material<S> {
-    let (restitution, friction) = (S::constant(restitution), S::constant(friction));
+    let (restitution, friction) = (S::from_f64(restitution), S::from_f64(friction));
     Material { restitution, friction, ..Material::default() }
 }
 
 /// A marble that touches a wall through the origin.
 fn on<S: Scalar>(normal: Vec3<S>, radius: f64, material: Material<S>) -> Marble<S> {
-    let radius = S::constant(radius);
+    let radius = S::from_f64(radius);
     let material = Some(material);
     Marble { material, ..Marble::new(Point3::from_vec(normal * radius), radius) }
 }
 
 fn run<S: Scalar>(world: &mut World<S>, dt: f64, seconds: f64) {
     for _ in 0..(seconds / dt).round() as u32 {
-        world.step(S::constant(dt)).unwrap();
+        world.step(S::from_f64(dt)).unwrap();
     }
 }
 

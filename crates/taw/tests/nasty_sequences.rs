@@ -86,7 +86,7 @@ impl<S: Scalar> Trial<S> {
         }
         let [mut world, mut alone] = worlds;
         let far = FAR.map(|at| {
-            let marble = Marble::new(Point3::from(at.map(S::constant)), S::constant(0.5));
+            let marble = Marble::new(Point3::from(at.map(S::from_f64)), S::from_f64(0.5));
             [world.marbles.insert(marble).unwrap(), alone.marbles.insert(marble).unwrap()]
         });
         let (near, walls) = (Vec::new(), Vec::new());
@@ -97,14 +97,14 @@ impl<S: Scalar> Trial<S> {
 
     /// A removal makes contacts forget what they bore, everywhere: rows have other names then.
     fn remove_alone(&mut self) {
-        let dummy = Marble::new(Point3::from([0.0, 500.0, 0.0].map(S::constant)), S::one());
+        let dummy = Marble::new(Point3::from([0.0, 500.0, 0.0].map(S::from_f64)), S::one());
         let dummy = self.alone.marbles.insert(dummy).unwrap();
         self.alone.marbles.remove(dummy).unwrap();
     }
 
     /// Does it; whether it was accepted.
     fn call(&mut self, call: &Call) -> bool {
-        let [a, b, c, d] = call.numbers.map(S::constant);
+        let [a, b, c, d] = call.numbers.map(S::from_f64);
         let v = Vec3::new(a, b, c);
         let marbles = &mut self.world.marbles;
         let id = self.near.get(usize::from(call.whom) % self.near.len().max(1)).copied();
@@ -170,11 +170,11 @@ impl<S: Scalar> Trial<S> {
                 self.world.walls.remove(wall).map(|_| ())
             }),
             (25, _) => {
-                let dt = a * S::constant(1e-30);
+                let dt = a * S::from_f64(1e-30);
                 self.world.step(dt).inspect(|()| self.alone.step(dt).unwrap())
             }
             (_, _) => {
-                let dt = S::constant(1.0 / 64.0);
+                let dt = S::from_f64(1.0 / 64.0);
                 self.alone.step(dt).unwrap();
                 self.world.step(dt)
             }

@@ -29,7 +29,7 @@ fn touch<S: Scalar>(a: &Thing<S>, b: &Thing<S>, margin: S) -> Manifold<S> {
 }
 
 fn support<S: Scalar>(thing: &Thing<S>, direction: Vec3<f64>) -> Point3<f64> {
-    cast_point(each!(thing, it => it.support(direction.map(S::constant))))
+    cast_point(each!(thing, it => it.support(direction.map(S::from_f64))))
 }
 
 fn surface<S: Scalar>(thing: &Thing<S>, point: Point3<S>) -> f64 {
@@ -116,7 +116,7 @@ fn check_manifold<S: Scalar>(
     size: f64,
     all: f64,
 ) -> Result<(), TestCaseError> {
-    let (found, nearest) = (touch(a, b, S::constant(0.01 * size)), near(a, b));
+    let (found, nearest) = (touch(a, b, S::from_f64(0.01 * size)), near(a, b));
     if nearest.distance.as_f64() > 0.0101 * size {
         prop_assert!(found.points.is_empty());
         return Ok(());

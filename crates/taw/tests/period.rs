@@ -24,17 +24,17 @@ fn world<S: Scalar>(model: Model) -> World<S> {
     let mut world = World::default();
     world.set_model(model).unwrap();
     world.set_gravity(Vec3::new(S::zero(), S::zero(), S::zero())).unwrap();
-    world.set_period([Some(S::constant(SIDE)); 3]).unwrap();
+    world.set_period([Some(S::from_f64(SIDE)); 3]).unwrap();
     world
 }
 
 fn ball<S: Scalar>(at: [f64; 3], velocity: [f64; 3], radius: f64, restitution: f64) -> Marble<S> {
-    let restitution = S::constant(restitution);
+    let restitution = S::from_f64(restitution);
     let material = Material { restitution, friction: S::zero(), ..Material::default() };
     Marble {
-        velocity: Vec3::from(velocity).map(S::constant),
+        velocity: Vec3::from(velocity).map(S::from_f64),
         material: Some(material),
-        ..Marble::new(Point3::from(at).map(S::constant), S::constant(radius))
+        ..Marble::new(Point3::from(at).map(S::from_f64), S::from_f64(radius))
     }
 }
 

@@ -10,7 +10,7 @@ use taw::contact::{
     time_of_impact,
 };
 use taw::frame::{AxisAngle, Pose, Ray};
-use taw::math::{cast_point, direction_and_length};
+use taw::math::{cast_point, normalize_and_length};
 use taw::prelude::*;
 use taw::shape::{BoundedShape, Capsule, Obb};
 use things::{Numbers, Thing, numbers, things};
@@ -39,7 +39,7 @@ fn moved(thing: &Thing<f64>, by: Vec3<f64>) -> Thing<f64> {
 }
 
 fn turned(thing: &Thing<f64>, sweep: &Sweep<f64>, time: f64) -> Thing<f64> {
-    let (axis, angle) = direction_and_length(sweep.rotation).unwrap_or((Vec3::unit_x(), 0.0));
+    let (axis, angle) = normalize_and_length(sweep.rotation).unwrap_or((Vec3::unit_x(), 0.0));
     let rotation = AxisAngle::new(axis, angle * time).unwrap().into();
     let pivot = sweep.center.to_vec();
     let turn = Pose { rotation, translation: pivot + sweep.translation * time - rotation * pivot };

@@ -55,7 +55,7 @@ fn a_bounce_reaches_the_height_that_restitution_leaves() {
                 highest = highest.max(marble.position.y - 0.1);
             }
         }
-        let asked = (e * e) as f32;
+        let asked = e * e;
         println!("{substeps} {e}: {highest} asked {asked}");
         assert!((highest - asked).abs() < 0.02 * asked, "{substeps}: {highest}, not {asked}");
     }

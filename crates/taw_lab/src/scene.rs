@@ -37,7 +37,7 @@ impl Stopwatch {
     /// If the world refuses the step.
     pub fn step<S: Scalar>(&mut self, world: &mut World<S>, dt: f64) {
         let begin = Instant::now();
-        world.step(S::constant(dt)).expect("the suite's steps are above zero");
+        world.step(S::from_f64(dt)).expect("the suite's steps are above zero");
         self.time += begin.elapsed();
         self.ball_steps += (world.marbles.len() + world.swarm.len()) as u64;
     }
@@ -48,7 +48,7 @@ impl Stopwatch {
         for _ in 0..steps as u64 {
             self.step(world, dt);
         }
-        steps * S::constant(dt).as_f64()
+        steps * S::from_f64(dt).as_f64()
     }
 
     /// Cost in nanoseconds per ball and step.
@@ -91,7 +91,7 @@ pub fn slope<S: Scalar>(model: Model, degrees: f64) -> World<S> {
 
 /// Adds a wall: the direction of its free side, and its distance from the origin along it.
 pub fn wall<S: Scalar>(world: &mut World<S>, normal: [f64; 3], offset: f64) -> WallId {
-    let plane = Plane::new(vector(normal), S::constant(offset)).expect("a unit vector");
+    let plane = Plane::new(vector(normal), S::from_f64(offset)).expect("a unit vector");
     world.walls.insert(plane).expect("a few walls")
 }
 
@@ -105,7 +105,7 @@ pub fn box_around<S: Scalar>(world: &mut World<S>, half: f64) {
 /// A vector in any scalar.
 #[must_use]
 pub fn vector<S: Scalar>(v: [f64; 3]) -> Vec3<S> {
-    Vec3::from(v.map(S::constant))
+    Vec3::from(v.map(S::from_f64))
 }
 
 /// A ball on its way into a scene.
@@ -151,7 +151,7 @@ impl Ball {
     /// # Panics
     /// If the world refuses it.
     pub fn insert<S: Scalar>(self, world: &mut World<S>) -> MarbleId {
-        let number = S::constant;
+        let number = S::from_f64;
         let m = self.material;
         let material = Material {
             restitution: number(m.restitution),

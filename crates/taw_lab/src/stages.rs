@@ -47,7 +47,7 @@ fn measure_in<S: Scalar>(
     let mut times = [0; 3].map(|_| Vec::with_capacity(steps));
     let before = allocated();
     let mut running = scene.run::<S>(model)?;
-    let (step, substep) = (S::constant(step), S::constant(step / f64::from(model.passes())));
+    let (step, substep) = (S::from_f64(step), S::from_f64(step / f64::from(model.passes())));
     let mut contacts = 0;
     for _ in 0..steps {
         running.move_walls(step)?;

@@ -57,7 +57,7 @@ impl Grid {
     /// Sorts the spheres into cells. Spheres up to `reach` metres apart count as touching.
     pub fn rebuild<S: Scalar>(&mut self, center: &[Point3<S>], radius: &[S], reach: S) {
         // Zero for a negative or NaN margin.
-        let half_reach = if reach > S::zero() { reach * S::constant(0.5) } else { S::zero() };
+        let half_reach = if reach > S::zero() { reach * S::from_f64(0.5) } else { S::zero() };
         let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r)) + half_reach;
         self.width = (2.0 * largest.as_f64() * CELL_MARGIN).max(LEAST_CELL);
         self.origin = middle(center);
@@ -188,7 +188,7 @@ fn pairs_in_level(cells: &[Cell], emit: &mut impl FnMut(&Cell, &Cell)) {
 
 /// The finest level whose cells are as wide as a sphere of this radius.
 fn level_of<S: Scalar>(radius: S, largest: S) -> u32 {
-    let half = S::constant(0.5);
+    let half = S::from_f64(0.5);
     let mut level = 0;
     let mut fits = largest * half;
     while radius <= fits && level + 1 < LEVELS {

@@ -35,7 +35,7 @@ impl<S: Scalar> Period<S> {
     /// Checks that the largest of these balls fits into each length often enough.
     pub fn check_radii(self, radius: &[S]) -> Result<(), Error> {
         let largest = radius.iter().fold(S::zero(), |max, r| Float::max(max, *r));
-        let least = largest * S::constant(2.0 * LEAST_DIAMETERS);
+        let least = largest * S::from_f64(2.0 * LEAST_DIAMETERS);
         for (length, field) in self.lengths.iter().zip(["period.x", "period.y", "period.z"]) {
             length.map(|length| within(field, length, least, S::max_value())).transpose()?;
         }
@@ -45,7 +45,7 @@ impl<S: Scalar> Period<S> {
     /// Shortest displacement modulo periods: minimum image convention (Allen and Tildesley,
     /// *Computer Simulation of Liquids*, 1987, §1.5.2).
     #[inline]
-    pub fn nearest(&self, way: Vec3<S>) -> Vec3<S> {
+    pub fn minimum_image(&self, way: Vec3<S>) -> Vec3<S> {
         self.image(Point3::from_vec(way), Point3::origin()).to_vec()
     }
 
@@ -61,7 +61,7 @@ impl<S: Scalar> Period<S> {
                 }
                 let way = point[axis] - near[axis];
                 // A point on a side stays on that side.
-                let half = length * S::constant(0.5);
+                let half = length * S::from_f64(0.5);
                 if way.abs() > half {
                     point[axis] -= length.copysign(way);
                 }
@@ -136,7 +136,7 @@ impl<S: Scalar> Images<S> {
             let (first, radius) = (self.center.len(), radius[inside]);
             for (axis, length) in period.lengths.iter().enumerate() {
                 let Some(length) = *length else { continue };
-                let half = length * S::constant(0.5);
+                let half = length * S::from_f64(0.5);
                 let far = (radius + largest + reach).min(half);
                 for image in std::iter::once(inside).chain(first..self.center.len()) {
                     let at = self.center[image];
@@ -175,7 +175,7 @@ mod tests {
             let radius: Vec<f64> = (0..center.len()).map(|i| [0.02, 0.05, 0.12][i % 3]).collect();
             let touches = |a: u32, b: u32| {
                 let (a, b) = (a as usize, b as usize);
-                period.nearest(center[b] - center[a]).magnitude() <= radius[a] + radius[b] + reach
+                period.minimum_image(center[b] - center[a]).magnitude() <= radius[a] + radius[b] + reach
             };
             let mut named = Vec::new();
             Images::default().pairs(&mut Grid::default(), (&center, &radius), reach, period, |a, b| {
@@ -197,9 +197,9 @@ mod tests {
     fn the_nearest_image_is_the_way_itself_where_that_is_short() {
         let period = Period { lengths: [Some(8.0_f32), None, Some(0.3)] };
         let short = Vec3::new(3.999, 1e9, -0.1499);
-        assert_eq!(period.nearest(short), short);
-        let there = period.nearest(Vec3::new(-5.0, 1e9, 0.25));
+        assert_eq!(period.minimum_image(short), short);
+        let there = period.minimum_image(Vec3::new(-5.0, 1e9, 0.25));
         assert_eq!(there, Vec3::new(3.0, 1e9, 0.25 - 0.3));
-        assert!(period.nearest(Vec3::new(f32::NAN, 0.0, 0.0)).x.is_nan());
+        assert!(period.minimum_image(Vec3::new(f32::NAN, 0.0, 0.0)).x.is_nan());
     }
 }

@@ -5,7 +5,7 @@ use super::brute_force;
 use super::core::{Convex, Core, Kind};
 use super::epa::penetration;
 use super::gjk::{Gjk, gjk};
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
 use crate::shape::{BoundedShape, Plane, Triangle};
 
 /// Closest points of two shapes, or their deepest points if they overlap.
@@ -56,7 +56,7 @@ pub fn closest_points<S: Scalar>(
     b: &(impl Convex<S> + ?Sized),
 ) -> ClosestPoints<S> {
     if let (Some(a), Some(b)) = (a.as_sphere(), b.as_sphere()) {
-        let apart = direction_and_length(b.center - a.center);
+        let apart = normalize_and_length(b.center - a.center);
         let some = if b.radius < a.radius { -Vec3::unit_x() } else { Vec3::unit_x() };
         let (normal, far) = apart.unwrap_or((some, S::zero()));
         let (on_a, on_b) = (a.center + normal * a.radius, b.center - normal * b.radius);
@@ -145,7 +145,7 @@ impl LocalClosestPoints {
 
     pub fn about<S: Scalar>(self, origin: Point3<f64>) -> ClosestPoints<S> {
         ClosestPoints {
-            distance: S::constant(self.distance),
+            distance: S::from_f64(self.distance),
             normal: cast_vector(self.normal),
             on_a: cast_point(origin + self.on_a),
             on_b: cast_point(origin + self.on_b),
@@ -261,7 +261,7 @@ fn closest_points_of_segments(
     if (on_b - on_a).magnitude2() > limit * limit * (1.0 + 1e-12) {
         return Gjk::OutOfRange;
     }
-    let Some((normal, distance)) = direction_and_length(on_b - on_a) else {
+    let Some((normal, distance)) = normalize_and_length(on_b - on_a) else {
         return Gjk::NotConverged;
     };
     // The plane across the normal gives a lower bound.

@@ -325,7 +325,7 @@ impl<S: Scalar> Convex<S> for Capsule<S> {
     }
 
     fn center(&self) -> Point3<S> {
-        self.a + (self.b - self.a) * S::constant(0.5)
+        self.a + (self.b - self.a) * S::from_f64(0.5)
     }
 
     fn as_sphere(&self) -> Option<Sphere<S>> {
@@ -371,7 +371,7 @@ impl<S: Scalar> Convex<S> for Triangle<S> {
 
     fn center(&self) -> Point3<S> {
         let [a, b, c] = self.corners;
-        a + ((b - a) + (c - a)) / S::constant(3.0)
+        a + ((b - a) + (c - a)) / S::from_f64(3.0)
     }
 }
 

@@ -7,7 +7,7 @@ use cgmath::InnerSpace;
 use super::closest::{LocalClosestPoints, TOLERANCE};
 use super::core::Core;
 use super::gjk::{Vertex, vertex};
-use crate::math::{Vec3, direction_and_length};
+use crate::math::{Vec3, normalize_and_length};
 
 /// A face of the polytope.
 #[derive(Clone, Copy)]
@@ -77,7 +77,7 @@ pub(super) fn penetration(
 /// A face, unless it is degenerate or has the origin in front of it.
 fn face(vertices: &[Vertex], corners: [usize; 3]) -> Option<PolytopeFace> {
     let [p, q, r] = corners.map(|i| vertices[i].difference);
-    let (normal, twice) = direction_and_length((q - p).cross(r - p))?;
+    let (normal, twice) = normalize_and_length((q - p).cross(r - p))?;
     let longest = (q - p).magnitude2().max((r - q).magnitude2()).max((p - r).magnitude2());
     let height = (p + q + r).dot(normal) / 3.0;
     (twice > 1e-10 * longest && height > -1e-13 * longest.sqrt()).then_some(PolytopeFace {

@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 use super::brute_force::{Axis, AxisSource};
 use super::closest::{ClosestPoints, LocalClosestPoints, closest_points, core_distance};
 use super::core::{Convex, Core, IndexedVertex, Kind, PARALLEL_SIN, Polygon};
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
 
 /// Contact manifold: a point, the ends of a segment, or up to four vertices of a polygon.
 #[derive(Clone, Debug, PartialEq)]
@@ -68,7 +68,7 @@ pub fn manifold<S: Scalar>(
     let (x, y) = (a.core(origin), b.core(origin));
     let margin = margin.as_f64();
     let Some(nearest) = core_distance(&x, &y, margin) else {
-        let normal = direction_and_length(y.inside() - x.inside());
+        let normal = normalize_and_length(y.inside() - x.inside());
         let normal = cast_vector(normal.map_or_else(Vec3::unit_x, |(normal, _)| normal));
         return Manifold { normal, points: Points::new() };
     };
@@ -93,7 +93,7 @@ pub fn manifold<S: Scalar>(
     let public = points.iter().map(|p| ManifoldPoint {
         on_a: point(p.on_a + normal * x.radius),
         on_b: point(p.on_b - normal * y.radius),
-        distance: S::constant(p.distance - x.radius - y.radius),
+        distance: S::from_f64(p.distance - x.radius - y.radius),
         feature: p.feature,
     });
     Manifold { normal: cast_vector(normal), points: public.collect() }
@@ -219,7 +219,7 @@ fn contact_points_of_parallel_segments(
     normal: Vec3<f64>,
 ) -> ContactPoints {
     let mut points = ContactPoints::new();
-    let (along, across) = (direction_and_length(q - p), direction_and_length(other[1] - other[0]));
+    let (along, across) = (normalize_and_length(q - p), normalize_and_length(other[1] - other[0]));
     let (Some((along, long)), Some((across, _))) = (along, across) else { return points };
     if along.cross(across).magnitude2() > PARALLEL_SIN * PARALLEL_SIN {
         return points;

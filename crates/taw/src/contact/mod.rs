@@ -82,8 +82,8 @@ mod tests {
 
     /// A sphere near the origin of a scene of this size.
     fn sphere<S: Scalar>(scale: f64, center: [f64; 3], radius: f64) -> Sphere<S> {
-        let [x, y, z] = center.map(|x| S::constant(x * scale));
-        Sphere::new(Point3::new(x, y, z), S::constant(radius * scale)).unwrap()
+        let [x, y, z] = center.map(|x| S::from_f64(x * scale));
+        Sphere::new(Point3::new(x, y, z), S::from_f64(radius * scale)).unwrap()
     }
 
     fn moved<S: Scalar>(sphere: &Sphere<S>, by: Vec3<S>) -> Sphere<S> {
@@ -96,7 +96,7 @@ mod tests {
             let z = 1.0 - (2.0 * f64::from(i) + 1.0) / f64::from(count);
             let around = f64::from(i) * std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
             let r = (1.0 - z * z).sqrt();
-            Vec3::new(r * around.cos(), r * around.sin(), z).map(S::constant)
+            Vec3::new(r * around.cos(), r * around.sin(), z).map(S::from_f64)
         })
     }
 
@@ -109,11 +109,11 @@ mod tests {
         separation: impl Fn(&Sphere<S>) -> S,
     ) {
         // What rounding a handful of operations on numbers of this size can do.
-        let tolerance = S::epsilon() * size * S::constant(8.0);
+        let tolerance = S::epsilon() * size * S::from_f64(8.0);
         let left = separation(&moved(b, mtv));
         assert!(left.abs() <= tolerance, "{left:?} left of {tolerance:?} allowed");
-        let shorter = length(mtv) * S::constant(0.999);
-        if shorter * S::constant(0.001) > tolerance {
+        let shorter = length(mtv) * S::from_f64(0.999);
+        if shorter * S::from_f64(0.001) > tolerance {
             for direction in directions(1000) {
                 let left = separation(&moved(b, direction * shorter));
                 assert!(left < S::zero(), "{direction:?} is shorter");
@@ -128,7 +128,7 @@ mod tests {
         let back = mtv_sphere_sphere(&b, &a);
         assert_eq!(back, mtv.map(|mtv| -mtv), "swapping the two negates it to the bit");
         if let Some(mtv) = mtv {
-            assert_separates_and_is_minimal(&b, mtv, S::constant(10.0 * scale), |b| {
+            assert_separates_and_is_minimal(&b, mtv, S::from_f64(10.0 * scale), |b| {
                 length(b.center - a.center) - (a.radius + b.radius)
             });
         }
@@ -136,12 +136,12 @@ mod tests {
 
     fn check_wall<S: Scalar>(scale: f64, at: [f64; 3], radius: f64, normal: [f64; 3], offset: f64) {
         let b = sphere::<S>(scale, at, radius);
-        let normal = Vec3::from(normal).normalize().map(S::constant);
-        let wall = Plane::new(normal.normalize(), S::constant(offset * scale)).unwrap();
+        let normal = Vec3::from(normal).normalize().map(S::from_f64);
+        let wall = Plane::new(normal.normalize(), S::from_f64(offset * scale)).unwrap();
         let mtv = mtv_sphere_plane(&b, &wall);
         assert_eq!(mtv.is_some(), touching_sphere_plane(&b, &wall));
         if let Some(mtv) = mtv {
-            assert_separates_and_is_minimal(&b, mtv, S::constant(10.0 * scale), |b| {
+            assert_separates_and_is_minimal(&b, mtv, S::from_f64(10.0 * scale), |b| {
                 wall.signed_distance(b.center) - b.radius
             });
         }

@@ -1,7 +1,7 @@
 use cgmath::{EuclideanSpace, InnerSpace};
 
 use crate::frame::Ray;
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
 use crate::shape::{Aabb3, BoundedShape, Capsule, Compound, Hull, Obb, Plane, Shape, Sphere};
 
 /// Hit of a ray on a surface.
@@ -34,7 +34,7 @@ struct LocalRay {
 impl LocalRay {
     fn new<S: Scalar>(ray: &Ray<S>, origin: Point3<f64>) -> Option<Self> {
         // Normalized in `f64`.
-        let (along, _) = direction_and_length(cast_vector::<S, f64>(ray.direction))?;
+        let (along, _) = normalize_and_length(cast_vector::<S, f64>(ray.direction))?;
         let start = cast_point::<S, f64>(ray.origin);
         let from = start - origin;
         let largest = start.to_vec().map(f64::abs) + from.map(f64::abs);
@@ -52,7 +52,7 @@ impl LocalRay {
         let ahead = distance >= -self.rounding;
         let distance = distance.max(0.0);
         (ahead && distance <= max_distance.as_f64()).then(|| RayHit {
-            distance: S::constant(distance),
+            distance: S::from_f64(distance),
             point: cast_point(origin + self.from + self.along * distance),
             normal: cast_vector(normal),
         })
@@ -110,7 +110,7 @@ fn cast_from_outside<S: Scalar>(
 
 impl<S: Scalar> RayCast<S> for Plane<S> {
     fn cast_ray(&self, ray: &Ray<S>, max_distance: S) -> Option<RayHit<S>> {
-        let (normal, length) = direction_and_length(cast_vector::<S, f64>(self.normal()))?;
+        let (normal, length) = normalize_and_length(cast_vector::<S, f64>(self.normal()))?;
         let local = LocalRay::new(ray, Point3::origin())?;
         let height = self.offset().as_f64() / length;
         let above = local.from.dot(normal) - height;
@@ -140,7 +140,7 @@ impl<S: Scalar> RayCast<S> for Capsule<S> {
             let local = LocalRay::new(ray, origin)?;
             let (end, radius) = (cast_point::<S, f64>(self.b) - origin, self.radius.as_f64());
             let ends = [Vec3::new(0.0, 0.0, 0.0), end].map(|end| local.enter_sphere(end, radius));
-            let side = direction_and_length(end)
+            let side = normalize_and_length(end)
                 .and_then(|(axis, long)| enter_side(&local, axis, long, radius));
             let ahead =
                 ends.into_iter().chain([side]).flatten().filter(|(t, _)| *t >= -local.rounding);

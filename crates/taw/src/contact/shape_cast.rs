@@ -58,7 +58,7 @@ pub fn shape_cast<S: Scalar>(
                 return None; // one slides along the other, to within rounding
             }
             return Some(ShapeCastHit {
-                time: S::constant(time),
+                time: S::from_f64(time),
                 normal: cast_vector(normal),
                 point: cast_point(origin + on_a + first * time),
             });

@@ -1,6 +1,6 @@
 use cgmath::InnerSpace;
 
-use crate::math::{Scalar, Vec3, direction_and_length, length};
+use crate::math::{Scalar, Vec3, length, normalize_and_length};
 use crate::shape::Sphere;
 
 /// Overlap test of two spheres: the distance of their centers is at most the sum of their radii
@@ -20,7 +20,7 @@ pub fn touching_sphere_sphere<S: Scalar>(a: &Sphere<S>, b: &Sphere<S>) -> bool {
 #[inline]
 pub fn mtv_sphere_sphere<S: Scalar>(a: &Sphere<S>, b: &Sphere<S>) -> Option<Vec3<S>> {
     let reach = a.radius + b.radius;
-    match direction_and_length(b.center - a.center) {
+    match normalize_and_length(b.center - a.center) {
         Some((direction, distance)) if distance <= reach => Some(direction * (reach - distance)),
         None if touching_sphere_sphere(a, b) => Some(Vec3::unit_x() * reach),
         _ => None,

@@ -8,7 +8,7 @@ use super::manifold::{Manifold, manifold};
 use super::ray_cast::RayHit;
 use super::shape_cast::{ShapeCastHit, shape_cast};
 use crate::frame::Ray;
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
 use crate::shape::{Aabb, Aabb3, Sphere, Surface, Triangle};
 
 /// Result for one triangle of a surface.
@@ -77,7 +77,7 @@ fn closest_of_sphere<S: Scalar>(
             let squared = Triangle { corners }.project_origin().to_vec().magnitude2();
             if best.is_none_or(|best| (squared, number) < best) {
                 best = Some((squared, number));
-                reach = S::constant(squared.sqrt());
+                reach = S::from_f64(squared.sqrt());
             }
         }
         reach
@@ -90,7 +90,7 @@ fn closest_of_sphere<S: Scalar>(
 /// Lower bound of the distance of a triangle and a shape: separation along the triangle's normal.
 fn distance_lower_bound(triangle: &Core<'_>, core: &Core<'_>) -> f64 {
     let Kind::Triangle([a, b, c]) = &triangle.kind else { return f64::NEG_INFINITY };
-    let Some((normal, _)) = direction_and_length((b - a).cross(c - a)) else {
+    let Some((normal, _)) = normalize_and_length((b - a).cross(c - a)) else {
         return f64::NEG_INFINITY;
     };
     let height = |of: Vec3<f64>| (of - a).dot(normal);
@@ -178,7 +178,7 @@ fn intersect_triangle<S: Scalar>(
     max_distance: S,
 ) -> Option<RayHit<S>> {
     let origin = cast_point::<S, f64>(ray.origin);
-    let (along, _) = direction_and_length(cast_vector::<S, f64>(ray.direction))?;
+    let (along, _) = normalize_and_length(cast_vector::<S, f64>(ray.direction))?;
     let [a, b, c] = corners.map(|corner| cast_point::<S, f64>(corner) - origin);
     // Sheared so that the ray runs along its dominant axis.
     let z = (1..3).fold(0, |most, i| if along[i].abs() > along[most].abs() { i } else { most });
@@ -194,9 +194,9 @@ fn intersect_triangle<S: Scalar>(
     }
     let at = (a * weights[0] + b * weights[1] + c * weights[2]) / sum;
     let distance = at.dot(along);
-    let (normal, _) = direction_and_length((b - a).cross(c - a))?;
+    let (normal, _) = normalize_and_length((b - a).cross(c - a))?;
     (distance >= 0.0 && distance <= max_distance.as_f64()).then(|| RayHit {
-        distance: S::constant(distance),
+        distance: S::from_f64(distance),
         point: cast_point(origin + along * distance),
         normal: cast_vector(if normal.dot(along) > 0.0 { -normal } else { normal }),
     })

@@ -3,7 +3,7 @@ use cgmath::{InnerSpace, Matrix3, Quaternion};
 use super::closest::{LocalClosestPoints, local_closest_points};
 use super::core::{Convex, Core};
 use super::shape_cast::{SLIDING, ShapeCastHit};
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
 
 /// Rigid motion over a time interval at constant velocity and angular velocity (a sweep).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -44,7 +44,7 @@ impl<'a> MovingCore<'a> {
     }
 
     fn at(&self, time: f64) -> Core<'a> {
-        let turned = match direction_and_length(self.rotation) {
+        let turned = match normalize_and_length(self.rotation) {
             Some((axis, angle)) => {
                 let (sin, cos) = (0.5 * angle * time).sin_cos_portable();
                 self.core.rotated(Matrix3::from(Quaternion::from_sv(cos, axis * sin)))
@@ -118,7 +118,7 @@ pub fn time_of_impact<S: Scalar>(
         }
         if lower_bound <= near || step + 1 == MAX_ITERATIONS {
             return Some(ShapeCastHit {
-                time: S::constant(time),
+                time: S::from_f64(time),
                 normal: cast_vector(normal),
                 point: cast_point(origin + on_a),
             });

@@ -2,7 +2,7 @@ use cgmath::Zero;
 
 use crate::Error;
 use crate::error::{finite, finite_vector};
-use crate::math::{Quat, Scalar, Vec3, direction_and_length};
+use crate::math::{Quat, Scalar, Vec3, normalize_and_length};
 
 /// A rotation by an angle about an axis, by the right hand.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -19,7 +19,7 @@ impl<S: Scalar> AxisAngle<S> {
     pub fn new(axis: Vec3<S>, angle: S) -> Result<Self, Error> {
         finite_vector(["axis.x", "axis.y", "axis.z"], axis)?;
         finite("angle", angle)?;
-        let Some((axis, _)) = direction_and_length(axis) else {
+        let Some((axis, _)) = normalize_and_length(axis) else {
             return Err(Error::NotUnit { field: "axis", value: 0.0 });
         };
         Ok(Self { axis, angle })
@@ -40,7 +40,7 @@ impl<S: Scalar> AxisAngle<S> {
 
 impl<S: Scalar> From<AxisAngle<S>> for Quat<S> {
     fn from(AxisAngle { axis, angle }: AxisAngle<S>) -> Self {
-        let (sin, cos) = (angle * S::constant(0.5)).sin_cos_portable();
+        let (sin, cos) = (angle * S::from_f64(0.5)).sin_cos_portable();
         Self::from_sv(cos, axis * sin)
     }
 }
@@ -49,9 +49,9 @@ impl<S: Scalar> From<Quat<S>> for AxisAngle<S> {
     /// The short way round: an angle in [0, π]. The identity becomes a zero rotation about x.
     fn from(rotation: Quat<S>) -> Self {
         let short = if rotation.s < S::zero() { -rotation } else { rotation };
-        match direction_and_length(short.v) {
+        match normalize_and_length(short.v) {
             Some((axis, sin)) => {
-                Self { axis, angle: sin.atan2_portable(short.s) * S::constant(2.0) }
+                Self { axis, angle: sin.atan2_portable(short.s) * S::from_f64(2.0) }
             }
             None => Self { axis: Vec3::unit_x(), angle: Zero::zero() },
         }

@@ -40,16 +40,16 @@ impl<S: Scalar> Camera<S> {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a field of view outside of (0, π), or a far that is not
-    /// above near; [`Error::NotPositive`] for the others; for the pose as [`Pose::checked`].
+    /// above near; [`Error::NotPositive`] for the others; for the pose as [`Pose::validated`].
     pub fn new(
         pose: Pose<S>,
         field_of_view: S,
         aspect: S,
         [near, far]: [S; 2],
     ) -> Result<Self, Error> {
-        let pose = pose.checked()?;
+        let pose = pose.validated()?;
         let least = S::min_positive_value();
-        let half_turn = S::constant(std::f64::consts::PI) * (S::one() - S::epsilon());
+        let half_turn = S::from_f64(std::f64::consts::PI) * (S::one() - S::epsilon());
         within("field_of_view", field_of_view, least, half_turn)?;
         positive("aspect", aspect)?;
         positive("near", near)?;
@@ -93,7 +93,7 @@ impl<S: Scalar> Camera<S> {
 
     /// Half width and half height of the view, one metre ahead.
     fn half_sizes(&self) -> [S; 2] {
-        let (sin, cos) = (self.field_of_view * S::constant(0.5)).sin_cos_portable();
+        let (sin, cos) = (self.field_of_view * S::from_f64(0.5)).sin_cos_portable();
         [sin / cos * self.aspect, sin / cos]
     }
 }

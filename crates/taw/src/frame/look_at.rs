@@ -3,7 +3,7 @@ use cgmath::InnerSpace;
 use super::rotation_of_matrix;
 use crate::Error;
 use crate::error::finite_vector;
-use crate::math::{Mat3, Quat, Scalar, Vec3, direction_and_length};
+use crate::math::{Mat3, Quat, Scalar, Vec3, normalize_and_length};
 
 /// A rotation given by the images of two axes: −z looks `forward`, y points `up`. Both are
 /// perpendicular unit vectors.
@@ -23,15 +23,15 @@ impl<S: Scalar> LookAt<S> {
         finite_vector(["forward.x", "forward.y", "forward.z"], forward)?;
         finite_vector(["up.x", "up.y", "up.z"], up)?;
         let zero = |field| Error::NotUnit { field, value: 0.0 };
-        let (forward, _) = direction_and_length(forward).ok_or(zero("forward"))?;
-        let (up, _) = direction_and_length(up).ok_or(zero("up"))?;
+        let (forward, _) = normalize_and_length(forward).ok_or(zero("forward"))?;
+        let (up, _) = normalize_and_length(up).ok_or(zero("up"))?;
         // Component perpendicular to the direction, if it is more than rounding.
         let beside = |v: Vec3<S>| {
             let rest = v - forward * v.dot(forward);
-            let (unit, length) = direction_and_length(rest)?;
+            let (unit, length) = normalize_and_length(rest)?;
             // Once more, for the rounding of the first subtraction.
             let unit = (unit - forward * unit.dot(forward)).normalize();
-            (length > S::epsilon() * S::constant(8.0)).then_some(unit)
+            (length > S::epsilon() * S::from_f64(8.0)).then_some(unit)
         };
         let instead = if up.dot(forward) > S::zero() { Vec3::unit_z() } else { -Vec3::unit_z() };
         let up = beside(up).or_else(|| beside(instead)).or_else(|| beside(Vec3::unit_y()));

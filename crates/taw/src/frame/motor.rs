@@ -49,7 +49,7 @@ impl<S: Scalar> Motor<S> {
     /// Creates the motion that rotates first and translates then.
     #[must_use]
     pub fn new(rotation: Quat<S>, translation: Vec3<S>) -> Self {
-        let half = S::constant(0.5);
+        let half = S::from_f64(0.5);
         Self { real: rotation, dual: Quat::from_sv(S::zero(), translation * half) * rotation }
     }
 
@@ -68,7 +68,7 @@ impl<S: Scalar> Motor<S> {
     /// Translation of the origin.
     #[must_use]
     pub fn translation(self) -> Vec3<S> {
-        (self.dual * self.real.conjugate()).v * S::constant(2.0)
+        (self.dual * self.real.conjugate()).v * S::from_f64(2.0)
     }
 
     /// Inverse motion: the reverse, in the algebra.
@@ -107,7 +107,7 @@ impl<S: Scalar> Motor<S> {
         } else {
             self
         };
-        let (half, two) = (S::constant(0.5), S::constant(2.0));
+        let (half, two) = (S::from_f64(0.5), S::from_f64(2.0));
         let sin = real.v.magnitude();
         let angle = sin.atan2_portable(real.s);
         let Screw { sinc, slope, .. } = Screw::of(angle * two, angle, half);
@@ -121,7 +121,7 @@ impl<S: Scalar> Motor<S> {
     #[must_use]
     pub fn exp(twist: Twist<S>, seconds: S) -> Self {
         let angular_velocity = twist.angular_velocity.dual();
-        let (rate, time) = (angular_velocity.magnitude(), seconds * S::constant(0.5));
+        let (rate, time) = (angular_velocity.magnitude(), seconds * S::from_f64(0.5));
         let Screw { cos, sinc, slope } = Screw::of(rate, rate * time, time);
         let along = angular_velocity.dot(twist.velocity);
         Self {
@@ -168,13 +168,13 @@ impl<S: Scalar> Screw<S> {
         let (sin, cos) = angle.sin_cos_portable();
         let squared = angle * angle;
         // Taylor series where both would suffer from cancellation.
-        if angle.abs() < S::constant(1e-2) {
+        if angle.abs() < S::from_f64(1e-2) {
             let one = S::one();
-            let [six, ten, twenty, twenty_eight] = [6.0, 10.0, 20.0, 28.0].map(S::constant);
+            let [six, ten, twenty, twenty_eight] = [6.0, 10.0, 20.0, 28.0].map(S::from_f64);
             return Self {
                 cos,
                 sinc: time * (one - squared / six * (one - squared / twenty)),
-                slope: -time * time * time / S::constant(3.0)
+                slope: -time * time * time / S::from_f64(3.0)
                     * (one - squared / ten * (one - squared / twenty_eight)),
             };
         }

@@ -43,7 +43,7 @@ impl<S: Scalar> Pose<S> {
     ///
     /// # Errors
     /// [`Error::NotFinite`] for the translation, [`Error::NotUnit`] for the rotation.
-    pub fn checked(self) -> Result<Self, Error> {
+    pub fn validated(self) -> Result<Self, Error> {
         let fields = ["translation.x", "translation.y", "translation.z"];
         let translation = finite_vector(fields, self.translation)?;
         Ok(Self { rotation: rotation("rotation", self.rotation)?, translation })

@@ -9,7 +9,7 @@ pub fn slerp<S: Scalar>(from: Quat<S>, to: Quat<S>, fraction: S) -> Quat<S> {
     let to = if from.dot(to) < S::zero() { -to } else { to };
     // Accurate for any angle between them (Kahan, *How futile are mindless assessments of
     // roundoff*, 2006, §12); an arc cosine is not for small ones.
-    let angle = (to - from).magnitude().atan2_portable((to + from).magnitude()) * S::constant(2.0);
+    let angle = (to - from).magnitude().atan2_portable((to + from).magnitude()) * S::from_f64(2.0);
     let (sin, _) = angle.sin_cos_portable();
     let weight = |fraction: S| {
         // Small-angle limit.

@@ -27,9 +27,9 @@ impl<S: Scalar> Tree<S> {
     /// Adds a node under a parent, or as a root.
     ///
     /// # Errors
-    /// [`Error::NoSuchNode`] for the parent; for the pose as [`Pose::checked`].
+    /// [`Error::NoSuchNode`] for the parent; for the pose as [`Pose::validated`].
     pub fn insert(&mut self, parent: Option<NodeId>, local: Pose<S>) -> Result<NodeId, Error> {
-        let local = local.checked()?;
+        let local = local.validated()?;
         if let Some(parent) = parent {
             self.node(parent)?;
         }
@@ -65,10 +65,10 @@ impl<S: Scalar> Tree<S> {
     /// Sets the local pose of a node; its descendants follow.
     ///
     /// # Errors
-    /// [`Error::NoSuchNode`]; for the pose as [`Pose::checked`].
+    /// [`Error::NoSuchNode`]; for the pose as [`Pose::validated`].
     pub fn set_local(&mut self, id: NodeId, local: Pose<S>) -> Result<(), Error> {
         self.node(id)?;
-        self.nodes[id].local = local.checked()?;
+        self.nodes[id].local = local.validated()?;
         Ok(())
     }
 
@@ -120,7 +120,7 @@ impl<S: Scalar> Tree<S> {
             Some(parent) => self.world(parent)?.inverse() * pose,
             None => pose,
         }
-        .checked()?;
+        .validated()?;
         self.detach(id);
         self.attach(id, parent);
         self.nodes[id].local = local;

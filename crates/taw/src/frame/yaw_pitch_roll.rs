@@ -16,7 +16,7 @@ pub struct YawPitchRoll<S> {
 
 impl<S: Scalar> From<YawPitchRoll<S>> for Quat<S> {
     fn from(YawPitchRoll { yaw, pitch, roll }: YawPitchRoll<S>) -> Self {
-        let half = |angle: S| (angle * S::constant(0.5)).sin_cos_portable();
+        let half = |angle: S| (angle * S::from_f64(0.5)).sin_cos_portable();
         let [(sy, cy), (sx, cx), (sz, cz)] = [yaw, pitch, roll].map(half);
         Self::new(
             cy * cx * cz + sy * sx * sz,
@@ -39,7 +39,7 @@ impl<S: Scalar + FloatConst> From<Quat<S>> for YawPitchRoll<S> {
         let Quat { s, v } = rotation;
         let (up, down) = ((v.y - v.z, s + v.x), (v.y + v.z, s - v.x));
         let (tall, deep) = (up.0.hypot(up.1), down.0.hypot(down.1));
-        let two = S::constant(2.0);
+        let two = S::from_f64(2.0);
         let pitch = (tall - deep).atan2_portable(tall + deep) * two;
         // Half of yaw less roll, and half of yaw and roll.
         let difference = up.0.atan2_portable(up.1);

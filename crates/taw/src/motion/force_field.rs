@@ -2,7 +2,7 @@ use cgmath::{InnerSpace, Zero};
 
 use crate::Error;
 use crate::error::{finite_point, finite_vector, within};
-use crate::math::{Point3, Scalar, Vec3, direction_and_length};
+use crate::math::{Point3, Scalar, Vec3, normalize_and_length};
 use crate::motion::Motion;
 
 /// A force field that acts on every marble besides gravity.
@@ -66,7 +66,7 @@ impl<S: Scalar> PartialEq for ForceField<S> {
 
 impl<S: Scalar> ForceField<S> {
     /// Validates the numbers.
-    pub(crate) fn checked(self) -> Result<Self, Error> {
+    pub(crate) fn validated(self) -> Result<Self, Error> {
         let not_negative = |field, value| within(field, value, S::zero(), S::max_value());
         match self {
             Self::Drag(medium) => {
@@ -98,12 +98,12 @@ impl<S: Scalar> ForceField<S> {
                 relative * ((linear + quadratic * relative.magnitude()) / mass)
             }
             Self::Spring { anchor, rest_length, stiffness } => {
-                direction_and_length(anchor - motion.position)
+                normalize_and_length(anchor - motion.position)
                     .map_or_else(Vec3::zero, |(toward, length)| {
                         toward * (stiffness * (length - rest_length) / mass)
                     })
             }
-            Self::Attraction { center, strength } => direction_and_length(center - motion.position)
+            Self::Attraction { center, strength } => normalize_and_length(center - motion.position)
                 .map_or_else(Vec3::zero, |(toward, length)| {
                     toward * (strength / (length * length))
                 }),

@@ -113,15 +113,15 @@ mod tests {
     /// When the box of the Dzhanibekov effect turns over for the twentieth time, in steps of
     /// 1/60 s.
     fn twentieth_flip<S: Scalar>() -> f64 {
-        let inertia = Vec3::new(1.6, 4.16, 5.44).map(S::constant);
-        let angular_velocity = Vec3::new(0.01, 5.0, 0.01).map(S::constant);
-        let velocity = Vec3::new(0.0, 0.0, 0.0).map(S::constant);
+        let inertia = Vec3::new(1.6, 4.16, 5.44).map(S::from_f64);
+        let angular_velocity = Vec3::new(0.01, 5.0, 0.01).map(S::from_f64);
+        let velocity = Vec3::new(0.0, 0.0, 0.0).map(S::from_f64);
         let mut state =
             (Motor::identity(), Twist { angular_velocity: angular_velocity.into(), velocity });
         let (mut flips, mut last) = (0, 1.0);
         for step in 1..=7200 {
             let (motor, twist) = state;
-            state = integrate_free_body(motor, twist, inertia, S::constant(1.0 / 60.0));
+            state = integrate_free_body(motor, twist, inertia, S::from_f64(1.0 / 60.0));
             let now = state.1.angular_velocity.dual().y.as_f64();
             flips += u32::from(now * last < 0.0);
             last = now;

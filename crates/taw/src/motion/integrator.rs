@@ -36,7 +36,7 @@ impl Integrator {
         match self {
             Self::ExplicitEuler => S::zero(),
             Self::SemiImplicitEuler => S::one(),
-            Self::VelocityVerlet | Self::Leapfrog | Self::Rk4 => S::constant(0.5),
+            Self::VelocityVerlet | Self::Leapfrog | Self::Rk4 => S::from_f64(0.5),
         }
     }
 
@@ -153,16 +153,16 @@ mod tests {
 
     fn start<S: Scalar>(x: f64, v: f64) -> Motion<S> {
         let (position, velocity) = (Point3::origin(), Vec3::zero());
-        let at = |x: f64| Vec3::unit_x() * S::constant(x);
+        let at = |x: f64| Vec3::unit_x() * S::from_f64(x);
         Motion { position: position + at(x), velocity: velocity + at(v) }
     }
 
     /// The lecture's table: from rest, acceleration 30, thirty steps of 1/30 s.
     fn lecture<S: Scalar>(integrator: Integrator) -> (f64, f64) {
-        let dt = S::one() / S::constant(30.0);
+        let dt = S::one() / S::from_f64(30.0);
         let mut motion = start::<S>(0.0, 0.0);
         for _ in 0..30 {
-            motion = motion.step(integrator, dt, |_| Vec3::unit_x() * S::constant(30.0));
+            motion = motion.step(integrator, dt, |_| Vec3::unit_x() * S::from_f64(30.0));
         }
         (motion.position.x.as_f64(), motion.velocity.x.as_f64())
     }

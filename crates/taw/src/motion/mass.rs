@@ -16,13 +16,13 @@ pub enum Mass<S> {
 impl<S: Scalar> Default for Mass<S> {
     /// Glass: 2,500 kg/m³.
     fn default() -> Self {
-        Self::Density(S::constant(2500.0))
+        Self::Density(S::from_f64(2500.0))
     }
 }
 
 impl<S: Scalar> Mass<S> {
     pub(crate) fn cast<T: Scalar>(self) -> Mass<T> {
-        let number = |x: S| T::constant(x.as_f64());
+        let number = |x: S| T::from_f64(x.as_f64());
         match self {
             Self::Density(density) => Mass::Density(number(density)),
             Self::Kilograms(mass) => Mass::Kilograms(number(mass)),
@@ -30,7 +30,7 @@ impl<S: Scalar> Mass<S> {
         }
     }
 
-    pub(crate) fn checked(self) -> Result<Self, Error> {
+    pub(crate) fn validated(self) -> Result<Self, Error> {
         match self {
             Self::Density(density) => positive("density", density).map(Self::Density),
             Self::Kilograms(mass) => positive("mass", mass).map(Self::Kilograms),
@@ -81,7 +81,7 @@ impl<S: Scalar> Mass<S> {
     pub fn of(self, radius: S) -> S {
         match self {
             Self::Density(density) => {
-                let volume_of_unit = S::constant(4.0 / 3.0 * std::f64::consts::PI);
+                let volume_of_unit = S::from_f64(4.0 / 3.0 * std::f64::consts::PI);
                 volume_of_unit * radius * radius * radius * density
             }
             Self::Kilograms(mass) => mass,
@@ -92,7 +92,7 @@ impl<S: Scalar> Mass<S> {
     /// Mass in kilograms of a capsule of this radius and half length in metres.
     #[must_use]
     pub fn of_capsule(self, radius: S, half_length: S) -> S {
-        let longer = S::one() + S::constant(1.5) * half_length / radius;
+        let longer = S::one() + S::from_f64(1.5) * half_length / radius;
         match self {
             Self::Density(_) => self.of(radius) * longer,
             Self::Kilograms(_) | Self::Infinite => self.of(radius),

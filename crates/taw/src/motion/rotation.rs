@@ -2,7 +2,7 @@ use std::marker::PhantomData;
 
 use cgmath::{InnerSpace, Rotation as _};
 
-use crate::math::{Quat, Scalar, Vec3, cast_vector, direction_and_length};
+use crate::math::{Quat, Scalar, Vec3, cast_vector, normalize_and_length};
 
 /// Rotation model of a world, ordered by how much it simulates.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -29,7 +29,7 @@ pub fn integrate_rotation<S: Scalar>(
     angular_velocity: Vec3<S>,
     dt: S,
 ) -> Quat<S> {
-    let Some((axis, speed)) = direction_and_length(angular_velocity) else {
+    let Some((axis, speed)) = normalize_and_length(angular_velocity) else {
         return rotation;
     };
     let turned = axis_angle(axis, speed * dt) * rotation;
@@ -39,7 +39,7 @@ pub fn integrate_rotation<S: Scalar>(
 
 /// Rotation about a unit axis by `angle` radians.
 fn axis_angle<S: Scalar>(axis: Vec3<S>, angle: S) -> Quat<S> {
-    let (sin, cos) = (angle * S::constant(0.5)).sin_cos_portable();
+    let (sin, cos) = (angle * S::from_f64(0.5)).sin_cos_portable();
     Quat::from_sv(cos, axis * sin)
 }
 
@@ -76,7 +76,7 @@ impl<S: Scalar> FreeRotation<S> {
     /// Attitude: from the body's principal axes to the world.
     #[must_use]
     pub fn attitude(&self) -> Quat<S> {
-        Quat::from_sv(S::constant(self.attitude.s), cast_vector(self.attitude.v))
+        Quat::from_sv(S::from_f64(self.attitude.s), cast_vector(self.attitude.v))
     }
 
     /// Angular momentum in kg m²/s, along the body's principal axes.
@@ -128,7 +128,7 @@ impl<S: Scalar> FreeRotation<S> {
     #[must_use]
     pub fn energy(&self, inertia: Vec3<S>) -> S {
         let parts = self.momentum.zip(cast_vector(inertia), |l, moment: f64| l * l / moment);
-        S::constant(0.5 * (parts.x + parts.y + parts.z))
+        S::from_f64(0.5 * (parts.x + parts.y + parts.z))
     }
 }
 
@@ -164,8 +164,8 @@ mod tests {
     /// the others. Gives (worst relative energy error, times at which the body's own
     /// angular velocity about y changed its sign).
     fn dzhanibekov<S: Scalar>(dt: f64) -> (f64, Vec<f64>) {
-        let inertia = Vec3::new(1.6, 4.16, 5.44).map(S::constant);
-        let angular_velocity = Vec3::new(0.01, 5.0, 0.01).map(S::constant);
+        let inertia = Vec3::new(1.6, 4.16, 5.44).map(S::from_f64);
+        let angular_velocity = Vec3::new(0.01, 5.0, 0.01).map(S::from_f64);
         let momentum = Vec3::new(
             angular_velocity.x * inertia.x,
             angular_velocity.y * inertia.y,
@@ -175,7 +175,7 @@ mod tests {
         let start = body.energy(inertia).as_f64();
         let (mut worst, mut flips, mut last): (f64, _, f64) = (0.0, Vec::new(), 1.0);
         for step in 1..=(100.0 / dt).round() as u32 {
-            body = body.step(inertia, S::constant(dt));
+            body = body.step(inertia, S::from_f64(dt));
             worst = worst.max((body.energy(inertia).as_f64() / start - 1.0).abs());
             let now = body.momentum().y.as_f64();
             if now * last < 0.0 {

@@ -43,7 +43,7 @@ impl<S: Scalar> CapsuleInertia<S> {
     /// Axial and transverse moment of inertia per mass, in m²: a cylinder with a hemisphere at each
     /// end, of uniform density.
     pub fn unit_inertia(radius: S, half_length: S) -> [S; 2] {
-        let number = S::constant;
+        let number = S::from_f64;
         let squared = radius * radius;
         // Fractions of the mass: the cylinder has volume π r² 2 h, the two hemispheres 4/3 π r³.
         let cylinder = half_length / (half_length + radius * number(2.0 / 3.0));

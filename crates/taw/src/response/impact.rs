@@ -57,7 +57,7 @@ impl BallRotation {
     pub(super) fn inverse_inertia_factor<S: Scalar>(self) -> S {
         match self {
             Self::Locked => S::zero(),
-            Self::Free => S::constant(2.5),
+            Self::Free => S::from_f64(2.5),
         }
     }
 }
@@ -101,7 +101,7 @@ mod tests {
     /// Bounce of a ball off a wall at rest whose normal is +y: velocity and spin speed (radius
     /// times spin about z) afterwards. The contact point moves by `vx + spin_speed` along x.
     fn bounce<S: Scalar>(v: [f64; 2], spin_speed: f64, material: Material<S>) -> ([f64; 2], f64) {
-        let number = S::constant;
+        let number = S::from_f64;
         let relative_velocity =
             Vec3::new(number(v[0]) + number(spin_speed), number(v[1]), S::zero());
         let inverse_effective_mass =
@@ -114,9 +114,9 @@ mod tests {
 
     fn material<S: Scalar>(e: f64, mu: f64, beta: f64) -> Material<S> {
         Material {
-            restitution: S::constant(e),
-            friction: S::constant(mu),
-            tangential_restitution: S::constant(beta),
+            restitution: S::from_f64(e),
+            friction: S::from_f64(mu),
+            tangential_restitution: S::from_f64(beta),
             ..Material::default()
         }
     }

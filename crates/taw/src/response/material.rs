@@ -44,7 +44,7 @@ impl<S: Scalar> Default for Elasticity<S> {
     /// Firm rubber, 10 megapascals and 0.25: the stiffest that marbles of glass's density and a few
     /// centimetres bear at steps of a millisecond. Glass itself has 70,000 megapascals.
     fn default() -> Self {
-        Self { youngs_modulus: S::constant(1e7), poissons_ratio: S::constant(0.25) }
+        Self { youngs_modulus: S::from_f64(1e7), poissons_ratio: S::from_f64(0.25) }
     }
 }
 
@@ -93,7 +93,7 @@ pub enum Combine {
 impl Combine {
     fn of<S: Scalar>(self, a: S, b: S) -> S {
         match self {
-            Self::Average => a + (b - a) * S::constant(0.5),
+            Self::Average => a + (b - a) * S::from_f64(0.5),
             Self::Min => a.min(b),
             Self::Multiply if a < S::zero() && b < S::zero() => -(a * b),
             Self::Multiply => a * b,
@@ -106,8 +106,8 @@ impl<S: Scalar> Default for Material<S> {
     /// Medium restitution and friction: 0.5 and 0.3. No rolling friction.
     fn default() -> Self {
         Self {
-            restitution: S::constant(0.5),
-            friction: S::constant(0.3),
+            restitution: S::from_f64(0.5),
+            friction: S::from_f64(0.3),
             tangential_restitution: S::zero(),
             rolling_resistance: S::zero(),
             spinning_resistance: S::zero(),
@@ -122,14 +122,14 @@ impl<S: Scalar> Material<S> {
     ///
     /// # Errors
     /// [`Error::OutOfRange`], or [`Error::NotPositive`] for Young's modulus.
-    pub fn checked(self) -> Result<Self, Error> {
+    pub fn validated(self) -> Result<Self, Error> {
         within("restitution", self.restitution, S::zero(), S::one())?;
         within("friction", self.friction, S::zero(), S::max_value())?;
         within("tangential_restitution", self.tangential_restitution, -S::one(), S::one())?;
         within("rolling_resistance", self.rolling_resistance, S::zero(), S::max_value())?;
         within("spinning_resistance", self.spinning_resistance, S::zero(), S::max_value())?;
         positive("youngs_modulus", self.elasticity.youngs_modulus)?;
-        within("poissons_ratio", self.elasticity.poissons_ratio, S::zero(), S::constant(0.5))?;
+        within("poissons_ratio", self.elasticity.poissons_ratio, S::zero(), S::from_f64(0.5))?;
         Ok(self)
     }
 
@@ -152,7 +152,7 @@ impl<S: Scalar> Material<S> {
 
     /// Converts to another scalar.
     pub(crate) fn cast<T: Scalar>(self) -> Material<T> {
-        let number = |x: S| T::constant(x.as_f64());
+        let number = |x: S| T::from_f64(x.as_f64());
         Material {
             restitution: number(self.restitution),
             friction: number(self.friction),
@@ -197,7 +197,7 @@ mod tests {
                     combine,
                     ..Material::default()
                 };
-                of(a).combined_with(of(b)).checked().unwrap();
+                of(a).combined_with(of(b)).validated().unwrap();
             }
         }
     }

@@ -11,7 +11,7 @@ use super::{
 use crate::Error;
 use crate::error::finite_vector;
 use crate::frame::{AxisAngle, Pose};
-use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, direction_and_length};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, normalize_and_length};
 use crate::motion::{ForceField, Mass, Medium, WallMotion};
 use crate::response::{Elasticity, Material};
 use crate::shape::{Capsule, Obb, Plane, Sphere};
@@ -186,16 +186,16 @@ impl ForceFieldDesc {
         match self {
             Self::Drag { velocity, linear, quadratic } => ForceField::Drag(Medium {
                 velocity: vector(velocity),
-                linear: S::constant(linear),
-                quadratic: S::constant(quadratic),
+                linear: S::from_f64(linear),
+                quadratic: S::from_f64(quadratic),
             }),
             Self::Spring { anchor, rest_length, stiffness } => ForceField::Spring {
                 anchor: point(anchor),
-                rest_length: S::constant(rest_length),
-                stiffness: S::constant(stiffness),
+                rest_length: S::from_f64(rest_length),
+                stiffness: S::from_f64(stiffness),
             },
             Self::Attraction { center, strength } => {
-                ForceField::Attraction { center: point(center), strength: S::constant(strength) }
+                ForceField::Attraction { center: point(center), strength: S::from_f64(strength) }
             }
         }
     }
@@ -206,14 +206,14 @@ impl MaterialDesc {
     #[must_use]
     pub fn to_material<S: Scalar>(self) -> Material<S> {
         Material {
-            restitution: S::constant(self.restitution),
-            friction: S::constant(self.friction),
-            tangential_restitution: S::constant(self.tangential_restitution),
-            rolling_resistance: S::constant(self.rolling_resistance),
-            spinning_resistance: S::constant(self.spinning_resistance),
+            restitution: S::from_f64(self.restitution),
+            friction: S::from_f64(self.friction),
+            tangential_restitution: S::from_f64(self.tangential_restitution),
+            rolling_resistance: S::from_f64(self.rolling_resistance),
+            spinning_resistance: S::from_f64(self.spinning_resistance),
             elasticity: Elasticity {
-                youngs_modulus: S::constant(self.youngs_modulus),
-                poissons_ratio: S::constant(self.poissons_ratio),
+                youngs_modulus: S::from_f64(self.youngs_modulus),
+                poissons_ratio: S::from_f64(self.poissons_ratio),
             },
             ..Material::default()
         }
@@ -225,12 +225,12 @@ impl MarbleDesc {
         let rotation = self.rotation.quaternion()?;
         Ok(Marble {
             velocity: vector(self.velocity),
-            rotation: Quat::from_sv(S::constant(rotation.s), cast_vector(rotation.v)),
+            rotation: Quat::from_sv(S::from_f64(rotation.s), cast_vector(rotation.v)),
             angular_velocity: vector(self.angular_velocity),
-            half_length: S::constant(self.half_length),
-            mass: Mass::Density(S::constant(self.density)),
+            half_length: S::from_f64(self.half_length),
+            mass: Mass::Density(S::from_f64(self.density)),
             material: Some(self.material.unwrap_or(material).to_material()),
-            ..Marble::new(point(self.position), S::constant(self.radius))
+            ..Marble::new(point(self.position), S::from_f64(self.radius))
         })
     }
 }
@@ -246,14 +246,14 @@ impl ShapeDesc {
             }
             Self::Box { center, size, rotation } => {
                 let turn = pose.rotation * rotation.quaternion()?;
-                let rotation = Quat::from_sv(S::constant(turn.s), cast_vector(turn.v));
+                let rotation = Quat::from_sv(S::from_f64(turn.s), cast_vector(turn.v));
                 Obb::new(place(center), rotation, vector(size.map(|side| 0.5 * side)))?.into()
             }
             Self::Ball { center, radius } => {
-                Sphere::new(place(center), S::constant(radius))?.into()
+                Sphere::new(place(center), S::from_f64(radius))?.into()
             }
             Self::Capsule { from, to, radius } => {
-                Capsule::new(place(from), place(to), S::constant(radius))?.into()
+                Capsule::new(place(from), place(to), S::from_f64(radius))?.into()
             }
         })
     }
@@ -309,7 +309,7 @@ impl KinematicMotion {
         };
         let pivot = Point3::from(pivot);
         let (direction, _) =
-            direction_and_length(finite_vector(["axis.x", "axis.y", "axis.z"], Vec3::from(axis))?)
+            normalize_and_length(finite_vector(["axis.x", "axis.y", "axis.z"], Vec3::from(axis))?)
                 .ok_or(Error::NotUnit { field: "axis", value: 0.0 })?;
         let rotation = axis_angle(axis, angle)?;
         // Rotation about the pivot, then translation.

@@ -67,15 +67,15 @@ impl Build {
     /// # Errors
     /// Errors of the sub-shapes, and [`Error::NotFinite`] for a half-space in a compound.
     pub(super) fn wall<S: Scalar>(&self, pose: Pose<f64>) -> Result<WallShape<S>, Error> {
-        let point = |p: &[f64; 3]| Point3::from(p.map(S::constant));
+        let point = |p: &[f64; 3]| Point3::from(p.map(S::from_f64));
         Ok(match self {
             Self::Mesh { points, triangles } => {
                 let mesh = Mesh::new(points.iter().map(point).collect(), triangles.clone())?;
                 WallShape::Mesh(Arc::new(mesh), cast_pose(pose))
             }
             Self::HeightField { corner, cell, columns, heights } => {
-                let heights = heights.iter().map(|height| S::constant(*height)).collect();
-                let cell = cell.map(S::constant);
+                let heights = heights.iter().map(|height| S::from_f64(*height)).collect();
+                let cell = cell.map(S::from_f64);
                 let field = HeightField::new(point(corner), cell, *columns, heights)?;
                 WallShape::HeightField(Arc::new(field), cast_pose(pose))
             }
@@ -94,7 +94,7 @@ impl Build {
 
 /// Converts to another scalar.
 pub(super) fn cast_pose<S: Scalar>(pose: Pose<f64>) -> Pose<S> {
-    let rotation = Quat::from_sv(S::constant(pose.rotation.s), cast_vector(pose.rotation.v));
+    let rotation = Quat::from_sv(S::from_f64(pose.rotation.s), cast_vector(pose.rotation.v));
     Pose { rotation, translation: cast_vector(pose.translation) }
 }
 

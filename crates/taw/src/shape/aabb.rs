@@ -91,7 +91,7 @@ impl<S: Scalar> Aabb3<S> {
     /// Center of the box.
     #[must_use]
     pub fn center(&self) -> Point3<S> {
-        self.min + (self.max - self.min) * S::constant(0.5)
+        self.min + (self.max - self.min) * S::from_f64(0.5)
     }
 }
 

@@ -3,7 +3,7 @@ use cgmath::{Array, Point2};
 use super::{Aabb, Aabb3, BoundedShape, PointProjection};
 use crate::Error;
 use crate::error::{coordinates, positive};
-use crate::math::{Point3, Scalar, Vec3, direction_and_length};
+use crate::math::{Point3, Scalar, Vec3, normalize_and_length};
 
 /// Ball: all points within `radius` of `center`, in two or three dimensions.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -54,7 +54,7 @@ where
 
 impl<S: Scalar> BoundedShape<S> for Sphere<S> {
     fn support(&self, direction: Vec3<S>) -> Point3<S> {
-        let (unit, _) = direction_and_length(direction).unwrap_or((Vec3::unit_x(), S::zero()));
+        let (unit, _) = normalize_and_length(direction).unwrap_or((Vec3::unit_x(), S::zero()));
         self.center + unit * self.radius
     }
 
@@ -63,12 +63,12 @@ impl<S: Scalar> BoundedShape<S> for Sphere<S> {
     }
 
     fn volume(&self) -> S {
-        let factor = S::constant(4.0 / 3.0 * std::f64::consts::PI);
+        let factor = S::from_f64(4.0 / 3.0 * std::f64::consts::PI);
         factor * self.radius * self.radius * self.radius
     }
 
     fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
-        let apart = direction_and_length(point - self.center);
+        let apart = normalize_and_length(point - self.center);
         let (normal, length) = apart.unwrap_or((Vec3::unit_x(), S::zero()));
         let distance = length - self.radius;
         PointProjection { point: self.center + normal * self.radius, normal, distance }

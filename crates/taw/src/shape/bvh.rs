@@ -117,7 +117,7 @@ impl<S: Scalar> Bvh<S> {
                 }
             }
             // With a tolerance for rounding.
-            into <= out * (S::one() + S::epsilon() * S::constant(8.0))
+            into <= out * (S::one() + S::epsilon() * S::from_f64(8.0))
         };
         self.visit(crosses, visit);
     }
@@ -130,7 +130,7 @@ impl<S: Scalar> Bvh<S> {
             bounds.map_or(S::infinity(), |bounds| bounds.distance_to_point(point))
         };
         // With a tolerance for rounding.
-        let tolerance = S::one() + S::epsilon() * S::constant(64.0);
+        let tolerance = S::one() + S::epsilon() * S::from_f64(64.0);
         let mut open = SmallVec::<[(S, u32); 64]>::new();
         open.push((gap(0), 0));
         while let Some((far, number)) = open.pop() {

@@ -4,7 +4,7 @@ use super::{Aabb, Aabb3, BoundedShape, PointProjection, Sphere};
 use crate::Error;
 use crate::error::{finite_point, positive};
 use crate::frame::Pose;
-use crate::math::{Point3, Scalar, Vec3, direction_and_length, length};
+use crate::math::{Point3, Scalar, Vec3, length, normalize_and_length};
 
 /// A capsule: all points within `radius` of the segment from `a` to `b`. With coincident ends it is
 /// a sphere.
@@ -41,7 +41,7 @@ impl<S: Scalar> Capsule<S> {
     /// Detection*, 2005, §5.1.2).
     #[must_use]
     pub fn project_on_segment(&self, point: Point3<S>) -> Point3<S> {
-        let Some((along, long)) = direction_and_length(self.b - self.a) else { return self.a };
+        let Some((along, long)) = normalize_and_length(self.b - self.a) else { return self.a };
         let part = (point - self.a).dot(along);
         if part <= S::zero() {
             self.a
@@ -66,8 +66,8 @@ impl<S: Scalar> BoundedShape<S> for Capsule<S> {
     }
 
     fn volume(&self) -> S {
-        let disc = S::constant(std::f64::consts::PI) * self.radius * self.radius;
-        disc * (length(self.b - self.a) + S::constant(4.0 / 3.0) * self.radius)
+        let disc = S::from_f64(std::f64::consts::PI) * self.radius * self.radius;
+        disc * (length(self.b - self.a) + S::from_f64(4.0 / 3.0) * self.radius)
     }
 
     fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
@@ -78,8 +78,8 @@ impl<S: Scalar> BoundedShape<S> for Capsule<S> {
             .iter()
             .flat_map(|p| [p.x.abs(), p.y.abs(), p.z.abs()])
             .fold(S::zero(), S::max);
-        let (normal, far) = direction_and_length(out)
-            .filter(|(_, far)| *far > largest * S::epsilon() * S::constant(4.0))
+        let (normal, far) = normalize_and_length(out)
+            .filter(|(_, far)| *far > largest * S::epsilon() * S::from_f64(4.0))
             .unwrap_or_else(|| (any_perpendicular(self.b - self.a), S::zero()));
         let distance = far - self.radius;
         PointProjection { point: center + normal * self.radius, normal, distance }
@@ -88,7 +88,7 @@ impl<S: Scalar> BoundedShape<S> for Capsule<S> {
 
 /// Any unit vector perpendicular to a direction; +x for zero.
 pub(crate) fn any_perpendicular<S: Scalar>(direction: Vec3<S>) -> Vec3<S> {
-    let Some((unit, _)) = direction_and_length(direction) else { return Vec3::unit_x() };
+    let Some((unit, _)) = normalize_and_length(direction) else { return Vec3::unit_x() };
     // From the axis that it is least aligned with.
     let [x, y, z] = [unit.x.abs(), unit.y.abs(), unit.z.abs()];
     let axis = if x <= y && x <= z {

@@ -126,13 +126,13 @@ impl<S: Scalar> Shape<S> {
         match self {
             Self::Sphere(Sphere { center, radius }) => Shape::Sphere(Sphere {
                 center: cast_point(*center),
-                radius: T::constant(radius.as_f64()),
+                radius: T::from_f64(radius.as_f64()),
             }),
             Self::Aabb(Aabb3 { min, max }) => {
                 Shape::Aabb(Aabb3 { min: cast_point(*min), max: cast_point(*max) })
             }
             Self::Obb(Obb { center, rotation, half_extents }) => {
-                let (s, v) = (T::constant(rotation.s.as_f64()), cast_vector(rotation.v));
+                let (s, v) = (T::from_f64(rotation.s.as_f64()), cast_vector(rotation.v));
                 Shape::Obb(Obb {
                     center: cast_point(*center),
                     // Normalized in that scalar.
@@ -143,7 +143,7 @@ impl<S: Scalar> Shape<S> {
             Self::Capsule(Capsule { a, b, radius }) => Shape::Capsule(Capsule {
                 a: cast_point(*a),
                 b: cast_point(*b),
-                radius: T::constant(radius.as_f64()),
+                radius: T::from_f64(radius.as_f64()),
             }),
             Self::Hull(hull) => Shape::Hull(hull.cast()),
             Self::Compound(compound) => {
@@ -154,7 +154,7 @@ impl<S: Scalar> Shape<S> {
     }
 
     /// Validates the shape and flattens nested compounds.
-    pub(crate) fn checked(self) -> Result<Self, Error> {
+    pub(crate) fn validated(self) -> Result<Self, Error> {
         let shape = match self {
             Self::Sphere(Sphere { center, radius }) => Self::Sphere(Sphere::new(center, radius)?),
             Self::Aabb(Aabb3 { min, max }) => Self::Aabb(Aabb3::new(min, max)?),
@@ -162,11 +162,11 @@ impl<S: Scalar> Shape<S> {
                 Self::Obb(Obb::new(center, error::rotation("rotation", rotation)?, half_extents)?)
             }
             Self::Capsule(Capsule { a, b, radius }) => Self::Capsule(Capsule::new(a, b, radius)?),
-            Self::Hull(hull) => Self::Hull(hull.checked()?),
+            Self::Hull(hull) => Self::Hull(hull.validated()?),
             Self::Compound(compound) => {
                 let mut parts = Vec::new();
                 compound.flatten(&mut parts);
-                let parts = parts.into_iter().map(Self::checked).collect::<Result<_, _>>()?;
+                let parts = parts.into_iter().map(Self::validated).collect::<Result<_, _>>()?;
                 Self::Compound(Compound::new(parts)?)
             }
         };

@@ -7,7 +7,7 @@ use super::{Aabb, Aabb3, BoundedShape, PointProjection};
 use crate::Error;
 use crate::error::{finite_point, within};
 use crate::frame::Pose;
-use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
 use cgmath::{EuclideanSpace, InnerSpace};
 
 /// Convex hull of points. Transformed copies share its vertices.
@@ -111,14 +111,14 @@ impl<S: Scalar> Hull<S> {
     }
 
     /// Validates the pose.
-    pub(crate) fn checked(self) -> Result<Self, Error> {
-        Ok(Self { pose: self.pose.checked()?, ..self })
+    pub(crate) fn validated(self) -> Result<Self, Error> {
+        Ok(Self { pose: self.pose.validated()?, ..self })
     }
 
     /// Converts to another scalar.
     pub(crate) fn cast<T: Scalar>(&self) -> Hull<T> {
         let Pose { rotation, translation } = self.pose;
-        let (s, v) = (T::constant(rotation.s.as_f64()), cast_vector(rotation.v));
+        let (s, v) = (T::from_f64(rotation.s.as_f64()), cast_vector(rotation.v));
         let pose = Pose { rotation: Quat::from_sv(s, v), translation: cast_vector(translation) };
         Hull { pose, polyhedron: Arc::clone(&self.polyhedron) }
     }
@@ -203,7 +203,7 @@ impl<S: Scalar> BoundedShape<S> for Hull<S> {
                 six += first.dot(a.cross(b));
             }
         }
-        S::constant(six / 6.0)
+        S::from_f64(six / 6.0)
     }
 
     fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
@@ -212,7 +212,7 @@ impl<S: Scalar> BoundedShape<S> for Hull<S> {
         let answer = |surface: Point3<f64>, normal: Vec3<f64>, distance: f64| PointProjection {
             point: cast_point(pose.transform_point(surface)),
             normal: cast_vector(pose.transform_vector(normal)),
-            distance: S::constant(distance),
+            distance: S::from_f64(distance),
         };
         let Polyhedron { points, faces, offsets, largest, .. } = &*self.polyhedron;
         let height = |(face, offset): (&Face, &f64)| local.to_vec().dot(face.normal) - offset;
@@ -247,7 +247,7 @@ impl<S: Scalar> BoundedShape<S> for Hull<S> {
                 }
             }
         }
-        let out = direction_and_length(local - nearest.1);
+        let out = normalize_and_length(local - nearest.1);
         let (normal, distance) = out.unwrap_or((face.normal, 0.0));
         answer(nearest.1, normal, distance)
     }

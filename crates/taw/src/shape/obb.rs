@@ -4,7 +4,7 @@ use super::{Aabb, Aabb3, BoundedShape, PointProjection};
 use crate::Error;
 use crate::error::{finite_point, within};
 use crate::frame::Pose;
-use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, direction_and_length, length};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, length, normalize_and_length};
 
 /// Oriented bounding box. It may be flat.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,7 +42,7 @@ impl<S: Scalar> Obb<S> {
     /// Converts an axis-aligned box.
     #[must_use]
     pub fn from_aabb(aabb: &Aabb3<S>) -> Self {
-        let half_extents = (aabb.max - aabb.min) * S::constant(0.5);
+        let half_extents = (aabb.max - aabb.min) * S::from_f64(0.5);
         Self { center: aabb.min + half_extents, rotation: Quat::one(), half_extents }
     }
 
@@ -106,7 +106,7 @@ impl<S: Scalar> BoundedShape<S> for Obb<S> {
 
     fn volume(&self) -> S {
         let Vec3 { x, y, z } = self.half_extents;
-        S::constant(8.0) * x * y * z
+        S::from_f64(8.0) * x * y * z
     }
 
     fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
@@ -120,7 +120,7 @@ impl<S: Scalar> BoundedShape<S> for Obb<S> {
             clamp_symmetric(local.z, half.z),
         );
         let there = |v: Vec3<S>| turn.x * v.x + turn.y * v.y + turn.z * v.z;
-        if let Some((normal, distance)) = direction_and_length(there(local - inside)) {
+        if let Some((normal, distance)) = normalize_and_length(there(local - inside)) {
             return PointProjection { point: self.center + there(inside), normal, distance };
         }
         // Inside: the nearest face. Among equally near faces, the first axis, and the side of the

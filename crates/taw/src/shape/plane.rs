@@ -2,7 +2,7 @@ use cgmath::{EuclideanSpace, InnerSpace};
 
 use crate::Error;
 use crate::error::{finite, finite_point, finite_vector};
-use crate::math::{Point3, Scalar, Vec3, direction_and_length, length};
+use crate::math::{Point3, Scalar, Vec3, length, normalize_and_length};
 
 /// A half-space: everything behind the surface `normal · x = offset` is solid.
 ///
@@ -44,7 +44,7 @@ impl<S: Scalar> Plane<S> {
     pub fn through(point: Point3<S>, direction: Vec3<S>) -> Result<Self, Error> {
         finite_point(["point.x", "point.y", "point.z"], point)?;
         finite_vector(["direction.x", "direction.y", "direction.z"], direction)?;
-        let Some((normal, _)) = direction_and_length(direction) else {
+        let Some((normal, _)) = normalize_and_length(direction) else {
             return Err(Error::NotUnit { field: "direction", value: 0.0 });
         };
         Self::new(normal, normal.dot(point.to_vec()))

@@ -2,7 +2,7 @@
 
 use cgmath::{EuclideanSpace, InnerSpace};
 
-use crate::math::{Point3, Scalar, Vec3, direction_and_length};
+use crate::math::{Point3, Scalar, Vec3, normalize_and_length};
 
 /// The unit normal of a counterclockwise polygon (Newell; Sutherland, Sproull and Schumacker 1974),
 /// also with many collinear vertices.
@@ -13,7 +13,7 @@ pub(crate) fn normal_of_polygon<S: Scalar>(corners: &[Point3<S>]) -> Vec3<S> {
         corners.iter().zip(ends).fold(Vec3::new(S::zero(), S::zero(), S::zero()), |n, (a, b)| {
             n + (*a - first).cross(*b - first)
         });
-    direction_and_length(twice).map_or_else(Vec3::unit_x, |(normal, _)| normal)
+    normalize_and_length(twice).map_or_else(Vec3::unit_x, |(normal, _)| normal)
 }
 
 /// The point of a polygon that is nearest to a given point.

@@ -143,7 +143,7 @@ impl<S: Scalar> HeightField<S> {
     }
 
     fn point(&self, column: u32, row: u32) -> Point3<S> {
-        let along = |cells: u32, width: S| S::constant(f64::from(cells)) * width;
+        let along = |cells: u32, width: S| S::from_f64(f64::from(cells)) * width;
         let (x, z) = (along(column, self.cell[0]), along(row, self.cell[1]));
         Point3::new(self.corner.x + x, self.height(column, row), self.corner.z + z)
     }
@@ -154,8 +154,8 @@ impl<S: Scalar> HeightField<S> {
         let place = |x: S, start: S, width: S, cells: u32| {
             let place = (x - start) / width;
             let cell = place.as_f64().floor().clamp(0.0, f64::from(cells - 1));
-            let part = place - S::constant(cell);
-            let inside = place >= S::zero() && place <= S::constant(f64::from(cells));
+            let part = place - S::from_f64(cell);
+            let inside = place >= S::zero() && place <= S::from_f64(f64::from(cells));
             inside.then_some((cell as u32, part))
         };
         let (column, x) = place(point.x, self.corner.x, self.cell[0], self.columns - 1)?;
@@ -262,11 +262,11 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
         }
         // Distance of a cell from the point along one axis, at least.
         let gap = |cell: u32, start: S, width: S, at: S| {
-            let left = start + S::constant(f64::from(cell)) * width;
+            let left = start + S::from_f64(f64::from(cell)) * width;
             (left - at).max(at - (left + width)).max(S::zero())
         };
         let columns = self.columns([point.x - reach, point.x + reach]);
-        let more = S::one() + S::epsilon() * S::constant(64.0);
+        let more = S::one() + S::epsilon() * S::from_f64(64.0);
         for row in self.rows([point.z - reach, point.z + reach]) {
             let across = gap(row, self.corner.z, self.cell[1], point.z);
             for column in columns.clone() {
@@ -297,7 +297,7 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
         }
         // Column by column, the rows that the segment crosses meanwhile.
         for column in self.columns([from.x.min(to.x), from.x.max(to.x)]) {
-            let left = self.corner.x + S::constant(f64::from(column)) * self.cell[0];
+            let left = self.corner.x + S::from_f64(f64::from(column)) * self.cell[0];
             let part = |x: S, straight: S| {
                 let part = if motion.x == S::zero() { straight } else { (x - from.x) / motion.x };
                 part.max(S::zero()).min(S::one())

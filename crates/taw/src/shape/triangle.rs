@@ -2,7 +2,7 @@ use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::polygon::project_on_segment;
 use super::{Aabb, Aabb3, BoundedShape, PointProjection};
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, direction_and_length};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
 
 /// A triangle: two-sided and without volume. It may be a sliver, a segment or a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,7 +18,7 @@ impl<S: Scalar> Triangle<S> {
         let [a, b, c] = self.corners;
         let longest = [b - a, c - b, a - c].map(InnerSpace::magnitude2).into_iter();
         let longest = longest.fold(S::zero(), S::max);
-        let (normal, twice) = direction_and_length((b - a).cross(c - a))?;
+        let (normal, twice) = normalize_and_length((b - a).cross(c - a))?;
         // Thinner than this, rounding would choose the normal.
         (twice > longest * S::epsilon()).then_some(normal)
     }
@@ -35,7 +35,7 @@ impl<S: Scalar> Triangle<S> {
             Some(up)
                 if near.distance > S::zero()
                     && near.distance <= deepest
-                    && (near.normal + up).magnitude() < S::constant(1e-3) =>
+                    && (near.normal + up).magnitude() < S::from_f64(1e-3) =>
             {
                 near.flipped()
             }
@@ -93,13 +93,13 @@ impl<S: Scalar> BoundedShape<S> for Triangle<S> {
         let local = |corner| Point3::from_vec(cast_point::<S, f64>(corner) - origin);
         let exact = Triangle { corners: self.corners.map(local) };
         let there = exact.project_origin();
-        let out = direction_and_length(-there.to_vec());
+        let out = normalize_and_length(-there.to_vec());
         let (normal, distance) =
             out.unwrap_or_else(|| (exact.normal().unwrap_or_else(Vec3::unit_y), 0.0));
         PointProjection {
             point: cast_point(origin + there.to_vec()),
             normal: cast_vector(normal),
-            distance: S::constant(distance),
+            distance: S::from_f64(distance),
         }
     }
 }

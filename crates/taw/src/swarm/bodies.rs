@@ -56,7 +56,7 @@ pub(crate) struct MarbleRow<S> {
 }
 
 fn number<S: Scalar>(x: f32) -> S {
-    S::constant(f64::from(x))
+    S::from_f64(f64::from(x))
 }
 
 fn vector<S: Scalar>(row: &Row) -> Vec3<S> {

@@ -155,7 +155,7 @@ impl Swarm {
     /// # Errors
     /// [`Error::OutOfRange`] for a number of it.
     pub fn set_model(&mut self, model: SwarmModel) -> Result<(), Error> {
-        let model = model.checked()?;
+        let model = model.validated()?;
         let tier = self.tier();
         let resists = self.surface_of().differ();
         self.model = model;

@@ -56,11 +56,11 @@ impl SwarmModel {
     pub const MAX_THREADS: u32 = super::team::MOST_THREADS as u32;
 
     /// This model, if a swarm can step with it.
-    pub(super) fn checked(self) -> Result<Self, Error> {
+    pub(super) fn validated(self) -> Result<Self, Error> {
         let check = |field, count, most| within(field, f64::from(count), 1.0, f64::from(most));
         check("substeps", self.substeps, Self::MAX_SUBSTEPS)?;
         check("threads", self.threads, Self::MAX_THREADS)?;
-        self.material.checked()?;
+        self.material.validated()?;
         Ok(self)
     }
 }

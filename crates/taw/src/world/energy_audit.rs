@@ -13,9 +13,9 @@ use crate::response::{EnergyLedger, Response};
 /// minus the dissipation by friction, restitution, resistance and the solver.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct EnergyAudit {
-    /// EnergyLedger of force fields, applied forces and damping; zero where only gravity acts.
+    /// Work of force fields, applied forces and damping; zero where only gravity acts.
     pub forces: f64,
-    /// EnergyLedger of moving walls and marbles of infinite mass.
+    /// Work of moving walls and marbles of infinite mass.
     pub walls: f64,
     /// Dissipation by sliding friction.
     pub friction: f64,
@@ -142,7 +142,7 @@ impl<S: Scalar> World<S> {
         let Some(mut audit_state) = self.audit_state.take() else { return };
         let AuditState { audit, residual, energy, potential, moment, work, .. } = &mut *audit_state;
         let now = self.energy();
-        // EnergyLedger of forces without that of gravity, for a response that moves marbles itself.
+        // Work of forces without that of gravity, for a response that moves marbles itself.
         let moves = self.model.response == Response::EventDriven && self.has_forces();
         let forces = if moves { work.forces - (*potential - now.potential) } else { 0.0 };
         let expected =

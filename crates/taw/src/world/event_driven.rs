@@ -106,7 +106,7 @@ impl<S: Scalar> World<S> {
             p.x.abs().max(p.y.abs()).max(p.z.abs())
         });
         let rounding = 16.0 * S::epsilon().as_f64() * far.fold(0.0, f64::max);
-        let reach = S::constant(0.02 * fall + rounding);
+        let reach = S::from_f64(0.02 * fall + rounding);
         if reach.is_finite() { reach } else { S::zero() }
     }
 }
@@ -148,7 +148,7 @@ impl<S: Scalar> event::WallSource for Source<'_, S> {
         let way = self.moving.iter().map(way).fold(0.0, f64::max);
         let digits =
             8.0 * S::epsilon().as_f64() * point.x.abs().max(point.y.abs()).max(point.z.abs());
-        let reach = S::constant((reach + way) * (1.0 + 1e-6) + digits);
+        let reach = S::from_f64((reach + way) * (1.0 + 1e-6) + digits);
         self.walls.for_each_near(cast_point(point), reach, |SubShape { wall, index: part }| {
             name(wall, part);
         });

@@ -205,7 +205,7 @@ impl<S: Scalar> Marbles<S> {
     pub(super) fn scale_by_moments(&self, row: usize, v: Vec3<S>, of: impl Fn(S) -> S) -> Vec3<S> {
         let (radius, half) = (self.radius[row], self.half_length(row));
         if half == S::zero() {
-            return v * of(S::constant(0.4) * radius * radius);
+            return v * of(S::from_f64(0.4) * radius * radius);
         }
         let [along, across] = CapsuleInertia::unit_inertia(radius, half).map(of);
         let axis = self.axis(row);

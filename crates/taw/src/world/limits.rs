@@ -22,7 +22,7 @@ impl<S> Default for SpeedLimits<S> {
 }
 
 impl<S: Scalar> SpeedLimits<S> {
-    pub(super) fn checked(self) -> Result<Self, Error> {
+    pub(super) fn validated(self) -> Result<Self, Error> {
         self.linear.map(|speed| positive("linear", speed)).transpose()?;
         self.angular.map(|speed| positive("angular", speed)).transpose()?;
         Ok(self)

@@ -80,11 +80,11 @@ impl<S: Scalar> Default for Damping<S> {
 
 impl<S: Scalar> Damping<S> {
     pub(super) fn cast<T: Scalar>(self) -> Damping<T> {
-        let number = |x: S| T::constant(x.as_f64());
+        let number = |x: S| T::from_f64(x.as_f64());
         Damping { linear: number(self.linear), angular: number(self.angular) }
     }
 
-    pub(super) fn checked(self) -> Result<Self, Error> {
+    pub(super) fn validated(self) -> Result<Self, Error> {
         within("damping.linear", self.linear, S::zero(), S::max_value())?;
         within("damping.angular", self.angular, S::zero(), S::max_value())?;
         Ok(self)

@@ -145,7 +145,7 @@ impl<S: Scalar> Marbles<S> {
         let precession = angular_velocity + axis * (about_axis * (along / across - 1.0));
         let own = axis * (about_axis - precession.dot(axis));
         let rotation = integrate_rotation(integrate_rotation(rotation, own, dt), precession, dt);
-        self.rotation[row] = Quat::from_sv(S::constant(rotation.s), cast_vector(rotation.v));
+        self.rotation[row] = Quat::from_sv(S::from_f64(rotation.s), cast_vector(rotation.v));
         // Relative to the stored, rounded axis, so that the angular velocity along it, and with it
         // the energy of thin capsules, does not change.
         let axis = (exact(self.rotation[row]) * Vec3::unit_y()).normalize();

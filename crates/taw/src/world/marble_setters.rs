@@ -105,7 +105,7 @@ impl<S: Scalar> Marbles<S> {
     /// [`Error::NoSuchMarble`], [`Error::NotPositive`]; [`Error::OutOfRange`] if the scalar cannot
     /// represent it or the inertia.
     pub fn set_mass(&mut self, id: MarbleId, mass: Mass<S>) -> Result<(), Error> {
-        let (row, mass) = (self.row(id)?, mass.checked()?);
+        let (row, mass) = (self.row(id)?, mass.validated()?);
         mass.of_size(self.radius[row], self.half_length(row))?;
         self.mass.set(row, non_default(mass, Mass::default()), self.len());
         Ok(())
@@ -128,7 +128,7 @@ impl<S: Scalar> Marbles<S> {
     /// [`Error::NoSuchMarble`], [`Error::OutOfRange`].
     pub fn set_damping(&mut self, id: MarbleId, damping: Damping<S>) -> Result<(), Error> {
         let row = self.row(id)?;
-        let damping = non_default(damping.checked()?, Damping::default());
+        let damping = non_default(damping.validated()?, Damping::default());
         self.damping.set(row, damping, self.len());
         Ok(())
     }
@@ -175,7 +175,7 @@ impl<S: Scalar> Marbles<S> {
         material: Option<Material<S>>,
     ) -> Result<(), Error> {
         let row = self.row(id)?;
-        let material = material.map(Material::checked).transpose()?;
+        let material = material.map(Material::validated).transpose()?;
         self.material.set(row, material, self.len());
         Ok(())
     }

@@ -73,7 +73,7 @@ impl<S: Scalar> Marbles<S> {
     /// Displacement between two marbles in metres: the shortest one of a periodic world.
     #[inline]
     pub(super) fn apart(&self, a: usize, b: usize) -> Vec3<S> {
-        self.period.nearest(self.position[b] - self.position[a])
+        self.period.minimum_image(self.position[b] - self.position[a])
     }
 
     /// Wraps positions into the periodic box.

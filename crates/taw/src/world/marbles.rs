@@ -112,11 +112,11 @@ impl<S: Scalar> Marbles<S> {
         let velocity = finite_vector(VELOCITY, marble.velocity)?;
         let rotation = validated_rotation(marble.rotation)?;
         let angular_velocity = finite_vector(ANGULAR_VELOCITY, marble.angular_velocity)?;
-        let mass = marble.mass.checked()?;
+        let mass = marble.mass.validated()?;
         mass.of_size(radius, marble.half_length)?;
         let gravity_scale = finite("gravity_scale", marble.gravity_scale)?;
-        let damping = marble.damping.checked()?;
-        let material = marble.material.map(Material::checked).transpose()?;
+        let damping = marble.damping.validated()?;
+        let material = marble.material.map(Material::validated).transpose()?;
         let handle = self.handles.push()?;
         if half_length.is_some() {
             self.enable_rotation(true); // which way it points counts in any model

@@ -128,7 +128,7 @@ impl<S: Scalar> Default for World<S> {
     fn default() -> Self {
         Self {
             model: Model::default(),
-            gravity: Vec3::unit_y() * S::constant(-9.81),
+            gravity: Vec3::unit_y() * S::from_f64(-9.81),
             forces: Vec::new(),
             limits: SpeedLimits::default(),
             marbles: Marbles::default(),
@@ -231,7 +231,7 @@ impl<S: Scalar> World<S> {
     /// [`Response::EventDriven`] and [`Response::SoftStep`] if a marble is a capsule;
     /// [`Error::Unsupported`] for [`Response::SoftStep`] in a periodic world.
     pub fn set_model(&mut self, model: Model) -> Result<(), Error> {
-        let model = model.checked()?;
+        let model = model.validated()?;
         if !model.response.knows_capsules()
             && let Some(id) = self.marbles.first_capsule()
         {
@@ -319,7 +319,7 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a number of one of them.
     pub fn set_forces(&mut self, forces: Vec<ForceField<S>>) -> Result<(), Error> {
-        self.forces = forces.into_iter().map(ForceField::checked).collect::<Result<_, _>>()?;
+        self.forces = forces.into_iter().map(ForceField::validated).collect::<Result<_, _>>()?;
         Ok(())
     }
 
@@ -334,7 +334,7 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// [`Error::NotPositive`].
     pub fn set_speed_limits(&mut self, limits: SpeedLimits<S>) -> Result<(), Error> {
-        self.limits = limits.checked()?;
+        self.limits = limits.validated()?;
         Ok(())
     }
 
@@ -352,7 +352,7 @@ impl<S: Scalar> World<S> {
         let substep = self.validated_substep(dt)?;
         self.begin_step();
         for after in (0..self.model.passes()).rev() {
-            self.begin_substep(substep * S::constant(f64::from(after)));
+            self.begin_substep(substep * S::from_f64(f64::from(after)));
             self.integrate(substep)?;
             self.generate_contacts();
             self.restitute(substep)?;
@@ -404,9 +404,9 @@ impl<S: Scalar> World<S> {
         self.quarantine_non_finite();
         self.reach = match self.model.response {
             // Rounding must not end the touch of what falls together.
-            Response::Displacement => length(self.gravity) * dt * dt * S::constant(1e-3),
+            Response::Displacement => length(self.gravity) * dt * dt * S::from_f64(1e-3),
             Response::Penalty(_) => S::zero(),
-            Response::Impulse => length(self.gravity) * dt * dt * S::constant(2.0),
+            Response::Impulse => length(self.gravity) * dt * dt * S::from_f64(2.0),
             Response::EventDriven | Response::SoftStep => self.resting_contact_distance(dt),
         };
         self.audit_forces();
@@ -450,19 +450,31 @@ impl<S: Scalar> World<S> {
         }
         self.audit_contacts();
         self.look_at_marbles();
+        self.solve(dt);
+        self.stop_bounces_at_walls();
+        self.quarantine_non_finite();
+        self.roll_what_only_shows();
+        self.limits.apply(&mut self.marbles);
+        self.audit_after();
+        self.marbles.wrap();
+        Ok(())
+    }
+
+    /// Solves the contacts by the model's response.
+    fn solve(&mut self, dt: S) {
         let (mut columns, material, integrator) =
             self.marbles.columns(&self.inverse_mass, &self.held, &self.rods);
         if self.model.rotation != Rotation::Dynamic {
             columns.spin = &mut []; // cosmetic rotation does not affect contacts
         }
-        let restitution_threshold = length(self.gravity) * dt * S::constant(2.0);
+        let restitution_threshold = length(self.gravity) * dt * S::from_f64(2.0);
         let settings = SolverSettings {
             iterations: self.model.iterations,
             dt,
             restitution_threshold,
             tolerance: restitution_threshold * S::epsilon(),
             slop: length(self.gravity) * dt * dt,
-            max_relative_slop: S::constant(0.001),
+            max_relative_slop: S::from_f64(0.001),
         };
         let context = Context {
             walls: &self.walls,
@@ -531,13 +543,6 @@ impl<S: Scalar> World<S> {
             Response::EventDriven => self.step_events(dt, self.rest_of_step),
             Response::SoftStep => {}
         }
-        self.stop_bounces_at_walls();
-        self.quarantine_non_finite();
-        self.roll_what_only_shows();
-        self.limits.apply(&mut self.marbles);
-        self.audit_after();
-        self.marbles.wrap();
-        Ok(())
     }
 
     /// Makes marbles that turn for show only roll over the walls that they touch.

@@ -95,7 +95,7 @@ impl Model {
     }
 
     /// Validates the model.
-    pub(super) fn checked(self) -> Result<Self, Error> {
+    pub(super) fn validated(self) -> Result<Self, Error> {
         let check = |field, count, most| within(field, f64::from(count), 1.0, f64::from(most));
         check("substeps", self.substeps, Self::MAX_SUBSTEPS)?;
         check("iterations", self.iterations, Self::MAX_ITERATIONS)?;

@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use super::walls::{SubShape, Walls};
 use super::{WallShape, World};
 use crate::contact::{Contact, mtv_sphere_plane, mtv_sphere_sphere};
-use crate::math::{Scalar, Vec3, direction_and_length, length};
+use crate::math::{Scalar, Vec3, length, normalize_and_length};
 use crate::response::Response;
 use crate::shape::{Aabb, BoundedShape, Plane, PointProjection, Shape, Sphere};
 
@@ -127,8 +127,8 @@ impl<S: Scalar> World<S> {
         self.walls.for_each_in_box(&Aabb { min: min - margin, max: max + margin }, |part| {
             let Some(touch) = self.walls.closest_points(part, capsule) else { return };
             let along = (touch.on_b - center).dot(axis);
-            let inside = along.abs() < half * S::constant(0.999);
-            let new = |other: &S| (along - *other).abs() > capsule.radius * S::constant(0.01);
+            let inside = along.abs() < half * S::from_f64(0.999);
+            let new = |other: &S| (along - *other).abs() > capsule.radius * S::from_f64(0.01);
             if inside && touch.distance <= contact_distance && samples.iter().all(new) {
                 samples.push(along);
             }
@@ -146,9 +146,9 @@ impl<S: Scalar> World<S> {
             let Sphere { center, radius } = self.sample_sphere(b, along)?;
             let wall = self.walls.shapes().get(a as usize)?;
             let PointProjection { normal, distance, .. } = wall.project_point_on(part, center);
-            (distance - radius <= radius * S::constant(INTERNAL_EDGE_TOLERANCE)).then_some(normal)
+            (distance - radius <= radius * S::from_f64(INTERNAL_EDGE_TOLERANCE)).then_some(normal)
         };
-        direction_and_length(mtv).map(|(normal, _)| normal).or_else(near)
+        normalize_and_length(mtv).map(|(normal, _)| normal).or_else(near)
     }
 
     /// Contact normal from the first to the second marble of a contact of `contacts.mm`, if they
@@ -159,12 +159,12 @@ impl<S: Scalar> World<S> {
         let near = || {
             let (first, second) =
                 (self.sample_sphere(a, along[0])?, self.sample_sphere(b, along[1])?);
-            let apart = self.marbles.period.nearest(second.center - first.center);
-            let (normal, distance) = direction_and_length(apart)?;
-            let flush = first.radius.min(second.radius) * S::constant(INTERNAL_EDGE_TOLERANCE);
+            let apart = self.marbles.period.minimum_image(second.center - first.center);
+            let (normal, distance) = normalize_and_length(apart)?;
+            let flush = first.radius.min(second.radius) * S::from_f64(INTERNAL_EDGE_TOLERANCE);
             (distance - first.radius - second.radius <= flush).then_some(normal)
         };
-        direction_and_length(mtv).map(|(normal, _)| normal).or_else(near)
+        normalize_and_length(mtv).map(|(normal, _)| normal).or_else(near)
     }
 
     /// Sample sphere of a marble at this distance along its axis from the center, in metres.
@@ -274,7 +274,7 @@ fn closest_points_of_segments<S: Scalar>(
     // Nearly parallel segments have no stable closest point. They are not parallel if their ends
     // deviate by a good fraction of their radii.
     let slim = ((first.radius + second.radius) / half_x.min(half_y)).min(S::one());
-    let parallel = squared_sin < slim * slim * S::constant(1e-3);
+    let parallel = squared_sin < slim * slim * S::from_f64(1e-3);
     if half_x > S::zero() && half_y > S::zero() && parallel {
         let ends = [-half_y, half_y].map(|end| clamp(on_x + cos * end, half_x));
         let samples = ends.map(|along| [along, clamp(cos * along - on_y, half_y)]);
@@ -341,8 +341,8 @@ pub(super) fn remove_ghost_collisions<S: Scalar>(
     let largest = [sphere.center.x, sphere.center.y, sphere.center.z]
         .iter()
         .fold(sphere.radius, |most, x| most.max(x.abs()));
-    let rounding = S::epsilon() * S::constant(4.0) * largest;
-    let flush = (sphere.radius * S::constant(INTERNAL_EDGE_TOLERANCE)).max(rounding);
+    let rounding = S::epsilon() * S::from_f64(4.0) * largest;
+    let flush = (sphere.radius * S::from_f64(INTERNAL_EDGE_TOLERANCE)).max(rounding);
     let on = |point: &Candidate<S>, other: &Candidate<S>| {
         walls.project_point(other.part, point.nearest.point).distance <= flush
     };

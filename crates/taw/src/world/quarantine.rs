@@ -63,9 +63,9 @@ impl<S: Scalar> World<S> {
 
     /// Length of a substep; validates a step of `dt` seconds.
     pub(crate) fn validated_substep(&self, dt: S) -> Result<S, Error> {
-        let substeps = S::constant(f64::from(self.model.substeps));
-        let passes = S::constant(f64::from(self.model.passes()));
-        let [least, most] = Self::TIMES.map(S::constant);
+        let substeps = S::from_f64(f64::from(self.model.substeps));
+        let passes = S::from_f64(f64::from(self.model.passes()));
+        let [least, most] = Self::TIMES.map(S::from_f64);
         within("dt", positive("dt", dt)?, least * substeps, most)?;
         self.check_shapes()?;
         Ok(dt / passes)
@@ -73,7 +73,7 @@ impl<S: Scalar> World<S> {
 
     /// Validates the length of a substep.
     pub(crate) fn validated_dt(dt: S) -> Result<S, Error> {
-        let [least, most] = Self::TIMES.map(S::constant);
+        let [least, most] = Self::TIMES.map(S::from_f64);
         within("dt", positive("dt", dt)?, least, most)
     }
 

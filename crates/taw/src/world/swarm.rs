@@ -96,7 +96,7 @@ impl<S: Scalar> World<S> {
     fn part_with_guests(&mut self) {
         for ((marble, _), (before, after)) in self.swarm.invited.iter().zip(self.swarm.hosted()) {
             let change = |before: &[f32; 4], after: &[f32; 4]| {
-                let [x, y, z] = [0, 1, 2].map(|i| S::constant(f64::from(after[i] - before[i])));
+                let [x, y, z] = [0, 1, 2].map(|i| S::from_f64(f64::from(after[i] - before[i])));
                 Vec3::new(x, y, z)
             };
             let moved = change(&before.at, &after.at);
@@ -135,7 +135,7 @@ impl<S: Scalar> Surroundings for Walls<S> {
         reach: f32,
         name: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
     ) {
-        let number = |x: f32| S::constant(f64::from(x));
+        let number = |x: f32| S::from_f64(f64::from(x));
         let center = cast_point(Point3::new(x, y, z));
         let sphere = Sphere { center, radius: number(radius) };
         let mut near = Vec::new();
@@ -154,13 +154,13 @@ impl<S: Scalar> Surroundings for Walls<S> {
         &[x, y, z, radius]: &[f32; 4],
         way: Vec3<f32>,
     ) -> Option<([u32; 2], Vec3<f32>, f32)> {
-        let number = |x: f32| S::constant(f64::from(x));
+        let number = |x: f32| S::from_f64(f64::from(x));
         let center: Point3<S> = cast_point(Point3::new(x, y, z));
         let sphere = Sphere { center, radius: number(radius) };
         let way: Vec3<S> = cast_vector(way);
         let (start, end) = (sphere.bounding_box(), Sphere { center: center + way, ..sphere });
         // Its core says whether it passes into the wall, its surface when it is there.
-        let core = Sphere { radius: sphere.radius * S::constant(0.5), ..sphere };
+        let core = Sphere { radius: sphere.radius * S::from_f64(0.5), ..sphere };
         let mut first: Option<(SubShape, S)> = None;
         Walls::for_each_in_box(self, &start.union(&end.bounding_box()), |part| {
             let passes = self.time_of_impact(part, &core, way).is_some();

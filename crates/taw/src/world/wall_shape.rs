@@ -28,17 +28,17 @@ pub enum WallShape<S> {
 
 impl<S: Scalar> WallShape<S> {
     /// Validates the shape and flattens nested compounds.
-    pub(super) fn checked(self) -> Result<Self, Error> {
+    pub(super) fn validated(self) -> Result<Self, Error> {
         Ok(match self {
             Self::Plane(_) => self,
-            Self::Solid(shape) => Self::Solid(shape.checked()?),
+            Self::Solid(shape) => Self::Solid(shape.validated()?),
             Self::Mesh(mesh, pose) => {
-                let pose = pose.checked()?;
+                let pose = pose.validated()?;
                 check_bounds(&mesh.bounds(), pose)?;
                 Self::Mesh(mesh, pose)
             }
             Self::HeightField(field, pose) => {
-                let pose = pose.checked()?;
+                let pose = pose.validated()?;
                 check_bounds(&solid_bounds(&field), pose)?;
                 Self::HeightField(field, pose)
             }

@@ -91,9 +91,9 @@ impl<S: Scalar> Walls<S> {
     ///
     /// # Errors
     /// [`Error::Full`] at 2³² walls; for a number that a wall cannot have, as the constructor of
-    /// its shape, or [`Pose::checked`](crate::frame::Pose::checked).
+    /// its shape, or [`Pose::validated`](crate::frame::Pose::validated).
     pub fn insert(&mut self, wall: impl Into<WallShape<S>>) -> Result<WallId, Error> {
-        let shape = wall.into().checked()?;
+        let shape = wall.into().validated()?;
         let handle = self.handles.push()?;
         self.change(&shape, Dirty::All);
         if matches!(shape, WallShape::Plane(_)) {
@@ -139,7 +139,7 @@ impl<S: Scalar> Walls<S> {
     /// [`Error::NoSuchWall`]; for a shape as [`Walls::insert`].
     pub fn set(&mut self, id: WallId, wall: impl Into<WallShape<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
-        let shape = wall.into().checked()?;
+        let shape = wall.into().validated()?;
         let parts = |shape: &WallShape<S>| {
             let mut count = 0;
             shape.for_each_box(|_, _| count += 1);
@@ -286,7 +286,7 @@ impl<S: Scalar> Walls<S> {
     /// [`Error::NoSuchWall`], [`Error::OutOfRange`].
     pub fn set_material(&mut self, id: WallId, material: Option<Material<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
-        let material = material.map(Material::checked).transpose()?;
+        let material = material.map(Material::validated).transpose()?;
         self.version += u64::from(self.material.get(row) != material);
         self.material.set(row, material, self.shapes.len());
         Ok(())
@@ -342,7 +342,7 @@ impl<S: Scalar> Walls<S> {
         for (row, end, motion) in &self.ends {
             // An invalid pose is skipped.
             let on_its_way =
-                || end.transformed(motion.pose_before(left)).and_then(WallShape::checked).ok();
+                || end.transformed(motion.pose_before(left)).and_then(WallShape::validated).ok();
             let shape = if left > S::zero() { on_its_way() } else { None };
             self.shapes[*row] = shape.unwrap_or_else(|| end.clone());
             let pivot = Some(motion.pivot - motion.velocity * left).filter(|p| is_finite_point(*p));

@@ -63,12 +63,12 @@ pub fn things<S: Scalar>(
     offset: f64,
 ) -> Vec<Thing<S>> {
     let point = |p: [f64; 3]| {
-        Point3::from([0, 1, 2].map(|i| S::constant((p[i] + at[i]) * scale + offset * scale)))
+        Point3::from([0, 1, 2].map(|i| S::from_f64((p[i] + at[i]) * scale + offset * scale)))
     };
-    let size = |x: f64| S::constant(x.abs() * scale + 0.01 * scale);
+    let size = |x: f64| S::from_f64(x.abs() * scale + 0.01 * scale);
     let turn = AxisAngle::new(Vec3::from(*axis), *angle).unwrap();
-    let axis = turn.axis().map(S::constant);
-    let rotation = AxisAngle::new(axis, S::constant(turn.angle())).unwrap().into();
+    let axis = turn.axis().map(S::from_f64);
+    let rotation = AxisAngle::new(axis, S::from_f64(turn.angle())).unwrap().into();
     let half_extents = Vec3::from([0, 1, 2].map(|i| size(points[0][i])));
     let obb = Obb::new(point([0.0; 3]), rotation, half_extents).unwrap();
     let corners: Vec<_> = points.iter().map(|p| point(*p)).collect();

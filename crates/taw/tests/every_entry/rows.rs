@@ -44,7 +44,7 @@ fn on_axis<S: Scalar>(case: usize, x: S) -> Vec3<S> {
 }
 
 fn insert<S: Scalar>(place: &mut Place<S>, change: impl Fn(&mut Marble<S>)) -> Outcome {
-    let mut marble = Marble::new(point(one(), S::constant(1.4), zero()), S::constant(0.5));
+    let mut marble = Marble::new(point(one(), S::from_f64(1.4), zero()), S::from_f64(0.5));
     change(&mut marble);
     place.subject = place.world.marbles.insert(marble)?;
     Ok(())
@@ -57,7 +57,7 @@ fn material<S: Scalar>(place: &mut Place<S>, x: S, set: impl Fn(&mut Material<S>
     match place.case {
         0 => place.world.marbles.set_material(place.subject, Some(material)),
         1 => place.world.walls.set_material(place.wall, Some(material)),
-        _ => material.checked().map(|_| ()),
+        _ => material.validated().map(|_| ()),
     }
 }
 
@@ -256,7 +256,7 @@ fn worlds<S: Scalar>() -> Vec<Row<S>> {
             let moves = KinematicMotion::Rotate { pivot: [0.0; 3], axis: [0.0, 1.0, 0.0], degrees_per_second: 1.0 };
             moves.pose(x.as_f64()).map(|_| ())
         };
-        World 3 "Material.restitution Material::checked Walls::set_material": |p, x| material(p, x, |m, x| m.restitution = x);
+        World 3 "Material.restitution Material::validated Walls::set_material": |p, x| material(p, x, |m, x| m.restitution = x);
         World 3 "Material.friction": |p, x| material(p, x, |m, x| m.friction = x);
         World 3 "Material.tangential_restitution Material.combine": |p, x| material(p, x, |m, x| m.tangential_restitution = x);
         World 3 "Material.rolling_resistance": |p, x| material(p, x, |m, x| m.rolling_resistance = x);
@@ -322,9 +322,9 @@ fn walls<S: Scalar>() -> Vec<Row<S>> {
         World 4 "Capsule.a": |p, x| solid(p, Shape::Capsule(Capsule { a: point(x, x, x), b: point(zero(), zero(), zero()), radius: one() }));
         World 4 "Capsule.b": |p, x| solid(p, Shape::Capsule(Capsule { a: point(zero(), zero(), zero()), b: point(x, x, x), radius: one() }));
         World 4 "Capsule.radius": |p, x| solid(p, Shape::Capsule(Capsule { a: point(zero(), zero(), zero()), b: point(one(), zero(), zero()), radius: x }));
-        World 6 "Pose.rotation Pose::checked": |p, x| {
+        World 6 "Pose.rotation Pose::validated": |p, x| {
             let pose = pose(quaternions(x)[p.case % 3], vector(zero(), zero(), zero()));
-            pose.checked()?;
+            pose.validated()?;
             with_pose(p, pose)
         };
         World 6 "Pose.translation": |p, x| {
@@ -377,7 +377,7 @@ fn constructors<S: Scalar>() -> Vec<Row<S>> {
         };
         World 2 "Hull::new": |p, x| {
             let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
-            let mut corners = corners.map(|c| Point3::from(c.map(S::constant))).to_vec();
+            let mut corners = corners.map(|c| Point3::from(c.map(S::from_f64))).to_vec();
             corners.push(point(zero(), zero(), x));
             match Hull::new(&corners) {
                 Err(Error::Coplanar { field }) => Err(Error::NotUnit { field, value: 0.0 }),
@@ -419,9 +419,9 @@ fn constructors<S: Scalar>() -> Vec<Row<S>> {
         };
         World 1 "Camera::new": |_, x| {
             let eye = pose(Quat::new(one(), zero(), zero(), zero()), vector(zero(), zero(), zero()));
-            Camera::new(eye, x, one(), [one(), S::constant(9.0)])?;
-            Camera::new(eye, one(), x, [one(), S::constant(9.0)])?;
-            Camera::new(eye, one(), one(), [x, S::constant(9.0)])?;
+            Camera::new(eye, x, one(), [one(), S::from_f64(9.0)])?;
+            Camera::new(eye, one(), x, [one(), S::from_f64(9.0)])?;
+            Camera::new(eye, one(), one(), [x, S::from_f64(9.0)])?;
             Camera::new(eye, one(), one(), [one(), x])?;
             Camera::new(pose(eye.rotation, vector(x, x, x)), one(), one(), [one(), one()]).map(|_| ())
         };

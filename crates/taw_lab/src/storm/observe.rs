@@ -177,7 +177,7 @@ fn balls<S: Scalar>(world: &World<S>) -> Vec<Body> {
 }
 
 fn beside_walls<S: Scalar>(mut body: Body, world: &World<S>) -> Body {
-    let point = |v: Vec3<f64>| Point3::new(S::constant(v.x), S::constant(v.y), S::constant(v.z));
+    let point = |v: Vec3<f64>| Point3::new(S::from_f64(v.x), S::from_f64(v.y), S::from_f64(v.z));
     body.wall_gap = f64::INFINITY;
     if !body.is_finite() {
         return body;

@@ -202,7 +202,7 @@ fn clones_go_on_alike<S: Scalar>(case: &Case, running: &Simulation<S>) -> bool {
 
 /// One step.
 pub fn advance<S: Scalar>(case: &Case, running: &mut Simulation<S>) -> Result<(), taw::Error> {
-    let dt = S::constant(case.step);
+    let dt = S::from_f64(case.step);
     let from = running.time();
     running.move_walls(dt)?;
     if case.differenced {
@@ -248,7 +248,7 @@ fn difference<S: Scalar>(
     // The short way round.
     let angle = 2.0 * (sin * cos.signum()).atan2(cos.abs());
     let axis = if sin > 0.0 { turn.v / sin } else { Vec3::zero() };
-    let vector = |v: Vec3<f32>| Vec3::new(v.x, v.y, v.z).map(|x: f32| S::constant(f64::from(x)));
+    let vector = |v: Vec3<f32>| Vec3::new(v.x, v.y, v.z).map(|x: f32| S::from_f64(f64::from(x)));
     Ok(Some(taw::motion::WallMotion {
         velocity: vector((now.0 - last.0) / dt),
         angular_velocity: vector(axis * (angle / dt)),

@@ -400,7 +400,7 @@ fn fuzz(_: &mut Stopwatch) -> f64 {
         let inverse =
             [10_f64.powf(number(-3.0, 3.0)), 10_f64.powf(number(-3.0, 3.0))].map(|x| x as f32);
         let (Some(normal), closing) = (
-            taw::math::direction_and_length(Vec3::new(
+            taw::math::normalize_and_length(Vec3::new(
                 number(-1.0, 1.0),
                 number(-1.0, 1.0),
                 number(-1.0, 1.0),

@@ -82,7 +82,7 @@ pub async fn record<S: Scalar>(
         (0..running.world.marbles.len()).filter_map(|row| running.world.marbles.id(row)).collect();
     let steps = (seconds / step).round() as u64;
     let every = (every / step).round().max(1.0) as u64;
-    let dt = S::constant(step);
+    let dt = S::from_f64(step);
     let mut recording = Recording::default();
     let mut times = Vec::new();
     let mut turn = Instant::now();
@@ -104,7 +104,7 @@ pub async fn record<S: Scalar>(
             }
             if !running.scene().gravity_keyframes.is_empty() {
                 // The steps have set the gravity of their midpoint.
-                let gravity = running.scene().gravity_at(frame.time).map(S::constant);
+                let gravity = running.scene().gravity_at(frame.time).map(S::from_f64);
                 running.world.set_gravity(gravity.into()).ok()?;
             }
             frame.energy = running.world.energy().total();
@@ -153,7 +153,7 @@ pub fn time(scene: &Scene, setting: RunConfig) -> f64 {
 
 fn time_in<S: Scalar>(scene: &Scene, RunConfig { model, step, .. }: RunConfig) -> f64 {
     let mut running = scene.run::<S>(model).expect("scenes are checked before");
-    let (dt, steps) = (S::constant(step), (scene.duration / step).round() as u64);
+    let (dt, steps) = (S::from_f64(step), (scene.duration / step).round() as u64);
     let begin = Instant::now();
     for _ in 0..steps {
         running.step(dt).expect("steps are above zero");

@@ -3,7 +3,7 @@
 use cgmath::InnerSpace;
 
 use super::features::Features;
-use crate::math::{Vec3, direction_and_length, is_finite};
+use crate::math::{Vec3, is_finite, normalize_and_length};
 
 /// Sine below which two directions are parallel.
 pub(in crate::contact) const PARALLEL: f64 = 1e-12;
@@ -77,7 +77,7 @@ pub(in crate::contact) fn at_right_angles(d: Vec3<f64>, e: Vec3<f64>) -> Option<
         return None;
     }
     let mut normal = cross / sin;
-    let (beside, _) = direction_and_length(e - d * d.dot(e))?;
+    let (beside, _) = normalize_and_length(e - d * d.dot(e))?;
     for _ in 0..2 {
         normal -= d * normal.dot(d);
         normal -= beside * (normal.dot(e) / beside.dot(e));

@@ -1,7 +1,7 @@
 use cgmath::{EuclideanSpace, InnerSpace};
 
 use crate::contact::core::{BOX_FACES, Core, Kind};
-use crate::math::{Vec3, direction_and_length};
+use crate::math::{Vec3, normalize_and_length};
 
 /// Vertices, edges and faces of a [`Core`].
 #[derive(Clone, Debug, PartialEq)]
@@ -60,7 +60,7 @@ impl Features {
             _ => Vec::new(),
         };
         for [a, b] in &edges {
-            let along = direction_and_length(points[*b as usize] - points[*a as usize]);
+            let along = normalize_and_length(points[*b as usize] - points[*a as usize]);
             if let Some((unit, _)) = along
                 && !directions.iter().any(|other| other.cross(unit).magnitude2() < 1e-20)
             {

@@ -13,7 +13,7 @@ use cgmath::{EuclideanSpace, InnerSpace};
 use super::closest::LocalClosestPoints;
 use super::core::Core;
 use super::manifold::deepest;
-use crate::math::{Point3, Vec3, direction_and_length};
+use crate::math::{Point3, Vec3, normalize_and_length};
 use crate::shape::any_perpendicular;
 use crate::shape::polygon::{project_on_polygon, project_on_segment};
 use axes::axis_of_max_separation;
@@ -38,7 +38,7 @@ pub(super) fn local_closest_points(x: &Core<'_>, y: &Core<'_>) -> LocalClosestPo
         }
         axis => {
             let (on_a, on_b) = nearest_features(a, b);
-            let out = direction_and_length(on_b - on_a).filter(|(_, far)| *far > tolerance);
+            let out = normalize_and_length(on_b - on_a).filter(|(_, far)| *far > tolerance);
             let (normal, distance) = out.unwrap_or_else(|| {
                 (axis.map_or_else(|| normal_between_touching_lines(a, b), |axis| axis.normal), 0.0)
             });
@@ -52,7 +52,7 @@ pub(super) fn local_closest_points(x: &Core<'_>, y: &Core<'_>) -> LocalClosestPo
 fn normal_between_touching_lines(a: &Features, b: &Features) -> Vec3<f64> {
     let [first, second] = [a, b].map(|x| x.directions.first().copied());
     let both = first.zip(second).map(|(first, second)| first.cross(second));
-    both.filter(|both| both.magnitude() > PARALLEL).and_then(direction_and_length).map_or_else(
+    both.filter(|both| both.magnitude() > PARALLEL).and_then(normalize_and_length).map_or_else(
         || any_perpendicular(first.or(second).unwrap_or_else(Vec3::unit_x)),
         |(unit, _)| unit,
     )
@@ -102,7 +102,7 @@ fn nearest_features(a: &Features, b: &Features) -> (Vec3<f64>, Vec3<f64>) {
     }
     ties.retain(|(squared, _)| *squared <= least * (1.0 + 1e-12));
     let separation = |(on_a, on_b): (Vec3<f64>, Vec3<f64>)| {
-        let out = direction_and_length(on_b - on_a);
+        let out = normalize_and_length(on_b - on_a);
         out.map_or(f64::NEG_INFINITY, |(normal, _)| -b.reach(-normal) - a.reach(normal))
     };
     let first = (f64::NEG_INFINITY, (a.points[0], b.points[0]));
@@ -126,8 +126,8 @@ pub(in crate::contact) fn crossing(
     [p, q]: [Vec3<f64>; 2],
     [r, s]: [Vec3<f64>; 2],
 ) -> Option<(Vec3<f64>, Vec3<f64>)> {
-    let (along_a, long_a) = direction_and_length(q - p)?;
-    let (along_b, long_b) = direction_and_length(s - r)?;
+    let (along_a, long_a) = normalize_and_length(q - p)?;
+    let (along_b, long_b) = normalize_and_length(s - r)?;
     let cos = along_a.dot(along_b);
     let sin = along_a.cross(along_b).magnitude();
     if sin < PARALLEL {

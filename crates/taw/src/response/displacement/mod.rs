@@ -192,7 +192,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         match c.a {
             BodyA::Wall(..) => self.velocity[c.b] += velocity_change,
             BodyA::Marble(a) => {
-                let half = velocity_change * S::constant(0.5);
+                let half = velocity_change * S::from_f64(0.5);
                 self.velocity[a as usize] -= half;
                 self.velocity[c.b] += half;
             }
@@ -300,6 +300,6 @@ impl<S: Scalar> SolverBodies<'_, S> {
 impl<S: Scalar> ApproachConstraint<S> {
     /// Fraction of a change that the second body takes.
     fn fraction_b(&self) -> S {
-        if self.a.marble().is_none() { S::one() } else { S::constant(0.5) }
+        if self.a.marble().is_none() { S::one() } else { S::from_f64(0.5) }
     }
 }

@@ -13,7 +13,7 @@ use super::wall::MovingWalls;
 use super::{EventDriven, EventSettings};
 use crate::broad::Period;
 use crate::contact::Contacts;
-use crate::math::{Point3, Vec3, direction_and_length};
+use crate::math::{Point3, Vec3, normalize_and_length};
 use crate::response::{Colliders, ImpulseSample};
 
 /// Maximum number of active constraints, which take some ten milliseconds. Pairs beyond that
@@ -269,7 +269,7 @@ fn constraints(
     });
     let between = contacts.mm.iter().filter_map(|c| {
         let (a, b) = (c.a as usize, c.b as usize);
-        let (normal, _) = direction_and_length(period.nearest(position[b] - position[a]))?;
+        let (normal, _) = normalize_and_length(period.minimum_image(position[b] - position[a]))?;
         Some(NormalConstraint { a: Some(a), b, normal, surface_velocity: Vec3::new(0.0, 0.0, 0.0) })
     });
     on_walls.chain(between).collect()

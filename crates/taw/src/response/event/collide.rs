@@ -6,7 +6,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::resting_cluster::{PressedBy, RestingCluster};
 use super::{Event, EventDriven, EventKind, EventSettings, Impact, MAX_DISSIPATIONS, MAX_FREEZES};
-use crate::math::{Vec3, direction_and_length};
+use crate::math::{Vec3, normalize_and_length};
 use crate::response::impact::clamp_length;
 use crate::response::{ImpulseSample, InverseEffectiveMass, Material, impact};
 
@@ -170,7 +170,7 @@ impl EventDriven {
     fn collision(&mut self, a: usize, b: usize, settings: &EventSettings) -> Collision {
         let threshold = self.pressing_speed(a, b, settings);
         let (first, second) = (&self.balls[a], &self.balls[b]);
-        let (normal, _) = direction_and_length(self.center_offset(first, second))
+        let (normal, _) = normalize_and_length(self.center_offset(first, second))
             .unwrap_or((Vec3::unit_x(), 0.0));
         let approach_speed = -(second.velocity - first.velocity).dot(normal);
         let mut material = first.material.combined_with(second.material);

@@ -13,7 +13,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::flat_support::Regime;
 use super::{Ball, Wall};
-use crate::math::{Point3, Vec3, direction_and_length};
+use crate::math::{Point3, Vec3, normalize_and_length};
 use crate::response::{BallRotation, Material};
 use crate::shape::PointProjection;
 
@@ -112,7 +112,7 @@ pub(super) struct Step {
 }
 
 impl CurvedSupport<'_> {
-    /// PointProjection wall, the first of several.
+    /// Nearest wall, the first of several.
     fn nearest(&self, at: Point3<f64>, time: f64) -> (usize, PointProjection<f64>) {
         self.cost.set(self.cost.get() + super::PART_COST * self.candidates.len() as u64);
         let nowhere = PointProjection { point: at, normal: Vec3::zero(), distance: f64::INFINITY };
@@ -135,7 +135,7 @@ impl CurvedSupport<'_> {
         normal: Vec3<f64>,
         relative_velocity: Vec3<f64>,
     ) -> Vec3<f64> {
-        let Some((tangential, speed)) = direction_and_length(relative_velocity) else {
+        let Some((tangential, speed)) = normalize_and_length(relative_velocity) else {
             return Vec3::zero();
         };
         let probe = PROBE_DISTANCE * self.radius;
@@ -223,9 +223,9 @@ impl CurvedSupport<'_> {
         let spin_velocity = contact.normal.cross(spin) * self.radius;
         let tangential_acceleration = self.external_acceleration
             - contact.normal * self.external_acceleration.dot(contact.normal);
-        direction_and_length(spin_velocity)
+        normalize_and_length(spin_velocity)
             .or_else(|| {
-                direction_and_length(contact.surface_acceleration - tangential_acceleration)
+                normalize_and_length(contact.surface_acceleration - tangential_acceleration)
             })
             .map_or_else(Vec3::zero, |(direction, _)| {
                 direction
@@ -281,8 +281,8 @@ impl CurvedSupport<'_> {
             Regime::Rolling => self.static_friction(&contact, state.spin),
             Regime::Sliding => {
                 let static_friction =
-                    || direction_and_length(self.static_friction(&contact, state.spin));
-                direction_and_length(-contact.slip)
+                    || normalize_and_length(self.static_friction(&contact, state.spin));
+                normalize_and_length(-contact.slip)
                     .or_else(static_friction)
                     .map_or_else(Vec3::zero, |(direction, _)| direction * max_friction)
             }
@@ -391,7 +391,7 @@ impl CurvedSupport<'_> {
     fn curvature(&self, state: &BallState, direction: Vec3<f64>) -> f64 {
         let normal = self.nearest(state.position, state.time).1.normal;
         let direction = direction - normal * direction.dot(normal);
-        let Some((direction, _)) = direction_and_length(direction) else { return 0.0 };
+        let Some((direction, _)) = normalize_and_length(direction) else { return 0.0 };
         self.normal_rate_over(state.position, state.time, normal, direction).magnitude()
     }
 

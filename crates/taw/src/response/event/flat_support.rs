@@ -8,7 +8,7 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use crate::math::{Vec3, direction_and_length};
+use crate::math::{Vec3, normalize_and_length};
 
 /// Largest rotation of the surface in one step, in radians.
 const MAX_TURN: f64 = 4e-3;
@@ -167,8 +167,8 @@ impl FlatSupport {
     /// Rolling resistance, as a rate of `p`.
     fn rolling_resistance_rate(&self, at: TangentialState) -> Vec3<f64> {
         // A ball that starts to move will roll along the tangential acceleration, against `p`.
-        let direction = direction_and_length(at.p)
-            .or_else(|| direction_and_length(self.surface_rate(at) - self.tangential_acceleration))
+        let direction = normalize_and_length(at.p)
+            .or_else(|| normalize_and_length(self.surface_rate(at) - self.tangential_acceleration))
             .map_or_else(Vec3::zero, |(direction, _)| direction);
         direction * (-2.5 * self.rolling_resistance * self.normal_acceleration)
     }
@@ -193,7 +193,7 @@ impl FlatSupport {
                 // When slipping starts, opposite to the friction that would have prevented it.
                 let direction =
                     if slip.magnitude2() > 0.0 { -slip } else { self.static_friction(at) };
-                direction_and_length(direction).map_or_else(Vec3::zero, |(d, _)| d * limit)
+                normalize_and_length(direction).map_or_else(Vec3::zero, |(d, _)| d * limit)
             }
         };
         let p = if self.rotates {

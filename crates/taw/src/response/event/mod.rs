@@ -109,7 +109,7 @@ impl Impact<f64> {
             on_wall: self.on_wall,
             b: self.b,
             normal: cast_vector(self.normal),
-            approach_speed: S::constant(self.approach_speed),
+            approach_speed: S::from_f64(self.approach_speed),
         }
     }
 }
@@ -330,7 +330,7 @@ impl EventDriven {
 
     /// Vector between the centers of two balls, in metres.
     fn center_offset(&self, first: &Ball, second: &Ball) -> Vec3<f64> {
-        self.period.nearest(second.position - first.position)
+        self.period.minimum_image(second.position - first.position)
     }
 
     /// Assigns balls to cells of the grid.

@@ -6,7 +6,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::toi::time_of_impact_spheres;
 use super::{EventDriven, EventKind, EventSettings, PRESS_SPEED};
-use crate::math::{Vec3, direction_and_length, is_finite};
+use crate::math::{Vec3, is_finite, normalize_and_length};
 
 /// Relative motion of two balls, of the second to the first.
 struct RelativeMotion {
@@ -63,7 +63,7 @@ impl EventDriven {
         let (first, second) = (&self.balls[a], &self.balls[b]);
         let remaining = settings.dt - now;
         let (from, to) = (first.position_at(now), second.position_at(now));
-        let center_offset = self.period.nearest(to - from);
+        let center_offset = self.period.minimum_image(to - from);
         let velocity = second.velocity_at(now) - first.velocity_at(now);
         let acceleration = second.trajectory.acceleration - first.trajectory.acceleration;
         if first.inverse_mass + second.inverse_mass <= 0.0
@@ -85,7 +85,7 @@ impl EventDriven {
         }
         settings.add_cost(if acceleration.is_zero() { 1 } else { super::QUARTIC_COST });
         let (normal, distance) =
-            direction_and_length(center_offset).unwrap_or((Vec3::unit_x(), 0.0));
+            normalize_and_length(center_offset).unwrap_or((Vec3::unit_x(), 0.0));
         let separation = distance - radius_sum;
         let version = second.trajectory.version;
         let press_speed = self.pressing_speed(a, b, settings);

@@ -8,7 +8,7 @@ use cgmath::{InnerSpace, Zero};
 use super::wall::Wall;
 use super::{EventDriven, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::contact::{Contact, Contacts};
-use crate::math::{Vec3, direction_and_length};
+use crate::math::{Vec3, normalize_and_length};
 use crate::shape::PointProjection;
 
 /// Maximum number of projections out of the deepest wall; between two walls at a right angle or
@@ -194,7 +194,7 @@ impl EventDriven {
         settings: &EventSettings,
     ) -> Option<f64> {
         let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
-        let center_offset = direction_and_length(self.center_offset(first, second));
+        let center_offset = normalize_and_length(self.center_offset(first, second));
         let (normal, distance) = center_offset.unwrap_or((Vec3::unit_x(), 0.0));
         let speed = (second.velocity - first.velocity).dot(normal);
         let max_acceleration =

@@ -79,7 +79,7 @@ impl Wall {
         Some((self.motion?, self.arrival_time? - time))
     }
 
-    /// PointProjection point of the surface at a time.
+    /// Nearest point of the surface at a time.
     pub fn nearest(&self, point: Point3<f64>, time: f64) -> PointProjection<f64> {
         let Some((WallMotion { velocity, angular_velocity: spin, pivot }, remaining)) =
             self.motion_at(time)

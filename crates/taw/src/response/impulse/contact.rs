@@ -5,7 +5,7 @@ use cgmath::Zero;
 
 use super::{BodyA, Colliders, Constraint, RollingConstraint};
 use crate::math::{
-    Point3, Scalar, Vec3, any_direction, cast_vector, direction_and_length, is_finite,
+    Point3, Scalar, Vec3, any_direction, cast_vector, is_finite, normalize_and_length,
 };
 use crate::response::{BallRotation, InverseEffectiveMass, Material, SolverBodies};
 
@@ -27,7 +27,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             BodyA::Marble(a) => {
                 let a = a as usize;
                 let first = *position.get(a)? + self.anchor(a, axis_offset[0]);
-                let direction = direction_and_length(self.period.nearest(second - first));
+                let direction = normalize_and_length(self.period.minimum_image(second - first));
                 let (normal, distance) =
                     direction.unwrap_or_else(|| (any_direction(a as u32, b as u32), S::zero()));
                 (normal, distance - self.radius[a])

@@ -35,25 +35,25 @@ impl<S: Scalar> IslandEnergy<S> {
     }
 
     fn gains(&self) -> bool {
-        self.work > self.exchanged * S::constant(GAIN_TOLERANCE)
+        self.work > self.exchanged * S::from_f64(GAIN_TOLERANCE)
     }
 
     /// Largest fraction of the restitution that gains no energy.
     fn max_restitution_fraction(&self) -> S {
         let Self { work, linear, quadratic, .. } = *self;
-        let root = (linear * linear - S::constant(4.0) * quadratic * work).sqrt();
+        let root = (linear * linear - S::from_f64(4.0) * quadratic * work).sqrt();
         // Root of the quadratic equation in the form without cancellation.
         let fraction = if linear > S::zero() {
-            work * S::constant(-2.0) / (linear + root)
+            work * S::from_f64(-2.0) / (linear + root)
         } else {
-            (root - linear) / (quadratic * S::constant(2.0))
+            (root - linear) / (quadratic * S::from_f64(2.0))
         };
         if fraction > S::zero() { fraction.min(S::one()) } else { S::zero() }
     }
 
     /// Fraction of all impulses that leaves the least energy.
     fn min_energy_fraction(&self) -> S {
-        let fraction = -self.linear / (self.quadratic * S::constant(2.0));
+        let fraction = -self.linear / (self.quadratic * S::from_f64(2.0));
         if fraction > S::zero() && fraction.is_finite() { fraction } else { S::zero() }
     }
 }
@@ -137,7 +137,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         islands.restart(|island| gaining[island]);
         iterate(self, constraints, islands, settings);
         self.measure_energy(constraints, islands, energies);
-        let half = S::constant(0.5);
+        let half = S::from_f64(0.5);
         for (c, full) in constraints.iter().zip(full_restitution.iter()) {
             let energy = &mut energies[c.island as usize];
             let (relative_velocity, relative_spin) =
@@ -266,7 +266,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         energies: &mut Vec<IslandEnergy<S>>,
     ) {
         self.measure_energy(constraints, islands, energies);
-        let half = S::constant(0.5);
+        let half = S::from_f64(0.5);
         for c in constraints {
             let energy = &mut energies[c.island as usize];
             let island = islands.of(c);
@@ -304,7 +304,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     ) {
         energies.clear();
         energies.resize(islands.len(), IslandEnergy::new());
-        let half = S::constant(0.5);
+        let half = S::from_f64(0.5);
         for c in constraints {
             let energy = &mut energies[c.island as usize];
             let island = islands.of(c);
@@ -330,6 +330,6 @@ impl<S: Scalar> Constraint<S> {
 
     /// Mean of the relative velocities before and after the impulse, at the time of impact, in m/s.
     fn mean_velocity(&self, after: Vec3<S>) -> Vec3<S> {
-        (self.initial_relative_velocity + after) * S::constant(0.5) - self.velocity_since_impact
+        (self.initial_relative_velocity + after) * S::from_f64(0.5) - self.velocity_since_impact
     }
 }

@@ -3,7 +3,7 @@
 use cgmath::InnerSpace;
 
 use super::Constraint;
-use crate::math::{Scalar, Vec3, direction_and_length};
+use crate::math::{Scalar, Vec3, normalize_and_length};
 
 /// Regularization of the search: additional compliance of a contact, relative to its own, in units
 /// of the scalar's rounding. It limits impulses that cancel except for rounding: two walls that
@@ -170,7 +170,7 @@ impl<S: Scalar> Islands<S> {
             island.converged = island.change <= tolerance;
             // Close to convergence plain iterations come to rest, which the search does not quite.
             island.accelerating =
-                !island.converged && island.change > restitution_threshold * S::constant(1e-5);
+                !island.converged && island.change > restitution_threshold * S::from_f64(1e-5);
             island.residual = island.change;
             island.change = S::zero();
         }
@@ -217,9 +217,9 @@ impl<S: Scalar> Island<S> {
     /// Adds the terms of one contact for each direction; `rounding` is the error of its velocities,
     /// in m/s.
     pub fn add_directions(&mut self, c: &Constraint<S>, rounding: S) {
-        let regularization = S::epsilon() * S::constant(REGULARIZATION);
+        let regularization = S::epsilon() * S::from_f64(REGULARIZATION);
         for (row, direction) in c.search_directions.iter().enumerate() {
-            let Some((unit, _)) = direction_and_length(*direction) else { continue };
+            let Some((unit, _)) = normalize_and_length(*direction) else { continue };
             self.search.gradient[row] += self.energy(c, *direction, c.velocity_error);
             let uncertainty = *direction * regularization + unit * rounding;
             self.search.curvature[row][row] += self.energy(c, *direction, uncertainty);
@@ -249,7 +249,7 @@ impl<S: Scalar> Island<S> {
     /// Adds the terms of one contact for the projected step, which changes its velocity by this.
     pub fn add_projected(&mut self, c: &Constraint<S>, direction: Vec3<S>, velocity: Vec3<S>) {
         self.search.projected_gradient += self.energy(c, direction, c.velocity_error);
-        let regularization = direction * (S::epsilon() * S::constant(REGULARIZATION));
+        let regularization = direction * (S::epsilon() * S::from_f64(REGULARIZATION));
         self.search.projected_curvature += self.energy(c, direction, velocity + regularization);
     }
 
@@ -321,7 +321,7 @@ impl<S: Scalar> Search<S> {
     }
 
     fn choose_step(&self) -> SearchStep<S> {
-        let half = S::constant(0.5);
+        let half = S::from_f64(0.5);
         let decrease = |fraction: S, gradient: S, curvature: S| {
             fraction * gradient - fraction * fraction * curvature * half
         };

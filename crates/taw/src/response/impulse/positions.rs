@@ -112,7 +112,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         if excess <= S::zero() {
             return;
         }
-        let pseudo_impulse = normal * (excess * S::constant(0.5) / c.inverse_effective_mass.normal);
+        let pseudo_impulse = normal * (excess * S::from_f64(0.5) / c.inverse_effective_mass.normal);
         for (row, pseudo_impulse) in [(Some(c.b), pseudo_impulse), (c.a.marble(), -pseudo_impulse)]
         {
             let Some(row) = row else { continue };

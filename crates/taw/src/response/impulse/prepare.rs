@@ -5,7 +5,7 @@ use cgmath::{InnerSpace, Zero};
 use super::islands::{DIRECTIONS, Island, Islands};
 use super::{BodyA, Colliders, Constraint, Context, WallsAtStart};
 use crate::contact::Contacts;
-use crate::math::{Mat3, Scalar, Vec3, direction_and_length};
+use crate::math::{Mat3, Scalar, Vec3, normalize_and_length};
 use crate::response::{Material, SolverBodies};
 
 /// Prepares a constraint per contact, walls first, and assigns islands.
@@ -139,7 +139,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             // Only if it is not back on the surface before the substep ends.
             let relative_acceleration = self.relative_acceleration(c, context);
             let speed = c.restitution * self.approach_speed(c, time_since_impact, context);
-            if speed + relative_acceleration.dot(c.normal) * time_since_impact * S::constant(0.5)
+            if speed + relative_acceleration.dot(c.normal) * time_since_impact * S::from_f64(0.5)
                 >= S::zero()
             {
                 (c.bounces, c.time_since_impact) = (true, Some(time_since_impact));
@@ -168,7 +168,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             return Some(geometry);
         }
         Some(start.map_or((normal, separation), |(normal_at_start, separation_at_start)| {
-            let mean = direction_and_length(normal + normal_at_start);
+            let mean = normalize_and_length(normal + normal_at_start);
             (mean.map_or(normal, |(mean, _)| mean), separation - separation_at_start.min(S::zero()))
         }))
     }
@@ -195,7 +195,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         {
             return None;
         }
-        let center_offset = self.period.nearest(self.position[b] - self.position[a]);
+        let center_offset = self.period.minimum_image(self.position[b] - self.position[a]);
         let radius_sum = self.radius[a] + self.radius[b];
         // Backward time of impact: |center_offset − velocity t| = radius_sum.
         let (radial, speed_squared) = (center_offset.dot(velocity), velocity.magnitude2());
@@ -207,7 +207,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
         let time_since_impact = (radial + root.sqrt()) / speed_squared;
         let (offset_at_impact, distance) =
-            direction_and_length(center_offset - velocity * time_since_impact)?;
+            normalize_and_length(center_offset - velocity * time_since_impact)?;
         let is_valid =
             time_since_impact > S::zero() && time_since_impact <= dt && distance.is_finite();
         // Other contacts, or rounding, may imply that the two never came together.
@@ -230,9 +230,9 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let end_speed = -c.initial_relative_velocity.dot(c.normal)
             - normal_acceleration * context.integrator_lead(c);
         let speed_squared = (end_speed * end_speed
-            - normal_acceleration * separation * S::constant(2.0))
+            - normal_acceleration * separation * S::from_f64(2.0))
         .max(S::zero());
-        let time_since_impact = separation * S::constant(-2.0) / (end_speed + speed_squared.sqrt());
+        let time_since_impact = separation * S::from_f64(-2.0) / (end_speed + speed_squared.sqrt());
         time_since_impact.max(S::zero()).min(context.settings.dt)
     }
 
@@ -349,11 +349,11 @@ where
     /// Lead of the integrator's velocities over those of the path, in seconds.
     fn integrator_lead(&self, c: &Constraint<S>) -> S {
         let position_weight = mean(c.a, c.b, |row| (self.position_weight)(row));
-        (position_weight - S::constant(0.5)) * self.settings.dt
+        (position_weight - S::from_f64(0.5)) * self.settings.dt
     }
 }
 
 /// Mean over the marbles of a contact.
 fn mean<S: Scalar>(a: BodyA, b: usize, of: impl Fn(usize) -> S) -> S {
-    a.marble().map_or_else(|| of(b), |a| (of(a) + of(b)) * S::constant(0.5))
+    a.marble().map_or_else(|| of(b), |a| (of(a) + of(b)) * S::from_f64(0.5))
 }

@@ -3,7 +3,7 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::PenaltySettings;
-use crate::math::{Scalar, Vec3, cast_vector, direction_and_length, is_finite};
+use crate::math::{Scalar, Vec3, cast_vector, is_finite, normalize_and_length};
 use crate::response::impulse::BodyA;
 use crate::response::material::Compliance;
 use crate::response::{
@@ -65,8 +65,9 @@ pub(super) fn find_contact<S: Scalar>(
     let (normal, distance);
     if two_marbles {
         displacement -= moved(a);
-        let center_offset = marbles.period.nearest(center - anchor_position(a, axis_offset[0]));
-        let direction = direction_and_length(center_offset);
+        let center_offset =
+            marbles.period.minimum_image(center - anchor_position(a, axis_offset[0]));
+        let direction = normalize_and_length(center_offset);
         let (direction, centers) = direction.unwrap_or((Vec3::unit_x(), S::zero()));
         (normal, distance) = (direction, centers - marbles.radius[a]);
         relative_velocity -= marbles.velocity[a] + marbles.anchor_spin_velocity(a, axis_offset[0]);

@@ -56,9 +56,9 @@ pub(super) struct Springs<S> {
 /// time dependence (Antypov and Elliott 2011).
 pub(super) fn damping_ratio<S: Scalar>(restitution: S) -> S {
     // Zero restitution would need infinite damping.
-    let y = restitution.max(S::constant(0.006)).ln_portable() * S::constant(-0.5);
+    let y = restitution.max(S::from_f64(0.006)).ln_portable() * S::from_f64(-0.5);
     let terms = [0.01166, 0.00267, 0.09554, 0.25344, 0.63683];
-    terms.into_iter().fold(S::zero(), |sum, term| sum * y + S::constant(term)) * y
+    terms.into_iter().fold(S::zero(), |sum, term| sum * y + S::from_f64(term)) * y
 }
 
 impl ContactLaw {
@@ -69,7 +69,7 @@ impl ContactLaw {
         penetration: S,
         dt: S,
     ) -> Springs<S> {
-        let number = S::constant;
+        let number = S::from_f64;
         let (normal, tangent) =
             (contact.inverse_effective_mass().normal, contact.inverse_effective_mass().tangent);
         let two_ratios = number(2.0) * damping_ratio(contact.material.restitution);
@@ -124,7 +124,7 @@ impl<S: Scalar> Elasticity<S> {
     /// [`ContactLaw::SpringDashpot`]. Balls that bear others need a shorter one.
     #[must_use]
     pub fn max_substep(self, mass: S, radius: S, speed: S) -> S {
-        let number = S::constant;
+        let number = S::from_f64;
         let (mass, radius) = (mass * number(0.5), radius * number(0.5));
         let modulus = (self.compliance().normal * number(2.0)).recip();
         // Hertz: the maximum penetration is (15/16 m v² / (E √R))^(2/5).

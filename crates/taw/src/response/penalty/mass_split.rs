@@ -40,7 +40,7 @@ impl<S: Scalar> ContactLoad<S> {
         dt: S,
         half_damping: [S; 2],
     ) -> Self {
-        let number = S::constant;
+        let number = S::from_f64;
         let inverse_mass = contact.inverse_effective_mass();
         let limits = [
             (springs.stiffness, inverse_mass.normal),
@@ -60,7 +60,7 @@ impl<S: Scalar> ContactLoad<S> {
         // Stable is (ω dt)² plus twice the damped fraction below 4. And a marble with all its
         // contacts goes through at most an eighth of its oscillation per substep, so that the
         // motion is resolved.
-        S::one().max(self.damping).max(self.stiffness / S::constant(RESOLVED))
+        S::one().max(self.damping).max(self.stiffness / S::from_f64(RESOLVED))
     }
 }
 

@@ -218,14 +218,14 @@ impl<S: Scalar> ContactForce<S> {
             // New contact: the dashpot acts since the contact began, after the last kick, and for
             // half of the time to the next one, at half of the penetration of then.
             let substep = -separation_speed * dt;
-            damped_time = S::constant(0.5) + (contact.penetration / substep).min(S::one());
+            damped_time = S::from_f64(0.5) + (contact.penetration / substep).min(S::one());
             let middle =
-                settings.law.springs(&contact, damped_time * substep * S::constant(0.5), dt);
+                settings.law.springs(&contact, damped_time * substep * S::from_f64(0.5), dt);
             (springs.damping, springs.tangent_damping) = (middle.damping, middle.tangent_damping);
         }
         // Half of the step by the velocity before, half by that after; a dashpot stops motion, but
         // never reverses it.
-        let half = S::constant(0.5) * dt;
+        let half = S::from_f64(0.5) * dt;
         let inverse_effective_mass = contact.inverse_effective_mass();
         let half_damping = [
             springs.damping * inverse_effective_mass.normal * half * damped_time,
@@ -281,7 +281,7 @@ impl<S: Scalar> ContactForce<S> {
             tangent_displacement =
                 clamp_length(tangent_displacement, limit / impulse_per_displacement);
         }
-        let dashpot = S::constant(2.0) * half_damping * self.force_scale
+        let dashpot = S::from_f64(2.0) * half_damping * self.force_scale
             / self.contact.inverse_effective_mass().tangent;
         let tangent_impulse = clamp_length(
             -(tangent_displacement * impulse_per_displacement
@@ -305,7 +305,7 @@ impl<S: Scalar> ContactForce<S> {
         let [half_damping, _] = self.half_damping;
         let fraction = self.force_scale / (S::one() + half_damping);
         let dashpot =
-            S::constant(2.0) * half_damping / self.contact.inverse_effective_mass().normal;
+            S::from_f64(2.0) * half_damping / self.contact.inverse_effective_mass().normal;
         let dashpot_impulse = -dashpot * separation_speed * fraction;
         let slowed_speed =
             separation_speed + self.shared_inverse_mass * dashpot_impulse.max(S::zero());
@@ -318,10 +318,10 @@ impl<S: Scalar> ContactForce<S> {
     /// made it stiffer or deeper; penetration that it did not stop itself separates slowly.
     fn max_spring_impulse(&self, separation_speed: S) -> S {
         let inverse_mass = self.shared_inverse_mass;
-        let mean_speed = (self.history.separation_speed + separation_speed) * S::constant(0.5);
+        let mean_speed = (self.history.separation_speed + separation_speed) * S::from_f64(0.5);
         let stored_energy = self.history.stored_energy.max(S::zero());
         let releasable =
-            (mean_speed * mean_speed + inverse_mass * stored_energy * S::constant(2.0)).sqrt()
+            (mean_speed * mean_speed + inverse_mass * stored_energy * S::from_f64(2.0)).sqrt()
                 - mean_speed;
         releasable.max(self.max_push_speed() - separation_speed).max(S::zero()) / inverse_mass
     }
@@ -395,7 +395,7 @@ impl<S: Scalar> ContactForce<S> {
 
     /// History for the next substep, if it is finite.
     fn next_history(&self, separation_speed: S) -> Option<SpringHistory<S>> {
-        let mean_speed = (self.history.separation_speed + separation_speed) * S::constant(0.5);
+        let mean_speed = (self.history.separation_speed + separation_speed) * S::from_f64(0.5);
         let stored_energy =
             (self.history.stored_energy - self.spring_impulse * mean_speed).max(S::zero());
         let history = SpringHistory { stored_energy, separation_speed, ..self.history };

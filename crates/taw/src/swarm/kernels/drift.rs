@@ -11,14 +11,14 @@ const MOST: f32 = 1e15;
 pub(in crate::swarm) struct Drift<'a> {
     pub at: &'a mut [Row],
     pub velocity: &'a mut [Row],
-    pub budget: &'a mut [f32],
     pub spin: &'a [Row],
+    pub budget: &'a mut [f32],
     /// In m/s, and zero.
     pub change: Row,
     /// In seconds, thrice, and zero.
     pub time: Row,
-    /// Way back of what no wall bears, in metres: half of what gravity changed velocities by, over
-    /// the time. So what flies does so along its parabola (velocity Verlet).
+    /// Displacement of balls in free flight, in metres, that makes the drift second order (velocity
+    /// Verlet): minus half the change of velocity by gravity times the time.
     pub back: Row,
     /// Least budget; below it, `overrun` is set.
     pub least: f32,

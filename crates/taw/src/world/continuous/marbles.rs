@@ -8,7 +8,7 @@ use super::walls::{Bend, WallImpact, lost_fraction};
 use super::{Continuous, MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::broad::Period;
 use crate::contact::time_of_impact_sphere_sphere;
-use crate::math::{Mat3, Scalar, Vec3, direction_and_length, length};
+use crate::math::{Mat3, Scalar, Vec3, length, normalize_and_length};
 use crate::response::Response;
 use crate::shape::Sphere;
 use crate::world::World;
@@ -80,15 +80,15 @@ impl<S: Scalar> World<S> {
             &mut self.continuous;
         let displaces = self.model.response == Response::Displacement;
         // Displacement changes along the path by itself, and has no normals to get right.
-        let min_motion = S::constant(if displaces { MAX_FREE_MOTION } else { MIN_GRAZING_MOTION });
+        let min_motion = S::from_f64(if displaces { MAX_FREE_MOTION } else { MIN_GRAZING_MOTION });
         let smallest = marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
         let moved = |row: usize| marbles.position[row] - start[row];
-        let fast = |row: usize| length(moved(row)) > smallest * min_motion * S::constant(0.5);
+        let fast = |row: usize| length(moved(row)) > smallest * min_motion * S::from_f64(0.5);
         candidates.clear();
         if !(0..start.len()).any(fast) {
             return;
         }
-        let shrink = S::one() - S::constant(OVERLAP);
+        let shrink = S::one() - S::from_f64(OVERLAP);
         paths.clear();
         paths.extend((0..start.len()).map(|row| Path {
             sphere: Sphere { center: start[row], radius: marbles.radius[row] * shrink },
@@ -122,7 +122,7 @@ impl<S: Scalar> World<S> {
     /// smallest radius that twice a motion must exceed.
     fn predict_meetings(&mut self, min_motion: S) {
         let Continuous { middle, reach, candidates, meetings, paths, .. } = &mut self.continuous;
-        let half = S::constant(0.5);
+        let half = S::from_f64(0.5);
         let smallest = self.marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
         let fast = |row: u32| length(paths[row as usize].motion) > smallest * min_motion * half;
         middle.clear();
@@ -319,7 +319,7 @@ impl<S: Scalar> Path<S> {
 
 /// Unit vector between two marbles and the distance of their centers, in metres.
 fn normal_of<S: Scalar>(x: &Path<S>, y: &Path<S>) -> (Vec3<S>, S) {
-    let apart = direction_and_length(y.sphere.center - x.sphere.center);
+    let apart = normalize_and_length(y.sphere.center - x.sphere.center);
     apart.unwrap_or((Vec3::unit_x(), S::zero()))
 }
 
@@ -346,7 +346,7 @@ impl<S: Scalar> Meeting<S> {
         let y = y.nearest_image(&x, period);
         let radius = x.sphere.radius.min(y.sphere.radius);
         let closing = x.rest() - y.rest();
-        if length(closing) <= radius * S::constant(MAX_FREE_MOTION) {
+        if length(closing) <= radius * S::from_f64(MAX_FREE_MOTION) {
             return None;
         }
         let (normal, distance) = normal_of(&x, &y);

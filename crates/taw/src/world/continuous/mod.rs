@@ -116,7 +116,7 @@ impl<S: Scalar> World<S> {
     /// Largest approach in metres per substep of a resting contact: that of gravity in two
     /// substeps.
     fn resting_approach(&self, dt: S) -> S {
-        length(self.gravity) * dt * dt * S::constant(2.0)
+        length(self.gravity) * dt * dt * S::from_f64(2.0)
     }
 }
 

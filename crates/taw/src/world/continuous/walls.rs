@@ -48,7 +48,7 @@ impl<S: Scalar> World<S> {
         let resting_approach = self.resting_approach(dt);
         for row in 0..self.marbles.len() {
             let motion = self.marbles.position[row] - self.continuous.start[row];
-            if length(motion) > self.marbles.radius[row] * S::constant(MAX_FREE_MOTION) {
+            if length(motion) > self.marbles.radius[row] * S::from_f64(MAX_FREE_MOTION) {
                 self.slide_along_walls(row, resting_approach);
             }
         }
@@ -69,7 +69,7 @@ impl<S: Scalar> World<S> {
         let mut change = velocity - self.continuous.velocity[row];
         let mut left = S::one();
         let mut surfaces: SmallVec<[Vec3<S>; MAX_BENDS as usize]> = SmallVec::new();
-        while length(displacement) > sphere.radius * S::constant(MAX_FREE_MOTION)
+        while length(displacement) > sphere.radius * S::from_f64(MAX_FREE_MOTION)
             && let Some(WallImpact { time, wall, normal, .. }) =
                 self.first_wall_impact(&sphere, displacement)
         {
@@ -118,7 +118,7 @@ impl<S: Scalar> World<S> {
             let sphere =
                 Sphere { center: self.continuous.bounced_from[row], ..self.marbles.sphere(row) };
             let displacement = self.marbles.position[row] - sphere.center;
-            if length(displacement) <= sphere.radius * S::constant(MAX_FREE_MOTION) {
+            if length(displacement) <= sphere.radius * S::from_f64(MAX_FREE_MOTION) {
                 continue;
             }
             let planes = self.walls.planes().filter_map(|(_, plane)| {
@@ -127,7 +127,7 @@ impl<S: Scalar> World<S> {
                     -displacement.dot(plane.normal()),
                 );
                 let passes = closing > S::zero()
-                    && closing > gap + sphere.radius * S::constant(MAX_FREE_MOTION);
+                    && closing > gap + sphere.radius * S::from_f64(MAX_FREE_MOTION);
                 passes.then(|| (gap / closing).max(S::zero()))
             });
             let other = self.first_wall_impact(&sphere, displacement).map(|stop| stop.time);
@@ -144,7 +144,7 @@ impl<S: Scalar> World<S> {
         sphere: &Sphere<S>,
         motion: Vec3<S>,
     ) -> Option<WallImpact<S>> {
-        let (half, shrink) = (S::constant(0.5), S::one() - S::constant(OVERLAP));
+        let (half, shrink) = (S::from_f64(0.5), S::one() - S::from_f64(OVERLAP));
         let (start, more) = (sphere.center, sphere.radius);
         let more = Vec3::new(more, more, more);
         let displacement = Aabb { min: start, max: start }
@@ -184,7 +184,7 @@ impl<S: Scalar> Walls<S> {
         sphere: &Sphere<S>,
         motion: Vec3<S>,
     ) -> Option<WallImpact<S>> {
-        let near = sphere.radius * S::constant(OVERLAP);
+        let near = sphere.radius * S::from_f64(OVERLAP);
         let mut time = S::zero();
         let mut last = None;
         for _ in 0..MAX_ITERATIONS {
