@@ -38,7 +38,7 @@
 //! | [`world`] | the state in columns, the [`Model`](world::Model), the step |
 //! | [`scene`] | a scene as a plain value, to be read from a file and run by any model |
 //!
-//! Imports point down this table's order only: a room never uses a later one.
+//! Imports follow the order of this table: a module never uses a later one (`tests/modules.rs`).
 //!
 //! With the feature `serde`, scenes and models are read from files and written. With the
 //! feature `mint`, cgmath's types convert to and from those of any other
@@ -56,6 +56,7 @@ pub mod broad;
 pub mod contact;
 mod error;
 pub mod frame;
+mod handle;
 pub mod math;
 pub mod motion;
 pub mod response;

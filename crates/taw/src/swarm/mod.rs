@@ -53,9 +53,9 @@ use cgmath::{EuclideanSpace, Zero};
 
 use crate::Error;
 use crate::error::{finite_point, finite_vector, positive, within};
+use crate::handle::MarbleId;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
-use crate::world::MarbleId;
 use batches::pairs_in;
 use grid::Grid;
 use ids::Ids;

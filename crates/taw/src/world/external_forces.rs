@@ -2,7 +2,8 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::marbles::{ANGULAR_VELOCITY, MarbleId, Marbles, VELOCITY};
+use super::MarbleId;
+use super::marbles::{ANGULAR_VELOCITY, Marbles, VELOCITY};
 use crate::Error;
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Bivector;

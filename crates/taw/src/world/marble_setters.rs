@@ -2,8 +2,9 @@
 
 use cgmath::Zero;
 
+use super::MarbleId;
 use super::marble::{Damping, non_default, validated_half_length, validated_rotation};
-use super::marbles::{ANGULAR_VELOCITY, MarbleId, Marbles, POSITION, VELOCITY};
+use super::marbles::{ANGULAR_VELOCITY, Marbles, POSITION, VELOCITY};
 use crate::Error;
 use crate::error::{finite, finite_point, finite_vector, positive};
 use crate::math::{Point3, Quat, Scalar, Vec3};

@@ -2,7 +2,8 @@
 
 use cgmath::EuclideanSpace;
 
-use super::marbles::{MarbleId, Marbles};
+use super::MarbleId;
+use super::marbles::Marbles;
 use crate::Error;
 use crate::math::{Point3, Scalar, Vec3};
 use crate::motion::Rotation;

@@ -2,21 +2,17 @@
 
 use cgmath::{One, Zero};
 
-use super::handles::{Handle, Handles};
 use super::marble::{Damping, Marble, non_default, validated_half_length, validated_rotation};
 use super::sparse_column::SparseColumn;
 use crate::Error;
 use crate::broad::Period;
 use crate::error::{finite, finite_point, finite_vector, positive};
 use crate::frame::Bivector;
+use crate::handle::{Handles, MarbleId};
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite, is_finite_point};
 use crate::motion::{Integrator, Mass, Motion, Rotation};
 use crate::response::{CapsuleInertia, Material, SolverBodies};
 use crate::swarm::BodyColumns;
-
-/// Stable handle of a marble.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct MarbleId(Handle);
 
 /// Compensation: the low parts of a marble's double-single numbers, which the scalar cuts off.
 #[derive(Clone, Copy, Debug, PartialEq)]

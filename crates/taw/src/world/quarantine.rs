@@ -3,8 +3,9 @@
 
 use cgmath::One;
 
+use super::MarbleId;
 use super::World;
-use super::marbles::{Compensation, MarbleId, Marbles};
+use super::marbles::{Compensation, Marbles};
 use crate::Error;
 use crate::broad::Period;
 use crate::error::{positive, within};

@@ -2,8 +2,8 @@
 
 use cgmath::{EuclideanSpace, InnerSpace};
 
+use super::MarbleId;
 use super::World;
-use super::marbles::MarbleId;
 use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
 use super::walls::{SubShape, Walls};
 use crate::Error;

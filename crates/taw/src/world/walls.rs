@@ -1,11 +1,11 @@
 use cgmath::Zero;
 
-use super::handles::{Handle, Handles};
 use super::sparse_column::SparseColumn;
 use super::wall_shape::WallShape;
 use crate::Error;
 use crate::contact::ClosestPoints;
 use crate::error::{finite_point, finite_vector};
+use crate::handle::{Handle, Handles};
 use crate::math::{Point3, Scalar, Vec3, is_finite_point};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};

@@ -1,16 +1,22 @@
+//! Stable handles of rows that move: an index and a generation.
+
 use crate::Error;
+
+/// Stable handle of a marble.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct MarbleId(pub(crate) Handle);
 
 /// Generational handle of an index that may move. The generation distinguishes it from earlier
 /// handles of the same slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub(super) struct Handle {
+pub(crate) struct Handle {
     pub slot: u32,
     pub generation: u32,
 }
 
 /// Bidirectional map of handles and indices (a generational arena).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub(super) struct Handles {
+pub(crate) struct Handles {
     slots: Vec<Slot>,
     /// Slot of each index.
     rows: Vec<u32>,

@@ -1,0 +1,53 @@
+//! The order in which the core's modules may use each other, as the table in `lib.rs` has it.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// From what everything uses to what uses everything.
+const ORDER: [&str; 11] = [
+    "math", "handle", "frame", "shape", "contact", "broad", "motion", "response", "swarm", "world",
+    "scene",
+];
+
+fn files(folder: &Path, found: &mut Vec<PathBuf>) {
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_dir() {
+            files(&path, found);
+        } else {
+            found.push(path);
+        }
+    }
+}
+
+/// Modules of the crate that a source file names, outside of comments and of its own tests.
+fn used(source: &str) -> impl Iterator<Item = &str> {
+    let code = source.split("#[cfg(test)]").next().unwrap_or(source);
+    let lines = code.lines().filter(|line| !line.trim_start().starts_with("//"));
+    lines.flat_map(|line| {
+        line.split("crate::").skip(1).map(|rest| {
+            let end = rest.find(|c: char| !c.is_alphanumeric() && c != '_');
+            &rest[..end.unwrap_or(rest.len())]
+        })
+    })
+}
+
+#[test]
+fn no_module_uses_one_that_comes_later() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let mut all = Vec::new();
+    files(&root, &mut all);
+    let rank = |name: &str| ORDER.iter().position(|module| *module == name);
+    let mut checked = 0;
+    for path in all {
+        let inside = path.strip_prefix(&root).unwrap();
+        let first = inside.iter().next().unwrap().to_str().unwrap().trim_end_matches(".rs");
+        let Some(own) = rank(first).filter(|_| !path.ends_with("tests.rs")) else { continue };
+        checked += 1;
+        for module in used(&fs::read_to_string(&path).unwrap()) {
+            let later = rank(module).is_some_and(|other| other > own);
+            assert!(!later, "{} uses {module}, which comes later", inside.display());
+        }
+    }
+    assert!(checked > 100, "only {checked} files were found");
+}
