@@ -11,8 +11,6 @@ const MISSED: &[(&str, &str)] = &[
     ("ordinary/cone", "event-driven"),
     // Springs give back a part of what overlap of the start holds.
     ("ordinary/overlap", "spring and dashpot"),
-    // Contacts that give way a little keep their motion longer: after 10 s one ball of 600 still rolls.
-    ("swarm/heap", "swarm, full"),
 ];
 
 #[test]

@@ -35,9 +35,10 @@ pub(super) struct Touch {
     pub torque: Vec3<f32>,
 }
 
-/// A ball that is so near to a wall, in radii, stands on it: more than rounding, and less than
-/// anybody sees.
-const TOUCHES: f32 = 0.01;
+/// Separation in radii, and in roundings of the coordinates, up to which a ball stands on a wall. A
+/// larger one would hold balls in the air that come down beside others.
+const TOUCHES: f32 = 1e-4;
+const ROUNDINGS: f32 = 4.0;
 
 fn xyz(row: &Row) -> Vec3<f32> {
     Vec3::new(row[0], row[1], row[2])
@@ -77,7 +78,8 @@ impl Touch {
 
     /// The impulse that the wall bore in the last substep, in N s; nothing, if the ball has left it.
     pub fn bears(&self, at: &Row) -> f32 {
-        let there = self.gap(at) <= at[3] * TOUCHES;
+        let place = at[0].abs() + at[1].abs() + at[2].abs();
+        let there = self.gap(at) <= at[3] * TOUCHES + place * (ROUNDINGS * f32::EPSILON);
         if there { self.pressure + self.borne_for_others } else { 0.0 }
     }
 
@@ -197,7 +199,7 @@ impl Touch {
         let grip = held(wish, self.numbers.friction * (pressure + self.borne_for_others));
         let across = grip - self.grip;
         self.grip = grip;
-        if pressure > 0.0 {
+        if pressure + self.borne_for_others > 0.0 {
             spin[3] = GROUNDED;
         }
         self.hit(velocity, spin, along, across);

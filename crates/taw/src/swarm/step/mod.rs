@@ -6,7 +6,7 @@ mod seek;
 pub(super) use seek::listed;
 
 use super::build::SOON;
-use super::kernels::{Columns, Drift, Impact, LOST, Pass, Soft, solve, squared};
+use super::kernels::{Columns, Drift, GROUNDED, Impact, LOST, Pass, Soft, solve, squared};
 use super::lanes::Row;
 use super::slab::Slab;
 use super::strays::Strays;
@@ -377,7 +377,7 @@ impl Swarm {
                 slab.leaving.clear();
                 for (velocity, spin) in velocity.iter_mut().zip(spin) {
                     *velocity = [0.0, 0.0, 0.0, -velocity[3]];
-                    *spin = [0.0; 4];
+                    *spin = [0.0, 0.0, 0.0, GROUNDED];
                 }
             }
         });
