@@ -34,6 +34,8 @@ const PUSH: f32 = 0.5;
 /// Mark of a ball that a wall bears in this step, be it through others; one less in the next
 /// one, and after that not at all.
 pub(in crate::swarm) const GROUNDED: f32 = 2.0;
+/// Mark of a ball that presses another one in this step and that no wall bears: neither flies.
+const TOUCHING: f32 = 0.5;
 
 /// The columns that several threads work on.
 #[derive(Clone, Copy)]
@@ -346,8 +348,9 @@ impl Columns<'_> {
         // stays.
         let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
         let [free_a, free_b] = [mobility(&a), mobility(&b)];
-        let a = free_a.pick_above(zero, grounded.pick_above(zero, one, free_a), zero);
-        let b = free_b.pick_above(zero, grounded.pick_above(zero, one, free_b), zero);
+        let borne = grounded.pick_above(L::splat(TOUCHING), one, zero);
+        let a = free_a.pick_above(zero, borne.pick_above(zero, one, free_a), zero);
+        let b = free_b.pick_above(zero, borne.pick_above(zero, one, free_b), zero);
         let by = (a + b).pick_above(zero, push / (a + b), zero);
         let ways = [normal.times(by * a), normal.times(by * b)];
         let places =
@@ -509,7 +512,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             after.store(&mut pressure[i]);
             let grounded = spins[0][3].max(spins[1][3]);
             for spin in &mut spins {
-                spin[3] = after.pick_above(zero, grounded, spin[3]);
+                spin[3] = after.pick_above(zero, grounded.max(L::splat(TOUCHING)), spin[3]);
             }
             let sliding = sliding(relative, normal, &spins);
             let old = V::<L>::load(&grip[i]);
