@@ -11,6 +11,7 @@ mod motion;
 mod nasty;
 mod scene;
 mod snapshots;
+mod soft_step;
 mod spawning;
 mod storm;
 mod swarms;

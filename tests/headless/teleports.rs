@@ -31,7 +31,7 @@ fn fastest(app: &mut App, ball: Entity, frames: u32) -> f32 {
 
 #[test]
 fn a_platform_that_is_put_elsewhere_throws_nothing() {
-    for response in [Response::Impulse, Response::EventDriven] {
+    for response in [Response::Impulse, Response::EventDriven, Response::SoftStep] {
         for jump in [Vec3::Y * 5.0, Vec3::Y * 0.4, Vec3::new(3.0, 0.3, 0.0), Vec3::NEG_Y * 0.5] {
             let (mut app, lift, ball) = ball_on_a_platform(response);
             app.world_mut().get_mut::<Transform>(lift).unwrap().translation += jump;

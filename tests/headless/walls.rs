@@ -34,7 +34,9 @@ fn floors() -> Vec<(Wall, Transform)> {
 
 #[test]
 fn a_marble_lies_on_every_kind_of_wall() {
-    for response in [Response::Displacement, Response::Impulse, Response::EventDriven] {
+    for response in
+        [Response::Displacement, Response::Impulse, Response::EventDriven, Response::SoftStep]
+    {
         for (wall, place) in floors() {
             let mut app = scene::app();
             app.insert_resource(TawModel(Model { response, ..Model::default() }));

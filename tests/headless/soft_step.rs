@@ -1,0 +1,89 @@
+//! Marbles by `Response::SoftStep`: many, asleep, woken, heard, and beside a swarm.
+
+use bevy::ecs::message::Messages;
+use bevy::prelude::*;
+use bevy_taw::prelude::*;
+
+use crate::scene;
+
+fn app() -> App {
+    let mut app = scene::app();
+    let (response, rotation) = (Response::SoftStep, Rotation::Dynamic);
+    app.insert_resource(TawModel(Model { response, rotation, substeps: 2, ..Model::default() }));
+    app
+}
+
+/// A box without a lid, of half-spaces, and so many marbles in it.
+fn heap(app: &mut App, count: u16) -> Vec<Entity> {
+    scene::floor(app);
+    for turn in [(0.0, 1.0), (0.0, -1.0), (1.0, 0.0), (-1.0, 0.0)] {
+        let (x, z) = turn;
+        let up = Quat::from_rotation_arc(Vec3::Y, Vec3::new(x, 0.0, z));
+        let place = Transform::from_xyz(-x, 0.0, -z).with_rotation(up);
+        app.world_mut().spawn((Wall::default(), place));
+    }
+    let place = |i: u16| {
+        let [x, y, z] = [i % 4, i / 16, i / 4 % 4].map(f32::from);
+        Vec3::new(x * 0.45 - 0.7 + 0.01 * y, 0.3 + y * 0.5, z * 0.45 - 0.7 + 0.013 * y)
+    };
+    (0..count).map(|i| scene::drop_marble(app, 0.2, place(i))).collect()
+}
+
+#[test]
+fn a_heap_of_entities_comes_to_rest_sleeps_and_wakes_by_a_push() {
+    let mut app = app();
+    let marbles = heap(&mut app, 48);
+    for marble in &marbles {
+        app.world_mut().entity_mut(*marble).insert(Velocity::default());
+    }
+    scene::frames(&mut app, 640);
+    let world = app.world().resource::<TawWorld>();
+    assert_eq!(world.swarm.asleep(), 48);
+    let heights: Vec<_> = marbles.iter().map(|marble| scene::position(&app, *marble).y).collect();
+    assert!(heights.iter().all(|height| (0.19..2.0).contains(height)), "{heights:?}");
+    scene::frames(&mut app, 10);
+    for (marble, height) in marbles.iter().zip(heights) {
+        assert_eq!(scene::position(&app, *marble).y, height, "it sleeps");
+    }
+    let push = ExternalImpulse { impulse: Vec3::Y * 800.0, ..default() };
+    app.world_mut().entity_mut(marbles[40]).insert(push);
+    scene::frames(&mut app, 2);
+    assert!(app.world().get::<Velocity>(marbles[40]).unwrap().y > 1.0);
+}
+
+#[test]
+fn contacts_of_sleepers_go_on_and_end_when_one_is_taken_away() {
+    let mut app = app();
+    app.add_message::<ContactStarted>().add_message::<ContactEnded>();
+    scene::floor(&mut app);
+    let low = scene::drop_marble(&mut app, 0.2, Vec3::Y * 0.2);
+    let count = |app: &App| {
+        let started = app.world().resource::<Messages<ContactStarted>>();
+        let ended = app.world().resource::<Messages<ContactEnded>>();
+        [
+            started.iter_current_update_messages().count(),
+            ended.iter_current_update_messages().count(),
+        ]
+    };
+    let mut sum = [0; 2];
+    for _ in 0..200 {
+        app.update();
+        let now = count(&app);
+        sum = [sum[0] + now[0], sum[1] + now[1]];
+    }
+    assert_eq!(sum, [1, 0], "it touched the floor once, and still does");
+    app.world_mut().get_mut::<Transform>(low).unwrap().translation.y = 5.0;
+    app.update();
+    assert_eq!(count(&app), [0, 1]);
+}
+
+#[test]
+fn a_fast_entity_meets_a_thin_wall() {
+    let mut app = app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    app.world_mut().spawn((Wall::from(Cuboid::new(0.02, 4.0, 4.0)), Transform::default()));
+    let bullet = scene::drop_marble(&mut app, 0.05, Vec3::X * -3.0);
+    app.world_mut().entity_mut(bullet).insert(Velocity(Vec3::X * 200.0));
+    scene::frames(&mut app, 10);
+    assert!(scene::position(&app, bullet).x < 0.0);
+}
