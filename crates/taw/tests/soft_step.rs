@@ -433,3 +433,42 @@ fn what_it_cannot_run_is_refused_by_name() {
     assert!(matches!(world.step(0.01), Err(taw::Error::UnsupportedShape(_))));
     assert_eq!(world, before);
 }
+
+#[test]
+fn verbs_in_any_order_and_swarms_of_other_times_do_no_harm() {
+    let (mut world, mut ids) = heap::<f32>(40, 30);
+    let before = world.swarm.clone();
+    let gone = ids.swap_remove(7);
+    world.marbles.remove(gone).unwrap();
+    ids.push(world.marbles.insert(Marble::new(Point3::new(0.0, 1.4, 0.0), 0.1)).unwrap());
+    world.step(1.0 / 60.0).unwrap();
+    world.swarm = before;
+    world.step(1.0 / 60.0).unwrap();
+    let ball = (0..world.swarm.len()).find_map(|row| world.swarm.id(row)).unwrap();
+    assert!(world.swarm.remove(&[ball]).is_err(), "it is a marble's");
+    world.restitute(0.01).unwrap();
+    world.generate_contacts();
+    world.restitute(0.1).unwrap();
+    world.integrate(1e-6).unwrap();
+    let gone = ids.swap_remove(3);
+    world.marbles.remove(gone).unwrap();
+    world.generate_contacts();
+    world.marbles.insert(Marble::new(Point3::new(0.0, 1.9, 0.0), 0.1)).unwrap();
+    world.restitute(0.02).unwrap();
+    world.swarm = taw::swarm::Swarm::default();
+    world.step(1.0 / 60.0).unwrap();
+    World::<f32>::restitute(&mut self::world(2), 0.01).unwrap();
+    let mut light = self::world::<f64>(2);
+    floor(&mut light);
+    let mass = taw::world::Mass::Kilograms(1e-60);
+    let tiny = Marble { mass, ..Marble::new(Point3::new(0.0, 1e-3, 0.0), 1e-60) };
+    let tiny = light.marbles.insert(tiny).unwrap();
+    for _ in 0..120 {
+        world.step(1.0 / 60.0).unwrap();
+        light.step(1.0 / 60.0).unwrap();
+    }
+    assert!(light.marbles.get(tiny).unwrap().position.y.abs() < 1e-2);
+    for Point3 { x, y, z } in world.marbles.position() {
+        assert!(x.abs().max(z.abs()) < 0.5 && (0.0..3.0).contains(y), "{x} {y} {z}");
+    }
+}

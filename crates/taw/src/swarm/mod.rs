@@ -214,8 +214,17 @@ impl Swarm {
     /// Takes balls out, all or none.
     ///
     /// # Errors
-    /// [`Error::NoSuchBall`], also for one that is named twice.
+    /// [`Error::NoSuchBall`], also for one that is named twice, and for a marble's.
     pub fn remove(&mut self, balls: &[BallId]) -> Result<(), Error> {
+        let is_marble = |id: &&BallId| self.row(**id).is_ok_and(|row| self.is_guest(row));
+        if let Some(id) = balls.iter().find(is_marble).filter(|_| self.hosting) {
+            return Err(Error::NoSuchBall(*id));
+        }
+        self.take_out(balls)
+    }
+
+    /// Takes balls out, those of marbles too.
+    pub(crate) fn take_out(&mut self, balls: &[BallId]) -> Result<(), Error> {
         self.ids.check(balls)?;
         self.remember();
         for ball in balls {

@@ -3,6 +3,7 @@
 
 use cgmath::{EuclideanSpace, Zero};
 
+use super::MarbleId;
 use super::World;
 use super::integrate::StepContext;
 use super::swarm::FURTHEST;
@@ -10,7 +11,7 @@ use crate::Error;
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::{Mass, Rotation};
 use crate::response::Material;
-use crate::swarm::{Body, MarbleRow, NO_ROW, Push, Surface};
+use crate::swarm::{BallId, Body, MarbleRow, NO_ROW, Push, Surface};
 
 /// Correspondence of marbles and rows, and scratch memory.
 #[derive(Clone, Debug)]
@@ -18,14 +19,17 @@ pub(super) struct SoftStep<S> {
     /// Removals and number of marbles for which these hold, and whether the balls of the swarm
     /// have the material of marbles that have none of their own.
     known: Option<(u64, usize, bool)>,
+    /// Handles of the marbles in the swarm for which they hold.
+    balls: Vec<(MarbleId, BallId)>,
     slot_of_marble: Vec<u32>,
     marble_of_slot: Vec<u32>,
     /// Last seen by marble; empty while no marble has any of its own.
     details: Vec<Details<S>>,
     changed: Vec<Body>,
-    /// Length of the step, in seconds, and version of the walls when contacts were found.
+    /// Length of the step that was integrated, in seconds.
     dt: f32,
-    walls: u64,
+    /// Length of the step and version of the walls for which contacts were found.
+    found: Option<(f32, u64)>,
 }
 
 /// Rarely changing numbers of a marble that rows need.
@@ -47,18 +51,22 @@ impl<S> Default for SoftStep<S> {
     fn default() -> Self {
         Self {
             known: None,
+            balls: Vec::new(),
             slot_of_marble: Vec::new(),
             marble_of_slot: Vec::new(),
             details: Vec::new(),
             changed: Vec::new(),
             dt: 0.0,
-            walls: 0,
+            found: None,
         }
     }
 }
 
-/// Least inverse mass of a row, in 1/kg: products with it and quotients by it are numbers.
-const LEAST_INVERSE_MASS: f32 = 1e-25;
+/// Least and largest inverse mass of a row, in 1/kg: products with it and quotients by it are numbers.
+const INVERSE_MASSES: [f32; 2] = [1e-25, 1e25];
+
+/// Least radius of a row, in metres, as of the balls of a swarm.
+const LEAST_RADIUS: f32 = 1e-9;
 
 impl<S: Scalar> World<S> {
     /// The first verb: forces other than gravity become changes of velocity, which the third one
@@ -87,7 +95,7 @@ impl<S: Scalar> World<S> {
         let pushes = self.accelerations.iter().zip(slots).filter_map(|(acceleration, slot)| {
             let change: [f64; 3] = ((acceleration - gravity) * dt).into();
             let change = change.map(|x| (x as f32).clamp(-FURTHEST, FURTHEST));
-            (change != [0.0; 3]).then_some(Push { slot: *slot, change })
+            (change != [0.0; 3] && *slot != NO_ROW).then_some(Push { slot: *slot, change })
         });
         self.swarm.set_pushes(pushes);
         Ok(())
@@ -96,9 +104,12 @@ impl<S: Scalar> World<S> {
     /// The second verb: finds which pairs may touch within the step, and lists those of marbles.
     pub(super) fn find_soft_contacts(&mut self) {
         self.walls.update_tree();
+        if self.sync_bodies().is_err() {
+            return; // the third verb says so
+        }
         let (dt, gravity) = (self.soft_step.dt, cast_vector(self.gravity));
-        self.soft_step.walls = self.walls.version();
         self.swarm.prepare(dt, gravity, &self.walls, self.walls.version());
+        self.soft_step.found = Some((dt, self.walls.version()));
         let reach = 2.0 * length(gravity) * dt * dt;
         let marbles = &self.soft_step.marble_of_slot;
         let turns = self.model.rotation == Rotation::Dynamic;
@@ -112,11 +123,12 @@ impl<S: Scalar> World<S> {
         self.audit_contacts();
         self.sync_bodies()?; // somebody may have moved some since the first verb
         self.walls.update_tree();
-        let gravity = cast_vector(self.gravity);
-        if self.soft_step.walls != self.walls.version() {
-            self.swarm.prepare(self.soft_step.dt, gravity, &self.walls, self.walls.version());
+        let (step, version) = (dt.as_f64() as f32, self.walls.version());
+        let found = self.soft_step.found.take();
+        if found != Some((step, version)) || !self.swarm.is_prepared() {
+            self.swarm.prepare(step, cast_vector(self.gravity), &self.walls, version);
         }
-        self.swarm.finish(dt.as_f64() as f32, self.model.substeps, &self.walls);
+        self.swarm.finish(step, self.model.substeps, &self.walls);
         let marbles = &self.soft_step.marble_of_slot;
         let stopped = self.swarm.stopped_slots();
         let stopped = stopped.filter_map(|slot| marbles.get(slot as usize).copied());
@@ -136,7 +148,7 @@ impl<S: Scalar> World<S> {
         self.swarm.set_hosting(true);
         let plain_swarm = self.swarm.model().material == Material::default();
         let known = Some((self.marbles.removals(), self.marbles.len(), plain_swarm));
-        let stale = self.soft_step.known != known || self.swarm.invited.len() != self.marbles.len();
+        let stale = self.soft_step.known != known || self.swarm.invited != self.soft_step.balls;
         if stale {
             self.see_guests_off()?;
             self.invite_all()?;
@@ -191,7 +203,8 @@ impl<S: Scalar> World<S> {
 
     /// Finds the slot of each marble, and the marble of each slot.
     fn match_slots(&mut self) {
-        let SoftStep { slot_of_marble, marble_of_slot, details, .. } = &mut self.soft_step;
+        let SoftStep { balls, slot_of_marble, marble_of_slot, details, .. } = &mut self.soft_step;
+        balls.clone_from(&self.swarm.invited);
         details.clear();
         slot_of_marble.clear();
         slot_of_marble.resize(self.marbles.len(), NO_ROW);
@@ -213,10 +226,11 @@ fn body<S: Scalar>(slot: u32, marble: MarbleRow<S>, mass: S, surface: Option<Sur
     let single = |x: S| (x.as_f64() as f32).clamp(-FURTHEST, FURTHEST);
     let row = |v: Vec3<S>, last: f32| [single(v.x), single(v.y), single(v.z), last];
     let spin = marble.spin.map_or_else(Vec3::zero, |spin| spin * marble.radius);
-    let inverse_mass = ((S::one() / mass).as_f64() as f32).max(LEAST_INVERSE_MASS);
+    let [least, most] = INVERSE_MASSES;
+    let inverse_mass = ((S::one() / mass).as_f64() as f32).clamp(least, most);
     Body {
         slot,
-        at: row(marble.position.to_vec(), single(marble.radius)),
+        at: row(marble.position.to_vec(), single(marble.radius).max(LEAST_RADIUS)),
         velocity: row(marble.velocity, inverse_mass),
         spin: row(spin, 0.0),
         surface,

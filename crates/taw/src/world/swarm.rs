@@ -52,7 +52,7 @@ impl<S: Scalar> World<S> {
         let (there, _): (Vec<_>, Vec<_>) = swarm.invited.iter().copied().partition(is_there);
         let (stay, gone): (Vec<_>, Vec<_>) = there.into_iter().partition(stays);
         swarm.invited = stay;
-        swarm.remove(&gone.into_iter().map(|(_, ball)| ball).collect::<Vec<_>>())
+        swarm.take_out(&gone.into_iter().map(|(_, ball)| ball).collect::<Vec<_>>())
     }
 
     /// Gives every marble a ball in the swarm.

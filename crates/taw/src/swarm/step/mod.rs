@@ -73,6 +73,11 @@ impl Swarm {
         self.find_contacts(dt, gravity, walls, walls_changed, &mut |_| ());
     }
 
+    /// Returns true if pairs are known, so that a step can be finished.
+    pub(crate) fn is_prepared(&self) -> bool {
+        self.paired
+    }
+
     /// Ends it: moves all on in substeps, and solves the contacts.
     pub(crate) fn finish(&mut self, dt: f32, substeps: u32, walls: &dyn Surroundings) {
         self.solve(dt, substeps, walls, &mut |_| ());
@@ -144,7 +149,7 @@ impl Swarm {
         walls: &dyn Surroundings,
         observe: &mut dyn FnMut(Stage),
     ) {
-        if self.slabs.iter().all(|slab| slab.asleep) {
+        if !self.paired || self.slabs.iter().all(|slab| slab.asleep) {
             return;
         }
         self.find_guests();
