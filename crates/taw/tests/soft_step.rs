@@ -261,11 +261,12 @@ fn heap<S: Scalar>(count: u16, steps: usize) -> (World<S>, Vec<MarbleId>) {
     (world, ids)
 }
 
+type Touch = fn(&mut World<f32>, MarbleId);
+
 #[test]
 fn a_heap_sleeps_and_whatever_touches_it_wakes_it() {
     let (asleep, ids) = heap::<f32>(64, 600);
     assert_eq!(asleep.swarm.asleep(), 64, "after ten seconds all lie");
-    type Touch = fn(&mut World<f32>, MarbleId);
     let touches: [(&str, Touch); 8] = [
         ("gravity", |world, _| world.set_gravity(Vec3::new(3.0, -9.0, 0.0)).unwrap()),
         ("velocity", |world, id| world.marbles.set_velocity(id, Vec3::new(0.0, 5.0, 0.0)).unwrap()),
