@@ -473,3 +473,54 @@ fn verbs_in_any_order_and_swarms_of_other_times_do_no_harm() {
         assert!(x.abs().max(z.abs()) < 0.5 && (0.0..3.0).contains(y), "{x} {y} {z}");
     }
 }
+
+/// A clone compares every marble with its row, the original only those that were set.
+#[test]
+fn whatever_is_set_of_a_marble_reaches_its_row() {
+    for seed in 0..40_u64 {
+        let mut random = seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) | 1;
+        let mut next = |count: u64| {
+            random ^= random << 13;
+            random ^= random >> 7;
+            random ^= random << 17;
+            (random >> 20) % count
+        };
+        let (mut world, ids) = heap::<f32>(20, 30);
+        for step in 0..25 {
+            for _ in 0..next(4) {
+                let id = ids[next(20) as usize];
+                let x = next(100) as f32 * 0.02 + 0.01;
+                let v = Vec3::new(x - 1.0, 0.5 * x, 0.3);
+                let marbles = &mut world.marbles;
+                match next(14) {
+                    0 => marbles.set_position(id, Point3::new(x, 3.0, -x)),
+                    1 => marbles.set_velocity(id, v),
+                    2 => marbles.set_radius(id, 0.05 + 0.05 * x),
+                    3 => marbles.set_angular_velocity(id, v * 9.0),
+                    4 => marbles.set_mass(id, Mass::Density(100.0 * x)),
+                    5 => marbles.set_material(
+                        id,
+                        Some(Material { friction: 0.1 * x, ..Material::default() }),
+                    ),
+                    6 => marbles.set_rotation_model(id, Some(Rotation::None)),
+                    7 => marbles.apply_impulse(id, v),
+                    8 => marbles
+                        .apply_angular_impulse(id, taw::frame::Bivector::wedge(v, Vec3::unit_y())),
+                    9 => marbles.apply_force(id, v * 1e3),
+                    10 => marbles.apply_torque(id, taw::frame::Bivector::wedge(v, Vec3::unit_x())),
+                    11 => marbles.set_gravity_scale(id, x - 0.5),
+                    12 => world.set_speed_limits(taw::world::SpeedLimits {
+                        linear: Some(0.5 + x),
+                        angular: None,
+                    }),
+                    _ => marbles.set_momentum(id, v),
+                }
+                .unwrap();
+            }
+            let mut clone = world.clone();
+            world.step(1.0 / 60.0).unwrap();
+            clone.step(1.0 / 60.0).unwrap();
+            assert_eq!(world.marbles, clone.marbles, "seed {seed}, step {step}");
+        }
+    }
+}

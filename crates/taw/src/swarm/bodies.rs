@@ -1,11 +1,15 @@
 //! Balls of the swarm that are marbles of the world: rows of the same solve as all others.
 
+use std::sync::atomic::{AtomicU64, Ordering};
+
 use cgmath::{EuclideanSpace, InnerSpace};
 
+use super::batches::Batch;
 use super::kernels::squared;
 use super::lanes::Row;
 use super::surfaces::{Surface, SurfaceOf};
 use super::team::{Shared, each};
+use super::touch::Touch;
 use super::{BallId, Swarm, Tier};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector};
@@ -23,6 +27,42 @@ pub(crate) struct Body {
     pub spin: Row,
     /// None for that of the swarm's model.
     pub surface: Option<Surface>,
+}
+
+/// Identity of two columns that agree, except for rows known to have changed. A clone has none, so
+/// that whatever is put in their place is compared in full.
+#[derive(Debug, Default)]
+pub(crate) struct SyncToken(u64);
+
+impl SyncToken {
+    /// A token that no other two share.
+    pub fn unique() -> [Self; 3] {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
+        let token = NEXT.fetch_add(1, Ordering::Relaxed);
+        [Self(token), Self(token), Self(token)]
+    }
+
+    pub fn is_set(&self) -> bool {
+        self.0 != 0
+    }
+
+    /// Returns true for two of one call of [`Self::unique`].
+    pub fn agrees(&self, other: &Self) -> bool {
+        self.is_set() && self.0 == other.0
+    }
+}
+
+impl Clone for SyncToken {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+impl PartialEq for SyncToken {
+    /// Does not count.
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
 }
 
 /// Change of velocity that a body gets besides gravity in a step, in m/s.
@@ -78,6 +118,7 @@ impl Swarm {
         self.guest_rows.clear();
         self.pushes.clear();
         self.surfaces.clear();
+        self.synced = SyncToken::default();
         (self.paired, self.remembers, self.walled) = (false, false, None);
         self.shape_columns();
         self.wake_all();
@@ -101,9 +142,16 @@ impl Swarm {
         }
     }
 
-    /// True if a marble is still as [`Self::read_bodies`] left it.
+    /// Returns true if a marble is still as [`Self::read_bodies`] left it, and the body has this
+    /// inverse mass, in 1/kg, and surface.
     #[inline]
-    pub(crate) fn is_as_read<S: Scalar>(&self, slot: u32, marble: MarbleRow<S>) -> bool {
+    pub(crate) fn is_as_read<S: Scalar>(
+        &self,
+        slot: u32,
+        marble: MarbleRow<S>,
+        inverse_mass: f32,
+        surface: Option<Surface>,
+    ) -> bool {
         let row = self.ids.rows()[slot as usize] as usize;
         let [at, velocity] = [&self.at[row], &self.velocity[row]];
         let MarbleRow { position, velocity: speed, spin, radius } = marble;
@@ -111,7 +159,9 @@ impl Swarm {
         Point3::from_vec(vector(at)) == position
             && number::<S>(at[3]) == radius
             && vector(velocity) == speed
+            && velocity[3].abs() == inverse_mass
             && turns()
+            && self.surfaces.get(slot) == surface
     }
 
     /// Takes over what changed of bodies, and wakes those.
@@ -231,12 +281,41 @@ impl Swarm {
         });
     }
 
-    /// Lists the contacts of bodies: with a wall or each other, of which the gap is at most `reach`
-    /// metres, or closes within `dt` seconds.
+    /// Lists the contacts of bodies: with a wall or each other, of which the separation is at most
+    /// `reach` metres, or closes within `dt` seconds. In the order of the solver's memory. `lists`
+    /// is scratch.
     pub(crate) fn list_contacts<S: Scalar>(
         &self,
         marble_of_slot: &[u32],
+        near: [f32; 2],
+        lists: &mut Vec<Contacts<S>>,
+        contacts: &mut Contacts<S>,
+    ) {
+        let chunks = self.slabs.len();
+        lists.resize_with(chunks + 1, Contacts::default);
+        lists.iter_mut().for_each(Contacts::clear);
+        let parts = Shared::new(lists);
+        each(self.model.threads as usize, chunks + 1, |_, chunk| {
+            // SAFETY: each has its own list.
+            let list = unsafe { &mut *parts.row(chunk) };
+            let (touches, batches) = self
+                .slabs
+                .get(chunk)
+                .map_or((&[][..], &self.strays.batches), |slab| (&slab.touches, &slab.batches));
+            self.list_contacts_of(marble_of_slot, near, (touches, batches), list);
+        });
+        for list in lists {
+            contacts.wm.append(&mut list.wm);
+            contacts.mm.append(&mut list.mm);
+        }
+    }
+
+    /// Lists those of these contacts with walls and these pairs.
+    fn list_contacts_of<S: Scalar>(
+        &self,
+        marble_of_slot: &[u32],
         [reach, dt]: [f32; 2],
+        (touches_of_walls, batches): (&[Touch], &[Batch]),
         contacts: &mut Contacts<S>,
     ) {
         let slots = self.ids.slots();
@@ -245,7 +324,7 @@ impl Swarm {
             marble.filter(|marble| *marble != NO_ROW)
         };
         let touches = |gap: f32, closing: f32| gap <= reach || gap < closing * dt;
-        for touch in self.slabs.iter().flat_map(|slab| &slab.touches) {
+        for touch in touches_of_walls {
             let Some(b) = marble(touch.row) else { continue };
             let row = touch.row as usize;
             let gap = touch.gap(&self.at[row]);
@@ -256,8 +335,7 @@ impl Swarm {
                 contacts.wm.push(Contact { a: touch.wall, b, part: touch.part, along, mtv });
             }
         }
-        let batches = self.slabs.iter().map(|slab| &slab.batches).chain([&self.strays.batches]);
-        for batch in batches.flatten() {
+        for batch in batches {
             for lane in 0..batch.count as usize {
                 let rows = batch.pair(lane);
                 let [Some(a), Some(b)] = rows.map(marble) else { continue };

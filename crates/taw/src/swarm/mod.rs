@@ -41,7 +41,7 @@ mod team;
 mod touch;
 mod walls;
 
-pub(crate) use bodies::{Body, BodyColumns, MarbleRow, NO_ROW, Push};
+pub(crate) use bodies::{Body, BodyColumns, MarbleRow, NO_ROW, Push, SyncToken};
 pub(crate) use guests::Guest;
 pub use ids::BallId;
 pub use lanes::Instructions;
@@ -124,6 +124,8 @@ pub struct Swarm {
     /// What moves them besides gravity.
     pushes: Vec<bodies::Push>,
     surfaces: Surfaces,
+    /// Agreement of bodies with the marbles.
+    pub(crate) synced: SyncToken,
     guests: Vec<Guest>,
     /// Their rows, in order, and which guest each is; only in a step.
     guest_rows: Vec<(u32, u32)>,

@@ -38,9 +38,12 @@ impl Surfaces {
         let index = surface.map_or(0, |surface| {
             let known = self.list.iter().rposition(|known| *known == surface);
             let index = known.unwrap_or_else(|| {
-                self.list.push(surface);
-                self.counts.push(0);
-                self.list.len() - 1
+                let unused = self.counts.iter().position(|count| *count == 0);
+                let index = unused.unwrap_or(self.list.len());
+                self.list.resize(self.list.len().max(index + 1), surface);
+                self.counts.resize(self.list.len(), 0);
+                self.list[index] = surface;
+                index
             });
             index as u32 + 1
         });
@@ -60,6 +63,12 @@ impl Surfaces {
             }
         }
         before != index
+    }
+
+    /// Surface of a slot; none for that of the model.
+    pub fn get(&self, slot: u32) -> Option<Surface> {
+        let index = *self.of_slot.get(slot as usize)?;
+        self.list.get((index as usize).checked_sub(1)?).copied()
     }
 
     /// Material of all balls, of which there are so many, where one is; and nobody's rotation is
@@ -101,10 +110,7 @@ impl SurfaceOf<'_> {
     /// Surface of the ball in a row.
     #[inline]
     pub fn row(&self, row: u32) -> Surface {
-        let own = || {
-            let index = *self.surfaces.of_slot.get(self.slots[row as usize] as usize)?;
-            self.surfaces.list.get((index as usize).checked_sub(1)?).copied()
-        };
+        let own = || self.surfaces.get(self.slots[row as usize]);
         let plain = Surface { material: self.model, rotation_locked: false };
         if self.surfaces.list.is_empty() { plain } else { own().unwrap_or(plain) }
     }

@@ -96,6 +96,7 @@ impl<S: Scalar> Marbles<S> {
         finite_vector(IMPULSE, impulse)?;
         let velocity = self.velocity[row] + impulse / self.mass(row);
         self.velocity[row] = finite_vector(VELOCITY, velocity)?;
+        self.mark_changed(row);
         Ok(())
     }
 
@@ -141,6 +142,7 @@ impl<S: Scalar> Marbles<S> {
         if let Some(angular_velocity) = self.angular_velocity.get_mut(row) {
             *angular_velocity = finite_vector(ANGULAR_VELOCITY, *angular_velocity + change)?;
         }
+        self.mark_changed(row);
         Ok(())
     }
 

@@ -30,16 +30,17 @@ impl<S: Scalar> SpeedLimits<S> {
 
     /// Clamps velocities and angular velocities to the limits.
     pub(super) fn apply(self, marbles: &mut Marbles<S>) {
-        for (limit, column) in
-            [(self.linear, &mut marbles.velocity), (self.angular, &mut marbles.angular_velocity)]
-        {
+        let rows = marbles.len();
+        let Marbles { velocity, angular_velocity, changed, .. } = marbles;
+        for (limit, column) in [(self.linear, velocity), (self.angular, angular_velocity)] {
             let Some(limit) = limit else { continue };
-            for v in column {
+            for (row, v) in column.iter_mut().enumerate() {
                 // Squares alone might overflow.
                 if v.magnitude2() > limit * limit || !v.magnitude2().is_finite() {
                     let speed = length(*v);
                     if speed > limit {
                         *v *= limit / speed;
+                        changed.add(row, rows);
                     }
                 }
             }

@@ -93,6 +93,7 @@ impl<S: Scalar> Marbles<S> {
             }
             if is_finite(angular_velocity) && angular_velocity != self.angular_velocity[row] {
                 self.angular_velocity[row] = angular_velocity;
+                self.mark_changed(row);
             }
         }
     }

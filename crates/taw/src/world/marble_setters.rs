@@ -19,6 +19,7 @@ impl<S: Scalar> Marbles<S> {
     pub fn set_position(&mut self, id: MarbleId, position: Point3<S>) -> Result<(), Error> {
         let row = self.row(id)?;
         self.position[row] = finite_point(POSITION, position)?;
+        self.mark_changed(row);
         if let Some(low) = self.compensation.get_mut(row) {
             low.position = Vec3::zero();
         }
@@ -32,6 +33,7 @@ impl<S: Scalar> Marbles<S> {
     pub fn set_velocity(&mut self, id: MarbleId, velocity: Vec3<S>) -> Result<(), Error> {
         let row = self.row(id)?;
         self.velocity[row] = finite_vector(VELOCITY, velocity)?;
+        self.mark_changed(row);
         if let Some(low) = self.compensation.get_mut(row) {
             low.velocity = Vec3::zero();
         }
@@ -47,6 +49,7 @@ impl<S: Scalar> Marbles<S> {
         let (row, radius) = (self.row(id)?, positive("radius", radius)?);
         self.own_mass(row).of_size(radius, self.half_length(row))?;
         self.radius[row] = radius;
+        self.mark_changed(row);
         Ok(())
     }
 
@@ -94,6 +97,7 @@ impl<S: Scalar> Marbles<S> {
         if let Some(slot) = self.angular_velocity.get_mut(row) {
             *slot = angular_velocity;
         }
+        self.mark_changed(row);
         if let Some(low) = self.compensation.get_mut(row) {
             low.angular_velocity = Vec3::zero();
         }
@@ -109,6 +113,7 @@ impl<S: Scalar> Marbles<S> {
         let (row, mass) = (self.row(id)?, mass.validated()?);
         mass.of_size(self.radius[row], self.half_length(row))?;
         self.mass.set(row, non_default(mass, Mass::default()), self.len());
+        self.mark_changed(row);
         Ok(())
     }
 
@@ -160,6 +165,7 @@ impl<S: Scalar> Marbles<S> {
     ) -> Result<(), Error> {
         let row = self.row(id)?;
         self.rotation_model.set(row, model, self.len());
+        self.mark_changed(row);
         if model == Some(Rotation::None) {
             self.set_angular_velocity(id, Vec3::zero())?;
         }
@@ -178,6 +184,7 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         let material = material.map(Material::validated).transpose()?;
         self.material.set(row, material, self.len());
+        self.mark_changed(row);
         Ok(())
     }
 }

@@ -2,6 +2,7 @@
 
 use cgmath::{One, Zero};
 
+use super::changed_rows::ChangedRows;
 use super::marble::{Damping, Marble, non_default, validated_half_length, validated_rotation};
 use super::sparse_column::SparseColumn;
 use crate::Error;
@@ -38,6 +39,7 @@ pub struct Marbles<S> {
     pub(super) has_rotation: bool,
     pub(super) compensated: bool,
     pub(super) period: Period<S>,
+    pub(super) changed: ChangedRows,
     pub(super) position: Vec<Point3<S>>,
     pub(super) radius: Vec<S>,
     /// Capsules only.
@@ -70,6 +72,7 @@ impl<S> Default for Marbles<S> {
             has_rotation: false,
             compensated: false,
             period: Period::default(),
+            changed: ChangedRows::default(),
             position: Vec::new(),
             radius: Vec::new(),
             half_length: SparseColumn::default(),
@@ -330,12 +333,9 @@ impl<S: Scalar> Marbles<S> {
 
     /// Returns true if gravity does not accelerate all alike, or other forces act.
     pub(super) fn accelerate_differently(&self) -> bool {
-        self.has_external_forces() || !(self.gravity_scale.is_empty() && self.mass.is_empty())
-    }
-
-    /// Returns true if all have the default mass and material and no own rotation model.
-    pub(super) fn are_alike(&self) -> bool {
-        self.mass.is_empty() && self.material.is_empty() && self.rotation_model.is_empty()
+        self.has_external_forces()
+            || !self.gravity_scale.is_empty()
+            || self.mass.values().any(|mass| mass == Mass::Infinite)
     }
 
     /// Columns that a solver of rows writes.
@@ -352,6 +352,11 @@ impl<S: Scalar> Marbles<S> {
             rotation,
             radius: &self.radius,
         }
+    }
+
+    /// Lists a row as set by others than the solver.
+    pub(super) fn mark_changed(&mut self, row: usize) {
+        self.changed.add(row, self.position.len());
     }
 
     /// Mass in kilograms; infinite for kinematic marbles.
@@ -375,6 +380,7 @@ impl<S: Scalar> Marbles<S> {
 
     /// Stops a marble: clears velocity, angular velocity and their compensation.
     pub(super) fn stop(&mut self, row: usize) {
+        self.mark_changed(row);
         self.velocity[row] = Vec3::zero();
         if let Some(angular_velocity) = self.angular_velocity.get_mut(row) {
             *angular_velocity = Vec3::zero();

@@ -1,5 +1,6 @@
 //! The state as columns, the choice of methods, and the step.
 
+mod changed_rows;
 mod contact_limit;
 mod continuous;
 mod energy;
@@ -244,6 +245,7 @@ impl<S: Scalar> World<S> {
             return Err(Error::Unsupported { response: "SoftStep", feature: "a period" });
         }
         self.model = model;
+        self.marbles.changed.add_all();
         self.forget_contacts();
         self.marbles
             .enable_rotation(model.rotation != Rotation::None || self.marbles.has_capsules());

@@ -3,59 +3,42 @@
 
 use cgmath::{EuclideanSpace, Zero};
 
-use super::MarbleId;
 use super::World;
 use super::integrate::StepContext;
 use super::swarm::FURTHEST;
 use crate::Error;
+use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, cast_vector, length};
-use crate::motion::{Mass, Rotation};
+use crate::motion::Rotation;
 use crate::response::Material;
-use crate::swarm::{BallId, Body, MarbleRow, NO_ROW, Push, Surface};
+use crate::swarm::{Body, MarbleRow, NO_ROW, Push, Surface, SyncToken};
 
 /// Correspondence of marbles and rows, and scratch memory.
 #[derive(Clone, Debug)]
 pub(super) struct SoftStep<S> {
-    /// Removals and number of marbles for which these hold, and whether the balls of the swarm
-    /// have the material of marbles that have none of their own.
-    known: Option<(u64, usize, bool)>,
-    /// Handles of the marbles in the swarm for which they hold.
-    balls: Vec<(MarbleId, BallId)>,
+    /// Number of removals and of marbles, rotation model, and whether the swarm has the default
+    /// material: others change the rows of all.
+    known: Option<(u64, usize, Rotation, bool)>,
+    token: SyncToken,
     slot_of_marble: Vec<u32>,
     marble_of_slot: Vec<u32>,
-    /// Last seen by marble; empty while no marble has any of its own.
-    details: Vec<Details<S>>,
     changed: Vec<Body>,
+    lists: Vec<Contacts<S>>,
     /// Length of the step that was integrated, in seconds.
     dt: f32,
     /// Length of the step and version of the walls for which contacts were found.
     found: Option<(f32, u64)>,
 }
 
-/// Rarely changing numbers of a marble that rows need.
-#[derive(Clone, Copy, Debug, PartialEq)]
-struct Details<S> {
-    mass: Mass<S>,
-    material: Option<Material<S>>,
-    rotation_locked: bool,
-}
-
-impl<S: Scalar> Details<S> {
-    fn surface(self) -> Surface {
-        let material = self.material.map_or_else(Material::default, Material::cast);
-        Surface { material, rotation_locked: self.rotation_locked }
-    }
-}
-
 impl<S> Default for SoftStep<S> {
     fn default() -> Self {
         Self {
             known: None,
-            balls: Vec::new(),
+            token: SyncToken::default(),
             slot_of_marble: Vec::new(),
             marble_of_slot: Vec::new(),
-            details: Vec::new(),
             changed: Vec::new(),
+            lists: Vec::new(),
             dt: 0.0,
             found: None,
         }
@@ -114,8 +97,8 @@ impl<S: Scalar> World<S> {
         let marbles = &self.soft_step.marble_of_slot;
         let turns = self.model.rotation == Rotation::Dynamic;
         self.swarm.read_bodies(marbles, self.marbles.body_columns(turns), None);
-        self.swarm.list_contacts(marbles, [reach, dt], &mut self.contacts);
-        self.contacts.sort();
+        let lists = &mut self.soft_step.lists;
+        self.swarm.list_contacts(marbles, [reach, dt], lists, &mut self.contacts);
     }
 
     /// The third verb: moves marbles on in substeps, and solves their contacts.
@@ -142,70 +125,66 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Brings rows up to date with marbles that came, went, or were changed by others than the
-    /// solver.
+    /// Brings rows up to date with marbles that came, went, or were set.
     fn sync_bodies(&mut self) -> Result<(), Error> {
         self.swarm.set_hosting(true);
-        let plain_swarm = self.swarm.model().material == Material::default();
-        let known = Some((self.marbles.removals(), self.marbles.len(), plain_swarm));
-        let stale = self.soft_step.known != known || self.swarm.invited != self.soft_step.balls;
-        if stale {
+        let rotation = self.model.rotation;
+        let plain = self.swarm.model().material == Material::default();
+        let known = Some((self.marbles.removals(), self.marbles.len(), rotation, plain));
+        let token = &self.soft_step.token;
+        let listed = self.soft_step.known == known && self.swarm.synced.agrees(token);
+        if !listed || !self.marbles.changed.agrees(token) {
             self.see_guests_off()?;
             self.invite_all()?;
             self.match_slots();
+            let all: Vec<_> = (0..self.marbles.len() as u32).collect();
+            self.find_changes(&all);
+            let [token, synced, changed] = SyncToken::unique();
+            (self.soft_step.token, self.swarm.synced) = (token, synced);
+            self.marbles.changed.reset(changed);
             self.soft_step.known = known;
-        }
-        let rotation = self.model.rotation;
-        let marbles = &self.marbles;
-        let SoftStep { slot_of_marble, details, changed, .. } = &mut self.soft_step;
-        let simple = marbles.are_alike() && rotation == Rotation::Dynamic;
-        let plain = Details { mass: Mass::default(), material: None, rotation_locked: false };
-        if simple && details.iter().all(|own| *own == plain) {
-            details.clear();
         } else {
-            details.resize(marbles.len(), plain);
+            let rows = self.marbles.changed.take();
+            self.find_changes(&rows);
+            self.marbles.changed.recycle(rows);
         }
+        self.swarm.write_bodies(&self.soft_step.changed);
+        Ok(())
+    }
+
+    /// Finds which of these marbles differ from their rows.
+    fn find_changes(&mut self, rows: &[u32]) {
+        let (marbles, rotation) = (&self.marbles, self.model.rotation);
+        let plain_swarm = self.swarm.model().material == Material::default();
+        let SoftStep { slot_of_marble, changed, .. } = &mut self.soft_step;
         changed.clear();
-        for (row, slot) in slot_of_marble.iter().enumerate() {
-            if *slot == NO_ROW {
+        for row in rows.iter().map(|row| *row as usize) {
+            let Some(slot) = slot_of_marble.get(row).copied().filter(|slot| *slot != NO_ROW) else {
                 continue;
-            }
-            let now = if details.is_empty() {
-                plain
-            } else {
-                Details {
-                    mass: marbles.own_mass(row),
-                    material: marbles.material.get(row),
-                    rotation_locked: marbles.rotation_of(row, rotation) != Rotation::Dynamic,
-                }
             };
-            let spin = marbles.angular_velocity.get(row).copied().filter(|_| !now.rotation_locked);
-            let same = details.get(row).is_none_or(|before| *before == now);
+            let material = marbles.material.get(row);
+            let rotation_locked = marbles.rotation_of(row, rotation) != Rotation::Dynamic;
+            let surface = (material.is_some() || rotation_locked || !plain_swarm).then(|| {
+                let material = material.map_or_else(Material::default, Material::cast);
+                Surface { material, rotation_locked }
+            });
+            let spin = marbles.angular_velocity.get(row).copied().filter(|_| !rotation_locked);
             let marble = MarbleRow {
                 position: marbles.position[row],
                 velocity: marbles.velocity[row],
                 spin,
                 radius: marbles.radius[row],
             };
-            if same && !stale && self.swarm.is_as_read(*slot, marble) {
-                continue;
+            let inverse_mass = inverse_mass(marbles.mass(row));
+            if !self.swarm.is_as_read(slot, marble, inverse_mass, surface) {
+                changed.push(body(slot, marble, inverse_mass, surface));
             }
-            if let Some(details) = details.get_mut(row) {
-                *details = now;
-            }
-            let own = now.material.is_some() || now.rotation_locked;
-            let surface = (own || !plain_swarm).then(|| now.surface());
-            changed.push(body(*slot, marble, marbles.mass(row), surface));
         }
-        self.swarm.write_bodies(&self.soft_step.changed);
-        Ok(())
     }
 
     /// Finds the slot of each marble, and the marble of each slot.
     fn match_slots(&mut self) {
-        let SoftStep { balls, slot_of_marble, marble_of_slot, details, .. } = &mut self.soft_step;
-        balls.clone_from(&self.swarm.invited);
-        details.clear();
+        let SoftStep { slot_of_marble, marble_of_slot, .. } = &mut self.soft_step;
         slot_of_marble.clear();
         slot_of_marble.resize(self.marbles.len(), NO_ROW);
         marble_of_slot.clear();
@@ -221,13 +200,22 @@ impl<S: Scalar> World<S> {
     }
 }
 
+/// Inverse mass of a row, in 1/kg.
+fn inverse_mass<S: Scalar>(mass: S) -> f32 {
+    let [least, most] = INVERSE_MASSES;
+    ((S::one() / mass).as_f64() as f32).clamp(least, most)
+}
+
 /// A marble as a row.
-fn body<S: Scalar>(slot: u32, marble: MarbleRow<S>, mass: S, surface: Option<Surface>) -> Body {
+fn body<S: Scalar>(
+    slot: u32,
+    marble: MarbleRow<S>,
+    inverse_mass: f32,
+    surface: Option<Surface>,
+) -> Body {
     let single = |x: S| (x.as_f64() as f32).clamp(-FURTHEST, FURTHEST);
     let row = |v: Vec3<S>, last: f32| [single(v.x), single(v.y), single(v.z), last];
     let spin = marble.spin.map_or_else(Vec3::zero, |spin| spin * marble.radius);
-    let [least, most] = INVERSE_MASSES;
-    let inverse_mass = ((S::one() / mass).as_f64() as f32).clamp(least, most);
     Body {
         slot,
         at: row(marble.position.to_vec(), single(marble.radius).max(LEAST_RADIUS)),

@@ -35,6 +35,11 @@ impl<T: Copy> SparseColumn<T> {
         }
     }
 
+    /// Iterates over the values that there are.
+    pub fn values(&self) -> impl Iterator<Item = T> + '_ {
+        self.values.iter().copied().flatten()
+    }
+
     /// Clears all values.
     pub fn clear(&mut self) {
         self.values.clear();
