@@ -152,6 +152,6 @@ pub(crate) fn take_out_walls(
 /// Balls that are neither a swarm's nor guests.
 pub(crate) fn lost_balls(world: &TawWorld, owned: &HashSet<BallId>) -> Vec<BallId> {
     let swarm = &world.swarm;
-    let rows = (0..swarm.slots().len()).filter(|row| !swarm.is_guest(*row));
+    let rows = (0..swarm.slots().len()).filter(|row| !swarm.is_marble(*row));
     rows.filter_map(|row| swarm.id(row)).filter(|ball| !owned.contains(ball)).collect()
 }

@@ -137,7 +137,7 @@ fn draw(
                 for ((row, ((ball, velocity), slot)), bytes) in
                     rows.zip(data.chunks_exact_mut(BYTES))
                 {
-                    if swarm.is_guest(number * BLOCK + row) {
+                    if swarm.is_marble(number * BLOCK + row) {
                         continue; // an entity, which is drawn by itself
                     }
                     let at = place(ball) - place(velocity) * ago;

@@ -3,7 +3,7 @@
 use taw::Error;
 use taw::prelude::*;
 use taw::shape::Mesh;
-use taw::swarm::{Ball, BallId, Instructions, Swarm, SwarmModel, Tier};
+use taw::swarm::{Ball, BallId, SimdLevel, Swarm, SwarmModel, Tier};
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -88,7 +88,7 @@ fn energy(swarm: &Swarm) -> f64 {
     for (row, (at, velocity)) in rows.enumerate() {
         let m = 1.0 / f64::from(velocity[3].abs());
         let square = |v: &[f32; 4]| v[..3].iter().map(|x| f64::from(*x).powi(2)).sum::<f64>();
-        let rim = swarm.rims().get(row).map_or(0.0, square);
+        let rim = swarm.spin_velocities().get(row).map_or(0.0, square);
         energy += m * (0.5 * square(velocity) + 0.2 * rim + 9.81 * f64::from(at[1]));
         mass += m;
     }
@@ -100,16 +100,16 @@ fn threads_and_instructions_change_no_bit() {
     for tier in [Tier::Lab, Tier::Full] {
         for least in [0.3, 0.01] {
             let start = pour(2_500, least, model(tier));
-            let run = |threads: u32, instructions: Instructions| {
+            let run = |threads: u32, instructions: SimdLevel| {
                 let mut world = start.clone();
                 world.swarm.set_model(SwarmModel { threads, ..model(tier) }).unwrap();
-                world.swarm.set_instructions(instructions);
+                world.swarm.set_simd_level(instructions);
                 steps(&mut world, 60);
                 world
             };
-            let reference = run(1, Instructions::PORTABLE);
+            let reference = run(1, SimdLevel::PORTABLE);
             assert!(reference.swarm.rebuilds() > 5);
-            for instructions in Instructions::available() {
+            for instructions in SimdLevel::available() {
                 for threads in [1, 2, 3, 8] {
                     let other = run(threads, instructions);
                     let what = format!("{tier:?}, {threads} threads, {instructions:?}");
@@ -280,7 +280,10 @@ fn the_tier_changes_while_balls_come_and_go() {
         world.swarm.remove(&[world.swarm.id(0).unwrap()]).unwrap();
         steps(&mut world, 1);
         assert_eq!(world.swarm.len(), count - 100);
-        assert_eq!(world.swarm.rims().len(), if tier == Tier::Full { count - 100 } else { 0 });
+        assert_eq!(
+            world.swarm.spin_velocities().len(),
+            if tier == Tier::Full { count - 100 } else { 0 }
+        );
     }
 }
 
@@ -495,7 +498,7 @@ fn marbles_and_swarms_push_each_other() {
         }
         // It is one of the balls, and goes when the marble does.
         assert_eq!(world.swarm.len(), 2);
-        assert_eq!((0..2).filter(|row| world.swarm.is_guest(*row)).count(), 1);
+        assert_eq!((0..2).filter(|row| world.swarm.is_marble(*row)).count(), 1);
         world.marbles.remove(marble).unwrap();
         world.step(1.0 / 60.0).unwrap();
         assert_eq!(world.swarm.len(), 1);
@@ -510,7 +513,7 @@ fn marbles_stay_guests_whatever_is_taken_out() {
         (0..4).map(|i| world.marbles.insert(Marble::new(place(i), 0.5)).unwrap()).collect();
     let own = world.swarm.insert(&[Ball::new(place(9), 0.5)]).unwrap()[0];
     let guests = |world: &World<f32>| {
-        let rows = (0..world.swarm.len()).filter(|row| world.swarm.is_guest(*row));
+        let rows = (0..world.swarm.len()).filter(|row| world.swarm.is_marble(*row));
         let mut places: Vec<_> =
             rows.map(|row| world.swarm.balls()[row][0].round() as u8).collect();
         places.sort_unstable();

@@ -19,7 +19,7 @@ fn kinetic(swarm: &Swarm) -> f64 {
     let square = |v: &[f32; 4]| v[..3].iter().map(|x| f64::from(*x).powi(2)).sum::<f64>();
     let of = |row: usize| {
         let velocity = &swarm.velocities()[row];
-        let rim = swarm.rims().get(row).map_or(0.0, square);
+        let rim = swarm.spin_velocities().get(row).map_or(0.0, square);
         (0.5 * square(velocity) + 0.2 * rim) / f64::from(velocity[3].abs())
     };
     (0..swarm.len()).map(of).sum()

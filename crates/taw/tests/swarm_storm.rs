@@ -2,7 +2,7 @@
 //! `SWARM_STORM=1000 cargo test -p taw --release --test swarm_storm` runs so many of them.
 
 use taw::prelude::*;
-use taw::swarm::{Ball, Instructions, Swarm, SwarmModel, Tier};
+use taw::swarm::{Ball, SimdLevel, Swarm, SwarmModel, Tier};
 
 const DT: f32 = 1.0 / 60.0;
 
@@ -91,7 +91,7 @@ fn energy(scene: &Scene) -> f64 {
     let square = |v: &[f32; 4]| v[..3].iter().map(|x| f64::from(*x).powi(2)).sum::<f64>();
     let of = |row: usize| {
         let (at, velocity) = (&swarm.balls()[row], &swarm.velocities()[row]);
-        let rim = swarm.rims().get(row).map_or(0.0, square);
+        let rim = swarm.spin_velocities().get(row).map_or(0.0, square);
         let height = f64::from(at[1] + scene.half);
         (0.5 * square(velocity) + 0.2 * rim + g * height) / f64::from(velocity[3].abs())
     };
@@ -146,15 +146,15 @@ fn random_swarms_make_no_energy() {
 fn random_swarms_have_the_same_bits_with_any_threads_and_instructions() {
     for seed in 0..6 {
         let mut reference = scene(seed);
-        reference.world.swarm.set_instructions(Instructions::PORTABLE);
+        reference.world.swarm.set_simd_level(SimdLevel::PORTABLE);
         let start = reference.world.clone();
         (0..30).for_each(|_| reference.world.step(DT).unwrap());
-        for instructions in Instructions::available() {
+        for instructions in SimdLevel::available() {
             for threads in [1, 2, 3] {
                 let mut other = start.clone();
                 let model = SwarmModel { threads, ..other.swarm.model() };
                 other.swarm.set_model(model).unwrap();
-                other.swarm.set_instructions(instructions);
+                other.swarm.set_simd_level(instructions);
                 (0..30).for_each(|_| other.step(DT).unwrap());
                 assert!(other.swarm == reference.world.swarm, "{} {threads}", reference.seed);
             }

@@ -1,10 +1,10 @@
-//! Batches of pairs, and how they are filled.
+//! Graph colouring of pairs: batches in which no ball is twice.
 
-use super::lanes::LANES;
-use super::memory::make_room;
+use super::impulse_cache::reserve_slack;
+use super::simd::LANES;
 
-/// Eight pairs, none of which has a ball in common with another. As rows after a first one, so
-/// that two bytes suffice.
+/// Wide constraint: eight pairs, none of which has a ball in common with another. As rows after a
+/// first one, so that two bytes suffice.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub(super) struct Batch {
     pub first: [u32; 2],
@@ -45,8 +45,8 @@ pub(super) fn pairs_in(batches: &[Batch]) -> usize {
     batches.iter().map(|batch| batch.count as usize).sum()
 }
 
-/// Number of batches that are filled at a time.
-pub(super) const OPEN: usize = 32;
+/// Number of colours: batches that are filled at a time.
+pub(super) const MAX_COLOURS: usize = 32;
 /// Rows by which a later pair may lie before the first one of a batch.
 const BEFORE: u32 = 1 << 14;
 /// Number of pairs listed at most, for each ball on average, and besides. A ball has six pairs
@@ -55,39 +55,39 @@ const BEFORE: u32 = 1 << 14;
 const PAIRS: usize = 64;
 const MORE_PAIRS: usize = 4096;
 
-/// Puts pairs into batches: each pair into the first open one in which neither ball is.
-pub(super) struct Filler<'a> {
+/// Greedy colouring: each pair goes into the first open batch in which neither ball is.
+pub(super) struct BatchBuilder<'a> {
     /// A power of two of them. Balls whose rows end in the same bits share one, which costs at
     /// most a place in a batch.
-    busy: &'a mut [u32],
-    open: &'a mut [Batch; OPEN],
+    colour_mask: &'a mut [u32],
+    open: &'a mut [Batch; MAX_COLOURS],
     batches: &'a mut Vec<Batch>,
     /// Number of pairs that may still be listed, and of those that were not.
     left: usize,
     unlisted: usize,
 }
 
-pub(super) fn filler<'a>(
-    busy: &'a mut Vec<u32>,
-    open: &'a mut [Batch; OPEN],
+pub(super) fn builder<'a>(
+    colour_mask: &'a mut Vec<u32>,
+    open: &'a mut [Batch; MAX_COLOURS],
     balls: usize,
     batches: &'a mut Vec<Batch>,
-) -> Filler<'a> {
-    busy.clear();
-    busy.resize(balls.next_power_of_two(), 0);
-    Filler { busy, open, batches, left: MORE_PAIRS, unlisted: 0 }
+) -> BatchBuilder<'a> {
+    colour_mask.clear();
+    colour_mask.resize(balls.next_power_of_two(), 0);
+    BatchBuilder { colour_mask, open, batches, left: MORE_PAIRS, unlisted: 0 }
 }
 
-impl Filler<'_> {
+impl BatchBuilder<'_> {
     /// Makes room for the pairs of a ball; says how many of so many there is room for.
     #[inline(always)]
     pub fn spend(&mut self, pairs: usize) -> usize {
-        self.make_room(1);
+        self.allow(1);
         self.spend_only(pairs)
     }
 
     /// Makes room for the pairs of so many balls.
-    pub fn make_room(&mut self, balls: usize) {
+    pub fn allow(&mut self, balls: usize) {
         self.left += PAIRS * balls;
     }
 
@@ -102,9 +102,9 @@ impl Filler<'_> {
 
     #[inline(always)]
     pub fn add(&mut self, a: u32, b: u32) {
-        let busy = *self.busy(a) | *self.busy(b);
-        let mut slot = busy.trailing_ones() as usize;
-        if slot == OPEN {
+        let colour_mask = *self.colour_mask(a) | *self.colour_mask(b);
+        let mut slot = colour_mask.trailing_ones() as usize;
+        if slot == MAX_COLOURS {
             // A large ball among many small ones.
             slot = self.fullest();
             self.close(slot);
@@ -122,8 +122,8 @@ impl Filler<'_> {
         let lane = batch.count as usize % LANES;
         (batch.a[lane], batch.b[lane]) = (place[0] as u16, place[1] as u16);
         batch.count += 1;
-        *self.busy(a) |= 1 << slot;
-        *self.busy(b) |= 1 << slot;
+        *self.colour_mask(a) |= 1 << slot;
+        *self.colour_mask(b) |= 1 << slot;
         if self.open[slot].count as usize == LANES {
             self.close(slot);
         }
@@ -131,10 +131,10 @@ impl Filler<'_> {
 
     /// The open batches in which a row is.
     #[inline(always)]
-    fn busy(&mut self, row: u32) -> &mut u32 {
-        let at = row as usize & (self.busy.len() - 1);
+    fn colour_mask(&mut self, row: u32) -> &mut u32 {
+        let at = row as usize & (self.colour_mask.len() - 1);
         // SAFETY: the length is a power of two.
-        unsafe { self.busy.get_unchecked_mut(at) }
+        unsafe { self.colour_mask.get_unchecked_mut(at) }
     }
 
     #[cold]
@@ -142,7 +142,7 @@ impl Filler<'_> {
         let counts = self.open.iter().map(|batch| batch.count);
         counts
             .enumerate()
-            .max_by_key(|(slot, count)| (*count, OPEN - slot))
+            .max_by_key(|(slot, count)| (*count, MAX_COLOURS - slot))
             .map_or(0, |(slot, _)| slot)
     }
 
@@ -153,7 +153,7 @@ impl Filler<'_> {
         if batch.count > 0 {
             for lane in 0..batch.count as usize {
                 for row in batch.pair(lane) {
-                    *self.busy(row) &= !(1 << slot);
+                    *self.colour_mask(row) &= !(1 << slot);
                 }
             }
             push(self.batches, batch);
@@ -163,13 +163,13 @@ impl Filler<'_> {
 
     /// Takes the open batches as they are. Says how many pairs there was no room for.
     pub fn close_all(&mut self) -> usize {
-        (0..OPEN).for_each(|slot| self.close(slot));
+        (0..MAX_COLOURS).for_each(|slot| self.close(slot));
         self.unlisted
     }
 }
 
 #[inline(always)]
 fn push(batches: &mut Vec<Batch>, batch: Batch) {
-    make_room(batches, batches.len() + 1);
+    reserve_slack(batches, batches.len() + 1);
     batches.push(batch);
 }

@@ -6,10 +6,10 @@ use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::batches::Batch;
 use super::kernels::squared;
-use super::lanes::Row;
+use super::simd::Row;
 use super::surfaces::{Surface, SurfaceOf};
-use super::team::{Shared, each};
-use super::touch::Touch;
+use super::wall_contact::WallContact;
+use super::workers::{DisjointSlice, parallel_for};
 use super::{BallId, Swarm, Tier};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector};
@@ -67,7 +67,7 @@ impl PartialEq for SyncToken {
 
 /// Change of velocity that a body gets besides gravity in a step, in m/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Push {
+pub(crate) struct VelocityChange {
     pub slot: u32,
     pub change: [f32; 3],
 }
@@ -104,41 +104,41 @@ fn vector<S: Scalar>(row: &Row) -> Vec3<S> {
 }
 
 impl Swarm {
-    /// Makes bodies rows like all others, or guests that somebody else moves.
-    pub(crate) fn set_hosting(&mut self, hosting: bool) {
-        if hosting == self.hosting {
+    /// Makes bodies rows of the same solve as all others, or proxies that the world's solver moves.
+    pub(crate) fn set_bodies_are_rows(&mut self, bodies_are_rows: bool) {
+        if bodies_are_rows == self.bodies_are_rows {
             return;
         }
         let tier = self.tier();
-        self.hosting = hosting;
+        self.bodies_are_rows = bodies_are_rows;
         if self.tier() != tier {
-            self.before.clear();
+            self.old_rows.clear();
         }
-        self.guests.clear();
-        self.guest_rows.clear();
-        self.pushes.clear();
+        self.proxies.clear();
+        self.proxy_rows.clear();
+        self.velocity_changes.clear();
         self.surfaces.clear();
         self.synced = SyncToken::default();
-        (self.paired, self.remembers, self.walled) = (false, false, None);
-        self.shape_columns();
+        (self.pairs_valid, self.cache_valid, self.walls_version) = (false, false, None);
+        self.resize_columns();
         self.wake_all();
     }
 
     /// Physics that the step models: bodies need all of it.
     pub(super) fn tier(&self) -> Tier {
-        if self.hosting { Tier::Full } else { self.model.tier }
+        if self.bodies_are_rows { Tier::Full } else { self.model.tier }
     }
 
     /// Marks which slots are bodies.
     pub(crate) fn set_bodies(&mut self, slots: impl Iterator<Item = u32>) {
-        self.guest_slots.clear();
-        self.guest_slots.resize(self.ids.slots().len().div_ceil(64), 0);
+        self.body_slots.clear();
+        self.body_slots.resize(self.ids.slots().len().div_ceil(64), 0);
         for slot in slots {
             let word = slot as usize / 64;
-            if self.guest_slots.len() <= word {
-                self.guest_slots.resize(word + 1, 0);
+            if self.body_slots.len() <= word {
+                self.body_slots.resize(word + 1, 0);
             }
-            self.guest_slots[word] |= 1 << (slot % 64);
+            self.body_slots[word] |= 1 << (slot % 64);
         }
     }
 
@@ -173,25 +173,28 @@ impl Swarm {
             self.wake(row);
             let at = self.at[row];
             resized |= at[3] != body.at[3];
-            self.budget[row] -= squared(less(body.at, at)).sqrt() + (body.at[3] - at[3]).abs();
+            self.skin_left[row] -= squared(less(body.at, at)).sqrt() + (body.at[3] - at[3]).abs();
             (self.at[row], self.velocity[row]) = (body.at, body.velocity);
             let [x, y, z, _] = body.spin;
             self.spin[row] = [x, y, z, self.spin[row][3]];
         }
         if resized {
-            self.measure();
+            self.measure_radii();
         }
         if resurfaced {
-            self.remember();
-            (self.paired, self.walled) = (false, None);
+            self.cache_impulses();
+            (self.pairs_valid, self.walls_version) = (false, None);
         }
     }
 
-    /// Sets what moves bodies besides gravity in the next step: the change of velocity of each, in
-    /// m/s. Wakes those for which it is another one than in the last step.
-    pub(crate) fn set_pushes(&mut self, pushes: impl Iterator<Item = Push>) {
-        let now: Vec<_> = pushes.collect();
-        let before = std::mem::take(&mut self.pushes);
+    /// Sets the velocity changes of bodies besides gravity in the next step, in m/s. Wakes those
+    /// for which it is another one than in the last step.
+    pub(crate) fn set_velocity_changes(
+        &mut self,
+        velocity_changes: impl Iterator<Item = VelocityChange>,
+    ) {
+        let now: Vec<_> = velocity_changes.collect();
+        let before = std::mem::take(&mut self.velocity_changes);
         for i in 0..before.len().max(now.len()) {
             let (old, new) = (before.get(i), now.get(i));
             if old != new {
@@ -203,13 +206,13 @@ impl Swarm {
                 }
             }
         }
-        self.pushes = now;
+        self.velocity_changes = now;
     }
 
-    /// Applies a part of these, where bodies are awake.
-    pub(super) fn push_bodies(&mut self, part: f32) {
+    /// Applies a fraction of these, where bodies are awake.
+    pub(super) fn apply_velocity_changes(&mut self, part: f32) {
         let rows = self.ids.rows();
-        for Push { slot, change } in &self.pushes {
+        for VelocityChange { slot, change } in &self.velocity_changes {
             let Some(velocity) = self.velocity.get_mut(rows[*slot as usize] as usize) else {
                 continue;
             };
@@ -223,9 +226,9 @@ impl Swarm {
 
     /// Moves bodies that no wall bears by these changes times some seconds: back by half of what
     /// they moved too far by them, as a drift does for gravity.
-    pub(super) fn take_pushes_back(&mut self, time: f32) {
+    pub(super) fn correct_free_flight(&mut self, time: f32) {
         let rows = self.ids.rows();
-        for Push { slot, change } in &self.pushes {
+        for VelocityChange { slot, change } in &self.velocity_changes {
             let row = rows[*slot as usize] as usize;
             let Some(at) = self.at.get_mut(row) else { continue };
             if self.spin[row][3] == 0.0 && !self.velocity[row][3].is_sign_negative() {
@@ -237,8 +240,8 @@ impl Swarm {
     }
 
     /// Writes the rows of bodies back to the columns of the marbles, of which each slot has one or
-    /// [none](NO_ROW). What slept through the step is as it was. Rotations go on by `dt` seconds; with
-    /// none, only what has just fallen asleep is read.
+    /// [none](NO_ROW). What slept through the step is as it was. Rotations go on by `dt` seconds;
+    /// with none, only what has just fallen asleep is read.
     pub(crate) fn read_bodies<S: Scalar>(
         &mut self,
         marble_of_slot: &[u32],
@@ -246,20 +249,21 @@ impl Swarm {
         dt: Option<S>,
     ) {
         let BodyColumns { position, velocity, angular_velocity: spin, rotation, radius } = columns;
-        let (position, velocity) = (Shared::new(position), Shared::new(velocity));
-        let (turns, spin, rotation) = (!spin.is_empty(), Shared::new(spin), Shared::new(rotation));
+        let (position, velocity) = (DisjointSlice::new(position), DisjointSlice::new(velocity));
+        let (turns, spin, rotation) =
+            (!spin.is_empty(), DisjointSlice::new(spin), DisjointSlice::new(rotation));
         let slots = self.ids.slots();
         let [places, speeds, spins] = [&self.at[..], &self.velocity[..], &self.spin[..]];
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
-        let slabs = Shared::new(&mut self.slabs);
-        each(self.model.threads as usize, slabs.len(), |_, slab| {
-            // SAFETY: each thread has its own slabs.
-            let slab = unsafe { &mut *slabs.row(slab) };
-            if slab.asleep && slab.read_asleep || !slab.asleep && dt.is_none() {
+        let chunks = DisjointSlice::new(&mut self.chunks);
+        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+            // SAFETY: each thread has its own chunks.
+            let chunk = unsafe { &mut *chunks.row(chunk) };
+            if chunk.asleep && chunk.read_asleep || !chunk.asleep && dt.is_none() {
                 return;
             }
-            slab.read_asleep = slab.asleep;
-            for row in slab.own_rows() {
+            chunk.read_asleep = chunk.asleep;
+            for row in chunk.own_rows() {
                 let marble = marble_of_slot.get(slots[row] as usize).copied().unwrap_or(NO_ROW);
                 if marble == NO_ROW {
                     continue;
@@ -291,18 +295,18 @@ impl Swarm {
         lists: &mut Vec<Contacts<S>>,
         contacts: &mut Contacts<S>,
     ) {
-        let chunks = self.slabs.len();
+        let chunks = self.chunks.len();
         lists.resize_with(chunks + 1, Contacts::default);
         lists.iter_mut().for_each(Contacts::clear);
-        let parts = Shared::new(lists);
-        each(self.model.threads as usize, chunks + 1, |_, chunk| {
+        let parts = DisjointSlice::new(lists);
+        parallel_for(self.model.threads as usize, chunks + 1, |_, chunk| {
             // SAFETY: each has its own list.
             let list = unsafe { &mut *parts.row(chunk) };
-            let (touches, batches) = self
-                .slabs
-                .get(chunk)
-                .map_or((&[][..], &self.strays.batches), |slab| (&slab.touches, &slab.batches));
-            self.list_contacts_of(marble_of_slot, near, (touches, batches), list);
+            let (wall_contacts, batches) =
+                self.chunks.get(chunk).map_or((&[][..], &self.fast_movers.batches), |chunk| {
+                    (&chunk.wall_contacts, &chunk.batches)
+                });
+            self.list_contacts_of(marble_of_slot, near, (wall_contacts, batches), list);
         });
         for list in lists {
             contacts.wm.append(&mut list.wm);
@@ -315,7 +319,7 @@ impl Swarm {
         &self,
         marble_of_slot: &[u32],
         [reach, dt]: [f32; 2],
-        (touches_of_walls, batches): (&[Touch], &[Batch]),
+        (contacts_of_walls, batches): (&[WallContact], &[Batch]),
         contacts: &mut Contacts<S>,
     ) {
         let slots = self.ids.slots();
@@ -323,16 +327,18 @@ impl Swarm {
             let marble = marble_of_slot.get(slots[row as usize] as usize).copied();
             marble.filter(|marble| *marble != NO_ROW)
         };
-        let touches = |gap: f32, closing: f32| gap <= reach || gap < closing * dt;
-        for touch in touches_of_walls {
-            let Some(b) = marble(touch.row) else { continue };
-            let row = touch.row as usize;
-            let gap = touch.gap(&self.at[row]);
-            let closing = -(vector::<f32>(&self.velocity[row]) - touch.surface);
-            if touches(gap, closing.dot(touch.normal)) {
-                let mtv = cast_vector(touch.normal * (-gap).max(0.0));
+        let is_near = |separation: f32, approach_speed: f32| {
+            separation <= reach || separation < approach_speed * dt
+        };
+        for contact in contacts_of_walls {
+            let Some(b) = marble(contact.row) else { continue };
+            let row = contact.row as usize;
+            let separation = contact.separation(&self.at[row]);
+            let approach_speed = -(vector::<f32>(&self.velocity[row]) - contact.surface);
+            if is_near(separation, approach_speed.dot(contact.normal)) {
+                let mtv = cast_vector(contact.normal * (-separation).max(0.0));
                 let along = [S::zero(); 2];
-                contacts.wm.push(Contact { a: touch.wall, b, part: touch.part, along, mtv });
+                contacts.wm.push(Contact { a: contact.wall, b, part: contact.part, along, mtv });
             }
         }
         for batch in batches {
@@ -343,10 +349,10 @@ impl Swarm {
                 let [u, v] = rows.map(|row| vector::<f32>(&self.velocity[row as usize]));
                 let apart = vector::<f32>(q) - vector(p);
                 let distance = apart.magnitude();
-                let gap = distance - (p[3] + q[3]);
+                let separation = distance - (p[3] + q[3]);
                 let normal = if distance > 0.0 { apart / distance } else { Vec3::unit_x() };
-                if touches(gap, (u - v).dot(normal)) {
-                    let mtv = cast_vector(normal * (-gap).max(0.0));
+                if is_near(separation, (u - v).dot(normal)) {
+                    let mtv = cast_vector(normal * (-separation).max(0.0));
                     let (a, b, mtv) = if a < b { (a, b, mtv) } else { (b, a, -mtv) };
                     contacts.mm.push(Contact { a, b, part: 0, along: [S::zero(); 2], mtv });
                 }

@@ -1,194 +1,209 @@
-//! Putting rows in order, and seeking pairs.
+//! Order of the rows, and the search for pairs.
 
 use super::batches::{pairs_in, take_out};
+use super::chunk::Chunk;
+use super::fast_movers::FastMovers;
 use super::grid::{reorder, reorder_rows};
+use super::impulse_cache::shrink_slack;
 use super::kernels::squared;
-use super::memory::fit;
-use super::pairs::{Fans, FindPairs, Search};
-use super::slab::Slab;
-use super::step::listed;
-use super::strays::Strays;
+use super::neighbours::{FindPairs, NeighbourLists, Search};
+use super::step::listed_planes;
 use super::surfaces::SurfaceOf;
-use super::team::{Shared, each, each_rows, list_rows};
-use super::{Stage, Surroundings, Swarm, walls};
+use super::workers::{DisjointSlice, parallel_filter, parallel_for, parallel_for_rows};
+use super::{Stage, StaticGeometry, Swarm, walls};
 
-/// Balls in a slab at least.
-const SLAB: u32 = 512;
-/// Way of a ball between two searches at most: as far as it goes in so many steps at its speed,
+/// Balls in a chunk at least.
+const MIN_CHUNK_ROWS: u32 = 512;
+/// Largest displacement between two searches for pairs: as far as a ball goes in so many steps at
+/// its speed,
 const STEPS: f32 = 12.0;
-/// or so many times as far as the margin at most if it is sought for alone.
+/// or so many times the skin at most, if it is a fast mover.
 const FAR: f32 = 16.0;
 
-/// Where a ball has fewer pairs than this and they are sought again after fewer steps than this,
-/// the margin becomes up to so much wider.
+/// Where a ball has fewer pairs than this, and pairs are searched again after fewer steps than
+/// this, the skin becomes up to so much wider.
 const SPARSE: f32 = 2.0;
 pub(super) const SOON: u32 = 6;
 const WIDEST: f32 = 6.0;
-/// Way at most of balls that are not sought for alone, in radii: further they pass through each
-/// other.
+/// Largest skin of balls that are no fast movers, in radii: beyond it they pass through each other.
 const WIDE: f32 = 2.0;
 
 impl Swarm {
-    /// Seeks pairs anew.
+    /// Sorts the rows and finds all pairs.
     pub(super) fn build(
         &mut self,
         dt: f32,
-        walls: &dyn Surroundings,
+        walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
     ) {
         let threads = self.model.threads as usize;
         self.rebuilds += 1;
         observe(Stage::Pairs);
-        if self.rough() {
-            self.remember();
+        if self.has_friction() {
+            self.cache_impulses();
         }
         observe(Stage::Order);
-        if self.paired {
-            self.adapt_margin();
+        if self.pairs_valid {
+            self.adapt_skin();
         }
-        self.cap = self.find_cap(dt);
-        let cap = self.cap;
-        // The budgets make room for the order: they are set anew after that.
-        let order = bytemuck::cast_slice_mut(&mut self.budget);
-        self.grid.sort(&self.at, 2.0 * cap, threads, order, &mut self.spare);
+        self.skin = self.choose_skin(dt);
+        let skin = self.skin;
+        // The remaining skins lend their column to the order: they are set after that.
+        let order = bytemuck::cast_slice_mut(&mut self.skin_left);
+        self.grid.sort(&self.at, 2.0 * skin, threads, order, &mut self.scratch);
         self.reorder();
-        self.set_budgets(dt, cap);
+        self.reset_skins(dt, skin);
         observe(Stage::Pairs);
-        self.cut_slabs();
-        self.find_pairs(cap, dt, walls);
-        self.memory.fit();
-        self.paired = true;
-        self.remembers = false;
+        self.cut_chunks();
+        self.find_pairs(skin, dt, walls);
+        self.impulse_cache.shrink_slack();
+        self.pairs_valid = true;
+        self.cache_valid = false;
     }
 
-    /// Way that most balls may go until pairs are sought again, in metres. In the lab's
-    /// tier a heap is livelier, and a pair more costs less.
+    /// Skin at the usual speed, in metres: displacement of most balls until pairs are searched
+    /// again. In the lab's tier a heap is livelier, and a pair more costs less.
     fn margin(&self) -> f32 {
-        self.mean * (1.0 + self.spread) * if self.rough() { 0.2 } else { 0.3 }
+        self.mean_radius * (1.0 + self.skin_scale) * if self.has_friction() { 0.2 } else { 0.3 }
     }
 
-    /// The margin, or as far as all but the fastest go in two steps, who are sought for alone: a
-    /// ball that goes further than others look for it would be found inside of them.
-    fn find_cap(&mut self, dt: f32) -> f32 {
+    /// Chooses the Verlet skin: the usual one, or as far as all but the fast movers go in two
+    /// steps. A ball that goes further than others look for it would be found inside of them.
+    fn choose_skin(&mut self, dt: f32) -> f32 {
         let margin = self.margin();
-        if !self.rough() {
+        if !self.has_friction() {
             return margin;
         }
-        let mut ways = std::mem::take(&mut self.ways);
-        ways.clear();
-        let way = |velocity: &[f32; 4]| 2.0 * squared(*velocity).sqrt() * dt;
-        ways.extend(self.velocity.iter().map(way).filter(|way| *way > margin));
-        let alone = super::strays::room(self.at.len());
-        let mut cap = margin;
-        if ways.len() > alone {
-            let nth = ways.len() - 1 - alone;
-            cap = *ways.select_nth_unstable_by(nth, f32::total_cmp).1;
+        let mut displacements = std::mem::take(&mut self.displacements);
+        displacements.clear();
+        let displacement = |velocity: &[f32; 4]| 2.0 * squared(*velocity).sqrt() * dt;
+        displacements.extend(
+            self.velocity.iter().map(displacement).filter(|displacement| *displacement > margin),
+        );
+        let alone = super::fast_movers::max_count(self.at.len());
+        let mut skin = margin;
+        if displacements.len() > alone {
+            let nth = displacements.len() - 1 - alone;
+            skin = *displacements.select_nth_unstable_by(nth, f32::total_cmp).1;
         }
-        self.ways = ways;
-        cap.min(WIDE * self.mean).max(margin)
+        self.displacements = displacements;
+        skin.min(WIDE * self.mean_radius).max(margin)
     }
 
-    /// Widens the margin where balls leave it soon although few are beside each other.
-    fn adapt_margin(&mut self) {
+    /// Widens the skin where balls leave it soon although few are beside each other.
+    fn adapt_skin(&mut self) {
         let sparse = (self.pairs() as f32) < SPARSE * self.len() as f32;
-        let wish = if sparse && self.steps_since_build < SOON { WIDEST } else { 0.0 };
-        self.spread += (wish - self.spread) * 0.3;
+        let target = if sparse && self.steps_since_build < SOON { WIDEST } else { 0.0 };
+        self.skin_scale += (target - self.skin_scale) * 0.3;
         self.steps_since_build = 0;
     }
 
-    /// Says how far each ball may go: more than the cap only if it is sought for alone.
-    fn set_budgets(&mut self, dt: f32, cap: f32) {
-        let (threads, lab) = (self.model.threads as usize, !self.rough());
-        let (at, velocity, way) = (&self.at[..], &self.velocity[..], &self.way[..]);
+    /// Sets the remaining skin of each ball: more than the common skin only for fast movers.
+    fn reset_skins(&mut self, dt: f32, skin: f32) {
+        let (threads, lab) = (self.model.threads as usize, !self.has_friction());
+        let (at, velocity, displacement) =
+            (&self.at[..], &self.velocity[..], &self.displacement[..]);
         let least = if lab { 0.12 } else { 0.08 };
-        self.strays.clear(self.at.len());
+        self.fast_movers.clear(self.at.len());
         // More than this are too many.
-        let most = self.strays.room(self.at.len()) + 1;
-        let budgets = Shared::new(&mut self.budget);
+        let most = self.fast_movers.remaining(self.at.len()) + 1;
+        let skins_left = DisjointSlice::new(&mut self.skin_left);
         let mut fast = std::mem::take(&mut self.leaving);
         fast.clear();
-        list_rows(threads, at.len(), &mut self.lists, &mut fast, |rows, fast| {
+        parallel_filter(threads, at.len(), &mut self.lists, &mut fast, |rows, fast| {
             // SAFETY: each job has its own rows.
-            let budgets = unsafe { budgets.part(rows.clone()) };
-            for (row, budget) in rows.zip(budgets) {
-                let way = if lab { way[row] } else { squared(velocity[row]).sqrt() * dt };
-                *budget = (way * STEPS).clamp(cap.min(least * at[row][3]), cap * FAR);
-                if *budget > cap && fast.len() < most {
+            let skins_left = unsafe { skins_left.part(rows.clone()) };
+            for (row, skin_left) in rows.zip(skins_left) {
+                let displacement =
+                    if lab { displacement[row] } else { squared(velocity[row]).sqrt() * dt };
+                *skin_left = (displacement * STEPS).clamp(skin.min(least * at[row][3]), skin * FAR);
+                if *skin_left > skin && fast.len() < most {
                     fast.push(row as u32);
                 }
             }
         });
-        if self.strays.full(fast.len(), self.at.len()) {
-            each_rows(threads, self.at.len(), |rows| {
+        if self.fast_movers.full(fast.len(), self.at.len()) {
+            parallel_for_rows(threads, self.at.len(), |rows| {
                 // SAFETY: as above.
-                let budgets = unsafe { budgets.part(rows) };
-                for budget in budgets {
-                    *budget = budget.min(cap);
+                let skins_left = unsafe { skins_left.part(rows) };
+                for skin_left in skins_left {
+                    *skin_left = skin_left.min(skin);
                 }
             });
         } else {
             for row in &fast {
-                self.strays.add(*row);
+                self.fast_movers.add(*row);
             }
         }
         self.leaving = fast;
     }
 
-    /// Seeks pairs for balls that leave their budget, or for all, if these are too many.
-    pub(super) fn seek_for(
+    /// Finds pairs for balls that leave their skin, or for all, if these are too many.
+    pub(super) fn find_pairs_of(
         &mut self,
         rows: &[u32],
         dt: f32,
-        walls: &dyn Surroundings,
+        walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
     ) {
-        if self.strays.full(rows.len(), self.at.len()) {
+        if self.fast_movers.full(rows.len(), self.at.len()) {
             return self.build(dt, walls, observe);
         }
         observe(Stage::Pairs);
-        let cap = self.cap;
+        let skin = self.skin;
         for row in rows {
-            self.strays.add(*row);
+            self.fast_movers.add(*row);
             let at = *row as usize;
-            let way =
-                if self.rough() { squared(self.velocity[at]).sqrt() * dt } else { self.way[at] };
-            self.budget[at] = (way * STEPS).clamp(cap, cap * FAR);
+            let displacement = if self.has_friction() {
+                squared(self.velocity[at]).sqrt() * dt
+            } else {
+                self.displacement[at]
+            };
+            self.skin_left[at] = (displacement * STEPS).clamp(skin, skin * FAR);
         }
-        self.find_strays(cap);
-        self.seek_walls_for(rows, dt, walls);
+        self.find_fast_movers(skin);
+        self.find_wall_contacts_of(rows, dt, walls);
     }
 
-    fn find_strays(&mut self, cap: f32) {
-        let (rough, search) = (self.rough(), &mut self.searches[0]);
-        let sizes = [self.largest, cap];
-        let (slots, guests) = (self.ids.slots(), &self.guest_slots[..]);
-        // Bodies that are hosted meet like all others.
-        let apart = rough && !self.guests.is_empty();
-        let guest = |row: u32| apart && Self::has_guest_slot(slots[row as usize], guests);
-        self.strays.find(&self.grid, &self.at, &self.budget, sizes, search, &guest, rough);
-        if rough {
+    fn find_fast_movers(&mut self, skin: f32) {
+        let (has_friction, search) = (self.has_friction(), &mut self.searches[0]);
+        let sizes = [self.max_radius, skin];
+        let (slots, proxies) = (self.ids.slots(), &self.body_slots[..]);
+        // Bodies that are rows meet like all others.
+        let apart = has_friction && !self.proxies.is_empty();
+        let proxy = |row: u32| apart && Self::has_slot(slots[row as usize], proxies);
+        self.fast_movers.find(
+            &self.grid,
+            &self.at,
+            &self.skin_left,
+            sizes,
+            search,
+            &proxy,
+            has_friction,
+        );
+        if has_friction {
             let surfaces =
                 SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
-            let Strays { batches, pushes, .. } = &mut self.strays;
-            pushes.set_numbers(batches, surfaces);
+            let FastMovers { batches, impulses, .. } = &mut self.fast_movers;
+            impulses.set_numbers(batches, surfaces);
         }
     }
 
     fn reorder(&mut self) {
-        let (threads, rough) = (self.model.threads as usize, self.rough());
-        let (order, spare) = (bytemuck::cast_slice(&self.budget), &mut self.spare);
-        reorder_rows(&mut self.at, spare, order, threads);
-        reorder_rows(&mut self.velocity, spare, order, threads);
-        if rough {
-            reorder_rows(&mut self.spin, spare, order, threads);
-            reorder(&mut self.before, spare, order, threads);
+        let (threads, has_friction) = (self.model.threads as usize, self.has_friction());
+        let (order, scratch) = (bytemuck::cast_slice(&self.skin_left), &mut self.scratch);
+        reorder_rows(&mut self.at, scratch, order, threads);
+        reorder_rows(&mut self.velocity, scratch, order, threads);
+        if has_friction {
+            reorder_rows(&mut self.spin, scratch, order, threads);
+            reorder(&mut self.old_rows, scratch, order, threads);
         } else {
-            reorder(&mut self.way, spare, order, threads);
+            reorder(&mut self.displacement, scratch, order, threads);
         }
         let (slots, rows) = self.ids.columns();
-        reorder(slots, spare, order, threads);
-        let (rows, slots) = (Shared::new(rows), &slots[..]);
-        each_rows(threads, slots.len(), |part| {
+        reorder(slots, scratch, order, threads);
+        let (rows, slots) = (DisjointSlice::new(rows), &slots[..]);
+        parallel_for_rows(threads, slots.len(), |part| {
             for row in part {
                 // SAFETY: a slot is that of one row.
                 unsafe { *rows.row(slots[row] as usize) = row as u32 };
@@ -196,103 +211,107 @@ impl Swarm {
         });
     }
 
-    fn cut_slabs(&mut self) {
+    fn cut_chunks(&mut self) {
         let layers = self.grid.layers();
         let (mut layer, mut count) = (0, 0);
         while layer < layers {
             let begin = layer;
             let first = self.grid.first_of_layer(begin);
-            while layer < layers && self.grid.first_of_layer(layer) - first < SLAB {
+            while layer < layers && self.grid.first_of_layer(layer) - first < MIN_CHUNK_ROWS {
                 layer += 1;
             }
             let next = self.grid.first_of_layer(layer);
-            if self.slabs.len() == count {
-                self.slabs.push(Slab::default());
+            if self.chunks.len() == count {
+                self.chunks.push(Chunk::default());
             }
-            let slab = &mut self.slabs[count];
-            slab.layers = [begin, layer];
-            slab.rows = [first, next, next];
-            slab.slow = 0.0;
-            slab.fastest_own = None;
-            slab.read_asleep = false;
+            let chunk = &mut self.chunks[count];
+            chunk.layers = [begin, layer];
+            chunk.rows = [first, next, next];
+            chunk.sleep_time = 0.0;
+            chunk.fastest_own = None;
+            chunk.read_asleep = false;
             let asleep = |row: &[f32; 4]| row[3].is_sign_negative();
             let velocities = &mut self.velocity[first as usize..next as usize];
-            slab.asleep = !velocities.is_empty() && velocities.iter().all(asleep);
-            if !slab.asleep {
+            chunk.asleep = !velocities.is_empty() && velocities.iter().all(asleep);
+            if !chunk.asleep {
                 for velocity in velocities {
                     velocity[3] = velocity[3].abs();
                 }
             }
             if count > 0 {
-                self.slabs[count - 1].rows[2] = next;
+                self.chunks[count - 1].rows[2] = next;
             }
             count += 1;
         }
-        self.slabs.truncate(count);
+        self.chunks.truncate(count);
     }
 
-    fn find_pairs(&mut self, cap: f32, dt: f32, walls: &dyn Surroundings) {
-        let (threads, rough, tier) = (self.model.threads as usize, self.rough(), self.tier());
-        let (instructions, ahead) = (self.instructions, self.ahead(dt));
+    fn find_pairs(&mut self, skin: f32, dt: f32, walls: &dyn StaticGeometry) {
+        let (threads, has_friction, tier) =
+            (self.model.threads as usize, self.has_friction(), self.tier());
+        let (simd_level, ahead) = (self.simd_level, self.ahead(dt));
         self.searches.resize(threads, Search::default());
-        let slabs = Shared::new(&mut self.slabs);
-        let searches = Shared::new(&mut self.searches);
-        let (grid, at, budget) = (&self.grid, &self.at[..], &self.budget[..]);
-        let (memory, before, planes) = (&self.memory, &self.before[..], listed(&self.planes, tier));
+        let chunks = DisjointSlice::new(&mut self.chunks);
+        let searches = DisjointSlice::new(&mut self.searches);
+        let (grid, at, skin_left) = (&self.grid, &self.at[..], &self.skin_left[..]);
+        let (impulse_cache, old_rows, planes) =
+            (&self.impulse_cache, &self.old_rows[..], listed_planes(&self.planes, tier));
         let shapes = walls.has_shapes();
-        let (slots, guests) = (self.ids.slots(), &self.guest_slots[..]);
-        let guest = |row: u32| Self::has_guest_slot(slots[row as usize], guests);
-        let several_guests = self.guests.len() > 1;
-        let fans = Shared::new(bytemuck::cast_slice_mut(&mut self.spare));
+        let (slots, proxies) = (self.ids.slots(), &self.body_slots[..]);
+        let proxy = |row: u32| Self::has_slot(slots[row as usize], proxies);
+        let several_proxies = self.proxies.len() > 1;
+        let neighbours = DisjointSlice::new(bytemuck::cast_slice_mut(&mut self.scratch));
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
-        let balls = walls::Balls { at, velocity: &self.velocity, budget, ahead, surfaces };
-        each(threads, slabs.len(), |thread, slab| {
+        let balls = walls::Balls { at, velocity: &self.velocity, skin_left, ahead, surfaces };
+        parallel_for(threads, chunks.len(), |thread, chunk| {
             // SAFETY: its thread's, and its own.
-            let (search, slab) = unsafe { (&mut *searches.row(thread), &mut *slabs.row(slab)) };
+            let (search, chunk) = unsafe { (&mut *searches.row(thread), &mut *chunks.row(chunk)) };
             // SAFETY: those of its rows.
-            let mut fans = (!rough).then(|| unsafe { fans.part(slab.fans_of_all()) });
-            instructions.run(FindPairs {
+            let mut neighbours =
+                (!has_friction).then(|| unsafe { neighbours.part(chunk.neighbour_range()) });
+            simd_level.run(FindPairs {
                 grid,
                 at,
-                budget,
-                cap,
-                layers: slab.layers,
-                rows: slab.rows,
+                skin_left,
+                skin,
+                layers: chunk.layers,
+                rows: chunk.rows,
                 search,
-                unlisted: &mut slab.unlisted,
-                batches: &mut slab.batches,
-                fans: fans.as_deref_mut(),
+                unlisted: &mut chunk.unlisted,
+                batches: &mut chunk.batches,
+                lists: neighbours.as_deref_mut(),
             });
-            let (first, rows) = (slab.rows[0], slab.rows[1] - slab.rows[0]);
-            let fans = fans.map(|list| Fans { first, rows, list });
-            if rough && several_guests {
+            let (first, rows) = (chunk.rows[0], chunk.rows[1] - chunk.rows[0]);
+            let neighbours = neighbours.map(|list| NeighbourLists { first, rows, list });
+            if has_friction && several_proxies {
                 // They touch each other without the swarm.
-                take_out(&mut slab.batches, |pair| pair.into_iter().all(guest));
+                take_out(&mut chunk.batches, |pair| pair.into_iter().all(proxy));
             }
-            let in_fans = fans.map_or(0, |fans| fans.of_rows().map(<[u16]>::len).sum());
-            slab.pairs = in_fans + pairs_in(&slab.batches);
-            fit(&mut slab.batches);
-            if rough {
-                slab.pushes.reset(slab.batches.len());
-                slab.pushes.set_numbers(&slab.batches, surfaces);
-                memory.recall(&slab.batches, before, &mut slab.pushes);
+            let in_lists =
+                neighbours.map_or(0, |neighbours| neighbours.of_rows().map(<[u16]>::len).sum());
+            chunk.pairs = in_lists + pairs_in(&chunk.batches);
+            shrink_slack(&mut chunk.batches);
+            if has_friction {
+                chunk.impulses.reset(chunk.batches.len());
+                chunk.impulses.set_numbers(&chunk.batches, surfaces);
+                impulse_cache.restore(&chunk.batches, old_rows, &mut chunk.impulses);
             }
-            slab.seek_walls(instructions, balls, planes, |touch| {
-                rough.then(|| memory.recall_touch(before, touch)).flatten()
+            chunk.find_wall_contacts(simd_level, balls, planes, |contact| {
+                has_friction.then(|| impulse_cache.cached_contact(old_rows, contact)).flatten()
             });
-            fit(&mut slab.touches);
-            slab.near_shapes.clear();
+            shrink_slack(&mut chunk.wall_contacts);
+            chunk.near_shapes.clear();
             if shapes {
-                walls::near_shapes(walls, balls, slab.own_rows(), &mut slab.near_shapes);
+                walls::near_shapes(walls, balls, chunk.own_rows(), &mut chunk.near_shapes);
             }
-            if rough {
-                slab.recall_shapes(|row| memory.shapes_of(before, row));
+            if has_friction {
+                chunk.restore_shape_contacts(|row| impulse_cache.shapes_of(old_rows, row));
             }
         });
-        self.find_strays(cap);
-        if rough {
-            let (memory, strays) = (&self.memory, &mut self.strays);
-            memory.recall(&strays.batches, &self.before, &mut strays.pushes);
+        self.find_fast_movers(skin);
+        if has_friction {
+            let (impulse_cache, fast_movers) = (&self.impulse_cache, &mut self.fast_movers);
+            impulse_cache.restore(&fast_movers.batches, &self.old_rows, &mut fast_movers.impulses);
         }
     }
 }
@@ -311,10 +330,11 @@ mod tests {
         let rows = 0..swarm.at.len() as u32;
         let near = |[a, b]: &[u32; 2]| {
             let (a, b) = (*a as usize, *b as usize);
-            let way = [0, 1, 2].map(|axis| swarm.at[b][axis] - swarm.at[a][axis]);
-            let reach = swarm.at[a][3] + swarm.budget[a] + swarm.at[b][3] + swarm.budget[b];
+            let displacement = [0, 1, 2].map(|axis| swarm.at[b][axis] - swarm.at[a][axis]);
+            let reach = swarm.at[a][3] + swarm.skin_left[a] + swarm.at[b][3] + swarm.skin_left[b];
             // Less what rounding may take.
-            squared([way[0], way[1], way[2], 0.0]) < reach * reach * (1.0 - 1e-5)
+            squared([displacement[0], displacement[1], displacement[2], 0.0])
+                < reach * reach * (1.0 - 1e-5)
         };
         rows.clone().flat_map(|b| (0..b).map(move |a| [a, b])).filter(near).collect()
     }
@@ -344,26 +364,29 @@ mod tests {
             balls.push(Ball::new(Point3::new(1e6, 0.0, 0.0), 0.5));
             world.swarm.insert(&balls).unwrap();
             if tier == Tier::Lab {
-                let ways = balls.iter().map(|ball| crate::math::length(ball.velocity) / 60.0);
-                world.swarm.way = ways.collect();
+                let displacements =
+                    balls.iter().map(|ball| crate::math::length(ball.velocity) / 60.0);
+                world.swarm.displacement = displacements.collect();
             }
             world.swarm.build(1.0 / 60.0, &world.walls, &mut |_| ());
             let swarm = &world.swarm;
-            assert!(swarm.slabs.len() > 3 && !swarm.strays.rows.is_empty());
-            let all = &swarm.slabs[..];
-            let slabs = all.iter().map(|slab| &slab.batches);
+            assert!(swarm.chunks.len() > 3 && !swarm.fast_movers.rows.is_empty());
+            let all = &swarm.chunks[..];
+            let chunks = all.iter().map(|chunk| &chunk.batches);
             let mut found = BTreeSet::new();
             let lab = tier == Tier::Lab;
-            let fans = if lab { bytemuck::cast_slice(&swarm.spare) } else { &[] };
-            for slab in all {
-                for (row, fan) in (slab.rows[0]..).zip(slab.fans(fans).of_rows()) {
-                    for after in fan {
+            let neighbours = if lab { bytemuck::cast_slice(&swarm.scratch) } else { &[] };
+            for chunk in all {
+                for (row, neighbours_after) in
+                    (chunk.rows[0]..).zip(chunk.neighbours(neighbours).of_rows())
+                {
+                    for after in neighbours_after {
                         let pair = [row, row + u32::from(*after)];
                         assert!(found.insert(pair), "{pair:?} comes twice");
                     }
                 }
             }
-            for batch in slabs.chain([&swarm.strays.batches]).flatten() {
+            for batch in chunks.chain([&swarm.fast_movers.batches]).flatten() {
                 let pairs: Vec<_> =
                     (0..batch.count as usize).map(|lane| batch.pair(lane)).collect();
                 let rows: BTreeSet<_> = pairs.iter().flatten().collect();

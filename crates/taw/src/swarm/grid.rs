@@ -11,9 +11,9 @@ use std::ops::Range;
 
 use bytemuck::{Pod, cast_slice_mut};
 
-use super::lanes::Row;
-use super::memory::fit;
-use super::team::{ROWS, Shared, each, each_rows};
+use super::impulse_cache::shrink_slack;
+use super::simd::Row;
+use super::workers::{DisjointSlice, ROWS, parallel_for, parallel_for_rows};
 
 /// Cells in all, for each ball.
 const CELLS_PER_BALL: f64 = 2.0;
@@ -146,14 +146,14 @@ impl Grid {
         level.cell(self, layer, row, cell)
     }
 
-    /// Decides where the cells are.
-    fn lay_out(&mut self, at: &[Row], skin: f32) {
+    /// Chooses origin, size and number of the cells.
+    fn choose_cells(&mut self, at: &[Row], skin: f32) {
         let (mut least, mut largest) = (f32::MAX, f32::MIN_POSITIVE);
         for row in at {
             largest = largest.max(row[3]);
             least = least.min(row[3]);
         }
-        // Where the bulk is; a few strays far out cost no cells.
+        // Where the bulk is; a few fast movers far out cost no cells.
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
         let every = at.len().div_ceil(SAMPLE).max(1);
         for axis in 0..3 {
@@ -213,27 +213,27 @@ impl Grid {
     }
 
     /// Sorts the rows into cells: `order` is, for each row of the new order, the one that it was.
-    /// `spare` is only scribbled on.
+    /// `scratch` is a buffer.
     pub fn sort(
         &mut self,
         at: &[Row],
         skin: f32,
         threads: usize,
         order: &mut [u32],
-        spare: &mut Vec<Row>,
+        scratch: &mut Vec<Row>,
     ) {
-        self.lay_out(at, skin);
+        self.choose_cells(at, skin);
         let cells = (self.layers() * self.per_layer) as usize;
         let mut start = std::mem::take(&mut self.start);
         let mut parts = std::mem::take(&mut self.parts);
         start.resize(cells + 2, 0);
-        fit(&mut start);
+        shrink_slack(&mut start);
         parts.resize(at.len().div_ceil(ROWS), Part::default());
-        spare.resize(at.len(), [0.0; 4]);
-        let keys = Shared::new(cast_slice_mut(spare));
+        scratch.resize(at.len(), [0.0; 4]);
+        let keys = DisjointSlice::new(cast_slice_mut(scratch));
         {
-            let (grid, parts) = (&*self, Shared::new(&mut parts));
-            each_rows(threads, at.len(), |rows| {
+            let (grid, parts) = (&*self, DisjointSlice::new(&mut parts));
+            parallel_for_rows(threads, at.len(), |rows| {
                 // SAFETY: each job has its own rows and its own part.
                 let keys = unsafe { keys.part(rows.clone()) };
                 let mut cells = [u32::MAX, 0];
@@ -247,12 +247,12 @@ impl Grid {
         // Now by cells. A cell is counted one further, and again one further.
         let share = |share: usize| cells * share / threads..cells * (share + 1) / threads;
         let mut totals = vec![0; threads];
-        let (all_start, totals) = (Shared::new(&mut start), Shared::new(&mut totals));
+        let (all_start, totals) = (DisjointSlice::new(&mut start), DisjointSlice::new(&mut totals));
         // SAFETY: nobody writes keys any more.
         let keys = unsafe { keys.read(0..at.len()) };
         // The rows of the parts that have any in these cells, which are few: most rows are still
         // about where they belong. Each is named with its cell, counted from the first one.
-        let rows_in = |cells: &Range<usize>, name: &mut dyn FnMut(u32, usize)| {
+        let rows_in = |cells: &Range<usize>, visit: &mut dyn FnMut(u32, usize)| {
             let (low, count) = (cells.start as u32, cells.len() as u32);
             for Part { first, cells } in &parts {
                 if cells[0] < low + count && cells[1] >= low {
@@ -260,13 +260,13 @@ impl Grid {
                     for (row, key) in (*first..).zip(&keys[rows]) {
                         let cell = key.wrapping_sub(low);
                         if cell < count {
-                            name(row, cell as usize);
+                            visit(row, cell as usize);
                         }
                     }
                 }
             }
         };
-        each(threads, threads, |_, number| {
+        parallel_for(threads, threads, |_, number| {
             let mine = share(number);
             // SAFETY: each job has its own cells and its own total.
             let start = unsafe { all_start.part(mine.start + 2..mine.end + 2) };
@@ -278,8 +278,8 @@ impl Grid {
             });
             unsafe { *totals.row(number) = total };
         });
-        let all_order = Shared::new(order);
-        each(threads, threads, |_, number| {
+        let all_order = DisjointSlice::new(order);
+        parallel_for(threads, threads, |_, number| {
             let mine = share(number);
             // SAFETY: as above, and the totals are written.
             let start = unsafe { all_start.part(mine.start + 2..mine.end + 2) };
@@ -307,35 +307,40 @@ impl Grid {
 /// Puts a column of rows into the order.
 pub(super) fn reorder_rows(
     column: &mut Vec<Row>,
-    spare: &mut Vec<Row>,
+    scratch: &mut Vec<Row>,
     order: &[u32],
     threads: usize,
 ) {
-    spare.resize(order.len(), [0.0; 4]);
-    take_in_order(column, Shared::new(spare), order, threads);
-    std::mem::swap(column, spare);
+    scratch.resize(order.len(), [0.0; 4]);
+    gather_in_order(column, DisjointSlice::new(scratch), order, threads);
+    std::mem::swap(column, scratch);
 }
 
 /// Puts a column of numbers into the order.
 pub(super) fn reorder<T: Pod + Send + Sync>(
     column: &mut [T],
-    spare: &mut Vec<Row>,
+    scratch: &mut Vec<Row>,
     order: &[u32],
     threads: usize,
 ) {
-    spare.resize(order.len(), [0.0; 4]);
-    let spare = Shared::new(cast_slice_mut(spare));
-    take_in_order(column, spare, order, threads);
-    let column = Shared::new(column);
-    each_rows(threads, order.len(), |rows| {
+    scratch.resize(order.len(), [0.0; 4]);
+    let scratch = DisjointSlice::new(cast_slice_mut(scratch));
+    gather_in_order(column, scratch, order, threads);
+    let column = DisjointSlice::new(column);
+    parallel_for_rows(threads, order.len(), |rows| {
         // SAFETY: each job has its own rows.
-        let (to, from) = unsafe { (column.part(rows.clone()), spare.read(rows)) };
+        let (to, from) = unsafe { (column.part(rows.clone()), scratch.read(rows)) };
         to.copy_from_slice(from);
     });
 }
 
-fn take_in_order<T: Copy + Send + Sync>(from: &[T], to: Shared<T>, order: &[u32], threads: usize) {
-    each_rows(threads, order.len(), |rows| {
+fn gather_in_order<T: Copy + Send + Sync>(
+    from: &[T],
+    to: DisjointSlice<T>,
+    order: &[u32],
+    threads: usize,
+) {
+    parallel_for_rows(threads, order.len(), |rows| {
         // SAFETY: each job has its own rows.
         let to = unsafe { to.part(rows.clone()) };
         for (to, row) in to.iter_mut().zip(&order[rows]) {

@@ -1,4 +1,4 @@
-//! Balls in bulk: a million of them, and few features.
+//! A particle system of balls: a million of them, and few features.
 //!
 //! A [`World`](crate::world::World) has marbles that differ in everything: shape, mass, material,
 //! integrator, rotation. A [`Swarm`] has balls in `f32` of one material, and for that it is many
@@ -7,47 +7,48 @@
 //!
 //! Parts of a step:
 //! - Rows lie in the order of cells, so that neighbours in space are neighbours in memory.
-//! - Layers of cells are grouped into *slabs*. Slabs that are not neighbours have no ball in
+//! - Layers of cells are grouped into *chunks*. Chunks that are not neighbours have no ball in
 //!   common, so threads work on the even ones first and on each odd one after those beside it, and
 //!   the result does not depend on how many threads there are.
-//! - Pairs that might touch are put into batches of eight in which no ball is twice: a batch is
-//!   solved by vector instructions, the batches of a slab one after another (Gauss and Seidel). In
-//!   the lab's tier each ball and those near it after it in the order, its *fan*, are a batch.
-//! - Each ball has a *budget* of how far it may go until pairs are sought again. What a pair
-//!   bore is remembered across that.
+//! - Graph colouring: pairs that might touch are put into batches of eight in which no ball is
+//!   twice. A batch is solved by vector instructions, the batches of a chunk one after another
+//!   (Gauss and Seidel). In the lab's tier each ball and its *neighbour list*, those near it after
+//!   it in the order, are a batch.
+//! - Each ball has a Verlet *skin*: the distance that it may go until pairs are searched again. A
+//!   cache keeps the impulses of pairs across that, for warm starts.
 
 #![expect(
     clippy::inline_always,
-    reason = "kernels are compiled for the instructions of whoever calls them"
+    reason = "kernels are compiled for the instructions of their caller"
 )]
 
 mod batches;
 mod bodies;
 mod build;
+mod chunk;
+mod fast_movers;
 mod grid;
-mod guests;
 mod ids;
+mod impulse_cache;
 mod kernels;
-mod lanes;
-mod memory;
 mod model;
-mod pairs;
-mod slab;
+mod neighbours;
+mod proxies;
+mod simd;
 mod state;
 mod step;
-mod strays;
 mod surfaces;
-mod team;
-mod touch;
+mod wall_contact;
 mod walls;
+mod workers;
 
-pub(crate) use bodies::{Body, BodyColumns, MarbleRow, NO_ROW, Push, SyncToken};
-pub(crate) use guests::Guest;
+pub(crate) use bodies::{Body, BodyColumns, MarbleRow, NO_ROW, SyncToken, VelocityChange};
 pub use ids::BallId;
-pub use lanes::Instructions;
 pub use model::{Ball, Stage, SwarmModel, Tier};
+pub(crate) use proxies::Proxy;
+pub use simd::SimdLevel;
 pub(crate) use surfaces::Surface;
-pub(crate) use walls::Surroundings;
+pub(crate) use walls::StaticGeometry;
 
 use cgmath::{EuclideanSpace, Zero};
 
@@ -57,13 +58,13 @@ use crate::handle::MarbleId;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
 use batches::pairs_in;
+use chunk::Chunk;
+use fast_movers::FastMovers;
 use grid::Grid;
 use ids::Ids;
-use lanes::Row;
-use memory::Memory;
-use pairs::Search;
-use slab::Slab;
-use strays::Strays;
+use impulse_cache::ImpulseCache;
+use neighbours::Search;
+use simd::Row;
 use surfaces::{SurfaceOf, Surfaces};
 use walls::HalfSpace;
 
@@ -71,13 +72,13 @@ use walls::HalfSpace;
 /// numbers, too.
 const RADII: [f32; 2] = [1e-9, 1e9];
 /// The furthest coordinate, in metres, and the largest speed, in m/s.
-const FURTHEST: f32 = 1e12;
+const MAX_COORDINATE: f32 = 1e12;
 
 /// Balls in bulk. See the [module](self).
 #[derive(Clone, Debug, Default)]
 pub struct Swarm {
     model: SwarmModel,
-    instructions: Instructions,
+    simd_level: SimdLevel,
     ids: Ids,
     /// Center and radius.
     at: Vec<Row>,
@@ -87,62 +88,62 @@ pub struct Swarm {
     /// Radius times spin, and whether a wall bears it ([`GROUNDED`](kernels::GROUNDED)); only in
     /// the full tier.
     spin: Vec<Row>,
-    /// See [`Columns::backing`](kernels::Columns::backing); only while it steps.
+    /// See [`SolverColumns::backing`](kernels::SolverColumns::backing); only while it steps.
     backing: Vec<Row>,
-    /// Way that each ball may still go until pairs are sought again, in metres.
-    budget: Vec<f32>,
-    /// Way that each ball wants to go in this step, in metres; only in the lab's tier.
-    way: Vec<f32>,
+    /// Remaining skin of each ball: distance until pairs are searched again, in metres.
+    skin_left: Vec<f32>,
+    /// Predicted displacement of each ball in this step, in metres; only in the lab's tier.
+    displacement: Vec<f32>,
     /// The largest radius, and the mean of all.
-    largest: f32,
-    mean: f32,
-    /// Way at most, since pairs were sought, of a ball that is not sought for alone, in
-    /// metres.
-    cap: f32,
+    max_radius: f32,
+    mean_radius: f32,
+    /// Verlet skin: largest displacement, since pairs were searched, of a ball that is no fast
+    /// mover, in metres.
+    skin: f32,
     grid: Grid,
-    slabs: Vec<Slab>,
-    /// The pairs of the fastest balls.
-    strays: Strays,
-    /// The rows that would leave their budget in this step.
+    chunks: Vec<Chunk>,
+    /// Pairs of balls that left their skin.
+    fast_movers: FastMovers,
+    /// Rows that would leave their skin in this step.
     leaving: Vec<u32>,
-    /// Ways of the fast balls; only while pairs are sought.
-    ways: Vec<f32>,
-    memory: Memory,
-    /// For each row, the one that it was when the memory was made, if it was then.
-    before: Vec<u32>,
-    remembers: bool,
+    /// Displacements of the fast balls; only while pairs are searched.
+    displacements: Vec<f32>,
+    impulse_cache: ImpulseCache,
+    /// For each row, the one that it was when the impulse cache was filled, if it was then.
+    old_rows: Vec<u32>,
+    cache_valid: bool,
     /// Set while pairs and balls at walls are up to date.
-    paired: bool,
-    walled: Option<u64>,
+    pairs_valid: bool,
+    walls_version: Option<u64>,
     gravity: Option<Vec3<f32>>,
     planes: Vec<HalfSpace>,
     stopped: Vec<u32>,
     /// The marbles of the world that are balls here, in their order.
-    pub(crate) invited: Vec<(MarbleId, BallId)>,
-    /// Set if these are rows like all others, and no guests.
-    hosting: bool,
-    /// What moves them besides gravity.
-    pushes: Vec<bodies::Push>,
+    pub(crate) body_balls: Vec<(MarbleId, BallId)>,
+    /// Set if these are rows of the same solve as all others, and no proxies.
+    bodies_are_rows: bool,
+    /// Velocity changes of bodies besides gravity.
+    velocity_changes: Vec<bodies::VelocityChange>,
     surfaces: Surfaces,
     /// Agreement of bodies with the marbles.
     pub(crate) synced: SyncToken,
-    guests: Vec<Guest>,
-    /// Their rows, in order, and which guest each is; only in a step.
-    guest_rows: Vec<(u32, u32)>,
-    /// Places and velocities of these rows before a drift.
-    kept_guests: Vec<[Row; 2]>,
-    /// A bit for each slot.
-    guest_slots: Vec<u64>,
-    /// Column to put others in order with; then, in the lab's tier, the fans of all slabs.
-    spare: Vec<Row>,
+    proxies: Vec<Proxy>,
+    /// Rows of proxies, in order, and which proxy each is; only in a step.
+    proxy_rows: Vec<(u32, u32)>,
+    /// Positions and velocities of these rows before they are integrated.
+    saved_proxies: Vec<[Row; 2]>,
+    /// A bit for each slot that is a marble.
+    body_slots: Vec<u64>,
+    /// Scratch column of the sort; then, in the lab's tier, the neighbour lists of all chunks.
+    scratch: Vec<Row>,
     lists: Vec<Vec<u32>>,
-    /// Progress of each slab, while they are worked on.
-    slab_states: Vec<u32>,
+    /// Progress of each chunk, while they are worked on.
+    chunk_states: Vec<u32>,
     searches: Vec<Search>,
     rebuilds: u64,
     steps_since_build: u32,
-    /// Width of the margin beyond the usual, as a part of that.
-    spread: f32,
+    /// Width of the skin beyond the usual, as a fraction of that.
+    skin_scale: f32,
 }
 
 impl Swarm {
@@ -162,21 +163,21 @@ impl Swarm {
         let resists = self.surface_of().differ();
         self.model = model;
         if self.tier() != tier {
-            (self.paired, self.remembers) = (false, false);
-            self.before.clear();
+            (self.pairs_valid, self.cache_valid) = (false, false);
+            self.old_rows.clear();
         } else if resists || self.surface_of().differ() {
-            self.remember();
-            self.paired = false; // pairs have numbers of their own
+            self.cache_impulses();
+            self.pairs_valid = false; // pairs have numbers of their own
         }
-        self.shape_columns();
-        self.walled = None;
+        self.resize_columns();
+        self.walls_version = None;
         self.wake_all();
         Ok(())
     }
 
     /// Changes by which instructions of the processor it steps. That changes no bit of it.
-    pub fn set_instructions(&mut self, instructions: Instructions) {
-        self.instructions = instructions;
+    pub fn set_simd_level(&mut self, simd_level: SimdLevel) {
+        self.simd_level = simd_level;
     }
 
     /// Puts balls in, all or none.
@@ -186,8 +187,8 @@ impl Swarm {
     /// [`Error::NotPositive`] for a mass, [`Error::Full`] at 2³² balls.
     pub fn insert(&mut self, balls: &[Ball]) -> Result<Vec<BallId>, Error> {
         for ball in balls {
-            checked_place(ball.position)?;
-            checked_velocity(ball.velocity)?;
+            validated_position(ball.position)?;
+            validated_velocity(ball.velocity)?;
             let [least, most] = RADII;
             within("radius", ball.radius, least, most)?;
             positive("mass", 1.0 / ball.mass.of(ball.radius))?;
@@ -199,17 +200,17 @@ impl Swarm {
     fn add(&mut self, balls: &[Ball]) -> Result<Vec<BallId>, Error> {
         let ids = self.ids.push(balls.len())?;
         let rows = balls.iter();
-        self.at.extend(rows.clone().map(|ball| with(ball.position.to_vec(), ball.radius)));
-        let moving = |ball: &Ball| with(ball.velocity, 1.0 / ball.mass.of(ball.radius));
+        self.at.extend(rows.clone().map(|ball| pack_row(ball.position.to_vec(), ball.radius)));
+        let moving = |ball: &Ball| pack_row(ball.velocity, 1.0 / ball.mass.of(ball.radius));
         self.velocity.extend(rows.map(moving));
-        self.budget.resize(self.at.len(), 0.0);
-        if self.rough() && (self.paired || self.remembers) {
-            self.remember();
-            self.before.resize(self.at.len(), u32::MAX);
+        self.skin_left.resize(self.at.len(), 0.0);
+        if self.has_friction() && (self.pairs_valid || self.cache_valid) {
+            self.cache_impulses();
+            self.old_rows.resize(self.at.len(), u32::MAX);
         }
-        self.shape_columns();
-        self.measure();
-        self.paired = false;
+        self.resize_columns();
+        self.measure_radii();
+        self.pairs_valid = false;
         Ok(ids)
     }
 
@@ -218,8 +219,8 @@ impl Swarm {
     /// # Errors
     /// [`Error::NoSuchBall`], also for one that is named twice, and for a marble's.
     pub fn remove(&mut self, balls: &[BallId]) -> Result<(), Error> {
-        let is_marble = |id: &&BallId| self.row(**id).is_ok_and(|row| self.is_guest(row));
-        if let Some(id) = balls.iter().find(is_marble).filter(|_| self.hosting) {
+        let is_marble = |id: &&BallId| self.row(**id).is_ok_and(|row| self.is_marble(row));
+        if let Some(id) = balls.iter().find(is_marble).filter(|_| self.bodies_are_rows) {
             return Err(Error::NoSuchBall(*id));
         }
         self.take_out(balls)
@@ -228,7 +229,7 @@ impl Swarm {
     /// Takes balls out, those of marbles too.
     pub(crate) fn take_out(&mut self, balls: &[BallId]) -> Result<(), Error> {
         self.ids.check(balls)?;
-        self.remember();
+        self.cache_impulses();
         for ball in balls {
             if let Some(slot) = self.slot_of(*ball) {
                 self.surfaces.set(slot, None);
@@ -238,12 +239,12 @@ impl Swarm {
         retain(&mut self.at, &kept);
         retain(&mut self.velocity, &kept);
         retain(&mut self.spin, &kept);
-        retain(&mut self.budget, &kept);
-        retain(&mut self.way, &kept);
-        retain(&mut self.before, &kept);
-        self.measure();
+        retain(&mut self.skin_left, &kept);
+        retain(&mut self.displacement, &kept);
+        retain(&mut self.old_rows, &kept);
+        self.measure_radii();
         self.wake_all();
-        self.paired = false;
+        self.pairs_valid = false;
         Ok(())
     }
 
@@ -268,8 +269,8 @@ impl Swarm {
     /// True if the ball in a row is a marble of the world, which the swarm pushes but does not
     /// move.
     #[must_use]
-    pub fn is_guest(&self, row: usize) -> bool {
-        row < self.len() && Self::has_guest_slot(self.ids.slots()[row], &self.guest_slots)
+    pub fn is_marble(&self, row: usize) -> bool {
+        row < self.len() && Self::has_slot(self.ids.slots()[row], &self.body_slots)
     }
 
     /// The velocities in m/s, row by row. The last number is the inverse mass in 1/kg, with a
@@ -279,10 +280,10 @@ impl Swarm {
         &self.velocity
     }
 
-    /// Radius times angular velocity in m/s, row by row, and a mark of the swarm's own; empty in the
-    /// lab's tier.
+    /// Radius times angular velocity in m/s, row by row, and a mark of the swarm's own; empty in
+    /// the lab's tier.
     #[must_use]
-    pub fn rims(&self) -> &[[f32; 4]] {
+    pub fn spin_velocities(&self) -> &[[f32; 4]] {
         &self.spin
     }
 
@@ -312,11 +313,11 @@ impl Swarm {
     /// # Errors
     /// [`Error::NoSuchBall`], [`Error::NotFinite`], [`Error::OutOfRange`].
     pub fn set_position(&mut self, ball: BallId, position: Point3<f32>) -> Result<(), Error> {
-        let (row, position) = (self.row(ball)?, checked_place(position)?);
+        let (row, position) = (self.row(ball)?, validated_position(position)?);
         self.wake(row);
-        self.at[row] = with(position.to_vec(), self.at[row][3]);
-        self.remember();
-        self.paired = false;
+        self.at[row] = pack_row(position.to_vec(), self.at[row][3]);
+        self.cache_impulses();
+        self.pairs_valid = false;
         Ok(())
     }
 
@@ -325,9 +326,9 @@ impl Swarm {
     /// # Errors
     /// [`Error::NoSuchBall`], [`Error::NotFinite`], [`Error::OutOfRange`].
     pub fn set_velocity(&mut self, ball: BallId, velocity: Vec3<f32>) -> Result<(), Error> {
-        let (row, velocity) = (self.row(ball)?, checked_velocity(velocity)?);
+        let (row, velocity) = (self.row(ball)?, validated_velocity(velocity)?);
         self.wake(row);
-        self.velocity[row] = with(velocity, self.velocity[row][3]);
+        self.velocity[row] = pack_row(velocity, self.velocity[row][3]);
         Ok(())
     }
 
@@ -339,25 +340,26 @@ impl Swarm {
     /// Number of balls that sleep.
     #[must_use]
     pub fn asleep(&self) -> usize {
-        let slabs = self.slabs.iter().filter(|slab| slab.asleep);
-        if self.paired { slabs.map(|slab| slab.own_rows().len()).sum() } else { 0 }
+        let chunks = self.chunks.iter().filter(|chunk| chunk.asleep);
+        if self.pairs_valid { chunks.map(|chunk| chunk.own_rows().len()).sum() } else { 0 }
     }
 
     /// Number of pairs of balls near enough to be looked at.
     #[must_use]
     pub fn pairs(&self) -> usize {
-        self.slabs.iter().map(|slab| slab.pairs).sum::<usize>() + pairs_in(&self.strays.batches)
+        self.chunks.iter().map(|chunk| chunk.pairs).sum::<usize>()
+            + pairs_in(&self.fast_movers.batches)
     }
 
-    /// Checks that all pairs near enough are looked at. Up to 64 a ball on average are, ten times as
-    /// many as touch in the densest heap; where more balls than that are inside of each other, the
-    /// rest wait until some have parted, and meanwhile overlap.
+    /// Checks that all pairs near enough are looked at. Up to 64 a ball on average are, ten times
+    /// as many as touch in the densest heap; where more balls than that are inside of each other,
+    /// the rest wait until some have parted, and meanwhile overlap.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for `pairs`: how many there are, and how many of them are looked at.
     pub fn check_pairs(&self) -> Result<(), Error> {
-        let unlisted = self.slabs.iter().map(|slab| slab.unlisted).sum::<usize>();
-        let (listed, all) = (self.pairs(), self.pairs() + unlisted + self.strays.unlisted);
+        let unlisted = self.chunks.iter().map(|chunk| chunk.unlisted).sum::<usize>();
+        let (listed, all) = (self.pairs(), self.pairs() + unlisted + self.fast_movers.unlisted);
         within("pairs", all as f64, 0.0, listed as f64).map(|_| ())
     }
 
@@ -365,7 +367,7 @@ impl Swarm {
     /// at all balls for each half-space, and does not count these.)
     #[must_use]
     pub fn near_walls(&self) -> usize {
-        self.slabs.iter().map(|slab| slab.touches.len()).sum()
+        self.chunks.iter().map(|chunk| chunk.wall_contacts.len()).sum()
     }
 
     /// Number of searches for pairs so far.
@@ -375,11 +377,12 @@ impl Swarm {
     }
 
     /// True in the tier with friction, bounce and spin.
-    fn rough(&self) -> bool {
+    fn has_friction(&self) -> bool {
         self.tier() == Tier::Full
     }
 
-    /// Material of all pairs that have no [numbers](kernels::Pushes::numbers) of their own.
+    /// Material of all pairs that have no [numbers](kernels::ContactImpulses::numbers) of their
+    /// own.
     fn common_material(&self) -> Material<f32> {
         let model = self.model.material;
         self.surfaces.common(model, self.len()).unwrap_or(model)
@@ -392,56 +395,56 @@ impl Swarm {
     }
 
     /// Gives the columns that only one tier needs as many rows as there are balls, or none.
-    fn shape_columns(&mut self) {
+    fn resize_columns(&mut self) {
         let rows = self.at.len();
-        let (spin, way) = if self.rough() { (rows, 0) } else { (0, rows) };
+        let (spin, displacement) = if self.has_friction() { (rows, 0) } else { (0, rows) };
         self.spin.resize(spin, [0.0; 4]);
-        self.way.resize(way, 0.0);
+        self.displacement.resize(displacement, 0.0);
         if spin == 0 {
             self.spin.shrink_to_fit();
         }
-        if way == 0 {
-            self.way.shrink_to_fit();
+        if displacement == 0 {
+            self.displacement.shrink_to_fit();
         }
     }
 
-    /// Keeps what pairs bore, as rows are about to change. The lab's tier has nothing to keep.
-    fn remember(&mut self) {
-        if self.remembers || !self.rough() {
+    /// Caches the impulses of pairs, as rows are about to change. The lab's tier has none.
+    fn cache_impulses(&mut self) {
+        if self.cache_valid || !self.has_friction() {
             return;
         }
-        if self.paired {
-            let (slabs, threads) = (&self.slabs[..], self.model.threads as usize);
-            self.memory.keep(slabs, &self.strays, self.at.len(), threads);
+        if self.pairs_valid {
+            let (chunks, threads) = (&self.chunks[..], self.model.threads as usize);
+            self.impulse_cache.keep(chunks, &self.fast_movers, self.at.len(), threads);
         } else {
-            self.memory.forget(self.at.len());
+            self.impulse_cache.forget(self.at.len());
         }
-        self.before.clear();
-        self.before.extend(0..self.at.len() as u32);
-        self.remembers = true;
+        self.old_rows.clear();
+        self.old_rows.extend(0..self.at.len() as u32);
+        self.cache_valid = true;
     }
 
-    fn measure(&mut self) {
+    fn measure_radii(&mut self) {
         let radii = self.at.iter().map(|row| row[3]);
-        self.largest = radii.clone().fold(0.0, f32::max);
+        self.max_radius = radii.clone().fold(0.0, f32::max);
         let sum = radii.map(f64::from).sum::<f64>();
-        self.mean = (sum / self.at.len().max(1) as f64) as f32;
+        self.mean_radius = (sum / self.at.len().max(1) as f64) as f32;
     }
 
     fn wake(&mut self, row: usize) {
-        if self.paired {
-            let slabs = &mut self.slabs;
-            let slab = slabs.partition_point(|slab| slab.rows[1] as usize <= row);
-            if let Some(slab) = slabs.get_mut(slab) {
-                slab.wake(&mut self.velocity);
+        if self.pairs_valid {
+            let chunks = &mut self.chunks;
+            let chunk = chunks.partition_point(|chunk| chunk.rows[1] as usize <= row);
+            if let Some(chunk) = chunks.get_mut(chunk) {
+                chunk.wake(&mut self.velocity);
             }
         }
         self.velocity[row][3] = self.velocity[row][3].abs();
     }
 
     fn wake_all(&mut self) {
-        for slab in &mut self.slabs {
-            (slab.asleep, slab.slow) = (false, 0.0);
+        for chunk in &mut self.chunks {
+            (chunk.asleep, chunk.sleep_time) = (false, 0.0);
         }
         for velocity in &mut self.velocity {
             velocity[3] = velocity[3].abs();
@@ -449,24 +452,24 @@ impl Swarm {
     }
 }
 
-fn with(vector: Vec3<f32>, last: f32) -> Row {
+fn pack_row(vector: Vec3<f32>, last: f32) -> Row {
     [vector.x, vector.y, vector.z, last]
 }
 
-fn checked_place(place: Point3<f32>) -> Result<Point3<f32>, Error> {
+fn validated_position(place: Point3<f32>) -> Result<Point3<f32>, Error> {
     let names = ["position.x", "position.y", "position.z"];
     finite_point(names, place)?;
     for (name, x) in names.into_iter().zip([place.x, place.y, place.z]) {
-        within(name, x, -FURTHEST, FURTHEST)?;
+        within(name, x, -MAX_COORDINATE, MAX_COORDINATE)?;
     }
     Ok(place)
 }
 
-fn checked_velocity(velocity: Vec3<f32>) -> Result<Vec3<f32>, Error> {
+fn validated_velocity(velocity: Vec3<f32>) -> Result<Vec3<f32>, Error> {
     let names = ["velocity.x", "velocity.y", "velocity.z"];
     finite_vector(names, velocity)?;
     for (name, x) in names.into_iter().zip([velocity.x, velocity.y, velocity.z]) {
-        within(name, x, -FURTHEST, FURTHEST)?;
+        within(name, x, -MAX_COORDINATE, MAX_COORDINATE)?;
     }
     Ok(velocity)
 }
@@ -487,6 +490,6 @@ fn retain<T: Copy>(column: &mut Vec<T>, kept: &[bool]) {
 }
 
 /// The speed in m/s up to which a ball counts as lying still, where it weighs so much.
-fn lying(gravity: Vec3<f32>, radius: f32) -> f32 {
+fn sleep_speed(gravity: Vec3<f32>, radius: f32) -> f32 {
     if gravity.is_zero() { 0.0 } else { 0.05 * (crate::math::length(gravity) * radius).sqrt() }
 }

@@ -7,10 +7,10 @@ use crate::response::Material;
 /// Physics of the balls of a swarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Tier {
-    /// They move along lines, and overlapping ones are moved apart, half each: the displacement
-    /// of the lecture. No masses, no friction, no bounce, no spin. What lies in a heap never
-    /// quite comes to rest, as nothing holds it but its neighbours. No push makes a ball faster than
-    /// it was, so that overlap is no energy: one at rest that another hits is moved, and stays there.
+    /// They move along lines, and overlapping ones are moved apart, half each: the displacement of
+    /// the lecture. No masses, no friction, no bounce, no spin. What lies in a heap never quite
+    /// comes to rest, as nothing holds it but its neighbours. No push makes a ball faster than it
+    /// was, so that overlap is no energy: one at rest that another hits is moved, and stays there.
     Lab,
     /// Masses, restitution, Coulomb friction and spin, by soft contacts in small steps.
     #[default]
@@ -53,7 +53,7 @@ impl SwarmModel {
     /// The largest number of [substeps](Self::substeps).
     pub const MAX_SUBSTEPS: u32 = 1000;
     /// The largest number of [threads](Self::threads).
-    pub const MAX_THREADS: u32 = super::team::MOST_THREADS as u32;
+    pub const MAX_THREADS: u32 = super::workers::MAX_THREADS as u32;
 
     /// This model, if a swarm can step with it.
     pub(super) fn validated(self) -> Result<Self, Error> {
@@ -94,9 +94,9 @@ pub enum Stage {
     Integrate,
     /// Rows are put in the order of cells.
     Order,
-    /// Pairs that might touch are sought, and what they bore is found again.
+    /// Pairs that might touch are searched, and their cached impulses restored.
     Pairs,
-    /// Balls at walls are sought.
+    /// Balls at walls are searched.
     Walls,
     /// Contacts change velocities or places.
     Restitute,

@@ -1,8 +1,8 @@
 //! All of a swarm, field by field: its bytes, and whether two will go on alike.
 
-use super::lanes::Row;
-use super::pairs::Search;
-use super::slab::Slab;
+use super::chunk::Chunk;
+use super::neighbours::Search;
+use super::simd::Row;
 use super::{Swarm, SwarmModel};
 
 impl Swarm {
@@ -15,124 +15,127 @@ impl Swarm {
         // All are named, so that none is left out.
         let Self {
             model: _,
-            instructions: _,
+            simd_level: _,
             ids,
             at,
             velocity,
             spin,
             backing,
-            budget,
-            way,
-            largest: _,
-            mean: _,
-            cap: _,
+            skin_left,
+            displacement,
+            max_radius: _,
+            mean_radius: _,
+            skin: _,
             grid,
-            slabs,
-            strays,
+            chunks,
+            fast_movers,
             leaving,
-            ways,
-            memory,
-            before,
-            remembers: _,
-            paired: _,
-            walled: _,
+            displacements,
+            impulse_cache,
+            old_rows,
+            cache_valid: _,
+            pairs_valid: _,
+            walls_version: _,
             gravity: _,
             planes,
             stopped,
-            invited,
-            hosting: _,
-            pushes,
+            body_balls,
+            bodies_are_rows: _,
+            velocity_changes,
             surfaces,
             synced: _,
-            guests,
-            guest_rows,
-            kept_guests,
-            guest_slots,
-            spare,
+            proxies,
+            proxy_rows,
+            saved_proxies,
+            body_slots,
+            scratch,
             lists,
-            slab_states,
+            chunk_states,
             searches,
             rebuilds: _,
             steps_since_build: _,
-            spread: _,
+            skin_scale: _,
         } = self;
-        let rows = [at, velocity, spin, backing, spare].map(of);
-        let numbers = [budget, way, ways].map(of);
-        let names = [leaving, before, stopped, slab_states].map(of);
+        let rows = [at, velocity, spin, backing, scratch].map(of);
+        let numbers = [skin_left, displacement, displacements].map(of);
+        let names = [leaving, old_rows, stopped, chunk_states].map(of);
         rows.into_iter().chain(numbers).chain(names).sum::<usize>()
-            + (of(slabs) + slabs.iter().map(Slab::bytes).sum::<usize>())
+            + (of(chunks) + chunks.iter().map(Chunk::bytes).sum::<usize>())
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
             + (of(lists) + lists.iter().map(of).sum::<usize>())
-            + (of(planes) + of(invited) + of(guests) + of(guest_rows) + of(guest_slots))
-            + (of(kept_guests) + of(pushes) + surfaces.bytes())
-            + (ids.bytes() + grid.bytes() + memory.bytes() + strays.bytes())
+            + (of(planes) + of(body_balls) + of(proxies) + of(proxy_rows) + of(body_slots))
+            + (of(saved_proxies) + of(velocity_changes) + surfaces.bytes())
+            + (ids.bytes() + grid.bytes() + impulse_cache.bytes() + fast_movers.bytes())
     }
 }
 
 impl PartialEq for Swarm {
-    /// Equal if they will go on alike, bit by bit: what is only scribbled on does not count, nor do
+    /// Equal if they will go on alike, bit by bit: scratch does not count, nor do
     /// threads and instructions.
     fn eq(&self, other: &Self) -> bool {
         // All are named, so that none is left out.
         let Self {
             model,
-            instructions: _,
+            simd_level: _,
             ids,
             at,
             velocity,
             spin,
             backing: _,
-            budget,
-            way,
-            largest,
-            mean,
-            cap,
+            skin_left,
+            displacement,
+            max_radius,
+            mean_radius,
+            skin,
             grid,
-            slabs,
-            strays,
+            chunks,
+            fast_movers,
             leaving: _,
-            ways: _,
-            memory,
-            before,
-            remembers,
-            paired,
-            walled,
+            displacements: _,
+            impulse_cache,
+            old_rows,
+            cache_valid,
+            pairs_valid,
+            walls_version,
             gravity,
             planes,
             stopped,
-            invited,
-            hosting,
-            pushes,
+            body_balls,
+            bodies_are_rows,
+            velocity_changes,
             surfaces,
             synced: _,
-            guests,
-            guest_rows: _,
-            kept_guests: _,
-            guest_slots,
-            spare,
+            proxies,
+            proxy_rows: _,
+            saved_proxies: _,
+            body_slots,
+            scratch,
             lists: _,
-            slab_states: _,
+            chunk_states: _,
             searches: _,
             rebuilds,
             steps_since_build,
-            spread,
+            skin_scale,
         } = self;
         let alone = |model: SwarmModel| SwarmModel { threads: 1, ..model };
-        // The fans are in it.
-        let fans = |spare| bytemuck::cast_slice::<Row, u32>(spare);
+        // The neighbour lists are in it.
+        let neighbours = |scratch| bytemuck::cast_slice::<Row, u32>(scratch);
         (alone(*model), ids, gravity) == (alone(other.model), &other.ids, &other.gravity)
             && (at, velocity, spin) == (&other.at, &other.velocity, &other.spin)
-            && (budget, way, before) == (&other.budget, &other.way, &other.before)
-            && (largest, mean, spread) == (&other.largest, &other.mean, &other.spread)
-            && *cap == other.cap
-            && (grid, slabs, strays) == (&other.grid, &other.slabs, &other.strays)
-            && (self.rough() || fans(spare) == fans(&other.spare))
-            && (remembers, paired) == (&other.remembers, &other.paired)
-            && (!remembers || *memory == other.memory)
-            && (walled, planes) == (&other.walled, &other.planes)
-            && (invited, guests) == (&other.invited, &other.guests)
-            && (hosting, pushes, surfaces) == (&other.hosting, &other.pushes, &other.surfaces)
-            && (guest_slots, stopped) == (&other.guest_slots, &other.stopped)
+            && (skin_left, displacement, old_rows)
+                == (&other.skin_left, &other.displacement, &other.old_rows)
+            && (max_radius, mean_radius, skin_scale)
+                == (&other.max_radius, &other.mean_radius, &other.skin_scale)
+            && *skin == other.skin
+            && (grid, chunks, fast_movers) == (&other.grid, &other.chunks, &other.fast_movers)
+            && (self.has_friction() || neighbours(scratch) == neighbours(&other.scratch))
+            && (cache_valid, pairs_valid) == (&other.cache_valid, &other.pairs_valid)
+            && (!cache_valid || *impulse_cache == other.impulse_cache)
+            && (walls_version, planes) == (&other.walls_version, &other.planes)
+            && (body_balls, proxies) == (&other.body_balls, &other.proxies)
+            && (bodies_are_rows, velocity_changes, surfaces)
+                == (&other.bodies_are_rows, &other.velocity_changes, &other.surfaces)
+            && (body_slots, stopped) == (&other.body_slots, &other.stopped)
             && (rebuilds, steps_since_build) == (&other.rebuilds, &other.steps_since_build)
     }
 }

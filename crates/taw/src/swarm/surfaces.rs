@@ -1,7 +1,7 @@
 //! Surfaces of balls that differ, and the numbers that two of them make of a contact.
 
 use super::batches::Batch;
-use super::lanes::LANES;
+use super::simd::LANES;
 use crate::response::Material;
 
 /// Mass times radius squared over the moment of inertia of a solid ball.

@@ -3,29 +3,34 @@ use std::ops::Range;
 use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
 use super::Tier;
-use super::guests::Guest;
+use super::chunk::Chunk;
+use super::impulse_cache::reserve_slack;
 use super::kernels::squared;
-use super::lanes::{Instructions, Kernel, LANES, Lanes, Row};
-use super::memory::make_room;
-use super::slab::Slab;
+use super::proxies::Proxy;
+use super::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use super::surfaces::{SurfaceOf, WallNumbers};
-use super::touch::Touch;
+use super::wall_contact::WallContact;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
 
-/// Walls of the world, as the balls of a swarm meet them.
-pub(crate) trait Surroundings: Sync {
-    /// Names all half-spaces: the wall, its normal, and how far along it the surface is.
-    fn planes(&self, name: &mut dyn FnMut(u32, Vec3<f32>, f32));
+/// Static and kinematic colliders of the world, as the balls of a swarm meet them.
+pub(crate) trait StaticGeometry: Sync {
+    /// Visits all half-spaces: the wall, its normal, and the offset of the surface along it, in
+    /// metres.
+    fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<f32>, f32));
     /// Says if there is anything else, and if some of it may be in a box.
     fn has_shapes(&self) -> bool;
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;
-    /// Names what else is within `reach` metres of a ball, without the seams: the wall and its
-    /// part, the normal, and the distance of the center.
-    fn shapes_at(&self, ball: &Row, reach: f32, name: &mut dyn FnMut([u32; 2], Vec3<f32>, f32));
+    /// Visits what else is within `reach` metres of a ball, without ghost collisions: the wall and
+    /// its part, the normal, and the distance of the center.
+    fn shapes_at(&self, ball: &Row, reach: f32, visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32));
     /// The part that a ball first meets on its way, likewise: with the normal where they meet, and
     /// how far the center is from the plane across that place.
-    fn first_on_way(&self, ball: &Row, way: Vec3<f32>) -> Option<([u32; 2], Vec3<f32>, f32)>;
+    fn first_hit_on_path(
+        &self,
+        ball: &Row,
+        displacement: Vec3<f32>,
+    ) -> Option<([u32; 2], Vec3<f32>, f32)>;
     /// In m/s, and the wall's own material.
     fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32>;
     fn material(&self, wall: u32) -> Option<Material<f32>>;
@@ -46,7 +51,7 @@ pub(super) struct HalfSpace {
 pub(super) struct Balls<'a> {
     pub at: &'a [Row],
     pub velocity: &'a [Row],
-    pub budget: &'a [f32],
+    pub skin_left: &'a [f32],
     /// In seconds; none in the lab's tier, where balls have moved already, and the velocities are
     /// the places before.
     pub ahead: Option<f32>,
@@ -54,21 +59,21 @@ pub(super) struct Balls<'a> {
 }
 
 impl Balls<'_> {
-    /// Way of a ball before walls are sought again: its budget, or more if it is so fast
-    /// that it leaves that in a step.
+    /// Displacement of a ball before walls are searched again: its remaining skin, or more if it is
+    /// so fast that it leaves that in a step.
     #[inline(always)]
     pub fn reach(&self, row: usize) -> f32 {
         let (velocity, at) = (self.velocity[row], self.at[row]);
-        let way = match self.ahead {
+        let displacement = match self.ahead {
             Some(ahead) => squared(velocity).sqrt() * ahead,
             None => squared([0, 1, 2, 0].map(|axis| at[axis] - velocity[axis])).sqrt(),
         };
-        self.budget[row].max(way)
+        self.skin_left[row].max(displacement)
     }
 }
 
 /// All half-spaces.
-pub(super) fn half_spaces(walls: &dyn Surroundings, planes: &mut Vec<HalfSpace>) {
+pub(super) fn half_spaces(walls: &dyn StaticGeometry, planes: &mut Vec<HalfSpace>) {
     planes.clear();
     walls.planes(&mut |wall, normal, offset| {
         planes.push(HalfSpace { wall, normal, offset, material: walls.material(wall) });
@@ -79,149 +84,167 @@ fn center(at: &Row) -> Point3<f32> {
     Point3::new(at[0], at[1], at[2])
 }
 
-impl Slab {
-    /// Finds the balls at walls anew. `recall` knows what they bore.
-    pub fn seek_walls(
+impl Chunk {
+    /// Finds the balls at walls. `restore` looks up their cached contacts.
+    pub fn find_wall_contacts(
         &mut self,
-        instructions: Instructions,
+        simd_level: SimdLevel,
         balls: Balls,
         planes: &[HalfSpace],
-        recall: impl Fn(&Touch) -> Option<Touch>,
+        restore: impl Fn(&WallContact) -> Option<WallContact>,
     ) {
-        self.touches.clear();
+        self.wall_contacts.clear();
         self.near_planes.clear();
         if planes.is_empty() {
             return;
         }
         let (rows, found) = (self.own_rows(), &mut self.near_planes);
-        instructions.run(NearPlanes { balls, planes, rows, found });
+        simd_level.run(NearPlanes { balls, planes, rows, found });
         for row in &self.near_planes {
-            let touches = &mut self.touches;
-            touch_planes(*row, balls, planes, |mut touch| {
-                if let Some(before) = recall(&touch) {
-                    touch.recall(&before);
+            let wall_contacts = &mut self.wall_contacts;
+            find_plane_contacts(*row, balls, planes, |mut contact| {
+                if let Some(before) = restore(&contact) {
+                    contact.restore(&before);
                 }
-                make_room(touches, touches.len() + 1);
-                touches.push(touch);
+                reserve_slack(wall_contacts, wall_contacts.len() + 1);
+                wall_contacts.push(contact);
             });
         }
     }
 
-    /// Takes over what the balls near other shapes than half-spaces bore there. Which parts they
+    /// Takes over the impulses of balls near shapes other than half-spaces. Which parts they
     /// touch now is looked at before the next pass.
-    pub fn recall_shapes<T: Iterator<Item = Touch>>(&mut self, recall: impl Fn(u32) -> T) {
-        let planes = self.touches.len();
-        for touch in self.near_shapes.iter().flat_map(|row| recall(*row)) {
-            let touches = &mut self.touches;
-            make_room(touches, touches.len() + 1);
-            touches.push(touch);
+    pub fn restore_shape_contacts<T: Iterator<Item = WallContact>>(
+        &mut self,
+        restore: impl Fn(u32) -> T,
+    ) {
+        let planes = self.wall_contacts.len();
+        for contact in self.near_shapes.iter().flat_map(|row| restore(*row)) {
+            let wall_contacts = &mut self.wall_contacts;
+            reserve_slack(wall_contacts, wall_contacts.len() + 1);
+            wall_contacts.push(contact);
         }
-        if self.touches.len() > planes {
-            self.touches.sort_unstable_by_key(Touch::key);
+        if self.wall_contacts.len() > planes {
+            self.wall_contacts.sort_unstable_by_key(WallContact::key);
         }
     }
 
-    /// Finds the half-spaces near some more balls of the slab.
-    pub fn seek_walls_for(&mut self, rows: &[u32], balls: Balls, planes: &[HalfSpace]) {
-        std::mem::swap(&mut self.touches, &mut self.old_touches);
-        self.touches.clear();
-        let old = &self.old_touches;
+    /// Finds the half-spaces near some more balls of the chunk.
+    pub fn find_wall_contacts_of(&mut self, rows: &[u32], balls: Balls, planes: &[HalfSpace]) {
+        std::mem::swap(&mut self.wall_contacts, &mut self.old_wall_contacts);
+        self.wall_contacts.clear();
+        let old = &self.old_wall_contacts;
         // Which parts of other shapes are touched is looked at before the next pass, which needs to
-        // know what they bore.
-        let kept = |touch: &&Touch| !touch.is_plane || rows.binary_search(&touch.row).is_err();
-        self.touches.extend(old.iter().filter(kept));
+        // know their impulses.
+        let kept =
+            |contact: &&WallContact| !contact.is_plane || rows.binary_search(&contact.row).is_err();
+        self.wall_contacts.extend(old.iter().filter(kept));
         for row in rows {
-            let touches = &mut self.touches;
-            touch_planes(*row, balls, planes, |touch| {
-                touches.push(find(old, &touch).copied().unwrap_or(touch));
+            let wall_contacts = &mut self.wall_contacts;
+            find_plane_contacts(*row, balls, planes, |contact| {
+                wall_contacts.push(find(old, &contact).copied().unwrap_or(contact));
             });
         }
-        self.touches.sort_unstable_by_key(Touch::key);
+        self.wall_contacts.sort_unstable_by_key(WallContact::key);
     }
 
     /// Brings the balls at walls up to date: how walls move, and which part of a shape is
     /// touched. That of fast balls only, where others know it already.
-    pub fn look_at_walls(&mut self, walls: &dyn Surroundings, look: &Look, only_fast: bool) {
+    pub fn update_wall_contacts(
+        &mut self,
+        walls: &dyn StaticGeometry,
+        query: &WallQuery,
+        only_fast: bool,
+    ) {
         if !self.near_shapes.is_empty() {
-            self.touch_shapes(walls, look, only_fast);
+            self.find_shape_contacts(walls, query, only_fast);
         }
-        for touch in &mut self.touches {
-            let ball = &look.at[touch.row as usize];
-            let point = center(ball) - touch.normal * ball[3];
-            touch.bears_guest = false;
-            touch.surface = walls.surface_velocity(touch.wall, point);
-            touch.offset = touch.offset_at_end;
-            touch.drift(-look.before);
+        for contact in &mut self.wall_contacts {
+            let ball = &query.at[contact.row as usize];
+            let point = center(ball) - contact.normal * ball[3];
+            contact.bears_proxy = false;
+            contact.surface = walls.surface_velocity(contact.wall, point);
+            contact.offset = contact.offset_at_end;
+            contact.advance(-query.before);
         }
     }
 
-    fn touch_shapes(&mut self, walls: &dyn Surroundings, look: &Look, only_fast: bool) {
-        std::mem::swap(&mut self.touches, &mut self.old_touches);
-        self.touches.clear();
-        let old = &self.old_touches;
-        let kept = |touch: &&Touch| touch.is_plane || only_fast && look.way(touch.row).is_none();
-        self.touches.extend(old.iter().filter(kept));
+    fn find_shape_contacts(
+        &mut self,
+        walls: &dyn StaticGeometry,
+        query: &WallQuery,
+        only_fast: bool,
+    ) {
+        std::mem::swap(&mut self.wall_contacts, &mut self.old_wall_contacts);
+        self.wall_contacts.clear();
+        let old = &self.old_wall_contacts;
+        let kept = |contact: &&WallContact| {
+            contact.is_plane || only_fast && query.displacement(contact.row).is_none()
+        };
+        self.wall_contacts.extend(old.iter().filter(kept));
         self.has_fast = false;
         for row in &self.near_shapes {
-            let way = look.way(*row);
-            let ball = &look.ball(*row, way);
-            if only_fast && way.is_none() {
+            let displacement = query.displacement(*row);
+            let ball = &query.ball(*row, displacement);
+            if only_fast && displacement.is_none() {
                 continue;
             }
-            let first = self.touches.len();
-            let touches = &mut self.touches;
-            let mut name = |ball: &Row, [wall, part]: [u32; 2], normal: Vec3<f32>, distance| {
-                let named = touches[first..].iter();
-                if named.into_iter().any(|touch| [touch.wall, touch.part] == [wall, part]) {
+            let first = self.wall_contacts.len();
+            let wall_contacts = &mut self.wall_contacts;
+            let mut visit = |ball: &Row, [wall, part]: [u32; 2], normal: Vec3<f32>, distance| {
+                let named = wall_contacts[first..].iter();
+                if named.into_iter().any(|contact| [contact.wall, contact.part] == [wall, part]) {
                     return;
                 }
-                let numbers = WallNumbers::new(look.surfaces.row(*row), walls.material(wall));
+                let numbers = WallNumbers::new(query.surfaces.row(*row), walls.material(wall));
                 let offset = normal.dot(center(ball).to_vec()) - distance;
-                let mut touch = Touch::new(*row, [wall, part], normal, offset, numbers);
-                touch.is_plane = false;
-                if let Some(same) = find(old, &touch) {
-                    touch.recall(same);
+                let mut contact = WallContact::new(*row, [wall, part], normal, offset, numbers);
+                contact.is_plane = false;
+                if let Some(same) = find(old, &contact) {
+                    contact.restore(same);
                 }
-                touches.push(touch);
+                wall_contacts.push(contact);
             };
-            let mut reach = look.budget[*row as usize].max(0.0);
-            if let Some(way) = way {
+            let mut reach = query.skin_left[*row as usize].max(0.0);
+            if let Some(displacement) = displacement {
                 self.has_fast = true;
-                reach = way.magnitude().min(FAST * ball[3]);
-                on_way(walls, ball, way, &mut name);
+                reach = displacement.magnitude().min(FAST * ball[3]);
+                along_path(walls, ball, displacement, &mut visit);
             }
             walls.shapes_at(ball, reach, &mut |part, normal, distance| {
-                name(ball, part, normal, distance);
+                visit(ball, part, normal, distance);
             });
         }
-        self.touches.sort_unstable_by_key(Touch::key);
+        self.wall_contacts.sort_unstable_by_key(WallContact::key);
     }
 }
 
-/// Names the walls that a ball meets on its way, and along those that it met.
-fn on_way(
-    walls: &dyn Surroundings,
+/// Visits the walls that a ball meets on its path, and along those that it met.
+fn along_path(
+    walls: &dyn StaticGeometry,
     ball: &Row,
-    way: Vec3<f32>,
-    name: &mut impl FnMut(&Row, [u32; 2], Vec3<f32>, f32),
+    displacement: Vec3<f32>,
+    visit: &mut impl FnMut(&Row, [u32; 2], Vec3<f32>, f32),
 ) {
-    let (mut ball, mut way) = (*ball, way);
+    let (mut ball, mut displacement) = (*ball, displacement);
     // In a corner, it meets three.
     for _ in 0..3 {
-        if way.magnitude() <= FAST * ball[3] {
+        if displacement.magnitude() <= FAST * ball[3] {
             return;
         }
-        let Some((part, normal, distance)) = walls.first_on_way(&ball, way) else { return };
-        name(&ball, part, normal, distance);
-        let closing = -way.dot(normal);
-        if closing.is_nan() || closing <= 0.0 {
+        let Some((part, normal, distance)) = walls.first_hit_on_path(&ball, displacement) else {
+            return;
+        };
+        visit(&ball, part, normal, distance);
+        let approach_speed = -displacement.dot(normal);
+        if approach_speed.is_nan() || approach_speed <= 0.0 {
             return;
         }
-        let time = ((distance - ball[3]) / closing).clamp(0.0, 1.0);
-        for (x, way) in ball.iter_mut().zip::<[f32; 3]>(way.into()) {
-            *x += way * time;
+        let time = ((distance - ball[3]) / approach_speed).clamp(0.0, 1.0);
+        for (x, displacement) in ball.iter_mut().zip::<[f32; 3]>(displacement.into()) {
+            *x += displacement * time;
         }
-        way = (way + normal * closing) * (1.0 - time);
+        displacement = (displacement + normal * approach_speed) * (1.0 - time);
     }
 }
 
@@ -230,14 +253,14 @@ fn on_way(
 /// in each substep.
 const FAST: f32 = 0.5;
 
-/// Facts that a look at walls needs.
+/// Input of an update of wall contacts.
 #[derive(Clone, Copy)]
-pub(super) struct Look<'a> {
+pub(super) struct WallQuery<'a> {
     pub tier: Tier,
     pub at: &'a [Row],
     /// In the lab's tier, where they were: there, they have moved already.
     pub velocity: &'a [Row],
-    pub budget: &'a [f32],
+    pub skin_left: &'a [f32],
     pub surfaces: SurfaceOf<'a>,
     /// Walls are where they will be at the end of the step; so long before, in seconds, they were
     /// elsewhere.
@@ -247,9 +270,9 @@ pub(super) struct Look<'a> {
     pub gravity: Vec3<f32>,
 }
 
-impl Look<'_> {
+impl WallQuery<'_> {
     /// Way of a fast ball in a substep, in metres; none for slow ones.
-    fn way(&self, row: u32) -> Option<Vec3<f32>> {
+    fn displacement(&self, row: u32) -> Option<Vec3<f32>> {
         let (at, [u, v, w, _]) = (&self.at[row as usize], self.velocity[row as usize]);
         let [step, substep] = match self.tier {
             Tier::Lab => [Vec3::new(at[0] - u, at[1] - v, at[2] - w); 2],
@@ -261,36 +284,44 @@ impl Look<'_> {
     }
 
     /// A ball where its way begins.
-    fn ball(&self, row: u32, way: Option<Vec3<f32>>) -> Row {
+    fn ball(&self, row: u32, displacement: Option<Vec3<f32>>) -> Row {
         let at = self.at[row as usize];
-        match (self.tier, way) {
-            (Tier::Lab, Some(way)) => [at[0] - way.x, at[1] - way.y, at[2] - way.z, at[3]],
+        match (self.tier, displacement) {
+            (Tier::Lab, Some(displacement)) => {
+                [at[0] - displacement.x, at[1] - displacement.y, at[2] - displacement.z, at[3]]
+            }
             _ => at,
         }
     }
 }
 
 impl HalfSpace {
-    /// Moves a guest out, but for how deep it was inside.
-    pub fn bear(&self, guest: &Guest, at: &mut Row) {
-        let gap = |ball: &Row| self.normal.dot(center(ball).to_vec()) - self.offset - ball[3];
-        let by = (gap(&guest.at).min(0.0) - gap(at)).max(0.0);
+    /// Moves a proxy out, except by how deep it was inside.
+    pub fn bear(&self, proxy: &Proxy, at: &mut Row) {
+        let separation =
+            |ball: &Row| self.normal.dot(center(ball).to_vec()) - self.offset - ball[3];
+        let by = (separation(&proxy.at).min(0.0) - separation(at)).max(0.0);
         for (x, normal) in at.iter_mut().zip::<[f32; 3]>(self.normal.into()) {
             *x += normal * by;
         }
     }
 }
 
-/// Names the half-spaces as far as to which a ball may go.
-fn touch_planes(row: u32, balls: Balls, planes: &[HalfSpace], mut name: impl FnMut(Touch)) {
+/// Visits the half-spaces that a ball may reach.
+fn find_plane_contacts(
+    row: u32,
+    balls: Balls,
+    planes: &[HalfSpace],
+    mut visit: impl FnMut(WallContact),
+) {
     let (ball, reach) = (&balls.at[row as usize], balls.reach(row as usize));
     for plane in planes {
         let HalfSpace { wall, normal, offset, material } = *plane;
-        let gap = normal.dot(center(ball).to_vec()) - offset - ball[3];
-        // A wall may also come nearer; who moves it seeks again.
-        if gap < reach {
+        let separation = normal.dot(center(ball).to_vec()) - offset - ball[3];
+        // A wall may also come nearer; a move of it starts another search.
+        if separation < reach {
             let numbers = WallNumbers::new(balls.surfaces.row(row), material);
-            name(Touch::new(row, [wall, 0], normal, offset, numbers));
+            visit(WallContact::new(row, [wall, 0], normal, offset, numbers));
         }
     }
 }
@@ -305,25 +336,25 @@ struct NearPlanes<'a> {
 
 impl Kernel for NearPlanes<'_> {
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         let Self { balls, planes, rows, found } = self;
         let mut first = rows.start;
         while first + LANES <= rows.end {
             // SAFETY: there are eight.
             let [x, y, z, radius] =
                 unsafe { L::gather(balls.at[first..].as_ptr(), &[0, 1, 2, 3, 4, 5, 6, 7]) };
-            let mut budget = [0.0; LANES];
-            for (lane, budget) in budget.iter_mut().enumerate() {
-                *budget = balls.reach(first + lane);
+            let mut skin_left = [0.0; LANES];
+            for (lane, skin_left) in skin_left.iter_mut().enumerate() {
+                *skin_left = balls.reach(first + lane);
             }
-            let budget = L::load(&budget);
-            let reach = radius + budget;
+            let skin_left = L::load(&skin_left);
+            let reach = radius + skin_left;
             let mut near = 0;
             for HalfSpace { normal, offset, .. } in planes {
                 let along =
                     L::splat(normal.x) * x + L::splat(normal.y) * y + L::splat(normal.z) * z;
                 // Rather one too many: the caller looks more closely.
-                near |= (L::splat(*offset) + reach * L::splat(1.001)).above(along);
+                near |= (L::splat(*offset) + reach * L::splat(1.001)).gt_mask(along);
             }
             while near != 0 {
                 found.push(first as u32 + near.trailing_zeros());
@@ -336,21 +367,27 @@ impl Kernel for NearPlanes<'_> {
 }
 
 /// The one of the same ball and wall, among many in order.
-pub(super) fn find<'a>(touches: &'a [Touch], touch: &Touch) -> Option<&'a Touch> {
-    let at = touches.binary_search_by_key(&touch.key(), Touch::key).ok()?;
-    touches.get(at)
+pub(super) fn find<'a>(
+    wall_contacts: &'a [WallContact],
+    contact: &WallContact,
+) -> Option<&'a WallContact> {
+    let at = wall_contacts.binary_search_by_key(&contact.key(), WallContact::key).ok()?;
+    wall_contacts.get(at)
 }
 
-/// The touches of a ball with other shapes than half-spaces, among many in order.
-pub(super) fn shapes_of(touches: &[Touch], row: u32) -> impl Iterator<Item = &Touch> {
-    let first = touches.partition_point(|touch| touch.row < row);
-    let of_row = touches[first..].iter().take_while(move |touch| touch.row == row);
-    of_row.filter(|touch| !touch.is_plane)
+/// The contacts of a ball with other shapes than half-spaces, among many in order.
+pub(super) fn shapes_of(
+    wall_contacts: &[WallContact],
+    row: u32,
+) -> impl Iterator<Item = &WallContact> {
+    let first = wall_contacts.partition_point(|contact| contact.row < row);
+    let of_row = wall_contacts[first..].iter().take_while(move |contact| contact.row == row);
+    of_row.filter(|contact| !contact.is_plane)
 }
 
 /// The rows among these that are near anything but half-spaces, found by ever smaller boxes.
 pub(super) fn near_shapes(
-    walls: &dyn Surroundings,
+    walls: &dyn StaticGeometry,
     balls: Balls,
     rows: Range<usize>,
     found: &mut Vec<u32>,
@@ -376,7 +413,7 @@ pub(super) fn near_shapes(
     near_shapes(walls, balls, middle..rows.end, found);
 }
 
-impl Touch {
+impl WallContact {
     fn new(
         row: u32,
         [wall, part]: [u32; 2],
@@ -389,15 +426,15 @@ impl Touch {
             wall,
             part,
             is_plane: true,
-            bears_guest: false,
+            bears_proxy: false,
             normal,
             offset,
             offset_at_end: offset,
             surface: Vec3::zero(),
             numbers,
             borne_for_others: 0.0,
-            pressure: 0.0,
-            grip: Vec3::zero(),
+            normal_impulse: 0.0,
+            tangent_impulse: Vec3::zero(),
             torque: Vec3::zero(),
         }
     }

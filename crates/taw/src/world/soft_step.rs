@@ -5,13 +5,13 @@ use cgmath::{EuclideanSpace, Zero};
 
 use super::World;
 use super::integrate::StepContext;
-use super::swarm::FURTHEST;
+use super::swarm::MAX_COORDINATE;
 use crate::Error;
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::Rotation;
 use crate::response::Material;
-use crate::swarm::{Body, MarbleRow, NO_ROW, Push, Surface, SyncToken};
+use crate::swarm::{Body, MarbleRow, NO_ROW, Surface, SyncToken, VelocityChange};
 
 /// Correspondence of marbles and rows, and scratch memory.
 #[derive(Clone, Debug)]
@@ -45,7 +45,8 @@ impl<S> Default for SoftStep<S> {
     }
 }
 
-/// Least and largest inverse mass of a row, in 1/kg: products with it and quotients by it are numbers.
+/// Least and largest inverse mass of a row, in 1/kg: products with it and quotients by it are
+/// numbers.
 const INVERSE_MASSES: [f32; 2] = [1e-25, 1e25];
 
 /// Least radius of a row, in metres, as of the balls of a swarm.
@@ -75,12 +76,14 @@ impl<S: Scalar> World<S> {
         }
         let (gravity, dt) = (cast_vector::<S, f64>(self.gravity), dt.as_f64());
         let slots = &self.soft_step.slot_of_marble;
-        let pushes = self.accelerations.iter().zip(slots).filter_map(|(acceleration, slot)| {
-            let change: [f64; 3] = ((acceleration - gravity) * dt).into();
-            let change = change.map(|x| (x as f32).clamp(-FURTHEST, FURTHEST));
-            (change != [0.0; 3] && *slot != NO_ROW).then_some(Push { slot: *slot, change })
-        });
-        self.swarm.set_pushes(pushes);
+        let velocity_changes =
+            self.accelerations.iter().zip(slots).filter_map(|(acceleration, slot)| {
+                let change: [f64; 3] = ((acceleration - gravity) * dt).into();
+                let change = change.map(|x| (x as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE));
+                (change != [0.0; 3] && *slot != NO_ROW)
+                    .then_some(VelocityChange { slot: *slot, change })
+            });
+        self.swarm.set_velocity_changes(velocity_changes);
         Ok(())
     }
 
@@ -127,15 +130,15 @@ impl<S: Scalar> World<S> {
 
     /// Brings rows up to date with marbles that came, went, or were set.
     fn sync_bodies(&mut self) -> Result<(), Error> {
-        self.swarm.set_hosting(true);
+        self.swarm.set_bodies_are_rows(true);
         let rotation = self.model.rotation;
         let plain = self.swarm.model().material == Material::default();
         let known = Some((self.marbles.removals(), self.marbles.len(), rotation, plain));
         let token = &self.soft_step.token;
         let listed = self.soft_step.known == known && self.swarm.synced.agrees(token);
         if !listed || !self.marbles.changed.agrees(token) {
-            self.see_guests_off()?;
-            self.invite_all()?;
+            self.remove_stale_bodies()?;
+            self.insert_missing_bodies()?;
             self.match_slots();
             let all: Vec<_> = (0..self.marbles.len() as u32).collect();
             self.find_changes(&all);
@@ -188,7 +191,7 @@ impl<S: Scalar> World<S> {
         slot_of_marble.clear();
         slot_of_marble.resize(self.marbles.len(), NO_ROW);
         marble_of_slot.clear();
-        for (marble, ball) in &self.swarm.invited {
+        for (marble, ball) in &self.swarm.body_balls {
             if let (Ok(row), Some(slot)) = (self.marbles.row(*marble), self.swarm.slot_of(*ball)) {
                 slot_of_marble[row] = slot;
                 let slots = marble_of_slot.len().max(slot as usize + 1);
@@ -213,7 +216,7 @@ fn body<S: Scalar>(
     inverse_mass: f32,
     surface: Option<Surface>,
 ) -> Body {
-    let single = |x: S| (x.as_f64() as f32).clamp(-FURTHEST, FURTHEST);
+    let single = |x: S| (x.as_f64() as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE);
     let row = |v: Vec3<S>, last: f32| [single(v.x), single(v.y), single(v.z), last];
     let spin = marble.spin.map_or_else(Vec3::zero, |spin| spin * marble.radius);
     Body {

@@ -10,7 +10,7 @@ use crate::Error;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::response::{Material, Response};
 use crate::shape::{Aabb, BoundedShape, Sphere};
-use crate::swarm::{BallId, Guest, Stage, Surroundings};
+use crate::swarm::{BallId, Proxy, Stage, StaticGeometry};
 
 impl<S: Scalar> World<S> {
     /// Moves the [swarm](Self::swarm) on, which a step does after the marbles. `observe` is told
@@ -27,56 +27,56 @@ impl<S: Scalar> World<S> {
         if self.model.response == Response::SoftStep {
             return Ok(()); // it moved with the marbles
         }
-        self.swarm.set_hosting(false);
-        self.see_guests_off()?;
-        if self.swarm.len() == self.swarm.invited.len() {
+        self.swarm.set_bodies_are_rows(false);
+        self.remove_stale_bodies()?;
+        if self.swarm.len() == self.swarm.body_balls.len() {
             return Ok(());
         }
-        self.invite_guests(dt)?;
+        self.sync_proxies(dt)?;
         self.walls.update_tree();
         let gravity = cast_vector(self.gravity);
         self.swarm.step(dt, gravity, &self.walls, self.walls.version(), observe);
-        self.part_with_guests();
+        self.write_back_proxies();
         Ok(())
     }
 
-    /// Forgets guests of which the world lost the marble or the swarm the ball, whoever took
+    /// Forgets proxies of which the world lost the marble or the swarm the ball, whoever took
     /// them out.
-    pub(super) fn see_guests_off(&mut self) -> Result<(), Error> {
+    pub(super) fn remove_stale_bodies(&mut self) -> Result<(), Error> {
         let (marbles, swarm) = (&self.marbles, &mut self.swarm);
         let stays = |(marble, _): &(MarbleId, BallId)| marbles.row(*marble).is_ok();
         let is_there = |(_, ball): &(MarbleId, BallId)| swarm.row(*ball).is_ok();
-        if swarm.invited.iter().all(|guest| stays(guest) && is_there(guest)) {
+        if swarm.body_balls.iter().all(|proxy| stays(proxy) && is_there(proxy)) {
             return Ok(());
         }
-        let (there, _): (Vec<_>, Vec<_>) = swarm.invited.iter().copied().partition(is_there);
+        let (there, _): (Vec<_>, Vec<_>) = swarm.body_balls.iter().copied().partition(is_there);
         let (stay, gone): (Vec<_>, Vec<_>) = there.into_iter().partition(stays);
-        swarm.invited = stay;
+        swarm.body_balls = stay;
         swarm.take_out(&gone.into_iter().map(|(_, ball)| ball).collect::<Vec<_>>())
     }
 
     /// Gives every marble a ball in the swarm.
-    pub(super) fn invite_all(&mut self) -> Result<(), Error> {
-        if self.swarm.invited.len() != self.marbles.len() {
+    pub(super) fn insert_missing_bodies(&mut self) -> Result<(), Error> {
+        if self.swarm.body_balls.len() != self.marbles.len() {
             let (marbles, swarm) = (&self.marbles, &mut self.swarm);
             let known =
-                |id: &MarbleId| swarm.invited.binary_search_by_key(id, |(id, _)| *id).is_ok();
+                |id: &MarbleId| swarm.body_balls.binary_search_by_key(id, |(id, _)| *id).is_ok();
             let ids = (0..marbles.len()).filter_map(|row| marbles.id(row));
             let new: Vec<_> = ids.filter(|id| !known(id)).collect();
-            let balls = swarm.invite(new.len())?;
-            swarm.invited.extend(new.into_iter().zip(balls));
-            swarm.invited.sort_unstable();
+            let balls = swarm.insert_bodies(new.len())?;
+            swarm.body_balls.extend(new.into_iter().zip(balls));
+            swarm.body_balls.sort_unstable();
         }
         Ok(())
     }
 
     /// Tells the swarm where the marbles are.
-    fn invite_guests(&mut self, dt: f32) -> Result<(), Error> {
-        self.invite_all()?;
-        let (marbles, invited) = (&self.marbles, std::mem::take(&mut self.swarm.invited));
-        let guests = invited.iter().filter_map(|(marble, ball)| {
+    fn sync_proxies(&mut self, dt: f32) -> Result<(), Error> {
+        self.insert_missing_bodies()?;
+        let (marbles, body_balls) = (&self.marbles, std::mem::take(&mut self.swarm.body_balls));
+        let proxies = body_balls.iter().filter_map(|(marble, ball)| {
             let row = marbles.row(*marble).ok()?;
-            let single = |x: S| (x.as_f64() as f32).clamp(-FURTHEST, FURTHEST);
+            let single = |x: S| (x.as_f64() as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE);
             let rows = |v: Vec3<S>, last: f32| [single(v.x), single(v.y), single(v.z), last];
             let radius = marbles.radius()[row];
             let spin = marbles
@@ -85,36 +85,38 @@ impl<S: Scalar> World<S> {
                 .map_or([0.0; 4], |spin| rows(*spin * radius, 0.0));
             let inverse_mass = (S::one() / marbles.mass(row)).as_f64() as f32;
             let at = rows(marbles.position()[row].to_vec(), single(radius));
-            Some(Guest::new(*ball, at, rows(marbles.velocity()[row], inverse_mass), spin))
+            Some(Proxy::new(*ball, at, rows(marbles.velocity()[row], inverse_mass), spin))
         });
-        self.swarm.host(guests, dt, cast_vector(self.gravity));
-        self.swarm.invited = invited;
+        self.swarm.set_proxies(proxies, dt, cast_vector(self.gravity));
+        self.swarm.body_balls = body_balls;
         Ok(())
     }
 
     /// Gives the marbles what the swarm did to them.
-    fn part_with_guests(&mut self) {
-        for ((marble, _), (before, after)) in self.swarm.invited.iter().zip(self.swarm.hosted()) {
+    fn write_back_proxies(&mut self) {
+        for ((marble, _), (before, after)) in
+            self.swarm.body_balls.iter().zip(self.swarm.proxies_and_results())
+        {
             let change = |before: &[f32; 4], after: &[f32; 4]| {
                 let [x, y, z] = [0, 1, 2].map(|i| S::from_f64(f64::from(after[i] - before[i])));
                 Vec3::new(x, y, z)
             };
             let moved = change(&before.at, &after.at);
             let faster = change(&before.velocity, &after.velocity);
-            let turned = change(&before.rim, &after.rim);
+            let turned = change(&before.spin_velocity, &after.spin_velocity);
             self.marbles.apply_delta(*marble, moved, faster, turned);
         }
     }
 }
 
 /// In metres and m/s.
-pub(super) const FURTHEST: f32 = 1e12;
+pub(super) const MAX_COORDINATE: f32 = 1e12;
 
-impl<S: Scalar> Surroundings for Walls<S> {
-    fn planes(&self, name: &mut dyn FnMut(u32, Vec3<f32>, f32)) {
+impl<S: Scalar> StaticGeometry for Walls<S> {
+    fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<f32>, f32)) {
         for (wall, plane) in Walls::planes(self) {
             let normal: Vec3<f32> = cast_vector(plane.normal());
-            name(wall, normal.normalize(), plane.offset().as_f64() as f32);
+            visit(wall, normal.normalize(), plane.offset().as_f64() as f32);
         }
     }
 
@@ -133,7 +135,7 @@ impl<S: Scalar> Surroundings for Walls<S> {
         &self,
         &[x, y, z, radius]: &[f32; 4],
         reach: f32,
-        name: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
+        visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
     ) {
         let number = |x: f32| S::from_f64(f64::from(x));
         let center = cast_point(Point3::new(x, y, z));
@@ -145,26 +147,28 @@ impl<S: Scalar> Surroundings for Walls<S> {
         }
         for Candidate { part: SubShape { wall, index: part }, nearest } in near {
             let normal: Vec3<f32> = cast_vector(nearest.normal);
-            name([wall, part], normal, nearest.distance.as_f64() as f32);
+            visit([wall, part], normal, nearest.distance.as_f64() as f32);
         }
     }
 
-    fn first_on_way(
+    fn first_hit_on_path(
         &self,
         &[x, y, z, radius]: &[f32; 4],
-        way: Vec3<f32>,
+        displacement: Vec3<f32>,
     ) -> Option<([u32; 2], Vec3<f32>, f32)> {
         let number = |x: f32| S::from_f64(f64::from(x));
         let center: Point3<S> = cast_point(Point3::new(x, y, z));
         let sphere = Sphere { center, radius: number(radius) };
-        let way: Vec3<S> = cast_vector(way);
-        let (start, end) = (sphere.bounding_box(), Sphere { center: center + way, ..sphere });
+        let displacement: Vec3<S> = cast_vector(displacement);
+        let (start, end) =
+            (sphere.bounding_box(), Sphere { center: center + displacement, ..sphere });
         // Its core says whether it passes into the wall, its surface when it is there.
         let core = Sphere { radius: sphere.radius * S::from_f64(0.5), ..sphere };
         let mut first: Option<(SubShape, S)> = None;
         Walls::for_each_in_box(self, &start.union(&end.bounding_box()), |part| {
-            let passes = self.time_of_impact(part, &core, way).is_some();
-            let Some(stop) = passes.then(|| self.time_of_impact(part, &sphere, way)).flatten()
+            let passes = self.time_of_impact(part, &core, displacement).is_some();
+            let Some(stop) =
+                passes.then(|| self.time_of_impact(part, &sphere, displacement)).flatten()
             else {
                 return;
             };
@@ -173,9 +177,9 @@ impl<S: Scalar> Surroundings for Walls<S> {
             }
         });
         let (part, time) = first?;
-        // The plane there is nearer by the way up to it.
-        let nearest = self.project_point(part, center + way * time);
-        let distance = nearest.distance - way.dot(nearest.normal) * time;
+        // The plane there is nearer by the displacement up to it.
+        let nearest = self.project_point(part, center + displacement * time);
+        let distance = nearest.distance - displacement.dot(nearest.normal) * time;
         let normal: Vec3<f32> = cast_vector(nearest.normal);
         Some(([part.wall, part.index], normal, distance.as_f64() as f32))
     }

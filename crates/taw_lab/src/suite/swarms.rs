@@ -95,7 +95,7 @@ fn kinetic(world: &World<f32>) -> f64 {
         return world.energy().total() - potential;
     }
     let square = |v: &[f32; 4]| v[..3].iter().map(|x| f64::from(*x).powi(2)).sum::<f64>();
-    let rows = world.swarm.velocities().iter().zip(world.swarm.rims());
+    let rows = world.swarm.velocities().iter().zip(world.swarm.spin_velocities());
     rows.map(|(v, rim)| (0.5 * square(v) + 0.2 * square(rim)) / f64::from(v[3].abs())).sum()
 }
 

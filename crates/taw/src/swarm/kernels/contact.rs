@@ -1,53 +1,42 @@
-//! Bounces and contacts of pairs in the full tier.
+//! Contact constraints of pairs in the full tier: restitution, warm start, solve and relax.
+//!
+//! Derivation: the velocity along the normal after an impulse `p` is `v + p (1/m₁ + 1/m₂)`, so
+//! `Δp = -m (v + separation / h)` with the effective mass `m = 1 / (1/m₁ + 1/m₂)` lets the pair just
+//! touch at the end of a substep of `h` seconds. The accumulated normal impulse is kept at or above
+//! zero, and the accumulated tangent impulse within the friction cone (Catto, 2005, "Iterative
+//! dynamics with temporal coherence"). The touched points of solid balls are 7/2 as easy to move
+//! along the tangent as along the normal, since balls also turn.
 
-use super::{ALL, Pushes, V, gather, mass, mobility, normal_and_gap, scatter};
+use super::backing::borne_by_wall;
+use super::params::{Pass, SolverParams};
+use super::rolling::RollingInertia;
+use super::{
+    ALL, ContactImpulses, Vec3Wide, effective_mass, gather, inverse_mass, normal_and_separation,
+    scatter,
+};
 use crate::swarm::batches::Batch;
-use crate::swarm::lanes::{Instructions, Kernel, LANES, Lanes, Row};
+use crate::swarm::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use crate::swarm::surfaces::{PairNumbers, SOLID_BALL};
-use crate::swarm::team::Shared;
+use crate::swarm::workers::DisjointSlice;
 
-/// Stiffness by which contacts bear what lies on them: overlap makes it part a little, which the
-/// pass after that takes back, though not what contacts have learned to bear. What they give back
-/// is what damps it: impulses that are applied again and corrected once a substep swing for a long
-/// time, and what pushes overlap out meanwhile makes them swing more (Catto, `Solver2D`, 2024: soft
-/// contacts).
-#[derive(Clone, Copy, Debug)]
-pub(in crate::swarm) struct Soft {
-    /// The part of an overlap that is to go per second.
-    pub rate: f32,
-    /// Speed of that at most, in m/s.
-    pub fastest: f32,
-    /// The part of the impulse that a hard contact would need, and how much of what it has borne
-    /// so far it gives back.
-    pub mass: f32,
-    pub back: f32,
-    /// So much of twice the smaller radius two balls may overlap before they are moved apart.
-    pub slop: f32,
-}
-
-/// So much of its radius a ball may be in a wall: more than what bears a heap gets.
-pub(in crate::swarm) const WALL_SLOP: f32 = 0.1;
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.
 const PUSH: f32 = 0.5;
 
-/// Mark of a ball that a wall bears in this step, be it through others; one less in the next
-/// one, and after that not at all.
-pub(in crate::swarm) const GROUNDED: f32 = 2.0;
 /// Mark of a ball that presses another one in this step and that no wall bears: neither flies.
 const TOUCHING: f32 = 0.5;
 
 /// The columns that several threads work on.
 #[derive(Clone, Copy)]
-pub(in crate::swarm) struct Columns<'a> {
+pub(in crate::swarm) struct SolverColumns<'a> {
     /// Center and radius.
-    pub at: Shared<'a, Row>,
+    pub at: DisjointSlice<'a, Row>,
     /// Velocity and inverse mass.
-    pub velocity: Shared<'a, Row>,
+    pub velocity: DisjointSlice<'a, Row>,
     /// Radius times spin, and nothing.
-    pub spin: Shared<'a, Row>,
-    /// Way that each ball may still go, in metres.
-    pub budget: Shared<'a, f32>,
+    pub spin: DisjointSlice<'a, Row>,
+    /// Remaining skin of each ball, in metres.
+    pub skin_left: DisjointSlice<'a, f32>,
     /// The normal of the wall behind each ball, and the impulse that it bears for those who press
     /// the ball on it, in N s; empty where all weigh about as much.
     ///
@@ -55,43 +44,7 @@ pub(in crate::swarm) struct Columns<'a> {
     /// time, if the wall takes it after that. So the wall takes it at once, as if pair and wall
     /// were solved together: the ball is moved only by what goes along the wall, and weighs as much
     /// more along the normal of the pair (the Schur complement of the wall's contact).
-    pub backing: Shared<'a, Row>,
-}
-
-/// In place of that impulse: the ball has left the wall behind it. What pairs bore with it is more
-/// than they bear without.
-pub(in crate::swarm) const LOST: f32 = -1.0;
-
-/// Mass that the walls behind two balls add to their pair.
-struct Behind<L> {
-    /// Effective mass of both along their normal, in kilograms, as long as the walls bear.
-    load: L,
-    /// Speed at which they leave the walls along it, in m/s: until then, they weigh as they are.
-    leaving: L,
-    /// Above zero if a wall bears.
-    bears: L,
-}
-
-impl<L: Lanes> Behind<L> {
-    /// The impulse that makes a pair of this mass part by so many m/s more slowly, less than zero
-    /// for faster.
-    #[inline(always)]
-    fn impulse(&self, alone: L, slower: L) -> L {
-        let zero = L::splat(0.0);
-        let plain = alone * slower;
-        let at_wall = slower + self.leaving;
-        let pressed = zero - (zero - self.load * at_wall).max(zero - plain);
-        let released = self.bears.pick_above(zero, self.load * slower, plain);
-        let apart = slower.pick_above(zero, released, plain);
-        zero.pick_above(at_wall, pressed, apart)
-    }
-}
-
-impl Columns<'_> {
-    /// Says if it is known who has a wall behind it.
-    pub fn backed(&self) -> bool {
-        self.backing.len() > 0
-    }
+    pub backing: DisjointSlice<'a, Row>,
 }
 
 /// One pass over the pairs for their impulses.
@@ -100,62 +53,27 @@ impl Columns<'_> {
 /// of the four is compiled alone.
 struct Solve<'a, const BACKED: bool, const OWN: bool> {
     pub pass: Pass,
-    pub columns: Columns<'a>,
+    pub columns: SolverColumns<'a>,
     pub batches: &'a [Batch],
-    pub pushes: &'a mut Pushes,
+    pub impulses: &'a mut ContactImpulses,
     pub friction: f32,
-}
-
-/// Kind of a pass.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::swarm) enum Pass {
-    /// Lets bounce what meets in a substep and comes together fast enough.
-    Impact(Impact),
-    /// Applies the impulses of the last substep again.
-    Begin(Impact),
-    /// Lets nothing come nearer than the gap within a substep.
-    Solve(Impact),
-    /// Solves once more, after the balls moved, and moves what overlaps apart. What bears nothing
-    /// and comes fast is left for the next bounce.
-    Relax(Impact),
-}
-
-/// Limits and numbers of bounces.
-///
-/// Bounces come before gravity and contacts, one pair after another, each by the velocities that
-/// the ones before it left: an impulse of at most twice what stops a pair adds no energy to it, so
-/// none of them does, in whatever order and however many meet at once (Guendelman, Bridson and
-/// Fedkiw, 2003, "Nonconvex rigid bodies with stacking"). What contacts remember is
-/// left out of it: a bounce comes once.
-#[derive(Clone, Copy, Debug)]
-pub(in crate::swarm) struct Impact {
-    /// Speed below which two that come together are a contact, in m/s.
-    pub speed: f32,
-    /// The part of the speed that balls have afterwards.
-    pub restitution: f32,
-    /// Length of a substep in seconds.
-    pub time: f32,
-    /// In m/s².
-    pub gravity: Row,
-    /// Stiffness of contacts.
-    pub soft: Soft,
 }
 
 /// Goes over the pairs of some batches.
 pub(in crate::swarm) fn solve(
-    instructions: Instructions,
+    simd_level: SimdLevel,
     pass: Pass,
-    columns: Columns,
+    columns: SolverColumns,
     batches: &[Batch],
-    pushes: &mut Pushes,
+    impulses: &mut ContactImpulses,
     friction: f32,
 ) {
     macro_rules! run {
         ($backed:literal, $own:literal) => {
-            instructions.run(Solve::<$backed, $own> { pass, columns, batches, pushes, friction })
+            simd_level.run(Solve::<$backed, $own> { pass, columns, batches, impulses, friction })
         };
     }
-    match (columns.backed(), !pushes.numbers.is_empty()) {
+    match (columns.backed(), !impulses.numbers.is_empty()) {
         (false, false) => run!(false, false),
         (false, true) => run!(false, true),
         (true, false) => run!(true, false),
@@ -165,12 +83,12 @@ pub(in crate::swarm) fn solve(
 
 impl<const BACKED: bool, const OWN: bool> Kernel for Solve<'_, BACKED, OWN> {
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         match self.pass {
-            Pass::Impact(impact) => self.impact::<L>(impact),
-            Pass::Begin(impact) => self.begin::<L>(impact),
-            Pass::Solve(impact) => self.solve::<L, true>(impact),
-            Pass::Relax(impact) => self.solve::<L, false>(impact),
+            Pass::Restitution(params) => self.restitution::<L>(params),
+            Pass::WarmStart(params) => self.warm_start::<L>(params),
+            Pass::Solve(params) => self.solve::<L, true>(params),
+            Pass::Relax(params) => self.solve::<L, false>(params),
         }
     }
 }
@@ -184,7 +102,7 @@ struct Numbers<L> {
     inertia_factors: [L; 2],
 }
 
-impl<L: Lanes> Numbers<L> {
+impl<L: Simd> Numbers<L> {
     #[inline(always)]
     fn load<const OWN: bool>(
         own: &[PairNumbers],
@@ -214,37 +132,37 @@ impl<L: Lanes> Numbers<L> {
         if OWN {
             let one = L::splat(1.0);
             let [of_a, of_b] = self.inertia_factors;
-            let sum = mobility(a) * (one + of_a) + mobility(b) * (one + of_b);
-            sum.pick_above(L::splat(0.0), one / sum, L::splat(0.0))
+            let sum = inverse_mass(a) * (one + of_a) + inverse_mass(b) * (one + of_b);
+            sum.select_gt(L::splat(0.0), one / sum, L::splat(0.0))
         } else {
             alone * L::splat(2.0 / 7.0)
         }
     }
 }
 
-impl Columns<'_> {
+impl SolverColumns<'_> {
     /// Applies an impulse to both balls of the pairs; the second gets it as it is.
     #[inline(always)]
-    fn hit<L: Lanes, const BACKED: bool>(
+    fn apply_impulse<L: Simd, const BACKED: bool>(
         &self,
         batch: &Batch,
         [a, b]: [[L; 4]; 2],
         [spin_a, spin_b]: [[L; 4]; 2],
-        normal: V<L>,
-        along: L,
-        across: V<L>,
+        normal: Vec3Wide<L>,
+        normal_part: L,
+        tangent_part: Vec3Wide<L>,
         [factor_a, factor_b]: [L; 2],
     ) {
-        let (mass_a, mass_b) = (mobility(&a), mobility(&b));
-        let impulse = normal.times(along).plus(across);
+        let (mass_a, mass_b) = (inverse_mass(&a), inverse_mass(&b));
+        let impulse = normal.times(normal_part).plus(tangent_part);
         // The column holds radius times spin.
-        let turn = normal.cross(across);
+        let turn = normal.cross(tangent_part);
         let spin = [
-            V::of(&spin_a).minus(turn.times(factor_a * mass_a)).with(spin_a[3]),
-            V::of(&spin_b).minus(turn.times(factor_b * mass_b)).with(spin_b[3]),
+            Vec3Wide::of(&spin_a).minus(turn.times(factor_a * mass_a)).with(spin_a[3]),
+            Vec3Wide::of(&spin_b).minus(turn.times(factor_b * mass_b)).with(spin_b[3]),
         ];
         scatter(self.spin, batch, spin);
-        let none = V([L::splat(0.0); 3]);
+        let none = Vec3Wide([L::splat(0.0); 3]);
         let [mut by_a, mut by_b] = [none.minus(impulse), impulse];
         if BACKED {
             let [back_a, back_b] = gather::<L>(self.backing, batch);
@@ -254,369 +172,313 @@ impl Columns<'_> {
             scatter(self.backing, batch, [borne_a, borne_b]);
         }
         let velocity = [
-            V::of(&a).plus(by_a.times(mass_a)).with(a[3]),
-            V::of(&b).plus(by_b.times(mass_b)).with(b[3]),
+            Vec3Wide::of(&a).plus(by_a.times(mass_a)).with(a[3]),
+            Vec3Wide::of(&b).plus(by_b.times(mass_b)).with(b[3]),
         ];
         scatter(self.velocity, batch, velocity);
     }
 
-    /// The walls behind two balls.
-    #[inline(always)]
-    fn behind<L: Lanes>(&self, batch: &Batch, [a, b]: [&[L; 4]; 2], normal: V<L>) -> Behind<L> {
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let [back_a, back_b] = gather::<L>(self.backing, batch);
-        // How far the pair's normal goes into the wall.
-        let into_a = normal.dot(V::of(&back_a)).max(zero);
-        let into_b = (zero - normal.dot(V::of(&back_b))).max(zero);
-        let free = |into: L| (one - into * into).max(zero);
-        let [of_a, of_b] = [mobility(a), mobility(b)];
-        // Two that have a wall behind them each weigh no more than the heavier one.
-        let heavier = of_a + of_b - of_a.max(of_b);
-        let sum = (of_a * free(into_a) + of_b * free(into_b)).max(heavier);
-        let away = |ball: &[L; 4], back: &[L; 4]| V::of(ball).dot(V::of(back)).max(zero);
-        Behind {
-            load: sum.pick_above(zero, one / sum, zero),
-            leaving: away(a, &back_a) * into_a + away(b, &back_b) * into_b,
-            bears: (back_a[3] * into_a).max(back_b[3] * into_b),
-        }
-    }
-
     /// Counts how far the balls of the pairs went.
     #[inline(always)]
-    fn spend<L: Lanes>(&self, batch: &Batch, ways: [V<L>; 2]) {
+    fn spend<L: Simd>(&self, batch: &Batch, displacements: [Vec3Wide<L>; 2]) {
         let mut lengths = [[0.0; LANES]; 2];
-        for (lengths, way) in lengths.iter_mut().zip(ways) {
-            way.dot(way).sqrt().store(lengths);
+        for (lengths, displacement) in lengths.iter_mut().zip(displacements) {
+            displacement.dot(displacement).sqrt().store(lengths);
         }
         for lane in 0..batch.count as usize {
             for (row, lengths) in batch.pair(lane).into_iter().zip(&lengths) {
                 // SAFETY: as in `scatter`.
-                unsafe { *self.budget.row(row as usize) -= lengths[lane] };
+                unsafe { *self.skin_left.row(row as usize) -= lengths[lane] };
             }
         }
     }
 
     /// Lets those pairs bounce that meet. Says whether any does.
     #[inline(always)]
-    fn bounce<L: Lanes, const OWN: bool>(
+    fn apply_restitution<L: Simd, const OWN: bool>(
         &self,
         batch: &Batch,
-        impact: &Impact,
+        params: &SolverParams,
         numbers: &Numbers<L>,
         [at_a, at_b]: [[L; 4]; 2],
         [a, b]: [[L; 4]; 2],
     ) -> bool {
         let zero = L::splat(0.0);
-        let (normal, closing) = meeting(impact, [&at_a, &at_b], [&a, &b]);
+        let (normal, approach_speed) = meeting(params, [&at_a, &at_b], [&a, &b]);
         // What does not bounce is stopped by its contact.
-        let closing =
-            if OWN { numbers.restitution.pick_above(zero, closing, zero) } else { closing };
-        if closing.above(zero) == 0 {
+        let approach_speed = if OWN {
+            numbers.restitution.select_gt(zero, approach_speed, zero)
+        } else {
+            approach_speed
+        };
+        if approach_speed.gt_mask(zero) == 0 {
             return false;
         }
-        let relative = V::of(&b).minus(V::of(&a));
-        let mass = mass(&a, &b);
-        let along = mass * closing * (L::splat(1.0) + numbers.restitution);
+        let relative = Vec3Wide::of(&b).minus(Vec3Wide::of(&a));
+        let mass = effective_mass(&a, &b);
+        let normal_part = mass * approach_speed * (L::splat(1.0) + numbers.restitution);
         let spins = self.spins(batch);
-        let sliding = sliding(relative, normal, &spins);
-        let wish = sliding.times(zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
-        let across = held(wish, numbers.friction * along);
-        self.hit::<L, false>(batch, [a, b], spins, normal, along, across, numbers.inertia_factors);
+        let tangent_velocity = tangent_velocity(relative, normal, &spins);
+        let target = tangent_velocity.times(zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
+        let tangent_part = clamp_length(target, numbers.friction * normal_part);
+        self.apply_impulse::<L, false>(
+            batch,
+            [a, b],
+            spins,
+            normal,
+            normal_part,
+            tangent_part,
+            numbers.inertia_factors,
+        );
         true
     }
 
     /// Moves apart what overlaps. That changes no velocity: overlap is not energy.
     #[inline(always)]
-    fn part<L: Lanes>(
+    fn push_apart<L: Simd>(
         &self,
         batch: &Batch,
         [at_a, at_b]: [[L; 4]; 2],
         [a, b]: [[L; 4]; 2],
-        normal: V<L>,
-        gap: L,
+        normal: Vec3Wide<L>,
+        separation: L,
         slop: f32,
         grounded: L,
     ) {
         let zero = L::splat(0.0);
         let smaller = at_a[3] + at_b[3] - at_a[3].max(at_b[3]);
-        let overlap = zero - gap - smaller * L::splat(2.0 * slop);
-        if overlap.above(zero) == 0 {
+        let overlap = zero - separation - smaller * L::splat(2.0 * slop);
+        if overlap.gt_mask(zero) == 0 {
             return;
         }
         // What flies keeps its center of mass. What a wall bears goes half each, whatever they
         // weigh: a light ball that a heavy one presses on something has nowhere to go. What sleeps
         // stays.
         let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
-        let [free_a, free_b] = [mobility(&a), mobility(&b)];
-        let borne = grounded.pick_above(L::splat(TOUCHING), one, zero);
-        let a = free_a.pick_above(zero, borne.pick_above(zero, one, free_a), zero);
-        let b = free_b.pick_above(zero, borne.pick_above(zero, one, free_b), zero);
-        let by = (a + b).pick_above(zero, push / (a + b), zero);
-        let ways = [normal.times(by * a), normal.times(by * b)];
-        let places =
-            [V::of(&at_a).minus(ways[0]).with(at_a[3]), V::of(&at_b).plus(ways[1]).with(at_b[3])];
-        scatter(self.at, batch, places);
-        self.spend(batch, ways);
-    }
-
-    /// Applies angular impulses about the centers of both; the second gets it as it is.
-    #[inline(always)]
-    fn twist<L: Lanes>(&self, batch: &Batch, inertia: &Inertia<L>, torque: V<L>) {
-        let [a, b] = self.spins::<L>(batch);
-        let [by_a, by_b] = inertia.surface_speed;
-        let spins = [
-            V::of(&a).minus(torque.times(by_a)).with(a[3]),
-            V::of(&b).plus(torque.times(by_b)).with(b[3]),
+        let [free_a, free_b] = [inverse_mass(&a), inverse_mass(&b)];
+        let borne = grounded.select_gt(L::splat(TOUCHING), one, zero);
+        let a = free_a.select_gt(zero, borne.select_gt(zero, one, free_a), zero);
+        let b = free_b.select_gt(zero, borne.select_gt(zero, one, free_b), zero);
+        let by = (a + b).select_gt(zero, push / (a + b), zero);
+        let displacements = [normal.times(by * a), normal.times(by * b)];
+        let places = [
+            Vec3Wide::of(&at_a).minus(displacements[0]).with(at_a[3]),
+            Vec3Wide::of(&at_b).plus(displacements[1]).with(at_b[3]),
         ];
-        scatter(self.spin, batch, spins);
-    }
-
-    /// Slows how the two turn against each other, by a torque of at most the resistance times
-    /// normal force times effective radius.
-    #[inline(always)]
-    fn resist<L: Lanes>(
-        &self,
-        batch: &Batch,
-        inertia: &Inertia<L>,
-        normal: V<L>,
-        normal_impulse: L,
-        numbers: &PairNumbers,
-        torque: &mut [[f32; LANES]; 3],
-    ) {
-        let most = normal_impulse * inertia.radius;
-        let rolling = L::load(&numbers.rolling_resistance) * most;
-        let spinning = L::load(&numbers.spinning_resistance) * most;
-        let before = V::<L>::load(torque);
-        let (zero, [a, b]) = (L::splat(0.0), self.spins::<L>(batch));
-        let [per_a, per_b] = inertia.per_radius;
-        let turning = V::of(&b).times(per_b).minus(V::of(&a).times(per_a));
-        let wish = before.minus(turning.times(inertia.mass));
-        let about = normal.times(wish.dot(normal));
-        let after =
-            held(wish.minus(about), rolling.max(zero)).plus(held(about, spinning.max(zero)));
-        after.store(torque);
-        self.twist(batch, inertia, after.minus(before));
+        scatter(self.at, batch, places);
+        self.spend(batch, displacements);
     }
 
     /// The spins of a batch.
     #[inline(always)]
-    fn spins<L: Lanes>(&self, batch: &Batch) -> [[L; 4]; 2] {
+    pub(super) fn spins<L: Simd>(&self, batch: &Batch) -> [[L; 4]; 2] {
         gather(self.spin, batch)
     }
 }
 
 impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
     #[inline(always)]
-    fn impact<L: Lanes>(self, impact: Impact) {
-        let Self { columns, batches, pushes, friction, .. } = self;
-        if !OWN && impact.restitution == 0.0 {
+    fn restitution<L: Simd>(self, params: SolverParams) {
+        let Self { columns, batches, impulses, friction, .. } = self;
+        if !OWN && params.restitution == 0.0 {
             return; // contacts stop what meets
         }
         for (i, batch) in batches.iter().enumerate() {
             let at = gather::<L>(columns.at, batch);
             let velocity = gather::<L>(columns.velocity, batch);
             let numbers =
-                Numbers::<L>::load::<OWN>(&pushes.numbers, i, friction, impact.restitution);
-            pushes.bounced |= columns.bounce::<L, OWN>(batch, &impact, &numbers, at, velocity);
+                Numbers::<L>::load::<OWN>(&impulses.numbers, i, friction, params.restitution);
+            impulses.bounced |=
+                columns.apply_restitution::<L, OWN>(batch, &params, &numbers, at, velocity);
         }
     }
 
     #[inline(always)]
-    fn begin<L: Lanes>(self, impact: Impact) {
-        let Self { columns, batches, pushes, friction, .. } = self;
-        let Pushes { pressure, grip, torque, numbers: own, .. } = pushes;
+    fn warm_start<L: Simd>(self, params: SolverParams) {
+        let Self { columns, batches, impulses, friction, .. } = self;
+        let ContactImpulses { normal_impulse, tangent_impulse, torque, numbers: own, .. } =
+            impulses;
         for (i, batch) in batches.iter().enumerate() {
             let [a, b] = gather::<L>(columns.at, batch);
-            let (normal, _) = normal_and_gap(&a, &b, ALL, |lane| batch.pair(lane));
+            let (normal, _) = normal_and_separation(&a, &b, ALL, |lane| batch.pair(lane));
             // It was across the normal of the last substep.
-            let across = V::load(&grip[i]);
-            let across = across.minus(normal.times(across.dot(normal)));
-            let mut along = L::load(&pressure[i]);
-            let mut across = across;
+            let tangent_part = Vec3Wide::load(&tangent_impulse[i]);
+            let tangent_part = tangent_part.minus(normal.times(tangent_part.dot(normal)));
+            let mut normal_part = L::load(&normal_impulse[i]);
+            let mut tangent_part = tangent_part;
             let (velocity, spin) = (gather::<L>(columns.velocity, batch), columns.spins(batch));
             if BACKED {
                 let [back_a, back_b] = gather::<L>(columns.backing, batch);
                 let (zero, one) = (L::splat(0.0), L::splat(1.0));
-                let lost = zero.pick_above(back_a[3], one, zero);
-                let kept = zero.pick_above(back_b[3], zero, one - lost);
+                let lost = zero.select_gt(back_a[3], one, zero);
+                let kept = zero.select_gt(back_b[3], zero, one - lost);
                 // Nor does it bear as much once it presses the ball along the wall: it parts them
                 // no faster than an overlap is pushed out.
                 let [a, b] = &velocity;
-                let (alone, load) = (mass(a, b), columns.behind(batch, [a, b], normal).load);
-                let most = load * L::splat(impact.soft.fastest);
-                let over = (along - most).max(zero);
-                along = (along - load.pick_above(alone, over, zero)) * kept;
-                along.store(&mut pressure[i]);
-                across = across.times(kept);
+                let (alone, load) =
+                    (effective_mass(a, b), columns.backing_of(batch, [a, b], normal).load);
+                let most = load * L::splat(params.softness.max_push_speed);
+                let over = (normal_part - most).max(zero);
+                normal_part = (normal_part - load.select_gt(alone, over, zero)) * kept;
+                normal_part.store(&mut normal_impulse[i]);
+                tangent_part = tangent_part.times(kept);
             }
-            across.store(&mut grip[i]);
-            let numbers = Numbers::<L>::load::<OWN>(own, i, friction, impact.restitution);
+            tangent_part.store(&mut tangent_impulse[i]);
+            let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
             let factors = numbers.inertia_factors;
-            columns.hit::<L, BACKED>(batch, velocity, spin, normal, along, across, factors);
+            columns.apply_impulse::<L, BACKED>(
+                batch,
+                velocity,
+                spin,
+                normal,
+                normal_part,
+                tangent_part,
+                factors,
+            );
             if OWN {
                 let [a, b] = gather::<L>(columns.at, batch);
-                let inertia = Inertia::new([&a, &b], &velocity, factors);
-                columns.twist(batch, &inertia, V::load(&torque[i]));
+                let inertia = RollingInertia::new([&a, &b], &velocity, factors);
+                columns.apply_angular_impulse(batch, &inertia, Vec3Wide::load(&torque[i]));
             }
         }
     }
 
     #[inline(always)]
-    fn solve<L: Lanes, const FIRST: bool>(self, impact: Impact) {
-        let Self { columns, batches, pushes, friction, .. } = self;
-        let Pushes { pressure, grip, torque, numbers: own, .. } = pushes;
-        let (zero, one, soft) = (L::splat(0.0), L::splat(1.0), impact.soft);
-        let per_second = L::splat(1.0 / impact.time);
+    fn solve<L: Simd, const FIRST: bool>(self, params: SolverParams) {
+        let Self { columns, batches, impulses, friction, .. } = self;
+        let ContactImpulses { normal_impulse, tangent_impulse, torque, numbers: own, .. } =
+            impulses;
+        let (zero, one, softness) = (L::splat(0.0), L::splat(1.0), params.softness);
+        let per_second = L::splat(1.0 / params.time);
         for (i, batch) in batches.iter().enumerate() {
-            let numbers = Numbers::<L>::load::<OWN>(own, i, friction, impact.restitution);
+            let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
             // Where nothing bounces, all is a contact.
-            let speed =
-                numbers.restitution.pick_above(zero, L::splat(impact.speed), L::splat(f32::MAX));
+            let speed = numbers.restitution.select_gt(
+                zero,
+                L::splat(params.restitution_threshold),
+                L::splat(f32::MAX),
+            );
             let at = gather::<L>(columns.at, batch);
-            let (normal, gap) = normal_and_gap(&at[0], &at[1], ALL, |lane| batch.pair(lane));
-            let before = L::load(&pressure[i]);
+            let (normal, separation) =
+                normal_and_separation(&at[0], &at[1], ALL, |lane| batch.pair(lane));
+            let before = L::load(&normal_impulse[i]);
             let velocity = gather::<L>(columns.velocity, batch);
             // What bears nothing and comes fast is no contact yet.
-            let closing = V::of(&velocity[0]).minus(V::of(&velocity[1])).dot(normal);
-            let fast = closing.pick_above(speed, one, zero);
-            let mut fresh = before.pick_above(zero, zero, fast);
-            if FIRST && fresh.above(zero) != 0 {
+            let approach_speed =
+                Vec3Wide::of(&velocity[0]).minus(Vec3Wide::of(&velocity[1])).dot(normal);
+            let fast = approach_speed.select_gt(speed, one, zero);
+            let mut fresh = before.select_gt(zero, zero, fast);
+            if FIRST && fresh.gt_mask(zero) != 0 {
                 // What meets nevertheless is stopped: it may come so fast only because of impulses
                 // that were applied again, and are taken back by the contacts that bear them.
-                let (_, meets) = meeting(&impact, [&at[0], &at[1]], [&velocity[0], &velocity[1]]);
-                fresh = meets.pick_above(zero, zero, fresh);
+                let (_, meets) = meeting(&params, [&at[0], &at[1]], [&velocity[0], &velocity[1]]);
+                fresh = meets.select_gt(zero, zero, fresh);
             }
             let [a, b] = velocity;
-            let relative = V::of(&b).minus(V::of(&a));
+            let relative = Vec3Wide::of(&b).minus(Vec3Wide::of(&a));
             let parting = relative.dot(normal);
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
-            let alone = mass(&a, &b);
+            let alone = effective_mass(&a, &b);
             // What so much slower parting takes.
             let impulse = |slower: L| {
                 if BACKED {
-                    columns.behind(batch, [&a, &b], normal).impulse(alone, slower)
+                    columns.backing_of(batch, [&a, &b], normal).impulse(alone, slower)
                 } else {
                     alone * slower
                 }
             };
             let change = if FIRST {
-                let pushed = (gap * L::splat(soft.rate)).max(L::splat(-soft.fastest));
-                let wish = gap.pick_above(zero, gap * per_second, pushed);
-                let part = gap.pick_above(zero, one, L::splat(soft.mass));
-                let back = gap.pick_above(zero, zero, L::splat(soft.back));
-                part * impulse(parting + wish) + before * back
+                let pushed = (separation * L::splat(softness.bias_rate))
+                    .max(L::splat(-softness.max_push_speed));
+                let target = separation.select_gt(zero, separation * per_second, pushed);
+                let part = separation.select_gt(zero, one, L::splat(softness.mass_scale));
+                let back = separation.select_gt(zero, zero, L::splat(softness.impulse_scale));
+                part * impulse(parting + target) + before * back
             } else {
-                impulse(parting + gap.max(zero) * per_second)
+                impulse(parting + separation.max(zero) * per_second)
             };
-            let after = (before - fresh.pick_above(zero, zero, change)).max(zero);
-            after.store(&mut pressure[i]);
+            let after = (before - fresh.select_gt(zero, zero, change)).max(zero);
+            after.store(&mut normal_impulse[i]);
             let grounded = spins[0][3].max(spins[1][3]);
             for spin in &mut spins {
-                spin[3] = after.pick_above(zero, grounded.max(L::splat(TOUCHING)), spin[3]);
+                spin[3] = after.select_gt(zero, grounded.max(L::splat(TOUCHING)), spin[3]);
             }
-            let sliding = sliding(relative, normal, &spins);
-            let old = V::<L>::load(&grip[i]);
-            let wish = old.minus(sliding.times(numbers.tangent_mass::<OWN>(alone, [&a, &b])));
-            let held = held(wish, numbers.friction * after);
-            held.store(&mut grip[i]);
-            let (along, across, factors) =
-                (after - before, held.minus(old), numbers.inertia_factors);
-            columns.hit::<L, BACKED>(batch, [a, b], spins, normal, along, across, factors);
+            let tangent_velocity = tangent_velocity(relative, normal, &spins);
+            let old = Vec3Wide::<L>::load(&tangent_impulse[i]);
+            let target =
+                old.minus(tangent_velocity.times(numbers.tangent_mass::<OWN>(alone, [&a, &b])));
+            let clamp_length = clamp_length(target, numbers.friction * after);
+            clamp_length.store(&mut tangent_impulse[i]);
+            let (normal_part, tangent_part, factors) =
+                (after - before, clamp_length.minus(old), numbers.inertia_factors);
+            columns.apply_impulse::<L, BACKED>(
+                batch,
+                [a, b],
+                spins,
+                normal,
+                normal_part,
+                tangent_part,
+                factors,
+            );
             if OWN {
-                let inertia = Inertia::new([&at[0], &at[1]], &[a, b], factors);
-                columns.resist(batch, &inertia, normal, after, &own[i], &mut torque[i]);
+                let inertia = RollingInertia::new([&at[0], &at[1]], &[a, b], factors);
+                columns.solve_rolling(batch, &inertia, normal, after, &own[i], &mut torque[i]);
             }
             if !FIRST {
-                columns.part(batch, at, [a, b], normal, gap, soft.slop, grounded);
+                columns.push_apart(batch, at, [a, b], normal, separation, softness.slop, grounded);
             }
         }
     }
-}
-
-/// Inertia of the balls of a batch against torques.
-struct Inertia<L> {
-    /// Change of radius times angular velocity by an angular impulse, in m/s per N m s.
-    surface_speed: [L; 2],
-    /// Reciprocals of the radii.
-    per_radius: [L; 2],
-    /// Moment of inertia against turning against each other, in kg m².
-    mass: L,
-    /// Effective radius, in metres.
-    radius: L,
-}
-
-impl<L: Lanes> Inertia<L> {
-    #[inline(always)]
-    fn new([at_a, at_b]: [&[L; 4]; 2], [a, b]: &[[L; 4]; 2], [of_a, of_b]: [L; 2]) -> Self {
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let [per_a, per_b] = [one / at_a[3], one / at_b[3]];
-        let [by_a, by_b] = [of_a * mobility(a) * per_a, of_b * mobility(b) * per_b];
-        let sum = by_a * per_a + by_b * per_b;
-        Self {
-            surface_speed: [by_a, by_b],
-            per_radius: [per_a, per_b],
-            mass: sum.pick_above(zero, one / sum, zero),
-            radius: one / (per_a + per_b),
-        }
-    }
-}
-
-/// An impulse on a ball, and with it what the wall behind takes so that the ball does not come
-/// nearer, or gives back of that; and the wall, with what it bears then.
-#[inline(always)]
-fn borne_by_wall<L: Lanes>(impulse: V<L>, ball: &[L; 4], back: &[L; 4]) -> (V<L>, [L; 4]) {
-    let (zero, one) = (L::splat(0.0), L::splat(1.0));
-    let (normal, free) = (V::of(back), mobility(ball));
-    let some = free.pick_above(zero, normal.dot(normal), zero);
-    let mass = free.pick_above(zero, one / free, zero);
-    let before = back[3].max(zero);
-    let away = V::of(ball).dot(normal) * mass + impulse.dot(normal);
-    let borne = (before - away).max(zero) * some;
-    (impulse.plus(normal.times(borne - before)), normal.with(borne))
 }
 
 /// Which pairs meet within a substep: the normal then, and how fast they come together, or zero for
 /// those that do not meet or too slowly.
 #[inline(always)]
-fn meeting<L: Lanes>(
-    impact: &Impact,
+fn meeting<L: Simd>(
+    params: &SolverParams,
     [at_a, at_b]: [&[L; 4]; 2],
     [a, b]: [&[L; 4]; 2],
-) -> (V<L>, L) {
+) -> (Vec3Wide<L>, L) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
-    let way = V::of(at_b).minus(V::of(at_a));
-    let relative = V::of(b).minus(V::of(a));
+    let displacement = Vec3Wide::of(at_b).minus(Vec3Wide::of(at_a));
+    let relative = Vec3Wide::of(b).minus(Vec3Wide::of(a));
     let reach = at_a[3] + at_b[3];
-    let approach = zero - way.dot(relative);
+    let approach = zero - displacement.dot(relative);
     // Where a sphere as wide as both meets a point.
-    let apart = (way.dot(way) - reach * reach).max(zero);
+    let apart = (displacement.dot(displacement) - reach * reach).max(zero);
     let square = approach * approach - relative.dot(relative) * apart;
-    let time = approach.pick_above(zero, apart / (approach + square.max(zero).sqrt()), zero);
-    // Of what does not meet, any time will do: what hardly moves would take longer than a number is.
-    let limit = L::splat(impact.time);
-    let meets = limit.pick_above(time, one, zero);
-    let time = limit.pick_above(time, time, zero);
-    let then = way.plus(relative.times(time));
+    let time = approach.select_gt(zero, apart / (approach + square.max(zero).sqrt()), zero);
+    // Of what does not meet, any time will do: what hardly moves would take longer than a number
+    // is.
+    let limit = L::splat(params.time);
+    let meets = limit.select_gt(time, one, zero);
+    let time = limit.select_gt(time, time, zero);
+    let then = displacement.plus(relative.times(time));
     let length = then.dot(then).sqrt();
-    let inverse = length.pick_above(zero, one / length, zero);
+    let inverse = length.select_gt(zero, one / length, zero);
     let normal = then.times(inverse);
-    let closing = zero - relative.dot(normal);
-    let closing = closing.pick_above(L::splat(impact.speed), closing, zero);
-    let closing = square.pick_above(zero, closing, zero);
-    (normal, meets.pick_above(zero, closing, zero))
+    let approach_speed = zero - relative.dot(normal);
+    let approach_speed =
+        approach_speed.select_gt(L::splat(params.restitution_threshold), approach_speed, zero);
+    let approach_speed = square.select_gt(zero, approach_speed, zero);
+    (normal, meets.select_gt(zero, approach_speed, zero))
 }
 
 /// Velocity at which the surfaces of two balls slide over each other.
 #[inline(always)]
-fn sliding<L: Lanes>(relative: V<L>, normal: V<L>, [a, b]: &[[L; 4]; 2]) -> V<L> {
-    let spin = V::of(a).plus(V::of(b));
+fn tangent_velocity<L: Simd>(
+    relative: Vec3Wide<L>,
+    normal: Vec3Wide<L>,
+    [a, b]: &[[L; 4]; 2],
+) -> Vec3Wide<L> {
+    let spin = Vec3Wide::of(a).plus(Vec3Wide::of(b));
     relative.minus(normal.times(relative.dot(normal))).minus(spin.cross(normal))
 }
 
-/// The most of an impulse that friction bears.
+/// Clamps a tangential impulse to the friction cone.
 #[inline(always)]
-fn held<L: Lanes>(wish: V<L>, most: L) -> V<L> {
-    let size = wish.dot(wish).sqrt();
+pub(super) fn clamp_length<L: Simd>(target: Vec3Wide<L>, most: L) -> Vec3Wide<L> {
+    let size = target.dot(target).sqrt();
     let part = most / size.max(L::splat(f32::MIN_POSITIVE));
-    wish.times(size.pick_above(most, part, L::splat(1.0)))
+    target.times(size.select_gt(most, part, L::splat(1.0)))
 }

@@ -1,26 +1,27 @@
 //! Overlap moved apart in the lab's tier.
 
-use super::{ALL, V, gather, normal_and_gap, scatter};
+use super::{ALL, Vec3Wide, gather, normal_and_separation, scatter};
 use crate::swarm::batches::Batch;
-use crate::swarm::lanes::{Kernel, LANES, Lanes, Row};
-use crate::swarm::pairs::Fans;
-use crate::swarm::team::Shared;
+use crate::swarm::neighbours::NeighbourLists;
+use crate::swarm::simd::{Kernel, LANES, Row, Simd};
 use crate::swarm::walls::HalfSpace;
+use crate::swarm::workers::DisjointSlice;
 
-/// Pushes overlapping balls apart, half each.
+/// Moves overlapping balls apart, half each.
 pub(in crate::swarm) struct Displace<'a> {
-    pub at: Shared<'a, Row>,
+    pub at: DisjointSlice<'a, Row>,
     pub batches: &'a [Batch],
 }
 
 impl Kernel for Displace<'_> {
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         for batch in self.batches {
             let [a, b] = gather::<L>(self.at, batch);
             let (normal, overlap) = normal_and_overlap(&a, &b, ALL, |lane| batch.pair(lane));
             let by = normal.times(overlap * L::splat(0.5));
-            let moved = [V::of(&a).minus(by).with(a[3]), V::of(&b).plus(by).with(b[3])];
+            let moved =
+                [Vec3Wide::of(&a).minus(by).with(a[3]), Vec3Wide::of(&b).plus(by).with(b[3])];
             scatter(self.at, batch, moved);
         }
     }
@@ -28,21 +29,21 @@ impl Kernel for Displace<'_> {
 
 /// The normal from the first to the second ball, and how far they overlap.
 #[inline(always)]
-fn normal_and_overlap<L: Lanes>(
+fn normal_and_overlap<L: Simd>(
     a: &[L; 4],
     b: &[L; 4],
     lanes: u32,
     pair: impl Fn(usize) -> [u32; 2],
-) -> (V<L>, L) {
-    let (normal, gap) = normal_and_gap(a, b, lanes, pair);
+) -> (Vec3Wide<L>, L) {
+    let (normal, separation) = normal_and_separation(a, b, lanes, pair);
     let zero = L::splat(0.0);
-    (normal, (zero - gap).max(zero))
+    (normal, (zero - separation).max(zero))
 }
 
-/// Pushes apart overlapping balls of fans: each ball and up to eight others at a time.
-pub(in crate::swarm) struct DisplaceFans<'a> {
-    pub at: Shared<'a, Row>,
-    pub fans: Fans<'a>,
+/// Moves overlapping balls of neighbour lists apart: each ball and up to eight others at a time.
+pub(in crate::swarm) struct DisplaceNeighbours<'a> {
+    pub at: DisjointSlice<'a, Row>,
+    pub lists: NeighbourLists<'a>,
 }
 
 /// Which part of an overlap each of two balls moves, by how many overlap the first one: where
@@ -64,10 +65,10 @@ static FIRST: [[u16; LANES]; LANES + 1] = {
     masks
 };
 
-impl Kernel for DisplaceFans<'_> {
+impl Kernel for DisplaceNeighbours<'_> {
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Fans { first, rows, list: mut rest } = self.fans;
+    fn run<L: Simd>(self) {
+        let NeighbourLists { first, rows, list: mut rest } = self.lists;
         for row in first..first + rows {
             let mut left = usize::from(rest[0]);
             rest = &rest[1..];
@@ -75,7 +76,7 @@ impl Kernel for DisplaceFans<'_> {
                 continue;
             }
             let ball = self.at.row(row as usize);
-            // SAFETY: no other thread has this row and those of its fan (see `Slab`).
+            // SAFETY: no other thread has this row and those of its neighbour list (see `Chunk`).
             let mut own = unsafe { *ball };
             while left > 0 {
                 let count = left.min(LANES);
@@ -91,16 +92,16 @@ impl Kernel for DisplaceFans<'_> {
                     *after &= other;
                 }
                 let a = [L::splat(own[0]), L::splat(own[1]), L::splat(own[2]), L::splat(own[3])];
-                // SAFETY: as above; no row but its own is twice in a fan.
+                // SAFETY: as above; no row but its own is twice in a neighbour list.
                 unsafe {
                     let b = L::gather(ball, &after);
                     let pair = |lane: usize| [row, row + u32::from(after[lane])];
                     let (normal, overlap) = normal_and_overlap(&a, &b, (1 << count) - 1, pair);
-                    let overlap = overlap.first(count);
-                    let hits = overlap.above(L::splat(0.0)).count_ones();
+                    let overlap = overlap.mask_first(count);
+                    let hits = overlap.gt_mask(L::splat(0.0)).count_ones();
                     let by = normal.times(overlap * L::splat(PART[hits as usize]));
-                    L::scatter(ball, &after, LANES, V::of(&b).plus(by).with(b[3]));
-                    let V([x, y, z]) = by;
+                    L::scatter(ball, &after, LANES, Vec3Wide::of(&b).plus(by).with(b[3]));
+                    let Vec3Wide([x, y, z]) = by;
                     own = [own[0] - x.sum(), own[1] - y.sum(), own[2] - z.sum(), own[3]];
                 }
                 (left, rest) = (left - count, &rest[count..]);
@@ -111,7 +112,7 @@ impl Kernel for DisplaceFans<'_> {
     }
 }
 
-/// Pushes balls out of half-spaces.
+/// Moves balls out of half-spaces.
 pub(in crate::swarm) struct DisplaceFromPlanes<'a> {
     pub at: &'a mut [Row],
     pub planes: &'a [HalfSpace],
@@ -119,7 +120,7 @@ pub(in crate::swarm) struct DisplaceFromPlanes<'a> {
 
 impl Kernel for DisplaceFromPlanes<'_> {
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         let zero = L::splat(0.0);
         for rows in self.at.chunks_mut(LANES) {
             let (base, count) = (rows.as_mut_ptr(), rows.len());
@@ -130,9 +131,9 @@ impl Kernel for DisplaceFromPlanes<'_> {
                 let mut out = 0;
                 for HalfSpace { normal, offset, .. } in self.planes {
                     let (nx, ny, nz) = (L::splat(normal.x), L::splat(normal.y), L::splat(normal.z));
-                    let gap = nx * x + ny * y + nz * z - L::splat(*offset) - radius;
-                    out |= zero.above(gap);
-                    let by = (zero - gap).max(zero);
+                    let separation = nx * x + ny * y + nz * z - L::splat(*offset) - radius;
+                    out |= zero.gt_mask(separation);
+                    let by = (zero - separation).max(zero);
                     (x, y, z) = (x + nx * by, y + ny * by, z + nz * by);
                 }
                 if out != 0 {

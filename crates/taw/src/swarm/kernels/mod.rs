@@ -1,26 +1,31 @@
 //! Work of a step on rows and on pairs, eight at a time.
 
 use super::batches::Batch;
-use super::lanes::{LANES, Lanes, Row};
-use super::memory::{fit, make_room};
+use super::impulse_cache::{reserve_slack, shrink_slack};
+use super::simd::{LANES, Row, Simd};
 use super::surfaces::{PairNumbers, SurfaceOf};
-use super::team::Shared;
+use super::workers::DisjointSlice;
 
+mod backing;
 mod contact;
 mod displace;
-mod drift;
+mod integrate;
+mod params;
+mod rolling;
 
-pub(super) use contact::{Columns, GROUNDED, Impact, LOST, Pass, Soft, WALL_SLOP, solve};
-pub(super) use displace::{Displace, DisplaceFans, DisplaceFromPlanes};
-pub(super) use drift::{Drift, Follow, Predict, squared};
+pub(super) use backing::LOST;
+pub(super) use contact::{SolverColumns, solve};
+pub(super) use displace::{Displace, DisplaceFromPlanes, DisplaceNeighbours};
+pub(super) use integrate::{IntegratePositions, Predict, UpdateVelocities, squared};
+pub(super) use params::{GROUNDED, Pass, Softness, SolverParams, WALL_SLOP};
 
-/// Impulses of batches of pairs, batch by batch; none in the lab's tier.
+/// Accumulated impulses of batches of pairs, batch by batch; none in the lab's tier.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Pushes {
-    /// The impulses along the normals, in N s.
-    pub pressure: Vec<[f32; LANES]>,
-    /// Those across them.
-    pub grip: Vec<[[f32; LANES]; 3]>,
+pub(super) struct ContactImpulses {
+    /// Normal impulses, in N s.
+    pub normal_impulse: Vec<[f32; LANES]>,
+    /// Tangent impulses (friction), in N s.
+    pub tangent_impulse: Vec<[[f32; LANES]; 3]>,
     /// Angular impulses against rolling and spinning, in N m s, and the numbers of each pair: both
     /// only where surfaces differ or resist.
     pub torque: Vec<[[f32; LANES]; 3]>,
@@ -29,10 +34,11 @@ pub(super) struct Pushes {
     pub bounced: bool,
 }
 
-impl Pushes {
+impl ContactImpulses {
     pub fn bytes(&self) -> usize {
-        self.pressure.capacity() * size_of::<[f32; LANES]>()
-            + (self.grip.capacity() + self.torque.capacity()) * size_of::<[[f32; LANES]; 3]>()
+        self.normal_impulse.capacity() * size_of::<[f32; LANES]>()
+            + (self.tangent_impulse.capacity() + self.torque.capacity())
+                * size_of::<[[f32; LANES]; 3]>()
             + self.numbers.capacity() * size_of::<PairNumbers>()
     }
 
@@ -40,12 +46,12 @@ impl Pushes {
     pub fn reset(&mut self, batches: usize) {
         fn reset<T: Clone>(column: &mut Vec<T>, batches: usize, none: T) {
             column.clear();
-            make_room(column, batches);
+            reserve_slack(column, batches);
             column.resize(batches, none);
-            fit(column);
+            shrink_slack(column);
         }
-        reset(&mut self.pressure, batches, [0.0; LANES]);
-        reset(&mut self.grip, batches, [[0.0; LANES]; 3]);
+        reset(&mut self.normal_impulse, batches, [0.0; LANES]);
+        reset(&mut self.tangent_impulse, batches, [[0.0; LANES]; 3]);
     }
 
     /// Sets the numbers of each pair, where they have some.
@@ -58,9 +64,9 @@ impl Pushes {
 
 /// Three coordinates on eight lanes.
 #[derive(Clone, Copy)]
-struct V<L>([L; 3]);
+struct Vec3Wide<L>([L; 3]);
 
-impl<L: Lanes> V<L> {
+impl<L: Simd> Vec3Wide<L> {
     #[inline(always)]
     fn of(row: &[L; 4]) -> Self {
         Self([row[0], row[1], row[2]])
@@ -119,24 +125,24 @@ impl<L: Lanes> V<L> {
 /// All lanes, as bits.
 const ALL: u32 = (1 << LANES) - 1;
 
-/// The normal from the first to the second ball, and the gap between them. Only those of the named
-/// lanes, as bits, are pairs of two balls.
+/// The normal from the first to the second ball, and the separation between them. Only those of the
+/// named lanes, as bits, are pairs of two balls.
 #[inline(always)]
-fn normal_and_gap<L: Lanes>(
+fn normal_and_separation<L: Simd>(
     a: &[L; 4],
     b: &[L; 4],
     lanes: u32,
     pair: impl Fn(usize) -> [u32; 2],
-) -> (V<L>, L) {
+) -> (Vec3Wide<L>, L) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let least = L::splat(f32::MIN_POSITIVE);
-    let way = V::of(b).minus(V::of(a));
-    let squared = way.dot(way);
+    let displacement = Vec3Wide::of(b).minus(Vec3Wide::of(a));
+    let squared = displacement.dot(displacement);
     let distance = squared.sqrt();
     // Root and quotient do not wait for each other.
-    let inverse = squared.pick_above(least, distance * (one / squared), zero);
-    let mut normal = way.times(inverse);
-    if least.above(squared) & lanes != 0 {
+    let inverse = squared.select_gt(least, distance * (one / squared), zero);
+    let mut normal = displacement.times(inverse);
+    if least.gt_mask(squared) & lanes != 0 {
         // Where the centers coincide, any direction is as good as another; with the same for all,
         // those at one point would come into a line.
         let mut any = [[0.0; LANES]; 3];
@@ -146,12 +152,12 @@ fn normal_and_gap<L: Lanes>(
                 axis[lane] = x;
             }
         }
-        let (V([x, y, z]), V([u, v, w])) = (normal, V::load(&any));
+        let (Vec3Wide([x, y, z]), Vec3Wide([u, v, w])) = (normal, Vec3Wide::load(&any));
         // (Not by `map`, which is compiled without the instructions of its caller.)
-        normal = V([
-            squared.pick_above(least, x, u),
-            squared.pick_above(least, y, v),
-            squared.pick_above(least, z, w),
+        normal = Vec3Wide([
+            squared.select_gt(least, x, u),
+            squared.select_gt(least, y, v),
+            squared.select_gt(least, z, w),
         ]);
     }
     (normal, distance - (a[3] + b[3]))
@@ -171,16 +177,16 @@ fn direction([a, b]: [u32; 2]) -> [f32; 3] {
 
 /// The rows of a column that the pairs of a batch are about.
 #[inline(always)]
-fn gather<L: Lanes>(column: Shared<Row>, batch: &Batch) -> [[L; 4]; 2] {
+fn gather<L: Simd>(column: DisjointSlice<Row>, batch: &Batch) -> [[L; 4]; 2] {
     let a = column.row(batch.first[0] as usize);
     let b = column.row(batch.first[1] as usize);
-    // SAFETY: no other thread has these rows (see `Slab`).
+    // SAFETY: no other thread has these rows (see `Chunk`).
     unsafe { [L::gather(a, &batch.a), L::gather(b, &batch.b)] }
 }
 
 /// Writes back what was gathered.
 #[inline(always)]
-fn scatter<L: Lanes>(column: Shared<Row>, batch: &Batch, [of_a, of_b]: [[L; 4]; 2]) {
+fn scatter<L: Simd>(column: DisjointSlice<Row>, batch: &Batch, [of_a, of_b]: [[L; 4]; 2]) {
     let a = column.row(batch.first[0] as usize);
     let b = column.row(batch.first[1] as usize);
     let count = batch.count as usize;
@@ -193,14 +199,14 @@ fn scatter<L: Lanes>(column: Shared<Row>, batch: &Batch, [of_a, of_b]: [[L; 4]; 
 
 /// The inverse mass of awake balls: those of balls asleep have a minus sign.
 #[inline(always)]
-fn mobility<L: Lanes>(velocity: &[L; 4]) -> L {
+fn inverse_mass<L: Simd>(velocity: &[L; 4]) -> L {
     velocity[3].max(L::splat(0.0))
 }
 
 /// Effective mass of both along their normal; zero if both are asleep.
 #[inline(always)]
-fn mass<L: Lanes>(a: &[L; 4], b: &[L; 4]) -> L {
-    let sum = mobility(a) + mobility(b);
+fn effective_mass<L: Simd>(a: &[L; 4], b: &[L; 4]) -> L {
+    let sum = inverse_mass(a) + inverse_mass(b);
     let zero = L::splat(0.0);
-    sum.pick_above(zero, L::splat(1.0) / sum, zero)
+    sum.select_gt(zero, L::splat(1.0) / sum, zero)
 }

@@ -1,19 +1,23 @@
 //! A step of a swarm, and its parts in the full tier.
 
+mod backing;
 mod lab;
-mod seek;
+mod sleep;
+mod wall_contacts;
 
-pub(super) use seek::listed;
+pub(super) use wall_contacts::listed_planes;
 
 use super::build::SOON;
-use super::kernels::{Columns, Drift, GROUNDED, Impact, LOST, Pass, Soft, solve, squared};
-use super::lanes::Row;
-use super::slab::Slab;
-use super::strays::Strays;
-use super::team::{Shared, each, each_beside};
+use super::chunk::Chunk;
+use super::fast_movers::FastMovers;
+use super::kernels::{
+    IntegratePositions, Pass, Softness, SolverColumns, SolverParams, solve, squared,
+};
+use super::simd::Row;
 use super::walls::half_spaces;
-use super::{Stage, Surroundings, Swarm, Tier, lying};
-use cgmath::{InnerSpace, Zero};
+use super::workers::{DisjointSlice, parallel_for, parallel_for_odd_even};
+use super::{Stage, StaticGeometry, Swarm, Tier};
+use cgmath::Zero;
 
 use crate::math::{Vec3, length};
 
@@ -30,23 +34,16 @@ const PUSHING: f32 = 0.3;
 const SLOP: f32 = 0.04;
 /// Slop where nothing lies on anything: only so that balls that touch are left alone.
 const SLOP_WEIGHTLESS: f32 = 0.01;
-/// Where one ball weighs more than so many times as much as another, pairs look who has a wall
-/// behind it: a pair sinks in by that ratio times the way of gravity in a substep while its contact
-/// learns what it bears, less than a millimetre for each such time.
-const UNEVEN: f32 = 8.0;
 /// Number of looks for bounces in a substep while any is found: in a gas hardly ever do five
 /// balls meet in one. What meets after that is stopped.
 const ROUNDS: usize = 4;
-/// For how long, in seconds, all balls of a slab lie still before they sleep.
-const FALL_ASLEEP: f32 = 0.5;
-
 impl Swarm {
     /// Moves the balls on by `dt` seconds. `version` changes whenever a wall does.
     pub(crate) fn step(
         &mut self,
         dt: f32,
         gravity: Vec3<f32>,
-        walls: &dyn Surroundings,
+        walls: &dyn StaticGeometry,
         version: u64,
         observe: &mut dyn FnMut(Stage),
     ) {
@@ -66,7 +63,7 @@ impl Swarm {
         &mut self,
         dt: f32,
         gravity: Vec3<f32>,
-        walls: &dyn Surroundings,
+        walls: &dyn StaticGeometry,
         version: u64,
     ) {
         let walls_changed = self.begin(gravity, walls, version);
@@ -75,35 +72,35 @@ impl Swarm {
 
     /// Returns true if pairs are known, so that a step can be finished.
     pub(crate) fn is_prepared(&self) -> bool {
-        self.paired
+        self.pairs_valid
     }
 
     /// Ends it: moves all on in substeps, and solves the contacts.
-    pub(crate) fn finish(&mut self, dt: f32, substeps: u32, walls: &dyn Surroundings) {
+    pub(crate) fn finish(&mut self, dt: f32, substeps: u32, walls: &dyn StaticGeometry) {
         self.solve(dt, substeps, walls, &mut |_| ());
         self.end();
     }
 
     /// Begins a step: gravity and walls. Returns whether these changed.
-    fn begin(&mut self, gravity: Vec3<f32>, walls: &dyn Surroundings, version: u64) -> bool {
+    fn begin(&mut self, gravity: Vec3<f32>, walls: &dyn StaticGeometry, version: u64) -> bool {
         self.stopped.clear();
         self.steps_since_build = (self.steps_since_build + 1).min(SOON);
         if self.gravity != Some(gravity) {
             self.gravity = Some(gravity);
             self.wake_all();
         }
-        let walls_changed = self.walled != Some(version);
+        let walls_changed = self.walls_version != Some(version);
         if walls_changed {
             half_spaces(walls, &mut self.planes);
             self.wake_all();
-            self.walled = Some(version);
+            self.walls_version = Some(version);
         }
         walls_changed
     }
 
     fn end(&mut self) {
-        for slab in &mut self.slabs {
-            self.stopped.append(&mut slab.stopped);
+        for chunk in &mut self.chunks {
+            self.stopped.append(&mut chunk.stopped);
         }
     }
 
@@ -112,30 +109,30 @@ impl Swarm {
         &mut self,
         dt: f32,
         gravity: Vec3<f32>,
-        walls: &dyn Surroundings,
+        walls: &dyn StaticGeometry,
         walls_changed: bool,
         observe: &mut dyn FnMut(Stage),
     ) {
         observe(Stage::Integrate);
-        if self.paired {
-            self.look(dt, gravity);
+        if self.pairs_valid {
+            self.update_sleep(dt, gravity);
         }
         let mut leaving = std::mem::take(&mut self.leaving);
         leaving.clear();
-        leaving.extend(self.slabs.iter().flat_map(|slab| &slab.leaving));
-        if !self.paired {
+        leaving.extend(self.chunks.iter().flat_map(|chunk| &chunk.leaving));
+        if !self.pairs_valid {
             self.build(dt, walls, observe);
-            self.look(dt, gravity);
+            self.update_sleep(dt, gravity);
         } else if !leaving.is_empty() {
             let rebuilds = self.rebuilds;
-            self.seek_for(&leaving, dt, walls, observe);
+            self.find_pairs_of(&leaving, dt, walls, observe);
             if self.rebuilds == rebuilds {
-                self.seek_walls_that_moved(walls_changed, dt, walls, observe);
+                self.find_wall_contacts_if_changed(walls_changed, dt, walls, observe);
             } else {
-                self.look(dt, gravity);
+                self.update_sleep(dt, gravity);
             }
         } else {
-            self.seek_walls_that_moved(walls_changed, dt, walls, observe);
+            self.find_wall_contacts_if_changed(walls_changed, dt, walls, observe);
         }
         self.leaving = leaving;
     }
@@ -146,148 +143,118 @@ impl Swarm {
         &mut self,
         dt: f32,
         count: u32,
-        walls: &dyn Surroundings,
+        walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
     ) {
-        if !self.paired || self.slabs.iter().all(|slab| slab.asleep) {
+        if !self.pairs_valid || self.chunks.iter().all(|chunk| chunk.asleep) {
             return;
         }
-        self.find_guests();
+        self.list_proxy_rows();
         observe(Stage::Restitute);
         let gravity = self.gravity.unwrap_or_else(Vec3::zero);
         let substeps = count as f32;
         let h = dt / substeps;
-        let (times, all) = ([dt, h], |_: &Slab| true);
+        let (times, all) = ([dt, h], |_: &Chunk| true);
         self.age_marks();
-        self.look_at_walls(walls, dt, times, all, false);
+        self.update_wall_contacts(walls, dt, times, all, false);
         // What gravity makes of rest in two steps is no impact.
         let speed = 2.0 * length(gravity) * dt;
         let restitution = self.common_material().restitution;
-        // What lies on others is borne by pushes; all else
-        // that overlaps is moved apart. Where nothing has weight, overlap makes no speed at all.
-        let soft = soft(h, length(gravity));
-        let impact = Impact { speed, restitution, time: h, gravity: row(gravity), soft };
-        let faster = |slab: &Slab, next: f32| 2.0 * slab.speed[0].max(next) > speed;
+        // Soft contacts bear what lies on others; all else that overlaps is moved apart. Where
+        // nothing has weight, overlap makes no speed at all.
+        let softness = softness(h, length(gravity));
+        let params = SolverParams {
+            restitution_threshold: speed,
+            restitution,
+            time: h,
+            gravity: row(gravity),
+            softness,
+        };
+        let faster = |chunk: &Chunk, next: f32| 2.0 * chunk.speed[0].max(next) > speed;
         for substep in 0..count {
             let left = dt - h * substep as f32;
             if substep > 0 {
-                self.look_at_walls(walls, left, times, |slab| slab.has_fast, true);
+                self.update_wall_contacts(walls, left, times, |chunk| chunk.has_fast, true);
             }
-            self.bounce(impact, faster);
-            let leaves = |velocity: &Row, budget| leaves(velocity, budget, left);
-            if self.seek_within_step(|slab| slab.struck, leaves, dt, walls, observe) {
-                self.look_at_walls(walls, left, times, all, false);
+            self.apply_restitution(params, faster);
+            let leaves = |velocity: &Row, skin_left| leaves(velocity, skin_left, left);
+            if self.find_pairs_within_step(|chunk| chunk.struck, leaves, dt, walls, observe) {
+                self.update_wall_contacts(walls, left, times, all, false);
             }
             observe(Stage::Integrate);
             let parts = [substep as f32, (substep + 1) as f32].map(|part| part / substeps);
-            self.push_bodies(1.0 / substeps);
-            self.keep_guests();
-            self.drift(row(gravity * h), [0.0; 4], [0.0; 4]);
-            self.drift_guests(parts, false, 0.0);
+            self.apply_velocity_changes(1.0 / substeps);
+            self.save_proxies();
+            self.integrate(row(gravity * h), [0.0; 4], [0.0; 4]);
+            self.advance_proxies(parts, false, 0.0);
             observe(Stage::Restitute);
             self.find_backing();
-            self.pass(Pass::Begin(impact), |_, _| true);
-            self.pass(Pass::Solve(impact), |_, _| true);
+            self.pass(Pass::WarmStart(params), |_, _| true);
+            self.pass(Pass::Solve(params), |_, _| true);
             observe(Stage::Integrate);
-            self.keep_guests();
-            self.drift([0.0; 4], [h, h, h, 0.0], row(gravity * (-0.5 * h * h)));
-            self.take_pushes_back(-0.5 * h / substeps);
-            self.drift_guests(parts, true, h);
-            let (cap, left) = (self.cap, left - h);
-            let left_it = |_: &Row, budget: f32| budget < -cap;
-            if self.seek_within_step(|slab| slab.overrun, left_it, dt, walls, observe) {
-                self.look_at_walls(walls, left, times, all, false);
+            self.save_proxies();
+            self.integrate([0.0; 4], [h, h, h, 0.0], row(gravity * (-0.5 * h * h)));
+            self.correct_free_flight(-0.5 * h / substeps);
+            self.advance_proxies(parts, true, h);
+            let (skin, left) = (self.skin, left - h);
+            let left_it = |_: &Row, skin_left: f32| skin_left < -skin;
+            if self.find_pairs_within_step(|chunk| chunk.overrun, left_it, dt, walls, observe) {
+                self.update_wall_contacts(walls, left, times, all, false);
                 self.find_backing(); // rows may have changed
             }
             observe(Stage::Restitute);
-            self.pass(Pass::Relax(impact), |_, _| true);
+            self.pass(Pass::Relax(params), |_, _| true);
             self.keep_out();
         }
     }
 
-    /// Finds for each ball the wall that bears most of it, where masses differ so much that pairs
-    /// need to know ([`Columns::backing`]).
-    fn find_backing(&mut self) {
-        let inverse = |slab: &Slab| slab.inverse_masses;
-        let [least, most] = self.slabs.iter().map(inverse).fold([f32::MAX, 0.0], wider);
-        let rows = if most > UNEVEN * least { self.at.len() } else { 0 };
-        self.backing.clear();
-        self.backing.resize(rows, [0.0; 4]);
-        if rows == 0 {
-            self.backing.shrink_to_fit();
-            return;
-        }
-        let (slabs, backing, at) = (&self.slabs, Shared::new(&mut self.backing), &self.at[..]);
-        each(self.model.threads as usize, slabs.len(), |_, slab| {
-            // Those of a ball follow each other.
-            for of_ball in slabs[slab].touches.chunk_by(|a, b| a.row == b.row) {
-                let (mut most, mut behind, mut last) = (0.0, [0.0; 4], &of_ball[0]);
-                for touch in of_ball {
-                    let bears = touch.bears(&at[touch.row as usize]);
-                    // Of a wall that comes nearer or gives way, each has to ask for itself.
-                    if bears > most && touch.surface.dot(touch.normal) == 0.0 {
-                        (most, behind) = (bears, row(touch.normal));
-                    }
-                    if touch.borne_for_others > last.borne_for_others {
-                        last = touch;
-                    }
-                }
-                if last.borne_for_others > 0.0 && behind[..3] != row(last.normal)[..3] {
-                    behind = [0.0, 0.0, 0.0, LOST];
-                }
-                // SAFETY: a row of the slab.
-                unsafe { *backing.row(last.row as usize) = behind };
-            }
-        });
-    }
-
     /// Forgets who was borne by a wall two steps ago.
     fn age_marks(&mut self) {
-        let (slabs, spin) = (&self.slabs, Shared::new(&mut self.spin));
-        each(self.model.threads as usize, slabs.len(), |_, slab| {
-            if !slabs[slab].asleep {
-                // SAFETY: the rows of the slab.
-                for spin in unsafe { spin.part(slabs[slab].own_rows()) } {
+        let (chunks, spin) = (&self.chunks, DisjointSlice::new(&mut self.spin));
+        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+            if !chunks[chunk].asleep {
+                // SAFETY: the rows of the chunk.
+                for spin in unsafe { spin.part(chunks[chunk].own_rows()) } {
                     spin[3] = (spin[3] - 1.0).max(0.0);
                 }
             }
         });
     }
 
-    /// Seeks pairs and walls for balls of some slabs that leave their budget within a step, since a
-    /// bounce or a contact made them faster. Says whether there were any.
-    fn seek_within_step(
+    /// Finds pairs and walls for balls of some chunks that leave their remaining skin within a
+    /// step, since a bounce or a contact made them faster. Says whether there were any.
+    fn find_pairs_within_step(
         &mut self,
-        which: impl Fn(&Slab) -> bool,
+        which: impl Fn(&Chunk) -> bool,
         leaves: impl Fn(&Row, f32) -> bool,
         dt: f32,
-        walls: &dyn Surroundings,
+        walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
     ) -> bool {
         let mut leaving = std::mem::take(&mut self.leaving);
         leaving.clear();
         // More than this are too many.
-        let most = self.strays.room(self.at.len()) + 1;
-        for slab in self.slabs.iter().filter(|slab| which(slab) && !slab.asleep) {
+        let most = self.fast_movers.remaining(self.at.len()) + 1;
+        for chunk in self.chunks.iter().filter(|chunk| which(chunk) && !chunk.asleep) {
             let leaves = |row: &u32| {
                 let at = *row as usize;
-                leaves(&self.velocity[at], self.budget[at])
+                leaves(&self.velocity[at], self.skin_left[at])
             };
             let room = most.saturating_sub(leaving.len());
-            leaving.extend((slab.rows[0]..slab.rows[1]).filter(leaves).take(room));
+            leaving.extend((chunk.rows[0]..chunk.rows[1]).filter(leaves).take(room));
         }
         if !leaving.is_empty() {
             // Rows may change.
-            for slab in &mut self.slabs {
-                self.stopped.append(&mut slab.stopped);
+            for chunk in &mut self.chunks {
+                self.stopped.append(&mut chunk.stopped);
             }
             let slots = self.ids.slots();
             self.stopped.iter_mut().for_each(|row| *row = slots[*row as usize]);
             let rebuilds = self.rebuilds;
-            self.seek_for(&leaving, dt, walls, observe);
+            self.find_pairs_of(&leaving, dt, walls, observe);
             if self.rebuilds != rebuilds {
-                self.look(dt, self.gravity.unwrap_or_else(Vec3::zero));
-                self.find_guests();
+                self.update_sleep(dt, self.gravity.unwrap_or_else(Vec3::zero));
+                self.list_proxy_rows();
             }
             let rows = self.ids.columns().1;
             self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
@@ -298,23 +265,27 @@ impl Swarm {
     }
 
     /// Lets bounce what meets, again where a bounce may have sent a ball on to the next one.
-    fn bounce(&mut self, impact: Impact, faster: impl Fn(&Slab, f32) -> bool + Sync) {
-        self.slabs.iter_mut().for_each(|slab| (slab.again, slab.struck) = (true, false));
+    fn apply_restitution(
+        &mut self,
+        params: SolverParams,
+        faster: impl Fn(&Chunk, f32) -> bool + Sync,
+    ) {
+        self.chunks.iter_mut().for_each(|chunk| (chunk.again, chunk.struck) = (true, false));
         for _ in 0..ROUNDS {
-            self.pass(Pass::Impact(impact), |slab, next| slab.again && faster(slab, next));
-            let all = self.strays.pushes.bounced;
-            let bounced = |slab: Option<&Slab>| slab.is_some_and(|slab| slab.pushes.bounced);
+            self.pass(Pass::Restitution(params), |chunk, next| chunk.again && faster(chunk, next));
+            let all = self.fast_movers.impulses.bounced;
+            let bounced = |chunk: Option<&Chunk>| chunk.is_some_and(|chunk| chunk.impulses.bounced);
             let mut any = all;
-            for i in 0..self.slabs.len() {
-                let before = i.checked_sub(1).and_then(|i| self.slabs.get(i));
-                let [own, next] = [self.slabs.get(i), self.slabs.get(i + 1)];
+            for i in 0..self.chunks.len() {
+                let before = i.checked_sub(1).and_then(|i| self.chunks.get(i));
+                let [own, next] = [self.chunks.get(i), self.chunks.get(i + 1)];
                 let again = bounced(before) || bounced(own) || bounced(next);
                 any |= again;
-                self.slabs[i].again = all || again;
-                self.slabs[i].struck |= all || again;
+                self.chunks[i].again = all || again;
+                self.chunks[i].struck |= all || again;
             }
-            self.strays.pushes.bounced = false;
-            self.slabs.iter_mut().for_each(|slab| slab.pushes.bounced = false);
+            self.fast_movers.impulses.bounced = false;
+            self.chunks.iter_mut().for_each(|chunk| chunk.impulses.bounced = false);
             if !any {
                 break;
             }
@@ -324,116 +295,57 @@ impl Swarm {
     /// Moves out of walls what is in them. That comes last: whatever else moves balls apart,
     /// nothing is pressed through a wall.
     fn keep_out(&mut self) {
-        let (at, budget) = (Shared::new(&mut self.at), Shared::new(&mut self.budget));
-        let slabs = &self.slabs;
-        each(self.model.threads as usize, slabs.len(), |_, slab| {
-            let slab = &slabs[slab];
-            for touch in slab.touches.iter().filter(|_| !slab.asleep) {
-                let row = touch.row as usize;
-                // SAFETY: a ball of the slab, and nobody works on others meanwhile.
-                unsafe { *budget.row(row) -= touch.keep_out(&mut *at.row(row)) };
+        let (at, skin_left) =
+            (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
+        let chunks = &self.chunks;
+        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+            let chunk = &chunks[chunk];
+            for contact in chunk.wall_contacts.iter().filter(|_| !chunk.asleep) {
+                let row = contact.row as usize;
+                // SAFETY: a ball of the chunk, and nobody works on others meanwhile.
+                unsafe { *skin_left.row(row) -= contact.keep_out(&mut *at.row(row)) };
             }
         });
-    }
-
-    /// Sees who falls asleep, who wakes, and who may leave its budget in this step.
-    fn look(&mut self, dt: f32, gravity: Vec3<f32>) {
-        let lying = lying(gravity, self.mean);
-        let sleeps = self.model.sleeps;
-        if !self.guests.is_empty() {
-            self.look_at_guests();
-        }
-        let (grid, budget) = (&self.grid, &self.budget[..]);
-        // More than this are too many.
-        let most = self.strays.room(self.at.len()) + 1;
-        let velocity = Shared::new(&mut self.velocity);
-        let spin = Shared::new(&mut self.spin);
-        let slabs = Shared::new(&mut self.slabs);
-        each(self.model.threads as usize, slabs.len(), |_, slab| {
-            // SAFETY: each thread has its own slabs, and their rows.
-            let slab = unsafe { &mut *slabs.row(slab) };
-            if slab.asleep {
-                return;
-            }
-            let (velocity, spin) =
-                unsafe { (velocity.part(slab.own_rows()), spin.part(slab.own_rows())) };
-            let budget = &budget[slab.own_rows()];
-            slab.leaving.clear();
-            let rows = (slab.rows[0]..).zip(velocity.iter().zip(budget));
-            let leaving = rows.filter(|(_, (velocity, budget))| leaves(velocity, **budget, dt));
-            slab.leaving.extend(leaving.map(|(row, _)| row).take(most));
-            let fastest = |from: u32, to: u32| {
-                let rows = (from - slab.rows[0]) as usize..(to - slab.rows[0]) as usize;
-                // Not its spin: on a single point a ball may spin for ever.
-                velocity[rows].iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt()
-            };
-            let [first, last] = [slab.layers[0] + 1, slab.layers[1] - 1];
-            slab.speed = [
-                fastest(slab.rows[0], slab.rows[1]),
-                fastest(slab.rows[0], grid.first_of_layer(first)),
-                fastest(grid.first_of_layer(last), slab.rows[1]),
-            ];
-            let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
-            slab.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
-            let lies = slab.fastest_own.unwrap_or(slab.speed[0]) < lying;
-            slab.slow = if lies { slab.slow + dt } else { 0.0 };
-            if sleeps && slab.slow > FALL_ASLEEP {
-                (slab.asleep, slab.speed) = (true, [0.0; 3]);
-                slab.leaving.clear();
-                for (velocity, spin) in velocity.iter_mut().zip(spin) {
-                    *velocity = [0.0, 0.0, 0.0, -velocity[3]];
-                    *spin = [0.0, 0.0, 0.0, GROUNDED];
-                }
-            }
-        });
-        let slabs = &mut self.slabs;
-        for i in 0..slabs.len() {
-            let before = i.checked_sub(1).map_or(0.0, |i| slabs[i].speed[2]);
-            let after = slabs.get(i + 1).map_or(0.0, |slab| slab.speed[1]);
-            if slabs[i].asleep && before.max(after) > 2.0 * lying {
-                slabs[i].wake(&mut self.velocity);
-            }
-        }
     }
 
     /// Changes velocities and moves the balls that are awake.
-    fn drift(&mut self, change: Row, time: Row, back: Row) {
-        let instructions = self.instructions;
-        let columns = Columns {
-            at: Shared::new(&mut self.at),
-            velocity: Shared::new(&mut self.velocity),
-            spin: Shared::new(&mut self.spin),
-            budget: Shared::new(&mut self.budget),
-            backing: Shared::new(&mut self.backing),
+    fn integrate(&mut self, change: Row, time: Row, correction: Row) {
+        let simd_level = self.simd_level;
+        let columns = SolverColumns {
+            at: DisjointSlice::new(&mut self.at),
+            velocity: DisjointSlice::new(&mut self.velocity),
+            spin: DisjointSlice::new(&mut self.spin),
+            skin_left: DisjointSlice::new(&mut self.skin_left),
+            backing: DisjointSlice::new(&mut self.backing),
         };
-        let slabs = Shared::new(&mut self.slabs);
-        let least = -self.cap;
-        each(self.model.threads as usize, slabs.len(), |_, slab| {
-            // SAFETY: each thread has its own slabs, and their rows.
-            let slab = unsafe { &mut *slabs.row(slab) };
-            if slab.asleep {
+        let chunks = DisjointSlice::new(&mut self.chunks);
+        let least = -self.skin;
+        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+            // SAFETY: each thread has its own chunks, and their rows.
+            let chunk = unsafe { &mut *chunks.row(chunk) };
+            if chunk.asleep {
                 return;
             }
-            let (rows, first) = (slab.own_rows(), slab.rows[0]);
-            let (at, velocity, spin, budget) = unsafe {
+            let (rows, first) = (chunk.own_rows(), chunk.rows[0]);
+            let (at, velocity, spin, skin_left) = unsafe {
                 let at = columns.at.part(rows.clone());
                 let (velocity, spin) =
                     (columns.velocity.part(rows.clone()), columns.spin.part(rows.clone()));
-                (at, velocity, spin, columns.budget.part(rows))
+                (at, velocity, spin, columns.skin_left.part(rows))
             };
-            for touch in &mut slab.touches {
-                touch.drift(time[0]);
+            for contact in &mut chunk.wall_contacts {
+                contact.advance(time[0]);
             }
-            let (stopped, overrun) = (&mut slab.stopped, &mut slab.overrun);
+            let (stopped, overrun) = (&mut chunk.stopped, &mut chunk.overrun);
             *overrun = false;
-            instructions.run(Drift {
+            simd_level.run(IntegratePositions {
                 at,
                 velocity,
                 spin,
-                budget,
+                skin_left,
                 change,
                 time,
-                back,
+                correction,
                 least,
                 overrun,
                 stopped,
@@ -442,72 +354,77 @@ impl Swarm {
         });
     }
 
-    /// Goes over all contacts of the slabs that are awake or beside one, and of which the
+    /// Goes over all contacts of the chunks that are awake or beside one, and of which the
     /// condition holds, given how fast a ball of the next one is.
-    fn pass(&mut self, pass: Pass, condition: impl Fn(&Slab, f32) -> bool + Sync) {
-        let instructions = self.instructions;
+    fn pass(&mut self, pass: Pass, condition: impl Fn(&Chunk, f32) -> bool + Sync) {
+        let simd_level = self.simd_level;
         let friction = self.common_material().friction;
-        let mut strays = std::mem::take(&mut self.strays);
-        self.each_slab(|next, columns, slab| {
-            if slab.asleep && next.is_none_or(|(asleep, _)| asleep)
-                || !condition(slab, next.map_or(0.0, |(_, speed)| speed))
+        let mut fast_movers = std::mem::take(&mut self.fast_movers);
+        self.for_each_chunk(|next, columns, chunk| {
+            if chunk.asleep && next.is_none_or(|(asleep, _)| asleep)
+                || !condition(chunk, next.map_or(0.0, |(_, speed)| speed))
             {
                 return;
             }
-            let Slab { batches, pushes, .. } = &mut *slab;
-            solve(instructions, pass, columns, batches, pushes, friction);
+            let Chunk { batches, impulses, .. } = &mut *chunk;
+            solve(simd_level, pass, columns, batches, impulses, friction);
             // Walls come last, so that nothing is pushed into them.
-            if !slab.asleep {
-                for touch in &mut slab.touches {
-                    let row = touch.row as usize;
-                    // SAFETY: a ball of the slab.
+            if !chunk.asleep {
+                for contact in &mut chunk.wall_contacts {
+                    let row = contact.row as usize;
+                    // SAFETY: a ball of the chunk.
                     unsafe {
                         let (at, velocity) = (columns.at.row(row), columns.velocity.row(row));
                         let spin = &mut *columns.spin.row(row);
                         if columns.backed() {
-                            touch.borne_for_others = touch.share_of(&*columns.backing.row(row));
+                            contact.borne_for_others = contact.share_of(&*columns.backing.row(row));
                         }
-                        if let Some(way) = touch.solve(pass, &mut *at, &mut *velocity, spin) {
-                            *columns.budget.row(row) -= way;
-                            slab.pushes.bounced = true;
+                        if let Some(displacement) =
+                            contact.solve(pass, &mut *at, &mut *velocity, spin)
+                        {
+                            *columns.skin_left.row(row) -= displacement;
+                            chunk.impulses.bounced = true;
                         }
                     }
                 }
             }
         });
-        let columns = Columns {
-            at: Shared::new(&mut self.at),
-            velocity: Shared::new(&mut self.velocity),
-            spin: Shared::new(&mut self.spin),
-            budget: Shared::new(&mut self.budget),
-            backing: Shared::new(&mut self.backing),
+        let columns = SolverColumns {
+            at: DisjointSlice::new(&mut self.at),
+            velocity: DisjointSlice::new(&mut self.velocity),
+            spin: DisjointSlice::new(&mut self.spin),
+            skin_left: DisjointSlice::new(&mut self.skin_left),
+            backing: DisjointSlice::new(&mut self.backing),
         };
-        let Strays { batches, pushes, .. } = &mut strays;
-        solve(instructions, pass, columns, batches, pushes, friction);
-        self.strays = strays;
+        let FastMovers { batches, impulses, .. } = &mut fast_movers;
+        solve(simd_level, pass, columns, batches, impulses, friction);
+        self.fast_movers = fast_movers;
     }
 
-    /// Works on all slabs, each with exclusive access to the balls of it and of the next one.
+    /// Works on all chunks, each with exclusive access to the balls of it and of the next one.
     /// Says whether the next one sleeps and how fast a ball of it is.
-    fn each_slab(&mut self, job: impl Fn(Option<(bool, f32)>, Columns, &mut Slab) + Sync) {
-        let columns = Columns {
-            at: Shared::new(&mut self.at),
-            velocity: Shared::new(&mut self.velocity),
-            spin: Shared::new(&mut self.spin),
-            budget: Shared::new(&mut self.budget),
-            backing: Shared::new(&mut self.backing),
+    fn for_each_chunk(
+        &mut self,
+        job: impl Fn(Option<(bool, f32)>, SolverColumns, &mut Chunk) + Sync,
+    ) {
+        let columns = SolverColumns {
+            at: DisjointSlice::new(&mut self.at),
+            velocity: DisjointSlice::new(&mut self.velocity),
+            spin: DisjointSlice::new(&mut self.spin),
+            skin_left: DisjointSlice::new(&mut self.skin_left),
+            backing: DisjointSlice::new(&mut self.backing),
         };
-        let slabs = Shared::new(&mut self.slabs);
-        let (threads, states) = (self.model.threads as usize, &mut self.slab_states);
-        each_beside(threads, slabs.len(), states, |slab| {
+        let chunks = DisjointSlice::new(&mut self.chunks);
+        let (threads, states) = (self.model.threads as usize, &mut self.chunk_states);
+        parallel_for_odd_even(threads, chunks.len(), states, |chunk| {
             // SAFETY: nobody works on a neighbour meanwhile. Of the next one, only what nobody
             // changes is read.
             unsafe {
-                let next = (slab + 1 < slabs.len()).then(|| {
-                    let next = slabs.row(slab + 1);
+                let next = (chunk + 1 < chunks.len()).then(|| {
+                    let next = chunks.row(chunk + 1);
                     ((*next).asleep, (*next).speed[0])
                 });
-                job(next, columns, &mut *slabs.row(slab));
+                job(next, columns, &mut *chunks.row(chunk));
             }
         });
     }
@@ -518,9 +435,9 @@ fn wider([a, b]: [f32; 2], [c, d]: [f32; 2]) -> [f32; 2] {
     [a.min(c), b.max(d)]
 }
 
-/// Says if a ball leaves its budget within a time.
-fn leaves(velocity: &Row, budget: f32, time: f32) -> bool {
-    budget < 0.0 || squared(*velocity) * time * time > budget * budget
+/// Returns true if a ball leaves its skin within a time.
+fn leaves(velocity: &Row, skin_left: f32, time: f32) -> bool {
+    skin_left < 0.0 || squared(*velocity) * time * time > skin_left * skin_left
 }
 
 fn row(vector: Vec3<f32>) -> Row {
@@ -528,11 +445,17 @@ fn row(vector: Vec3<f32>) -> Row {
 }
 
 /// Springs that are as stiff as so short a step allows (Catto, `Solver2D`, 2024).
-fn soft(h: f32, gravity: f32) -> Soft {
+fn softness(h: f32, gravity: f32) -> Softness {
     let omega = 2.0 * std::f32::consts::PI * HERTZ.min(0.25 / h);
     let a1 = 2.0 * DAMPING + h * omega;
     let a2 = h * omega * a1;
     let a3 = 1.0 / (1.0 + a2);
     let slop = if gravity > 0.0 { SLOP } else { SLOP_WEIGHTLESS };
-    Soft { rate: omega / a1, fastest: PUSHING * gravity, mass: a2 * a3, back: a3, slop }
+    Softness {
+        bias_rate: omega / a1,
+        max_push_speed: PUSHING * gravity,
+        mass_scale: a2 * a3,
+        impulse_scale: a3,
+        slop,
+    }
 }

@@ -1,8 +1,8 @@
-//! Threads that help with a step.
+//! Pool of worker threads that help with a step.
 //!
 //! They live as long as the process, wait for work without a pause for a moment and then asleep,
 //! and help with one thing at a time. Work is cut into jobs, and each thread takes the next one
-//! that nobody has: so a helper that the system gives no time holds up nobody, and it does not
+//! that nobody has: so a worker that the system gives no time holds up nobody, and it does not
 //! matter to the result how many there are.
 
 use std::cell::UnsafeCell;
@@ -11,97 +11,97 @@ use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// The most threads of a team.
-pub(super) const MOST_THREADS: usize = 64;
-/// Looks for work before a thread goes to sleep: some tenths of a millisecond.
-const PATIENCE: u32 = 1 << 14;
+pub(super) const MAX_THREADS: usize = 64;
+/// Spins before a thread goes to sleep: some tenths of a millisecond.
+const SPIN_COUNT: u32 = 1 << 14;
 /// Number of rows of a job.
 pub(super) const ROWS: usize = 1 << 13;
 
-/// Work that is going on: a reference to a closure on the stack of the one who asked for it,
-/// which is told the number of a helper.
+/// Work that is going on: a pointer to a closure on the caller's stack, which gets the number of a
+/// worker.
 #[derive(Clone, Copy)]
-struct Work {
+struct Job {
     work: *const (dyn Fn(usize) + Sync),
-    /// Number of helpers that there may be.
-    helpers: usize,
+    /// Number of workers that there may be.
+    workers: usize,
 }
 
-// SAFETY: what it points to is shared between threads, and outlives the work: see `together`.
-unsafe impl Send for Work {}
+// SAFETY: what it points to is shared between threads, and outlives the work: see `run_on_workers`.
+unsafe impl Send for Job {}
 
-/// Where the helpers find their work.
+/// Slot from which the workers take their work.
 #[derive(Default)]
-struct Board {
-    /// Number of works put up so far.
+struct JobSlot {
+    /// Number of works posted so far.
     count: AtomicUsize,
-    /// Number of helpers that have done their part of the last one.
+    /// Number of workers that have done their part of the last one.
     done: AtomicUsize,
-    now: Mutex<Now>,
+    current: Mutex<Current>,
     wake: Condvar,
 }
 
 #[derive(Default)]
-struct Now {
-    work: Option<Work>,
-    /// Number of helpers that have taken part.
+struct Current {
+    work: Option<Job>,
+    /// Number of workers that have taken part.
     joined: usize,
 }
 
 /// The threads that help.
 #[derive(Default)]
-struct Helpers {
-    board: Arc<Board>,
+struct Workers {
+    job_slot: Arc<JobSlot>,
     count: usize,
 }
 
-static HELPERS: Mutex<Option<Helpers>> = Mutex::new(None);
+static WORKERS: Mutex<Option<Workers>> = Mutex::new(None);
 
 /// Calls this on the current thread, as number 0, and meanwhile on up to so many in all: the ones
 /// that come in time.
-fn together(threads: usize, work: impl Fn(usize) + Sync) {
+fn run_on_workers(threads: usize, work: impl Fn(usize) + Sync) {
     if threads <= 1 {
         return work(0);
     }
-    let mut helpers = match HELPERS.try_lock() {
-        Ok(helpers) => helpers,
-        Err(TryLockError::Poisoned(helpers)) => helpers.into_inner(),
+    let mut workers = match WORKERS.try_lock() {
+        Ok(workers) => workers,
+        Err(TryLockError::Poisoned(workers)) => workers.into_inner(),
         Err(TryLockError::WouldBlock) => return work(0),
     };
-    let helpers = helpers.get_or_insert_with(Helpers::default);
-    let count = helpers.at_least(threads.min(MOST_THREADS) - 1);
+    let workers = workers.get_or_insert_with(Workers::default);
+    let count = workers.at_least(threads.min(MAX_THREADS) - 1);
     let closure: &(dyn Fn(usize) + Sync) = &work;
-    // SAFETY: only the lifetime changes. `Open` takes the work off the board again and waits for
-    // those who took part, also if this thread panics.
+    // SAFETY: only the lifetime changes. `Running` takes the work out of the slot again and waits
+    // for those who took part, also if this thread panics.
     let closure: *const (dyn Fn(usize) + Sync) = unsafe { std::mem::transmute(closure) };
-    helpers.board.put_up(Work { work: closure, helpers: count });
-    let open = Open { board: &helpers.board };
+    workers.job_slot.post(Job { work: closure, workers: count });
+    let open = Running { job_slot: &workers.job_slot };
     work(0);
     drop(open);
 }
 
-/// Work that is on the board.
-struct Open<'a> {
-    board: &'a Board,
+/// Work that is in the slot.
+struct Running<'a> {
+    job_slot: &'a JobSlot,
 }
 
-impl Drop for Open<'_> {
+impl Drop for Running<'_> {
     fn drop(&mut self) {
         let joined = {
-            let mut now = self.board.lock();
-            now.work = None;
-            now.joined
+            let mut current = self.job_slot.lock();
+            current.work = None;
+            current.joined
         };
-        wait_for(|| self.board.done.load(Ordering::Acquire) == joined);
+        wait_for(|| self.job_slot.done.load(Ordering::Acquire) == joined);
     }
 }
 
-impl Helpers {
+impl Workers {
     /// Makes so many, if the system gives them; says how many may take part.
     fn at_least(&mut self, count: usize) -> usize {
         while self.count < count {
-            let board = self.board.clone();
+            let job_slot = self.job_slot.clone();
             let thread = std::thread::Builder::new().name(format!("taw {}", self.count + 1));
-            if thread.spawn(move || help(&board)).is_err() {
+            if thread.spawn(move || worker_main(&job_slot)).is_err() {
                 break;
             }
             self.count += 1;
@@ -110,49 +110,49 @@ impl Helpers {
     }
 }
 
-impl Board {
-    fn lock(&self) -> MutexGuard<'_, Now> {
-        self.now.lock().unwrap_or_else(PoisonError::into_inner)
+impl JobSlot {
+    fn lock(&self) -> MutexGuard<'_, Current> {
+        self.current.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    fn put_up(&self, work: Work) {
+    fn post(&self, work: Job) {
         {
-            let mut now = self.lock();
+            let mut current = self.lock();
             self.done.store(0, Ordering::Relaxed);
-            *now = Now { work: Some(work), joined: 0 };
+            *current = Current { work: Some(work), joined: 0 };
             self.count.fetch_add(1, Ordering::Release);
         }
         self.wake.notify_all();
     }
 
     /// Waits for work that is not yet seen, and joins it if there is room.
-    fn next(&self, seen: &mut usize) -> Option<(Work, usize)> {
+    fn next(&self, seen: &mut usize) -> Option<(Job, usize)> {
         let news = |seen: usize| self.count.load(Ordering::Acquire) != seen;
         let mut looked = 0;
-        while !news(*seen) && looked < PATIENCE {
+        while !news(*seen) && looked < SPIN_COUNT {
             std::hint::spin_loop();
             looked += 1;
         }
-        let mut now = self.lock();
+        let mut current = self.lock();
         while !news(*seen) {
-            now = self.wake.wait(now).unwrap_or_else(PoisonError::into_inner);
+            current = self.wake.wait(current).unwrap_or_else(PoisonError::into_inner);
         }
         *seen = self.count.load(Ordering::Acquire);
-        let work = now.work.filter(|work| now.joined < work.helpers)?;
-        now.joined += 1;
-        Some((work, now.joined))
+        let work = current.work.filter(|work| current.joined < work.workers)?;
+        current.joined += 1;
+        Some((work, current.joined))
     }
 }
 
-/// The life of a helper.
-fn help(board: &Board) {
+/// Main loop of a worker.
+fn worker_main(job_slot: &JobSlot) {
     let mut seen = 0;
     loop {
-        let Some((work, number)) = board.next(&mut seen) else { continue };
+        let Some((work, number)) = job_slot.next(&mut seen) else { continue };
         let guard = AbortOnPanic;
-        // SAFETY: whoever put it up waits for those who joined.
+        // SAFETY: the caller that posted it waits for those who joined.
         unsafe { (*work.work)(number) };
-        board.done.fetch_add(1, Ordering::Release);
+        job_slot.done.fetch_add(1, Ordering::Release);
         std::mem::forget(guard);
     }
 }
@@ -168,13 +168,13 @@ impl Drop for AbortOnPanic {
 
 /// Does so many jobs, in any order. Each is told the number of its thread, which is less than
 /// `threads`, and its own.
-pub(super) fn each(threads: usize, count: usize, job: impl Fn(usize, usize) + Sync) {
-    let size = threads.clamp(1, MOST_THREADS).min(count);
+pub(super) fn parallel_for(threads: usize, count: usize, job: impl Fn(usize, usize) + Sync) {
+    let size = threads.clamp(1, MAX_THREADS).min(count);
     // Everybody has a share, so that memory stays with the same threads, and helps with the next
     // one then.
     let begin = |share: usize| count * share / size;
-    let taken = [const { AtomicUsize::new(0) }; MOST_THREADS];
-    together(size, |number| {
+    let taken = [const { AtomicUsize::new(0) }; MAX_THREADS];
+    run_on_workers(size, |number| {
         for share in (number..size).chain(0..number) {
             loop {
                 let at = begin(share) + taken[share].fetch_add(1, Ordering::Relaxed);
@@ -188,13 +188,15 @@ pub(super) fn each(threads: usize, count: usize, job: impl Fn(usize, usize) + Sy
 }
 
 /// Does something with so many rows, some at a time.
-pub(super) fn each_rows(threads: usize, rows: usize, job: impl Fn(Range<usize>) + Sync) {
-    each(threads, rows.div_ceil(ROWS), |_, part| job(part * ROWS..rows.min((part + 1) * ROWS)));
+pub(super) fn parallel_for_rows(threads: usize, rows: usize, job: impl Fn(Range<usize>) + Sync) {
+    parallel_for(threads, rows.div_ceil(ROWS), |_, part| {
+        job(part * ROWS..rows.min((part + 1) * ROWS))
+    });
 }
 
-/// Works on parts of rows, and lists rows: those that each part names, in their order. `lists` is
-/// only scribbled on.
-pub(super) fn list_rows(
+/// Works on parts of rows, and lists the rows that each part adds, in their order. `lists` is
+/// scratch.
+pub(super) fn parallel_filter(
     threads: usize,
     rows: usize,
     lists: &mut Vec<Vec<u32>>,
@@ -202,8 +204,8 @@ pub(super) fn list_rows(
     job: impl Fn(Range<usize>, &mut Vec<u32>) + Sync,
 ) {
     lists.resize_with(rows.div_ceil(ROWS), Vec::new);
-    let lists = Shared::new(lists);
-    each_rows(threads, rows, |rows| {
+    let lists = DisjointSlice::new(lists);
+    parallel_for_rows(threads, rows, |rows| {
         // SAFETY: one for each part.
         let list = unsafe { &mut *lists.row(rows.start / ROWS) };
         list.clear();
@@ -213,13 +215,13 @@ pub(super) fn list_rows(
     unsafe { lists.read(0..lists.len()) }.iter().for_each(|list| listed.extend(list));
 }
 
-/// Progress of each of a row of neighbours; see [`each_beside`].
-const TAKEN: u32 = 1;
-const DONE: u32 = 2;
+/// Progress of each of a row of neighbours; see [`parallel_for_odd_even`].
+const CLAIMED: u32 = 1;
+const FINISHED: u32 = 2;
 
 /// Does so many jobs, of which neighbours must not be done at a time: even ones come before the
-/// odd ones beside them. `state` is only scribbled on.
-pub(super) fn each_beside(
+/// odd ones beside them. `state` is scratch.
+pub(super) fn parallel_for_odd_even(
     threads: usize,
     count: usize,
     state: &mut Vec<u32>,
@@ -227,40 +229,40 @@ pub(super) fn each_beside(
 ) {
     state.clear();
     state.resize(count, 0);
-    let state = Shared::new(state);
+    let state = DisjointSlice::new(state);
     // SAFETY: while they are shared they are only used as atomics.
     let state = |at: usize| unsafe { AtomicU32::from_ptr(state.row(at)) };
-    let take = |at: usize| {
+    let claim = |at: usize| {
         state(at).load(Ordering::Relaxed) == 0
-            && state(at).compare_exchange(0, TAKEN, Ordering::Relaxed, Ordering::Relaxed).is_ok()
+            && state(at).compare_exchange(0, CLAIMED, Ordering::Relaxed, Ordering::Relaxed).is_ok()
     };
     let one = |at: usize| {
         let guard = AbortOnPanic;
         job(at);
         std::mem::forget(guard);
-        state(at).store(DONE, Ordering::Release);
+        state(at).store(FINISHED, Ordering::Release);
     };
     let free = |odd: usize| {
-        let done = |at: usize| state(at).load(Ordering::Acquire) == DONE;
+        let done = |at: usize| state(at).load(Ordering::Acquire) == FINISHED;
         done(odd - 1) && (odd + 1 == count || done(odd + 1))
     };
-    let (evens, size) = (count.div_ceil(2), threads.clamp(1, MOST_THREADS).min(count));
-    together(size, |number| {
+    let (evens, size) = (count.div_ceil(2), threads.clamp(1, MAX_THREADS).min(count));
+    run_on_workers(size, |number| {
         let begin = evens * number / size;
         let order = || (begin..evens).chain(0..begin).map(|half| 2 * half);
         for even in order() {
-            if take(even) {
+            if claim(even) {
                 one(even);
             }
             // The one before it, while its balls are at hand.
-            if even > 0 && free(even - 1) && take(even - 1) {
+            if even > 0 && free(even - 1) && claim(even - 1) {
                 one(even - 1);
             }
         }
         for odd in order().map(|even| even + 1).filter(|odd| *odd < count) {
             if state(odd).load(Ordering::Relaxed) == 0 {
                 wait_for(|| free(odd));
-                if take(odd) {
+                if claim(odd) {
                     one(odd);
                 }
             }
@@ -282,21 +284,21 @@ fn wait_for(ready: impl Fn() -> bool) {
 }
 
 /// A column that several threads write, each elsewhere.
-pub(super) struct Shared<'a, T>(&'a [UnsafeCell<T>]);
+pub(super) struct DisjointSlice<'a, T>(&'a [UnsafeCell<T>]);
 
-impl<T> Clone for Shared<'_, T> {
+impl<T> Clone for DisjointSlice<'_, T> {
     fn clone(&self) -> Self {
         *self
     }
 }
 
-impl<T> Copy for Shared<'_, T> {}
+impl<T> Copy for DisjointSlice<'_, T> {}
 
 // SAFETY: what is written where is up to those who call the unsafe methods.
-unsafe impl<T: Send + Sync> Sync for Shared<'_, T> {}
-unsafe impl<T: Send + Sync> Send for Shared<'_, T> {}
+unsafe impl<T: Send + Sync> Sync for DisjointSlice<'_, T> {}
+unsafe impl<T: Send + Sync> Send for DisjointSlice<'_, T> {}
 
-impl<'a, T> Shared<'a, T> {
+impl<'a, T> DisjointSlice<'a, T> {
     pub fn new(column: &'a mut [T]) -> Self {
         // SAFETY: a cell has the layout of what is in it, and nobody else has the column.
         Self(unsafe { &*(std::ptr::from_mut(column) as *const [UnsafeCell<T>]) })
@@ -315,7 +317,7 @@ impl<'a, T> Shared<'a, T> {
     /// Some rows for one thread alone.
     ///
     /// # Safety
-    /// Nobody else touches them as long as the slice lives.
+    /// No other thread touches them as long as the slice lives.
     pub unsafe fn part(self, rows: Range<usize>) -> &'a mut [T] {
         let cells = &self.0[rows];
         // SAFETY: as the caller promises.

@@ -1,26 +1,26 @@
-//! Rows that move on: by their velocities in the full tier, before and after overlap is moved
+//! Integration of rows: by their velocities in the full tier, before and after overlap is moved
 //! apart in the lab's.
 
-use crate::swarm::lanes::{Kernel, Lanes, Row};
+use crate::swarm::simd::{Kernel, Row, Simd};
 
 /// Faster than this, in m/s, or further out, in metres, a ball is no longer a ball: squares of
 /// such numbers and of sums of them are still finite.
-const MOST: f32 = 1e15;
+const MAX_MAGNITUDE: f32 = 1e15;
 
-/// Changes velocities, and moves on what has them.
-pub(in crate::swarm) struct Drift<'a> {
+/// Integrates velocities, and positions by these.
+pub(in crate::swarm) struct IntegratePositions<'a> {
     pub at: &'a mut [Row],
     pub velocity: &'a mut [Row],
     pub spin: &'a [Row],
-    pub budget: &'a mut [f32],
+    pub skin_left: &'a mut [f32],
     /// In m/s, and zero.
     pub change: Row,
     /// In seconds, thrice, and zero.
     pub time: Row,
-    /// Displacement of balls in free flight, in metres, that makes the drift second order (velocity
+    /// Displacement of balls in free flight, in metres, that makes the step second order (velocity
     /// Verlet): minus half the change of velocity by gravity times the time.
-    pub back: Row,
-    /// Least budget; below it, `overrun` is set.
+    pub correction: Row,
+    /// Least remaining skin, in metres; below it, `overrun` is set.
     pub least: f32,
     pub overrun: &'a mut bool,
     /// The rows that were stopped because of where they would have gone.
@@ -28,23 +28,24 @@ pub(in crate::swarm) struct Drift<'a> {
     pub first: u32,
 }
 
-impl Kernel for Drift<'_> {
+impl Kernel for IntegratePositions<'_> {
     #[inline(always)]
-    fn run<L: Lanes>(self) {
+    fn run<L: Simd>(self) {
         // In registers, not behind a reference that any of the rows might be.
-        let (change, time, back) = (self.change, self.time, self.back);
+        let (change, time, correction) = (self.change, self.time, self.correction);
         let mut lowest = f32::MAX;
-        let rows = self.at.iter_mut().zip(self.velocity).zip(self.budget).zip(self.spin);
-        for (row, (((at, velocity), budget), spin)) in rows.enumerate() {
+        let rows = self.at.iter_mut().zip(self.velocity).zip(self.skin_left).zip(self.spin);
+        for (row, (((at, velocity), skin_left), spin)) in rows.enumerate() {
             let new = sum(*velocity, change);
-            let way = product(new, time);
-            let way = if spin[3] == 0.0 { sum(way, back) } else { way };
-            let place = sum(*at, way);
-            let ok = largest(new) < MOST && largest(place) < MOST;
+            let displacement = product(new, time);
+            let displacement =
+                if spin[3] == 0.0 { sum(displacement, correction) } else { displacement };
+            let place = sum(*at, displacement);
+            let ok = largest(new) < MAX_MAGNITUDE && largest(place) < MAX_MAGNITUDE;
             if ok {
                 (*velocity, *at) = (new, place);
-                *budget -= squared(way).sqrt();
-                lowest = lowest.min(*budget);
+                *skin_left -= squared(displacement).sqrt();
+                lowest = lowest.min(*skin_left);
             } else {
                 *velocity = [0.0, 0.0, 0.0, velocity[3]];
                 self.stopped.push(self.first + row as u32);
@@ -82,7 +83,7 @@ pub(in crate::swarm) struct Predict<'a> {
     pub at: &'a mut [Row],
     pub velocity: &'a mut [Row],
     /// Way of each.
-    pub way: &'a mut [f32],
+    pub displacement: &'a mut [f32],
     pub change: Row,
     pub time: Row,
     pub stopped: &'a mut Vec<u32>,
@@ -91,17 +92,17 @@ pub(in crate::swarm) struct Predict<'a> {
 
 impl Kernel for Predict<'_> {
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let rows = self.at.iter_mut().zip(self.velocity).zip(self.way);
+    fn run<L: Simd>(self) {
+        let rows = self.at.iter_mut().zip(self.velocity).zip(self.displacement);
         for (row, ((at, velocity), length)) in rows.enumerate() {
             let new = sum(*velocity, self.change);
-            let way = product(new, self.time);
-            let place = sum(*at, way);
-            let ok = largest(new) < MOST && largest(place) < MOST;
+            let displacement = product(new, self.time);
+            let place = sum(*at, displacement);
+            let ok = largest(new) < MAX_MAGNITUDE && largest(place) < MAX_MAGNITUDE;
             let before = [at[0], at[1], at[2], velocity[3]];
             if ok {
                 *at = place;
-                *length = squared(way).sqrt();
+                *length = squared(displacement).sqrt();
             } else {
                 *length = 0.0;
                 self.stopped.push(self.first + row as u32);
@@ -113,24 +114,24 @@ impl Kernel for Predict<'_> {
 
 /// The last part of it: velocities are what places became, though no ball is faster than it was
 /// before others pushed it. (What is pushed out of a deep overlap would fly off otherwise.)
-pub(in crate::swarm) struct Follow<'a> {
+pub(in crate::swarm) struct UpdateVelocities<'a> {
     pub at: &'a [Row],
     pub velocity: &'a mut [Row],
-    pub way: &'a [f32],
-    pub budget: &'a mut [f32],
+    pub displacement: &'a [f32],
+    pub skin_left: &'a mut [f32],
     pub per_second: Row,
 }
 
-impl Kernel for Follow<'_> {
+impl Kernel for UpdateVelocities<'_> {
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let rows = self.at.iter().zip(self.velocity).zip(self.way).zip(self.budget);
-        for (((at, velocity), expected), budget) in rows {
-            let way = [at[0] - velocity[0], at[1] - velocity[1], at[2] - velocity[2], 0.0];
-            let length = squared(way).sqrt();
-            *budget -= length;
+    fn run<L: Simd>(self) {
+        let rows = self.at.iter().zip(self.velocity).zip(self.displacement).zip(self.skin_left);
+        for (((at, velocity), expected), skin_left) in rows {
+            let displacement = [at[0] - velocity[0], at[1] - velocity[1], at[2] - velocity[2], 0.0];
+            let length = squared(displacement).sqrt();
+            *skin_left -= length;
             let part = if length > *expected { *expected / length } else { 1.0 };
-            let new = product(way, self.per_second);
+            let new = product(displacement, self.per_second);
             *velocity = [new[0] * part, new[1] * part, new[2] * part, velocity[3]];
         }
     }

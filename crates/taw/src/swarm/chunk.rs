@@ -1,30 +1,30 @@
 use std::ops::Range;
 
 use super::batches::Batch;
-use super::kernels::Pushes;
-use super::lanes::Row;
-use super::pairs::{FAN, Fans};
-use super::touch::Touch;
+use super::kernels::ContactImpulses;
+use super::neighbours::{NEIGHBOUR_ROOM, NeighbourLists};
+use super::simd::Row;
+use super::wall_contact::WallContact;
 
 /// Some layers of the grid, as much as one thread works on at a time. Pairs of its balls, among
-/// themselves and with those of the next slab, are its own; so two slabs that are not neighbours
+/// themselves and with those of the next chunk, are its own; so two chunks that are not neighbours
 /// have no ball in common.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "they have nothing to do with each other")]
-pub(super) struct Slab {
+pub(super) struct Chunk {
     /// The first layer, and the one after the last.
     pub layers: [u32; 2],
     /// The first row, of it, of the next one, and after that.
     pub rows: [u32; 3],
     pub batches: Vec<Batch>,
-    /// Number of its pairs, in batches and fans.
+    /// Number of its pairs, in batches and neighbour lists.
     pub pairs: usize,
     /// Number of those that there was no room for.
     pub unlisted: usize,
-    pub pushes: Pushes,
+    pub impulses: ContactImpulses,
     /// By rows.
-    pub touches: Vec<Touch>,
-    pub old_touches: Vec<Touch>,
+    pub wall_contacts: Vec<WallContact>,
+    pub old_wall_contacts: Vec<WallContact>,
     /// The rows near half-spaces, and near other walls.
     pub near_planes: Vec<u32>,
     pub near_shapes: Vec<u32>,
@@ -34,31 +34,31 @@ pub(super) struct Slab {
     pub speed: [f32; 3],
     /// The least and the largest inverse mass, in 1/kg.
     pub inverse_masses: [f32; 2],
-    /// For how long all have been slow, in seconds, and whether they sleep.
-    pub slow: f32,
+    /// Time for which all have been slow, in seconds, and whether they sleep.
+    pub sleep_time: f32,
     pub asleep: bool,
     /// Set once the bodies that fell asleep in it were read.
     pub read_asleep: bool,
-    /// The speed in m/s of its fastest ball that is no guest, if it has guests.
+    /// The speed in m/s of its fastest ball that is no proxy, if it has proxies.
     pub fastest_own: Option<f32>,
     /// Set if a ball of it or of those beside it bounced just now, and in this substep.
     pub again: bool,
     pub struck: bool,
-    /// Set if a ball of it went further than its budget by more than the cap.
+    /// Set if a ball of it went beyond its skin by more than the common skin.
     pub overrun: bool,
-    /// The rows that would leave their budget in this step, and those that were stopped.
+    /// Rows that would leave their skin in this step, and those that were stopped.
     pub leaving: Vec<u32>,
     pub stopped: Vec<u32>,
 }
 
-impl Slab {
+impl Chunk {
     pub fn wake(&mut self, velocity: &mut [Row]) {
         if self.asleep {
             for velocity in &mut velocity[self.own_rows()] {
                 velocity[3] = velocity[3].abs();
             }
         }
-        (self.asleep, self.slow) = (false, 0.0);
+        (self.asleep, self.sleep_time) = (false, 0.0);
     }
 
     pub fn bytes(&self) -> usize {
@@ -68,15 +68,15 @@ impl Slab {
             batches,
             pairs: _,
             unlisted: _,
-            pushes,
-            touches,
-            old_touches,
+            impulses,
+            wall_contacts,
+            old_wall_contacts,
             near_planes,
             near_shapes,
             has_fast: _,
             speed: _,
             inverse_masses: _,
-            slow: _,
+            sleep_time: _,
             asleep: _,
             read_asleep: _,
             fastest_own: _,
@@ -88,22 +88,22 @@ impl Slab {
         } = self;
         let names = [near_planes, near_shapes, leaving, stopped].map(Vec::capacity);
         batches.capacity() * size_of::<Batch>()
-            + pushes.bytes()
-            + (touches.capacity() + old_touches.capacity()) * size_of::<Touch>()
+            + impulses.bytes()
+            + (wall_contacts.capacity() + old_wall_contacts.capacity()) * size_of::<WallContact>()
             + names.iter().sum::<usize>() * size_of::<u32>()
     }
 
-    /// Where its fans are in the list of all.
-    pub fn fans_of_all(&self) -> Range<usize> {
+    /// Range of its neighbour lists in the list of all.
+    pub fn neighbour_range(&self) -> Range<usize> {
         let rows = self.own_rows();
-        rows.start * FAN..rows.end * FAN
+        rows.start * NEIGHBOUR_ROOM..rows.end * NEIGHBOUR_ROOM
     }
 
-    /// Its fans, in the list of all.
-    pub fn fans<'a>(&self, all: &'a [u16]) -> Fans<'a> {
+    /// Its neighbour lists, in the list of all.
+    pub fn neighbours<'a>(&self, all: &'a [u16]) -> NeighbourLists<'a> {
         let [first, next, _] = self.rows;
-        let list = all.get(self.fans_of_all().start..).unwrap_or_default();
-        Fans { first, rows: next - first, list }
+        let list = all.get(self.neighbour_range().start..).unwrap_or_default();
+        NeighbourLists { first, rows: next - first, list }
     }
 
     pub fn own_rows(&self) -> Range<usize> {

@@ -1,5 +1,5 @@
-//! Eight numbers at once: by the processor's own instructions where it has them, else in plain
-//! Rust. Both round each operation alike, so a step gives the same bits by either.
+//! SIMD: eight numbers at once, by the processor's own instructions where it has them, else in
+//! plain Rust. Both round each operation alike, so a step gives the same bits by either.
 
 use std::ops::{Add, Div, Mul, Sub};
 
@@ -10,7 +10,7 @@ pub(super) const LANES: usize = 8;
 pub(super) type Row = [f32; 4];
 
 /// Eight numbers. Nothing here adds across lanes or fuses two roundings into one.
-pub(super) trait Lanes:
+pub(super) trait Simd:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
     fn splat(x: f32) -> Self;
@@ -19,25 +19,26 @@ pub(super) trait Lanes:
     fn sqrt(self) -> Self;
     /// The second one where they do not compare.
     fn max(self, other: Self) -> Self;
-    /// A bit for each lane where the first is the greater, the lowest bit for the first lane.
-    fn above(self, other: Self) -> u32;
+    /// Mask with a bit for each lane where the first is the greater, the lowest bit for the first
+    /// lane.
+    fn gt_mask(self, other: Self) -> u32;
     /// `yes` where the first is the greater, else `no`.
-    fn pick_above(self, other: Self, yes: Self, no: Self) -> Self;
+    fn select_gt(self, other: Self, yes: Self, no: Self) -> Self;
     /// The sum of all: of the lanes that are four apart, then two, then one.
     fn sum(self) -> f32;
     /// The lanes before this one; zeros after them.
-    fn first(self, count: usize) -> Self;
+    fn mask_first(self, count: usize) -> Self;
     /// The lanes whose bits are set, counted from a number on; the rest is anything.
-    fn name(bits: u32, from: u32, to: &mut [u32; LANES]);
+    fn compress(bits: u32, from: u32, to: &mut [u32; LANES]);
     /// The rows at these places after `base`, as columns.
     ///
     /// # Safety
     /// The rows exist, and nobody writes them meanwhile.
     unsafe fn gather(base: *const Row, at: &[u16; LANES]) -> [Self; 4];
-    /// Writes back the first `count` of what [`Lanes::gather`] read.
+    /// Writes back the first `count` of what [`Simd::gather`] read.
     ///
     /// # Safety
-    /// The rows exist, and nobody else touches them meanwhile.
+    /// The rows exist, and no other thread touches them meanwhile.
     unsafe fn scatter(base: *mut Row, at: &[u16; LANES], count: usize, columns: [Self; 4]);
 }
 
@@ -46,31 +47,31 @@ pub(super) trait Kernel {
     /// Does it. Mark it and all that it calls `#[inline(always)]`, so that it is compiled for the
     /// instructions of the lanes that it is done by; and call no closure with lanes, which cannot
     /// be marked so.
-    fn run<L: Lanes>(self);
+    fn run<L: Simd>(self);
 }
 
-/// Which instructions of the processor a swarm uses. Each gives the same bits.
+/// Instruction set that a swarm uses. Each gives the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Instructions(Set);
+pub struct SimdLevel(Kind);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Set {
+enum Kind {
     Portable,
     /// AVX2, BMI1 and POPCNT; only where the processor has them.
     #[cfg(target_arch = "x86_64")]
     Avx2,
 }
 
-impl Default for Instructions {
+impl Default for SimdLevel {
     /// The fastest that this machine has.
     fn default() -> Self {
         Self::available().next().unwrap_or(Self::PORTABLE)
     }
 }
 
-impl Instructions {
+impl SimdLevel {
     /// Those that every machine of its kind has.
-    pub const PORTABLE: Self = Self(Set::Portable);
+    pub const PORTABLE: Self = Self(Kind::Portable);
 
     /// All that this machine has, the fastest first.
     pub fn available() -> impl Iterator<Item = Self> {
@@ -78,7 +79,7 @@ impl Instructions {
         let more = (std::is_x86_feature_detected!("avx2")
             && std::is_x86_feature_detected!("bmi1")
             && std::is_x86_feature_detected!("popcnt"))
-        .then_some(Self(Set::Avx2));
+        .then_some(Self(Kind::Avx2));
         #[cfg(not(target_arch = "x86_64"))]
         let more = None;
         more.into_iter().chain([Self::PORTABLE])
@@ -86,19 +87,19 @@ impl Instructions {
 
     pub(super) fn run(self, kernel: impl Kernel) {
         match self.0 {
-            Set::Portable => kernel.run::<Plain>(),
+            Kind::Portable => kernel.run::<Portable>(),
             // SAFETY: a value of this kind comes from `available` only.
             #[cfg(target_arch = "x86_64")]
-            Set::Avx2 => unsafe { x86::run(kernel) },
+            Kind::Avx2 => unsafe { x86::run(kernel) },
         }
     }
 }
 
 /// Plain Rust.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Plain([f32; LANES]);
+pub(super) struct Portable([f32; LANES]);
 
-impl Plain {
+impl Portable {
     #[inline(always)]
     fn both(self, other: Self, of: impl Fn(f32, f32) -> f32) -> Self {
         let mut out = self.0;
@@ -111,7 +112,7 @@ impl Plain {
 
 macro_rules! operator {
     ($name:ident, $method:ident, $plain:tt, $avx:ident) => {
-        impl $name for Plain {
+        impl $name for Portable {
             type Output = Self;
             #[inline(always)]
             fn $method(self, other: Self) -> Self {
@@ -134,7 +135,7 @@ operator!(Sub, sub, -, _mm256_sub_ps);
 operator!(Mul, mul, *, _mm256_mul_ps);
 operator!(Div, div, /, _mm256_div_ps);
 
-impl Lanes for Plain {
+impl Simd for Portable {
     #[inline(always)]
     fn splat(x: f32) -> Self {
         Self([x; LANES])
@@ -161,12 +162,12 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn above(self, other: Self) -> u32 {
+    fn gt_mask(self, other: Self) -> u32 {
         (0..LANES).map(|lane| u32::from(self.0[lane] > other.0[lane]) << lane).sum()
     }
 
     #[inline(always)]
-    fn pick_above(self, other: Self, yes: Self, no: Self) -> Self {
+    fn select_gt(self, other: Self, yes: Self, no: Self) -> Self {
         let mut out = no.0;
         for (lane, out) in out.iter_mut().enumerate() {
             if self.0[lane] > other.0[lane] {
@@ -183,14 +184,14 @@ impl Lanes for Plain {
     }
 
     #[inline(always)]
-    fn first(self, count: usize) -> Self {
+    fn mask_first(self, count: usize) -> Self {
         let mut out = self.0;
         out.iter_mut().skip(count).for_each(|lane| *lane = 0.0);
         Self(out)
     }
 
     #[inline(always)]
-    fn name(mut bits: u32, from: u32, to: &mut [u32; LANES]) {
+    fn compress(mut bits: u32, from: u32, to: &mut [u32; LANES]) {
         let mut count = 0;
         while bits != 0 {
             to[count] = from + bits.trailing_zeros();
@@ -227,7 +228,7 @@ mod x86 {
     #[allow(clippy::wildcard_imports, reason = "they all begin with _mm")]
     use std::arch::x86_64::*;
 
-    use super::{Kernel, LANES, Lanes, Row};
+    use super::{Kernel, LANES, Row, Simd};
 
     /// # Safety
     /// The processor has these.
@@ -241,7 +242,7 @@ mod x86 {
     #[derive(Clone, Copy)]
     pub struct Avx(pub(super) __m256);
 
-    impl Lanes for Avx {
+    impl Simd for Avx {
         #[inline(always)]
         fn splat(x: f32) -> Self {
             Self(unsafe { _mm256_set1_ps(x) })
@@ -268,14 +269,14 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn above(self, other: Self) -> u32 {
+        fn gt_mask(self, other: Self) -> u32 {
             unsafe {
                 _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0)).cast_unsigned()
             }
         }
 
         #[inline(always)]
-        fn pick_above(self, other: Self, yes: Self, no: Self) -> Self {
+        fn select_gt(self, other: Self, yes: Self, no: Self) -> Self {
             unsafe {
                 let mask = _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0);
                 Self(_mm256_blendv_ps(no.0, yes.0, mask))
@@ -293,14 +294,14 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn first(self, count: usize) -> Self {
+        fn mask_first(self, count: usize) -> Self {
             let mask = &MASK[LANES - count.min(LANES)..];
             // SAFETY: eight follow.
             Self(unsafe { _mm256_and_ps(self.0, _mm256_loadu_ps(mask.as_ptr().cast())) })
         }
 
         #[inline(always)]
-        fn name(bits: u32, from: u32, to: &mut [u32; LANES]) {
+        fn compress(bits: u32, from: u32, to: &mut [u32; LANES]) {
             unsafe {
                 let which = _mm256_loadu_si256(FIRST[bits as usize & 0xff].as_ptr().cast());
                 let from = _mm256_set1_epi32(from.cast_signed());

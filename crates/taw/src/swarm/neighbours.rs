@@ -1,59 +1,63 @@
-//! Who might touch whom. In the full tier: pairs of balls, eight to a batch in which no ball is
-//! twice, so that each pair is solved with what the ones before it left. In the lab's tier: for
-//! each ball those that come after it, a *fan*, which is found faster and takes less room.
+//! Candidate pairs. In the full tier: eight to a batch in which no ball is twice, so that each pair
+//! is solved with the velocities that the ones before it left. In the lab's tier: for each ball
+//! those that come after it, a half *neighbour list*, which is found faster and takes less room.
 
 use std::ops::Range;
 
-use super::batches::{Batch, Filler, OPEN, filler};
+use super::batches::{Batch, BatchBuilder, MAX_COLOURS, builder};
 use super::grid::{Grid, Level};
-use super::lanes::{Kernel, LANES, Lanes, Row};
+use super::simd::{Kernel, LANES, Row, Simd};
 
 /// More than any ball is away from another, and its square is finite.
-const FAR: f32 = 1e18;
+const NOWHERE: f32 = 1e18;
 
 /// Scratch of the search; one for each thread.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Search {
-    columns: Columns,
-    /// In which of the open batches a row has been, as bits.
-    busy: Vec<u32>,
-    open: [Batch; OPEN],
+    columns: CandidateWindow,
+    /// Colours of a row: the open batches in which it is, as bits.
+    colour_mask: Vec<u32>,
+    open: [Batch; MAX_COLOURS],
 }
 
-/// See [`Around`].
+/// See [`CandidateBlocks`].
 #[derive(Clone, Debug, Default)]
-struct Columns {
-    /// Of a slab and the next one: center, and radius with budget.
+struct CandidateWindow {
+    /// Of a chunk and the next one: center, and radius with remaining skin.
     window: [Vec<f32>; 4],
-    eights: Vec<[u32; 2]>,
+    blocks: Vec<[u32; 2]>,
     found: Vec<u32>,
 }
 
 impl Search {
     /// Puts pairs of about so many balls into batches.
-    pub fn filler<'a>(&'a mut self, balls: usize, batches: &'a mut Vec<Batch>) -> Filler<'a> {
-        filler(&mut self.busy, &mut self.open, balls, batches)
+    pub fn builder<'a>(
+        &'a mut self,
+        balls: usize,
+        batches: &'a mut Vec<Batch>,
+    ) -> BatchBuilder<'a> {
+        builder(&mut self.colour_mask, &mut self.open, balls, batches)
     }
 
     pub fn bytes(&self) -> usize {
-        let Columns { window, eights, found } = &self.columns;
+        let CandidateWindow { window, blocks, found } = &self.columns;
         let columns = window.iter().map(Vec::capacity).sum::<usize>();
-        (columns + eights.capacity() * 2 + found.capacity() + self.busy.capacity()) * 4
+        (columns + blocks.capacity() * 2 + found.capacity() + self.colour_mask.capacity()) * 4
     }
 }
 
 /// Taker of the pairs that are found.
-trait Sink {
+trait PairVisitor {
     /// A ball and some that come after it. Balls are named in order; those without any may be
     /// left out.
-    fn fan(&mut self, ball: u32, near: &[u32]);
+    fn neighbours_after(&mut self, ball: u32, near: &[u32]);
     /// A ball and some that come before or after it.
-    fn around(&mut self, ball: u32, near: &[u32]);
+    fn neighbours_around(&mut self, ball: u32, near: &[u32]);
 }
 
-impl Sink for Filler<'_> {
+impl PairVisitor for BatchBuilder<'_> {
     #[inline(always)]
-    fn fan(&mut self, ball: u32, near: &[u32]) {
+    fn neighbours_after(&mut self, ball: u32, near: &[u32]) {
         let count = self.spend(near.len());
         for other in &near[..count] {
             self.add(ball, *other);
@@ -61,7 +65,7 @@ impl Sink for Filler<'_> {
     }
 
     #[inline(always)]
-    fn around(&mut self, ball: u32, near: &[u32]) {
+    fn neighbours_around(&mut self, ball: u32, near: &[u32]) {
         let count = self.spend(near.len());
         for other in &near[..count] {
             self.add(ball.min(*other), ball.max(*other));
@@ -69,13 +73,13 @@ impl Sink for Filler<'_> {
     }
 }
 
-/// Numbers that the fans of a row may take, on average over a slab: as many as fit into a
+/// Numbers that the list of a row may take, on average over a chunk: as many as fit into a
 /// row of a column that is not in use meanwhile.
-pub(super) const FAN: usize = size_of::<Row>() / size_of::<u16>();
+pub(super) const NEIGHBOUR_ROOM: usize = size_of::<Row>() / size_of::<u16>();
 
-/// For each row of a slab, how many others its fan has, and how far after it each of them is.
+/// For each row of a chunk, the length of its neighbour list, and how far after it each entry is.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Fans<'a> {
+pub(super) struct NeighbourLists<'a> {
     /// The first row.
     pub first: u32,
     pub rows: u32,
@@ -83,31 +87,31 @@ pub(super) struct Fans<'a> {
     pub list: &'a [u16],
 }
 
-impl<'a> Fans<'a> {
+impl<'a> NeighbourLists<'a> {
     /// The others of each row.
     pub fn of_rows(self) -> impl Iterator<Item = &'a [u16]> {
         let mut rest = self.list;
         (0..self.rows).map_while(move |_| {
             let (count, more) = rest.split_first()?;
-            let (fan, more) = more.split_at_checked((*count).into())?;
+            let (neighbours_after, more) = more.split_at_checked((*count).into())?;
             rest = more;
-            Some(fan)
+            Some(neighbours_after)
         })
     }
 }
 
-/// Puts fans one after another, and what fits into none of them into batches.
-struct FanFiller<'a> {
+/// Puts neighbour lists one after another, and what fits into none of them into batches.
+struct NeighbourListBuilder<'a> {
     /// The next row, and the one after the last.
     next: u32,
     end: u32,
     list: &'a mut [u16],
     filled: usize,
-    filler: Filler<'a>,
+    builder: BatchBuilder<'a>,
 }
 
-impl FanFiller<'_> {
-    /// All rows before this one have no more fans.
+impl NeighbourListBuilder<'_> {
+    /// All rows before this one have no more neighbours.
     #[inline(always)]
     fn skip_to(&mut self, row: u32) {
         while self.next < row {
@@ -118,11 +122,11 @@ impl FanFiller<'_> {
     }
 }
 
-impl Sink for FanFiller<'_> {
+impl PairVisitor for NeighbourListBuilder<'_> {
     #[inline(always)]
-    fn fan(&mut self, ball: u32, near: &[u32]) {
+    fn neighbours_after(&mut self, ball: u32, near: &[u32]) {
         debug_assert!(self.next <= ball);
-        let near = &near[..self.filler.spend(near.len())];
+        let near = &near[..self.builder.spend(near.len())];
         self.skip_to(ball);
         // The rows from this one on need a number each. The others come in order.
         let room = self.list.len() - self.filled - (self.end - ball) as usize;
@@ -138,24 +142,24 @@ impl Sink for FanFiller<'_> {
             *after = (other - ball) as u16;
         }
         for other in rest {
-            self.filler.add(ball, *other);
+            self.builder.add(ball, *other);
         }
     }
 
     #[inline(always)]
-    fn around(&mut self, ball: u32, near: &[u32]) {
-        self.filler.around(ball, near);
+    fn neighbours_around(&mut self, ball: u32, near: &[u32]) {
+        self.builder.neighbours_around(ball, near);
     }
 }
 
-/// Finds the pairs of a slab: of its own balls, and of these with those of the next one.
+/// Finds the pairs of a chunk: of its own balls, and of these with those of the next one.
 pub(super) struct FindPairs<'a> {
     pub grid: &'a Grid,
     pub at: &'a [Row],
-    /// Way that each ball may go until pairs are sought again, in metres.
-    pub budget: &'a [f32],
-    /// Balls with more than this are sought for alone.
-    pub cap: f32,
+    /// Remaining skin of each ball, in metres.
+    pub skin_left: &'a [f32],
+    /// Balls with more than this are fast movers.
+    pub skin: f32,
     /// The layers of level 0 in it.
     pub layers: [u32; 2],
     /// The first row, of it, of the next one and after that.
@@ -163,66 +167,68 @@ pub(super) struct FindPairs<'a> {
     pub search: &'a mut Search,
     /// Number of pairs that there was no room for.
     pub unlisted: &'a mut usize,
-    /// Where pairs go that are part of no fan.
+    /// Where pairs go that are part of no neighbour list.
     pub batches: &'a mut Vec<Batch>,
-    /// Where fans go, if there shall be any: [`FAN`] for each row of the slab.
-    pub fans: Option<&'a mut [u16]>,
+    /// Where lists go, if there shall be any: [`NEIGHBOUR_ROOM`] for each row of the chunk.
+    pub lists: Option<&'a mut [u16]>,
 }
 
 impl Kernel for FindPairs<'_> {
     #[inline(always)]
-    fn run<L: Lanes>(self) {
-        let Self { grid, at, budget, cap, layers, rows, search, unlisted, batches, fans } = self;
+    fn run<L: Simd>(self) {
+        let Self { grid, at, skin_left, skin, layers, rows, search, unlisted, batches, lists } =
+            self;
         let [first, next, end] = rows;
         let window = first as usize..end as usize;
-        let Search { columns, busy, open } = search;
-        columns.window.fill_with(&at[window.clone()], &budget[window.clone()], cap);
+        let Search { columns, colour_mask, open } = search;
+        columns.window.fill_with(&at[window.clone()], &skin_left[window.clone()], skin);
         batches.clear();
-        let mut filler = filler(busy, open, window.len(), batches);
-        let mut around = Around::new(columns, first..end);
-        if let Some(list) = fans {
-            let mut fans = FanFiller { next: first, end: next, list, filled: 0, filler };
-            find::<L>(grid, at, layers, rows, &mut around, &mut fans);
-            fans.skip_to(next);
-            *unlisted = fans.filler.close_all();
+        let mut builder = builder(colour_mask, open, window.len(), batches);
+        let mut candidates = CandidateBlocks::new(columns, first..end);
+        if let Some(list) = lists {
+            let mut lists =
+                NeighbourListBuilder { next: first, end: next, list, filled: 0, builder };
+            find::<L>(grid, at, layers, rows, &mut candidates, &mut lists);
+            lists.skip_to(next);
+            *unlisted = lists.builder.close_all();
         } else {
-            find::<L>(grid, at, layers, rows, &mut around, &mut filler);
-            *unlisted = filler.close_all();
+            find::<L>(grid, at, layers, rows, &mut candidates, &mut builder);
+            *unlisted = builder.close_all();
         }
     }
 }
 
 #[inline(always)]
-fn find<L: Lanes>(
+fn find<L: Simd>(
     grid: &Grid,
     at: &[Row],
     layers: [u32; 2],
     rows: [u32; 3],
-    around: &mut Around,
-    sink: &mut impl Sink,
+    candidates: &mut CandidateBlocks,
+    visitor: &mut impl PairVisitor,
 ) {
     // In the order of the rows.
     for coarse in layers[0]..layers[1] {
         for level in &grid.levels {
             let fine = coarse << level.number..(coarse + 1) << level.number;
             for layer in fine {
-                level_layer::<L>(grid, level, layer, around, sink);
+                pairs_in_layer::<L>(grid, level, layer, candidates, visitor);
             }
         }
     }
     if grid.levels.len() > 1 {
-        across::<L>(grid, at, layers, rows, around, sink);
+        cross_level_pairs::<L>(grid, at, layers, rows, candidates, visitor);
     }
 }
 
 /// The pairs of the balls of one layer with those of the same level.
 #[inline(always)]
-fn level_layer<L: Lanes>(
+fn pairs_in_layer<L: Simd>(
     grid: &Grid,
     level: &Level,
     layer: u32,
-    around: &mut Around,
-    sink: &mut impl Sink,
+    candidates: &mut CandidateBlocks,
+    visitor: &mut impl PairVisitor,
 ) {
     let [row_count, cell_count] = level.size();
     for row in 1..row_count - 1 {
@@ -231,43 +237,43 @@ fn level_layer<L: Lanes>(
             continue;
         }
         let starts = grid.starts(line, cell_count);
-        let ahead = ahead(grid, level, layer, row);
+        let lines_ahead = lines_ahead(grid, level, layer, row);
         for (cell, four) in starts.windows(4).enumerate() {
             let [_, from, to, end] = *four else { continue };
             if from == to {
                 continue;
             }
-            around.eights.clear();
-            around.add(from, end);
-            for starts in &ahead {
+            candidates.blocks.clear();
+            candidates.add(from, end);
+            for starts in &lines_ahead {
                 if let Some(&[from, _, _, to]) = starts.get(cell..cell + 4) {
-                    around.add(from, to);
+                    candidates.add(from, to);
                 }
             }
             for ball in from..to {
                 // Each with those that come after it.
-                sink.fan(ball, around.near::<L>(ball, ball + 1));
+                visitor.neighbours_after(ball, candidates.near::<L>(ball, ball + 1));
             }
         }
     }
 }
 
 trait Fill {
-    /// Takes rows in; those with a budget above the cap are nowhere.
-    fn fill_with(&mut self, at: &[Row], budget: &[f32], cap: f32);
+    /// Takes rows in; fast movers, with more than the common skin, are nowhere.
+    fn fill_with(&mut self, at: &[Row], skin_left: &[f32], skin: f32);
 }
 
 impl Fill for [Vec<f32>; 4] {
-    fn fill_with(&mut self, at: &[Row], budget: &[f32], cap: f32) {
+    fn fill_with(&mut self, at: &[Row], skin_left: &[f32], skin: f32) {
         let [x, y, z, reach] = self;
         for column in [&mut *x, y, z, reach] {
             column.clear();
-            column.resize(at.len() + LANES, FAR);
+            column.resize(at.len() + LANES, NOWHERE);
         }
         let columns = x.iter_mut().zip(y).zip(z).zip(reach);
-        for ((at, budget), (((x, y), z), reach)) in at.iter().zip(budget).zip(columns) {
-            [*x, *y, *z, *reach] = [at[0], at[1], at[2], at[3] + budget];
-            if *budget > cap {
+        for ((at, skin_left), (((x, y), z), reach)) in at.iter().zip(skin_left).zip(columns) {
+            [*x, *y, *z, *reach] = [at[0], at[1], at[2], at[3] + skin_left];
+            if *skin_left > skin {
                 *x = f32::NAN; // near to nothing, also not to another one
             }
         }
@@ -275,7 +281,7 @@ impl Fill for [Vec<f32>; 4] {
 }
 
 /// The lines of cells that come later and are beside one: where the rows of their cells begin.
-fn ahead<'a>(grid: &'a Grid, level: &Level, layer: u32, row: u32) -> [&'a [u32]; 4] {
+fn lines_ahead<'a>(grid: &'a Grid, level: &Level, layer: u32, row: u32) -> [&'a [u32]; 4] {
     let cells = level.size()[1];
     let line = |layer, row| grid.starts(level.cell(grid, layer, row, 0), cells);
     let here = line(layer, row + 1);
@@ -287,15 +293,15 @@ fn ahead<'a>(grid: &'a Grid, level: &Level, layer: u32, row: u32) -> [&'a [u32];
 
 /// Pairs of a ball with one of a coarser level: there, all 27 cells around it.
 #[inline(always)]
-fn across<L: Lanes>(
+fn cross_level_pairs<L: Simd>(
     grid: &Grid,
     at: &[Row],
     layers: [u32; 2],
     [first, next, end]: [u32; 3],
-    around: &mut Around,
-    sink: &mut impl Sink,
+    candidates: &mut CandidateBlocks,
+    visitor: &mut impl PairVisitor,
 ) {
-    // Also of the next slab's balls, with those of this one.
+    // Also of the next chunk's balls, with those of this one.
     for small in first..end {
         let place = &at[small as usize];
         let own = grid.level_of(place[3]);
@@ -304,38 +310,38 @@ fn across<L: Lanes>(
             if small >= next && layer > layers[1] << level.number {
                 continue;
             }
-            around.eights.clear();
+            candidates.blocks.clear();
             let last = if small < next { end } else { next };
             for layer in layer.saturating_sub(1)..(layer + 2).min(level.layers) {
                 for row in row - 1..row + 2 {
                     let line = level.cell(grid, layer, row, 0);
                     let [from, to] = [grid.first(line + cell - 1), grid.first(line + cell + 2)];
-                    around.add(from.max(first), to.min(last));
+                    candidates.add(from.max(first), to.min(last));
                 }
             }
-            sink.around(small, around.near::<L>(small, 0));
+            visitor.neighbours_around(small, candidates.near::<L>(small, 0));
         }
     }
 }
 
 /// Looks which balls are near one, among some runs of rows.
-struct Around<'a> {
+struct CandidateBlocks<'a> {
     /// The first row of the window.
     first: u32,
     /// The columns of the window, with [`LANES`] places more.
     columns: [&'a [f32]; 4],
     /// The runs by eights: where each begins in the window, and a bit for each row of the run.
-    eights: &'a mut Vec<[u32; 2]>,
+    blocks: &'a mut Vec<[u32; 2]>,
     /// Those that are near.
     found: &'a mut Vec<u32>,
 }
 
-impl<'a> Around<'a> {
-    fn new(search: &'a mut Columns, window: Range<u32>) -> Self {
+impl<'a> CandidateBlocks<'a> {
+    fn new(search: &'a mut CandidateWindow, window: Range<u32>) -> Self {
         let size = window.len();
-        let Columns { window: columns, eights, found } = search;
+        let CandidateWindow { window: columns, blocks, found } = search;
         let columns = columns.each_ref().map(|column| &column[..size + LANES]);
-        Self { first: window.start, columns, eights, found }
+        Self { first: window.start, columns, blocks, found }
     }
 
     /// Adds a run of rows of the window.
@@ -344,7 +350,7 @@ impl<'a> Around<'a> {
         let mut at = from;
         while at < to {
             let bits = if to - at < LANES as u32 { (1 << (to - at)) - 1 } else { 0xff };
-            self.eights.push([at - self.first, bits]);
+            self.blocks.push([at - self.first, bits]);
             at += LANES as u32;
         }
     }
@@ -352,17 +358,17 @@ impl<'a> Around<'a> {
     /// The rows near a ball of the window. Of the first eights, as many rows are left out as come
     /// before `after`.
     #[inline(always)]
-    fn near<L: Lanes>(&mut self, ball: u32, after: u32) -> &[u32] {
+    fn near<L: Simd>(&mut self, ball: u32, after: u32) -> &[u32] {
         let local = (ball - self.first) as usize;
         let [x, y, z, reach] = self.columns;
         let (ax, ay) = (L::splat(x[local]), L::splat(y[local]));
         let (az, a_reach) = (L::splat(z[local]), L::splat(reach[local]));
-        let room = (self.eights.len() + 1) * LANES;
+        let room = (self.blocks.len() + 1) * LANES;
         if self.found.len() < room {
             self.found.resize(2 * room, 0);
         }
         let mut count = 0;
-        for [at, bits] in &*self.eights {
+        for [at, bits] in &*self.blocks {
             let row = *at as usize;
             // SAFETY: an eight begins in the window, which eight places follow; and there is
             // room for eight of each.
@@ -371,8 +377,8 @@ impl<'a> Around<'a> {
                 let dy = get::<L>(y, row) - ay;
                 let dz = get::<L>(z, row) - az;
                 let near = get::<L>(reach, row) + a_reach;
-                let hits = (near * near).above(dx * dx + dy * dy + dz * dz) & bits;
-                L::name(hits, self.first + at, &mut *self.found.as_mut_ptr().add(count).cast());
+                let hits = (near * near).gt_mask(dx * dx + dy * dy + dz * dz) & bits;
+                L::compress(hits, self.first + at, &mut *self.found.as_mut_ptr().add(count).cast());
                 count += hits.count_ones() as usize;
             }
         }
@@ -386,7 +392,7 @@ impl<'a> Around<'a> {
 /// # Safety
 /// There are eight from there on.
 #[inline(always)]
-unsafe fn get<L: Lanes>(column: &[f32], at: usize) -> L {
+unsafe fn get<L: Simd>(column: &[f32], at: usize) -> L {
     debug_assert!(at + LANES <= column.len());
     // SAFETY: as the caller promises.
     L::load(unsafe { &*column.as_ptr().add(at).cast() })

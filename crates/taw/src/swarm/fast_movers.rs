@@ -1,0 +1,225 @@
+//! Balls that left their skin: few, so pairs are searched for them alone, and one fast ball does
+//! not cost a search for all.
+//!
+//! Pairs that such a ball already has in its chunk stay there. One that it then has twice shares
+//! its impulse between the two.
+
+use super::batches::{Batch, BatchBuilder};
+use super::grid::Grid;
+use super::kernels::{ContactImpulses, squared};
+use super::neighbours::Search;
+use super::simd::Row;
+
+/// Fast movers at most: one of so many balls, and besides so many.
+const BALLS_PER_MOVER: usize = 500;
+const BASE_COUNT: usize = 32;
+
+/// See the module.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct FastMovers {
+    /// Their rows, in order, and a bit for each row.
+    pub rows: Vec<u32>,
+    bits: Vec<u64>,
+    /// Their pairs, and how many more there was no room for.
+    pub batches: Vec<Batch>,
+    pub unlisted: usize,
+    pub impulses: ContactImpulses,
+    /// Impulses of their pairs before the last search, in order.
+    cached: Vec<CachedPair>,
+    /// The fast movers along the x axis.
+    sorted: Vec<u32>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct CachedPair {
+    pair: [u32; 2],
+    normal_impulse: f32,
+    tangent_impulse: [f32; 3],
+}
+
+/// Largest number of fast movers among so many balls.
+pub(super) fn max_count(balls: usize) -> usize {
+    BASE_COUNT + balls / BALLS_PER_MOVER
+}
+
+impl FastMovers {
+    /// Returns true if so many more would be too many.
+    pub fn full(&self, more: usize, balls: usize) -> bool {
+        more > self.remaining(balls)
+    }
+
+    /// Number that may still be added, among so many balls.
+    pub fn remaining(&self, balls: usize) -> usize {
+        max_count(balls).saturating_sub(self.rows.len())
+    }
+
+    /// Forgets all, in a swarm of so many.
+    pub fn clear(&mut self, balls: usize) {
+        self.rows.clear();
+        self.unlisted = 0;
+        self.batches.clear();
+        self.impulses.reset(0);
+        self.bits.clear();
+        self.bits.resize(balls.div_ceil(64), 0);
+    }
+
+    pub fn add(&mut self, row: u32) {
+        if !self.has(row) {
+            self.bits[row as usize / 64] |= 1 << (row % 64);
+            self.rows.push(row);
+        }
+    }
+
+    #[inline]
+    pub fn has(&self, row: u32) -> bool {
+        self.bits[row as usize / 64] >> (row % 64) & 1 == 1
+    }
+
+    /// Finds all their pairs. `max_radius` is that of all balls, `skin` the largest displacement of
+    /// other balls since the rows were sorted. Proxies touch each other without the swarm.
+    pub fn find(
+        &mut self,
+        grid: &Grid,
+        at: &[Row],
+        skin_left: &[f32],
+        [max_radius, skin]: [f32; 2],
+        search: &mut Search,
+        proxy: &dyn Fn(u32) -> bool,
+        has_friction: bool,
+    ) {
+        if has_friction {
+            self.save_impulses();
+        }
+        self.rows.sort_unstable();
+        let mut batches = std::mem::take(&mut self.batches);
+        batches.clear();
+        self.unlisted = 0;
+        if !self.rows.is_empty() {
+            let mut builder = search.builder(64 * self.rows.len(), &mut batches);
+            let widest = self.rows.iter().fold(0.0_f32, |most, row| {
+                most.max(at[*row as usize][3] + skin_left[*row as usize])
+            });
+            builder.allow(at.len());
+            for mover in &self.rows {
+                self.find_pairs_of(
+                    *mover,
+                    grid,
+                    at,
+                    skin_left,
+                    max_radius + skin,
+                    proxy,
+                    &mut builder,
+                );
+            }
+            self.sorted.clear();
+            self.sorted.extend(&self.rows);
+            let x = |row: &u32| at[*row as usize][0];
+            self.sorted.sort_unstable_by(|a, b| x(a).total_cmp(&x(b)).then(a.cmp(b)));
+            for (i, a) in self.sorted.iter().enumerate() {
+                let reach = at[*a as usize][3] + skin_left[*a as usize];
+                let far = x(a) + reach + widest;
+                for b in self.sorted[i + 1..].iter().take_while(|b| x(b) <= far) {
+                    let both_proxies = proxy(*a) && proxy(*b);
+                    if near(*a, *b, at, skin_left) && !both_proxies && builder.spend_only(1) == 1 {
+                        builder.add(*a.min(b), *a.max(b));
+                    }
+                }
+            }
+            self.unlisted = builder.close_all();
+        }
+        self.batches = batches;
+        if has_friction {
+            self.impulses.reset(self.batches.len());
+            self.restore();
+        }
+    }
+
+    /// Finds the pairs of one with balls that are none.
+    fn find_pairs_of(
+        &self,
+        mover: u32,
+        grid: &Grid,
+        at: &[Row],
+        skin_left: &[f32],
+        more: f32,
+        proxy: &dyn Fn(u32) -> bool,
+        builder: &mut BatchBuilder,
+    ) {
+        let is_marble = proxy(mover);
+        let [x, y, z, radius] = at[mover as usize];
+        let far = radius + skin_left[mover as usize] + more;
+        for level in &grid.levels {
+            let low = grid.coordinates(level, &[x - far, y - far, z - far, 0.0]);
+            let high = grid.coordinates(level, &[x + far, y + far, z + far, 0.0]);
+            for layer in low[0]..=high[0] {
+                for row in low[1]..=high[1] {
+                    let line = level.cell(grid, layer, row, 0);
+                    for other in grid.first(line + low[2])..grid.first(line + high[2] + 1) {
+                        let is_for_others = self.has(other) || is_marble && proxy(other);
+                        if !is_for_others
+                            && near(mover, other, at, skin_left)
+                            && builder.spend_only(1) == 1
+                        {
+                            builder.add(mover.min(other), mover.max(other));
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Saves the impulses of their pairs.
+    fn save_impulses(&mut self) {
+        self.cached.clear();
+        for (i, batch) in self.batches.iter().enumerate() {
+            for lane in 0..batch.count as usize {
+                let normal_impulse = self.impulses.normal_impulse[i][lane];
+                if normal_impulse > 0.0 {
+                    let tangent_impulse = self.impulses.tangent_impulse.get(i);
+                    let tangent_impulse = tangent_impulse
+                        .map_or([0.0; 3], |tangent_impulse| tangent_impulse.map(|axis| axis[lane]));
+                    self.cached.push(CachedPair {
+                        pair: batch.pair(lane),
+                        normal_impulse,
+                        tangent_impulse,
+                    });
+                }
+            }
+        }
+        self.cached.sort_unstable_by_key(|cached| cached.pair);
+    }
+
+    fn restore(&mut self) {
+        for (i, batch) in self.batches.iter().enumerate() {
+            for lane in 0..batch.count as usize {
+                let pair = batch.pair(lane);
+                let Ok(at) = self.cached.binary_search_by_key(&pair, |cached| cached.pair) else {
+                    continue;
+                };
+                let CachedPair { normal_impulse, tangent_impulse, .. } = self.cached[at];
+                self.impulses.normal_impulse[i][lane] = normal_impulse;
+                if let Some(to) = self.impulses.tangent_impulse.get_mut(i) {
+                    for (axis, tangent_impulse) in to.iter_mut().zip(tangent_impulse) {
+                        axis[lane] = tangent_impulse;
+                    }
+                }
+            }
+        }
+    }
+
+    pub fn bytes(&self) -> usize {
+        (self.rows.capacity() + self.sorted.capacity()) * size_of::<u32>()
+            + self.bits.capacity() * size_of::<u64>()
+            + self.batches.capacity() * size_of::<Batch>()
+            + self.impulses.bytes()
+            + self.cached.capacity() * size_of::<CachedPair>()
+    }
+}
+
+/// Returns true if two balls might touch before one of them leaves its skin.
+fn near(a: u32, b: u32, at: &[Row], skin_left: &[f32]) -> bool {
+    let (a, b) = (a as usize, b as usize);
+    let apart = [at[b][0] - at[a][0], at[b][1] - at[a][1], at[b][2] - at[a][2], 0.0];
+    let reach = at[a][3] + skin_left[a].max(0.0) + at[b][3] + skin_left[b].max(0.0);
+    squared(apart) < reach * reach
+}

@@ -1,0 +1,173 @@
+//! Cache of contact impulses for warm starts, while rows change places and pairs are searched
+//! again.
+
+use super::batches::Batch;
+use super::chunk::Chunk;
+use super::fast_movers::FastMovers;
+use super::kernels::ContactImpulses;
+use super::wall_contact::WallContact;
+use super::walls::{find, shapes_of};
+use super::workers::{DisjointSlice, parallel_for};
+
+/// Impulses of a pair; stored with its first ball.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct CachedImpulse {
+    /// The row of the second ball.
+    other: u32,
+    normal_impulse: f32,
+    tangent_impulse: [f32; 3],
+}
+
+/// See the module.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct ImpulseCache {
+    /// Beginning of each row's pairs, and after the last row, one place further.
+    start: Vec<u32>,
+    kept: Vec<CachedImpulse>,
+    wall_contacts: Vec<WallContact>,
+}
+
+impl ImpulseCache {
+    /// Stores the impulses of all pairs and contacts with walls. The rows are as they were.
+    pub fn keep(
+        &mut self,
+        chunks: &[Chunk],
+        fast_movers: &FastMovers,
+        rows: usize,
+        threads: usize,
+    ) {
+        self.wall_contacts.clear();
+        self.wall_contacts.extend(chunks.iter().flat_map(|chunk| &chunk.wall_contacts));
+        self.start.clear();
+        self.start.resize(rows + 2, 0);
+        {
+            let counts = DisjointSlice::new(&mut self.start);
+            // SAFETY: the first ball of a pair is in the chunk, so only one thread counts it; and
+            // the fast movers come alone.
+            let count = |[row, _]: [u32; 2], _: CachedImpulse| unsafe {
+                *counts.row(row as usize + 2) += 1
+            };
+            parallel_for(threads, chunks.len(), |_, chunk| {
+                for_each_loaded(&chunks[chunk].batches, &chunks[chunk].impulses, count);
+            });
+            for_each_loaded(&fast_movers.batches, &fast_movers.impulses, count);
+        }
+        let mut sum = 0;
+        for start in &mut self.start {
+            sum += *start;
+            *start = sum;
+        }
+        self.kept.clear();
+        reserve_slack(&mut self.kept, sum as usize);
+        self.kept.resize(sum as usize, CachedImpulse::default());
+        // As pairs are placed, each start grows to the one after it.
+        let (start, places) =
+            (DisjointSlice::new(&mut self.start), DisjointSlice::new(&mut self.kept));
+        // SAFETY: as above, and each place is given out once.
+        let place = |[row, _]: [u32; 2], kept: CachedImpulse| unsafe {
+            let place = start.row(row as usize + 1);
+            *places.row(*place as usize) = kept;
+            *place += 1;
+        };
+        parallel_for(threads, chunks.len(), |_, chunk| {
+            for_each_loaded(&chunks[chunk].batches, &chunks[chunk].impulses, place);
+        });
+        for_each_loaded(&fast_movers.batches, &fast_movers.impulses, place);
+    }
+
+    /// Gives room back.
+    pub fn shrink_slack(&mut self) {
+        self.wall_contacts = Vec::new();
+        shrink_slack(&mut self.kept);
+    }
+
+    /// Empties the cache, for so many rows.
+    pub fn forget(&mut self, rows: usize) {
+        self.wall_contacts.clear();
+        self.kept.clear();
+        self.start.clear();
+        self.start.resize(rows + 2, 0);
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.start.capacity() * size_of::<u32>()
+            + self.kept.capacity() * size_of::<CachedImpulse>()
+            + self.wall_contacts.capacity() * size_of::<WallContact>()
+    }
+
+    /// Gives the pairs of a batch their cached impulses. `before` is the earlier row of each row.
+    pub fn restore(&self, batches: &[Batch], old_rows: &[u32], impulses: &mut ContactImpulses) {
+        for (i, batch) in batches.iter().enumerate() {
+            for lane in 0..batch.count as usize {
+                let [a, b] = batch.pair(lane).map(|row| old_rows[row as usize]);
+                let (first, other) = (a.min(b), a.max(b));
+                if other == u32::MAX {
+                    continue; // one of them is new
+                }
+                let kept = self.start[first as usize]..self.start[first as usize + 1];
+                let kept = &self.kept[kept.start as usize..kept.end as usize];
+                // A fast mover may have had a pair twice.
+                for kept in kept.iter().filter(|kept| kept.other == other) {
+                    impulses.normal_impulse[i][lane] += kept.normal_impulse;
+                    if let Some(tangent_impulse) = impulses.tangent_impulse.get_mut(i) {
+                        // The impulse is what the second of the two gets.
+                        let sign = if first == a { 1.0 } else { -1.0 };
+                        for (axis, tangent_impulse) in
+                            tangent_impulse.iter_mut().zip(kept.tangent_impulse)
+                        {
+                            axis[lane] += tangent_impulse * sign;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Contacts that a ball had with shapes other than half-spaces, in order.
+    pub fn shapes_of(&self, old_rows: &[u32], row: u32) -> impl Iterator<Item = WallContact> {
+        let then = old_rows[row as usize];
+        shapes_of(&self.wall_contacts, then).map(move |contact| WallContact { row, ..*contact })
+    }
+
+    /// Contact that a ball had with a wall before, with its impulses.
+    pub fn cached_contact(&self, old_rows: &[u32], contact: &WallContact) -> Option<WallContact> {
+        let then = WallContact { row: old_rows[contact.row as usize], ..*contact };
+        find(&self.wall_contacts, &then).copied()
+    }
+}
+
+/// Makes room for so many, and a few more. (A list that doubles is half empty for a long time.)
+#[inline(always)]
+pub(super) fn reserve_slack<T>(list: &mut Vec<T>, count: usize) {
+    if list.capacity() < count {
+        list.reserve_exact(count + count / 16 + 8 - list.len());
+    }
+}
+
+/// Gives room back that is no longer needed.
+pub(super) fn shrink_slack<T>(list: &mut Vec<T>) {
+    let count = list.len() + list.len() / 16 + 8;
+    if list.capacity() > count + count / 4 {
+        list.shrink_to(count);
+    }
+}
+
+/// Visits the pairs that carry a normal impulse.
+fn for_each_loaded(
+    batches: &[Batch],
+    impulses: &ContactImpulses,
+    visit: impl Fn([u32; 2], CachedImpulse),
+) {
+    for (i, batch) in batches.iter().enumerate() {
+        for lane in 0..batch.count as usize {
+            let normal_impulse = impulses.normal_impulse[i][lane];
+            if normal_impulse > 0.0 {
+                let tangent_impulse = impulses.tangent_impulse.get(i);
+                let tangent_impulse = tangent_impulse
+                    .map_or([0.0; 3], |tangent_impulse| tangent_impulse.map(|axis| axis[lane]));
+                let rows = batch.pair(lane);
+                visit(rows, CachedImpulse { other: rows[1], normal_impulse, tangent_impulse });
+            }
+        }
+    }
+}

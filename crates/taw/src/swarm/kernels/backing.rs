@@ -1,0 +1,88 @@
+//! Walls behind the balls of a pair, where masses differ much: the Schur complement of their
+//! contacts, so that a light ball between a heavy one and a wall carries the load at once.
+
+use super::contact::SolverColumns;
+use super::{Vec3Wide, gather, inverse_mass};
+use crate::swarm::batches::Batch;
+use crate::swarm::simd::Simd;
+
+/// In place of the impulse of [`SolverColumns::backing`]: the ball has left the wall behind it. The
+/// impulses that its pairs had with that wall are larger than those without.
+pub(in crate::swarm) const LOST: f32 = -1.0;
+
+/// Mass that the walls behind two balls add to their pair.
+pub(super) struct Backing<L> {
+    /// Effective mass of both along their normal, in kilograms, as long as the walls bear.
+    pub load: L,
+    /// Speed at which they leave the walls along it, in m/s: until then, they weigh as they are.
+    leaving: L,
+    /// Above zero if a wall bears.
+    bears: L,
+}
+
+impl<L: Simd> Backing<L> {
+    /// The impulse that makes a pair of this mass part by so many m/s more slowly, less than zero
+    /// for faster.
+    #[inline(always)]
+    pub fn impulse(&self, alone: L, slower: L) -> L {
+        let zero = L::splat(0.0);
+        let plain = alone * slower;
+        let at_wall = slower + self.leaving;
+        let pressed = zero - (zero - self.load * at_wall).max(zero - plain);
+        let released = self.bears.select_gt(zero, self.load * slower, plain);
+        let apart = slower.select_gt(zero, released, plain);
+        zero.select_gt(at_wall, pressed, apart)
+    }
+}
+
+impl SolverColumns<'_> {
+    /// Says if it is known who has a wall behind it.
+    pub fn backed(&self) -> bool {
+        self.backing.len() > 0
+    }
+
+    /// The walls behind two balls.
+    #[inline(always)]
+    pub(super) fn backing_of<L: Simd>(
+        &self,
+        batch: &Batch,
+        [a, b]: [&[L; 4]; 2],
+        normal: Vec3Wide<L>,
+    ) -> Backing<L> {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let [back_a, back_b] = gather::<L>(self.backing, batch);
+        // How far the pair's normal goes into the wall.
+        let into_a = normal.dot(Vec3Wide::of(&back_a)).max(zero);
+        let into_b = (zero - normal.dot(Vec3Wide::of(&back_b))).max(zero);
+        let free = |into: L| (one - into * into).max(zero);
+        let [of_a, of_b] = [inverse_mass(a), inverse_mass(b)];
+        // Two that have a wall behind them each weigh no more than the heavier one.
+        let heavier = of_a + of_b - of_a.max(of_b);
+        let sum = (of_a * free(into_a) + of_b * free(into_b)).max(heavier);
+        let away =
+            |ball: &[L; 4], back: &[L; 4]| Vec3Wide::of(ball).dot(Vec3Wide::of(back)).max(zero);
+        Backing {
+            load: sum.select_gt(zero, one / sum, zero),
+            leaving: away(a, &back_a) * into_a + away(b, &back_b) * into_b,
+            bears: (back_a[3] * into_a).max(back_b[3] * into_b),
+        }
+    }
+}
+
+/// An impulse on a ball, and with it what the wall behind takes so that the ball does not come
+/// nearer, or gives back of that; and the wall, with what it bears then.
+#[inline(always)]
+pub(super) fn borne_by_wall<L: Simd>(
+    impulse: Vec3Wide<L>,
+    ball: &[L; 4],
+    back: &[L; 4],
+) -> (Vec3Wide<L>, [L; 4]) {
+    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let (normal, free) = (Vec3Wide::of(back), inverse_mass(ball));
+    let some = free.select_gt(zero, normal.dot(normal), zero);
+    let mass = free.select_gt(zero, one / free, zero);
+    let before = back[3].max(zero);
+    let away = Vec3Wide::of(ball).dot(normal) * mass + impulse.dot(normal);
+    let borne = (before - away).max(zero) * some;
+    (impulse.plus(normal.times(borne - before)), normal.with(borne))
+}

@@ -1,0 +1,81 @@
+//! Rolling and spinning resistance of pairs.
+
+use super::contact::{SolverColumns, clamp_length};
+use super::{Vec3Wide, inverse_mass, scatter};
+use crate::swarm::batches::Batch;
+use crate::swarm::simd::{LANES, Simd};
+use crate::swarm::surfaces::PairNumbers;
+
+/// Inertia of the balls of a batch against torques.
+pub(super) struct RollingInertia<L> {
+    /// Change of radius times angular velocity by an angular impulse, in m/s per N m s.
+    surface_speed: [L; 2],
+    /// Reciprocals of the radii.
+    per_radius: [L; 2],
+    /// Moment of inertia against turning against each other, in kg m².
+    mass: L,
+    /// Effective radius, in metres.
+    radius: L,
+}
+
+impl<L: Simd> RollingInertia<L> {
+    #[inline(always)]
+    pub fn new([at_a, at_b]: [&[L; 4]; 2], [a, b]: &[[L; 4]; 2], [of_a, of_b]: [L; 2]) -> Self {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let [per_a, per_b] = [one / at_a[3], one / at_b[3]];
+        let [by_a, by_b] = [of_a * inverse_mass(a) * per_a, of_b * inverse_mass(b) * per_b];
+        let sum = by_a * per_a + by_b * per_b;
+        Self {
+            surface_speed: [by_a, by_b],
+            per_radius: [per_a, per_b],
+            mass: sum.select_gt(zero, one / sum, zero),
+            radius: one / (per_a + per_b),
+        }
+    }
+}
+
+impl SolverColumns<'_> {
+    /// Applies angular impulses about the centers of both; the second gets it as it is.
+    #[inline(always)]
+    pub(super) fn apply_angular_impulse<L: Simd>(
+        &self,
+        batch: &Batch,
+        inertia: &RollingInertia<L>,
+        torque: Vec3Wide<L>,
+    ) {
+        let [a, b] = self.spins::<L>(batch);
+        let [by_a, by_b] = inertia.surface_speed;
+        let spins = [
+            Vec3Wide::of(&a).minus(torque.times(by_a)).with(a[3]),
+            Vec3Wide::of(&b).plus(torque.times(by_b)).with(b[3]),
+        ];
+        scatter(self.spin, batch, spins);
+    }
+
+    /// Slows how the two turn against each other, by a torque of at most the resistance times
+    /// normal force times effective radius.
+    #[inline(always)]
+    pub(super) fn solve_rolling<L: Simd>(
+        &self,
+        batch: &Batch,
+        inertia: &RollingInertia<L>,
+        normal: Vec3Wide<L>,
+        normal_impulse: L,
+        numbers: &PairNumbers,
+        torque: &mut [[f32; LANES]; 3],
+    ) {
+        let most = normal_impulse * inertia.radius;
+        let rolling = L::load(&numbers.rolling_resistance) * most;
+        let spinning = L::load(&numbers.spinning_resistance) * most;
+        let before = Vec3Wide::<L>::load(torque);
+        let (zero, [a, b]) = (L::splat(0.0), self.spins::<L>(batch));
+        let [per_a, per_b] = inertia.per_radius;
+        let turning = Vec3Wide::of(&b).times(per_b).minus(Vec3Wide::of(&a).times(per_a));
+        let target = before.minus(turning.times(inertia.mass));
+        let about = normal.times(target.dot(normal));
+        let after = clamp_length(target.minus(about), rolling.max(zero))
+            .plus(clamp_length(about, spinning.max(zero)));
+        after.store(torque);
+        self.apply_angular_impulse(batch, inertia, after.minus(before));
+    }
+}

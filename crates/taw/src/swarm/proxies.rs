@@ -1,0 +1,295 @@
+//! Proxies of the marbles of the world, which its own solver moves, in the swarm.
+
+use super::kernels::squared;
+use super::{BallId, Row, Swarm};
+use crate::math::Vec3;
+
+/// A ball that the swarm pushes but does not move.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Proxy {
+    pub ball: BallId,
+    /// Center and radius in metres; velocity in m/s and inverse mass in 1/kg; radius times spin.
+    pub at: Row,
+    pub velocity: Row,
+    pub spin_velocity: Row,
+    /// Place and velocity at the begin of the step. Balls of the swarm move in substeps, and
+    /// gravity pulls them in each; a proxy at the end of its path in the first of them
+    /// would let go of the balls on it, and be inside of those below it.
+    pub from: [Row; 2],
+    /// Changed in its velocity by the swarm in the last step.
+    pub borne: bool,
+    /// Set if it moves, for all that it and the swarm did in the last step.
+    pub moving: bool,
+    /// Velocity that it brought, and its displacement, from rest in the first step in which it
+    /// slept.
+    pub asleep: Option<[Row; 2]>,
+}
+
+/// Insignificant fraction of the [sleep speed](super::sleep_speed): a proxy that brings as much
+/// more or less than before sleeps on, and one that the swarm does not bear and that is slower
+/// counts as lying.
+const STILL: f32 = 0.01;
+
+impl Proxy {
+    /// One that begins its step where it ends.
+    pub fn new(ball: BallId, at: Row, velocity: Row, spin_velocity: Row) -> Self {
+        Self {
+            ball,
+            at,
+            velocity,
+            spin_velocity,
+            from: [at, velocity],
+            borne: false,
+            moving: true,
+            asleep: None,
+        }
+    }
+
+    /// Place and velocity that it would have without the swarm when this part of the step is over.
+    fn alone(&self, part: f32) -> [Row; 2] {
+        let between = |from: Row, to: Row| {
+            let mut row = to;
+            if part < 1.0 {
+                for axis in 0..3 {
+                    row[axis] = from[axis] + (to[axis] - from[axis]) * part;
+                }
+            }
+            row
+        };
+        [between(self.from[0], self.at), between(self.from[1], self.velocity)]
+    }
+
+    /// Finds where it began its step, by where the swarm left it. In the velocity that it brings,
+    /// only what gravity gave it came bit by bit.
+    fn find_begin(&mut self, at: &Row, velocity: &Row, dt: f32, gravity: Row) {
+        let [displacement, faster] = [less(&self.at, at), less(&self.velocity, velocity)];
+        let [own, before] = [squared(self.velocity).sqrt(), squared(*velocity).sqrt()];
+        // A jump by less than half its radius passes through nobody.
+        if squared(displacement).sqrt() <= (own + before) * dt + 0.5 * self.at[3] {
+            self.from[0] = [at[0], at[1], at[2], self.at[3]];
+        }
+        let fall = squared(gravity) * dt;
+        if fall > 0.0 {
+            let part = (dot(&faster, &gravity) / fall).clamp(0.0, 1.0);
+            for (speed, pull) in self.from[1].iter_mut().zip(gravity).take(3) {
+                *speed -= pull * part * dt;
+            }
+        }
+    }
+
+    /// Says if a proxy that sleeps does so in this step too: what it does from rest is the same as
+    /// before, so what pulls it and holds it is. `at` is where it sleeps.
+    fn sleeps_on(&mut self, at: &Row, before: &Self, sleep_speed: f32, dt: f32) -> bool {
+        let now = [self.velocity, less(&self.at, at)];
+        // The solver of the world learns over some steps what such contacts bear that come again
+        // and again; a player pushes at once.
+        let own_way = self.velocity.map(|speed| speed * dt);
+        let (last, most) = match before.asleep {
+            Some(_) => ([before.velocity, less(&before.at, at)], STILL * sleep_speed),
+            None => ([before.velocity, own_way], sleep_speed),
+        };
+        let first = before.asleep.unwrap_or(now);
+        let rounding = 2.0 * f32::EPSILON * (at[0].abs() + at[1].abs() + at[2].abs());
+        let as_in = |then: &[Row; 2], most: f32| {
+            // Overlap is moved apart as it comes; as far as what lies may go, that is no way.
+            squared(less(&now[0], &then[0])).sqrt() <= most
+                && squared(less(&now[1], &then[1])).sqrt() <= sleep_speed * dt + rounding
+        };
+        let spins = squared(self.spin_velocity).sqrt() > sleep_speed;
+        let same = as_in(&last, most) && as_in(&first, sleep_speed) && !spins;
+        self.asleep = same.then_some(first);
+        same
+    }
+}
+
+/// The first three numbers of one row, less those of another.
+fn less(a: &Row, b: &Row) -> Row {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2], 0.0]
+}
+
+fn dot(a: &Row, b: &Row) -> f32 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+impl Swarm {
+    /// Proxies before and after the last step, in the order of [`set_proxies`](Self::set_proxies).
+    pub(crate) fn proxies_and_results(&self) -> impl Iterator<Item = (&Proxy, Proxy)> {
+        self.proxies.iter().map(|proxy| {
+            let Some(row) = self.ids.row(proxy.ball) else { return (proxy, *proxy) };
+            let spin_velocity = self.spin.get(row).copied().unwrap_or([0.0; 4]);
+            let after =
+                Proxy { at: self.at[row], velocity: self.velocity[row], spin_velocity, ..*proxy };
+            (proxy, after)
+        })
+    }
+
+    /// Sets where the proxies are now, in a step of `dt` seconds. Each of them is a ball of the
+    /// swarm.
+    pub(crate) fn set_proxies(
+        &mut self,
+        proxies: impl IntoIterator<Item = Proxy>,
+        dt: f32,
+        gravity: Vec3<f32>,
+    ) {
+        let old = std::mem::take(&mut self.proxies);
+        self.proxies.extend(proxies);
+        self.body_slots.clear();
+        self.body_slots.resize(self.ids.slots().len().div_ceil(64), 0);
+        let mut proxies = std::mem::take(&mut self.proxies);
+        let (has_friction, sleep_speed) =
+            (self.has_friction(), super::sleep_speed(gravity, self.mean_radius));
+        let pull = [gravity.x, gravity.y, gravity.z, 0.0];
+        for (i, proxy) in proxies.iter_mut().enumerate() {
+            let Some(row) = self.ids.row(proxy.ball) else { continue };
+            let slot = self.ids.slots()[row] as usize;
+            if self.body_slots.len() <= slot / 64 {
+                self.body_slots.resize(slot / 64 + 1, 0);
+            }
+            self.body_slots[slot / 64] |= 1 << (slot % 64);
+            let (at, velocity) = (self.at[row], self.velocity[row]);
+            self.max_radius = self.max_radius.max(proxy.at[3]);
+            let before = old.get(i).filter(|before| before.ball == proxy.ball);
+            if velocity[3].is_sign_negative() {
+                let unchanged = velocity[3] == -proxy.velocity[3] && at[3] == proxy.at[3];
+                let sleeps = |before| proxy.sleeps_on(&at, before, sleep_speed, dt);
+                if unchanged && before.is_some_and(sleeps) {
+                    continue;
+                }
+                self.wake(row);
+            }
+            if let Some(before) = before.filter(|_| has_friction) {
+                proxy.borne = less(&velocity, &before.velocity) != [0.0; 4];
+                let moved = squared(less(&at, &before.from[0])).sqrt();
+                let faster = squared(less(&proxy.velocity, &before.velocity)).sqrt();
+                let most = if proxy.borne { sleep_speed } else { STILL * sleep_speed };
+                // Walls and other marbles change its velocity, and the swarm changes it back.
+                proxy.moving = moved > most * dt || faster > sleep_speed;
+                proxy.find_begin(&at, &velocity, dt, pull);
+            }
+            // Integration counts the displacement by its velocity; any other is counted here.
+            let [jump, displacement] = [less(&proxy.from[0], &at), less(&proxy.at, &proxy.from[0])];
+            let own = (squared(proxy.from[1]).sqrt() + squared(pull).sqrt() * dt) * dt;
+            self.skin_left[row] -=
+                squared(jump).sqrt() + (squared(displacement).sqrt() - own).max(0.0);
+            (self.at[row], self.velocity[row]) = (proxy.from[0], proxy.from[1]);
+            if let Some(spin) = self.spin.get_mut(row) {
+                *spin = proxy.spin_velocity;
+            }
+        }
+        self.proxies = proxies;
+    }
+
+    /// Finds for each chunk with proxies the largest speed of its own balls, in m/s; infinity, if a
+    /// proxy moves.
+    pub(super) fn measure_speeds_beside_proxies(&mut self) {
+        for chunk in &mut self.chunks {
+            chunk.fastest_own = None;
+        }
+        self.list_proxy_rows();
+        let mut rest = &self.proxy_rows[..];
+        for chunk in &mut self.chunks {
+            let (its, others) =
+                rest.split_at(rest.partition_point(|(row, _)| *row < chunk.rows[1]));
+            rest = others;
+            if its.is_empty() || chunk.asleep {
+                continue;
+            }
+            if its.iter().any(|(_, proxy)| self.proxies[*proxy as usize].moving) {
+                chunk.fastest_own = Some(f32::INFINITY);
+                continue;
+            }
+            let (mut from, mut most) = (chunk.rows[0], 0.0_f32);
+            for to in its.iter().map(|(row, _)| *row).chain([chunk.rows[1]]) {
+                let rows = &self.velocity[from as usize..to as usize];
+                most = rows.iter().fold(most, |most, velocity| most.max(squared(*velocity)));
+                from = to + 1;
+            }
+            chunk.fastest_own = Some(most.sqrt());
+        }
+    }
+
+    /// Lists the rows of the proxies, in order.
+    pub(super) fn list_proxy_rows(&mut self) {
+        self.proxy_rows.clear();
+        let rows = self.proxies.iter().zip(0..);
+        let rows = rows.filter_map(|(proxy, i)| Some((self.ids.row(proxy.ball)? as u32, i)));
+        self.proxy_rows.extend(rows);
+        self.proxy_rows.sort_unstable();
+    }
+
+    /// The proxy in a row, among those that were listed.
+    pub(super) fn proxy_at<'a>(
+        proxies: &'a [Proxy],
+        proxy_rows: &[(u32, u32)],
+        row: u32,
+    ) -> Option<&'a Proxy> {
+        let at = proxy_rows.binary_search_by_key(&row, |(row, _)| *row).ok()?;
+        proxies.get(proxy_rows[at].1 as usize)
+    }
+
+    pub(super) fn has_slot(slot: u32, body_slots: &[u64]) -> bool {
+        let bits = body_slots.get(slot as usize / 64);
+        bits.is_some_and(|bits| bits >> (slot % 64) & 1 == 1)
+    }
+
+    /// Inserts balls for so many bodies.
+    pub(crate) fn insert_bodies(&mut self, count: usize) -> Result<Vec<BallId>, crate::Error> {
+        let position = crate::math::Point3::new(0.0, 0.0, 0.0);
+        self.add(&vec![super::Ball::new(position, super::RADII[0]); count])
+    }
+
+    /// Saves the rows of the proxies, before they are integrated.
+    pub(super) fn save_proxies(&mut self) {
+        let rows = self.proxy_rows.iter().map(|(row, _)| *row as usize);
+        self.saved_proxies.clear();
+        self.saved_proxies.extend(rows.map(|row| [self.at[row], self.velocity[row]]));
+    }
+
+    /// Advances the proxies in place of the integration, from one part of the step to another: as
+    /// they do alone, and by what the swarm changed of it, so that a push moves no center of mass.
+    pub(super) fn advance_proxies(&mut self, [from, to]: [f32; 2], place: bool, time: f32) {
+        for ((row, proxy), [at, velocity]) in self.proxy_rows.iter().zip(&self.saved_proxies) {
+            let (row, proxy) = (*row as usize, &self.proxies[*proxy as usize]);
+            if self.velocity[row][3].is_sign_negative() {
+                continue;
+            }
+            let ([at_from, before], [at_to, after]) = (proxy.alone(from), proxy.alone(to));
+            let pushed = less(velocity, if place { &after } else { &before });
+            for axis in 0..3 {
+                if place {
+                    let displacement = at_to[axis] + (at[axis] - at_from[axis]);
+                    self.at[row][axis] = displacement + pushed[axis] * time;
+                } else {
+                    self.velocity[row][axis] = after[axis] + pushed[axis];
+                }
+            }
+        }
+    }
+
+    /// Takes back what the prediction of the lab's tier did to the proxies. There, the velocity is
+    /// the place before.
+    pub(super) fn reset_proxies_in_lab(&mut self) {
+        for proxy in &self.proxies {
+            let Some(row) = self.ids.row(proxy.ball) else { continue };
+            self.at[row] = proxy.at;
+            let [x, y, z, _] = proxy.at;
+            self.velocity[row] = [x, y, z, proxy.velocity[3]];
+            self.displacement[row] = 0.0;
+        }
+    }
+
+    /// Gives the proxies their velocities back, except what is against the direction in which they
+    /// were pushed.
+    pub(super) fn update_proxy_velocities_in_lab(&mut self, dt: f32) {
+        for proxy in &self.proxies {
+            let Some(row) = self.ids.row(proxy.ball) else { continue };
+            let ([x, y, z, _], [a, b, c, _]) = (self.at[row], proxy.at);
+            let push = [x - a, y - b, z - c];
+            let [u, v, w, mass] = proxy.velocity;
+            let against = -(u * push[0] + v * push[1] + w * push[2]);
+            let squared = push[0] * push[0] + push[1] * push[1] + push[2] * push[2];
+            let part = if squared > 0.0 { (against / squared).clamp(0.0, 1.0 / dt) } else { 0.0 };
+            self.velocity[row] = [u + push[0] * part, v + push[1] * part, w + push[2] * part, mass];
+        }
+    }
+}

@@ -1,0 +1,53 @@
+//! Walls behind balls, where masses differ much.
+
+use cgmath::InnerSpace;
+
+use super::{row, wider};
+use crate::swarm::Swarm;
+use crate::swarm::chunk::Chunk;
+use crate::swarm::kernels::LOST;
+use crate::swarm::workers::{DisjointSlice, parallel_for};
+
+/// Where one ball weighs more than so many times as much as another, pairs look who has a wall
+/// behind it: a pair sinks in by that ratio times the way of gravity in a substep while its contact
+/// learns what it bears, less than a millimetre for each such time.
+const UNEVEN: f32 = 8.0;
+
+impl Swarm {
+    /// Finds for each ball the wall that bears most of it, where masses differ so much that pairs
+    /// need to know ([`SolverColumns::backing`]).
+    pub(super) fn find_backing(&mut self) {
+        let inverse = |chunk: &Chunk| chunk.inverse_masses;
+        let [least, most] = self.chunks.iter().map(inverse).fold([f32::MAX, 0.0], wider);
+        let rows = if most > UNEVEN * least { self.at.len() } else { 0 };
+        self.backing.clear();
+        self.backing.resize(rows, [0.0; 4]);
+        if rows == 0 {
+            self.backing.shrink_to_fit();
+            return;
+        }
+        let (chunks, backing, at) =
+            (&self.chunks, DisjointSlice::new(&mut self.backing), &self.at[..]);
+        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+            // Those of a ball follow each other.
+            for of_ball in chunks[chunk].wall_contacts.chunk_by(|a, b| a.row == b.row) {
+                let (mut most, mut behind, mut last) = (0.0, [0.0; 4], &of_ball[0]);
+                for contact in of_ball {
+                    let bears = contact.bears(&at[contact.row as usize]);
+                    // Of a wall that comes nearer or gives way, each has to ask for itself.
+                    if bears > most && contact.surface.dot(contact.normal) == 0.0 {
+                        (most, behind) = (bears, row(contact.normal));
+                    }
+                    if contact.borne_for_others > last.borne_for_others {
+                        last = contact;
+                    }
+                }
+                if last.borne_for_others > 0.0 && behind[..3] != row(last.normal)[..3] {
+                    behind = [0.0, 0.0, 0.0, LOST];
+                }
+                // SAFETY: a row of the chunk.
+                unsafe { *backing.row(last.row as usize) = behind };
+            }
+        });
+    }
+}

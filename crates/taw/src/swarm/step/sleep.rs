@@ -1,0 +1,73 @@
+//! Sleep of chunks.
+
+use super::{leaves, wider};
+use crate::math::Vec3;
+use crate::swarm::kernels::{GROUNDED, squared};
+use crate::swarm::workers::{DisjointSlice, parallel_for};
+use crate::swarm::{Swarm, sleep_speed};
+
+/// Time to sleep: for so long, in seconds, all balls of a chunk lie still before they sleep.
+const TIME_TO_SLEEP: f32 = 0.5;
+
+impl Swarm {
+    /// Finds which chunks fall asleep or wake, and which balls may leave their skin in this step.
+    pub(super) fn update_sleep(&mut self, dt: f32, gravity: Vec3<f32>) {
+        let sleep_speed = sleep_speed(gravity, self.mean_radius);
+        let sleeps = self.model.sleeps;
+        if !self.proxies.is_empty() {
+            self.measure_speeds_beside_proxies();
+        }
+        let (grid, skin_left) = (&self.grid, &self.skin_left[..]);
+        // More than this are too many.
+        let most = self.fast_movers.remaining(self.at.len()) + 1;
+        let velocity = DisjointSlice::new(&mut self.velocity);
+        let spin = DisjointSlice::new(&mut self.spin);
+        let chunks = DisjointSlice::new(&mut self.chunks);
+        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+            // SAFETY: each thread has its own chunks, and their rows.
+            let chunk = unsafe { &mut *chunks.row(chunk) };
+            if chunk.asleep {
+                return;
+            }
+            let (velocity, spin) =
+                unsafe { (velocity.part(chunk.own_rows()), spin.part(chunk.own_rows())) };
+            let skin_left = &skin_left[chunk.own_rows()];
+            chunk.leaving.clear();
+            let rows = (chunk.rows[0]..).zip(velocity.iter().zip(skin_left));
+            let leaving =
+                rows.filter(|(_, (velocity, skin_left))| leaves(velocity, **skin_left, dt));
+            chunk.leaving.extend(leaving.map(|(row, _)| row).take(most));
+            let fastest = |from: u32, to: u32| {
+                let rows = (from - chunk.rows[0]) as usize..(to - chunk.rows[0]) as usize;
+                // Not its spin: on a single point a ball may spin for ever.
+                velocity[rows].iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt()
+            };
+            let [first, last] = [chunk.layers[0] + 1, chunk.layers[1] - 1];
+            chunk.speed = [
+                fastest(chunk.rows[0], chunk.rows[1]),
+                fastest(chunk.rows[0], grid.first_of_layer(first)),
+                fastest(grid.first_of_layer(last), chunk.rows[1]),
+            ];
+            let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
+            chunk.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
+            let lies = chunk.fastest_own.unwrap_or(chunk.speed[0]) < sleep_speed;
+            chunk.sleep_time = if lies { chunk.sleep_time + dt } else { 0.0 };
+            if sleeps && chunk.sleep_time > TIME_TO_SLEEP {
+                (chunk.asleep, chunk.speed) = (true, [0.0; 3]);
+                chunk.leaving.clear();
+                for (velocity, spin) in velocity.iter_mut().zip(spin) {
+                    *velocity = [0.0, 0.0, 0.0, -velocity[3]];
+                    *spin = [0.0, 0.0, 0.0, GROUNDED];
+                }
+            }
+        });
+        let chunks = &mut self.chunks;
+        for i in 0..chunks.len() {
+            let before = i.checked_sub(1).map_or(0.0, |i| chunks[i].speed[2]);
+            let after = chunks.get(i + 1).map_or(0.0, |chunk| chunk.speed[1]);
+            if chunks[i].asleep && before.max(after) > 2.0 * sleep_speed {
+                chunks[i].wake(&mut self.velocity);
+            }
+        }
+    }
+}

@@ -1,0 +1,149 @@
+//! Balls at walls: who is near one, and where it is touched.
+
+use cgmath::Zero;
+
+use crate::math::Vec3;
+use crate::swarm::chunk::Chunk;
+use crate::swarm::surfaces::SurfaceOf;
+use crate::swarm::walls::{Balls, HalfSpace, WallQuery, find, near_shapes, shapes_of};
+use crate::swarm::workers::{DisjointSlice, parallel_for};
+use crate::swarm::{Stage, StaticGeometry, Swarm, Tier};
+
+impl Swarm {
+    /// Time before a ball can be at a wall from which on it is searched, in seconds; in the lab's
+    /// tier, it has moved already.
+    pub(in crate::swarm) fn ahead(&self, dt: f32) -> Option<f32> {
+        self.has_friction().then_some(2.0 * dt)
+    }
+
+    /// Finds the balls at walls anew, if one of these changed.
+    pub(in crate::swarm) fn find_wall_contacts_if_changed(
+        &mut self,
+        changed: bool,
+        dt: f32,
+        walls: &dyn StaticGeometry,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        if changed {
+            observe(Stage::Walls);
+            self.find_wall_contacts(dt, walls);
+        }
+    }
+
+    /// Finds the balls at walls anew, where pairs are still known.
+    pub(in crate::swarm) fn find_wall_contacts(&mut self, dt: f32, walls: &dyn StaticGeometry) {
+        let (simd_level, shapes) = (self.simd_level, walls.has_shapes());
+        let (planes, ahead) = (listed_planes(&self.planes, self.tier()), self.ahead(dt));
+        let (at, skin_left) = (&self.at[..], &self.skin_left[..]);
+        let balls = Balls {
+            at,
+            velocity: &self.velocity,
+            skin_left,
+            ahead,
+            surfaces: SurfaceOf {
+                model: self.model.material,
+                surfaces: &self.surfaces,
+                slots: self.ids.slots(),
+            },
+        };
+        let chunks = DisjointSlice::new(&mut self.chunks);
+        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+            // SAFETY: its own.
+            let chunk = unsafe { &mut *chunks.row(chunk) };
+            let old = std::mem::take(&mut chunk.wall_contacts);
+            chunk.wall_contacts = std::mem::take(&mut chunk.old_wall_contacts);
+            chunk.find_wall_contacts(simd_level, balls, planes, |contact| {
+                find(&old, contact).copied()
+            });
+            chunk.near_shapes.clear();
+            if shapes {
+                near_shapes(walls, balls, chunk.own_rows(), &mut chunk.near_shapes);
+            }
+            chunk.restore_shape_contacts(|row| shapes_of(&old, row).copied());
+            chunk.old_wall_contacts = old;
+        });
+    }
+
+    /// Finds the walls of some more balls, in order of their rows.
+    pub(in crate::swarm) fn find_wall_contacts_of(
+        &mut self,
+        rows: &[u32],
+        dt: f32,
+        walls: &dyn StaticGeometry,
+    ) {
+        let ahead = self.ahead(dt);
+        let planes = listed_planes(&self.planes, self.tier());
+        let (at, skin_left) = (&self.at[..], &self.skin_left[..]);
+        let surfaces = SurfaceOf {
+            model: self.model.material,
+            surfaces: &self.surfaces,
+            slots: self.ids.slots(),
+        };
+        let balls = Balls { at, velocity: &self.velocity, skin_left, ahead, surfaces };
+        for chunk in &mut self.chunks {
+            let mine = chunk.own_rows();
+            let mine = rows.partition_point(|row| (*row as usize) < mine.start)
+                ..rows.partition_point(|row| (*row as usize) < mine.end);
+            if mine.is_empty() {
+                continue;
+            }
+            chunk.find_wall_contacts_of(&rows[mine.clone()], balls, planes);
+            if walls.has_shapes() {
+                for row in &rows[mine] {
+                    let row = *row as usize;
+                    near_shapes(walls, balls, row..row + 1, &mut chunk.near_shapes);
+                }
+                chunk.near_shapes.sort_unstable();
+                chunk.near_shapes.dedup();
+            }
+        }
+    }
+
+    /// Brings the contacts of some chunks up to date. Walls are where they will be at the end; so
+    /// long `before`, in seconds, they were elsewhere.
+    pub(in crate::swarm) fn update_wall_contacts(
+        &mut self,
+        walls: &dyn StaticGeometry,
+        before: f32,
+        times: [f32; 2],
+        which: impl Fn(&Chunk) -> bool + Sync,
+        only_fast: bool,
+    ) {
+        let (proxies, rows) = (&self.proxies[..], &self.proxy_rows[..]);
+        let query = WallQuery {
+            tier: self.tier(),
+            at: &self.at,
+            velocity: &self.velocity,
+            skin_left: &self.skin_left,
+            surfaces: SurfaceOf {
+                model: self.model.material,
+                surfaces: &self.surfaces,
+                slots: self.ids.slots(),
+            },
+            before,
+            times,
+            gravity: self.gravity.unwrap_or_else(Vec3::zero),
+        };
+        let chunks = DisjointSlice::new(&mut self.chunks);
+        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+            // SAFETY: its own.
+            let chunk = unsafe { &mut *chunks.row(chunk) };
+            if chunk.asleep || !which(chunk) {
+                return;
+            }
+            chunk.update_wall_contacts(walls, &query, only_fast);
+            if !rows.is_empty() {
+                for contact in &mut chunk.wall_contacts {
+                    if let Some(proxy) = Self::proxy_at(proxies, rows, contact.row) {
+                        contact.bear(proxy, before);
+                    }
+                }
+            }
+        });
+    }
+}
+
+/// The half-spaces of which the balls near them are listed. The lab's tier looks at all balls.
+pub(in crate::swarm) fn listed_planes(planes: &[HalfSpace], tier: Tier) -> &[HalfSpace] {
+    if tier == Tier::Full { planes } else { &[] }
+}
