@@ -27,6 +27,7 @@ pub(crate) struct Body {
     pub spin: Row,
     /// None for that of the swarm's model.
     pub surface: Option<Surface>,
+    pub sleeping_disabled: bool,
 }
 
 /// Identity of two columns that agree, except for rows known to have changed. A clone has none, so
@@ -118,6 +119,7 @@ impl Swarm {
         self.proxy_rows.clear();
         self.velocity_changes.clear();
         self.surfaces.clear();
+        self.sleepless.clear(0);
         self.synced = SyncToken::default();
         (self.pairs_valid, self.cache_valid, self.walls_version) = (false, false, None);
         self.resize_columns();
@@ -131,19 +133,14 @@ impl Swarm {
 
     /// Marks which slots are bodies.
     pub(crate) fn set_bodies(&mut self, slots: impl Iterator<Item = u32>) {
-        self.body_slots.clear();
-        self.body_slots.resize(self.ids.slots().len().div_ceil(64), 0);
+        self.body_slots.clear(self.ids.slots().len());
         for slot in slots {
-            let word = slot as usize / 64;
-            if self.body_slots.len() <= word {
-                self.body_slots.resize(word + 1, 0);
-            }
-            self.body_slots[word] |= 1 << (slot % 64);
+            self.body_slots.insert(slot);
         }
     }
 
     /// Returns true if a marble is still as [`Self::read_bodies`] left it, and the body has this
-    /// inverse mass, in 1/kg, and surface.
+    /// inverse mass, in 1/kg, surface, and permission to sleep.
     #[inline]
     pub(crate) fn is_as_read<S: Scalar>(
         &self,
@@ -151,6 +148,7 @@ impl Swarm {
         marble: MarbleRow<S>,
         inverse_mass: f32,
         surface: Option<Surface>,
+        sleeping_disabled: bool,
     ) -> bool {
         let row = self.ids.rows()[slot as usize] as usize;
         let [at, velocity] = [&self.at[row], &self.velocity[row]];
@@ -162,6 +160,7 @@ impl Swarm {
             && velocity[3].abs() == inverse_mass
             && turns()
             && self.surfaces.get(slot) == surface
+            && self.sleepless.contains(slot) == sleeping_disabled
     }
 
     /// Takes over what changed of bodies, and wakes those.
@@ -170,6 +169,11 @@ impl Swarm {
         for body in bodies {
             let row = self.ids.rows()[body.slot as usize] as usize;
             resurfaced |= self.surfaces.set(body.slot, body.surface);
+            if body.sleeping_disabled {
+                self.sleepless.insert(body.slot);
+            } else {
+                self.sleepless.remove(body.slot);
+            }
             self.wake(row);
             let at = self.at[row];
             resized |= at[3] != body.at[3];
@@ -358,6 +362,17 @@ impl Swarm {
                 }
             }
         }
+    }
+
+    /// Returns true if a ball sleeps.
+    pub(crate) fn is_asleep(&self, ball: BallId) -> bool {
+        let row = self.ids.row(ball);
+        row.is_some_and(|row| self.velocity[row][3].is_sign_negative())
+    }
+
+    /// Number that changes whenever a ball falls asleep, wakes, comes or goes.
+    pub(crate) fn sleep_version(&self) -> u64 {
+        self.sleep_version
     }
 
     /// Slot of a ball.

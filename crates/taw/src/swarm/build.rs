@@ -168,10 +168,10 @@ impl Swarm {
     fn find_fast_movers(&mut self, skin: f32) {
         let (has_friction, search) = (self.has_friction(), &mut self.searches[0]);
         let sizes = [self.max_radius, skin];
-        let (slots, proxies) = (self.ids.slots(), &self.body_slots[..]);
+        let (slots, proxies) = (self.ids.slots(), &self.body_slots);
         // Bodies that are rows meet like all others.
         let apart = has_friction && !self.proxies.is_empty();
-        let proxy = |row: u32| apart && Self::has_slot(slots[row as usize], proxies);
+        let proxy = |row: u32| apart && proxies.contains(slots[row as usize]);
         self.fast_movers.find(
             &self.grid,
             &self.at,
@@ -235,6 +235,7 @@ impl Swarm {
             chunk.asleep = !velocities.is_empty() && velocities.iter().all(asleep);
             if !chunk.asleep {
                 for velocity in velocities {
+                    self.sleep_version += u64::from(asleep(velocity));
                     velocity[3] = velocity[3].abs();
                 }
             }
@@ -257,8 +258,8 @@ impl Swarm {
         let (impulse_cache, old_rows, planes) =
             (&self.impulse_cache, &self.old_rows[..], listed_planes(&self.planes, tier));
         let shapes = walls.has_shapes();
-        let (slots, proxies) = (self.ids.slots(), &self.body_slots[..]);
-        let proxy = |row: u32| Self::has_slot(slots[row as usize], proxies);
+        let (slots, proxies) = (self.ids.slots(), &self.body_slots);
+        let proxy = |row: u32| proxies.contains(slots[row as usize]);
         let several_proxies = self.proxies.len() > 1;
         let neighbours = DisjointSlice::new(bytemuck::cast_slice_mut(&mut self.scratch));
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };

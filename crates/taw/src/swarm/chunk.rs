@@ -37,6 +37,8 @@ pub(super) struct Chunk {
     /// Time for which all have been slow, in seconds, and whether they sleep.
     pub sleep_time: f32,
     pub asleep: bool,
+    /// Set if they fell asleep just now.
+    pub fell_asleep: bool,
     /// Set once the bodies that fell asleep in it were read.
     pub read_asleep: bool,
     /// The speed in m/s of its fastest ball that is no proxy, if it has proxies.
@@ -78,6 +80,7 @@ impl Chunk {
             inverse_masses: _,
             sleep_time: _,
             asleep: _,
+            fell_asleep: _,
             read_asleep: _,
             fastest_own: _,
             again: _,

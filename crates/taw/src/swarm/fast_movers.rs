@@ -5,6 +5,7 @@
 //! its impulse between the two.
 
 use super::batches::{Batch, BatchBuilder};
+use super::bit_set::BitSet;
 use super::grid::Grid;
 use super::kernels::{ContactImpulses, squared};
 use super::neighbours::Search;
@@ -19,7 +20,7 @@ const BASE_COUNT: usize = 32;
 pub(super) struct FastMovers {
     /// Their rows, in order, and a bit for each row.
     pub rows: Vec<u32>,
-    bits: Vec<u64>,
+    bits: BitSet,
     /// Their pairs, and how many more there was no room for.
     pub batches: Vec<Batch>,
     pub unlisted: usize,
@@ -59,20 +60,18 @@ impl FastMovers {
         self.unlisted = 0;
         self.batches.clear();
         self.impulses.reset(0);
-        self.bits.clear();
-        self.bits.resize(balls.div_ceil(64), 0);
+        self.bits.clear(balls);
     }
 
     pub fn add(&mut self, row: u32) {
-        if !self.has(row) {
-            self.bits[row as usize / 64] |= 1 << (row % 64);
+        if self.bits.insert(row) {
             self.rows.push(row);
         }
     }
 
     #[inline]
     pub fn has(&self, row: u32) -> bool {
-        self.bits[row as usize / 64] >> (row % 64) & 1 == 1
+        self.bits.contains(row)
     }
 
     /// Finds all their pairs. `max_radius` is that of all balls, `skin` the largest displacement of
@@ -209,7 +208,7 @@ impl FastMovers {
 
     pub fn bytes(&self) -> usize {
         (self.rows.capacity() + self.sorted.capacity()) * size_of::<u32>()
-            + self.bits.capacity() * size_of::<u64>()
+            + self.bits.bytes()
             + self.batches.capacity() * size_of::<Batch>()
             + self.impulses.bytes()
             + self.cached.capacity() * size_of::<CachedPair>()

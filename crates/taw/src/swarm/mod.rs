@@ -23,6 +23,7 @@
 )]
 
 mod batches;
+mod bit_set;
 mod bodies;
 mod build;
 mod chunk;
@@ -58,6 +59,7 @@ use crate::handle::MarbleId;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
 use batches::pairs_in;
+use bit_set::BitSet;
 use chunk::Chunk;
 use fast_movers::FastMovers;
 use grid::Grid;
@@ -132,8 +134,12 @@ pub struct Swarm {
     proxy_rows: Vec<(u32, u32)>,
     /// Positions and velocities of these rows before they are integrated.
     saved_proxies: Vec<[Row; 2]>,
-    /// A bit for each slot that is a marble.
-    body_slots: Vec<u64>,
+    /// Slots of marbles.
+    body_slots: BitSet,
+    /// Slots of balls that never sleep, nor those about them.
+    sleepless: BitSet,
+    /// Number of times that balls fell asleep, woke, came or went.
+    sleep_version: u64,
     /// Scratch column of the sort; then, in the lab's tier, the neighbour lists of all chunks.
     scratch: Vec<Row>,
     lists: Vec<Vec<u32>>,
@@ -208,6 +214,7 @@ impl Swarm {
             self.cache_impulses();
             self.old_rows.resize(self.at.len(), u32::MAX);
         }
+        self.sleep_version += 1;
         self.resize_columns();
         self.measure_radii();
         self.pairs_valid = false;
@@ -233,6 +240,7 @@ impl Swarm {
         for ball in balls {
             if let Some(slot) = self.slot_of(*ball) {
                 self.surfaces.set(slot, None);
+                self.sleepless.remove(slot);
             }
         }
         let kept = self.ids.remove(balls);
@@ -270,7 +278,7 @@ impl Swarm {
     /// move.
     #[must_use]
     pub fn is_marble(&self, row: usize) -> bool {
-        row < self.len() && Self::has_slot(self.ids.slots()[row], &self.body_slots)
+        row < self.len() && self.body_slots.contains(self.ids.slots()[row])
     }
 
     /// The velocities in m/s, row by row. The last number is the inverse mass in 1/kg, with a
@@ -436,6 +444,7 @@ impl Swarm {
             let chunks = &mut self.chunks;
             let chunk = chunks.partition_point(|chunk| chunk.rows[1] as usize <= row);
             if let Some(chunk) = chunks.get_mut(chunk) {
+                self.sleep_version += u64::from(chunk.asleep);
                 chunk.wake(&mut self.velocity);
             }
         }
@@ -443,6 +452,7 @@ impl Swarm {
     }
 
     fn wake_all(&mut self) {
+        self.sleep_version += 1;
         for chunk in &mut self.chunks {
             (chunk.asleep, chunk.sleep_time) = (false, 0.0);
         }

@@ -133,19 +133,14 @@ impl Swarm {
     ) {
         let old = std::mem::take(&mut self.proxies);
         self.proxies.extend(proxies);
-        self.body_slots.clear();
-        self.body_slots.resize(self.ids.slots().len().div_ceil(64), 0);
+        self.body_slots.clear(self.ids.slots().len());
         let mut proxies = std::mem::take(&mut self.proxies);
         let (has_friction, sleep_speed) =
             (self.has_friction(), super::sleep_speed(gravity, self.mean_radius));
         let pull = [gravity.x, gravity.y, gravity.z, 0.0];
         for (i, proxy) in proxies.iter_mut().enumerate() {
             let Some(row) = self.ids.row(proxy.ball) else { continue };
-            let slot = self.ids.slots()[row] as usize;
-            if self.body_slots.len() <= slot / 64 {
-                self.body_slots.resize(slot / 64 + 1, 0);
-            }
-            self.body_slots[slot / 64] |= 1 << (slot % 64);
+            self.body_slots.insert(self.ids.slots()[row]);
             let (at, velocity) = (self.at[row], self.velocity[row]);
             self.max_radius = self.max_radius.max(proxy.at[3]);
             let before = old.get(i).filter(|before| before.ball == proxy.ball);
@@ -225,11 +220,6 @@ impl Swarm {
     ) -> Option<&'a Proxy> {
         let at = proxy_rows.binary_search_by_key(&row, |(row, _)| *row).ok()?;
         proxies.get(proxy_rows[at].1 as usize)
-    }
-
-    pub(super) fn has_slot(slot: u32, body_slots: &[u64]) -> bool {
-        let bits = body_slots.get(slot as usize / 64);
-        bits.is_some_and(|bits| bits >> (slot % 64) & 1 == 1)
     }
 
     /// Inserts balls for so many bodies.

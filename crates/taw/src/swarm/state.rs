@@ -48,6 +48,8 @@ impl Swarm {
             proxy_rows,
             saved_proxies,
             body_slots,
+            sleepless,
+            sleep_version: _,
             scratch,
             lists,
             chunk_states,
@@ -63,7 +65,9 @@ impl Swarm {
             + (of(chunks) + chunks.iter().map(Chunk::bytes).sum::<usize>())
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
             + (of(lists) + lists.iter().map(of).sum::<usize>())
-            + (of(planes) + of(body_balls) + of(proxies) + of(proxy_rows) + of(body_slots))
+            + (of(planes) + of(body_balls) + of(proxies) + of(proxy_rows))
+            + body_slots.bytes()
+            + sleepless.bytes()
             + (of(saved_proxies) + of(velocity_changes) + surfaces.bytes())
             + (ids.bytes() + grid.bytes() + impulse_cache.bytes() + fast_movers.bytes())
     }
@@ -109,6 +113,8 @@ impl PartialEq for Swarm {
             proxy_rows: _,
             saved_proxies: _,
             body_slots,
+            sleepless,
+            sleep_version: _,
             scratch,
             lists: _,
             chunk_states: _,
@@ -135,7 +141,8 @@ impl PartialEq for Swarm {
             && (body_balls, proxies) == (&other.body_balls, &other.proxies)
             && (bodies_are_rows, velocity_changes, surfaces)
                 == (&other.bodies_are_rows, &other.velocity_changes, &other.surfaces)
-            && (body_slots, stopped) == (&other.body_slots, &other.stopped)
+            && (body_slots, sleepless) == (&other.body_slots, &other.sleepless)
+            && *stopped == other.stopped
             && (rebuilds, steps_since_build) == (&other.rebuilds, &other.steps_since_build)
     }
 }

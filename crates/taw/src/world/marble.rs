@@ -37,6 +37,8 @@ pub struct Marble<S> {
     pub rotation_model: Option<Rotation>,
     /// Own material instead of the default one.
     pub material: Option<Material<S>>,
+    /// Keeps it, and those about it, awake ([`World::is_asleep`](super::World::is_asleep)).
+    pub sleeping_disabled: bool,
 }
 
 impl<S: Scalar> Marble<S> {
@@ -56,6 +58,7 @@ impl<S: Scalar> Marble<S> {
             integrator: None,
             rotation_model: None,
             material: None,
+            sleeping_disabled: false,
         }
     }
 }

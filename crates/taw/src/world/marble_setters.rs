@@ -187,4 +187,14 @@ impl<S: Scalar> Marbles<S> {
         self.mark_changed(row);
         Ok(())
     }
+    /// Forbids a marble to sleep, or allows it again.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn set_sleeping_disabled(&mut self, id: MarbleId, disabled: bool) -> Result<(), Error> {
+        let row = self.row(id)?;
+        self.sleeping_disabled.set(row, disabled.then_some(()), self.len());
+        self.mark_changed(row);
+        Ok(())
+    }
 }

@@ -63,6 +63,8 @@ pub struct Marbles<S> {
     pub(super) integrator: SparseColumn<Integrator>,
     pub(super) rotation_model: SparseColumn<Rotation>,
     pub(super) material: SparseColumn<Material<S>>,
+    /// Marbles that never sleep.
+    pub(super) sleeping_disabled: SparseColumn<()>,
 }
 
 impl<S> Default for Marbles<S> {
@@ -88,6 +90,7 @@ impl<S> Default for Marbles<S> {
             integrator: SparseColumn::default(),
             rotation_model: SparseColumn::default(),
             material: SparseColumn::default(),
+            sleeping_disabled: SparseColumn::default(),
         }
     }
 }
@@ -141,6 +144,7 @@ impl<S: Scalar> Marbles<S> {
         self.integrator.set(rows - 1, marble.integrator, rows);
         self.rotation_model.set(rows - 1, marble.rotation_model, rows);
         self.material.set(rows - 1, material, rows);
+        self.sleeping_disabled.set(rows - 1, marble.sleeping_disabled.then_some(()), rows);
         Ok(MarbleId(handle))
     }
 
@@ -170,6 +174,7 @@ impl<S: Scalar> Marbles<S> {
             self.integrator.swap_remove(row);
             self.rotation_model.swap_remove(row);
             self.material.swap_remove(row);
+            self.sleeping_disabled.swap_remove(row);
         }
         Ok(marble)
     }
@@ -193,6 +198,7 @@ impl<S: Scalar> Marbles<S> {
             integrator: self.integrator.get(row),
             rotation_model: self.rotation_model.get(row),
             material: self.material.get(row),
+            sleeping_disabled: self.sleeping_disabled.get(row).is_some(),
         })
     }
 
@@ -220,6 +226,7 @@ impl<S: Scalar> Marbles<S> {
             integrator: marble.integrator,
             rotation_model: marble.rotation_model,
             material: marble.material.map(Material::cast),
+            sleeping_disabled: marble.sleeping_disabled,
         })
     }
 

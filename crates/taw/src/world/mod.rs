@@ -23,6 +23,7 @@ mod sparse_column;
 mod swarm;
 #[cfg(test)]
 mod tests;
+mod wall_changes;
 mod wall_shape;
 mod walls;
 

@@ -1,11 +1,11 @@
-//! The three verbs of [`Response::SoftStep`]: marbles are rows of the same solve as the balls of
+//! The three verbs of [`Response::SoftStep`](crate::response::Response::SoftStep): marbles are rows of the same solve as the balls of
 //! the swarm.
 
 use cgmath::{EuclideanSpace, Zero};
 
-use super::World;
 use super::integrate::StepContext;
 use super::swarm::MAX_COORDINATE;
+use super::{MarbleId, World};
 use crate::Error;
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, cast_vector, length};
@@ -128,6 +128,26 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
+    /// Returns true if a marble sleeps: in a model with [`Response::SoftStep`], while it and all about
+    /// it have been at rest for half a second. What sleeps costs next to nothing, and has no velocity.
+    /// It wakes when it is touched or set, when a wall or gravity changes, and when a neighbour wakes.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn is_asleep(&self, id: MarbleId) -> Result<bool, Error> {
+        self.marbles.row(id)?;
+        let bodies = &self.swarm.body_balls;
+        let found = bodies.binary_search_by_key(&id, |(marble, _)| *marble);
+        Ok(found.is_ok_and(|i| self.swarm.is_asleep(bodies[i].1)))
+    }
+
+    /// Number that changes whenever a marble or a ball falls asleep, wakes, comes or goes; to look
+    /// only then who sleeps.
+    #[must_use]
+    pub fn sleep_version(&self) -> u64 {
+        self.swarm.sleep_version()
+    }
+
     /// Brings rows up to date with marbles that came, went, or were set.
     fn sync_bodies(&mut self) -> Result<(), Error> {
         self.swarm.set_bodies_are_rows(true);
@@ -179,8 +199,10 @@ impl<S: Scalar> World<S> {
                 radius: marbles.radius[row],
             };
             let inverse_mass = inverse_mass(marbles.mass(row));
-            if !self.swarm.is_as_read(slot, marble, inverse_mass, surface) {
-                changed.push(body(slot, marble, inverse_mass, surface));
+            let sleepless = marbles.sleeping_disabled.get(row).is_some();
+            if !self.swarm.is_as_read(slot, marble, inverse_mass, surface, sleepless) {
+                let body = body(slot, marble, inverse_mass, surface);
+                changed.push(Body { sleeping_disabled: sleepless, ..body });
             }
         }
     }
@@ -225,5 +247,6 @@ fn body<S: Scalar>(
         velocity: row(marble.velocity, inverse_mass),
         spin: row(spin, 0.0),
         surface,
+        sleeping_disabled: false,
     }
 }

@@ -124,6 +124,13 @@ impl<S: Scalar> StaticGeometry for Walls<S> {
         !self.are_half_spaces()
     }
 
+    fn visit_changes_since(&self, version: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool {
+        Walls::visit_changes_since(self, version, |region| {
+            let corner = |point: Point3<S>| cast_point::<S, f32>(point).into();
+            visit([corner(region.min), corner(region.max)]);
+        })
+    }
+
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool {
         let bounds = Aabb { min: cast_point(low.into()), max: cast_point(high.into()) };
         let mut any = false;

@@ -62,6 +62,15 @@ impl<S: Scalar> WallShape<S> {
         }
     }
 
+    /// Bounding box; none of a half-space.
+    pub(super) fn bounding_box(&self) -> Option<Aabb3<S>> {
+        let mut bounds: Option<Aabb3<S>> = None;
+        self.for_each_box(|_, part| {
+            bounds = Some(bounds.map_or(part, |bounds| bounds.union(&part)));
+        });
+        bounds
+    }
+
     /// Visits the sub-shapes that may overlap a box, within one of its bounding boxes.
     pub(super) fn for_each_in_box(&self, part: u32, bounds: &Aabb3<S>, visit: impl FnMut(u32)) {
         let mut visit = visit;

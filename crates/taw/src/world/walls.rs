@@ -1,6 +1,7 @@
 use cgmath::Zero;
 
 use super::sparse_column::SparseColumn;
+use super::wall_changes::WallChanges;
 use super::wall_shape::WallShape;
 use crate::Error;
 use crate::contact::ClosestPoints;
@@ -44,6 +45,7 @@ pub struct Walls<S> {
     dirty: Dirty,
     /// Number of insertions, removals and changes.
     version: u64,
+    changes: WallChanges<S>,
 }
 
 /// Changes since the tree was built.
@@ -70,6 +72,7 @@ impl<S> Default for Walls<S> {
             tree: Bvh::default(),
             dirty: Dirty::Nothing,
             version: 0,
+            changes: WallChanges::default(),
         }
     }
 }
@@ -96,6 +99,7 @@ impl<S: Scalar> Walls<S> {
         let shape = wall.into().validated()?;
         let handle = self.handles.push()?;
         self.change(&shape, Dirty::All);
+        self.log_change(shape.bounding_box());
         if matches!(shape, WallShape::Plane(_)) {
             self.planes.push(self.shapes.len() as u32);
         }
@@ -120,6 +124,7 @@ impl<S: Scalar> Walls<S> {
         // Another wall has this index now.
         self.dirty = Dirty::All;
         self.version += 1;
+        self.log_change(None);
         let shape = self.shapes.swap_remove(row);
         self.collect_planes();
         Ok(shape)
@@ -150,6 +155,8 @@ impl<S: Scalar> Walls<S> {
             self.moved.set(row, Some(()), self.shapes.len());
         }
         self.change(&shape, if same { Dirty::Poses } else { Dirty::All });
+        let [old, new] = [&self.shapes[row], &shape].map(WallShape::bounding_box);
+        self.log_change(old.zip(new).map(|(old, new)| old.union(&new)));
         let is_plane = |shape: &WallShape<S>| matches!(shape, WallShape::Plane(_));
         let turns = is_plane(&shape) != is_plane(&self.shapes[row]);
         self.shapes[row] = shape;
@@ -172,6 +179,16 @@ impl<S: Scalar> Walls<S> {
         if dirty == Dirty::All || !matches!(shape, WallShape::Plane(_)) {
             self.dirty = self.dirty.max(dirty);
         }
+    }
+
+    /// Logs the region of a change that made the current version.
+    fn log_change(&mut self, region: Option<Aabb3<S>>) {
+        self.changes.add(self.version, region);
+    }
+
+    /// Visits the boxes in which walls changed after a version. Returns false if all may have.
+    pub(super) fn visit_changes_since(&self, version: u64, visit: impl FnMut(&Aabb3<S>)) -> bool {
+        self.changes.visit_since(version, self.version, visit)
     }
 
     /// Updates the tree. Moved walls are refitted.
@@ -266,7 +283,10 @@ impl<S: Scalar> Walls<S> {
             )?;
             finite_point(["pivot.x", "pivot.y", "pivot.z"], motion.pivot)?;
         }
-        self.version += u64::from(self.motion.get(row) != motion);
+        if self.motion.get(row) != motion {
+            self.version += 1;
+            self.log_change(self.shapes[row].bounding_box());
+        }
         self.motion.set(row, motion, self.shapes.len());
         Ok(())
     }
@@ -287,7 +307,10 @@ impl<S: Scalar> Walls<S> {
     pub fn set_material(&mut self, id: WallId, material: Option<Material<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
         let material = material.map(Material::validated).transpose()?;
-        self.version += u64::from(self.material.get(row) != material);
+        if self.material.get(row) != material {
+            self.version += 1;
+            self.log_change(self.shapes[row].bounding_box());
+        }
         self.material.set(row, material, self.shapes.len());
         Ok(())
     }

@@ -92,7 +92,7 @@ impl Swarm {
         let walls_changed = self.walls_version != Some(version);
         if walls_changed {
             half_spaces(walls, &mut self.planes);
-            self.wake_all();
+            self.wake_beside_changes(walls);
             self.walls_version = Some(version);
         }
         walls_changed

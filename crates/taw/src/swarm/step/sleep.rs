@@ -1,10 +1,13 @@
 //! Sleep of chunks.
 
+use std::mem::take;
+
 use super::{leaves, wider};
 use crate::math::Vec3;
 use crate::swarm::kernels::{GROUNDED, squared};
+use crate::swarm::simd::Row;
 use crate::swarm::workers::{DisjointSlice, parallel_for};
-use crate::swarm::{Swarm, sleep_speed};
+use crate::swarm::{StaticGeometry, Swarm, sleep_speed};
 
 /// Time to sleep: for so long, in seconds, all balls of a chunk lie still before they sleep.
 const TIME_TO_SLEEP: f32 = 0.5;
@@ -18,6 +21,8 @@ impl Swarm {
             self.measure_speeds_beside_proxies();
         }
         let (grid, skin_left) = (&self.grid, &self.skin_left[..]);
+        let (slots, sleepless) = (self.ids.slots(), &self.sleepless);
+        let all_may_sleep = sleepless.is_empty();
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
         let velocity = DisjointSlice::new(&mut self.velocity);
@@ -52,7 +57,12 @@ impl Swarm {
             chunk.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
             let lies = chunk.fastest_own.unwrap_or(chunk.speed[0]) < sleep_speed;
             chunk.sleep_time = if lies { chunk.sleep_time + dt } else { 0.0 };
-            if sleeps && chunk.sleep_time > TIME_TO_SLEEP {
+            let may_sleep = || {
+                all_may_sleep
+                    || !slots[chunk.own_rows()].iter().any(|slot| sleepless.contains(*slot))
+            };
+            if sleeps && chunk.sleep_time > TIME_TO_SLEEP && may_sleep() {
+                chunk.fell_asleep = true;
                 (chunk.asleep, chunk.speed) = (true, [0.0; 3]);
                 chunk.leaving.clear();
                 for (velocity, spin) in velocity.iter_mut().zip(spin) {
@@ -62,12 +72,44 @@ impl Swarm {
             }
         });
         let chunks = &mut self.chunks;
+        let fell_asleep =
+            chunks.iter_mut().filter_map(|chunk| take(&mut chunk.fell_asleep).then_some(()));
+        self.sleep_version += fell_asleep.count() as u64;
         for i in 0..chunks.len() {
             let before = i.checked_sub(1).map_or(0.0, |i| chunks[i].speed[2]);
             let after = chunks.get(i + 1).map_or(0.0, |chunk| chunk.speed[1]);
             if chunks[i].asleep && before.max(after) > 2.0 * sleep_speed {
                 chunks[i].wake(&mut self.velocity);
+                self.sleep_version += 1;
             }
         }
     }
+    /// Wakes the chunks with balls near walls that changed since the last step.
+    pub(super) fn wake_beside_changes(&mut self, walls: &dyn StaticGeometry) {
+        let mut regions = Vec::new();
+        let since = self.walls_version.filter(|_| self.pairs_valid);
+        let known = since
+            .is_some_and(|since| walls.visit_changes_since(since, &mut |box_| regions.push(box_)));
+        if !known {
+            return self.wake_all();
+        }
+        for chunk in &mut self.chunks {
+            let is_near = |row: usize| {
+                let reach = self.at[row][3] + self.skin_left[row].max(0.0);
+                regions.iter().any(|region| overlaps(region, &self.at[row], reach))
+            };
+            if chunk.asleep && chunk.own_rows().any(is_near) {
+                chunk.wake(&mut self.velocity);
+                self.sleep_version += 1;
+            }
+        }
+    }
+}
+
+/// Returns true if a box and one of this half width about a ball overlap, or may by rounding.
+fn overlaps([low, high]: &[[f32; 3]; 2], at: &Row, reach: f32) -> bool {
+    (0..3).all(|axis| {
+        let reach = reach + 4.0 * f32::EPSILON * (at[axis].abs() + reach);
+        at[axis] + reach >= low[axis] && at[axis] - reach <= high[axis]
+    })
 }

@@ -50,6 +50,9 @@ impl Swarm {
         parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
             // SAFETY: its own.
             let chunk = unsafe { &mut *chunks.row(chunk) };
+            if chunk.asleep {
+                return; // what changed is elsewhere, or it were awake
+            }
             let old = std::mem::take(&mut chunk.wall_contacts);
             chunk.wall_contacts = std::mem::take(&mut chunk.old_wall_contacts);
             chunk.find_wall_contacts(simd_level, balls, planes, |contact| {

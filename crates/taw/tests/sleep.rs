@@ -1,0 +1,239 @@
+//! Marbles sleep where they rest, and wake when something changes about them.
+
+use taw::motion::WallMotion;
+use taw::prelude::*;
+use taw::response::Response;
+use taw::shape::{Aabb, BoundedShape};
+use taw::swarm::SwarmModel;
+
+const DT: f32 = 1.0 / 60.0;
+
+fn block(min: [f32; 3], max: [f32; 3]) -> Aabb<Point3<f32>> {
+    Aabb { min: min.into(), max: max.into() }
+}
+
+fn world() -> World<f32> {
+    let mut world = World::default();
+    let model = Model {
+        response: Response::SoftStep,
+        rotation: Rotation::Dynamic,
+        substeps: 2,
+        ..Model::default()
+    };
+    world.set_model(model).unwrap();
+    world.swarm.set_model(SwarmModel { threads: 1, ..SwarmModel::default() }).unwrap();
+    world.set_gravity(Vec3::new(0.0, -9.81, 0.0)).unwrap();
+    world
+}
+
+/// Three layers of balls that lie in a box without a top.
+fn heap() -> (World<f32>, WallId, Vec<MarbleId>) {
+    let mut world = world();
+    let floor = world.walls.insert(block([-5.0, -1.0, -5.0], [5.0, 0.0, 5.0])).unwrap();
+    for axis in [0, 2] {
+        for side in [-1.0, 1.0] {
+            let (mut min, mut max) = ([-5.0, 0.0, -5.0], [5.0, 9.0, 5.0]);
+            (min[axis], max[axis]) = if side < 0.0 { (-5.0, -1.0) } else { (1.0, 5.0) };
+            world.walls.insert(block(min, max)).unwrap();
+        }
+    }
+    let ids = (0..48_u16).map(|i| {
+        let at = |cell: u16| f32::from(cell) * 0.5 - 0.75;
+        let y = 0.3 + f32::from(i / 16) * 0.5 + f32::from(i % 3) * 0.02;
+        let ball = Marble::new(Point3::new(at(i % 4), y, at(i / 4 % 4)), 0.23);
+        world.marbles.insert(ball).unwrap()
+    });
+    let ids: Vec<_> = ids.collect();
+    (world, floor, ids)
+}
+
+fn sliding(velocity: Vec3<f32>) -> WallMotion<f32> {
+    let zero = Vec3::new(0.0, 0.0, 0.0);
+    WallMotion { velocity, angular_velocity: zero, pivot: Point3::new(0.0, 0.0, 0.0) }
+}
+
+fn steps(world: &mut World<f32>, count: u32) {
+    (0..count).for_each(|_| world.step(DT).unwrap());
+}
+
+fn asleep(world: &World<f32>, ids: &[MarbleId]) -> usize {
+    ids.iter().filter(|id| world.is_asleep(**id).unwrap()).count()
+}
+
+/// The heap after four seconds, in which it has fallen asleep.
+fn sleeping() -> (World<f32>, WallId, Vec<MarbleId>) {
+    let (mut world, floor, ids) = heap();
+    assert_eq!(asleep(&world, &ids), 0);
+    let version = world.sleep_version();
+    steps(&mut world, 240);
+    assert_eq!(asleep(&world, &ids), ids.len());
+    assert_ne!(world.sleep_version(), version);
+    assert!(world.marbles.velocity().iter().all(|v| *v == Vec3::new(0.0, 0.0, 0.0)));
+    (world, floor, ids)
+}
+
+type Change = fn(&mut World<f32>, WallId, MarbleId);
+
+#[test]
+fn whatever_changes_about_a_heap_wakes_it() {
+    let (world, floor, ids) = sleeping();
+    let changes: [(&str, Change); 14] = [
+        ("impulse", |w, _, id| w.marbles.apply_impulse(id, Vec3::new(0.0, 5.0, 0.0)).unwrap()),
+        ("velocity", |w, _, id| w.marbles.set_velocity(id, Vec3::new(0.0, 1.0, 0.0)).unwrap()),
+        ("force", |w, _, id| w.marbles.apply_force(id, Vec3::new(0.0, 1e3, 0.0)).unwrap()),
+        ("mass", |w, _, id| w.marbles.set_mass(id, Mass::Kilograms(1.0)).unwrap()),
+        ("gravity", |w, _, _| w.set_gravity(Vec3::new(0.1, -9.81, 0.0)).unwrap()),
+        ("gravity scale", |w, _, id| w.marbles.set_gravity_scale(id, -1.0).unwrap()),
+        ("floor lower", |w, floor, _| {
+            w.walls.set(floor, block([-5.0, -2.0, -5.0], [5.0, -1.0, 5.0])).unwrap();
+        }),
+        ("floor gone", |w, floor, _| drop(w.walls.remove(floor).unwrap())),
+        ("floor of another material", |w, floor, _| {
+            w.walls.set_material(floor, Some(Material::default())).unwrap();
+        }),
+        ("floor conveys", |w, floor, _| {
+            let motion = sliding(Vec3::new(1.0, 0.0, 0.0));
+            w.walls.set_motion(floor, Some(motion)).unwrap();
+        }),
+        ("wall inside", |w, _, _| {
+            w.walls.insert(block([0.0, 0.0, 0.0], [0.2, 0.2, 0.2])).unwrap();
+        }),
+        ("half-space", |w, _, _| {
+            w.walls.insert(Plane::new(Vec3::unit_y(), -20.0).unwrap()).unwrap();
+        }),
+        ("neighbour gone", |w, _, id| {
+            let _ = w.marbles.remove(id).unwrap();
+        }),
+        ("sleeping disabled", |w, _, id| w.marbles.set_sleeping_disabled(id, true).unwrap()),
+    ];
+    for (name, change) in changes {
+        let mut world = world.clone();
+        change(&mut world, floor, ids[7]);
+        let version = world.sleep_version();
+        steps(&mut world, 1);
+        let rest: Vec<_> =
+            ids.iter().copied().filter(|id| world.marbles.row(*id).is_ok()).collect();
+        assert_eq!(asleep(&world, &rest), 0, "{name}");
+        assert_ne!(world.sleep_version(), version, "{name}");
+        if name.starts_with("floor gone") {
+            steps(&mut world, 60);
+            let fell = |id: &MarbleId| world.marbles.get(*id).unwrap().position.y < -2.0;
+            assert!(rest.iter().all(fell), "{name}");
+        }
+    }
+}
+
+#[test]
+fn nothing_falls_asleep_about_a_marble_that_must_not() {
+    let (mut world, _, ids) = heap();
+    world.marbles.set_sleeping_disabled(ids[3], true).unwrap();
+    assert!(world.marbles.get(ids[3]).unwrap().sleeping_disabled);
+    for _ in 0..300 {
+        steps(&mut world, 1);
+        assert_eq!(asleep(&world, &ids), 0);
+    }
+    world.marbles.set_sleeping_disabled(ids[3], false).unwrap();
+    steps(&mut world, 60);
+    assert_eq!(asleep(&world, &ids), ids.len());
+    // The slot of one that is gone says nothing of the next.
+    world.marbles.set_sleeping_disabled(ids[3], true).unwrap();
+    steps(&mut world, 1);
+    let marble = world.marbles.remove(ids[3]).unwrap();
+    let id = world.marbles.insert(Marble { sleeping_disabled: false, ..marble }).unwrap();
+    steps(&mut world, 120);
+    assert!(world.is_asleep(id).unwrap() && world.is_asleep(ids[3]).is_err());
+}
+
+#[test]
+fn a_lift_wakes_only_what_it_comes_to() {
+    let (mut world, _, ids) = sleeping();
+    let at = |x: f32| block([x, 0.0, -0.5], [x + 1.0, 0.5, 0.5]);
+    let lift = world.walls.insert(at(20.0)).unwrap();
+    steps(&mut world, 1);
+    let version = world.sleep_version();
+    for step in 0..60_u8 {
+        let speed = Vec3::new(0.0, 0.1, 0.0);
+        world.walls.set_motion(lift, Some(sliding(speed))).unwrap();
+        world.walls.set(lift, at(20.0 - f32::from(step) * 0.1)).unwrap();
+        steps(&mut world, 1);
+        assert_eq!(asleep(&world, &ids), ids.len());
+    }
+    assert_eq!(world.sleep_version(), version);
+    // Within one step from far away into the heap.
+    let mut jump = world.clone();
+    jump.walls.set(lift, at(0.0)).unwrap();
+    steps(&mut jump, 1);
+    assert_eq!(asleep(&jump, &ids), 0);
+    // More changes than anybody keeps.
+    for step in 0..3_000_u16 {
+        world.walls.set(lift, at(20.0 + f32::from(step % 7))).unwrap();
+    }
+    steps(&mut world, 1);
+    assert_eq!(asleep(&world, &ids), 0);
+}
+
+/// Says if a ball touches a wall or another ball, or nearly.
+fn is_supported(world: &World<f32>, row: usize) -> bool {
+    let (at, radius) = (world.marbles.position()[row], world.marbles.radius()[row]);
+    let reach = 1.1 * radius;
+    let by_ball = (0..world.marbles.len()).any(|other| {
+        let apart = (world.marbles.position()[other] - at).magnitude();
+        other != row && apart < reach + world.marbles.radius()[other]
+    });
+    let by_wall = world.walls.shapes().iter().any(|shape| match shape {
+        WallShape::Plane(plane) => plane.signed_distance(at) < reach,
+        WallShape::Solid(shape) => shape.project_point(at).distance < reach,
+        _ => false,
+    });
+    by_ball || by_wall
+}
+
+#[test]
+fn nothing_sleeps_in_mid_air() {
+    let mut slept = 0;
+    for seed in 1..=60_u64 {
+        let mut state = seed.wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        let mut random = || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            (state >> 40) as f32 / (1 << 24) as f32
+        };
+        let mut world = world();
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        let table = |y: f32| block([-1.0, y - 0.3, -1.0], [1.0, y, 1.0]);
+        let wall = world.walls.insert(table(1.0)).unwrap();
+        let ids: Vec<_> = (0..30)
+            .map(|_| {
+                let at = [4.0 * random() - 2.0, 0.5 + 3.0 * random(), 4.0 * random() - 2.0];
+                let velocity = Vec3::new(random() - 0.5, 4.0 * random(), random() - 0.5);
+                let material = Material {
+                    restitution: random(),
+                    rolling_resistance: 0.1,
+                    ..Material::default()
+                };
+                let radius = 0.02 + 0.2 * random();
+                let mut ball = Marble::new(Point3::from(at), radius);
+                (ball.velocity, ball.material) = (velocity, Some(material));
+                world.marbles.insert(ball).unwrap()
+            })
+            .collect();
+        let (leaves, moves) = (300 + (random() * 300.0) as u32, random() < 0.5);
+        for step in 0..720 {
+            if step == leaves {
+                if moves {
+                    world.walls.set(wall, table(-3.0)).unwrap();
+                } else {
+                    world.walls.remove(wall).unwrap();
+                }
+            }
+            steps(&mut world, 1);
+            for id in &ids {
+                if world.is_asleep(*id).unwrap() {
+                    slept += 1;
+                    let row = world.marbles.row(*id).unwrap();
+                    assert!(is_supported(&world, row), "seed {seed}, step {step}, {id:?}");
+                }
+            }
+        }
+    }
+    assert!(slept > 1000, "only {slept} times did any sleep");
+}
