@@ -39,6 +39,7 @@ fn a_heap_of_entities_comes_to_rest_sleeps_and_wakes_by_a_push() {
     scene::frames(&mut app, 640);
     let world = app.world().resource::<TawWorld>();
     assert_eq!(world.swarm.asleep(), 48);
+    assert_eq!(count_sleeping(&mut app), 48);
     let heights: Vec<_> = marbles.iter().map(|marble| scene::position(&app, *marble).y).collect();
     assert!(heights.iter().all(|height| (0.19..2.0).contains(height)), "{heights:?}");
     scene::frames(&mut app, 10);
@@ -48,7 +49,39 @@ fn a_heap_of_entities_comes_to_rest_sleeps_and_wakes_by_a_push() {
     let push = ExternalImpulse { impulse: Vec3::Y * 800.0, ..default() };
     app.world_mut().entity_mut(marbles[40]).insert(push);
     scene::frames(&mut app, 2);
+    assert_eq!(count_sleeping(&mut app), 0);
     assert!(app.world().get::<Velocity>(marbles[40]).unwrap().y > 1.0);
+}
+
+fn count_sleeping(app: &mut App) -> usize {
+    app.world_mut().query_filtered::<(), (With<Marble>, With<Sleeping>)>().iter(app.world()).count()
+}
+
+#[test]
+fn a_marble_that_must_not_sleep_keeps_those_about_it_awake() {
+    let mut app = app();
+    let marbles = heap(&mut app, 32);
+    app.world_mut().entity_mut(marbles[5]).insert(SleepingDisabled);
+    scene::frames(&mut app, 500);
+    assert_eq!(count_sleeping(&mut app), 0);
+    app.world_mut().entity_mut(marbles[5]).remove::<SleepingDisabled>();
+    scene::frames(&mut app, 120);
+    assert_eq!(count_sleeping(&mut app), 32);
+    // The marker follows the physics: back in time, into other models, and out of it.
+    let saved = app.world().resource::<TawWorld>().snapshot();
+    app.world_mut().entity_mut(marbles[7]).get_mut::<Transform>().unwrap().translation.y += 9.0;
+    scene::frames(&mut app, 2);
+    assert_eq!(count_sleeping(&mut app), 0);
+    app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+    scene::frames(&mut app, 60);
+    assert_eq!(count_sleeping(&mut app), 32);
+    app.world_mut().entity_mut(marbles[0]).remove::<Marble>();
+    assert!(app.world().get::<Sleeping>(marbles[0]).is_none());
+    scene::frames(&mut app, 600);
+    assert_eq!(count_sleeping(&mut app), 31);
+    app.world_mut().resource_mut::<TawModel>().response = Response::Impulse;
+    scene::frames(&mut app, 2);
+    assert_eq!(count_sleeping(&mut app), 0);
 }
 
 #[test]

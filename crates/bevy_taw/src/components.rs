@@ -197,6 +197,21 @@ pub struct MarbleIntegrator(#[reflect(remote = IntegratorReflect)] pub Integrato
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
 
+/// Marker of a marble that sleeps, to read: the plugin adds and removes it after each step.
+///
+/// With the response [`SoftStep`](taw::response::Response::SoftStep), marbles that rest for half a
+/// second sleep together with those about them, which then cost next to nothing. They wake when they
+/// are touched or written, when gravity changes, or a wall near them. Marbles of other responses do
+/// not sleep.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct Sleeping;
+
+/// Forbids a marble to sleep, and with it those about it.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct SleepingDisabled;
+
 /// Makes a capsule of a marble: all points within its radius of a line along the entity's y
 /// axis, which goes this far both ways, in metres; like Bevy's `Capsule3d`. Zero is a ball.
 ///
@@ -269,6 +284,7 @@ pub(crate) struct SeenMarble {
     pub material: Option<([u32; 7], Combine)>,
     pub integrator: Option<Integrator>,
     pub rotation_model: Option<Rotation>,
+    pub sleeping_disabled: bool,
 }
 
 /// What the physics knows of a wall entity.

@@ -11,8 +11,8 @@ use taw::world as core;
 
 use crate::components::{
     AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
-    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, SeenMarble,
-    SurfaceMaterial, Velocity, WallState, bits, rotation_bits,
+    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, SeenMarble, Sleeping,
+    SleepingDisabled, SurfaceMaterial, Velocity, WallState, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
@@ -70,6 +70,7 @@ type OptionalComponents<'a> = (
     Option<&'a SurfaceMaterial>,
     Option<&'a MarbleIntegrator>,
     Option<&'a MarbleRotation>,
+    Option<&'a SleepingDisabled>,
 );
 
 impl SeenMarble {
@@ -84,6 +85,7 @@ impl SeenMarble {
             material,
             integrator,
             rotation_model,
+            sleeping_disabled,
         ) = optional;
         Self {
             translation: bits(transform.translation),
@@ -98,6 +100,7 @@ impl SeenMarble {
             material: material.map(SurfaceMaterial::bits),
             integrator: integrator.map(|i| **i),
             rotation_model: rotation_model.map(|r| **r),
+            sleeping_disabled: sleeping_disabled.is_some(),
         }
     }
 }
@@ -177,7 +180,7 @@ fn take_over(
     refusals: &mut Refusals,
 ) -> bool {
     let seen = SeenMarble::of(*marble, transform, &optional);
-    let (half_length, velocity, spin, mass, gravity_scale, damping, material, _, _) = optional;
+    let (half_length, velocity, spin, mass, gravity_scale, damping, material, _, _, _) = optional;
     let half_length = *half_length.copied().unwrap_or_default();
     let place = if is_child {
         transforms.compute_global_transform(entity).map(|t| t.compute_transform())
@@ -210,6 +213,7 @@ fn take_over(
         integrator: seen.integrator,
         rotation_model: seen.rotation_model,
         material: material.map(|m| (*m).into()),
+        sleeping_disabled: seen.sleeping_disabled,
     };
     let balls_only = !world.model().response.knows_capsules() && half_length > 0.0;
     let check = |result: Result<(), Refusal>| refusals.check(Some(entity), result);
@@ -313,6 +317,9 @@ fn update(
     if all || seen.integrator != last.integrator {
         set(marbles.set_integrator(id, now.integrator));
     }
+    if all || seen.sleeping_disabled != last.sleeping_disabled {
+        set(marbles.set_sleeping_disabled(id, now.sleeping_disabled));
+    }
     if balls_only && seen.half_length != last.half_length {
         check(Err(Refusal::Capsule(now.half_length)));
     }
@@ -363,7 +370,7 @@ pub fn forget_marble(removed: On<Remove, Marble>, mut app: DeferredWorld) {
         let _ = world.marbles.remove(id);
         world.marble_entities.remove(&id);
     }
-    app.commands().entity(removed.entity).try_remove::<MarbleState>();
+    app.commands().entity(removed.entity).try_remove::<(MarbleState, Sleeping)>();
 }
 
 /// Takes a wall out of the world when its component or entity goes, also of an entity that

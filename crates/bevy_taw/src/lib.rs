@@ -79,6 +79,7 @@ mod reflect;
 pub mod refusal;
 pub mod resources;
 mod scatter;
+mod sleep;
 pub mod snapshot;
 pub mod swarm;
 #[cfg(feature = "render")]
@@ -94,8 +95,8 @@ pub use taw;
 pub mod prelude {
     pub use crate::components::{
         AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
-        MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, SurfaceMaterial, Teleport,
-        Velocity,
+        MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
+        SurfaceMaterial, Teleport, Velocity,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;

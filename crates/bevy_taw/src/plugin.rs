@@ -4,8 +4,8 @@ use bevy::prelude::*;
 
 use crate::components::{
     AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
-    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, SurfaceMaterial, Teleport,
-    Velocity,
+    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
+    SurfaceMaterial, Teleport, Velocity,
 };
 use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
@@ -15,7 +15,7 @@ use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::snapshot::RowRemoved;
 use crate::swarm::{self, TawSwarmModel};
 use crate::wall::Wall;
-use crate::{gather, gather_walls, scatter};
+use crate::{gather, gather_walls, scatter, sleep};
 
 /// Everything: the physics, interpolation between its steps, and with the feature
 /// `render` the gizmos, and swarms on the screen.
@@ -100,7 +100,7 @@ impl Plugin for TawPlugin {
         app.register_type::<(Marble, Velocity, AngularVelocity, MarbleMass, GravityScale)>()
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
-            .register_type::<(Wall, Teleport)>()
+            .register_type::<(Wall, Teleport, Sleeping, SleepingDisabled)>()
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
 
@@ -134,7 +134,7 @@ impl Plugin for TawPlugin {
                     .in_set(TawSystems::Gather),
                 (run_substeps, swarm::step).chain().in_set(TawSystems::Step),
                 (
-                    (scatter::marbles, refusal::report_stopped, swarm::report_stopped),
+                    (scatter::marbles, sleep::mark, refusal::report_stopped, swarm::report_stopped),
                     messages::write.run_if(messages::are_read),
                     diagnostics::measure,
                 )
