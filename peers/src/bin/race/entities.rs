@@ -32,7 +32,7 @@ impl Entities {
         app.insert_resource(Time::<Fixed>::from_duration(step));
         app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
         app.insert_resource(TawModel(model(Response::SoftStep)));
-        app.insert_resource(TawSwarmModel(swarm_model(Tier::Full, 2, THREADS)));
+        app.insert_resource(TawSwarmModel(swarm_model(Tier::Full, 2, THREADS, scene.sleeps)));
         app.finish();
         app.update();
         let world = app.world_mut();

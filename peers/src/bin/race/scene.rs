@@ -12,7 +12,13 @@ pub struct Scene {
     /// Centers, half sizes, and rotations.
     pub boxes: Vec<(Vec3, Vec3, Quat)>,
     pub turn: fn(f32) -> Quat,
+    /// Number of steps.
+    pub steps: u32,
+    /// Lets what rests fall asleep; then only taw runs it.
+    pub sleeps: bool,
 }
+
+const STEPS: u32 = 240;
 
 /// Numbers in [0, 1) that look random.
 struct Random(u64);
@@ -69,7 +75,19 @@ pub fn pour(count: usize) -> Scene {
         planes: open_box(side as f32 * 1.05 * 0.5),
         boxes: Vec::new(),
         turn: still,
+        steps: STEPS,
+        sleeps: false,
     }
+}
+
+/// Few balls, as most games have.
+pub fn few() -> Scene {
+    Scene { name: "few", ..pour(20) }
+}
+
+/// Ten thousand that have fallen asleep.
+pub fn asleep() -> Scene {
+    Scene { name: "asleep", steps: 1_200, sleeps: true, ..pour(10_000) }
 }
 
 /// A drum of 24 faces that turns once in ten seconds.
@@ -86,6 +104,8 @@ pub fn drum() -> Scene {
         planes: faces.chain(ends).collect(),
         boxes: Vec::new(),
         turn: |time| Quat::from_rotation_z(time * std::f32::consts::TAU / 10.0),
+        steps: STEPS,
+        sleeps: false,
     }
 }
 
@@ -106,6 +126,8 @@ pub fn hopper() -> Scene {
         planes: open_box(16.0),
         boxes,
         turn: still,
+        steps: STEPS,
+        sleeps: false,
     }
 }
 
@@ -120,5 +142,7 @@ pub fn board() -> Scene {
             let about = |speed: f32| (time * speed).sin() * 0.2;
             Quat::from_rotation_x(about(1.1)) * Quat::from_rotation_z(about(0.7))
         },
+        steps: STEPS,
+        sleeps: false,
     }
 }

@@ -11,10 +11,10 @@ pub fn material() -> core::Material<f32> {
     core::Material { friction: FRICTION, restitution: RESTITUTION, ..Default::default() }
 }
 
-/// Threads of the solver, which works for marbles too; nothing sleeps.
-pub fn swarm_model(tier: Tier, substeps: u32, threads: usize) -> SwarmModel {
+/// Model of the solver, which works for marbles too.
+pub fn swarm_model(tier: Tier, substeps: u32, threads: usize, sleeps: bool) -> SwarmModel {
     let threads = u32::try_from(threads).expect("few threads");
-    SwarmModel { tier, substeps, threads, material: material(), sleeps: false }
+    SwarmModel { tier, substeps, threads, material: material(), sleeps }
 }
 
 /// Friction and spin; two substeps where the response solves once in each, else one.
@@ -67,7 +67,7 @@ impl Taw {
     }
 
     pub fn swarm(scene: &Scene, tier: Tier, substeps: u32, threads: usize) -> Self {
-        let mut taw = Self::empty(scene, swarm_model(tier, substeps, threads));
+        let mut taw = Self::empty(scene, swarm_model(tier, substeps, threads, scene.sleeps));
         let ball = |(at, radius): &(Vec3, f32)| Ball {
             mass: core::Mass::Density(1.0),
             ..Ball::new(point(*at), *radius)
@@ -78,7 +78,7 @@ impl Taw {
     }
 
     pub fn marbles(scene: &Scene, response: core::Response, threads: usize) -> Self {
-        let mut taw = Self::empty(scene, swarm_model(Tier::Full, 2, threads));
+        let mut taw = Self::empty(scene, swarm_model(Tier::Full, 2, threads, scene.sleeps));
         taw.world.set_model(model(response)).expect("a model");
         let marbles = scene.balls.iter().map(|(at, radius)| {
             let marble = taw::world::Marble {
