@@ -105,23 +105,68 @@ impl SeenMarble {
     }
 }
 
-/// What the settings were when marbles were last gathered.
+/// Settings when marbles were last gathered, and number of marbles after that.
 #[derive(Default)]
 pub struct Settings {
     rotation: Rotation,
     response: Response,
+    marbles: usize,
 }
+
+/// Marbles that others changed, besides those that components tell.
+#[derive(Resource, Default)]
+pub struct ChangedMarbles {
+    /// Lost an optional component since the last step.
+    pub lost_component: Vec<Entity>,
+    /// Were taken over in this step.
+    pub gathered: Vec<Entity>,
+}
+
+/// Notes that an entity lost an optional component.
+pub fn note_lost_component<C: Component>(
+    removed: On<Remove, C>,
+    mut changed: ResMut<ChangedMarbles>,
+) {
+    changed.lost_component.push(removed.entity);
+}
+
+/// Marbles asleep of which a component was written, if only with the same value.
+type WrittenAsleep = (
+    With<Sleeping>,
+    Or<(
+        Changed<Marble>,
+        Changed<Transform>,
+        Changed<HalfLength>,
+        Changed<Velocity>,
+        Changed<AngularVelocity>,
+        Changed<MarbleMass>,
+        Changed<GravityScale>,
+        Changed<MarbleDamping>,
+        Changed<SurfaceMaterial>,
+        Changed<MarbleIntegrator>,
+        Changed<MarbleRotation>,
+        Changed<SleepingDisabled>,
+    )>,
+);
+
+/// Number of marbles from which on it pays to look at them on all threads.
+pub const MANY: usize = 1_000;
 
 /// Puts new marbles in and takes over what somebody else wrote since the last
 /// scatter.
 pub fn marbles(
     mut world: ResMut<TawWorld>,
-    mut queries: ParamSet<(Query<MarbleComponents>, Query<(Entity, &mut MarbleState)>)>,
+    mut queries: ParamSet<(
+        Query<MarbleComponents>,
+        Query<(Entity, &mut MarbleState)>,
+        Query<MarbleComponents, Without<Sleeping>>,
+        Query<MarbleComponents, WrittenAsleep>,
+    )>,
     transforms: TransformHelper,
     entities: &Entities,
     (mut refusals, mut removed): (Refusals, MessageWriter<RowRemoved>),
     mut last: Local<Settings>,
-    mut stale: Local<Vec<Entity>>,
+    mut changed: ResMut<ChangedMarbles>,
 ) {
     if world.just_restored {
         snapshot::name_marbles(&mut world, &mut queries.p1());
@@ -131,11 +176,14 @@ pub fn marbles(
     let begins_to_turn = last.rotation == Rotation::None && model.rotation != Rotation::None;
     // What could be no marble may be one now.
     let knows_capsules = !last.response.knows_capsules() && model.response.knows_capsules();
-    *last = Settings { rotation: model.rotation, response: model.response };
+    let all = begins_to_turn
+        || knows_capsules
+        || world.just_restored
+        || last.marbles != world.marbles.len();
     // Looking at all is for all threads; then there are few or none, and they go in order.
     let any = AtomicBool::new(false);
     let (rows, restored) = (&world.marbles, world.just_restored);
-    queries.p0().par_iter_mut().for_each(|(_, marble, transform, optional, _, mut state)| {
+    let look = |(_, marble, transform, optional, _, mut state): MarbleItem| {
         if begins_to_turn {
             (state.seen.rotation, state.seen.angular_velocity) = ([0; 4], None); // no rotation's bits
         }
@@ -153,15 +201,30 @@ pub fn marbles(
         if stale {
             any.store(true, Ordering::Relaxed);
         }
-    });
+    };
+    // What sleeps is looked at only where it was written.
+    match (all, rows.len() >= MANY) {
+        (true, false) => queries.p0().iter_mut().for_each(look),
+        (true, true) => queries.p0().par_iter_mut().for_each(look),
+        (false, false) => queries.p2().iter_mut().for_each(look),
+        (false, true) => queries.p2().par_iter_mut().for_each(look),
+    }
+    if !all {
+        queries.p3().iter_mut().for_each(look);
+        for entity in changed.lost_component.drain(..) {
+            let _ = queries.p0().get_mut(entity).map(look); // it may be gone
+        }
+    }
+    changed.lost_component.clear();
+    changed.gathered.clear();
     let mut without_row = 0;
     if any.into_inner() {
-        stale.clear();
         let states = queries.p1();
-        stale.extend(states.iter().filter(|(_, state)| state.stale).map(|(entity, _)| entity));
+        let stale = states.iter().filter(|(_, state)| state.stale).map(|(entity, _)| entity);
+        changed.gathered.extend(stale);
         let mut marbles = queries.p0();
-        for entity in stale.drain(..) {
-            let Ok(marble) = marbles.get_mut(entity) else { continue };
+        for entity in &changed.gathered {
+            let Ok(marble) = marbles.get_mut(*entity) else { continue };
             let has_row = take_over(&mut world, marble, &transforms, &mut refusals);
             without_row += usize::from(!has_row);
         }
@@ -170,6 +233,11 @@ pub fn marbles(
     if visible.iter().len() != world.marbles.len() + without_row {
         snapshot::take_out_marbles(&mut world, &visible, entities, &mut removed);
     }
+    *last = Settings {
+        rotation: model.rotation,
+        response: model.response,
+        marbles: world.marbles.len(),
+    };
 }
 
 /// Takes over one marble. Gives whether it has a row.

@@ -91,6 +91,7 @@ impl Plugin for TawPlugin {
             .init_resource::<Forces>()
             .init_resource::<SubstepDelta>()
             .init_resource::<StepTimes>()
+            .init_resource::<gather::ChangedMarbles>()
             .init_resource::<Touches>()
             .init_resource::<Told>()
             .init_resource::<gather_walls::FrameTime>()
@@ -104,7 +105,17 @@ impl Plugin for TawPlugin {
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
 
-        app.add_observer(gather::forget_marble)
+        app.add_observer(gather::note_lost_component::<HalfLength>)
+            .add_observer(gather::note_lost_component::<Velocity>)
+            .add_observer(gather::note_lost_component::<AngularVelocity>)
+            .add_observer(gather::note_lost_component::<MarbleMass>)
+            .add_observer(gather::note_lost_component::<GravityScale>)
+            .add_observer(gather::note_lost_component::<MarbleDamping>)
+            .add_observer(gather::note_lost_component::<SurfaceMaterial>)
+            .add_observer(gather::note_lost_component::<MarbleIntegrator>)
+            .add_observer(gather::note_lost_component::<MarbleRotation>)
+            .add_observer(gather::note_lost_component::<SleepingDisabled>)
+            .add_observer(gather::forget_marble)
             .add_observer(gather::forget_wall)
             .add_observer(swarm::forget);
         app.add_systems(
@@ -120,27 +131,38 @@ impl Plugin for TawPlugin {
         .add_systems(
             FixedUpdate,
             (
-                (
-                    diagnostics::update_energy_audit,
-                    gather::settings,
-                    gather_walls::walls,
-                    gather::marbles,
-                    gather::forces,
-                    swarm::gather,
-                    gather_walls::land,
-                    gather::finish,
-                )
-                    .chain()
-                    .in_set(TawSystems::Gather),
-                (run_substeps, swarm::step).chain().in_set(TawSystems::Step),
-                (
-                    (scatter::marbles, sleep::mark, refusal::report_stopped, swarm::report_stopped),
-                    messages::write.run_if(messages::are_read),
-                    diagnostics::measure,
-                )
-                    .chain()
-                    .in_set(TawSystems::Scatter),
+                run_part(Part::Gather).in_set(TawSystems::Gather),
+                run_part(Part::Step).in_set(TawSystems::Step),
+                run_part(Part::Scatter).in_set(TawSystems::Scatter),
             ),
+        )
+        .add_systems(
+            Part::Gather,
+            (
+                diagnostics::update_energy_audit,
+                gather::settings,
+                gather_walls::walls,
+                gather::marbles,
+                gather::forces,
+                swarm::gather,
+                gather_walls::land,
+                gather::finish,
+            )
+                .chain(),
+        )
+        .add_systems(Part::Step, (run_substeps, swarm::step).chain())
+        .add_systems(
+            Part::Scatter,
+            (
+                sleep::unmark,
+                scatter::marbles,
+                sleep::mark,
+                refusal::report_stopped,
+                swarm::report_stopped,
+                messages::write.run_if(messages::are_read),
+                diagnostics::measure,
+            )
+                .chain(),
         );
         app.configure_sets(
             Substep,
@@ -157,11 +179,29 @@ impl Plugin for TawPlugin {
                     .in_set(TawSystems::Restitute),
                 messages::collect_impacts.run_if(messages::are_read).after(TawSystems::Restitute),
             ),
-        )
-        // One verb after the other: threads would only have to be woken for each.
-        .edit_schedule(Substep, |schedule| {
+        );
+        // One system after the other: threads would only have to be woken for each.
+        let one_by_one = |schedule: &mut Schedule| {
             schedule.set_executor(SingleThreadedExecutor::new());
-        });
+        };
+        app.edit_schedule(Substep, one_by_one)
+            .edit_schedule(Part::Gather, one_by_one)
+            .edit_schedule(Part::Step, one_by_one)
+            .edit_schedule(Part::Scatter, one_by_one);
+    }
+}
+
+/// Schedules of the systems of a step. Each is one exclusive system of `FixedUpdate`.
+#[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Part {
+    Gather,
+    Step,
+    Scatter,
+}
+
+fn run_part(part: Part) -> impl FnMut(&mut World) {
+    move |world: &mut World| {
+        let _ = world.try_run_schedule(part); // the plugin has added it
     }
 }
 

@@ -5,9 +5,10 @@ use bevy::prelude::*;
 use bevy_transform_interpolation::prelude::NoTransformEasing;
 
 use crate::components::{
-    AngularVelocity, Eased, Marble, MarbleState, Velocity, bits, rotation_bits,
+    AngularVelocity, Eased, Marble, MarbleState, Sleeping, Velocity, bits, rotation_bits,
 };
 use crate::convert::{from_point, from_rotation, from_vector};
+use crate::gather::{ChangedMarbles, MANY};
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 
@@ -79,19 +80,25 @@ type Moved<'a> = (
 );
 
 /// Writes `Transform`, `Velocity` and `AngularVelocity` of the marbles that moved, and of those
-/// whose own values were refused.
+/// whose own values were refused. What sleeps and was not written by others is as it was.
 pub fn marbles(
     world: Res<TawWorld>,
     mut transforms: ParamSet<(
-        Query<Moved, (With<Marble>, Without<ChildOf>)>,
+        Query<Moved, (With<Marble>, Without<ChildOf>, Without<Sleeping>)>,
         TransformHelper,
         Query<Moved, With<Marble>>,
     )>,
     children: Query<(Entity, &ChildOf), With<Marble>>,
+    changed: Res<ChangedMarbles>,
     mut frames: Local<Vec<(Entity, Frame)>>,
     mut refusals: Refusals,
 ) {
-    transforms.p0().par_iter_mut().for_each(|moved| write(&world, moved, &Frame::WORLD));
+    let write_one = |moved: MovedItem| write(&world, moved, &Frame::WORLD);
+    if world.marbles.len() < MANY {
+        transforms.p0().iter_mut().for_each(write_one);
+    } else {
+        transforms.p0().par_iter_mut().for_each(write_one);
+    }
     // A child's Transform is relative to its parents, which have all moved by now.
     let helper = transforms.p1();
     frames.clear();
@@ -105,6 +112,13 @@ pub fn marbles(
         Some((entity, frame?))
     }));
     let mut marbles = transforms.p2();
+    for entity in &changed.gathered {
+        if !children.contains(*entity)
+            && let Ok(moved) = marbles.get_mut(*entity)
+        {
+            write(&world, moved, &Frame::WORLD);
+        }
+    }
     for (entity, frame) in &frames {
         if let Ok(moved) = marbles.get_mut(*entity) {
             write(&world, moved, frame);

@@ -1,6 +1,7 @@
 //! Balls of the swarm that are marbles of the world: rows of the same solve as all others.
 
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, PoisonError};
 
 use cgmath::{EuclideanSpace, InnerSpace};
 
@@ -12,7 +13,7 @@ use super::wall_contact::WallContact;
 use super::workers::{DisjointSlice, parallel_for};
 use super::{BallId, Swarm, Tier};
 use crate::contact::{Contact, Contacts};
-use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector};
+use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite};
 use crate::motion::integrate_rotation;
 
 /// State of a marble as a row.
@@ -245,12 +246,14 @@ impl Swarm {
 
     /// Writes the rows of bodies back to the columns of the marbles, of which each slot has one or
     /// [none](NO_ROW). What slept through the step is as it was. Rotations go on by `dt` seconds;
-    /// with none, only what has just fallen asleep is read.
+    /// with none, only what has just fallen asleep is read. Marbles whose angular velocity overflows
+    /// are added to `stopped`, in any order.
     pub(crate) fn read_bodies<S: Scalar>(
         &mut self,
         marble_of_slot: &[u32],
         columns: BodyColumns<S>,
         dt: Option<S>,
+        stopped: &mut Vec<u32>,
     ) {
         let BodyColumns { position, velocity, angular_velocity: spin, rotation, radius } = columns;
         let (position, velocity) = (DisjointSlice::new(position), DisjointSlice::new(velocity));
@@ -259,6 +262,7 @@ impl Swarm {
         let slots = self.ids.slots();
         let [places, speeds, spins] = [&self.at[..], &self.velocity[..], &self.spin[..]];
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
+        let non_finite = Mutex::new(stopped);
         let chunks = DisjointSlice::new(&mut self.chunks);
         parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
             // SAFETY: each thread has its own chunks.
@@ -279,6 +283,12 @@ impl Swarm {
                     *velocity.row(marble) = vector(&speeds[row]);
                     if turns && !surfaces.row(row as u32).rotation_locked {
                         let rate: Vec3<S> = vector(&spins[row]) / radius[marble];
+                        if !is_finite(rate) {
+                            let mut stopped =
+                                non_finite.lock().unwrap_or_else(PoisonError::into_inner);
+                            stopped.push(marble as u32);
+                            continue;
+                        }
                         *spin.row(marble) = rate;
                         let rotation = rotation.row(marble);
                         *rotation =
@@ -289,8 +299,8 @@ impl Swarm {
         });
     }
 
-    /// Lists the contacts of bodies: with a wall or each other, of which the separation is at most
-    /// `reach` metres, or closes within `dt` seconds. In the order of the solver's memory. `lists`
+    /// Lists the contacts of bodies that are awake: with a wall or each other, of which the separation is
+    /// at most `reach` metres, or closes within `dt` seconds. In the order of the solver's memory. `lists`
     /// is scratch.
     pub(crate) fn list_contacts<S: Scalar>(
         &self,
@@ -306,10 +316,14 @@ impl Swarm {
         parallel_for(self.model.threads as usize, chunks + 1, |_, chunk| {
             // SAFETY: each has its own list.
             let list = unsafe { &mut *parts.row(chunk) };
-            let (wall_contacts, batches) =
-                self.chunks.get(chunk).map_or((&[][..], &self.fast_movers.batches), |chunk| {
-                    (&chunk.wall_contacts, &chunk.batches)
-                });
+            let (wall_contacts, batches) = match self.chunks.get(chunk..) {
+                None | Some([]) => (&[][..], &self.fast_movers.batches[..]),
+                Some([chunk, ..]) if !chunk.asleep => {
+                    (&chunk.wall_contacts[..], &chunk.batches[..])
+                }
+                Some([chunk, next, ..]) if !next.asleep => (&[][..], &chunk.batches[..]),
+                Some(_) => return,
+            };
             self.list_contacts_of(marble_of_slot, near, (wall_contacts, batches), list);
         });
         for list in lists {
@@ -348,6 +362,9 @@ impl Swarm {
         for batch in batches {
             for lane in 0..batch.count as usize {
                 let rows = batch.pair(lane);
+                if rows.into_iter().all(|row| self.velocity[row as usize][3].is_sign_negative()) {
+                    continue; // both sleep
+                }
                 let [Some(a), Some(b)] = rows.map(marble) else { continue };
                 let [p, q] = rows.map(|row| &self.at[row as usize]);
                 let [u, v] = rows.map(|row| vector::<f32>(&self.velocity[row as usize]));

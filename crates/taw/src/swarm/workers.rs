@@ -12,8 +12,9 @@ use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// The most threads of a team.
 pub(super) const MAX_THREADS: usize = 64;
-/// Spins before a thread goes to sleep: some tenths of a millisecond.
-const SPIN_COUNT: u32 = 1 << 14;
+/// Spins before a thread goes to sleep: some hundredths of a millisecond, longer than between two
+/// works of a step. Other threads of the process may need the core.
+const SPIN_COUNT: u32 = 1 << 11;
 /// Number of rows of a job.
 pub(super) const ROWS: usize = 1 << 13;
 

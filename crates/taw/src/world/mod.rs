@@ -81,7 +81,8 @@ pub struct World<S> {
     pub walls: Walls<S>,
     /// Balls in bulk, which touch the walls. (What is touched by whom of them is not listed.)
     pub swarm: Swarm,
-    /// The touches of the last substep. Between [`World::generate_contacts`] and
+    /// The touches of the last substep, except those of marbles [asleep](Self::is_asleep) with each
+    /// other and with walls. Between [`World::generate_contacts`] and
     /// [`World::restitute`] they may be changed: what is taken out is not
     /// restituted, and a row that does not exist is passed over.
     ///
@@ -374,11 +375,11 @@ impl<S: Scalar> World<S> {
     pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
         let dt = Self::validated_dt(dt)?;
         self.check_shapes()?;
-        self.store_poses();
         self.audit_before();
         if self.model.response == Response::SoftStep {
             return self.integrate_forces(dt);
         }
+        self.store_poses();
         self.begin_continuous();
         let drive = StepContext {
             integrator: self.model.integrator,
@@ -550,7 +551,9 @@ impl<S: Scalar> World<S> {
 
     /// Makes marbles that turn for show only roll over the walls that they touch.
     fn roll_what_only_shows(&mut self) {
-        if self.model.rotation == Rotation::None {
+        let all_dynamic =
+            self.model.rotation == Rotation::Dynamic && !self.marbles.has_rotation_locks();
+        if self.model.rotation == Rotation::None || all_dynamic {
             return;
         }
         // The deepest contact comes first in the list, so it has the last word.

@@ -111,6 +111,11 @@ impl<S: Scalar> World<S> {
     pub(super) fn quarantine_non_finite(&mut self) {
         let non_finite = (0..self.marbles.len()).filter(|row| !self.marbles.is_finite_state(*row));
         self.stopped.extend(non_finite.map(|row| row as u32));
+        self.quarantine_stopped();
+    }
+
+    /// Stops marbles that a stage has found to be non-finite, and reports them.
+    pub(super) fn quarantine_stopped(&mut self) {
         if self.stopped.is_empty() {
             return;
         }

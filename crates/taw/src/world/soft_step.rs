@@ -57,12 +57,14 @@ impl<S: Scalar> World<S> {
     /// applies in substeps.
     pub(super) fn integrate_forces(&mut self, dt: S) -> Result<(), Error> {
         if self.model.rotation == Rotation::Dynamic {
-            self.marbles.integrate_angular_velocity(dt);
+            if self.marbles.has_external_forces() {
+                self.marbles.integrate_angular_velocity(dt);
+                self.quarantine_non_finite();
+            }
         } else {
             self.marbles.integrate_rotations(dt, self.model.rotation);
         }
         self.soft_step.dt = dt.as_f64() as f32;
-        self.quarantine_non_finite();
         self.sync_bodies()?;
         let drive = StepContext {
             integrator: self.model.integrator,
@@ -99,7 +101,8 @@ impl<S: Scalar> World<S> {
         let reach = 2.0 * length(gravity) * dt * dt;
         let marbles = &self.soft_step.marble_of_slot;
         let turns = self.model.rotation == Rotation::Dynamic;
-        self.swarm.read_bodies(marbles, self.marbles.body_columns(turns), None);
+        let columns = self.marbles.body_columns(turns);
+        self.swarm.read_bodies(marbles, columns, None, &mut self.stopped);
         let lists = &mut self.soft_step.lists;
         self.swarm.list_contacts(marbles, [reach, dt], lists, &mut self.contacts);
     }
@@ -120,8 +123,9 @@ impl<S: Scalar> World<S> {
         let stopped = stopped.filter_map(|slot| marbles.get(slot as usize).copied());
         self.stopped.extend(stopped.filter(|marble| *marble != NO_ROW));
         let turns = self.model.rotation == Rotation::Dynamic;
-        self.swarm.read_bodies(marbles, self.marbles.body_columns(turns), Some(dt));
-        self.quarantine_non_finite();
+        let columns = self.marbles.body_columns(turns);
+        self.swarm.read_bodies(marbles, columns, Some(dt), &mut self.stopped);
+        self.quarantine_stopped();
         self.roll_what_only_shows();
         self.limits.apply(&mut self.marbles);
         self.audit_after();

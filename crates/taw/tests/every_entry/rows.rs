@@ -157,10 +157,11 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
         Marble 1 "Marble.gravity_scale": |p, x| insert(p, |m| m.gravity_scale = x);
         Marble 1 "Marble.damping Damping.linear": |p, x| insert(p, |m| m.damping.linear = x);
         Marble 1 "Damping.angular": |p, x| insert(p, |m| m.damping.angular = x);
-        Marble 1 "Marble.material Marble.integrator Marble.rotation_model": |p, x| insert(p, |m| {
+        Marble 1 "Marble.material Marble.integrator Marble.rotation_model Marble.sleeping_disabled": |p, x| insert(p, |m| {
             m.material = Some(Material { restitution: x, ..Material::default() });
             m.integrator = Some(Integrator::Rk4);
             m.rotation_model = Some(Rotation::Rolling);
+            m.sleeping_disabled = true;
         });
         Marble 4 "Marbles::set_position": |p, x| { let v = on_axis(p.case, x); p.world.marbles.set_position(p.subject, Point3::from_vec(v)) };
         Marble 4 "Marbles::set_velocity": |p, x| { let v = on_axis(p.case, x); p.world.marbles.set_velocity(p.subject, v) };
@@ -171,6 +172,7 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
         };
         Marble 3 "Marbles::set_rotation": |p, x| p.world.marbles.set_rotation(p.subject, quaternions(x)[p.case]);
         Marble 4 "Marbles::set_angular_velocity": |p, x| { let v = on_axis(p.case, x); p.world.marbles.set_angular_velocity(p.subject, v) };
+        Marble 1 "Marbles::set_sleeping_disabled": |p, x| p.world.marbles.set_sleeping_disabled(p.subject, x > zero());
         Marble 1 "Marbles::set_mass": |p, x| p.world.marbles.set_mass(p.subject, Mass::Kilograms(x));
         Marble 1 "Marbles::set_gravity_scale": |p, x| p.world.marbles.set_gravity_scale(p.subject, x);
         Marble 1 "Marbles::set_damping": |p, x| p.world.marbles.set_damping(p.subject, Damping { linear: x, angular: x });
