@@ -7,7 +7,7 @@ use bevy::ecs::world::DeferredWorld;
 use bevy::prelude::*;
 use taw::motion::Rotation;
 use taw::response::Response;
-use taw::world as core;
+use taw::world::{self as core, Model};
 
 use crate::components::{
     AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
@@ -152,16 +152,23 @@ type WrittenAsleep = (
 /// Number of marbles from which on it pays to look at them on all threads.
 pub const MANY: usize = 1_000;
 
+/// Queries of marbles: all, their states, those awake, and those that were written asleep.
+type MarbleQueries<'w, 's> = ParamSet<
+    'w,
+    's,
+    (
+        Query<'w, 's, MarbleComponents<'static>>,
+        Query<'w, 's, (Entity, &'static mut MarbleState)>,
+        Query<'w, 's, MarbleComponents<'static>, Without<Sleeping>>,
+        Query<'w, 's, MarbleComponents<'static>, WrittenAsleep>,
+    ),
+>;
+
 /// Puts new marbles in and takes over what somebody else wrote since the last
 /// scatter.
 pub fn marbles(
     mut world: ResMut<TawWorld>,
-    mut queries: ParamSet<(
-        Query<MarbleComponents>,
-        Query<(Entity, &mut MarbleState)>,
-        Query<MarbleComponents, Without<Sleeping>>,
-        Query<MarbleComponents, WrittenAsleep>,
-    )>,
+    mut queries: MarbleQueries,
     transforms: TransformHelper,
     entities: &Entities,
     (mut refusals, mut removed): (Refusals, MessageWriter<RowRemoved>),
@@ -171,16 +178,39 @@ pub fn marbles(
     if world.just_restored {
         snapshot::name_marbles(&mut world, &mut queries.p1());
     }
+    changed.gathered.clear();
+    if find_stale(&world, &last, &mut queries, &mut changed) {
+        let states = queries.p1();
+        let stale = states.iter().filter(|(_, state)| state.stale).map(|(entity, _)| entity);
+        changed.gathered.extend(stale);
+    }
+    let mut without_row = 0;
+    let mut marbles = queries.p0();
+    for entity in &changed.gathered {
+        let Ok(marble) = marbles.get_mut(*entity) else { continue };
+        let has_row = take_over(&mut world, marble, &transforms, &mut refusals);
+        without_row += usize::from(!has_row);
+    }
+    let visible = queries.p1();
+    if visible.iter().len() != world.marbles.len() + without_row {
+        snapshot::take_out_marbles(&mut world, &visible, entities, &mut removed);
+    }
+    let Model { rotation, response, .. } = world.model();
+    *last = Settings { rotation, response, marbles: world.marbles.len() };
+}
+
+/// Marks the marbles of which components differ from what was seen. Returns whether any does.
+fn find_stale(
+    world: &TawWorld,
+    last: &Settings,
+    queries: &mut MarbleQueries,
+    changed: &mut ChangedMarbles,
+) -> bool {
     let model = world.model();
     // The world's own columns for it begin unturned; the components know better.
     let begins_to_turn = last.rotation == Rotation::None && model.rotation != Rotation::None;
     // What could be no marble may be one now.
     let knows_capsules = !last.response.knows_capsules() && model.response.knows_capsules();
-    let all = begins_to_turn
-        || knows_capsules
-        || world.just_restored
-        || last.marbles != world.marbles.len();
-    // Looking at all is for all threads; then there are few or none, and they go in order.
     let any = AtomicBool::new(false);
     let (rows, restored) = (&world.marbles, world.just_restored);
     let look = |(_, marble, transform, optional, _, mut state): MarbleItem| {
@@ -203,41 +233,21 @@ pub fn marbles(
         }
     };
     // What sleeps is looked at only where it was written.
+    let all = begins_to_turn || knows_capsules || restored || last.marbles != rows.len();
     match (all, rows.len() >= MANY) {
         (true, false) => queries.p0().iter_mut().for_each(look),
         (true, true) => queries.p0().par_iter_mut().for_each(look),
         (false, false) => queries.p2().iter_mut().for_each(look),
         (false, true) => queries.p2().par_iter_mut().for_each(look),
     }
+    let lost_component = changed.lost_component.drain(..);
     if !all {
         queries.p3().iter_mut().for_each(look);
-        for entity in changed.lost_component.drain(..) {
+        for entity in lost_component {
             let _ = queries.p0().get_mut(entity).map(look); // it may be gone
         }
     }
-    changed.lost_component.clear();
-    changed.gathered.clear();
-    let mut without_row = 0;
-    if any.into_inner() {
-        let states = queries.p1();
-        let stale = states.iter().filter(|(_, state)| state.stale).map(|(entity, _)| entity);
-        changed.gathered.extend(stale);
-        let mut marbles = queries.p0();
-        for entity in &changed.gathered {
-            let Ok(marble) = marbles.get_mut(*entity) else { continue };
-            let has_row = take_over(&mut world, marble, &transforms, &mut refusals);
-            without_row += usize::from(!has_row);
-        }
-    }
-    let visible = queries.p1();
-    if visible.iter().len() != world.marbles.len() + without_row {
-        snapshot::take_out_marbles(&mut world, &visible, entities, &mut removed);
-    }
-    *last = Settings {
-        rotation: model.rotation,
-        response: model.response,
-        marbles: world.marbles.len(),
-    };
+    any.into_inner()
 }
 
 /// Takes over one marble. Gives whether it has a row.

@@ -104,91 +104,106 @@ impl Plugin for TawPlugin {
             .register_type::<(Wall, Teleport, Sleeping, SleepingDisabled)>()
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
-
-        app.add_observer(gather::note_lost_component::<HalfLength>)
-            .add_observer(gather::note_lost_component::<Velocity>)
-            .add_observer(gather::note_lost_component::<AngularVelocity>)
-            .add_observer(gather::note_lost_component::<MarbleMass>)
-            .add_observer(gather::note_lost_component::<GravityScale>)
-            .add_observer(gather::note_lost_component::<MarbleDamping>)
-            .add_observer(gather::note_lost_component::<SurfaceMaterial>)
-            .add_observer(gather::note_lost_component::<MarbleIntegrator>)
-            .add_observer(gather::note_lost_component::<MarbleRotation>)
-            .add_observer(gather::note_lost_component::<SleepingDisabled>)
-            .add_observer(gather::forget_marble)
-            .add_observer(gather::forget_wall)
-            .add_observer(swarm::forget);
-        app.add_systems(
-            RunFixedMainLoop,
-            gather_walls::count_frame.in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
-        )
-        .add_systems(FixedPreUpdate, gather_walls::note_places)
-        .add_systems(PostUpdate, scatter::stay.before(TransformSystems::Propagate));
-        app.configure_sets(
-            FixedUpdate,
-            (TawSystems::Gather, TawSystems::Step, TawSystems::Scatter).chain(),
-        )
-        .add_systems(
-            FixedUpdate,
-            (
-                run_part(Part::Gather).in_set(TawSystems::Gather),
-                run_part(Part::Step).in_set(TawSystems::Step),
-                run_part(Part::Scatter).in_set(TawSystems::Scatter),
-            ),
-        )
-        .add_systems(
-            Part::Gather,
-            (
-                diagnostics::update_energy_audit,
-                gather::settings,
-                gather_walls::walls,
-                gather::marbles,
-                gather::forces,
-                swarm::gather,
-                gather_walls::land,
-                gather::finish,
-            )
-                .chain(),
-        )
-        .add_systems(Part::Step, (run_substeps, swarm::step).chain())
-        .add_systems(
-            Part::Scatter,
-            (
-                sleep::unmark,
-                scatter::marbles,
-                sleep::mark,
-                refusal::report_stopped,
-                swarm::report_stopped,
-                messages::write.run_if(messages::are_read),
-                diagnostics::measure,
-            )
-                .chain(),
-        );
-        app.configure_sets(
-            Substep,
-            (TawSystems::Integrate, TawSystems::GenerateContacts, TawSystems::Restitute).chain(),
-        )
-        .add_systems(
-            Substep,
-            (
-                integrate.in_set(TawSystems::Integrate),
-                generate_contacts.in_set(TawSystems::GenerateContacts),
-                // What a game takes out of the contacts before they are restituted is not told.
-                (messages::collect.run_if(messages::are_read), restitute)
-                    .chain()
-                    .in_set(TawSystems::Restitute),
-                messages::collect_impacts.run_if(messages::are_read).after(TawSystems::Restitute),
-            ),
-        );
-        // One system after the other: threads would only have to be woken for each.
-        let one_by_one = |schedule: &mut Schedule| {
-            schedule.set_executor(SingleThreadedExecutor::new());
-        };
-        app.edit_schedule(Substep, one_by_one)
-            .edit_schedule(Part::Gather, one_by_one)
-            .edit_schedule(Part::Step, one_by_one)
-            .edit_schedule(Part::Scatter, one_by_one);
+        observe(app);
+        add_step(app);
+        add_substep(app);
     }
+}
+
+/// Adds what watches components go, and what runs outside of `FixedUpdate`.
+fn observe(app: &mut App) {
+    app.add_observer(gather::note_lost_component::<HalfLength>)
+        .add_observer(gather::note_lost_component::<Velocity>)
+        .add_observer(gather::note_lost_component::<AngularVelocity>)
+        .add_observer(gather::note_lost_component::<MarbleMass>)
+        .add_observer(gather::note_lost_component::<GravityScale>)
+        .add_observer(gather::note_lost_component::<MarbleDamping>)
+        .add_observer(gather::note_lost_component::<SurfaceMaterial>)
+        .add_observer(gather::note_lost_component::<MarbleIntegrator>)
+        .add_observer(gather::note_lost_component::<MarbleRotation>)
+        .add_observer(gather::note_lost_component::<SleepingDisabled>)
+        .add_observer(gather::forget_marble)
+        .add_observer(gather::forget_wall)
+        .add_observer(swarm::forget);
+    app.add_systems(
+        RunFixedMainLoop,
+        gather_walls::count_frame.in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
+    )
+    .add_systems(FixedPreUpdate, gather_walls::note_places)
+    .add_systems(PostUpdate, scatter::stay.before(TransformSystems::Propagate));
+}
+
+/// Adds the step to `FixedUpdate`.
+fn add_step(app: &mut App) {
+    app.configure_sets(
+        FixedUpdate,
+        (TawSystems::Gather, TawSystems::Step, TawSystems::Scatter).chain(),
+    )
+    .add_systems(
+        FixedUpdate,
+        (
+            run_part(Part::Gather).in_set(TawSystems::Gather),
+            run_part(Part::Step).in_set(TawSystems::Step),
+            run_part(Part::Scatter).in_set(TawSystems::Scatter),
+        ),
+    )
+    .add_systems(
+        Part::Gather,
+        (
+            diagnostics::update_energy_audit,
+            gather::settings,
+            gather_walls::walls,
+            gather::marbles,
+            gather::forces,
+            swarm::gather,
+            gather_walls::land,
+            gather::finish,
+        )
+            .chain(),
+    )
+    .add_systems(Part::Step, (run_substeps, swarm::step).chain())
+    .add_systems(
+        Part::Scatter,
+        (
+            sleep::unmark,
+            scatter::marbles,
+            sleep::mark,
+            refusal::report_stopped,
+            swarm::report_stopped,
+            messages::write.run_if(messages::are_read),
+            diagnostics::measure,
+        )
+            .chain(),
+    );
+    app.edit_schedule(Part::Gather, one_by_one)
+        .edit_schedule(Part::Step, one_by_one)
+        .edit_schedule(Part::Scatter, one_by_one);
+}
+
+/// Adds the verbs to the substep.
+fn add_substep(app: &mut App) {
+    app.configure_sets(
+        Substep,
+        (TawSystems::Integrate, TawSystems::GenerateContacts, TawSystems::Restitute).chain(),
+    )
+    .add_systems(
+        Substep,
+        (
+            integrate.in_set(TawSystems::Integrate),
+            generate_contacts.in_set(TawSystems::GenerateContacts),
+            // What a game takes out of the contacts before they are restituted is not told.
+            (messages::collect.run_if(messages::are_read), restitute)
+                .chain()
+                .in_set(TawSystems::Restitute),
+            messages::collect_impacts.run_if(messages::are_read).after(TawSystems::Restitute),
+        ),
+    );
+    app.edit_schedule(Substep, one_by_one);
+}
+
+/// Lets a schedule run one system after the other: threads would only have to be woken for each.
+fn one_by_one(schedule: &mut Schedule) {
+    schedule.set_executor(SingleThreadedExecutor::new());
 }
 
 /// Schedules of the systems of a step. Each is one exclusive system of `FixedUpdate`.

@@ -51,7 +51,7 @@ pub use simd::SimdLevel;
 pub(crate) use surfaces::Surface;
 pub(crate) use walls::StaticGeometry;
 
-use cgmath::{EuclideanSpace, Zero};
+use cgmath::EuclideanSpace;
 
 use crate::Error;
 use crate::error::{finite_point, finite_vector, positive, within};
@@ -438,28 +438,6 @@ impl Swarm {
         let sum = radii.map(f64::from).sum::<f64>();
         self.mean_radius = (sum / self.at.len().max(1) as f64) as f32;
     }
-
-    fn wake(&mut self, row: usize) {
-        if self.pairs_valid {
-            let chunks = &mut self.chunks;
-            let chunk = chunks.partition_point(|chunk| chunk.rows[1] as usize <= row);
-            if let Some(chunk) = chunks.get_mut(chunk) {
-                self.sleep_version += u64::from(chunk.asleep);
-                chunk.wake(&mut self.velocity);
-            }
-        }
-        self.velocity[row][3] = self.velocity[row][3].abs();
-    }
-
-    fn wake_all(&mut self) {
-        self.sleep_version += 1;
-        for chunk in &mut self.chunks {
-            (chunk.asleep, chunk.sleep_time) = (false, 0.0);
-        }
-        for velocity in &mut self.velocity {
-            velocity[3] = velocity[3].abs();
-        }
-    }
 }
 
 fn pack_row(vector: Vec3<f32>, last: f32) -> Row {
@@ -497,9 +475,4 @@ fn retain<T: Copy>(column: &mut Vec<T>, kept: &[bool]) {
         }
     }
     column.truncate(to);
-}
-
-/// The speed in m/s up to which a ball counts as lying still, where it weighs so much.
-fn sleep_speed(gravity: Vec3<f32>, radius: f32) -> f32 {
-    if gravity.is_zero() { 0.0 } else { 0.05 * (crate::math::length(gravity) * radius).sqrt() }
 }

@@ -1,6 +1,7 @@
 //! Proxies of the marbles of the world, which its own solver moves, in the swarm.
 
 use super::kernels::squared;
+use super::step::sleep_speed;
 use super::{BallId, Row, Swarm};
 use crate::math::Vec3;
 
@@ -25,7 +26,7 @@ pub(crate) struct Proxy {
     pub asleep: Option<[Row; 2]>,
 }
 
-/// Insignificant fraction of the [sleep speed](super::sleep_speed): a proxy that brings as much
+/// Insignificant fraction of the [sleep speed](sleep_speed): a proxy that brings as much
 /// more or less than before sleeps on, and one that the swarm does not bear and that is slower
 /// counts as lying.
 const STILL: f32 = 0.01;
@@ -136,7 +137,7 @@ impl Swarm {
         self.body_slots.clear(self.ids.slots().len());
         let mut proxies = std::mem::take(&mut self.proxies);
         let (has_friction, sleep_speed) =
-            (self.has_friction(), super::sleep_speed(gravity, self.mean_radius));
+            (self.has_friction(), sleep_speed(gravity, self.mean_radius));
         let pull = [gravity.x, gravity.y, gravity.z, 0.0];
         for (i, proxy) in proxies.iter_mut().enumerate() {
             let Some(row) = self.ids.row(proxy.ball) else { continue };

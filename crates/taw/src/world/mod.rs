@@ -1,4 +1,4 @@
-//! The state as columns, the choice of methods, and the step.
+//! State of a world as columns, and the choice of methods.
 
 mod changed_rows;
 mod contact_limit;
@@ -20,6 +20,7 @@ mod quarantine;
 mod query;
 mod soft_step;
 mod sparse_column;
+mod step;
 mod swarm;
 #[cfg(test)]
 mod tests;
@@ -43,26 +44,18 @@ use crate::Error;
 use crate::broad::{Grid, Images, Period};
 use crate::contact::Contacts;
 use crate::error::{finite, finite_vector, positive};
-use crate::math::{Point3, Scalar, Vec3, cast_vector, length};
+use crate::math::{Point3, Scalar, Vec3, length};
 use crate::motion::{ForceField, Rotation};
 use crate::response::event::EventDriven;
-use crate::response::impulse::{
-    self, CachedImpulse, Context, SolverSettings, SubstepStart, solve_contacts,
-};
-use crate::response::{
-    CapsuleInertia, Impact, Response, SpringHistory,
-    displacement::{self, solve_displacement},
-    penalty::{PenaltySettings, apply_penalty_forces},
-};
+use crate::response::impulse::{self, CachedImpulse};
+use crate::response::{CapsuleInertia, Impact, Response, SpringHistory, displacement};
 use crate::swarm::Swarm;
 use contact_limit::ContactLimit;
 use continuous::Continuous;
 use energy_audit::AuditState;
-use integrate::StepContext;
 use narrow_phase::Candidate;
 use quarantine::Quarantine;
 use soft_step::SoftStep;
-use walls::SubShape;
 
 /// Everything that moves and everything that it can touch.
 ///
@@ -342,252 +335,6 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Moves the world on by `dt` seconds, in [`Model::substeps`] equal parts.
-    ///
-    /// A marble whose motion overflows keeps its last place, loses its velocity and its spin,
-    /// and is named by [`World::stopped`]; no marble that does not touch it is affected.
-    ///
-    /// # Errors
-    /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not in
-    /// [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven
-    /// or periodic; [`Error::OutOfRange`] for a marble too large for its
-    /// [period](Self::set_period). Then nothing has changed.
-    pub fn step(&mut self, dt: S) -> Result<(), Error> {
-        let substep = self.validated_substep(dt)?;
-        self.begin_step();
-        for after in (0..self.model.passes()).rev() {
-            self.begin_substep(substep * S::from_f64(f64::from(after)));
-            self.integrate(substep)?;
-            self.generate_contacts();
-            self.restitute(substep)?;
-        }
-        self.end_step();
-        self.step_swarm(dt, &mut |_| ())
-    }
-
-    /// The first verb: forces change velocities, velocities change positions, over
-    /// `dt` seconds. For [`Response::EventDriven`], forces become accelerations only: what
-    /// moves when is decided by the third verb.
-    ///
-    /// # Errors
-    /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
-    /// and what [`World::step`] says of marbles; then nothing has moved.
-    pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
-        let dt = Self::validated_dt(dt)?;
-        self.check_shapes()?;
-        self.audit_before();
-        if self.model.response == Response::SoftStep {
-            return self.integrate_forces(dt);
-        }
-        self.store_poses();
-        self.begin_continuous();
-        let drive = StepContext {
-            integrator: self.model.integrator,
-            gravity: self.gravity,
-            forces: &self.forces,
-            dt,
-        };
-        if self.model.rotation == Rotation::Dynamic {
-            self.marbles.integrate_angular_velocity(dt);
-        }
-        if self.model.response == Response::EventDriven {
-            self.marbles.mean_accelerations(drive, &mut self.accelerations);
-        } else {
-            self.velocity_before.clear();
-            if self.model.response == Response::Impulse {
-                self.velocity_before.extend_from_slice(self.marbles.velocity());
-            }
-            self.marbles.integrate(drive, &mut self.stopped);
-            self.solve_continuous(dt);
-        }
-        if !(self.model.response == Response::EventDriven
-            && self.model.rotation == Rotation::Dynamic)
-        {
-            self.marbles.integrate_rotations(dt, self.model.rotation);
-        }
-        self.quarantine_non_finite();
-        self.reach = match self.model.response {
-            // Rounding must not end the touch of what falls together.
-            Response::Displacement => length(self.gravity) * dt * dt * S::from_f64(1e-3),
-            Response::Penalty(_) => S::zero(),
-            Response::Impulse => length(self.gravity) * dt * dt * S::from_f64(2.0),
-            Response::EventDriven | Response::SoftStep => self.resting_contact_distance(dt),
-        };
-        self.audit_forces();
-        Ok(())
-    }
-
-    /// The second verb: finds who touches whom, and by how much.
-    ///
-    /// For [`Response::Impulse`], that is also who is so near that gravity closes the
-    /// gap within two substeps; the displacement of these is zero. For
-    /// [`Response::EventDriven`] it is who may rest on each other at the start; who comes
-    /// together later is found later.
-    pub fn generate_contacts(&mut self) {
-        self.contacts.clear();
-        if self.model.response == Response::SoftStep {
-            return self.find_soft_contacts();
-        }
-        self.collide_walls(self.reach);
-        self.collide_marbles(self.reach);
-        self.add_grazing_contacts();
-        self.drop_separated_stops();
-    }
-
-    /// The third verb: contacts change positions and velocities back to what the
-    /// scene allows. `dt` is the time that was integrated, in seconds.
-    ///
-    /// # Errors
-    /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`].
-    pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
-        let dt = Self::validated_dt(dt)?;
-        if self.model.response == Response::SoftStep {
-            return self.solve_soft_contacts(dt);
-        }
-        self.walls.update_tree(); // some may have been taken out since contacts were looked for
-        let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
-        self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
-        self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
-        self.release_separated_stops();
-        if self.model.response == Response::Impulse {
-            self.continuous.begin_bounces(&self.marbles.position);
-        }
-        self.audit_contacts();
-        self.look_at_marbles();
-        self.solve(dt);
-        self.stop_bounces_at_walls();
-        self.quarantine_non_finite();
-        self.roll_what_only_shows();
-        self.limits.apply(&mut self.marbles);
-        self.audit_after();
-        self.marbles.wrap();
-        Ok(())
-    }
-
-    /// Solves the contacts by the model's response.
-    fn solve(&mut self, dt: S) {
-        let (mut columns, material, integrator) =
-            self.marbles.columns(&self.inverse_mass, &self.held, &self.rods);
-        if self.model.rotation != Rotation::Dynamic {
-            columns.spin = &mut []; // cosmetic rotation does not affect contacts
-        }
-        let restitution_threshold = length(self.gravity) * dt * S::from_f64(2.0);
-        let settings = SolverSettings {
-            iterations: self.model.iterations,
-            dt,
-            restitution_threshold,
-            tolerance: restitution_threshold * S::epsilon(),
-            slop: length(self.gravity) * dt * dt,
-            max_relative_slop: S::from_f64(0.001),
-        };
-        let context = Context {
-            walls: &self.walls,
-            material: |row| material.get(row).unwrap_or_default(),
-            position_weight: |row| {
-                integrator.get(row).unwrap_or(self.model.integrator).position_weight()
-            },
-            start: SubstepStart {
-                position: &[],
-                velocity: &self.velocity_before,
-                ccd_stops: &self.continuous.projections,
-            },
-            settings: &settings,
-        };
-        match self.model.response {
-            Response::Displacement => {
-                let contacts = self.contacts.len() as u32;
-                let mut pushes = self.audit_state.as_ref().map(|_| Vec::new());
-                solve_displacement(
-                    &mut columns,
-                    &mut self.contacts,
-                    &context,
-                    &mut self.displacement,
-                    &mut self.warm,
-                    &mut self.stopped,
-                    |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change))),
-                );
-                if let Some(audit_state) = &mut self.audit_state {
-                    audit_state.work.collisions = contacts;
-                    for (row, change) in pushes.into_iter().flatten() {
-                        let mass = self.marbles.mass(row as usize).as_f64();
-                        audit_state.work.momentum += cast_vector::<S, f64>(change) * mass;
-                    }
-                }
-            }
-            Response::Impulse => {
-                solve_contacts(
-                    &mut columns,
-                    &mut self.contacts,
-                    &context,
-                    &mut self.impulse,
-                    &mut self.warm,
-                    &mut self.stopped,
-                );
-                if let Some(audit_state) = &mut self.audit_state {
-                    let AuditState { velocity, angular_velocity, work, .. } = &mut **audit_state;
-                    self.impulse.record_energy(&mut columns, velocity, angular_velocity, work);
-                }
-            }
-            Response::Penalty(law) => apply_penalty_forces(
-                &PenaltySettings {
-                    law,
-                    dt,
-                    material: |row| material.get(row).unwrap_or_default(),
-                    position_weight: |row| {
-                        integrator.get(row).unwrap_or(self.model.integrator).position_weight()
-                    },
-                },
-                &mut columns,
-                &mut self.contacts,
-                &self.walls,
-                &mut self.shear,
-                &mut self.stopped,
-                self.audit_state.as_mut().map(|audit_state| &mut audit_state.work),
-            ),
-            Response::EventDriven => self.step_events(dt, self.rest_of_step),
-            Response::SoftStep => {}
-        }
-    }
-
-    /// Makes marbles that turn for show only roll over the walls that they touch.
-    fn roll_what_only_shows(&mut self) {
-        let all_dynamic =
-            self.model.rotation == Rotation::Dynamic && !self.marbles.has_rotation_locks();
-        if self.model.rotation == Rotation::None || all_dynamic {
-            return;
-        }
-        // The deepest contact comes first in the list, so it has the last word.
-        for contact in self.contacts.wm.iter().rev() {
-            let part = SubShape { wall: contact.a, index: contact.part };
-            let row = contact.b as usize;
-            let normal = self.walls.project_point(part, self.marbles.position()[row]).normal;
-            if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Rolling {
-                self.marbles.roll_without_slip(row, normal);
-            }
-        }
-    }
-
-    /// Brings up to date what a response asks of marbles: masses, who is held, what is long;
-    /// and forgets contacts whose rows are no longer theirs.
-    fn look_at_marbles(&mut self) {
-        self.inverse_mass.clear();
-        if matches!(self.model.response, Response::Impulse | Response::Penalty(_)) {
-            let masses = (0..self.marbles.len()).map(|row| self.marbles.mass(row));
-            self.inverse_mass.extend(masses.map(|mass| S::one() / mass));
-        }
-        let removals = [self.walls.removals(), self.marbles.removals()];
-        if self.warm_removals != removals {
-            self.forget_contacts();
-            self.warm_removals = removals;
-        }
-        self.held.clear();
-        if self.model.rotation == Rotation::Dynamic && self.marbles.has_rotation_locks() {
-            self.held
-                .extend((0..self.marbles.len()).map(|row| self.marbles.is_rotation_locked(row)));
-        }
-        self.marbles.rods(self.model.rotation, &mut self.rods);
-    }
-
     /// Forgets what contacts remember from substep to substep.
     fn forget_contacts(&mut self) {
         self.warm.clear();
@@ -614,32 +361,6 @@ impl<S: Scalar> World<S> {
     #[must_use]
     pub fn residual(&self) -> S {
         self.impulse.residual()
-    }
-
-    /// Forgets who was [stopped](World::stopped), and the [impacts](World::impacts). A
-    /// step begins with this; whoever calls the verbs one by one begins so too.
-    pub fn begin_step(&mut self) {
-        self.rest_of_step = S::zero();
-        self.stopped.clear();
-        self.quarantine.stopped.clear();
-        self.impacts.clear();
-        self.reset_audit();
-    }
-
-    /// Begins a substep, after which `rest` seconds of the step are left: walls that were set
-    /// elsewhere and have a motion are where that puts them by then. Whoever calls the verbs one by
-    /// one in several substeps begins each so; without it, walls are at the end of their ways.
-    pub fn begin_substep(&mut self, rest: S) {
-        self.rest_of_step = if rest.is_finite() { rest.max(S::zero()) } else { S::zero() };
-        if !matches!(self.model.response, Response::EventDriven | Response::SoftStep) {
-            self.walls.interpolate_to(self.rest_of_step);
-        }
-    }
-
-    /// Ends a step: walls are at the end of their ways, and forces that were applied are forgotten.
-    pub fn end_step(&mut self) {
-        self.walls.finish_step();
-        self.marbles.clear_forces();
     }
 
     /// The grid of the last substep, for drawing it.

@@ -5,6 +5,7 @@ mod lab;
 mod sleep;
 mod wall_contacts;
 
+pub(super) use sleep::sleep_speed;
 pub(super) use wall_contacts::listed_planes;
 
 use super::build::SOON;

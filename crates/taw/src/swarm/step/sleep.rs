@@ -3,11 +3,15 @@
 use std::mem::take;
 
 use super::{leaves, wider};
+use cgmath::Zero;
+
 use crate::math::Vec3;
+use crate::swarm::chunk::Chunk;
+use crate::swarm::grid::Grid;
 use crate::swarm::kernels::{GROUNDED, squared};
 use crate::swarm::simd::Row;
 use crate::swarm::workers::{DisjointSlice, parallel_for};
-use crate::swarm::{StaticGeometry, Swarm, sleep_speed};
+use crate::swarm::{StaticGeometry, Swarm};
 
 /// Time to sleep: for so long, in seconds, all balls of a chunk lie still before they sleep.
 const TIME_TO_SLEEP: f32 = 0.5;
@@ -42,17 +46,7 @@ impl Swarm {
             let leaving =
                 rows.filter(|(_, (velocity, skin_left))| leaves(velocity, **skin_left, dt));
             chunk.leaving.extend(leaving.map(|(row, _)| row).take(most));
-            let fastest = |from: u32, to: u32| {
-                let rows = (from - chunk.rows[0]) as usize..(to - chunk.rows[0]) as usize;
-                // Not its spin: on a single point a ball may spin for ever.
-                velocity[rows].iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt()
-            };
-            let [first, last] = [chunk.layers[0] + 1, chunk.layers[1] - 1];
-            chunk.speed = [
-                fastest(chunk.rows[0], chunk.rows[1]),
-                fastest(chunk.rows[0], grid.first_of_layer(first)),
-                fastest(grid.first_of_layer(last), chunk.rows[1]),
-            ];
+            chunk.speed = largest_speeds(chunk, velocity, grid);
             let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
             chunk.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
             let lies = chunk.fastest_own.unwrap_or(chunk.speed[0]) < sleep_speed;
@@ -84,6 +78,30 @@ impl Swarm {
             }
         }
     }
+    /// Wakes a ball, and its chunk.
+    pub(in crate::swarm) fn wake(&mut self, row: usize) {
+        if self.pairs_valid {
+            let chunks = &mut self.chunks;
+            let chunk = chunks.partition_point(|chunk| chunk.rows[1] as usize <= row);
+            if let Some(chunk) = chunks.get_mut(chunk) {
+                self.sleep_version += u64::from(chunk.asleep);
+                chunk.wake(&mut self.velocity);
+            }
+        }
+        self.velocity[row][3] = self.velocity[row][3].abs();
+    }
+
+    /// Wakes all balls.
+    pub(in crate::swarm) fn wake_all(&mut self) {
+        self.sleep_version += 1;
+        for chunk in &mut self.chunks {
+            (chunk.asleep, chunk.sleep_time) = (false, 0.0);
+        }
+        for velocity in &mut self.velocity {
+            velocity[3] = velocity[3].abs();
+        }
+    }
+
     /// Wakes the chunks with balls near walls that changed since the last step.
     pub(super) fn wake_beside_changes(&mut self, walls: &dyn StaticGeometry) {
         let mut regions = Vec::new();
@@ -106,10 +124,30 @@ impl Swarm {
     }
 }
 
+/// Largest speed of a ball of a chunk, of one in its first layer, and of one in its last, in m/s.
+fn largest_speeds(chunk: &Chunk, velocity: &[Row], grid: &Grid) -> [f32; 3] {
+    let fastest = |from: u32, to: u32| {
+        let rows = (from - chunk.rows[0]) as usize..(to - chunk.rows[0]) as usize;
+        // Not its spin: on a single point a ball may spin for ever.
+        velocity[rows].iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt()
+    };
+    let [first, last] = [chunk.layers[0] + 1, chunk.layers[1] - 1];
+    [
+        fastest(chunk.rows[0], chunk.rows[1]),
+        fastest(chunk.rows[0], grid.first_of_layer(first)),
+        fastest(grid.first_of_layer(last), chunk.rows[1]),
+    ]
+}
+
 /// Returns true if a box and one of this half width about a ball overlap, or may by rounding.
 fn overlaps([low, high]: &[[f32; 3]; 2], at: &Row, reach: f32) -> bool {
     (0..3).all(|axis| {
         let reach = reach + 4.0 * f32::EPSILON * (at[axis].abs() + reach);
         at[axis] + reach >= low[axis] && at[axis] - reach <= high[axis]
     })
+}
+
+/// Speed in m/s up to which a ball counts as resting, by what gravity makes of it in its radius.
+pub(in crate::swarm) fn sleep_speed(gravity: Vec3<f32>, radius: f32) -> f32 {
+    if gravity.is_zero() { 0.0 } else { 0.05 * (crate::math::length(gravity) * radius).sqrt() }
 }
