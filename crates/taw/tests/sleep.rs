@@ -237,3 +237,33 @@ fn nothing_sleeps_in_mid_air() {
     }
     assert!(slept > 1000, "only {slept} times did any sleep");
 }
+
+#[test]
+fn walls_of_another_history_wake_all() {
+    let (world, floor, ids) = sleeping();
+    let lower = block([-5.0, -2.0, -5.0], [5.0, -1.0, 5.0]);
+    let far = block([20.0, 0.0, 0.0], [21.0, 1.0, 1.0]);
+    // The same number of changes as the world has seen, and more, of walls that began alike.
+    for extra in 0..4 {
+        let (mut seen, mut other) = (world.clone(), world.clone());
+        let lift = seen.walls.insert(far).unwrap();
+        seen.walls.set(lift, far).unwrap();
+        steps(&mut seen, 1);
+        assert_eq!(asleep(&seen, &ids), ids.len());
+        other.walls.set(floor, lower).unwrap();
+        let lift = other.walls.insert(far).unwrap();
+        (0..extra).for_each(|_| other.walls.set(lift, far).unwrap());
+        seen.walls = other.walls;
+        steps(&mut seen, 1);
+        assert_eq!(asleep(&seen, &ids), 0, "{extra}");
+    }
+    // Clones see the same, also when both change in the same way.
+    let mut pair = [world.clone(), world];
+    for world in &mut pair {
+        let lift = world.walls.insert(far).unwrap();
+        steps(world, 2);
+        world.walls.set(lift, lower).unwrap();
+        steps(world, 2);
+    }
+    assert_eq!(pair[0], pair[1]);
+}

@@ -122,7 +122,7 @@ impl Swarm {
         self.surfaces.clear();
         self.sleepless.clear(0);
         self.synced = SyncToken::default();
-        (self.pairs_valid, self.cache_valid, self.walls_version) = (false, false, None);
+        (self.pairs_valid, self.cache_valid, self.walls_identity) = (false, false, None);
         self.resize_columns();
         self.wake_all();
     }
@@ -188,7 +188,7 @@ impl Swarm {
         }
         if resurfaced {
             self.cache_impulses();
-            (self.pairs_valid, self.walls_version) = (false, None);
+            (self.pairs_valid, self.walls_identity) = (false, None);
         }
     }
 

@@ -116,7 +116,7 @@ pub struct Swarm {
     cache_valid: bool,
     /// Set while pairs and balls at walls are up to date.
     pairs_valid: bool,
-    walls_version: Option<u64>,
+    walls_identity: Option<u64>,
     gravity: Option<Vec3<f32>>,
     planes: Vec<HalfSpace>,
     stopped: Vec<u32>,
@@ -176,7 +176,7 @@ impl Swarm {
             self.pairs_valid = false; // pairs have numbers of their own
         }
         self.resize_columns();
-        self.walls_version = None;
+        self.walls_identity = None;
         self.wake_all();
         Ok(())
     }

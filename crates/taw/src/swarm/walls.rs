@@ -18,8 +18,9 @@ pub(crate) trait StaticGeometry: Sync {
     /// Visits all half-spaces: the wall, its normal, and the offset of the surface along it, in
     /// metres.
     fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<f32>, f32));
-    /// Visits the boxes in which walls changed after a version. Returns false if all may have.
-    fn visit_changes_since(&self, version: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool;
+    /// Visits the boxes in which walls changed since they had this identity. Returns false if all may
+    /// have.
+    fn visit_changes_since(&self, identity: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool;
     /// Says if there is anything else, and if some of it may be in a box.
     fn has_shapes(&self) -> bool;
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;

@@ -161,6 +161,7 @@ impl<S: Scalar> Default for World<S> {
 
 impl<S: Scalar> PartialEq for World<S> {
     fn eq(&self, other: &Self) -> bool {
+        let knows_walls = |world: &Self| world.swarm.knows_walls(world.walls.identity());
         let Self {
             model,
             gravity,
@@ -204,6 +205,7 @@ impl<S: Scalar> PartialEq for World<S> {
             && *marbles == other.marbles
             && *walls == other.walls
             && *swarm == other.swarm
+            && knows_walls(self) == knows_walls(other)
             && *contacts == other.contacts
             && quarantine.stopped == other.quarantine.stopped
             && *warm == other.warm

@@ -26,7 +26,7 @@ pub(super) struct SoftStep<S> {
     lists: Vec<Contacts<S>>,
     /// Length of the step that was integrated, in seconds.
     dt: f32,
-    /// Length of the step and version of the walls for which contacts were found.
+    /// Length of the step and identity of the walls for which contacts were found.
     found: Option<(f32, u64)>,
 }
 
@@ -96,8 +96,8 @@ impl<S: Scalar> World<S> {
             return; // the third verb says so
         }
         let (dt, gravity) = (self.soft_step.dt, cast_vector(self.gravity));
-        self.swarm.prepare(dt, gravity, &self.walls, self.walls.version());
-        self.soft_step.found = Some((dt, self.walls.version()));
+        self.swarm.prepare(dt, gravity, &self.walls, self.walls.identity());
+        self.soft_step.found = Some((dt, self.walls.identity()));
         let reach = 2.0 * length(gravity) * dt * dt;
         let marbles = &self.soft_step.marble_of_slot;
         let turns = self.model.rotation == Rotation::Dynamic;
@@ -112,10 +112,10 @@ impl<S: Scalar> World<S> {
         self.audit_contacts();
         self.sync_bodies()?; // somebody may have moved some since the first verb
         self.walls.update_tree();
-        let (step, version) = (dt.as_f64() as f32, self.walls.version());
+        let (step, identity) = (dt.as_f64() as f32, self.walls.identity());
         let found = self.soft_step.found.take();
-        if found != Some((step, version)) || !self.swarm.is_prepared() {
-            self.swarm.prepare(step, cast_vector(self.gravity), &self.walls, version);
+        if found != Some((step, identity)) || !self.swarm.is_prepared() {
+            self.swarm.prepare(step, cast_vector(self.gravity), &self.walls, identity);
         }
         self.swarm.finish(step, self.model.substeps, &self.walls);
         let marbles = &self.soft_step.marble_of_slot;

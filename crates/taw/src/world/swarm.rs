@@ -35,7 +35,7 @@ impl<S: Scalar> World<S> {
         self.sync_proxies(dt)?;
         self.walls.update_tree();
         let gravity = cast_vector(self.gravity);
-        self.swarm.step(dt, gravity, &self.walls, self.walls.version(), observe);
+        self.swarm.step(dt, gravity, &self.walls, self.walls.identity(), observe);
         self.write_back_proxies();
         Ok(())
     }
@@ -124,8 +124,8 @@ impl<S: Scalar> StaticGeometry for Walls<S> {
         !self.are_half_spaces()
     }
 
-    fn visit_changes_since(&self, version: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool {
-        Walls::visit_changes_since(self, version, |region| {
+    fn visit_changes_since(&self, identity: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool {
+        Walls::visit_changes_since(self, identity, |region| {
             let corner = |point: Point3<S>| cast_point::<S, f32>(point).into();
             visit([corner(region.min), corner(region.max)]);
         })

@@ -1,6 +1,7 @@
 //! Log of where walls changed.
 
 use std::collections::VecDeque;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use crate::math::Scalar;
 use crate::shape::Aabb3;
@@ -11,36 +12,43 @@ const MAX_CHANGES: usize = 1024;
 /// Regions in which walls changed, in order. Does not count in comparisons.
 #[derive(Clone, Debug)]
 pub(super) struct WallChanges<S> {
-    /// Version after the change, and the region; none for one without bounds.
+    /// Identity of the walls before the first change of the log.
+    base: u64,
+    /// Identity of the walls after the change, and the region; none for one without bounds.
     log: VecDeque<(u64, Option<Aabb3<S>>)>,
-    /// Version after which the log has all changes.
-    complete_since: u64,
 }
 
 impl<S> Default for WallChanges<S> {
     fn default() -> Self {
-        Self { log: VecDeque::new(), complete_since: 0 }
+        Self { base: 0, log: VecDeque::new() }
     }
 }
 
 impl<S: Scalar> WallChanges<S> {
-    /// Adds the change that made this version.
-    pub fn add(&mut self, version: u64, region: Option<Aabb3<S>>) {
+    /// Adds a change.
+    pub fn add(&mut self, region: Option<Aabb3<S>>) {
+        static NEXT: AtomicU64 = AtomicU64::new(1);
         if self.log.len() == MAX_CHANGES
             && let Some((dropped, _)) = self.log.pop_front()
         {
-            self.complete_since = dropped;
+            self.base = dropped;
         }
-        self.log.push_back((version, region));
+        self.log.push_back((NEXT.fetch_add(1, Ordering::Relaxed), region));
     }
 
-    /// Visits the regions that changed after a version. Returns false if they are not known, or
-    /// without bounds.
-    pub fn visit_since(&self, version: u64, now: u64, mut visit: impl FnMut(&Aabb3<S>)) -> bool {
-        if version < self.complete_since || version > now {
+    /// Identity of the walls as they are: that of their clones until one of them changes, and of no
+    /// others.
+    pub fn identity(&self) -> u64 {
+        self.log.back().map_or(self.base, |(identity, _)| *identity)
+    }
+
+    /// Visits the regions that changed since the walls had this identity. Returns false if they are
+    /// not known, or without bounds.
+    pub fn visit_since(&self, identity: u64, mut visit: impl FnMut(&Aabb3<S>)) -> bool {
+        let known = self.log.iter().rposition(|(known, _)| *known == identity);
+        let Some(new) = known.map(|at| at + 1).or((identity == self.base).then_some(0)) else {
             return false;
-        }
-        let new = self.log.partition_point(|(change, _)| *change <= version);
+        };
         for (_, region) in self.log.range(new..) {
             let Some(region) = region else { return false };
             visit(region);

@@ -181,14 +181,21 @@ impl<S: Scalar> Walls<S> {
         }
     }
 
-    /// Logs the region of a change that made the current version.
+    /// Logs the region of a change.
     fn log_change(&mut self, region: Option<Aabb3<S>>) {
-        self.changes.add(self.version, region);
+        self.changes.add(region);
     }
 
-    /// Visits the boxes in which walls changed after a version. Returns false if all may have.
-    pub(super) fn visit_changes_since(&self, version: u64, visit: impl FnMut(&Aabb3<S>)) -> bool {
-        self.changes.visit_since(version, self.version, visit)
+    /// Identity of the walls as they are: that of their clones until one of them changes, and of no
+    /// others.
+    pub(super) fn identity(&self) -> u64 {
+        self.changes.identity()
+    }
+
+    /// Visits the boxes in which walls changed since they had this identity. Returns false if all may
+    /// have.
+    pub(super) fn visit_changes_since(&self, identity: u64, visit: impl FnMut(&Aabb3<S>)) -> bool {
+        self.changes.visit_since(identity, visit)
     }
 
     /// Updates the tree. Moved walls are refitted.

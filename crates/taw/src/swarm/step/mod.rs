@@ -39,16 +39,16 @@ const SLOP_WEIGHTLESS: f32 = 0.01;
 /// balls meet in one. What meets after that is stopped.
 const ROUNDS: usize = 4;
 impl Swarm {
-    /// Moves the balls on by `dt` seconds. `version` changes whenever a wall does.
+    /// Moves the balls on by `dt` seconds. `walls_identity` is another whenever a wall changed.
     pub(crate) fn step(
         &mut self,
         dt: f32,
         gravity: Vec3<f32>,
         walls: &dyn StaticGeometry,
-        version: u64,
+        walls_identity: u64,
         observe: &mut dyn FnMut(Stage),
     ) {
-        let walls_changed = self.begin(gravity, walls, version);
+        let walls_changed = self.begin(gravity, walls, walls_identity);
         match self.tier() {
             Tier::Lab => self.step_lab(dt, gravity, walls, walls_changed, observe),
             Tier::Full => {
@@ -65,9 +65,9 @@ impl Swarm {
         dt: f32,
         gravity: Vec3<f32>,
         walls: &dyn StaticGeometry,
-        version: u64,
+        walls_identity: u64,
     ) {
-        let walls_changed = self.begin(gravity, walls, version);
+        let walls_changed = self.begin(gravity, walls, walls_identity);
         self.find_contacts(dt, gravity, walls, walls_changed, &mut |_| ());
     }
 
@@ -82,19 +82,24 @@ impl Swarm {
         self.end();
     }
 
+    /// Returns true if the balls at walls of this identity are known.
+    pub(crate) fn knows_walls(&self, identity: u64) -> bool {
+        self.walls_identity == Some(identity)
+    }
+
     /// Begins a step: gravity and walls. Returns whether these changed.
-    fn begin(&mut self, gravity: Vec3<f32>, walls: &dyn StaticGeometry, version: u64) -> bool {
+    fn begin(&mut self, gravity: Vec3<f32>, walls: &dyn StaticGeometry, identity: u64) -> bool {
         self.stopped.clear();
         self.steps_since_build = (self.steps_since_build + 1).min(SOON);
         if self.gravity != Some(gravity) {
             self.gravity = Some(gravity);
             self.wake_all();
         }
-        let walls_changed = self.walls_version != Some(version);
+        let walls_changed = self.walls_identity != Some(identity);
         if walls_changed {
             half_spaces(walls, &mut self.planes);
             self.wake_beside_changes(walls);
-            self.walls_version = Some(version);
+            self.walls_identity = Some(identity);
         }
         walls_changed
     }

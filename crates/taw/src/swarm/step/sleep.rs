@@ -105,7 +105,7 @@ impl Swarm {
     /// Wakes the chunks with balls near walls that changed since the last step.
     pub(super) fn wake_beside_changes(&mut self, walls: &dyn StaticGeometry) {
         let mut regions = Vec::new();
-        let since = self.walls_version.filter(|_| self.pairs_valid);
+        let since = self.walls_identity.filter(|_| self.pairs_valid);
         let known = since
             .is_some_and(|since| walls.visit_changes_since(since, &mut |box_| regions.push(box_)));
         if !known {
