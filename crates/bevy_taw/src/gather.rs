@@ -153,14 +153,14 @@ type WrittenAsleep = (
 pub const MANY: usize = 1_000;
 
 /// Queries of marbles: all, their states, those awake, and those that were written asleep.
-type MarbleQueries<'w, 's> = ParamSet<
+type MarbleQueries<'w, 's, 'a, 'b> = ParamSet<
     'w,
     's,
     (
-        Query<'w, 's, MarbleComponents<'static>>,
-        Query<'w, 's, (Entity, &'static mut MarbleState)>,
-        Query<'w, 's, MarbleComponents<'static>, Without<Sleeping>>,
-        Query<'w, 's, MarbleComponents<'static>, WrittenAsleep>,
+        Query<'a, 'b, MarbleComponents<'static>>,
+        Query<'a, 'b, (Entity, &'static mut MarbleState)>,
+        Query<'a, 'b, MarbleComponents<'static>, Without<Sleeping>>,
+        Query<'a, 'b, MarbleComponents<'static>, WrittenAsleep>,
     ),
 >;
 
