@@ -1,5 +1,6 @@
 //! Marbles by `Response::SoftStep`: many, asleep, woken, heard, and beside a swarm.
 
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::message::Messages;
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
@@ -82,6 +83,55 @@ fn a_marble_that_must_not_sleep_keeps_those_about_it_awake() {
     app.world_mut().resource_mut::<TawModel>().response = Response::Impulse;
     scene::frames(&mut app, 2);
     assert_eq!(count_sleeping(&mut app), 0);
+}
+
+#[test]
+fn sleepers_that_are_disabled_or_lose_a_component_or_their_parent_are_noticed() {
+    let mut app = app();
+    let marbles = heap(&mut app, 32);
+    let parent = app.world_mut().spawn(Transform::from_xyz(3.0, 0.0, 0.0)).id();
+    app.world_mut().entity_mut(marbles[9]).insert((GravityScale(1.5), ChildOf(parent)));
+    app.world_mut().get_mut::<Transform>(marbles[9]).unwrap().translation.x -= 3.0;
+    scene::frames(&mut app, 600);
+    assert_eq!(count_sleeping(&mut app), 32);
+    // Written with what it is: nothing happens.
+    app.world_mut().get_mut::<Transform>(marbles[4]).unwrap().set_changed();
+    scene::frames(&mut app, 3);
+    assert_eq!(count_sleeping(&mut app), 32);
+    // Refused: it is as it was, and sleeps on.
+    let before = scene::position(&app, marbles[4]);
+    app.world_mut().get_mut::<Transform>(marbles[4]).unwrap().translation.x = f32::NAN;
+    scene::frames(&mut app, 1);
+    assert_eq!(scene::position(&app, marbles[4]), before);
+    assert_eq!(count_sleeping(&mut app), 32);
+    let id = |app: &App, entity: Entity| {
+        let world = app.world().resource::<TawWorld>();
+        let mut rows = 0..u32::try_from(world.marbles.len()).unwrap();
+        let row = rows.find(|row| world.marble_entity(*row) == Some(entity));
+        row.and_then(|row| world.marbles.id(row as usize))
+    };
+    // Its parent goes: the place stays.
+    let child = id(&app, marbles[9]).unwrap();
+    app.world_mut().entity_mut(marbles[9]).remove::<ChildOf>();
+    scene::frames(&mut app, 1);
+    let place = app.world().resource::<TawWorld>().marbles.get(child).unwrap().position;
+    assert_eq!(scene::position(&app, marbles[9]), Vec3::new(place.x, place.y, place.z));
+    app.world_mut().entity_mut(marbles[9]).remove::<GravityScale>();
+    scene::frames(&mut app, 1);
+    let marble = app.world().resource::<TawWorld>().marbles.get(child).unwrap();
+    assert_eq!(marble.gravity_scale.to_bits(), 1.0_f32.to_bits());
+    scene::frames(&mut app, 300);
+    assert_eq!(count_sleeping(&mut app), 32);
+    // One goes as another comes.
+    for [goes, comes] in [[3, 3], [5, 3], [8, 5], [8, 8]] {
+        app.world_mut().entity_mut(marbles[goes]).insert(Disabled);
+        app.world_mut().entity_mut(marbles[comes]).remove::<Disabled>();
+        scene::frames(&mut app, 300);
+    }
+    app.world_mut().entity_mut(marbles[8]).remove::<Disabled>();
+    scene::frames(&mut app, 600);
+    assert!(marbles.iter().all(|marble| id(&app, *marble).is_some()));
+    assert_eq!(count_sleeping(&mut app), 32);
 }
 
 #[test]

@@ -116,18 +116,21 @@ pub struct Settings {
 /// Marbles that others changed, besides those that components tell.
 #[derive(Resource, Default)]
 pub struct ChangedMarbles {
-    /// Lost an optional component since the last step.
+    /// Lost an optional component or their parent since the last step, asleep.
     pub lost_component: Vec<Entity>,
     /// Were taken over in this step.
     pub gathered: Vec<Entity>,
 }
 
-/// Notes that an entity lost an optional component.
+/// Notes that a marble asleep lost an optional component, or its parent.
 pub fn note_lost_component<C: Component>(
     removed: On<Remove, C>,
+    asleep: Query<(), (With<Marble>, With<Sleeping>)>,
     mut changed: ResMut<ChangedMarbles>,
 ) {
-    changed.lost_component.push(removed.entity);
+    if asleep.contains(removed.entity) {
+        changed.lost_component.push(removed.entity);
+    }
 }
 
 /// Marbles asleep of which a component was written, if only with the same value.
@@ -171,7 +174,7 @@ pub fn marbles(
     mut queries: MarbleQueries,
     transforms: TransformHelper,
     entities: &Entities,
-    (mut refusals, mut removed): (Refusals, MessageWriter<RowRemoved>),
+    (mut refusals, mut removed, mut commands): (Refusals, MessageWriter<RowRemoved>, Commands),
     mut last: Local<Settings>,
     mut changed: ResMut<ChangedMarbles>,
 ) {
@@ -183,6 +186,8 @@ pub fn marbles(
         let states = queries.p1();
         let stale = states.iter().filter(|(_, state)| state.stale).map(|(entity, _)| entity);
         changed.gathered.extend(stale);
+        changed.gathered.sort_unstable();
+        changed.gathered.dedup();
     }
     let mut without_row = 0;
     let mut marbles = queries.p0();
@@ -193,7 +198,8 @@ pub fn marbles(
     }
     let visible = queries.p1();
     if visible.iter().len() != world.marbles.len() + without_row {
-        snapshot::take_out_marbles(&mut world, &visible, entities, &mut removed);
+        let (removed, commands) = (&mut removed, &mut commands);
+        snapshot::take_out_marbles(&mut world, &visible, entities, removed, commands);
     }
     let Model { rotation, response, .. } = world.model();
     *last = Settings { rotation, response, marbles: world.marbles.len() };
@@ -244,7 +250,10 @@ fn find_stale(
     if !all {
         queries.p3().iter_mut().for_each(look);
         for entity in lost_component {
-            let _ = queries.p0().get_mut(entity).map(look); // it may be gone
+            // One that was despawned is gone.
+            if queries.p0().get_mut(entity).map(look).is_ok() {
+                changed.gathered.push(entity);
+            }
         }
     }
     any.into_inner()

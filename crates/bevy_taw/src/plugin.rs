@@ -122,6 +122,7 @@ fn observe(app: &mut App) {
         .add_observer(gather::note_lost_component::<MarbleIntegrator>)
         .add_observer(gather::note_lost_component::<MarbleRotation>)
         .add_observer(gather::note_lost_component::<SleepingDisabled>)
+        .add_observer(gather::note_lost_component::<ChildOf>)
         .add_observer(gather::forget_marble)
         .add_observer(gather::forget_wall)
         .add_observer(swarm::forget);

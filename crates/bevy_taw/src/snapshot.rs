@@ -6,7 +6,7 @@ use bevy::prelude::*;
 use taw::swarm::BallId;
 use taw::world::{MarbleId, WallId};
 
-use crate::components::{MarbleState, WallState};
+use crate::components::{MarbleState, Sleeping, WallState};
 use crate::resources::TawWorld;
 
 /// The physics of an app as it was: see [`TawWorld::snapshot`].
@@ -105,6 +105,7 @@ pub(crate) fn take_out_marbles(
     visible: &Query<(Entity, &mut MarbleState)>,
     entities: &Entities,
     removed: &mut MessageWriter<RowRemoved>,
+    commands: &mut Commands,
 ) {
     let has_row = |id| {
         let entity = world.marble_entities.get(&id)?;
@@ -120,6 +121,7 @@ pub(crate) fn take_out_marbles(
             entity.filter(|entity| entities.contains(*entity) && visible.get(*entity).is_err())
         {
             world.away.insert(entity, marble);
+            commands.entity(entity).try_remove::<Sleeping>(); // what is away is awake when it comes back
         } else {
             log::warn!("taw took out {id:?}: no entity stands behind it");
             removed.write(RowRemoved::Marble(id));

@@ -236,6 +236,7 @@ impl Swarm {
     /// Takes balls out, those of marbles too.
     pub(crate) fn take_out(&mut self, balls: &[BallId]) -> Result<(), Error> {
         self.ids.check(balls)?;
+        self.sleep_version += 1;
         self.cache_impulses();
         for ball in balls {
             if let Some(slot) = self.slot_of(*ball) {

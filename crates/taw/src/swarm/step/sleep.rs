@@ -93,13 +93,15 @@ impl Swarm {
 
     /// Wakes all balls.
     pub(in crate::swarm) fn wake_all(&mut self) {
-        self.sleep_version += 1;
         for chunk in &mut self.chunks {
             (chunk.asleep, chunk.sleep_time) = (false, 0.0);
         }
+        let mut any = false;
         for velocity in &mut self.velocity {
+            any |= velocity[3].is_sign_negative();
             velocity[3] = velocity[3].abs();
         }
+        self.sleep_version += u64::from(any);
     }
 
     /// Wakes the chunks with balls near walls that changed since the last step.
