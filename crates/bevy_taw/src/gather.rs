@@ -186,8 +186,6 @@ pub fn marbles(
         let states = queries.p1();
         let stale = states.iter().filter(|(_, state)| state.stale).map(|(entity, _)| entity);
         changed.gathered.extend(stale);
-        changed.gathered.sort_unstable();
-        changed.gathered.dedup();
     }
     let mut without_row = 0;
     let mut marbles = queries.p0();
