@@ -108,7 +108,7 @@ impl TawTrade {
                 let mut told = ours.lock().unwrap_or_else(PoisonError::into_inner);
                 *told = Told { part: done as f32 / all as f32, news: Some(advice.clone()) };
             };
-            advise(&snapshot, wish, tell).await
+            Box::pin(advise(&snapshot, wish, tell)).await
         });
         self.advice = Advice::default();
         self.measuring = Some(Measuring { task, told, part: 0.0 });

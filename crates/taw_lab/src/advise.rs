@@ -84,9 +84,9 @@ impl ReplayableScene for Scene {
                 ball
             });
             let scene = Scene { marbles: marbles.collect(), lattices: Vec::new(), ..self.clone() };
-            record_scene(&scene, setting, every).await
+            Box::pin(record_scene(&scene, setting, every)).await
         } else {
-            record_scene(self, setting, every).await
+            Box::pin(record_scene(self, setting, every)).await
         }
     }
 }

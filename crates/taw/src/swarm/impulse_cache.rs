@@ -45,7 +45,7 @@ impl ImpulseCache {
             // SAFETY: the first ball of a pair is in the chunk, so only one thread counts it; and
             // the fast movers come alone.
             let count = |[row, _]: [u32; 2], _: CachedImpulse| unsafe {
-                *counts.row(row as usize + 2) += 1
+                *counts.row(row as usize + 2) += 1;
             };
             parallel_for(threads, chunks.len(), |_, chunk| {
                 for_each_loaded(&chunks[chunk].batches, &chunks[chunk].impulses, count);

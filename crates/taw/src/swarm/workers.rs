@@ -191,7 +191,7 @@ pub(super) fn parallel_for(threads: usize, count: usize, job: impl Fn(usize, usi
 /// Does something with so many rows, some at a time.
 pub(super) fn parallel_for_rows(threads: usize, rows: usize, job: impl Fn(Range<usize>) + Sync) {
     parallel_for(threads, rows.div_ceil(ROWS), |_, part| {
-        job(part * ROWS..rows.min((part + 1) * ROWS))
+        job(part * ROWS..rows.min((part + 1) * ROWS));
     });
 }
 
