@@ -132,9 +132,10 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Returns true if a marble sleeps: in a model with [`Response::SoftStep`], while it and all about
-    /// it have been at rest for half a second. What sleeps costs next to nothing, and has no velocity.
-    /// It wakes when it is touched or set, when a wall or gravity changes, and when a neighbour wakes.
+    /// Returns true if a marble sleeps: in a model with
+    /// [`Response::SoftStep`](crate::response::Response::SoftStep), while it and all about it have
+    /// been at rest for half a second. What sleeps costs next to nothing, and has no velocity. It
+    /// wakes when it is touched or set, when a wall or gravity changes, and when a neighbour wakes.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].

@@ -13,7 +13,8 @@ use crate::response::penalty::{PenaltySettings, apply_penalty_forces};
 use crate::response::{ContactLaw, Response};
 
 impl<S: Scalar> World<S> {
-    /// Moves the world on by `dt` seconds, in [`Model::substeps`] equal parts.
+    /// Moves the world on by `dt` seconds, in [`Model::substeps`](super::Model::substeps) equal
+    /// parts.
     ///
     /// A marble whose motion overflows keeps its last place, loses its velocity and its spin,
     /// and is named by [`World::stopped`]; no marble that does not touch it is affected.
