@@ -242,6 +242,27 @@ proptest! {
         check_all(&first, &second, scale, offset, 200)?;
     }
 
+    /// Side by side, end to end or in one line; the test of millions found a manifold 5 % of the
+    /// size too deep where one capsule goes on beyond the end of the other.
+    #[test]
+    fn capsules_that_are_nearly_parallel_touch_where_they_are_nearest(
+        shift in (-2.0..2.0_f64, -0.5..0.5_f64, -0.5..0.5_f64),
+        tilt in (-8e-3..8e-3_f64, -8e-3..8e-3_f64),
+        long in (1e-3..2.0_f64, 1e-3..2.0_f64),
+        radius in (0.0..0.3_f64, 0.0..0.3_f64),
+    ) {
+        let end = Point3::new(shift.0, shift.1, shift.2);
+        let way = Vec3::new(1.0, tilt.0, tilt.1) * long.1;
+        let lying =
+            Capsule { a: Point3::origin(), b: Point3::new(long.0, 0.0, 0.0), radius: radius.0 };
+        for (a, b) in [(end, end + way), (end, end - way)] {
+            let other = Capsule { a, b, radius: radius.1 };
+            let (lying, other) = (Thing::Capsule(lying), Thing::Capsule(other));
+            check_manifold(&lying, &other, 4.0, 4.0)?;
+            check_manifold(&other, &lying, 4.0, 4.0)?;
+        }
+    }
+
     #[test]
     fn a_plane_touches_what_reaches_it(first in numbers(), offset in -2.0..2.0_f64) {
         let plane = Plane::through(Point3::new(0.0, offset, 0.0), Vec3::new(0.3, 1.0, -0.2)).unwrap();

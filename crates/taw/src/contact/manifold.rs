@@ -212,7 +212,7 @@ fn clip_segment(
     }
 }
 
-/// End points of the overlap of two parallel segments, if any.
+/// End points of the overlap of two nearly parallel segments, if any.
 fn contact_points_of_parallel_segments(
     [p, q]: [Vec3<f64>; 2],
     other: [Vec3<f64>; 2],
@@ -224,15 +224,16 @@ fn contact_points_of_parallel_segments(
     if along.cross(across).magnitude2() > PARALLEL_SIN * PARALLEL_SIN {
         return points;
     }
-    for (number, end) in (0..).zip(other) {
-        let part = (end - p).dot(along);
-        let held = part.clamp(0.0, long);
-        let (on_a, on_b) = (p + along * held, end + along * (held - part));
+    let parts = other.map(|end| (end - p).dot(along));
+    let held = parts.map(|part| part.clamp(0.0, long));
+    if held[0] == held[1] {
+        return points; // One lies beyond an end of the other.
+    }
+    for (number, held) in (0..).zip(held) {
+        let share = (held - parts[0]) / (parts[1] - parts[0]);
+        let (on_a, on_b) = (p + along * held, other[0] + (other[1] - other[0]) * share);
         let distance = (on_b - on_a).dot(normal);
-        let next = ContactPoint { on_a, on_b, distance, feature: number };
-        if points.iter().all(|other: &ContactPoint| (other.on_a - next.on_a).magnitude2() > 0.0) {
-            points.push(next);
-        }
+        points.push(ContactPoint { on_a, on_b, distance, feature: number });
     }
     points
 }
