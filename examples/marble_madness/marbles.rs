@@ -96,6 +96,7 @@ fn make_look(
     });
 }
 
+#[expect(clippy::too_many_arguments, reason = "a Bevy system")]
 fn obey(
     mut orders: MessageReader<Order>,
     mut commands: Commands,

@@ -67,6 +67,7 @@ fn measure(mut trade: ResMut<TawTrade>, mut world: ResMut<TawWorld>, fixed: Res<
     trade.measure(&mut world, fixed.timestep());
 }
 
+#[expect(clippy::too_many_arguments, reason = "a Bevy system")]
 fn panels(
     mut contexts: EguiContexts,
     mut open: ResMut<Open>,

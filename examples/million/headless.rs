@@ -46,6 +46,11 @@ fn pour(options: &Options) -> Result<(), taw::Error> {
         options.model().threads,
         inserted.as_millis()
     );
+    run_and_report(&mut world, options.steps)
+}
+
+/// Steps the swarm and prints a line for every 60 steps.
+fn run_and_report(world: &mut World<f32>, steps: u32) -> Result<(), taw::Error> {
     println!(
         "| steps | ms a step, median | mean | integrate | order | pairs | walls | restitute | ns a marble | sought anew | asleep | bytes a marble |"
     );
@@ -53,7 +58,7 @@ fn pour(options: &Options) -> Result<(), taw::Error> {
     let mut times = Vec::new();
     let mut stages = [Duration::ZERO; STAGES.len()];
     let mut rebuilds = world.swarm.rebuilds();
-    for step in 1..=options.steps {
+    for step in 1..=steps {
         let mut last: Option<(Stage, Instant)> = None;
         let began = Instant::now();
         world.step_swarm(1.0 / 60.0, &mut |stage| {
@@ -62,7 +67,7 @@ fn pour(options: &Options) -> Result<(), taw::Error> {
         })?;
         add(&mut stages, last, Instant::now());
         times.push(began.elapsed());
-        if step % 60 == 0 || step == options.steps {
+        if step % 60 == 0 || step == steps {
             times.sort_unstable();
             let ms = |time: Duration| time.as_secs_f64() * 1e3;
             let median = ms(times[times.len() / 2]);

@@ -72,7 +72,7 @@ pub fn board(app: &mut App) -> Entity {
     board
 }
 
-/// A pseudo-random number in [0, 1) for each `seed` (SplitMix64, Steele 2014).
+/// A pseudo-random number in [0, 1) for each `seed` (`SplitMix64`, Steele 2014).
 pub fn random(seed: u64) -> f32 {
     let mut z = seed.wrapping_add(1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);

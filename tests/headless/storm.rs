@@ -127,13 +127,10 @@ impl Storm {
         (count > 0).then(|| self.marbles[self.random.usize(0..count)])
     }
 
-    /// Does one of the things that games do.
-    fn disturb(&mut self) {
-        let Some(marble) = self.some_marble() else { return self.spawn_marble() };
-        let (parent, ..) = self.parents[self.random.usize(0..self.parents.len())];
+    /// Moves, adds or removes something.
+    fn rearrange(&mut self, what: u32, marble: Entity, parent: Entity) {
         let random = &mut self.random;
-        let bad = [f32::NAN, f32::INFINITY, -1.0, 0.0, 1e-40, 1e30, f32::MAX][random.usize(0..7)];
-        match random.u32(0..17) {
+        match what {
             0 => {
                 let to = point(random, HALF - 1.0);
                 self.app.world_mut().get_mut::<Transform>(marble).unwrap().translation = to;
@@ -163,7 +160,18 @@ impl Storm {
                 let wall = self.walls.swap_remove(random.usize(0..self.walls.len()));
                 self.app.world_mut().despawn(wall);
             }
-            7 => self.spawn_wall(),
+            _ => self.spawn_wall(),
+        }
+    }
+
+    /// Does one of the things that games do.
+    fn disturb(&mut self) {
+        let Some(marble) = self.some_marble() else { return self.spawn_marble() };
+        let (parent, ..) = self.parents[self.random.usize(0..self.parents.len())];
+        let random = &mut self.random;
+        let bad = [f32::NAN, f32::INFINITY, -1.0, 0.0, 1e-40, 1e30, f32::MAX][random.usize(0..7)];
+        match random.u32(0..17) {
+            what @ 0..8 => self.rearrange(what, marble, parent),
             8 | 9 => {
                 let wall = self.walls.first().copied().unwrap_or(marble);
                 let entity = if random.bool() { marble } else { wall };

@@ -265,8 +265,6 @@ fn take_over(
     refusals: &mut Refusals,
 ) -> bool {
     let seen = SeenMarble::of(*marble, transform, &optional);
-    let (half_length, velocity, spin, mass, gravity_scale, damping, material, _, _, _) = optional;
-    let half_length = *half_length.copied().unwrap_or_default();
     let place = if is_child {
         transforms.compute_global_transform(entity).map(|t| t.compute_transform())
     } else {
@@ -282,24 +280,8 @@ fn take_over(
         return state.id.is_some();
     }
     let last = std::mem::replace(&mut state.seen, seen);
-    let mut now = core::Marble {
-        position: to_point(place.translation),
-        radius: marble.radius,
-        half_length,
-        velocity: to_vector(velocity.map_or(Vec3::ZERO, |v| **v)),
-        rotation: to_rotation(place.rotation),
-        angular_velocity: to_vector(spin.map_or(Vec3::ZERO, |s| **s)),
-        mass: mass.copied().unwrap_or_default().into(),
-        gravity_scale: *gravity_scale.copied().unwrap_or_default(),
-        damping: damping.map_or_else(core::Damping::default, |d| core::Damping {
-            linear: d.linear,
-            angular: d.angular,
-        }),
-        integrator: seen.integrator,
-        rotation_model: seen.rotation_model,
-        material: material.map(|m| (*m).into()),
-        sleeping_disabled: seen.sleeping_disabled,
-    };
+    let mut now = to_core(*marble, &place, &optional, &seen);
+    let half_length = now.half_length;
     let balls_only = !world.model().response.knows_capsules() && half_length > 0.0;
     let check = |result: Result<(), Refusal>| refusals.check(Some(entity), result);
     if let Some(id) = state.id {
@@ -326,6 +308,34 @@ fn take_over(
     });
     state.refused = !refusals.check(Some(entity), inserted);
     !state.refused
+}
+
+/// Marble of an entity with these components.
+fn to_core(
+    marble: Marble,
+    place: &Transform,
+    optional: &OptionalComponents,
+    seen: &SeenMarble,
+) -> core::Marble<f32> {
+    let (half_length, velocity, spin, mass, gravity_scale, damping, material, ..) = *optional;
+    core::Marble {
+        position: to_point(place.translation),
+        radius: marble.radius,
+        half_length: *half_length.copied().unwrap_or_default(),
+        velocity: to_vector(velocity.map_or(Vec3::ZERO, |v| **v)),
+        rotation: to_rotation(place.rotation),
+        angular_velocity: to_vector(spin.map_or(Vec3::ZERO, |s| **s)),
+        mass: mass.copied().unwrap_or_default().into(),
+        gravity_scale: *gravity_scale.copied().unwrap_or_default(),
+        damping: damping.map_or_else(core::Damping::default, |d| core::Damping {
+            linear: d.linear,
+            angular: d.angular,
+        }),
+        integrator: seen.integrator,
+        rotation_model: seen.rotation_model,
+        material: material.map(|m| (*m).into()),
+        sleeping_disabled: seen.sleeping_disabled,
+    }
 }
 
 /// Makes a marble that comes back go on as it was, but for what was written since.

@@ -94,6 +94,7 @@ fn block() -> Mesh {
 }
 
 /// Hands the marbles over, as far as they are between the last two steps.
+#[expect(clippy::too_many_arguments, reason = "a Bevy system")]
 fn draw(
     mut commands: Commands,
     mut drawn: ResMut<Drawn>,
@@ -124,11 +125,42 @@ fn draw(
     };
     // A step behind, on the way to where they are.
     let ago = fixed.timestep().as_secs_f32() * (1.0 - fixed.overstep_fraction());
+    let data = quads(swarm, blocks, ago, &tint_of);
+    // A buffer of the same size is written, not made anew.
+    let buffer = drawn.buffer.clone();
+    if drawn.blocks.len() == blocks
+        && let Some(mut buffer) = buffers.get_mut(&buffer)
+    {
+        buffer.data = Some(data);
+        return;
+    }
+    if drawn.blocks.is_empty() {
+        drawn.mesh = meshes.add(block());
+    }
+    drawn.buffer = buffers.add(ShaderBuffer::new(&data, RenderAssetUsages::default()));
+    drawn.material = materials.add(SwarmMaterial { marbles: drawn.buffer.clone() });
+    for entity in drawn.blocks.drain(..) {
+        commands.entity(entity).despawn();
+    }
+    let Drawn { mesh, material, blocks: entities, .. } = &mut *drawn;
+    let block = |number: usize| {
+        let parts = (Mesh3d(mesh.clone()), MeshMaterial3d(material.clone()));
+        (Name::new("swarm"), parts, MeshTag(number as u32), NoFrustumCulling, Transform::default())
+    };
+    entities.extend((0..blocks).map(|number| commands.spawn(block(number)).id()));
+}
+
+/// Position, radius and color of each ball `ago` seconds before now, for the shader.
+fn quads(
+    swarm: &taw::swarm::Swarm,
+    blocks: usize,
+    ago: f32,
+    tint_of: &(impl Fn(u32) -> Tint + Sync),
+) -> Vec<u8> {
     let mut data = vec![0_u8; blocks * BLOCK * BYTES];
     let rows = swarm.balls().chunks(BLOCK).zip(swarm.velocities().chunks(BLOCK));
     let rows = rows.zip(swarm.slots().chunks(BLOCK)).enumerate();
     ComputeTaskPool::get_or_init(Default::default).scope(|scope| {
-        let tint_of = &tint_of;
         for ((number, ((balls, velocities), slots)), data) in
             rows.zip(data.chunks_mut(BLOCK * BYTES))
         {
@@ -152,28 +184,7 @@ fn draw(
             });
         }
     });
-    // A buffer of the same size is written, not made anew.
-    let buffer = drawn.buffer.clone();
-    if drawn.blocks.len() == blocks
-        && let Some(mut buffer) = buffers.get_mut(&buffer)
-    {
-        buffer.data = Some(data);
-        return;
-    }
-    if drawn.blocks.is_empty() {
-        drawn.mesh = meshes.add(block());
-    }
-    drawn.buffer = buffers.add(ShaderBuffer::new(&data, RenderAssetUsages::default()));
-    drawn.material = materials.add(SwarmMaterial { marbles: drawn.buffer.clone() });
-    for entity in drawn.blocks.drain(..) {
-        commands.entity(entity).despawn();
-    }
-    let Drawn { mesh, material, blocks: entities, .. } = &mut *drawn;
-    let block = |number: usize| {
-        let parts = (Mesh3d(mesh.clone()), MeshMaterial3d(material.clone()));
-        (Name::new("swarm"), parts, MeshTag(number as u32), NoFrustumCulling, Transform::default())
-    };
-    entities.extend((0..blocks).map(|number| commands.spawn(block(number)).id()));
+    data
 }
 
 fn place([x, y, z, _]: &[f32; 4]) -> Vec3 {

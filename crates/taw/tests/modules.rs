@@ -1,4 +1,5 @@
-//! The order in which the core's modules may use each other, as the table in `lib.rs` has it.
+//! The order in which the core's modules may use each other, as the table in `lib.rs` has it, and
+//! the length of files. (`clippy.toml` limits that of functions.)
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -50,4 +51,21 @@ fn no_module_uses_one_that_comes_later() {
         }
     }
     assert!(checked > 100, "only {checked} files were found");
+}
+
+/// Lines of a source file at most.
+const LONGEST: usize = 500;
+
+#[test]
+fn no_file_is_too_long_to_read() {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
+    let mut all = Vec::new();
+    for folder in ["crates", "examples", "tests", "peers/src"] {
+        files(&workspace.join(folder), &mut all);
+    }
+    all.retain(|path| path.extension().is_some_and(|ending| ending == "rs"));
+    let lines = |path: &PathBuf| fs::read_to_string(path).unwrap().lines().count();
+    let long: Vec<_> = all.iter().filter(|path| lines(path) > LONGEST).collect();
+    assert!(long.is_empty(), "over {LONGEST} lines: {long:#?}");
+    assert!(all.len() > 300, "only {} files were found", all.len());
 }

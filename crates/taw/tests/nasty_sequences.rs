@@ -77,6 +77,28 @@ struct Trial<S> {
     reaches_far: bool,
 }
 
+/// A marble one of whose fields is odd.
+fn odd_marble<S: Scalar>(call: &Call) -> Marble<S> {
+    let [a, b, c, d] = call.numbers.map(S::from_f64);
+    let v = Vec3::new(a, b, c);
+    let mut marble = Marble::new(Point3::new(a, b.abs(), c), d);
+    match call.whom {
+        0 => marble.velocity = v,
+        1 => marble.angular_velocity = v,
+        2 => marble.mass = Mass::Density(a),
+        3 => marble.mass = Mass::Kilograms(b),
+        4 => marble.damping = Damping { linear: a, angular: b },
+        5 => marble.gravity_scale = b,
+        6 => marble.mass = Mass::Infinite,
+        7 => {
+            marble.material = Some(Material { friction: a, restitution: b, ..Material::default() });
+        }
+        8 => marble.rotation = Quat::new(a, b, c, d),
+        _ => {}
+    }
+    marble
+}
+
 impl<S: Scalar> Trial<S> {
     fn new(model: Model) -> Self {
         let mut worlds = [World::default(), World::default()];
@@ -110,26 +132,7 @@ impl<S: Scalar> Trial<S> {
         let id = self.near.get(usize::from(call.whom) % self.near.len().max(1)).copied();
         let wall = self.walls.get(usize::from(call.whom) % self.walls.len().max(1)).copied();
         let outcome = match (call.which, id) {
-            (0..8, _) | (_, None) => {
-                let position = Point3::new(a, b.abs(), c);
-                let mut marble = Marble::new(position, d);
-                match call.whom {
-                    0 => marble.velocity = v,
-                    1 => marble.angular_velocity = v,
-                    2 => marble.mass = Mass::Density(a),
-                    3 => marble.mass = Mass::Kilograms(b),
-                    4 => marble.damping = Damping { linear: a, angular: b },
-                    5 => marble.gravity_scale = b,
-                    6 => marble.mass = Mass::Infinite,
-                    7 => {
-                        marble.material =
-                            Some(Material { friction: a, restitution: b, ..Material::default() });
-                    }
-                    8 => marble.rotation = Quat::new(a, b, c, d),
-                    _ => {}
-                }
-                marbles.insert(marble).map(|id| self.near.push(id))
-            }
+            (0..8, _) | (_, None) => marbles.insert(odd_marble(call)).map(|id| self.near.push(id)),
             (8, Some(id)) => marbles.remove(id).map(|_| {
                 self.near.retain(|it| *it != id);
                 self.remove_alone();

@@ -91,7 +91,7 @@ impl<S: Scalar> FreeRotation<S> {
     /// A symmetric top, with two equal moments, is solved exactly for any `dt`. The excess of an
     /// asymmetric one is split off and applied half before, half after (Strang), which makes the
     /// step order 2 and reversible (Touma and Wisdom, *Lie-Poisson integrators for rigid body
-    /// dynamics*, 1994; Dullweber, Leimkuhler and McLachlan 1997).
+    /// dynamics*, 1994; Dullweber, Leimkuhler and `McLachlan` 1997).
     #[must_use]
     pub fn step(self, inertia: Vec3<S>, dt: S) -> Self {
         let inverse: Vec3<f64> = inertia.map(|moment| 1.0 / moment.as_f64());

@@ -117,7 +117,7 @@ impl Swarm {
             self.old_rows.clear();
         }
         self.proxies.clear();
-        self.proxy_rows.clear();
+        self.scratch.proxy_rows.clear();
         self.velocity_changes.clear();
         self.surfaces.clear();
         self.sleepless.clear(0);

@@ -1,12 +1,14 @@
 //! Order of the rows, and the search for pairs.
 
 use super::batches::{pairs_in, take_out};
+use super::bit_set::BitSet;
 use super::chunk::Chunk;
-use super::fast_movers::FastMovers;
-use super::grid::{reorder, reorder_rows};
-use super::impulse_cache::shrink_slack;
+use super::fast_movers::{FastMovers, SortedBalls};
+use super::grid::{Grid, reorder, reorder_rows};
+use super::impulse_cache::{ImpulseCache, shrink_slack};
 use super::kernels::squared;
 use super::neighbours::{FindPairs, NeighbourLists, Search};
+use super::simd::SimdLevel;
 use super::step::listed_planes;
 use super::surfaces::SurfaceOf;
 use super::workers::{DisjointSlice, parallel_filter, parallel_for, parallel_for_rows};
@@ -50,7 +52,7 @@ impl Swarm {
         let skin = self.skin;
         // The remaining skins lend their column to the order: they are set after that.
         let order = bytemuck::cast_slice_mut(&mut self.skin_left);
-        self.grid.sort(&self.at, 2.0 * skin, threads, order, &mut self.scratch);
+        self.grid.sort(&self.at, 2.0 * skin, threads, order, &mut self.neighbours);
         self.reorder();
         self.reset_skins(dt, skin);
         observe(Stage::Pairs);
@@ -74,7 +76,7 @@ impl Swarm {
         if !self.has_friction() {
             return margin;
         }
-        let mut displacements = std::mem::take(&mut self.displacements);
+        let mut displacements = std::mem::take(&mut self.scratch.displacements);
         displacements.clear();
         let displacement = |velocity: &[f32; 4]| 2.0 * squared(*velocity).sqrt() * dt;
         displacements.extend(
@@ -86,7 +88,7 @@ impl Swarm {
             let nth = displacements.len() - 1 - alone;
             skin = *displacements.select_nth_unstable_by(nth, f32::total_cmp).1;
         }
-        self.displacements = displacements;
+        self.scratch.displacements = displacements;
         skin.min(WIDE * self.mean_radius).max(margin)
     }
 
@@ -108,9 +110,9 @@ impl Swarm {
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
         let skins_left = DisjointSlice::new(&mut self.skin_left);
-        let mut fast = std::mem::take(&mut self.leaving);
+        let mut fast = std::mem::take(&mut self.scratch.leaving);
         fast.clear();
-        parallel_filter(threads, at.len(), &mut self.lists, &mut fast, |rows, fast| {
+        parallel_filter(threads, at.len(), &mut self.scratch.lists, &mut fast, |rows, fast| {
             // SAFETY: each job has its own rows.
             let skins_left = unsafe { skins_left.part(rows.clone()) };
             for (row, skin_left) in rows.zip(skins_left) {
@@ -135,7 +137,7 @@ impl Swarm {
                 self.fast_movers.add(*row);
             }
         }
-        self.leaving = fast;
+        self.scratch.leaving = fast;
     }
 
     /// Finds pairs for balls that leave their skin, or for all, if these are too many.
@@ -166,21 +168,13 @@ impl Swarm {
     }
 
     fn find_fast_movers(&mut self, skin: f32) {
-        let (has_friction, search) = (self.has_friction(), &mut self.searches[0]);
-        let sizes = [self.max_radius, skin];
+        let (has_friction, search) = (self.has_friction(), &mut self.scratch.searches[0]);
         let (slots, proxies) = (self.ids.slots(), &self.body_slots);
         // Bodies that are rows meet like all others.
         let apart = has_friction && !self.proxies.is_empty();
         let proxy = |row: u32| apart && proxies.contains(slots[row as usize]);
-        self.fast_movers.find(
-            &self.grid,
-            &self.at,
-            &self.skin_left,
-            sizes,
-            search,
-            &proxy,
-            has_friction,
-        );
+        let balls = SortedBalls { grid: &self.grid, at: &self.at, skin_left: &self.skin_left };
+        self.fast_movers.find(&balls, self.max_radius + skin, search, &proxy, has_friction);
         if has_friction {
             let surfaces =
                 SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
@@ -191,7 +185,7 @@ impl Swarm {
 
     fn reorder(&mut self) {
         let (threads, has_friction) = (self.model.threads as usize, self.has_friction());
-        let (order, scratch) = (bytemuck::cast_slice(&self.skin_left), &mut self.scratch);
+        let (order, scratch) = (bytemuck::cast_slice(&self.skin_left), &mut self.neighbours);
         reorder_rows(&mut self.at, scratch, order, threads);
         reorder_rows(&mut self.velocity, scratch, order, threads);
         if has_friction {
@@ -251,52 +245,31 @@ impl Swarm {
         let (threads, has_friction, tier) =
             (self.model.threads as usize, self.has_friction(), self.tier());
         let (simd_level, ahead) = (self.simd_level, self.ahead(dt));
-        self.searches.resize(threads, Search::default());
+        self.scratch.searches.resize(threads, Search::default());
         let chunks = DisjointSlice::new(&mut self.chunks);
-        let searches = DisjointSlice::new(&mut self.searches);
-        let (grid, at, skin_left) = (&self.grid, &self.at[..], &self.skin_left[..]);
+        let searches = DisjointSlice::new(&mut self.scratch.searches);
+        let (at, skin_left, slots) = (&self.at[..], &self.skin_left[..], self.ids.slots());
         let (impulse_cache, old_rows, planes) =
             (&self.impulse_cache, &self.old_rows[..], listed_planes(&self.planes, tier));
         let shapes = walls.has_shapes();
-        let (slots, proxies) = (self.ids.slots(), &self.body_slots);
-        let proxy = |row: u32| proxies.contains(slots[row as usize]);
-        let several_proxies = self.proxies.len() > 1;
-        let neighbours = DisjointSlice::new(bytemuck::cast_slice_mut(&mut self.scratch));
+        let neighbours = DisjointSlice::new(bytemuck::cast_slice_mut(&mut self.neighbours));
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
         let balls = walls::Balls { at, velocity: &self.velocity, skin_left, ahead, surfaces };
+        let pairs = PairSearch {
+            simd_level,
+            grid: &self.grid,
+            balls,
+            skin,
+            proxies: (self.proxies.len() > 1).then_some(&self.body_slots),
+            cache: has_friction.then_some((impulse_cache, old_rows)),
+        };
         parallel_for(threads, chunks.len(), |thread, chunk| {
             // SAFETY: its thread's, and its own.
             let (search, chunk) = unsafe { (&mut *searches.row(thread), &mut *chunks.row(chunk)) };
             // SAFETY: those of its rows.
-            let mut neighbours =
+            let neighbours =
                 (!has_friction).then(|| unsafe { neighbours.part(chunk.neighbour_range()) });
-            simd_level.run(FindPairs {
-                grid,
-                at,
-                skin_left,
-                skin,
-                layers: chunk.layers,
-                rows: chunk.rows,
-                search,
-                unlisted: &mut chunk.unlisted,
-                batches: &mut chunk.batches,
-                lists: neighbours.as_deref_mut(),
-            });
-            let (first, rows) = (chunk.rows[0], chunk.rows[1] - chunk.rows[0]);
-            let neighbours = neighbours.map(|list| NeighbourLists { first, rows, list });
-            if has_friction && several_proxies {
-                // They touch each other without the swarm.
-                take_out(&mut chunk.batches, |pair| pair.into_iter().all(proxy));
-            }
-            let in_lists =
-                neighbours.map_or(0, |neighbours| neighbours.of_rows().map(<[u16]>::len).sum());
-            chunk.pairs = in_lists + pairs_in(&chunk.batches);
-            shrink_slack(&mut chunk.batches);
-            if has_friction {
-                chunk.impulses.reset(chunk.batches.len());
-                chunk.impulses.set_numbers(&chunk.batches, surfaces);
-                impulse_cache.restore(&chunk.batches, old_rows, &mut chunk.impulses);
-            }
+            pairs.run(chunk, search, neighbours);
             chunk.find_wall_contacts(simd_level, balls, planes, |contact| {
                 has_friction.then(|| impulse_cache.cached_contact(old_rows, contact)).flatten()
             });
@@ -313,6 +286,52 @@ impl Swarm {
         if has_friction {
             let (impulse_cache, fast_movers) = (&self.impulse_cache, &mut self.fast_movers);
             impulse_cache.restore(&fast_movers.batches, &self.old_rows, &mut fast_movers.impulses);
+        }
+    }
+}
+
+/// Search for the pairs of a chunk.
+struct PairSearch<'a> {
+    simd_level: SimdLevel,
+    grid: &'a Grid,
+    balls: walls::Balls<'a>,
+    skin: f32,
+    /// Slots of the proxies, if there are several: they touch each other without the swarm.
+    proxies: Option<&'a BitSet>,
+    /// Impulses of the last search and the rows of then; only in the full tier.
+    cache: Option<(&'a ImpulseCache, &'a [u32])>,
+}
+
+impl PairSearch<'_> {
+    /// Finds them, as `neighbours` in the lab's tier, else as batches with their old impulses.
+    fn run(&self, chunk: &mut Chunk, search: &mut Search, mut neighbours: Option<&mut [u16]>) {
+        let walls::Balls { at, skin_left, surfaces, .. } = self.balls;
+        self.simd_level.run(FindPairs {
+            grid: self.grid,
+            at,
+            skin_left,
+            skin: self.skin,
+            layers: chunk.layers,
+            rows: chunk.rows,
+            search,
+            unlisted: &mut chunk.unlisted,
+            batches: &mut chunk.batches,
+            lists: neighbours.as_deref_mut(),
+        });
+        let (first, rows) = (chunk.rows[0], chunk.rows[1] - chunk.rows[0]);
+        let neighbours = neighbours.map(|list| NeighbourLists { first, rows, list });
+        if let (Some(_), Some(proxies)) = (self.cache, self.proxies) {
+            let proxy = |row: u32| proxies.contains(surfaces.slots[row as usize]);
+            take_out(&mut chunk.batches, |pair| pair.into_iter().all(proxy));
+        }
+        let in_lists =
+            neighbours.map_or(0, |neighbours| neighbours.of_rows().map(<[u16]>::len).sum());
+        chunk.pairs = in_lists + pairs_in(&chunk.batches);
+        shrink_slack(&mut chunk.batches);
+        if let Some((cache, old_rows)) = self.cache {
+            chunk.impulses.reset(chunk.batches.len());
+            chunk.impulses.set_numbers(&chunk.batches, surfaces);
+            cache.restore(&chunk.batches, old_rows, &mut chunk.impulses);
         }
     }
 }
@@ -376,7 +395,7 @@ mod tests {
             let chunks = all.iter().map(|chunk| &chunk.batches);
             let mut found = BTreeSet::new();
             let lab = tier == Tier::Lab;
-            let neighbours = if lab { bytemuck::cast_slice(&swarm.scratch) } else { &[] };
+            let neighbours = if lab { bytemuck::cast_slice(&swarm.neighbours) } else { &[] };
             for chunk in all {
                 for (row, neighbours_after) in
                     (chunk.rows[0]..).zip(chunk.neighbours(neighbours).of_rows())

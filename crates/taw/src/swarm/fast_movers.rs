@@ -43,6 +43,25 @@ pub(super) fn max_count(balls: usize) -> usize {
     BASE_COUNT + balls / BALLS_PER_MOVER
 }
 
+/// Balls in the order of their cells.
+pub(super) struct SortedBalls<'a> {
+    pub grid: &'a Grid,
+    /// Center and radius.
+    pub at: &'a [Row],
+    /// Remaining skin, in metres.
+    pub skin_left: &'a [f32],
+}
+
+impl SortedBalls<'_> {
+    /// Returns true if two balls might touch before one of them leaves its skin.
+    fn near(&self, a: u32, b: u32) -> bool {
+        let (at, skin_left, a, b) = (self.at, self.skin_left, a as usize, b as usize);
+        let apart = [at[b][0] - at[a][0], at[b][1] - at[a][1], at[b][2] - at[a][2], 0.0];
+        let reach = at[a][3] + skin_left[a].max(0.0) + at[b][3] + skin_left[b].max(0.0);
+        squared(apart) < reach * reach
+    }
+}
+
 impl FastMovers {
     /// Returns true if so many more would be too many.
     pub fn full(&self, more: usize, balls: usize) -> bool {
@@ -74,14 +93,12 @@ impl FastMovers {
         self.bits.contains(row)
     }
 
-    /// Finds all their pairs. `max_radius` is that of all balls, `skin` the largest displacement of
-    /// other balls since the rows were sorted. Proxies touch each other without the swarm.
+    /// Finds all their pairs. `more` is the largest radius of all balls and the largest displacement
+    /// of other balls since the rows were sorted. Proxies touch each other without the swarm.
     pub fn find(
         &mut self,
-        grid: &Grid,
-        at: &[Row],
-        skin_left: &[f32],
-        [max_radius, skin]: [f32; 2],
+        balls: &SortedBalls,
+        more: f32,
         search: &mut Search,
         proxy: &dyn Fn(u32) -> bool,
         has_friction: bool,
@@ -94,21 +111,14 @@ impl FastMovers {
         batches.clear();
         self.unlisted = 0;
         if !self.rows.is_empty() {
+            let SortedBalls { at, skin_left, .. } = *balls;
             let mut builder = search.builder(64 * self.rows.len(), &mut batches);
             let widest = self.rows.iter().fold(0.0_f32, |most, row| {
                 most.max(at[*row as usize][3] + skin_left[*row as usize])
             });
             builder.allow(at.len());
             for mover in &self.rows {
-                self.find_pairs_of(
-                    *mover,
-                    grid,
-                    at,
-                    skin_left,
-                    max_radius + skin,
-                    proxy,
-                    &mut builder,
-                );
+                self.find_pairs_of(*mover, balls, more, proxy, &mut builder);
             }
             self.sorted.clear();
             self.sorted.extend(&self.rows);
@@ -119,7 +129,7 @@ impl FastMovers {
                 let far = x(a) + reach + widest;
                 for b in self.sorted[i + 1..].iter().take_while(|b| x(b) <= far) {
                     let both_proxies = proxy(*a) && proxy(*b);
-                    if near(*a, *b, at, skin_left) && !both_proxies && builder.spend_only(1) == 1 {
+                    if balls.near(*a, *b) && !both_proxies && builder.spend_only(1) == 1 {
                         builder.add(*a.min(b), *a.max(b));
                     }
                 }
@@ -137,14 +147,13 @@ impl FastMovers {
     fn find_pairs_of(
         &self,
         mover: u32,
-        grid: &Grid,
-        at: &[Row],
-        skin_left: &[f32],
+        balls: &SortedBalls,
         more: f32,
         proxy: &dyn Fn(u32) -> bool,
         builder: &mut BatchBuilder,
     ) {
         let is_marble = proxy(mover);
+        let SortedBalls { grid, at, skin_left } = *balls;
         let [x, y, z, radius] = at[mover as usize];
         let far = radius + skin_left[mover as usize] + more;
         for level in &grid.levels {
@@ -155,9 +164,7 @@ impl FastMovers {
                     let line = level.cell(grid, layer, row, 0);
                     for other in grid.first(line + low[2])..grid.first(line + high[2] + 1) {
                         let is_for_others = self.has(other) || is_marble && proxy(other);
-                        if !is_for_others
-                            && near(mover, other, at, skin_left)
-                            && builder.spend_only(1) == 1
+                        if !is_for_others && balls.near(mover, other) && builder.spend_only(1) == 1
                         {
                             builder.add(mover.min(other), mover.max(other));
                         }
@@ -213,12 +220,4 @@ impl FastMovers {
             + self.impulses.bytes()
             + self.cached.capacity() * size_of::<CachedPair>()
     }
-}
-
-/// Returns true if two balls might touch before one of them leaves its skin.
-fn near(a: u32, b: u32, at: &[Row], skin_left: &[f32]) -> bool {
-    let (a, b) = (a as usize, b as usize);
-    let apart = [at[b][0] - at[a][0], at[b][1] - at[a][1], at[b][2] - at[a][2], 0.0];
-    let reach = at[a][3] + skin_left[a].max(0.0) + at[b][3] + skin_left[b].max(0.0);
-    squared(apart) < reach * reach
 }

@@ -146,14 +146,9 @@ impl Grid {
         level.cell(self, layer, row, cell)
     }
 
-    /// Chooses origin, size and number of the cells.
-    fn choose_cells(&mut self, at: &[Row], skin: f32) {
-        let (mut least, mut largest) = (f32::MAX, f32::MIN_POSITIVE);
-        for row in at {
-            largest = largest.max(row[3]);
-            least = least.min(row[3]);
-        }
-        // Where the bulk is; a few fast movers far out cost no cells.
+    /// Corners of a box around the bulk of the balls, of which the largest has this radius: a few
+    /// fast movers far out cost no cells.
+    fn bounds_of_bulk(&mut self, at: &[Row], largest: f32) -> [[f32; 3]; 2] {
         let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
         let every = at.len().div_ceil(SAMPLE).max(1);
         for axis in 0..3 {
@@ -165,11 +160,22 @@ impl Grid {
                 continue;
             }
             let (a, b) = (self.sample[count / 64], self.sample[count - 1 - count / 64]);
-            let (least, most) = (self.sample[0], self.sample[count - 1]);
+            let (first, last) = (self.sample[0], self.sample[count - 1]);
             let room = (b - a) * 0.1 + 4.0 * largest;
             (low[axis], high[axis]) =
-                ((a - room).max(least - largest), (b + room).min(most + largest));
+                ((a - room).max(first - largest), (b + room).min(last + largest));
         }
+        [low, high]
+    }
+
+    /// Chooses origin, size and number of the cells.
+    fn choose_cells(&mut self, at: &[Row], skin: f32) {
+        let (mut least, mut largest) = (f32::MAX, f32::MIN_POSITIVE);
+        for row in at {
+            largest = largest.max(row[3]);
+            least = least.min(row[3]);
+        }
+        let [low, high] = self.bounds_of_bulk(at, largest);
         self.low = low;
         let mut width = (2.0 * largest + skin) * MARGIN;
         let budget = at.len() as f64 * CELLS_PER_BALL + CELLS;
@@ -225,36 +231,21 @@ impl Grid {
         self.choose_cells(at, skin);
         let cells = (self.layers() * self.per_layer) as usize;
         let mut start = std::mem::take(&mut self.start);
-        let mut parts = std::mem::take(&mut self.parts);
         start.resize(cells + 2, 0);
         shrink_slack(&mut start);
-        parts.resize(at.len().div_ceil(ROWS), Part::default());
         scratch.resize(at.len(), [0.0; 4]);
-        let keys = DisjointSlice::new(cast_slice_mut(scratch));
-        {
-            let (grid, parts) = (&*self, DisjointSlice::new(&mut parts));
-            parallel_for_rows(threads, at.len(), |rows| {
-                // SAFETY: each job has its own rows and its own part.
-                let keys = unsafe { keys.part(rows.clone()) };
-                let mut cells = [u32::MAX, 0];
-                for (key, at) in keys.iter_mut().zip(&at[rows.clone()]) {
-                    *key = grid.key(at);
-                    cells = [cells[0].min(*key), cells[1].max(*key)];
-                }
-                unsafe { *parts.row(rows.start / ROWS) = Part { first: rows.start as u32, cells } };
-            });
-        }
-        // Now by cells. A cell is counted one further, and again one further.
+        let keys = cast_slice_mut(scratch);
+        self.find_keys(at, threads, keys);
+        let parts = &self.parts;
+        // By cells. A cell is counted one further, and again one further.
         let share = |share: usize| cells * share / threads..cells * (share + 1) / threads;
         let mut totals = vec![0; threads];
         let (all_start, totals) = (DisjointSlice::new(&mut start), DisjointSlice::new(&mut totals));
-        // SAFETY: nobody writes keys any more.
-        let keys = unsafe { keys.read(0..at.len()) };
         // The rows of the parts that have any in these cells, which are few: most rows are still
         // about where they belong. Each is named with its cell, counted from the first one.
         let rows_in = |cells: &Range<usize>, visit: &mut dyn FnMut(u32, usize)| {
             let (low, count) = (cells.start as u32, cells.len() as u32);
-            for Part { first, cells } in &parts {
+            for Part { first, cells } in parts {
                 if cells[0] < low + count && cells[1] >= low {
                     let rows = *first as usize..at.len().min(*first as usize + ROWS);
                     for (row, key) in (*first..).zip(&keys[rows]) {
@@ -300,7 +291,27 @@ impl Grid {
         });
         // start[cell + 2] is now the first row after the cell.
         start[..2].fill(0);
-        (self.start, self.parts) = (start, parts);
+        self.start = start;
+    }
+
+    /// Cell of each row, and the cells of each part of the rows.
+    fn find_keys(&mut self, at: &[Row], threads: usize, keys: &mut [u32]) {
+        let mut parts = std::mem::take(&mut self.parts);
+        parts.resize(at.len().div_ceil(ROWS), Part::default());
+        {
+            let (keys, parts) = (DisjointSlice::new(keys), DisjointSlice::new(&mut parts));
+            parallel_for_rows(threads, at.len(), |rows| {
+                // SAFETY: each job has its own rows and its own part.
+                let keys = unsafe { keys.part(rows.clone()) };
+                let mut cells = [u32::MAX, 0];
+                for (key, at) in keys.iter_mut().zip(&at[rows.clone()]) {
+                    *key = self.key(at);
+                    cells = [cells[0].min(*key), cells[1].max(*key)];
+                }
+                unsafe { *parts.row(rows.start / ROWS) = Part { first: rows.start as u32, cells } };
+            });
+        }
+        self.parts = parts;
     }
 }
 

@@ -90,8 +90,6 @@ pub struct Swarm {
     /// Radius times spin, and whether a wall bears it ([`GROUNDED`](kernels::GROUNDED)); only in
     /// the full tier.
     spin: Vec<Row>,
-    /// See [`SolverColumns::backing`](kernels::SolverColumns::backing); only while it steps.
-    backing: Vec<Row>,
     /// Remaining skin of each ball: distance until pairs are searched again, in metres.
     skin_left: Vec<f32>,
     /// Predicted displacement of each ball in this step, in metres; only in the lab's tier.
@@ -106,10 +104,6 @@ pub struct Swarm {
     chunks: Vec<Chunk>,
     /// Pairs of balls that left their skin.
     fast_movers: FastMovers,
-    /// Rows that would leave their skin in this step.
-    leaving: Vec<u32>,
-    /// Displacements of the fast balls; only while pairs are searched.
-    displacements: Vec<f32>,
     impulse_cache: ImpulseCache,
     /// For each row, the one that it was when the impulse cache was filled, if it was then.
     old_rows: Vec<u32>,
@@ -130,26 +124,40 @@ pub struct Swarm {
     /// Agreement of bodies with the marbles.
     pub(crate) synced: SyncToken,
     proxies: Vec<Proxy>,
-    /// Rows of proxies, in order, and which proxy each is; only in a step.
-    proxy_rows: Vec<(u32, u32)>,
-    /// Positions and velocities of these rows before they are integrated.
-    saved_proxies: Vec<[Row; 2]>,
     /// Slots of marbles.
     body_slots: BitSet,
     /// Slots of balls that never sleep, nor those about them.
     sleepless: BitSet,
     /// Number of times that balls fell asleep, woke, came or went.
     sleep_version: u64,
-    /// Scratch column of the sort; then, in the lab's tier, the neighbour lists of all chunks.
-    scratch: Vec<Row>,
-    lists: Vec<Vec<u32>>,
-    /// Progress of each chunk, while they are worked on.
-    chunk_states: Vec<u32>,
-    searches: Vec<Search>,
+    /// Neighbour lists of all chunks, in the lab's tier; while rows are sorted, a column to sort
+    /// into.
+    neighbours: Vec<Row>,
+    scratch: Scratch,
     rebuilds: u64,
     steps_since_build: u32,
     /// Width of the skin beyond the usual, as a fraction of that.
     skin_scale: f32,
+}
+
+/// Memory that a step writes before it reads it.
+#[derive(Clone, Debug, Default)]
+struct Scratch {
+    /// See [`SolverColumns::backing`](kernels::SolverColumns::backing).
+    backing: Vec<Row>,
+    /// Rows that would leave their skin in this step.
+    leaving: Vec<u32>,
+    /// Displacements of the fast balls, while pairs are searched.
+    displacements: Vec<f32>,
+    /// Rows of proxies, in order, and which proxy each is.
+    proxy_rows: Vec<(u32, u32)>,
+    /// Positions and velocities of these rows before they are integrated.
+    saved_proxies: Vec<[Row; 2]>,
+    /// Rows that each thread found.
+    lists: Vec<Vec<u32>>,
+    /// Progress of each chunk, while they are worked on.
+    chunk_states: Vec<u32>,
+    searches: Vec<Search>,
 }
 
 impl Swarm {

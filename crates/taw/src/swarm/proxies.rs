@@ -182,7 +182,7 @@ impl Swarm {
             chunk.fastest_own = None;
         }
         self.list_proxy_rows();
-        let mut rest = &self.proxy_rows[..];
+        let mut rest = &self.scratch.proxy_rows[..];
         for chunk in &mut self.chunks {
             let (its, others) =
                 rest.split_at(rest.partition_point(|(row, _)| *row < chunk.rows[1]));
@@ -206,11 +206,11 @@ impl Swarm {
 
     /// Lists the rows of the proxies, in order.
     pub(super) fn list_proxy_rows(&mut self) {
-        self.proxy_rows.clear();
+        self.scratch.proxy_rows.clear();
         let rows = self.proxies.iter().zip(0..);
         let rows = rows.filter_map(|(proxy, i)| Some((self.ids.row(proxy.ball)? as u32, i)));
-        self.proxy_rows.extend(rows);
-        self.proxy_rows.sort_unstable();
+        self.scratch.proxy_rows.extend(rows);
+        self.scratch.proxy_rows.sort_unstable();
     }
 
     /// The proxy in a row, among those that were listed.
@@ -231,15 +231,17 @@ impl Swarm {
 
     /// Saves the rows of the proxies, before they are integrated.
     pub(super) fn save_proxies(&mut self) {
-        let rows = self.proxy_rows.iter().map(|(row, _)| *row as usize);
-        self.saved_proxies.clear();
-        self.saved_proxies.extend(rows.map(|row| [self.at[row], self.velocity[row]]));
+        let rows = self.scratch.proxy_rows.iter().map(|(row, _)| *row as usize);
+        self.scratch.saved_proxies.clear();
+        self.scratch.saved_proxies.extend(rows.map(|row| [self.at[row], self.velocity[row]]));
     }
 
     /// Advances the proxies in place of the integration, from one part of the step to another: as
     /// they do alone, and by what the swarm changed of it, so that a push moves no center of mass.
     pub(super) fn advance_proxies(&mut self, [from, to]: [f32; 2], place: bool, time: f32) {
-        for ((row, proxy), [at, velocity]) in self.proxy_rows.iter().zip(&self.saved_proxies) {
+        for ((row, proxy), [at, velocity]) in
+            self.scratch.proxy_rows.iter().zip(&self.scratch.saved_proxies)
+        {
             let (row, proxy) = (*row as usize, &self.proxies[*proxy as usize]);
             if self.velocity[row][3].is_sign_negative() {
                 continue;

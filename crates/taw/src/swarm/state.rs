@@ -3,15 +3,12 @@
 use super::chunk::Chunk;
 use super::neighbours::Search;
 use super::simd::Row;
-use super::{Swarm, SwarmModel};
+use super::{Scratch, Swarm, SwarmModel};
 
 impl Swarm {
     /// Bytes that it has from the allocator, without those of threads.
     #[must_use]
     pub fn bytes(&self) -> usize {
-        fn of<T>(column: &Vec<T>) -> usize {
-            column.capacity() * size_of::<T>()
-        }
         // All are named, so that none is left out.
         let Self {
             model: _,
@@ -20,7 +17,6 @@ impl Swarm {
             at,
             velocity,
             spin,
-            backing,
             skin_left,
             displacement,
             max_radius: _,
@@ -29,8 +25,6 @@ impl Swarm {
             grid,
             chunks,
             fast_movers,
-            leaving,
-            displacements,
             impulse_cache,
             old_rows,
             cache_valid: _,
@@ -45,32 +39,50 @@ impl Swarm {
             surfaces,
             synced: _,
             proxies,
-            proxy_rows,
-            saved_proxies,
             body_slots,
             sleepless,
             sleep_version: _,
+            neighbours,
             scratch,
-            lists,
-            chunk_states,
-            searches,
             rebuilds: _,
             steps_since_build: _,
             skin_scale: _,
         } = self;
-        let rows = [at, velocity, spin, backing, scratch].map(of);
-        let numbers = [skin_left, displacement, displacements].map(of);
-        let names = [leaving, old_rows, stopped, chunk_states].map(of);
+        let rows = [at, velocity, spin, neighbours].map(of);
+        let numbers = [skin_left, displacement].map(of);
+        let names = [old_rows, stopped].map(of);
         rows.into_iter().chain(numbers).chain(names).sum::<usize>()
             + (of(chunks) + chunks.iter().map(Chunk::bytes).sum::<usize>())
-            + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
-            + (of(lists) + lists.iter().map(of).sum::<usize>())
-            + (of(planes) + of(body_balls) + of(proxies) + of(proxy_rows))
-            + body_slots.bytes()
-            + sleepless.bytes()
-            + (of(saved_proxies) + of(velocity_changes) + surfaces.bytes())
+            + (of(planes) + of(body_balls) + of(proxies))
+            + (body_slots.bytes() + sleepless.bytes())
+            + (of(velocity_changes) + surfaces.bytes())
             + (ids.bytes() + grid.bytes() + impulse_cache.bytes() + fast_movers.bytes())
+            + scratch.bytes()
     }
+}
+
+impl Scratch {
+    fn bytes(&self) -> usize {
+        let Self {
+            backing,
+            leaving,
+            displacements,
+            proxy_rows,
+            saved_proxies,
+            lists,
+            chunk_states,
+            searches,
+        } = self;
+        (of(backing) + of(leaving) + of(displacements) + of(proxy_rows) + of(saved_proxies))
+            + (of(lists) + lists.iter().map(of).sum::<usize>())
+            + of(chunk_states)
+            + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
+    }
+}
+
+/// Bytes of a column.
+fn of<T>(column: &Vec<T>) -> usize {
+    column.capacity() * size_of::<T>()
 }
 
 impl PartialEq for Swarm {
@@ -85,7 +97,6 @@ impl PartialEq for Swarm {
             at,
             velocity,
             spin,
-            backing: _,
             skin_left,
             displacement,
             max_radius,
@@ -94,8 +105,6 @@ impl PartialEq for Swarm {
             grid,
             chunks,
             fast_movers,
-            leaving: _,
-            displacements: _,
             impulse_cache,
             old_rows,
             cache_valid,
@@ -110,22 +119,18 @@ impl PartialEq for Swarm {
             surfaces,
             synced: _,
             proxies,
-            proxy_rows: _,
-            saved_proxies: _,
             body_slots,
             sleepless,
             sleep_version: _,
-            scratch,
-            lists: _,
-            chunk_states: _,
-            searches: _,
+            neighbours,
+            scratch: _,
             rebuilds,
             steps_since_build,
             skin_scale,
         } = self;
         let alone = |model: SwarmModel| SwarmModel { threads: 1, ..model };
-        // The neighbour lists are in it.
-        let neighbours = |scratch| bytemuck::cast_slice::<Row, u32>(scratch);
+        // As bits: most are no numbers.
+        let bits = |neighbours| bytemuck::cast_slice::<Row, u32>(neighbours);
         (alone(*model), ids, gravity) == (alone(other.model), &other.ids, &other.gravity)
             && (at, velocity, spin) == (&other.at, &other.velocity, &other.spin)
             && (skin_left, displacement, old_rows)
@@ -134,7 +139,7 @@ impl PartialEq for Swarm {
                 == (&other.max_radius, &other.mean_radius, &other.skin_scale)
             && *skin == other.skin
             && (grid, chunks, fast_movers) == (&other.grid, &other.chunks, &other.fast_movers)
-            && (self.has_friction() || neighbours(scratch) == neighbours(&other.scratch))
+            && (self.has_friction() || bits(neighbours) == bits(&other.neighbours))
             && (cache_valid, pairs_valid) == (&other.cache_valid, &other.pairs_valid)
             && (!cache_valid || *impulse_cache == other.impulse_cache)
             && *planes == other.planes

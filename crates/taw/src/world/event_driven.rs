@@ -16,6 +16,27 @@ impl<S: Scalar> World<S> {
     /// Runs the event-driven solver for a substep of `dt` seconds. `rest` is the time of the step
     /// after it: walls reach their poses at the end of the step.
     pub(super) fn step_events(&mut self, dt: S, rest: S) {
+        self.read_balls();
+        self.read_contacts();
+        let events = &mut self.events;
+        let source = &Source::new(&self.walls, [dt.as_f64(), rest.as_f64()]);
+        let iterations = self.model.iterations;
+        let settings = EventSettings { dt: dt.as_f64(), iterations, source, cost: 0.into() };
+        events.work = self.audit_state.is_some().then(EnergyLedger::default);
+        let mut impacts = Vec::new();
+        self.stopped.extend(events.run(&settings, &mut impacts));
+        self.impacts.extend(impacts.into_iter().map(Impact::cast));
+        if let (Some(audit_state), Some(work)) = (&mut self.audit_state, self.events.work) {
+            audit_state.work = work;
+        }
+        self.write_back_balls();
+        if rest <= S::zero() {
+            self.walls.finish_step();
+        }
+    }
+
+    /// Copies the marbles into the balls of the event-driven solver.
+    fn read_balls(&mut self) {
         let exact = self.model.precision == Precision::Compensated;
         let marbles = &self.marbles;
         let events = &mut self.events;
@@ -48,6 +69,11 @@ impl<S: Scalar> World<S> {
                 trajectory: Trajectory::default(),
             }
         }));
+    }
+
+    /// Copies the contacts between marbles into the event-driven solver, as many of each as it
+    /// takes.
+    fn read_contacts(&mut self) {
         let cast = |contact: &Contact<S>| Contact {
             a: contact.a,
             b: contact.b,
@@ -55,8 +81,9 @@ impl<S: Scalar> World<S> {
             along: [0.0; 2],
             mtv: cast_vector(contact.mtv),
         };
-        events.near.clear();
-        let mut touches = vec![0; marbles.len()];
+        let near = &mut self.events.near;
+        near.clear();
+        let mut touches = vec![0; self.marbles.len()];
         let wanted = self.contacts.mm.iter().filter(|contact| {
             let (a, b) = (contact.a as usize, contact.b as usize);
             let wanted = touches[a].min(touches[b]) < event::MAX_CONTACTS;
@@ -64,21 +91,7 @@ impl<S: Scalar> World<S> {
             touches[b] += 1;
             wanted
         });
-        events.near.mm.extend(wanted.map(cast));
-        let source = &Source::new(&self.walls, [dt.as_f64(), rest.as_f64()]);
-        let iterations = self.model.iterations;
-        let settings = EventSettings { dt: dt.as_f64(), iterations, source, cost: 0.into() };
-        events.work = self.audit_state.is_some().then(EnergyLedger::default);
-        let mut impacts = Vec::new();
-        self.stopped.extend(events.run(&settings, &mut impacts));
-        self.impacts.extend(impacts.into_iter().map(Impact::cast));
-        if let (Some(audit_state), Some(work)) = (&mut self.audit_state, self.events.work) {
-            audit_state.work = work;
-        }
-        self.write_back_balls();
-        if rest <= S::zero() {
-            self.walls.finish_step();
-        }
+        near.mm.extend(wanted.map(cast));
     }
 
     /// Writes the balls of the event-driven solver back to the columns.

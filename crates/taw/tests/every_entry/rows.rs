@@ -135,9 +135,13 @@ macro_rules! table {
 
 pub fn rows<S: Scalar>() -> Vec<Row<S>> {
     let mut rows = marbles();
+    rows.extend(forces());
     rows.extend(worlds());
+    rows.extend(materials());
+    rows.extend(swarms());
     rows.extend(walls());
     rows.extend(constructors());
+    rows.extend(planes_and_frames());
     rows
 }
 
@@ -195,7 +199,7 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
     }
 }
 
-fn worlds<S: Scalar>() -> Vec<Row<S>> {
+fn forces<S: Scalar>() -> Vec<Row<S>> {
     table! {
         World 4 "World::set_gravity": |p, x| {
             p.world.set_gravity(on_axis(p.case, x))
@@ -235,6 +239,11 @@ fn worlds<S: Scalar>() -> Vec<Row<S>> {
             if !x.is_nan() { return Ok(()) }
             p.world.set_forces(vec![ForceField::Custom(|_, mass| vector(mass / S::zero(), S::zero(), S::zero()))])
         };
+    }
+}
+
+fn worlds<S: Scalar>() -> Vec<Row<S>> {
+    table! {
         World 1 "World::set_speed_limits SpeedLimits.linear": |p, x| {
             p.world.set_speed_limits(SpeedLimits { linear: Some(x), angular: None })
         };
@@ -258,6 +267,11 @@ fn worlds<S: Scalar>() -> Vec<Row<S>> {
             let moves = KinematicMotion::Rotate { pivot: [0.0; 3], axis: [0.0, 1.0, 0.0], degrees_per_second: 1.0 };
             moves.pose(x.as_f64()).map(|_| ())
         };
+    }
+}
+
+fn materials<S: Scalar>() -> Vec<Row<S>> {
+    table! {
         World 3 "Material.restitution Material::validated Walls::set_material": |p, x| material(p, x, |m, x| m.restitution = x);
         World 3 "Material.friction": |p, x| material(p, x, |m, x| m.friction = x);
         World 3 "Material.tangential_restitution Material.combine": |p, x| material(p, x, |m, x| m.tangential_restitution = x);
@@ -269,6 +283,11 @@ fn worlds<S: Scalar>() -> Vec<Row<S>> {
         World 3 "Elasticity.poissons_ratio": |p, x| {
             material(p, x, |m, x| m.elasticity = Elasticity { poissons_ratio: x, ..m.elasticity })
         };
+    }
+}
+
+fn swarms<S: Scalar>() -> Vec<Row<S>> {
+    table! {
         World 4 "Swarm::insert": |p, x| {
             let case = p.case;
             into_swarm(p, |ball| match case {
@@ -398,6 +417,11 @@ fn constructors<S: Scalar>() -> Vec<Row<S>> {
                 _ => HeightField::new(point(x, x, x), [one(), one()], 2, vec![x; 4])?,
             })
         };
+    }
+}
+
+fn planes_and_frames<S: Scalar>() -> Vec<Row<S>> {
+    table! {
         World 4 "Plane::new": |p, x| {
             let (normal, offset) = if p.case < 2 { (x, zero()) } else { (one(), x) };
             wall(p, Plane::new(vector(zero(), normal, zero()), offset)?)

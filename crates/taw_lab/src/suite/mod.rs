@@ -5,9 +5,11 @@
 //! in the suite and fails.
 
 mod bouncing;
+mod fast;
 mod gas;
 mod granular;
 mod impacts;
+mod long_rolls;
 mod numbers;
 mod ordinary;
 mod rolling;
@@ -165,6 +167,8 @@ pub fn measure(
 
 /// All cases, in the order of `references.md`.
 pub fn rows() -> impl Iterator<Item = &'static SuiteCase> {
-    let families = [rolling::ROWS, bouncing::ROWS, impacts::ROWS, gas::ROWS, granular::ROWS];
-    families.into_iter().chain([ordinary::ROWS, swarms::ROWS, numbers::ROWS]).flatten()
+    let rolling = [rolling::ROWS, long_rolls::ROWS];
+    let impacts = [bouncing::ROWS, impacts::ROWS, fast::ROWS];
+    let many = [gas::ROWS, granular::ROWS, ordinary::ROWS, swarms::ROWS, numbers::ROWS];
+    rolling.into_iter().chain(impacts).chain(many).flatten()
 }

@@ -76,20 +76,7 @@ where
         .label_style((FONT, 15))
         .axis_desc_style((FONT, 17))
         .x_labels(5)
-        .x_label_formatter(&|x| {
-            // The lines between powers of ten have none.
-            if x.fract() != 0.0 {
-                return String::new();
-            }
-            let seconds = 10_f64.powf(-x - marbles.log10());
-            let (unit, name) = match seconds {
-                0.999.. => (1.0, "s"),
-                0.999e-3.. => (1e-3, "ms"),
-                0.999e-6.. => (1e-6, "µs"),
-                _ => (1e-9, "ns"),
-            };
-            format!("{} ×, {} {name}", digits(10_f64.powf(*x)), digits(seconds / unit))
-        })
+        .x_label_formatter(&|x| speed_label(*x, marbles))
         .y_label_formatter(&|y| match *y {
             0.0 => "1".into(),
             y if y.fract() == 0.0 => format!("10^{:.0}", -y),
@@ -126,6 +113,22 @@ where
     draw_legend::<B>(&legend, curves, &colors)?;
     area.present()?;
     Ok(())
+}
+
+/// Speed at a power of ten of real time, and what a marble and simulated second cost then. The
+/// lines between powers have no label.
+fn speed_label(power: f64, marbles: f64) -> String {
+    if power.fract() != 0.0 {
+        return String::new();
+    }
+    let seconds = 10_f64.powf(-power - marbles.log10());
+    let (unit, name) = match seconds {
+        0.999.. => (1.0, "s"),
+        0.999e-3.. => (1e-3, "ms"),
+        0.999e-6.. => (1e-6, "µs"),
+        _ => (1e-9, "ns"),
+    };
+    format!("{} ×, {} {name}", digits(10_f64.powf(power)), digits(seconds / unit))
 }
 
 /// Two digits or more, as people write them.

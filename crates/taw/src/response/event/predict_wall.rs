@@ -158,8 +158,8 @@ impl EventDriven {
             } else {
                 let just_left = step == 0 && ball.trajectory.left_wall == Some(number);
                 let thresholds = [rest_threshold, impact_threshold];
-                match self
-                    .predict_contact(row, number, time, separation, thresholds, just_left, settings)
+                let pair = (row, number);
+                match self.predict_contact(pair, time, separation, thresholds, just_left, settings)
                 {
                     ControlFlow::Continue(after) => after,
                     ControlFlow::Break(event) => {
@@ -179,8 +179,7 @@ impl EventDriven {
     /// the contact is to be tested again.
     fn predict_contact(
         &self,
-        row: usize,
-        wall: usize,
+        (row, wall): (usize, usize),
         time: f64,
         separation: SeparationMotion,
         [rest_threshold, impact_threshold]: [f64; 2],

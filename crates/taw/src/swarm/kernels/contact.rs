@@ -126,6 +126,13 @@ impl<L: Simd> Numbers<L> {
         }
     }
 
+    /// Approach speed that bounces; where nothing bounces, all is a contact.
+    #[inline(always)]
+    fn restitution_threshold(&self, params: &SolverParams) -> L {
+        let threshold = L::splat(params.restitution_threshold);
+        self.restitution.select_gt(L::splat(0.0), threshold, L::splat(f32::MAX))
+    }
+
     /// Effective mass of the touched points across the normal. `alone` is that along it.
     #[inline(always)]
     fn tangent_mass<const OWN: bool>(&self, alone: L, [a, b]: [&[L; 4]; 2]) -> L {
@@ -140,17 +147,22 @@ impl<L: Simd> Numbers<L> {
     }
 }
 
+/// Impulses on the second balls of the pairs.
+struct PairImpulse<L> {
+    normal: Vec3Wide<L>,
+    normal_part: L,
+    tangent_part: Vec3Wide<L>,
+}
+
 impl SolverColumns<'_> {
-    /// Applies an impulse to both balls of the pairs; the second gets it as it is.
+    /// Applies an impulse to both balls of the pairs, with these factors of inertia.
     #[inline(always)]
     fn apply_impulse<L: Simd, const BACKED: bool>(
         &self,
         batch: &Batch,
         [a, b]: [[L; 4]; 2],
         [spin_a, spin_b]: [[L; 4]; 2],
-        normal: Vec3Wide<L>,
-        normal_part: L,
-        tangent_part: Vec3Wide<L>,
+        PairImpulse { normal, normal_part, tangent_part }: PairImpulse<L>,
         [factor_a, factor_b]: [L; 2],
     ) {
         let (mass_a, mass_b) = (inverse_mass(&a), inverse_mass(&b));
@@ -221,15 +233,8 @@ impl SolverColumns<'_> {
         let tangent_velocity = tangent_velocity(relative, normal, &spins);
         let target = tangent_velocity.times(zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
         let tangent_part = clamp_length(target, numbers.friction * normal_part);
-        self.apply_impulse::<L, false>(
-            batch,
-            [a, b],
-            spins,
-            normal,
-            normal_part,
-            tangent_part,
-            numbers.inertia_factors,
-        );
+        let impulse = PairImpulse { normal, normal_part, tangent_part };
+        self.apply_impulse::<L, false>(batch, [a, b], spins, impulse, numbers.inertia_factors);
         true
     }
 
@@ -240,8 +245,7 @@ impl SolverColumns<'_> {
         batch: &Batch,
         [at_a, at_b]: [[L; 4]; 2],
         [a, b]: [[L; 4]; 2],
-        normal: Vec3Wide<L>,
-        separation: L,
+        (normal, separation): (Vec3Wide<L>, L),
         slop: f32,
         grounded: L,
     ) {
@@ -326,15 +330,8 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             tangent_part.store(&mut tangent_impulse[i]);
             let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
             let factors = numbers.inertia_factors;
-            columns.apply_impulse::<L, BACKED>(
-                batch,
-                velocity,
-                spin,
-                normal,
-                normal_part,
-                tangent_part,
-                factors,
-            );
+            let impulse = PairImpulse { normal, normal_part, tangent_part };
+            columns.apply_impulse::<L, BACKED>(batch, velocity, spin, impulse, factors);
             if OWN {
                 let [a, b] = gather::<L>(columns.at, batch);
                 let inertia = RollingInertia::new([&a, &b], &velocity, factors);
@@ -348,35 +345,20 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
         let Self { columns, batches, impulses, friction, .. } = self;
         let ContactImpulses { normal_impulse, tangent_impulse, torque, numbers: own, .. } =
             impulses;
-        let (zero, one, softness) = (L::splat(0.0), L::splat(1.0), params.softness);
+        let (zero, softness) = (L::splat(0.0), params.softness);
         let per_second = L::splat(1.0 / params.time);
         for (i, batch) in batches.iter().enumerate() {
             let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
-            // Where nothing bounces, all is a contact.
-            let speed = numbers.restitution.select_gt(
-                zero,
-                L::splat(params.restitution_threshold),
-                L::splat(f32::MAX),
-            );
+            let speed = numbers.restitution_threshold(&params);
             let at = gather::<L>(columns.at, batch);
             let (normal, separation) =
                 normal_and_separation(&at[0], &at[1], ALL, |lane| batch.pair(lane));
             let before = L::load(&normal_impulse[i]);
-            let velocity = gather::<L>(columns.velocity, batch);
-            // What bears nothing and comes fast is no contact yet.
-            let approach_speed =
-                Vec3Wide::of(&velocity[0]).minus(Vec3Wide::of(&velocity[1])).dot(normal);
-            let fast = approach_speed.select_gt(speed, one, zero);
-            let mut fresh = before.select_gt(zero, zero, fast);
-            if FIRST && fresh.gt_mask(zero) != 0 {
-                // What meets nevertheless is stopped: it may come so fast only because of impulses
-                // that were applied again, and are taken back by the contacts that bear them.
-                let (_, meets) = meeting(&params, [&at[0], &at[1]], [&velocity[0], &velocity[1]]);
-                fresh = meets.select_gt(zero, zero, fresh);
-            }
-            let [a, b] = velocity;
+            let [a, b] = gather::<L>(columns.velocity, batch);
             let relative = Vec3Wide::of(&b).minus(Vec3Wide::of(&a));
             let parting = relative.dot(normal);
+            let fresh =
+                fresh::<L, FIRST>(&params, [&at[0], &at[1]], [&a, &b], speed, before, parting);
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
             let alone = effective_mass(&a, &b);
             // What so much slower parting takes.
@@ -388,12 +370,8 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
                 }
             };
             let change = if FIRST {
-                let pushed = (separation * L::splat(softness.bias_rate))
-                    .max(L::splat(-softness.max_push_speed));
-                let target = separation.select_gt(zero, separation * per_second, pushed);
-                let part = separation.select_gt(zero, one, L::splat(softness.mass_scale));
-                let back = separation.select_gt(zero, zero, L::splat(softness.impulse_scale));
-                part * impulse(parting + target) + before * back
+                let (bias, part, back) = softness.of(separation, per_second);
+                part * impulse(parting + bias) + before * back
             } else {
                 impulse(parting + separation.max(zero) * per_second)
             };
@@ -409,26 +387,42 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
                 old.minus(tangent_velocity.times(numbers.tangent_mass::<OWN>(alone, [&a, &b])));
             let clamp_length = clamp_length(target, numbers.friction * after);
             clamp_length.store(&mut tangent_impulse[i]);
-            let (normal_part, tangent_part, factors) =
-                (after - before, clamp_length.minus(old), numbers.inertia_factors);
-            columns.apply_impulse::<L, BACKED>(
-                batch,
-                [a, b],
-                spins,
-                normal,
-                normal_part,
-                tangent_part,
-                factors,
-            );
+            let (normal_part, tangent_part) = (after - before, clamp_length.minus(old));
+            let (impulse, factors) =
+                (PairImpulse { normal, normal_part, tangent_part }, numbers.inertia_factors);
+            columns.apply_impulse::<L, BACKED>(batch, [a, b], spins, impulse, factors);
             if OWN {
                 let inertia = RollingInertia::new([&at[0], &at[1]], &[a, b], factors);
                 columns.solve_rolling(batch, &inertia, normal, after, &own[i], &mut torque[i]);
             }
             if !FIRST {
-                columns.push_apart(batch, at, [a, b], normal, separation, softness.slop, grounded);
+                let contact = (normal, separation);
+                columns.push_apart(batch, at, [a, b], contact, softness.slop, grounded);
             }
         }
     }
+}
+
+/// One where a pair is no contact yet: it bears nothing and comes faster than `speed`.
+#[inline(always)]
+fn fresh<L: Simd, const FIRST: bool>(
+    params: &SolverParams,
+    at: [&[L; 4]; 2],
+    velocity: [&[L; 4]; 2],
+    speed: L,
+    before: L,
+    parting: L,
+) -> L {
+    let zero = L::splat(0.0);
+    let fast = (zero - parting).select_gt(speed, L::splat(1.0), zero);
+    let fresh = before.select_gt(zero, zero, fast);
+    if !FIRST || fresh.gt_mask(zero) == 0 {
+        return fresh;
+    }
+    // What meets nevertheless is stopped: it may come so fast only because of impulses that were
+    // applied again, and are taken back by the contacts that bear them.
+    let (_, meets) = meeting(params, at, velocity);
+    meets.select_gt(zero, zero, fresh)
 }
 
 /// Which pairs meet within a substep: the normal then, and how fast they come together, or zero for

@@ -1,6 +1,6 @@
 //! Parameters of the solver's passes.
 
-use crate::swarm::simd::Row;
+use crate::swarm::simd::{Row, Simd};
 
 /// Kind of a pass.
 #[derive(Clone, Copy, Debug)]
@@ -54,6 +54,21 @@ pub(in crate::swarm) struct Softness {
     pub impulse_scale: f32,
     /// So much of twice the smaller radius two balls may overlap before they are moved apart.
     pub slop: f32,
+}
+
+impl Softness {
+    /// Velocity that a separation adds to the target, the part of the impulse of a hard contact
+    /// that is applied, and the part of the accumulated one that is given back: an overlap is soft,
+    /// a gap may close within the substep.
+    #[inline(always)]
+    pub fn of<L: Simd>(self, separation: L, per_second: L) -> (L, L, L) {
+        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let pushed = (separation * L::splat(self.bias_rate)).max(L::splat(-self.max_push_speed));
+        let bias = separation.select_gt(zero, separation * per_second, pushed);
+        let part = separation.select_gt(zero, one, L::splat(self.mass_scale));
+        let back = separation.select_gt(zero, zero, L::splat(self.impulse_scale));
+        (bias, part, back)
+    }
 }
 
 /// So much of its radius a ball may be in a wall: more than what bears a heap gets.

@@ -20,14 +20,14 @@ impl Swarm {
         let inverse = |chunk: &Chunk| chunk.inverse_masses;
         let [least, most] = self.chunks.iter().map(inverse).fold([f32::MAX, 0.0], wider);
         let rows = if most > UNEVEN * least { self.at.len() } else { 0 };
-        self.backing.clear();
-        self.backing.resize(rows, [0.0; 4]);
+        self.scratch.backing.clear();
+        self.scratch.backing.resize(rows, [0.0; 4]);
         if rows == 0 {
-            self.backing.shrink_to_fit();
+            self.scratch.backing.shrink_to_fit();
             return;
         }
         let (chunks, backing, at) =
-            (&self.chunks, DisjointSlice::new(&mut self.backing), &self.at[..]);
+            (&self.chunks, DisjointSlice::new(&mut self.scratch.backing), &self.at[..]);
         parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
             // Those of a ball follow each other.
             for of_ball in chunks[chunk].wall_contacts.chunk_by(|a, b| a.row == b.row) {

@@ -39,7 +39,7 @@ impl Swarm {
     fn predict(&mut self, dt: f32, gravity: Vec3<f32>) {
         let (change, time) = (row(gravity * dt), [dt, dt, dt, 0.0]);
         let (simd_level, threads) = (self.simd_level, self.model.threads as usize);
-        let mut leaving = std::mem::take(&mut self.leaving);
+        let mut leaving = std::mem::take(&mut self.scratch.leaving);
         leaving.clear();
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
@@ -48,32 +48,38 @@ impl Swarm {
         let displacement = DisjointSlice::new(&mut self.displacement);
         let skin_left = &self.skin_left[..];
         let all_stopped = std::sync::Mutex::new(&mut self.stopped);
-        parallel_filter(threads, at.len(), &mut self.lists, &mut leaving, |rows, leaving| {
-            let mut stopped = Vec::new();
-            // SAFETY: each job has its own rows.
-            let (at, velocity, displacement) = unsafe {
-                (
-                    at.part(rows.clone()),
-                    velocity.part(rows.clone()),
-                    displacement.part(rows.clone()),
-                )
-            };
-            let (stop, first) = (&mut stopped, rows.start as u32);
-            let predict =
-                Predict { at, velocity, displacement, change, time, stopped: stop, first };
-            simd_level.run(predict);
-            let both = displacement.iter().zip(&skin_left[rows]);
-            let leaves =
-                (first..).zip(both).filter(|(_, (displacement, skin))| displacement > skin);
-            leaving.extend(leaves.map(|(row, _)| row).take(most));
-            if !stopped.is_empty()
-                && let Ok(mut all) = all_stopped.lock()
-            {
-                all.append(&mut stopped);
-            }
-        });
+        parallel_filter(
+            threads,
+            at.len(),
+            &mut self.scratch.lists,
+            &mut leaving,
+            |rows, leaving| {
+                let mut stopped = Vec::new();
+                // SAFETY: each job has its own rows.
+                let (at, velocity, displacement) = unsafe {
+                    (
+                        at.part(rows.clone()),
+                        velocity.part(rows.clone()),
+                        displacement.part(rows.clone()),
+                    )
+                };
+                let (stop, first) = (&mut stopped, rows.start as u32);
+                let predict =
+                    Predict { at, velocity, displacement, change, time, stopped: stop, first };
+                simd_level.run(predict);
+                let both = displacement.iter().zip(&skin_left[rows]);
+                let leaves =
+                    (first..).zip(both).filter(|(_, (displacement, skin))| displacement > skin);
+                leaving.extend(leaves.map(|(row, _)| row).take(most));
+                if !stopped.is_empty()
+                    && let Ok(mut all) = all_stopped.lock()
+                {
+                    all.append(&mut stopped);
+                }
+            },
+        );
         self.stopped.sort_unstable();
-        self.leaving = leaving;
+        self.scratch.leaving = leaving;
     }
 
     /// Finds pairs and walls for the balls that leave their skin, where these are known for others.
@@ -84,7 +90,7 @@ impl Swarm {
         walls_changed: bool,
         observe: &mut dyn FnMut(Stage),
     ) {
-        let mut leaving = std::mem::take(&mut self.leaving);
+        let mut leaving = std::mem::take(&mut self.scratch.leaving);
         leaving.retain(|row| self.displacement[*row as usize] > self.skin_left[*row as usize]);
         if !self.pairs_valid || !leaving.is_empty() {
             self.stopped = self.stopped.iter().map(|row| self.ids.slots()[*row as usize]).collect();
@@ -101,16 +107,16 @@ impl Swarm {
         } else {
             self.find_wall_contacts_if_changed(walls_changed, dt, walls, observe);
         }
-        self.leaving = leaving;
+        self.scratch.leaving = leaving;
     }
 
     /// Moves balls out of each other and out of walls.
     fn displace(&mut self) {
         let simd_level = self.simd_level;
-        let rows = std::mem::take(&mut self.proxy_rows);
+        let rows = std::mem::take(&mut self.scratch.proxy_rows);
         let proxies = std::mem::take(&mut self.proxies);
         let planes = std::mem::take(&mut self.planes);
-        let scratch = std::mem::take(&mut self.scratch);
+        let scratch = std::mem::take(&mut self.neighbours);
         let neighbours: &[u16] = bytemuck::cast_slice(&scratch);
         let walls =
             WallDisplacement { simd_level, rows: &rows, proxies: &proxies, planes: &planes };
@@ -130,8 +136,8 @@ impl Swarm {
             // SAFETY: as above.
             unsafe { walls.apply(chunk, columns.at) };
         });
-        (self.proxy_rows, self.proxies) = (rows, proxies);
-        (self.planes, self.scratch) = (planes, scratch);
+        (self.scratch.proxy_rows, self.proxies) = (rows, proxies);
+        (self.planes, self.neighbours) = (planes, scratch);
     }
 
     /// Makes velocities what positions became.

@@ -123,7 +123,7 @@ impl Swarm {
         if self.pairs_valid {
             self.update_sleep(dt, gravity);
         }
-        let mut leaving = std::mem::take(&mut self.leaving);
+        let mut leaving = std::mem::take(&mut self.scratch.leaving);
         leaving.clear();
         leaving.extend(self.chunks.iter().flat_map(|chunk| &chunk.leaving));
         if !self.pairs_valid {
@@ -140,7 +140,7 @@ impl Swarm {
         } else {
             self.find_wall_contacts_if_changed(walls_changed, dt, walls, observe);
         }
-        self.leaving = leaving;
+        self.scratch.leaving = leaving;
     }
 
     /// Moves all on by `dt` seconds, in substeps: *bounce*, *integrate velocities*, *warm start*,
@@ -163,19 +163,8 @@ impl Swarm {
         let (times, all) = ([dt, h], |_: &Chunk| true);
         self.age_marks();
         self.update_wall_contacts(walls, dt, times, all, false);
-        // What gravity makes of rest in two steps is no impact.
-        let speed = 2.0 * length(gravity) * dt;
-        let restitution = self.common_material().restitution;
-        // Soft contacts bear what lies on others; all else that overlaps is moved apart. Where
-        // nothing has weight, overlap makes no speed at all.
-        let softness = softness(h, length(gravity));
-        let params = SolverParams {
-            restitution_threshold: speed,
-            restitution,
-            time: h,
-            gravity: row(gravity),
-            softness,
-        };
+        let params = self.solver_params(dt, h);
+        let speed = params.restitution_threshold;
         let faster = |chunk: &Chunk, next: f32| 2.0 * chunk.speed[0].max(next) > speed;
         for substep in 0..count {
             let left = dt - h * substep as f32;
@@ -214,6 +203,21 @@ impl Swarm {
         }
     }
 
+    /// Parameters of a substep of `h` seconds in a step of `dt` seconds.
+    fn solver_params(&self, dt: f32, h: f32) -> SolverParams {
+        let gravity = self.gravity.unwrap_or_else(Vec3::zero);
+        SolverParams {
+            // What gravity makes of rest in two steps is no impact.
+            restitution_threshold: 2.0 * length(gravity) * dt,
+            restitution: self.common_material().restitution,
+            time: h,
+            gravity: row(gravity),
+            // Soft contacts bear what lies on others; all else that overlaps is moved apart. Where
+            // nothing has weight, overlap makes no speed at all.
+            softness: softness(h, length(gravity)),
+        }
+    }
+
     /// Forgets who was borne by a wall two steps ago.
     fn age_marks(&mut self) {
         let (chunks, spin) = (&self.chunks, DisjointSlice::new(&mut self.spin));
@@ -237,7 +241,7 @@ impl Swarm {
         walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
     ) -> bool {
-        let mut leaving = std::mem::take(&mut self.leaving);
+        let mut leaving = std::mem::take(&mut self.scratch.leaving);
         leaving.clear();
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
@@ -266,7 +270,7 @@ impl Swarm {
             self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
         }
         let any = !leaving.is_empty();
-        self.leaving = leaving;
+        self.scratch.leaving = leaving;
         any
     }
 
@@ -322,7 +326,7 @@ impl Swarm {
             velocity: DisjointSlice::new(&mut self.velocity),
             spin: DisjointSlice::new(&mut self.spin),
             skin_left: DisjointSlice::new(&mut self.skin_left),
-            backing: DisjointSlice::new(&mut self.backing),
+            backing: DisjointSlice::new(&mut self.scratch.backing),
         };
         let chunks = DisjointSlice::new(&mut self.chunks);
         let least = -self.skin;
@@ -400,7 +404,7 @@ impl Swarm {
             velocity: DisjointSlice::new(&mut self.velocity),
             spin: DisjointSlice::new(&mut self.spin),
             skin_left: DisjointSlice::new(&mut self.skin_left),
-            backing: DisjointSlice::new(&mut self.backing),
+            backing: DisjointSlice::new(&mut self.scratch.backing),
         };
         let FastMovers { batches, impulses, .. } = &mut fast_movers;
         solve(simd_level, pass, columns, batches, impulses, friction);
@@ -418,10 +422,10 @@ impl Swarm {
             velocity: DisjointSlice::new(&mut self.velocity),
             spin: DisjointSlice::new(&mut self.spin),
             skin_left: DisjointSlice::new(&mut self.skin_left),
-            backing: DisjointSlice::new(&mut self.backing),
+            backing: DisjointSlice::new(&mut self.scratch.backing),
         };
         let chunks = DisjointSlice::new(&mut self.chunks);
-        let (threads, states) = (self.model.threads as usize, &mut self.chunk_states);
+        let (threads, states) = (self.model.threads as usize, &mut self.scratch.chunk_states);
         parallel_for_odd_even(threads, chunks.len(), states, |chunk| {
             // SAFETY: nobody works on a neighbour meanwhile. Of the next one, only what nobody
             // changes is read.

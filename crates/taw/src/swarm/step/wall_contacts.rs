@@ -112,7 +112,7 @@ impl Swarm {
         which: impl Fn(&Chunk) -> bool + Sync,
         only_fast: bool,
     ) {
-        let (proxies, rows) = (&self.proxies[..], &self.proxy_rows[..]);
+        let (proxies, rows) = (&self.proxies[..], &self.scratch.proxy_rows[..]);
         let query = WallQuery {
             tier: self.tier(),
             at: &self.at,
