@@ -117,13 +117,6 @@ impl<S: Scalar> Trial<S> {
         Self { world, alone, far: far.to_vec(), near, walls, reaches_far }
     }
 
-    /// A removal makes contacts forget what they bore, everywhere: rows have other names then.
-    fn remove_alone(&mut self) {
-        let dummy = Marble::new(Point3::from([0.0, 500.0, 0.0].map(S::from_f64)), S::one());
-        let dummy = self.alone.marbles.insert(dummy).unwrap();
-        self.alone.marbles.remove(dummy).unwrap();
-    }
-
     /// Does it; whether it was accepted.
     fn call(&mut self, call: &Call) -> bool {
         let [a, b, c, d] = call.numbers.map(S::from_f64);
@@ -135,7 +128,6 @@ impl<S: Scalar> Trial<S> {
             (0..8, _) | (_, None) => marbles.insert(odd_marble(call)).map(|id| self.near.push(id)),
             (8, Some(id)) => marbles.remove(id).map(|_| {
                 self.near.retain(|it| *it != id);
-                self.remove_alone();
             }),
             (9, Some(id)) => marbles.set_position(id, Point3::from_vec(v)),
             (10, Some(id)) => marbles.set_velocity(id, v),
@@ -169,7 +161,6 @@ impl<S: Scalar> Trial<S> {
             }
             (24, _) => wall.map_or(Ok(()), |wall| {
                 self.walls.retain(|it| *it != wall);
-                self.remove_alone();
                 self.world.walls.remove(wall).map(|_| ())
             }),
             (25, _) => {

@@ -2,6 +2,7 @@
 //! One method per file; all take the same columns and the same contacts.
 
 mod bodies;
+mod contact_key;
 pub(crate) mod displacement;
 mod energy_ledger;
 pub(crate) mod event;
@@ -11,6 +12,7 @@ mod material;
 pub(crate) mod penalty;
 
 pub(crate) use bodies::{CapsuleInertia, SolverBodies};
+pub(crate) use contact_key::{ContactKey, KeyedByContact, follow_rows, rename_rows};
 pub(crate) use energy_ledger::{EnergyLedger, ImpulseSample};
 pub use event::Impact;
 pub use impact::{BallRotation, InverseEffectiveMass, impact};

@@ -2,6 +2,7 @@
 
 mod changed_rows;
 mod contact_limit;
+mod contact_memory;
 mod continuous;
 mod energy;
 mod energy_audit;
@@ -47,10 +48,11 @@ use crate::error::{finite, finite_vector, positive};
 use crate::math::{Point3, Scalar, Vec3, length};
 use crate::motion::{ForceField, Rotation};
 use crate::response::event::EventDriven;
-use crate::response::impulse::{self, CachedImpulse};
-use crate::response::{CapsuleInertia, Impact, Response, SpringHistory, displacement};
+use crate::response::impulse;
+use crate::response::{CapsuleInertia, Impact, Response, displacement};
 use crate::swarm::Swarm;
 use contact_limit::ContactLimit;
+use contact_memory::ContactMemory;
 use continuous::Continuous;
 use energy_audit::AuditState;
 use narrow_phase::Candidate;
@@ -100,11 +102,7 @@ pub struct World<S> {
     held: Vec<bool>,
     displacement: displacement::Scratch<S>,
     impulse: impulse::Scratch<S>,
-    /// What the contacts of the last substep bore, and the removals until then: they
-    /// move rows, after which nothing here has the right name any more.
-    warm: Vec<CachedImpulse<S>>,
-    shear: Vec<SpringHistory<S>>,
-    warm_removals: [u64; 2],
+    memory: ContactMemory<S>,
     /// For a response that moves marbles by itself: how each is to be accelerated.
     accelerations: Vec<Vec3<f64>>,
     /// How much of a step comes after the substep, in seconds; zero unless within one.
@@ -143,9 +141,7 @@ impl<S: Scalar> Default for World<S> {
             held: Vec::new(),
             displacement: displacement::Scratch::default(),
             impulse: impulse::Scratch::default(),
-            warm: Vec::new(),
-            shear: Vec::new(),
-            warm_removals: [0; 2],
+            memory: ContactMemory::default(),
             accelerations: Vec::new(),
             rest_of_step: S::zero(),
             events: EventDriven::default(),
@@ -183,9 +179,7 @@ impl<S: Scalar> PartialEq for World<S> {
             held: _,
             displacement: _,
             impulse: _,
-            warm,
-            shear,
-            warm_removals,
+            memory,
             accelerations: _,
             rest_of_step: _,
             events,
@@ -208,9 +202,7 @@ impl<S: Scalar> PartialEq for World<S> {
             && knows_walls(self) == knows_walls(other)
             && *contacts == other.contacts
             && quarantine.stopped == other.quarantine.stopped
-            && *warm == other.warm
-            && *shear == other.shear
-            && *warm_removals == other.warm_removals
+            && *memory == other.memory
     }
 }
 
@@ -335,13 +327,6 @@ impl<S: Scalar> World<S> {
     pub fn set_speed_limits(&mut self, limits: SpeedLimits<S>) -> Result<(), Error> {
         self.limits = limits.validated()?;
         Ok(())
-    }
-
-    /// Forgets what contacts remember from substep to substep.
-    fn forget_contacts(&mut self) {
-        self.warm.clear();
-        self.shear.clear();
-        self.events.impulse_cache.clear();
     }
 
     /// The marbles that the last step stopped because their motion overflowed, each once.

@@ -10,7 +10,7 @@ use crate::Error;
 use crate::broad::Period;
 use crate::error::{positive, within};
 use crate::math::{Point3, Quat, Scalar, is_finite, is_finite_point};
-use crate::response::Response;
+use crate::response::{Response, rename_rows};
 
 /// Poses at the start of the substep, and the marbles stopped since the start of the step.
 #[derive(Clone, Debug)]
@@ -127,10 +127,9 @@ impl<S: Scalar> World<S> {
             self.marbles.stop(row);
         }
         let stays = |row: usize| rows.binary_search(&(row as u32)).is_err().then_some(row);
-        self.warm.retain_mut(|warm| warm.remap(stays));
-        self.events.impulse_cache.retain_mut(|warm| warm.remap(stays));
-        self.shear
-            .retain(|shear| shear.rows().into_iter().flatten().all(|row| stays(row).is_some()));
+        rename_rows(&mut self.memory.impulses, stays);
+        rename_rows(&mut self.memory.springs, stays);
+        rename_rows(&mut self.events.impulse_cache, stays);
         self.quarantine
             .stopped
             .extend(rows.iter().filter_map(|row| self.marbles.id(*row as usize)));

@@ -167,9 +167,10 @@ impl<S: Scalar> World<S> {
             },
             settings: &settings,
         };
-        let (contacts, warm, stopped) = (&mut self.contacts, &mut self.warm, &mut self.stopped);
+        let (contacts, impulses, stopped) =
+            (&mut self.contacts, &mut self.memory.impulses, &mut self.stopped);
         if self.model.response == Response::Impulse {
-            solve_contacts(&mut columns, contacts, &context, &mut self.impulse, warm, stopped);
+            solve_contacts(&mut columns, contacts, &context, &mut self.impulse, impulses, stopped);
             if let Some(audit_state) = &mut self.audit_state {
                 let AuditState { velocity, angular_velocity, work, .. } = &mut **audit_state;
                 self.impulse.record_energy(&mut columns, velocity, angular_velocity, work);
@@ -179,8 +180,8 @@ impl<S: Scalar> World<S> {
         let count = contacts.len() as u32;
         let mut pushes = self.audit_state.as_ref().map(|_| Vec::new());
         let push = |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change)));
-        let memory = &mut self.displacement;
-        solve_displacement(&mut columns, contacts, &context, memory, warm, stopped, push);
+        let scratch = &mut self.displacement;
+        solve_displacement(&mut columns, contacts, &context, scratch, impulses, stopped, push);
         if let Some(audit_state) = &mut self.audit_state {
             audit_state.work.collisions = count;
             for (row, change) in pushes.into_iter().flatten() {
@@ -223,7 +224,7 @@ impl<S: Scalar> World<S> {
             &mut columns,
             &mut self.contacts,
             &self.walls,
-            &mut self.shear,
+            &mut self.memory.springs,
             &mut self.stopped,
             self.audit_state.as_mut().map(|audit_state| &mut audit_state.work),
         );
@@ -248,18 +249,14 @@ impl<S: Scalar> World<S> {
     }
 
     /// Brings up to date what a response asks of marbles: masses, who is held, what is long;
-    /// and forgets contacts whose rows are no longer theirs.
+    /// and what contacts remember of them.
     fn look_at_marbles(&mut self) {
         self.inverse_mass.clear();
         if matches!(self.model.response, Response::Impulse | Response::Penalty(_)) {
             let masses = (0..self.marbles.len()).map(|row| self.marbles.mass(row));
             self.inverse_mass.extend(masses.map(|mass| S::one() / mass));
         }
-        let removals = [self.walls.removals(), self.marbles.removals()];
-        if self.warm_removals != removals {
-            self.forget_contacts();
-            self.warm_removals = removals;
-        }
+        self.follow_contacts();
         self.held.clear();
         if self.model.rotation == Rotation::Dynamic && self.marbles.has_rotation_locks() {
             self.held

@@ -275,7 +275,7 @@ fn a_model_equal_to_the_current_one_changes_nothing() {
     for _ in 0..4 {
         world.step(1.0 / 64.0).unwrap();
     }
-    assert!(!world.warm.is_empty(), "the contact remembers an impulse");
+    assert!(!world.memory.impulses.is_empty(), "the contact remembers an impulse");
     let before = world.clone();
     world.set_model(model).unwrap();
     assert_eq!(world, before);

@@ -8,8 +8,8 @@ mod tests;
 
 use cgmath::{InnerSpace, Zero};
 
-use super::impulse::{BodyA, CachedImpulse, Context, UnionFind, contact_key};
-use super::{Colliders, Material, SolverBodies};
+use super::impulse::{BodyA, CachedImpulse, Context, UnionFind};
+use super::{Colliders, KeyedByContact, Material, SolverBodies};
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, is_finite, is_finite_point};
 
@@ -119,7 +119,7 @@ pub(crate) fn solve_displacement<S: Scalar>(
     }
     cache.clear();
     cache.extend(constraints.iter().map(|t| {
-        CachedImpulse::of_normal_impulse(contact_key(t.a, t.b, t.axis_offset), t.velocity_change)
+        CachedImpulse::of_normal_impulse(t.a.contact_key(t.b, t.axis_offset), t.velocity_change)
     }));
     cache.sort_unstable_by_key(CachedImpulse::key);
 }
@@ -214,7 +214,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             .resize(constraints.len(), WarmStartSums { requested: S::zero(), achieved: S::zero() });
         for c in constraints.iter_mut() {
             let Ok(at) = cache
-                .binary_search_by_key(&contact_key(c.a, c.b, c.axis_offset), CachedImpulse::key)
+                .binary_search_by_key(&c.a.contact_key(c.b, c.axis_offset), CachedImpulse::key)
             else {
                 continue;
             };

@@ -8,6 +8,7 @@ use super::{EventDriven, EventSettings, MAX_CONTACTS, Trajectory};
 use crate::contact::{Contact, Contacts};
 use crate::math::Vec3;
 use crate::response::impulse::CachedImpulse;
+use crate::response::rename_rows;
 
 /// Balls that rest together from now on.
 pub(super) struct RestingCluster {
@@ -225,7 +226,7 @@ impl EventDriven {
         let remaining = settings.dt - now;
         self.cluster.gather(contacts, &self.balls, self.period);
         let max_acceleration = self.move_cluster_freely(remaining);
-        impulse_cache.retain_mut(|entry| entry.remap(|row| self.cluster.local_index(row)));
+        rename_rows(impulse_cache, |row| self.cluster.local_index(row));
         let mut touches_balls = vec![false; self.cluster.rows.len()];
         for local in contacts.mm.iter().flat_map(|c| [c.a, c.b]) {
             touches_balls[local as usize] = true;
@@ -234,7 +235,7 @@ impl EventDriven {
         self.cluster.solve(contacts, &walls, max_acceleration, remaining, settings, impulse_cache);
         let Cluster { rows, bodies, sets, scratch, .. } = &mut self.cluster;
         let ClusterBodies { position, velocity, spin, inverse_mass, .. } = bodies;
-        impulse_cache.retain_mut(|entry| entry.remap(|at| rows.get(at).map(|row| *row as usize)));
+        rename_rows(impulse_cache, |at| rows.get(at).map(|row| *row as usize));
         let mut wall_power = self.work.map(|_| vec![0.0; rows.len()]);
         if let Some(wall_power) = &mut wall_power {
             scratch.for_each_supplied_energy(velocity, inverse_mass, |at, energy| {

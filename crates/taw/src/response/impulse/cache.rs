@@ -2,12 +2,9 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::{BodyA, Constraint};
+use super::Constraint;
 use crate::math::{Scalar, Vec3};
-use crate::response::SolverBodies;
-
-/// Identity of a contact across substeps; sorts walls first, then by rows.
-pub(in crate::response) type ContactKey = (bool, usize, usize, u32, [i8; 2]);
+use crate::response::{ContactKey, KeyedByContact, SolverBodies};
 
 /// Impulse cache entry: the impulses of a contact in the last substep, for the warm start.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,29 +15,10 @@ pub(crate) struct CachedImpulse<S> {
     angular_impulse: Vec3<S>,
 }
 
-/// Key of a contact.
-pub(in crate::response) fn contact_key<S: Scalar>(
-    a: BodyA,
-    b: usize,
-    axis_offset: [S; 2],
-) -> ContactKey {
-    let zero = S::zero();
-    // The ends of capsules, because one capsule often touches with both.
-    let side = axis_offset.map(|offset| if offset > zero { 2 } else { i8::from(offset < zero) });
-    match a {
-        BodyA::Wall(wall, part) => (false, wall as usize, b, part, side),
-        BodyA::Marble(a) => (true, a as usize, b, 0, side),
-    }
-}
-
 impl<S: Scalar> CachedImpulse<S> {
     /// Entry without friction, from a normal impulse as a change of speed, in m/s.
     pub(in crate::response) fn of_normal_impulse(key: ContactKey, normal_impulse: S) -> Self {
         Self { key, normal_impulse, tangent_impulse: Vec3::zero(), angular_impulse: Vec3::zero() }
-    }
-
-    pub(in crate::response) fn key(&self) -> ContactKey {
-        self.key
     }
 
     pub(in crate::response) fn normal_impulse(&self) -> S {
@@ -48,14 +26,18 @@ impl<S: Scalar> CachedImpulse<S> {
     }
 }
 
-impl<S> CachedImpulse<S> {
-    /// Maps its rows to new ones. False if one has none.
-    pub fn remap(&mut self, map_row: impl Fn(usize) -> Option<usize>) -> bool {
-        let (two_marbles, a, b, part, side) = self.key;
-        let a = if two_marbles { map_row(a) } else { Some(a) };
-        let (Some(a), Some(b)) = (a, map_row(b)) else { return false };
-        self.key = (two_marbles, a, b, part, side);
-        true
+impl<S: Scalar> KeyedByContact for CachedImpulse<S> {
+    fn key(&self) -> ContactKey {
+        self.key
+    }
+
+    fn set_key(&mut self, key: ContactKey) {
+        self.key = key;
+    }
+
+    fn reverse(&mut self) {
+        self.tangent_impulse = -self.tangent_impulse;
+        self.angular_impulse = -self.angular_impulse;
     }
 }
 

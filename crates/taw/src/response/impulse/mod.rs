@@ -13,10 +13,11 @@ use cgmath::{InnerSpace, Zero};
 
 use crate::contact::{Contact, Contacts};
 use crate::math::{Mat3, Point3, Scalar, Vec3, cast_vector};
-use crate::response::{EnergyLedger, ImpulseSample, InverseEffectiveMass, Material, SolverBodies};
+use crate::response::{
+    ContactKey, EnergyLedger, ImpulseSample, InverseEffectiveMass, Material, SolverBodies,
+};
 pub(crate) use cache::CachedImpulse;
-pub(super) use cache::contact_key;
-use cache::{ContactKey, store_impulses};
+use cache::store_impulses;
 use energy_guard::{FullRestitution, IslandEnergy};
 pub(super) use islands::UnionFind;
 use islands::{DIRECTIONS, Islands};
@@ -75,6 +76,13 @@ impl BodyA {
     pub(super) fn of_each<S>(contacts: &Contacts<S>) -> impl Iterator<Item = (Self, &Contact<S>)> {
         let wm = contacts.wm.iter().map(|c| (Self::Wall(c.a, c.part), c));
         wm.chain(contacts.mm.iter().map(|c| (Self::Marble(c.a), c)))
+    }
+
+    pub(super) fn contact_key<S: Scalar>(self, b: usize, axis_offset: [S; 2]) -> ContactKey {
+        match self {
+            Self::Wall(wall, part) => ContactKey::new(Some(part), wall, b as u32, axis_offset),
+            Self::Marble(a) => ContactKey::new(None, a, b as u32, axis_offset),
+        }
     }
 
     pub(super) fn marble(self) -> Option<usize> {
@@ -236,7 +244,7 @@ struct RollingConstraint<S> {
 
 impl<S: Scalar> Constraint<S> {
     fn key(&self) -> ContactKey {
-        contact_key(self.a, self.b, self.axis_offset)
+        self.a.contact_key(self.b, self.axis_offset)
     }
 
     /// Accumulated impulse times the normal inverse effective mass, in m/s.

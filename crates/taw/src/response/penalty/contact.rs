@@ -7,15 +7,13 @@ use crate::math::{Scalar, Vec3, cast_vector, is_finite, normalize_and_length};
 use crate::response::impulse::BodyA;
 use crate::response::material::Compliance;
 use crate::response::{
-    Colliders, EnergyLedger, ImpulseSample, InverseEffectiveMass, Material, SolverBodies,
+    Colliders, ContactKey, EnergyLedger, ImpulseSample, InverseEffectiveMass, Material,
+    SolverBodies,
 };
-
-/// Identity of a contact: two marbles or not, rows, sub-shape of the wall, ends of capsules.
-pub(super) type SpringKey = (bool, u32, u32, u32, [i8; 2]);
 
 /// Penalty contact: bodies, geometry and relative motion.
 pub(super) struct PenaltyContact<S> {
-    pub key: SpringKey,
+    pub key: ContactKey,
     /// First body; none for a wall.
     pub a: Option<usize>,
     pub b: usize,
@@ -44,9 +42,7 @@ pub(super) fn find_contact<S: Scalar>(
     (two_marbles, a, b, part): (bool, u32, u32, u32),
     axis_offset: [S; 2],
 ) -> Option<PenaltyContact<S>> {
-    // The ends of capsules.
-    let side = axis_offset.map(|x| if x > S::zero() { 2 } else { i8::from(x < S::zero()) });
-    let key = (two_marbles, a, b, part, side);
+    let key = ContactKey::new((!two_marbles).then_some(part), a, b, axis_offset);
     let (a, b) = (a as usize, b as usize);
     let anchor_position =
         |row: usize, axis_offset: S| marbles.position[row] + marbles.anchor(row, axis_offset);

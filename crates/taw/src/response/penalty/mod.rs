@@ -19,15 +19,17 @@ use cgmath::{InnerSpace, Zero};
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, cast_vector, is_finite};
 use crate::response::impact::clamp_length;
-use crate::response::{Colliders, EnergyLedger, Material, SolverBodies};
-use contact::{PenaltyContact, SpringKey, find_contact};
+use crate::response::{
+    Colliders, ContactKey, EnergyLedger, KeyedByContact, Material, SolverBodies,
+};
+use contact::{PenaltyContact, find_contact};
 use law::Springs;
 use mass_split::ContactLoad;
 
 /// Contact history: state of a contact's springs from the last substep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SpringHistory<S> {
-    key: SpringKey,
+    key: ContactKey,
     /// Tangential displacement of the two points while they stick, in metres, and its stiffness, in
     /// N/m.
     tangent_displacement: Vec3<S>,
@@ -38,11 +40,17 @@ pub(crate) struct SpringHistory<S> {
     separation_speed: S,
 }
 
-impl<S> SpringHistory<S> {
-    /// Rows of its marbles.
-    pub fn rows(&self) -> [Option<usize>; 2] {
-        let (two_marbles, a, b, ..) = self.key;
-        [two_marbles.then_some(a as usize), Some(b as usize)]
+impl<S: Scalar> KeyedByContact for SpringHistory<S> {
+    fn key(&self) -> ContactKey {
+        self.key
+    }
+
+    fn set_key(&mut self, key: ContactKey) {
+        self.key = key;
+    }
+
+    fn reverse(&mut self) {
+        self.tangent_displacement = -self.tangent_displacement;
     }
 }
 

@@ -1,0 +1,85 @@
+//! Identity of a contact from one substep to the next, and its impulses meanwhile.
+
+use crate::math::Scalar;
+
+/// Identity of a contact across substeps; sorts walls first, then by rows.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub(crate) struct ContactKey {
+    /// Two marbles, or a wall and a marble.
+    is_pair: bool,
+    /// Row of the first marble or of the wall.
+    a: u32,
+    /// Row of the marble; the higher one of a pair.
+    b: u32,
+    /// Sub-shape of the wall.
+    part: u32,
+    /// Ends of capsules that touch, since one capsule often touches with both.
+    ends: [i8; 2],
+}
+
+impl ContactKey {
+    /// Key of a contact at these offsets along the axes of capsules. `part` is that of a wall, none
+    /// for a pair.
+    pub fn new<S: Scalar>(part: Option<u32>, a: u32, b: u32, axis_offset: [S; 2]) -> Self {
+        let zero = S::zero();
+        let ends =
+            axis_offset.map(|offset| if offset > zero { 2 } else { i8::from(offset < zero) });
+        Self { is_pair: part.is_none(), a, b, part: part.unwrap_or(0), ends }
+    }
+
+    /// Key after rows have moved; none if one of them is gone.
+    pub fn remap(
+        self,
+        marble: impl Fn(usize) -> Option<usize>,
+        wall: impl Fn(usize) -> Option<usize>,
+    ) -> Option<Self> {
+        let a = if self.is_pair { marble(self.a as usize) } else { wall(self.a as usize) };
+        let (a, b) = (a? as u32, marble(self.b as usize)? as u32);
+        Some(Self { a, b, ..self })
+    }
+
+    /// Key with the lower row of a pair first, and whether the two had to be swapped.
+    pub fn in_order(self) -> (Self, bool) {
+        let swap = self.is_pair && self.a > self.b;
+        let [first, second] = self.ends;
+        let swapped = Self { a: self.b, b: self.a, ends: [second, first], ..self };
+        (if swap { swapped } else { self }, swap)
+    }
+}
+
+/// Memory of a contact.
+pub(crate) trait KeyedByContact {
+    fn key(&self) -> ContactKey;
+    fn set_key(&mut self, key: ContactKey);
+    /// Turns round what acts on the second body.
+    fn reverse(&mut self);
+}
+
+/// Renames the rows of marbles, and forgets contacts of those that have no new name.
+pub(crate) fn rename_rows<T: KeyedByContact>(
+    memory: &mut Vec<T>,
+    marble: impl Fn(usize) -> Option<usize>,
+) {
+    memory.retain_mut(|entry| {
+        let key = entry.key().remap(&marble, Some);
+        key.inspect(|key| entry.set_key(*key)).is_some()
+    });
+}
+
+/// Follows rows that have moved, and forgets contacts of rows that are gone.
+pub(crate) fn follow_rows<T: KeyedByContact>(
+    memory: &mut Vec<T>,
+    marble: impl Fn(usize) -> Option<usize>,
+    wall: impl Fn(usize) -> Option<usize>,
+) {
+    memory.retain_mut(|entry| {
+        let Some(key) = entry.key().remap(&marble, &wall) else { return false };
+        let (key, swapped) = key.in_order();
+        entry.set_key(key);
+        if swapped {
+            entry.reverse();
+        }
+        true
+    });
+    memory.sort_unstable_by_key(T::key);
+}

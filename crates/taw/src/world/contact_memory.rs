@@ -1,0 +1,63 @@
+//! Memory of contacts from substep to substep, which follows marbles and walls as they come and go.
+
+use super::World;
+use super::walls::WallId;
+use crate::handle::MarbleId;
+use crate::math::Scalar;
+use crate::response::impulse::CachedImpulse;
+use crate::response::{SpringHistory, follow_rows};
+
+/// Impulses and springs of the last substep's contacts, by row.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct ContactMemory<S> {
+    pub impulses: Vec<CachedImpulse<S>>,
+    pub springs: Vec<SpringHistory<S>>,
+    /// Who had which row then: a removal moves another marble or wall into its row.
+    marbles: Vec<MarbleId>,
+    walls: Vec<WallId>,
+    /// Number of removals of marbles and of walls until then.
+    removals: [u64; 2],
+}
+
+impl<S> Default for ContactMemory<S> {
+    fn default() -> Self {
+        let (impulses, springs) = (Vec::new(), Vec::new());
+        Self { impulses, springs, marbles: Vec::new(), walls: Vec::new(), removals: [0; 2] }
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// Forgets what contacts remember from substep to substep.
+    pub(super) fn forget_contacts(&mut self) {
+        self.memory.impulses.clear();
+        self.memory.springs.clear();
+        self.events.impulse_cache.clear();
+    }
+
+    /// Brings the memory of contacts up to date with the rows of marbles and walls.
+    pub(super) fn follow_contacts(&mut self) {
+        let (marbles, walls, memory) = (&self.marbles, &self.walls, &mut self.memory);
+        let removals = [marbles.removals(), walls.removals()];
+        if memory.removals != removals {
+            let ContactMemory { impulses, springs, marbles: old, walls: old_walls, .. } = memory;
+            let marble = |row: usize| old.get(row).and_then(|id| marbles.row(*id).ok());
+            let wall = |row: usize| old_walls.get(row).and_then(|id| walls.row(*id).ok());
+            follow_rows(impulses, marble, wall);
+            follow_rows(springs, marble, wall);
+            if memory.removals[1] == removals[1] {
+                follow_rows(&mut self.events.impulse_cache, marble, Some);
+            } else {
+                self.events.impulse_cache.clear(); // it has rows of its own for walls
+            }
+        }
+        if memory.removals != removals || memory.marbles.len() != marbles.len() {
+            memory.marbles.clear();
+            memory.marbles.extend((0..marbles.len()).filter_map(|row| marbles.id(row)));
+        }
+        if memory.removals != removals || memory.walls.len() != walls.len() {
+            memory.walls.clear();
+            memory.walls.extend((0..walls.len()).filter_map(|row| walls.id(row)));
+        }
+        memory.removals = removals;
+    }
+}
