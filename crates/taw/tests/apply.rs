@@ -1,6 +1,8 @@
 //! What pushes, turns, slows and bounds single marbles.
 
+use cgmath::InnerSpace;
 use taw::frame::Bivector;
+use taw::motion::Medium;
 use taw::prelude::*;
 use taw::response::Elasticity;
 use taw::world::{Damping, SpeedLimits};
@@ -159,5 +161,35 @@ fn compensated_precision_moves_where_plain_precision_stands() {
         };
         assert_eq!(way(Precision::Plain), 0.0, "{response:?}");
         assert!((way(Precision::Compensated) - 1000.0 / 1024.0).abs() < 1e-9, "{response:?}");
+    }
+}
+
+#[test]
+fn drag_of_any_strength_only_slows() {
+    let responses = [Response::Displacement, Response::SoftStep, Response::EventDriven];
+    for integrator in Integrator::ALL {
+        for (response, strength) in responses
+            .iter()
+            .flat_map(|response| [0.1, 2.0, 50.0, 1e6, 1e30].map(|k| (*response, k)))
+        {
+            let mut world = World::<f32>::default();
+            world.set_model(Model { integrator, response, ..Model::default() }).unwrap();
+            let wind = Vec3::new(0.0, 0.0, 0.0);
+            world.set_gravity(wind).unwrap();
+            let half =
+                |linear, quadratic| ForceField::Drag(Medium { velocity: wind, linear, quadratic });
+            world.set_forces(vec![half(strength, 0.0), half(0.0, strength)]).unwrap();
+            let velocity = Vec3::new(1.0, -2.0, 0.5);
+            let thrown = Marble { velocity, ..Marble::new(Point3::new(0.0, 1.0, 0.0), 0.01) };
+            let id = world.marbles.insert(thrown).unwrap();
+            let mut before = velocity.magnitude();
+            for _ in 0..60 {
+                world.step(1.0 / 60.0).unwrap();
+                let speed = world.marbles.get(id).unwrap().velocity.magnitude();
+                assert!(speed <= before * 1.000_001, "{integrator:?} {response:?} {strength}");
+                before = speed;
+            }
+            assert!(before < 2.0, "{integrator:?} {response:?} {strength}: still {before} m/s");
+        }
     }
 }

@@ -1,5 +1,8 @@
 //! Marbles sleep where they rest, and wake when something changes about them.
 
+#[path = "sleep/slow.rs"]
+mod slow;
+
 use taw::motion::WallMotion;
 use taw::prelude::*;
 use taw::response::Response;
@@ -198,9 +201,14 @@ fn nothing_sleeps_in_mid_air() {
             (state >> 40) as f32 / (1 << 24) as f32
         };
         let mut world = world();
-        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        let floor = world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
         let table = |y: f32| block([-1.0, y - 0.3, -1.0], [1.0, y, 1.0]);
         let wall = world.walls.insert(table(1.0)).unwrap();
+        // Or what rolls would roll on.
+        let slows = Material { rolling_resistance: 0.1, ..Material::default() };
+        for wall in [floor, wall] {
+            world.walls.set_material(wall, Some(slows)).unwrap();
+        }
         let ids: Vec<_> = (0..30)
             .map(|_| {
                 let at = [4.0 * random() - 2.0, 0.5 + 3.0 * random(), 4.0 * random() - 2.0];

@@ -2,6 +2,8 @@
 
 #[path = "soft_step/state.rs"]
 mod state;
+#[path = "soft_step/walls.rs"]
+mod walls;
 
 use cgmath::{InnerSpace, Zero};
 use taw::prelude::*;

@@ -93,9 +93,8 @@ impl<S: Scalar> ForceField<S> {
     #[must_use]
     pub fn acceleration(&self, motion: Motion<S>, mass: S) -> Vec3<S> {
         match *self {
-            Self::Drag(Medium { velocity, linear, quadratic }) => {
-                let relative = velocity - motion.velocity;
-                relative * ((linear + quadratic * relative.magnitude()) / mass)
+            Self::Drag(medium) => {
+                (medium.velocity - motion.velocity) * medium.drag_rate(motion, mass)
             }
             Self::Spring { anchor, rest_length, stiffness } => {
                 normalize_and_length(anchor - motion.position)
@@ -110,6 +109,35 @@ impl<S: Scalar> ForceField<S> {
             Self::Custom(force) => force(motion, mass) / mass,
         }
     }
+}
+
+impl<S: Scalar> Medium<S> {
+    /// Part of the relative velocity that drag takes per second.
+    fn drag_rate(&self, motion: Motion<S>, mass: S) -> S {
+        let speed = (self.velocity - motion.velocity).magnitude();
+        (self.linear + self.quadratic * speed) / mass
+    }
+}
+
+/// Acceleration of a body of this mass (kg) by several fields in a step of `dt` seconds, in m/s².
+/// Drag takes no more in it than all of a velocity: an explicit step of a stiffer one would turn the
+/// body back, faster than it came.
+pub(crate) fn acceleration_in_step<S: Scalar>(
+    fields: &[ForceField<S>],
+    motion: Motion<S>,
+    mass: S,
+    dt: S,
+) -> Vec3<S> {
+    let drags = fields.iter().filter(|field| matches!(field, ForceField::Drag(_))).count();
+    let most = S::one() / (dt * S::from_f64(drags as f64));
+    fields.iter().fold(Vec3::zero(), |sum, field| {
+        sum + match field {
+            ForceField::Drag(medium) => {
+                (medium.velocity - motion.velocity) * medium.drag_rate(motion, mass).min(most)
+            }
+            other => other.acceleration(motion, mass),
+        }
+    })
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod mass;
 mod rotation;
 mod wall_motion;
 
+pub(crate) use force_field::acceleration_in_step;
 pub use force_field::{ForceField, Medium};
 pub use free_body::{integrate_free_body, world_velocity};
 pub use integrator::{Integrator, Motion};

@@ -141,13 +141,13 @@ impl Swarm {
     }
 
     /// Returns true if a marble is still as [`Self::read_bodies`] left it, and the body has this
-    /// inverse mass, in 1/kg, surface, and permission to sleep.
+    /// radius, in metres, inverse mass, in 1/kg, surface, and permission to sleep.
     #[inline]
     pub(crate) fn is_as_read<S: Scalar>(
         &self,
         slot: u32,
         marble: MarbleRow<S>,
-        inverse_mass: f32,
+        [row_radius, inverse_mass]: [f32; 2],
         surface: Option<Surface>,
         sleeping_disabled: bool,
     ) -> bool {
@@ -156,7 +156,7 @@ impl Swarm {
         let MarbleRow { position, velocity: speed, spin, radius } = marble;
         let turns = || spin.is_none_or(|spin| spin == vector::<S>(&self.spin[row]) / radius);
         Point3::from_vec(vector(at)) == position
-            && number::<S>(at[3]) == radius
+            && at[3] == row_radius
             && vector(velocity) == speed
             && velocity[3].abs() == inverse_mass
             && turns()

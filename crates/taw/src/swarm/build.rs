@@ -221,7 +221,10 @@ impl Swarm {
             let chunk = &mut self.chunks[count];
             chunk.layers = [begin, layer];
             chunk.rows = [first, next, next];
-            chunk.sleep_time = 0.0;
+            chunk.rest.end();
+            let radii = self.at[first as usize..next as usize].iter().map(|at| at[3]);
+            chunk.radii =
+                radii.fold([f32::MAX, 0.0], |[least, most], r| [least.min(r), most.max(r)]);
             chunk.fastest_own = None;
             chunk.read_asleep = false;
             let asleep = |row: &[f32; 4]| row[3].is_sign_negative();

@@ -3,6 +3,7 @@ use std::ops::Range;
 use super::batches::Batch;
 use super::kernels::ContactImpulses;
 use super::neighbours::{NEIGHBOUR_ROOM, NeighbourLists};
+use super::rest::Rest;
 use super::simd::Row;
 use super::wall_contact::WallContact;
 
@@ -34,9 +35,11 @@ pub(super) struct Chunk {
     pub speed: [f32; 3],
     /// The least and the largest inverse mass, in 1/kg.
     pub inverse_masses: [f32; 2],
-    /// Time for which all have been slow, in seconds, and whether they sleep.
-    pub sleep_time: f32,
+    /// The least and the largest radius, in metres.
+    pub radii: [f32; 2],
+    /// Whether they sleep, or how long they have rested.
     pub asleep: bool,
+    pub rest: Rest,
     /// Set if they fell asleep just now.
     pub fell_asleep: bool,
     /// Set once the bodies that fell asleep in it were read.
@@ -46,6 +49,8 @@ pub(super) struct Chunk {
     /// Set if a ball of it or of those beside it bounced just now, and in this substep.
     pub again: bool,
     pub struck: bool,
+    /// Set if a ball of it was put back to a wall in this substep.
+    pub caught: bool,
     /// Set if a ball of it went beyond its skin by more than the common skin.
     pub overrun: bool,
     /// Rows that would leave their skin in this step, and those that were stopped.
@@ -60,7 +65,8 @@ impl Chunk {
                 velocity[3] = velocity[3].abs();
             }
         }
-        (self.asleep, self.sleep_time) = (false, 0.0);
+        self.asleep = false;
+        self.rest.end();
     }
 
     pub fn bytes(&self) -> usize {
@@ -78,13 +84,15 @@ impl Chunk {
             has_fast: _,
             speed: _,
             inverse_masses: _,
-            sleep_time: _,
+            radii: _,
             asleep: _,
+            rest,
             fell_asleep: _,
             read_asleep: _,
             fastest_own: _,
             again: _,
             struck: _,
+            caught: _,
             overrun: _,
             leaving,
             stopped,
@@ -94,6 +102,7 @@ impl Chunk {
             + impulses.bytes()
             + (wall_contacts.capacity() + old_wall_contacts.capacity()) * size_of::<WallContact>()
             + names.iter().sum::<usize>() * size_of::<u32>()
+            + rest.bytes()
     }
 
     /// Range of its neighbour lists in the list of all.

@@ -35,6 +35,7 @@ mod kernels;
 mod model;
 mod neighbours;
 mod proxies;
+mod rest;
 mod simd;
 mod state;
 mod step;
@@ -75,6 +76,9 @@ use walls::HalfSpace;
 const RADII: [f32; 2] = [1e-9, 1e9];
 /// The furthest coordinate, in metres, and the largest speed, in m/s.
 const MAX_COORDINATE: f32 = 1e12;
+
+/// Inverse mass in 1/kg of a body that no force moves.
+pub(crate) const INFINITE_MASS: f32 = 1e-25;
 
 /// Balls in bulk. See the [module](self).
 #[derive(Clone, Debug, Default)]

@@ -27,8 +27,8 @@ pub struct SwarmModel {
     pub substeps: u32,
     /// Number of threads that work on a step at most, from 1 to 64. They change no bit of it.
     pub threads: u32,
-    /// Material of the balls. Rolling and spinning resistance and tangential restitution
-    /// are not modelled.
+    /// Material of the balls. Tangential restitution is not modelled, nor in the lab's tier are
+    /// friction, restitution, rolling and spinning resistance.
     pub material: Material<f32>,
     /// Lets balls that lie still fall asleep, in the full tier.
     pub sleeps: bool,

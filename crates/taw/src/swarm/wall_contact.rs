@@ -41,7 +41,7 @@ pub(super) struct WallContact {
 const TOUCHES: f32 = 1e-4;
 const ROUNDINGS: f32 = 4.0;
 
-fn xyz(row: &Row) -> Vec3<f32> {
+pub(super) fn xyz(row: &Row) -> Vec3<f32> {
     Vec3::new(row[0], row[1], row[2])
 }
 

@@ -251,6 +251,34 @@ fn along_path(
     }
 }
 
+/// Puts a ball that passed into a wall on this displacement back to where it met it. Returns how
+/// far that is, in metres.
+pub(super) fn stop_at_wall(
+    walls: &dyn StaticGeometry,
+    at: &mut Row,
+    displacement: Vec3<f32>,
+) -> f32 {
+    let start = center(at) - displacement;
+    let ball = [start.x, start.y, start.z, at[3]];
+    let Some((_, normal, distance)) = walls.first_hit_on_path(&ball, displacement) else {
+        return 0.0;
+    };
+    let approach = -displacement.dot(normal);
+    if approach.is_nan() || approach <= 0.0 {
+        return 0.0;
+    }
+    let back = displacement * (1.0 - ((distance - at[3]) / approach).clamp(0.0, 1.0));
+    for (x, back) in at.iter_mut().zip::<[f32; 3]>(back.into()) {
+        *x -= back;
+    }
+    back.magnitude()
+}
+
+/// Returns true if a ball of this velocity and radius is fast for a step of so many seconds.
+pub(super) fn is_fast(velocity: &Row, time: f32, radius: f32) -> bool {
+    squared(*velocity) * time * time > FAST * FAST * radius * radius
+}
+
 /// A ball that goes further than this in a step, in radii, is fast: the plane across the nearest
 /// point of a wall says little about where it meets it, so it is looked where that is, and again
 /// in each substep.

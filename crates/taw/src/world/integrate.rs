@@ -4,7 +4,7 @@ use cgmath::Zero;
 
 use super::marbles::{Compensation, Marbles};
 use crate::math::{Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
-use crate::motion::{ForceField, Integrator, Motion};
+use crate::motion::{ForceField, Integrator, Motion, acceleration_in_step};
 
 /// Step context: integrator, gravity, force fields and time step.
 #[derive(Clone, Copy)]
@@ -25,9 +25,7 @@ impl<S: Scalar> StepContext<'_, S> {
         }
         let scale = marbles.gravity_scale.get(row).unwrap_or(S::one());
         let own = marbles.force.get(row).unwrap_or_else(Vec3::zero) / mass;
-        self.forces
-            .iter()
-            .fold(self.gravity * scale + own, |sum, force| sum + force.acceleration(motion, mass))
+        self.gravity * scale + own + acceleration_in_step(self.forces, motion, mass, self.dt)
     }
 }
 

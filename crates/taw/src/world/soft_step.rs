@@ -10,8 +10,8 @@ use crate::Error;
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::Rotation;
-use crate::response::Material;
-use crate::swarm::{Body, MarbleRow, NO_ROW, Surface, SyncToken, VelocityChange};
+use crate::response::{Material, Response};
+use crate::swarm::{Body, INFINITE_MASS, MarbleRow, NO_ROW, Surface, SyncToken, VelocityChange};
 
 /// Correspondence of marbles and rows, and scratch memory.
 #[derive(Clone, Debug)]
@@ -47,7 +47,7 @@ impl<S> Default for SoftStep<S> {
 
 /// Least and largest inverse mass of a row, in 1/kg: products with it and quotients by it are
 /// numbers.
-const INVERSE_MASSES: [f32; 2] = [1e-25, 1e25];
+const INVERSE_MASSES: [f32; 2] = [INFINITE_MASS, 1e25];
 
 /// Least radius of a row, in metres, as of the balls of a swarm.
 const LEAST_RADIUS: f32 = 1e-9;
@@ -63,6 +63,7 @@ impl<S: Scalar> World<S> {
             }
         } else {
             self.marbles.integrate_rotations(dt, self.model.rotation);
+            self.quarantine_non_finite();
         }
         self.soft_step.dt = dt.as_f64() as f32;
         self.sync_bodies()?;
@@ -133,14 +134,19 @@ impl<S: Scalar> World<S> {
     }
 
     /// Returns true if a marble sleeps: in a model with
-    /// [`Response::SoftStep`](crate::response::Response::SoftStep), while it and all about it have
-    /// been at rest for half a second. What sleeps costs next to nothing, and has no velocity. It
-    /// wakes when it is touched or set, when a wall or gravity changes, and when a neighbour wakes.
+    /// [`Response::SoftStep`](crate::response::Response::SoftStep), once it and all about it have
+    /// rested: for half a second, and longer for balls of over 10 cm (five times √(r/g)), each was
+    /// borne by something and went no further than 2 % of its radius. What sleeps costs next to
+    /// nothing, and has no velocity. It wakes when it is touched or set, when a wall or gravity
+    /// changes, and when a neighbour wakes.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
     pub fn is_asleep(&self, id: MarbleId) -> Result<bool, Error> {
         self.marbles.row(id)?;
+        if self.model.response != Response::SoftStep {
+            return Ok(false);
+        }
         let bodies = &self.swarm.body_balls;
         let found = bodies.binary_search_by_key(&id, |(marble, _)| *marble);
         Ok(found.is_ok_and(|i| self.swarm.is_asleep(bodies[i].1)))
@@ -205,7 +211,8 @@ impl<S: Scalar> World<S> {
             };
             let inverse_mass = inverse_mass(marbles.mass(row));
             let sleepless = marbles.sleeping_disabled.get(row).is_some();
-            if !self.swarm.is_as_read(slot, marble, inverse_mass, surface, sleepless) {
+            let numbers = [row_radius(marble.radius), inverse_mass];
+            if !self.swarm.is_as_read(slot, marble, numbers, surface, sleepless) {
                 let body = body(slot, marble, inverse_mass, surface);
                 changed.push(Body { sleeping_disabled: sleepless, ..body });
             }
@@ -236,6 +243,11 @@ fn inverse_mass<S: Scalar>(mass: S) -> f32 {
     ((S::one() / mass).as_f64() as f32).clamp(least, most)
 }
 
+/// Radius of a row, in metres.
+fn row_radius<S: Scalar>(radius: S) -> f32 {
+    (radius.as_f64() as f32).clamp(LEAST_RADIUS, MAX_COORDINATE)
+}
+
 /// A marble as a row.
 fn body<S: Scalar>(
     slot: u32,
@@ -248,7 +260,7 @@ fn body<S: Scalar>(
     let spin = marble.spin.map_or_else(Vec3::zero, |spin| spin * marble.radius);
     Body {
         slot,
-        at: row(marble.position.to_vec(), single(marble.radius).max(LEAST_RADIUS)),
+        at: row(marble.position.to_vec(), row_radius(marble.radius)),
         velocity: row(marble.velocity, inverse_mass),
         spin: row(spin, 0.0),
         surface,

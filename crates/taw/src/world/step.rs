@@ -21,8 +21,8 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not in
-    /// [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven
-    /// or periodic; [`Error::OutOfRange`] for a marble too large for its
+    /// [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven,
+    /// periodic, or steps by `SoftStep`; [`Error::OutOfRange`] for a marble too large for its
     /// [period](Self::set_period). Then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
         let substep = self.validated_substep(dt)?;

@@ -9,7 +9,7 @@ use super::walls::{SubShape, Walls};
 use crate::Error;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::response::{Material, Response};
-use crate::shape::{Aabb, BoundedShape, Sphere};
+use crate::shape::{Aabb, Aabb3, BoundedShape, PointProjection, Sphere};
 use crate::swarm::{BallId, Proxy, Stage, StaticGeometry};
 
 impl<S: Scalar> World<S> {
@@ -109,8 +109,39 @@ impl<S: Scalar> World<S> {
     }
 }
 
+/// Overlap in radii at the end of a path up to which a ball only grazes a wall.
+const GRAZES: f64 = 0.02;
 /// In metres and m/s.
 pub(super) const MAX_COORDINATE: f32 = 1e12;
+
+impl<S: Scalar> Walls<S> {
+    /// Time at which a sphere meets the first part that it passes into on a path, as a fraction of
+    /// it. Its core, or how deep it comes in the end, says whether it passes into a wall: one that
+    /// grazes it goes on.
+    fn time_of_passage(
+        &self,
+        sphere: &Sphere<S>,
+        displacement: Vec3<S>,
+        reached: &Aabb3<S>,
+    ) -> Option<S> {
+        let core = Sphere { radius: sphere.radius * S::from_f64(0.5), ..*sphere };
+        let deep = sphere.radius * S::from_f64(1.0 - GRAZES);
+        let mut first: Option<S> = None;
+        Walls::for_each_in_box(self, reached, |part| {
+            let distance = |point| self.project_point(part, point).distance;
+            let ends_in_it = || {
+                let end = distance(sphere.center + displacement);
+                end < deep && end < distance(sphere.center)
+            };
+            let passes = ends_in_it() || self.time_of_impact(part, &core, displacement).is_some();
+            let stop = passes.then(|| self.time_of_impact(part, sphere, displacement)).flatten();
+            if let Some(stop) = stop {
+                first = Some(first.map_or(stop.time, |time| time.min(stop.time)));
+            }
+        });
+        first
+    }
+}
 
 impl<S: Scalar> StaticGeometry for Walls<S> {
     fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<f32>, f32)) {
@@ -169,23 +200,24 @@ impl<S: Scalar> StaticGeometry for Walls<S> {
         let displacement: Vec3<S> = cast_vector(displacement);
         let (start, end) =
             (sphere.bounding_box(), Sphere { center: center + displacement, ..sphere });
-        // Its core says whether it passes into the wall, its surface when it is there.
-        let core = Sphere { radius: sphere.radius * S::from_f64(0.5), ..sphere };
-        let mut first: Option<(SubShape, S)> = None;
-        Walls::for_each_in_box(self, &start.union(&end.bounding_box()), |part| {
-            let passes = self.time_of_impact(part, &core, displacement).is_some();
-            let Some(stop) =
-                passes.then(|| self.time_of_impact(part, &sphere, displacement)).flatten()
-            else {
+        let reached = start.union(&end.bounding_box());
+        let time = self.time_of_passage(&sphere, displacement, &reached)?;
+        // Before the part that it passes into it may meet another one, of which that is the
+        // continuation: then the edge between them is no obstacle.
+        let mut first: Option<(SubShape, S, PointProjection<S>)> = None;
+        Walls::for_each_in_box(self, &reached, |part| {
+            let Some(stop) = self.time_of_impact(part, &sphere, displacement) else { return };
+            if stop.time > time || first.as_ref().is_some_and(|(_, time, _)| stop.time >= *time) {
                 return;
-            };
-            if first.is_none_or(|(_, time)| stop.time < time) {
-                first = Some((part, stop.time));
+            }
+            let nearest = self.project_point(part, center + displacement * stop.time);
+            let approach = -displacement.dot(nearest.normal);
+            if stop.time == time || approach > displacement.magnitude() * S::from_f64(GRAZES) {
+                first = Some((part, stop.time, nearest));
             }
         });
-        let (part, time) = first?;
+        let (part, time, nearest) = first?;
         // The plane there is nearer by the displacement up to it.
-        let nearest = self.project_point(part, center + displacement * time);
         let distance = nearest.distance - displacement.dot(nearest.normal) * time;
         let normal: Vec3<f32> = cast_vector(nearest.normal);
         Some(([part.wall, part.index], normal, distance.as_f64() as f32))

@@ -272,3 +272,15 @@ fn whatever_is_set_of_a_marble_reaches_its_row() {
         }
     }
 }
+
+#[test]
+fn a_spin_beyond_all_numbers_is_stopped_and_named() {
+    let mut world = world::<f32>(2);
+    world.set_model(Model { rotation: Rotation::Rolling, ..world.model() }).unwrap();
+    let id = world.marbles.insert(Marble::new(Point3::new(0.0, 1.0, 0.0), 0.1)).unwrap();
+    world.marbles.set_angular_velocity(id, Vec3::new(3e38, 3e38, 0.4)).unwrap();
+    world.step(1.0 / 60.0).unwrap();
+    let rotation = world.marbles.get(id).unwrap().rotation;
+    assert!(rotation.s.is_finite() && rotation.v.x.is_finite(), "{rotation:?}");
+    assert_eq!(world.stopped().collect::<Vec<_>>(), [id]);
+}

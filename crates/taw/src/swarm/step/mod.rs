@@ -190,12 +190,15 @@ impl Swarm {
             self.save_proxies();
             self.integrate([0.0; 4], [h, h, h, 0.0], row(gravity * (-0.5 * h * h)));
             self.correct_free_flight(-0.5 * h / substeps);
+            let caught = self.stop_at_walls(walls, h, gravity * (0.5 * h * h));
             self.advance_proxies(parts, true, h);
             let (skin, left) = (self.skin, left - h);
             let left_it = |_: &Row, skin_left: f32| skin_left < -skin;
             if self.find_pairs_within_step(|chunk| chunk.overrun, left_it, dt, walls, observe) {
                 self.update_wall_contacts(walls, left, times, all, false);
                 self.find_backing(); // rows may have changed
+            } else if caught {
+                self.update_wall_contacts(walls, left, times, |chunk| chunk.caught, true);
             }
             observe(Stage::Restitute);
             self.pass(Pass::Relax(params), |_, _| true);

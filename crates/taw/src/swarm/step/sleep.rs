@@ -5,7 +5,7 @@ use std::mem::take;
 use super::{leaves, wider};
 use cgmath::Zero;
 
-use crate::math::Vec3;
+use crate::math::{Vec3, length};
 use crate::swarm::chunk::Chunk;
 use crate::swarm::grid::Grid;
 use crate::swarm::kernels::{GROUNDED, squared};
@@ -13,19 +13,16 @@ use crate::swarm::simd::Row;
 use crate::swarm::workers::{DisjointSlice, parallel_for};
 use crate::swarm::{StaticGeometry, Swarm};
 
-/// Time to sleep: for so long, in seconds, all balls of a chunk lie still before they sleep.
-const TIME_TO_SLEEP: f32 = 0.5;
-
 impl Swarm {
     /// Finds which chunks fall asleep or wake, and which balls may leave their skin in this step.
     pub(super) fn update_sleep(&mut self, dt: f32, gravity: Vec3<f32>) {
-        let sleep_speed = sleep_speed(gravity, self.mean_radius);
         let sleeps = self.model.sleeps;
         if !self.proxies.is_empty() {
             self.measure_speeds_beside_proxies();
         }
-        let (grid, skin_left) = (&self.grid, &self.skin_left[..]);
-        let (slots, sleepless) = (self.ids.slots(), &self.sleepless);
+        let (grid, at, skin_left) = (&self.grid, &self.at[..], &self.skin_left[..]);
+        let (slots, sleepless, bodies) = (self.ids.slots(), &self.sleepless, &self.body_slots);
+        let has_proxies = !self.proxies.is_empty();
         let all_may_sleep = sleepless.is_empty();
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
@@ -49,13 +46,19 @@ impl Swarm {
             chunk.speed = largest_speeds(chunk, velocity, grid);
             let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
             chunk.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
-            let lies = chunk.fastest_own.unwrap_or(chunk.speed[0]) < sleep_speed;
-            chunk.sleep_time = if lies { chunk.sleep_time + dt } else { 0.0 };
-            let may_sleep = || {
-                all_may_sleep
-                    || !slots[chunk.own_rows()].iter().any(|slot| sleepless.contains(*slot))
-            };
-            if sleeps && chunk.sleep_time > TIME_TO_SLEEP && may_sleep() {
+            let own_slots = &slots[chunk.own_rows()];
+            let fastest = chunk.fastest_own.unwrap_or(chunk.speed[0]);
+            if !sleeps || fastest >= sleep_speed(gravity, chunk.radii[1]) {
+                chunk.rest.end();
+                return;
+            }
+            let rows = [&at[chunk.own_rows()], &*velocity, &*spin];
+            let is_proxy = |row: usize| has_proxies && bodies.contains(own_slots[row]);
+            let rests = chunk.rests(rows, is_proxy, length(gravity), dt);
+            let may_sleep =
+                || all_may_sleep || !own_slots.iter().any(|slot| sleepless.contains(*slot));
+            if rests && may_sleep() {
+                chunk.rest.end();
                 chunk.fell_asleep = true;
                 (chunk.asleep, chunk.speed) = (true, [0.0; 3]);
                 chunk.leaving.clear();
@@ -69,15 +72,24 @@ impl Swarm {
         let fell_asleep =
             chunks.iter_mut().filter_map(|chunk| take(&mut chunk.fell_asleep).then_some(()));
         self.sleep_version += fell_asleep.count() as u64;
+        self.wake_beside_fast(gravity);
+    }
+
+    /// Wakes the chunks beside balls that are fast enough to disturb them.
+    fn wake_beside_fast(&mut self, gravity: Vec3<f32>) {
+        let chunks = &mut self.chunks;
         for i in 0..chunks.len() {
             let before = i.checked_sub(1).map_or(0.0, |i| chunks[i].speed[2]);
             let after = chunks.get(i + 1).map_or(0.0, |chunk| chunk.speed[1]);
+            // The lightest touch that would count among its smallest balls.
+            let sleep_speed = sleep_speed(gravity, chunks[i].radii[0]);
             if chunks[i].asleep && before.max(after) > 2.0 * sleep_speed {
                 chunks[i].wake(&mut self.velocity);
                 self.sleep_version += 1;
             }
         }
     }
+
     /// Wakes a ball, and its chunk.
     pub(in crate::swarm) fn wake(&mut self, row: usize) {
         if self.pairs_valid {
@@ -94,7 +106,8 @@ impl Swarm {
     /// Wakes all balls.
     pub(in crate::swarm) fn wake_all(&mut self) {
         for chunk in &mut self.chunks {
-            (chunk.asleep, chunk.sleep_time) = (false, 0.0);
+            chunk.asleep = false;
+            chunk.rest.end();
         }
         let mut any = false;
         for velocity in &mut self.velocity {
@@ -118,9 +131,9 @@ impl Swarm {
                 let reach = self.at[row][3] + self.skin_left[row].max(0.0);
                 regions.iter().any(|region| overlaps(region, &self.at[row], reach))
             };
-            if chunk.asleep && chunk.own_rows().any(is_near) {
+            if (chunk.asleep || chunk.rest.began()) && chunk.own_rows().any(is_near) {
+                self.sleep_version += u64::from(chunk.asleep);
                 chunk.wake(&mut self.velocity);
-                self.sleep_version += 1;
             }
         }
     }
@@ -151,5 +164,5 @@ fn overlaps([low, high]: &[[f32; 3]; 2], at: &Row, reach: f32) -> bool {
 
 /// Speed in m/s up to which a ball counts as resting, by what gravity makes of it in its radius.
 pub(in crate::swarm) fn sleep_speed(gravity: Vec3<f32>, radius: f32) -> f32 {
-    if gravity.is_zero() { 0.0 } else { 0.05 * (crate::math::length(gravity) * radius).sqrt() }
+    if gravity.is_zero() { 0.0 } else { 0.05 * (length(gravity) * radius).sqrt() }
 }

@@ -5,7 +5,10 @@ use cgmath::Zero;
 use crate::math::Vec3;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::surfaces::SurfaceOf;
-use crate::swarm::walls::{Balls, HalfSpace, WallQuery, find, near_shapes, shapes_of};
+use crate::swarm::wall_contact::xyz;
+use crate::swarm::walls::{
+    Balls, HalfSpace, WallQuery, find, is_fast, near_shapes, shapes_of, stop_at_wall,
+};
 use crate::swarm::workers::{DisjointSlice, parallel_for};
 use crate::swarm::{Stage, StaticGeometry, Swarm, Tier};
 
@@ -100,6 +103,42 @@ impl Swarm {
                 chunk.near_shapes.dedup();
             }
         }
+    }
+
+    /// Puts back to the wall each ball that passed into one in these `h` seconds, because of a
+    /// contact that sent it another way than its wall contacts were sought on. It flew by its
+    /// velocity, and that much lower. Returns true if there was any.
+    pub(in crate::swarm) fn stop_at_walls(
+        &mut self,
+        walls: &dyn StaticGeometry,
+        h: f32,
+        lower: Vec3<f32>,
+    ) -> bool {
+        if !walls.has_shapes() {
+            return false;
+        }
+        let count = self.chunks.len();
+        let (chunks, velocity) = (DisjointSlice::new(&mut self.chunks), &self.velocity);
+        let (at, skin_left) =
+            (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
+        parallel_for(self.model.threads as usize, count, |_, chunk| {
+            // SAFETY: each thread has its own chunks, and their rows.
+            let chunk = unsafe { &mut *chunks.row(chunk) };
+            chunk.caught = false;
+            if chunk.asleep {
+                return;
+            }
+            let rows = chunk.own_rows();
+            let (at, skin_left) = unsafe { (at.part(rows.clone()), skin_left.part(rows.clone())) };
+            for ((at, skin_left), velocity) in at.iter_mut().zip(skin_left).zip(&velocity[rows]) {
+                if is_fast(velocity, h, at[3]) {
+                    let back = stop_at_wall(walls, at, xyz(velocity) * h - lower);
+                    *skin_left -= back;
+                    chunk.caught |= back > 0.0;
+                }
+            }
+        });
+        self.chunks.iter().any(|chunk| chunk.caught)
     }
 
     /// Brings the contacts of some chunks up to date. Walls are where they will be at the end; so

@@ -1,0 +1,85 @@
+//! Rest: what all balls of a chunk are at before they fall asleep.
+
+use cgmath::Zero;
+
+use super::INFINITE_MASS;
+use super::chunk::Chunk;
+use super::kernels::squared;
+use super::simd::Row;
+use super::wall_contact::WallContact;
+
+/// Least time of rest before a chunk sleeps, in seconds, and in times that a ball needs to fall by
+/// half its radius: the larger a ball, the longer it lingers where it turns back.
+const TIME: f32 = 0.5;
+const FALLS: f32 = 5.0;
+/// Distance in radii that a ball at rest keeps to. A ball that begins to roll down a slope of .13°
+/// goes further in that time.
+const PLACE: f32 = 0.02;
+
+/// How long all balls of a chunk have been where they are.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Rest {
+    /// Centers and radii at the beginning; none while any ball moves.
+    places: Vec<Row>,
+    /// In seconds.
+    time: f32,
+}
+
+impl Rest {
+    pub fn end(&mut self) {
+        self.places.clear();
+        self.time = 0.0;
+    }
+
+    /// Returns true while they rest.
+    pub fn began(&self) -> bool {
+        !self.places.is_empty()
+    }
+
+    pub fn bytes(&self) -> usize {
+        self.places.capacity() * size_of::<Row>()
+    }
+
+    /// Says if the balls have rested for long enough to sleep under such a gravity, in m/s²: each
+    /// has no velocity, or is borne by something and stays where it is.
+    fn lasts(&self, largest: f32, gravity: f32) -> bool {
+        self.time > TIME.max(FALLS * (largest / gravity).sqrt())
+    }
+}
+
+impl Chunk {
+    /// Looks, `dt` seconds after the last time, whether its balls rest. Returns true if they have
+    /// for long enough to sleep. Proxies are moved by others, and do not count.
+    pub fn rests(
+        &mut self,
+        [at, velocity, spin]: [&[Row]; 3],
+        is_proxy: impl Fn(usize) -> bool,
+        gravity: f32,
+        dt: f32,
+    ) -> bool {
+        let is_carried =
+            |contact: &WallContact| contact.normal_impulse > 0.0 && !contact.surface.is_zero();
+        // The mark is that of the last step.
+        let is_held = |row: usize| {
+            let moves = squared(velocity[row]) > 0.0;
+            !moves || velocity[row][3] > INFINITE_MASS && spin[row][3] > 0.0 || is_proxy(row)
+        };
+        if !(0..at.len()).all(is_held) || self.wall_contacts.iter().any(is_carried) {
+            self.rest.end();
+            return false;
+        }
+        let stays = |(row, (at, place)): (usize, (&Row, &Row))| {
+            let away = [at[0] - place[0], at[1] - place[1], at[2] - place[2], 0.0];
+            squared(away).sqrt() <= PLACE * at[3] || is_proxy(row)
+        };
+        let places = &mut self.rest.places;
+        if places.len() == at.len() && at.iter().zip(&*places).enumerate().all(stays) {
+            self.rest.time += dt;
+        } else {
+            places.clear();
+            places.extend(at);
+            self.rest.time = 0.0;
+        }
+        self.rest.lasts(self.radii[1], gravity)
+    }
+}

@@ -1,0 +1,129 @@
+//! What is slow, and must not sleep.
+
+use taw::motion::WallMotion;
+use taw::prelude::*;
+
+use crate::{DT, world};
+
+fn slope(degrees: f32) -> World<f32> {
+    let mut world = world();
+    let (sin, cos) = degrees.to_radians().sin_cos();
+    world.walls.insert(Plane::new(Vec3::new(sin, cos, 0.0), 0.0).unwrap()).unwrap();
+    world
+}
+
+/// How far a marble goes in ten seconds, and if it sleeps then.
+fn ten_seconds(world: &mut World<f32>, marble: Marble<f32>) -> (f32, bool) {
+    let id = world.marbles.insert(marble).unwrap();
+    for _ in 0..600 {
+        world.step(DT).unwrap();
+    }
+    let way = world.marbles.get(id).unwrap().position - marble.position;
+    (cgmath::InnerSpace::magnitude(way), world.is_asleep(id).unwrap())
+}
+
+#[test]
+fn what_begins_to_roll_goes_on() {
+    for (degrees, radius) in [(1.0_f32, 0.3), (0.5, 0.1), (2.0, 0.6), (25.0, 100.0), (0.2, 0.01)] {
+        let mut world = slope(degrees);
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let at = Point3::new(sin * radius, cos * radius, 0.0);
+        let rough = Material { friction: 0.8, ..Material::default() };
+        let ball = Marble { material: Some(rough), ..Marble::new(at, radius) };
+        let (way, _) = ten_seconds(&mut world, ball);
+        let exact = 0.5 * 5.0 / 7.0 * 9.81 * sin * 100.0;
+        assert!((way / exact - 1.0).abs() < 0.02, "{degrees}°, {radius} m: {way}, not {exact}");
+    }
+}
+
+#[test]
+fn what_no_force_moves_goes_on() {
+    for speed in [0.03, 1e-4] {
+        let ball = Marble {
+            velocity: Vec3::new(speed, 0.0, 0.0),
+            ..Marble::new(Point3::new(0.0, 5.0, 0.0), 0.1)
+        };
+        for ball in [Marble { mass: Mass::Infinite, ..ball }, Marble { gravity_scale: 0.0, ..ball }]
+        {
+            let (way, _) = ten_seconds(&mut slope(0.0), ball);
+            assert!((way / (10.0 * speed) - 1.0).abs() < 1e-3, "{ball:?} went {way}");
+        }
+    }
+}
+
+#[test]
+fn what_a_conveyor_carries_goes_on() {
+    for speed in [0.04, 0.002] {
+        let mut world = world();
+        let floor = world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        let motion = WallMotion {
+            velocity: Vec3::new(speed, 0.0, 0.0),
+            angular_velocity: Vec3::new(0.0, 0.0, 0.0),
+            pivot: Point3::new(0.0, 0.0, 0.0),
+        };
+        world.walls.set_motion(floor, Some(motion)).unwrap();
+        let sticky = Material { rolling_resistance: 0.1, ..Material::default() };
+        let ball =
+            Marble { material: Some(sticky), ..Marble::new(Point3::new(0.0, 0.1, 0.0), 0.1) };
+        let (way, _) = ten_seconds(&mut world, ball);
+        assert!((way / (10.0 * speed) - 1.0).abs() < 0.02, "{way}, not {}", 10.0 * speed);
+    }
+}
+
+#[test]
+fn nothing_turns_back_so_slowly_that_it_sleeps_there() {
+    let thrown = Marble {
+        velocity: Vec3::new(0.0, 3.0, 0.0),
+        ..Marble::new(Point3::new(0.0, 5000.0, 0.0), 1000.0)
+    };
+    let (_, asleep) = ten_seconds(&mut world(), thrown);
+    assert!(!asleep);
+    // Nor in steps of a second.
+    let mut world = world();
+    let id = world.marbles.insert(Marble::new(Point3::new(0.0, 100.0, 0.0), 0.1)).unwrap();
+    for _ in 0..5 {
+        world.step(1.0).unwrap();
+    }
+    let height = world.marbles.get(id).unwrap().position.y;
+    assert!((height - (100.0 - 0.5 * 9.81 * 25.0)).abs() < 0.01, "{height}");
+}
+
+#[test]
+fn a_giant_far_away_stops_nobody() {
+    for giant in [None, Some(1.0), Some(10.0), Some(1000.0)] {
+        let mut world = slope(0.0);
+        if let Some(radius) = giant {
+            let at = Point3::new(0.0, radius, 5000.0);
+            world.marbles.insert(Marble::new(at, radius)).unwrap();
+        }
+        let rolls = Marble {
+            velocity: Vec3::new(0.2, 0.0, 0.0),
+            angular_velocity: Vec3::new(0.0, 0.0, -20.0),
+            ..Marble::new(Point3::new(0.0, 0.01, 0.0), 0.01)
+        };
+        let (way, _) = ten_seconds(&mut world, rolls);
+        assert!((way - 2.0).abs() < 0.02, "beside {giant:?}: {way}");
+    }
+}
+
+#[test]
+fn a_clone_goes_on_alike_whatever_the_radius() {
+    for radius in [0.1, 0.125, 1.0 / 3.0] {
+        let mut world = World::<f64>::default();
+        let model =
+            Model { response: Response::SoftStep, rotation: Rotation::Dynamic, ..Model::default() };
+        world.set_model(model).unwrap();
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        let id = world.marbles.insert(Marble::new(Point3::new(0.0, radius, 0.0), radius)).unwrap();
+        for _ in 0..180 {
+            world.step(1.0 / 60.0).unwrap();
+        }
+        let mut clone = world.clone();
+        assert!(world.is_asleep(id).unwrap(), "{radius}");
+        for world in [&mut world, &mut clone] {
+            world.step(1.0 / 60.0).unwrap();
+        }
+        assert!(clone.is_asleep(id).unwrap(), "{radius}");
+        assert_eq!(clone, world, "{radius}");
+    }
+}
