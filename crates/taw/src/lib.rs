@@ -33,6 +33,7 @@
 //! | [`contact`] | when things touch, where, and the shortest way apart; rays and sweeps |
 //! | [`broad`] | who might touch: a grid for marbles |
 //! | [`motion`] | how a thing moves: integrators, forces, masses, rotation |
+//! | `constraint` | the impulse of one contact point, for all methods |
 //! | [`response`] | what a touch does |
 //! | [`swarm`] | balls in bulk: few features, a million of them |
 //! | [`world`] | the state in columns, the [`Model`](world::Model), the step |
@@ -53,6 +54,7 @@
 #![cfg_attr(not(test), warn(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod broad;
+mod constraint;
 pub mod contact;
 mod error;
 pub mod frame;

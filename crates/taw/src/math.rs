@@ -3,6 +3,10 @@
 use cgmath::num_traits::{self, Float, ToPrimitive};
 use cgmath::{BaseFloat, InnerSpace};
 
+mod real;
+
+pub(crate) use real::{Real, RealVector};
+
 /// Displacement, velocity or direction.
 pub type Vec3<S> = cgmath::Vector3<S>;
 /// Position.

@@ -5,8 +5,18 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From what everything uses to what uses everything.
-const ORDER: [&str; 11] = [
-    "math", "handle", "frame", "shape", "contact", "broad", "motion", "response", "swarm", "world",
+const ORDER: [&str; 12] = [
+    "math",
+    "handle",
+    "frame",
+    "shape",
+    "contact",
+    "broad",
+    "motion",
+    "constraint",
+    "response",
+    "swarm",
+    "world",
     "scene",
 ];
 

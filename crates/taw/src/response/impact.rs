@@ -1,6 +1,6 @@
 use cgmath::{InnerSpace, Zero};
 
-use crate::math::{Scalar, Vec3, length};
+use crate::math::{RealVector, Scalar, Vec3};
 use crate::response::Material;
 
 /// Inverse effective mass of a contact: change of the relative velocity of its two points per
@@ -84,13 +84,7 @@ pub fn impact<S: Scalar>(
     let tangent_velocity = relative_velocity + normal * approach;
     let stopping_impulse = tangent_velocity
         * (-(S::one() + material.tangential_restitution) / inverse_effective_mass.tangent);
-    normal * normal_impulse + clamp_length(stopping_impulse, material.friction * normal_impulse)
-}
-
-/// Clamps the length of a vector. Impulses of small marbles are so small that their squares vanish.
-pub(super) fn clamp_length<S: Scalar>(v: Vec3<S>, max: S) -> Vec3<S> {
-    let length = length(v);
-    if length > max { v * (max / length) } else { v }
+    normal * normal_impulse + stopping_impulse.clamp_length(material.friction * normal_impulse)
 }
 
 #[cfg(test)]

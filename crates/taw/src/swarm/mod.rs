@@ -40,6 +40,7 @@ mod simd;
 mod state;
 mod step;
 mod surfaces;
+mod vec3_wide;
 mod wall_contact;
 mod walls;
 mod workers;

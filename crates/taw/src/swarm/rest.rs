@@ -58,7 +58,7 @@ impl Chunk {
         dt: f32,
     ) -> bool {
         let is_carried =
-            |contact: &WallContact| contact.normal_impulse > 0.0 && !contact.surface.is_zero();
+            |contact: &WallContact| contact.impulse.normal > 0.0 && !contact.surface.is_zero();
         // The mark is that of the last step.
         let is_held = |row: usize| {
             let moves = squared(velocity[row]) > 0.0;

@@ -3,6 +3,9 @@
 
 use std::ops::{Add, Div, Mul, Sub};
 
+use super::vec3_wide::Vec3Wide;
+use crate::math::Real;
+
 /// Number of contacts that a kernel works on at once.
 pub(super) const LANES: usize = 8;
 
@@ -10,20 +13,13 @@ pub(super) const LANES: usize = 8;
 pub(super) type Row = [f32; 4];
 
 /// Eight numbers. Nothing here adds across lanes or fuses two roundings into one.
-pub(super) trait Simd:
-    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
-{
-    fn splat(x: f32) -> Self;
+pub(super) trait Simd: Real<Vector = Vec3Wide<Self>> {
     fn load(from: &[f32; LANES]) -> Self;
     fn store(self, to: &mut [f32; LANES]);
     fn sqrt(self) -> Self;
-    /// The second one where they do not compare.
-    fn max(self, other: Self) -> Self;
     /// Mask with a bit for each lane where the first is the greater, the lowest bit for the first
     /// lane.
     fn gt_mask(self, other: Self) -> u32;
-    /// `yes` where the first is the greater, else `no`.
-    fn select_gt(self, other: Self, yes: Self, no: Self) -> Self;
     /// The sum of all: of the lanes that are four apart, then two, then one.
     fn sum(self) -> f32;
     /// The lanes before this one; zeros after them.
@@ -135,12 +131,32 @@ operator!(Sub, sub, -, _mm256_sub_ps);
 operator!(Mul, mul, *, _mm256_mul_ps);
 operator!(Div, div, /, _mm256_div_ps);
 
-impl Simd for Portable {
+impl Real for Portable {
+    type Vector = Vec3Wide<Self>;
+
     #[inline(always)]
     fn splat(x: f32) -> Self {
         Self([x; LANES])
     }
 
+    #[inline(always)]
+    fn max(self, other: Self) -> Self {
+        self.both(other, |a, b| if a > b { a } else { b })
+    }
+
+    #[inline(always)]
+    fn select_gt(self, other: Self, yes: Self, no: Self) -> Self {
+        let mut out = no.0;
+        for (lane, out) in out.iter_mut().enumerate() {
+            if self.0[lane] > other.0[lane] {
+                *out = yes.0[lane];
+            }
+        }
+        Self(out)
+    }
+}
+
+impl Simd for Portable {
     #[inline(always)]
     fn load(from: &[f32; LANES]) -> Self {
         Self(*from)
@@ -157,24 +173,8 @@ impl Simd for Portable {
     }
 
     #[inline(always)]
-    fn max(self, other: Self) -> Self {
-        self.both(other, |a, b| if a > b { a } else { b })
-    }
-
-    #[inline(always)]
     fn gt_mask(self, other: Self) -> u32 {
         (0..LANES).map(|lane| u32::from(self.0[lane] > other.0[lane]) << lane).sum()
-    }
-
-    #[inline(always)]
-    fn select_gt(self, other: Self, yes: Self, no: Self) -> Self {
-        let mut out = no.0;
-        for (lane, out) in out.iter_mut().enumerate() {
-            if self.0[lane] > other.0[lane] {
-                *out = yes.0[lane];
-            }
-        }
-        Self(out)
     }
 
     #[inline(always)]
@@ -228,7 +228,7 @@ mod x86 {
     #[allow(clippy::wildcard_imports, reason = "they all begin with _mm")]
     use std::arch::x86_64::*;
 
-    use super::{Kernel, LANES, Row, Simd};
+    use super::{Kernel, LANES, Real, Row, Simd, Vec3Wide};
 
     /// # Safety
     /// The processor has these.
@@ -239,15 +239,32 @@ mod x86 {
 
     /// Eight lanes of a register. Only [`run`] makes them, where the processor has AVX2: that is
     /// why each of the instructions below is safe.
-    #[derive(Clone, Copy)]
-    pub struct Avx(pub(super) __m256);
+    #[derive(Clone, Copy, Debug)]
+    pub(in crate::swarm) struct Avx(pub(super) __m256);
 
-    impl Simd for Avx {
+    impl Real for Avx {
+        type Vector = Vec3Wide<Self>;
+
         #[inline(always)]
         fn splat(x: f32) -> Self {
             Self(unsafe { _mm256_set1_ps(x) })
         }
 
+        #[inline(always)]
+        fn max(self, other: Self) -> Self {
+            Self(unsafe { _mm256_max_ps(self.0, other.0) })
+        }
+
+        #[inline(always)]
+        fn select_gt(self, other: Self, yes: Self, no: Self) -> Self {
+            unsafe {
+                let mask = _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0);
+                Self(_mm256_blendv_ps(no.0, yes.0, mask))
+            }
+        }
+    }
+
+    impl Simd for Avx {
         #[inline(always)]
         fn load(from: &[f32; LANES]) -> Self {
             Self(unsafe { _mm256_loadu_ps(from.as_ptr()) })
@@ -264,22 +281,9 @@ mod x86 {
         }
 
         #[inline(always)]
-        fn max(self, other: Self) -> Self {
-            Self(unsafe { _mm256_max_ps(self.0, other.0) })
-        }
-
-        #[inline(always)]
         fn gt_mask(self, other: Self) -> u32 {
             unsafe {
                 _mm256_movemask_ps(_mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0)).cast_unsigned()
-            }
-        }
-
-        #[inline(always)]
-        fn select_gt(self, other: Self, yes: Self, no: Self) -> Self {
-            unsafe {
-                let mask = _mm256_cmp_ps::<_CMP_GT_OQ>(self.0, other.0);
-                Self(_mm256_blendv_ps(no.0, yes.0, mask))
             }
         }
 

@@ -2,11 +2,12 @@
 
 use cgmath::InnerSpace;
 
-use super::kernels::{GROUNDED, Pass, Softness, SolverParams, WALL_SLOP};
+use super::kernels::{GROUNDED, Pass, SolverParams, WALL_SLOP};
 use super::proxies::Proxy;
 use super::simd::Row;
 use super::surfaces::WallNumbers;
-use crate::math::Vec3;
+use crate::constraint::{ContactImpulse, ContactSoftness, FrictionCone, solve_rolling};
+use crate::math::{RealVector, Vec3};
 
 /// Contact constraint of a ball and a part of a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,11 +28,10 @@ pub(super) struct WallContact {
     /// The velocity of the surface, in m/s.
     pub surface: Vec3<f32>,
     pub numbers: WallNumbers,
-    /// Normal impulse for others that press on the ball, normal impulse for the ball itself, and
-    /// tangent impulse (friction), accumulated, in N s.
+    /// Accumulated normal impulse for others that press on the ball, and impulse for the ball
+    /// itself, in N s.
     pub borne_for_others: f32,
-    pub normal_impulse: f32,
-    pub tangent_impulse: Vec3<f32>,
+    pub impulse: ContactImpulse<f32>,
     /// Angular impulse against rolling and spinning, over the radius, in N s.
     pub torque: Vec3<f32>,
 }
@@ -47,12 +47,6 @@ pub(super) fn xyz(row: &Row) -> Vec3<f32> {
 
 fn set(row: &mut Row, to: Vec3<f32>) {
     [row[0], row[1], row[2]] = to.into();
-}
-
-/// Clamps a tangential impulse to the friction cone.
-fn clamp_length(target: Vec3<f32>, most: f32) -> Vec3<f32> {
-    let size = target.magnitude();
-    if size > most { target * (most / size) } else { target }
 }
 
 impl WallContact {
@@ -80,13 +74,12 @@ impl WallContact {
     pub fn bears(&self, at: &Row) -> f32 {
         let place = at[0].abs() + at[1].abs() + at[2].abs();
         let there = self.separation(at) <= at[3] * TOUCHES + place * (ROUNDINGS * f32::EPSILON);
-        if there { self.normal_impulse + self.borne_for_others } else { 0.0 }
+        if there { self.impulse.normal + self.borne_for_others } else { 0.0 }
     }
 
     /// Takes over the impulses of an earlier contact of ball and wall.
     pub fn restore(&mut self, before: &Self) {
-        (self.normal_impulse, self.tangent_impulse, self.torque) =
-            (before.normal_impulse, before.tangent_impulse, before.torque);
+        (self.impulse, self.torque) = (before.impulse, before.torque);
         self.borne_for_others = before.borne_for_others;
     }
 
@@ -122,17 +115,17 @@ impl WallContact {
                 return self.apply_restitution(&params, at, velocity, spin);
             }
             Pass::WarmStart(_) => {
-                self.tangent_impulse -= self.normal * self.tangent_impulse.dot(self.normal);
-                self.apply_impulse(velocity, spin, self.normal_impulse, self.tangent_impulse);
+                self.impulse.tangent = self.impulse.tangent.reject_from(self.normal);
+                self.apply_impulse(velocity, spin, self.impulse);
                 let give = self.numbers.inertia_factor * velocity[3];
-                set(spin, xyz(spin) - self.torque * give);
+                set(spin, xyz(spin) + self.torque * give);
             }
             Pass::Solve(params) => {
                 self.push(params.time, Some(params.softness), at, velocity, spin);
             }
             Pass::Relax(params) => {
                 let approach_speed = -(xyz(velocity) - self.surface).dot(self.normal);
-                if self.normal_impulse > 0.0
+                if self.impulse.normal > 0.0
                     || self.numbers.restitution == 0.0
                     || approach_speed <= params.restitution_threshold
                 {
@@ -168,67 +161,60 @@ impl WallContact {
         if meets <= params.restitution_threshold {
             return None;
         }
-        let normal_part = (approach_speed + meets * self.numbers.restitution) / velocity[3];
-        let target = self.tangent_velocity(relative, spin) * (-self.tangent_mass() / velocity[3]);
-        let tangent_part = clamp_length(target, self.numbers.friction * normal_part);
+        let impulse = FrictionCone::new(self.numbers.friction).clamp(ContactImpulse {
+            normal: (approach_speed + meets * self.numbers.restitution) / velocity[3],
+            tangent: self.slip(relative, spin) * (-self.tangent_mass() / velocity[3]),
+        });
         set(at, xyz(at) - self.normal * separation);
-        self.apply_impulse(velocity, spin, normal_part, tangent_part);
+        self.apply_impulse(velocity, spin, impulse);
         Some(separation)
     }
 
     /// Velocity at which the ball's surface slides over the wall's, in m/s.
-    fn tangent_velocity(&self, relative: Vec3<f32>, spin: &Row) -> Vec3<f32> {
-        let parting = self.normal * relative.dot(self.normal);
-        relative - parting - xyz(spin).cross(self.normal)
+    fn slip(&self, relative: Vec3<f32>, spin: &Row) -> Vec3<f32> {
+        relative.reject_from(self.normal) - xyz(spin).cross(self.normal)
     }
 
-    /// Solves the contact: the ball approaches by no more than the separation within so many
-    /// seconds.
+    /// Solves the contact: the ball approaches by no more than the separation within a substep of
+    /// `time` seconds. Rigid without softness.
     fn push(
         &mut self,
         time: f32,
-        softness: Option<Softness>,
+        softness: Option<ContactSoftness>,
         at: &Row,
         velocity: &mut Row,
         spin: &mut Row,
     ) {
         let (separation, mass) = (self.separation(at), 1.0 / velocity[3]);
         let relative = xyz(velocity) - self.surface;
-        let parting = relative.dot(self.normal);
-        let change = match softness {
-            Some(softness) if separation <= 0.0 => {
-                let target = (separation * softness.bias_rate).max(-softness.max_push_speed);
-                mass * softness.mass_scale * (parting + target)
-                    + self.normal_impulse * softness.impulse_scale
+        let (target, softness) = match softness {
+            Some(softness) => {
+                let (target, softness) = softness.at(separation, 1.0 / time);
+                (target, Some(softness))
             }
-            _ => mass * (parting + separation.max(0.0) / time),
+            None => (-separation.max(0.0) / time, None),
         };
-        let normal_impulse = (self.normal_impulse - change).max(0.0);
-        let normal_part = normal_impulse - self.normal_impulse;
-        self.normal_impulse = normal_impulse;
-        let target = self.tangent_impulse
-            - self.tangent_velocity(relative, spin) * (mass * self.tangent_mass());
-        let tangent_impulse =
-            clamp_length(target, self.numbers.friction * (normal_impulse + self.borne_for_others));
-        let tangent_part = tangent_impulse - self.tangent_impulse;
-        self.tangent_impulse = tangent_impulse;
-        if normal_impulse + self.borne_for_others > 0.0 {
+        let wanted = ContactImpulse {
+            normal: mass * (target - relative.dot(self.normal)),
+            tangent: self.slip(relative, spin) * (-mass * self.tangent_mass()),
+        };
+        let cone = FrictionCone {
+            extra_friction: self.numbers.friction * self.borne_for_others,
+            ..FrictionCone::new(self.numbers.friction)
+        };
+        let change = self.impulse.solve(wanted, softness, &cone);
+        if self.impulse.normal + self.borne_for_others > 0.0 {
             spin[3] = GROUNDED;
         }
-        self.apply_impulse(velocity, spin, normal_part, tangent_part);
+        self.apply_impulse(velocity, spin, change);
         self.solve_rolling(velocity, spin);
     }
 
-    fn apply_impulse(
-        &self,
-        velocity: &mut Row,
-        spin: &mut Row,
-        normal_part: f32,
-        tangent_part: Vec3<f32>,
-    ) {
+    fn apply_impulse(&self, velocity: &mut Row, spin: &mut Row, impulse: ContactImpulse<f32>) {
         let inverse_mass = velocity[3];
-        set(velocity, xyz(velocity) + (self.normal * normal_part + tangent_part) * inverse_mass);
-        let turn = self.normal.cross(tangent_part) * (self.numbers.inertia_factor * inverse_mass);
+        set(velocity, xyz(velocity) + impulse.along(self.normal) * inverse_mass);
+        let turn =
+            self.normal.cross(impulse.tangent) * (self.numbers.inertia_factor * inverse_mass);
         set(spin, xyz(spin) - turn);
     }
 
@@ -246,11 +232,9 @@ impl WallContact {
         if rolling_resistance + spinning_resistance == 0.0 || give == 0.0 {
             return;
         }
-        let target = self.torque + xyz(spin) / give;
-        let about = self.normal * self.normal.dot(target);
-        let torque = clamp_length(target - about, rolling_resistance * self.normal_impulse)
-            + clamp_length(about, spinning_resistance * self.normal_impulse);
-        set(spin, xyz(spin) - (torque - self.torque) * give);
-        self.torque = torque;
+        let load = self.impulse.normal;
+        let limits = [rolling_resistance * load, spinning_resistance * load];
+        let change = solve_rolling(&mut self.torque, xyz(spin) / -give, self.normal, limits);
+        set(spin, xyz(spin) + change * give);
     }
 }

@@ -10,6 +10,7 @@ use super::proxies::Proxy;
 use super::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use super::surfaces::{SurfaceOf, WallNumbers};
 use super::wall_contact::WallContact;
+use crate::constraint::ContactImpulse;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
 
@@ -464,8 +465,7 @@ impl WallContact {
             surface: Vec3::zero(),
             numbers,
             borne_for_others: 0.0,
-            normal_impulse: 0.0,
-            tangent_impulse: Vec3::zero(),
+            impulse: ContactImpulse::zero(),
             torque: Vec3::zero(),
         }
     }

@@ -6,8 +6,8 @@ use cgmath::{InnerSpace, Zero};
 
 use super::resting_cluster::{PressedBy, RestingCluster};
 use super::{Event, EventDriven, EventKind, EventSettings, Impact, MAX_DISSIPATIONS, MAX_FREEZES};
+use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::math::{Vec3, normalize_and_length};
-use crate::response::impact::clamp_length;
 use crate::response::{ImpulseSample, InverseEffectiveMass, Material, impact};
 
 /// Maximum number of iterations for simultaneous collisions.
@@ -33,8 +33,8 @@ struct Collision {
     material: Material<f64>,
     /// Relaxation factor, beside the other collisions of the two balls.
     relaxation: f64,
-    /// Impulse on the second ball, in N s.
-    impulse: Vec3<f64>,
+    /// Accumulated impulse, in N s.
+    impulse: ContactImpulse<f64>,
 }
 
 impl EventDriven {
@@ -191,7 +191,7 @@ impl EventDriven {
             inverse_effective_mass,
             material,
             relaxation: 1.0,
-            impulse: Vec3::zero(),
+            impulse: ContactImpulse::zero(),
         }
     }
 
@@ -226,23 +226,20 @@ impl EventDriven {
                 collisions.iter_mut().zip(relative_velocity).zip(&initial_velocity)
             {
                 let normal = c.impact.normal;
-                let (Material { restitution, friction, tangential_restitution, .. }, before) =
-                    (c.material, c.impulse);
-                let normal_part = |v: Vec3<f64>| v.dot(normal);
-                let tangential_part = |v: Vec3<f64>| v - normal * v.dot(normal);
-                let target_speed = restitution * (-normal_part(*initial_velocity)).max(0.0);
-                let normal_impulse = normal_part(before)
-                    + c.relaxation * (target_speed - normal_part(relative_velocity))
-                        / c.inverse_effective_mass.normal;
-                let normal_impulse = normal_impulse.max(0.0);
-                let target_tangent_velocity =
-                    tangential_part(*initial_velocity) * -tangential_restitution;
-                let tangent_impulse = tangential_part(before)
-                    + (target_tangent_velocity - tangential_part(relative_velocity))
-                        * (c.relaxation / c.inverse_effective_mass.tangent);
-                c.impulse = normal * normal_impulse
-                    + clamp_length(tangent_impulse, friction * normal_impulse);
-                let change = c.impulse - before;
+                let Material { restitution, friction, tangential_restitution, .. } = c.material;
+                let split = |velocity| ContactImpulse::split(velocity, normal);
+                let (initial, now) = (split(*initial_velocity), split(relative_velocity));
+                let target = ContactImpulse {
+                    normal: restitution * (-initial.normal).max(0.0),
+                    tangent: initial.tangent * -tangential_restitution,
+                };
+                let masses = c.inverse_effective_mass;
+                let wanted = ContactImpulse {
+                    normal: c.relaxation * (target.normal - now.normal) / masses.normal,
+                    tangent: (target.tangent - now.tangent) * (c.relaxation / masses.tangent),
+                };
+                let change = c.impulse.solve(wanted, None, &FrictionCone::new(friction));
+                let change = change.along(normal);
                 largest = largest.max(change.magnitude() * c.inverse_effective_mass.normal);
                 for (row, impulse, normal) in [(c.a, -change, -normal), (c.b, change, normal)] {
                     if let Ok(index) = rows.binary_search(&row) {
@@ -262,7 +259,7 @@ impl EventDriven {
             }
         }
         for (c, initial_velocity) in collisions.iter().zip(initial_velocity) {
-            self.record_impact(c, c.impulse, initial_velocity);
+            self.record_impact(c, c.impulse.along(c.impact.normal), initial_velocity);
         }
     }
 

@@ -8,6 +8,7 @@ use cgmath::{InnerSpace, Zero};
 use super::islands::Islands;
 use super::solve::iterate;
 use super::{Constraint, SolverSettings};
+use crate::constraint::ContactImpulse;
 use crate::math::{Scalar, Vec3};
 use crate::response::SolverBodies;
 
@@ -189,7 +190,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             self.add_impulse(c, -c.impulse());
             self.add_angular_impulse(c, -c.angular_impulse());
             c.rolling = None;
-            friction.push(std::mem::replace(&mut c.friction, S::zero()));
+            friction.push(std::mem::replace(&mut c.cone.friction, S::zero()));
             (c.target_normal_velocity, c.target_tangent_velocity) = (
                 c.target_without_restitution(),
                 if c.bounces {
@@ -204,9 +205,9 @@ impl<S: Scalar> SolverBodies<'_, S> {
         self.apply_poisson_restitution(constraints, islands, energies, &gaining);
         let gaining_constraints = constraints.iter_mut().filter(|c| gaining[c.island as usize]);
         for (c, friction) in gaining_constraints.zip(friction) {
-            c.normal_impulse = c.normal_impulse.max(S::zero()); // rounding
-            (c.min_normal_impulse, c.friction_bound) =
-                (c.normal_impulse, friction * c.normal_impulse);
+            c.impulse.normal = c.impulse.normal.max(S::zero()); // rounding
+            (c.cone.min_normal_impulse, c.cone.extra_friction) =
+                (c.impulse.normal, friction * c.impulse.normal);
         }
         islands.restart(|island| gaining[island]);
         iterate(self, constraints, islands, settings);
@@ -223,7 +224,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     ) {
         self.measure_scaling(constraints, islands, energies);
         let mut min_restitution = vec![S::one(); energies.len()];
-        for c in constraints.iter().filter(|c| c.normal_impulse > S::zero()) {
+        for c in constraints.iter().filter(|c| c.impulse.normal > S::zero()) {
             let restitution = if c.bounces { c.restitution } else { S::zero() };
             let min_restitution = &mut min_restitution[c.island as usize];
             *min_restitution = min_restitution.min(restitution);
@@ -283,9 +284,9 @@ impl<S: Scalar> SolverBodies<'_, S> {
     /// Adds an impulse to a contact; the caller keeps it within the friction cone.
     fn add_impulse(&mut self, c: &mut Constraint<S>, impulse: Vec3<S>) {
         self.apply_impulse_pair(c, impulse);
-        let axis_offset = impulse.dot(c.normal);
-        c.normal_impulse += axis_offset;
-        c.tangent_impulse += impulse - c.normal * axis_offset;
+        let change = ContactImpulse::split(impulse, c.normal);
+        c.impulse.normal += change.normal;
+        c.impulse.tangent += change.tangent;
     }
 
     fn add_angular_impulse(&mut self, c: &mut Constraint<S>, impulse: Vec3<S>) {

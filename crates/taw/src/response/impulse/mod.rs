@@ -11,6 +11,7 @@ mod solve;
 
 use cgmath::{InnerSpace, Zero};
 
+use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Mat3, Point3, Scalar, Vec3, cast_vector};
 use crate::response::{
@@ -178,7 +179,7 @@ impl<S: Scalar> Scratch<S> {
                 fixed_velocity: [first, marbles.fixed_velocity(c.b)],
             });
             work.record_angular_impulse(cast_vector(c.angular_impulse()), before[1], after[1]);
-            work.collisions += u32::from(c.bounces && c.normal_impulse > S::zero());
+            work.collisions += u32::from(c.bounces && c.impulse.normal > S::zero());
         }
     }
 }
@@ -198,9 +199,8 @@ pub(super) struct Constraint<S> {
     surface_velocity: Vec3<S>,
     inverse_effective_mass: InverseEffectiveMass<S>,
     restitution: S,
-    /// Friction bound: coefficient times the normal impulse, plus a constant in m/s.
-    friction: S,
-    friction_bound: S,
+    /// Limits of the impulse, in m/s.
+    cone: FrictionCone<S>,
     /// Relative velocity of the two points, in m/s, and relative spin, in rad/s, before any
     /// impulse.
     initial_relative_velocity: Vec3<S>,
@@ -218,10 +218,7 @@ pub(super) struct Constraint<S> {
     target_tangent_velocity: Vec3<S>,
     /// Impulse accumulated in this substep, times the normal inverse effective mass: in m/s, a
     /// scale that a pebble and a boulder have in common.
-    normal_impulse: S,
-    tangent_impulse: Vec3<S>,
-    /// Lower bound of the normal impulse.
-    min_normal_impulse: S,
+    impulse: ContactImpulse<S>,
     /// Search directions, as impulses: last iteration and accelerated steps before; the relative
     /// velocity that each causes; and the velocity error where the search began; in m/s.
     search_directions: [Vec3<S>; DIRECTIONS],
@@ -249,7 +246,7 @@ impl<S: Scalar> Constraint<S> {
 
     /// Accumulated impulse times the normal inverse effective mass, in m/s.
     fn impulse(&self) -> Vec3<S> {
-        self.normal * self.normal_impulse + self.tangent_impulse
+        self.impulse.along(self.normal)
     }
 
     /// Accumulated angular impulse of rolling and torsional friction, in kg m²/s.

@@ -4,6 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::islands::{DIRECTIONS, Island, Islands};
 use super::{BodyA, Colliders, Constraint, Context, WallsAtStart};
+use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::contact::Contacts;
 use crate::math::{Mat3, Scalar, Vec3, normalize_and_length};
 use crate::response::{Material, SolverBodies};
@@ -79,9 +80,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             surface_velocity,
             inverse_effective_mass,
             restitution: material.restitution,
-            friction: material.friction,
-            friction_bound: S::zero(),
-            min_normal_impulse: S::zero(),
+            cone: FrictionCone::new(material.friction),
             initial_relative_velocity: relative_velocity,
             initial_relative_spin: zero,
             bounces: is_fast && dt == S::zero(),
@@ -89,8 +88,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             velocity_since_impact: zero,
             target_normal_velocity: target_normal_velocity.min(S::zero()),
             target_tangent_velocity: zero,
-            normal_impulse: S::zero(),
-            tangent_impulse: zero,
+            impulse: ContactImpulse::zero(),
             search_directions: [zero; DIRECTIONS],
             direction_velocities: [zero; DIRECTIONS],
             velocity_error: zero,

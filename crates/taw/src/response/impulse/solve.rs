@@ -4,9 +4,9 @@ use cgmath::{InnerSpace, Zero};
 
 use super::islands::{DIRECTIONS, Island, Islands, SearchStep};
 use super::{Constraint, SolverSettings};
+use crate::constraint::{ContactImpulse, solve_rolling};
 use crate::math::{Scalar, Vec3, is_finite, length};
-use crate::response::SolverBodies;
-use crate::response::impact::clamp_length;
+use crate::response::{InverseEffectiveMass, SolverBodies};
 
 /// Iterates over the contacts of islands that have not converged, until they do or the iterations
 /// are used up.
@@ -50,29 +50,23 @@ pub(super) fn iterate<S: Scalar>(
 }
 
 impl<S: Scalar> Constraint<S> {
-    /// Projection of an impulse to the friction cone, as normal and tangential impulse: no tension,
-    /// and Coulomb friction.
-    fn project_to_cone(&self, impulse: Vec3<S>) -> (S, Vec3<S>) {
-        let normal_part = impulse.dot(self.normal);
-        let normal_impulse = normal_part.max(self.min_normal_impulse);
-        (
-            normal_impulse,
-            clamp_length(impulse - self.normal * normal_part, self.max_friction(normal_impulse)),
-        )
+    /// Projection of an impulse to the friction cone: no tension, and Coulomb friction.
+    fn project_to_cone(&self, impulse: Vec3<S>) -> ContactImpulse<S> {
+        self.cone.clamp(ContactImpulse::split(impulse, self.normal))
     }
 
     /// Change of the impulse, clamped to the cone.
     fn clamp_to_cone(&self, direction: Vec3<S>) -> Vec3<S> {
-        let (normal_impulse, tangent_impulse) = self.project_to_cone(self.impulse() + direction);
-        self.normal * (normal_impulse - self.normal_impulse)
-            + (tangent_impulse - self.tangent_impulse)
+        let clamped = self.project_to_cone(self.impulse() + direction);
+        self.normal * (clamped.normal - self.impulse.normal)
+            + (clamped.tangent - self.impulse.tangent)
     }
 
     /// Largest fraction of a change for which the normal impulse stays admissible.
     fn max_fraction(&self, direction: Vec3<S>) -> S {
         let normal_part = direction.dot(self.normal);
         if normal_part < S::zero() {
-            (self.min_normal_impulse - self.normal_impulse) / normal_part
+            (self.cone.min_normal_impulse - self.impulse.normal) / normal_part
         } else {
             S::infinity()
         }
@@ -80,11 +74,11 @@ impl<S: Scalar> Constraint<S> {
 
     /// Restricts the search directions to those that the contact can follow.
     fn restrict_directions(&mut self, island_bounces: bool) {
-        if self.normal_impulse <= S::zero() {
+        if self.impulse.normal <= S::zero() {
             self.search_directions = [Vec3::zero(); DIRECTIONS]; // an open contact has no impulse
         } else if island_bounces
-            || length(self.tangent_impulse)
-                >= self.max_friction(self.normal_impulse) * (S::one() - S::epsilon())
+            || length(self.impulse.tangent)
+                >= self.cone.max_friction(self.impulse.normal) * (S::one() - S::epsilon())
         {
             // Sliding friction stays at the cone, whichever way it slides. And restitution can ask
             // for more than friction in a corner can give, so that both would grow without end.
@@ -92,11 +86,6 @@ impl<S: Scalar> Constraint<S> {
             self.search_directions =
                 self.search_directions.map(|direction| normal * direction.dot(normal));
         }
-    }
-
-    /// Friction bound for a normal impulse.
-    fn max_friction(&self, normal_impulse: S) -> S {
-        self.friction * normal_impulse + self.friction_bound
     }
 }
 
@@ -121,19 +110,15 @@ impl<S: Scalar> SolverBodies<'_, S> {
 
     /// Solves one contact point. Returns the velocity change, in m/s.
     fn solve_point(&mut self, c: &mut Constraint<S>) -> S {
-        let velocity_error = self.velocity_error_of(c);
-        let normal_part = velocity_error.dot(c.normal);
-        let normal_impulse = (c.normal_impulse + normal_part).max(c.min_normal_impulse);
-        let tangential = (velocity_error - c.normal * normal_part)
-            * (c.inverse_effective_mass.normal / c.inverse_effective_mass.tangent);
-        let tangent_impulse =
-            clamp_length(c.tangent_impulse + tangential, c.max_friction(normal_impulse));
-        let change =
-            c.normal * (normal_impulse - c.normal_impulse) + (tangent_impulse - c.tangent_impulse);
+        let error = ContactImpulse::split(self.velocity_error_of(c), c.normal);
+        let InverseEffectiveMass { normal, tangent } = c.inverse_effective_mass;
+        let wanted = ContactImpulse { tangent: error.tangent * (normal / tangent), ..error };
+        let mut impulse = c.impulse;
+        let change = impulse.solve(wanted, None, &c.cone).along(c.normal);
         if !is_finite(change) {
             return S::zero(); // an overflow must not reach the other body
         }
-        (c.normal_impulse, c.tangent_impulse) = (normal_impulse, tangent_impulse);
+        c.impulse = impulse;
         self.apply_impulse_pair(c, change);
         self.solve_rolling(c);
         change.magnitude()
@@ -165,7 +150,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             let direction = c.clamp_to_cone(straight);
             let clamped = direction - straight;
             let tangential = clamped - c.normal * clamped.dot(c.normal);
-            let rounding = (c.normal_impulse + length(straight)) * S::epsilon();
+            let rounding = (c.impulse.normal + length(straight)) * S::epsilon();
             island.add_cone_limit(c.max_fraction(straight), length(tangential) > rounding);
             self.apply_impulse_pair(c, direction - c.search_directions[0]);
             // The oldest direction is dropped.
@@ -191,7 +176,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             };
             self.apply_impulse_pair(c, direction - c.search_directions[1]);
             // Cones are convex, so only rounding can lie outside.
-            (c.normal_impulse, c.tangent_impulse) = c.project_to_cone(c.impulse() + direction);
+            c.impulse = c.project_to_cone(c.impulse() + direction);
             (c.search_directions[1], c.direction_velocities[1]) = (direction, direction_velocities);
         }
     }
@@ -199,13 +184,11 @@ impl<S: Scalar> SolverBodies<'_, S> {
     /// Solves rolling and torsional friction: one step toward zero relative spin.
     fn solve_rolling(&mut self, c: &mut Constraint<S>) {
         let Some(rolling) = c.rolling else { return };
-        let target = rolling.angular_impulse - self.relative_spin(c) / rolling.inverse_inertia;
-        let normal_impulse = c.normal_impulse / c.inverse_effective_mass.normal;
-        let torsional = c.normal * target.dot(c.normal);
-        let angular_impulse =
-            clamp_length(target - torsional, rolling.rolling_lever * normal_impulse)
-                + clamp_length(torsional, rolling.torsional_lever * normal_impulse);
-        let change = angular_impulse - rolling.angular_impulse;
+        let wanted = self.relative_spin(c) / -rolling.inverse_inertia;
+        let load = c.impulse.normal / c.inverse_effective_mass.normal;
+        let limits = [rolling.rolling_lever * load, rolling.torsional_lever * load];
+        let mut angular_impulse = rolling.angular_impulse;
+        let change = solve_rolling(&mut angular_impulse, wanted, c.normal, limits);
         if is_finite(change) {
             c.rolling = Some(super::RollingConstraint { angular_impulse, ..rolling });
             self.apply_angular_impulse_pair(c, change);

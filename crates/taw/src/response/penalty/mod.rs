@@ -16,9 +16,9 @@ pub use law::ContactLaw;
 
 use cgmath::{InnerSpace, Zero};
 
+use crate::constraint::solve_rolling;
 use crate::contact::Contacts;
-use crate::math::{Scalar, Vec3, cast_vector, is_finite};
-use crate::response::impact::clamp_length;
+use crate::math::{RealVector, Scalar, Vec3, cast_vector, is_finite};
 use crate::response::{
     Colliders, ContactKey, EnergyLedger, KeyedByContact, Material, SolverBodies,
 };
@@ -287,25 +287,21 @@ impl<S: Scalar> ContactForce<S> {
         if impulse_per_displacement > S::zero() {
             // Friction limits the tangential displacement.
             tangent_displacement =
-                clamp_length(tangent_displacement, limit / impulse_per_displacement);
+                tangent_displacement.clamp_length(limit / impulse_per_displacement);
         }
         let dashpot = S::from_f64(2.0) * half_damping * self.force_scale
             / self.contact.inverse_effective_mass().tangent;
-        let tangent_impulse = clamp_length(
-            -(tangent_displacement * impulse_per_displacement
-                + tangent_velocity * (dashpot / (S::one() + half_damping))),
-            limit,
-        );
+        let spring_and_dashpot = tangent_displacement * impulse_per_displacement
+            + tangent_velocity * (dashpot / (S::one() + half_damping));
+        let tangent_impulse = (-spring_and_dashpot).clamp_length(limit);
         self.history.tangent_displacement =
             if is_finite(tangent_displacement) { tangent_displacement } else { Vec3::zero() };
         self.history.tangent_stiffness = tangent_stiffness;
         self.impulse = normal * self.normal_impulse + tangent_impulse;
-        let (wanted_angular_impulse, lever) =
-            (self.angular_impulse, self.normal_impulse / curvature);
-        let torsional = normal * wanted_angular_impulse.dot(normal);
-        self.angular_impulse =
-            clamp_length(wanted_angular_impulse - torsional, material.rolling_resistance * lever)
-                + clamp_length(torsional, material.spinning_resistance * lever);
+        let lever = self.normal_impulse / curvature;
+        let limits = [material.rolling_resistance * lever, material.spinning_resistance * lever];
+        let wanted = std::mem::replace(&mut self.angular_impulse, Vec3::zero());
+        solve_rolling(&mut self.angular_impulse, wanted, normal, limits);
     }
 
     /// Normal impulses in a substep: of the spring, and of spring and dashpot; in N s.

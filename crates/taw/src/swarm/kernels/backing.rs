@@ -2,9 +2,10 @@
 //! contacts, so that a light ball between a heavy one and a wall carries the load at once.
 
 use super::contact::SolverColumns;
-use super::{Vec3Wide, gather, inverse_mass};
+use super::{gather, inverse_mass};
 use crate::swarm::batches::Batch;
 use crate::swarm::simd::Simd;
+use crate::swarm::vec3_wide::Vec3Wide;
 
 /// In place of the impulse of [`SolverColumns::backing`]: the ball has left the wall behind it. The
 /// impulses that its pairs had with that wall are larger than those without.
@@ -84,5 +85,5 @@ pub(super) fn borne_by_wall<L: Simd>(
     let before = back[3].max(zero);
     let away = Vec3Wide::of(ball).dot(normal) * mass + impulse.dot(normal);
     let borne = (before - away).max(zero) * some;
-    (impulse.plus(normal.times(borne - before)), normal.with(borne))
+    (impulse + normal * (borne - before), normal.with(borne))
 }

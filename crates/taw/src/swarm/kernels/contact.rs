@@ -1,22 +1,18 @@
-//! Contact constraints of pairs in the full tier: restitution, warm start, solve and relax.
-//!
-//! Derivation: the velocity along the normal after an impulse `p` is `v + p (1/m₁ + 1/m₂)`, so
-//! `Δp = -m (v + separation / h)` with the effective mass `m = 1 / (1/m₁ + 1/m₂)` lets the pair just
-//! touch at the end of a substep of `h` seconds. The accumulated normal impulse is kept at or above
-//! zero, and the accumulated tangent impulse within the friction cone (Catto, 2005, "Iterative
-//! dynamics with temporal coherence"). The touched points of solid balls are 7/2 as easy to move
-//! along the tangent as along the normal, since balls also turn.
+//! Contacts of pairs in the full tier, eight at a time: restitution, warm start, solve and relax.
+//! The constraint itself is in [`crate::constraint`].
 
 use super::backing::borne_by_wall;
 use super::params::{Pass, SolverParams};
 use super::rolling::RollingInertia;
 use super::{
-    ALL, ContactImpulses, Vec3Wide, effective_mass, gather, inverse_mass, normal_and_separation,
-    scatter,
+    ALL, ContactImpulses, effective_mass, gather, inverse_mass, normal_and_separation, scatter,
 };
+use crate::constraint::{ContactImpulse, FrictionCone};
+use crate::math::RealVector;
 use crate::swarm::batches::Batch;
 use crate::swarm::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use crate::swarm::surfaces::{PairNumbers, SOLID_BALL};
+use crate::swarm::vec3_wide::Vec3Wide;
 use crate::swarm::workers::DisjointSlice;
 
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
@@ -147,13 +143,6 @@ impl<L: Simd> Numbers<L> {
     }
 }
 
-/// Impulses on the second balls of the pairs.
-struct PairImpulse<L> {
-    normal: Vec3Wide<L>,
-    normal_part: L,
-    tangent_part: Vec3Wide<L>,
-}
-
 impl SolverColumns<'_> {
     /// Applies an impulse to both balls of the pairs, with these factors of inertia.
     #[inline(always)]
@@ -162,20 +151,21 @@ impl SolverColumns<'_> {
         batch: &Batch,
         [a, b]: [[L; 4]; 2],
         [spin_a, spin_b]: [[L; 4]; 2],
-        PairImpulse { normal, normal_part, tangent_part }: PairImpulse<L>,
+        normal: Vec3Wide<L>,
+        change: ContactImpulse<L, Vec3Wide<L>>,
         [factor_a, factor_b]: [L; 2],
     ) {
         let (mass_a, mass_b) = (inverse_mass(&a), inverse_mass(&b));
-        let impulse = normal.times(normal_part).plus(tangent_part);
+        let impulse = change.along(normal);
         // The column holds radius times spin.
-        let turn = normal.cross(tangent_part);
+        let turn = normal.cross(change.tangent);
         let spin = [
-            Vec3Wide::of(&spin_a).minus(turn.times(factor_a * mass_a)).with(spin_a[3]),
-            Vec3Wide::of(&spin_b).minus(turn.times(factor_b * mass_b)).with(spin_b[3]),
+            (Vec3Wide::of(&spin_a) - turn * (factor_a * mass_a)).with(spin_a[3]),
+            (Vec3Wide::of(&spin_b) - turn * (factor_b * mass_b)).with(spin_b[3]),
         ];
         scatter(self.spin, batch, spin);
         let none = Vec3Wide([L::splat(0.0); 3]);
-        let [mut by_a, mut by_b] = [none.minus(impulse), impulse];
+        let [mut by_a, mut by_b] = [none - impulse, impulse];
         if BACKED {
             let [back_a, back_b] = gather::<L>(self.backing, batch);
             let (borne_a, borne_b);
@@ -184,8 +174,8 @@ impl SolverColumns<'_> {
             scatter(self.backing, batch, [borne_a, borne_b]);
         }
         let velocity = [
-            Vec3Wide::of(&a).plus(by_a.times(mass_a)).with(a[3]),
-            Vec3Wide::of(&b).plus(by_b.times(mass_b)).with(b[3]),
+            (Vec3Wide::of(&a) + by_a * mass_a).with(a[3]),
+            (Vec3Wide::of(&b) + by_b * mass_b).with(b[3]),
         ];
         scatter(self.velocity, batch, velocity);
     }
@@ -226,15 +216,16 @@ impl SolverColumns<'_> {
         if approach_speed.gt_mask(zero) == 0 {
             return false;
         }
-        let relative = Vec3Wide::of(&b).minus(Vec3Wide::of(&a));
+        let relative = Vec3Wide::of(&b) - Vec3Wide::of(&a);
         let mass = effective_mass(&a, &b);
-        let normal_part = mass * approach_speed * (L::splat(1.0) + numbers.restitution);
         let spins = self.spins(batch);
-        let tangent_velocity = tangent_velocity(relative, normal, &spins);
-        let target = tangent_velocity.times(zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
-        let tangent_part = clamp_length(target, numbers.friction * normal_part);
-        let impulse = PairImpulse { normal, normal_part, tangent_part };
-        self.apply_impulse::<L, false>(batch, [a, b], spins, impulse, numbers.inertia_factors);
+        let slip = slip(relative, normal, &spins);
+        let impulse = FrictionCone::new(numbers.friction).clamp(ContactImpulse {
+            normal: mass * approach_speed * (L::splat(1.0) + numbers.restitution),
+            tangent: slip * (zero - numbers.tangent_mass::<OWN>(mass, [&a, &b])),
+        });
+        let factors = numbers.inertia_factors;
+        self.apply_impulse::<L, false>(batch, [a, b], spins, normal, impulse, factors);
         true
     }
 
@@ -264,10 +255,10 @@ impl SolverColumns<'_> {
         let a = free_a.select_gt(zero, borne.select_gt(zero, one, free_a), zero);
         let b = free_b.select_gt(zero, borne.select_gt(zero, one, free_b), zero);
         let by = (a + b).select_gt(zero, push / (a + b), zero);
-        let displacements = [normal.times(by * a), normal.times(by * b)];
+        let displacements = [normal * (by * a), normal * (by * b)];
         let places = [
-            Vec3Wide::of(&at_a).minus(displacements[0]).with(at_a[3]),
-            Vec3Wide::of(&at_b).plus(displacements[1]).with(at_b[3]),
+            (Vec3Wide::of(&at_a) - displacements[0]).with(at_a[3]),
+            (Vec3Wide::of(&at_b) + displacements[1]).with(at_b[3]),
         ];
         scatter(self.at, batch, places);
         self.spend(batch, displacements);
@@ -306,10 +297,10 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, _) = normal_and_separation(&a, &b, ALL, |lane| batch.pair(lane));
             // It was across the normal of the last substep.
-            let tangent_part = Vec3Wide::load(&tangent_impulse[i]);
-            let tangent_part = tangent_part.minus(normal.times(tangent_part.dot(normal)));
-            let mut normal_part = L::load(&normal_impulse[i]);
-            let mut tangent_part = tangent_part;
+            let mut impulse = ContactImpulse {
+                normal: L::load(&normal_impulse[i]),
+                tangent: Vec3Wide::load(&tangent_impulse[i]).reject_from(normal),
+            };
             let (velocity, spin) = (gather::<L>(columns.velocity, batch), columns.spins(batch));
             if BACKED {
                 let [back_a, back_b] = gather::<L>(columns.backing, batch);
@@ -322,16 +313,15 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
                 let (alone, load) =
                     (effective_mass(a, b), columns.backing_of(batch, [a, b], normal).load);
                 let most = load * L::splat(params.softness.max_push_speed);
-                let over = (normal_part - most).max(zero);
-                normal_part = (normal_part - load.select_gt(alone, over, zero)) * kept;
-                normal_part.store(&mut normal_impulse[i]);
-                tangent_part = tangent_part.times(kept);
+                let over = (impulse.normal - most).max(zero);
+                impulse.normal = (impulse.normal - load.select_gt(alone, over, zero)) * kept;
+                impulse.normal.store(&mut normal_impulse[i]);
+                impulse.tangent = impulse.tangent * kept;
             }
-            tangent_part.store(&mut tangent_impulse[i]);
+            impulse.tangent.store(&mut tangent_impulse[i]);
             let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
             let factors = numbers.inertia_factors;
-            let impulse = PairImpulse { normal, normal_part, tangent_part };
-            columns.apply_impulse::<L, BACKED>(batch, velocity, spin, impulse, factors);
+            columns.apply_impulse::<L, BACKED>(batch, velocity, spin, normal, impulse, factors);
             if OWN {
                 let [a, b] = gather::<L>(columns.at, batch);
                 let inertia = RollingInertia::new([&a, &b], &velocity, factors);
@@ -353,51 +343,58 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let at = gather::<L>(columns.at, batch);
             let (normal, separation) =
                 normal_and_separation(&at[0], &at[1], ALL, |lane| batch.pair(lane));
-            let before = L::load(&normal_impulse[i]);
+            let mut impulse = ContactImpulse {
+                normal: L::load(&normal_impulse[i]),
+                tangent: Vec3Wide::load(&tangent_impulse[i]),
+            };
             let [a, b] = gather::<L>(columns.velocity, batch);
-            let relative = Vec3Wide::of(&b).minus(Vec3Wide::of(&a));
+            let relative = Vec3Wide::of(&b) - Vec3Wide::of(&a);
             let parting = relative.dot(normal);
-            let fresh =
-                fresh::<L, FIRST>(&params, [&at[0], &at[1]], [&a, &b], speed, before, parting);
+            let velocity = [&a, &b];
+            let fresh = fresh::<L, FIRST>(
+                &params,
+                [&at[0], &at[1]],
+                velocity,
+                speed,
+                impulse.normal,
+                parting,
+            );
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
             let alone = effective_mass(&a, &b);
-            // What so much slower parting takes.
-            let impulse = |slower: L| {
-                if BACKED {
-                    columns.backing_of(batch, [&a, &b], normal).impulse(alone, slower)
-                } else {
-                    alone * slower
-                }
-            };
-            let change = if FIRST {
-                let (bias, part, back) = softness.of(separation, per_second);
-                part * impulse(parting + bias) + before * back
+            let (target, softness) = if FIRST {
+                let (target, softness) = softness.at(separation, per_second);
+                (target, Some(softness))
             } else {
-                impulse(parting + separation.max(zero) * per_second)
+                (zero - separation.max(zero) * per_second, None)
             };
-            let after = (before - fresh.select_gt(zero, zero, change)).max(zero);
-            after.store(&mut normal_impulse[i]);
+            let slower = parting - target;
+            let wanted = if BACKED {
+                columns.backing_of(batch, velocity, normal).impulse(alone, slower)
+            } else {
+                alone * slower
+            };
+            let wanted = ContactImpulse {
+                normal: fresh.select_gt(zero, zero, zero - wanted),
+                tangent: slip(relative, normal, &spins)
+                    * (zero - numbers.tangent_mass::<OWN>(alone, velocity)),
+            };
+            let change = impulse.solve(wanted, softness, &FrictionCone::new(numbers.friction));
+            impulse.normal.store(&mut normal_impulse[i]);
+            impulse.tangent.store(&mut tangent_impulse[i]);
             let grounded = spins[0][3].max(spins[1][3]);
             for spin in &mut spins {
-                spin[3] = after.select_gt(zero, grounded.max(L::splat(TOUCHING)), spin[3]);
+                spin[3] = impulse.normal.select_gt(zero, grounded.max(L::splat(TOUCHING)), spin[3]);
             }
-            let tangent_velocity = tangent_velocity(relative, normal, &spins);
-            let old = Vec3Wide::<L>::load(&tangent_impulse[i]);
-            let target =
-                old.minus(tangent_velocity.times(numbers.tangent_mass::<OWN>(alone, [&a, &b])));
-            let clamp_length = clamp_length(target, numbers.friction * after);
-            clamp_length.store(&mut tangent_impulse[i]);
-            let (normal_part, tangent_part) = (after - before, clamp_length.minus(old));
-            let (impulse, factors) =
-                (PairImpulse { normal, normal_part, tangent_part }, numbers.inertia_factors);
-            columns.apply_impulse::<L, BACKED>(batch, [a, b], spins, impulse, factors);
+            let factors = numbers.inertia_factors;
+            columns.apply_impulse::<L, BACKED>(batch, [a, b], spins, normal, change, factors);
             if OWN {
                 let inertia = RollingInertia::new([&at[0], &at[1]], &[a, b], factors);
-                columns.solve_rolling(batch, &inertia, normal, after, &own[i], &mut torque[i]);
+                let load = impulse.normal;
+                columns.solve_rolling(batch, &inertia, normal, load, &own[i], &mut torque[i]);
             }
             if !FIRST {
                 let contact = (normal, separation);
-                columns.push_apart(batch, at, [a, b], contact, softness.slop, grounded);
+                columns.push_apart(batch, at, [a, b], contact, params.slop, grounded);
             }
         }
     }
@@ -434,8 +431,8 @@ fn meeting<L: Simd>(
     [a, b]: [&[L; 4]; 2],
 ) -> (Vec3Wide<L>, L) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
-    let displacement = Vec3Wide::of(at_b).minus(Vec3Wide::of(at_a));
-    let relative = Vec3Wide::of(b).minus(Vec3Wide::of(a));
+    let displacement = Vec3Wide::of(at_b) - Vec3Wide::of(at_a);
+    let relative = Vec3Wide::of(b) - Vec3Wide::of(a);
     let reach = at_a[3] + at_b[3];
     let approach = zero - displacement.dot(relative);
     // Where a sphere as wide as both meets a point.
@@ -447,10 +444,10 @@ fn meeting<L: Simd>(
     let limit = L::splat(params.time);
     let meets = limit.select_gt(time, one, zero);
     let time = limit.select_gt(time, time, zero);
-    let then = displacement.plus(relative.times(time));
+    let then = displacement + relative * time;
     let length = then.dot(then).sqrt();
     let inverse = length.select_gt(zero, one / length, zero);
-    let normal = then.times(inverse);
+    let normal = then * inverse;
     let approach_speed = zero - relative.dot(normal);
     let approach_speed =
         approach_speed.select_gt(L::splat(params.restitution_threshold), approach_speed, zero);
@@ -460,19 +457,7 @@ fn meeting<L: Simd>(
 
 /// Velocity at which the surfaces of two balls slide over each other.
 #[inline(always)]
-fn tangent_velocity<L: Simd>(
-    relative: Vec3Wide<L>,
-    normal: Vec3Wide<L>,
-    [a, b]: &[[L; 4]; 2],
-) -> Vec3Wide<L> {
-    let spin = Vec3Wide::of(a).plus(Vec3Wide::of(b));
-    relative.minus(normal.times(relative.dot(normal))).minus(spin.cross(normal))
-}
-
-/// Clamps a tangential impulse to the friction cone.
-#[inline(always)]
-pub(super) fn clamp_length<L: Simd>(target: Vec3Wide<L>, most: L) -> Vec3Wide<L> {
-    let size = target.dot(target).sqrt();
-    let part = most / size.max(L::splat(f32::MIN_POSITIVE));
-    target.times(size.select_gt(most, part, L::splat(1.0)))
+fn slip<L: Simd>(relative: Vec3Wide<L>, normal: Vec3Wide<L>, [a, b]: &[[L; 4]; 2]) -> Vec3Wide<L> {
+    let spin = Vec3Wide::of(a) + Vec3Wide::of(b);
+    relative.reject_from(normal) - spin.cross(normal)
 }

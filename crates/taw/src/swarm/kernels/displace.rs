@@ -1,9 +1,10 @@
 //! Overlap moved apart in the lab's tier.
 
-use super::{ALL, Vec3Wide, gather, normal_and_separation, scatter};
+use super::{ALL, gather, normal_and_separation, scatter};
 use crate::swarm::batches::Batch;
 use crate::swarm::neighbours::NeighbourLists;
 use crate::swarm::simd::{Kernel, LANES, Row, Simd};
+use crate::swarm::vec3_wide::Vec3Wide;
 use crate::swarm::walls::HalfSpace;
 use crate::swarm::workers::DisjointSlice;
 
@@ -19,9 +20,8 @@ impl Kernel for Displace<'_> {
         for batch in self.batches {
             let [a, b] = gather::<L>(self.at, batch);
             let (normal, overlap) = normal_and_overlap(&a, &b, ALL, |lane| batch.pair(lane));
-            let by = normal.times(overlap * L::splat(0.5));
-            let moved =
-                [Vec3Wide::of(&a).minus(by).with(a[3]), Vec3Wide::of(&b).plus(by).with(b[3])];
+            let by = normal * (overlap * L::splat(0.5));
+            let moved = [(Vec3Wide::of(&a) - by).with(a[3]), (Vec3Wide::of(&b) + by).with(b[3])];
             scatter(self.at, batch, moved);
         }
     }
@@ -99,8 +99,8 @@ impl Kernel for DisplaceNeighbours<'_> {
                     let (normal, overlap) = normal_and_overlap(&a, &b, (1 << count) - 1, pair);
                     let overlap = overlap.mask_first(count);
                     let hits = overlap.gt_mask(L::splat(0.0)).count_ones();
-                    let by = normal.times(overlap * L::splat(PART[hits as usize]));
-                    L::scatter(ball, &after, LANES, Vec3Wide::of(&b).plus(by).with(b[3]));
+                    let by = normal * (overlap * L::splat(PART[hits as usize]));
+                    L::scatter(ball, &after, LANES, (Vec3Wide::of(&b) + by).with(b[3]));
                     let Vec3Wide([x, y, z]) = by;
                     own = [own[0] - x.sum(), own[1] - y.sum(), own[2] - z.sum(), own[3]];
                 }

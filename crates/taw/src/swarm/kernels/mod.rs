@@ -4,6 +4,7 @@ use super::batches::Batch;
 use super::impulse_cache::{reserve_slack, shrink_slack};
 use super::simd::{LANES, Row, Simd};
 use super::surfaces::{PairNumbers, SurfaceOf};
+use super::vec3_wide::Vec3Wide;
 use super::workers::DisjointSlice;
 
 mod backing;
@@ -17,7 +18,7 @@ pub(super) use backing::LOST;
 pub(super) use contact::{SolverColumns, solve};
 pub(super) use displace::{Displace, DisplaceFromPlanes, DisplaceNeighbours};
 pub(super) use integrate::{IntegratePositions, Predict, UpdateVelocities, squared};
-pub(super) use params::{GROUNDED, Pass, Softness, SolverParams, WALL_SLOP};
+pub(super) use params::{GROUNDED, Pass, SolverParams, WALL_SLOP};
 
 /// Accumulated impulses of batches of pairs, batch by batch; none in the lab's tier.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,66 +63,6 @@ impl ContactImpulses {
     }
 }
 
-/// Three coordinates on eight lanes.
-#[derive(Clone, Copy)]
-struct Vec3Wide<L>([L; 3]);
-
-impl<L: Simd> Vec3Wide<L> {
-    #[inline(always)]
-    fn of(row: &[L; 4]) -> Self {
-        Self([row[0], row[1], row[2]])
-    }
-
-    #[inline(always)]
-    fn load(from: &[[f32; LANES]; 3]) -> Self {
-        Self([L::load(&from[0]), L::load(&from[1]), L::load(&from[2])])
-    }
-
-    #[inline(always)]
-    fn store(self, to: &mut [[f32; LANES]; 3]) {
-        let Self([x, y, z]) = self;
-        x.store(&mut to[0]);
-        y.store(&mut to[1]);
-        z.store(&mut to[2]);
-    }
-
-    #[inline(always)]
-    fn plus(self, other: Self) -> Self {
-        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
-        Self([a + x, b + y, c + z])
-    }
-
-    #[inline(always)]
-    fn minus(self, other: Self) -> Self {
-        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
-        Self([a - x, b - y, c - z])
-    }
-
-    #[inline(always)]
-    fn times(self, by: L) -> Self {
-        let Self([x, y, z]) = self;
-        Self([x * by, y * by, z * by])
-    }
-
-    #[inline(always)]
-    fn dot(self, other: Self) -> L {
-        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
-        a * x + b * y + c * z
-    }
-
-    #[inline(always)]
-    fn cross(self, other: Self) -> Self {
-        let (Self([a, b, c]), Self([x, y, z])) = (self, other);
-        Self([b * z - c * y, c * x - a * z, a * y - b * x])
-    }
-
-    #[inline(always)]
-    fn with(self, w: L) -> [L; 4] {
-        let Self([x, y, z]) = self;
-        [x, y, z, w]
-    }
-}
-
 /// All lanes, as bits.
 const ALL: u32 = (1 << LANES) - 1;
 
@@ -136,12 +77,12 @@ fn normal_and_separation<L: Simd>(
 ) -> (Vec3Wide<L>, L) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let least = L::splat(f32::MIN_POSITIVE);
-    let displacement = Vec3Wide::of(b).minus(Vec3Wide::of(a));
+    let displacement = Vec3Wide::of(b) - Vec3Wide::of(a);
     let squared = displacement.dot(displacement);
     let distance = squared.sqrt();
     // Root and quotient do not wait for each other.
     let inverse = squared.select_gt(least, distance * (one / squared), zero);
-    let mut normal = displacement.times(inverse);
+    let mut normal = displacement * inverse;
     if least.gt_mask(squared) & lanes != 0 {
         // Where the centers coincide, any direction is as good as another; with the same for all,
         // those at one point would come into a line.

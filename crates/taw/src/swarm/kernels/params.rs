@@ -1,6 +1,7 @@
 //! Parameters of the solver's passes.
 
-use crate::swarm::simd::{Row, Simd};
+use crate::constraint::ContactSoftness;
+use crate::swarm::simd::Row;
 
 /// Kind of a pass.
 #[derive(Clone, Copy, Debug)]
@@ -34,41 +35,9 @@ pub(in crate::swarm) struct SolverParams {
     /// In m/s².
     pub gravity: Row,
     /// Stiffness of contacts.
-    pub softness: Softness,
-}
-
-/// Stiffness by which contacts bear what lies on them: overlap makes it part a little, which the
-/// pass after that takes back, though not what contacts have learned to bear. What they give back
-/// is what damps it: impulses that are applied again and corrected once a substep swing for a long
-/// time, and what pushes overlap out meanwhile makes them swing more (Catto, `Solver2D`, 2024: soft
-/// contacts).
-#[derive(Clone, Copy, Debug)]
-pub(in crate::swarm) struct Softness {
-    /// The part of an overlap that is to go per second.
-    pub bias_rate: f32,
-    /// Speed of that at most, in m/s.
-    pub max_push_speed: f32,
-    /// The part of the impulse that a hard contact would need, and how much of what it has borne
-    /// so far it gives back.
-    pub mass_scale: f32,
-    pub impulse_scale: f32,
-    /// So much of twice the smaller radius two balls may overlap before they are moved apart.
+    pub softness: ContactSoftness,
+    /// Overlap of two balls that is left alone, over twice the smaller radius.
     pub slop: f32,
-}
-
-impl Softness {
-    /// Velocity that a separation adds to the target, the part of the impulse of a hard contact
-    /// that is applied, and the part of the accumulated one that is given back: an overlap is soft,
-    /// a gap may close within the substep.
-    #[inline(always)]
-    pub fn of<L: Simd>(self, separation: L, per_second: L) -> (L, L, L) {
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
-        let pushed = (separation * L::splat(self.bias_rate)).max(L::splat(-self.max_push_speed));
-        let bias = separation.select_gt(zero, separation * per_second, pushed);
-        let part = separation.select_gt(zero, one, L::splat(self.mass_scale));
-        let back = separation.select_gt(zero, zero, L::splat(self.impulse_scale));
-        (bias, part, back)
-    }
 }
 
 /// So much of its radius a ball may be in a wall: more than what bears a heap gets.

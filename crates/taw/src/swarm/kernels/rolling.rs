@@ -1,10 +1,12 @@
 //! Rolling and spinning resistance of pairs.
 
-use super::contact::{SolverColumns, clamp_length};
-use super::{Vec3Wide, inverse_mass, scatter};
+use super::contact::SolverColumns;
+use super::{inverse_mass, scatter};
+use crate::constraint::solve_rolling;
 use crate::swarm::batches::Batch;
 use crate::swarm::simd::{LANES, Simd};
 use crate::swarm::surfaces::PairNumbers;
+use crate::swarm::vec3_wide::Vec3Wide;
 
 /// Inertia of the balls of a batch against torques.
 pub(super) struct RollingInertia<L> {
@@ -46,8 +48,8 @@ impl SolverColumns<'_> {
         let [a, b] = self.spins::<L>(batch);
         let [by_a, by_b] = inertia.surface_speed;
         let spins = [
-            Vec3Wide::of(&a).minus(torque.times(by_a)).with(a[3]),
-            Vec3Wide::of(&b).plus(torque.times(by_b)).with(b[3]),
+            (Vec3Wide::of(&a) - torque * by_a).with(a[3]),
+            (Vec3Wide::of(&b) + torque * by_b).with(b[3]),
         ];
         scatter(self.spin, batch, spins);
     }
@@ -67,15 +69,14 @@ impl SolverColumns<'_> {
         let most = normal_impulse * inertia.radius;
         let rolling = L::load(&numbers.rolling_resistance) * most;
         let spinning = L::load(&numbers.spinning_resistance) * most;
-        let before = Vec3Wide::<L>::load(torque);
+        let mut accumulated = Vec3Wide::<L>::load(torque);
         let (zero, [a, b]) = (L::splat(0.0), self.spins::<L>(batch));
         let [per_a, per_b] = inertia.per_radius;
-        let turning = Vec3Wide::of(&b).times(per_b).minus(Vec3Wide::of(&a).times(per_a));
-        let target = before.minus(turning.times(inertia.mass));
-        let about = normal.times(target.dot(normal));
-        let after = clamp_length(target.minus(about), rolling.max(zero))
-            .plus(clamp_length(about, spinning.max(zero)));
-        after.store(torque);
-        self.apply_angular_impulse(batch, inertia, after.minus(before));
+        let relative_spin = Vec3Wide::of(&b) * per_b - Vec3Wide::of(&a) * per_a;
+        let wanted = relative_spin * (zero - inertia.mass);
+        let limits = [rolling.max(zero), spinning.max(zero)];
+        let change = solve_rolling(&mut accumulated, wanted, normal, limits);
+        accumulated.store(torque);
+        self.apply_angular_impulse(batch, inertia, change);
     }
 }

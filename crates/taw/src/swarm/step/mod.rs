@@ -11,15 +11,14 @@ pub(super) use wall_contacts::listed_planes;
 use super::build::SOON;
 use super::chunk::Chunk;
 use super::fast_movers::FastMovers;
-use super::kernels::{
-    IntegratePositions, Pass, Softness, SolverColumns, SolverParams, solve, squared,
-};
+use super::kernels::{IntegratePositions, Pass, SolverColumns, SolverParams, solve, squared};
 use super::simd::Row;
 use super::walls::half_spaces;
 use super::workers::{DisjointSlice, parallel_for, parallel_for_odd_even};
 use super::{Stage, StaticGeometry, Swarm, Tier};
 use cgmath::Zero;
 
+use crate::constraint::ContactSoftness;
 use crate::math::{Vec3, length};
 
 /// Stiffness of contacts: at most so many oscillations a second, and as many times as much
@@ -217,7 +216,8 @@ impl Swarm {
             gravity: row(gravity),
             // Soft contacts bear what lies on others; all else that overlaps is moved apart. Where
             // nothing has weight, overlap makes no speed at all.
-            softness: softness(h, length(gravity)),
+            softness: ContactSoftness::new(h, HERTZ, DAMPING, PUSHING * length(gravity)),
+            slop: if length(gravity) > 0.0 { SLOP } else { SLOP_WEIGHTLESS },
         }
     }
 
@@ -455,20 +455,4 @@ fn leaves(velocity: &Row, skin_left: f32, time: f32) -> bool {
 
 fn row(vector: Vec3<f32>) -> Row {
     [vector.x, vector.y, vector.z, 0.0]
-}
-
-/// Springs that are as stiff as so short a step allows (Catto, `Solver2D`, 2024).
-fn softness(h: f32, gravity: f32) -> Softness {
-    let omega = 2.0 * std::f32::consts::PI * HERTZ.min(0.25 / h);
-    let a1 = 2.0 * DAMPING + h * omega;
-    let a2 = h * omega * a1;
-    let a3 = 1.0 / (1.0 + a2);
-    let slop = if gravity > 0.0 { SLOP } else { SLOP_WEIGHTLESS };
-    Softness {
-        bias_rate: omega / a1,
-        max_push_speed: PUSHING * gravity,
-        mass_scale: a2 * a3,
-        impulse_scale: a3,
-        slop,
-    }
 }
