@@ -6,20 +6,26 @@ use super::INFINITE_MASS;
 use super::chunk::Chunk;
 use super::kernels::squared;
 use super::simd::Row;
+use super::step::sleep_speed;
 use super::wall_contact::WallContact;
+use crate::math::{Vec3, length};
 
 /// Least time of rest before a chunk sleeps, in seconds, and in times that a ball needs to fall by
 /// half its radius: the larger a ball, the longer it lingers where it turns back.
 const TIME: f32 = 0.5;
 const FALLS: f32 = 5.0;
-/// Distance in radii that a ball at rest keeps to. A ball that begins to roll down a slope of .13°
-/// goes further in that time.
-const PLACE: f32 = 0.02;
+/// Distance in radii that a ball at rest keeps to, unless it is slow and does not speed up: without rolling
+/// resistance, a slow one on a level floor rolls on for ever. A ball that begins to roll down a slope
+/// of .33° goes further in that time, and one under 10 cm down a gentler slope.
+const PLACE: f32 = 0.05;
+/// Speed over that at the beginning up to which a ball does not speed up: one that rolls down a slope
+/// of .08° gains more in that time.
+const STEADY: f32 = 1.1;
 
 /// How long all balls of a chunk have been where they are.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Rest {
-    /// Centers and radii at the beginning; none while any ball moves.
+    /// Centers and speeds at the beginning; none while any ball moves.
     places: Vec<Row>,
     /// In seconds.
     time: f32,
@@ -54,7 +60,7 @@ impl Chunk {
         &mut self,
         [at, velocity, spin]: [&[Row]; 3],
         is_proxy: impl Fn(usize) -> bool,
-        gravity: f32,
+        gravity: Vec3<f32>,
         dt: f32,
     ) -> bool {
         let is_carried =
@@ -70,16 +76,20 @@ impl Chunk {
         }
         let stays = |(row, (at, place)): (usize, (&Row, &Row))| {
             let away = [at[0] - place[0], at[1] - place[1], at[2] - place[2], 0.0];
-            squared(away).sqrt() <= PLACE * at[3] || is_proxy(row)
+            let speed = squared(velocity[row]).sqrt();
+            squared(away).sqrt() <= PLACE * at[3]
+                || speed <= (STEADY * place[3]).min(sleep_speed(gravity, at[3]))
+                || is_proxy(row)
         };
         let places = &mut self.rest.places;
         if places.len() == at.len() && at.iter().zip(&*places).enumerate().all(stays) {
             self.rest.time += dt;
         } else {
             places.clear();
-            places.extend(at);
+            let speeds = velocity.iter().map(|velocity| squared(*velocity).sqrt());
+            places.extend(at.iter().zip(speeds).map(|([x, y, z, _], speed)| [*x, *y, *z, speed]));
             self.rest.time = 0.0;
         }
-        self.rest.lasts(self.radii[1], gravity)
+        self.rest.lasts(self.radii[1], length(gravity))
     }
 }

@@ -54,7 +54,7 @@ impl Swarm {
             }
             let rows = [&at[chunk.own_rows()], &*velocity, &*spin];
             let is_proxy = |row: usize| has_proxies && bodies.contains(own_slots[row]);
-            let rests = chunk.rests(rows, is_proxy, length(gravity), dt);
+            let rests = chunk.rests(rows, is_proxy, gravity, dt);
             let may_sleep =
                 || all_may_sleep || !own_slots.iter().any(|slot| sleepless.contains(*slot));
             if rests && may_sleep() {
