@@ -19,10 +19,15 @@
 //!   `λ` times a lever: one about the tangents, one about the normal.
 //! - **Softness.** A spring and damper, integrated implicitly, apply only a part of the impulse and
 //!   give back a part of what has accumulated: `λ ← max(0, λ + a m (v* − v·n) − b λ)` (Catto, *Soft
-//!   contacts*, in *Solver2D*, 2024).
+//!   contacts*, in `Solver2D`, 2024).
 //!
 //! What differs between methods is the order of the contacts, the targets and the units of the
 //! impulses, which are the caller's: N s, or m/s after multiplication by an inverse mass.
+
+#![allow(
+    clippy::inline_always,
+    reason = "kernels are compiled for the instructions of their caller"
+)]
 
 mod contact_impulse;
 mod softness;

@@ -24,7 +24,7 @@ impl<R: Real> Softness<R> {
 /// Contacts that overlap are pushed apart a little, which the relax pass takes back, though not the
 /// load that they have learned to bear. What they give back is what damps them: impulses that are
 /// applied again and corrected once a substep swing for a long time, and a push that removes overlap
-/// meanwhile makes them swing more (Catto, *Solver2D*, 2024).
+/// meanwhile makes them swing more (Catto, `Solver2D`, 2024).
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ContactSoftness {
     /// Fraction of an overlap that is removed per second.
@@ -38,7 +38,7 @@ pub(crate) struct ContactSoftness {
 
 impl ContactSoftness {
     /// Spring of this frequency, in Hz, or the stiffest that a substep of `h` seconds allows, with a
-    /// damping ratio (Catto, *Solver2D*, 2024); implicit Euler over the substep.
+    /// damping ratio (Catto, `Solver2D`, 2024); implicit Euler over the substep.
     pub fn new(h: f32, hertz: f32, damping_ratio: f32, max_push_speed: f32) -> Self {
         let omega = 2.0 * std::f32::consts::PI * hertz.min(0.25 / h);
         let a1 = 2.0 * damping_ratio + h * omega;

@@ -1,5 +1,10 @@
 //! Arithmetic of one number or of several side by side, for formulas that are written once for both.
 
+#![allow(
+    clippy::inline_always,
+    reason = "kernels are compiled for the instructions of their caller"
+)]
+
 use std::ops::{Add, Div, Mul, Sub};
 
 use cgmath::InnerSpace;

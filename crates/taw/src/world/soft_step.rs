@@ -134,7 +134,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Returns true if a marble sleeps: in a model with
-    /// [`Response::SoftStep`](crate::response::Response::SoftStep), once it and all about it have
+    /// [`Response::SoftStep`], once it and all about it have
     /// rested: for half a second, and longer for balls of over 10 cm (five times √(r/g)), each was
     /// borne by something and either went no further than 5 % of its radius, or was slower than .05 √(g r)
     /// and did not speed up. What sleeps costs next to nothing, and has no velocity. It wakes when it is touched or set, when a wall or gravity

@@ -297,10 +297,8 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, _) = normal_and_separation(&a, &b, ALL, |lane| batch.pair(lane));
             // It was across the normal of the last substep.
-            let mut impulse = ContactImpulse {
-                normal: L::load(&normal_impulse[i]),
-                tangent: Vec3Wide::load(&tangent_impulse[i]).reject_from(normal),
-            };
+            let mut impulse = load::<L>(&normal_impulse[i], &tangent_impulse[i]);
+            impulse.tangent = impulse.tangent.reject_from(normal);
             let (velocity, spin) = (gather::<L>(columns.velocity, batch), columns.spins(batch));
             if BACKED {
                 let [back_a, back_b] = gather::<L>(columns.backing, batch);
@@ -343,22 +341,13 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let at = gather::<L>(columns.at, batch);
             let (normal, separation) =
                 normal_and_separation(&at[0], &at[1], ALL, |lane| batch.pair(lane));
-            let mut impulse = ContactImpulse {
-                normal: L::load(&normal_impulse[i]),
-                tangent: Vec3Wide::load(&tangent_impulse[i]),
-            };
+            let mut impulse = load::<L>(&normal_impulse[i], &tangent_impulse[i]);
             let [a, b] = gather::<L>(columns.velocity, batch);
             let relative = Vec3Wide::of(&b) - Vec3Wide::of(&a);
             let parting = relative.dot(normal);
             let velocity = [&a, &b];
-            let fresh = fresh::<L, FIRST>(
-                &params,
-                [&at[0], &at[1]],
-                velocity,
-                speed,
-                impulse.normal,
-                parting,
-            );
+            let (places, before) = ([&at[0], &at[1]], impulse.normal);
+            let fresh = fresh::<L, FIRST>(&params, places, velocity, speed, before, parting);
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
             let alone = effective_mass(&a, &b);
             let (target, softness) = if FIRST {
@@ -388,8 +377,8 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let factors = numbers.inertia_factors;
             columns.apply_impulse::<L, BACKED>(batch, [a, b], spins, normal, change, factors);
             if OWN {
-                let inertia = RollingInertia::new([&at[0], &at[1]], &[a, b], factors);
-                let load = impulse.normal;
+                let (inertia, load) =
+                    (RollingInertia::new(places, &[a, b], factors), impulse.normal);
                 columns.solve_rolling(batch, &inertia, normal, load, &own[i], &mut torque[i]);
             }
             if !FIRST {
@@ -398,6 +387,15 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             }
         }
     }
+}
+
+/// The accumulated impulses of a batch.
+#[inline(always)]
+fn load<L: Simd>(
+    normal: &[f32; LANES],
+    tangent: &[[f32; LANES]; 3],
+) -> ContactImpulse<L, Vec3Wide<L>> {
+    ContactImpulse { normal: L::load(normal), tangent: Vec3Wide::load(tangent) }
 }
 
 /// One where a pair is no contact yet: it bears nothing and comes faster than `speed`.
