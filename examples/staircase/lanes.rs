@@ -127,8 +127,8 @@ pub fn run(runner: Runner, response: Response) -> Result<Run, bevy_taw::taw::Err
         }
         world.step(1.0 / 60.0)?;
         let marble = world.marbles.get(id)?;
-        let touches = world.contacts.wm.iter().any(|c| c.mtv.magnitude() > 0.0)
-            || !world.impacts().is_empty();
+        let touches =
+            world.contacts.wm.iter().any(|c| c.separation < 0.0) || !world.impacts().is_empty();
         found.hops += u32::from(in_air && touches);
         in_air = !touches;
         let slope = (top() - RISE - marble.position.x * RISE / RUN).max(0.0);

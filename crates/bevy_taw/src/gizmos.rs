@@ -98,7 +98,7 @@ fn draw(world: Res<TawWorld>, mut gizmos: Gizmos<TawGizmos>) {
 /// Where a contact is: on the second marble, where it meets the first thing.
 fn point_and_normal(world: &TawWorld, contact: &Contact<f32>) -> Option<(Vec3, Vec3)> {
     let row = contact.b as usize;
-    let normal = from_vector(contact.mtv).normalize_or_zero();
+    let normal = from_vector(contact.normal);
     let center = from_point(*world.marbles.position().get(row)?);
-    Some((center - normal * *world.marbles.radius().get(row)?, normal))
+    Some((center + from_vector(contact.arms[1]), normal))
 }

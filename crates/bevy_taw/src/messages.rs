@@ -113,29 +113,23 @@ pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
         let (normal, closing) = (from_vector(normal), from_vector(closing));
         ContactStarted { pair, normal, approach_speed: -closing.dot(normal) }
     };
-    for contact in &world.contacts.wm {
+    for contact in world.contacts.wm.iter().filter(|contact| contact.is_touching()) {
         if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
-            let normal = world.wall_contact_normal(contact);
-            let touch =
-                normal.map(|normal| started(ContactPair { a, b }, normal, velocity(contact.b)));
-            touches.now.extend(touch);
+            let touch = started(ContactPair { a, b }, contact.normal, velocity(contact.b));
+            touches.now.push(touch);
         }
     }
-    for contact in &world.contacts.mm {
+    for contact in world.contacts.mm.iter().filter(|contact| contact.is_touching()) {
         if let (Some(a), Some(b)) = (world.marble_entity(contact.a), world.marble_entity(contact.b))
         {
             let closing = velocity(contact.b) - velocity(contact.a);
-            let normal = world.marble_contact_normal(contact);
-            let mut touch = normal.map(|normal| started(ContactPair { a, b }, normal, closing));
+            let mut touch = started(ContactPair { a, b }, contact.normal, closing);
             if b < a {
                 // Rows move about; the order of entities does not.
-                touch = touch.map(|touch| ContactStarted {
-                    pair: ContactPair { a: b, b: a },
-                    normal: -touch.normal,
-                    ..touch
-                });
+                touch.pair = ContactPair { a: b, b: a };
+                touch.normal = -touch.normal;
             }
-            touches.now.extend(touch);
+            touches.now.push(touch);
         }
     }
 }

@@ -139,6 +139,17 @@ pub fn normalize_and_length<S: Scalar>(v: Vec3<S>) -> Option<(Vec3<S>, S)> {
     }
 }
 
+/// Unit normal between the centers of two balls, and their distance. Coincident centers get an
+/// [arbitrary normal](any_direction), different for each pair.
+#[inline]
+pub(crate) fn normal_and_distance<S: Scalar>(
+    center_offset: Vec3<S>,
+    [a, b]: [u32; 2],
+) -> (Vec3<S>, S) {
+    let direction = normalize_and_length(center_offset);
+    direction.unwrap_or_else(|| (any_direction(a, b), length(center_offset)))
+}
+
 /// Deterministic unit vector for a pair of indices without a direction: spread evenly over the
 /// sphere by the golden angle (González, *Measurement of areas on a sphere using Fibonacci and
 /// latitude–longitude lattices*, 2010).

@@ -4,6 +4,7 @@
 use std::time::Instant;
 
 use taw::Error;
+use taw::contact::Contact;
 use taw::frame::Pose;
 use taw::math::Quat;
 use taw::prelude::*;
@@ -409,7 +410,7 @@ fn thousands_in_one_place_part_in_seconds_and_without_energy() {
     let mut world = crowd(3000, Response::Impulse);
     let clock = Instant::now();
     let deepest = |world: &World<f32>| {
-        let depths = world.contacts.mm.iter().map(|contact| contact.mtv.magnitude());
+        let depths = world.contacts.mm.iter().map(Contact::penetration);
         depths.fold(0.0, f32::max)
     };
     let mut steps = 0;

@@ -132,8 +132,8 @@ fn roll(walls: Vec<WallShape<f64>>, model: Model, heading: f64, way: f64) -> (f6
     for _ in 0..(way / 5.0 / DT) as u32 {
         world.step(DT).unwrap();
         for contact in &world.contacts.wm {
-            if contact.mtv.magnitude() > 0.0 {
-                worst = worst.max(contact.mtv.angle(Vec3::unit_y()).0);
+            if contact.separation < 0.0 {
+                worst = worst.max(contact.normal.angle(Vec3::unit_y()).0);
             }
         }
         for impact in world.impacts() {
@@ -242,8 +242,8 @@ fn a_capsule_feels_one_floor_too() {
                 let mut worst: f64 = 0.0;
                 for _ in 0..96 {
                     world.step(DT).unwrap();
-                    for contact in world.contacts.wm.iter().filter(|c| c.mtv.magnitude() > 0.0) {
-                        worst = worst.max(contact.mtv.angle(Vec3::unit_y()).0);
+                    for contact in world.contacts.wm.iter().filter(|c| c.separation < 0.0) {
+                        worst = worst.max(contact.normal.angle(Vec3::unit_y()).0);
                     }
                 }
                 let end = world.marbles.get(id).unwrap();
@@ -286,8 +286,10 @@ fn a_hundred_flush_boxes_are_one_floor_in_single_precision() {
         let id = world.marbles.insert(Marble { velocity, material, ..marble }).unwrap();
         for _ in 0..330 {
             world.step(1.0 / 60.0).unwrap();
-            for contact in world.contacts.wm.iter().filter(|c| c.mtv.y > 0.0) {
-                let off = contact.mtv.angle(Vec3::unit_y()).0;
+            for contact in
+                world.contacts.wm.iter().filter(|c| c.separation < 0.0 && c.normal.y > 0.0)
+            {
+                let off = contact.normal.angle(Vec3::unit_y()).0;
                 assert!(off < 1e-5, "{:?}: off by {off} rad", model.response);
             }
         }

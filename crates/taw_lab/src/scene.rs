@@ -198,5 +198,5 @@ pub fn overlaps<S: Scalar>(world: &World<S>) -> Vec<f64> {
     let mut touched = world.clone();
     touched.generate_contacts();
     let contacts = touched.contacts.wm.iter().chain(&touched.contacts.mm);
-    contacts.map(|c| c.mtv.map(Scalar::as_f64).magnitude()).collect()
+    contacts.map(|c| c.penetration().as_f64()).collect()
 }

@@ -1,10 +1,13 @@
 use std::cmp::Ordering;
 
-use cgmath::InnerSpace;
+use cgmath::Zero;
 
-use crate::math::{Scalar, Vec3, length};
+use crate::math::{Scalar, Vec3, is_finite, length};
 
-/// A contact point between two bodies, given by their indices in the world's columns. Indices are
+/// Gap between two that touch, as a fraction of the shorter lever arm, at most.
+const TOUCHING: f64 = 5e-6;
+
+/// Contact point between two bodies, given by their indices in the world's columns. Indices are
 /// stable within a step only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Contact<S> {
@@ -18,9 +21,97 @@ pub struct Contact<S> {
     /// Contact anchor on the axis of each body, in metres from its center: zero except for
     /// capsules.
     pub along: [S; 2],
+    /// Unit normal, from `a` to `b`.
+    pub normal: Vec3<S>,
+    /// Separation of the two surfaces along the normal, in metres; negative for a penetration.
+    pub separation: S,
+    /// Lever arm of each body: from its center to the contact point on its surface, in metres; zero
+    /// for a wall.
+    pub arms: [Vec3<S>; 2],
+    /// Normal impulse accumulated in this substep, in N s. Zero until the contact is solved;
+    /// listed by `Impulse` and `Penalty`.
+    pub normal_impulse: S,
+    /// Friction impulse on `b` accumulated in this substep, in N s; that on `a` is its opposite.
+    pub tangent_impulse: Vec3<S>,
+}
+
+impl<S: Scalar> Contact<S> {
+    /// Contact of a wall and a marble, not placed yet.
+    pub(crate) fn with_wall(wall: u32, part: u32, marble: u32) -> Self {
+        Self { part, ..Self::between_marbles(wall, marble) }
+    }
+
+    /// Contact of two marbles, not placed yet.
+    pub(crate) fn between_marbles(a: u32, b: u32) -> Self {
+        let (zero, none) = (S::zero(), Vec3::zero());
+        Self {
+            a,
+            b,
+            part: 0,
+            along: [zero; 2],
+            normal: none,
+            separation: zero,
+            arms: [none; 2],
+            normal_impulse: zero,
+            tangent_impulse: none,
+        }
+    }
+
+    /// Places the contact between two balls, or two points on the axes of capsules, these metres
+    /// apart. `anchors` are these points relative to the centers. A wall has a radius of zero.
+    pub(crate) fn placed(
+        self,
+        (normal, distance): (Vec3<S>, S),
+        radii: [S; 2],
+        anchors: [Vec3<S>; 2],
+    ) -> Self {
+        // In this order, so that the gap between a boulder and a pebble keeps its digits.
+        let separation = distance - radii[0] - radii[1];
+        let arms = [anchors[0] + normal * radii[0], anchors[1] - normal * radii[1]];
+        Self { normal, separation, arms, ..self }
+    }
+
+    /// Stores the impulse of this substep, in N s; zero for one that overflows.
+    pub(crate) fn set_impulse(&mut self, normal_impulse: S, tangent_impulse: Vec3<S>) {
+        if normal_impulse.is_finite() && is_finite(tangent_impulse) {
+            (self.normal_impulse, self.tangent_impulse) = (normal_impulse, tangent_impulse);
+        }
+    }
+
+    /// Contact with the two bodies swapped.
+    pub(crate) fn reversed(self) -> Self {
+        let Self { a, b, along: [x, y], arms: [p, q], .. } = self;
+        let (normal, tangent_impulse) = (-self.normal, -self.tangent_impulse);
+        Self { a: b, b: a, along: [y, x], arms: [q, p], normal, tangent_impulse, ..self }
+    }
+
+    /// Penetration along the normal, in metres; zero for separated surfaces.
+    #[must_use]
+    pub fn penetration(&self) -> S {
+        (-self.separation).max(S::zero())
+    }
+
+    /// True if the surfaces overlap, or are within 5e-6 of the shorter arm of each other: the gap
+    /// that rounding may leave under a resting marble. False for a speculative contact.
+    #[must_use]
+    pub fn is_touching(&self) -> bool {
+        let arm = |arm: Vec3<S>| if arm.is_zero() { S::infinity() } else { length(arm) };
+        let shorter = arm(self.arms[0]).min(arm(self.arms[1]));
+        self.separation <= shorter * S::from_f64(TOUCHING)
+    }
+
     /// Minimum translation vector (penetration vector): displacement of `b` that separates it from
-    /// `a`, in metres.
-    pub mtv: Vec3<S>,
+    /// `a`, in metres. The lecture's view of a contact.
+    #[must_use]
+    pub fn mtv(&self) -> Vec3<S> {
+        self.normal * self.penetration()
+    }
+
+    /// Impulse on `b` in this substep, in N s.
+    #[must_use]
+    pub fn impulse(&self) -> Vec3<S> {
+        self.normal * self.normal_impulse + self.tangent_impulse
+    }
 }
 
 /// Contact lists of a substep.
@@ -39,7 +130,7 @@ impl<S> Default for Contacts<S> {
 }
 
 impl<S: Scalar> Contacts<S> {
-    /// Sorts both lists by penetration, deepest first. Ties are ordered by indices and NaN comes
+    /// Sorts both lists by separation, deepest penetration first. Ties are ordered by indices and NaN comes
     /// last, so the order does not depend on how the contacts were found.
     pub fn sort(&mut self) {
         self.wm.sort_unstable_by(deeper_first);
@@ -58,6 +149,16 @@ impl<S: Scalar> Contacts<S> {
         self.wm.len() + self.mm.len()
     }
 
+    /// Contact by its index in both lists, those with walls first.
+    pub(crate) fn get_mut(&mut self, index: usize) -> Option<&mut Contact<S>> {
+        let with_walls = self.wm.len();
+        if index < with_walls {
+            self.wm.get_mut(index)
+        } else {
+            self.mm.get_mut(index - with_walls)
+        }
+    }
+
     /// Returns true without any contact.
     #[must_use]
     pub fn is_empty(&self) -> bool {
@@ -66,20 +167,12 @@ impl<S: Scalar> Contacts<S> {
 }
 
 fn deeper_first<S: Scalar>(x: &Contact<S>, y: &Contact<S>) -> Ordering {
-    let (squared_x, squared_y) = (x.mtv.magnitude2(), y.mtv.magnitude2());
-    if squared_x > squared_y {
-        return Ordering::Less;
-    }
-    if squared_x < squared_y {
-        return Ordering::Greater;
-    }
-    let descending = |x: S, y: S| y.partial_cmp(&x).unwrap_or(Ordering::Equal);
-    (squared_x.is_nan().cmp(&squared_y.is_nan()))
-        // Squares of tiny and huge lengths vanish and overflow alike.
-        .then_with(|| descending(length(x.mtv), length(y.mtv)))
+    let ascending = |x: S, y: S| x.partial_cmp(&y).unwrap_or(Ordering::Equal);
+    (x.separation.is_nan().cmp(&y.separation.is_nan()))
+        .then_with(|| ascending(x.separation, y.separation))
         .then_with(|| (x.a, x.b, x.part).cmp(&(y.a, y.b, y.part)))
-        .then_with(|| descending(x.along[0], y.along[0]))
-        .then_with(|| descending(x.along[1], y.along[1]))
+        .then_with(|| ascending(y.along[0], x.along[0]))
+        .then_with(|| ascending(y.along[1], x.along[1]))
 }
 
 #[cfg(test)]
@@ -87,8 +180,7 @@ mod tests {
     use super::*;
 
     fn contact(a: u32, b: u32, depth: f32) -> Contact<f32> {
-        let mtv = Vec3::new(0.0, depth, 0.0);
-        Contact { a, b, part: 0, along: [0.0; 2], mtv }
+        Contact { separation: -depth, ..Contact::between_marbles(a, b) }
     }
 
     #[test]
@@ -98,10 +190,10 @@ mod tests {
             contact(2, 3, 5.0),
             contact(0, 1, 2.0),
             contact(0, 2, 2.0),
-            contact(1, 2, -2.0),
             contact(8, 9, 2e-30),
             contact(5, 9, 1e-30),
             contact(5, 6, 0.0),
+            contact(1, 2, -2.0),
             contact(0, 9, f32::NAN),
             contact(4, 9, f32::NAN),
         ];

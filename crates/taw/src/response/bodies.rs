@@ -115,7 +115,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     pub(super) fn inverse_effective_mass(
         &self,
         row: usize,
-        axis_offset: S,
+        arm: Vec3<S>,
         normal: Vec3<S>,
     ) -> InverseEffectiveMass<S> {
         let inverse_mass = self.inverse_mass[row];
@@ -125,7 +125,6 @@ impl<S: Scalar> SolverBodies<'_, S> {
                 (inverse_mass, self.ball_rotation(row)),
             ]);
         };
-        let arm = capsule.axis * axis_offset - normal * self.radius[row];
         let lever = arm.cross(normal);
         let [axial, transverse] = capsule.inverse_unit_inertia;
         let max_inverse = axial.max(transverse);
@@ -136,28 +135,18 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Velocity of that axis point relative to the center, by the spin, in m/s.
-    #[inline]
-    pub(super) fn anchor_spin_velocity(&self, row: usize, axis_offset: S) -> Vec3<S> {
-        match self.capsule(row) {
-            Some(capsule) => self.unlocked_spin(row).cross(capsule.axis * axis_offset),
-            None => Vec3::zero(),
-        }
-    }
-
-    /// Applies an impulse, given as a velocity change of the center, at the contact point: `normal`
-    /// points from there to the center, or to the point `axis_offset` along the axis.
+    /// Applies an impulse, given as a velocity change of the center, at a contact point: `arm`
+    /// metres from the center, along the negative `normal` for a ball.
     #[inline]
     pub(super) fn apply_impulse(
         &mut self,
         row: usize,
         velocity_change: Vec3<S>,
         normal: Vec3<S>,
-        axis_offset: S,
+        arm: Vec3<S>,
     ) {
         self.velocity[row] += velocity_change;
-        if !self.capsules.is_empty() && self.spin_capsule(row, velocity_change, normal, axis_offset)
-        {
+        if !self.capsules.is_empty() && self.spin_capsule(row, velocity_change, arm) {
             return;
         }
         let factor = self.ball_rotation(row).inverse_inertia_factor::<S>();
@@ -167,15 +156,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
     }
 
     /// Applies the angular part to a capsule. False if the body is a sphere.
-    pub(super) fn spin_capsule(
-        &mut self,
-        row: usize,
-        velocity_change: Vec3<S>,
-        normal: Vec3<S>,
-        axis_offset: S,
-    ) -> bool {
+    fn spin_capsule(&mut self, row: usize, velocity_change: Vec3<S>, arm: Vec3<S>) -> bool {
         let Some(capsule) = self.capsule(row).copied() else { return false };
-        let arm = capsule.axis * axis_offset - normal * self.radius[row];
         if let Some(spin) = self.spin.get_mut(row) {
             *spin += capsule.apply_inverse_inertia(arm.cross(velocity_change));
         }

@@ -1,5 +1,6 @@
 //! Identity of a contact from one substep to the next, and its impulses meanwhile.
 
+use crate::contact::Contact;
 use crate::math::Scalar;
 
 /// Identity of a contact across substeps; sorts walls first, then by rows.
@@ -18,13 +19,17 @@ pub(crate) struct ContactKey {
 }
 
 impl ContactKey {
-    /// Key of a contact at these offsets along the axes of capsules. `part` is that of a wall, none
-    /// for a pair.
-    pub fn new<S: Scalar>(part: Option<u32>, a: u32, b: u32, axis_offset: [S; 2]) -> Self {
+    /// Key of a contact with a wall.
+    pub fn with_wall<S: Scalar>(contact: &Contact<S>) -> Self {
+        Self { is_pair: false, ..Self::between_marbles(contact) }
+    }
+
+    /// Key of a contact between two marbles.
+    pub fn between_marbles<S: Scalar>(contact: &Contact<S>) -> Self {
+        let Contact { a, b, part, along, .. } = *contact;
         let zero = S::zero();
-        let ends =
-            axis_offset.map(|offset| if offset > zero { 2 } else { i8::from(offset < zero) });
-        Self { is_pair: part.is_none(), a, b, part: part.unwrap_or(0), ends }
+        let ends = along.map(|along| if along > zero { 2 } else { i8::from(along < zero) });
+        Self { is_pair: true, a, b, part, ends }
     }
 
     /// Key after rows have moved; none if one of them is gone.

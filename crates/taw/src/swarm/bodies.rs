@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use cgmath::{EuclideanSpace, InnerSpace};
+use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
 use super::batches::Batch;
 use super::kernels::squared;
@@ -348,15 +348,18 @@ impl Swarm {
         let is_near = |separation: f32, approach_speed: f32| {
             separation <= reach || separation < approach_speed * dt
         };
+        let (number, centers) = (|x: f32| S::from_f64(f64::from(x)), [Zero::zero(); 2]);
         for contact in contacts_of_walls {
             let Some(b) = marble(contact.row) else { continue };
             let row = contact.row as usize;
             let separation = contact.separation(&self.at[row]);
             let approach_speed = -(vector::<f32>(&self.velocity[row]) - contact.surface);
             if is_near(separation, approach_speed.dot(contact.normal)) {
-                let mtv = cast_vector(contact.normal * (-separation).max(0.0));
-                let along = [S::zero(); 2];
-                contacts.wm.push(Contact { a: contact.wall, b, part: contact.part, along, mtv });
+                let radii = [S::zero(), number(self.at[row][3])];
+                let place = (cast_vector(contact.normal), S::zero());
+                let listed = Contact::with_wall(contact.wall, contact.part, b);
+                let listed = listed.placed(place, radii, centers);
+                contacts.wm.push(Contact { separation: number(separation), ..listed });
             }
         }
         for batch in batches {
@@ -373,9 +376,10 @@ impl Swarm {
                 let separation = distance - (p[3] + q[3]);
                 let normal = if distance > 0.0 { apart / distance } else { Vec3::unit_x() };
                 if is_near(separation, (u - v).dot(normal)) {
-                    let mtv = cast_vector(normal * (-separation).max(0.0));
-                    let (a, b, mtv) = if a < b { (a, b, mtv) } else { (b, a, -mtv) };
-                    contacts.mm.push(Contact { a, b, part: 0, along: [S::zero(); 2], mtv });
+                    let radii = [number(p[3]), number(q[3])];
+                    let place = (cast_vector(normal), number(distance));
+                    let listed = Contact::between_marbles(a, b).placed(place, radii, centers);
+                    contacts.mm.push(if a < b { listed } else { listed.reversed() });
                 }
             }
         }

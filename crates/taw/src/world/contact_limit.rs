@@ -1,10 +1,8 @@
 //! Limits the number of contacts per marble, however many marbles overlap in one place.
 
-use cgmath::Zero;
-
 use super::marbles::Marbles;
 use crate::contact::Contact;
-use crate::math::{Scalar, Vec3, length};
+use crate::math::Scalar;
 
 /// Maximum number of contacts of a ball with marbles of its own size or larger. Twelve can touch
 /// one without overlap (Schütte and van der Waerden, *Das Problem der dreizehn Kugeln*, 1953), and
@@ -41,11 +39,11 @@ impl<S> Default for ContactLimit<S> {
 }
 
 impl<S: Scalar> Rank<S> {
-    fn of(contact: &Contact<S>, separation: S) -> Self {
+    fn of(contact: &Contact<S>) -> Self {
         // The choice among coincident contacts must vary between marbles (Fibonacci hashing, Knuth,
         // *The Art of Computer Programming*, vol. 3, §6.4).
         let mixed = u64::from(contact.a) << 32 | u64::from(contact.b);
-        Self(separation, mixed.wrapping_mul(0x9E37_79B9_7F4A_7C15), contact.along)
+        Self(contact.separation, mixed.wrapping_mul(0x9E37_79B9_7F4A_7C15), contact.along)
     }
 
     fn order(&self, other: &Self) -> std::cmp::Ordering {
@@ -67,17 +65,6 @@ fn max_contacts<S: Scalar>(marbles: &Marbles<S>, row: usize) -> usize {
         + ((MAX_CONTACTS as f64 * longer) as usize).min(MAX_CONTACTS_OF_CAPSULE - MAX_CONTACTS)
 }
 
-/// Separation at a contact; negative for an overlap.
-fn separation<S: Scalar>(marbles: &Marbles<S>, contact: &Contact<S>) -> S {
-    let (a, b) = (contact.a as usize, contact.b as usize);
-    let sample = |row: usize, along: S| {
-        if along == S::zero() { Vec3::zero() } else { marbles.axis(row) * along }
-    };
-    let [first, second] = contact.along;
-    let apart = length(marbles.apart(a, b) + sample(b, second) - sample(a, first));
-    apart - marbles.radius()[a] - marbles.radius()[b]
-}
-
 impl<S: Scalar> ContactLimit<S> {
     /// Starts a new list for this many marbles.
     pub fn begin(&mut self, rows: usize) {
@@ -91,7 +78,7 @@ impl<S: Scalar> ContactLimit<S> {
     pub fn add(&mut self, list: &mut Vec<Contact<S>>, marbles: &Marbles<S>, new: Contact<S>) {
         if !self.last.is_empty()
             && let Some(last) = self.last[index_of(marbles, &new)]
-            && Rank::of(&new, separation(marbles, &new)) > last
+            && Rank::of(&new) > last
         {
             return;
         }
@@ -144,7 +131,7 @@ impl<S: Scalar> ContactLimit<S> {
         self.order.resize(list.len(), nothing);
         for (number, contact) in (0..).zip(list.iter()) {
             let place = &mut self.start[index_of(marbles, contact)];
-            self.order[*place as usize] = (Rank::of(contact, separation(marbles, contact)), number);
+            self.order[*place as usize] = (Rank::of(contact), number);
             *place += 1;
         }
         let mut begin = 0;

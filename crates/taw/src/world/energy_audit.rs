@@ -4,7 +4,7 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::World;
-use crate::math::{Scalar, Vec3, length};
+use crate::math::{Scalar, Vec3};
 use crate::response::{EnergyLedger, Response};
 
 /// Energy audit of a step, in joules. Dissipated energy counts positive.
@@ -129,7 +129,7 @@ impl<S: Scalar> World<S> {
         let Some(mut audit_state) = self.audit_state.take() else { return };
         let contacts = self.contacts.wm.iter().chain(&self.contacts.mm);
         let max_penetration =
-            contacts.map(|contact| length(contact.mtv).as_f64()).fold(0.0, f64::max);
+            contacts.map(|contact| contact.penetration().as_f64()).fold(0.0, f64::max);
         audit_state.audit.max_penetration = audit_state.audit.max_penetration.max(max_penetration);
         audit_state.potential = self.energy().potential;
         audit_state.moment = self.momentum();

@@ -75,11 +75,8 @@ impl<S: Scalar> World<S> {
     /// takes.
     fn read_contacts(&mut self) {
         let cast = |contact: &Contact<S>| Contact {
-            a: contact.a,
-            b: contact.b,
-            part: 0,
-            along: [0.0; 2],
-            mtv: cast_vector(contact.mtv),
+            separation: contact.separation.as_f64(),
+            ..Contact::between_marbles(contact.a, contact.b)
         };
         let near = &mut self.events.near;
         near.clear();

@@ -79,7 +79,9 @@ pub struct World<S> {
     /// The touches of the last substep, except those of marbles [asleep](Self::is_asleep) with each
     /// other and with walls. Between [`World::generate_contacts`] and
     /// [`World::restitute`] they may be changed: what is taken out is not
-    /// restituted, and a row that does not exist is passed over.
+    /// restituted, a normal or a separation that was changed is the one by which velocities are
+    /// solved (which [`Response::EventDriven`] and [`Response::SoftStep`] do not look at), and a row
+    /// that does not exist is passed over.
     ///
     /// Of a marble among many, those with the 32 that are deepest in it or nearest are listed, of
     /// all that are as large or larger; of a long capsule so many more as it is longer than wide.

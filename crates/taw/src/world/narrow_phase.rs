@@ -5,12 +5,13 @@ use std::collections::HashSet;
 use cgmath::{InnerSpace, Zero};
 use smallvec::SmallVec;
 
+use super::marbles::Marbles;
 use super::walls::{SubShape, Walls};
 use super::{WallShape, World};
-use crate::contact::{Contact, mtv_sphere_plane, mtv_sphere_sphere};
-use crate::math::{Scalar, Vec3, length, normalize_and_length};
+use crate::contact::Contact;
+use crate::math::{Scalar, Vec3, normal_and_distance};
 use crate::response::Response;
-use crate::shape::{Aabb, BoundedShape, Plane, PointProjection, Shape, Sphere};
+use crate::shape::{Aabb, BoundedShape, PointProjection, Shape, Sphere};
 
 /// Tolerance of internal edges, as a fraction of the radius: a point this far outside of another
 /// wall still counts as on it. It would tilt a normal by less than 1e-5 rad, and flush walls are no
@@ -27,11 +28,7 @@ pub(super) struct Candidate<S> {
 impl<S: Scalar> World<S> {
     /// Collides walls with marbles, up to a contact distance of `contact_distance` metres.
     pub(super) fn collide_walls(&mut self, contact_distance: S) {
-        if self.marbles.has_capsules() {
-            self.collide_half_spaces_with_capsules(contact_distance);
-        } else {
-            self.collide_half_spaces(contact_distance);
-        }
+        self.collide_half_spaces(contact_distance);
         self.walls.update_tree();
         if self.walls.are_half_spaces() {
             return;
@@ -57,39 +54,42 @@ impl<S: Scalar> World<S> {
         self.near_walls = candidates;
     }
 
+    /// Collides half-spaces with marbles and capsules, which touch with their ends.
     fn collide_half_spaces(&mut self, contact_distance: S) {
-        for (a, plane) in self.walls.planes() {
+        for (wall, plane) in self.walls.planes() {
             for b in 0..self.marbles.len() {
-                if let Some(mtv) =
-                    penetration_of_half_space(plane, &self.marbles.sphere(b), contact_distance)
-                {
-                    let along = [S::zero(); 2];
-                    self.contacts.wm.push(Contact { a, b: b as u32, part: 0, along, mtv });
+                let half = self.marbles.half_length(b);
+                let ends = [-half, half].into_iter().take(if half > S::zero() { 2 } else { 1 });
+                for along in ends {
+                    let center = self.marbles.position()[b] + self.anchor(b, along);
+                    let place = (plane.normal(), plane.signed_distance(center));
+                    let contact = self.wall_contact(SubShape { wall, index: 0 }, b, along, place);
+                    if contact.separation <= contact_distance {
+                        self.contacts.wm.push(contact);
+                    }
                 }
             }
         }
     }
 
-    /// Collides half-spaces with marbles and capsules, which touch with their ends.
-    fn collide_half_spaces_with_capsules(&mut self, contact_distance: S) {
-        for (a, plane) in self.walls.planes() {
-            for b in 0..self.marbles.len() {
-                let (sphere, half) = (self.marbles.sphere(b), self.marbles.half_length(b));
-                let ends = [-half, half].into_iter().take(if half > S::zero() { 2 } else { 1 });
-                for along in ends {
-                    let center = sphere.center + self.marbles.axis(b) * along;
-                    let mtv = penetration_of_half_space(
-                        plane,
-                        &Sphere { center, ..sphere },
-                        contact_distance,
-                    );
-                    if let Some(mtv) = mtv {
-                        let along = [S::zero(), along];
-                        self.contacts.wm.push(Contact { a, b: b as u32, part: 0, along, mtv });
-                    }
-                }
-            }
-        }
+    /// Point on a capsule's axis at this distance from the center, relative to the center.
+    fn anchor(&self, row: usize, along: S) -> Vec3<S> {
+        if along == S::zero() { Vec3::zero() } else { self.marbles.axis(row) * along }
+    }
+
+    /// Contact of a wall and a marble, or a capsule's sphere at `along` on its axis, by the normal
+    /// of the wall and the distance of the sphere's center.
+    fn wall_contact(
+        &self,
+        SubShape { wall, index }: SubShape,
+        b: usize,
+        along: S,
+        place: (Vec3<S>, S),
+    ) -> Contact<S> {
+        let (radii, anchors) =
+            ([S::zero(), self.marbles.radius()[b]], [Vec3::zero(), self.anchor(b, along)]);
+        Contact { along: [S::zero(), along], ..Contact::with_wall(wall, index, b as u32) }
+            .placed(place, radii, anchors)
     }
 
     /// Collides a marble, or a sample sphere of a capsule at `along` on its axis, with sub-shapes
@@ -107,10 +107,10 @@ impl<S: Scalar> World<S> {
         if candidates.len() > 1 {
             remove_ghost_collisions(&self.walls, sphere, candidates);
         }
-        for Candidate { part: SubShape { wall, index: part }, nearest } in candidates.iter() {
-            let depth = (sphere.radius - nearest.distance).max(S::zero());
-            let (mtv, along) = (nearest.normal * depth, [S::zero(), along]);
-            self.contacts.wm.push(Contact { a: *wall, b: b as u32, part: *part, along, mtv });
+        for Candidate { part, nearest } in candidates.iter() {
+            let place = (nearest.normal, nearest.distance);
+            let contact = self.wall_contact(*part, b, along, place);
+            self.contacts.wm.push(contact);
         }
     }
 
@@ -136,44 +136,6 @@ impl<S: Scalar> World<S> {
         samples
     }
 
-    /// Contact normal from the wall to the marble of a contact of `contacts.wm`, if they touch
-    /// within 5e-6 radii, the gap that rounding may leave under a resting marble. None beyond that,
-    /// and for invalid indices.
-    #[must_use]
-    pub fn wall_contact_normal(&self, contact: &Contact<S>) -> Option<Vec3<S>> {
-        let Contact { a, b, part, along: [_, along], mtv } = *contact;
-        let near = || {
-            let Sphere { center, radius } = self.sample_sphere(b, along)?;
-            let wall = self.walls.shapes().get(a as usize)?;
-            let PointProjection { normal, distance, .. } = wall.project_point_on(part, center);
-            (distance - radius <= radius * S::from_f64(INTERNAL_EDGE_TOLERANCE)).then_some(normal)
-        };
-        normalize_and_length(mtv).map(|(normal, _)| normal).or_else(near)
-    }
-
-    /// Contact normal from the first to the second marble of a contact of `contacts.mm`, if they
-    /// touch within 5e-6 of the smaller radius. None beyond that, and for invalid indices.
-    #[must_use]
-    pub fn marble_contact_normal(&self, contact: &Contact<S>) -> Option<Vec3<S>> {
-        let Contact { a, b, along, mtv, .. } = *contact;
-        let near = || {
-            let (first, second) =
-                (self.sample_sphere(a, along[0])?, self.sample_sphere(b, along[1])?);
-            let apart = self.marbles.period.minimum_image(second.center - first.center);
-            let (normal, distance) = normalize_and_length(apart)?;
-            let flush = first.radius.min(second.radius) * S::from_f64(INTERNAL_EDGE_TOLERANCE);
-            (distance - first.radius - second.radius <= flush).then_some(normal)
-        };
-        normalize_and_length(mtv).map(|(normal, _)| normal).or_else(near)
-    }
-
-    /// Sample sphere of a marble at this distance along its axis from the center, in metres.
-    fn sample_sphere(&self, row: u32, along: S) -> Option<Sphere<S>> {
-        let row = row as usize;
-        let center = *self.marbles.position().get(row)? + self.marbles.axis(row) * along;
-        Some(Sphere { center, radius: self.marbles.radius()[row] })
-    }
-
     /// Collides marbles with each other, up to a contact distance of `contact_distance` metres.
     pub(super) fn collide_marbles(&mut self, contact_distance: S) {
         let center = self.marbles.position();
@@ -181,12 +143,9 @@ impl<S: Scalar> World<S> {
         if !self.marbles.has_capsules() {
             let (spheres, period) = ((center, self.marbles.radius()), self.marbles.period);
             self.images.pairs(&mut self.grid, spheres, contact_distance, period, |a, b| {
-                let (first, second) = (a as usize, b as usize);
-                let (first, mut second) = (self.marbles.sphere(first), self.marbles.sphere(second));
-                second.center = period.image(second.center, first.center);
-                if let Some(mtv) = penetration_of_spheres(&first, &second, contact_distance) {
-                    let along = [S::zero(); 2];
-                    let contact = Contact { a, b, part: 0, along, mtv };
+                let zero = S::zero();
+                let contact = marble_contact(&self.marbles, [a, b], [zero; 2], contact_distance);
+                if let Some(contact) = contact {
                     self.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
                 }
             });
@@ -202,15 +161,9 @@ impl<S: Scalar> World<S> {
                 let row = row as usize;
                 (self.marbles.sphere(row), self.marbles.axis(row), self.marbles.half_length(row))
             };
-            let (first, second) = (line(a), line(b));
-            for along in closest_points_of_segments(first, second) {
-                let sample_sphere = |(sphere, axis, _): (Sphere<S>, Vec3<S>, S), along: S| Sphere {
-                    center: sphere.center + axis * along,
-                    ..sphere
-                };
-                let (x, y) = (sample_sphere(first, along[0]), sample_sphere(second, along[1]));
-                if let Some(mtv) = penetration_of_spheres(&x, &y, contact_distance) {
-                    let contact = Contact { a, b, part: 0, along, mtv };
+            for along in closest_points_of_segments(line(a), line(b)) {
+                let contact = marble_contact(&self.marbles, [a, b], along, contact_distance);
+                if let Some(contact) = contact {
                     self.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
                 }
             }
@@ -228,37 +181,35 @@ impl<S: Scalar> World<S> {
         }
         let mut listed: HashSet<_> = self.contacts.mm.iter().map(|c| (c.a, c.b)).collect();
         for (a, b) in self.continuous.grazes.iter().copied().filter(|pair| listed.insert(*pair)) {
-            let (along, mtv) = ([S::zero(); 2], Vec3::zero());
-            self.contacts.mm.push(Contact { a, b, part: 0, along, mtv });
+            let center = [S::zero(); 2];
+            let contact = marble_contact(&self.marbles, [a, b], center, S::max_value());
+            self.contacts.mm.extend(contact);
         }
     }
 }
 
-/// Penetration vector of a sphere and a half-space in metres: zero within `contact_distance` metres
-/// outside, none beyond.
+/// Contact of two marbles, or of two spheres at `along` on the axes of capsules; none if they are
+/// farther apart than `contact_distance` metres.
 #[inline]
-fn penetration_of_half_space<S: Scalar>(
-    plane: &Plane<S>,
-    sphere: &Sphere<S>,
+fn marble_contact<S: Scalar>(
+    marbles: &Marbles<S>,
+    [a, b]: [u32; 2],
+    along: [S; 2],
     contact_distance: S,
-) -> Option<Vec3<S>> {
-    let gap = || plane.signed_distance(sphere.center) - sphere.radius;
-    let near = || contact_distance > S::zero() && gap() <= contact_distance;
-    mtv_sphere_plane(sphere, plane).or_else(|| near().then(Vec3::zero))
-}
-
-/// Penetration vector of two spheres in metres: zero within `contact_distance` metres, none beyond.
-#[inline]
-fn penetration_of_spheres<S: Scalar>(
-    first: &Sphere<S>,
-    second: &Sphere<S>,
-    contact_distance: S,
-) -> Option<Vec3<S>> {
-    let near = || {
-        let gap = length(second.center - first.center) - first.radius - second.radius;
-        contact_distance > S::zero() && gap <= contact_distance
+) -> Option<Contact<S>> {
+    let (first, second) = (a as usize, b as usize);
+    let anchor = |row: usize, along: S| {
+        if along == S::zero() { Vec3::zero() } else { marbles.axis(row) * along }
     };
-    mtv_sphere_sphere(first, second).or_else(|| near().then(Vec3::zero))
+    let anchors = [anchor(first, along[0]), anchor(second, along[1])];
+    let core_offset = marbles.apart(first, second) + anchors[1] - anchors[0];
+    let radii = [marbles.radius()[first], marbles.radius()[second]];
+    let contact = Contact { along, ..Contact::between_marbles(a, b) }.placed(
+        normal_and_distance(core_offset, [a, b]),
+        radii,
+        anchors,
+    );
+    (contact.separation <= contact_distance).then_some(contact)
 }
 
 /// Closest points of two segments, as positions along their axes; for parallel ones, both ends of

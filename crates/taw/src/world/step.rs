@@ -124,6 +124,7 @@ impl<S: Scalar> World<S> {
         if self.model.response == Response::Impulse {
             self.continuous.begin_bounces(&self.marbles.position);
         }
+        self.contacts.sort();
         self.audit_contacts();
         self.look_at_marbles();
         self.solve(dt);

@@ -261,7 +261,7 @@ fn a_contact_taken_out_is_not_restituted_and_a_made_up_one_is_passed_over() {
     world.generate_contacts();
     assert_eq!(world.contacts.wm.len(), 1);
     world.contacts.wm[0].b = 77;
-    world.contacts.mm.push(Contact { a: 0, b: 1, part: 0, along: [0.0; 2], mtv: Vec3::unit_x() });
+    world.contacts.mm.push(Contact::between_marbles(0, 1));
     world.restitute(DT).unwrap();
     assert_eq!(world.marbles.get(id).unwrap().position.y, 0.0);
 }

@@ -9,8 +9,8 @@ mod tests;
 use cgmath::{InnerSpace, Zero};
 
 use super::impulse::{BodyA, CachedImpulse, Context, UnionFind};
-use super::{Colliders, KeyedByContact, Material, SolverBodies};
-use crate::contact::Contacts;
+use super::{Colliders, ContactKey, KeyedByContact, Material, SolverBodies};
+use crate::contact::{Contact, Contacts};
 use crate::math::{Scalar, Vec3, is_finite, is_finite_point};
 
 /// Scratch buffers, kept for their memory.
@@ -49,6 +49,7 @@ impl<S: Scalar> WarmStartSums<S> {
 struct ApproachConstraint<S> {
     a: BodyA,
     b: usize,
+    key: ContactKey,
     /// Index of its island. Islands do not influence each other, to the bit.
     island: u32,
     axis_offset: [S; 2],
@@ -82,14 +83,13 @@ pub(crate) fn solve_displacement<S: Scalar>(
     quarantined: &mut Vec<u32>,
     mut on_wall_impulse: impl FnMut(u32, Vec3<S>),
 ) {
-    contacts.sort();
     let Scratch { constraints, initial_velocity, islands, warm_starts } = scratch;
     initial_velocity.clear();
     initial_velocity.extend_from_slice(marbles.velocity);
     constraints.clear();
     constraints.extend(
         BodyA::of_each(contacts)
-            .filter_map(|(a, c)| marbles.approach_constraint(a, c.b as usize, c.along, context)),
+            .filter_map(|(a, contact)| marbles.approach_constraint(a, contact, context)),
     );
     islands.build(constraints.iter().map(|t| (t.a.marble(), t.b)), marbles.velocity.len());
     for c in constraints.iter_mut() {
@@ -118,9 +118,9 @@ pub(crate) fn solve_displacement<S: Scalar>(
         marbles.separate(c, context);
     }
     cache.clear();
-    cache.extend(constraints.iter().map(|t| {
-        CachedImpulse::of_normal_impulse(t.a.contact_key(t.b, t.axis_offset), t.velocity_change)
-    }));
+    cache.extend(
+        constraints.iter().map(|c| CachedImpulse::of_normal_impulse(c.key, c.velocity_change)),
+    );
     cache.sort_unstable_by_key(CachedImpulse::key);
 }
 
@@ -130,23 +130,20 @@ impl<S: Scalar> SolverBodies<'_, S> {
     fn approach_constraint(
         &self,
         a: BodyA,
-        b: usize,
-        axis_offset: [S; 2],
+        contact: &Contact<S>,
         context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> Option<ApproachConstraint<S>> {
-        let (normal, separation) =
-            self.normal_and_separation(self.position, a, b, axis_offset, context.walls)?;
-        let surface_speed = match a {
-            BodyA::Wall(wall, _) => {
-                let arm = self.anchor(b, axis_offset[1]) - normal * self.radius[b];
-                context.walls.surface_velocity(wall as usize, self.position[b] + arm).dot(normal)
-            }
-            BodyA::Marble(_) => S::zero(),
-        };
+        let Contact { normal, separation, arms, along: axis_offset, .. } = *contact;
+        if !separation.is_finite() {
+            return None;
+        }
+        let b = contact.b as usize;
+        let surface_speed = self.surface_velocity(a, b, arms, context.walls).dot(normal);
         let zero = S::zero();
         let mut c = ApproachConstraint {
             a,
             b,
+            key: a.contact_key(contact),
             island: 0,
             axis_offset,
             normal,
@@ -213,11 +210,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         warm_starts
             .resize(constraints.len(), WarmStartSums { requested: S::zero(), achieved: S::zero() });
         for c in constraints.iter_mut() {
-            let Ok(at) = cache
-                .binary_search_by_key(&c.a.contact_key(c.b, c.axis_offset), CachedImpulse::key)
-            else {
-                continue;
-            };
+            let Ok(at) = cache.binary_search_by_key(&c.key, CachedImpulse::key) else { continue };
             c.velocity_change = cache[at].normal_impulse();
             let (weighted_change, separation_speed) =
                 (c.velocity_change * c.fraction_b(), self.separation_speed(c));

@@ -29,8 +29,8 @@ fn restituted<S: Scalar>(
     let mut position: Vec<_> = spheres.iter().map(|s| s.0).collect();
     let radius: Vec<_> = spheres.iter().map(|s| s.1).collect();
     let mut velocity: Vec<_> = spheres.iter().map(|s| s.2).collect();
-    let (count, all) = (spheres.len() as u32, Vec3::unit_y()); // only the order depends on it
-    let contact = |a, b| Contact { a, b, part: 0, along: [S::zero(); 2], mtv: all };
+    let count = spheres.len() as u32;
+    let contact = Contact::between_marbles;
     let mut contacts = Contacts { wm: (0..count).map(|b| contact(0, b)).collect(), mm: vec![] };
     crate::broad::brute_force_pairs(count, |a, b| contacts.mm.push(contact(a, b)));
     let mut columns = SolverBodies {
@@ -60,6 +60,8 @@ fn restituted<S: Scalar>(
         settings: &settings,
     };
     let (mut scratch, mut cache, mut quarantined) = (Scratch::default(), vec![], vec![]);
+    columns.place_contacts(&mut contacts, &floor);
+    contacts.sort();
     solve_displacement(
         &mut columns,
         &mut contacts,

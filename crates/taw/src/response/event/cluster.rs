@@ -140,8 +140,11 @@ impl Cluster {
             start: SubstepStart { position: &self.start, velocity: &[], ccd_stops: &[] },
             settings: &settings_,
         };
+        contacts.sort();
+        let mut bodies = self.bodies.columns();
+        bodies.place_contacts(contacts, walls);
         solve_contacts(
-            &mut self.bodies.columns(),
+            &mut bodies,
             contacts,
             &context,
             &mut self.scratch,

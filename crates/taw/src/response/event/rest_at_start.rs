@@ -82,8 +82,7 @@ impl EventDriven {
         let mut near = std::mem::take(&mut self.near.wm);
         let at = self.balls[row].position;
         self.for_each_wall(row, |wall| {
-            let mtv = Vec3::zero();
-            let contact = Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
+            let contact = Contact::with_wall(wall as u32, 0, row as u32);
             let min_speed = if self.is_moving(wall) { f64::NEG_INFINITY } else { 0.0 };
             if self
                 .wall_contact(&contact, 0.0, 0.0, settings)

@@ -163,7 +163,7 @@ impl EventDriven {
                 let before = self.balls[other];
                 self.balls[other].advance(now);
                 let (a, b) = (row.min(other) as u32, row.max(other) as u32);
-                let contact = Contact { a, b, part: 0, along: [0.0; 2], mtv: Vec3::zero() };
+                let contact = Contact::between_marbles(a, b);
                 // The colliding two are in contact, whatever rounding says.
                 let is_seed = seeds.contains(&row) && seeds.contains(&other);
                 let is_full = contact_counts[row].min(contact_counts[other]) >= MAX_CONTACTS;
@@ -204,8 +204,7 @@ impl EventDriven {
         settings.add_cost(1 + self.wall_cost(row));
         let at = self.balls[row].position;
         self.for_each_wall(row, |wall| {
-            let mtv = Vec3::zero();
-            let contact = Contact { a: wall as u32, b: row as u32, part: 0, along: [0.0; 2], mtv };
+            let contact = Contact::with_wall(wall as u32, 0, row as u32);
             if self.wall_contact(&contact, now, max_separation_speed, settings).is_some()
                 && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, now, settings))
             {

@@ -4,6 +4,7 @@ use cgmath::Zero;
 
 use super::Constraint;
 use crate::constraint::ContactImpulse;
+use crate::contact::Contacts;
 use crate::math::{RealVector, Scalar, Vec3};
 use crate::response::{ContactKey, KeyedByContact, SolverBodies};
 
@@ -42,14 +43,20 @@ impl<S: Scalar> KeyedByContact for CachedImpulse<S> {
     }
 }
 
-/// Stores the impulses for the next substep's warm start.
+/// Stores the impulses in the contacts, and for the next substep's warm start.
 pub(super) fn store_impulses<S: Scalar>(
     constraints: &[Constraint<S>],
+    contacts: &mut Contacts<S>,
     cache: &mut Vec<CachedImpulse<S>>,
 ) {
+    for c in constraints {
+        let Some(contact) = contacts.get_mut(c.index) else { continue };
+        let inverse_mass = c.inverse_effective_mass.normal;
+        contact.set_impulse(c.impulse.normal / inverse_mass, c.impulse.tangent / inverse_mass);
+    }
     cache.clear();
     cache.extend(constraints.iter().map(|c| CachedImpulse {
-        key: c.key(),
+        key: c.key,
         impulse: c.impulse,
         angular_impulse: c.angular_impulse(),
     }));
@@ -65,7 +72,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         cache: &[CachedImpulse<S>],
     ) {
         for c in constraints.iter_mut().filter(|c| !c.bounces) {
-            let Ok(at) = cache.binary_search_by_key(&c.key(), |entry| entry.key) else { continue };
+            let Ok(at) = cache.binary_search_by_key(&c.key, |entry| entry.key) else { continue };
             let CachedImpulse { impulse, angular_impulse, .. } = cache[at];
             let tangent = impulse.tangent.reject_from(c.normal);
             c.impulse = ContactImpulse { tangent, ..impulse };

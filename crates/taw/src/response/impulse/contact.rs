@@ -4,9 +4,8 @@
 use cgmath::Zero;
 
 use super::{BodyA, Colliders, Constraint, RollingConstraint};
-use crate::math::{
-    Point3, Scalar, Vec3, any_direction, cast_vector, is_finite, normalize_and_length,
-};
+use crate::contact::{Contact, Contacts};
+use crate::math::{Point3, Scalar, Vec3, cast_vector, is_finite, normal_and_distance};
 use crate::response::{BallRotation, InverseEffectiveMass, Material, SolverBodies};
 
 impl<S: Scalar> SolverBodies<'_, S> {
@@ -24,12 +23,11 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let second = *position.get(b)? + self.anchor(b, axis_offset[1]);
         let (normal, distance) = match a {
             BodyA::Wall(wall, part) => walls.normal_and_distance(wall as usize, part, second),
-            BodyA::Marble(a) => {
-                let a = a as usize;
-                let first = *position.get(a)? + self.anchor(a, axis_offset[0]);
-                let direction = normalize_and_length(self.period.minimum_image(second - first));
-                let (normal, distance) =
-                    direction.unwrap_or_else(|| (any_direction(a as u32, b as u32), S::zero()));
+            BodyA::Marble(first) => {
+                let a = first as usize;
+                let center_offset = second - (*position.get(a)? + self.anchor(a, axis_offset[0]));
+                let center_offset = self.period.minimum_image(center_offset);
+                let (normal, distance) = normal_and_distance(center_offset, [first, b as u32]);
                 (normal, distance - self.radius[a])
             }
         };
@@ -37,12 +35,58 @@ impl<S: Scalar> SolverBodies<'_, S> {
         separation.is_finite().then_some((normal, separation))
     }
 
+    /// Places contacts where the bodies are.
+    pub(in crate::response) fn place_contacts(
+        &self,
+        contacts: &mut Contacts<S>,
+        walls: &impl Colliders<S>,
+    ) {
+        let place = |a: BodyA, contact: &mut Contact<S>| {
+            let (b, along) = (contact.b as usize, contact.along);
+            let place = self.normal_and_separation(self.position, a, b, along, walls);
+            (contact.normal, contact.separation) = place.unwrap_or((Vec3::zero(), S::infinity()));
+            contact.arms = self.arms(a, b, along, contact.normal);
+        };
+        contacts.wm.iter_mut().for_each(|c| place(BodyA::Wall(c.a, c.part), c));
+        contacts.mm.iter_mut().for_each(|c| place(BodyA::Marble(c.a), c));
+    }
+
+    /// Lever arms of a contact with this normal, in metres.
+    pub(in crate::response) fn arms(
+        &self,
+        a: BodyA,
+        b: usize,
+        axis_offset: [S; 2],
+        normal: Vec3<S>,
+    ) -> [Vec3<S>; 2] {
+        let first = a
+            .marble()
+            .map_or_else(Vec3::zero, |a| self.anchor(a, axis_offset[0]) + normal * self.radius[a]);
+        [first, self.anchor(b, axis_offset[1]) - normal * self.radius[b]]
+    }
+
+    /// Velocity of the wall's surface at a contact, in m/s; zero between marbles.
+    pub(in crate::response) fn surface_velocity(
+        &self,
+        a: BodyA,
+        b: usize,
+        arms: [Vec3<S>; 2],
+        walls: &impl Colliders<S>,
+    ) -> Vec3<S> {
+        match a {
+            BodyA::Wall(wall, _) => {
+                walls.surface_velocity(wall as usize, self.position[b] + arms[1])
+            }
+            BodyA::Marble(_) => Vec3::zero(),
+        }
+    }
+
     /// Inverse effective mass of a contact, over both bodies.
     pub(super) fn pair_inverse_effective_mass(
         &self,
         a: BodyA,
         b: usize,
-        axis_offset: [S; 2],
+        arms: [Vec3<S>; 2],
         normal: Vec3<S>,
     ) -> InverseEffectiveMass<S> {
         if self.capsules.is_empty() {
@@ -54,10 +98,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
                 (self.inverse_mass[b], self.ball_rotation(b)),
             ]);
         }
-        let second = self.inverse_effective_mass(b, axis_offset[1], normal);
-        a.marble().map_or(second, |a| {
-            second.plus(self.inverse_effective_mass(a, axis_offset[0], -normal))
-        })
+        let second = self.inverse_effective_mass(b, arms[1], normal);
+        a.marble().map_or(second, |a| second.plus(self.inverse_effective_mass(a, arms[0], -normal)))
     }
 
     /// Relative velocity at a contact: that of the second's contact point minus the first's, in
@@ -66,21 +108,25 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &self,
         a: BodyA,
         b: usize,
-        axis_offset: [S; 2],
+        arms: [Vec3<S>; 2],
         normal: Vec3<S>,
         surface_velocity: Vec3<S>,
     ) -> Vec3<S> {
         let mut velocity = self.velocity[b] - surface_velocity;
-        let mut radius_times_spin = self.radius_times_spin(b);
-        if let Some(a) = a.marble() {
-            velocity -= self.velocity[a];
-            radius_times_spin += self.radius_times_spin(a);
-        }
-        if !self.capsules.is_empty() {
-            velocity += self.anchor_spin_velocity(b, axis_offset[1]);
-            if let Some(a) = a.marble() {
-                velocity -= self.anchor_spin_velocity(a, axis_offset[0]);
+        // The arms of balls lie along the normal: one product does for both. A ball among capsules
+        // moves to the same bits as without them.
+        let mut radius_times_spin = Vec3::zero();
+        let mut add_spin = |row: usize, arm: Vec3<S>, sign: S| {
+            if self.capsule(row).is_some() {
+                velocity += self.unlocked_spin(row).cross(arm) * sign;
+            } else {
+                radius_times_spin += self.radius_times_spin(row);
             }
+        };
+        add_spin(b, arms[1], S::one());
+        if let Some(a) = a.marble() {
+            add_spin(a, arms[0], -S::one());
+            velocity -= self.velocity[a];
         }
         velocity + normal.cross(radius_times_spin)
     }
@@ -89,7 +135,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     pub(super) fn relative_motion(&self, c: &Constraint<S>) -> [Vec3<f64>; 2] {
         let first = c.a.marble().map_or_else(Vec3::zero, |a| self.unlocked_spin(a));
         let relative_velocity =
-            self.relative_velocity(c.a, c.b, c.axis_offset, c.normal, c.surface_velocity);
+            self.relative_velocity(c.a, c.b, c.arms, c.normal, c.surface_velocity);
         [cast_vector(relative_velocity), cast_vector(self.unlocked_spin(c.b) - first)]
     }
 
@@ -162,8 +208,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let second = impulse_speed * fraction(c.b);
         if let Some(a) = c.a.marble() {
             let first = -impulse_speed * fraction(a);
-            self.apply_impulse(a, first, -c.normal, c.axis_offset[0]);
+            self.apply_impulse(a, first, -c.normal, c.arms[0]);
         }
-        self.apply_impulse(c.b, second, c.normal, c.axis_offset[1]);
+        self.apply_impulse(c.b, second, c.normal, c.arms[1]);
     }
 }

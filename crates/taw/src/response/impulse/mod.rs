@@ -79,10 +79,10 @@ impl BodyA {
         wm.chain(contacts.mm.iter().map(|c| (Self::Marble(c.a), c)))
     }
 
-    pub(super) fn contact_key<S: Scalar>(self, b: usize, axis_offset: [S; 2]) -> ContactKey {
+    pub(super) fn contact_key<S: Scalar>(self, contact: &Contact<S>) -> ContactKey {
         match self {
-            Self::Wall(wall, part) => ContactKey::new(Some(part), wall, b as u32, axis_offset),
-            Self::Marble(a) => ContactKey::new(None, a, b as u32, axis_offset),
+            Self::Wall(..) => ContactKey::with_wall(contact),
+            Self::Marble(_) => ContactKey::between_marbles(contact),
         }
     }
 
@@ -189,12 +189,17 @@ impl<S: Scalar> Scratch<S> {
 pub(super) struct Constraint<S> {
     a: BodyA,
     b: usize,
+    key: ContactKey,
+    /// Index of its contact, those with walls first.
+    index: usize,
     /// Offset of the contact along the axis of each capsule, in metres.
     axis_offset: [S; 2],
     /// Index of its island.
     island: u32,
     /// Unit normal from a to b.
     normal: Vec3<S>,
+    /// Lever arms, from the center of each body to the contact point, in metres.
+    arms: [Vec3<S>; 2],
     /// Velocity of the wall's surface, in m/s; zero between marbles.
     surface_velocity: Vec3<S>,
     inverse_effective_mass: InverseEffectiveMass<S>,
@@ -240,10 +245,6 @@ struct RollingConstraint<S> {
 }
 
 impl<S: Scalar> Constraint<S> {
-    fn key(&self) -> ContactKey {
-        self.a.contact_key(self.b, self.axis_offset)
-    }
-
     /// Accumulated impulse times the normal inverse effective mass, in m/s.
     fn impulse(&self) -> Vec3<S> {
         self.impulse.along(self.normal)
@@ -269,7 +270,6 @@ pub(crate) fn solve_contacts<S: Scalar>(
     cache: &mut Vec<CachedImpulse<S>>,
     quarantined: &mut Vec<u32>,
 ) {
-    contacts.sort();
     let settings = context.settings;
     let Scratch { initial_velocity, constraints, islands, energies, full_restitution, separations } =
         scratch;
@@ -282,7 +282,7 @@ pub(crate) fn solve_contacts<S: Scalar>(
     marbles.limit_energy(constraints, islands, energies, full_restitution, settings);
     marbles.update_positions(initial_velocity, constraints, context);
     marbles.solve_positions(constraints, context, separations);
-    store_impulses(constraints, cache);
+    store_impulses(constraints, contacts, cache);
     marbles.quarantine_non_finite(constraints, quarantined);
 }
 

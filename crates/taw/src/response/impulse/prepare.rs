@@ -5,7 +5,7 @@ use cgmath::{InnerSpace, Zero};
 use super::islands::{DIRECTIONS, Island, Islands};
 use super::{BodyA, Colliders, Constraint, Context, WallsAtStart};
 use crate::constraint::{ContactImpulse, FrictionCone};
-use crate::contact::Contacts;
+use crate::contact::{Contact, Contacts};
 use crate::math::{Mat3, Scalar, Vec3, normalize_and_length};
 use crate::response::{Material, SolverBodies};
 
@@ -20,7 +20,8 @@ pub(super) fn prepare<S: Scalar>(
     constraints.clear();
     constraints.extend(
         BodyA::of_each(contacts)
-            .filter_map(|(a, c)| marbles.constraint(a, c.b as usize, c.along, context)),
+            .enumerate()
+            .filter_map(|(index, (a, contact))| marbles.constraint(index, a, contact, context)),
     );
     islands.build(constraints, marbles.velocity.len(), context.settings.restitution_threshold);
     if !constraints.iter().any(|c| c.bounces) {
@@ -46,16 +47,18 @@ impl<S: Scalar> SolverBodies<'_, S> {
     /// Constraint of a contact without restitution, and the decision if it bounces.
     fn constraint(
         &self,
+        index: usize,
         a: BodyA,
-        b: usize,
-        axis_offset: [S; 2],
+        contact: &Contact<S>,
         context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> Option<Constraint<S>> {
-        let (normal, separation) = self.contact_geometry(a, b, axis_offset, context)?;
+        let (b, axis_offset) = (contact.b as usize, contact.along);
+        let (normal, separation) = self.contact_geometry(a, contact, context)?;
+        let arms = self.arms(a, b, axis_offset, normal);
         let material = context.material_of(a, b);
-        let surface_velocity = self.surface_velocity(a, b, axis_offset, normal, context);
-        let inverse_effective_mass = self.pair_inverse_effective_mass(a, b, axis_offset, normal);
-        let relative_velocity = self.relative_velocity(a, b, axis_offset, normal, surface_velocity);
+        let surface_velocity = self.surface_velocity(a, b, arms, context.walls);
+        let inverse_effective_mass = self.pair_inverse_effective_mass(a, b, arms, normal);
+        let relative_velocity = self.relative_velocity(a, b, arms, normal, surface_velocity);
         let approach_speed = -relative_velocity.dot(normal);
         // Positions have moved already, and will follow the velocity changes. This target velocity
         // just keeps the separation from closing.
@@ -74,9 +77,12 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let mut constraint = Constraint {
             a,
             b,
+            key: a.contact_key(contact),
+            index,
             axis_offset,
             island: 0,
             normal,
+            arms,
             surface_velocity,
             inverse_effective_mass,
             restitution: material.restitution,
@@ -104,24 +110,6 @@ impl<S: Scalar> SolverBodies<'_, S> {
         (inverse_effective_mass.normal > S::zero()).then_some(constraint)
     }
 
-    /// Velocity of the wall's surface at a contact, in m/s; zero between marbles.
-    fn surface_velocity(
-        &self,
-        a: BodyA,
-        b: usize,
-        axis_offset: [S; 2],
-        normal: Vec3<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
-    ) -> Vec3<S> {
-        match a {
-            BodyA::Wall(wall, _) => {
-                let arm = self.anchor(b, axis_offset[1]) - normal * self.radius[b];
-                context.walls.surface_velocity(wall as usize, self.position[b] + arm)
-            }
-            BodyA::Marble(_) => Vec3::zero(),
-        }
-    }
-
     /// Marks a fast contact as bouncing if the impact happened within the substep.
     fn detect_bounce(
         &self,
@@ -145,16 +133,18 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Normal and separation of a contact at the end of the substep.
+    /// Normal and separation by which a contact is solved; none for one that is not finite.
     fn contact_geometry(
         &self,
         a: BodyA,
-        b: usize,
-        axis_offset: [S; 2],
+        contact: &Contact<S>,
         context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> Option<(Vec3<S>, S)> {
-        let (normal, separation) =
-            self.normal_and_separation(self.position, a, b, axis_offset, context.walls)?;
+        let Contact { normal, separation, along: axis_offset, .. } = *contact;
+        let b = contact.b as usize;
+        if !separation.is_finite() {
+            return None;
+        }
         // An impulse along the mean normal of the substep does no work, and constant penetration
         // does none either.
         let walls_at_start = &WallsAtStart(context.walls);

@@ -92,7 +92,7 @@ impl<S: Scalar> Constraint<S> {
 impl<S: Scalar> SolverBodies<'_, S> {
     /// Relative velocity of a contact's two points, in m/s.
     pub(super) fn relative_velocity_of(&self, c: &Constraint<S>) -> Vec3<S> {
-        self.relative_velocity(c.a, c.b, c.axis_offset, c.normal, c.surface_velocity)
+        self.relative_velocity(c.a, c.b, c.arms, c.normal, c.surface_velocity)
     }
 
     /// Rounding of the velocities at a contact, in m/s. Smaller changes would only push fast bodies

@@ -3,7 +3,8 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::PenaltySettings;
-use crate::math::{Scalar, Vec3, cast_vector, is_finite, normalize_and_length};
+use crate::contact::Contact;
+use crate::math::{Scalar, Vec3, cast_vector, is_finite};
 use crate::response::impulse::BodyA;
 use crate::response::material::Compliance;
 use crate::response::{
@@ -14,11 +15,12 @@ use crate::response::{
 /// Penalty contact: bodies, geometry and relative motion.
 pub(super) struct PenaltyContact<S> {
     pub key: ContactKey,
+    pub body_a: BodyA,
     /// First body; none for a wall.
     pub a: Option<usize>,
     pub b: usize,
-    /// Offset along the axis of each capsule, in metres.
-    pub axis_offset: [S; 2],
+    /// Lever arms, from the center of each body to the contact point, in metres.
+    pub arms: [Vec3<S>; 2],
     /// Unit normal from a to b.
     pub normal: Vec3<S>,
     pub penetration: S,
@@ -35,67 +37,45 @@ pub(super) struct PenaltyContact<S> {
     pub compliance: Compliance<S>,
 }
 
-pub(super) fn find_contact<S: Scalar>(
+/// State of a contact; none without penetration, or if nothing can move.
+pub(super) fn active_contact<S: Scalar>(
     settings: &PenaltySettings<S, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     marbles: &SolverBodies<S>,
     walls: &impl Colliders<S>,
-    (two_marbles, a, b, part): (bool, u32, u32, u32),
-    axis_offset: [S; 2],
+    body_a: BodyA,
+    contact: &Contact<S>,
 ) -> Option<PenaltyContact<S>> {
-    let key = ContactKey::new((!two_marbles).then_some(part), a, b, axis_offset);
-    let (a, b) = (a as usize, b as usize);
-    let anchor_position =
-        |row: usize, axis_offset: S| marbles.position[row] + marbles.anchor(row, axis_offset);
+    let Contact { normal, separation, arms, .. } = *contact;
+    let (a, b) = (body_a.marble(), contact.b as usize);
     // Displacement since the position of the step's own kick; see this module's docs. Along the
     // present normal, because internal edges are known for that one.
     let moved =
         |row: usize| marbles.velocity[row] * (settings.dt * (settings.position_weight)(row));
-    let mut displacement = moved(b);
-    let mut relative_velocity =
-        marbles.velocity[b] + marbles.anchor_spin_velocity(b, axis_offset[1]);
-    let mut radius_times_spin = marbles.radius_times_spin(b);
-    let center = anchor_position(b, axis_offset[1]);
-    let mut curvature = S::one() / marbles.radius[b];
-    let mut surface_velocity = Vec3::zero();
-    let (material, compliance) = surfaces(settings, walls, two_marbles.then_some(a), a, b);
-    let (normal, distance);
-    if two_marbles {
-        displacement -= moved(a);
-        let center_offset =
-            marbles.period.minimum_image(center - anchor_position(a, axis_offset[0]));
-        let direction = normalize_and_length(center_offset);
-        let (direction, centers) = direction.unwrap_or((Vec3::unit_x(), S::zero()));
-        (normal, distance) = (direction, centers - marbles.radius[a]);
-        relative_velocity -= marbles.velocity[a] + marbles.anchor_spin_velocity(a, axis_offset[0]);
-        radius_times_spin += marbles.radius_times_spin(a);
-        curvature += S::one() / marbles.radius[a];
-    } else {
-        (normal, distance) = walls.normal_and_distance(a, part, center);
-        surface_velocity = walls.surface_velocity(a, center - normal * marbles.radius[b]);
-        relative_velocity -= surface_velocity;
-    }
+    let displacement = moved(b) - a.map_or_else(Vec3::zero, moved);
+    let surface_velocity = marbles.surface_velocity(body_a, b, arms, walls);
+    let (material, compliance) = surfaces(settings, walls, a, contact);
     let none = InverseEffectiveMass { normal: S::zero(), tangent: S::zero() };
-    let first =
-        if two_marbles { marbles.inverse_effective_mass(a, axis_offset[0], -normal) } else { none };
-    let contact = PenaltyContact {
-        key,
-        a: two_marbles.then_some(a),
+    let found = PenaltyContact {
+        key: body_a.contact_key(contact),
+        body_a,
+        a,
         b,
-        axis_offset,
+        arms,
         normal,
-        penetration: marbles.radius[b] - distance + displacement.dot(normal),
-        relative_velocity: relative_velocity + normal.cross(radius_times_spin),
+        penetration: displacement.dot(normal) - separation,
+        relative_velocity: marbles.relative_velocity(body_a, b, arms, normal, surface_velocity),
         surface_velocity,
         inverse_effective_masses: [
-            first,
-            marbles.inverse_effective_mass(b, axis_offset[1], normal),
+            a.map_or(none, |a| marbles.inverse_effective_mass(a, arms[0], -normal)),
+            marbles.inverse_effective_mass(b, arms[1], normal),
         ],
-        has_capsule: marbles.capsule(b).is_some() || two_marbles && marbles.capsule(a).is_some(),
-        curvature,
+        has_capsule: [a, Some(b)].into_iter().flatten().any(|row| marbles.capsule(row).is_some()),
+        curvature: a.map_or_else(S::zero, |a| marbles.radius[a].recip())
+            + marbles.radius[b].recip(),
         material,
         compliance,
     };
-    (marbles.radius[b] > distance && contact.is_active()).then_some(contact)
+    (separation < S::zero() && found.is_active()).then_some(found)
 }
 
 /// Combined material and compliance of the surfaces of a contact.
@@ -103,12 +83,12 @@ fn surfaces<S: Scalar>(
     settings: &PenaltySettings<S, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     walls: &impl Colliders<S>,
     marble_a: Option<usize>,
-    a: usize,
-    b: usize,
+    contact: &Contact<S>,
 ) -> (Material<S>, Compliance<S>) {
-    let own = (settings.material)(b);
+    let own = (settings.material)(contact.b as usize);
     let compliance = own.elasticity.compliance();
-    let other = marble_a.map_or_else(|| walls.material(a), |a| Some((settings.material)(a)));
+    let wall = || walls.material(contact.a as usize);
+    let other = marble_a.map_or_else(wall, |a| Some((settings.material)(a)));
     // A wall without a material of its own is rigid.
     let Some(other) = other else { return (own, compliance) };
     (own.combined_with(other), compliance.plus(other.elasticity.compliance()))
@@ -133,14 +113,8 @@ impl<S: Scalar> PenaltyContact<S> {
 
     /// Relative velocity of the contact points now, in m/s.
     pub fn relative_velocity(&self, marbles: &SolverBodies<S>) -> Vec3<S> {
-        let first = self.a.map_or(BodyA::Wall(0, 0), |a| BodyA::Marble(a as u32));
-        marbles.relative_velocity(
-            first,
-            self.b,
-            self.axis_offset,
-            self.normal,
-            self.surface_velocity,
-        )
+        let Self { body_a, b, arms, normal, surface_velocity, .. } = *self;
+        marbles.relative_velocity(body_a, b, arms, normal, surface_velocity)
     }
 
     pub fn separation_speed(&self, marbles: &SolverBodies<S>) -> S {
@@ -177,12 +151,12 @@ impl<S: Scalar> PenaltyContact<S> {
     }
 
     pub fn apply_impulse(&self, marbles: &mut SolverBodies<S>, impulse: Vec3<S>) {
-        let [first, second] = self.axis_offset;
-        for (row, impulse, normal, axis_offset) in
+        let [first, second] = self.arms;
+        for (row, impulse, normal, arm) in
             [(Some(self.b), impulse, self.normal, second), (self.a, -impulse, -self.normal, first)]
         {
             let Some(row) = row else { continue };
-            marbles.apply_impulse(row, impulse * marbles.inverse_mass[row], normal, axis_offset);
+            marbles.apply_impulse(row, impulse * marbles.inverse_mass[row], normal, arm);
         }
     }
 

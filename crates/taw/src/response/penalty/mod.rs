@@ -19,10 +19,11 @@ use cgmath::{InnerSpace, Zero};
 use crate::constraint::solve_rolling;
 use crate::contact::Contacts;
 use crate::math::{RealVector, Scalar, Vec3, cast_vector, is_finite};
+use crate::response::impulse::BodyA;
 use crate::response::{
     Colliders, ContactKey, EnergyLedger, KeyedByContact, Material, SolverBodies,
 };
-use contact::{PenaltyContact, find_contact};
+use contact::{PenaltyContact, active_contact};
 use law::Springs;
 use mass_split::ContactLoad;
 
@@ -68,6 +69,8 @@ pub(crate) struct PenaltySettings<S, M, F> {
 
 /// Contact with its forces in this substep.
 struct ContactForce<S> {
+    /// Index of its contact, those with walls first.
+    index: usize,
     contact: PenaltyContact<S>,
     springs: Springs<S>,
     /// Half of the velocity fraction that the dashpots take in a substep, normal and tangential.
@@ -98,14 +101,11 @@ pub(crate) fn apply_penalty_forces<S: Scalar>(
     quarantined: &mut Vec<u32>,
     mut work: Option<&mut EnergyLedger>,
 ) {
-    contacts.sort();
     let before = std::mem::take(histories);
     let mut forces = Vec::with_capacity(contacts.len());
-    let wm = contacts.wm.iter().map(|c| ((false, c.a, c.b, c.part), c.along));
-    let mm = contacts.mm.iter().map(|c| ((true, c.a, c.b, 0), c.along));
-    for (key, axis_offset) in wm.chain(mm) {
-        if let Some(contact) = find_contact(settings, marbles, walls, key, axis_offset) {
-            forces.push(ContactForce::new(settings, contact, &before));
+    for (index, (a, contact)) in BodyA::of_each(contacts).enumerate() {
+        if let Some(contact) = active_contact(settings, marbles, walls, a, contact) {
+            forces.push(ContactForce::new(settings, index, contact, &before));
         }
     }
     split_masses(marbles, &mut forces, settings.dt);
@@ -140,6 +140,7 @@ pub(crate) fn apply_penalty_forces<S: Scalar>(
         }
     }
     histories.sort_unstable_by_key(|history| history.key);
+    list_impulses(&forces, contacts);
     for contact in contacts.wm.iter().chain(&contacts.mm) {
         quarantine_if_non_finite(marbles, contact.b, quarantined);
     }
@@ -147,6 +148,14 @@ pub(crate) fn apply_penalty_forces<S: Scalar>(
         .mm
         .iter()
         .for_each(|contact| quarantine_if_non_finite(marbles, contact.a, quarantined));
+}
+
+/// Lists the impulses in their contacts.
+fn list_impulses<S: Scalar>(forces: &[ContactForce<S>], contacts: &mut Contacts<S>) {
+    for ContactForce { index, normal_impulse, impulse, contact, .. } in forces {
+        let Some(listed) = contacts.get_mut(*index) else { continue };
+        listed.set_impulse(*normal_impulse, impulse.reject_from(contact.normal));
+    }
 }
 
 fn quarantine_if_non_finite<S: Scalar>(
@@ -213,13 +222,14 @@ fn split_masses<S: Scalar>(marbles: &SolverBodies<S>, forces: &mut [ContactForce
 impl<S: Scalar> ContactForce<S> {
     fn new(
         settings: &PenaltySettings<S, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        index: usize,
         contact: PenaltyContact<S>,
         before: &[SpringHistory<S>],
     ) -> Self {
         let dt = settings.dt;
         let separation_speed = contact.relative_velocity.dot(contact.normal);
-        let index = before.binary_search_by_key(&contact.key, |history| history.key);
-        let history = index.map(|at| before[at]);
+        let known = before.binary_search_by_key(&contact.key, |history| history.key);
+        let history = known.map(|at| before[at]);
         let mut springs = settings.law.springs(&contact, contact.penetration, dt);
         let mut damped_time = S::one();
         if history.is_err() && separation_speed < S::zero() {
@@ -249,6 +259,7 @@ impl<S: Scalar> ContactForce<S> {
         });
         let (zero, none) = (S::zero(), Vec3::zero());
         Self {
+            index,
             contact,
             springs,
             half_damping,
@@ -376,7 +387,7 @@ impl<S: Scalar> ContactForce<S> {
 
     /// Applies the last impulse of an ending contact.
     fn apply_last_impulse(
-        &self,
+        &mut self,
         settings: &PenaltySettings<S, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
         marbles: &mut SolverBodies<S>,
         separation_speed: S,
@@ -390,6 +401,8 @@ impl<S: Scalar> ContactForce<S> {
         let impulse = self.contact.normal * normal_impulse;
         let before = self.contact.relative_velocity(marbles);
         self.contact.apply_impulse(marbles, impulse);
+        self.normal_impulse += normal_impulse;
+        self.impulse += impulse;
         if let Some(work) = work {
             let mean_velocity =
                 cast_vector::<S, f64>(before + self.contact.relative_velocity(marbles)) * 0.5;

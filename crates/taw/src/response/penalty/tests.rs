@@ -28,13 +28,7 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
             return [time, penetration, force];
         }
         let mut contacts = Contacts::default();
-        contacts.mm.push(crate::contact::Contact {
-            a: 0,
-            b: 1,
-            part: 0,
-            along: [0.0; 2],
-            mtv: Vec3::zero(),
-        });
+        contacts.mm.push(crate::contact::Contact::between_marbles(0, 1));
         let before = velocity[1].x;
         let mut columns = SolverBodies {
             period: Period::default(),
@@ -48,6 +42,7 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
         };
         let law = ContactLaw::HertzMindlin;
         let settings = PenaltySettings { law, dt, material: |_| own, position_weight: |_| 0.0 };
+        columns.place_contacts(&mut contacts, &walls);
         let mut quarantined = vec![];
         apply_penalty_forces(
             &settings,
