@@ -5,7 +5,7 @@ use crate::error::{finite_point, finite_vector, within};
 use crate::math::{Point3, Scalar, Vec3, normalize_and_length};
 use crate::motion::Motion;
 
-/// A force field that acts on every marble besides gravity.
+/// A force field that acts on every marble, and on every ball of the swarm, besides gravity.
 #[derive(Clone, Copy, Debug)]
 pub enum ForceField<S> {
     /// Drag of a medium at rest or in motion, such as wind.

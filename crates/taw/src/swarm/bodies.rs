@@ -119,8 +119,11 @@ impl Swarm {
         self.proxies.clear();
         self.scratch.proxy_rows.clear();
         self.velocity_changes.clear();
-        self.surfaces.clear();
-        self.sleepless.clear(0);
+        let slots: Vec<_> =
+            self.body_balls.iter().filter_map(|(_, ball)| self.slot_of(*ball)).collect();
+        for slot in slots {
+            self.forget_settings(slot); // balls that are no bodies keep theirs
+        }
         self.synced = SyncToken::default();
         (self.pairs_valid, self.cache_valid, self.walls_identity) = (false, false, None);
         self.resize_columns();
@@ -192,23 +195,20 @@ impl Swarm {
         }
     }
 
-    /// Sets the velocity changes of bodies besides gravity in the next step, in m/s. Wakes those
-    /// for which it is another one than in the last step.
-    pub(crate) fn set_velocity_changes(
-        &mut self,
-        velocity_changes: impl Iterator<Item = VelocityChange>,
-    ) {
-        let now: Vec<_> = velocity_changes.collect();
+    /// Sets the velocity changes besides gravity in the next step, in m/s, at most one of a slot.
+    /// Wakes those for which it is another one than in the last step.
+    pub(crate) fn set_velocity_changes(&mut self, mut now: Vec<VelocityChange>) {
+        now.sort_unstable_by_key(|change| change.slot);
         let before = std::mem::take(&mut self.velocity_changes);
-        for i in 0..before.len().max(now.len()) {
-            let (old, new) = (before.get(i), now.get(i));
-            if old != new {
-                for push in [old, new].into_iter().flatten() {
-                    let row = self.ids.rows().get(push.slot as usize).copied();
-                    if let Some(row) = row.filter(|row| *row != NO_ROW) {
-                        self.wake(row as usize);
-                    }
-                }
+        let (mut old, mut new) = (before.iter().peekable(), now.iter().peekable());
+        while let Some(slot) = [old.peek(), new.peek()].into_iter().flatten().map(|c| c.slot).min()
+        {
+            let of_slot = |change: &&VelocityChange| change.slot == slot;
+            if old.next_if(of_slot) != new.next_if(of_slot)
+                && let Some(row) = self.ids.rows().get(slot as usize).copied()
+                && row != NO_ROW
+            {
+                self.wake(row as usize);
             }
         }
         self.velocity_changes = now;

@@ -1,9 +1,9 @@
 //! A particle system of balls: a million of them, and few features.
 //!
 //! A [`World`](crate::world::World) has marbles that differ in everything: shape, mass, material,
-//! integrator, rotation. A [`Swarm`] has balls in `f32` of one material, and for that it is many
-//! times as fast: see [`Tier`] for what it models. It lives in a world, whose walls and
-//! marbles it touches.
+//! integrator, rotation. A [`Swarm`] has balls in `f32` of any radius, mass, material and gravity
+//! scale: see [`Tier`] for what it models. It lives in a world, whose walls and marbles it touches
+//! and whose force fields move it.
 //!
 //! Parts of a step:
 //! - Rows lie in the order of cells, so that neighbours in space are neighbours in memory.
@@ -22,6 +22,7 @@
     reason = "kernels are compiled for the instructions of their caller"
 )]
 
+mod ball_settings;
 mod batches;
 mod bit_set;
 mod bodies;
@@ -126,6 +127,8 @@ pub struct Swarm {
     /// Velocity changes of bodies besides gravity.
     velocity_changes: Vec<bodies::VelocityChange>,
     surfaces: Surfaces,
+    /// Factors on gravity, by slot; one beyond the end.
+    gravity_scales: Vec<f32>,
     /// Agreement of bodies with the marbles.
     pub(crate) synced: SyncToken,
     proxies: Vec<Proxy>,
@@ -253,8 +256,7 @@ impl Swarm {
         self.cache_impulses();
         for ball in balls {
             if let Some(slot) = self.slot_of(*ball) {
-                self.surfaces.set(slot, None);
-                self.sleepless.remove(slot);
+                self.forget_settings(slot);
             }
         }
         let kept = self.ids.remove(balls);

@@ -37,6 +37,7 @@ impl Swarm {
             bodies_are_rows: _,
             velocity_changes,
             surfaces,
+            gravity_scales,
             synced: _,
             proxies,
             body_slots,
@@ -55,7 +56,7 @@ impl Swarm {
             + (of(chunks) + chunks.iter().map(Chunk::bytes).sum::<usize>())
             + (of(planes) + of(body_balls) + of(proxies))
             + (body_slots.bytes() + sleepless.bytes())
-            + (of(velocity_changes) + surfaces.bytes())
+            + (of(velocity_changes) + surfaces.bytes() + of(gravity_scales))
             + (ids.bytes() + grid.bytes() + impulse_cache.bytes() + fast_movers.bytes())
             + scratch.bytes()
     }
@@ -117,6 +118,7 @@ impl PartialEq for Swarm {
             bodies_are_rows,
             velocity_changes,
             surfaces,
+            gravity_scales,
             synced: _,
             proxies,
             body_slots,
@@ -146,6 +148,7 @@ impl PartialEq for Swarm {
             && (body_balls, proxies) == (&other.body_balls, &other.proxies)
             && (bodies_are_rows, velocity_changes, surfaces)
                 == (&other.bodies_are_rows, &other.velocity_changes, &other.surfaces)
+            && *gravity_scales == other.gravity_scales
             && (body_slots, sleepless) == (&other.body_slots, &other.sleepless)
             && *stopped == other.stopped
             && (rebuilds, steps_since_build) == (&other.rebuilds, &other.steps_since_build)

@@ -84,13 +84,6 @@ impl Surfaces {
         }
     }
 
-    /// Drops what no slot has any more.
-    pub fn clear(&mut self) {
-        self.list.clear();
-        self.counts.clear();
-        self.of_slot.clear();
-    }
-
     pub fn bytes(&self) -> usize {
         self.list.capacity() * size_of::<Surface>()
             + (self.counts.capacity() + self.of_slot.capacity()) * size_of::<u32>()

@@ -75,7 +75,7 @@ impl<S: Scalar> World<S> {
     /// takes.
     fn read_contacts(&mut self) {
         let cast = |contact: &Contact<S>| Contact {
-            separation: contact.separation.as_f64(),
+            separation: -contact.penetration().as_f64(),
             ..Contact::between_marbles(contact.a, contact.b)
         };
         let near = &mut self.events.near;

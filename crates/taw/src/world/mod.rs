@@ -301,7 +301,7 @@ impl<S: Scalar> World<S> {
         self.marbles.period.image(point, near)
     }
 
-    /// The force fields that act on every marble besides gravity.
+    /// The force fields that act on every marble, and on every ball of the swarm, besides gravity.
     #[must_use]
     pub fn forces(&self) -> &[ForceField<S>] {
         &self.forces

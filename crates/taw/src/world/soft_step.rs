@@ -77,16 +77,17 @@ impl<S: Scalar> World<S> {
         if !self.forces.is_empty() || self.marbles.accelerate_differently() {
             self.marbles.mean_accelerations(drive, &mut self.accelerations);
         }
-        let (gravity, dt) = (cast_vector::<S, f64>(self.gravity), dt.as_f64());
+        let (gravity, step) = (cast_vector::<S, f64>(self.gravity), dt.as_f64());
         let slots = &self.soft_step.slot_of_marble;
-        let velocity_changes =
-            self.accelerations.iter().zip(slots).filter_map(|(acceleration, slot)| {
-                let change: [f64; 3] = ((acceleration - gravity) * dt).into();
-                let change = change.map(|x| (x as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE));
-                (change != [0.0; 3] && *slot != NO_ROW)
-                    .then_some(VelocityChange { slot: *slot, change })
-            });
-        self.swarm.set_velocity_changes(velocity_changes);
+        let of_marbles = self.accelerations.iter().zip(slots).filter_map(|(acceleration, slot)| {
+            let change: [f64; 3] = ((acceleration - gravity) * step).into();
+            let change = change.map(|x| (x as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE));
+            (change != [0.0; 3] && *slot != NO_ROW)
+                .then_some(VelocityChange { slot: *slot, change })
+        });
+        let mut changes: Vec<_> = of_marbles.collect();
+        changes.append(&mut self.field_changes_of_swarm(dt));
+        self.swarm.set_velocity_changes(changes);
         Ok(())
     }
 

@@ -8,9 +8,10 @@ use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisio
 use super::walls::{SubShape, Walls};
 use crate::Error;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+use crate::motion::{Motion, acceleration_in_step};
 use crate::response::{Material, Response};
 use crate::shape::{Aabb, Aabb3, BoundedShape, PointProjection, Sphere};
-use crate::swarm::{BallId, Proxy, Stage, StaticGeometry};
+use crate::swarm::{BallId, Proxy, Stage, StaticGeometry, VelocityChange};
 
 impl<S: Scalar> World<S> {
     /// Moves the [swarm](Self::swarm) on, which a step does after the marbles. `observe` is told
@@ -23,7 +24,8 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
     /// [`Error::Full`] at 2³² balls.
     pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
-        let dt = Self::validated_dt(dt)?.as_f64() as f32;
+        let step = Self::validated_dt(dt)?;
+        let dt = step.as_f64() as f32;
         if self.model.response == Response::SoftStep {
             return Ok(()); // it moved with the marbles
         }
@@ -34,10 +36,27 @@ impl<S: Scalar> World<S> {
         }
         self.sync_proxies(dt)?;
         self.walls.update_tree();
-        let gravity = cast_vector(self.gravity);
+        let (gravity, changes) = (cast_vector(self.gravity), self.field_changes_of_swarm(step));
+        self.swarm.set_velocity_changes(changes);
         self.swarm.step(dt, gravity, &self.walls, self.walls.identity(), observe);
         self.write_back_proxies();
         Ok(())
+    }
+
+    /// Changes of velocity by force fields and gravity scales of the swarm's own balls in a step of
+    /// `dt` seconds.
+    pub(super) fn field_changes_of_swarm(&self, dt: S) -> Vec<VelocityChange> {
+        let acceleration = |motion: Motion<f32>, mass: f32| {
+            let motion = Motion {
+                position: cast_point(motion.position),
+                velocity: cast_vector(motion.velocity),
+            };
+            let mass = S::from_f64(f64::from(mass));
+            cast_vector(acceleration_in_step(&self.forces, motion, mass, dt))
+        };
+        let acceleration = (!self.forces.is_empty()).then_some(acceleration);
+        let (gravity, dt) = (cast_vector(self.gravity), dt.as_f64() as f32);
+        self.swarm.field_changes(acceleration, gravity, dt)
     }
 
     /// Forgets proxies of which the world lost the marble or the swarm the ball, whoever took

@@ -33,6 +33,8 @@ pub(super) struct Cluster {
     /// Number of contacts of each ball.
     pub contact_counts: Vec<u32>,
     pub bodies: ClusterBodies,
+    /// Contacts where the balls are in the solve at hand.
+    placed: Contacts<f64>,
     /// Positions at the start of the substep.
     pub start: Vec<Point3<f64>>,
     pub material: Vec<Material<f64>>,
@@ -140,12 +142,14 @@ impl Cluster {
             start: SubstepStart { position: &self.start, velocity: &[], ccd_stops: &[] },
             settings: &settings_,
         };
+        // In the order of the penetrations that the world found, at any time of the substep.
         contacts.sort();
+        self.placed.clone_from(contacts);
         let mut bodies = self.bodies.columns();
-        bodies.place_contacts(contacts, walls);
+        bodies.place_contacts(&mut self.placed, walls);
         solve_contacts(
             &mut bodies,
-            contacts,
+            &mut self.placed,
             &context,
             &mut self.scratch,
             impulse_cache,

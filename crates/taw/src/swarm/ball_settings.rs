@@ -1,0 +1,131 @@
+//! Settings of single balls: material and gravity scale; and what force fields do to them.
+
+use cgmath::Zero;
+
+use super::bodies::VelocityChange;
+use super::surfaces::Surface;
+use super::workers::{DisjointSlice, parallel_for_rows};
+use super::{BallId, MAX_COORDINATE, Swarm};
+use crate::Error;
+use crate::error::finite;
+use crate::math::{Point3, Vec3};
+use crate::motion::Motion;
+use crate::response::Material;
+
+impl Swarm {
+    /// Material of a ball.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`], also for a marble's.
+    pub fn material(&self, ball: BallId) -> Result<Material<f32>, Error> {
+        let slot = self.own_slot(ball)?;
+        Ok(self.surfaces.get(slot).map_or(self.model.material, |surface| surface.material))
+    }
+
+    /// Gives a ball a material of its own, or with none that of the [model](Self::model), and wakes
+    /// it. Balls may share materials: each different one is stored once. In the lab's tier it has
+    /// no effect.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`], also for a marble's; [`Error::OutOfRange`] for a number of it.
+    pub fn set_material(
+        &mut self,
+        ball: BallId,
+        material: Option<Material<f32>>,
+    ) -> Result<(), Error> {
+        let slot = self.own_slot(ball)?;
+        let material = material.map(Material::validated).transpose()?;
+        let surface = material.map(|material| Surface { material, rotation_locked: false });
+        if self.surfaces.set(slot, surface) {
+            self.wake(self.row(ball)?);
+            self.cache_impulses();
+            (self.pairs_valid, self.walls_identity) = (false, None);
+        }
+        Ok(())
+    }
+
+    /// Factor on gravity for a ball.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`], also for a marble's.
+    pub fn gravity_scale(&self, ball: BallId) -> Result<f32, Error> {
+        let slot = self.own_slot(ball)?;
+        Ok(self.gravity_scales.get(slot as usize).copied().unwrap_or(1.0))
+    }
+
+    /// Changes the factor on gravity for a ball: zero for one that floats, negative for one that
+    /// rises. Wakes it in the next step.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`], also for a marble's; [`Error::NotFinite`].
+    pub fn set_gravity_scale(&mut self, ball: BallId, gravity_scale: f32) -> Result<(), Error> {
+        let slot = self.own_slot(ball)? as usize;
+        let gravity_scale = finite("gravity_scale", gravity_scale)?;
+        if gravity_scale != 1.0 && self.gravity_scales.len() <= slot {
+            self.gravity_scales.resize(slot + 1, 1.0);
+        }
+        if let Some(scale) = self.gravity_scales.get_mut(slot) {
+            *scale = gravity_scale;
+        }
+        Ok(())
+    }
+
+    /// Drops the settings of a slot, as its ball goes.
+    pub(super) fn forget_settings(&mut self, slot: u32) {
+        self.surfaces.set(slot, None);
+        self.sleepless.remove(slot);
+        if let Some(scale) = self.gravity_scales.get_mut(slot as usize) {
+            *scale = 1.0;
+        }
+    }
+
+    /// Slot of a ball that is no marble.
+    fn own_slot(&self, ball: BallId) -> Result<u32, Error> {
+        let slot = self.slot_of(ball).ok_or(Error::NoSuchBall(ball))?;
+        if self.body_slots.contains(slot) { Err(Error::NoSuchBall(ball)) } else { Ok(slot) }
+    }
+
+    /// Changes of velocity by force fields, of which the acceleration is given for a motion and a
+    /// mass, and by gravity scales, in a step of `dt` seconds, for all balls that are no marbles.
+    /// None where there are neither.
+    pub(crate) fn field_changes(
+        &self,
+        acceleration: Option<impl Fn(Motion<f32>, f32) -> Vec3<f32> + Sync>,
+        gravity: Vec3<f32>,
+        dt: f32,
+    ) -> Vec<VelocityChange> {
+        if acceleration.is_none() && self.gravity_scales.is_empty() {
+            return Vec::new();
+        }
+        let rows = self.ids.rows();
+        let none = VelocityChange { slot: 0, change: [0.0; 3] };
+        let mut changes = vec![none; rows.len()];
+        let parts = DisjointSlice::new(&mut changes);
+        parallel_for_rows(self.model.threads as usize, rows.len(), |slots| {
+            // SAFETY: each job has its own slots.
+            let part = unsafe { parts.part(slots.clone()) };
+            for (slot, change) in slots.zip(part) {
+                let (row, slot) = (rows[slot] as usize, slot as u32);
+                let (Some(&[x, y, z, _]), Some(&[u, v, w, inverse_mass])) =
+                    (self.at.get(row), self.velocity.get(row))
+                else {
+                    continue; // nobody has the slot
+                };
+                let motion =
+                    Motion { position: Point3::new(x, y, z), velocity: Vec3::new(u, v, w) };
+                let scale = self.gravity_scales.get(slot as usize).copied().unwrap_or(1.0);
+                let fields = acceleration.as_ref().map_or_else(Vec3::zero, |acceleration| {
+                    acceleration(motion, inverse_mass.abs().recip())
+                });
+                let numbers: [f32; 3] = ((gravity * (scale - 1.0) + fields) * dt).into();
+                let is_number = numbers.iter().all(|x| !x.is_nan());
+                if is_number && !self.body_slots.contains(slot) {
+                    let numbers = numbers.map(|x| x.clamp(-MAX_COORDINATE, MAX_COORDINATE));
+                    *change = VelocityChange { slot, change: numbers };
+                }
+            }
+        });
+        changes.retain(|change| change.change != [0.0; 3]);
+        changes
+    }
+}
