@@ -309,6 +309,22 @@ fn swarms<S: Scalar>() -> Vec<Row<S>> {
             let x = single(x);
             p.world.swarm.set_velocity(ball, Vec3::new(x, x, x)).inspect_err(|_| p.world = before)
         };
+        World 3 "Swarm::set_material": |p, x| {
+            let before = p.world.clone();
+            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
+            let (x, plain) = (single(x), Material::default());
+            let material = match p.case {
+                0 => Material { friction: x, ..plain },
+                1 => Material { restitution: x, ..plain },
+                _ => Material { rolling_resistance: x, ..plain },
+            };
+            p.world.swarm.set_material(ball, Some(material)).inspect_err(|_| p.world = before)
+        };
+        World 1 "Swarm::set_gravity_scale": |p, x| {
+            let before = p.world.clone();
+            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
+            p.world.swarm.set_gravity_scale(ball, single(x)).inspect_err(|_| p.world = before)
+        };
         World 1 "Swarm::set_model": |p, x| {
             let mut model = p.world.swarm.model();
             model.material.friction = single(x);
