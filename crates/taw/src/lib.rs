@@ -71,6 +71,7 @@ pub use error::Error;
 
 /// What nearly every program needs.
 pub mod prelude {
+    pub use crate::broad::CollisionLayers;
     pub use crate::contact::{Contact, Contacts};
     pub use crate::math::{Point3, Scalar, Vec3};
     pub use crate::motion::{ForceField, Integrator, Rotation};

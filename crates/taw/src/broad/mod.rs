@@ -3,8 +3,10 @@
 
 mod brute_force;
 mod grid;
+mod layers;
 mod period;
 
 pub use brute_force::brute_force_pairs;
 pub use grid::Grid;
+pub use layers::CollisionLayers;
 pub(crate) use period::{Images, Period};

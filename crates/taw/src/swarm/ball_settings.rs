@@ -1,4 +1,4 @@
-//! Settings of single balls: material and gravity scale; and what force fields do to them.
+//! Settings of single balls: material, layers and gravity scale; and what force fields do to them.
 
 use cgmath::Zero;
 
@@ -7,6 +7,7 @@ use super::surfaces::Surface;
 use super::workers::{DisjointSlice, parallel_for_rows};
 use super::{BallId, MAX_COORDINATE, Swarm};
 use crate::Error;
+use crate::broad::CollisionLayers;
 use crate::error::finite;
 use crate::math::{Point3, Vec3};
 use crate::motion::Motion;
@@ -38,10 +39,42 @@ impl Swarm {
         let surface = material.map(|material| Surface { material, rotation_locked: false });
         if self.surfaces.set(slot, surface) {
             self.wake(self.row(ball)?);
-            self.cache_impulses();
-            (self.pairs_valid, self.walls_identity) = (false, None);
+            self.forget_contacts();
         }
         Ok(())
+    }
+
+    /// Layers of a ball.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`], also for a marble's.
+    pub fn layers(&self, ball: BallId) -> Result<CollisionLayers, Error> {
+        self.own_slot(ball).map(|slot| self.surfaces.layers(slot))
+    }
+
+    /// Changes the layers of a ball: which walls, marbles and other balls it collides with. All
+    /// balls wake.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`], also for a marble's.
+    pub fn set_layers(&mut self, ball: BallId, layers: CollisionLayers) -> Result<(), Error> {
+        let slot = self.own_slot(ball)?;
+        self.set_layers_of_slot(slot, layers);
+        Ok(())
+    }
+
+    /// Changes the layers of a slot.
+    pub(crate) fn set_layers_of_slot(&mut self, slot: u32, layers: CollisionLayers) {
+        if self.surfaces.set_layers(slot, layers) {
+            self.wake_all(); // one that bore others may be gone for them
+            self.forget_contacts();
+        }
+    }
+
+    /// Has pairs and balls at walls found anew, with the impulses that they have.
+    pub(super) fn forget_contacts(&mut self) {
+        self.cache_impulses();
+        (self.pairs_valid, self.walls_identity) = (false, None);
     }
 
     /// Factor on gravity for a ball.
@@ -73,6 +106,7 @@ impl Swarm {
     /// Drops the settings of a slot, as its ball goes.
     pub(super) fn forget_settings(&mut self, slot: u32) {
         self.surfaces.set(slot, None);
+        self.surfaces.set_layers(slot, CollisionLayers::ALL);
         self.sleepless.remove(slot);
         if let Some(scale) = self.gravity_scales.get_mut(slot as usize) {
             *scale = 1.0;

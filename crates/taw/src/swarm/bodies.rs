@@ -12,6 +12,7 @@ use super::surfaces::{Surface, SurfaceOf};
 use super::wall_contact::WallContact;
 use super::workers::{DisjointSlice, parallel_for};
 use super::{BallId, Swarm, Tier};
+use crate::broad::CollisionLayers;
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite};
 use crate::motion::integrate_rotation;
@@ -28,6 +29,7 @@ pub(crate) struct Body {
     pub spin: Row,
     /// None for that of the swarm's model.
     pub surface: Option<Surface>,
+    pub layers: CollisionLayers,
     pub sleeping_disabled: bool,
 }
 
@@ -144,14 +146,14 @@ impl Swarm {
     }
 
     /// Returns true if a marble is still as [`Self::read_bodies`] left it, and the body has this
-    /// radius, in metres, inverse mass, in 1/kg, surface, and permission to sleep.
+    /// radius, in metres, inverse mass, in 1/kg, surface, layers, and permission to sleep.
     #[inline]
     pub(crate) fn is_as_read<S: Scalar>(
         &self,
         slot: u32,
         marble: MarbleRow<S>,
         [row_radius, inverse_mass]: [f32; 2],
-        surface: Option<Surface>,
+        (surface, layers): (Option<Surface>, CollisionLayers),
         sleeping_disabled: bool,
     ) -> bool {
         let row = self.ids.rows()[slot as usize] as usize;
@@ -164,6 +166,7 @@ impl Swarm {
             && velocity[3].abs() == inverse_mass
             && turns()
             && self.surfaces.get(slot) == surface
+            && self.surfaces.layers(slot) == layers
             && self.sleepless.contains(slot) == sleeping_disabled
     }
 
@@ -173,6 +176,7 @@ impl Swarm {
         for body in bodies {
             let row = self.ids.rows()[body.slot as usize] as usize;
             resurfaced |= self.surfaces.set(body.slot, body.surface);
+            self.set_layers_of_slot(body.slot, body.layers);
             if body.sleeping_disabled {
                 self.sleepless.insert(body.slot);
             } else {
@@ -190,8 +194,7 @@ impl Swarm {
             self.measure_radii();
         }
         if resurfaced {
-            self.cache_impulses();
-            (self.pairs_valid, self.walls_identity) = (false, None);
+            self.forget_contacts();
         }
     }
 

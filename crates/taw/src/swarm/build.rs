@@ -173,11 +173,11 @@ impl Swarm {
         // Bodies that are rows meet like all others.
         let apart = has_friction && !self.proxies.is_empty();
         let proxy = |row: u32| apart && proxies.contains(slots[row as usize]);
-        let balls = SortedBalls { grid: &self.grid, at: &self.at, skin_left: &self.skin_left };
+        let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
+        let (grid, at, skin_left) = (&self.grid, &self.at[..], &self.skin_left[..]);
+        let balls = SortedBalls { grid, at, skin_left, surfaces };
         self.fast_movers.find(&balls, self.max_radius + skin, search, &proxy, has_friction);
         if has_friction {
-            let surfaces =
-                SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
             let FastMovers { batches, impulses, .. } = &mut self.fast_movers;
             impulses.set_numbers(batches, surfaces);
         }
@@ -314,6 +314,7 @@ impl PairSearch<'_> {
             at,
             skin_left,
             skin: self.skin,
+            surfaces,
             layers: chunk.layers,
             rows: chunk.rows,
             search,

@@ -10,6 +10,7 @@ use super::grid::Grid;
 use super::kernels::{ContactImpulses, squared};
 use super::neighbours::Search;
 use super::simd::Row;
+use super::surfaces::SurfaceOf;
 
 /// Fast movers at most: one of so many balls, and besides so many.
 const BALLS_PER_MOVER: usize = 500;
@@ -50,15 +51,16 @@ pub(super) struct SortedBalls<'a> {
     pub at: &'a [Row],
     /// Remaining skin, in metres.
     pub skin_left: &'a [f32],
+    pub surfaces: SurfaceOf<'a>,
 }
 
 impl SortedBalls<'_> {
-    /// Returns true if two balls might touch before one of them leaves its skin.
+    /// Returns true if two balls that collide might touch before one of them leaves its skin.
     fn near(&self, a: u32, b: u32) -> bool {
         let (at, skin_left, a, b) = (self.at, self.skin_left, a as usize, b as usize);
         let apart = [at[b][0] - at[a][0], at[b][1] - at[a][1], at[b][2] - at[a][2], 0.0];
         let reach = at[a][3] + skin_left[a].max(0.0) + at[b][3] + skin_left[b].max(0.0);
-        squared(apart) < reach * reach
+        squared(apart) < reach * reach && self.surfaces.may_collide(a as u32, b as u32)
     }
 }
 
@@ -153,7 +155,7 @@ impl FastMovers {
         builder: &mut BatchBuilder,
     ) {
         let is_marble = proxy(mover);
-        let SortedBalls { grid, at, skin_left } = *balls;
+        let SortedBalls { grid, at, skin_left, .. } = *balls;
         let [x, y, z, radius] = at[mover as usize];
         let far = radius + skin_left[mover as usize] + more;
         for level in &grid.levels {

@@ -7,6 +7,7 @@ use std::ops::Range;
 use super::batches::{Batch, BatchBuilder, MAX_COLOURS, builder};
 use super::grid::{Grid, Level};
 use super::simd::{Kernel, LANES, Row, Simd};
+use super::surfaces::SurfaceOf;
 
 /// More than any ball is away from another, and its square is finite.
 const NOWHERE: f32 = 1e18;
@@ -160,6 +161,7 @@ pub(super) struct FindPairs<'a> {
     pub skin_left: &'a [f32],
     /// Balls with more than this are fast movers.
     pub skin: f32,
+    pub surfaces: SurfaceOf<'a>,
     /// The layers of level 0 in it.
     pub layers: [u32; 2],
     /// The first row, of it, of the next one and after that.
@@ -176,15 +178,15 @@ pub(super) struct FindPairs<'a> {
 impl Kernel for FindPairs<'_> {
     #[inline(always)]
     fn run<L: Simd>(self) {
-        let Self { grid, at, skin_left, skin, layers, rows, search, unlisted, batches, lists } =
-            self;
+        let Self { grid, at, skin_left, skin, surfaces, layers, rows, .. } = self;
+        let Self { search, unlisted, batches, lists, .. } = self;
         let [first, next, end] = rows;
         let window = first as usize..end as usize;
         let Search { columns, colour_mask, open } = search;
         columns.window.fill_with(&at[window.clone()], &skin_left[window.clone()], skin);
         batches.clear();
         let mut builder = builder(colour_mask, open, window.len(), batches);
-        let mut candidates = CandidateBlocks::new(columns, first..end);
+        let mut candidates = CandidateBlocks::new(columns, first..end, surfaces);
         if let Some(list) = lists {
             let mut lists =
                 NeighbourListBuilder { next: first, end: next, list, filled: 0, builder };
@@ -334,14 +336,15 @@ struct CandidateBlocks<'a> {
     blocks: &'a mut Vec<[u32; 2]>,
     /// Those that are near.
     found: &'a mut Vec<u32>,
+    surfaces: SurfaceOf<'a>,
 }
 
 impl<'a> CandidateBlocks<'a> {
-    fn new(search: &'a mut CandidateWindow, window: Range<u32>) -> Self {
+    fn new(search: &'a mut CandidateWindow, window: Range<u32>, surfaces: SurfaceOf<'a>) -> Self {
         let size = window.len();
         let CandidateWindow { window: columns, blocks, found } = search;
         let columns = columns.each_ref().map(|column| &column[..size + LANES]);
-        Self { first: window.start, columns, blocks, found }
+        Self { first: window.start, columns, blocks, found, surfaces }
     }
 
     /// Adds a run of rows of the window.
@@ -355,7 +358,7 @@ impl<'a> CandidateBlocks<'a> {
         }
     }
 
-    /// The rows near a ball of the window. Of the first eights, as many rows are left out as come
+    /// The rows near a ball of the window that it collides with. Of the first eights, as many rows are left out as come
     /// before `after`.
     #[inline(always)]
     fn near<L: Simd>(&mut self, ball: u32, after: u32) -> &[u32] {
@@ -382,10 +385,26 @@ impl<'a> CandidateBlocks<'a> {
                 count += hits.count_ones() as usize;
             }
         }
+        if self.surfaces.has_layers() {
+            count = self.retain_colliding(ball, count);
+        }
         let found = &self.found[..count];
         // They come in order, those of the ball's own line first.
         let before = found.iter().take_while(|row| **row < after).count();
         &found[before..]
+    }
+
+    /// Keeps those of the first `count` rows that were found whose layers collide with a ball's.
+    /// Returns their number.
+    #[cold]
+    fn retain_colliding(&mut self, ball: u32, count: usize) -> usize {
+        let mut kept = 0;
+        for i in 0..count {
+            let other = self.found[i];
+            self.found[kept] = other;
+            kept += usize::from(self.surfaces.may_collide(ball, other));
+        }
+        kept
     }
 }
 

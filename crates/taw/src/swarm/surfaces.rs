@@ -1,7 +1,8 @@
-//! Surfaces of balls that differ, and the numbers that two of them make of a contact.
+//! Surfaces and collision layers of balls that differ, and the numbers that two of them make of a contact.
 
 use super::batches::Batch;
 use super::simd::LANES;
+use crate::broad::CollisionLayers;
 use crate::response::Material;
 
 /// Mass times radius squared over the moment of inertia of a solid ball.
@@ -21,7 +22,8 @@ impl Surface {
     }
 }
 
-/// Surfaces of all balls. Most have that of the swarm's model, which takes no memory.
+/// Surfaces and layers of all balls. Most have the surface of the swarm's model and all layers, which
+/// takes no memory.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Surfaces {
     /// Different ones, in the order in which they came.
@@ -30,9 +32,29 @@ pub(super) struct Surfaces {
     counts: Vec<u32>,
     /// One more than the place in the list, by slot; zero for the model's surface.
     of_slot: Vec<u32>,
+    /// Layers, by slot; all beyond the end.
+    layers: Vec<CollisionLayers>,
 }
 
 impl Surfaces {
+    /// Changes the layers of a slot. Returns whether it had others.
+    pub fn set_layers(&mut self, slot: u32, layers: CollisionLayers) -> bool {
+        let slot = slot as usize;
+        if self.layers.len() <= slot {
+            if layers == CollisionLayers::ALL {
+                return false;
+            }
+            self.layers.resize(slot + 1, CollisionLayers::ALL);
+        }
+        std::mem::replace(&mut self.layers[slot], layers) != layers
+    }
+
+    /// Layers of a slot.
+    #[inline]
+    pub fn layers(&self, slot: u32) -> CollisionLayers {
+        self.layers.get(slot as usize).copied().unwrap_or_default()
+    }
+
     /// Gives a slot a surface of its own, or that of the model. Returns whether it had another.
     pub fn set(&mut self, slot: u32, surface: Option<Surface>) -> bool {
         let index = surface.map_or(0, |surface| {
@@ -87,6 +109,7 @@ impl Surfaces {
     pub fn bytes(&self) -> usize {
         self.list.capacity() * size_of::<Surface>()
             + (self.counts.capacity() + self.of_slot.capacity()) * size_of::<u32>()
+            + self.layers.capacity() * size_of::<CollisionLayers>()
     }
 }
 
@@ -106,6 +129,28 @@ impl SurfaceOf<'_> {
         let own = || self.surfaces.get(self.slots[row as usize]);
         let plain = Surface { material: self.model, rotation_locked: false };
         if self.surfaces.list.is_empty() { plain } else { own().unwrap_or(plain) }
+    }
+
+    /// True if a ball may have layers other than all.
+    #[inline]
+    pub fn has_layers(&self) -> bool {
+        !self.surfaces.layers.is_empty()
+    }
+
+    /// Layers of the ball in a row.
+    #[inline]
+    pub fn layers(&self, row: u32) -> CollisionLayers {
+        if self.has_layers() {
+            self.surfaces.layers(self.slots[row as usize])
+        } else {
+            CollisionLayers::ALL
+        }
+    }
+
+    /// Returns true if the layers of the balls in two rows let them collide.
+    #[inline]
+    pub fn may_collide(&self, a: u32, b: u32) -> bool {
+        !self.has_layers() || self.layers(a).interacts_with(self.layers(b))
     }
 
     /// True if pairs need numbers of their own.

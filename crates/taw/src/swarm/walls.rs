@@ -10,6 +10,7 @@ use super::proxies::Proxy;
 use super::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use super::surfaces::{SurfaceOf, WallNumbers};
 use super::wall_contact::WallContact;
+use crate::broad::CollisionLayers;
 use crate::constraint::ContactImpulse;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
@@ -25,16 +26,25 @@ pub(crate) trait StaticGeometry: Sync {
     /// Says if there is anything else, and if some of it may be in a box.
     fn has_shapes(&self) -> bool;
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;
-    /// Visits what else is within `reach` metres of a ball, without ghost collisions: the wall and
-    /// its part, the normal, and the distance of the center.
-    fn shapes_at(&self, ball: &Row, reach: f32, visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32));
+    /// Visits what else is within `reach` metres of a ball of these layers, without ghost collisions:
+    /// the wall and its part, the normal, and the distance of the center.
+    fn shapes_at(
+        &self,
+        ball: &Row,
+        layers: CollisionLayers,
+        reach: f32,
+        visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
+    );
     /// The part that a ball first meets on its way, likewise: with the normal where they meet, and
     /// how far the center is from the plane across that place.
     fn first_hit_on_path(
         &self,
         ball: &Row,
+        layers: CollisionLayers,
         displacement: Vec3<f32>,
     ) -> Option<([u32; 2], Vec3<f32>, f32)>;
+    /// Layers of a wall.
+    fn layers(&self, wall: u32) -> CollisionLayers;
     /// In m/s, and the wall's own material.
     fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32>;
     fn material(&self, wall: u32) -> Option<Material<f32>>;
@@ -48,6 +58,7 @@ pub(super) struct HalfSpace {
     pub offset: f32,
     /// Of the wall itself, if it has one.
     material: Option<Material<f32>>,
+    pub layers: CollisionLayers,
 }
 
 /// The columns that say which balls may come to a wall.
@@ -80,7 +91,8 @@ impl Balls<'_> {
 pub(super) fn half_spaces(walls: &dyn StaticGeometry, planes: &mut Vec<HalfSpace>) {
     planes.clear();
     walls.planes(&mut |wall, normal, offset| {
-        planes.push(HalfSpace { wall, normal, offset, material: walls.material(wall) });
+        let (material, layers) = (walls.material(wall), walls.layers(wall));
+        planes.push(HalfSpace { wall, normal, offset, material, layers });
     });
 }
 
@@ -188,7 +200,7 @@ impl Chunk {
         self.wall_contacts.extend(old.iter().filter(kept));
         self.has_fast = false;
         for row in &self.near_shapes {
-            let displacement = query.displacement(*row);
+            let (displacement, layers) = (query.displacement(*row), query.surfaces.layers(*row));
             let ball = &query.ball(*row, displacement);
             if only_fast && displacement.is_none() {
                 continue;
@@ -213,9 +225,9 @@ impl Chunk {
             if let Some(displacement) = displacement {
                 self.has_fast = true;
                 reach = displacement.magnitude().min(FAST * ball[3]);
-                along_path(walls, ball, displacement, &mut visit);
+                along_path(walls, (ball, layers), displacement, &mut visit);
             }
-            walls.shapes_at(ball, reach, &mut |part, normal, distance| {
+            walls.shapes_at(ball, layers, reach, &mut |part, normal, distance| {
                 visit(ball, part, normal, distance);
             });
         }
@@ -226,7 +238,7 @@ impl Chunk {
 /// Visits the walls that a ball meets on its path, and along those that it met.
 fn along_path(
     walls: &dyn StaticGeometry,
-    ball: &Row,
+    (ball, layers): (&Row, CollisionLayers),
     displacement: Vec3<f32>,
     visit: &mut impl FnMut(&Row, [u32; 2], Vec3<f32>, f32),
 ) {
@@ -236,7 +248,8 @@ fn along_path(
         if displacement.magnitude() <= FAST * ball[3] {
             return;
         }
-        let Some((part, normal, distance)) = walls.first_hit_on_path(&ball, displacement) else {
+        let hit = walls.first_hit_on_path(&ball, layers, displacement);
+        let Some((part, normal, distance)) = hit else {
             return;
         };
         visit(&ball, part, normal, distance);
@@ -257,11 +270,12 @@ fn along_path(
 pub(super) fn stop_at_wall(
     walls: &dyn StaticGeometry,
     at: &mut Row,
+    layers: CollisionLayers,
     displacement: Vec3<f32>,
 ) -> f32 {
     let start = center(at) - displacement;
     let ball = [start.x, start.y, start.z, at[3]];
-    let Some((_, normal, distance)) = walls.first_hit_on_path(&ball, displacement) else {
+    let Some((_, normal, distance)) = walls.first_hit_on_path(&ball, layers, displacement) else {
         return 0.0;
     };
     let approach = -displacement.dot(normal);
@@ -348,10 +362,10 @@ fn find_plane_contacts(
 ) {
     let (ball, reach) = (&balls.at[row as usize], balls.reach(row as usize));
     for plane in planes {
-        let HalfSpace { wall, normal, offset, material } = *plane;
+        let HalfSpace { wall, normal, offset, material, layers } = *plane;
         let separation = normal.dot(center(ball).to_vec()) - offset - ball[3];
         // A wall may also come nearer; a move of it starts another search.
-        if separation < reach {
+        if separation < reach && layers.interacts_with(balls.surfaces.layers(row)) {
             let numbers = WallNumbers::new(balls.surfaces.row(row), material);
             visit(WallContact::new(row, [wall, 0], normal, offset, numbers));
         }

@@ -60,6 +60,7 @@ impl<S: Scalar> World<S> {
                 radius,
                 inverse_mass: 1.0 / marbles.mass(row).as_f64(),
                 material: marbles.material.get(row).unwrap_or_default().cast(),
+                layers: marbles.layers_of_row(row),
                 rotation: match self.model.rotation {
                     Rotation::Dynamic if !marbles.is_rotation_locked(row) => BallRotation::Free,
                     _ => BallRotation::Locked,
@@ -176,6 +177,7 @@ impl<S: Scalar> event::WallSource for Source<'_, S> {
             motion,
             arrival_time: moved.then_some(self.there),
             material: self.walls.material_of_row(place).map(Material::cast),
+            layers: self.walls.layers_of_row(row),
             relative_rounding: 8.0 * S::epsilon().as_f64(),
         })
     }

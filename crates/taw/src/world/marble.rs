@@ -3,6 +3,7 @@
 use cgmath::{InnerSpace, One, Zero};
 
 use crate::Error;
+use crate::broad::CollisionLayers;
 use crate::error::within;
 use crate::math::{Point3, Quat, Scalar, Vec3};
 use crate::motion::{Integrator, Mass, Rotation};
@@ -37,6 +38,8 @@ pub struct Marble<S> {
     pub rotation_model: Option<Rotation>,
     /// Own material instead of the default one.
     pub material: Option<Material<S>>,
+    /// Layers: which walls and balls it collides with.
+    pub layers: CollisionLayers,
     /// Keeps it, and those about it, awake ([`World::is_asleep`](super::World::is_asleep)).
     pub sleeping_disabled: bool,
 }
@@ -58,6 +61,7 @@ impl<S: Scalar> Marble<S> {
             integrator: None,
             rotation_model: None,
             material: None,
+            layers: CollisionLayers::ALL,
             sleeping_disabled: false,
         }
     }

@@ -6,6 +6,7 @@ use super::MarbleId;
 use super::marble::{Damping, non_default, validated_half_length, validated_rotation};
 use super::marbles::{ANGULAR_VELOCITY, Marbles, POSITION, VELOCITY};
 use crate::Error;
+use crate::broad::CollisionLayers;
 use crate::error::{finite, finite_point, finite_vector, positive};
 use crate::math::{Point3, Quat, Scalar, Vec3};
 use crate::motion::{Integrator, Mass, Rotation};
@@ -187,6 +188,18 @@ impl<S: Scalar> Marbles<S> {
         self.mark_changed(row);
         Ok(())
     }
+
+    /// Changes the layers of a marble.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn set_layers(&mut self, id: MarbleId, layers: CollisionLayers) -> Result<(), Error> {
+        let row = self.row(id)?;
+        self.layers.set(row, non_default(layers, CollisionLayers::ALL), self.len());
+        self.mark_changed(row);
+        Ok(())
+    }
+
     /// Forbids a marble to sleep, or allows it again.
     ///
     /// # Errors

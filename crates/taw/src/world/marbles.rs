@@ -6,6 +6,7 @@ use super::changed_rows::ChangedRows;
 use super::marble::{Damping, Marble, non_default, validated_half_length, validated_rotation};
 use super::sparse_column::SparseColumn;
 use crate::Error;
+use crate::broad::CollisionLayers;
 use crate::broad::Period;
 use crate::error::{finite, finite_point, finite_vector, positive};
 use crate::frame::Bivector;
@@ -63,6 +64,8 @@ pub struct Marbles<S> {
     pub(super) integrator: SparseColumn<Integrator>,
     pub(super) rotation_model: SparseColumn<Rotation>,
     pub(super) material: SparseColumn<Material<S>>,
+    /// Layers other than all.
+    pub(super) layers: SparseColumn<CollisionLayers>,
     /// Marbles that never sleep.
     pub(super) sleeping_disabled: SparseColumn<()>,
 }
@@ -90,6 +93,7 @@ impl<S> Default for Marbles<S> {
             integrator: SparseColumn::default(),
             rotation_model: SparseColumn::default(),
             material: SparseColumn::default(),
+            layers: SparseColumn::default(),
             sleeping_disabled: SparseColumn::default(),
         }
     }
@@ -144,6 +148,8 @@ impl<S: Scalar> Marbles<S> {
         self.integrator.set(rows - 1, marble.integrator, rows);
         self.rotation_model.set(rows - 1, marble.rotation_model, rows);
         self.material.set(rows - 1, material, rows);
+        let layers = non_default(marble.layers, CollisionLayers::ALL);
+        self.layers.set(rows - 1, layers, rows);
         self.sleeping_disabled.set(rows - 1, marble.sleeping_disabled.then_some(()), rows);
         Ok(MarbleId(handle))
     }
@@ -174,6 +180,7 @@ impl<S: Scalar> Marbles<S> {
             self.integrator.swap_remove(row);
             self.rotation_model.swap_remove(row);
             self.material.swap_remove(row);
+            self.layers.swap_remove(row);
             self.sleeping_disabled.swap_remove(row);
         }
         Ok(marble)
@@ -198,6 +205,7 @@ impl<S: Scalar> Marbles<S> {
             integrator: self.integrator.get(row),
             rotation_model: self.rotation_model.get(row),
             material: self.material.get(row),
+            layers: self.layers_of_row(row),
             sleeping_disabled: self.sleeping_disabled.get(row).is_some(),
         })
     }
@@ -226,8 +234,22 @@ impl<S: Scalar> Marbles<S> {
             integrator: marble.integrator,
             rotation_model: marble.rotation_model,
             material: marble.material.map(Material::cast),
+            layers: marble.layers,
             sleeping_disabled: marble.sleeping_disabled,
         })
+    }
+
+    /// Layers of a marble.
+    #[inline]
+    pub(super) fn layers_of_row(&self, row: usize) -> CollisionLayers {
+        self.layers.get(row).unwrap_or_default()
+    }
+
+    /// Returns true if the layers of two marbles let them collide.
+    #[inline]
+    pub(super) fn may_collide(&self, a: u32, b: u32) -> bool {
+        let layers = |row: u32| self.layers_of_row(row as usize);
+        self.layers.is_empty() || layers(a).interacts_with(layers(b))
     }
 
     /// Returns true if any marble has applied forces, torques or damping.

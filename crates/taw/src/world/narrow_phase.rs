@@ -8,6 +8,7 @@ use smallvec::SmallVec;
 use super::marbles::Marbles;
 use super::walls::{SubShape, Walls};
 use super::{WallShape, World};
+use crate::broad::CollisionLayers;
 use crate::contact::Contact;
 use crate::math::{Scalar, Vec3, normal_and_distance};
 use crate::response::Response;
@@ -57,7 +58,11 @@ impl<S: Scalar> World<S> {
     /// Collides half-spaces with marbles and capsules, which touch with their ends.
     fn collide_half_spaces(&mut self, contact_distance: S) {
         for (wall, plane) in self.walls.planes() {
+            let layers = self.walls.layers_of_row(wall);
             for b in 0..self.marbles.len() {
+                if !layers.interacts_with(self.marbles.layers_of_row(b)) {
+                    continue;
+                }
                 let half = self.marbles.half_length(b);
                 let ends = [-half, half].into_iter().take(if half > S::zero() { 2 } else { 1 });
                 for along in ends {
@@ -103,9 +108,10 @@ impl<S: Scalar> World<S> {
         candidates: &mut Vec<Candidate<S>>,
     ) {
         candidates.clear();
-        candidate_sub_shapes(&self.walls, sphere, contact_distance, candidates);
+        let layers = self.marbles.layers_of_row(b);
+        candidate_sub_shapes(&self.walls, (sphere, layers), contact_distance, candidates);
         if candidates.len() > 1 {
-            remove_ghost_collisions(&self.walls, sphere, candidates);
+            remove_ghost_collisions(&self.walls, (sphere, layers), candidates);
         }
         for Candidate { part, nearest } in candidates.iter() {
             let place = (nearest.normal, nearest.distance);
@@ -124,7 +130,8 @@ impl<S: Scalar> World<S> {
         let margin = Vec3::new(contact_distance, contact_distance, contact_distance);
         let Aabb { min, max } = capsule.bounding_box();
         let (center, axis) = (self.marbles.sphere(b).center, self.marbles.axis(b));
-        self.walls.for_each_in_box(&Aabb { min: min - margin, max: max + margin }, |part| {
+        let bounds = Aabb { min: min - margin, max: max + margin };
+        self.walls.for_each_colliding(&bounds, self.marbles.layers_of_row(b), |part| {
             let Some(touch) = self.walls.closest_points(part, capsule) else { return };
             let along = (touch.on_b - center).dot(axis);
             let inside = along.abs() < half * S::from_f64(0.999);
@@ -189,7 +196,7 @@ impl<S: Scalar> World<S> {
 }
 
 /// Contact of two marbles, or of two spheres at `along` on the axes of capsules; none if they are
-/// farther apart than `contact_distance` metres.
+/// farther apart than `contact_distance` metres, or their layers do not collide.
 #[inline]
 fn marble_contact<S: Scalar>(
     marbles: &Marbles<S>,
@@ -197,6 +204,9 @@ fn marble_contact<S: Scalar>(
     along: [S; 2],
     contact_distance: S,
 ) -> Option<Contact<S>> {
+    if !marbles.may_collide(a, b) {
+        return None;
+    }
     let (first, second) = (a as usize, b as usize);
     let anchor = |row: usize, along: S| {
         if along == S::zero() { Vec3::zero() } else { marbles.axis(row) * along }
@@ -242,17 +252,17 @@ fn closest_points_of_segments<S: Scalar>(
 }
 
 /// Collects the sub-shapes of walls, except half-spaces, within `contact_distance` metres of a
-/// sphere, in order.
+/// sphere with these layers, in order.
 pub(super) fn candidate_sub_shapes<S: Scalar>(
     walls: &Walls<S>,
-    sphere: &Sphere<S>,
+    (sphere, layers): (&Sphere<S>, CollisionLayers),
     contact_distance: S,
     candidates: &mut Vec<Candidate<S>>,
 ) {
     let far = sphere.radius + contact_distance;
     let margin = Vec3::new(far, far, far);
     let bounds = Aabb { min: sphere.center - margin, max: sphere.center + margin };
-    walls.for_each_in_box(&bounds, |part| {
+    walls.for_each_colliding(&bounds, layers, |part| {
         let nearest = walls.project_point(part, sphere.center);
         if nearest.distance <= far {
             candidates.push(Candidate { part, nearest });
@@ -286,7 +296,7 @@ pub(super) fn candidate_sub_shapes<S: Scalar>(
 /// nearest points, and one suffices.
 pub(super) fn remove_ghost_collisions<S: Scalar>(
     walls: &Walls<S>,
-    sphere: &Sphere<S>,
+    (sphere, layers): (&Sphere<S>, CollisionLayers),
     candidates: &mut Vec<Candidate<S>>,
 ) {
     let largest = [sphere.center.x, sphere.center.y, sphere.center.z]
@@ -302,8 +312,9 @@ pub(super) fn remove_ghost_collisions<S: Scalar>(
     };
     let ghosts = |it: &Candidate<S>| {
         let others = candidates.iter().filter(|other| other.part != it.part);
-        let on_planes =
-            || walls.planes().any(|(_, plane)| plane.signed_distance(it.nearest.point) <= flush);
+        let mut planes = walls.colliding_planes(layers);
+        let mut on_planes =
+            || planes.any(|(_, plane)| plane.signed_distance(it.nearest.point) <= flush);
         let covers = |other: &Candidate<S>| on(it, other) && (before(other, it) || !on(other, it));
         others.into_iter().any(covers) || on_planes()
     };

@@ -7,6 +7,7 @@ use super::integrate::StepContext;
 use super::swarm::MAX_COORDINATE;
 use super::{MarbleId, World};
 use crate::Error;
+use crate::broad::CollisionLayers;
 use crate::contact::Contacts;
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::Rotation;
@@ -213,9 +214,10 @@ impl<S: Scalar> World<S> {
             let inverse_mass = inverse_mass(marbles.mass(row));
             let sleepless = marbles.sleeping_disabled.get(row).is_some();
             let numbers = [row_radius(marble.radius), inverse_mass];
-            if !self.swarm.is_as_read(slot, marble, numbers, surface, sleepless) {
+            let layers = marbles.layers_of_row(row);
+            if !self.swarm.is_as_read(slot, marble, numbers, (surface, layers), sleepless) {
                 let body = body(slot, marble, inverse_mass, surface);
-                changed.push(Body { sleeping_disabled: sleepless, ..body });
+                changed.push(Body { layers, sleeping_disabled: sleepless, ..body });
             }
         }
     }
@@ -265,6 +267,7 @@ fn body<S: Scalar>(
         velocity: row(marble.velocity, inverse_mass),
         spin: row(spin, 0.0),
         surface,
+        layers: CollisionLayers::ALL,
         sleeping_disabled: false,
     }
 }

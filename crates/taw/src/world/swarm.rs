@@ -7,6 +7,7 @@ use super::World;
 use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
 use super::walls::{SubShape, Walls};
 use crate::Error;
+use crate::broad::CollisionLayers;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
 use crate::motion::{Motion, acceleration_in_step};
 use crate::response::{Material, Response};
@@ -93,6 +94,11 @@ impl<S: Scalar> World<S> {
     fn sync_proxies(&mut self, dt: f32) -> Result<(), Error> {
         self.insert_missing_bodies()?;
         let (marbles, body_balls) = (&self.marbles, std::mem::take(&mut self.swarm.body_balls));
+        for (marble, ball) in &body_balls {
+            if let (Ok(row), Some(slot)) = (marbles.row(*marble), self.swarm.slot_of(*ball)) {
+                self.swarm.set_layers_of_slot(slot, marbles.layers_of_row(row));
+            }
+        }
         let proxies = body_balls.iter().filter_map(|(marble, ball)| {
             let row = marbles.row(*marble).ok()?;
             let single = |x: S| (x.as_f64() as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE);
@@ -139,14 +145,14 @@ impl<S: Scalar> Walls<S> {
     /// grazes it goes on.
     fn time_of_passage(
         &self,
-        sphere: &Sphere<S>,
+        (sphere, layers): (&Sphere<S>, CollisionLayers),
         displacement: Vec3<S>,
         reached: &Aabb3<S>,
     ) -> Option<S> {
         let core = Sphere { radius: sphere.radius * S::from_f64(0.5), ..*sphere };
         let deep = sphere.radius * S::from_f64(1.0 - GRAZES);
         let mut first: Option<S> = None;
-        Walls::for_each_in_box(self, reached, |part| {
+        self.for_each_colliding(reached, layers, |part| {
             let distance = |point| self.project_point(part, point).distance;
             let ends_in_it = || {
                 let end = distance(sphere.center + displacement);
@@ -191,6 +197,7 @@ impl<S: Scalar> StaticGeometry for Walls<S> {
     fn shapes_at(
         &self,
         &[x, y, z, radius]: &[f32; 4],
+        layers: CollisionLayers,
         reach: f32,
         visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
     ) {
@@ -198,9 +205,9 @@ impl<S: Scalar> StaticGeometry for Walls<S> {
         let center = cast_point(Point3::new(x, y, z));
         let sphere = Sphere { center, radius: number(radius) };
         let mut near = Vec::new();
-        candidate_sub_shapes(self, &sphere, number(reach), &mut near);
+        candidate_sub_shapes(self, (&sphere, layers), number(reach), &mut near);
         if near.len() > 1 {
-            remove_ghost_collisions(self, &sphere, &mut near);
+            remove_ghost_collisions(self, (&sphere, layers), &mut near);
         }
         for Candidate { part: SubShape { wall, index: part }, nearest } in near {
             let normal: Vec3<f32> = cast_vector(nearest.normal);
@@ -211,6 +218,7 @@ impl<S: Scalar> StaticGeometry for Walls<S> {
     fn first_hit_on_path(
         &self,
         &[x, y, z, radius]: &[f32; 4],
+        layers: CollisionLayers,
         displacement: Vec3<f32>,
     ) -> Option<([u32; 2], Vec3<f32>, f32)> {
         let number = |x: f32| S::from_f64(f64::from(x));
@@ -220,11 +228,11 @@ impl<S: Scalar> StaticGeometry for Walls<S> {
         let (start, end) =
             (sphere.bounding_box(), Sphere { center: center + displacement, ..sphere });
         let reached = start.union(&end.bounding_box());
-        let time = self.time_of_passage(&sphere, displacement, &reached)?;
+        let time = self.time_of_passage((&sphere, layers), displacement, &reached)?;
         // Before the part that it passes into it may meet another one, of which that is the
         // continuation: then the edge between them is no obstacle.
         let mut first: Option<(SubShape, S, PointProjection<S>)> = None;
-        Walls::for_each_in_box(self, &reached, |part| {
+        self.for_each_colliding(&reached, layers, |part| {
             let Some(stop) = self.time_of_impact(part, &sphere, displacement) else { return };
             if stop.time > time || first.as_ref().is_some_and(|(_, time, _)| stop.time >= *time) {
                 return;
@@ -248,6 +256,10 @@ impl<S: Scalar> StaticGeometry for Walls<S> {
             wall as usize,
             cast_point(point),
         ))
+    }
+
+    fn layers(&self, wall: u32) -> CollisionLayers {
+        self.layers_of_row(wall)
     }
 
     fn material(&self, wall: u32) -> Option<Material<f32>> {

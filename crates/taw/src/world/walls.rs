@@ -1,9 +1,11 @@
 use cgmath::Zero;
 
+use super::marble::non_default;
 use super::sparse_column::SparseColumn;
 use super::wall_changes::WallChanges;
 use super::wall_shape::WallShape;
 use crate::Error;
+use crate::broad::CollisionLayers;
 use crate::contact::ClosestPoints;
 use crate::error::{finite_point, finite_vector};
 use crate::handle::{Handle, Handles};
@@ -34,6 +36,8 @@ pub struct Walls<S> {
     motion: SparseColumn<WallMotion<S>>,
     /// Materials of walls that have their own.
     material: SparseColumn<Material<S>>,
+    /// Layers other than all.
+    layers: SparseColumn<CollisionLayers>,
     /// Walls that were set to another pose since the last step.
     moved: SparseColumn<()>,
     /// Final shapes and motions, by index, of walls on their way through a step.
@@ -65,6 +69,7 @@ impl<S> Default for Walls<S> {
             planes: Vec::new(),
             motion: SparseColumn::default(),
             material: SparseColumn::default(),
+            layers: SparseColumn::default(),
             moved: SparseColumn::default(),
             ends: Vec::new(),
             boxes: Vec::new(),
@@ -80,11 +85,12 @@ impl<S> Default for Walls<S> {
 impl<S: Scalar> PartialEq for Walls<S> {
     fn eq(&self, other: &Self) -> bool {
         // The other fields follow from the shapes.
-        let Self { handles, shapes, motion, material, moved, .. } = self;
+        let Self { handles, shapes, motion, material, layers, moved, .. } = self;
         *handles == other.handles
             && *shapes == other.shapes
             && *motion == other.motion
             && *material == other.material
+            && *layers == other.layers
             && *moved == other.moved
     }
 }
@@ -107,6 +113,7 @@ impl<S: Scalar> Walls<S> {
         let rows = self.shapes.len();
         self.motion.set(rows - 1, None, rows);
         self.material.set(rows - 1, None, rows);
+        self.layers.set(rows - 1, None, rows);
         self.moved.set(rows - 1, None, rows);
         Ok(WallId(handle))
     }
@@ -120,6 +127,7 @@ impl<S: Scalar> Walls<S> {
         let row = row.ok_or(Error::NoSuchWall(id))?;
         self.motion.swap_remove(row);
         self.material.swap_remove(row);
+        self.layers.swap_remove(row);
         self.moved.swap_remove(row);
         // Another wall has this index now.
         self.dirty = Dirty::All;
@@ -233,6 +241,29 @@ impl<S: Scalar> Walls<S> {
         });
     }
 
+    /// Visits the sub-shapes that may overlap a box, of walls that a collider of these layers
+    /// collides with, except half-spaces.
+    pub(super) fn for_each_colliding(
+        &self,
+        bounds: &Aabb3<S>,
+        layers: CollisionLayers,
+        mut visit: impl FnMut(SubShape),
+    ) {
+        self.for_each_in_box(bounds, |part| {
+            if self.layers_of_row(part.wall).interacts_with(layers) {
+                visit(part);
+            }
+        });
+    }
+
+    /// Half-spaces that a collider of these layers collides with, with their rows.
+    pub(super) fn colliding_planes(
+        &self,
+        layers: CollisionLayers,
+    ) -> impl Iterator<Item = (u32, &Plane<S>)> {
+        self.planes().filter(move |(wall, _)| self.layers_of_row(*wall).interacts_with(layers))
+    }
+
     /// Visits the sub-shapes of walls, except half-spaces, that may be within `reach` metres of a
     /// point.
     pub(super) fn for_each_near(
@@ -330,6 +361,29 @@ impl<S: Scalar> Walls<S> {
         self.row(id).map(|row| self.material.get(row))
     }
 
+    /// Changes the layers of a wall: which marbles and balls collide with it. Sleeping ones near it
+    /// wake.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchWall`].
+    pub fn set_layers(&mut self, id: WallId, layers: CollisionLayers) -> Result<(), Error> {
+        let row = self.row(id)?;
+        if self.layers_of_row(row as u32) != layers {
+            self.version += 1;
+            self.log_change(self.shapes[row].bounding_box());
+        }
+        self.layers.set(row, non_default(layers, CollisionLayers::ALL), self.shapes.len());
+        Ok(())
+    }
+
+    /// Layers of a wall.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchWall`].
+    pub fn layers(&self, id: WallId) -> Result<CollisionLayers, Error> {
+        self.row(id).map(|row| self.layers_of_row(row as u32))
+    }
+
     /// Shapes of all walls, by index.
     #[must_use]
     pub fn shapes(&self) -> &[WallShape<S>] {
@@ -392,6 +446,12 @@ impl<S: Scalar> Walls<S> {
     /// The wall's own material, by index.
     pub(super) fn material_of_row(&self, row: usize) -> Option<Material<S>> {
         self.material.get(row)
+    }
+
+    /// Layers of the wall at an index.
+    #[inline]
+    pub(super) fn layers_of_row(&self, row: u32) -> CollisionLayers {
+        self.layers.get(row as usize).unwrap_or_default()
     }
 
     /// Number of insertions, removals and changes so far: unchanged as long as the walls are.

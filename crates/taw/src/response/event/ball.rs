@@ -5,6 +5,7 @@ use cgmath::Zero;
 use super::cells::Cell;
 use super::curved_support::BallState;
 use super::{EventSettings, MAX_FREEZES, SIMULTANEOUS};
+use crate::broad::CollisionLayers;
 use crate::math::{Point3, Vec3};
 use crate::response::{BallRotation, Material};
 
@@ -24,6 +25,7 @@ pub(crate) struct Ball {
     /// Inverse mass, in 1/kg.
     pub inverse_mass: f64,
     pub material: Material<f64>,
+    pub layers: CollisionLayers,
     /// Rotation lock: tells if friction spins it.
     pub rotation: BallRotation,
     /// Position error by rounding, in metres.

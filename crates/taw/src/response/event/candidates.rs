@@ -129,15 +129,17 @@ impl EventDriven {
             }
             (covered, ids) = (next_range, next_ids);
         }
+        let layers = self.balls[row].layers;
         let Self { candidates: WallCandidates { index, lists, per_ball, .. }, walls, .. } = self;
         let start = lists.len();
         lists.extend(ids.into_iter().filter_map(|(row, part)| {
-            index.get(&(row, part)).copied().or_else(|| {
+            let wall = index.get(&(row, part)).copied().or_else(|| {
                 walls.push(settings.source.wall(row, part)?);
                 let wall = walls.len() as u32 - 1;
                 index.insert((row, part), wall);
                 Some(wall)
-            })
+            })?;
+            walls[wall as usize].layers.interacts_with(layers).then_some(wall)
         }));
         settings.add_cost((lists.len() - start) as u64 * super::PART_COST);
         lists[start..].sort_unstable();
@@ -198,7 +200,7 @@ impl EventDriven {
 
     /// Visits the candidate walls of a ball.
     pub(super) fn for_each_wall(&self, row: usize, mut visit: impl FnMut(usize)) {
-        self.candidates.planes.iter().for_each(|wall| visit(*wall as usize));
+        self.planes_of(row).for_each(|wall| visit(wall as usize));
         self.parts_of(row).iter().for_each(|wall| visit(*wall as usize));
     }
 
@@ -208,9 +210,11 @@ impl EventDriven {
         &self.candidates.lists[start..end]
     }
 
-    /// Indices of all half-spaces.
-    pub(super) fn half_spaces(&self) -> &[u32] {
-        &self.candidates.planes
+    /// Half-spaces that a ball collides with.
+    pub(super) fn planes_of(&self, row: usize) -> impl Iterator<Item = u32> {
+        let layers = self.balls[row].layers;
+        let collides = move |wall: &u32| self.walls[*wall as usize].layers.interacts_with(layers);
+        self.candidates.planes.iter().copied().filter(collides)
     }
 
     /// Cost of testing a ball against all its candidate walls.
@@ -232,6 +236,7 @@ fn max_acceleration(ball: &Ball) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::broad::CollisionLayers;
     use crate::math::Vec3;
     use crate::response::event::{Trajectory, WallCollider};
     use crate::response::{BallRotation, Material};
@@ -264,6 +269,7 @@ mod tests {
                 motion,
                 arrival_time,
                 material,
+                layers: CollisionLayers::ALL,
                 relative_rounding: 0.0,
             })
         }
@@ -279,6 +285,7 @@ mod tests {
             radius: 0.1,
             inverse_mass: 1.0,
             material: Material::default(),
+            layers: CollisionLayers::ALL,
             rotation: BallRotation::Free,
             position_error: 0.0,
             rotation_increment: Vec3::zero(),

@@ -12,7 +12,7 @@ impl EventDriven {
     pub(super) fn predict(&mut self, row: usize, now: f64, settings: &EventSettings) {
         self.update_cell(row, now, settings.dt);
         let refresh = self.candidates_expiry(row, now, settings);
-        let walls = self.half_spaces().len() + self.parts_of(row).len();
+        let walls = self.planes_of(row).count() + self.parts_of(row).len();
         settings.add_cost(1 + walls as u64);
         let ball = &self.balls[row];
         let remaining = settings.dt - now;
@@ -89,8 +89,14 @@ impl EventDriven {
         }
     }
 
-    /// Visits balls that a ball may touch soon, itself among them.
+    /// Visits balls that a ball may touch soon and collides with; itself may be among them.
     pub(super) fn for_each_near(&self, row: usize, mut visit: impl FnMut(usize)) {
+        let layers = self.balls[row].layers;
+        let mut visit = |other: usize| {
+            if self.balls[other].layers.interacts_with(layers) {
+                visit(other);
+            }
+        };
         match self.balls[row].trajectory.cell_slot {
             CellSlot::Cell(cell) => {
                 self.cells.for_each_near(cell, &mut visit);

@@ -104,7 +104,7 @@ impl EventDriven {
         self.push_out(row, now, self.parts_of(row).to_vec());
         // Half-spaces come last, and static ones after moving ones: behind them there is nothing.
         for is_moving in [true, false] {
-            let planes = self.half_spaces().iter().copied();
+            let planes = self.planes_of(row);
             let planes =
                 planes.filter(|wall| self.is_moving(*wall as usize) == is_moving).collect();
             self.push_out(row, now, planes);

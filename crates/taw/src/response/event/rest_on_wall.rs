@@ -288,6 +288,7 @@ fn end_of_face(ground: &CurvedSupport, ball: &Ball, normal: Vec3<f64>, duration:
 mod tests {
     use super::super::{Trajectory, Wall, WallSource};
     use super::*;
+    use crate::broad::CollisionLayers;
     use crate::math::Point3;
     use crate::response::Material;
     use crate::shape::Triangle;
@@ -318,6 +319,7 @@ mod tests {
                 motion,
                 arrival_time,
                 material,
+                layers: CollisionLayers::ALL,
                 relative_rounding: 0.0,
             })
         }
@@ -336,6 +338,7 @@ mod tests {
                 radius: 0.2,
                 inverse_mass: 1.0,
                 material: Material { friction: 0.5, ..Material::default() },
+                layers: CollisionLayers::ALL,
                 rotation: BallRotation::Free,
                 position_error: 1e-15,
                 rotation_increment: Vec3::zero(),

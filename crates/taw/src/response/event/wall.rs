@@ -2,6 +2,7 @@
 
 use cgmath::{InnerSpace, One, Rotation as _, Zero};
 
+use crate::broad::CollisionLayers;
 use crate::math::{Point3, Quat, Vec3};
 use crate::motion::{WallMotion, integrate_rotation};
 use crate::response::{Colliders, Material};
@@ -26,6 +27,7 @@ pub(crate) struct Wall {
     /// conveyor.
     pub arrival_time: Option<f64>,
     pub material: Option<Material<f64>>,
+    pub layers: CollisionLayers,
     /// Rounding error of its points, relative to their coordinates.
     pub relative_rounding: f64,
 }

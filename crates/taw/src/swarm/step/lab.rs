@@ -1,6 +1,7 @@
 //! A step in the lab's tier: *predict*, *displace*, *update velocities*.
 
 use super::row;
+use crate::broad::CollisionLayers;
 use crate::math::Vec3;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::{
@@ -119,8 +120,14 @@ impl Swarm {
         let planes = std::mem::take(&mut self.planes);
         let scratch = std::mem::take(&mut self.neighbours);
         let neighbours: &[u16] = bytemuck::cast_slice(&scratch);
-        let walls =
-            WallDisplacement { simd_level, rows: &rows, proxies: &proxies, planes: &planes };
+        let layers = self.layers_by_row(&planes);
+        let walls = WallDisplacement {
+            simd_level,
+            rows: &rows,
+            proxies: &proxies,
+            planes: &planes,
+            layers: &layers,
+        };
         for _ in 0..self.model.substeps {
             self.for_each_chunk(|_, columns, chunk| {
                 // SAFETY: the job has the balls of the chunk.
@@ -139,6 +146,17 @@ impl Swarm {
         });
         (self.scratch.proxy_rows, self.proxies) = (rows, proxies);
         (self.planes, self.neighbours) = (planes, scratch);
+    }
+
+    /// Layers of all balls by row; none if all balls collide with all half-spaces.
+    fn layers_by_row(&self, planes: &[HalfSpace]) -> Vec<CollisionLayers> {
+        let surfaces = self.surface_of();
+        let differ = |plane: &HalfSpace| plane.layers != CollisionLayers::ALL;
+        if surfaces.has_layers() || planes.iter().any(differ) {
+            (0..self.at.len() as u32).map(|row| surfaces.layers(row)).collect()
+        } else {
+            Vec::new()
+        }
     }
 
     /// Makes velocities what positions became.
@@ -164,6 +182,8 @@ struct WallDisplacement<'a> {
     rows: &'a [(u32, u32)],
     proxies: &'a [Proxy],
     planes: &'a [HalfSpace],
+    /// Layers of all balls, if they matter.
+    layers: &'a [CollisionLayers],
 }
 
 impl WallDisplacement<'_> {
@@ -173,17 +193,18 @@ impl WallDisplacement<'_> {
     /// # Safety
     /// No other thread touches the balls of the chunk meanwhile.
     unsafe fn apply(&self, chunk: &Chunk, all: DisjointSlice<Row>) {
-        let Self { simd_level, rows, proxies, planes } = *self;
+        let Self { rows, proxies, planes, layers, .. } = *self;
         let mut from = chunk.rows[0];
         let its = rows.partition_point(|(row, _)| *row < chunk.rows[0])
             ..rows.partition_point(|(row, _)| *row < chunk.rows[1]);
         for (to, proxy) in rows[its].iter().chain([&(chunk.rows[1], u32::MAX)]) {
             // SAFETY: as the caller promises.
             let at = unsafe { all.part(from as usize..*to as usize) };
-            simd_level.run(DisplaceFromPlanes { at, planes });
+            self.displace_from_planes(at, from);
             from = to + 1;
             let Some(proxy) = proxies.get(*proxy as usize) else { continue };
-            for plane in planes {
+            let layers = layers.get(*to as usize).copied().unwrap_or_default();
+            for plane in planes.iter().filter(|plane| plane.layers.interacts_with(layers)) {
                 // SAFETY: as above.
                 plane.bear(proxy, unsafe { &mut *all.row(*to as usize) });
             }
@@ -191,6 +212,24 @@ impl WallDisplacement<'_> {
         for contact in &chunk.wall_contacts {
             // SAFETY: as above.
             contact.displace(unsafe { &mut *all.row(contact.row as usize) });
+        }
+    }
+
+    /// Moves balls, the first of which is in row `first`, out of the half-spaces that they collide
+    /// with: all that come one after another with equal layers at a time.
+    fn displace_from_planes(&self, mut at: &mut [Row], first: u32) {
+        let Self { simd_level, planes, layers, .. } = *self;
+        if layers.is_empty() {
+            return simd_level.run(DisplaceFromPlanes { at, planes });
+        }
+        let mut layers = &layers[first as usize..][..at.len()];
+        while let Some(own) = layers.first() {
+            let count = layers.iter().take_while(|other| *other == own).count();
+            let (alike, more) = at.split_at_mut(count);
+            let collides = |plane: &&HalfSpace| plane.layers.interacts_with(*own);
+            let planes: Vec<_> = planes.iter().filter(collides).copied().collect();
+            simd_level.run(DisplaceFromPlanes { at: alike, planes: &planes });
+            (at, layers) = (more, &layers[count..]);
         }
     }
 }

@@ -119,6 +119,11 @@ impl Swarm {
         }
         let count = self.chunks.len();
         let (chunks, velocity) = (DisjointSlice::new(&mut self.chunks), &self.velocity);
+        let surfaces = SurfaceOf {
+            model: self.model.material,
+            surfaces: &self.surfaces,
+            slots: self.ids.slots(),
+        };
         let (at, skin_left) =
             (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
         parallel_for(self.model.threads as usize, count, |_, chunk| {
@@ -130,9 +135,11 @@ impl Swarm {
             }
             let rows = chunk.own_rows();
             let (at, skin_left) = unsafe { (at.part(rows.clone()), skin_left.part(rows.clone())) };
-            for ((at, skin_left), velocity) in at.iter_mut().zip(skin_left).zip(&velocity[rows]) {
+            let columns = at.iter_mut().zip(skin_left).zip(&velocity[rows.clone()]);
+            for (((at, skin_left), velocity), row) in columns.zip(rows) {
                 if is_fast(velocity, h, at[3]) {
-                    let back = stop_at_wall(walls, at, xyz(velocity) * h - lower);
+                    let layers = surfaces.layers(row as u32);
+                    let back = stop_at_wall(walls, at, layers, xyz(velocity) * h - lower);
                     *skin_left -= back;
                     chunk.caught |= back > 0.0;
                 }

@@ -138,7 +138,7 @@ impl<S: Scalar> World<S> {
         );
         let spheres = (&middle[..], &reach[..]);
         self.images.pairs(&mut self.grid, spheres, S::zero(), self.marbles.period, |a, b| {
-            if fast(a) || fast(b) {
+            if (fast(a) || fast(b)) && self.marbles.may_collide(a, b) {
                 candidates.extend([(a, b), (b, a)]);
             }
         });
@@ -271,7 +271,7 @@ impl<S: Scalar> World<S> {
         let start = Sphere { center: self.continuous.start[row], ..self.marbles.sphere(row) };
         let displacement = sphere.center - start.center;
         let looks = met_marble && !self.walls.are_half_spaces();
-        let stop = if looks { self.first_wall_impact(&start, displacement) } else { None };
+        let stop = if looks { self.first_wall_impact(row, &start, displacement) } else { None };
         let Some(WallImpact { time, wall, .. }) = stop else { return };
         self.marbles.position[row] = start.center + displacement * time;
         let obstacle = Obstacle::Wall(wall);

@@ -71,7 +71,7 @@ impl<S: Scalar> World<S> {
         let mut surfaces: SmallVec<[Vec3<S>; MAX_BENDS as usize]> = SmallVec::new();
         while length(displacement) > sphere.radius * S::from_f64(MAX_FREE_MOTION)
             && let Some(WallImpact { time, wall, normal, .. }) =
-                self.first_wall_impact(&sphere, displacement)
+                self.first_wall_impact(row, &sphere, displacement)
         {
             sphere.center += displacement * time;
             let rest = S::one() - time;
@@ -121,7 +121,8 @@ impl<S: Scalar> World<S> {
             if length(displacement) <= sphere.radius * S::from_f64(MAX_FREE_MOTION) {
                 continue;
             }
-            let planes = self.walls.planes().filter_map(|(_, plane)| {
+            let layers = self.marbles.layers_of_row(row);
+            let planes = self.walls.colliding_planes(layers).filter_map(|(_, plane)| {
                 let (gap, closing) = (
                     plane.signed_distance(sphere.center) - sphere.radius,
                     -displacement.dot(plane.normal()),
@@ -130,7 +131,7 @@ impl<S: Scalar> World<S> {
                     && closing > gap + sphere.radius * S::from_f64(MAX_FREE_MOTION);
                 passes.then(|| (gap / closing).max(S::zero()))
             });
-            let other = self.first_wall_impact(&sphere, displacement).map(|stop| stop.time);
+            let other = self.first_wall_impact(row, &sphere, displacement).map(|stop| stop.time);
             let first = planes.chain(other).fold(S::one(), S::min);
             if first < S::one() {
                 self.marbles.position[row] = sphere.center + displacement * first;
@@ -138,9 +139,10 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// First time of impact of a sphere with a wall that it would pass into.
+    /// First time of impact of a marble's sphere with a wall that it would pass into.
     pub(super) fn first_wall_impact(
         &self,
+        row: usize,
         sphere: &Sphere<S>,
         motion: Vec3<S>,
     ) -> Option<WallImpact<S>> {
@@ -154,8 +156,9 @@ impl<S: Scalar> World<S> {
         // first wherever it touches, so that at the internal edge of two flush parts the one below
         // counts.
         let core = Sphere { radius: sphere.radius * half, ..*sphere };
+        let layers = self.marbles.layers_of_row(row);
         let mut passes = false;
-        self.walls.for_each_in_box(&bounds, |part| {
+        self.walls.for_each_colliding(&bounds, layers, |part| {
             passes = passes || self.walls.time_of_impact(part, &core, motion).is_some();
         });
         if !passes {
@@ -164,7 +167,7 @@ impl<S: Scalar> World<S> {
         let scale = if self.model.response.needs_penetration() { half } else { shrink };
         let all = Sphere { radius: sphere.radius * scale, ..*sphere };
         let mut best: Option<WallImpact<S>> = None;
-        self.walls.for_each_in_box(&bounds, |part| {
+        self.walls.for_each_colliding(&bounds, layers, |part| {
             let Some(stop) = self.walls.time_of_impact(part, &all, motion) else { return };
             let order = |stop: &WallImpact<S>| (stop.time, stop.gap);
             if best.as_ref().is_none_or(|best| order(&stop) < order(best)) {
