@@ -7,6 +7,7 @@ mod contacts;
 mod disabling;
 mod input;
 mod interpolation;
+mod layers;
 mod motion;
 mod nasty;
 mod scene;

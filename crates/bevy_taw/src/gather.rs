@@ -10,9 +10,9 @@ use taw::response::Response;
 use taw::world::{self as core, Model};
 
 use crate::components::{
-    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
-    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, SeenMarble, Sleeping,
-    SleepingDisabled, SurfaceMaterial, Velocity, WallState, bits, rotation_bits,
+    AngularVelocity, CollisionLayers, ExternalForce, ExternalImpulse, GravityScale, HalfLength,
+    Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, SeenMarble,
+    Sleeping, SleepingDisabled, SurfaceMaterial, Velocity, WallState, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
@@ -71,6 +71,7 @@ type OptionalComponents<'a> = (
     Option<&'a MarbleIntegrator>,
     Option<&'a MarbleRotation>,
     Option<&'a SleepingDisabled>,
+    Option<&'a CollisionLayers>,
 );
 
 impl SeenMarble {
@@ -86,6 +87,7 @@ impl SeenMarble {
             integrator,
             rotation_model,
             sleeping_disabled,
+            layers,
         ) = optional;
         Self {
             translation: bits(transform.translation),
@@ -100,6 +102,7 @@ impl SeenMarble {
             material: material.map(SurfaceMaterial::bits),
             integrator: integrator.map(|i| **i),
             rotation_model: rotation_model.map(|r| **r),
+            layers: layers.copied().unwrap_or_default(),
             sleeping_disabled: sleeping_disabled.is_some(),
         }
     }
@@ -149,6 +152,7 @@ type WrittenAsleep = (
         Changed<MarbleIntegrator>,
         Changed<MarbleRotation>,
         Changed<SleepingDisabled>,
+        Changed<CollisionLayers>,
     )>,
 );
 
@@ -334,6 +338,7 @@ fn to_core(
         integrator: seen.integrator,
         rotation_model: seen.rotation_model,
         material: material.map(|m| (*m).into()),
+        layers: seen.layers.into(),
         sleeping_disabled: seen.sleeping_disabled,
     }
 }
@@ -411,6 +416,9 @@ fn update(
     }
     if all || seen.integrator != last.integrator {
         set(marbles.set_integrator(id, now.integrator));
+    }
+    if all || seen.layers != last.layers {
+        set(marbles.set_layers(id, now.layers));
     }
     if all || seen.sleeping_disabled != last.sleeping_disabled {
         set(marbles.set_sleeping_disabled(id, now.sleeping_disabled));

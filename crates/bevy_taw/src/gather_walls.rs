@@ -8,7 +8,8 @@ use taw::frame::Pose;
 use taw::world::WallMotion;
 
 use crate::components::{
-    LocalShape, Marble, SurfaceMaterial, Teleport, WallState, Way, bits, rotation_bits,
+    CollisionLayers, LocalShape, Marble, SurfaceMaterial, Teleport, WallState, Way, bits,
+    rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::refusal::{Refusal, Refusals};
@@ -53,11 +54,15 @@ pub fn note_places(
 type WallComponents<'a> = (
     (Entity, &'a Transform, Has<Marble>),
     Ref<'a, Wall>,
-    Option<&'a SurfaceMaterial>,
+    (Option<&'a SurfaceMaterial>, Option<&'a CollisionLayers>),
     &'a mut WallState,
 );
-type WallItem<'a> =
-    ((Entity, &'a Transform, bool), Ref<'a, Wall>, Option<&'a SurfaceMaterial>, Mut<'a, WallState>);
+type WallItem<'a> = (
+    (Entity, &'a Transform, bool),
+    Ref<'a, Wall>,
+    (Option<&'a SurfaceMaterial>, Option<&'a CollisionLayers>),
+    Mut<'a, WallState>,
+);
 
 /// Who was put elsewhere, and who carries whom.
 type Jumps<'w, 's> = (Query<'w, 's, Entity, With<Teleport>>, Query<'w, 's, &'static ChildOf>);
@@ -128,7 +133,7 @@ impl Gathering<'_, '_> {
     /// Takes over one wall. Gives whether it has a row.
     fn take_over(
         &mut self,
-        ((entity, own, is_marble), wall, material, mut state): WallItem,
+        ((entity, own, is_marble), wall, (material, layers), mut state): WallItem,
         place: Option<GlobalTransform>,
         clock: Clock,
     ) -> bool {
@@ -178,6 +183,7 @@ impl Gathering<'_, '_> {
         }
         self.put(entity, state, now, clock);
         self.make_of(entity, state, material);
+        self.put_into_layers(entity, state, layers.copied().unwrap_or_default());
         state.id.is_some()
     }
 
@@ -218,6 +224,16 @@ impl Gathering<'_, '_> {
             }),
         });
         self.refusals.check(Some(entity), put);
+    }
+
+    /// Gives a wall its layers.
+    fn put_into_layers(&mut self, entity: Entity, state: &mut WallState, layers: CollisionLayers) {
+        if let Some(id) = state.id
+            && (state.layers != layers || self.all)
+        {
+            state.layers = layers;
+            self.refusals.check(Some(entity), self.world.walls.set_layers(id, layers.into()));
+        }
     }
 
     /// Gives a wall its material.

@@ -94,9 +94,9 @@ pub use taw;
 /// What nearly every game needs.
 pub mod prelude {
     pub use crate::components::{
-        AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
-        MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
-        SurfaceMaterial, Teleport, Velocity,
+        AngularVelocity, CollisionLayers, ExternalForce, ExternalImpulse, GravityScale, HalfLength,
+        Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping,
+        SleepingDisabled, SurfaceMaterial, Teleport, Velocity,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;

@@ -3,9 +3,9 @@ use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
 
 use crate::components::{
-    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
-    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
-    SurfaceMaterial, Teleport, Velocity,
+    AngularVelocity, CollisionLayers, ExternalForce, ExternalImpulse, GravityScale, HalfLength,
+    Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping,
+    SleepingDisabled, SurfaceMaterial, Teleport, Velocity,
 };
 use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
@@ -101,7 +101,7 @@ impl Plugin for TawPlugin {
         app.register_type::<(Marble, Velocity, AngularVelocity, MarbleMass, GravityScale)>()
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
-            .register_type::<(Wall, Teleport, Sleeping, SleepingDisabled)>()
+            .register_type::<(Wall, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
         observe(app);
@@ -122,6 +122,7 @@ fn observe(app: &mut App) {
         .add_observer(gather::note_lost_component::<MarbleIntegrator>)
         .add_observer(gather::note_lost_component::<MarbleRotation>)
         .add_observer(gather::note_lost_component::<SleepingDisabled>)
+        .add_observer(gather::note_lost_component::<CollisionLayers>)
         .add_observer(gather::note_lost_component::<ChildOf>)
         .add_observer(gather::forget_marble)
         .add_observer(gather::forget_wall)

@@ -7,6 +7,7 @@ use bevy::prelude::*;
 use taw::swarm::{Ball, BallId, Stage, SwarmModel};
 use taw::world::Mass;
 
+use crate::components::CollisionLayers;
 use crate::convert::to_point;
 use crate::diagnostics::StepTimes;
 use crate::refusal::{Refusals, report};
@@ -16,6 +17,7 @@ use crate::snapshot::{RowRemoved, lost_balls};
 /// Marbles in bulk, up to millions, which collide with each other, with walls, and with the
 /// marbles that are entities. How they step is in [`TawSwarmModel`].
 ///
+/// A [`CollisionLayers`] beside it holds for all its balls.
 /// They live in world space; a `Transform` beside this component says nothing. They go when it
 /// goes. With the feature `render`, a camera sees them.
 ///
@@ -36,6 +38,8 @@ pub struct Swarm {
     coming: Vec<Ball>,
     going: Vec<BallId>,
     balls: Vec<BallId>,
+    /// Layers that the balls have.
+    layers: CollisionLayers,
 }
 
 /// What the colour of a marble says.
@@ -170,7 +174,7 @@ pub(crate) struct Owners {
 /// Puts new marbles in, and takes those out that go.
 pub(crate) fn gather(
     mut world: ResMut<TawWorld>,
-    mut swarms: Query<(Entity, &mut Swarm)>,
+    mut swarms: Query<(Entity, &mut Swarm, Option<&CollisionLayers>)>,
     mut owners: ResMut<Owners>,
     model: Res<TawSwarmModel>,
     mut refusals: Refusals,
@@ -180,21 +184,27 @@ pub(crate) fn gather(
         refusals.check(None, world.swarm.set_model(**model));
     }
     if world.just_restored {
-        name_balls(&mut world, &mut swarms, &mut owners, &mut removed);
+        let named = swarms.iter_mut().map(|(entity, swarm, _)| (entity, swarm));
+        name_balls(&mut world, named, &mut owners, &mut removed);
     }
-    for (entity, mut swarm) in &mut swarms {
-        if swarm.coming.is_empty() && swarm.going.is_empty() {
+    for (entity, mut swarm, layers) in &mut swarms {
+        let layers = layers.copied().unwrap_or_default();
+        let moved = swarm.layers != layers || world.just_restored;
+        if swarm.coming.is_empty() && swarm.going.is_empty() && !moved {
             continue;
         }
         let swarm = &mut *swarm;
         let going = std::mem::take(&mut swarm.going);
         refusals.check(Some(entity), world.swarm.remove(&going));
         let coming = std::mem::take(&mut swarm.coming);
+        let old = if moved { 0 } else { swarm.balls.len() };
         let inserted = world.swarm.insert(&coming).map(|balls| {
             owners.note(&world, entity, &balls);
             swarm.balls.extend(balls);
         });
         refusals.check(Some(entity), inserted);
+        swarm.layers = layers;
+        refusals.check(Some(entity), world.swarm.set_layers(&swarm.balls[old..], layers.into()));
     }
 }
 
@@ -212,9 +222,9 @@ impl Owners {
 }
 
 /// Gives swarms the balls that they have in a restored world, and takes out what is nobody's.
-fn name_balls(
+fn name_balls<'a>(
     world: &mut TawWorld,
-    swarms: &mut Query<(Entity, &mut Swarm)>,
+    swarms: impl Iterator<Item = (Entity, Mut<'a, Swarm>)>,
     owners: &mut Owners,
     removed: &mut MessageWriter<RowRemoved>,
 ) {

@@ -246,13 +246,10 @@ fn balls_of_swarms_have_layers() {
                 .collect();
             let reds = world.swarm.insert(&reds).unwrap();
             let blues = world.swarm.insert(&blues).unwrap();
-            for id in &blues {
-                world.swarm.set_layers(*id, CollisionLayers::new(BLUE, BLUE)).unwrap();
-                assert_eq!(world.swarm.layers(*id).unwrap(), CollisionLayers::new(BLUE, BLUE));
-            }
-            for id in &reds {
-                world.swarm.set_layers(*id, CollisionLayers::new(RED, RED | SOLID)).unwrap();
-            }
+            world.swarm.set_layers(&blues, CollisionLayers::new(BLUE, BLUE)).unwrap();
+            let layers = world.swarm.layers(blues[7]).unwrap();
+            assert_eq!(layers, CollisionLayers::new(BLUE, BLUE));
+            world.swarm.set_layers(&reds, CollisionLayers::new(RED, RED | SOLID)).unwrap();
             run(&mut world, 1.5);
             for id in &reds {
                 let at = ball_height(&world, *id);
@@ -277,9 +274,7 @@ fn balls_wake_when_layers_change() {
     cage.unwrap();
     run(&mut world, 4.0);
     let before = ball_height(&world, balls[3]);
-    for ball in &balls[..3] {
-        world.swarm.set_layers(*ball, CollisionLayers::NONE).unwrap();
-    }
+    world.swarm.set_layers(&balls[..3], CollisionLayers::NONE).unwrap();
     run(&mut world, 2.0);
     let after = ball_height(&world, balls[3]);
     assert!((after - 0.5).abs() < 0.02 && before >= 0.49, "{before} {after}");
@@ -305,13 +300,16 @@ fn marbles_and_balls_of_swarms_agree() {
             .swarm
             .insert(&[0.0, 5.0].map(|x| Ball::new(Point3::new(x, 5.0, 0.0), 0.5)))
             .unwrap();
-        world.swarm.set_layers(balls[0], CollisionLayers::new(RED, u32::MAX)).unwrap();
-        world.swarm.set_layers(balls[1], CollisionLayers::new(BLUE, u32::MAX)).unwrap();
+        world.swarm.set_layers(&balls[..1], CollisionLayers::new(RED, u32::MAX)).unwrap();
+        world.swarm.set_layers(&balls[1..], CollisionLayers::new(BLUE, u32::MAX)).unwrap();
         run(&mut world, 0.9);
         assert!(ball_height(&world, balls[0]) > 3.5, "{response:?}");
         assert!(ball_height(&world, balls[1]) < 2.0, "{response:?}");
         // And the other way about while they fall.
         world.swarm.remove(&balls).unwrap();
+        let before = world.clone();
+        assert!(world.swarm.set_layers(&balls, CollisionLayers::NONE).is_err());
+        assert!(world == before);
         let ball = world.swarm.insert(&[Ball::new(Point3::new(5.0, 5.0, 0.0), 0.5)]).unwrap()[0];
         assert_eq!(world.swarm.layers(ball).unwrap(), CollisionLayers::ALL);
         run(&mut world, 0.9);

@@ -52,20 +52,27 @@ impl Swarm {
         self.own_slot(ball).map(|slot| self.surfaces.layers(slot))
     }
 
-    /// Changes the layers of a ball: which walls, marbles and other balls it collides with. All
-    /// balls wake.
+    /// Changes the layers of balls, all or none: which walls, marbles and other balls they collide
+    /// with. If any had others, all balls wake.
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], also for a marble's.
-    pub fn set_layers(&mut self, ball: BallId, layers: CollisionLayers) -> Result<(), Error> {
-        let slot = self.own_slot(ball)?;
-        self.set_layers_of_slot(slot, layers);
+    pub fn set_layers(&mut self, balls: &[BallId], layers: CollisionLayers) -> Result<(), Error> {
+        let slots: Result<Vec<_>, _> = balls.iter().map(|ball| self.own_slot(*ball)).collect();
+        self.set_layers_of_slots(slots?.into_iter().map(|slot| (slot, layers)));
         Ok(())
     }
 
-    /// Changes the layers of a slot.
-    pub(crate) fn set_layers_of_slot(&mut self, slot: u32, layers: CollisionLayers) {
-        if self.surfaces.set_layers(slot, layers) {
+    /// Changes the layers of slots.
+    pub(crate) fn set_layers_of_slots(
+        &mut self,
+        all: impl Iterator<Item = (u32, CollisionLayers)>,
+    ) {
+        let mut changed = false;
+        for (slot, layers) in all {
+            changed |= self.surfaces.set_layers(slot, layers);
+        }
+        if changed {
             self.wake_all(); // one that bore others may be gone for them
             self.forget_contacts();
         }

@@ -172,11 +172,11 @@ impl Swarm {
 
     /// Takes over what changed of bodies, and wakes those.
     pub(crate) fn write_bodies(&mut self, bodies: &[Body]) {
+        self.set_layers_of_slots(bodies.iter().map(|body| (body.slot, body.layers)));
         let (mut resized, mut resurfaced) = (false, false);
         for body in bodies {
             let row = self.ids.rows()[body.slot as usize] as usize;
             resurfaced |= self.surfaces.set(body.slot, body.surface);
-            self.set_layers_of_slot(body.slot, body.layers);
             if body.sleeping_disabled {
                 self.sleepless.insert(body.slot);
             } else {

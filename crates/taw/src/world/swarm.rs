@@ -94,11 +94,12 @@ impl<S: Scalar> World<S> {
     fn sync_proxies(&mut self, dt: f32) -> Result<(), Error> {
         self.insert_missing_bodies()?;
         let (marbles, body_balls) = (&self.marbles, std::mem::take(&mut self.swarm.body_balls));
-        for (marble, ball) in &body_balls {
-            if let (Ok(row), Some(slot)) = (marbles.row(*marble), self.swarm.slot_of(*ball)) {
-                self.swarm.set_layers_of_slot(slot, marbles.layers_of_row(row));
-            }
-        }
+        let slots = &self.swarm;
+        let layers = body_balls.iter().filter_map(|(marble, ball)| {
+            Some((slots.slot_of(*ball)?, marbles.layers_of_row(marbles.row(*marble).ok()?)))
+        });
+        let layers: Vec<_> = layers.collect();
+        self.swarm.set_layers_of_slots(layers.into_iter());
         let proxies = body_balls.iter().filter_map(|(marble, ball)| {
             let row = marbles.row(*marble).ok()?;
             let single = |x: S| (x.as_f64() as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE);

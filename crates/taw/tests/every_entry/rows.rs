@@ -177,6 +177,7 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
         Marble 3 "Marbles::set_rotation": |p, x| p.world.marbles.set_rotation(p.subject, quaternions(x)[p.case]);
         Marble 4 "Marbles::set_angular_velocity": |p, x| { let v = on_axis(p.case, x); p.world.marbles.set_angular_velocity(p.subject, v) };
         Marble 1 "Marbles::set_sleeping_disabled": |p, x| p.world.marbles.set_sleeping_disabled(p.subject, x > zero());
+        Marble 1 "Marbles::set_layers Marble.layers": |p, x| p.world.marbles.set_layers(p.subject, taw::broad::CollisionLayers::new(x.as_f64() as u32, !0));
         Marble 1 "Marbles::set_mass": |p, x| p.world.marbles.set_mass(p.subject, Mass::Kilograms(x));
         Marble 1 "Marbles::set_gravity_scale": |p, x| p.world.marbles.set_gravity_scale(p.subject, x);
         Marble 1 "Marbles::set_damping": |p, x| p.world.marbles.set_damping(p.subject, Damping { linear: x, angular: x });
@@ -320,6 +321,11 @@ fn swarms<S: Scalar>() -> Vec<Row<S>> {
             };
             p.world.swarm.set_material(ball, Some(material)).inspect_err(|_| p.world = before)
         };
+        World 1 "Swarm::set_layers": |p, x| {
+            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
+            p.world.swarm.set_layers(&[ball], taw::broad::CollisionLayers::new(x.as_f64() as u32, !0))
+        };
+        World 1 "Walls::set_layers": |p, x| p.world.walls.set_layers(p.wall, taw::broad::CollisionLayers::new(!0, x.as_f64() as u32));
         World 1 "Swarm::set_gravity_scale": |p, x| {
             let before = p.world.clone();
             let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
