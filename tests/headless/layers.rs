@@ -5,8 +5,14 @@ use bevy_taw::prelude::*;
 
 use crate::scene;
 
-const FLOOR: u32 = 1 << 0;
-const GHOST: u32 = 1 << 1;
+#[derive(PhysicsLayer)]
+enum Layer {
+    Floor,
+    Ghost,
+}
+
+const FLOOR: Layer = Layer::Floor;
+const GHOST: Layer = Layer::Ghost;
 
 fn app(response: Response) -> App {
     let mut app = scene::app();
@@ -30,7 +36,7 @@ fn ghosts_meet_the_floor_and_not_each_other() {
         for entity in &marbles[1..] {
             app.world_mut().entity_mut(*entity).insert(ghost);
         }
-        app.world_mut().entity_mut(floor).insert(CollisionLayers::new(FLOOR, FLOOR | GHOST));
+        app.world_mut().entity_mut(floor).insert(CollisionLayers::new(FLOOR, [FLOOR, GHOST]));
         scene::frames(&mut app, 120);
         // They meet the floor, and are in the same place.
         let apart = height(&app, marbles[1]) - height(&app, marbles[2]);
@@ -59,8 +65,7 @@ fn a_sleeping_marble_wakes_when_its_layers_change() {
     let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
     scene::frames(&mut app, 300);
     assert!(app.world().get::<Sleeping>(marble).is_some());
-    let none = CollisionLayers::new(0, 0);
-    app.world_mut().entity_mut(marble).insert(none);
+    app.world_mut().entity_mut(marble).insert(CollisionLayers::NONE);
     scene::frames(&mut app, 60);
     assert!(height(&app, marble) < -1.0);
     let lower = height(&app, marble);
@@ -74,7 +79,7 @@ fn a_sleeping_marble_wakes_when_its_layers_change() {
 fn the_layers_of_a_swarm_are_those_of_its_balls() {
     let mut app = app(Response::Impulse);
     let floor = scene::floor(&mut app);
-    app.world_mut().entity_mut(floor).insert(CollisionLayers::new(FLOOR, !GHOST));
+    app.world_mut().entity_mut(floor).insert(CollisionLayers::new(FLOOR, !LayerMask::from(GHOST)));
     let balls = |x: f32| vec![Ball::new([x, 1.0, 0.0].into(), 0.5)];
     let solid = app.world_mut().spawn(Swarm::new(balls(0.0))).id();
     let ghosts =
@@ -97,4 +102,14 @@ fn the_layers_of_a_swarm_are_those_of_its_balls() {
         .flat_map(|swarm| app.world().get::<Swarm>(swarm).unwrap().positions(world))
         .collect();
     assert!(heights.len() == 3 && heights.iter().all(|at| at.y < -1.0), "{heights:?}");
+}
+
+#[test]
+fn masks_are_made_of_layers_arrays_and_bits() {
+    assert_eq!(LayerMask::from(GHOST), LayerMask(2));
+    assert_eq!(LayerMask::from([FLOOR, GHOST]), LayerMask(3));
+    assert_eq!(LayerMask::from(&[FLOOR][..]) | GHOST.into(), LayerMask::from(3));
+    assert_eq!(!LayerMask::NONE, LayerMask::ALL);
+    let ghost = CollisionLayers::new(GHOST, FLOOR);
+    assert!(ghost.interacts_with(CollisionLayers::default()) && !ghost.interacts_with(ghost));
 }

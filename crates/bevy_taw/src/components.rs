@@ -7,6 +7,7 @@ use taw::motion::{Integrator, Rotation};
 use taw::response::{Combine, Elasticity, Material};
 use taw::world::{MarbleId, Mass, WallId, WallShape};
 
+use crate::layers::CollisionLayers;
 use crate::reflect::{CombineReflect, IntegratorReflect, RotationReflect};
 
 /// A marble: a ball that moves and collides.
@@ -196,57 +197,6 @@ pub struct MarbleIntegrator(#[reflect(remote = IntegratorReflect)] pub Integrato
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Deref, DerefMut, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
-
-/// Collision layers: those that a marble, a wall or a [`Swarm`](crate::swarm::Swarm) is in, and those
-/// that it collides with, a bit each. Two collide if each is in a layer that the other collides with.
-/// Without this component, something is in all layers and collides with all.
-///
-/// ```
-/// # use bevy::prelude::*;
-/// # use bevy_taw::prelude::*;
-/// const GHOSTS: u32 = 1 << 0;
-/// const FLOOR: u32 = 1 << 1;
-///
-/// fn spawn_ghost(mut commands: Commands) {
-///     // Meets the floor, and no other ghost.
-///     commands.spawn((Marble { radius: 0.5 }, CollisionLayers::new(GHOSTS, FLOOR)));
-/// }
-/// ```
-#[derive(Component, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
-#[reflect(Component, Debug, Default, PartialEq)]
-pub struct CollisionLayers {
-    /// Layers that it is in.
-    pub memberships: u32,
-    /// Layers that it collides with.
-    pub filters: u32,
-}
-
-impl CollisionLayers {
-    /// Layers that it is in, and layers that it collides with.
-    #[must_use]
-    pub const fn new(memberships: u32, filters: u32) -> Self {
-        Self { memberships, filters }
-    }
-
-    /// Returns true if two such colliders collide.
-    #[must_use]
-    pub fn interacts_with(self, other: Self) -> bool {
-        taw::broad::CollisionLayers::from(self).interacts_with(other.into())
-    }
-}
-
-impl Default for CollisionLayers {
-    /// In all layers, and collides with all.
-    fn default() -> Self {
-        Self::new(u32::MAX, u32::MAX)
-    }
-}
-
-impl From<CollisionLayers> for taw::broad::CollisionLayers {
-    fn from(CollisionLayers { memberships, filters }: CollisionLayers) -> Self {
-        Self::new(memberships, filters)
-    }
-}
 
 /// Marker of a marble that sleeps, to read: the plugin adds and removes it after each step.
 ///

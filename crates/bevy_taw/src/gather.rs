@@ -10,12 +10,13 @@ use taw::response::Response;
 use taw::world::{self as core, Model};
 
 use crate::components::{
-    AngularVelocity, CollisionLayers, ExternalForce, ExternalImpulse, GravityScale, HalfLength,
-    Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, SeenMarble,
-    Sleeping, SleepingDisabled, SurfaceMaterial, Velocity, WallState, bits, rotation_bits,
+    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
+    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, SeenMarble, Sleeping,
+    SleepingDisabled, SurfaceMaterial, Velocity, WallState, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
+use crate::layers::CollisionLayers;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::snapshot::{self, RowRemoved};

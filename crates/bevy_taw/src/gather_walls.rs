@@ -8,10 +8,10 @@ use taw::frame::Pose;
 use taw::world::WallMotion;
 
 use crate::components::{
-    CollisionLayers, LocalShape, Marble, SurfaceMaterial, Teleport, WallState, Way, bits,
-    rotation_bits,
+    LocalShape, Marble, SurfaceMaterial, Teleport, WallState, Way, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
+use crate::layers::CollisionLayers;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 use crate::snapshot::{self, RowRemoved};

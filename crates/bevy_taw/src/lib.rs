@@ -73,6 +73,7 @@ pub mod gizmos;
 #[cfg(feature = "trade")]
 pub mod governor;
 pub mod interpolation;
+pub mod layers;
 pub mod messages;
 mod plugin;
 mod reflect;
@@ -94,12 +95,13 @@ pub use taw;
 /// What nearly every game needs.
 pub mod prelude {
     pub use crate::components::{
-        AngularVelocity, CollisionLayers, ExternalForce, ExternalImpulse, GravityScale, HalfLength,
-        Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping,
-        SleepingDisabled, SurfaceMaterial, Teleport, Velocity,
+        AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
+        MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
+        SurfaceMaterial, Teleport, Velocity,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;
+    pub use crate::layers::{CollisionLayers, LayerMask, PhysicsLayer};
     pub use crate::messages::{ContactEnded, ContactOngoing, ContactPair, ContactStarted};
     pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};

@@ -3,12 +3,13 @@ use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
 
 use crate::components::{
-    AngularVelocity, CollisionLayers, ExternalForce, ExternalImpulse, GravityScale, HalfLength,
-    Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping,
-    SleepingDisabled, SurfaceMaterial, Teleport, Velocity,
+    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
+    MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
+    SurfaceMaterial, Teleport, Velocity,
 };
 use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
+use crate::layers::CollisionLayers;
 use crate::messages::{self, Touches};
 use crate::refusal::{self, InputRefused, MarbleStopped, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};

@@ -7,9 +7,9 @@ use bevy::prelude::*;
 use taw::swarm::{Ball, BallId, Stage, SwarmModel};
 use taw::world::Mass;
 
-use crate::components::CollisionLayers;
 use crate::convert::to_point;
 use crate::diagnostics::StepTimes;
+use crate::layers::CollisionLayers;
 use crate::refusal::{Refusals, report};
 use crate::resources::TawWorld;
 use crate::snapshot::{RowRemoved, lost_balls};
