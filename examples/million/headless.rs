@@ -43,7 +43,7 @@ fn pour(options: &Options) -> Result<(), taw::Error> {
         options.marbles,
         options.model().tier,
         options.model().substeps,
-        options.model().threads,
+        options.model().threads_for(options.marbles as usize),
         inserted.as_millis()
     );
     run_and_report(&mut world, options.steps)

@@ -434,13 +434,18 @@ fn every_number_of_every_resource_is_refused_once_or_harmless() {
 #[test]
 fn counts_that_cannot_be_are_refused_once() {
     type Set = fn(&mut World, u32);
-    let rows: [(&str, Set, u32); 4] = [
-        ("substeps", |w, n| w.resource_mut::<TawModel>().substeps = n, 1_000),
-        ("iterations", |w, n| w.resource_mut::<TawModel>().iterations = n, 1_000),
-        ("substeps", |w, n| w.resource_mut::<TawSwarmModel>().substeps = n, 1_000),
-        ("threads", |w, n| w.resource_mut::<TawSwarmModel>().threads = n, SwarmModel::MAX_THREADS),
+    let rows: [(&str, Set, u32, u32); 4] = [
+        ("substeps", |w, n| w.resource_mut::<TawModel>().substeps = n, 1, 1_000),
+        ("iterations", |w, n| w.resource_mut::<TawModel>().iterations = n, 1, 1_000),
+        ("substeps", |w, n| w.resource_mut::<TawSwarmModel>().substeps = n, 1, 1_000),
+        (
+            "threads",
+            |w, n| w.resource_mut::<TawSwarmModel>().threads = n,
+            0,
+            SwarmModel::MAX_THREADS,
+        ),
     ];
-    for (field, set, most) in rows {
+    for (field, set, least, most) in rows {
         for n in [0, 1, most, most + 1, u32::MAX] {
             let (mut app, _) = app(Model::default());
             set(app.world_mut(), n);
@@ -449,7 +454,7 @@ fn counts_that_cannot_be_are_refused_once() {
                 app.update();
                 refused.extend(told(&app));
             }
-            assert_eq!(refused.len(), usize::from(n == 0 || n > most), "{field} = {n}");
+            assert_eq!(refused.len(), usize::from(n < least || n > most), "{field} = {n}");
             assert!(
                 refused
                     .iter()

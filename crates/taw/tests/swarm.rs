@@ -112,7 +112,7 @@ fn threads_and_instructions_change_no_bit() {
             let reference = run(1, SimdLevel::PORTABLE);
             assert!(reference.swarm.rebuilds() > 5);
             for instructions in SimdLevel::available() {
-                for threads in [1, 2, 3, 8] {
+                for threads in [0, 1, 2, 3, 8] {
                     let other = run(threads, instructions);
                     let what = format!("{tier:?}, {threads} threads, {instructions:?}");
                     assert!(other.swarm == reference.swarm, "{what}");

@@ -142,7 +142,7 @@ impl Swarm {
         let none = VelocityChange { slot: 0, change: [0.0; 3] };
         let mut changes = vec![none; rows.len()];
         let parts = DisjointSlice::new(&mut changes);
-        parallel_for_rows(self.model.threads as usize, rows.len(), |slots| {
+        parallel_for_rows(self.scratch.threads, rows.len(), |slots| {
             // SAFETY: each job has its own slots.
             let part = unsafe { parts.part(slots.clone()) };
             for (slot, change) in slots.zip(part) {

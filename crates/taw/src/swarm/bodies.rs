@@ -267,7 +267,7 @@ impl Swarm {
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
         let non_finite = Mutex::new(stopped);
         let chunks = DisjointSlice::new(&mut self.chunks);
-        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             // SAFETY: each thread has its own chunks.
             let chunk = unsafe { &mut *chunks.row(chunk) };
             if chunk.asleep && chunk.read_asleep || !chunk.asleep && dt.is_none() {
@@ -316,7 +316,7 @@ impl Swarm {
         lists.resize_with(chunks + 1, Contacts::default);
         lists.iter_mut().for_each(Contacts::clear);
         let parts = DisjointSlice::new(lists);
-        parallel_for(self.model.threads as usize, chunks + 1, |_, chunk| {
+        parallel_for(self.scratch.threads, chunks + 1, |_, chunk| {
             // SAFETY: each has its own list.
             let list = unsafe { &mut *parts.row(chunk) };
             let (wall_contacts, batches) = match self.chunks.get(chunk..) {

@@ -151,6 +151,8 @@ pub struct Swarm {
 /// Memory that a step writes before it reads it.
 #[derive(Clone, Debug, Default)]
 struct Scratch {
+    /// Number of threads that work on this step.
+    threads: usize,
     /// See [`SolverColumns::backing`](kernels::SolverColumns::backing).
     backing: Vec<Row>,
     /// Rows that would leave their skin in this step.
@@ -438,7 +440,7 @@ impl Swarm {
             return;
         }
         if self.pairs_valid {
-            let (chunks, threads) = (&self.chunks[..], self.model.threads as usize);
+            let (chunks, threads) = (&self.chunks[..], self.scratch.threads);
             self.impulse_cache.keep(chunks, &self.fast_movers, self.at.len(), threads);
         } else {
             self.impulse_cache.forget(self.at.len());

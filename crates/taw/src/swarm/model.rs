@@ -1,8 +1,22 @@
+use std::sync::OnceLock;
+
 use crate::Error;
 use crate::error::within;
 use crate::math::{Point3, Vec3};
 use crate::motion::Mass;
 use crate::response::Material;
+
+/// Number of balls from which on another thread saves more than waking it costs.
+const BALLS_PER_THREAD: usize = 1000;
+
+/// Number of threads of the machine, at most [`SwarmModel::MAX_THREADS`].
+fn machine_threads() -> usize {
+    static THREADS: OnceLock<usize> = OnceLock::new(); // asking the system takes microseconds
+    *THREADS.get_or_init(|| {
+        let threads = std::thread::available_parallelism().map_or(1, usize::from);
+        threads.min(SwarmModel::MAX_THREADS as usize)
+    })
+}
 
 /// Physics of the balls of a swarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
@@ -25,7 +39,8 @@ pub struct SwarmModel {
     /// Into how many equal parts each step is cut, from 1 to 1,000: in the lab's tier, how often
     /// overlapping balls are moved apart.
     pub substeps: u32,
-    /// Number of threads that work on a step at most, from 1 to 64. They change no bit of it.
+    /// Number of threads that work on a step, from 1 to 64, or 0 for as many of the machine's as
+    /// there are balls enough to keep busy. They change no bit of it.
     pub threads: u32,
     /// Material of the balls. Tangential restitution is not modelled, nor in the lab's tier are
     /// friction, restitution, rolling and spinning resistance.
@@ -35,14 +50,12 @@ pub struct SwarmModel {
 }
 
 impl Default for SwarmModel {
-    /// The full tier in two substeps, on all threads that the machine has, with sleep.
+    /// The full tier in two substeps, on as many threads as pay, with sleep.
     fn default() -> Self {
-        let threads =
-            std::thread::available_parallelism().map_or(1, |threads| threads.get() as u32);
         Self {
             tier: Tier::Full,
             substeps: 2,
-            threads: threads.min(Self::MAX_THREADS),
+            threads: 0,
             material: Material::default(),
             sleeps: true,
         }
@@ -57,11 +70,19 @@ impl SwarmModel {
 
     /// This model, if a swarm can step with it.
     pub(super) fn validated(self) -> Result<Self, Error> {
-        let check = |field, count, most| within(field, f64::from(count), 1.0, f64::from(most));
-        check("substeps", self.substeps, Self::MAX_SUBSTEPS)?;
-        check("threads", self.threads, Self::MAX_THREADS)?;
+        within("substeps", f64::from(self.substeps), 1.0, f64::from(Self::MAX_SUBSTEPS))?;
+        within("threads", f64::from(self.threads), 0.0, f64::from(Self::MAX_THREADS))?;
         self.material.validated()?;
         Ok(self)
+    }
+
+    /// Number of threads that work on a step of so many balls.
+    #[must_use]
+    pub fn threads_for(self, balls: usize) -> usize {
+        match self.threads {
+            0 => (balls / BALLS_PER_THREAD).clamp(1, machine_threads()),
+            threads => threads as usize,
+        }
     }
 }
 

@@ -73,6 +73,7 @@ impl Scratch {
             lists,
             chunk_states,
             searches,
+            threads: _,
         } = self;
         (of(backing) + of(leaving) + of(displacements) + of(proxy_rows) + of(saved_proxies))
             + (of(lists) + lists.iter().map(of).sum::<usize>())

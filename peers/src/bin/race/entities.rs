@@ -9,7 +9,7 @@ use bevy_taw::prelude::*;
 
 use crate::scene::Scene;
 use crate::taw::{model, swarm_model};
-use crate::{DT, Engine, FRICTION, RESTITUTION, THREADS};
+use crate::{AUTOMATIC, DT, Engine, FRICTION, RESTITUTION, THREADS};
 
 pub struct Entities {
     app: App,
@@ -32,7 +32,7 @@ impl Entities {
         app.insert_resource(Time::<Fixed>::from_duration(step));
         app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
         app.insert_resource(TawModel(model(Response::SoftStep)));
-        app.insert_resource(TawSwarmModel(swarm_model(Tier::Full, 2, THREADS, scene.sleeps)));
+        app.insert_resource(TawSwarmModel(swarm_model(Tier::Full, 2, AUTOMATIC, scene.sleeps)));
         app.finish();
         app.update();
         let world = app.world_mut();

@@ -24,6 +24,8 @@ use crate::scene::Scene;
 const DT: f32 = 1.0 / 60.0;
 const MEASURED: u32 = 60;
 const THREADS: usize = 2;
+/// taw takes as many threads as pay: of a larger machine, give it two (`taskset -c 0,1`).
+const AUTOMATIC: usize = 0;
 const FRICTION: f32 = 0.3;
 const RESTITUTION: f32 = 0.2;
 
@@ -94,13 +96,13 @@ const ENGINES: [Entry; 12] = [
     ("Box3D (boxddd 0.4.0)", 100_000, |scene| Box::new(box3d::Box3d::new(scene).expect("a world"))),
     ("Avian 0.7.0", 10_000, |scene| Box::new(avian::Avian::new(scene))),
     ("taw entities in Bevy, SoftStep", 100_000, |scene| Box::new(entities::Entities::new(scene))),
-    ("taw marbles, SoftStep", 100_000, |scene| marbles(scene, Response::SoftStep, THREADS)),
+    ("taw marbles, SoftStep", 100_000, |scene| marbles(scene, Response::SoftStep, AUTOMATIC)),
     ("taw marbles, SoftStep, one thread", 100_000, |scene| marbles(scene, Response::SoftStep, 1)),
-    ("taw marbles, Impulse", 10_000, |scene| marbles(scene, Response::Impulse, THREADS)),
-    ("taw marbles, EventDriven", 1_000, |scene| marbles(scene, Response::EventDriven, THREADS)),
-    ("taw swarm, full", 1_000_000, |scene| swarm(scene, Tier::Full, THREADS)),
+    ("taw marbles, Impulse", 10_000, |scene| marbles(scene, Response::Impulse, AUTOMATIC)),
+    ("taw marbles, EventDriven", 1_000, |scene| marbles(scene, Response::EventDriven, AUTOMATIC)),
+    ("taw swarm, full", 1_000_000, |scene| swarm(scene, Tier::Full, AUTOMATIC)),
     ("taw swarm, full, one thread", 1_000_000, |scene| swarm(scene, Tier::Full, 1)),
-    ("taw swarm, lab", 1_000_000, |scene| swarm(scene, Tier::Lab, THREADS)),
+    ("taw swarm, lab", 1_000_000, |scene| swarm(scene, Tier::Lab, AUTOMATIC)),
     ("taw swarm, lab, one thread", 1_000_000, |scene| swarm(scene, Tier::Lab, 1)),
 ];
 

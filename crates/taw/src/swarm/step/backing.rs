@@ -28,7 +28,7 @@ impl Swarm {
         }
         let (chunks, backing, at) =
             (&self.chunks, DisjointSlice::new(&mut self.scratch.backing), &self.at[..]);
-        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             // Those of a ball follow each other.
             for of_ball in chunks[chunk].wall_contacts.chunk_by(|a, b| a.row == b.row) {
                 let (mut most, mut behind, mut last) = (0.0, [0.0; 4], &of_ball[0]);

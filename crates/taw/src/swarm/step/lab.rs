@@ -40,7 +40,7 @@ impl Swarm {
     /// those that leave their skin.
     fn predict(&mut self, dt: f32, gravity: Vec3<f32>) {
         let (change, time) = (row(gravity * dt), [dt, dt, dt, 0.0]);
-        let (simd_level, threads) = (self.simd_level, self.model.threads as usize);
+        let (simd_level, threads) = (self.simd_level, self.scratch.threads);
         let mut leaving = std::mem::take(&mut self.scratch.leaving);
         leaving.clear();
         // More than this are too many.
@@ -161,7 +161,7 @@ impl Swarm {
 
     /// Makes velocities what positions became.
     fn update_velocities(&mut self, dt: f32) {
-        let (simd_level, threads) = (self.simd_level, self.model.threads as usize);
+        let (simd_level, threads) = (self.simd_level, self.scratch.threads);
         let per_second = [1.0 / dt, 1.0 / dt, 1.0 / dt, 0.0];
         let velocity = DisjointSlice::new(&mut self.velocity);
         let skin_left = DisjointSlice::new(&mut self.skin_left);

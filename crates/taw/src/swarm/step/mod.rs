@@ -89,6 +89,7 @@ impl Swarm {
     /// Begins a step: gravity and walls. Returns whether these changed.
     fn begin(&mut self, gravity: Vec3<f32>, walls: &dyn StaticGeometry, identity: u64) -> bool {
         self.stopped.clear();
+        self.scratch.threads = self.model.threads_for(self.at.len());
         self.steps_since_build = (self.steps_since_build + 1).min(SOON);
         if self.gravity != Some(gravity) {
             self.gravity = Some(gravity);
@@ -224,7 +225,7 @@ impl Swarm {
     /// Forgets who was borne by a wall two steps ago.
     fn age_marks(&mut self) {
         let (chunks, spin) = (&self.chunks, DisjointSlice::new(&mut self.spin));
-        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             if !chunks[chunk].asleep {
                 // SAFETY: the rows of the chunk.
                 for spin in unsafe { spin.part(chunks[chunk].own_rows()) } {
@@ -311,7 +312,7 @@ impl Swarm {
         let (at, skin_left) =
             (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
         let chunks = &self.chunks;
-        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             let chunk = &chunks[chunk];
             for contact in chunk.wall_contacts.iter().filter(|_| !chunk.asleep) {
                 let row = contact.row as usize;
@@ -333,7 +334,7 @@ impl Swarm {
         };
         let chunks = DisjointSlice::new(&mut self.chunks);
         let least = -self.skin;
-        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             // SAFETY: each thread has its own chunks, and their rows.
             let chunk = unsafe { &mut *chunks.row(chunk) };
             if chunk.asleep {
@@ -428,7 +429,7 @@ impl Swarm {
             backing: DisjointSlice::new(&mut self.scratch.backing),
         };
         let chunks = DisjointSlice::new(&mut self.chunks);
-        let (threads, states) = (self.model.threads as usize, &mut self.scratch.chunk_states);
+        let (threads, states) = (self.scratch.threads, &mut self.scratch.chunk_states);
         parallel_for_odd_even(threads, chunks.len(), states, |chunk| {
             // SAFETY: nobody works on a neighbour meanwhile. Of the next one, only what nobody
             // changes is read.

@@ -29,7 +29,7 @@ impl Swarm {
         let velocity = DisjointSlice::new(&mut self.velocity);
         let spin = DisjointSlice::new(&mut self.spin);
         let chunks = DisjointSlice::new(&mut self.chunks);
-        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             // SAFETY: each thread has its own chunks, and their rows.
             let chunk = unsafe { &mut *chunks.row(chunk) };
             if chunk.asleep {

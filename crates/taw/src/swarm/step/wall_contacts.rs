@@ -50,7 +50,7 @@ impl Swarm {
             },
         };
         let chunks = DisjointSlice::new(&mut self.chunks);
-        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             // SAFETY: its own.
             let chunk = unsafe { &mut *chunks.row(chunk) };
             if chunk.asleep {
@@ -126,7 +126,7 @@ impl Swarm {
         };
         let (at, skin_left) =
             (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
-        parallel_for(self.model.threads as usize, count, |_, chunk| {
+        parallel_for(self.scratch.threads, count, |_, chunk| {
             // SAFETY: each thread has its own chunks, and their rows.
             let chunk = unsafe { &mut *chunks.row(chunk) };
             chunk.caught = false;
@@ -174,7 +174,7 @@ impl Swarm {
             gravity: self.gravity.unwrap_or_else(Vec3::zero),
         };
         let chunks = DisjointSlice::new(&mut self.chunks);
-        parallel_for(self.model.threads as usize, chunks.len(), |_, chunk| {
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             // SAFETY: its own.
             let chunk = unsafe { &mut *chunks.row(chunk) };
             if chunk.asleep || !which(chunk) {
