@@ -140,6 +140,15 @@ struct Storm {
     /// Only models whose name contains this: impulse/swept.
     #[arg(long, value_name = "PATTERN", default_value = "")]
     only: String,
+    /// Length of all steps, in s, ms or µs [default: random]
+    #[arg(long, value_parser = duration)]
+    step: Option<f64>,
+    /// Substeps of all marbles [default: random]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    substeps: Option<u32>,
+    /// Iterations of all marbles [default: random]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
+    iterations: Option<u32>,
     /// Where failures go, as files for --replay [default: nowhere]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
@@ -290,6 +299,8 @@ fn print_advice(file: &Path, wish: Requirements) -> Result<ExitCode, Box<dyn Err
 }
 
 fn storm(options: Storm) -> Result<ExitCode, Box<dyn Error>> {
+    let Storm { step, substeps, iterations, .. } = options;
+    let settings = storm::Settings { step, substeps, iterations };
     if let Some(name) = options.replay {
         let case = match std::fs::read_to_string(&name) {
             Ok(text) => Case::from_text(&text)?,
@@ -297,7 +308,7 @@ fn storm(options: Storm) -> Result<ExitCode, Box<dyn Error>> {
                 name.parse().map_err(|other| format!("{name}: {error}, and {other}"))?,
             ),
         };
-        let text = storm::replay(&case);
+        let text = storm::replay(&settings.apply(case));
         print!("{text}");
         let held = text.ends_with("all held\n");
         return Ok(if held { ExitCode::SUCCESS } else { ExitCode::FAILURE });
@@ -306,6 +317,7 @@ fn storm(options: Storm) -> Result<ExitCode, Box<dyn Error>> {
         scenes: options.scenes,
         seed: options.seed,
         only: options.only,
+        settings,
         jobs: options.jobs,
         out: options.out,
         shrink: !options.no_shrink,

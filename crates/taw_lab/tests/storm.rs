@@ -7,8 +7,8 @@ use std::time::Duration;
 use taw::prelude::*;
 use taw::scene::{MarbleDesc, MaterialDesc, Scene, ShapeDesc, WallDesc};
 use taw_lab::storm::{
-    Bench, Body, Case, Finding, Invariant, Kind, Name, Plan, Pulse, Snapshot, generate, run,
-    shrink_by, weather,
+    Bench, Body, Case, Finding, Invariant, Kind, Name, Plan, Pulse, Settings, Snapshot, generate,
+    run, shrink_by, weather,
 };
 use taw_lab::trade::trace::ScalarType;
 
@@ -340,6 +340,7 @@ fn the_same_name_is_the_same_scene_and_has_the_same_verdict() {
         scenes: 36,
         seed: 2,
         only: String::new(),
+        settings: Settings::default(),
         jobs,
         out: None,
         shrink: false,
@@ -348,6 +349,17 @@ fn the_same_name_is_the_same_scene_and_has_the_same_verdict() {
     };
     let failures = |jobs| weather(&plan(jobs), |_, _| ()).unwrap().failures;
     assert_eq!(failures(1), failures(3));
+}
+
+#[test]
+fn settings_take_the_place_of_random_ones_and_keep_the_duration() {
+    let case = generate(Name { kind: Kind::Impulse, seed: 1, number: 4 });
+    assert_eq!(Settings::default().apply(case.clone()), case);
+    let settings = Settings { step: Some(0.5 * case.step), substeps: Some(7), iterations: Some(3) };
+    let other = settings.apply(case.clone());
+    assert_eq!((other.model.substeps, other.model.iterations), (7, 3));
+    assert_eq!((other.step, other.steps), (0.5 * case.step, 2 * case.steps));
+    assert_eq!(other.scene, case.scene);
 }
 
 #[test]

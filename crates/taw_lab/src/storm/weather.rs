@@ -15,6 +15,30 @@ use super::report::Tally;
 use super::run::{Failure, Pulse, Verdict, run, run_for, trail};
 use super::shrink::shrink;
 
+/// Settings that all cases have instead of random ones.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Settings {
+    /// Length of a step, in seconds.
+    pub step: Option<f64>,
+    /// From 1 to 1,000.
+    pub substeps: Option<u32>,
+    /// From 1 to 1,000.
+    pub iterations: Option<u32>,
+}
+
+impl Settings {
+    /// The case with these settings, and of the same duration.
+    #[must_use]
+    pub fn apply(self, mut case: Case) -> Case {
+        let step = self.step.unwrap_or(case.step);
+        case.steps = (f64::from(case.steps) * case.step / step).round().max(1.0) as u32;
+        case.step = step;
+        case.model.substeps = self.substeps.unwrap_or(case.model.substeps);
+        case.model.iterations = self.iterations.unwrap_or(case.model.iterations);
+        case
+    }
+}
+
 /// Plan of a storm.
 #[derive(Clone, Debug)]
 pub struct Plan {
@@ -24,6 +48,8 @@ pub struct Plan {
     pub seed: u64,
     /// Only kinds whose name contains this.
     pub only: String,
+    /// Settings of all scenes.
+    pub settings: Settings,
     /// Number of scenes run in parallel.
     pub jobs: usize,
     /// Where failures go, if anywhere.
@@ -76,7 +102,8 @@ pub fn weather(plan: &Plan, mut progress: impl FnMut(u64, u64)) -> std::io::Resu
     let names = Arc::new(names(plan));
     let next = Arc::new(AtomicUsize::new(0));
     let (send, receive) = mpsc::channel();
-    let work = || hire(Arc::clone(&names), Arc::clone(&next), send.clone());
+    let settings = plan.settings;
+    let work = || hire(Arc::clone(&names), settings, Arc::clone(&next), send.clone());
     let mut workers: Vec<Worker> = (0..plan.jobs.max(1)).map(|_| work()).collect();
     let mut verdicts = BTreeMap::new();
     while verdicts.len() < names.len() {
@@ -107,6 +134,7 @@ pub fn weather(plan: &Plan, mut progress: impl FnMut(u64, u64)) -> std::io::Resu
 
 fn hire(
     names: Arc<Vec<Name>>,
+    settings: Settings,
     next: Arc<AtomicUsize>,
     send: mpsc::Sender<(Name, Verdict)>,
 ) -> Worker {
@@ -117,7 +145,7 @@ fn hire(
             if let Ok(mut at) = at.lock() {
                 *at = Some(*name);
             }
-            let verdict = run(&generate(*name), &pulse);
+            let verdict = run(&settings.apply(generate(*name)), &pulse);
             // Whoever was given up as stuck has been replaced.
             let mine = at.lock().is_ok_and(|mut at| at.take().is_some());
             if !mine || send.send((*name, verdict)).is_err() {
@@ -167,7 +195,7 @@ fn write(
     out: &std::path::Path,
 ) -> std::io::Result<PathBuf> {
     let invariant = failure.finding.invariant;
-    let mut case = Case { broke: Some(invariant), ..generate(name) };
+    let mut case = Case { broke: Some(invariant), ..plan.settings.apply(generate(name)) };
     case.steps = failure.step.max(1);
     // A hung case cannot be run again.
     if plan.shrink && invariant != Invariant::Ends {
