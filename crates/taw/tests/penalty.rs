@@ -222,3 +222,88 @@ fn a_turning_wall_drives_a_ball_no_faster_than_itself() {
         }
     }
 }
+
+/// A ball over a ring of balls that nothing moves, which are `spread` times as far from each other
+/// as if they touched.
+fn over_a_ring(law: ContactLaw, count: usize, spread: f64, own: Material<f64>) -> World<f64> {
+    let mut world = world::<f64>(law, Integrator::SemiImplicitEuler);
+    let (radius, half_angle) = (0.4, std::f64::consts::PI / count as f64);
+    let ring = radius * spread / half_angle.sin();
+    for i in 0..count {
+        let (sin, cos) = (2.0 * half_angle * i as f64).sin_cos();
+        let fixed = ball([ring * cos, 0.0, ring * sin], radius, own);
+        let mass = Mass::Kilograms(1e12);
+        world.marbles.insert(Marble { mass, gravity_scale: 0.0, ..fixed }).unwrap();
+    }
+    let height = (4.0 * radius * radius - ring * ring).sqrt();
+    world.marbles.insert(ball([0.0, height, 0.0], radius, own)).unwrap();
+    world
+}
+
+#[test]
+fn a_ball_on_three_or_four_others_sinks_in_no_further_than_the_docs_say() {
+    for law in BOTH {
+        for restitution in [0.0, 0.3] {
+            for friction in [0.0, 0.5] {
+                for (count, spread, dt) in
+                    [(3, 1.0, 60.0), (4, 1.0, 60.0), (3, 1.0, 30.0), (4, 1.1, 60.0), (3, 1.4, 60.0)]
+                {
+                    let dt = 1.0 / dt;
+                    let mut world =
+                        over_a_ring(law, count, spread, material(restitution, friction));
+                    for _ in 0..(10.0 / dt) as u32 {
+                        world.step(dt).unwrap();
+                    }
+                    let [other, ball] = [0, count].map(|row| world.marbles.position()[row]);
+                    let distance = (ball - other).magnitude();
+                    // Each contact bears its part of the weight along the line of centers.
+                    let borne = distance / (count as f64 * ball.y);
+                    // And hertz: 3 mm at 1e7 Pa, in series with what the substep allows.
+                    let allowed = 26.0 * borne * 9.81 * dt * dt + 3e-3;
+                    assert!(
+                        0.8 - distance < allowed && ball.y > 0.0,
+                        "{law:?}, e {restitution}, µ {friction}, {count} at {spread}, {dt} s: \
+                         {} m, not {allowed}, at {ball:?}",
+                        0.8 - distance
+                    );
+                    // Hertz's spring is soft where dashpots bear nearly all: a swing in what gravity
+                    // adds in a substep.
+                    let swing = fastest(&world);
+                    assert!(swing < 0.05 * 9.81 * dt, "{law:?}: {swing} m/s");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn what_friction_holds_on_a_slope_stays_there() {
+    for law in BOTH {
+        for integrator in Integrator::ALL {
+            for rolling_resistance in [None, Some(0.5)] {
+                let mut world = world::<f64>(law, integrator);
+                // A ball that cannot turn, or one whose rolling is resisted.
+                let rotation =
+                    if rolling_resistance.is_some() { Rotation::Dynamic } else { Rotation::None };
+                world.set_model(Model { rotation, ..world.model() }).unwrap();
+                world.set_gravity(Vec3::new(3.0, -9.0, 0.0)).unwrap();
+                floor(&mut world);
+                let rolling_resistance = rolling_resistance.unwrap_or(0.0);
+                let own = Material { rolling_resistance, ..material(0.3, 0.8) };
+                world.marbles.insert(ball([0.0, 0.1, 0.0], 0.1, own)).unwrap();
+                let mut run = || {
+                    for _ in 0..600 {
+                        world.step(1.0 / 60.0).unwrap();
+                    }
+                    world.marbles.position()[0].x
+                };
+                let (before, after) = (run(), run());
+                // A swing of the contact's springs dies away; gravity alone would go 150 m.
+                assert!(
+                    (after - before).abs() < 1e-6,
+                    "{law:?}, {integrator:?}: {before}, {after}"
+                );
+            }
+        }
+    }
+}

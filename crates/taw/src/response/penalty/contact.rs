@@ -117,10 +117,6 @@ impl<S: Scalar> PenaltyContact<S> {
         marbles.relative_velocity(body_a, b, arms, normal, surface_velocity)
     }
 
-    pub fn separation_speed(&self, marbles: &SolverBodies<S>) -> S {
-        self.relative_velocity(marbles).dot(self.normal)
-    }
-
     /// Books the energy of an impulse, after all were applied.
     pub fn record_energy(
         &self,

@@ -25,14 +25,14 @@ use crate::response::{
 };
 use contact::{PenaltyContact, active_contact};
 use law::Springs;
-use mass_split::ContactLoad;
+use mass_split::{ContactLoad, damped_fraction};
 
 /// Contact history: state of a contact's springs from the last substep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SpringHistory<S> {
     key: ContactKey,
-    /// Tangential displacement of the two points while they stick, in metres, and its stiffness, in
-    /// N/m.
+    /// Tangential displacement of the two points while they stick, in metres, at the position of the
+    /// next kick, and its stiffness, in N/m.
     tangent_displacement: Vec3<S>,
     tangent_stiffness: S,
     /// Energy stored in the normal spring, in joules.
@@ -76,8 +76,12 @@ struct ContactForce<S> {
     /// Half of the velocity fraction that the dashpots take in a substep, normal and tangential.
     half_damping: [S; 2],
     history: SpringHistory<S>,
-    /// Factor on its forces by mass splitting.
-    force_scale: S,
+    /// Factor on the forces of its springs by mass splitting.
+    spring_scale: S,
+    /// Factors on those of its dashpots, normal and tangential.
+    dashpot_scales: [S; 2],
+    /// Number of contacts of each body.
+    counts: [S; 2],
     /// Normal inverse mass if all contacts of both bodies push equally, in 1/kg.
     shared_inverse_mass: S,
     /// Impulse of the normal spring, all of the normal impulse, and the total, in N s.
@@ -114,8 +118,8 @@ pub(crate) fn apply_penalty_forces<S: Scalar>(
     for force in &mut forces {
         force.solve(settings.dt);
     }
-    for force in &forces {
-        force.apply(marbles, work.as_deref_mut());
+    for ContactForce { contact, impulse, .. } in &forces {
+        contact.apply_impulse(marbles, *impulse);
     }
     update_positions(settings, marbles, &forces, &start);
     if let Some(work) = work.as_deref_mut() {
@@ -123,15 +127,23 @@ pub(crate) fn apply_penalty_forces<S: Scalar>(
             contact.record_energy(marbles, *impulse, work);
         }
     }
-    let separation_speeds: Vec<_> =
-        forces.iter().map(|p| p.contact.separation_speed(marbles)).collect();
+    // After friction has turned the marbles: what it adds in a substep is resisted in the same one.
+    for force in &mut forces {
+        force.solve_rolling(marbles);
+    }
+    for force in &forces {
+        force.apply_rolling(marbles, work.as_deref_mut());
+    }
+    let velocities: Vec<_> = forces.iter().map(|p| p.contact.relative_velocity(marbles)).collect();
     let ending: Vec<_> = forces
         .iter()
-        .zip(&separation_speeds)
-        .map(|(force, separation_speed)| force.ends(settings, marbles, *separation_speed))
+        .zip(&velocities)
+        .map(|(force, velocity)| force.ends(settings, marbles, velocity.dot(force.contact.normal)))
         .collect();
-    for ((force, separation_speed), ends) in forces.iter_mut().zip(separation_speeds).zip(ending) {
-        let Some(history) = force.next_history(separation_speed) else { continue };
+    for ((force, velocity), ends) in forces.iter_mut().zip(velocities).zip(ending) {
+        let separation_speed = velocity.dot(force.contact.normal);
+        let tangent_way = velocity.reject_from(force.contact.normal) * settings.dt;
+        let Some(history) = force.next_history(separation_speed, tangent_way) else { continue };
         if ends {
             force.history = history;
             force.apply_last_impulse(settings, marbles, separation_speed, work.as_deref_mut());
@@ -197,25 +209,33 @@ fn update_positions<S: Scalar>(
     }
 }
 
-/// Sets the force scale of each contact by mass splitting.
+/// Sets the factors of each contact by mass splitting.
 fn split_masses<S: Scalar>(marbles: &SolverBodies<S>, forces: &mut [ContactForce<S>], dt: S) {
-    let mut loads = vec![ContactLoad::none(S::zero()); marbles.velocity.len()];
+    let mut loads = vec![ContactLoad::none(); marbles.velocity.len()];
     for ContactForce { contact, springs, half_damping, .. } in forces.iter() {
-        let load = ContactLoad::of(contact, springs, dt, *half_damping);
-        contact.a.into_iter().chain([contact.b]).for_each(|row| loads[row].add(&load));
+        let load = |body| ContactLoad::of(contact, springs, dt, *half_damping, body);
+        contact.a.into_iter().for_each(|row| loads[row].add(&load(0)));
+        loads[contact.b].add(&load(1));
     }
     for force in forces {
         let contact = &force.contact;
-        let alone = contact.inverse_effective_mass();
-        let of = |row: Option<usize>| row.map_or(ContactLoad::none(S::zero()), |row| loads[row]);
+        let own = ContactLoad::of(contact, &force.springs, dt, force.half_damping, 1);
+        let of = |row: Option<usize>| row.map_or(ContactLoad::none(), |row| loads[row]);
         let [a, b] = [of(contact.a), of(Some(contact.b))];
+        let alone = contact.inverse_effective_mass();
         let [first, second] = contact.inverse_effective_masses;
-        let split = first.scaled(a.split_count()).plus(second.scaled(b.split_count()));
-        let fraction = |alone: S, split: S| alone / split;
-        force.force_scale =
-            fraction(alone.normal, split.normal).min(fraction(alone.tangent, split.tangent));
+        let springs = first.scaled(a.spring_split()).plus(second.scaled(b.spring_split()));
+        force.spring_scale = (alone.normal / springs.normal).min(alone.tangent / springs.tangent);
+        let [a_splits, b_splits] = [a.dashpot_splits(&own), b.dashpot_splits(&own)];
+        let fraction = |alone: S, [first, second]: [S; 2], at: usize| {
+            alone / (first * a_splits[at] + second * b_splits[at])
+        };
+        force.dashpot_scales = [
+            fraction(alone.normal, [first.normal, second.normal], 0),
+            fraction(alone.tangent, [first.tangent, second.tangent], 1),
+        ];
         force.shared_inverse_mass = first.normal * a.count + second.normal * b.count;
-        force.angular_impulse = contact.rolling_impulse(marbles, [a.count, b.count]);
+        force.counts = [a.count, b.count];
     }
 }
 
@@ -231,7 +251,7 @@ impl<S: Scalar> ContactForce<S> {
         let known = before.binary_search_by_key(&contact.key, |history| history.key);
         let history = known.map(|at| before[at]);
         let mut springs = settings.law.springs(&contact, contact.penetration, dt);
-        let mut damped_time = S::one();
+        let (mut damped_time, mut tangent_displacement) = (S::one(), Vec3::zero());
         if history.is_err() && separation_speed < S::zero() {
             // New contact: the dashpot acts since the contact began, after the last kick, and for
             // half of the time to the next one, at half of the penetration of then.
@@ -240,6 +260,11 @@ impl<S: Scalar> ContactForce<S> {
             let middle =
                 settings.law.springs(&contact, damped_time * substep * S::from_f64(0.5), dt);
             (springs.damping, springs.tangent_damping) = (middle.damping, middle.tangent_damping);
+            tangent_displacement = contact.relative_velocity.reject_from(contact.normal)
+                * (contact.penetration / -separation_speed).min(dt);
+        }
+        if contact.material.friction == S::zero() {
+            (springs.tangent_stiffness, springs.tangent_damping) = (S::zero(), S::zero());
         }
         // Half of the step by the velocity before, half by that after; a dashpot stops motion, but
         // never reverses it.
@@ -252,7 +277,7 @@ impl<S: Scalar> ContactForce<S> {
         .map(|damping| damping.min(S::one()));
         let history = history.unwrap_or(SpringHistory {
             key: contact.key,
-            tangent_displacement: Vec3::zero(),
+            tangent_displacement,
             tangent_stiffness: S::zero(),
             stored_energy: S::zero(),
             separation_speed,
@@ -264,7 +289,9 @@ impl<S: Scalar> ContactForce<S> {
             springs,
             half_damping,
             history,
-            force_scale: S::one(),
+            spring_scale: S::one(),
+            dashpot_scales: [S::one(); 2],
+            counts: [zero; 2],
             shared_inverse_mass: zero,
             spring_impulse: zero,
             normal_impulse: zero,
@@ -275,7 +302,7 @@ impl<S: Scalar> ContactForce<S> {
 
     /// Solves for the impulses of a substep of `dt` seconds.
     fn solve(&mut self, dt: S) {
-        let PenaltyContact { normal, relative_velocity, material, curvature, .. } = self.contact;
+        let PenaltyContact { normal, relative_velocity, material, .. } = self.contact;
         let separation_speed = relative_velocity.dot(normal);
         [self.spring_impulse, self.normal_impulse] =
             self.normal_impulses(self.springs.elastic_force, separation_speed, dt);
@@ -284,7 +311,7 @@ impl<S: Scalar> ContactForce<S> {
         // The tangential displacement rotates with the contact plane.
         let previous = self.history.tangent_displacement;
         let mut tangent_displacement = previous - normal * previous.dot(normal);
-        let tangent_stiffness = self.springs.tangent_stiffness * self.force_scale;
+        let tangent_stiffness = self.springs.tangent_stiffness * self.spring_scale;
         if tangent_stiffness > self.history.tangent_stiffness
             && self.history.tangent_stiffness > S::zero()
         {
@@ -292,7 +319,6 @@ impl<S: Scalar> ContactForce<S> {
             // absorbed.
             tangent_displacement *= self.history.tangent_stiffness / tangent_stiffness;
         }
-        tangent_displacement += tangent_velocity * dt;
         let half_damping = self.half_damping[1];
         let impulse_per_displacement = tangent_stiffness * dt / (S::one() + half_damping);
         if impulse_per_displacement > S::zero() {
@@ -300,30 +326,35 @@ impl<S: Scalar> ContactForce<S> {
             tangent_displacement =
                 tangent_displacement.clamp_length(limit / impulse_per_displacement);
         }
-        let dashpot = S::from_f64(2.0) * half_damping * self.force_scale
+        let dashpot = damped_fraction(half_damping) * self.dashpot_scales[1]
             / self.contact.inverse_effective_mass().tangent;
-        let spring_and_dashpot = tangent_displacement * impulse_per_displacement
-            + tangent_velocity * (dashpot / (S::one() + half_damping));
+        let spring_and_dashpot =
+            tangent_displacement * impulse_per_displacement + tangent_velocity * dashpot;
         let tangent_impulse = (-spring_and_dashpot).clamp_length(limit);
         self.history.tangent_displacement =
             if is_finite(tangent_displacement) { tangent_displacement } else { Vec3::zero() };
         self.history.tangent_stiffness = tangent_stiffness;
         self.impulse = normal * self.normal_impulse + tangent_impulse;
+    }
+
+    /// Solves for the angular impulse of rolling and torsional friction.
+    fn solve_rolling(&mut self, marbles: &SolverBodies<S>) {
+        let PenaltyContact { normal, material, curvature, .. } = self.contact;
         let lever = self.normal_impulse / curvature;
         let limits = [material.rolling_resistance * lever, material.spinning_resistance * lever];
-        let wanted = std::mem::replace(&mut self.angular_impulse, Vec3::zero());
+        let wanted = self.contact.rolling_impulse(marbles, self.counts);
         solve_rolling(&mut self.angular_impulse, wanted, normal, limits);
     }
 
     /// Normal impulses in a substep: of the spring, and of spring and dashpot; in N s.
     fn normal_impulses(&self, elastic_force: S, separation_speed: S, dt: S) -> [S; 2] {
         let [half_damping, _] = self.half_damping;
-        let fraction = self.force_scale / (S::one() + half_damping);
-        let dashpot =
-            S::from_f64(2.0) * half_damping / self.contact.inverse_effective_mass().normal;
-        let dashpot_impulse = -dashpot * separation_speed * fraction;
-        let slowed_speed =
-            separation_speed + self.shared_inverse_mass * dashpot_impulse.max(S::zero());
+        let damped = damped_fraction(half_damping);
+        let dashpot_impulse = -separation_speed * damped * self.dashpot_scales[0]
+            / self.contact.inverse_effective_mass().normal;
+        // All dashpots together slow an approach by no more than its own would.
+        let slowed_speed = separation_speed.max(separation_speed * (S::one() - damped));
+        let fraction = self.spring_scale / (S::one() + half_damping);
         let spring_impulse =
             (elastic_force * dt * fraction).min(self.max_spring_impulse(slowed_speed));
         [spring_impulse, (spring_impulse + dashpot_impulse).max(S::zero())]
@@ -346,8 +377,8 @@ impl<S: Scalar> ContactForce<S> {
         self.contact.curvature.recip()
     }
 
-    fn apply(&self, marbles: &mut SolverBodies<S>, work: Option<&mut EnergyLedger>) {
-        self.contact.apply_impulse(marbles, self.impulse);
+    /// Applies the angular impulse.
+    fn apply_rolling(&self, marbles: &mut SolverBodies<S>, work: Option<&mut EnergyLedger>) {
         if self.angular_impulse.is_zero() {
             return;
         }
@@ -411,12 +442,15 @@ impl<S: Scalar> ContactForce<S> {
     }
 
     /// History for the next substep, if it is finite.
-    fn next_history(&self, separation_speed: S) -> Option<SpringHistory<S>> {
+    fn next_history(&self, separation_speed: S, tangent_way: Vec3<S>) -> Option<SpringHistory<S>> {
         let mean_speed = (self.history.separation_speed + separation_speed) * S::from_f64(0.5);
         let stored_energy =
             (self.history.stored_energy - self.spring_impulse * mean_speed).max(S::zero());
-        let history = SpringHistory { stored_energy, separation_speed, ..self.history };
+        let tangent_displacement = self.history.tangent_displacement + tangent_way;
+        let history =
+            SpringHistory { tangent_displacement, stored_energy, separation_speed, ..self.history };
         let known = history.stored_energy.is_finite() && history.separation_speed.is_finite();
-        (known && history.tangent_stiffness.is_finite()).then_some(history)
+        (known && history.tangent_stiffness.is_finite() && is_finite(tangent_displacement))
+            .then_some(history)
     }
 }
