@@ -1,9 +1,11 @@
 //! Forces that grow with the overlap: what they give back, what they bear, and that they make
 //! nothing from nothing.
 
-use cgmath::{EuclideanSpace, InnerSpace, Zero};
+use cgmath::{EuclideanSpace, InnerSpace, One, Zero};
+use taw::math::Quat;
 use taw::prelude::*;
 use taw::response::Elasticity;
+use taw::shape::Obb;
 
 const BOTH: [ContactLaw; 2] = [ContactLaw::SpringDashpot, ContactLaw::HertzMindlin];
 const INTEGRATORS: [Integrator; 3] =
@@ -304,6 +306,27 @@ fn what_friction_holds_on_a_slope_stays_there() {
                     "{law:?}, {integrator:?}: {before}, {after}"
                 );
             }
+        }
+    }
+}
+
+#[test]
+fn a_ball_that_sinks_beyond_the_middle_of_a_thin_wall_comes_back_on_its_side() {
+    for law in BOTH {
+        for detection in [Detection::Discrete, Detection::Swept] {
+            let mut world = world::<f64>(law, Integrator::SemiImplicitEuler);
+            world.set_model(Model { detection, ..world.model() }).unwrap();
+            let center = Point3::new(0.0, -0.005, 0.0);
+            let sheet = Obb::new(center, Quat::one(), Vec3::new(0.5, 0.005, 0.5));
+            world.walls.insert(sheet.unwrap()).unwrap();
+            let start = ball([0.0, 0.2, 0.0], 0.1, material(0.9, 0.5));
+            // 33 mm in a substep, so 170 mm deep by 16 of them in a collision: beyond the middle.
+            let id = world.marbles.insert(Marble { velocity: Vec3::new(0.0, -8.0, 0.0), ..start });
+            for _ in 0..240 {
+                world.step(1.0 / 240.0).unwrap();
+            }
+            let ball = world.marbles.get(id.unwrap()).unwrap();
+            assert!(ball.position.y > 0.0, "{law:?}, {detection:?}: {:?}", ball.position);
         }
     }
 }

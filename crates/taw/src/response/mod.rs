@@ -72,8 +72,11 @@ pub enum Response {
     /// For engineers (with [`ContactLaw::HertzMindlin`]), and to see why games do without: a marble
     /// penetrates as far as the stiffness allows, and a stiffer contact needs shorter substeps. A
     /// contact that bears m times its marble's weight by [`ContactLaw::SpringDashpot`] penetrates
-    /// by 26 m g dt², for substeps of dt. No contact releases more energy than it absorbed, and
-    /// penetration from the start separates at one radius per second at most.
+    /// by about 26 m g dt² at most, for substeps of dt, and a collision at v m/s by up to 5 v dt: a
+    /// marble for which either is more than its radius falls through what it lies on or hits. One
+    /// that sinks in beyond the middle of a thin wall comes back on the side that it came from. No
+    /// contact releases more energy than it absorbed, and penetration from the start separates at
+    /// one radius per second at most.
     Penalty(ContactLaw),
     /// Event-driven: collisions in the order of time, each with its own normal at its own time of
     /// impact, thousands in one substep if need be. Nothing tunnels at any speed, and bounces lose

@@ -38,8 +38,8 @@ pub struct Model {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Detection {
     /// Discrete collision detection at the end of each substep. Marbles that move by more than
-    /// their radii in it may tunnel through each other and through thin walls. (Half-spaces are
-    /// solid behind.)
+    /// their radii in it may tunnel through each other, and by more than half of their radii
+    /// through thin walls. (Half-spaces are solid behind.)
     Discrete,
     /// Continuous collision detection (CCD) within each substep, so that nothing tunnels. Marbles
     /// that move against each other or a wall by more than half of their radius in a substep stop

@@ -1,11 +1,8 @@
 //! Mass splitting: the contacts of one marble share its mass.
 
-use cgmath::{Matrix3, SquareMatrix, Zero};
-
 use super::contact::PenaltyContact;
 use super::law::Springs;
 use crate::math::Scalar;
-use crate::response::InverseEffectiveMass;
 
 /// Stiffness and damping demand of a marble's contacts in a substep.
 ///
@@ -18,48 +15,32 @@ use crate::response::InverseEffectiveMass;
 /// bear what lies on them.
 #[derive(Clone, Copy)]
 pub(super) struct ContactLoad<S> {
-    /// Fraction of the velocity that the dashpots take in a substep, by direction: the sum of f n nᵀ
-    /// of normal ones, and of the part of tangential ones that does not turn the marble. More than
-    /// one would reverse it.
-    directed_damping: Matrix3<S>,
-    /// Sum of the fractions, normal or tangential, whatever the directions.
+    /// Fraction of the velocity that all dashpots take in a substep; more than one would reverse
+    /// it.
     damping: S,
     /// Stiffness of the springs, as (ω dt)².
     stiffness: S,
     /// Number of contacts.
     pub count: S,
-    /// A capsule turns by normal impulses too, so that directions alone do not tell how its
-    /// contacts share it.
-    has_capsule: bool,
 }
 
 impl<S: Scalar> ContactLoad<S> {
     pub fn none() -> Self {
-        let zero = S::zero();
-        Self {
-            directed_damping: Matrix3::zero(),
-            damping: zero,
-            stiffness: zero,
-            count: zero,
-            has_capsule: false,
-        }
+        Self { damping: S::zero(), stiffness: S::zero(), count: S::zero() }
     }
 
     pub fn add(&mut self, other: &Self) {
-        self.directed_damping += other.directed_damping;
         self.damping += other.damping;
         self.stiffness += other.stiffness;
         self.count += other.count;
-        self.has_capsule |= other.has_capsule;
     }
 
-    /// Demand of a contact on one of its bodies, the first or the second.
+    /// Demand of one contact, normal and tangential.
     pub fn of(
         contact: &PenaltyContact<S>,
         springs: &Springs<S>,
         dt: S,
         half_damping: [S; 2],
-        body: usize,
     ) -> Self {
         let inverse_mass = contact.inverse_effective_mass();
         let limits = [
@@ -72,17 +53,7 @@ impl<S: Scalar> ContactLoad<S> {
         let total = |[normal, tangent]: [S; 2]| {
             if contact.has_capsule { normal + tangent } else { normal.max(tangent) }
         };
-        let InverseEffectiveMass { normal, tangent } = contact.inverse_effective_masses[body];
-        let across = if tangent > S::zero() { damping[1] * normal / tangent } else { S::zero() };
-        let n = contact.normal;
-        let along = Matrix3::from_cols(n * n.x, n * n.y, n * n.z);
-        Self {
-            directed_damping: along * (damping[0] - across) + Matrix3::from_value(across),
-            damping: total(damping),
-            stiffness: total(stiffness),
-            count: S::one(),
-            has_capsule: contact.has_capsule,
-        }
+        Self { damping: total(damping), stiffness: total(stiffness), count: S::one() }
     }
 
     /// Number of marbles that one is split into for its springs, at least one.
@@ -93,17 +64,9 @@ impl<S: Scalar> ContactLoad<S> {
         S::one().max(self.stiffness / S::from_f64(RESOLVED))
     }
 
-    /// Number of marbles that one is split into for the dashpots of a contact of this demand,
-    /// normal and tangential, at least one.
-    pub fn dashpot_splits(&self, own: &Self) -> [S; 2] {
-        let all = S::one().max(self.damping);
-        if self.has_capsule {
-            return [all; 2];
-        }
-        // Tangential dashpots turn the marble, too: what others have in common with them is counted
-        // twice, so that all together stay stable.
-        let normal = S::one().max(largest_eigenvalue(self.directed_damping));
-        [normal, normal.max(self.damping + (self.damping - own.damping))]
+    /// Number of marbles that one is split into for its dashpots, at least one.
+    pub fn dashpot_split(&self) -> S {
+        S::one().max(self.damping)
     }
 }
 
@@ -112,19 +75,10 @@ pub(super) fn damped_fraction<S: Scalar>(half_damping: S) -> S {
     half_damping * S::from_f64(2.0) / (S::one() + half_damping)
 }
 
-/// Largest eigenvalue of a symmetric matrix (Smith 1961).
-fn largest_eigenvalue<S: Scalar>(matrix: Matrix3<S>) -> S {
-    let number = S::from_f64;
-    let mean = matrix.trace() / number(3.0);
-    let rest = matrix - Matrix3::from_value(mean);
-    let spread = ((rest * rest).trace() / number(6.0)).max(S::zero()).sqrt();
-    if !(spread > S::zero()) {
-        return mean;
-    }
-    let cosine = (rest * spread.recip()).determinant() * number(0.5);
-    let cosine = cosine.max(-S::one()).min(S::one());
-    let angle = (S::one() - cosine * cosine).sqrt().atan2_portable(cosine) / number(3.0);
-    mean + spread * number(2.0) * angle.sin_cos_portable().1
+/// Fraction of a spring's impulse that its own dashpot, which acts half by the velocity before and
+/// half by that after, leaves of it.
+pub(super) fn undamped_fraction<S: Scalar>(damped_fraction: S) -> S {
+    S::one() - damped_fraction * S::from_f64(0.5)
 }
 
 /// Square of π/4.

@@ -25,12 +25,15 @@ use crate::response::{
 };
 use contact::{PenaltyContact, active_contact};
 use law::Springs;
-use mass_split::{ContactLoad, damped_fraction};
+use mass_split::{ContactLoad, damped_fraction, undamped_fraction};
 
 /// Contact history: state of a contact's springs from the last substep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct SpringHistory<S> {
     key: ContactKey,
+    /// Unit normal, and penetration at the position of the next kick, in metres.
+    normal: Vec3<S>,
+    penetration: S,
     /// Tangential displacement of the two points while they stick, in metres, at the position of the
     /// next kick, and its stiffness, in N/m.
     tangent_displacement: Vec3<S>,
@@ -51,6 +54,7 @@ impl<S: Scalar> KeyedByContact for SpringHistory<S> {
     }
 
     fn reverse(&mut self) {
+        self.normal = -self.normal;
         self.tangent_displacement = -self.tangent_displacement;
     }
 }
@@ -76,10 +80,9 @@ struct ContactForce<S> {
     /// Half of the velocity fraction that the dashpots take in a substep, normal and tangential.
     half_damping: [S; 2],
     history: SpringHistory<S>,
-    /// Factor on the forces of its springs by mass splitting.
+    /// Factors on the forces of its springs and of its dashpots by mass splitting.
     spring_scale: S,
-    /// Factors on those of its dashpots, normal and tangential.
-    dashpot_scales: [S; 2],
+    dashpot_scale: S,
     /// Number of contacts of each body.
     counts: [S; 2],
     /// Normal inverse mass if all contacts of both bodies push equally, in 1/kg.
@@ -106,6 +109,7 @@ pub(crate) fn apply_penalty_forces<S: Scalar>(
     mut work: Option<&mut EnergyLedger>,
 ) {
     let before = std::mem::take(histories);
+    keep_sides(settings, marbles, contacts, &before);
     let mut forces = Vec::with_capacity(contacts.len());
     for (index, (a, contact)) in BodyA::of_each(contacts).enumerate() {
         if let Some(contact) = active_contact(settings, marbles, walls, a, contact) {
@@ -142,8 +146,7 @@ pub(crate) fn apply_penalty_forces<S: Scalar>(
         .collect();
     for ((force, velocity), ends) in forces.iter_mut().zip(velocities).zip(ending) {
         let separation_speed = velocity.dot(force.contact.normal);
-        let tangent_way = velocity.reject_from(force.contact.normal) * settings.dt;
-        let Some(history) = force.next_history(separation_speed, tangent_way) else { continue };
+        let Some(history) = force.next_history(settings.dt, velocity) else { continue };
         if ends {
             force.history = history;
             force.apply_last_impulse(settings, marbles, separation_speed, work.as_deref_mut());
@@ -160,6 +163,29 @@ pub(crate) fn apply_penalty_forces<S: Scalar>(
         .mm
         .iter()
         .for_each(|contact| quarantine_if_non_finite(marbles, contact.a, quarantined));
+}
+
+/// Keeps marbles on the side of a wall from which they came: one that has sunk in beyond the middle
+/// of a thin wall is nearer to its other side, where it would be pushed out.
+fn keep_sides<S: Scalar>(
+    settings: &PenaltySettings<S, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    marbles: &SolverBodies<S>,
+    contacts: &mut Contacts<S>,
+    before: &[SpringHistory<S>],
+) {
+    for contact in &mut contacts.wm {
+        let key = ContactKey::with_wall(contact);
+        let Ok(at) = before.binary_search_by_key(&key, |history| history.key) else { continue };
+        let SpringHistory { normal, penetration, .. } = before[at];
+        if normal.dot(contact.normal) > S::from_f64(-0.5) {
+            continue;
+        }
+        let row = contact.b as usize;
+        contact.arms[1] += contact.normal * (marbles.radius[row] * S::from_f64(2.0));
+        contact.normal = -contact.normal;
+        let moved = marbles.velocity[row] * (settings.dt * (settings.position_weight)(row));
+        contact.separation = moved.dot(contact.normal) - penetration;
+    }
 }
 
 /// Lists the impulses in their contacts.
@@ -213,29 +239,23 @@ fn update_positions<S: Scalar>(
 fn split_masses<S: Scalar>(marbles: &SolverBodies<S>, forces: &mut [ContactForce<S>], dt: S) {
     let mut loads = vec![ContactLoad::none(); marbles.velocity.len()];
     for ContactForce { contact, springs, half_damping, .. } in forces.iter() {
-        let load = |body| ContactLoad::of(contact, springs, dt, *half_damping, body);
-        contact.a.into_iter().for_each(|row| loads[row].add(&load(0)));
-        loads[contact.b].add(&load(1));
+        let load = ContactLoad::of(contact, springs, dt, *half_damping);
+        contact.a.into_iter().chain([contact.b]).for_each(|row| loads[row].add(&load));
     }
     for force in forces {
         let contact = &force.contact;
-        let own = ContactLoad::of(contact, &force.springs, dt, force.half_damping, 1);
+        let alone = contact.inverse_effective_mass();
         let of = |row: Option<usize>| row.map_or(ContactLoad::none(), |row| loads[row]);
         let [a, b] = [of(contact.a), of(Some(contact.b))];
-        let alone = contact.inverse_effective_mass();
         let [first, second] = contact.inverse_effective_masses;
-        let springs = first.scaled(a.spring_split()).plus(second.scaled(b.spring_split()));
-        force.spring_scale = (alone.normal / springs.normal).min(alone.tangent / springs.tangent);
-        let [a_splits, b_splits] = [a.dashpot_splits(&own), b.dashpot_splits(&own)];
-        let fraction = |alone: S, [first, second]: [S; 2], at: usize| {
-            alone / (first * a_splits[at] + second * b_splits[at])
+        let fraction = |counts: [S; 2]| {
+            let split = first.scaled(counts[0]).plus(second.scaled(counts[1]));
+            (alone.normal / split.normal).min(alone.tangent / split.tangent)
         };
-        force.dashpot_scales = [
-            fraction(alone.normal, [first.normal, second.normal], 0),
-            fraction(alone.tangent, [first.tangent, second.tangent], 1),
-        ];
-        force.shared_inverse_mass = first.normal * a.count + second.normal * b.count;
+        force.spring_scale = fraction([a.spring_split(), b.spring_split()]);
+        force.dashpot_scale = fraction([a.dashpot_split(), b.dashpot_split()]);
         force.counts = [a.count, b.count];
+        force.shared_inverse_mass = first.normal * a.count + second.normal * b.count;
     }
 }
 
@@ -277,6 +297,8 @@ impl<S: Scalar> ContactForce<S> {
         .map(|damping| damping.min(S::one()));
         let history = history.unwrap_or(SpringHistory {
             key: contact.key,
+            normal: contact.normal,
+            penetration: contact.penetration,
             tangent_displacement,
             tangent_stiffness: S::zero(),
             stored_energy: S::zero(),
@@ -290,7 +312,7 @@ impl<S: Scalar> ContactForce<S> {
             half_damping,
             history,
             spring_scale: S::one(),
-            dashpot_scales: [S::one(); 2],
+            dashpot_scale: S::one(),
             counts: [zero; 2],
             shared_inverse_mass: zero,
             spring_impulse: zero,
@@ -319,15 +341,14 @@ impl<S: Scalar> ContactForce<S> {
             // absorbed.
             tangent_displacement *= self.history.tangent_stiffness / tangent_stiffness;
         }
-        let half_damping = self.half_damping[1];
-        let impulse_per_displacement = tangent_stiffness * dt / (S::one() + half_damping);
+        let damped = damped_fraction(self.half_damping[1]) * self.dashpot_scale;
+        let impulse_per_displacement = tangent_stiffness * dt * undamped_fraction(damped);
         if impulse_per_displacement > S::zero() {
             // Friction limits the tangential displacement.
             tangent_displacement =
                 tangent_displacement.clamp_length(limit / impulse_per_displacement);
         }
-        let dashpot = damped_fraction(half_damping) * self.dashpot_scales[1]
-            / self.contact.inverse_effective_mass().tangent;
+        let dashpot = damped / self.contact.inverse_effective_mass().tangent;
         let spring_and_dashpot =
             tangent_displacement * impulse_per_displacement + tangent_velocity * dashpot;
         let tangent_impulse = (-spring_and_dashpot).clamp_length(limit);
@@ -348,13 +369,13 @@ impl<S: Scalar> ContactForce<S> {
 
     /// Normal impulses in a substep: of the spring, and of spring and dashpot; in N s.
     fn normal_impulses(&self, elastic_force: S, separation_speed: S, dt: S) -> [S; 2] {
-        let [half_damping, _] = self.half_damping;
-        let damped = damped_fraction(half_damping);
-        let dashpot_impulse = -separation_speed * damped * self.dashpot_scales[0]
-            / self.contact.inverse_effective_mass().normal;
+        let alone = damped_fraction(self.half_damping[0]);
+        let damped = alone * self.dashpot_scale;
+        let dashpot_impulse =
+            -separation_speed * damped / self.contact.inverse_effective_mass().normal;
         // All dashpots together slow an approach by no more than its own would.
-        let slowed_speed = separation_speed.max(separation_speed * (S::one() - damped));
-        let fraction = self.spring_scale / (S::one() + half_damping);
+        let slowed_speed = separation_speed.max(separation_speed * (S::one() - alone));
+        let fraction = self.spring_scale * undamped_fraction(damped);
         let spring_impulse =
             (elastic_force * dt * fraction).min(self.max_spring_impulse(slowed_speed));
         [spring_impulse, (spring_impulse + dashpot_impulse).max(S::zero())]
@@ -442,14 +463,25 @@ impl<S: Scalar> ContactForce<S> {
     }
 
     /// History for the next substep, if it is finite.
-    fn next_history(&self, separation_speed: S, tangent_way: Vec3<S>) -> Option<SpringHistory<S>> {
+    fn next_history(&self, dt: S, velocity: Vec3<S>) -> Option<SpringHistory<S>> {
+        let normal = self.contact.normal;
+        let separation_speed = velocity.dot(normal);
         let mean_speed = (self.history.separation_speed + separation_speed) * S::from_f64(0.5);
         let stored_energy =
             (self.history.stored_energy - self.spring_impulse * mean_speed).max(S::zero());
-        let tangent_displacement = self.history.tangent_displacement + tangent_way;
-        let history =
-            SpringHistory { tangent_displacement, stored_energy, separation_speed, ..self.history };
-        let known = history.stored_energy.is_finite() && history.separation_speed.is_finite();
+        let tangent_displacement =
+            self.history.tangent_displacement + velocity.reject_from(normal) * dt;
+        let history = SpringHistory {
+            normal,
+            penetration: self.next_penetration(dt, separation_speed),
+            tangent_displacement,
+            stored_energy,
+            separation_speed,
+            ..self.history
+        };
+        let known = history.penetration.is_finite()
+            && history.stored_energy.is_finite()
+            && history.separation_speed.is_finite();
         (known && history.tangent_stiffness.is_finite() && is_finite(tangent_displacement))
             .then_some(history)
     }

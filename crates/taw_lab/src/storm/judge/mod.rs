@@ -141,6 +141,8 @@ pub struct Rules {
     pub moving: bool,
     /// The softest contact's modulus: `E / (2 (1 − ν²))` of the softest material, in pascals.
     pub modulus: f64,
+    /// Contacts of marbles are looked for at the end of substeps only.
+    pub discrete: bool,
     /// Sag of heaps relative to that of eight iterations.
     pub sag: f64,
 }
@@ -169,6 +171,12 @@ impl Rules {
             integrator: case.model.integrator,
             moving: case.has_moving_walls(),
             modulus: softest(case),
+            // Springs are discrete or swept, and of one kind.
+            discrete: case.model.detection == Detection::Discrete
+                && matches!(
+                    kind,
+                    Kind::Displacement | Kind::Impulse | Kind::SpringDashpot | Kind::HertzMindlin
+                ),
             sag: (8.0 / iterations).max(1.0),
         }
     }
@@ -184,12 +192,6 @@ impl Rules {
     #[must_use]
     pub fn springs(&self) -> bool {
         matches!(self.kind, Kind::SpringDashpot | Kind::HertzMindlin)
-    }
-
-    /// True where contacts are looked for at the end of substeps only.
-    #[must_use]
-    pub fn discrete(&self) -> bool {
-        matches!(self.kind, Kind::Displacement | Kind::Impulse)
     }
 
     /// Returns true if marbles stop at the time of impact and lose the rest of their motion.
@@ -269,7 +271,7 @@ impl Bench {
         findings.extend(self.flight.judge(rules, before, after, &near));
         findings.extend(self.rest.judge(rules, before, after));
         findings.push(overlap::overlap(rules, before, after, [self.begin, self.fastest]));
-        if rules.discrete() {
+        if rules.discrete {
             overlap::forget_the_fast(rules, after, &mut self.outside);
         }
         let closed = |corners| overlap::closed(rules, after, self.fastest, &self.outside, corners);
