@@ -45,7 +45,8 @@ pub enum Detection {
     /// that move against each other or a wall by more than half of their radius in a substep stop
     /// at the time of impact. Resting and sliding marbles continue along the surface; bouncing ones
     /// keep the velocity and normal of that moment, slide on along a wall, and lose the rest of
-    /// their time against another marble. Others lose none. Nearly free where nothing is fast.
+    /// their time against another marble. Others lose none. A wall that moves meets them on its way,
+    /// and carries along what it meets. Nearly free where nothing is fast.
     ///
     /// [`Response::EventDriven`] is always continuous, and loses no time. With
     /// [`Response::Penalty`] only walls stop marbles, once they are half of their radius deep.

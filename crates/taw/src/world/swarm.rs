@@ -4,6 +4,7 @@ use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::MarbleId;
 use super::World;
+use super::continuous::{Frame, RelativePath};
 use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
 use super::walls::{SubShape, Walls};
 use crate::Error;
@@ -150,7 +151,8 @@ impl<S: Scalar> Walls<S> {
         displacement: Vec3<S>,
         reached: &Aabb3<S>,
     ) -> Option<S> {
-        let core = Sphere { radius: sphere.radius * S::from_f64(0.5), ..*sphere };
+        let core = sphere.radius * S::from_f64(0.5);
+        let path = RelativePath { start: sphere.center, displacement, frame: Frame::Standing };
         let deep = sphere.radius * S::from_f64(1.0 - GRAZES);
         let mut first: Option<S> = None;
         self.for_each_colliding(reached, layers, |part| {
@@ -159,8 +161,8 @@ impl<S: Scalar> Walls<S> {
                 let end = distance(sphere.center + displacement);
                 end < deep && end < distance(sphere.center)
             };
-            let passes = ends_in_it() || self.time_of_impact(part, &core, displacement).is_some();
-            let stop = passes.then(|| self.time_of_impact(part, sphere, displacement)).flatten();
+            let passes = ends_in_it() || self.time_of_impact(part, core, &path).is_some();
+            let stop = passes.then(|| self.time_of_impact(part, sphere.radius, &path)).flatten();
             if let Some(stop) = stop {
                 first = Some(first.map_or(stop.time, |time| time.min(stop.time)));
             }
@@ -232,9 +234,10 @@ impl<S: Scalar> StaticGeometry for Walls<S> {
         let time = self.time_of_passage((&sphere, layers), displacement, &reached)?;
         // Before the part that it passes into it may meet another one, of which that is the
         // continuation: then the edge between them is no obstacle.
+        let path = RelativePath { start: center, displacement, frame: Frame::Standing };
         let mut first: Option<(SubShape, S, PointProjection<S>)> = None;
         self.for_each_colliding(&reached, layers, |part| {
-            let Some(stop) = self.time_of_impact(part, &sphere, displacement) else { return };
+            let Some(stop) = self.time_of_impact(part, sphere.radius, &path) else { return };
             if stop.time > time || first.as_ref().is_some_and(|(_, time, _)| stop.time >= *time) {
                 return;
             }

@@ -4,7 +4,7 @@ use std::cmp::{Ordering, Reverse};
 
 use cgmath::{InnerSpace, SquareMatrix, Zero};
 
-use super::walls::{Bend, WallImpact, lost_fraction};
+use super::walls::{Bend, Motion, WallImpact, lost_fraction};
 use super::{Continuous, MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::broad::Period;
 use crate::contact::time_of_impact_sphere_sphere;
@@ -61,6 +61,8 @@ pub(super) struct Path<S> {
     /// Number of bends so far, and whether a wall or another marble caused one.
     bends: u32,
     held_by_wall: bool,
+    /// Motion of the wall that holds it, in metres per substep.
+    carried: Vec3<S>,
     met_marble: bool,
     /// Index of the next bend at a wall.
     next: Option<u32>,
@@ -85,7 +87,7 @@ impl<S: Scalar> World<S> {
         let moved = |row: usize| marbles.position[row] - start[row];
         let fast = |row: usize| length(moved(row)) > smallest * min_motion * S::from_f64(0.5);
         candidates.clear();
-        if !(0..start.len()).any(fast) {
+        if bends.is_empty() && !(0..start.len()).any(fast) {
             return;
         }
         let shrink = S::one() - S::from_f64(OVERLAP);
@@ -97,6 +99,7 @@ impl<S: Scalar> World<S> {
             change: marbles.velocity[row] - velocity[row],
             bends: 0,
             held_by_wall: false,
+            carried: Vec3::zero(),
             met_marble: false,
             next: None,
         }));
@@ -114,17 +117,22 @@ impl<S: Scalar> World<S> {
             self.continuous.collect_grazes(self.marbles.period);
         }
         for row in 0..self.continuous.paths.len() {
-            self.arrive(row);
+            self.arrive(row, dt);
         }
     }
 
     /// Finds candidate pairs and predicts their first meetings; `min_motion` is the fraction of the
     /// smallest radius that twice a motion must exceed.
     fn predict_meetings(&mut self, min_motion: S) {
-        let Continuous { middle, reach, candidates, meetings, paths, .. } = &mut self.continuous;
+        let Continuous { middle, reach, candidates, meetings, paths, bends, .. } =
+            &mut self.continuous;
         let half = S::from_f64(0.5);
         let smallest = self.marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
-        let fast = |row: u32| length(paths[row as usize].motion) > smallest * min_motion * half;
+        let fast = |row: u32| {
+            let path = &paths[row as usize];
+            length(path.motion) > smallest * min_motion * half
+                || path.carried_bends(bends).next().is_some()
+        };
         middle.clear();
         middle.extend(
             paths
@@ -133,9 +141,11 @@ impl<S: Scalar> World<S> {
         );
         reach.clear();
         let reaches = paths.iter().zip(&self.marbles.radius);
-        reach.extend(
-            reaches.map(|(displacement, radius)| *radius + length(displacement.motion) * half),
-        );
+        reach.extend(reaches.zip(&*middle).map(|((path, radius), middle)| {
+            // A wall may carry it farther.
+            let far = |bend: &Bend<S>| length(bend.center + bend.displacement - *middle);
+            *radius + path.carried_bends(bends).map(far).fold(length(path.motion) * half, S::max)
+        }));
         let spheres = (&middle[..], &reach[..]);
         self.images.pairs(&mut self.grid, spheres, S::zero(), self.marbles.period, |a, b| {
             if (fast(a) || fast(b)) && self.marbles.may_collide(a, b) {
@@ -189,6 +199,7 @@ impl<S: Scalar> World<S> {
             change: bend.change * per_substep,
             bends: displacement.bends + 1,
             held_by_wall: true,
+            carried: bend.carried * per_substep,
             next: Some(index + 1).filter(|next| {
                 bends.get(*next as usize).is_some_and(|it| it.stop.row == bend.stop.row)
             }),
@@ -214,20 +225,23 @@ impl<S: Scalar> World<S> {
         let total = inverse_masses[0] + inverse_masses[1];
         let closing = (y.motion - x.motion).dot(normal);
         let again = x.bends.max(y.bends) + 1 < MAX_BENDS;
-        let stopped = [x, y]
-            .iter()
-            .any(|displacement| displacement.met_marble && displacement.motion == Vec3::zero());
+        let stopped = [x, y].iter().any(|displacement| {
+            displacement.met_marble && displacement.motion == displacement.carried
+        });
         let slides = -closing <= resting_approach && again && !stopped && total > S::zero();
+        // A wall that carries one along carries both; of two walls the faster one.
+        let carried = if y.is_carried_slower_than(&x) { x.carried } else { y.carried };
         // Loss of each: its share along the normal, or everything.
-        let lost = |of: [Vec3<S>; 2]| {
+        let lost = |of: [Vec3<S>; 2], kept: [Vec3<S>; 2]| {
             let both = normal * (of[1] - of[0]).dot(normal);
             if slides {
                 [both * (-inverse_masses[0] / total), both * (inverse_masses[1] / total)]
             } else {
-                of
+                [of[0] - kept[0], of[1] - kept[1]]
             }
         };
-        let (motion, change) = (lost([x.motion, y.motion]), lost([x.change, y.change]));
+        let motion = lost([x.motion, y.motion], [carried; 2]);
+        let change = lost([x.change, y.change], [Vec3::zero(); 2]);
         let rest = S::one() - time;
         let end = (self.marbles.velocity[rows[1]] - self.marbles.velocity[rows[0]]).dot(normal);
         let part = lost_fraction((change[1] - change[0]).dot(normal) * rest, end);
@@ -252,6 +266,7 @@ impl<S: Scalar> World<S> {
                 change: displacement.change - change[side],
                 bends: displacement.bends + 1,
                 held_by_wall: displacement.held_by_wall || !slides,
+                carried: if slides { displacement.carried } else { carried },
                 met_marble: true,
                 next: None,
                 ..displacement
@@ -262,7 +277,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Moves a marble whose path has bent to its end, or to the wall that another one pushed it to.
-    fn arrive(&mut self, row: usize) {
+    fn arrive(&mut self, row: usize, dt: S) {
         let Path { sphere, bends, met_marble, .. } = self.continuous.paths[row].at(S::one());
         if bends == 0 {
             return;
@@ -271,11 +286,12 @@ impl<S: Scalar> World<S> {
         let start = Sphere { center: self.continuous.start[row], ..self.marbles.sphere(row) };
         let displacement = sphere.center - start.center;
         let looks = met_marble && !self.walls.are_half_spaces();
-        let stop = if looks { self.first_wall_impact(row, &start, displacement) } else { None };
-        let Some(WallImpact { time, wall, .. }) = stop else { return };
-        self.marbles.position[row] = start.center + displacement * time;
-        let obstacle = Obstacle::Wall(wall);
-        let (displacement, change) = (displacement * (S::one() - time), Vec3::zero());
+        let motion = Motion { displacement, time: dt, carrier: None };
+        let stop = if looks { self.first_wall_impact(row, &start, motion) } else { None };
+        let Some(WallImpact { part, center, .. }) = stop else { return };
+        self.marbles.position[row] = center;
+        let obstacle = Obstacle::Wall(part.wall);
+        let (displacement, change) = (sphere.center - center, Vec3::zero());
         self.continuous
             .stop(StoppedMarble { row: row as u32, obstacle, displacement, change }, Mat3::zero());
     }
@@ -298,6 +314,27 @@ impl<S: Scalar> Path<S> {
     fn at(&self, time: S) -> Self {
         let center = self.sphere.center + self.motion * (time - self.since);
         Self { sphere: Sphere { center, ..self.sphere }, since: time, ..*self }
+    }
+
+    /// Order of the motions of the walls that carry two paths along, total, so that no two marbles
+    /// stop each other again and again.
+    fn is_carried_slower_than(&self, other: &Self) -> bool {
+        let key = |path: &Self| {
+            let Vec3 { x, y, z } = path.carried;
+            [path.carried.magnitude2(), x, y, z]
+        };
+        key(self) < key(other)
+    }
+
+    /// Bends ahead at walls that carry the marble along.
+    fn carried_bends<'a>(
+        &self,
+        bends: &'a [Bend<S>],
+    ) -> impl Iterator<Item = &'a Bend<S>> + use<'a, S> {
+        let ahead = self.next.and_then(|next| bends.get(next as usize..)).unwrap_or_default();
+        let row = ahead.first().map(|bend| bend.stop.row);
+        let its = ahead.iter().take_while(move |bend| Some(bend.stop.row) == row);
+        its.filter(|bend| !bend.carried.is_zero())
     }
 
     /// Periodic image nearest to another path.

@@ -3,6 +3,7 @@
 //! Slower ones that only graze each other within the substep are listed as contacts.
 
 mod marbles;
+mod moving_walls;
 mod walls;
 
 use std::cmp::Reverse;
@@ -12,6 +13,8 @@ use super::{Detection, World};
 use crate::contact::Contact;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
 use marbles::{Meeting, Path};
+use moving_walls::MovingWall;
+pub(super) use moving_walls::{Frame, RelativePath};
 use walls::Bend;
 
 /// Penetration of marbles that are stopped at each other, relative to the sum of their radii: a
@@ -46,6 +49,10 @@ pub(super) struct Continuous<S> {
     paths: Vec<Path<S>>,
     /// Bends at walls by marble, in the order of time.
     bends: Vec<Bend<S>>,
+    /// Walls that move within the substep.
+    moving_walls: Vec<MovingWall<S>>,
+    /// Marbles that were half inside of a wall, sorted.
+    deep: Vec<u32>,
     /// Positions before they follow the velocity changes of contacts, in metres.
     bounced_from: Vec<Point3<S>>,
 }
@@ -144,6 +151,8 @@ impl<S: Scalar> Continuous<S> {
         self.projections.clear();
         self.grazes.clear();
         self.bends.clear();
+        self.moving_walls.clear();
+        self.deep.clear();
         self.bounced_from.clear();
     }
 }

@@ -3,24 +3,45 @@
 use cgmath::{InnerSpace, SquareMatrix, Zero};
 use smallvec::SmallVec;
 
+use super::moving_walls::{Frame, MovingWall, Place, RelativePath, path_bounds};
 use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
+use crate::contact::Contact;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
 use crate::response::Colliders as _;
-use crate::shape::{Aabb, PointProjection, Sphere};
+use crate::shape::{PointProjection, Sphere};
 use crate::world::World;
 use crate::world::walls::{SubShape, Walls};
 
 /// Enough iterations for any wall that a marble does not only graze.
 const MAX_ITERATIONS: u32 = 32;
 
+/// Penetration, as a fraction of the radius, up to which a sphere that touches a rotating wall and
+/// parts may advance: shorter steps would lead nowhere.
+const MAX_OVERSHOOT: f64 = 0.005;
+
 /// Time of impact of a marble with a wall.
 pub(in crate::world) struct WallImpact<S> {
     /// Fraction of the motion.
     pub time: S,
-    pub wall: u32,
+    pub part: SubShape,
     pub normal: Vec3<S>,
+    /// Center there in the frame of the wall, which is that of the world at the end of the substep.
+    pub center: Point3<S>,
+    place: Place<S>,
     /// Separation from the wall there, in metres.
     gap: S,
+}
+
+/// Motion of a marble, and the walls that it may meet.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Motion<S> {
+    /// Displacement, in metres.
+    pub displacement: Vec3<S>,
+    /// Time that it takes until the end of the substep, in seconds; zero for one that takes place
+    /// at its end, where no wall moves.
+    pub time: S,
+    /// Moving wall that carries the marble along, with start and displacement in its frame.
+    pub carrier: Option<(u32, Point3<S>, Vec3<S>)>,
 }
 
 /// Bend of a path at a wall.
@@ -33,24 +54,59 @@ pub(super) struct Bend<S> {
     pub left: S,
     pub displacement: Vec3<S>,
     pub change: Vec3<S>,
+    /// Remaining displacement of the wall there, in metres.
+    pub carried: Vec3<S>,
     /// Projection by which the position still follows the velocity.
     pub along: Mat3<S>,
 }
 
 impl<S: Scalar> World<S> {
     /// Finds the bends of paths that would pass into walls by more than half of the marble's
-    /// radius. Walls count at their current poses; half-spaces are solid and need no such test.
+    /// radius. Half-spaces are solid and need no such test.
     pub(super) fn bend_at_walls(&mut self, dt: S) {
         self.walls.update_tree();
         if self.walls.are_half_spaces() {
             return;
         }
-        let resting_approach = self.resting_approach(dt);
+        MovingWall::list(&self.walls, dt, &mut self.continuous.moving_walls);
+        self.list_deep_marbles();
         for row in 0..self.marbles.len() {
-            let motion = self.marbles.position[row] - self.continuous.start[row];
-            if length(motion) > self.marbles.radius[row] * S::from_f64(MAX_FREE_MOTION) {
-                self.slide_along_walls(row, resting_approach);
+            let Sphere { center, radius } = self.marbles.sphere(row);
+            let start = self.continuous.start[row];
+            let motion = center - start;
+            let is_fast = length(motion) > self.free_motion(row);
+            let moving_walls = &self.continuous.moving_walls;
+            let may_be_met = || {
+                let bounds = path_bounds(start, motion, radius);
+                moving_walls.iter().any(|wall| wall.is_near(&bounds))
+            };
+            if is_fast || (!moving_walls.is_empty() && may_be_met()) {
+                self.slide_along_walls(row, dt);
             }
+        }
+    }
+
+    /// Lists the marbles that a response whose forces need an overlap has let pass half into a wall:
+    /// however slow, they must not come out on the other side.
+    fn list_deep_marbles(&mut self) {
+        if self.model.response.needs_penetration() {
+            let half = S::from_f64(0.5);
+            let radius = self.marbles.radius();
+            let is_deep = |c: &&Contact<S>| {
+                radius.get(c.b as usize).is_some_and(|radius| c.penetration() > *radius * half)
+            };
+            let deep = self.contacts.wm.iter().filter(is_deep).map(|c| c.b);
+            self.continuous.deep.extend(deep);
+            self.continuous.deep.sort_unstable();
+        }
+    }
+
+    /// Motion of a marble against a wall that needs no sweep, in metres: beyond this it may pass.
+    fn free_motion(&self, row: usize) -> S {
+        if self.continuous.deep.binary_search(&(row as u32)).is_ok() {
+            S::zero()
+        } else {
+            self.marbles.radius()[row] * S::from_f64(MAX_FREE_MOTION)
         }
     }
 
@@ -58,27 +114,31 @@ impl<S: Scalar> World<S> {
     /// [`Response::Penalty`](crate::response::Response::Penalty), whose forces need an overlap,
     /// when half of its radius is inside. The remaining motion and velocity change by forces
     /// continue along the surface ("collide and slide"; Fauerby, *Improved collision detection and
-    /// response*, 2003). A marble that approaches faster than `resting_approach`, in metres per
-    /// substep, keeps the velocity of the impact, with which it bounces; if it would slide off the
-    /// wall, it stays, since there it could not bounce. A resting one keeps its velocity: friction
-    /// needs its weight.
-    fn slide_along_walls(&mut self, row: usize, resting_approach: S) {
+    /// response*, 2003), which carries the marble along if it moves. A marble that approaches faster
+    /// than [`World::resting_approach`] keeps the velocity of the impact, with which it bounces; if
+    /// it would slide off the wall, it stays, since there it could not bounce. A resting one keeps
+    /// its velocity: friction needs its weight.
+    fn slide_along_walls(&mut self, row: usize, dt: S) {
+        let resting_approach = self.resting_approach(dt);
         let mut sphere = Sphere { center: self.continuous.start[row], ..self.marbles.sphere(row) };
         let mut displacement = self.marbles.position[row] - sphere.center;
         let mut velocity = self.marbles.velocity[row];
         let mut change = velocity - self.continuous.velocity[row];
         let mut left = S::one();
         let mut surfaces: SmallVec<[Vec3<S>; MAX_BENDS as usize]> = SmallVec::new();
-        while length(displacement) > sphere.radius * S::from_f64(MAX_FREE_MOTION)
-            && let Some(WallImpact { time, wall, normal, .. }) =
-                self.first_wall_impact(row, &sphere, displacement)
+        let mut carrier = None;
+        while surfaces.len() < MAX_BENDS as usize
+            && let Some(WallImpact { time, part, normal, center, place, .. }) = self
+                .first_wall_impact(row, &sphere, Motion { displacement, time: left * dt, carrier })
         {
-            sphere.center += displacement * time;
-            let rest = S::one() - time;
-            (displacement, change, left) = (displacement * rest, change * rest, left * rest);
+            let SubShape { wall, .. } = part;
+            let (rest, carried) = (S::one() - time, place.carried);
+            sphere.center = place.position;
+            // From here on as the wall sees it.
+            (displacement, change, left) = (place.rest, change * rest, left * rest);
             let mut along = along_surfaces(displacement, normal, &surfaces);
             surfaces.push(normal);
-            let there = sphere.center + along * displacement;
+            let there = center + along * displacement;
             let slides_off = || {
                 let wall = &self.walls.shapes()[wall as usize];
                 wall.project_point(there).distance > sphere.radius
@@ -88,7 +148,7 @@ impl<S: Scalar> World<S> {
                 along = Mat3::from_value(S::zero());
             }
             let (slid, kept) = (along * displacement, along * change);
-            let surface = self.walls.surface_velocity(wall as usize, sphere.center);
+            let surface = self.walls.surface_velocity(wall as usize, center);
             let closing = (velocity - surface).dot(normal);
             let part = lost_fraction((change - kept).dot(normal), closing);
             let stop = StoppedMarble {
@@ -98,13 +158,14 @@ impl<S: Scalar> World<S> {
                 change: if fast { (change - kept) * part } else { Vec3::zero() },
             };
             velocity -= stop.change;
-            (displacement, change) = (slid, kept);
-            let center = sphere.center;
+            (displacement, change) = (slid + carried, kept);
+            carrier = Some((wall, center, slid)).filter(|_| !carried.is_zero());
             self.continuous.bends.push(Bend {
                 stop,
-                center,
+                center: sphere.center,
                 left,
                 displacement,
+                carried,
                 change,
                 along: along * rest,
             });
@@ -131,7 +192,8 @@ impl<S: Scalar> World<S> {
                     && closing > gap + sphere.radius * S::from_f64(MAX_FREE_MOTION);
                 passes.then(|| (gap / closing).max(S::zero()))
             });
-            let other = self.first_wall_impact(row, &sphere, displacement).map(|stop| stop.time);
+            let motion = Motion { displacement, time: S::zero(), carrier: None };
+            let other = self.first_wall_impact(row, &sphere, motion).map(|stop| stop.time);
             let first = planes.chain(other).fold(S::one(), S::min);
             if first < S::one() {
                 self.marbles.position[row] = sphere.center + displacement * first;
@@ -144,31 +206,31 @@ impl<S: Scalar> World<S> {
         &self,
         row: usize,
         sphere: &Sphere<S>,
-        motion: Vec3<S>,
+        motion: Motion<S>,
     ) -> Option<WallImpact<S>> {
-        let (half, shrink) = (S::from_f64(0.5), S::one() - S::from_f64(OVERLAP));
-        let (start, more) = (sphere.center, sphere.radius);
-        let more = Vec3::new(more, more, more);
-        let displacement = Aabb { min: start, max: start }
-            .union(&Aabb { min: start + motion, max: start + motion });
-        let bounds = Aabb { min: displacement.min - more, max: displacement.max + more };
+        let half = S::from_f64(0.5);
         // The core (half the radius) decides whether it passes into a wall, the full sphere when:
         // first wherever it touches, so that at the internal edge of two flush parts the one below
         // counts.
-        let core = Sphere { radius: sphere.radius * half, ..*sphere };
-        let layers = self.marbles.layers_of_row(row);
-        let mut passes = false;
-        self.walls.for_each_colliding(&bounds, layers, |part| {
-            passes = passes || self.walls.time_of_impact(part, &core, motion).is_some();
-        });
-        if !passes {
-            return None;
+        let core = sphere.radius * half;
+        let passes = self.first_impact_of(core, (row, sphere, motion))?;
+        if self.model.response.needs_penetration() {
+            return Some(passes);
         }
-        let scale = if self.model.response.needs_penetration() { half } else { shrink };
-        let all = Sphere { radius: sphere.radius * scale, ..*sphere };
+        let all = sphere.radius - sphere.radius * S::from_f64(OVERLAP);
+        Some(self.first_impact_of(all, (row, sphere, motion)).unwrap_or(passes))
+    }
+
+    /// First time of impact of a sphere of this radius, of the parts that are met at once the
+    /// deepest.
+    fn first_impact_of(
+        &self,
+        radius: S,
+        (row, sphere, motion): (usize, &Sphere<S>, Motion<S>),
+    ) -> Option<WallImpact<S>> {
         let mut best: Option<WallImpact<S>> = None;
-        self.walls.for_each_colliding(&bounds, layers, |part| {
-            let Some(stop) = self.walls.time_of_impact(part, &all, motion) else { return };
+        self.for_each_wall_on_path(row, sphere, motion, |part, path| {
+            let Some(stop) = self.walls.time_of_impact(part, radius, path) else { return };
             let order = |stop: &WallImpact<S>| (stop.time, stop.gap);
             if best.as_ref().is_none_or(|best| order(&stop) < order(best)) {
                 best = Some(stop);
@@ -176,38 +238,104 @@ impl<S: Scalar> World<S> {
         });
         best
     }
+
+    /// Visits the sub-shapes of walls that a marble may meet on its path, except half-spaces, and
+    /// the path as each of them sees it.
+    fn for_each_wall_on_path(
+        &self,
+        row: usize,
+        sphere: &Sphere<S>,
+        Motion { displacement, time, carrier }: Motion<S>,
+        mut visit: impl FnMut(SubShape, &RelativePath<S>),
+    ) {
+        let layers = self.marbles.layers_of_row(row);
+        let free = self.free_motion(row);
+        let bounds = path_bounds(sphere.center, displacement, sphere.radius);
+        let moving_walls = if time > S::zero() { &self.continuous.moving_walls[..] } else { &[] };
+        let path = RelativePath { start: sphere.center, displacement, frame: Frame::Standing };
+        let moves = |part: SubShape| {
+            time > S::zero() && self.walls.swept_motion_of_row(part.wall as usize).is_some()
+        };
+        if path.max_length() > free {
+            self.walls.for_each_colliding(&bounds, layers, |part| {
+                if !moves(part) {
+                    visit(part, &path);
+                }
+            });
+        }
+        for wall in moving_walls {
+            let carried = carrier.filter(|(row, ..)| *row == wall.row);
+            let path = match carried {
+                Some((_, start, displacement)) => {
+                    let frame = Frame::Carrying(wall.motion, time);
+                    RelativePath { start, displacement, frame }
+                }
+                None => RelativePath { frame: Frame::Moving(wall.motion, time), ..path },
+            };
+            if (carried.is_some() || wall.is_near(&bounds))
+                && wall.collides(&self.walls, layers)
+                && path.max_length() > free
+            {
+                wall.for_each_near_path(&self.walls, &path, sphere.radius, |part| {
+                    visit(part, &path);
+                });
+            }
+        }
+    }
 }
 
 impl<S: Scalar> Walls<S> {
-    /// Time of impact of a sphere with a sub-shape of a wall by conservative advancement (Mirtich
-    /// 1996).
+    /// Time of impact of a sphere of this radius with a sub-shape of a wall, by conservative
+    /// advancement (Mirtich 1996): as the path is bent where the wall rotates, with a bound of its
+    /// acceleration beside the velocity.
     pub(in crate::world) fn time_of_impact(
         &self,
         part: SubShape,
-        sphere: &Sphere<S>,
-        motion: Vec3<S>,
+        radius: S,
+        path: &RelativePath<S>,
     ) -> Option<WallImpact<S>> {
-        let near = sphere.radius * S::from_f64(OVERLAP);
+        let near = radius * S::from_f64(OVERLAP);
+        let bend = path.max_acceleration();
         let mut time = S::zero();
         let mut last = None;
         for _ in 0..MAX_ITERATIONS {
-            let PointProjection { normal, distance, .. } =
-                self.project_point(part, sphere.center + motion * time);
-            let (gap, closing) = (distance - sphere.radius, -motion.dot(normal));
-            if closing.is_nan() || closing <= S::zero() {
+            let center = path.at(time);
+            let PointProjection { normal, distance, .. } = self.project_point(part, center);
+            let (gap, closing) = (distance - radius, -path.velocity(time, center).dot(normal));
+            if closing.is_nan() || (closing <= S::zero() && bend <= S::zero()) {
                 return None;
             }
-            if gap <= near {
-                return Some(WallImpact { time, wall: part.wall, normal, gap });
+            last = (closing > S::zero()).then_some(WallImpact {
+                time,
+                part,
+                normal,
+                center,
+                place: path.place(time, center),
+                gap,
+            });
+            if gap <= near && last.is_some() {
+                return last;
             }
-            last = Some(WallImpact { time, wall: part.wall, normal, gap });
-            time += gap / closing;
+            // One that touches and parts may come back where the wall rotates.
+            let overshoot = radius * S::from_f64(MAX_OVERSHOOT);
+            let gap = if closing > S::zero() { gap } else { gap.max(overshoot) };
+            time += if bend > S::zero() {
+                let root = (closing * closing + S::from_f64(2.0) * bend * gap).sqrt();
+                // Without cancellation.
+                if closing > S::zero() {
+                    S::from_f64(2.0) * gap / (closing + root)
+                } else {
+                    (root - closing) / bend
+                }
+            } else {
+                gap / closing
+            };
             if time > S::one() {
                 return None;
             }
         }
         // A grazing contact, or within rounding.
-        last.filter(|last| last.gap <= sphere.radius)
+        last.filter(|last| last.gap <= radius)
     }
 }
 
