@@ -241,7 +241,7 @@ fn a_paddle_at_any_speed_passes_through_no_ball() {
 /// A crowd before a plate, which pushes balls into balls.
 fn sweep_up<S: Scalar>(run: u64) -> Result<(), String> {
     let mut draw = Draw(fastrand::Rng::with_seed(run));
-    let response = Response::Impulse;
+    let response = RESPONSES[run as usize % 3];
     let mut world = world::<S>(&mut draw, response);
     let hollow = draw.0.bool();
     let speed = draw.log(5.0, 500.0);

@@ -121,7 +121,7 @@ impl<S: Scalar> World<S> {
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
         self.release_separated_stops();
-        if self.model.response == Response::Impulse {
+        if self.model.response != Response::EventDriven {
             self.continuous.begin_bounces(&self.marbles.position);
         }
         self.contacts.sort();

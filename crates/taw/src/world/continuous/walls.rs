@@ -5,8 +5,7 @@ use smallvec::SmallVec;
 
 use super::moving_walls::{Frame, MovingWall, Place, RelativePath, path_bounds};
 use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
-use crate::contact::Contact;
-use crate::math::{Mat3, Point3, Scalar, Vec3, length};
+use crate::math::{Mat3, Point3, Scalar, Vec3, is_finite_point, length};
 use crate::response::Colliders as _;
 use crate::shape::{PointProjection, Sphere};
 use crate::world::World;
@@ -69,7 +68,7 @@ impl<S: Scalar> World<S> {
             return;
         }
         MovingWall::list(&self.walls, dt, &mut self.continuous.moving_walls);
-        self.list_deep_marbles();
+        self.list_deep_marbles(|_, _| S::zero());
         for row in 0..self.marbles.len() {
             let Sphere { center, radius } = self.marbles.sphere(row);
             let start = self.continuous.start[row];
@@ -86,19 +85,20 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Lists the marbles that a response whose forces need an overlap has let pass half into a wall:
-    /// however slow, they must not come out on the other side.
-    fn list_deep_marbles(&mut self) {
-        if self.model.response.needs_penetration() {
-            let half = S::from_f64(0.5);
-            let radius = self.marbles.radius();
-            let is_deep = |c: &&Contact<S>| {
-                radius.get(c.b as usize).is_some_and(|radius| c.penetration() > *radius * half)
-            };
-            let deep = self.contacts.wm.iter().filter(is_deep).map(|c| c.b);
-            self.continuous.deep.extend(deep);
-            self.continuous.deep.sort_unstable();
-        }
+    /// Lists the marbles that contacts with walls, as they were found, show half inside of one after
+    /// they have moved by `motion` metres: however slow, they must not come out on the other side.
+    fn list_deep_marbles(&mut self, motion: impl Fn(&Self, usize) -> S) {
+        let mut deep = std::mem::take(&mut self.continuous.deep);
+        deep.clear();
+        deep.extend(self.contacts.wm.iter().filter_map(|c| {
+            let radius = *self.marbles.radius().get(c.b as usize)?;
+            let is_deep = c.penetration() > S::zero()
+                && c.penetration() + motion(self, c.b as usize)
+                    > radius * S::from_f64(MAX_FREE_MOTION);
+            is_deep.then_some(c.b)
+        }));
+        deep.sort_unstable();
+        self.continuous.deep = deep;
     }
 
     /// Motion of a marble against a wall that needs no sweep, in metres: beyond this it may pass.
@@ -175,29 +175,66 @@ impl<S: Scalar> World<S> {
     /// Stops marbles at a second wall, half-spaces included, that a bounce would carry them into:
     /// they keep their velocity, and bounce there in the next substep.
     pub(in crate::world) fn stop_bounces_at_walls(&mut self) {
-        for row in 0..self.continuous.bounced_from.len().min(self.marbles.len()) {
-            let sphere =
-                Sphere { center: self.continuous.bounced_from[row], ..self.marbles.sphere(row) };
-            let displacement = self.marbles.position[row] - sphere.center;
-            if length(displacement) <= sphere.radius * S::from_f64(MAX_FREE_MOTION) {
-                continue;
+        let rows = self.continuous.bounced_from.len().min(self.marbles.len());
+        self.list_deep_marbles(|world, row| {
+            let from = world.continuous.bounced_from.get(row);
+            from.map_or_else(S::zero, |from| length(world.marbles.position[row] - *from))
+        });
+        // Forces that grow with the overlap turn everything round by themselves in front of a
+        // half-space.
+        let turns_round = self.model.response.needs_penetration();
+        for row in 0..rows {
+            self.stop_bounce_at_walls(row);
+            if !turns_round {
+                self.push_out_of_half_spaces(row);
             }
-            let layers = self.marbles.layers_of_row(row);
-            let planes = self.walls.colliding_planes(layers).filter_map(|(_, plane)| {
-                let (gap, closing) = (
-                    plane.signed_distance(sphere.center) - sphere.radius,
-                    -displacement.dot(plane.normal()),
-                );
-                let passes = closing > S::zero()
-                    && closing > gap + sphere.radius * S::from_f64(MAX_FREE_MOTION);
-                passes.then(|| (gap / closing).max(S::zero()))
-            });
-            let motion = Motion { displacement, time: S::zero(), carrier: None };
-            let other = self.first_wall_impact(row, &sphere, motion).map(|stop| stop.time);
-            let first = planes.chain(other).fold(S::one(), S::min);
-            if first < S::one() {
-                self.marbles.position[row] = sphere.center + displacement * first;
+        }
+    }
+
+    /// Stops a marble at the first wall that it would pass into by more than half of its radius, on
+    /// the way from where it was before contacts moved it.
+    fn stop_bounce_at_walls(&mut self, row: usize) {
+        let sphere =
+            Sphere { center: self.continuous.bounced_from[row], ..self.marbles.sphere(row) };
+        let displacement = self.marbles.position[row] - sphere.center;
+        if length(displacement) <= self.free_motion(row) {
+            return;
+        }
+        let layers = self.marbles.layers_of_row(row);
+        let planes = self.walls.colliding_planes(layers).filter_map(|(_, plane)| {
+            let (gap, closing) = (
+                plane.signed_distance(sphere.center) - sphere.radius,
+                -displacement.dot(plane.normal()),
+            );
+            let passes =
+                closing > S::zero() && closing > gap + sphere.radius * S::from_f64(MAX_FREE_MOTION);
+            passes.then(|| (gap / closing).max(S::zero()))
+        });
+        let motion = Motion { displacement, time: S::zero(), carrier: None };
+        let other = self.first_wall_impact(row, &sphere, motion).map(|stop| stop.time);
+        let first = planes.chain(other).fold(S::one(), S::min);
+        if first < S::one() {
+            self.marbles.position[row] = sphere.center + displacement * first;
+        }
+    }
+
+    /// Moves a marble that the contacts leave in a half-space by more than half of its radius back
+    /// to its surface: nothing else would stop it there. One whose contact the user has removed
+    /// passes.
+    fn push_out_of_half_spaces(&mut self, row: usize) {
+        let Sphere { mut center, radius } = self.marbles.sphere(row);
+        let from = self.continuous.bounced_from[row];
+        for (wall, plane) in self.walls.colliding_planes(self.marbles.layers_of_row(row)) {
+            let gap = plane.signed_distance(center) - radius;
+            let is_deep = gap.is_finite() && gap < radius * S::from_f64(-MAX_FREE_MOTION);
+            let was_listed = || plane.signed_distance(from) - radius <= self.reach;
+            let is_listed = || self.contacts.wm.iter().any(|c| (c.a, c.b) == (wall, row as u32));
+            if is_deep && (!was_listed() || is_listed()) {
+                center -= plane.normal() * gap;
             }
+        }
+        if is_finite_point(center) {
+            self.marbles.position[row] = center;
         }
     }
 
