@@ -5,6 +5,7 @@ use std::ops::ControlFlow;
 use cgmath::InnerSpace;
 
 use super::toi::{SeparationMotion, time_of_impact_plane};
+use super::wall::distance_rounding;
 use super::{
     EventDriven, EventKind, EventSettings, PRESS_SPEED, REST_SPEED, SEAM_TOLERANCE, SLOP,
     WallCollider,
@@ -264,6 +265,7 @@ impl EventDriven {
         let tolerance = (SEAM_TOLERANCE * ball.radius).max(ball.position_error);
         let nearest = |wall: usize, point: Point3<f64>| self.walls[wall].nearest(point, time);
         let nearest_here = nearest(wall, at);
+        let rounding = distance_rounding(at, nearest_here.distance);
         let mut covered = false;
         self.for_each_wall(row, |other| {
             if !covered
@@ -272,7 +274,11 @@ impl EventDriven {
                 && nearest(other, nearest_here.point).distance <= tolerance
             {
                 let nearest_other = nearest(other, at);
-                let before = (nearest_other.distance, other) < (nearest_here.distance, wall);
+                // Faces that share an edge are equally near, whatever rounding says at the time of
+                // impact of either one; else each might be covered by the other.
+                let difference = nearest_other.distance - nearest_here.distance;
+                let is_tie = difference.abs() <= rounding;
+                let before = if is_tie { other < wall } else { difference < 0.0 };
                 covered = before || nearest(wall, nearest_other.point).distance > tolerance;
             }
         });

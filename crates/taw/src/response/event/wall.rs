@@ -12,6 +12,11 @@ use crate::shape::{Aabb3, BoundedShape, PointProjection, Shape, Triangle};
 /// operations.
 const ROUNDING: f64 = 1e-12;
 
+/// Rounding error of a distance from a point, both in metres.
+pub(super) fn distance_rounding(point: Point3<f64>, distance: f64) -> f64 {
+    ROUNDING * (distance.abs() + point.x.abs().max(point.y.abs()).max(point.z.abs()))
+}
+
 /// Wall, or a sub-shape of one (static or kinematic collider).
 #[derive(Clone, Debug)]
 pub(crate) struct Wall {
@@ -115,7 +120,7 @@ impl Wall {
         if may_be_inside {
             return f64::NEG_INFINITY; // negative if it is inside
         }
-        distance - ROUNDING * (distance + shifted.x.abs().max(shifted.y.abs()).max(shifted.z.abs()))
+        distance - distance_rounding(shifted, distance)
     }
 
     /// Velocity of a point that moves with the wall; zero for a static one.
