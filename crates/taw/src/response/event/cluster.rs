@@ -1,6 +1,6 @@
 //! Contact clusters: balls in contact, as columns that the impulse solver works on.
 
-use cgmath::InnerSpace;
+use cgmath::{InnerSpace, Zero};
 
 use super::wall::MovingWalls;
 use super::{Ball, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
@@ -92,7 +92,10 @@ impl Cluster {
         fill(&mut bodies.position, each().map(|b| b.position));
         fill(&mut self.start, each().map(|b| b.position));
         fill(&mut bodies.velocity, each().map(|b| b.velocity));
-        fill(&mut bodies.spin, each().map(|b| b.spin));
+        // What is frozen stands still with its surface, which would drive the others without losing
+        // anything, and between two that turn against each other a ball has no solution.
+        let spin = |b: &Ball| if b.is_frozen() { Vec3::zero() } else { b.spin };
+        fill(&mut bodies.spin, each().map(spin));
         fill(&mut bodies.radius, each().map(|b| b.radius));
         fill(
             &mut bodies.inverse_mass,

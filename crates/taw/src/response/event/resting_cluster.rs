@@ -303,3 +303,69 @@ impl EventDriven {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Ball, MAX_FREEZES, Wall, WallSource};
+    use super::*;
+    use crate::broad::CollisionLayers;
+    use crate::math::Point3;
+    use crate::response::{BallRotation, Material};
+
+    struct NoWalls;
+
+    impl WallSource for NoWalls {
+        fn planes(&self, _: &mut dyn FnMut(u32)) {}
+
+        fn has_parts(&self) -> bool {
+            false
+        }
+
+        fn near(&self, _: Point3<f64>, _: f64, _: &mut dyn FnMut(u32, u32)) {}
+
+        fn wall(&self, _: u32, _: u32) -> Option<Wall> {
+            None
+        }
+    }
+
+    fn ball(position: [f64; 2], spin: f64, freeze_count: i32) -> Ball {
+        Ball {
+            position: Point3::new(position[0], position[1], 0.0),
+            velocity: Vec3::zero(),
+            spin: Vec3::unit_z() * spin,
+            external_acceleration: Vec3::unit_y() * -9.81,
+            radius: 1.0,
+            inverse_mass: 1.0,
+            material: Material { friction: 0.9, ..Material::default() },
+            layers: CollisionLayers::ALL,
+            rotation: BallRotation::Free,
+            position_error: 1e-9,
+            rotation_increment: Vec3::zero(),
+            trajectory: Trajectory { freeze_count, ..Trajectory::default() },
+        }
+    }
+
+    #[test]
+    fn a_ball_wedged_between_frozen_ones_gains_no_energy_in_any_order() {
+        // Friction holds it in the wedge: the line through the contact points is within both cones.
+        let (x, y) = (f64::sqrt(3.0), 1.0);
+        let frozen = MAX_FREEZES;
+        let light = Ball { velocity: Vec3::unit_y() * -0.1, ..ball([0.0, 0.0], 0.0, 0) };
+        let balls = [ball([-x, -y], -9.0, frozen), light, ball([x, -y], 9.0, frozen)];
+        for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
+            let place = |of: usize| order.iter().position(|ball| *ball == of).unwrap();
+            let mut method =
+                EventDriven { balls: order.map(|i| balls[i]).to_vec(), ..EventDriven::default() };
+            let settings =
+                EventSettings { dt: 0.01, iterations: 8, source: &NoWalls, cost: 0.into() };
+            method.assign_cells(settings.dt);
+            method.find_candidates(&settings);
+            method.rest_cluster([place(0), place(1)], f64::INFINITY, 0.0, &settings);
+            let light = &method.balls[place(1)];
+            assert!(light.trajectory.clustered, "{order:?}");
+            assert!(light.velocity.magnitude() <= 0.1, "{order:?}: {light:?}");
+            assert!(light.spin.magnitude() <= 0.1, "{order:?}: {light:?}");
+            assert!(light.velocity_at(settings.dt).magnitude() <= 0.1, "{order:?}: {light:?}");
+        }
+    }
+}
