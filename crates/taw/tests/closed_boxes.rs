@@ -1,0 +1,110 @@
+//! Contacts push nothing out of closed boxes, of half-spaces or of plates.
+
+use taw::math::Quat;
+use taw::prelude::*;
+use taw::shape::Obb;
+
+const RESPONSES: [Response; 2] = [Response::Displacement, Response::Impulse];
+
+/// Walls of a box of half-spaces, or of plates of this thickness, 2 m wide inside.
+fn closed_box(world: &mut World<f64>, thickness: Option<f64>) {
+    for axis in 0..3 {
+        for side in [-1.0, 1.0] {
+            let mut normal = Vec3::zero();
+            normal[axis] = side;
+            let Some(thickness) = thickness else {
+                world.walls.insert(Plane::new(-normal, -1.0).unwrap()).unwrap();
+                continue;
+            };
+            let mut half = Vec3::new(1.5, 1.5, 1.5);
+            half[axis] = thickness / 2.0;
+            let center = Point3::from_vec(normal * (1.0 + half[axis]));
+            let upright = Quat::new(1.0, 0.0, 0.0, 0.0);
+            world.walls.insert(Obb::new(center, upright, half).unwrap()).unwrap();
+        }
+    }
+}
+
+/// Balls at random places of that box, apart from each other.
+fn crowd(
+    world: &mut World<f64>,
+    random: &mut fastrand::Rng,
+    count: usize,
+    speed: f64,
+    masses: f64,
+) {
+    let mut balls: Vec<(Vec3<f64>, f64)> = Vec::new();
+    for _ in 0..20 * count {
+        let radius = 0.04 * 6.0_f64.powf(random.f64());
+        let mut any = || 2.0 * random.f64() - 1.0;
+        let at = Vec3::new(any(), any(), any()) * (1.0 - radius);
+        let velocity = Vec3::new(any(), any(), any()) * speed;
+        if balls.len() < count && balls.iter().all(|b| (b.0 - at).magnitude() > b.1 + radius) {
+            balls.push((at, radius));
+            let (restitution, friction) = (random.f64(), random.f64());
+            let material = Some(Material { restitution, friction, ..Material::default() });
+            let mass = taw::motion::Mass::Kilograms(masses.powf(random.f64()));
+            let marble = Marble::new(Point3::from_vec(at), radius);
+            world.marbles.insert(Marble { velocity, material, mass, ..marble }).unwrap();
+        }
+    }
+}
+
+/// Runs of each response that get a centre outside of the box.
+fn escapes(runs: usize, run: impl Fn(Response, usize) -> World<f64>) -> [Vec<usize>; 2] {
+    let leaves = |response: Response, number: usize| {
+        let mut world = run(response, number);
+        (0..30).any(|_| {
+            world.step(1.0 / 60.0).unwrap();
+            world.marbles.position().iter().any(|p| p.x.abs().max(p.y.abs()).max(p.z.abs()) > 1.0)
+        })
+    };
+    RESPONSES.map(|response| (0..runs).filter(|number| leaves(response, *number)).collect())
+}
+
+fn in_a_box(response: Response, thickness: Option<f64>) -> World<f64> {
+    let mut world = World::default();
+    let rotation = Rotation::Dynamic;
+    world.set_model(Model { response, rotation, ..Model::default() }).unwrap();
+    closed_box(&mut world, thickness);
+    world
+}
+
+#[test]
+fn crowds_of_unequal_masses_stay_in_a_box_of_half_spaces() {
+    let out = escapes(200, |response, run| {
+        let mut random = fastrand::Rng::with_seed(run as u64);
+        let mut world = in_a_box(response, None);
+        crowd(&mut world, &mut random, 25, 1000.0, 1e9);
+        world
+    });
+    assert!(out.iter().all(Vec::is_empty), "of {RESPONSES:?}: {out:?}");
+}
+
+#[test]
+fn the_fastest_balls_stay_in_a_box_of_plates() {
+    let out = escapes(100, |response, run| {
+        let mut random = fastrand::Rng::with_seed(run as u64);
+        let mut world = in_a_box(response, Some(0.1));
+        crowd(&mut world, &mut random, 4, 1e6, 1.0);
+        world
+    });
+    assert!(out.iter().all(Vec::is_empty), "of {RESPONSES:?}: {out:?}");
+}
+
+#[test]
+fn heaps_stay_in_a_box_of_thin_plates() {
+    let out = escapes(4, |response, run| {
+        let mut random = fastrand::Rng::with_seed(run as u64);
+        let mut world = in_a_box(response, Some(0.02));
+        // Pressed against one of its edges.
+        world.set_gravity(Vec3::new(-100.0, -100.0, 0.0)).unwrap();
+        for i in 0..300 {
+            let [x, y, z] = [i % 8, i / 64, i / 8 % 8].map(|i| 0.23 * f64::from(i) - 0.8);
+            let jitter = 0.01 * random.f64();
+            world.marbles.insert(Marble::new(Point3::new(x + jitter, y, z), 0.1)).unwrap();
+        }
+        world
+    });
+    assert!(out.iter().all(Vec::is_empty), "of {RESPONSES:?}: {out:?}");
+}
