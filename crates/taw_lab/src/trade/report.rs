@@ -228,8 +228,8 @@ fn cheapest<'a>(points: &'a [Point], scenes: &[&str], most: f64) -> Option<(f64,
 const HEAD: &str = "\
 # Error against cost
 
-Written by `taw-lab trade`. Cost is nanoseconds for each marble and simulated second, on the
-machine that it was measured on; error is a part of what the scene is about. Settings are step ×
+Written by `taw-lab trade`. Cost is nanoseconds of one thread's processor time for each marble and
+simulated second, on the machine that it was measured on; error is a part of what the scene is about. Settings are step ×
 substeps × iterations. *Order* is the slope of the error over the length of a substep, with most
 iterations; a curve is *monotone* if a shorter substep is never worse by more than a hundredth.
 Each line of a chart joins the settings of a model that no other one of its settings beats. Compare

@@ -138,25 +138,3 @@ pub async fn record_scene(scene: &Scene, setting: RunConfig, every: f64) -> Opti
         ScalarType::F64 => record(scene.run::<f64>(model).ok()?, times).await,
     }
 }
-
-/// Wall-clock time of a scene in seconds, from the first step to the last one.
-///
-/// # Panics
-/// If the scene cannot be run.
-#[must_use]
-pub fn time(scene: &Scene, setting: RunConfig) -> f64 {
-    match setting.number {
-        ScalarType::F32 => time_in::<f32>(scene, setting),
-        ScalarType::F64 => time_in::<f64>(scene, setting),
-    }
-}
-
-fn time_in<S: Scalar>(scene: &Scene, RunConfig { model, step, .. }: RunConfig) -> f64 {
-    let mut running = scene.run::<S>(model).expect("scenes are checked before");
-    let (dt, steps) = (S::from_f64(step), (scene.duration / step).round() as u64);
-    let begin = Instant::now();
-    for _ in 0..steps {
-        running.step(dt).expect("steps are above zero");
-    }
-    begin.elapsed().as_secs_f64()
-}
