@@ -302,9 +302,9 @@ impl Swarm {
         });
     }
 
-    /// Lists the contacts of bodies that are awake: with a wall or each other, of which the separation is
-    /// at most `reach` metres, or closes within `dt` seconds. In the order of the solver's memory. `lists`
-    /// is scratch.
+    /// Lists the contacts of bodies that are awake, with a wall or each other, of which the separation
+    /// is at most `reach` metres, besides what closes within `dt` seconds. In the order of the solver's
+    /// memory. `lists` is scratch.
     pub(crate) fn list_contacts<S: Scalar>(
         &self,
         marble_of_slot: &[u32],
@@ -349,7 +349,7 @@ impl Swarm {
             marble.filter(|marble| *marble != NO_ROW)
         };
         let is_near = |separation: f32, approach_speed: f32| {
-            separation <= reach || separation < approach_speed * dt
+            separation <= reach + approach_speed.max(0.0) * dt
         };
         let (number, centers) = (|x: f32| S::from_f64(f64::from(x)), [Zero::zero(); 2]);
         for contact in contacts_of_walls {

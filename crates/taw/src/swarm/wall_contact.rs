@@ -125,8 +125,10 @@ impl WallContact {
             }
             Pass::Relax(params) => {
                 let approach_speed = -(xyz(velocity) - self.surface).dot(self.normal);
+                let overlaps = || self.separation(at) <= 0.0;
+                // What comes fast and is not there yet keeps its speed until it is.
                 if self.impulse.normal > 0.0
-                    || self.numbers.restitution == 0.0
+                    || self.numbers.restitution == 0.0 && overlaps()
                     || approach_speed <= params.restitution_threshold
                 {
                     self.push(params.time, None, at, velocity, spin);
@@ -148,15 +150,14 @@ impl WallContact {
         let relative = xyz(velocity) - self.surface;
         let approach_speed = -relative.dot(self.normal);
         let separation = self.separation(at).max(0.0);
-        if self.numbers.restitution == 0.0
-            || approach_speed <= 0.0
-            || separation >= approach_speed * params.time
-        {
+        // Gravity works on the ball as far as it comes nearer. As far as the contact reaches, by the
+        // velocity after gravity: one that only stops the ball would take its bounce.
+        let gravity = -xyz(&params.gravity).dot(self.normal);
+        let nearer = (approach_speed + gravity * params.time) * params.time;
+        if self.numbers.restitution == 0.0 || approach_speed <= 0.0 || separation >= nearer {
             return None;
         }
-        // Gravity works on the ball as far as it comes nearer.
-        let square = approach_speed * approach_speed
-            - 2.0 * xyz(&params.gravity).dot(self.normal) * separation;
+        let square = approach_speed * approach_speed + 2.0 * gravity * separation;
         let meets = square.max(0.0).sqrt();
         if meets <= params.restitution_threshold {
             return None;

@@ -224,7 +224,8 @@ impl Chunk {
             let mut reach = query.skin_left[*row as usize].max(0.0);
             if let Some(displacement) = displacement {
                 self.has_fast = true;
-                reach = displacement.magnitude().min(FAST * ball[3]);
+                let way = displacement.magnitude();
+                reach = if query.whole_way { way } else { way.min(FAST * ball[3]) };
                 along_path(walls, (ball, layers), displacement, &mut visit);
             }
             walls.shapes_at(ball, layers, reach, &mut |part, normal, distance| {
@@ -313,6 +314,8 @@ pub(super) struct WallQuery<'a> {
     pub before: f32,
     /// Lengths of a step and of a substep, in seconds.
     pub times: [f32; 2],
+    /// Surfaces as far away as a fast ball goes are found, too, not only those that it may pass.
+    pub whole_way: bool,
     pub gravity: Vec3<f32>,
 }
 

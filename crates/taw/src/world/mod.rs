@@ -19,6 +19,7 @@ mod model;
 mod narrow_phase;
 mod quarantine;
 mod query;
+mod soft_impacts;
 mod soft_step;
 mod sparse_column;
 mod step;
@@ -86,7 +87,7 @@ pub struct World<S> {
     /// Of a marble among many, those with the 32 that are deepest in it or nearest are listed, of
     /// all that are as large or larger; of a long capsule so many more as it is longer than wide.
     pub contacts: Contacts<S>,
-    /// The collisions of the last step, if the response is event-driven.
+    /// Impacts of the last step, of a response that goes through them by itself.
     impacts: Vec<Impact<S>>,
     grid: Grid,
     images: Images<S>,
@@ -336,8 +337,12 @@ impl<S: Scalar> World<S> {
         self.quarantine.stopped.iter().copied()
     }
 
-    /// The collisions of the last step, in the order of time within each substep. Only
-    /// [`Response::EventDriven`] goes through them one by one.
+    /// Impacts of the last step that are in no list of contacts: those of
+    /// [`Response::EventDriven`], in the order of time within each substep, and of
+    /// [`Response::SoftStep`] those of marbles that came together within the step, at most one for
+    /// each contact, in the order of [`World::contacts`]. (Without restitution an impact may take two
+    /// steps, and is told in both, with the speed that is left.) Other responses list contacts where
+    /// surfaces overlap, and no impacts.
     #[must_use]
     pub fn impacts(&self) -> &[Impact<S>] {
         &self.impacts

@@ -4,6 +4,7 @@
 use cgmath::{EuclideanSpace, Zero};
 
 use super::integrate::StepContext;
+use super::soft_impacts::PredictedImpacts;
 use super::swarm::MAX_COORDINATE;
 use super::{MarbleId, World};
 use crate::Error;
@@ -29,6 +30,7 @@ pub(super) struct SoftStep<S> {
     dt: f32,
     /// Length of the step and identity of the walls for which contacts were found.
     found: Option<(f32, u64)>,
+    pub predicted: PredictedImpacts<S>,
 }
 
 impl<S> Default for SoftStep<S> {
@@ -42,6 +44,7 @@ impl<S> Default for SoftStep<S> {
             lists: Vec::new(),
             dt: 0.0,
             found: None,
+            predicted: PredictedImpacts::default(),
         }
     }
 }
@@ -108,6 +111,7 @@ impl<S: Scalar> World<S> {
         self.swarm.read_bodies(marbles, columns, None, &mut self.stopped);
         let lists = &mut self.soft_step.lists;
         self.swarm.list_contacts(marbles, [reach, dt], lists, &mut self.contacts);
+        self.predict_impacts(S::from_f64(dt.into()));
     }
 
     /// The third verb: moves marbles on in substeps, and solves their contacts.
@@ -129,6 +133,7 @@ impl<S: Scalar> World<S> {
         let columns = self.marbles.body_columns(turns);
         self.swarm.read_bodies(marbles, columns, Some(dt), &mut self.stopped);
         self.quarantine_stopped();
+        self.list_impacts(dt);
         self.roll_what_only_shows();
         self.limits.apply(&mut self.marbles);
         self.audit_after();

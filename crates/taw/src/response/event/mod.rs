@@ -86,7 +86,7 @@ const PART_COST: u64 = 8;
 /// Cost of a time of impact of two balls with different accelerations (a quartic).
 const QUARTIC_COST: u64 = 16;
 
-/// Collision that a substep processed.
+/// Collision that a step processed, of the rows that bodies have at its end.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Impact<S> {
     /// Row of the first body: a marble, or a wall if `on_wall`.

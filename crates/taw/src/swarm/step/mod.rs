@@ -58,7 +58,7 @@ impl Swarm {
         self.end();
     }
 
-    /// Begins a step of bodies and balls: looks who may touch. Returns whether all sleep.
+    /// Begins a step of bodies and balls: finds who may touch within it.
     pub(crate) fn prepare(
         &mut self,
         dt: f32,
@@ -68,6 +68,7 @@ impl Swarm {
     ) {
         let walls_changed = self.begin(gravity, walls, walls_identity);
         self.find_contacts(dt, gravity, walls, walls_changed, &mut |_| ());
+        self.update_contacts_on_the_way(walls, dt);
     }
 
     /// Returns true if pairs are known, so that a step can be finished.

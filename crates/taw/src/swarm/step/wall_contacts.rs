@@ -148,6 +148,18 @@ impl Swarm {
         self.chunks.iter().any(|chunk| chunk.caught)
     }
 
+    /// Finds the contacts of fast balls with all that they may meet in the step of `dt` seconds. (The
+    /// solver finds them anew in each substep, and more exactly.)
+    pub(in crate::swarm) fn update_contacts_on_the_way(
+        &mut self,
+        walls: &dyn StaticGeometry,
+        dt: f32,
+    ) {
+        if walls.has_shapes() {
+            self.update_contacts_of(walls, dt, [dt, dt], |_| true, [true, true]);
+        }
+    }
+
     /// Brings the contacts of some chunks up to date. Walls are where they will be at the end; so
     /// long `before`, in seconds, they were elsewhere.
     pub(in crate::swarm) fn update_wall_contacts(
@@ -157,6 +169,17 @@ impl Swarm {
         times: [f32; 2],
         which: impl Fn(&Chunk) -> bool + Sync,
         only_fast: bool,
+    ) {
+        self.update_contacts_of(walls, before, times, which, [only_fast, false]);
+    }
+
+    fn update_contacts_of(
+        &mut self,
+        walls: &dyn StaticGeometry,
+        before: f32,
+        times: [f32; 2],
+        which: impl Fn(&Chunk) -> bool + Sync,
+        [only_fast, whole_way]: [bool; 2],
     ) {
         let (proxies, rows) = (&self.proxies[..], &self.scratch.proxy_rows[..]);
         let query = WallQuery {
@@ -171,6 +194,7 @@ impl Swarm {
             },
             before,
             times,
+            whole_way,
             gravity: self.gravity.unwrap_or_else(Vec3::zero),
         };
         let chunks = DisjointSlice::new(&mut self.chunks);
