@@ -108,3 +108,22 @@ fn heaps_stay_in_a_box_of_thin_plates() {
     });
     assert!(out.iter().all(Vec::is_empty), "of {RESPONSES:?}: {out:?}");
 }
+
+#[test]
+fn a_marble_of_infinite_mass_goes_through_walls_as_it_is_told() {
+    for response in [Response::Impulse, Response::Penalty(ContactLaw::SpringDashpot)] {
+        for thickness in [None, Some(0.02)] {
+            let mut world = in_a_box(response, thickness);
+            world.set_gravity(Vec3::zero()).unwrap();
+            let velocity = Vec3::new(0.0, -0.5, 0.0);
+            let mass = taw::motion::Mass::Infinite;
+            let marble = Marble::new(Point3::new(0.0, -0.8, 0.0), 0.1);
+            world.marbles.insert(Marble { velocity, mass, ..marble }).unwrap();
+            for _ in 0..60 {
+                world.step(1.0 / 60.0).unwrap();
+            }
+            let y = world.marbles.position()[0].y;
+            assert!((y + 1.3).abs() < 1e-9, "{response:?} {thickness:?}: {y}");
+        }
+    }
+}

@@ -262,8 +262,9 @@ impl<S: Scalar> World<S> {
             self.marbles.velocity[rows[side]] -= stop.change;
             self.continuous.stop(stop, along);
             self.continuous.paths[rows[side]] = Path {
-                motion: displacement.motion - motion[side],
-                change: displacement.change - change[side],
+                // To the bit: who is stopped is told by it.
+                motion: if slides { displacement.motion - motion[side] } else { carried },
+                change: if slides { displacement.change - change[side] } else { Vec3::zero() },
                 bends: displacement.bends + 1,
                 held_by_wall: displacement.held_by_wall || !slides,
                 carried: if slides { displacement.carried } else { carried },

@@ -6,7 +6,7 @@ use smallvec::SmallVec;
 use super::moving_walls::{Frame, MovingWall, Place, RelativePath, path_bounds};
 use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::math::{Mat3, Point3, Scalar, Vec3, is_finite_point, length};
-use crate::response::Colliders as _;
+use crate::response::{Colliders as _, Response};
 use crate::shape::{PointProjection, Sphere};
 use crate::world::World;
 use crate::world::walls::{SubShape, Walls};
@@ -95,10 +95,16 @@ impl<S: Scalar> World<S> {
             let is_deep = c.penetration() > S::zero()
                 && c.penetration() + motion(self, c.b as usize)
                     > radius * S::from_f64(MAX_FREE_MOTION);
-            is_deep.then_some(c.b)
+            (is_deep && !self.is_kinematic(c.b as usize)).then_some(c.b)
         }));
         deep.sort_unstable();
         self.continuous.deep = deep;
+    }
+
+    /// Returns true for a marble of infinite mass, which contacts do not move, if the response knows
+    /// masses.
+    fn is_kinematic(&self, row: usize) -> bool {
+        self.model.response != Response::Displacement && self.marbles.mass(row).is_infinite()
     }
 
     /// Motion of a marble against a wall that needs no sweep, in metres: beyond this it may pass.
@@ -176,18 +182,16 @@ impl<S: Scalar> World<S> {
     /// they keep their velocity, and bounce there in the next substep.
     pub(in crate::world) fn stop_bounces_at_walls(&mut self) {
         let rows = self.continuous.bounced_from.len().min(self.marbles.len());
+        if rows == 0 {
+            return;
+        }
         self.list_deep_marbles(|world, row| {
             let from = world.continuous.bounced_from.get(row);
             from.map_or_else(S::zero, |from| length(world.marbles.position[row] - *from))
         });
-        // Forces that grow with the overlap turn everything round by themselves in front of a
-        // half-space.
-        let turns_round = self.model.response.needs_penetration();
         for row in 0..rows {
             self.stop_bounce_at_walls(row);
-            if !turns_round {
-                self.push_out_of_half_spaces(row);
-            }
+            self.push_out_of_half_spaces(row);
         }
     }
 
@@ -202,6 +206,9 @@ impl<S: Scalar> World<S> {
         }
         let layers = self.marbles.layers_of_row(row);
         let planes = self.walls.colliding_planes(layers).filter_map(|(_, plane)| {
+            if self.model.response.needs_penetration() {
+                return None; // its forces turn everything round within a half-space
+            }
             let (gap, closing) = (
                 plane.signed_distance(sphere.center) - sphere.radius,
                 -displacement.dot(plane.normal()),
@@ -220,8 +227,11 @@ impl<S: Scalar> World<S> {
 
     /// Moves a marble that the contacts leave in a half-space by more than half of its radius back
     /// to its surface: nothing else would stop it there. One whose contact the user has removed
-    /// passes.
+    /// passes, and one that contacts do not move.
     fn push_out_of_half_spaces(&mut self, row: usize) {
+        if self.model.response.needs_penetration() || self.is_kinematic(row) {
+            return;
+        }
         let Sphere { mut center, radius } = self.marbles.sphere(row);
         let from = self.continuous.bounced_from[row];
         for (wall, plane) in self.walls.colliding_planes(self.marbles.layers_of_row(row)) {
