@@ -99,6 +99,40 @@ fn hills_of_any_size_hold_and_every_step_ends() {
     over_hills::<f64>(1e100);
 }
 
+/// A landscape of one square, which falls from one metre at its border z = 0 along z.
+fn beside_a_slope<S: Scalar>(position: [f64; 3], velocity: [f64; 3]) -> World<S> {
+    let mut world = world::<S>();
+    let heights = [1.0, 1.0, 0.0, 0.0].map(S::from_f64).to_vec();
+    let corner = Point3::from([S::zero(); 3]);
+    world.walls.insert(HeightField::new(corner, [S::one(); 2], 2, heights).unwrap()).unwrap();
+    let marble = Marble {
+        material: Some(surface(1.0, 0.0)),
+        velocity: velocity.map(S::from_f64).into(),
+        ..Marble::new(position.map(S::from_f64).into(), S::from_f64(0.01))
+    };
+    world.marbles.insert(marble).unwrap();
+    world
+}
+
+fn falls_beside_a_slope<S: Scalar>() {
+    // Behind the slope, seen along its normal, but beside it.
+    let mut world = beside_a_slope::<S>([0.5, 0.52, -0.08], [0.0; 3]);
+    let mut free = world.clone();
+    let slope = free.walls.id(0).unwrap();
+    free.walls.remove(slope).unwrap();
+    for _ in 0..12 {
+        world.step(S::from_f64(DT)).unwrap();
+        free.step(S::from_f64(DT)).unwrap();
+        assert_eq!(world.marbles.position(), free.marbles.position());
+    }
+}
+
+#[test]
+fn a_ball_beside_a_height_field_falls_freely() {
+    falls_beside_a_slope::<f64>();
+    falls_beside_a_slope::<f32>();
+}
+
 /// The inside of half a pipe of so many facets, which falls by `slope` along x.
 fn half_pipe(facets: u32, radius: f64, slope: f64) -> Mesh<f64> {
     let rim = |i: u32| std::f64::consts::PI * f64::from(i) / f64::from(facets);

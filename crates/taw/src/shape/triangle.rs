@@ -11,6 +11,25 @@ pub struct Triangle<S> {
     pub corners: [Point3<S>; 3],
 }
 
+/// Rectangle: the base of a right prism.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Rectangle<S> {
+    pub corner: Point3<S>,
+    /// Sides from there, in metres.
+    pub sides: [Vec3<S>; 2],
+}
+
+impl<S: Scalar> Rectangle<S> {
+    /// Tests if a point is in the prism, at any height.
+    fn has_in_prism(&self, point: Point3<S>) -> bool {
+        let offset = point - self.corner;
+        self.sides.iter().all(|side| {
+            let along = offset.dot(*side);
+            along >= S::zero() && along <= side.magnitude2()
+        })
+    }
+}
+
 impl<S: Scalar> Triangle<S> {
     /// The unit normal, unless the vertices are collinear.
     #[must_use]
@@ -23,19 +42,23 @@ impl<S: Scalar> Triangle<S> {
         (twice > longest * S::epsilon()).then_some(normal)
     }
 
-    /// Projects a point as if the volume below, against y, were solid: a point straight behind the
-    /// triangle, by no more than its width, is inside.
-    pub(crate) fn project_point_one_sided(&self, point: Point3<S>) -> PointProjection<S> {
+    /// Projects a point as if the volume behind the triangle were solid, within the prism over
+    /// `base`: a point straight behind the triangle, by no more than its width, is inside.
+    pub(crate) fn project_point_one_sided(
+        &self,
+        point: Point3<S>,
+        base: &Rectangle<S>,
+    ) -> PointProjection<S> {
         let [a, b, c] = self.corners;
         let deepest = (b - a).magnitude().min((c - a).magnitude());
         let near = self.project_point(point);
-        let up = self.normal().map(|n| if n.y < S::zero() { -n } else { n });
-        match up {
+        match self.normal() {
             // Straight behind, to within rounding.
             Some(up)
                 if near.distance > S::zero()
                     && near.distance <= deepest
-                    && (near.normal + up).magnitude() < S::from_f64(1e-3) =>
+                    && (near.normal + up).magnitude() < S::from_f64(1e-3)
+                    && base.has_in_prism(point) =>
             {
                 near.flipped()
             }

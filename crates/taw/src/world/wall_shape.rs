@@ -10,7 +10,7 @@ use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
 use crate::response::event::WallCollider;
 use crate::shape::{
     Aabb3, BoundedShape, Capsule, Compound, HeightField, Hull, Mesh, Obb, Plane, PointProjection,
-    Shape, Sphere, Surface, Triangle,
+    Rectangle, Shape, Sphere, Surface, Triangle,
 };
 
 /// Shape of a wall.
@@ -240,7 +240,15 @@ impl<S: Scalar> WallShape<S> {
                 triangle(mesh.triangle(part), pose).map(WallCollider::Triangle)
             }
             Self::HeightField(field, pose) => {
-                triangle(field.triangle(part), pose).map(WallCollider::OneSidedTriangle)
+                let surface = triangle(field.triangle(part), pose)?;
+                let Aabb3 { min, max } = field.bounds();
+                let diagonal = max - min;
+                let base = Rectangle {
+                    corner: cast_point(pose.transform_point(min)),
+                    sides: [Vec3::unit_x() * diagonal.x, Vec3::unit_z() * diagonal.z]
+                        .map(|side| cast_vector(pose.transform_vector(side))),
+                };
+                Some(WallCollider::OneSidedTriangle(surface, base))
             }
         }
     }

@@ -6,7 +6,7 @@ use crate::broad::CollisionLayers;
 use crate::math::{Point3, Quat, Vec3};
 use crate::motion::{WallMotion, integrate_rotation};
 use crate::response::{Colliders, Material};
-use crate::shape::{Aabb3, BoundedShape, PointProjection, Shape, Triangle};
+use crate::shape::{Aabb3, BoundedShape, PointProjection, Rectangle, Shape, Triangle};
 
 /// Rounding error of a distance, relative to it and the coordinates: many times that of a few
 /// operations.
@@ -46,8 +46,8 @@ pub(crate) enum WallCollider {
     },
     Solid(Shape<f64>),
     Triangle(Triangle<f64>),
-    /// Triangle of a height field, solid below.
-    OneSidedTriangle(Triangle<f64>),
+    /// Triangle of a height field, solid below, within the field's rectangle.
+    OneSidedTriangle(Triangle<f64>, Rectangle<f64>),
 }
 
 impl WallCollider {
@@ -56,7 +56,7 @@ impl WallCollider {
         match self {
             Self::Plane { .. } => None,
             Self::Solid(shape) => Some(shape.bounding_box()),
-            Self::Triangle(triangle) | Self::OneSidedTriangle(triangle) => {
+            Self::Triangle(triangle) | Self::OneSidedTriangle(triangle, _) => {
                 Some(triangle.bounding_box())
             }
         }
@@ -70,7 +70,9 @@ impl WallCollider {
             }
             Self::Solid(shape) => shape.project_point(point),
             Self::Triangle(triangle) => triangle.project_point(point),
-            Self::OneSidedTriangle(triangle) => triangle.project_point_one_sided(point),
+            Self::OneSidedTriangle(triangle, field) => {
+                triangle.project_point_one_sided(point, field)
+            }
         }
     }
 }
@@ -115,7 +117,7 @@ impl Wall {
             None => point,
         };
         let distance = bounds.distance_to_point(shifted);
-        let may_be_inside = matches!(self.collider, WallCollider::OneSidedTriangle(_))
+        let may_be_inside = matches!(self.collider, WallCollider::OneSidedTriangle(..))
             && distance <= (bounds.max - bounds.min).magnitude() * (1.0 + ROUNDING);
         if may_be_inside {
             return f64::NEG_INFINITY; // negative if it is inside
