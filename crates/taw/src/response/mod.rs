@@ -27,7 +27,7 @@ pub(crate) use penalty::SpringHistory;
 pub enum Response {
     /// Position projection (the lecture's method; engines call it position-based). Bodies that
     /// penetrated in this substep are moved apart, deepest contact first (a wall stays, marbles
-    /// take half each), and velocities change by that displacement per step. Penetration from
+    /// take half each), and velocities change by that displacement per substep. Penetration from
     /// before the substep (spawned, grown or placed bodies) is resolved afterwards without a change
     /// of velocity: penetration is no energy.
     ///
@@ -72,11 +72,12 @@ pub enum Response {
     /// For engineers (with [`ContactLaw::HertzMindlin`]), and to see why games do without: a marble
     /// penetrates as far as the stiffness allows, and a stiffer contact needs shorter substeps. A
     /// contact that bears m times its marble's weight by [`ContactLaw::SpringDashpot`] penetrates
-    /// by about 26 m g dt² at most, for substeps of dt, and a collision at v m/s by up to 5 v dt: a
-    /// marble for which either is more than its radius falls through what it lies on or hits. One
-    /// that sinks in beyond the middle of a thin wall comes back on the side that it came from. No
-    /// contact releases more energy than it absorbed, and penetration from the start separates at
-    /// one radius per second at most.
+    /// by about 26 m g dt² at most, for substeps of dt seconds, and a collision at v m/s by about
+    /// 5 v dt at most. Where either is more than its radius, a marble may pass through another
+    /// one, or with [`Detection::Discrete`](crate::world::Detection::Discrete) through a thin wall;
+    /// if it sinks in beyond the middle of the wall without leaving it, it comes back on the side
+    /// that it came from. No contact releases more energy than it absorbed, and penetration from the
+    /// start separates at one radius per second at most.
     Penalty(ContactLaw),
     /// Event-driven: collisions in the order of time, each with its own normal at its own time of
     /// impact, thousands in one substep if need be. Nothing tunnels at any speed, and bounces lose

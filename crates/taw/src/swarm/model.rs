@@ -6,10 +6,10 @@ use crate::math::{Point3, Vec3};
 use crate::motion::Mass;
 use crate::response::Material;
 
-/// Number of balls from which on another thread saves more than waking it costs.
+/// Balls per thread: with fewer, waking a thread costs more than it saves.
 const BALLS_PER_THREAD: usize = 1000;
 
-/// Number of threads of the machine, at most [`SwarmModel::MAX_THREADS`].
+/// Number of hardware threads, at most [`SwarmModel::MAX_THREADS`].
 fn machine_threads() -> usize {
     static THREADS: OnceLock<usize> = OnceLock::new(); // asking the system takes microseconds
     *THREADS.get_or_init(|| {
@@ -18,15 +18,15 @@ fn machine_threads() -> usize {
     })
 }
 
-/// Physics of the balls of a swarm.
+/// Physics of the balls of a swarm (fidelity of its solver).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, Default)]
 pub enum Tier {
-    /// They move along lines, and overlapping ones are moved apart, half each: the displacement of
-    /// the lecture. No masses, no friction, no bounce, no spin. What lies in a heap never quite
-    /// comes to rest, as nothing holds it but its neighbours. No push makes a ball faster than it
-    /// was, so that overlap is no energy: one at rest that another hits is moved, and stays there.
+    /// Position projection, the lecture's displacement: balls move straight, and overlapping ones
+    /// are moved apart, half each. No masses, friction, restitution or spin. A heap never quite comes
+    /// to rest, as nothing holds a ball but its neighbours. No correction makes a ball faster than it
+    /// was, so that overlap is no energy: a ball at rest that is hit moves aside, and stays there.
     Lab,
-    /// Masses, restitution, Coulomb friction and spin, by soft contacts in small steps.
+    /// Masses, restitution, Coulomb friction and spin, by soft contacts with substeps (TGS soft).
     #[default]
     Full,
 }
@@ -36,21 +36,21 @@ pub enum Tier {
 pub struct SwarmModel {
     /// Physics of its balls.
     pub tier: Tier,
-    /// Into how many equal parts each step is cut, from 1 to 1,000: in the lab's tier, how often
-    /// overlapping balls are moved apart.
+    /// Substeps per step, from 1 to 1,000; in [`Tier::Lab`], passes in which overlapping balls are
+    /// moved apart.
     pub substeps: u32,
-    /// Number of threads that work on a step, from 1 to 64, or 0 for as many of the machine's as
-    /// there are balls enough to keep busy. They change no bit of it.
+    /// Number of threads that work on a step, from 1 to 64, or 0 for automatic: one per 1,000 balls,
+    /// at most all hardware threads. The result has the same bits with any number.
     pub threads: u32,
-    /// Material of the balls. Tangential restitution is not modelled, nor in the lab's tier are
-    /// friction, restitution, rolling and spinning resistance.
+    /// Material of balls that have none of their own. Tangential restitution is not modelled;
+    /// [`Tier::Lab`] uses no number of it.
     pub material: Material<f32>,
-    /// Lets balls that lie still fall asleep, in the full tier.
+    /// Lets balls at rest fall asleep, in [`Tier::Full`].
     pub sleeps: bool,
 }
 
 impl Default for SwarmModel {
-    /// The full tier in two substeps, on as many threads as pay, with sleep.
+    /// [`Tier::Full`] in two substeps, with automatic threads and sleep.
     fn default() -> Self {
         Self {
             tier: Tier::Full,
@@ -63,12 +63,12 @@ impl Default for SwarmModel {
 }
 
 impl SwarmModel {
-    /// The largest number of [substeps](Self::substeps).
+    /// Maximum number of [substeps](Self::substeps).
     pub const MAX_SUBSTEPS: u32 = 1000;
-    /// The largest number of [threads](Self::threads).
+    /// Maximum number of [threads](Self::threads).
     pub const MAX_THREADS: u32 = super::workers::MAX_THREADS as u32;
 
-    /// This model, if a swarm can step with it.
+    /// Validates the model.
     pub(super) fn validated(self) -> Result<Self, Error> {
         within("substeps", f64::from(self.substeps), 1.0, f64::from(Self::MAX_SUBSTEPS))?;
         within("threads", f64::from(self.threads), 0.0, f64::from(Self::MAX_THREADS))?;
@@ -76,7 +76,8 @@ impl SwarmModel {
         Ok(self)
     }
 
-    /// Number of threads that work on a step of so many balls.
+    /// Number of threads that work on a step of this many balls; [`threads`](Self::threads) if it is
+    /// not automatic.
     #[must_use]
     pub fn threads_for(self, balls: usize) -> usize {
         match self.threads {
@@ -86,21 +87,21 @@ impl SwarmModel {
     }
 }
 
-/// A ball on its way into a swarm.
+/// Initial state of a ball of a swarm.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ball {
-    /// The center, in metres.
+    /// Center, in metres.
     pub position: Point3<f32>,
-    /// In metres, from 1e-9 to 1e9.
+    /// Radius in metres, from 1e-9 to 1e9.
     pub radius: f32,
-    /// In metres per second.
+    /// Velocity, in m/s.
     pub velocity: Vec3<f32>,
     /// Mass of the ball.
     pub mass: Mass<f32>,
 }
 
 impl Ball {
-    /// A ball of glass, at rest.
+    /// Ball at rest with the density of glass, 2,500 kg/m³.
     #[must_use]
     pub fn new(position: Point3<f32>, radius: f32) -> Self {
         let velocity = Vec3::new(0.0, 0.0, 0.0);
@@ -108,17 +109,17 @@ impl Ball {
     }
 }
 
-/// Part of a step, for whoever wants to know how long each takes.
+/// Stage of a swarm's step, for profiling.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash, PartialOrd, Ord)]
 pub enum Stage {
-    /// Velocities and places move on.
+    /// Integration of velocities and positions.
     Integrate,
-    /// Rows are put in the order of cells.
+    /// Sorting of rows by cell.
     Order,
-    /// Pairs that might touch are searched, and their cached impulses restored.
+    /// Search for pairs that may touch (broad phase), and restoring of their cached impulses.
     Pairs,
-    /// Balls at walls are searched.
+    /// Search for balls near walls.
     Walls,
-    /// Contacts change velocities or places.
+    /// Solving of contacts: velocity and position changes.
     Restitute,
 }

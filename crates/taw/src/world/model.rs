@@ -28,8 +28,9 @@ pub struct Model {
     pub detection: Detection,
     /// Substeps per step, from 1 to 1,000. The cost is proportional.
     pub substeps: u32,
-    /// Iterations of [`Response::Impulse`] and [`Response::Displacement`] over all contacts in a
-    /// substep, from 1 to 1,000. They end sooner when nothing changes any more.
+    /// Maximum number of solver iterations over all contacts in a substep, from 1 to 1,000, of
+    /// [`Response::Impulse`], of [`Response::Displacement`], and of the large clusters of
+    /// [`Response::EventDriven`]. They end sooner once the contacts have converged.
     pub iterations: u32,
 }
 
@@ -38,18 +39,21 @@ pub struct Model {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Detection {
     /// Discrete collision detection at the end of each substep. Marbles that move by more than
-    /// their radii in it may tunnel through each other, and by more than half of their radii
-    /// through thin walls. (Half-spaces are solid behind.)
+    /// their radii in a substep may tunnel through each other, and those that move by more than half
+    /// of their radius through thin walls. (Half-spaces are solid behind.)
     Discrete,
     /// Continuous collision detection (CCD) within each substep, so that nothing tunnels. Marbles
-    /// that move against each other or a wall by more than half of their radius in a substep stop
-    /// at the time of impact. Resting and sliding marbles continue along the surface; bouncing ones
-    /// keep the velocity and normal of that moment, slide on along a wall, and lose the rest of
-    /// their time against another marble. Others lose none. A wall that moves meets them on its way,
-    /// and carries along what it meets. Nearly free where nothing is fast.
+    /// that move relative to each other or to a wall by more than half of their radius in a substep
+    /// stop at the time of impact. Resting and sliding marbles continue along the surface; bouncing
+    /// ones keep the velocity and normal of that moment, slide on along a wall, and lose the rest of
+    /// the substep at another marble. Others lose none. A wall that was
+    /// [set](crate::world::Walls::set) to another pose since the last step, and has a
+    /// [motion](crate::world::WallMotion), meets marbles on its way through the substep and carries
+    /// them along. Nearly free where nothing is fast.
     ///
-    /// [`Response::EventDriven`] is always continuous, and loses no time. With
-    /// [`Response::Penalty`] only walls stop marbles, once they are half of their radius deep.
+    /// [`Response::EventDriven`] is always continuous, and loses no time; [`Response::SoftStep`] is
+    /// always continuous at walls. With [`Response::Penalty`] only walls stop marbles, once they are
+    /// half of their radius deep.
     #[default]
     Swept,
 }
