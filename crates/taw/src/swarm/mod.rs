@@ -1,9 +1,9 @@
-//! A particle system of balls: a million of them, and few features.
+//! Particle system of up to millions of balls, with few features each.
 //!
 //! A [`World`](crate::world::World) has marbles that differ in everything: shape, mass, material,
 //! integrator, rotation. A [`Swarm`] has balls in `f32` of any radius, mass, material and gravity
-//! scale: see [`Tier`] for what it models. It lives in a world, whose walls and marbles it touches
-//! and whose force fields move it.
+//! scale: see [`Tier`] for what it models. It belongs to a world: it collides with the world's walls
+//! and marbles, and the world's force fields act on it.
 //!
 //! Parts of a step:
 //! - Rows lie in the order of cells, so that neighbours in space are neighbours in memory.
@@ -73,16 +73,15 @@ use simd::Row;
 use surfaces::{SurfaceOf, Surfaces};
 use walls::HalfSpace;
 
-/// The smallest and the largest radius, in metres: their cubes and squares of squares are
-/// numbers, too.
+/// Minimum and maximum radius, in metres: their third and fourth powers are finite, too.
 const RADII: [f32; 2] = [1e-9, 1e9];
-/// The furthest coordinate, in metres, and the largest speed, in m/s.
+/// Maximum coordinate in metres, and maximum component of a velocity in m/s.
 const MAX_COORDINATE: f32 = 1e12;
 
 /// Inverse mass in 1/kg of a body that no force moves.
 pub(crate) const INFINITE_MASS: f32 = 1e-25;
 
-/// Balls in bulk. See the [module](self).
+/// Particle system of balls. See the [module](self).
 #[derive(Clone, Debug, Default)]
 pub struct Swarm {
     model: SwarmModel,
@@ -171,16 +170,16 @@ struct Scratch {
 }
 
 impl Swarm {
-    /// Model by which it steps.
+    /// Model of its physics and solver.
     #[must_use]
     pub fn model(&self) -> SwarmModel {
         self.model
     }
 
-    /// Changes how it steps. All balls wake.
+    /// Sets the model. All balls wake.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a number of it.
+    /// [`Error::OutOfRange`] for a field of it.
     pub fn set_model(&mut self, model: SwarmModel) -> Result<(), Error> {
         let model = model.validated()?;
         let tier = self.tier();
@@ -199,15 +198,15 @@ impl Swarm {
         Ok(())
     }
 
-    /// Changes by which instructions of the processor it steps. That changes no bit of it.
+    /// Sets the SIMD instructions that it uses. The result has the same bits with any of them.
     pub fn set_simd_level(&mut self, simd_level: SimdLevel) {
         self.simd_level = simd_level;
     }
 
-    /// Puts balls in, all or none.
+    /// Inserts balls, all or none.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a number of one of them,
+    /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a field of one of them,
     /// [`Error::NotPositive`] for a mass, [`Error::Full`] at 2³² balls.
     pub fn insert(&mut self, balls: &[Ball]) -> Result<Vec<BallId>, Error> {
         for ball in balls {
@@ -239,10 +238,10 @@ impl Swarm {
         Ok(ids)
     }
 
-    /// Takes balls out, all or none.
+    /// Removes balls, all or none.
     ///
     /// # Errors
-    /// [`Error::NoSuchBall`], also for one that is named twice, and for a marble's.
+    /// [`Error::NoSuchBall`], also for one that is listed twice, and for a marble's.
     pub fn remove(&mut self, balls: &[BallId]) -> Result<(), Error> {
         let is_marble = |id: &&BallId| self.row(**id).is_ok_and(|row| self.is_marble(row));
         if let Some(id) = balls.iter().find(is_marble).filter(|_| self.bodies_are_rows) {
@@ -286,47 +285,46 @@ impl Swarm {
         self.at.is_empty()
     }
 
-    /// The centers and radii, row by row, in metres. Steps change which ball is in which row.
+    /// Centers and radii by row, in metres. Steps reorder the rows.
     #[must_use]
     pub fn balls(&self) -> &[[f32; 4]] {
         &self.at
     }
 
-    /// True if the ball in a row is a marble of the world, which the swarm pushes but does not
-    /// move.
+    /// True if the ball in a row stands for a marble of the world.
     #[must_use]
     pub fn is_marble(&self, row: usize) -> bool {
         row < self.len() && self.body_slots.contains(self.ids.slots()[row])
     }
 
-    /// The velocities in m/s, row by row. The last number is the inverse mass in 1/kg, with a
-    /// minus sign if the ball sleeps.
+    /// Velocities by row, in m/s. The last number is the inverse mass in 1/kg, with a minus sign if
+    /// the ball sleeps.
     #[must_use]
     pub fn velocities(&self) -> &[[f32; 4]] {
         &self.velocity
     }
 
-    /// Radius times angular velocity in m/s, row by row, and a mark of the swarm's own; empty in
-    /// the lab's tier.
+    /// Radius times angular velocity by row, in m/s, and a number for internal use; empty in
+    /// [`Tier::Lab`].
     #[must_use]
     pub fn spin_velocities(&self) -> &[[f32; 4]] {
         &self.spin
     }
 
-    /// The ball in a row.
+    /// Ball in a row.
     #[must_use]
     pub fn id(&self, row: usize) -> Option<BallId> {
         self.ids.id(row)
     }
 
-    /// A number for the ball in each row that stays the same, and is smaller than the most balls
-    /// there ever were: for tables of one's own.
+    /// Slot of the ball in each row: an index that a ball keeps as long as it exists, below the
+    /// maximum number of balls so far. For tables of the caller.
     #[must_use]
     pub fn slots(&self) -> &[u32] {
         self.ids.slots()
     }
 
-    /// The row of a ball until the next step or change.
+    /// Row of a ball, until the next step or change.
     ///
     /// # Errors
     /// [`Error::NoSuchBall`].
@@ -334,7 +332,7 @@ impl Swarm {
         self.ids.row(ball).ok_or(Error::NoSuchBall(ball))
     }
 
-    /// Moves a ball to another place at once.
+    /// Sets the position of a ball (teleports it), in metres, and wakes it.
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], [`Error::NotFinite`], [`Error::OutOfRange`].
@@ -347,7 +345,7 @@ impl Swarm {
         Ok(())
     }
 
-    /// Gives a ball another velocity, in m/s, and wakes it and those around.
+    /// Sets the velocity of a ball, in m/s, and wakes it and those around.
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], [`Error::NotFinite`], [`Error::OutOfRange`].
@@ -358,7 +356,7 @@ impl Swarm {
         Ok(())
     }
 
-    /// The balls that the last step stopped because their motion overflowed.
+    /// Balls that the last step stopped because their motion overflowed.
     pub fn stopped(&self) -> impl Iterator<Item = BallId> + '_ {
         self.stopped.iter().filter_map(|row| self.ids.id(*row as usize))
     }
@@ -370,33 +368,33 @@ impl Swarm {
         if self.pairs_valid { chunks.map(|chunk| chunk.own_rows().len()).sum() } else { 0 }
     }
 
-    /// Number of pairs of balls near enough to be looked at.
+    /// Number of candidate pairs of balls (broad phase).
     #[must_use]
     pub fn pairs(&self) -> usize {
         self.chunks.iter().map(|chunk| chunk.pairs).sum::<usize>()
             + pairs_in(&self.fast_movers.batches)
     }
 
-    /// Checks that all pairs near enough are looked at. Up to 64 a ball on average are, ten times
-    /// as many as touch in the densest heap; where more balls than that are inside of each other,
-    /// the rest wait until some have parted, and meanwhile overlap.
+    /// Checks that all candidate pairs are solved. Up to 64 per ball on average are, ten times as
+    /// many as touch in the densest heap; where more balls than that overlap each other, the other
+    /// pairs wait until some have separated, and overlap meanwhile.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for `pairs`: how many there are, and how many of them are looked at.
+    /// [`Error::OutOfRange`] for `pairs`: the number of candidates, and the number that is solved.
     pub fn check_pairs(&self) -> Result<(), Error> {
         let unlisted = self.chunks.iter().map(|chunk| chunk.unlisted).sum::<usize>();
         let (listed, all) = (self.pairs(), self.pairs() + unlisted + self.fast_movers.unlisted);
         within("pairs", all as f64, 0.0, listed as f64).map(|_| ())
     }
 
-    /// Number of times that a ball is near enough to a wall to be looked at. (The lab's tier looks
-    /// at all balls for each half-space, and does not count these.)
+    /// Number of candidate pairs of a ball and a wall. ([`Tier::Lab`] tests all balls against each
+    /// half-space, and does not count these.)
     #[must_use]
     pub fn near_walls(&self) -> usize {
         self.chunks.iter().map(|chunk| chunk.wall_contacts.len()).sum()
     }
 
-    /// Number of searches for pairs so far.
+    /// Number of searches for candidate pairs so far.
     #[must_use]
     pub fn rebuilds(&self) -> u64 {
         self.rebuilds

@@ -1,4 +1,4 @@
-//! State of a world as columns, and the choice of methods.
+//! World: its state as columns, its step, queries, and the energy audit.
 
 mod changed_rows;
 mod contact_limit;
@@ -60,61 +60,62 @@ use narrow_phase::Candidate;
 use quarantine::Quarantine;
 use soft_step::SoftStep;
 
-/// Everything that moves and everything that it can touch.
+/// Marbles, walls and balls, and the settings of their simulation.
 ///
 /// A world is plain data: a clone is a snapshot, and stepping two clones gives
 /// the same bits. Two worlds are equal when their state and their last contacts
-/// are; what a step only scribbles on does not count.
+/// are; scratch memory does not count.
 #[derive(Clone, Debug)]
 pub struct World<S> {
     model: Model,
     gravity: Vec3<S>,
     forces: Vec<ForceField<S>>,
     limits: SpeedLimits<S>,
-    /// What moves.
+    /// Marbles: dynamic bodies.
     pub marbles: Marbles<S>,
-    /// What nothing can move.
+    /// Walls: static and kinematic colliders.
     pub walls: Walls<S>,
-    /// Balls in bulk, which touch the walls. (What is touched by whom of them is not listed.)
+    /// Particle system of balls, which collide with walls, marbles and each other. (Their contacts
+    /// are not listed.)
     pub swarm: Swarm,
-    /// The touches of the last substep, except those of marbles [asleep](Self::is_asleep) with each
-    /// other and with walls. Between [`World::generate_contacts`] and
-    /// [`World::restitute`] they may be changed: what is taken out is not
-    /// restituted, a normal or a separation that was changed is the one by which velocities are
-    /// solved (which [`Response::EventDriven`] and [`Response::SoftStep`] do not look at), and a row
-    /// that does not exist is passed over.
+    /// Contacts of the last substep, except those of marbles [asleep](Self::is_asleep) with each
+    /// other and with walls. Between [`World::generate_contacts`] and [`World::restitute`] they may
+    /// be edited: a removed contact is not solved, a changed normal or separation is the one that
+    /// is solved, and a contact of a row that does not exist is ignored.
+    /// ([`Response::EventDriven`] and [`Response::SoftStep`] detect collisions themselves, whatever
+    /// is edited.)
     ///
-    /// Of a marble among many, those with the 32 that are deepest in it or nearest are listed, of
-    /// all that are as large or larger; of a long capsule so many more as it is longer than wide.
+    /// Of each marble, the contacts with at most 32 marbles of its size or larger are listed, the
+    /// deepest or nearest; of a capsule, more in proportion to its length over its width.
     pub contacts: Contacts<S>,
-    /// Impacts of the last step, of a response that goes through them by itself.
+    /// Impacts of the last step, of a response that solves them within it.
     impacts: Vec<Impact<S>>,
     grid: Grid,
     images: Images<S>,
-    /// The rows that the verb at work has stopped.
+    /// Rows that the current verb has stopped.
     stopped: Vec<u32>,
     quarantine: Quarantine<S>,
     contact_limit: ContactLimit<S>,
-    /// How wide a gap still makes a contact, in metres: what gravity closes in two
+    /// Speculative margin: maximum separation of a contact, in metres. Gravity closes it within two
     /// substeps, for a response that looks ahead.
     reach: S,
     inverse_mass: Vec<S>,
-    /// Before forces changed them in this substep, in m/s; empty for a response that has no use
-    /// for them.
+    /// Velocities before forces changed them in this substep, in m/s; empty for a response that does
+    /// not use them.
     velocity_before: Vec<Vec3<S>>,
     held: Vec<bool>,
     displacement: displacement::Scratch<S>,
     impulse: impulse::Scratch<S>,
     memory: ContactMemory<S>,
-    /// For a response that moves marbles by itself: how each is to be accelerated.
+    /// Accelerations in m/s², for a response that integrates marbles by itself.
     accelerations: Vec<Vec3<f64>>,
-    /// How much of a step comes after the substep, in seconds; zero unless within one.
+    /// Time of the step that is left after the substep, in seconds; zero unless within one.
     rest_of_step: S,
     events: EventDriven,
     soft_step: SoftStep<S>,
     continuous: Continuous<S>,
     near_walls: Vec<Candidate<S>>,
-    /// What is long about marbles, and how far they reach.
+    /// Axes and inertia of capsules, and bounding radii in metres.
     rods: Vec<CapsuleInertia<S>>,
     reaches: Vec<S>,
     audit_state: Option<Box<AuditState<S>>>,
@@ -210,14 +211,14 @@ impl<S: Scalar> PartialEq for World<S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// How this world steps.
+    /// Model: physics and accuracy of its steps.
     #[must_use]
     pub fn model(&self) -> Model {
         self.model
     }
 
-    /// Changes how the next step is done. A model equal to the current one changes nothing;
-    /// another one forgets the impulses that contacts remember.
+    /// Sets the model for the next step. A model equal to the current one changes nothing; another
+    /// one clears the cached impulses of contacts (warm starts).
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for the substeps or the iterations; [`Error::UnsupportedShape`] for
@@ -245,16 +246,16 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// The acceleration of every marble, in m/s².
+    /// Gravity: acceleration of every marble and ball, in m/s².
     #[must_use]
     pub fn gravity(&self) -> Vec3<S> {
         self.gravity
     }
 
-    /// Changes the acceleration of every marble, in m/s².
+    /// Sets gravity, in m/s².
     ///
     /// # Errors
-    /// [`Error::NotFinite`], also if it is longer than a number can be.
+    /// [`Error::NotFinite`], also if its length overflows.
     pub fn set_gravity(&mut self, gravity: Vec3<S>) -> Result<(), Error> {
         finite_vector(["gravity.x", "gravity.y", "gravity.z"], gravity)?;
         finite("the length of gravity", length(gravity))?;
@@ -262,7 +263,7 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Lengths of the periodic box along the axes, in metres; none along those without sides.
+    /// Lengths of the periodic box along the axes, in metres; none along axes that are not periodic.
     #[must_use]
     pub fn period(&self) -> [Option<S>; 3] {
         self.marbles.period.lengths
@@ -272,16 +273,17 @@ impl<S: Scalar> World<S> {
     /// it through the opposite one, and balls touch across the sides. Along an axis with none,
     /// which is the default, it has no sides.
     ///
-    /// Walls are where they are, and nowhere else: what crosses a side is to be a half-space along
-    /// it. Balls of [`World::swarm`], queries and attraction know no sides. [`World::energy`] and
-    /// the account count where marbles are: who crosses a side along gravity changes them. But for
-    /// [`Response::EventDriven`], who goes farther than a quarter of a length in a substep may pass
-    /// through others.
+    /// Walls are not repeated: one that crosses a side has to be a half-space along it. Balls of
+    /// [`World::swarm`], queries and attraction are not periodic. [`World::energy`] and the energy
+    /// audit use positions as they are: a marble that crosses a side along gravity changes them.
+    /// Except by [`Response::EventDriven`], a marble that moves by more than a quarter of a length in
+    /// a substep may pass through others.
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a length of less than 8.02 radii of the largest marble;
     /// [`Error::NotPositive`] for one that is no length; [`Error::UnsupportedShape`] if a marble is
-    /// a capsule; [`Error::Unsupported`] for [`Response::SoftStep`]. Steps refuse marbles that came later in the same way.
+    /// a capsule; [`Error::Unsupported`] for [`Response::SoftStep`]. Steps refuse marbles that were
+    /// added later in the same way.
     pub fn set_period(&mut self, lengths: [Option<S>; 3]) -> Result<(), Error> {
         for (length, field) in lengths.iter().zip(["period.x", "period.y", "period.z"]) {
             length.map(|length| positive(field, length)).transpose()?;
@@ -302,28 +304,28 @@ impl<S: Scalar> World<S> {
         self.marbles.period.image(point, near)
     }
 
-    /// The force fields that act on every marble, and on every ball of the swarm, besides gravity.
+    /// Force fields that act on every marble, and on every ball of the swarm, besides gravity.
     #[must_use]
     pub fn forces(&self) -> &[ForceField<S>] {
         &self.forces
     }
 
-    /// Changes the force fields.
+    /// Sets the force fields.
     ///
     /// # Errors
-    /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a number of one of them.
+    /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a field of one of them.
     pub fn set_forces(&mut self, forces: Vec<ForceField<S>>) -> Result<(), Error> {
         self.forces = forces.into_iter().map(ForceField::validated).collect::<Result<_, _>>()?;
         Ok(())
     }
 
-    /// How fast marbles may be at most.
+    /// Speed limits of marbles.
     #[must_use]
     pub fn speed_limits(&self) -> SpeedLimits<S> {
         self.limits
     }
 
-    /// Changes how fast marbles may be at most, from the end of the next substep on.
+    /// Sets the speed limits of marbles, from the end of the next substep on.
     ///
     /// # Errors
     /// [`Error::NotPositive`].
@@ -332,7 +334,7 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// The marbles that the last step stopped because their motion overflowed, each once.
+    /// Marbles that the last step stopped because their motion overflowed, each once.
     pub fn stopped(&self) -> impl Iterator<Item = MarbleId> + '_ {
         self.quarantine.stopped.iter().copied()
     }
@@ -348,16 +350,15 @@ impl<S: Scalar> World<S> {
         &self.impacts
     }
 
-    /// How far the contacts of the last substep were from agreeing when
-    /// [`Response::Impulse`] let them be: by how much a velocity still changed in its last
-    /// sweep, at most, in m/s. It ends at the [iterations](Model::iterations), or where
-    /// the change is below the rounding of what gravity does in two substeps.
+    /// Residual of [`Response::Impulse`] in the last substep: maximum change of a velocity in the
+    /// last iteration, in m/s. Iterations end at [`Model::iterations`], or when the residual is
+    /// below the rounding error of the speed that gravity adds in two substeps.
     #[must_use]
     pub fn residual(&self) -> S {
         self.impulse.residual()
     }
 
-    /// The grid of the last substep, for drawing it.
+    /// Broad-phase grid of the last substep, for drawing it.
     #[must_use]
     pub fn grid(&self) -> &Grid {
         &self.grid
