@@ -37,7 +37,7 @@ pub(super) struct Chunk {
     pub inverse_masses: [f32; 2],
     /// The least and the largest radius, in metres.
     pub radii: [f32; 2],
-    /// Whether they sleep, or how long they have rested.
+    /// Set while its balls sleep; and the time that they have rested.
     pub asleep: bool,
     pub rest: Rest,
     /// Set if they fell asleep just now.

@@ -22,7 +22,7 @@ const PLACE: f32 = 0.05;
 /// of .08° gains more in that time.
 const STEADY: f32 = 1.1;
 
-/// How long all balls of a chunk have been where they are.
+/// Time for which all balls of a chunk have stayed where they are.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Rest {
     /// Centers and speeds at the beginning; none while any ball moves.
