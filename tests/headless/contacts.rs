@@ -68,7 +68,9 @@ fn a_start_says_how_hard_and_where_from() {
 
 #[test]
 fn a_fall_is_heard_at_its_speed_by_every_response() {
-    for response in [Response::Displacement, Response::Impulse, Response::EventDriven] {
+    let responses =
+        [Response::Displacement, Response::Impulse, Response::EventDriven, Response::SoftStep];
+    for response in responses {
         for tenths in 5..25_u8 {
             let mut app = scene::app();
             app.add_message::<ContactStarted>();
