@@ -6,7 +6,7 @@
 //! *Unilateral contact and dry friction in finite freedom dynamics*, 1988). So among walls at rest
 //! it only loses energy, and momentum is conserved.
 
-use cgmath::InnerSpace;
+use cgmath::{InnerSpace, Zero};
 
 use super::cluster::ClusterBodies;
 use super::wall::MovingWalls;
@@ -204,11 +204,12 @@ impl EventDriven {
     pub(super) fn end_remaining_approach(
         &mut self,
         contacts: &Contacts<f64>,
-        now: f64,
+        (now, walls_at_rest): (f64, bool),
         tolerance: f64,
         settings: &EventSettings,
     ) {
-        let walls = MovingWalls { walls: &self.walls, start: now, end: now };
+        let walls =
+            MovingWalls { walls: &self.walls, start: now, end: now, at_rest: walls_at_rest };
         let constraints = constraints(contacts, &walls, &self.cluster.start, self.period);
         let ClusterBodies { velocity, inverse_mass, .. } = &mut self.cluster.bodies;
         for _ in 0..PASSES {
@@ -264,7 +265,11 @@ fn constraints(
             a: None,
             b,
             normal,
-            surface_velocity: walls.walls[wall].velocity_at(position[b], walls.end),
+            surface_velocity: if walls.at_rest {
+                Vec3::zero()
+            } else {
+                walls.walls[wall].velocity_at(position[b], walls.end)
+            },
         }
     });
     let between = contacts.mm.iter().filter_map(|c| {

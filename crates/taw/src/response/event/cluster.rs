@@ -161,6 +161,37 @@ impl Cluster {
         settings.add_cost(2 * self.scratch.solve_count());
     }
 
+    /// Twice the kinetic energy of the balls, in joules.
+    pub fn kinetic_energy(&self) -> f64 {
+        let ClusterBodies { velocity, spin, radius, inverse_mass, rotation_locked, .. } =
+            &self.bodies;
+        let of_ball = |at: usize| {
+            let arm = if rotation_locked[at] { 0.0 } else { radius[at] };
+            let turning = 0.4 * arm * arm * spin[at].magnitude2();
+            (velocity[at].magnitude2() + turning) / inverse_mass[at]
+        };
+        (0..self.rows.len()).filter(|at| inverse_mass[*at] > 0.0).map(of_ball).sum()
+    }
+
+    /// Twice the kinetic energy of the balls if each moves with the fastest of the walls in contact,
+    /// in joules. None if these are at rest.
+    pub fn carried_energy(&self, contacts: &Contacts<f64>, walls: &MovingWalls) -> Option<f64> {
+        let mut moving: Vec<_> = contacts.wm.iter().map(|c| c.a as usize).collect();
+        moving.sort_unstable();
+        moving.dedup();
+        moving.retain(|wall| walls.walls[*wall].motion.is_some());
+        if moving.is_empty() {
+            return None;
+        }
+        let ClusterBodies { position, inverse_mass, .. } = &self.bodies;
+        let of_ball = |at: usize| {
+            let speed2 = |wall: &usize| walls.velocity_at(*wall, position[at]).magnitude2();
+            let fastest = moving.iter().map(speed2).fold(0.0, f64::max);
+            fastest / inverse_mass[at]
+        };
+        Some((0..self.rows.len()).filter(|at| inverse_mass[*at] > 0.0).map(of_ball).sum())
+    }
+
     /// Books the energy of an instantaneous solve, with the velocities before it.
     pub fn record_energy(
         &mut self,

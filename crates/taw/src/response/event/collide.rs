@@ -47,12 +47,14 @@ impl EventDriven {
     /// they separate just now. Between a wall and a heavy ball, a light one always separates from
     /// one of them.
     pub(super) fn stop_collapse(&mut self, rows: [usize; 2], time: f64, settings: &EventSettings) {
-        let RestingCluster { rows, pressed_by } =
+        let RestingCluster { rows, pressed_by, squeezed } =
             self.rest_cluster(rows, f64::INFINITY, time, settings);
         for row in rows {
             let trajectory = &mut self.balls[row].trajectory;
             trajectory.dissipation_count = 0.0;
-            if !self.balls[row].is_frozen() && self.count_freeze(row, pressed_by) {
+            // What walls squeeze gives way to those that move.
+            let gives_way = squeezed && self.touches_moving_wall(row, time, settings);
+            if !self.balls[row].is_frozen() && (gives_way || self.count_freeze(row, pressed_by)) {
                 self.balls[row].freeze();
             }
             self.predict(row, time, settings);

@@ -21,6 +21,7 @@ mod predict_wall;
 mod rest_at_start;
 mod rest_on_wall;
 mod resting_cluster;
+mod squeeze;
 mod toi;
 mod wall;
 

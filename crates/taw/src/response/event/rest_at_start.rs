@@ -62,10 +62,10 @@ impl EventDriven {
             let mut contacts = Contacts { wm: walls.to_vec(), ..Contacts::default() };
             self.cluster.gather(&mut contacts, &self.balls, self.period);
             let max_acceleration = self.balls[row as usize].external_acceleration.magnitude();
-            self.solve_inelastic_impact(&mut contacts, 0.0, max_acceleration, settings);
+            self.solve_inelastic_impact(&mut contacts, (0.0, false), max_acceleration, settings);
             self.end_remaining_approach(
                 &contacts,
-                0.0,
+                (0.0, false),
                 REST_SPEED * max_acceleration * settings.dt,
                 settings,
             );
@@ -133,6 +133,22 @@ impl EventDriven {
             }
             self.balls[row].position += deepest.1;
         }
+    }
+
+    /// Tests if a ball touches a wall that moves through the substep.
+    pub(super) fn touches_moving_wall(
+        &self,
+        row: usize,
+        now: f64,
+        settings: &EventSettings,
+    ) -> bool {
+        let mut touches = false;
+        self.for_each_wall(row, |wall| {
+            let contact = Contact::with_wall(wall as u32, 0, row as u32);
+            touches |= self.is_moving(wall)
+                && self.wall_contact(&contact, now, f64::INFINITY, settings).is_some();
+        });
+        touches
     }
 
     /// Tests if a wall moves through the substep.

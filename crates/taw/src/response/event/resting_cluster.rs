@@ -14,6 +14,8 @@ use crate::response::rename_rows;
 pub(super) struct RestingCluster {
     pub rows: Vec<usize>,
     pub pressed_by: PressedBy,
+    /// True if walls squeeze them.
+    pub squeezed: bool,
 }
 
 /// Causes that may press resting balls together again.
@@ -47,11 +49,9 @@ impl EventDriven {
         // First the collision.
         self.cluster.gather(&mut contacts, &self.balls, self.period);
         let remaining = settings.dt - now;
-        self.solve_inelastic_impact(&mut contacts, now, max_acceleration, settings);
-        if max_separation_speed == f64::INFINITY {
-            let tolerance = self.cluster.tolerance(max_acceleration, settings);
-            self.end_remaining_approach(&contacts, now, tolerance, settings);
-        }
+        let ends_all = max_separation_speed == f64::INFINITY;
+        let tolerance = ends_all.then(|| self.cluster.tolerance(max_acceleration, settings));
+        let squeezed = self.end_approach(&mut contacts, now, max_acceleration, tolerance, settings);
         for (local, row) in self.cluster.rows.iter().enumerate() {
             let ball = &mut self.balls[*row as usize];
             if !ball.is_frozen() {
@@ -72,7 +72,7 @@ impl EventDriven {
         } else {
             self.keep_velocity(&found);
         }
-        RestingCluster { rows: found, pressed_by }
+        RestingCluster { rows: found, pressed_by, squeezed }
     }
 
     /// Solves the approach of a gathered cluster as one collision without restitution;
@@ -80,14 +80,15 @@ impl EventDriven {
     pub(super) fn solve_inelastic_impact(
         &mut self,
         contacts: &mut Contacts<f64>,
-        now: f64,
+        (now, walls_at_rest): (f64, bool),
         max_acceleration: f64,
         settings: &EventSettings,
     ) {
         for material in &mut self.cluster.material {
             (material.restitution, material.tangential_restitution) = (0.0, 0.0);
         }
-        let walls = MovingWalls { walls: &self.walls, start: now, end: now };
+        let walls =
+            MovingWalls { walls: &self.walls, start: now, end: now, at_rest: walls_at_rest };
         let before = self
             .work
             .map(|_| (self.cluster.bodies.velocity.clone(), self.cluster.bodies.spin.clone()));
@@ -230,8 +231,7 @@ impl EventDriven {
         for local in contacts.mm.iter().flat_map(|c| [c.a, c.b]) {
             touches_balls[local as usize] = true;
         }
-        let walls = MovingWalls { walls: &self.walls, start: now, end: settings.dt };
-        self.cluster.solve(contacts, &walls, max_acceleration, remaining, settings, impulse_cache);
+        self.solve_until_end(contacts, now, max_acceleration, settings, impulse_cache);
         let Cluster { rows, bodies, sets, scratch, .. } = &mut self.cluster;
         let ClusterBodies { position, velocity, spin, inverse_mass, .. } = bodies;
         rename_rows(impulse_cache, |at| rows.get(at).map(|row| *row as usize));

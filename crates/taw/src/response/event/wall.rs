@@ -154,6 +154,19 @@ pub(super) struct MovingWalls<'a> {
     pub walls: &'a [Wall],
     pub start: f64,
     pub end: f64,
+    /// True if their velocities do not count: they are where they are, and carry nothing along.
+    pub at_rest: bool,
+}
+
+impl MovingWalls<'_> {
+    /// Velocity of a wall at a point that moves with it, or with its surface, in m/s.
+    pub fn velocity_at(&self, wall: usize, point: Point3<f64>) -> Vec3<f64> {
+        let wall = &self.walls[wall];
+        match wall.motion {
+            Some(motion) if wall.arrival_time.is_none() => motion.velocity_at(point),
+            _ => wall.velocity_at(point, self.end),
+        }
+    }
 }
 
 impl Colliders<f64> for MovingWalls<'_> {
@@ -173,6 +186,9 @@ impl Colliders<f64> for MovingWalls<'_> {
     }
 
     fn surface_velocity(&self, wall: usize, point: Point3<f64>) -> Vec3<f64> {
+        if self.at_rest {
+            return Vec3::zero();
+        }
         let wall = &self.walls[wall];
         wall.surface_velocity(wall.nearest(point, self.end).normal, point, self.end)
     }
