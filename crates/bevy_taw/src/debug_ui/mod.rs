@@ -247,11 +247,9 @@ pub fn swarm_model(ui: &mut Ui, model: &mut ResMut<TawSwarmModel>) {
     });
     ui.add(egui::Slider::new(&mut chosen.substeps, 1..=8).text("substeps"));
     let machine = std::thread::available_parallelism().map_or(1, |count| count.get() as u32);
-    let threads = egui::Slider::new(
-        &mut chosen.threads,
-        0..=machine.min(SwarmModel::MAX_THREADS).max(chosen.threads),
-    );
-    ui.add(threads.text("threads")).on_hover_text("0: as many as pay");
+    let most = machine.min(SwarmModel::MAX_THREADS).max(chosen.threads);
+    let threads = egui::Slider::new(&mut chosen.threads, 0..=most).text("threads");
+    ui.add(threads).on_hover_text("0: as many as pay");
     if chosen.tier == Tier::Full {
         ui.add(egui::Slider::new(&mut chosen.material.friction, 0.0..=1.0).text("friction"));
         let restitution = egui::Slider::new(&mut chosen.material.restitution, 0.0..=1.0);
