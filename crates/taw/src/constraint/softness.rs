@@ -48,37 +48,17 @@ impl ContactSoftness {
     }
 
     /// Target velocity along the normal, in m/s, and softness at a separation in metres. An overlap
-    /// is soft and pushed apart; a gap is rigid, and may close within the substep (speculative
-    /// contact). A gap of up to `tolerance` metres may close, too, but is soft: a body that has just
-    /// landed has a separation of zero, of which rounding makes an overlap or a gap, and both targets
-    /// are zero there.
+    /// is soft; a gap is rigid, and may close within the substep (speculative contact).
     #[inline(always)]
-    pub fn at<R: Real>(&self, separation: R, per_second: R, tolerance: R) -> (R, Softness<R>) {
+    pub fn at<R: Real>(&self, separation: R, per_second: R) -> (R, Softness<R>) {
         let (zero, one) = (R::splat(0.0), R::splat(1.0));
         let push =
             (separation * R::splat(self.bias_rate)).max(zero - R::splat(self.max_push_speed));
         let bias = separation.select_gt(zero, separation * per_second, push);
         let softness = Softness {
-            mass_scale: separation.select_gt(tolerance, one, R::splat(self.mass_scale)),
-            impulse_scale: separation.select_gt(tolerance, zero, R::splat(self.impulse_scale)),
+            mass_scale: separation.select_gt(zero, one, R::splat(self.mass_scale)),
+            impulse_scale: separation.select_gt(zero, zero, R::splat(self.impulse_scale)),
         };
         (zero - bias, softness)
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_sign_of_a_rounding_does_not_matter_to_what_has_just_landed() {
-        let softness = ContactSoftness::new(1.0 / 60.0, 60.0, 10.0, 3.0);
-        let at = |separation: f32| softness.at(separation, 60.0, 1e-5);
-        let ([above, below], [rigid, touch]) = ([at(1e-9), at(-1e-9)], [at(2e-5), at(0.5e-5)]);
-        assert_eq!(above.1, below.1);
-        assert!((above.0 - below.0).abs() < 1e-7);
-        // A gap closes, be it soft or rigid.
-        assert_eq!([rigid.0, touch.0], [-2e-5 * 60.0, -0.5e-5 * 60.0]);
-        assert_eq!((rigid.1.mass_scale, rigid.1.impulse_scale), (1.0, 0.0));
     }
 }

@@ -2,7 +2,7 @@
 
 use cgmath::InnerSpace;
 
-use super::kernels::{GROUNDED, Pass, SolverParams, TOUCHES, WALL_SLOP};
+use super::kernels::{GROUNDED, Pass, SolverParams, WALL_SLOP};
 use super::proxies::Proxy;
 use super::simd::Row;
 use super::surfaces::WallNumbers;
@@ -36,15 +36,10 @@ pub(super) struct WallContact {
     pub torque: Vec3<f32>,
 }
 
-/// Separation in roundings of the coordinates up to which a ball stands on a wall, beyond
-/// [`TOUCHES`]. A larger one would hold balls in the air that come down beside others.
+/// Separation in radii, and in roundings of the coordinates, up to which a ball stands on a wall. A
+/// larger one would hold balls in the air that come down beside others.
+const TOUCHES: f32 = 1e-4;
 const ROUNDINGS: f32 = 4.0;
-
-/// Separation up to which a ball stands on a wall, in metres.
-fn touch_tolerance(at: &Row) -> f32 {
-    let place = at[0].abs() + at[1].abs() + at[2].abs();
-    at[3] * TOUCHES + place * (ROUNDINGS * f32::EPSILON)
-}
 
 pub(super) fn xyz(row: &Row) -> Vec3<f32> {
     Vec3::new(row[0], row[1], row[2])
@@ -77,7 +72,8 @@ impl WallContact {
 
     /// Normal impulse in the last substep, in N s; zero if the ball has left the wall.
     pub fn bears(&self, at: &Row) -> f32 {
-        let there = self.separation(at) <= touch_tolerance(at);
+        let place = at[0].abs() + at[1].abs() + at[2].abs();
+        let there = self.separation(at) <= at[3] * TOUCHES + place * (ROUNDINGS * f32::EPSILON);
         if there { self.impulse.normal + self.borne_for_others } else { 0.0 }
     }
 
@@ -194,7 +190,7 @@ impl WallContact {
         let relative = xyz(velocity) - self.surface;
         let (target, softness) = match softness {
             Some(softness) => {
-                let (target, softness) = softness.at(separation, 1.0 / time, touch_tolerance(at));
+                let (target, softness) = softness.at(separation, 1.0 / time);
                 (target, Some(softness))
             }
             None => (-separation.max(0.0) / time, None),

@@ -2,7 +2,7 @@
 //! The constraint itself is in [`crate::constraint`].
 
 use super::backing::borne_by_wall;
-use super::params::{Pass, SolverParams, TOUCHES};
+use super::params::{Pass, SolverParams};
 use super::rolling::RollingInertia;
 use super::{
     ALL, ContactImpulses, effective_mass, gather, inverse_mass, normal_and_separation, scatter,
@@ -351,8 +351,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
             let alone = effective_mass(&a, &b);
             let (target, softness) = if FIRST {
-                let tolerance = (at[0][3] + at[1][3]) * L::splat(TOUCHES);
-                let (target, softness) = softness.at(separation, per_second, tolerance);
+                let (target, softness) = softness.at(separation, per_second);
                 (target, Some(softness))
             } else {
                 (zero - separation.max(zero) * per_second, None)

@@ -18,7 +18,7 @@ pub(super) use backing::LOST;
 pub(super) use contact::{SolverColumns, solve};
 pub(super) use displace::{Displace, DisplaceFromPlanes, DisplaceNeighbours};
 pub(super) use integrate::{IntegratePositions, Predict, UpdateVelocities, squared};
-pub(super) use params::{GROUNDED, Pass, SolverParams, TOUCHES, WALL_SLOP};
+pub(super) use params::{GROUNDED, Pass, SolverParams, WALL_SLOP};
 
 /// Accumulated impulses of batches of pairs, batch by batch; none in the lab's tier.
 #[derive(Clone, Debug, Default, PartialEq)]

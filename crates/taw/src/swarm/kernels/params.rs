@@ -40,8 +40,6 @@ pub(in crate::swarm) struct SolverParams {
     pub slop: f32,
 }
 
-/// Separation in radii up to which balls touch: more than rounding makes of none at all.
-pub(in crate::swarm) const TOUCHES: f32 = 1e-4;
 /// So much of its radius a ball may be in a wall: more than what bears a heap gets.
 pub(in crate::swarm) const WALL_SLOP: f32 = 0.1;
 /// Mark of a ball that a wall bears in this step, be it through others; one less in the next
