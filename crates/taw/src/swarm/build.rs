@@ -38,7 +38,7 @@ impl Swarm {
         walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
     ) {
-        let threads = self.scratch.threads;
+        let threads = self.threads();
         self.rebuilds += 1;
         observe(Stage::Pairs);
         if self.has_friction() {
@@ -102,7 +102,7 @@ impl Swarm {
 
     /// Sets the remaining skin of each ball: more than the common skin only for fast movers.
     fn reset_skins(&mut self, dt: f32, skin: f32) {
-        let (threads, lab) = (self.scratch.threads, !self.has_friction());
+        let (threads, lab) = (self.threads(), !self.has_friction());
         let (at, velocity, displacement) =
             (&self.at[..], &self.velocity[..], &self.displacement[..]);
         let least = if lab { 0.12 } else { 0.08 };
@@ -184,7 +184,7 @@ impl Swarm {
     }
 
     fn reorder(&mut self) {
-        let (threads, has_friction) = (self.scratch.threads, self.has_friction());
+        let (threads, has_friction) = (self.threads(), self.has_friction());
         let (order, scratch) = (bytemuck::cast_slice(&self.skin_left), &mut self.neighbours);
         reorder_rows(&mut self.at, scratch, order, threads);
         reorder_rows(&mut self.velocity, scratch, order, threads);
@@ -245,8 +245,7 @@ impl Swarm {
     }
 
     fn find_pairs(&mut self, skin: f32, dt: f32, walls: &dyn StaticGeometry) {
-        let (threads, has_friction, tier) =
-            (self.scratch.threads, self.has_friction(), self.tier());
+        let (threads, has_friction, tier) = (self.threads(), self.has_friction(), self.tier());
         let (simd_level, ahead) = (self.simd_level, self.ahead(dt));
         self.scratch.searches.resize(threads, Search::default());
         let chunks = DisjointSlice::new(&mut self.chunks);

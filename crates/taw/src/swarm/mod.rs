@@ -185,6 +185,7 @@ impl Swarm {
         let tier = self.tier();
         let resists = self.surface_of().differ();
         self.model = model;
+        self.scratch.threads = model.threads as usize;
         if self.tier() != tier {
             (self.pairs_valid, self.cache_valid) = (false, false);
             self.old_rows.clear();

@@ -6,6 +6,11 @@ use super::simd::Row;
 use super::{Scratch, Swarm, SwarmModel};
 
 impl Swarm {
+    /// Number of threads that work on this step: of the last model until the first step begins.
+    pub(super) fn threads(&self) -> usize {
+        self.scratch.threads.max(1)
+    }
+
     /// Bytes that it has from the allocator, without those of threads.
     #[must_use]
     pub fn bytes(&self) -> usize {
