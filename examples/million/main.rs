@@ -33,7 +33,7 @@ pub struct Options {
     /// Into how many parts a step is cut; 1 for lab and 2 for full if not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100))]
     substeps: Option<u32>,
-    /// How many threads; as many as pay if not given
+    /// Number of threads; as many as pay if not given
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=64))]
     threads: Option<u32>,
     /// No window: prints what the steps cost
