@@ -4,13 +4,14 @@
 //! `cargo run --release --bin trade -- FILE` in this folder, then `taw-lab trade --with FILE`.
 //! `--quick` runs the settings of a quick sweep. Both engines by default but for what is swept:
 //! steps, and solver iterations (Rapier) or substeps (Avian). Nothing sleeps. Fields are forces
-//! that are set before each step.
+//! that are set before each step. Cost is the processor time of all threads; Rapier has one.
 
-use std::time::{Duration, Instant};
+use std::time::Duration;
 
 use avian3d::prelude as avian;
 use bevy::prelude::*;
 use bevy::time::TimeUpdateStrategy;
+use cpu_time::ProcessTime;
 use rapier3d::prelude as rapier;
 use taw::math::Vec3 as Exact;
 use taw::scene::{
@@ -336,7 +337,7 @@ fn run<E: Engine>(judged: &ReferenceCase, step: (&str, f64), count: u32) -> Poin
             if i < steps {
                 let now = (i as f64 + 0.5) * step.1;
                 let gravity = vec(scene.gravity_at(now));
-                let begin = Instant::now();
+                let begin = ProcessTime::now();
                 let forces = if scene.force_fields.is_empty() {
                     vec![]
                 } else {
@@ -382,6 +383,7 @@ fn main() -> std::io::Result<()> {
     let quick = arguments.iter().any(|word| word == "--quick");
     let file = arguments.iter().find(|word| !word.starts_with("--"));
     let file = file.map_or("peers.jsonl", String::as_str);
+    rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("once");
     eprintln!("{}: {}", Rapier::NAME, Rapier::defaults());
     eprintln!("{}: {}", Avian::NAME, Avian::defaults());
     let mut points = Vec::new();

@@ -39,6 +39,9 @@ pub fn time_of_impact_sphere_sphere<S: Scalar>(
     let (apart, motion) = (b.center - a.center, b_translation - a_translation);
     let reach = a.radius + b.radius;
     let distance = length(apart);
+    if distance > (reach + length(motion)) * S::from_f64(1.001) {
+        return None; // out of reach, whatever rounding says
+    }
     // In units of the sum of radii, so that no square vanishes or overflows.
     let (d, m) = (apart / reach, motion / reach);
     let open = (distance / reach - S::one()) * (distance / reach + S::one());

@@ -81,12 +81,6 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Radius times angular velocity, in m/s; crossed with the normal, the surface speed.
-    #[inline]
-    pub(super) fn radius_times_spin(&self, row: usize) -> Vec3<S> {
-        self.unlocked_spin(row) * self.radius[row]
-    }
-
     /// Inverse moment of inertia, in 1/(kg m²), the largest one of a capsule; zero if the rotation
     /// is locked.
     pub(super) fn inverse_inertia(&self, row: usize) -> S {
@@ -135,6 +129,23 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
+    /// Motion of a row, as contacts see it.
+    #[inline]
+    pub(super) fn motion(&self, row: usize) -> Motion<S> {
+        Motion {
+            velocity: self.velocity[row],
+            spin: self.unlocked_spin(row),
+            radius: self.radius[row],
+        }
+    }
+
+    /// Spin of a ball per change of its velocity at right angles to the normal, in 1/m; zero if the
+    /// rotation is locked.
+    #[inline]
+    pub(super) fn spin_per_speed(&self, row: usize) -> S {
+        self.ball_rotation(row).inverse_inertia_factor::<S>() / self.radius[row]
+    }
+
     /// Applies an impulse, given as a velocity change of the center, at a contact point: `arm`
     /// metres from the center, along the negative `normal` for a ball.
     #[inline]
@@ -145,37 +156,95 @@ impl<S: Scalar> SolverBodies<'_, S> {
         normal: Vec3<S>,
         arm: Vec3<S>,
     ) {
-        self.velocity[row] += velocity_change;
-        if !self.capsules.is_empty() && self.spin_capsule(row, velocity_change, arm) {
-            return;
+        if self.capsule(row).is_some() {
+            self.velocity[row] += velocity_change;
+            return self.spin_capsule(row, velocity_change, arm);
         }
-        let factor = self.ball_rotation(row).inverse_inertia_factor::<S>();
-        if let Some(spin) = self.spin.get_mut(row) {
-            *spin -= normal.cross(velocity_change) * (factor / self.radius[row]);
-        }
+        let spin_per_speed = self.spin_per_speed(row);
+        let mut no_spin = Vec3::zero();
+        let spin = self.spin.get_mut(row).unwrap_or(&mut no_spin);
+        push(&mut self.velocity[row], spin, velocity_change, normal, spin_per_speed);
     }
 
-    /// Applies the angular part to a capsule. False if the body is a sphere.
-    fn spin_capsule(&mut self, row: usize, velocity_change: Vec3<S>, arm: Vec3<S>) -> bool {
-        let Some(capsule) = self.capsule(row).copied() else { return false };
+    /// Applies the angular part of an impulse to a capsule.
+    fn spin_capsule(&mut self, row: usize, velocity_change: Vec3<S>, arm: Vec3<S>) {
+        let Some(capsule) = self.capsule(row).copied() else { return };
         if let Some(spin) = self.spin.get_mut(row) {
             *spin += capsule.apply_inverse_inertia(arm.cross(velocity_change));
         }
-        true
+    }
+
+    /// Change of the spin by an angular impulse (in kg m²/s), in rad/s.
+    pub(super) fn spin_change(&self, row: usize, angular_impulse: Vec3<S>) -> Vec3<S> {
+        match self.capsule(row) {
+            Some(capsule) => {
+                capsule.apply_inverse_inertia(angular_impulse * self.inverse_mass[row])
+            }
+            None => angular_impulse * self.inverse_inertia(row),
+        }
     }
 
     /// Applies an angular impulse, in kg m²/s.
     pub(super) fn apply_angular_impulse(&mut self, row: usize, angular_impulse: Vec3<S>) {
-        let inverse = self.inverse_inertia(row);
-        if let Some(capsule) = self.capsule(row).copied() {
-            let inverse_mass = self.inverse_mass[row];
-            if let Some(spin) = self.spin.get_mut(row) {
-                *spin += capsule.apply_inverse_inertia(angular_impulse * inverse_mass);
-            }
-            return;
-        }
+        let change = self.spin_change(row, angular_impulse);
         if let Some(spin) = self.spin.get_mut(row) {
-            *spin += angular_impulse * inverse;
+            *spin += change;
         }
     }
+}
+
+/// Motion of a body, as contacts see it.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Motion<S> {
+    /// Velocity of the center, in m/s.
+    pub velocity: Vec3<S>,
+    /// Angular velocity, in rad/s; zero if the rotation is locked.
+    pub spin: Vec3<S>,
+    /// Radius, in metres.
+    pub radius: S,
+}
+
+/// Changes the velocity of a ball by an impulse at a contact, and its spin with it.
+#[inline]
+pub(super) fn push<S: Scalar>(
+    velocity: &mut Vec3<S>,
+    spin: &mut Vec3<S>,
+    change: Vec3<S>,
+    normal: Vec3<S>,
+    spin_per_speed: S,
+) {
+    *velocity += change;
+    *spin -= normal.cross(change) * spin_per_speed;
+}
+
+/// Relative velocity at a contact: that of the second body's contact point minus the first's, or
+/// the surface's if there is no first body; in m/s.
+#[inline]
+pub(super) fn relative_velocity<S: Scalar>(
+    motion: impl Fn(usize) -> Motion<S>,
+    is_capsule: impl Fn(usize) -> bool,
+    (a, b): (Option<usize>, usize),
+    arms: &[Vec3<S>; 2],
+    normal: Vec3<S>,
+    surface_velocity: Vec3<S>,
+) -> Vec3<S> {
+    let second = motion(b);
+    let mut velocity = second.velocity - surface_velocity;
+    // The arms of balls lie along the normal: one product does for both. A ball among capsules
+    // moves to the same bits as without them.
+    let mut radius_times_spin = Vec3::zero();
+    let mut add_spin = |row: usize, motion: &Motion<S>, arm: &Vec3<S>, sign: S| {
+        if is_capsule(row) {
+            velocity += motion.spin.cross(*arm) * sign;
+        } else {
+            radius_times_spin += motion.spin * motion.radius;
+        }
+    };
+    add_spin(b, &second, &arms[1], S::one());
+    if let Some(a) = a {
+        let first = motion(a);
+        add_spin(a, &first, &arms[0], -S::one());
+        velocity -= first.velocity;
+    }
+    velocity + normal.cross(radius_times_spin)
 }

@@ -186,8 +186,12 @@ impl<S: Scalar> World<S> {
         if self.continuous.grazes.is_empty() || !looks {
             return;
         }
-        let mut listed: HashSet<_> = self.contacts.mm.iter().map(|c| (c.a, c.b)).collect();
-        for (a, b) in self.continuous.grazes.iter().copied().filter(|pair| listed.insert(*pair)) {
+        let grazes = &mut self.continuous.grazes;
+        grazes.sort_unstable();
+        grazes.dedup();
+        let listed = self.contacts.mm.iter().map(|c| (c.a, c.b));
+        let listed: HashSet<_> = listed.filter(|pair| grazes.binary_search(pair).is_ok()).collect();
+        for (a, b) in grazes.iter().copied().filter(|pair| !listed.contains(pair)) {
             let center = [S::zero(); 2];
             let contact = marble_contact(&self.marbles, [a, b], center, S::max_value());
             self.contacts.mm.extend(contact);

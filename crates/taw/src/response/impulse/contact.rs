@@ -6,6 +6,7 @@ use cgmath::Zero;
 use super::{BodyA, Colliders, Constraint, RollingConstraint};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Scalar, Vec3, cast_vector, is_finite, normal_and_distance};
+use crate::response::bodies::relative_velocity;
 use crate::response::{BallRotation, InverseEffectiveMass, Material, SolverBodies};
 
 impl<S: Scalar> SolverBodies<'_, S> {
@@ -112,23 +113,10 @@ impl<S: Scalar> SolverBodies<'_, S> {
         normal: Vec3<S>,
         surface_velocity: Vec3<S>,
     ) -> Vec3<S> {
-        let mut velocity = self.velocity[b] - surface_velocity;
-        // The arms of balls lie along the normal: one product does for both. A ball among capsules
-        // moves to the same bits as without them.
-        let mut radius_times_spin = Vec3::zero();
-        let mut add_spin = |row: usize, arm: Vec3<S>, sign: S| {
-            if self.capsule(row).is_some() {
-                velocity += self.unlocked_spin(row).cross(arm) * sign;
-            } else {
-                radius_times_spin += self.radius_times_spin(row);
-            }
-        };
-        add_spin(b, arms[1], S::one());
-        if let Some(a) = a.marble() {
-            add_spin(a, arms[0], -S::one());
-            velocity -= self.velocity[a];
-        }
-        velocity + normal.cross(radius_times_spin)
+        let motion = |row: usize| self.motion(row);
+        let is_capsule = |row: usize| self.capsule(row).is_some();
+        let bodies = (a.marble(), b);
+        relative_velocity(motion, is_capsule, bodies, &arms, normal, surface_velocity)
     }
 
     /// Relative velocity of the contact points, in m/s, and relative spin, in rad/s.

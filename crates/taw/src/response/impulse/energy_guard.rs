@@ -6,6 +6,7 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::islands::Islands;
+use super::rows::Rows;
 use super::solve::iterate;
 use super::{Constraint, SolverSettings};
 use crate::constraint::ContactImpulse;
@@ -81,15 +82,23 @@ impl<S: Scalar> SolverBodies<'_, S> {
         islands: &mut Islands<S>,
         energies: &mut Vec<IslandEnergy<S>>,
         full_restitution: &mut Vec<FullRestitution<S>>,
+        rows: &mut Rows<S>,
         settings: &SolverSettings<S>,
     ) {
         self.measure_energy(constraints, islands, energies);
         if energies.iter().any(|energy| energy.bounces && energy.gains()) {
-            self.reduce_restitution(constraints, islands, energies, full_restitution, settings);
+            self.reduce_restitution(
+                constraints,
+                islands,
+                energies,
+                full_restitution,
+                rows,
+                settings,
+            );
             self.measure_energy(constraints, islands, energies);
         }
         if energies.iter().any(IslandEnergy::gains) {
-            self.solve_normals_before_friction(constraints, islands, energies, settings);
+            self.solve_normals_before_friction(constraints, islands, energies, rows, settings);
         }
         self.stop_approaches(constraints, islands);
     }
@@ -104,7 +113,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             let c = &mut constraints[index];
             let missing_speed =
                 c.target_without_restitution() - self.relative_velocity_of(c).dot(c.normal);
-            let island = islands.of(c);
+            let island = islands.of(c.island);
             let unfinished = island.bounces || island.incomplete || !island.converged;
             if unfinished && missing_speed > self.velocity_rounding(c) && missing_speed.is_finite()
             {
@@ -119,6 +128,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         islands: &mut Islands<S>,
         energies: &mut Vec<IslandEnergy<S>>,
         full_restitution: &mut Vec<FullRestitution<S>>,
+        rows: &mut Rows<S>,
         settings: &SolverSettings<S>,
     ) {
         let gaining: Vec<_> = energies.iter().map(|it| it.bounces && it.gains()).collect();
@@ -136,7 +146,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             );
         }
         islands.restart(|island| gaining[island]);
-        iterate(self, constraints, islands, settings);
+        iterate(self, constraints, islands, rows, settings);
         self.measure_energy(constraints, islands, energies);
         let half = S::from_f64(0.5);
         for (c, full) in constraints.iter().zip(full_restitution.iter()) {
@@ -147,16 +157,21 @@ impl<S: Scalar> SolverBodies<'_, S> {
                 (full.impulse - c.impulse(), full.angular_impulse - c.angular_impulse());
             let (velocity_change, spin_change) =
                 (full.relative_velocity - relative_velocity, full.relative_spin - relative_spin);
-            let island = islands.of(c);
-            energy.linear += island.energy(c, impulse, c.mean_velocity(relative_velocity))
-                + island.energy(c, c.impulse(), velocity_change * half)
-                + island.angular_energy(
-                    angular_impulse,
-                    (c.initial_relative_spin + relative_spin) * half,
-                )
+            let island = islands.of(c.island);
+            energy.linear += island.energy(
+                c.inverse_effective_mass.normal,
+                impulse,
+                c.mean_velocity(relative_velocity),
+            ) + island.energy(
+                c.inverse_effective_mass.normal,
+                c.impulse(),
+                velocity_change * half,
+            ) + island
+                .angular_energy(angular_impulse, (c.initial_relative_spin + relative_spin) * half)
                 + island.angular_energy(c.angular_impulse(), spin_change * half);
-            energy.quadratic += island.energy(c, impulse, velocity_change * half)
-                + island.angular_energy(angular_impulse, spin_change * half);
+            energy.quadratic +=
+                island.energy(c.inverse_effective_mass.normal, impulse, velocity_change * half)
+                    + island.angular_energy(angular_impulse, spin_change * half);
         }
         for (c, full) in constraints.iter_mut().zip(full_restitution) {
             if gaining[c.island as usize] {
@@ -180,6 +195,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         constraints: &mut [Constraint<S>],
         islands: &mut Islands<S>,
         energies: &mut Vec<IslandEnergy<S>>,
+        rows: &mut Rows<S>,
         settings: &SolverSettings<S>,
     ) {
         let gaining: Vec<_> = energies.iter().map(IslandEnergy::gains).collect();
@@ -201,7 +217,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             );
         }
         islands.restart(|island| gaining[island]);
-        iterate(self, constraints, islands, settings);
+        iterate(self, constraints, islands, rows, settings);
         self.apply_poisson_restitution(constraints, islands, energies, &gaining);
         let gaining_constraints = constraints.iter_mut().filter(|c| gaining[c.island as usize]);
         for (c, friction) in gaining_constraints.zip(friction) {
@@ -210,7 +226,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
                 (c.impulse.normal, friction * c.impulse.normal);
         }
         islands.restart(|island| gaining[island]);
-        iterate(self, constraints, islands, settings);
+        iterate(self, constraints, islands, rows, settings);
     }
 
     /// Scales the normal impulses by Poisson's hypothesis (1838): by the least restitution of the
@@ -270,14 +286,18 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let half = S::from_f64(0.5);
         for c in constraints {
             let energy = &mut energies[c.island as usize];
-            let island = islands.of(c);
+            let island = islands.of(c.island);
             let velocity_change = self.relative_velocity_of(c) - c.initial_relative_velocity;
             let spin_change = self.relative_spin(c) - c.initial_relative_spin;
-            energy.linear +=
-                island.energy(c, c.impulse(), c.mean_velocity(c.initial_relative_velocity))
-                    + island.angular_energy(c.angular_impulse(), c.initial_relative_spin);
-            energy.quadratic += island.energy(c, c.impulse(), velocity_change * half)
-                + island.angular_energy(c.angular_impulse(), spin_change * half);
+            energy.linear += island.energy(
+                c.inverse_effective_mass.normal,
+                c.impulse(),
+                c.mean_velocity(c.initial_relative_velocity),
+            ) + island
+                .angular_energy(c.angular_impulse(), c.initial_relative_spin);
+            energy.quadratic +=
+                island.energy(c.inverse_effective_mass.normal, c.impulse(), velocity_change * half)
+                    + island.angular_energy(c.angular_impulse(), spin_change * half);
         }
     }
 
@@ -308,13 +328,17 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let half = S::from_f64(0.5);
         for c in constraints {
             let energy = &mut energies[c.island as usize];
-            let island = islands.of(c);
+            let island = islands.of(c.island);
             energy.bounces |= c.bounces;
             let relative_spin = (c.initial_relative_spin + self.relative_spin(c)) * half;
-            energy.work +=
-                island.energy(c, c.impulse(), c.mean_velocity(self.relative_velocity_of(c)))
-                    + island.angular_energy(c.angular_impulse(), relative_spin);
-            energy.exchanged += island.energy(c, c.impulse(), c.initial_relative_velocity).abs();
+            energy.work += island.energy(
+                c.inverse_effective_mass.normal,
+                c.impulse(),
+                c.mean_velocity(self.relative_velocity_of(c)),
+            ) + island.angular_energy(c.angular_impulse(), relative_spin);
+            energy.exchanged += island
+                .energy(c.inverse_effective_mass.normal, c.impulse(), c.initial_relative_velocity)
+                .abs();
         }
     }
 }

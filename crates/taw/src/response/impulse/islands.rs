@@ -3,7 +3,8 @@
 use cgmath::InnerSpace;
 
 use super::Constraint;
-use crate::math::{Scalar, Vec3, normalize_and_length};
+use super::rows::{Row, SearchDirections};
+use crate::math::{Scalar, Vec3};
 
 /// Regularization of the search: additional compliance of a contact, relative to its own, in units
 /// of the scalar's rounding. It limits impulses that cancel except for rounding: two walls that
@@ -71,9 +72,10 @@ impl UnionFind {
 #[derive(Clone, Copy, Debug)]
 #[expect(clippy::struct_excessive_bools, reason = "each is a question of its own")]
 pub(super) struct Island<S> {
-    /// Energy units, so that squares do not underflow: 1/kg and m/s.
+    /// Energy units, so that squares do not underflow: mass in 1/kg, and speed as its reciprocal, in
+    /// s/m.
     inverse_mass_unit: S,
-    speed_unit: S,
+    inverse_speed_unit: S,
     /// True if one of its contacts bounces; true if one rests; and the time since the first bounce
     /// in this substep, in seconds.
     pub bounces: bool,
@@ -123,22 +125,22 @@ impl<S: Scalar> Islands<S> {
         self.list.len()
     }
 
-    /// Island of a contact.
+    /// Island by its index.
     #[inline]
-    pub fn of(&self, c: &Constraint<S>) -> &Island<S> {
-        &self.list[c.island as usize]
+    pub fn of(&self, island: u32) -> &Island<S> {
+        &self.list[island as usize]
     }
 
-    /// Island of a contact.
+    /// Island by its index.
     #[inline]
-    pub fn of_mut(&mut self, c: &Constraint<S>) -> &mut Island<S> {
-        &mut self.list[c.island as usize]
+    pub fn of_mut(&mut self, island: u32) -> &mut Island<S> {
+        &mut self.list[island as usize]
     }
 
-    /// Island of a contact, if it is accelerated.
+    /// Island of a row, if it is accelerated and the row takes part in it.
     #[inline]
-    pub fn accelerating(&mut self, c: &Constraint<S>) -> Option<&mut Island<S>> {
-        Some(self.of_mut(c)).filter(|island| island.accelerating)
+    pub fn accelerating(&mut self, row: &Row<S>) -> Option<&mut Island<S>> {
+        Some(self.of_mut(row.island)).filter(|island| island.accelerating && !row.is_open())
     }
 
     /// Restarts the iterations of some islands; all others count as converged.
@@ -183,7 +185,7 @@ impl<S: Scalar> Island<S> {
         let (zero, one) = (S::zero(), S::one());
         Self {
             inverse_mass_unit,
-            speed_unit: if speed_unit > zero { speed_unit } else { one },
+            inverse_speed_unit: Some(speed_unit.recip()).filter(|r| r.is_finite()).unwrap_or(one),
             bounces: false,
             has_resting_contact: false,
             time_since_impact: zero,
@@ -199,14 +201,15 @@ impl<S: Scalar> Island<S> {
     /// Product of an impulse (as a speed: times the inverse effective mass) and a velocity at a
     /// contact, in units of the island.
     #[inline]
-    pub fn energy(&self, c: &Constraint<S>, impulse: Vec3<S>, velocity: Vec3<S>) -> S {
-        let weight = self.inverse_mass_unit / c.inverse_effective_mass.normal;
-        (impulse / self.speed_unit).dot(velocity / self.speed_unit) * weight
+    pub fn energy(&self, inverse_effective_mass: S, impulse: Vec3<S>, velocity: Vec3<S>) -> S {
+        let weight = self.inverse_mass_unit / inverse_effective_mass;
+        (impulse * self.inverse_speed_unit).dot(velocity * self.inverse_speed_unit) * weight
     }
 
     /// Product of an angular impulse (in kg m²/s) and a spin, in units of the island.
     pub fn angular_energy(&self, angular_impulse: Vec3<S>, spin: Vec3<S>) -> S {
-        (angular_impulse / self.speed_unit).dot(spin / self.speed_unit) * self.inverse_mass_unit
+        (angular_impulse * self.inverse_speed_unit).dot(spin * self.inverse_speed_unit)
+            * self.inverse_mass_unit
     }
 
     /// Resets the search.
@@ -216,15 +219,21 @@ impl<S: Scalar> Island<S> {
 
     /// Adds the terms of one contact for each direction; `rounding` is the error of its velocities,
     /// in m/s.
-    pub fn add_directions(&mut self, c: &Constraint<S>, rounding: S) {
+    #[inline]
+    pub fn add_directions(&mut self, row: &Row<S>, search: &SearchDirections<S>, rounding: S) {
+        let scale = self.inverse_speed_unit;
+        let weight = self.inverse_mass_unit / row.inverse_effective_mass;
         let regularization = S::epsilon() * S::from_f64(REGULARIZATION);
-        for (row, direction) in c.search_directions.iter().enumerate() {
-            let Some((unit, _)) = normalize_and_length(*direction) else { continue };
-            self.search.gradient[row] += self.energy(c, *direction, c.velocity_error);
-            let uncertainty = *direction * regularization + unit * rounding;
-            self.search.curvature[row][row] += self.energy(c, *direction, uncertainty);
-            for (column, velocity) in c.direction_velocities.iter().enumerate().take(row + 1) {
-                self.search.curvature[row][column] += self.energy(c, *direction, *velocity);
+        let directions = search.directions.map(|direction| direction * scale);
+        let velocities = search.velocities.map(|velocity| velocity * scale);
+        let (error, rounding) = (search.velocity_error * scale, rounding * scale);
+        let Search { gradient, curvature, .. } = &mut self.search;
+        for (row, direction) in directions.iter().enumerate() {
+            let squared = direction.magnitude2();
+            gradient[row] += direction.dot(error) * weight;
+            curvature[row][row] += (squared * regularization + squared.sqrt() * rounding) * weight;
+            for (column, velocity) in velocities.iter().enumerate().take(row + 1) {
+                curvature[row][column] += direction.dot(*velocity) * weight;
             }
         }
     }
@@ -246,11 +255,13 @@ impl<S: Scalar> Island<S> {
         self.search.friction_clamped |= friction_clamped;
     }
 
-    /// Adds the terms of one contact for the projected step, which changes its velocity by this.
-    pub fn add_projected(&mut self, c: &Constraint<S>, direction: Vec3<S>, velocity: Vec3<S>) {
-        self.search.projected_gradient += self.energy(c, direction, c.velocity_error);
+    /// Adds the terms of one contact for the projected step.
+    pub fn add_projected(&mut self, row: &Row<S>, search: &SearchDirections<S>) {
+        let mass = row.inverse_effective_mass;
+        let (direction, velocity) = (search.directions[1], search.velocities[1]);
+        self.search.projected_gradient += self.energy(mass, direction, search.velocity_error);
         let regularization = direction * (S::epsilon() * S::from_f64(REGULARIZATION));
-        self.search.projected_curvature += self.energy(c, direction, velocity + regularization);
+        self.search.projected_curvature += self.energy(mass, direction, velocity + regularization);
     }
 
     /// Chooses between the projected step and the straight step up to the exit from the first cone:

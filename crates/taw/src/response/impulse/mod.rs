@@ -7,6 +7,7 @@ mod energy_guard;
 mod islands;
 mod positions;
 mod prepare;
+mod rows;
 mod solve;
 
 use cgmath::{InnerSpace, Zero};
@@ -20,9 +21,10 @@ use crate::response::{
 pub(crate) use cache::CachedImpulse;
 use cache::store_impulses;
 use energy_guard::{FullRestitution, IslandEnergy};
+use islands::Islands;
 pub(super) use islands::UnionFind;
-use islands::{DIRECTIONS, Islands};
 use prepare::prepare;
+use rows::Rows;
 use solve::iterate;
 
 /// Solver input besides bodies and contacts.
@@ -100,6 +102,7 @@ pub(crate) struct Scratch<S> {
     initial_velocity: Vec<Vec3<S>>,
     constraints: Vec<Constraint<S>>,
     islands: Islands<S>,
+    rows: Rows<S>,
     energies: Vec<IslandEnergy<S>>,
     full_restitution: Vec<FullRestitution<S>>,
     separations: Vec<S>,
@@ -224,11 +227,6 @@ pub(super) struct Constraint<S> {
     /// Impulse accumulated in this substep, times the normal inverse effective mass: in m/s, a
     /// scale that a pebble and a boulder have in common.
     impulse: ContactImpulse<S>,
-    /// Search directions, as impulses: last iteration and accelerated steps before; the relative
-    /// velocity that each causes; and the velocity error where the search began; in m/s.
-    search_directions: [Vec3<S>; DIRECTIONS],
-    direction_velocities: [Vec3<S>; DIRECTIONS],
-    velocity_error: Vec3<S>,
     rolling: Option<RollingConstraint<S>>,
 }
 
@@ -271,15 +269,22 @@ pub(crate) fn solve_contacts<S: Scalar>(
     quarantined: &mut Vec<u32>,
 ) {
     let settings = context.settings;
-    let Scratch { initial_velocity, constraints, islands, energies, full_restitution, separations } =
-        scratch;
+    let Scratch {
+        initial_velocity,
+        constraints,
+        islands,
+        rows,
+        energies,
+        full_restitution,
+        separations,
+    } = scratch;
     initial_velocity.clear();
     initial_velocity.extend_from_slice(marbles.velocity);
     prepare(marbles, contacts, context, constraints, islands);
     marbles.warm_start(constraints, cache);
     marbles.limit_warm_start(constraints, islands, energies);
-    iterate(marbles, constraints, islands, settings);
-    marbles.limit_energy(constraints, islands, energies, full_restitution, settings);
+    iterate(marbles, constraints, islands, rows, settings);
+    marbles.limit_energy(constraints, islands, energies, full_restitution, rows, settings);
     marbles.update_positions(initial_velocity, constraints, context);
     marbles.solve_positions(constraints, context, separations);
     store_impulses(constraints, contacts, cache);

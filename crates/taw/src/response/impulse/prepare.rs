@@ -2,7 +2,7 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::islands::{DIRECTIONS, Island, Islands};
+use super::islands::{Island, Islands};
 use super::{BodyA, Colliders, Constraint, Context, WallsAtStart};
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::contact::{Contact, Contacts};
@@ -28,7 +28,7 @@ pub(super) fn prepare<S: Scalar>(
         return;
     }
     for c in constraints.iter() {
-        let island = islands.of_mut(c);
+        let island = islands.of_mut(c.island);
         island.bounces |= c.bounces;
         // A rotating capsule's position follows for the whole substep, too.
         island.has_resting_contact |= !c.bounces || c.axis_offset != [S::zero(); 2];
@@ -39,7 +39,7 @@ pub(super) fn prepare<S: Scalar>(
         }
     }
     for c in constraints.iter_mut().filter(|c| c.bounces) {
-        marbles.set_restitution(c, islands.of(c), context);
+        marbles.set_restitution(c, islands.of(c.island), context);
     }
 }
 
@@ -95,9 +95,6 @@ impl<S: Scalar> SolverBodies<'_, S> {
             target_normal_velocity: target_normal_velocity.min(S::zero()),
             target_tangent_velocity: zero,
             impulse: ContactImpulse::zero(),
-            search_directions: [zero; DIRECTIONS],
-            direction_velocities: [zero; DIRECTIONS],
-            velocity_error: zero,
             rolling: self.rolling_constraint(a, b, material),
         };
         constraint.initial_relative_spin = self.relative_spin(&constraint);

@@ -3,10 +3,11 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::islands::{DIRECTIONS, Island, Islands, SearchStep};
-use super::{Constraint, SolverSettings};
+use super::rows::{PackedBodies, Row, Rows, SearchDirections};
+use super::{Constraint, RollingConstraint, SolverSettings};
 use crate::constraint::{ContactImpulse, solve_rolling};
 use crate::math::{Scalar, Vec3, is_finite, length};
-use crate::response::{InverseEffectiveMass, SolverBodies};
+use crate::response::SolverBodies;
 
 /// Iterates over the contacts of islands that have not converged, until they do or the iterations
 /// are used up.
@@ -25,19 +26,22 @@ pub(super) fn iterate<S: Scalar>(
     marbles: &mut SolverBodies<S>,
     constraints: &mut [Constraint<S>],
     islands: &mut Islands<S>,
+    packed: &mut Rows<S>,
     settings: &SolverSettings<S>,
 ) {
+    packed.pack(marbles, constraints, islands);
+    let (rows, searches, mut bodies) = packed.split(marbles);
     for iteration in 0..settings.iterations {
-        for c in constraints.iter_mut() {
-            if islands.of(c).converged {
+        for (row, search) in rows.iter_mut().zip(searches.iter_mut()) {
+            if islands.of(row.island).converged {
                 continue;
             }
             islands.solve_count += 1;
-            let previous_impulse = c.impulse();
-            let change = marbles.solve_point(c);
-            c.search_directions[0] = c.impulse() - previous_impulse;
-            let island = islands.of_mut(c);
-            if change > island.change && change > marbles.velocity_rounding(c) {
+            let previous_impulse = row.impulse();
+            let change = bodies.solve_point(row, &mut constraints[row.constraint as usize]);
+            search.directions[0] = row.impulse() - previous_impulse;
+            let island = islands.of_mut(row.island);
+            if change > island.change && change > bodies.velocity_rounding(row) {
                 island.change = change;
             }
         }
@@ -45,11 +49,22 @@ pub(super) fn iterate<S: Scalar>(
         if islands.end_iteration(settings.restitution_threshold, settings.tolerance) || is_last {
             break;
         }
-        marbles.accelerate(constraints, islands);
+        bodies.accelerate(rows, searches, constraints, islands);
     }
+    packed.unpack(marbles, constraints);
 }
 
-impl<S: Scalar> Constraint<S> {
+impl<S: Scalar> Row<S> {
+    /// Accumulated impulse, in m/s as in [`Constraint`].
+    fn impulse(&self) -> Vec3<S> {
+        self.impulse.along(self.normal)
+    }
+
+    /// True if the contact bears nothing, so that the search leaves it as it is.
+    pub fn is_open(&self) -> bool {
+        self.impulse.normal <= S::zero()
+    }
+
     /// Projection of an impulse to the friction cone: no tension, and Coulomb friction.
     fn project_to_cone(&self, impulse: Vec3<S>) -> ContactImpulse<S> {
         self.cone.clamp(ContactImpulse::split(impulse, self.normal))
@@ -73,9 +88,10 @@ impl<S: Scalar> Constraint<S> {
     }
 
     /// Restricts the search directions to those that the contact can follow.
-    fn restrict_directions(&mut self, island_bounces: bool) {
-        if self.impulse.normal <= S::zero() {
-            self.search_directions = [Vec3::zero(); DIRECTIONS]; // an open contact has no impulse
+    fn restrict_directions(&self, search: &mut SearchDirections<S>, island_bounces: bool) {
+        if self.is_open() {
+            search.directions = [Vec3::zero(); DIRECTIONS];
+            search.velocities = search.directions;
         } else if island_bounces
             || length(self.impulse.tangent)
                 >= self.cone.max_friction(self.impulse.normal) * (S::one() - S::epsilon())
@@ -83,8 +99,105 @@ impl<S: Scalar> Constraint<S> {
             // Sliding friction stays at the cone, whichever way it slides. And restitution can ask
             // for more than friction in a corner can give, so that both would grow without end.
             let normal = self.normal;
-            self.search_directions =
-                self.search_directions.map(|direction| normal * direction.dot(normal));
+            search.directions = search.directions.map(|direction| normal * direction.dot(normal));
+        }
+    }
+}
+
+impl<S: Scalar> PackedBodies<'_, '_, S> {
+    /// Solves one contact point. Returns the velocity change, in m/s.
+    fn solve_point(&mut self, row: &mut Row<S>, c: &mut Constraint<S>) -> S {
+        let error = ContactImpulse::split(self.velocity_error(row, &c.arms), row.normal);
+        let wanted = ContactImpulse { tangent: error.tangent * row.tangent_ratio, ..error };
+        let mut impulse = row.impulse;
+        let change = impulse.solve(wanted, None, &row.cone).along(row.normal);
+        if !is_finite(change) {
+            return S::zero(); // an overflow must not reach the other body
+        }
+        row.impulse = impulse;
+        self.apply_impulse(row, &c.arms, change);
+        self.solve_rolling(row, &mut c.rolling);
+        change.magnitude()
+    }
+
+    /// Accelerates a pass: extends it, together with the steps before, to the combination that
+    /// brings each island nearest to its target velocities.
+    fn accelerate(
+        &mut self,
+        rows: &mut [Row<S>],
+        searches: &mut [SearchDirections<S>],
+        constraints: &[Constraint<S>],
+        islands: &mut Islands<S>,
+    ) {
+        islands.list.iter_mut().for_each(Island::begin_search);
+        let arms = |row: &Row<S>| &constraints[row.constraint as usize].arms;
+        for (row, search) in rows.iter().zip(searches.iter_mut()) {
+            let Island { accelerating, bounces, .. } = islands.of(row.island);
+            if *accelerating {
+                row.restrict_directions(search, *bounces);
+            }
+            if islands.accelerating(row).is_some() {
+                search.velocity_error = self.velocity_error(row, arms(row));
+            }
+        }
+        for (row, search) in rows.iter().zip(searches.iter()) {
+            if islands.accelerating(row).is_some() {
+                self.apply_impulse(row, arms(row), search.directions[0]);
+            }
+        }
+        for (row, search) in rows.iter().zip(searches.iter_mut()) {
+            let Some(island) = islands.accelerating(row) else { continue };
+            search.velocities[0] = search.velocity_error - self.velocity_error(row, arms(row));
+            island.add_directions(row, search, self.velocity_rounding(row));
+        }
+        islands.list.iter_mut().for_each(Island::solve_weights);
+        // Projected to the cones: inadmissible impulses would throw other marbles about.
+        for (row, search) in rows.iter().zip(searches.iter_mut()) {
+            let Some(island) = islands.accelerating(row) else { continue };
+            let [last, previous, _] = search.directions;
+            let straight = island.combine(&search.directions);
+            let direction = row.clamp_to_cone(straight);
+            let clamped = direction - straight;
+            let tangential = clamped - row.normal * clamped.dot(row.normal);
+            let rounding = (row.impulse.normal + length(straight)) * S::epsilon();
+            island.add_cone_limit(row.max_fraction(straight), length(tangential) > rounding);
+            self.apply_impulse(row, arms(row), direction - last);
+            // The oldest direction is dropped.
+            search.directions = [straight, direction, previous];
+            search.velocities =
+                [island.combine(&search.velocities), Vec3::zero(), search.velocities[1]];
+        }
+        for (row, search) in rows.iter().zip(searches.iter_mut()) {
+            let Some(island) = islands.accelerating(row) else { continue };
+            search.velocities[1] = search.velocity_error - self.velocity_error(row, arms(row));
+            island.add_projected(row, search);
+        }
+        for (row, search) in rows.iter_mut().zip(searches.iter_mut()) {
+            let Some(island) = islands.accelerating(row) else { continue };
+            let (which, fraction) = match island.choose_step() {
+                SearchStep::Projected(fraction) => (1, fraction),
+                SearchStep::Straight(fraction) => (0, fraction),
+            };
+            let direction = search.directions[which] * fraction;
+            self.apply_impulse(row, arms(row), direction - search.directions[1]);
+            // Cones are convex, so only rounding can lie outside.
+            row.impulse = row.project_to_cone(row.impulse() + direction);
+            search.velocities[1] = search.velocities[which] * fraction;
+            search.directions[1] = direction;
+        }
+    }
+
+    /// Solves rolling and torsional friction: one step toward zero relative spin.
+    fn solve_rolling(&mut self, row: &Row<S>, rolling: &mut Option<RollingConstraint<S>>) {
+        let Some(rolling) = rolling else { return };
+        let wanted = self.relative_spin(row) / -rolling.inverse_inertia;
+        let load = row.impulse.normal / row.inverse_effective_mass;
+        let limits = [rolling.rolling_lever * load, rolling.torsional_lever * load];
+        let mut angular_impulse = rolling.angular_impulse;
+        let change = solve_rolling(&mut angular_impulse, wanted, row.normal, limits);
+        if is_finite(change) {
+            rolling.angular_impulse = angular_impulse;
+            self.apply_angular_impulse(row, change);
         }
     }
 }
@@ -100,99 +213,6 @@ impl<S: Scalar> SolverBodies<'_, S> {
     pub(super) fn velocity_rounding(&self, c: &Constraint<S>) -> S {
         let speed = |row: usize| self.velocity[row].magnitude();
         (speed(c.b) + c.a.marble().map_or_else(S::zero, speed)) * S::epsilon()
-    }
-
-    /// Velocity error: target minus relative velocity, in m/s.
-    fn velocity_error_of(&self, c: &Constraint<S>) -> Vec3<S> {
-        c.normal * c.target_normal_velocity + c.target_tangent_velocity
-            - self.relative_velocity_of(c)
-    }
-
-    /// Solves one contact point. Returns the velocity change, in m/s.
-    fn solve_point(&mut self, c: &mut Constraint<S>) -> S {
-        let error = ContactImpulse::split(self.velocity_error_of(c), c.normal);
-        let InverseEffectiveMass { normal, tangent } = c.inverse_effective_mass;
-        let wanted = ContactImpulse { tangent: error.tangent * (normal / tangent), ..error };
-        let mut impulse = c.impulse;
-        let change = impulse.solve(wanted, None, &c.cone).along(c.normal);
-        if !is_finite(change) {
-            return S::zero(); // an overflow must not reach the other body
-        }
-        c.impulse = impulse;
-        self.apply_impulse_pair(c, change);
-        self.solve_rolling(c);
-        change.magnitude()
-    }
-
-    /// Accelerates a pass: extends it, together with the steps before, to the combination that
-    /// brings each island nearest to its target velocities.
-    fn accelerate(&mut self, constraints: &mut [Constraint<S>], islands: &mut Islands<S>) {
-        islands.list.iter_mut().for_each(Island::begin_search);
-        for c in constraints.iter_mut() {
-            let Some(island) = islands.accelerating(c) else { continue };
-            c.restrict_directions(island.bounces);
-            c.velocity_error = self.velocity_error_of(c);
-        }
-        for c in constraints.iter().filter(|c| islands.of(c).accelerating) {
-            self.apply_impulse_pair(c, c.search_directions[0]);
-        }
-        for c in constraints.iter_mut() {
-            let Some(island) = islands.accelerating(c) else { continue };
-            c.direction_velocities[0] = c.velocity_error - self.velocity_error_of(c);
-            island.add_directions(c, self.velocity_rounding(c));
-        }
-        islands.list.iter_mut().for_each(Island::solve_weights);
-        // Projected to the cones: inadmissible impulses would throw other marbles about.
-        for c in constraints.iter_mut() {
-            let Some(island) = islands.accelerating(c) else { continue };
-            let (straight, direction_velocities) =
-                (island.combine(&c.search_directions), island.combine(&c.direction_velocities));
-            let direction = c.clamp_to_cone(straight);
-            let clamped = direction - straight;
-            let tangential = clamped - c.normal * clamped.dot(c.normal);
-            let rounding = (c.impulse.normal + length(straight)) * S::epsilon();
-            island.add_cone_limit(c.max_fraction(straight), length(tangential) > rounding);
-            self.apply_impulse_pair(c, direction - c.search_directions[0]);
-            // The oldest direction is dropped.
-            (c.search_directions, c.direction_velocities) = (
-                [straight, direction, c.search_directions[1]],
-                [direction_velocities, Vec3::zero(), c.direction_velocities[1]],
-            );
-        }
-        for c in constraints.iter_mut() {
-            let Some(island) = islands.accelerating(c) else { continue };
-            c.direction_velocities[1] = c.velocity_error - self.velocity_error_of(c);
-            island.add_projected(c, c.search_directions[1], c.direction_velocities[1]);
-        }
-        for c in constraints.iter_mut() {
-            let Some(island) = islands.accelerating(c) else { continue };
-            let (direction, direction_velocities) = match island.choose_step() {
-                SearchStep::Projected(fraction) => {
-                    (c.search_directions[1] * fraction, c.direction_velocities[1] * fraction)
-                }
-                SearchStep::Straight(fraction) => {
-                    (c.search_directions[0] * fraction, c.direction_velocities[0] * fraction)
-                }
-            };
-            self.apply_impulse_pair(c, direction - c.search_directions[1]);
-            // Cones are convex, so only rounding can lie outside.
-            c.impulse = c.project_to_cone(c.impulse() + direction);
-            (c.search_directions[1], c.direction_velocities[1]) = (direction, direction_velocities);
-        }
-    }
-
-    /// Solves rolling and torsional friction: one step toward zero relative spin.
-    fn solve_rolling(&mut self, c: &mut Constraint<S>) {
-        let Some(rolling) = c.rolling else { return };
-        let wanted = self.relative_spin(c) / -rolling.inverse_inertia;
-        let load = c.impulse.normal / c.inverse_effective_mass.normal;
-        let limits = [rolling.rolling_lever * load, rolling.torsional_lever * load];
-        let mut angular_impulse = rolling.angular_impulse;
-        let change = solve_rolling(&mut angular_impulse, wanted, c.normal, limits);
-        if is_finite(change) {
-            c.rolling = Some(super::RollingConstraint { angular_impulse, ..rolling });
-            self.apply_angular_impulse_pair(c, change);
-        }
     }
 
     /// Relative spin of a contact, in rad/s.

@@ -124,15 +124,15 @@ impl<S: Scalar> World<S> {
     /// Finds candidate pairs and predicts their first meetings; `min_motion` is the fraction of the
     /// smallest radius that twice a motion must exceed.
     fn predict_meetings(&mut self, min_motion: S) {
-        let Continuous { middle, reach, candidates, meetings, paths, bends, .. } =
+        let Continuous { middle, reach, fast, candidates, meetings, paths, bends, .. } =
             &mut self.continuous;
         let half = S::from_f64(0.5);
         let smallest = self.marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
-        let fast = |row: u32| {
-            let path = &paths[row as usize];
+        fast.clear();
+        fast.extend(paths.iter().map(|path| {
             length(path.motion) > smallest * min_motion * half
                 || path.carried_bends(bends).next().is_some()
-        };
+        }));
         middle.clear();
         middle.extend(
             paths
@@ -148,18 +148,21 @@ impl<S: Scalar> World<S> {
         }));
         let spheres = (&middle[..], &reach[..]);
         self.images.pairs(&mut self.grid, spheres, S::zero(), self.marbles.period, |a, b| {
-            if (fast(a) || fast(b)) && self.marbles.may_collide(a, b) {
-                candidates.extend([(a, b), (b, a)]);
+            if (fast[a as usize] || fast[b as usize]) && self.marbles.may_collide(a, b) {
+                candidates.push((a, b));
             }
         });
-        candidates.sort_unstable();
-        let ahead = candidates.iter().filter(|(a, b)| a < b);
-        let period = self.marbles.period;
-        meetings.extend(ahead.filter_map(|pair| Meeting::predict(*pair, paths, S::zero(), period)));
+        let (pairs, period) = (candidates.iter(), self.marbles.period);
+        meetings.extend(pairs.filter_map(|pair| Meeting::predict(*pair, paths, S::zero(), period)));
     }
 
     /// Processes bends at walls and meetings of marbles in the order of time.
     fn bend_in_order(&mut self, resting_approach: S) {
+        if self.continuous.meetings.is_empty() {
+            return;
+        }
+        let Continuous { partners, candidates, start, .. } = &mut self.continuous;
+        partners.build(candidates, start.len());
         while let Some(Reverse(hit)) = self.continuous.meetings.pop() {
             let Meeting { time, pair, bends } = hit;
             let bent = |row: u32| self.continuous.paths[row as usize].bends;
@@ -171,14 +174,12 @@ impl<S: Scalar> World<S> {
             } else {
                 self.meet(pair, time, resting_approach);
             }
-            let Continuous { candidates, meetings, paths, bends, .. } = &mut self.continuous;
+            let Continuous { partners, meetings, paths, bends, .. } = &mut self.continuous;
             let period = self.marbles.period;
             for row in [pair.0, pair.1] {
                 meetings.extend(Meeting::at_wall(row, paths, bends));
                 // Meetings with this marble change.
-                let first = candidates.partition_point(|pair| pair.0 < row);
-                let others = candidates[first..].iter().take_while(|pair| pair.0 == row);
-                meetings.extend(others.filter_map(|(_, other)| {
+                meetings.extend(partners.of(row).iter().filter_map(|other| {
                     Meeting::predict((row.min(*other), row.max(*other)), paths, time, period)
                 }));
             }
@@ -217,7 +218,7 @@ impl<S: Scalar> World<S> {
         let rows = [pair.0 as usize, pair.1 as usize];
         let old = rows.map(|row| self.continuous.paths[row]);
         let [x, y] = old.map(|displacement| displacement.at(time));
-        let normal = normal_of(&x, &y.nearest_image(&x, self.marbles.period)).0;
+        let normal = normal_of(&x, &y.nearest_image(&x, self.marbles.period));
         let inverse_masses = [0, 1].map(|side| {
             let mass = self.marbles.mass(rows[side]);
             if old[side].held_by_wall { S::zero() } else { mass.recip() }
@@ -298,6 +299,44 @@ impl<S: Scalar> World<S> {
     }
 }
 
+/// Partners of each row among the candidate pairs, in one list.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Partners {
+    /// End of each row's partners in the list.
+    end: Vec<u32>,
+    rows: Vec<u32>,
+}
+
+impl Partners {
+    /// Sorts the pairs by both rows (counting sort).
+    fn build(&mut self, pairs: &[(u32, u32)], rows: usize) {
+        self.end.clear();
+        self.end.resize(rows + 1, 0);
+        for (a, b) in pairs {
+            self.end[*a as usize + 1] += 1;
+            self.end[*b as usize + 1] += 1;
+        }
+        for row in 0..rows {
+            self.end[row + 1] += self.end[row];
+        }
+        self.rows.clear();
+        self.rows.resize(2 * pairs.len(), 0);
+        for (a, b) in pairs {
+            for (row, partner) in [(*a, *b), (*b, *a)] {
+                let place = &mut self.end[row as usize];
+                self.rows[*place as usize] = partner;
+                *place += 1;
+            }
+        }
+    }
+
+    fn of(&self, row: u32) -> &[u32] {
+        let row = row as usize;
+        let start = row.checked_sub(1).map_or(0, |before| self.end[before]);
+        &self.rows[start as usize..self.end[row] as usize]
+    }
+}
+
 impl<S: Scalar> Continuous<S> {
     /// Lists pairs that graze each other within the substep though neither was stopped.
     fn collect_grazes(&mut self, period: Period<S>) {
@@ -305,7 +344,7 @@ impl<S: Scalar> Continuous<S> {
         grazes.extend(candidates.iter().filter(|(a, b)| {
             let [x, y] = [*a, *b].map(|row| &paths[row as usize]);
             let straight = x.bends == 0 && y.bends == 0;
-            a < b && straight && x.time_of_impact(&y.nearest_image(x, period)).is_some()
+            straight && x.time_of_impact(&y.nearest_image(x, period)).is_some()
         }));
     }
 }
@@ -355,10 +394,10 @@ impl<S: Scalar> Path<S> {
     }
 }
 
-/// Unit vector between two marbles and the distance of their centers, in metres.
-fn normal_of<S: Scalar>(x: &Path<S>, y: &Path<S>) -> (Vec3<S>, S) {
+/// Unit vector between two marbles.
+fn normal_of<S: Scalar>(x: &Path<S>, y: &Path<S>) -> Vec3<S> {
     let apart = normalize_and_length(y.sphere.center - x.sphere.center);
-    apart.unwrap_or((Vec3::unit_x(), S::zero()))
+    apart.map_or(Vec3::unit_x(), |(normal, _)| normal)
 }
 
 impl<S: Scalar> Meeting<S> {
@@ -380,19 +419,20 @@ impl<S: Scalar> Meeting<S> {
         now: S,
         period: Period<S>,
     ) -> Option<Reverse<Self>> {
-        let [x, y] = [pair.0, pair.1].map(|row| paths[row as usize].at(now));
-        let y = y.nearest_image(&x, period);
+        let [x, y] = [pair.0, pair.1].map(|row| &paths[row as usize]);
         let radius = x.sphere.radius.min(y.sphere.radius);
-        let closing = x.rest() - y.rest();
+        let closing = (x.motion - y.motion) * (S::one() - now);
         if length(closing) <= radius * S::from_f64(MAX_FREE_MOTION) {
             return None;
         }
-        let (normal, distance) = normal_of(&x, &y);
+        let (x, y) = (x.at(now), y.at(now));
+        let y = y.nearest_image(&x, period);
+        let distance = length(y.sphere.center - x.sphere.center);
         let after = if distance > x.sphere.radius + y.sphere.radius {
             x.time_of_impact(&y)?
         } else {
             // They touch: stop only if they would pass right through.
-            (closing.dot(normal) > radius).then_some(S::zero())?
+            (closing.dot(normal_of(&x, &y)) > radius).then_some(S::zero())?
         };
         let time = now + after * (S::one() - now);
         Some(Reverse(Self { time, pair, bends: (x.bends, y.bends) }))

@@ -12,7 +12,7 @@ use std::collections::{BinaryHeap, HashSet};
 use super::{Detection, World};
 use crate::contact::Contact;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
-use marbles::{Meeting, Path};
+use marbles::{Meeting, Partners, Path};
 use moving_walls::MovingWall;
 pub(super) use moving_walls::{Frame, RelativePath};
 use walls::Bend;
@@ -43,8 +43,11 @@ pub(super) struct Continuous<S> {
     pub grazes: Vec<(u32, u32)>,
     middle: Vec<Point3<S>>,
     reach: Vec<S>,
-    /// Candidate pairs in both orders, sorted.
+    /// Rows that move so far that they may meet others on the way.
+    fast: Vec<bool>,
+    /// Candidate pairs, the lower row first.
     candidates: Vec<(u32, u32)>,
+    partners: Partners,
     meetings: BinaryHeap<Reverse<Meeting<S>>>,
     paths: Vec<Path<S>>,
     /// Bends at walls by marble, in the order of time.
@@ -114,9 +117,13 @@ impl<S: Scalar> World<S> {
 
     /// Predicate: the two bodies of a stop have a contact.
     fn touches(&self) -> impl Fn(&StoppedMarble<S>) -> bool + use<S> {
+        let mut stopped: Vec<_> = self.continuous.stops.iter().map(|stop| stop.row).collect();
+        stopped.sort_unstable();
         let walls = self.contacts.wm.iter().map(|c| (Obstacle::Wall(c.a), c.b));
         let both = |c: &Contact<S>| [(Obstacle::Marble(c.a), c.b), (Obstacle::Marble(c.b), c.a)];
-        let touches: HashSet<_> = walls.chain(self.contacts.mm.iter().flat_map(both)).collect();
+        let contacts = walls.chain(self.contacts.mm.iter().flat_map(both));
+        let its = contacts.filter(|(_, row)| stopped.binary_search(row).is_ok());
+        let touches: HashSet<_> = its.collect();
         move |stop| touches.contains(&(stop.obstacle, stop.row))
     }
 
