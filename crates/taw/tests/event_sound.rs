@@ -65,7 +65,7 @@ fn boards<S: Scalar>() -> Vec<(&'static str, WallShape<S>)> {
 }
 
 /// A wall that goes from pose to pose, as the plugin moves walls.
-struct Mover<S> {
+struct Mover<S: Scalar> {
     id: WallId,
     shape: WallShape<S>,
     last: (f64, f64),

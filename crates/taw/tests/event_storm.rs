@@ -29,7 +29,7 @@ fn vector<S: Scalar>(p: [f64; 3]) -> Vec3<S> {
 /// Half the width of the box that all is in.
 const ROOM: f64 = 2.0;
 
-struct Scene<S> {
+struct Scene<S: Scalar> {
     world: World<S>,
     /// A wall that moves: how far and by which angle, and how often in a second.
     moving: Option<(WallId, WallShape<S>, [f64; 3])>,

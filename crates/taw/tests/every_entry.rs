@@ -55,7 +55,7 @@ fn models() -> Vec<Model> {
 }
 
 /// A ball on a floor to which something is done, and others far from it.
-struct Place<S> {
+struct Place<S: Scalar> {
     world: World<S>,
     /// The one to which it is done; another one touches it.
     subject: MarbleId,
@@ -120,7 +120,7 @@ enum Scope {
 }
 
 /// One way in.
-struct Row<S> {
+struct Row<S: Scalar> {
     /// All entries of which it is a case: functions as `Type::name`, fields as `Type.name`.
     names: &'static str,
     scope: Scope,

@@ -66,7 +66,7 @@ fn models() -> Vec<Model> {
 const FAR: [[f64; 3]; 4] =
     [[900.0, 0.5, 0.0], [901.5, 2.0, 0.0], [902.0, 0.5, 0.1], [-900.0, 3.0, 900.0]];
 
-struct Trial<S> {
+struct Trial<S: Scalar> {
     world: World<S>,
     /// With those far away alone.
     alone: World<S>,

@@ -19,7 +19,7 @@ use crate::world::{Marble, Model, WallId, WallShape, World};
 
 /// Running simulation of a [`Scene`]: its world and kinematic motions.
 #[derive(Clone, Debug)]
-pub struct Simulation<S> {
+pub struct Simulation<S: Scalar> {
     /// The world, with marbles in the order of the scene.
     pub world: World<S>,
     scene: Scene,
@@ -108,7 +108,7 @@ impl Scene {
     }
 }
 
-impl<S> From<World<S>> for Simulation<S> {
+impl<S: Scalar> From<World<S>> for Simulation<S> {
     /// Wraps an existing world without kinematic motions.
     fn from(world: World<S>) -> Self {
         Self { world, scene: Scene::default(), moving: Vec::new(), time: 0.0 }

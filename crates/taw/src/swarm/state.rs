@@ -116,7 +116,7 @@ impl PartialEq for Swarm {
             old_rows,
             cache_valid,
             pairs_valid,
-            walls_identity: _,
+            walls_identity,
             gravity,
             planes,
             stopped,
@@ -157,6 +157,7 @@ impl PartialEq for Swarm {
             && *gravity_scales == other.gravity_scales
             && (body_slots, sleepless) == (&other.body_slots, &other.sleepless)
             && *stopped == other.stopped
+            && walls_identity.is_some() == other.walls_identity.is_some()
             && (rebuilds, steps_since_build) == (&other.rebuilds, &other.steps_since_build)
     }
 }

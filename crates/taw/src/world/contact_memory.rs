@@ -12,6 +12,8 @@ use crate::response::{SpringHistory, follow_rows};
 pub(super) struct ContactMemory<S> {
     pub impulses: Vec<CachedImpulse<S>>,
     pub springs: Vec<SpringHistory<S>>,
+    /// Impulses of the clusters at rest of [`Response::EventDriven`](crate::response::Response).
+    pub event_impulses: Vec<CachedImpulse<f64>>,
     /// Who had which row then: a removal moves another marble or wall into its row.
     marbles: Vec<MarbleId>,
     walls: Vec<WallId>,
@@ -21,8 +23,14 @@ pub(super) struct ContactMemory<S> {
 
 impl<S> Default for ContactMemory<S> {
     fn default() -> Self {
-        let (impulses, springs) = (Vec::new(), Vec::new());
-        Self { impulses, springs, marbles: Vec::new(), walls: Vec::new(), removals: [0; 2] }
+        Self {
+            impulses: Vec::new(),
+            springs: Vec::new(),
+            event_impulses: Vec::new(),
+            marbles: Vec::new(),
+            walls: Vec::new(),
+            removals: [0; 2],
+        }
     }
 }
 
@@ -31,7 +39,7 @@ impl<S: Scalar> World<S> {
     pub(super) fn forget_contacts(&mut self) {
         self.memory.impulses.clear();
         self.memory.springs.clear();
-        self.events.impulse_cache.clear();
+        self.memory.event_impulses.clear();
     }
 
     /// Brings the memory of contacts up to date with the rows of marbles and walls.
@@ -39,15 +47,22 @@ impl<S: Scalar> World<S> {
         let (marbles, walls, memory) = (&self.marbles, &self.walls, &mut self.memory);
         let removals = [marbles.removals(), walls.removals()];
         if memory.removals != removals {
-            let ContactMemory { impulses, springs, marbles: old, walls: old_walls, .. } = memory;
+            let ContactMemory {
+                impulses,
+                springs,
+                event_impulses,
+                marbles: old,
+                walls: old_walls,
+                ..
+            } = memory;
             let marble = |row: usize| old.get(row).and_then(|id| marbles.row(*id).ok());
             let wall = |row: usize| old_walls.get(row).and_then(|id| walls.row(*id).ok());
             follow_rows(impulses, marble, wall);
             follow_rows(springs, marble, wall);
             if memory.removals[1] == removals[1] {
-                follow_rows(&mut self.events.impulse_cache, marble, Some);
+                follow_rows(event_impulses, marble, Some);
             } else {
-                self.events.impulse_cache.clear(); // it has rows of its own for walls
+                event_impulses.clear(); // they have rows of its own for walls
             }
         }
         if memory.removals != removals || memory.marbles.len() != marbles.len() {

@@ -34,7 +34,7 @@ impl<S: Scalar> World<S> {
             let Motion { position, velocity } = self.marbles.motion_f64(row);
             let scale = self.marbles.gravity_scale.get(row).unwrap_or(S::one()).as_f64();
             energy.kinetic += 0.5 * mass * velocity.magnitude2();
-            if self.marbles.rotation_of(row, self.model.rotation) == Rotation::Dynamic {
+            if self.marbles.rotation_of(row, self.settings.model.rotation) == Rotation::Dynamic {
                 energy.rotational += 0.5 * mass * self.marbles.rotational_energy(row);
             }
             energy.potential -= mass * scale * gravity.dot(position.to_vec());

@@ -65,8 +65,8 @@ impl<S: Scalar> World<S> {
     /// Switches the [energy audit](Self::energy_audit) of every step on or off. Off by default, at
     /// no cost.
     pub fn enable_energy_audit(&mut self, keep: bool) {
-        if keep != self.audit_state.is_some() {
-            self.audit_state = keep.then(|| {
+        if keep != self.scratch.audit_state.is_some() {
+            self.scratch.audit_state = keep.then(|| {
                 Box::new(AuditState {
                     audit: EnergyAudit::default(),
                     residual: Vec3::zero(),
@@ -85,12 +85,12 @@ impl<S: Scalar> World<S> {
     /// swarms.
     #[must_use]
     pub fn energy_audit(&self) -> Option<EnergyAudit> {
-        self.audit_state.as_ref().map(|audit_state| audit_state.audit)
+        self.scratch.audit_state.as_ref().map(|audit_state| audit_state.audit)
     }
 
     /// Resets the audit at the start of a step.
     pub(super) fn reset_audit(&mut self) {
-        if let Some(audit_state) = &mut self.audit_state {
+        if let Some(audit_state) = &mut self.scratch.audit_state {
             audit_state.audit = EnergyAudit::default();
             audit_state.residual = Vec3::zero();
         }
@@ -98,27 +98,27 @@ impl<S: Scalar> World<S> {
 
     /// Records the state before integration.
     pub(super) fn audit_before(&mut self) {
-        let Some(mut audit_state) = self.audit_state.take() else { return };
+        let Some(mut audit_state) = self.scratch.audit_state.take() else { return };
         audit_state.energy = self.energy().total();
         audit_state.velocity.clear();
         audit_state.velocity.extend_from_slice(self.marbles.velocity());
         audit_state.angular_velocity.clear();
         audit_state.angular_velocity.extend_from_slice(self.marbles.angular_velocity());
-        self.audit_state = Some(audit_state);
+        self.scratch.audit_state = Some(audit_state);
     }
 
     /// Returns true if anything besides gravity acts.
     fn has_forces(&self) -> bool {
-        !self.forces.is_empty() || self.marbles.has_external_forces()
+        !self.settings.forces.is_empty() || self.marbles.has_external_forces()
     }
 
     /// Records the work of forces after integration.
     pub(super) fn audit_forces(&mut self) {
-        if self.audit_state.is_none() || !self.has_forces() {
+        if self.scratch.audit_state.is_none() || !self.has_forces() {
             return;
         }
         let energy = self.energy().total();
-        if let Some(audit_state) = &mut self.audit_state {
+        if let Some(audit_state) = &mut self.scratch.audit_state {
             audit_state.audit.forces += energy - audit_state.energy;
             audit_state.energy = energy;
         }
@@ -126,7 +126,7 @@ impl<S: Scalar> World<S> {
 
     /// Records the state before the contacts are solved.
     pub(super) fn audit_contacts(&mut self) {
-        let Some(mut audit_state) = self.audit_state.take() else { return };
+        let Some(mut audit_state) = self.scratch.audit_state.take() else { return };
         let contacts = self.contacts.wm.iter().chain(&self.contacts.mm);
         let max_penetration =
             contacts.map(|contact| contact.penetration().as_f64()).fold(0.0, f64::max);
@@ -134,16 +134,16 @@ impl<S: Scalar> World<S> {
         audit_state.potential = self.energy().potential;
         audit_state.moment = self.momentum();
         audit_state.work = EnergyLedger::default();
-        self.audit_state = Some(audit_state);
+        self.scratch.audit_state = Some(audit_state);
     }
 
     /// Completes the audit of a substep.
     pub(super) fn audit_after(&mut self) {
-        let Some(mut audit_state) = self.audit_state.take() else { return };
+        let Some(mut audit_state) = self.scratch.audit_state.take() else { return };
         let AuditState { audit, residual, energy, potential, moment, work, .. } = &mut *audit_state;
         let now = self.energy();
         // Work of forces without that of gravity, for a response that moves marbles itself.
-        let moves = self.model.response == Response::EventDriven && self.has_forces();
+        let moves = self.settings.model.response == Response::EventDriven && self.has_forces();
         let forces = if moves { work.forces - (*potential - now.potential) } else { 0.0 };
         let expected =
             *energy + forces + work.walls - work.friction - work.restitution - work.resistance;
@@ -156,6 +156,6 @@ impl<S: Scalar> World<S> {
         audit.collisions += work.collisions;
         *residual += self.momentum() - *moment - work.momentum;
         audit.momentum = residual.magnitude();
-        self.audit_state = Some(audit_state);
+        self.scratch.audit_state = Some(audit_state);
     }
 }

@@ -18,15 +18,19 @@ impl<S: Scalar> World<S> {
     pub(super) fn step_events(&mut self, dt: S, rest: S) {
         self.read_balls();
         self.read_contacts();
-        let events = &mut self.events;
+        let events = &mut self.scratch.events;
         let source = &Source::new(&self.walls, [dt.as_f64(), rest.as_f64()]);
-        let iterations = self.model.iterations;
+        let iterations = self.settings.model.iterations;
         let settings = EventSettings { dt: dt.as_f64(), iterations, source, cost: 0.into() };
-        events.work = self.audit_state.is_some().then(EnergyLedger::default);
+        events.work = self.scratch.audit_state.is_some().then(EnergyLedger::default);
+        events.impulse_cache = std::mem::take(&mut self.memory.event_impulses);
         let mut impacts = Vec::new();
-        self.stopped.extend(events.run(&settings, &mut impacts));
+        self.scratch.stopped.extend(events.run(&settings, &mut impacts));
+        self.memory.event_impulses = std::mem::take(&mut events.impulse_cache);
         self.impacts.extend(impacts.into_iter().map(Impact::cast));
-        if let (Some(audit_state), Some(work)) = (&mut self.audit_state, self.events.work) {
+        if let (Some(audit_state), Some(work)) =
+            (&mut self.scratch.audit_state, self.scratch.events.work)
+        {
             audit_state.work = work;
         }
         self.write_back_balls();
@@ -37,9 +41,9 @@ impl<S: Scalar> World<S> {
 
     /// Copies the marbles into the balls of the event-driven solver.
     fn read_balls(&mut self) {
-        let exact = self.model.precision == Precision::Compensated;
+        let exact = self.settings.model.precision == Precision::Compensated;
         let marbles = &self.marbles;
-        let events = &mut self.events;
+        let events = &mut self.scratch.events;
         events.period =
             Period { lengths: marbles.period.lengths.map(|length| length.map(S::as_f64)) };
         events.balls.clear();
@@ -53,6 +57,7 @@ impl<S: Scalar> World<S> {
                 velocity,
                 spin: marbles.angular_velocity_f64(row),
                 external_acceleration: self
+                    .scratch
                     .accelerations
                     .get(row)
                     .copied()
@@ -61,7 +66,7 @@ impl<S: Scalar> World<S> {
                 inverse_mass: 1.0 / marbles.mass(row).as_f64(),
                 material: marbles.material.get(row).unwrap_or_default().cast(),
                 layers: marbles.layers_of_row(row),
-                rotation: match self.model.rotation {
+                rotation: match self.settings.model.rotation {
                     Rotation::Dynamic if !marbles.is_rotation_locked(row) => BallRotation::Free,
                     _ => BallRotation::Locked,
                 },
@@ -79,7 +84,7 @@ impl<S: Scalar> World<S> {
             separation: -contact.penetration().as_f64(),
             ..Contact::between_marbles(contact.a, contact.b)
         };
-        let near = &mut self.events.near;
+        let near = &mut self.scratch.events.near;
         near.clear();
         let mut touches = vec![0; self.marbles.len()];
         let wanted = self.contacts.mm.iter().filter(|contact| {
@@ -94,15 +99,15 @@ impl<S: Scalar> World<S> {
 
     /// Writes the balls of the event-driven solver back to the columns.
     fn write_back_balls(&mut self) {
-        for (row, ball) in self.events.balls.iter().enumerate() {
+        for (row, ball) in self.scratch.events.balls.iter().enumerate() {
             let (position, velocity) = (ball.position, ball.velocity);
             let mut whole = self.marbles.set_motion_f64(row, Motion { position, velocity });
-            if self.model.rotation == Rotation::Dynamic {
+            if self.settings.model.rotation == Rotation::Dynamic {
                 whole &= self.marbles.set_angular_velocity_f64(row, ball.spin);
                 self.marbles.rotate_by(row, cast_vector(ball.rotation_increment));
             }
-            if !whole && !self.stopped.contains(&(row as u32)) {
-                self.stopped.push(row as u32);
+            if !whole && !self.scratch.stopped.contains(&(row as u32)) {
+                self.scratch.stopped.push(row as u32);
             }
         }
     }
@@ -110,7 +115,7 @@ impl<S: Scalar> World<S> {
     /// Contact distance of resting marbles in metres: many times the tolerance of the method, and
     /// of rounding.
     pub(super) fn resting_contact_distance(&self, dt: S) -> S {
-        let strongest = self.accelerations.iter().map(|a| a.magnitude());
+        let strongest = self.scratch.accelerations.iter().map(|a| a.magnitude());
         let fall = strongest.fold(0.0, f64::max) * dt.as_f64() * dt.as_f64();
         let far = self.marbles.position().iter().map(|p| {
             let p = cast_point::<S, f64>(*p);

@@ -19,6 +19,8 @@ mod model;
 mod narrow_phase;
 mod quarantine;
 mod query;
+mod scratch;
+mod settings;
 mod soft_impacts;
 mod soft_step;
 mod sparse_column;
@@ -43,34 +45,25 @@ pub use wall_shape::WallShape;
 pub use walls::{WallId, Walls};
 
 use crate::Error;
-use crate::broad::{Grid, Images, Period};
+use crate::broad::{Grid, Period};
 use crate::contact::Contacts;
 use crate::error::{finite, finite_vector, positive};
 use crate::math::{Point3, Scalar, Vec3, length};
 use crate::motion::{ForceField, Rotation};
-use crate::response::event::EventDriven;
-use crate::response::impulse;
-use crate::response::{CapsuleInertia, Impact, Response, displacement};
+use crate::response::{Impact, Response};
 use crate::swarm::Swarm;
-use contact_limit::ContactLimit;
 use contact_memory::ContactMemory;
-use continuous::Continuous;
-use energy_audit::AuditState;
-use narrow_phase::Candidate;
-use quarantine::Quarantine;
-use soft_step::SoftStep;
+use scratch::Scratch;
+use settings::Settings;
 
 /// Marbles, walls and balls, and the settings of their simulation.
 ///
 /// A world is plain data: a clone is a snapshot, and stepping two clones gives
 /// the same bits. Two worlds are equal when their state and their last contacts
 /// are; scratch memory does not count.
-#[derive(Clone, Debug)]
-pub struct World<S> {
-    model: Model,
-    gravity: Vec3<S>,
-    forces: Vec<ForceField<S>>,
-    limits: SpeedLimits<S>,
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct World<S: Scalar> {
+    settings: Settings<S>,
     /// Marbles: dynamic bodies.
     pub marbles: Marbles<S>,
     /// Walls: static and kinematic colliders.
@@ -90,131 +83,17 @@ pub struct World<S> {
     pub contacts: Contacts<S>,
     /// Impacts of the last step, of a response that solves them within it.
     impacts: Vec<Impact<S>>,
-    grid: Grid,
-    images: Images<S>,
-    /// Rows that the current verb has stopped.
-    stopped: Vec<u32>,
-    quarantine: Quarantine<S>,
-    contact_limit: ContactLimit<S>,
-    /// Speculative margin: maximum separation of a contact, in metres. Gravity closes it within two
-    /// substeps, for a response that looks ahead.
-    reach: S,
-    inverse_mass: Vec<S>,
-    /// Velocities before forces changed them in this substep, in m/s; empty for a response that does
-    /// not use them.
-    velocity_before: Vec<Vec3<S>>,
-    held: Vec<bool>,
-    displacement: displacement::Scratch<S>,
-    impulse: impulse::Scratch<S>,
+    /// Marbles that the last step stopped, sorted by handle, each once.
+    quarantined: Vec<MarbleId>,
     memory: ContactMemory<S>,
-    /// Accelerations in m/s², for a response that integrates marbles by itself.
-    accelerations: Vec<Vec3<f64>>,
-    /// Time of the step that is left after the substep, in seconds; zero unless within one.
-    rest_of_step: S,
-    events: EventDriven,
-    soft_step: SoftStep<S>,
-    continuous: Continuous<S>,
-    near_walls: Vec<Candidate<S>>,
-    /// Axes and inertia of capsules, and bounding radii in metres.
-    rods: Vec<CapsuleInertia<S>>,
-    reaches: Vec<S>,
-    audit_state: Option<Box<AuditState<S>>>,
-}
-
-impl<S: Scalar> Default for World<S> {
-    /// Empty, with gravity 9.81 m/s² toward −y and the default [`Model`].
-    fn default() -> Self {
-        Self {
-            model: Model::default(),
-            gravity: Vec3::unit_y() * S::from_f64(-9.81),
-            forces: Vec::new(),
-            limits: SpeedLimits::default(),
-            marbles: Marbles::default(),
-            walls: Walls::default(),
-            swarm: Swarm::default(),
-            contacts: Contacts::default(),
-            impacts: Vec::new(),
-            grid: Grid::default(),
-            images: Images::default(),
-            stopped: Vec::new(),
-            quarantine: Quarantine::default(),
-            contact_limit: ContactLimit::default(),
-            reach: S::zero(),
-            inverse_mass: Vec::new(),
-            velocity_before: Vec::new(),
-            held: Vec::new(),
-            displacement: displacement::Scratch::default(),
-            impulse: impulse::Scratch::default(),
-            memory: ContactMemory::default(),
-            accelerations: Vec::new(),
-            rest_of_step: S::zero(),
-            events: EventDriven::default(),
-            soft_step: SoftStep::default(),
-            continuous: Continuous::default(),
-            near_walls: Vec::new(),
-            rods: Vec::new(),
-            reaches: Vec::new(),
-            audit_state: None,
-        }
-    }
-}
-
-impl<S: Scalar> PartialEq for World<S> {
-    fn eq(&self, other: &Self) -> bool {
-        let knows_walls = |world: &Self| world.swarm.knows_walls(world.walls.identity());
-        let Self {
-            model,
-            gravity,
-            forces,
-            limits,
-            marbles,
-            walls,
-            swarm,
-            contacts,
-            impacts,
-            quarantine,
-            stopped: _,
-            contact_limit: _,
-            grid: _,
-            images: _,
-            reach: _,
-            inverse_mass: _,
-            velocity_before: _,
-            held: _,
-            displacement: _,
-            impulse: _,
-            memory,
-            accelerations: _,
-            rest_of_step: _,
-            events,
-            soft_step: _,
-            continuous: _,
-            near_walls: _,
-            rods: _,
-            reaches: _,
-            audit_state: _,
-        } = self;
-        *model == other.model
-            && *gravity == other.gravity
-            && *forces == other.forces
-            && *limits == other.limits
-            && *impacts == other.impacts
-            && events.impulse_cache == other.events.impulse_cache
-            && *marbles == other.marbles
-            && *walls == other.walls
-            && *swarm == other.swarm
-            && knows_walls(self) == knows_walls(other)
-            && *contacts == other.contacts
-            && quarantine.stopped == other.quarantine.stopped
-            && *memory == other.memory
-    }
+    scratch: Scratch<S>,
 }
 
 impl<S: Scalar> World<S> {
     /// Model: physics and accuracy of its steps.
     #[must_use]
     pub fn model(&self) -> Model {
-        self.model
+        self.settings.model
     }
 
     /// Sets the model for the next step. A model equal to the current one changes nothing; another
@@ -231,13 +110,13 @@ impl<S: Scalar> World<S> {
         {
             return Err(Error::UnsupportedShape(id));
         }
-        if model == self.model {
+        if model == self.settings.model {
             return Ok(());
         }
         if model.response == Response::SoftStep && !self.marbles.period.is_open() {
             return Err(Error::Unsupported { response: "SoftStep", feature: "a period" });
         }
-        self.model = model;
+        self.settings.model = model;
         self.marbles.changed.add_all();
         self.forget_contacts();
         self.marbles
@@ -249,7 +128,7 @@ impl<S: Scalar> World<S> {
     /// Gravity: acceleration of every marble and ball, in m/s².
     #[must_use]
     pub fn gravity(&self) -> Vec3<S> {
-        self.gravity
+        self.settings.gravity
     }
 
     /// Sets gravity, in m/s².
@@ -259,7 +138,7 @@ impl<S: Scalar> World<S> {
     pub fn set_gravity(&mut self, gravity: Vec3<S>) -> Result<(), Error> {
         finite_vector(["gravity.x", "gravity.y", "gravity.z"], gravity)?;
         finite("the length of gravity", length(gravity))?;
-        self.gravity = gravity;
+        self.settings.gravity = gravity;
         Ok(())
     }
 
@@ -307,7 +186,7 @@ impl<S: Scalar> World<S> {
     /// Force fields that act on every marble, and on every ball of the swarm, besides gravity.
     #[must_use]
     pub fn forces(&self) -> &[ForceField<S>] {
-        &self.forces
+        &self.settings.forces
     }
 
     /// Sets the force fields.
@@ -315,14 +194,15 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a field of one of them.
     pub fn set_forces(&mut self, forces: Vec<ForceField<S>>) -> Result<(), Error> {
-        self.forces = forces.into_iter().map(ForceField::validated).collect::<Result<_, _>>()?;
+        self.settings.forces =
+            forces.into_iter().map(ForceField::validated).collect::<Result<_, _>>()?;
         Ok(())
     }
 
     /// Speed limits of marbles.
     #[must_use]
     pub fn speed_limits(&self) -> SpeedLimits<S> {
-        self.limits
+        self.settings.limits
     }
 
     /// Sets the speed limits of marbles, from the end of the next substep on.
@@ -330,13 +210,13 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// [`Error::NotPositive`].
     pub fn set_speed_limits(&mut self, limits: SpeedLimits<S>) -> Result<(), Error> {
-        self.limits = limits.validated()?;
+        self.settings.limits = limits.validated()?;
         Ok(())
     }
 
     /// Marbles that the last step stopped because their motion overflowed, each once.
     pub fn stopped(&self) -> impl Iterator<Item = MarbleId> + '_ {
-        self.quarantine.stopped.iter().copied()
+        self.quarantined.iter().copied()
     }
 
     /// Impacts of the last step that are in no list of contacts: those of
@@ -355,12 +235,12 @@ impl<S: Scalar> World<S> {
     /// below the rounding error of the speed that gravity adds in two substeps.
     #[must_use]
     pub fn residual(&self) -> S {
-        self.impulse.residual()
+        self.scratch.impulse.residual()
     }
 
     /// Broad-phase grid of the last substep, for drawing it.
     #[must_use]
     pub fn grid(&self) -> &Grid {
-        &self.grid
+        &self.scratch.grid
     }
 }

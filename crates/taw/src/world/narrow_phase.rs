@@ -34,7 +34,7 @@ impl<S: Scalar> World<S> {
         if self.walls.are_half_spaces() {
             return;
         }
-        let mut candidates = std::mem::take(&mut self.near_walls);
+        let mut candidates = std::mem::take(&mut self.scratch.near_walls);
         for b in 0..self.marbles.len() {
             let sphere = self.marbles.sphere(b);
             if self.marbles.half_length(b) == S::zero() {
@@ -52,7 +52,7 @@ impl<S: Scalar> World<S> {
                 );
             }
         }
-        self.near_walls = candidates;
+        self.scratch.near_walls = candidates;
     }
 
     /// Collides half-spaces with marbles and capsules, which touch with their ends.
@@ -146,24 +146,35 @@ impl<S: Scalar> World<S> {
     /// Collides marbles with each other, up to a contact distance of `contact_distance` metres.
     pub(super) fn collide_marbles(&mut self, contact_distance: S) {
         let center = self.marbles.position();
-        self.contact_limit.begin(center.len());
+        self.scratch.contact_limit.begin(center.len());
         if !self.marbles.has_capsules() {
             let (spheres, period) = ((center, self.marbles.radius()), self.marbles.period);
-            self.images.pairs(&mut self.grid, spheres, contact_distance, period, |a, b| {
-                let zero = S::zero();
-                let contact = marble_contact(&self.marbles, [a, b], [zero; 2], contact_distance);
-                if let Some(contact) = contact {
-                    self.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
-                }
-            });
-            self.contact_limit.drop_excess(&mut self.contacts.mm, &self.marbles);
+            self.scratch.images.pairs(
+                &mut self.scratch.grid,
+                spheres,
+                contact_distance,
+                period,
+                |a, b| {
+                    let zero = S::zero();
+                    let contact =
+                        marble_contact(&self.marbles, [a, b], [zero; 2], contact_distance);
+                    if let Some(contact) = contact {
+                        self.scratch.contact_limit.add(
+                            &mut self.contacts.mm,
+                            &self.marbles,
+                            contact,
+                        );
+                    }
+                },
+            );
+            self.scratch.contact_limit.drop_excess(&mut self.contacts.mm, &self.marbles);
             return;
         }
-        self.reaches.clear();
+        self.scratch.reaches.clear();
         let far = |row: usize| self.marbles.radius()[row] + self.marbles.half_length(row);
-        self.reaches.extend((0..self.marbles.len()).map(far));
-        self.grid.rebuild(center, &self.reaches, contact_distance);
-        self.grid.pairs(center, |a, b| {
+        self.scratch.reaches.extend((0..self.marbles.len()).map(far));
+        self.scratch.grid.rebuild(center, &self.scratch.reaches, contact_distance);
+        self.scratch.grid.pairs(center, |a, b| {
             let line = |row: u32| {
                 let row = row as usize;
                 (self.marbles.sphere(row), self.marbles.axis(row), self.marbles.half_length(row))
@@ -171,22 +182,23 @@ impl<S: Scalar> World<S> {
             for along in closest_points_of_segments(line(a), line(b)) {
                 let contact = marble_contact(&self.marbles, [a, b], along, contact_distance);
                 if let Some(contact) = contact {
-                    self.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
+                    self.scratch.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
                 }
             }
         });
-        self.contact_limit.drop_excess(&mut self.contacts.mm, &self.marbles);
+        self.scratch.contact_limit.drop_excess(&mut self.contacts.mm, &self.marbles);
     }
 }
 
 impl<S: Scalar> World<S> {
     /// Adds pairs that met within the substep, though they are apart at its end.
     pub(super) fn add_grazing_contacts(&mut self) {
-        let looks = matches!(self.model.response, Response::Displacement | Response::Impulse);
-        if self.continuous.grazes.is_empty() || !looks {
+        let looks =
+            matches!(self.settings.model.response, Response::Displacement | Response::Impulse);
+        if self.scratch.continuous.grazes.is_empty() || !looks {
             return;
         }
-        let grazes = &mut self.continuous.grazes;
+        let grazes = &mut self.scratch.continuous.grazes;
         grazes.sort_unstable();
         grazes.dedup();
         let listed = self.contacts.mm.iter().map(|c| (c.a, c.b));

@@ -3,7 +3,6 @@
 
 use cgmath::One;
 
-use super::MarbleId;
 use super::World;
 use super::marbles::{Compensation, Marbles};
 use crate::Error;
@@ -12,24 +11,22 @@ use crate::error::{positive, within};
 use crate::math::{Point3, Quat, Scalar, is_finite, is_finite_point};
 use crate::response::{Response, rename_rows};
 
-/// Poses at the start of the substep, and the marbles stopped since the start of the step.
+/// Poses at the start of the substep.
 #[derive(Clone, Debug)]
-pub(super) struct Quarantine<S> {
+pub(super) struct StoredPoses<S> {
     position: Vec<Point3<S>>,
     rotation: Vec<Quat<S>>,
     /// Number of removals at that time: with others, the stored indices are stale.
     removals: u64,
-    /// Stopped marbles, sorted by handle, each once.
-    pub stopped: Vec<MarbleId>,
 }
 
-impl<S> Default for Quarantine<S> {
+impl<S> Default for StoredPoses<S> {
     fn default() -> Self {
-        Self { position: Vec::new(), rotation: Vec::new(), removals: 0, stopped: Vec::new() }
+        Self { position: Vec::new(), rotation: Vec::new(), removals: 0 }
     }
 }
 
-impl<S: Scalar> Quarantine<S> {
+impl<S: Scalar> StoredPoses<S> {
     /// Stores the poses, which are finite.
     fn store(&mut self, marbles: &Marbles<S>) {
         self.removals = marbles.removals();
@@ -64,8 +61,8 @@ impl<S: Scalar> World<S> {
 
     /// Length of a substep; validates a step of `dt` seconds.
     pub(crate) fn validated_substep(&self, dt: S) -> Result<S, Error> {
-        let substeps = S::from_f64(f64::from(self.model.substeps));
-        let passes = S::from_f64(f64::from(self.model.passes()));
+        let substeps = S::from_f64(f64::from(self.settings.model.substeps));
+        let passes = S::from_f64(f64::from(self.settings.model.passes()));
         let [least, most] = Self::TIMES.map(S::from_f64);
         within("dt", positive("dt", dt)?, least * substeps, most)?;
         self.check_shapes()?;
@@ -82,7 +79,9 @@ impl<S: Scalar> World<S> {
     pub(crate) fn check_shapes(&self) -> Result<(), Error> {
         self.check_period(self.marbles.period)?;
         match self.marbles.first_capsule() {
-            Some(id) if !self.model.response.knows_capsules() => Err(Error::UnsupportedShape(id)),
+            Some(id) if !self.settings.model.response.knows_capsules() => {
+                Err(Error::UnsupportedShape(id))
+            }
             _ => Ok(()),
         }
     }
@@ -92,7 +91,7 @@ impl<S: Scalar> World<S> {
         if period.is_open() {
             return Ok(());
         }
-        if self.model.response == Response::SoftStep {
+        if self.settings.model.response == Response::SoftStep {
             return Err(Error::Unsupported { response: "SoftStep", feature: "a period" });
         }
         if let Some(id) = self.marbles.first_capsule() {
@@ -103,39 +102,37 @@ impl<S: Scalar> World<S> {
 
     /// Stores the poses of all marbles before any of them moves.
     pub(super) fn store_poses(&mut self) {
-        self.quarantine.store(&self.marbles);
+        self.scratch.stored_poses.store(&self.marbles);
     }
 
     /// Stops marbles with non-finite state where they were at the start of the substep, and reports
     /// them together with those that a stage has stopped itself.
     pub(super) fn quarantine_non_finite(&mut self) {
         let non_finite = (0..self.marbles.len()).filter(|row| !self.marbles.is_finite_state(*row));
-        self.stopped.extend(non_finite.map(|row| row as u32));
+        self.scratch.stopped.extend(non_finite.map(|row| row as u32));
         self.quarantine_stopped();
     }
 
     /// Stops marbles that a stage has found to be non-finite, and reports them.
     pub(super) fn quarantine_stopped(&mut self) {
-        if self.stopped.is_empty() {
+        if self.scratch.stopped.is_empty() {
             return;
         }
-        let mut rows = std::mem::take(&mut self.stopped);
+        let mut rows = std::mem::take(&mut self.scratch.stopped);
         rows.sort_unstable();
         rows.dedup();
         for row in rows.iter().map(|row| *row as usize) {
-            self.quarantine.restore(&mut self.marbles, row);
+            self.scratch.stored_poses.restore(&mut self.marbles, row);
             self.marbles.stop(row);
         }
         let stays = |row: usize| rows.binary_search(&(row as u32)).is_err().then_some(row);
         rename_rows(&mut self.memory.impulses, stays);
         rename_rows(&mut self.memory.springs, stays);
-        rename_rows(&mut self.events.impulse_cache, stays);
-        self.quarantine
-            .stopped
-            .extend(rows.iter().filter_map(|row| self.marbles.id(*row as usize)));
-        self.quarantine.stopped.sort_unstable();
-        self.quarantine.stopped.dedup();
+        rename_rows(&mut self.memory.event_impulses, stays);
+        self.quarantined.extend(rows.iter().filter_map(|row| self.marbles.id(*row as usize)));
+        self.quarantined.sort_unstable();
+        self.quarantined.dedup();
         rows.clear();
-        self.stopped = rows;
+        self.scratch.stopped = rows;
     }
 }

@@ -84,7 +84,7 @@ impl<S: Scalar> QueryTree<S> {
 /// Ray and shape casts hit meshes and height fields on their surface, from either side; only
 /// [`Queries::project_point`] treats the volume below a height field as inside.
 #[derive(Debug)]
-pub struct Queries<'a, S> {
+pub struct Queries<'a, S: Scalar> {
     world: &'a World<S>,
     tree: &'a QueryTree<S>,
 }
@@ -335,7 +335,7 @@ impl<S: Scalar> Queries<'_, S> {
 }
 
 /// Collector of ray hits.
-struct Hits<'a, S, F> {
+struct Hits<'a, S: Scalar, F> {
     queries: &'a Queries<'a, S>,
     filter: F,
     found: Vec<QueryHit<RayHit<S>>>,

@@ -37,20 +37,21 @@ const CONFIRMING: f64 = 1e-3;
 impl<S: Scalar> World<S> {
     /// Predicts which listed contacts begin within the step of `dt` seconds.
     pub(super) fn predict_impacts(&mut self, dt: S) {
-        let mut list = std::mem::take(&mut self.soft_step.predicted.list);
+        let mut list = std::mem::take(&mut self.scratch.soft_step.predicted.list);
         list.clear();
         let at_walls = self.contacts.wm.iter();
         list.extend(at_walls.filter_map(|contact| self.predict_wall_impact(contact, dt)));
         let of_pairs = self.contacts.mm.iter();
         list.extend(of_pairs.filter_map(|contact| self.predict_pair_impact(contact, dt)));
         let rows = (self.marbles.removals(), self.marbles.len());
-        self.soft_step.predicted = PredictedImpacts { list, rows };
+        self.scratch.soft_step.predicted = PredictedImpacts { list, rows };
     }
 
     /// Returns true if two that touch already come together faster than gravity makes rest within
     /// two steps: their impact is now.
     fn meet_now(&self, contact: &Contact<S>, approach_speed: S, dt: S) -> bool {
-        contact.is_touching() && approach_speed > length(self.gravity) * dt * S::from_f64(2.0)
+        contact.is_touching()
+            && approach_speed > length(self.settings.gravity) * dt * S::from_f64(2.0)
     }
 
     /// Impact of a marble that flies along its parabola to the plane of its contact.
@@ -93,15 +94,15 @@ impl<S: Scalar> World<S> {
     /// Lists the predicted impacts that took place: both bodies were pushed apart. (Who was stopped
     /// by something else on the way left the other one as it was.)
     pub(super) fn list_impacts(&mut self, dt: S) {
-        let predicted = std::mem::take(&mut self.soft_step.predicted);
+        let predicted = std::mem::take(&mut self.scratch.soft_step.predicted);
         if predicted.rows == (self.marbles.removals(), self.marbles.len()) {
             let took_place =
                 predicted.list.iter().filter(|predicted| self.took_place(predicted, dt));
             let impacts: Vec<_> = took_place.map(|predicted| predicted.impact).collect();
             self.impacts.extend(impacts);
         }
-        self.soft_step.predicted = predicted;
-        self.soft_step.predicted.list.clear();
+        self.scratch.soft_step.predicted = predicted;
+        self.scratch.soft_step.predicted.list.clear();
     }
 
     fn took_place(&self, PredictedImpact { impact, velocity }: &PredictedImpact<S>, dt: S) -> bool {
@@ -123,6 +124,9 @@ impl<S: Scalar> World<S> {
 
     /// Acceleration of a marble by gravity and forces in this step, in m/s².
     fn soft_acceleration(&self, row: usize) -> Vec3<S> {
-        self.accelerations.get(row).map_or(self.gravity, |acceleration| cast_vector(*acceleration))
+        self.scratch
+            .accelerations
+            .get(row)
+            .map_or(self.settings.gravity, |acceleration| cast_vector(*acceleration))
     }
 }

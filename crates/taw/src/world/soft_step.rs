@@ -60,35 +60,36 @@ impl<S: Scalar> World<S> {
     /// The first verb: forces other than gravity become changes of velocity, which the third one
     /// applies in substeps.
     pub(super) fn integrate_forces(&mut self, dt: S) -> Result<(), Error> {
-        if self.model.rotation == Rotation::Dynamic {
+        if self.settings.model.rotation == Rotation::Dynamic {
             if self.marbles.has_external_forces() {
                 self.marbles.integrate_angular_velocity(dt);
                 self.quarantine_non_finite();
             }
         } else {
-            self.marbles.integrate_rotations(dt, self.model.rotation);
+            self.marbles.integrate_rotations(dt, self.settings.model.rotation);
             self.quarantine_non_finite();
         }
-        self.soft_step.dt = dt.as_f64() as f32;
+        self.scratch.soft_step.dt = dt.as_f64() as f32;
         self.sync_bodies()?;
         let drive = StepContext {
-            integrator: self.model.integrator,
-            gravity: self.gravity,
-            forces: &self.forces,
+            integrator: self.settings.model.integrator,
+            gravity: self.settings.gravity,
+            forces: &self.settings.forces,
             dt,
         };
-        self.accelerations.clear();
-        if !self.forces.is_empty() || self.marbles.accelerate_differently() {
-            self.marbles.mean_accelerations(drive, &mut self.accelerations);
+        self.scratch.accelerations.clear();
+        if !self.settings.forces.is_empty() || self.marbles.accelerate_differently() {
+            self.marbles.mean_accelerations(drive, &mut self.scratch.accelerations);
         }
-        let (gravity, step) = (cast_vector::<S, f64>(self.gravity), dt.as_f64());
-        let slots = &self.soft_step.slot_of_marble;
-        let of_marbles = self.accelerations.iter().zip(slots).filter_map(|(acceleration, slot)| {
-            let change: [f64; 3] = ((acceleration - gravity) * step).into();
-            let change = change.map(|x| (x as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE));
-            (change != [0.0; 3] && *slot != NO_ROW)
-                .then_some(VelocityChange { slot: *slot, change })
-        });
+        let (gravity, step) = (cast_vector::<S, f64>(self.settings.gravity), dt.as_f64());
+        let slots = &self.scratch.soft_step.slot_of_marble;
+        let of_marbles =
+            self.scratch.accelerations.iter().zip(slots).filter_map(|(acceleration, slot)| {
+                let change: [f64; 3] = ((acceleration - gravity) * step).into();
+                let change = change.map(|x| (x as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE));
+                (change != [0.0; 3] && *slot != NO_ROW)
+                    .then_some(VelocityChange { slot: *slot, change })
+            });
         let mut changes: Vec<_> = of_marbles.collect();
         changes.append(&mut self.field_changes_of_swarm(dt));
         self.swarm.set_velocity_changes(changes);
@@ -101,15 +102,16 @@ impl<S: Scalar> World<S> {
         if self.sync_bodies().is_err() {
             return; // the third verb says so
         }
-        let (dt, gravity) = (self.soft_step.dt, cast_vector(self.gravity));
+        let (dt, gravity) = (self.scratch.soft_step.dt, cast_vector(self.settings.gravity));
         self.swarm.prepare(dt, gravity, &self.walls, self.walls.identity());
-        self.soft_step.found = Some((dt, self.walls.identity()));
+        self.walls.mark_seen();
+        self.scratch.soft_step.found = Some((dt, self.walls.identity()));
         let reach = 2.0 * length(gravity) * dt * dt;
-        let marbles = &self.soft_step.marble_of_slot;
-        let turns = self.model.rotation == Rotation::Dynamic;
+        let marbles = &self.scratch.soft_step.marble_of_slot;
+        let turns = self.settings.model.rotation == Rotation::Dynamic;
         let columns = self.marbles.body_columns(turns);
-        self.swarm.read_bodies(marbles, columns, None, &mut self.stopped);
-        let lists = &mut self.soft_step.lists;
+        self.swarm.read_bodies(marbles, columns, None, &mut self.scratch.stopped);
+        let lists = &mut self.scratch.soft_step.lists;
         self.swarm.list_contacts(marbles, [reach, dt], lists, &mut self.contacts);
         self.predict_impacts(S::from_f64(dt.into()));
     }
@@ -120,22 +122,23 @@ impl<S: Scalar> World<S> {
         self.sync_bodies()?; // somebody may have moved some since the first verb
         self.walls.update_tree();
         let (step, identity) = (dt.as_f64() as f32, self.walls.identity());
-        let found = self.soft_step.found.take();
+        let found = self.scratch.soft_step.found.take();
         if found != Some((step, identity)) || !self.swarm.is_prepared() {
-            self.swarm.prepare(step, cast_vector(self.gravity), &self.walls, identity);
+            self.swarm.prepare(step, cast_vector(self.settings.gravity), &self.walls, identity);
+            self.walls.mark_seen();
         }
-        self.swarm.finish(step, self.model.substeps, &self.walls);
-        let marbles = &self.soft_step.marble_of_slot;
+        self.swarm.finish(step, self.settings.model.substeps, &self.walls);
+        let marbles = &self.scratch.soft_step.marble_of_slot;
         let stopped = self.swarm.stopped_slots();
         let stopped = stopped.filter_map(|slot| marbles.get(slot as usize).copied());
-        self.stopped.extend(stopped.filter(|marble| *marble != NO_ROW));
-        let turns = self.model.rotation == Rotation::Dynamic;
+        self.scratch.stopped.extend(stopped.filter(|marble| *marble != NO_ROW));
+        let turns = self.settings.model.rotation == Rotation::Dynamic;
         let columns = self.marbles.body_columns(turns);
-        self.swarm.read_bodies(marbles, columns, Some(dt), &mut self.stopped);
+        self.swarm.read_bodies(marbles, columns, Some(dt), &mut self.scratch.stopped);
         self.quarantine_stopped();
         self.list_impacts(dt);
         self.roll_what_only_shows();
-        self.limits.apply(&mut self.marbles);
+        self.settings.limits.apply(&mut self.marbles);
         self.audit_after();
         Ok(())
     }
@@ -151,7 +154,7 @@ impl<S: Scalar> World<S> {
     /// [`Error::NoSuchMarble`].
     pub fn is_asleep(&self, id: MarbleId) -> Result<bool, Error> {
         self.marbles.row(id)?;
-        if self.model.response != Response::SoftStep {
+        if self.settings.model.response != Response::SoftStep {
             return Ok(false);
         }
         let bodies = &self.swarm.body_balls;
@@ -169,11 +172,11 @@ impl<S: Scalar> World<S> {
     /// Brings rows up to date with marbles that came, went, or were set.
     fn sync_bodies(&mut self) -> Result<(), Error> {
         self.swarm.set_bodies_are_rows(true);
-        let rotation = self.model.rotation;
+        let rotation = self.settings.model.rotation;
         let plain = self.swarm.model().material == Material::default();
         let known = Some((self.marbles.removals(), self.marbles.len(), rotation, plain));
-        let token = &self.soft_step.token;
-        let listed = self.soft_step.known == known && self.swarm.synced.agrees(token);
+        let token = &self.scratch.soft_step.token;
+        let listed = self.scratch.soft_step.known == known && self.swarm.synced.agrees(token);
         if !listed || !self.marbles.changed.agrees(token) {
             self.remove_stale_bodies()?;
             self.insert_missing_bodies()?;
@@ -181,23 +184,23 @@ impl<S: Scalar> World<S> {
             let all: Vec<_> = (0..self.marbles.len() as u32).collect();
             self.find_changes(&all);
             let [token, synced, changed] = SyncToken::unique();
-            (self.soft_step.token, self.swarm.synced) = (token, synced);
+            (self.scratch.soft_step.token, self.swarm.synced) = (token, synced);
             self.marbles.changed.reset(changed);
-            self.soft_step.known = known;
+            self.scratch.soft_step.known = known;
         } else {
             let rows = self.marbles.changed.take();
             self.find_changes(&rows);
             self.marbles.changed.recycle(rows);
         }
-        self.swarm.write_bodies(&self.soft_step.changed);
+        self.swarm.write_bodies(&self.scratch.soft_step.changed);
         Ok(())
     }
 
     /// Finds which of these marbles differ from their rows.
     fn find_changes(&mut self, rows: &[u32]) {
-        let (marbles, rotation) = (&self.marbles, self.model.rotation);
+        let (marbles, rotation) = (&self.marbles, self.settings.model.rotation);
         let plain_swarm = self.swarm.model().material == Material::default();
-        let SoftStep { slot_of_marble, changed, .. } = &mut self.soft_step;
+        let SoftStep { slot_of_marble, changed, .. } = &mut self.scratch.soft_step;
         changed.clear();
         for row in rows.iter().map(|row| *row as usize) {
             let Some(slot) = slot_of_marble.get(row).copied().filter(|slot| *slot != NO_ROW) else {
@@ -229,7 +232,7 @@ impl<S: Scalar> World<S> {
 
     /// Finds the slot of each marble, and the marble of each slot.
     fn match_slots(&mut self) {
-        let SoftStep { slot_of_marble, marble_of_slot, .. } = &mut self.soft_step;
+        let SoftStep { slot_of_marble, marble_of_slot, .. } = &mut self.scratch.soft_step;
         slot_of_marble.clear();
         slot_of_marble.resize(self.marbles.len(), NO_ROW);
         marble_of_slot.clear();

@@ -28,7 +28,7 @@ impl<S: Scalar> World<S> {
     pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
         let step = Self::validated_dt(dt)?;
         let dt = step.as_f64() as f32;
-        if self.model.response == Response::SoftStep {
+        if self.settings.model.response == Response::SoftStep {
             return Ok(()); // it moved with the marbles
         }
         self.swarm.set_bodies_are_rows(false);
@@ -38,9 +38,11 @@ impl<S: Scalar> World<S> {
         }
         self.sync_proxies(dt)?;
         self.walls.update_tree();
-        let (gravity, changes) = (cast_vector(self.gravity), self.field_changes_of_swarm(step));
+        let (gravity, changes) =
+            (cast_vector(self.settings.gravity), self.field_changes_of_swarm(step));
         self.swarm.set_velocity_changes(changes);
         self.swarm.step(dt, gravity, &self.walls, self.walls.identity(), observe);
+        self.walls.mark_seen();
         self.write_back_proxies();
         Ok(())
     }
@@ -54,10 +56,10 @@ impl<S: Scalar> World<S> {
                 velocity: cast_vector(motion.velocity),
             };
             let mass = S::from_f64(f64::from(mass));
-            cast_vector(acceleration_in_step(&self.forces, motion, mass, dt))
+            cast_vector(acceleration_in_step(&self.settings.forces, motion, mass, dt))
         };
-        let acceleration = (!self.forces.is_empty()).then_some(acceleration);
-        let (gravity, dt) = (cast_vector(self.gravity), dt.as_f64() as f32);
+        let acceleration = (!self.settings.forces.is_empty()).then_some(acceleration);
+        let (gravity, dt) = (cast_vector(self.settings.gravity), dt.as_f64() as f32);
         self.swarm.field_changes(acceleration, gravity, dt)
     }
 
@@ -114,7 +116,7 @@ impl<S: Scalar> World<S> {
             let at = rows(marbles.position()[row].to_vec(), single(radius));
             Some(Proxy::new(*ball, at, rows(marbles.velocity()[row], inverse_mass), spin))
         });
-        self.swarm.set_proxies(proxies, dt, cast_vector(self.gravity));
+        self.swarm.set_proxies(proxies, dt, cast_vector(self.settings.gravity));
         self.swarm.body_balls = body_balls;
         Ok(())
     }

@@ -9,18 +9,27 @@ use crate::shape::Aabb3;
 /// Changes kept at most; a reader that is further behind takes all walls for changed.
 const MAX_CHANGES: usize = 1024;
 
-/// Regions in which walls changed, in order. Does not count in comparisons.
+/// Regions in which walls changed, in order. Two are equal if the swarm knows of all changes, or has
+/// some to learn of, in both.
 #[derive(Clone, Debug)]
 pub(super) struct WallChanges<S> {
     /// Identity of the walls before the first change of the log.
     base: u64,
     /// Identity of the walls after the change, and the region; none for one without bounds.
     log: VecDeque<(u64, Option<Aabb3<S>>)>,
+    /// Identity of the walls when the swarm last looked at them.
+    seen: u64,
+}
+
+impl<S: Scalar> PartialEq for WallChanges<S> {
+    fn eq(&self, other: &Self) -> bool {
+        (self.identity() == self.seen) == (other.identity() == other.seen)
+    }
 }
 
 impl<S> Default for WallChanges<S> {
     fn default() -> Self {
-        Self { base: 0, log: VecDeque::new() }
+        Self { base: 0, log: VecDeque::new(), seen: 0 }
     }
 }
 
@@ -40,6 +49,11 @@ impl<S: Scalar> WallChanges<S> {
     /// others.
     pub fn identity(&self) -> u64 {
         self.log.back().map_or(self.base, |(identity, _)| *identity)
+    }
+
+    /// Notes that the swarm knows of all changes.
+    pub fn mark_seen(&mut self) {
+        self.seen = self.identity();
     }
 
     /// Visits the regions that changed since the walls had this identity. Returns false if they are

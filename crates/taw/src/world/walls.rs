@@ -85,13 +85,14 @@ impl<S> Default for Walls<S> {
 impl<S: Scalar> PartialEq for Walls<S> {
     fn eq(&self, other: &Self) -> bool {
         // The other fields follow from the shapes.
-        let Self { handles, shapes, motion, material, layers, moved, .. } = self;
+        let Self { handles, shapes, motion, material, layers, moved, changes, .. } = self;
         *handles == other.handles
             && *shapes == other.shapes
             && *motion == other.motion
             && *material == other.material
             && *layers == other.layers
             && *moved == other.moved
+            && *changes == other.changes
     }
 }
 
@@ -198,6 +199,11 @@ impl<S: Scalar> Walls<S> {
     /// others.
     pub(super) fn identity(&self) -> u64 {
         self.changes.identity()
+    }
+
+    /// Notes that the swarm knows of all changes.
+    pub(super) fn mark_seen(&mut self) {
+        self.changes.mark_seen();
     }
 
     /// Visits the boxes in which walls changed since they had this identity. Returns false if all may

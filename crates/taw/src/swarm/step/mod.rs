@@ -82,11 +82,6 @@ impl Swarm {
         self.end();
     }
 
-    /// Returns true if the balls at walls of this identity are known.
-    pub(crate) fn knows_walls(&self, identity: u64) -> bool {
-        self.walls_identity == Some(identity)
-    }
-
     /// Begins a step: gravity and walls. Returns whether these changed.
     fn begin(&mut self, gravity: Vec3<f32>, walls: &dyn StaticGeometry, identity: u64) -> bool {
         self.stopped.clear();

@@ -73,14 +73,14 @@ impl<S: Scalar> World<S> {
     /// walls or through each other at the time of impact, in the order of time, and lets resting
     /// ones slide.
     pub(in crate::world) fn solve_continuous(&mut self, dt: S) {
-        if self.continuous.start.len() != self.marbles.len() {
+        if self.scratch.continuous.start.len() != self.marbles.len() {
             return; // this model does not sweep
         }
         self.bend_at_walls(dt);
         let marbles = &self.marbles;
         let Continuous { start, velocity, candidates, meetings, paths, bends, .. } =
-            &mut self.continuous;
-        let displaces = self.model.response == Response::Displacement;
+            &mut self.scratch.continuous;
+        let displaces = self.settings.model.response == Response::Displacement;
         // Displacement changes along the path by itself, and has no normals to get right.
         let min_motion = S::from_f64(if displaces { MAX_FREE_MOTION } else { MIN_GRAZING_MOTION });
         let smallest = marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
@@ -109,14 +109,14 @@ impl<S: Scalar> World<S> {
         }
         meetings
             .extend((0..start.len() as u32).filter_map(|row| Meeting::at_wall(row, paths, bends)));
-        if !self.model.response.needs_penetration() {
+        if !self.settings.model.response.needs_penetration() {
             self.predict_meetings(min_motion);
         }
         self.bend_in_order(self.resting_approach(dt));
         if !displaces {
-            self.continuous.collect_grazes(self.marbles.period);
+            self.scratch.continuous.collect_grazes(self.marbles.period);
         }
-        for row in 0..self.continuous.paths.len() {
+        for row in 0..self.scratch.continuous.paths.len() {
             self.arrive(row, dt);
         }
     }
@@ -125,7 +125,7 @@ impl<S: Scalar> World<S> {
     /// smallest radius that twice a motion must exceed.
     fn predict_meetings(&mut self, min_motion: S) {
         let Continuous { middle, reach, fast, candidates, meetings, paths, bends, .. } =
-            &mut self.continuous;
+            &mut self.scratch.continuous;
         let half = S::from_f64(0.5);
         let smallest = self.marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
         fast.clear();
@@ -147,25 +147,31 @@ impl<S: Scalar> World<S> {
             *radius + path.carried_bends(bends).map(far).fold(length(path.motion) * half, S::max)
         }));
         let spheres = (&middle[..], &reach[..]);
-        self.images.pairs(&mut self.grid, spheres, S::zero(), self.marbles.period, |a, b| {
-            if (fast[a as usize] || fast[b as usize]) && self.marbles.may_collide(a, b) {
-                candidates.push((a, b));
-            }
-        });
+        self.scratch.images.pairs(
+            &mut self.scratch.grid,
+            spheres,
+            S::zero(),
+            self.marbles.period,
+            |a, b| {
+                if (fast[a as usize] || fast[b as usize]) && self.marbles.may_collide(a, b) {
+                    candidates.push((a, b));
+                }
+            },
+        );
         let (pairs, period) = (candidates.iter(), self.marbles.period);
         meetings.extend(pairs.filter_map(|pair| Meeting::predict(*pair, paths, S::zero(), period)));
     }
 
     /// Processes bends at walls and meetings of marbles in the order of time.
     fn bend_in_order(&mut self, resting_approach: S) {
-        if self.continuous.meetings.is_empty() {
+        if self.scratch.continuous.meetings.is_empty() {
             return;
         }
-        let Continuous { partners, candidates, start, .. } = &mut self.continuous;
+        let Continuous { partners, candidates, start, .. } = &mut self.scratch.continuous;
         partners.build(candidates, start.len());
-        while let Some(Reverse(hit)) = self.continuous.meetings.pop() {
+        while let Some(Reverse(hit)) = self.scratch.continuous.meetings.pop() {
             let Meeting { time, pair, bends } = hit;
-            let bent = |row: u32| self.continuous.paths[row as usize].bends;
+            let bent = |row: u32| self.scratch.continuous.paths[row as usize].bends;
             if bends != (bent(pair.0), bent(pair.1)) {
                 continue; // superseded by a newer prediction
             }
@@ -174,7 +180,7 @@ impl<S: Scalar> World<S> {
             } else {
                 self.meet(pair, time, resting_approach);
             }
-            let Continuous { partners, meetings, paths, bends, .. } = &mut self.continuous;
+            let Continuous { partners, meetings, paths, bends, .. } = &mut self.scratch.continuous;
             let period = self.marbles.period;
             for row in [pair.0, pair.1] {
                 meetings.extend(Meeting::at_wall(row, paths, bends));
@@ -188,7 +194,7 @@ impl<S: Scalar> World<S> {
 
     /// Bends the path of a marble at its next wall.
     fn bend_at_wall(&mut self, row: usize) {
-        let Continuous { paths, bends, .. } = &mut self.continuous;
+        let Continuous { paths, bends, .. } = &mut self.scratch.continuous;
         let displacement = &mut paths[row];
         let Some(index) = displacement.next else { return };
         let bend = bends[index as usize];
@@ -207,7 +213,7 @@ impl<S: Scalar> World<S> {
             ..*displacement
         };
         self.marbles.velocity[row] -= bend.stop.change;
-        self.continuous.stop(bend.stop, bend.along);
+        self.scratch.continuous.stop(bend.stop, bend.along);
     }
 
     /// Bends the paths of two marbles where they meet. Marbles that approach faster than
@@ -216,7 +222,7 @@ impl<S: Scalar> World<S> {
     /// none.
     fn meet(&mut self, pair: (u32, u32), time: S, resting_approach: S) {
         let rows = [pair.0 as usize, pair.1 as usize];
-        let old = rows.map(|row| self.continuous.paths[row]);
+        let old = rows.map(|row| self.scratch.continuous.paths[row]);
         let [x, y] = old.map(|displacement| displacement.at(time));
         let normal = normal_of(&x, &y.nearest_image(&x, self.marbles.period));
         let inverse_masses = [0, 1].map(|side| {
@@ -261,8 +267,8 @@ impl<S: Scalar> World<S> {
             let along =
                 if slides && left > S::zero() { plane * (rest / left) } else { Mat3::zero() };
             self.marbles.velocity[rows[side]] -= stop.change;
-            self.continuous.stop(stop, along);
-            self.continuous.paths[rows[side]] = Path {
+            self.scratch.continuous.stop(stop, along);
+            self.scratch.continuous.paths[rows[side]] = Path {
                 // To the bit: who is stopped is told by it.
                 motion: if slides { displacement.motion - motion[side] } else { carried },
                 change: if slides { displacement.change - change[side] } else { Vec3::zero() },
@@ -275,17 +281,19 @@ impl<S: Scalar> World<S> {
             };
         }
         // Rounding may leave a gap.
-        self.continuous.grazes.push(pair);
+        self.scratch.continuous.grazes.push(pair);
     }
 
     /// Moves a marble whose path has bent to its end, or to the wall that another one pushed it to.
     fn arrive(&mut self, row: usize, dt: S) {
-        let Path { sphere, bends, met_marble, .. } = self.continuous.paths[row].at(S::one());
+        let Path { sphere, bends, met_marble, .. } =
+            self.scratch.continuous.paths[row].at(S::one());
         if bends == 0 {
             return;
         }
         self.marbles.position[row] = sphere.center;
-        let start = Sphere { center: self.continuous.start[row], ..self.marbles.sphere(row) };
+        let start =
+            Sphere { center: self.scratch.continuous.start[row], ..self.marbles.sphere(row) };
         let displacement = sphere.center - start.center;
         let looks = met_marble && !self.walls.are_half_spaces();
         let motion = Motion { displacement, time: dt, carrier: None };
@@ -294,7 +302,8 @@ impl<S: Scalar> World<S> {
         self.marbles.position[row] = center;
         let obstacle = Obstacle::Wall(part.wall);
         let (displacement, change) = (sphere.center - center, Vec3::zero());
-        self.continuous
+        self.scratch
+            .continuous
             .stop(StoppedMarble { row: row as u32, obstacle, displacement, change }, Mat3::zero());
     }
 }

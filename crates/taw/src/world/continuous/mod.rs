@@ -80,36 +80,36 @@ enum Obstacle {
 impl<S: Scalar> World<S> {
     /// Stores the positions before marbles move, if the model has continuous detection.
     pub(super) fn begin_continuous(&mut self) {
-        self.continuous.clear();
-        if self.model.detection == Detection::Swept {
-            self.continuous.start.extend_from_slice(&self.marbles.position);
-            self.continuous.velocity.extend_from_slice(&self.marbles.velocity);
+        self.scratch.continuous.clear();
+        if self.settings.model.detection == Detection::Swept {
+            self.scratch.continuous.start.extend_from_slice(&self.marbles.position);
+            self.scratch.continuous.velocity.extend_from_slice(&self.marbles.velocity);
         }
     }
 
     /// Drops stops of marbles that have slid off: their lost motion stays lost.
     pub(super) fn drop_separated_stops(&mut self) {
-        if !self.continuous.stops.is_empty() {
+        if !self.scratch.continuous.stops.is_empty() {
             let touches = self.touches();
-            self.continuous.stops.retain(touches);
+            self.scratch.continuous.stops.retain(touches);
         }
     }
 
     /// Releases marbles whose stopping contact the user has removed.
     pub(super) fn release_separated_stops(&mut self) {
-        if self.continuous.start.len() != self.marbles.len() {
-            self.continuous.clear(); // rows have changed
+        if self.scratch.continuous.start.len() != self.marbles.len() {
+            self.scratch.continuous.clear(); // rows have changed
         }
-        if self.continuous.stops.is_empty() {
+        if self.scratch.continuous.stops.is_empty() {
             return;
         }
         let touches = self.touches();
-        self.continuous.stops.retain(|stop| {
+        self.scratch.continuous.stops.retain(|stop| {
             let row = stop.row as usize;
             if !touches(stop) {
                 self.marbles.position[row] += stop.displacement;
                 self.marbles.velocity[row] += stop.change;
-                self.continuous.projections[row] = None;
+                self.scratch.continuous.projections[row] = None;
             }
             touches(stop)
         });
@@ -117,7 +117,8 @@ impl<S: Scalar> World<S> {
 
     /// Predicate: the two bodies of a stop have a contact.
     fn touches(&self) -> impl Fn(&StoppedMarble<S>) -> bool + use<S> {
-        let mut stopped: Vec<_> = self.continuous.stops.iter().map(|stop| stop.row).collect();
+        let mut stopped: Vec<_> =
+            self.scratch.continuous.stops.iter().map(|stop| stop.row).collect();
         stopped.sort_unstable();
         let walls = self.contacts.wm.iter().map(|c| (Obstacle::Wall(c.a), c.b));
         let both = |c: &Contact<S>| [(Obstacle::Marble(c.a), c.b), (Obstacle::Marble(c.b), c.a)];
@@ -130,7 +131,7 @@ impl<S: Scalar> World<S> {
     /// Largest approach in metres per substep of a resting contact: that of gravity in two
     /// substeps.
     fn resting_approach(&self, dt: S) -> S {
-        length(self.gravity) * dt * dt * S::from_f64(2.0)
+        length(self.settings.gravity) * dt * dt * S::from_f64(2.0)
     }
 }
 

@@ -67,14 +67,14 @@ impl<S: Scalar> World<S> {
         if self.walls.are_half_spaces() {
             return;
         }
-        MovingWall::list(&self.walls, dt, &mut self.continuous.moving_walls);
+        MovingWall::list(&self.walls, dt, &mut self.scratch.continuous.moving_walls);
         self.list_deep_marbles(|_, _| S::zero());
         for row in 0..self.marbles.len() {
             let Sphere { center, radius } = self.marbles.sphere(row);
-            let start = self.continuous.start[row];
+            let start = self.scratch.continuous.start[row];
             let motion = center - start;
             let is_fast = length(motion) > self.free_motion(row);
-            let moving_walls = &self.continuous.moving_walls;
+            let moving_walls = &self.scratch.continuous.moving_walls;
             let may_be_met = || {
                 let bounds = path_bounds(start, motion, radius);
                 moving_walls.iter().any(|wall| wall.is_near(&bounds))
@@ -88,7 +88,7 @@ impl<S: Scalar> World<S> {
     /// Lists the marbles that contacts with walls, as they were found, show half inside of one after
     /// they have moved by `motion` metres: however slow, they must not come out on the other side.
     fn list_deep_marbles(&mut self, motion: impl Fn(&Self, usize) -> S) {
-        let mut deep = std::mem::take(&mut self.continuous.deep);
+        let mut deep = std::mem::take(&mut self.scratch.continuous.deep);
         deep.clear();
         deep.extend(self.contacts.wm.iter().filter_map(|c| {
             let radius = *self.marbles.radius().get(c.b as usize)?;
@@ -98,18 +98,19 @@ impl<S: Scalar> World<S> {
             (is_deep && !self.is_kinematic(c.b as usize)).then_some(c.b)
         }));
         deep.sort_unstable();
-        self.continuous.deep = deep;
+        self.scratch.continuous.deep = deep;
     }
 
     /// Returns true for a marble of infinite mass, which contacts do not move, if the response knows
     /// masses.
     fn is_kinematic(&self, row: usize) -> bool {
-        self.model.response != Response::Displacement && self.marbles.mass(row).is_infinite()
+        self.settings.model.response != Response::Displacement
+            && self.marbles.mass(row).is_infinite()
     }
 
     /// Motion of a marble against a wall that needs no sweep, in metres: beyond this it may pass.
     fn free_motion(&self, row: usize) -> S {
-        if self.continuous.deep.binary_search(&(row as u32)).is_ok() {
+        if self.scratch.continuous.deep.binary_search(&(row as u32)).is_ok() {
             S::zero()
         } else {
             self.marbles.radius()[row] * S::from_f64(MAX_FREE_MOTION)
@@ -126,10 +127,11 @@ impl<S: Scalar> World<S> {
     /// its velocity: friction needs its weight.
     fn slide_along_walls(&mut self, row: usize, dt: S) {
         let resting_approach = self.resting_approach(dt);
-        let mut sphere = Sphere { center: self.continuous.start[row], ..self.marbles.sphere(row) };
+        let mut sphere =
+            Sphere { center: self.scratch.continuous.start[row], ..self.marbles.sphere(row) };
         let mut displacement = self.marbles.position[row] - sphere.center;
         let mut velocity = self.marbles.velocity[row];
-        let mut change = velocity - self.continuous.velocity[row];
+        let mut change = velocity - self.scratch.continuous.velocity[row];
         let mut left = S::one();
         let mut surfaces: SmallVec<[Vec3<S>; MAX_BENDS as usize]> = SmallVec::new();
         let mut carrier = None;
@@ -166,7 +168,7 @@ impl<S: Scalar> World<S> {
             velocity -= stop.change;
             (displacement, change) = (slid + carried, kept);
             carrier = Some((wall, center, slid)).filter(|_| !carried.is_zero());
-            self.continuous.bends.push(Bend {
+            self.scratch.continuous.bends.push(Bend {
                 stop,
                 center: sphere.center,
                 left,
@@ -181,12 +183,12 @@ impl<S: Scalar> World<S> {
     /// Stops marbles at a second wall, half-spaces included, that a bounce would carry them into:
     /// they keep their velocity, and bounce there in the next substep.
     pub(in crate::world) fn stop_bounces_at_walls(&mut self) {
-        let rows = self.continuous.bounced_from.len().min(self.marbles.len());
+        let rows = self.scratch.continuous.bounced_from.len().min(self.marbles.len());
         if rows == 0 {
             return;
         }
         self.list_deep_marbles(|world, row| {
-            let from = world.continuous.bounced_from.get(row);
+            let from = world.scratch.continuous.bounced_from.get(row);
             from.map_or_else(S::zero, |from| length(world.marbles.position[row] - *from))
         });
         for row in 0..rows {
@@ -198,15 +200,17 @@ impl<S: Scalar> World<S> {
     /// Stops a marble at the first wall that it would pass into by more than half of its radius, on
     /// the way from where it was before contacts moved it.
     fn stop_bounce_at_walls(&mut self, row: usize) {
-        let sphere =
-            Sphere { center: self.continuous.bounced_from[row], ..self.marbles.sphere(row) };
+        let sphere = Sphere {
+            center: self.scratch.continuous.bounced_from[row],
+            ..self.marbles.sphere(row)
+        };
         let displacement = self.marbles.position[row] - sphere.center;
         if length(displacement) <= self.free_motion(row) {
             return;
         }
         let layers = self.marbles.layers_of_row(row);
         let planes = self.walls.colliding_planes(layers).filter_map(|(_, plane)| {
-            if self.model.response.needs_penetration() {
+            if self.settings.model.response.needs_penetration() {
                 return None; // its forces turn everything round within a half-space
             }
             let (gap, closing) = (
@@ -229,15 +233,15 @@ impl<S: Scalar> World<S> {
     /// to its surface: nothing else would stop it there. One whose contact the user has removed
     /// passes, and one that contacts do not move.
     fn push_out_of_half_spaces(&mut self, row: usize) {
-        if self.model.response.needs_penetration() || self.is_kinematic(row) {
+        if self.settings.model.response.needs_penetration() || self.is_kinematic(row) {
             return;
         }
         let Sphere { mut center, radius } = self.marbles.sphere(row);
-        let from = self.continuous.bounced_from[row];
+        let from = self.scratch.continuous.bounced_from[row];
         for (wall, plane) in self.walls.colliding_planes(self.marbles.layers_of_row(row)) {
             let gap = plane.signed_distance(center) - radius;
             let is_deep = gap.is_finite() && gap < radius * S::from_f64(-MAX_FREE_MOTION);
-            let was_listed = || plane.signed_distance(from) - radius <= self.reach;
+            let was_listed = || plane.signed_distance(from) - radius <= self.scratch.reach;
             let is_listed = || self.contacts.wm.iter().any(|c| (c.a, c.b) == (wall, row as u32));
             if is_deep && (!was_listed() || is_listed()) {
                 center -= plane.normal() * gap;
@@ -261,7 +265,7 @@ impl<S: Scalar> World<S> {
         // counts.
         let core = sphere.radius * half;
         let passes = self.first_impact_of(core, (row, sphere, motion))?;
-        if self.model.response.needs_penetration() {
+        if self.settings.model.response.needs_penetration() {
             return Some(passes);
         }
         let all = sphere.radius - sphere.radius * S::from_f64(OVERLAP);
@@ -298,7 +302,8 @@ impl<S: Scalar> World<S> {
         let layers = self.marbles.layers_of_row(row);
         let free = self.free_motion(row);
         let bounds = path_bounds(sphere.center, displacement, sphere.radius);
-        let moving_walls = if time > S::zero() { &self.continuous.moving_walls[..] } else { &[] };
+        let moving_walls =
+            if time > S::zero() { &self.scratch.continuous.moving_walls[..] } else { &[] };
         let path = RelativePath { start: sphere.center, displacement, frame: Frame::Standing };
         let moves = |part: SubShape| {
             time > S::zero() && self.walls.swept_motion_of_row(part.wall as usize).is_some()

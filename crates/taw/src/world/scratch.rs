@@ -1,0 +1,79 @@
+//! Scratch memory of a step: nothing that outlives it but the capacity of its lists, and what can be
+//! found again.
+
+use super::contact_limit::ContactLimit;
+use super::continuous::Continuous;
+use super::energy_audit::AuditState;
+use super::narrow_phase::Candidate;
+use super::quarantine::StoredPoses;
+use super::soft_step::SoftStep;
+use crate::broad::{Grid, Images};
+use crate::math::{Scalar, Vec3};
+use crate::response::event::EventDriven;
+use crate::response::{CapsuleInertia, displacement, impulse};
+
+/// Lists that the verbs of a step fill and read. All are equal, so that worlds can be compared.
+#[derive(Clone, Debug)]
+pub(super) struct Scratch<S> {
+    pub grid: Grid,
+    pub images: Images<S>,
+    /// Rows that the current verb has stopped.
+    pub stopped: Vec<u32>,
+    pub stored_poses: StoredPoses<S>,
+    pub contact_limit: ContactLimit<S>,
+    /// Speculative margin: maximum separation of a contact, in metres. Gravity closes it within two
+    /// substeps, for a response that looks ahead.
+    pub reach: S,
+    pub inverse_mass: Vec<S>,
+    /// Velocities before forces changed them in this substep, in m/s; empty for a response that does
+    /// not use them.
+    pub velocity_before: Vec<Vec3<S>>,
+    pub held: Vec<bool>,
+    pub displacement: displacement::Scratch<S>,
+    pub impulse: impulse::Scratch<S>,
+    /// Accelerations in m/s², for a response that integrates marbles by itself.
+    pub accelerations: Vec<Vec3<f64>>,
+    /// Time of the step that is left after the substep, in seconds; zero unless within one.
+    pub rest_of_step: S,
+    pub events: EventDriven,
+    pub soft_step: SoftStep<S>,
+    pub continuous: Continuous<S>,
+    pub near_walls: Vec<Candidate<S>>,
+    /// Axes and inertia of capsules, and bounding radii in metres.
+    pub rods: Vec<CapsuleInertia<S>>,
+    pub reaches: Vec<S>,
+    pub audit_state: Option<Box<AuditState<S>>>,
+}
+
+impl<S: Scalar> Default for Scratch<S> {
+    fn default() -> Self {
+        Self {
+            grid: Grid::default(),
+            images: Images::default(),
+            stopped: Vec::new(),
+            stored_poses: StoredPoses::default(),
+            contact_limit: ContactLimit::default(),
+            reach: S::zero(),
+            inverse_mass: Vec::new(),
+            velocity_before: Vec::new(),
+            held: Vec::new(),
+            displacement: displacement::Scratch::default(),
+            impulse: impulse::Scratch::default(),
+            accelerations: Vec::new(),
+            rest_of_step: S::zero(),
+            events: EventDriven::default(),
+            soft_step: SoftStep::default(),
+            continuous: Continuous::default(),
+            near_walls: Vec::new(),
+            rods: Vec::new(),
+            reaches: Vec::new(),
+            audit_state: None,
+        }
+    }
+}
+
+impl<S> PartialEq for Scratch<S> {
+    fn eq(&self, _: &Self) -> bool {
+        true
+    }
+}
