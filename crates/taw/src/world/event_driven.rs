@@ -3,6 +3,7 @@
 
 use cgmath::InnerSpace;
 
+use super::method::Method;
 use super::walls::{SubShape, Walls};
 use super::{Precision, World};
 use crate::broad::Period;
@@ -12,10 +13,35 @@ use crate::motion::{Motion, Rotation, WallMotion};
 use crate::response::event::{self, Ball, EventSettings, Trajectory, Wall};
 use crate::response::{BallRotation, EnergyLedger, Impact, Material};
 
+/// Collisions in the order of time; the third verb moves marbles.
+pub(super) struct EventDriven;
+
+impl<S: Scalar> Method<S> for EventDriven {
+    fn advance(&self, world: &mut World<S>, dt: S) {
+        let context = world.settings.step_context(dt);
+        world.marbles.mean_accelerations(context, &mut world.scratch.accelerations);
+        if world.settings.model.rotation != Rotation::Dynamic {
+            world.marbles.integrate_rotations(dt, world.settings.model.rotation);
+        }
+    }
+
+    fn contact_distance(&self, world: &World<S>, dt: S) -> S {
+        world.resting_contact_distance(dt)
+    }
+
+    fn solve(&self, world: &mut World<S>, dt: S) {
+        world.step_events(dt, world.scratch.rest_of_step);
+    }
+
+    fn interpolates_walls(&self) -> bool {
+        false
+    }
+}
+
 impl<S: Scalar> World<S> {
     /// Runs the event-driven solver for a substep of `dt` seconds. `rest` is the time of the step
     /// after it: walls reach their poses at the end of the step.
-    pub(super) fn step_events(&mut self, dt: S, rest: S) {
+    fn step_events(&mut self, dt: S, rest: S) {
         self.read_balls();
         self.read_contacts();
         let events = &mut self.scratch.events;
@@ -114,7 +140,7 @@ impl<S: Scalar> World<S> {
 
     /// Contact distance of resting marbles in metres: many times the tolerance of the method, and
     /// of rounding.
-    pub(super) fn resting_contact_distance(&self, dt: S) -> S {
+    fn resting_contact_distance(&self, dt: S) -> S {
         let strongest = self.scratch.accelerations.iter().map(|a| a.magnitude());
         let fall = strongest.fold(0.0, f64::max) * dt.as_f64() * dt.as_f64();
         let far = self.marbles.position().iter().map(|p| {

@@ -6,11 +6,12 @@ use super::continuous::Continuous;
 use super::energy_audit::AuditState;
 use super::narrow_phase::Candidate;
 use super::quarantine::StoredPoses;
-use super::soft_step::SoftStep;
+use super::soft_step::SoftRows;
+use super::solver_columns::SolverColumns;
 use crate::broad::{Grid, Images};
 use crate::math::{Scalar, Vec3};
 use crate::response::event::EventDriven;
-use crate::response::{CapsuleInertia, displacement, impulse};
+use crate::response::{displacement, impulse};
 
 /// Lists that the verbs of a step fill and read. All are equal, so that worlds can be compared.
 #[derive(Clone, Debug)]
@@ -24,11 +25,7 @@ pub(super) struct Scratch<S> {
     /// Speculative margin: maximum separation of a contact, in metres. Gravity closes it within two
     /// substeps, for a response that looks ahead.
     pub reach: S,
-    pub inverse_mass: Vec<S>,
-    /// Velocities before forces changed them in this substep, in m/s; empty for a response that does
-    /// not use them.
-    pub velocity_before: Vec<Vec3<S>>,
-    pub held: Vec<bool>,
+    pub columns: SolverColumns<S>,
     pub displacement: displacement::Scratch<S>,
     pub impulse: impulse::Scratch<S>,
     /// Accelerations in m/s², for a response that integrates marbles by itself.
@@ -36,11 +33,10 @@ pub(super) struct Scratch<S> {
     /// Time of the step that is left after the substep, in seconds; zero unless within one.
     pub rest_of_step: S,
     pub events: EventDriven,
-    pub soft_step: SoftStep<S>,
+    pub soft_step: SoftRows<S>,
     pub continuous: Continuous<S>,
     pub near_walls: Vec<Candidate<S>>,
-    /// Axes and inertia of capsules, and bounding radii in metres.
-    pub rods: Vec<CapsuleInertia<S>>,
+    /// Bounding radii of capsules, in metres.
     pub reaches: Vec<S>,
     pub audit_state: Option<Box<AuditState<S>>>,
 }
@@ -54,18 +50,15 @@ impl<S: Scalar> Default for Scratch<S> {
             stored_poses: StoredPoses::default(),
             contact_limit: ContactLimit::default(),
             reach: S::zero(),
-            inverse_mass: Vec::new(),
-            velocity_before: Vec::new(),
-            held: Vec::new(),
+            columns: SolverColumns::default(),
             displacement: displacement::Scratch::default(),
             impulse: impulse::Scratch::default(),
             accelerations: Vec::new(),
             rest_of_step: S::zero(),
             events: EventDriven::default(),
-            soft_step: SoftStep::default(),
+            soft_step: SoftRows::default(),
             continuous: Continuous::default(),
             near_walls: Vec::new(),
-            rods: Vec::new(),
             reaches: Vec::new(),
             audit_state: None,
         }

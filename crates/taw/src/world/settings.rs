@@ -1,5 +1,6 @@
 //! Settings of a world.
 
+use super::integrate::StepContext;
 use super::{Model, SpeedLimits};
 use crate::math::{Scalar, Vec3};
 use crate::motion::ForceField;
@@ -22,6 +23,18 @@ impl<S: Scalar> Default for Settings<S> {
             gravity: Vec3::unit_y() * S::from_f64(-9.81),
             forces: Vec::new(),
             limits: SpeedLimits::default(),
+        }
+    }
+}
+
+impl<S: Scalar> Settings<S> {
+    /// Forces on marbles over `dt` seconds.
+    pub fn step_context(&self, dt: S) -> StepContext<'_, S> {
+        StepContext {
+            integrator: self.model.integrator,
+            gravity: self.gravity,
+            forces: &self.forces,
+            dt,
         }
     }
 }

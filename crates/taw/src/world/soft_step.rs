@@ -3,7 +3,7 @@
 
 use cgmath::{EuclideanSpace, Zero};
 
-use super::integrate::StepContext;
+use super::method::Method;
 use super::soft_impacts::PredictedImpacts;
 use super::swarm::MAX_COORDINATE;
 use super::{MarbleId, World};
@@ -17,7 +17,7 @@ use crate::swarm::{Body, INFINITE_MASS, MarbleRow, NO_ROW, Surface, SyncToken, V
 
 /// Correspondence of marbles and rows, and scratch memory.
 #[derive(Clone, Debug)]
-pub(super) struct SoftStep<S> {
+pub(super) struct SoftRows<S> {
     /// Number of removals and of marbles, rotation model, and whether the swarm has the default
     /// material: others change the rows of all.
     known: Option<(u64, usize, Rotation, bool)>,
@@ -33,7 +33,7 @@ pub(super) struct SoftStep<S> {
     pub predicted: PredictedImpacts<S>,
 }
 
-impl<S> Default for SoftStep<S> {
+impl<S> Default for SoftRows<S> {
     fn default() -> Self {
         Self {
             known: None,
@@ -56,10 +56,39 @@ const INVERSE_MASSES: [f32; 2] = [INFINITE_MASS, 1e25];
 /// Least radius of a row, in metres, as of the balls of a swarm.
 const LEAST_RADIUS: f32 = 1e-9;
 
+/// Soft contacts in small steps, all within the third verb.
+pub(super) struct SoftStep;
+
+impl<S: Scalar> Method<S> for SoftStep {
+    fn advance(&self, _: &mut World<S>, _: S) {} // the solver moves marbles
+
+    fn contact_distance(&self, _: &World<S>, _: S) -> S {
+        S::zero()
+    }
+
+    fn solve(&self, _: &mut World<S>, _: S) {} // the solver has a list of its own
+
+    fn integrate(&self, world: &mut World<S>, dt: S) -> Result<(), Error> {
+        world.integrate_forces(dt)
+    }
+
+    fn generate_contacts(&self, world: &mut World<S>) {
+        world.find_soft_contacts();
+    }
+
+    fn restitute(&self, world: &mut World<S>, dt: S) -> Result<(), Error> {
+        world.solve_soft_contacts(dt)
+    }
+
+    fn interpolates_walls(&self) -> bool {
+        false
+    }
+}
+
 impl<S: Scalar> World<S> {
     /// The first verb: forces other than gravity become changes of velocity, which the third one
     /// applies in substeps.
-    pub(super) fn integrate_forces(&mut self, dt: S) -> Result<(), Error> {
+    fn integrate_forces(&mut self, dt: S) -> Result<(), Error> {
         if self.settings.model.rotation == Rotation::Dynamic {
             if self.marbles.has_external_forces() {
                 self.marbles.integrate_angular_velocity(dt);
@@ -71,15 +100,10 @@ impl<S: Scalar> World<S> {
         }
         self.scratch.soft_step.dt = dt.as_f64() as f32;
         self.sync_bodies()?;
-        let drive = StepContext {
-            integrator: self.settings.model.integrator,
-            gravity: self.settings.gravity,
-            forces: &self.settings.forces,
-            dt,
-        };
         self.scratch.accelerations.clear();
         if !self.settings.forces.is_empty() || self.marbles.accelerate_differently() {
-            self.marbles.mean_accelerations(drive, &mut self.scratch.accelerations);
+            let context = self.settings.step_context(dt);
+            self.marbles.mean_accelerations(context, &mut self.scratch.accelerations);
         }
         let (gravity, step) = (cast_vector::<S, f64>(self.settings.gravity), dt.as_f64());
         let slots = &self.scratch.soft_step.slot_of_marble;
@@ -97,7 +121,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The second verb: finds which pairs may touch within the step, and lists those of marbles.
-    pub(super) fn find_soft_contacts(&mut self) {
+    fn find_soft_contacts(&mut self) {
         self.walls.update_tree();
         if self.sync_bodies().is_err() {
             return; // the third verb says so
@@ -117,7 +141,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The third verb: moves marbles on in substeps, and solves their contacts.
-    pub(super) fn solve_soft_contacts(&mut self, dt: S) -> Result<(), Error> {
+    fn solve_soft_contacts(&mut self, dt: S) -> Result<(), Error> {
         self.audit_contacts();
         self.sync_bodies()?; // somebody may have moved some since the first verb
         self.walls.update_tree();
@@ -200,7 +224,7 @@ impl<S: Scalar> World<S> {
     fn find_changes(&mut self, rows: &[u32]) {
         let (marbles, rotation) = (&self.marbles, self.settings.model.rotation);
         let plain_swarm = self.swarm.model().material == Material::default();
-        let SoftStep { slot_of_marble, changed, .. } = &mut self.scratch.soft_step;
+        let SoftRows { slot_of_marble, changed, .. } = &mut self.scratch.soft_step;
         changed.clear();
         for row in rows.iter().map(|row| *row as usize) {
             let Some(slot) = slot_of_marble.get(row).copied().filter(|slot| *slot != NO_ROW) else {
@@ -232,7 +256,7 @@ impl<S: Scalar> World<S> {
 
     /// Finds the slot of each marble, and the marble of each slot.
     fn match_slots(&mut self) {
-        let SoftStep { slot_of_marble, marble_of_slot, .. } = &mut self.scratch.soft_step;
+        let SoftRows { slot_of_marble, marble_of_slot, .. } = &mut self.scratch.soft_step;
         slot_of_marble.clear();
         slot_of_marble.resize(self.marbles.len(), NO_ROW);
         marble_of_slot.clear();

@@ -1,16 +1,11 @@
 //! The step: its three verbs, each by the model's response.
 
 use super::World;
-use super::energy_audit::AuditState;
-use super::integrate::StepContext;
+use super::method::{Method, method_of};
 use super::walls::SubShape;
 use crate::Error;
-use crate::math::{Scalar, cast_vector, length};
+use crate::math::Scalar;
 use crate::motion::Rotation;
-use crate::response::displacement::solve_displacement;
-use crate::response::impulse::{Context, SolverSettings, SubstepStart, solve_contacts};
-use crate::response::penalty::{PenaltySettings, apply_penalty_forces};
-use crate::response::{ContactLaw, Response};
 
 impl<S: Scalar> World<S> {
     /// Moves the world on by `dt` seconds, in [`Model::substeps`](super::Model::substeps) equal
@@ -48,45 +43,29 @@ impl<S: Scalar> World<S> {
         let dt = Self::validated_dt(dt)?;
         self.check_shapes()?;
         self.audit_before();
-        if self.settings.model.response == Response::SoftStep {
-            return self.integrate_forces(dt);
-        }
+        method_of(self.settings.model.response).integrate(self, dt)
+    }
+
+    /// Integrates marbles by a method: velocities, positions, rotations.
+    pub(super) fn integrate_marbles(&mut self, method: &(impl Method<S> + ?Sized), dt: S) {
         self.store_poses();
         self.begin_continuous();
-        let drive = StepContext {
-            integrator: self.settings.model.integrator,
-            gravity: self.settings.gravity,
-            forces: &self.settings.forces,
-            dt,
-        };
-        if self.settings.model.rotation == Rotation::Dynamic {
+        let rotation = self.settings.model.rotation;
+        if rotation == Rotation::Dynamic {
             self.marbles.integrate_angular_velocity(dt);
         }
-        if self.settings.model.response == Response::EventDriven {
-            self.marbles.mean_accelerations(drive, &mut self.scratch.accelerations);
-        } else {
-            self.scratch.velocity_before.clear();
-            if self.settings.model.response == Response::Impulse {
-                self.scratch.velocity_before.extend_from_slice(self.marbles.velocity());
-            }
-            self.marbles.integrate(drive, &mut self.scratch.stopped);
-            self.solve_continuous(dt);
-        }
-        if !(self.settings.model.response == Response::EventDriven
-            && self.settings.model.rotation == Rotation::Dynamic)
-        {
-            self.marbles.integrate_rotations(dt, self.settings.model.rotation);
-        }
+        method.advance(self, dt);
         self.quarantine_non_finite();
-        self.scratch.reach = match self.settings.model.response {
-            // Rounding must not end the touch of what falls together.
-            Response::Displacement => length(self.settings.gravity) * dt * dt * S::from_f64(1e-3),
-            Response::Penalty(_) => S::zero(),
-            Response::Impulse => length(self.settings.gravity) * dt * dt * S::from_f64(2.0),
-            Response::EventDriven | Response::SoftStep => self.resting_contact_distance(dt),
-        };
+        self.scratch.reach = method.contact_distance(self, dt);
         self.audit_forces();
-        Ok(())
+    }
+
+    /// Moves marbles freely over `dt` seconds; with continuous detection, to where they meet others.
+    pub(super) fn move_marbles(&mut self, dt: S) {
+        let context = self.settings.step_context(dt);
+        self.marbles.integrate(context, &mut self.scratch.stopped);
+        self.solve_continuous(dt);
+        self.marbles.integrate_rotations(dt, self.settings.model.rotation);
     }
 
     /// The second verb: finds who touches whom, and by how much.
@@ -97,9 +76,11 @@ impl<S: Scalar> World<S> {
     /// together later is found later.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
-        if self.settings.model.response == Response::SoftStep {
-            return self.find_soft_contacts();
-        }
+        method_of(self.settings.model.response).generate_contacts(self);
+    }
+
+    /// Lists contacts up to the speculative margin.
+    pub(super) fn list_contacts(&mut self) {
         self.collide_walls(self.scratch.reach);
         self.collide_marbles(self.scratch.reach);
         self.add_grazing_contacts();
@@ -113,135 +94,27 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`].
     pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
         let dt = Self::validated_dt(dt)?;
-        if self.settings.model.response == Response::SoftStep {
-            return self.solve_soft_contacts(dt);
-        }
+        method_of(self.settings.model.response).restitute(self, dt)
+    }
+
+    /// Solves the listed contacts by a method.
+    pub(super) fn solve_listed_contacts(&mut self, method: &(impl Method<S> + ?Sized), dt: S) {
         self.walls.update_tree(); // some may have been taken out since contacts were looked for
         let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
         self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
         self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
         self.release_separated_stops();
-        if self.settings.model.response != Response::EventDriven {
-            self.scratch.continuous.begin_bounces(&self.marbles.position);
-        }
         self.contacts.sort();
         self.audit_contacts();
-        self.look_at_marbles();
-        self.solve(dt);
+        self.follow_contacts();
+        self.scratch.columns.read(&mut self.marbles, self.settings.model);
+        method.solve(self, dt);
         self.stop_bounces_at_walls();
         self.quarantine_non_finite();
         self.roll_what_only_shows();
         self.settings.limits.apply(&mut self.marbles);
         self.audit_after();
         self.marbles.wrap();
-        Ok(())
-    }
-
-    /// Solves the contacts by the model's response.
-    fn solve(&mut self, dt: S) {
-        match self.settings.model.response {
-            Response::Displacement | Response::Impulse => self.solve_listed_contacts(dt),
-            Response::Penalty(law) => self.apply_penalty_forces(law, dt),
-            Response::EventDriven => self.step_events(dt, self.scratch.rest_of_step),
-            Response::SoftStep => {} // has verbs of its own
-        }
-    }
-
-    /// Solves the listed contacts by impulses, or by displacements.
-    fn solve_listed_contacts(&mut self, dt: S) {
-        let settings = self.solver_settings(dt);
-        let (mut columns, material, integrator) = self.marbles.columns(
-            &self.scratch.inverse_mass,
-            &self.scratch.held,
-            &self.scratch.rods,
-        );
-        if self.settings.model.rotation != Rotation::Dynamic {
-            columns.spin = &mut []; // cosmetic rotation does not affect contacts
-        }
-        let context = Context {
-            walls: &self.walls,
-            material: |row| material.get(row).unwrap_or_default(),
-            position_weight: |row| {
-                integrator.get(row).unwrap_or(self.settings.model.integrator).position_weight()
-            },
-            start: SubstepStart {
-                position: &[],
-                velocity: &self.scratch.velocity_before,
-                ccd_stops: &self.scratch.continuous.projections,
-            },
-            settings: &settings,
-        };
-        let (contacts, impulses, stopped) =
-            (&mut self.contacts, &mut self.memory.impulses, &mut self.scratch.stopped);
-        if self.settings.model.response == Response::Impulse {
-            solve_contacts(
-                &mut columns,
-                contacts,
-                &context,
-                &mut self.scratch.impulse,
-                impulses,
-                stopped,
-            );
-            if let Some(audit_state) = &mut self.scratch.audit_state {
-                let AuditState { velocity, angular_velocity, work, .. } = &mut **audit_state;
-                self.scratch.impulse.record_energy(&mut columns, velocity, angular_velocity, work);
-            }
-            return;
-        }
-        let count = contacts.len() as u32;
-        let mut pushes = self.scratch.audit_state.as_ref().map(|_| Vec::new());
-        let push = |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change)));
-        let scratch = &mut self.scratch.displacement;
-        solve_displacement(&mut columns, contacts, &context, scratch, impulses, stopped, push);
-        if let Some(audit_state) = &mut self.scratch.audit_state {
-            audit_state.work.collisions = count;
-            for (row, change) in pushes.into_iter().flatten() {
-                let mass = self.marbles.mass(row as usize).as_f64();
-                audit_state.work.momentum += cast_vector::<S, f64>(change) * mass;
-            }
-        }
-    }
-
-    /// Settings of the solver of listed contacts.
-    fn solver_settings(&self, dt: S) -> SolverSettings<S> {
-        let restitution_threshold = length(self.settings.gravity) * dt * S::from_f64(2.0);
-        SolverSettings {
-            iterations: self.settings.model.iterations,
-            dt,
-            restitution_threshold,
-            tolerance: restitution_threshold * S::epsilon(),
-            slop: length(self.settings.gravity) * dt * dt,
-            max_relative_slop: S::from_f64(0.001),
-        }
-    }
-
-    /// Applies forces that grow with the overlap.
-    fn apply_penalty_forces(&mut self, law: ContactLaw, dt: S) {
-        let (mut columns, material, integrator) = self.marbles.columns(
-            &self.scratch.inverse_mass,
-            &self.scratch.held,
-            &self.scratch.rods,
-        );
-        if self.settings.model.rotation != Rotation::Dynamic {
-            columns.spin = &mut [];
-        }
-        let settings = PenaltySettings {
-            law,
-            dt,
-            material: |row| material.get(row).unwrap_or_default(),
-            position_weight: |row| {
-                integrator.get(row).unwrap_or(self.settings.model.integrator).position_weight()
-            },
-        };
-        apply_penalty_forces(
-            &settings,
-            &mut columns,
-            &mut self.contacts,
-            &self.walls,
-            &mut self.memory.springs,
-            &mut self.scratch.stopped,
-            self.scratch.audit_state.as_mut().map(|audit_state| &mut audit_state.work),
-        );
     }
 
     /// Makes marbles that turn for show only roll over the walls that they touch.
@@ -262,24 +135,6 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Brings up to date what a response asks of marbles: masses, who is held, what is long;
-    /// and what contacts remember of them.
-    fn look_at_marbles(&mut self) {
-        self.scratch.inverse_mass.clear();
-        if matches!(self.settings.model.response, Response::Impulse | Response::Penalty(_)) {
-            let masses = (0..self.marbles.len()).map(|row| self.marbles.mass(row));
-            self.scratch.inverse_mass.extend(masses.map(|mass| S::one() / mass));
-        }
-        self.follow_contacts();
-        self.scratch.held.clear();
-        if self.settings.model.rotation == Rotation::Dynamic && self.marbles.has_rotation_locks() {
-            self.scratch
-                .held
-                .extend((0..self.marbles.len()).map(|row| self.marbles.is_rotation_locked(row)));
-        }
-        self.marbles.rods(self.settings.model.rotation, &mut self.scratch.rods);
-    }
-
     /// Forgets who was [stopped](World::stopped), and the [impacts](World::impacts). A
     /// step begins with this; whoever calls the verbs one by one begins so too.
     pub fn begin_step(&mut self) {
@@ -295,7 +150,7 @@ impl<S: Scalar> World<S> {
     /// one in several substeps begins each so; without it, walls are at the end of their ways.
     pub fn begin_substep(&mut self, rest: S) {
         self.scratch.rest_of_step = if rest.is_finite() { rest.max(S::zero()) } else { S::zero() };
-        if !matches!(self.settings.model.response, Response::EventDriven | Response::SoftStep) {
+        if method_of::<S>(self.settings.model.response).interpolates_walls() {
             self.walls.interpolate_to(self.scratch.rest_of_step);
         }
     }

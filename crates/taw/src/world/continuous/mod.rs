@@ -115,6 +115,14 @@ impl<S: Scalar> World<S> {
         });
     }
 
+    /// Stores positions before they follow the velocity changes of contacts.
+    pub(super) fn begin_bounces(&mut self) {
+        let Continuous { start, bounced_from, .. } = &mut self.scratch.continuous;
+        if start.len() == self.marbles.len() {
+            bounced_from.extend_from_slice(&self.marbles.position);
+        }
+    }
+
     /// Predicate: the two bodies of a stop have a contact.
     fn touches(&self) -> impl Fn(&StoppedMarble<S>) -> bool + use<S> {
         let mut stopped: Vec<_> =
@@ -142,13 +150,6 @@ impl<S: Scalar> Continuous<S> {
         let free = &mut self.projections[stopped.row as usize];
         *free = Some(free.map_or(along, |free| along * free));
         self.stops.push(stopped);
-    }
-
-    /// Stores the positions before they follow the velocity changes of contacts.
-    pub fn begin_bounces(&mut self, position: &[Point3<S>]) {
-        if self.start.len() == position.len() {
-            self.bounced_from.extend_from_slice(position);
-        }
     }
 
     /// Clears the state of the last substep.

@@ -1,0 +1,58 @@
+//! [`Response::Displacement`](crate::response::Response) in a world.
+
+use super::World;
+use super::method::Method;
+use crate::math::{Scalar, cast_vector, length};
+use crate::response::displacement::solve_displacement;
+use crate::response::impulse::{Context, SubstepStart};
+
+/// Position projection, without masses.
+pub(super) struct Displacement;
+
+impl<S: Scalar> Method<S> for Displacement {
+    fn advance(&self, world: &mut World<S>, dt: S) {
+        world.move_marbles(dt);
+    }
+
+    /// Rounding must not end the touch of what falls together.
+    fn contact_distance(&self, world: &World<S>, dt: S) -> S {
+        length(world.settings.gravity) * dt * dt * S::from_f64(1e-3)
+    }
+
+    fn solve(&self, world: &mut World<S>, dt: S) {
+        world.begin_bounces();
+        let (settings, model, scratch) =
+            (world.solver_settings(dt), world.settings.model, &mut world.scratch);
+        let (mut bodies, material, position_weight) =
+            scratch.columns.bodies(&mut world.marbles, model);
+        let context = Context {
+            walls: &world.walls,
+            material,
+            position_weight,
+            start: SubstepStart {
+                position: &[],
+                velocity: &[],
+                ccd_stops: &scratch.continuous.projections,
+            },
+            settings: &settings,
+        };
+        let mut pushes = scratch.audit_state.as_ref().map(|_| Vec::new());
+        solve_displacement(
+            &mut bodies,
+            &mut world.contacts,
+            &context,
+            &mut scratch.displacement,
+            &mut world.memory.impulses,
+            &mut scratch.stopped,
+            |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change))),
+        );
+        drop(context);
+        if let Some(audit_state) = &mut scratch.audit_state {
+            audit_state.work.collisions = world.contacts.len() as u32;
+            for (row, change) in pushes.into_iter().flatten() {
+                let mass = world.marbles.mass(row as usize).as_f64();
+                audit_state.work.momentum += cast_vector::<S, f64>(change) * mass;
+            }
+        }
+    }
+}

@@ -1,0 +1,54 @@
+//! [`Response::Impulse`](crate::response::Response) in a world.
+
+use super::World;
+use super::energy_audit::AuditState;
+use super::method::Method;
+use crate::math::{Scalar, length};
+use crate::response::impulse::{Context, SubstepStart, solve_contacts};
+
+/// Sequential impulses.
+pub(super) struct Impulse;
+
+impl<S: Scalar> Method<S> for Impulse {
+    fn advance(&self, world: &mut World<S>, dt: S) {
+        let before = &mut world.scratch.columns.velocity_before;
+        before.clear();
+        before.extend_from_slice(world.marbles.velocity());
+        world.move_marbles(dt);
+    }
+
+    fn contact_distance(&self, world: &World<S>, dt: S) -> S {
+        length(world.settings.gravity) * dt * dt * S::from_f64(2.0)
+    }
+
+    fn solve(&self, world: &mut World<S>, dt: S) {
+        world.begin_bounces();
+        let (settings, model, scratch) =
+            (world.solver_settings(dt), world.settings.model, &mut world.scratch);
+        let (mut bodies, material, position_weight) =
+            scratch.columns.bodies(&mut world.marbles, model);
+        let context = Context {
+            walls: &world.walls,
+            material,
+            position_weight,
+            start: SubstepStart {
+                position: &[],
+                velocity: &scratch.columns.velocity_before,
+                ccd_stops: &scratch.continuous.projections,
+            },
+            settings: &settings,
+        };
+        solve_contacts(
+            &mut bodies,
+            &mut world.contacts,
+            &context,
+            &mut scratch.impulse,
+            &mut world.memory.impulses,
+            &mut scratch.stopped,
+        );
+        if let Some(audit_state) = &mut scratch.audit_state {
+            let AuditState { velocity, angular_velocity, work, .. } = &mut **audit_state;
+            scratch.impulse.record_energy(&mut bodies, velocity, angular_velocity, work);
+        }
+    }
+}

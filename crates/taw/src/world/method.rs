@@ -1,0 +1,56 @@
+//! Outline of a step's three verbs, which all methods follow, each in a file of its own.
+
+use super::World;
+use super::displacement::Displacement;
+use super::event_driven::EventDriven;
+use super::impulse::Impulse;
+use super::penalty::Penalty;
+use super::soft_step::SoftStep;
+use crate::Error;
+use crate::math::Scalar;
+use crate::response::Response;
+
+/// Method of a response.
+pub(super) trait Method<S: Scalar> {
+    /// Moves marbles freely over `dt` seconds, from velocities and forces.
+    fn advance(&self, world: &mut World<S>, dt: S);
+
+    /// Speculative margin of contacts after `dt` seconds, in metres.
+    fn contact_distance(&self, world: &World<S>, dt: S) -> S;
+
+    /// Solves the listed contacts of a substep of `dt` seconds.
+    fn solve(&self, world: &mut World<S>, dt: S);
+
+    /// First verb.
+    fn integrate(&self, world: &mut World<S>, dt: S) -> Result<(), Error> {
+        world.integrate_marbles(self, dt);
+        Ok(())
+    }
+
+    /// Second verb.
+    fn generate_contacts(&self, world: &mut World<S>) {
+        world.list_contacts();
+    }
+
+    /// Third verb.
+    fn restitute(&self, world: &mut World<S>, dt: S) -> Result<(), Error> {
+        world.solve_listed_contacts(self, dt);
+        Ok(())
+    }
+
+    /// True if walls are moved to the end of each substep, false if the method moves them itself.
+    fn interpolates_walls(&self) -> bool {
+        true
+    }
+}
+
+/// Method of a response.
+pub(super) fn method_of<S: Scalar>(response: Response) -> &'static dyn Method<S> {
+    match response {
+        Response::Displacement => &Displacement,
+        Response::Impulse => &Impulse,
+        Response::SoftStep => &SoftStep,
+        Response::Penalty(_) => &Penalty,
+        Response::EventDriven => &EventDriven,
+    }
+}

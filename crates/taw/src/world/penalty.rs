@@ -1,0 +1,41 @@
+//! [`Response::Penalty`] in a world.
+
+use super::World;
+use super::method::Method;
+use crate::math::Scalar;
+use crate::response::penalty::{PenaltySettings, apply_penalty_forces};
+use crate::response::{ContactLaw, Response};
+
+/// Forces that grow with penetration.
+pub(super) struct Penalty;
+
+impl<S: Scalar> Method<S> for Penalty {
+    fn advance(&self, world: &mut World<S>, dt: S) {
+        world.move_marbles(dt);
+    }
+
+    fn contact_distance(&self, _: &World<S>, _: S) -> S {
+        S::zero()
+    }
+
+    fn solve(&self, world: &mut World<S>, dt: S) {
+        world.begin_bounces();
+        let (model, scratch) = (world.settings.model, &mut world.scratch);
+        let law = match model.response {
+            Response::Penalty(law) => law,
+            _ => ContactLaw::SpringDashpot,
+        };
+        let (mut bodies, material, position_weight) =
+            scratch.columns.bodies(&mut world.marbles, model);
+        let settings = PenaltySettings { law, dt, material, position_weight };
+        apply_penalty_forces(
+            &settings,
+            &mut bodies,
+            &mut world.contacts,
+            &world.walls,
+            &mut world.memory.springs,
+            &mut scratch.stopped,
+            scratch.audit_state.as_mut().map(|audit_state| &mut audit_state.work),
+        );
+    }
+}

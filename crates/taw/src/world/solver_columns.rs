@@ -1,0 +1,74 @@
+//! Marbles as the solvers of listed contacts see them.
+
+use super::World;
+use super::marbles::Marbles;
+use super::model::Model;
+use crate::math::{Scalar, Vec3, length};
+use crate::motion::Rotation;
+use crate::response::impulse::SolverSettings;
+use crate::response::{CapsuleInertia, Material, Response, SolverBodies};
+
+/// Columns that a solver reads besides those of the marbles.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SolverColumns<S> {
+    /// Inverse masses, in 1/kg; empty for a method that ignores masses.
+    inverse_mass: Vec<S>,
+    /// Velocities before forces changed them in this substep, in m/s; empty for a method that does
+    /// not use them.
+    pub velocity_before: Vec<Vec3<S>>,
+    /// Rows whose rotation is locked; empty if there are none.
+    held: Vec<bool>,
+    /// Axes and inertia of capsules; empty if there are none.
+    capsules: Vec<CapsuleInertia<S>>,
+}
+
+impl<S: Scalar> SolverColumns<S> {
+    /// Brings masses, locks and capsules up to date with the marbles.
+    pub fn read(&mut self, marbles: &mut Marbles<S>, model: Model) {
+        self.inverse_mass.clear();
+        if matches!(model.response, Response::Impulse | Response::Penalty(_)) {
+            let masses = (0..marbles.len()).map(|row| marbles.mass(row));
+            self.inverse_mass.extend(masses.map(|mass| S::one() / mass));
+        }
+        self.held.clear();
+        if model.rotation == Rotation::Dynamic && marbles.has_rotation_locks() {
+            self.held.extend((0..marbles.len()).map(|row| marbles.is_rotation_locked(row)));
+        }
+        marbles.rods(model.rotation, &mut self.capsules);
+    }
+
+    /// Bodies, the material of each row, and how far its position follows a change of velocity.
+    pub fn bodies<'a>(
+        &'a self,
+        marbles: &'a mut Marbles<S>,
+        model: Model,
+    ) -> (
+        SolverBodies<'a, S>,
+        impl Fn(usize) -> Material<S> + use<'a, S>,
+        impl Fn(usize) -> S + use<'a, S>,
+    ) {
+        let (mut bodies, material, integrator) =
+            marbles.columns(&self.inverse_mass, &self.held, &self.capsules);
+        if model.rotation != Rotation::Dynamic {
+            bodies.spin = &mut []; // cosmetic rotation does not affect contacts
+        }
+        let position_weight =
+            move |row| integrator.get(row).unwrap_or(model.integrator).position_weight();
+        (bodies, move |row| material.get(row).unwrap_or_default(), position_weight)
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// Settings of the solver of listed contacts.
+    pub(super) fn solver_settings(&self, dt: S) -> SolverSettings<S> {
+        let restitution_threshold = length(self.settings.gravity) * dt * S::from_f64(2.0);
+        SolverSettings {
+            iterations: self.settings.model.iterations,
+            dt,
+            restitution_threshold,
+            tolerance: restitution_threshold * S::epsilon(),
+            slop: length(self.settings.gravity) * dt * dt,
+            max_relative_slop: S::from_f64(0.001),
+        }
+    }
+}
