@@ -4,7 +4,7 @@ use bevy_egui::input::EguiWantsInput;
 use bevy_panorbit_camera::{PanOrbitCamera, PanOrbitCameraPlugin};
 
 /// Lets a camera made by [`orbit_camera`] be turned and moved by the mouse, unless
-/// the mouse is over a panel.
+/// the mouse is over a panel. Needs `EguiPlugin`, added before it.
 pub struct OrbitCameraPlugin;
 
 impl Plugin for OrbitCameraPlugin {
@@ -20,7 +20,7 @@ pub fn orbit_camera(focus: Vec3, distance: f32) -> impl Bundle {
     orbit_camera_at(focus, distance, 0.95)
 }
 
-/// The same, looking down by `pitch` radians at first.
+/// Orbiting camera as [`orbit_camera`], which looks down by `pitch` radians at first.
 #[must_use]
 pub fn orbit_camera_at(focus: Vec3, distance: f32, pitch: f32) -> impl Bundle {
     (
