@@ -51,7 +51,7 @@ pub enum Response {
     Impulse,
     /// Soft contacts in small steps (Catto, 2024, `Solver2D`): masses, restitution, friction,
     /// rolling and torsional friction, and spin if the model's rotation is dynamic. Made for games:
-    /// for thousands of balls, on all threads; nothing tunnels through walls.
+    /// for thousands of balls, on all threads; nothing tunnels.
     ///
     /// Marbles and the balls of the [swarm](crate::world::World::swarm) are solved as one, with the
     /// threads and the sleep of its [model](crate::swarm::SwarmModel), in the
@@ -62,8 +62,8 @@ pub enum Response {
     ///
     /// Balls only, in `f32` in any world, and no periods. Marbles may have their own mass, material,
     /// gravity scale, damping, forces and rotation model; integrators and tangential restitution
-    /// have no effect. Forces are evaluated once a step. A ball stops at thin walls at any speed,
-    /// but two that move on by over two of their diameters a step may pass through each other. It
+    /// have no effect. Forces are evaluated once a step. A ball stops at thin walls and other balls
+    /// at any speed, whatever the world's [detection](crate::world::Detection). It
     /// finds contacts itself, so removing some from the world's lists does not keep marbles apart.
     SoftStep,
     /// Penalty method: forces that grow with penetration. Contacts last for a finite time, many

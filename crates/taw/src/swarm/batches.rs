@@ -19,6 +19,11 @@ impl Batch {
     pub fn pair(&self, lane: usize) -> [u32; 2] {
         [self.first[0] + u32::from(self.a[lane]), self.first[1] + u32::from(self.b[lane])]
     }
+
+    /// All its pairs.
+    pub fn pairs(&self) -> impl Iterator<Item = [u32; 2]> + '_ {
+        (0..self.count as usize).map(|lane| self.pair(lane))
+    }
 }
 
 /// Takes some pairs out of batches.

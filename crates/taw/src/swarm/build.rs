@@ -11,8 +11,10 @@ use super::neighbours::{FindPairs, NeighbourLists, Search};
 use super::simd::SimdLevel;
 use super::step::listed_planes;
 use super::surfaces::SurfaceOf;
+use super::sweeps::{CrowdSweep, Sweep};
 use super::workers::{DisjointSlice, parallel_filter, parallel_for, parallel_for_rows};
 use super::{Stage, StaticGeometry, Swarm, walls};
+use crate::math::length;
 
 /// Balls in a chunk at least.
 const MIN_CHUNK_ROWS: u32 = 512;
@@ -27,7 +29,8 @@ const FAR: f32 = 16.0;
 const SPARSE: f32 = 2.0;
 pub(super) const SOON: u32 = 6;
 const WIDEST: f32 = 6.0;
-/// Largest skin of balls that are no fast movers, in radii: beyond it they pass through each other.
+/// Largest skin of balls that are no fast movers, in radii: pairs that meet beyond it are looked for
+/// along their paths.
 const WIDE: f32 = 2.0;
 
 impl Swarm {
@@ -69,6 +72,11 @@ impl Swarm {
         self.mean_radius * (1.0 + self.skin_scale) * if self.has_friction() { 0.2 } else { 0.3 }
     }
 
+    /// Widest skin of a ball that is searched for all around, in metres.
+    pub(super) fn reach_of_skins(&self) -> f32 {
+        self.skin * FAR
+    }
+
     /// Chooses the Verlet skin: the usual one, or as far as all but the fast movers go in two
     /// steps. A ball that goes further than others look for it would be found inside of them.
     fn choose_skin(&mut self, dt: f32) -> f32 {
@@ -100,44 +108,56 @@ impl Swarm {
         self.steps_since_build = 0;
     }
 
-    /// Sets the remaining skin of each ball: more than the common skin only for fast movers.
+    /// Sets the remaining skin of each ball: more than the common skin only for fast movers. These
+    /// are all that may leave the common skin before pairs are searched again, or, if they are too
+    /// many, those that leave it in this step.
     fn reset_skins(&mut self, dt: f32, skin: f32) {
+        self.fast_movers.clear(self.at.len());
+        let mut fast = std::mem::take(&mut self.scratch.leaving);
+        self.list_fast([dt, skin], None, &mut fast);
+        if self.fast_movers.full(fast.len(), self.at.len()) {
+            self.list_fast([dt, skin], Some(skin), &mut fast);
+        }
+        if self.fast_movers.full(fast.len(), self.at.len()) {
+            self.fast_movers.crowded = self.has_friction();
+            self.list_fast([dt, skin], Some(f32::MAX), &mut fast);
+        }
+        for row in &fast {
+            self.fast_movers.add(*row);
+        }
+        self.scratch.leaving = fast;
+    }
+
+    /// Sets the remaining skins, and lists the balls whose skin is wider than the common one, no more
+    /// than are too many. With `least`, only a ball that goes further in the step, in metres, may
+    /// have one.
+    fn list_fast(&mut self, [dt, skin]: [f32; 2], least: Option<f32>, fast: &mut Vec<u32>) {
         let (threads, lab) = (self.threads(), !self.has_friction());
         let (at, velocity, displacement) =
             (&self.at[..], &self.velocity[..], &self.displacement[..]);
-        let least = if lab { 0.12 } else { 0.08 };
-        self.fast_movers.clear(self.at.len());
+        let narrow = if lab { 0.12 } else { 0.08 };
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
         let skins_left = DisjointSlice::new(&mut self.skin_left);
-        let mut fast = std::mem::take(&mut self.scratch.leaving);
         fast.clear();
-        parallel_filter(threads, at.len(), &mut self.scratch.lists, &mut fast, |rows, fast| {
+        parallel_filter(threads, at.len(), &mut self.scratch.lists, fast, |rows, fast| {
             // SAFETY: each job has its own rows.
             let skins_left = unsafe { skins_left.part(rows.clone()) };
             for (row, skin_left) in rows.zip(skins_left) {
+                let path = if lab { 0.0 } else { Sweep::skin_of_path(&velocity[row], dt) };
                 let displacement =
                     if lab { displacement[row] } else { squared(velocity[row]).sqrt() * dt };
-                *skin_left = (displacement * STEPS).clamp(skin.min(least * at[row][3]), skin * FAR);
+                *skin_left = (displacement * STEPS)
+                    .clamp(skin.min(narrow * at[row][3]), skin * FAR)
+                    .max(path);
+                if least.is_some_and(|least| path.max(displacement) <= least) {
+                    *skin_left = skin_left.min(skin);
+                }
                 if *skin_left > skin && fast.len() < most {
                     fast.push(row as u32);
                 }
             }
         });
-        if self.fast_movers.full(fast.len(), self.at.len()) {
-            parallel_for_rows(threads, self.at.len(), |rows| {
-                // SAFETY: as above.
-                let skins_left = unsafe { skins_left.part(rows) };
-                for skin_left in skins_left {
-                    *skin_left = skin_left.min(skin);
-                }
-            });
-        } else {
-            for row in &fast {
-                self.fast_movers.add(*row);
-            }
-        }
-        self.scratch.leaving = fast;
     }
 
     /// Finds pairs for balls that leave their skin, or for all, if these are too many.
@@ -162,12 +182,23 @@ impl Swarm {
                 self.displacement[at]
             };
             self.skin_left[at] = (displacement * STEPS).clamp(skin, skin * FAR);
+            if self.has_friction() {
+                let of_path = Sweep::skin_of_path(&self.velocity[at], dt);
+                self.skin_left[at] = self.skin_left[at].max(of_path);
+            }
         }
-        self.find_fast_movers(skin);
+        self.find_fast_movers(skin, dt);
         self.find_wall_contacts_of(rows, dt, walls);
     }
 
-    fn find_fast_movers(&mut self, skin: f32) {
+    fn find_fast_movers(&mut self, skin: f32, dt: f32) {
+        let gravity = self.gravity.map_or(0.0, length);
+        // Solver and gravity bring balls off their straight paths.
+        let slack = self.margin() + gravity * dt * dt;
+        if self.fast_movers.crowded {
+            self.find_crossing_pairs(skin, dt, slack);
+        }
+        let reach = self.reach_of_skins();
         let (has_friction, search) = (self.has_friction(), &mut self.scratch.searches[0]);
         let (slots, proxies) = (self.ids.slots(), &self.body_slots);
         // Bodies that are rows meet like all others.
@@ -175,11 +206,32 @@ impl Swarm {
         let proxy = |row: u32| apart && proxies.contains(slots[row as usize]);
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
         let (grid, at, skin_left) = (&self.grid, &self.at[..], &self.skin_left[..]);
-        let balls = SortedBalls { grid, at, skin_left, surfaces };
+        let velocity = &self.velocity[..];
+        let sweep = has_friction.then_some(Sweep { at, velocity, skin_left, dt, reach, slack });
+        let balls = SortedBalls { grid, at, skin_left, surfaces, sweep };
         self.fast_movers.find(&balls, self.max_radius + skin, search, &proxy, has_friction);
         if has_friction {
             let FastMovers { batches, impulses, .. } = &mut self.fast_movers;
             impulses.set_numbers(batches, surfaces);
+        }
+    }
+
+    /// Finds the pairs that meet beyond the reach of skins, where more balls go that far than there
+    /// may be fast movers.
+    fn find_crossing_pairs(&mut self, skin: f32, dt: f32, slack: f32) {
+        let (at, velocity) = (&self.at[..], &self.velocity[..]);
+        let axes = self.grid.axes();
+        let FastMovers { crossing, .. } = &mut self.fast_movers;
+        let crowd = CrowdSweep { at, velocity, dt, skin, slack, axes };
+        crowd.find(&mut self.scratch.crowd, crossing);
+        let (model, slots) = (self.model.material, self.ids.slots());
+        let surfaces = SurfaceOf { model, surfaces: &self.surfaces, slots };
+        if surfaces.has_layers() {
+            crossing.retain(|[a, b]| surfaces.may_collide(*a, *b));
+        }
+        if self.proxies.len() > 1 {
+            let proxy = |row: &u32| self.body_slots.contains(slots[*row as usize]);
+            crossing.retain(|pair| !pair.iter().all(proxy));
         }
     }
 
@@ -284,7 +336,7 @@ impl Swarm {
                 chunk.restore_shape_contacts(|row| impulse_cache.shapes_of(old_rows, row));
             }
         });
-        self.find_fast_movers(skin);
+        self.find_fast_movers(skin, dt);
         if has_friction {
             let (impulse_cache, fast_movers) = (&self.impulse_cache, &mut self.fast_movers);
             impulse_cache.restore(&fast_movers.batches, &self.old_rows, &mut fast_movers.impulses);
@@ -345,13 +397,20 @@ mod tests {
 
     use crate::math::{Point3, Vec3};
     use crate::swarm::kernels::squared;
+    use crate::swarm::sweeps::Sweep;
     use crate::swarm::{Ball, Swarm, SwarmModel, Tier};
     use crate::world::World;
 
     /// Every pair that might touch, by asking each ball about each.
     fn by_all(swarm: &Swarm) -> BTreeSet<[u32; 2]> {
         let rows = 0..swarm.at.len() as u32;
+        let Swarm { at, velocity, skin_left, .. } = swarm;
+        let (dt, reach) = (1.0 / 60.0, swarm.reach_of_skins());
+        let sweep = Sweep { at, velocity, skin_left, dt, reach, slack: 0.0 };
         let near = |[a, b]: &[u32; 2]| {
+            if swarm.has_friction() && (sweep.is_swift(*a) || sweep.is_swift(*b)) {
+                return sweep.meet(*a, *b); // on their paths
+            }
             let (a, b) = (*a as usize, *b as usize);
             let displacement = [0, 1, 2].map(|axis| swarm.at[b][axis] - swarm.at[a][axis]);
             let reach = swarm.at[a][3] + swarm.skin_left[a] + swarm.at[b][3] + swarm.skin_left[b];

@@ -1,5 +1,6 @@
 //! Balls that left their skin: few, so pairs are searched for them alone, and one fast ball does
-//! not cost a search for all.
+//! not cost a search for all. Those that go further in a step than skins reach are looked for along
+//! their [paths](super::sweeps).
 //!
 //! Pairs that such a ball already has in its chunk stay there. One that it then has twice shares
 //! its impulse between the two.
@@ -11,6 +12,7 @@ use super::kernels::{ContactImpulses, squared};
 use super::neighbours::Search;
 use super::simd::Row;
 use super::surfaces::SurfaceOf;
+use super::sweeps::Sweep;
 
 /// Fast movers at most: one of so many balls, and besides so many.
 const BALLS_PER_MOVER: usize = 500;
@@ -30,6 +32,12 @@ pub(super) struct FastMovers {
     cached: Vec<CachedPair>,
     /// The fast movers along the x axis.
     sorted: Vec<u32>,
+    /// Set while more balls than there may be fast movers go further than skins reach; and pairs of
+    /// those that meet there.
+    pub crowded: bool,
+    pub crossing: Vec<[u32; 2]>,
+    /// Balls along the path of one. Scratch.
+    beside: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,12 +60,19 @@ pub(super) struct SortedBalls<'a> {
     /// Remaining skin, in metres.
     pub skin_left: &'a [f32],
     pub surfaces: SurfaceOf<'a>,
+    /// Paths of those that go further than skins reach; none in the lab's tier.
+    pub sweep: Option<Sweep<'a>>,
 }
 
 impl SortedBalls<'_> {
     /// Returns true if two balls that collide might touch before one of them leaves its skin.
     fn near(&self, a: u32, b: u32) -> bool {
-        let (at, skin_left, a, b) = (self.at, self.skin_left, a as usize, b as usize);
+        let (at, skin_left) = (self.at, self.skin_left);
+        let widest = skin_left[a as usize].max(skin_left[b as usize]);
+        if let Some(sweep) = self.sweep.as_ref().filter(|sweep| widest > sweep.reach) {
+            return sweep.meet(a, b) && self.surfaces.may_collide(a, b);
+        }
+        let (a, b) = (a as usize, b as usize);
         let apart = [at[b][0] - at[a][0], at[b][1] - at[a][1], at[b][2] - at[a][2], 0.0];
         let reach = at[a][3] + skin_left[a].max(0.0) + at[b][3] + skin_left[b].max(0.0);
         squared(apart) < reach * reach && self.surfaces.may_collide(a as u32, b as u32)
@@ -78,6 +93,8 @@ impl FastMovers {
     /// Forgets all, in a swarm of so many.
     pub fn clear(&mut self, balls: usize) {
         self.rows.clear();
+        self.crossing.clear();
+        self.crowded = false;
         self.unlisted = 0;
         self.batches.clear();
         self.impulses.reset(0);
@@ -112,16 +129,30 @@ impl FastMovers {
         let mut batches = std::mem::take(&mut self.batches);
         batches.clear();
         self.unlisted = 0;
-        if !self.rows.is_empty() {
+        if !self.rows.is_empty() || !self.crossing.is_empty() {
             let SortedBalls { at, skin_left, .. } = *balls;
-            let mut builder = search.builder(64 * self.rows.len(), &mut batches);
+            let count = 64 * self.rows.len() + 2 * self.crossing.len();
+            let mut builder = search.builder(count, &mut batches);
             let widest = self.rows.iter().fold(0.0_f32, |most, row| {
                 most.max(at[*row as usize][3] + skin_left[*row as usize])
             });
             builder.allow(at.len());
-            for mover in &self.rows {
-                self.find_pairs_of(*mover, balls, more, proxy, &mut builder);
+            for [a, b] in &self.crossing {
+                if builder.spend_only(1) == 1 {
+                    builder.add(*a, *b);
+                }
             }
+            let mut beside = std::mem::take(&mut self.beside);
+            for mover in &self.rows {
+                match balls.sweep.filter(|sweep| sweep.is_swift(*mover)) {
+                    Some(sweep) => {
+                        sweep.visit_path(*mover, balls.grid, more, &mut beside);
+                        self.add_pairs(*mover, beside.iter().copied(), balls, proxy, &mut builder);
+                    }
+                    None => self.find_pairs_of(*mover, balls, more, proxy, &mut builder),
+                }
+            }
+            self.beside = beside;
             self.sorted.clear();
             self.sorted.extend(&self.rows);
             let x = |row: &u32| at[*row as usize][0];
@@ -145,6 +176,24 @@ impl FastMovers {
         }
     }
 
+    /// Adds the pairs of one with those of some balls that are none.
+    fn add_pairs(
+        &self,
+        mover: u32,
+        others: impl IntoIterator<Item = u32>,
+        balls: &SortedBalls,
+        proxy: &dyn Fn(u32) -> bool,
+        builder: &mut BatchBuilder,
+    ) {
+        let is_marble = proxy(mover);
+        for other in others {
+            let is_for_others = self.has(other) || is_marble && proxy(other);
+            if !is_for_others && balls.near(mover, other) && builder.spend_only(1) == 1 {
+                builder.add(mover.min(other), mover.max(other));
+            }
+        }
+    }
+
     /// Finds the pairs of one with balls that are none.
     fn find_pairs_of(
         &self,
@@ -154,25 +203,13 @@ impl FastMovers {
         proxy: &dyn Fn(u32) -> bool,
         builder: &mut BatchBuilder,
     ) {
-        let is_marble = proxy(mover);
         let SortedBalls { grid, at, skin_left, .. } = *balls;
-        let [x, y, z, radius] = at[mover as usize];
-        let far = radius + skin_left[mover as usize] + more;
+        let at = &at[mover as usize];
+        let far = at[3] + skin_left[mover as usize] + more;
         for level in &grid.levels {
-            let low = grid.coordinates(level, &[x - far, y - far, z - far, 0.0]);
-            let high = grid.coordinates(level, &[x + far, y + far, z + far, 0.0]);
-            for layer in low[0]..=high[0] {
-                for row in low[1]..=high[1] {
-                    let line = level.cell(grid, layer, row, 0);
-                    for other in grid.first(line + low[2])..grid.first(line + high[2] + 1) {
-                        let is_for_others = self.has(other) || is_marble && proxy(other);
-                        if !is_for_others && balls.near(mover, other) && builder.spend_only(1) == 1
-                        {
-                            builder.add(mover.min(other), mover.max(other));
-                        }
-                    }
-                }
-            }
+            grid.for_each_run(level, at, far, |rows| {
+                self.add_pairs(mover, rows, balls, proxy, builder);
+            });
         }
     }
 
@@ -216,7 +253,8 @@ impl FastMovers {
     }
 
     pub fn bytes(&self) -> usize {
-        (self.rows.capacity() + self.sorted.capacity()) * size_of::<u32>()
+        (self.rows.capacity() + self.sorted.capacity() + self.beside.capacity()) * size_of::<u32>()
+            + self.crossing.capacity() * size_of::<[u32; 2]>()
             + self.bits.bytes()
             + self.batches.capacity() * size_of::<Batch>()
             + self.impulses.bytes()

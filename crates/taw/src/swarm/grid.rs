@@ -85,6 +85,11 @@ impl Level {
             + cell
     }
 
+    /// Width of a cell, in metres.
+    pub fn width(&self) -> f32 {
+        1.0 / self.per_metre
+    }
+
     /// Number of rows, and of cells in a row, with the empty ones around.
     pub fn size(&self) -> [u32; 2] {
         [self.rows + 2, self.cells + 2]
@@ -136,6 +141,31 @@ impl Grid {
             (cell.max(0.0) as u32).min(count - 1)
         };
         [axis(0, level.layers), axis(1, level.rows) + 1, axis(2, level.cells) + 1]
+    }
+
+    /// Visits the balls of a level in the cells that are within `far` metres of a place along each
+    /// axis, as runs of rows.
+    #[inline]
+    pub fn for_each_run(
+        &self,
+        level: &Level,
+        [x, y, z, _]: &Row,
+        far: f32,
+        mut visit: impl FnMut(Range<u32>),
+    ) {
+        let low = self.coordinates(level, &[x - far, y - far, z - far, 0.0]);
+        let high = self.coordinates(level, &[x + far, y + far, z + far, 0.0]);
+        for layer in low[0]..=high[0] {
+            for row in low[1]..=high[1] {
+                let line = level.cell(self, layer, row, 0);
+                visit(self.first(line + low[2])..self.first(line + high[2] + 1));
+            }
+        }
+    }
+
+    /// The sides of the scene, as axes, the longest first.
+    pub fn axes(&self) -> [usize; 3] {
+        self.axes
     }
 
     #[inline(always)]

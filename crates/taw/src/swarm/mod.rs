@@ -41,6 +41,7 @@ mod simd;
 mod state;
 mod step;
 mod surfaces;
+mod sweeps;
 mod vec3_wide;
 mod wall_contact;
 mod walls;
@@ -71,6 +72,7 @@ use impulse_cache::ImpulseCache;
 use neighbours::Search;
 use simd::Row;
 use surfaces::{SurfaceOf, Surfaces};
+use sweeps::Crowd;
 use walls::HalfSpace;
 
 /// Minimum and maximum radius, in metres: their third and fourth powers are finite, too.
@@ -167,6 +169,8 @@ struct Scratch {
     /// Progress of each chunk, while they are worked on.
     chunk_states: Vec<u32>,
     searches: Vec<Search>,
+    crowd: Crowd,
+    path_changes: Vec<Row>,
 }
 
 impl Swarm {

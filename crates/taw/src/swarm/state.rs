@@ -79,11 +79,14 @@ impl Scratch {
             chunk_states,
             searches,
             threads: _,
+            crowd,
+            path_changes,
         } = self;
         (of(backing) + of(leaving) + of(displacements) + of(proxy_rows) + of(saved_proxies))
             + (of(lists) + lists.iter().map(of).sum::<usize>())
             + of(chunk_states)
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
+            + (crowd.bytes() + of(path_changes))
     }
 }
 

@@ -52,8 +52,8 @@ pub enum Detection {
     /// them along. Nearly free where nothing is fast.
     ///
     /// [`Response::EventDriven`] is always continuous, and loses no time; [`Response::SoftStep`] is
-    /// always continuous at walls. With [`Response::Penalty`] only walls stop marbles, once they are
-    /// half of their radius deep.
+    /// always continuous. With [`Response::Penalty`] only walls stop marbles, once they are half of
+    /// their radius deep.
     #[default]
     Swept,
 }

@@ -122,11 +122,36 @@ impl<L: Simd> Numbers<L> {
         }
     }
 
-    /// Approach speed that bounces; where nothing bounces, all is a contact.
+    /// One where a pair is no contact yet: it bears nothing and comes fast.
     #[inline(always)]
-    fn restitution_threshold(&self, params: &SolverParams) -> L {
-        let threshold = L::splat(params.restitution_threshold);
-        self.restitution.select_gt(L::splat(0.0), threshold, L::splat(f32::MAX))
+    fn fresh<const FIRST: bool>(
+        &self,
+        params: &SolverParams,
+        at: [&[L; 4]; 2],
+        velocity: [&[L; 4]; 2],
+        before: L,
+        [separation, parting]: [L; 2],
+    ) -> L {
+        let (zero, speed) = (L::splat(0.0), L::splat(params.restitution_threshold));
+        let fast = (zero - parting).select_gt(speed, L::splat(1.0), zero);
+        let fresh = before.select_gt(zero, zero, fast);
+        if fresh.gt_mask(zero) == 0 {
+            return fresh;
+        }
+        let bounces = self.restitution.select_gt(zero, fresh, zero);
+        // Where nothing bounces, all is a contact but what passes by far away.
+        let beside = (at[0][3] + at[1][3]) * L::splat(0.5);
+        let stops = self.restitution.select_gt(zero, zero, fresh);
+        let stops = separation.select_gt(beside, stops, zero);
+        let unsure = if FIRST { bounces + stops } else { stops };
+        if unsure.gt_mask(zero) == 0 {
+            return bounces;
+        }
+        // What meets nevertheless is stopped: it may come so fast only because of impulses that were
+        // applied again, and are taken back by the contacts that bear them.
+        let (_, meets) = meeting(params, at, velocity);
+        let missed = meets.select_gt(zero, zero, unsure);
+        if FIRST { missed } else { bounces + missed }
     }
 
     /// Effective mass of the touched points across the normal. `alone` is that along it.
@@ -337,7 +362,6 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
         let per_second = L::splat(1.0 / params.time);
         for (i, batch) in batches.iter().enumerate() {
             let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
-            let speed = numbers.restitution_threshold(&params);
             let at = gather::<L>(columns.at, batch);
             let (normal, separation) =
                 normal_and_separation(&at[0], &at[1], ALL, |lane| batch.pair(lane));
@@ -347,7 +371,8 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let parting = relative.dot(normal);
             let velocity = [&a, &b];
             let (places, before) = ([&at[0], &at[1]], impulse.normal);
-            let fresh = fresh::<L, FIRST>(&params, places, velocity, speed, before, parting);
+            let gap = [separation, parting];
+            let fresh = numbers.fresh::<FIRST>(&params, places, velocity, before, gap);
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
             let alone = effective_mass(&a, &b);
             let (target, softness) = if FIRST {
@@ -398,28 +423,6 @@ fn load<L: Simd>(
     ContactImpulse { normal: L::load(normal), tangent: Vec3Wide::load(tangent) }
 }
 
-/// One where a pair is no contact yet: it bears nothing and comes faster than `speed`.
-#[inline(always)]
-fn fresh<L: Simd, const FIRST: bool>(
-    params: &SolverParams,
-    at: [&[L; 4]; 2],
-    velocity: [&[L; 4]; 2],
-    speed: L,
-    before: L,
-    parting: L,
-) -> L {
-    let zero = L::splat(0.0);
-    let fast = (zero - parting).select_gt(speed, L::splat(1.0), zero);
-    let fresh = before.select_gt(zero, zero, fast);
-    if !FIRST || fresh.gt_mask(zero) == 0 {
-        return fresh;
-    }
-    // What meets nevertheless is stopped: it may come so fast only because of impulses that were
-    // applied again, and are taken back by the contacts that bear them.
-    let (_, meets) = meeting(params, at, velocity);
-    meets.select_gt(zero, zero, fresh)
-}
-
 /// Which pairs meet within a substep: the normal then, and how fast they come together, or zero for
 /// those that do not meet or too slowly.
 #[inline(always)]
@@ -428,18 +431,26 @@ fn meeting<L: Simd>(
     [at_a, at_b]: [&[L; 4]; 2],
     [a, b]: [&[L; 4]; 2],
 ) -> (Vec3Wide<L>, L) {
-    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let (zero, one, least) = (L::splat(0.0), L::splat(1.0), L::splat(f32::MIN_POSITIVE));
     let displacement = Vec3Wide::of(at_b) - Vec3Wide::of(at_a);
     let relative = Vec3Wide::of(b) - Vec3Wide::of(a);
     let reach = at_a[3] + at_b[3];
     let approach = zero - displacement.dot(relative);
     // Where a sphere as wide as both meets a point.
     let apart = (displacement.dot(displacement) - reach * reach).max(zero);
-    let square = approach * approach - relative.dot(relative) * apart;
+    let limit = L::splat(params.time);
+    // Nobody is there before half of the time that the approach would take.
+    let farthest = approach * (limit * L::splat(2.0 * (1.0 + 1e-5)));
+    if apart.gt_mask(farthest) == ALL {
+        return (displacement, zero);
+    }
+    // By how far it goes past the point, which is exact from afar too.
+    let speed = relative.dot(relative);
+    let across = displacement + relative * speed.select_gt(least, approach / speed, zero);
+    let square = speed * (reach * reach - across.dot(across));
     let time = approach.select_gt(zero, apart / (approach + square.max(zero).sqrt()), zero);
     // Of what does not meet, any time will do: what hardly moves would take longer than a number
     // is.
-    let limit = L::splat(params.time);
     let meets = limit.select_gt(time, one, zero);
     let time = limit.select_gt(time, time, zero);
     let then = displacement + relative * time;

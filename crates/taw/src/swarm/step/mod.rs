@@ -2,6 +2,7 @@
 
 mod backing;
 mod lab;
+mod paths;
 mod sleep;
 mod wall_contacts;
 
@@ -136,6 +137,7 @@ impl Swarm {
         } else {
             self.find_wall_contacts_if_changed(walls_changed, dt, walls, observe);
         }
+        self.wake_on_paths();
         self.scratch.leaving = leaving;
     }
 
@@ -168,10 +170,7 @@ impl Swarm {
                 self.update_wall_contacts(walls, left, times, |chunk| chunk.has_fast, true);
             }
             self.apply_restitution(params, faster);
-            let leaves = |velocity: &Row, skin_left| leaves(velocity, skin_left, left);
-            if self.find_pairs_within_step(|chunk| chunk.struck, leaves, dt, walls, observe) {
-                self.update_wall_contacts(walls, left, times, all, false);
-            }
+            self.find_pairs_after_bounces(substep > 0, [dt, h, left], walls, observe);
             observe(Stage::Integrate);
             let parts = [substep as f32, (substep + 1) as f32].map(|part| part / substeps);
             self.apply_velocity_changes(1.0 / substeps);
@@ -183,10 +182,12 @@ impl Swarm {
             self.pass(Pass::WarmStart(params), |_, _| true);
             self.pass(Pass::Solve(params), |_, _| true);
             observe(Stage::Integrate);
+            self.end_swift_paths([dt, h, left], walls, observe);
             self.save_proxies();
             self.integrate([0.0; 4], [h, h, h, 0.0], row(gravity * (-0.5 * h * h)));
             self.correct_free_flight(-0.5 * h / substeps);
             let caught = self.stop_at_walls(walls, h, gravity * (0.5 * h * h));
+            self.shorten_paths();
             self.advance_proxies(parts, true, h);
             let (skin, left) = (self.skin, left - h);
             let left_it = |_: &Row, skin_left: f32| skin_left < -skin;
@@ -231,6 +232,25 @@ impl Swarm {
         });
     }
 
+    /// Finds pairs and walls for balls that bounced, and along the paths that may have changed since
+    /// the begin of the step. Given are the seconds of it, of a substep, and what is left of it.
+    fn find_pairs_after_bounces(
+        &mut self,
+        later: bool,
+        [dt, h, left]: [f32; 3],
+        walls: &dyn StaticGeometry,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        let reach = self.reach_of_skins();
+        let leaves =
+            |velocity: &Row, skin_left| leaves(velocity, skin_left, left) || skin_left > reach;
+        let later = later && !self.fast_movers.crowded;
+        let turns = |chunk: &Chunk| chunk.struck || later && chunk.speed[0] * dt > reach;
+        if self.find_pairs_within_step(turns, leaves, dt, walls, observe) {
+            self.update_wall_contacts(walls, left, [dt, h], |_| true, false);
+        }
+    }
+
     /// Finds pairs and walls for balls of some chunks that leave their remaining skin within a
     /// step, since a bounce or a contact made them faster. Says whether there were any.
     fn find_pairs_within_step(
@@ -253,6 +273,17 @@ impl Swarm {
             let room = most.saturating_sub(leaving.len());
             leaving.extend((chunk.rows[0]..chunk.rows[1]).filter(leaves).take(room));
         }
+        self.find_pairs_of_listed(leaving, dt, walls, observe)
+    }
+
+    /// Finds pairs and walls for some balls within a step. Says whether there were any.
+    fn find_pairs_of_listed(
+        &mut self,
+        leaving: Vec<u32>,
+        dt: f32,
+        walls: &dyn StaticGeometry,
+        observe: &mut dyn FnMut(Stage),
+    ) -> bool {
         if !leaving.is_empty() {
             // Rows may change.
             for chunk in &mut self.chunks {
@@ -266,6 +297,7 @@ impl Swarm {
                 self.update_sleep(dt, self.gravity.unwrap_or_else(Vec3::zero));
                 self.list_proxy_rows();
             }
+            self.wake_on_paths();
             let rows = self.ids.columns().1;
             self.stopped.iter_mut().for_each(|slot| *slot = rows[*slot as usize]);
         }

@@ -6,6 +6,7 @@ use super::{leaves, wider};
 use cgmath::Zero;
 
 use crate::math::{Vec3, length};
+use crate::swarm::batches::Batch;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::grid::Grid;
 use crate::swarm::kernels::{GROUNDED, squared};
@@ -23,7 +24,7 @@ impl Swarm {
         let (grid, at, skin_left) = (&self.grid, &self.at[..], &self.skin_left[..]);
         let (slots, sleepless, bodies) = (self.ids.slots(), &self.sleepless, &self.body_slots);
         let has_proxies = !self.proxies.is_empty();
-        let all_may_sleep = sleepless.is_empty();
+        let (all_may_sleep, reach) = (sleepless.is_empty(), self.reach_of_skins());
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
         let velocity = DisjointSlice::new(&mut self.velocity);
@@ -40,8 +41,10 @@ impl Swarm {
             let skin_left = &skin_left[chunk.own_rows()];
             chunk.leaving.clear();
             let rows = (chunk.rows[0]..).zip(velocity.iter().zip(skin_left));
-            let leaving =
-                rows.filter(|(_, (velocity, skin_left))| leaves(velocity, **skin_left, dt));
+            // A path is known for one step.
+            let leaving = rows.filter(|(_, (velocity, skin_left))| {
+                leaves(velocity, **skin_left, dt) || **skin_left > reach
+            });
             chunk.leaving.extend(leaving.map(|(row, _)| row).take(most));
             chunk.speed = largest_speeds(chunk, velocity, grid);
             let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
@@ -88,6 +91,23 @@ impl Swarm {
                 self.sleep_version += 1;
             }
         }
+    }
+
+    /// Wakes what swift balls may meet on their paths, however many chunks away.
+    pub(super) fn wake_on_paths(&mut self) {
+        if !self.has_swift() {
+            return;
+        }
+        let (reach, fast_movers) = (self.reach_of_skins(), take(&mut self.fast_movers));
+        for [a, b] in fast_movers.batches.iter().flat_map(Batch::pairs) {
+            for [swift, met] in [[a as usize, b as usize], [b as usize, a as usize]] {
+                let [by, of] = [swift, met].map(|row| self.velocity[row][3]);
+                if self.skin_left[swift] > reach && by.is_sign_positive() && of.is_sign_negative() {
+                    self.wake(met);
+                }
+            }
+        }
+        self.fast_movers = fast_movers;
     }
 
     /// Wakes a ball, and its chunk.

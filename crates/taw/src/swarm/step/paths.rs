@@ -1,0 +1,129 @@
+//! Ends of paths: what the solver left going through something stops there.
+
+use super::leaves;
+use crate::swarm::batches::Batch;
+use crate::swarm::kernels::squared;
+use crate::swarm::simd::Row;
+use crate::swarm::{Stage, StaticGeometry, Swarm};
+
+/// Number of times that pairs are looked at: a ball that stops before one stands in the way of another.
+const ROUNDS: usize = 32;
+/// Distance of the centers over both radii at which paths end, and that at which they pass through
+/// each other.
+const STOP: f32 = 0.95;
+const PASS: f32 = 0.9;
+
+impl Swarm {
+    /// Finds what the balls meet that fast ones struck, and where the paths of the next substep end.
+    /// Given are the seconds of the step, of the substep, and what is left of the step.
+    pub(super) fn end_swift_paths(
+        &mut self,
+        [dt, h, left]: [f32; 3],
+        walls: &dyn StaticGeometry,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        if !self.has_swift() {
+            return;
+        }
+        let mut struck = std::mem::take(&mut self.scratch.leaving);
+        self.list_struck(h, &mut struck);
+        if self.find_pairs_of_listed(struck, dt, walls, observe) {
+            self.update_wall_contacts(walls, left, [dt, h], |_| true, false);
+            self.find_backing(); // rows may have changed
+        }
+        self.limit_paths(h);
+    }
+
+    /// Returns true if a ball goes further than skins reach.
+    pub(super) fn has_swift(&self) -> bool {
+        let reach = self.reach_of_skins();
+        let is_swift = |row: &u32| self.skin_left[*row as usize] > reach;
+        !self.fast_movers.crossing.is_empty() || self.fast_movers.rows.iter().any(is_swift)
+    }
+
+    /// Lists the partners of fast movers that would leave their skin in the next `h` seconds, since
+    /// these struck them.
+    fn list_struck(&self, h: f32, struck: &mut Vec<u32>) {
+        struck.clear();
+        let pairs = self.fast_movers.batches.iter().flat_map(Batch::pairs);
+        struck.extend(pairs.flatten().filter(|row| {
+            let row = *row as usize;
+            leaves(&self.velocity[row], self.skin_left[row], h)
+        }));
+        struck.sort_unstable();
+        struck.dedup();
+    }
+
+    /// Finds how balls have to go in the next `h` seconds so that none goes through another: three in
+    /// a row are solved one pair after another, and the last pair makes the first one close again.
+    /// What is too much of a pair's path is taken from both, and their center of mass goes on; from a
+    /// proxy, which goes its own way, nothing.
+    fn limit_paths(&mut self, h: f32) {
+        let Self { at, velocity, fast_movers, proxies, scratch, .. } = self;
+        let (changes, proxy_rows) = (&mut scratch.path_changes, &scratch.proxy_rows);
+        changes.clear();
+        let gives = |row: usize| match Self::proxy_at(proxies, proxy_rows, row as u32) {
+            Some(_) => 0.0,
+            None => velocity[row][3].max(0.0),
+        };
+        for _ in 0..ROUNDS {
+            let mut any = false;
+            for [a, b] in fast_movers.batches.iter().flat_map(Batch::pairs) {
+                let [a, b] = [a as usize, b as usize];
+                let mut by = less(&velocity[b], &velocity[a]).map(|speed| speed * h);
+                if !changes.is_empty() {
+                    by = sum(&by, &less(&changes[b], &changes[a]));
+                }
+                let part = free_part(less(&at[b], &at[a]), by, at[a][3] + at[b][3]);
+                let [by_a, by_b] = [a, b].map(gives);
+                if part == 1.0 || by_a + by_b == 0.0 {
+                    continue;
+                }
+                any = true;
+                changes.resize(at.len(), [0.0; 4]);
+                let share = |by: f32| (1.0 - part) * (by / (by_a + by_b));
+                changes[a] = sum(&changes[a], &by.map(|x| x * share(by_a)));
+                changes[b] = sum(&changes[b], &by.map(|x| x * -share(by_b)));
+            }
+            if !any {
+                break;
+            }
+        }
+    }
+
+    /// Changes the paths as [`Self::limit_paths`] found.
+    pub(super) fn shorten_paths(&mut self) {
+        for (at, change) in self.at.iter_mut().zip(&self.scratch.path_changes) {
+            *at = sum(at, change);
+        }
+        self.scratch.path_changes.clear();
+    }
+}
+
+/// The first three numbers of a row, and those of another.
+fn sum(a: &Row, b: &Row) -> Row {
+    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3]]
+}
+
+/// The first three numbers of a row, less those of another.
+fn less(a: &Row, b: &Row) -> Row {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2], 0.0]
+}
+
+/// The part of a path, relative to a ball that is `apart`, that can be gone until they meet; all of
+/// it if it does not lead through the ball.
+fn free_part(apart: Row, path: Row, radii: f32) -> f32 {
+    let dot = |a: &Row, b: &Row| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    let square = squared(path);
+    let nearest = -dot(&apart, &path);
+    if nearest <= 0.0 || square < f32::MIN_POSITIVE {
+        return 1.0;
+    }
+    let time = nearest / square;
+    let past = squared([0, 1, 2, 3].map(|axis| apart[axis] + path[axis] * time));
+    let [stop, pass] = [STOP, PASS].map(|part| part * radii * part * radii);
+    if past >= pass {
+        return 1.0;
+    }
+    (time - ((stop - past) / square).sqrt()).clamp(0.0, 1.0)
+}
