@@ -90,8 +90,8 @@ fn two_thousand_balls_fall_asleep_between_boxes_as_between_half_spaces() {
     }
 }
 
-/// Marbles that the world moves stir the balls about them: of eight heaps with one or three of them some
-/// two roll a ball about for more than a minute, which nobody has mended yet.
+/// Marbles that the world moves stir the balls about them; one heap in some sixty rolls a ball about for
+/// more than a minute.
 #[test]
 fn marbles_among_balls_fall_asleep_with_them_and_sink_no_further() {
     for walls in [Walls::HalfSpaces, Walls::Boxes] {
@@ -101,7 +101,7 @@ fn marbles_among_balls_fall_asleep_with_them_and_sink_no_further() {
         };
         for marbles in [1, 3] {
             let count = asleep(marbles);
-            assert!(count >= 4, "{walls:?}, {marbles} marbles: {count} of 8");
+            assert!(count >= 7, "{walls:?}, {marbles} marbles: {count} of 8");
         }
     }
 }

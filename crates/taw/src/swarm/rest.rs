@@ -63,8 +63,10 @@ impl Chunk {
         gravity: Vec3<f32>,
         dt: f32,
     ) -> bool {
-        let is_carried =
-            |contact: &WallContact| contact.impulse.normal > 0.0 && !contact.surface.is_zero();
+        // A wall that bears a proxy moves as the proxy does.
+        let is_carried = |contact: &WallContact| {
+            contact.impulse.normal > 0.0 && !contact.surface.is_zero() && !contact.bears_proxy
+        };
         // The mark is that of the last step.
         let is_held = |row: usize| {
             let moves = squared(velocity[row]) > 0.0;

@@ -86,13 +86,9 @@ impl<S: Scalar> PartialEq for Walls<S> {
     fn eq(&self, other: &Self) -> bool {
         // The other fields follow from the shapes.
         let Self { handles, shapes, motion, material, layers, moved, changes, .. } = self;
-        *handles == other.handles
-            && *shapes == other.shapes
-            && *motion == other.motion
-            && *material == other.material
-            && *layers == other.layers
-            && *moved == other.moved
-            && *changes == other.changes
+        (handles, shapes, changes) == (&other.handles, &other.shapes, &other.changes)
+            && (motion, material) == (&other.motion, &other.material)
+            && (layers, moved) == (&other.layers, &other.moved)
     }
 }
 
