@@ -4,6 +4,8 @@
 mod impacts;
 #[path = "soft_step/state.rs"]
 mod state;
+#[path = "soft_step/tangential.rs"]
+mod tangential;
 #[path = "soft_step/tunnelling.rs"]
 mod tunnelling;
 #[path = "soft_step/walls.rs"]

@@ -61,10 +61,10 @@ pub enum Response {
     /// its height to rounding.
     ///
     /// Balls only, in `f32` in any world, and no periods. Marbles may have their own mass, material,
-    /// gravity scale, damping, forces and rotation model; integrators and tangential restitution
-    /// have no effect. Forces are evaluated once a step. A ball stops at thin walls and other balls
-    /// at any speed, whatever the world's [detection](crate::world::Detection). It
-    /// finds contacts itself, so removing some from the world's lists does not keep marbles apart.
+    /// gravity scale, damping, forces and rotation model; integrators have no effect, nor has tangential
+    /// restitution where restitution is zero. Forces are evaluated once a step. A ball stops at thin
+    /// walls and other balls at any speed, whatever the world's [detection](crate::world::Detection).
+    /// It finds contacts itself, so removing some from the world's lists does not keep marbles apart.
     SoftStep,
     /// Penalty method: forces that grow with penetration. Contacts last for a finite time, many
     /// marbles can push at once, and the load of a contact is a force in newtons.

@@ -42,8 +42,8 @@ pub struct SwarmModel {
     /// Number of threads that work on a step, from 1 to 64, or 0 for automatic: one per 1,000 balls,
     /// at most all hardware threads. The result has the same bits with any number.
     pub threads: u32,
-    /// Material of balls that have none of their own. Tangential restitution is not modelled;
-    /// [`Tier::Lab`] uses no number of it.
+    /// Material of balls that have none of their own. Tangential restitution acts where restitution
+    /// is above zero; [`Tier::Lab`] uses no number of it.
     pub material: Material<f32>,
     /// Lets balls at rest fall asleep, in [`Tier::Full`].
     pub sleeps: bool,

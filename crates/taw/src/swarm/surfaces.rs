@@ -156,12 +156,14 @@ impl SurfaceOf<'_> {
     /// True if pairs need numbers of their own.
     pub fn differ(&self) -> bool {
         self.surfaces.common(self.model, self.slots.len()).is_none_or(|common| {
-            common.rolling_resistance > 0.0 || common.spinning_resistance > 0.0
+            common.rolling_resistance > 0.0
+                || common.spinning_resistance > 0.0
+                || common.tangential_restitution != 0.0
         })
     }
 
     /// Fills in the numbers of the pairs of some batches; none, if all balls have one surface that
-    /// resists neither rolling nor spinning.
+    /// resists neither rolling nor spinning and has no tangential restitution.
     pub fn of_pairs(&self, batches: &[Batch], numbers: &mut Vec<PairNumbers>) {
         numbers.clear();
         if !self.differ() {
@@ -182,6 +184,7 @@ impl SurfaceOf<'_> {
 pub(super) struct PairNumbers {
     pub friction: [f32; LANES],
     pub restitution: [f32; LANES],
+    pub tangential_restitution: [f32; LANES],
     pub rolling_resistance: [f32; LANES],
     pub spinning_resistance: [f32; LANES],
     /// Mass times radius squared over the moment of inertia of both; zero where locked.
@@ -193,6 +196,7 @@ impl PairNumbers {
         let material = a.material.combined_with(b.material);
         self.friction[lane] = material.friction;
         self.restitution[lane] = material.restitution;
+        self.tangential_restitution[lane] = material.tangential_restitution;
         self.rolling_resistance[lane] = material.rolling_resistance;
         self.spinning_resistance[lane] = material.spinning_resistance;
         let factors = [a, b].map(Surface::inertia_factor);
@@ -207,6 +211,7 @@ impl PairNumbers {
 pub(super) struct WallNumbers {
     pub friction: f32,
     pub restitution: f32,
+    pub tangential_restitution: f32,
     pub rolling_resistance: f32,
     pub spinning_resistance: f32,
     /// Mass times radius squared over the moment of inertia of the ball; zero where locked.
@@ -220,6 +225,7 @@ impl WallNumbers {
         Self {
             friction: material.friction,
             restitution: material.restitution,
+            tangential_restitution: material.tangential_restitution,
             rolling_resistance: material.rolling_resistance,
             spinning_resistance: material.spinning_resistance,
             inertia_factor: ball.inertia_factor(),

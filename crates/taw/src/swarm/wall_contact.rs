@@ -162,9 +162,10 @@ impl WallContact {
         if meets <= params.restitution_threshold {
             return None;
         }
+        let stopping = self.slip(relative, spin) * (-self.tangent_mass() / velocity[3]);
         let impulse = FrictionCone::new(self.numbers.friction).clamp(ContactImpulse {
             normal: (approach_speed + meets * self.numbers.restitution) / velocity[3],
-            tangent: self.slip(relative, spin) * (-self.tangent_mass() / velocity[3]),
+            tangent: stopping * (1.0 + self.numbers.tangential_restitution),
         });
         set(at, xyz(at) - self.normal * separation);
         self.apply_impulse(velocity, spin, impulse);

@@ -94,6 +94,7 @@ impl<const BACKED: bool, const OWN: bool> Kernel for Solve<'_, BACKED, OWN> {
 struct Numbers<L> {
     friction: L,
     restitution: L,
+    tangential_restitution: L,
     /// Mass times radius squared over the moment of inertia of both.
     inertia_factors: [L; 2],
 }
@@ -107,16 +108,24 @@ impl<L: Simd> Numbers<L> {
         restitution: f32,
     ) -> Self {
         if OWN {
-            let PairNumbers { friction, restitution, inertia_factors: [a, b], .. } = &own[batch];
+            let PairNumbers {
+                friction,
+                restitution,
+                tangential_restitution,
+                inertia_factors: [a, b],
+                ..
+            } = &own[batch];
             Self {
                 friction: L::load(friction),
                 restitution: L::load(restitution),
+                tangential_restitution: L::load(tangential_restitution),
                 inertia_factors: [L::load(a), L::load(b)],
             }
         } else {
             Self {
                 friction: L::splat(friction),
                 restitution: L::splat(restitution),
+                tangential_restitution: L::splat(0.0),
                 inertia_factors: [L::splat(SOLID_BALL); 2],
             }
         }
@@ -245,9 +254,11 @@ impl SolverColumns<'_> {
         let mass = effective_mass(&a, &b);
         let spins = self.spins(batch);
         let slip = slip(relative, normal, &spins);
+        let one = L::splat(1.0);
+        let stopping = slip * (zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
         let impulse = FrictionCone::new(numbers.friction).clamp(ContactImpulse {
-            normal: mass * approach_speed * (L::splat(1.0) + numbers.restitution),
-            tangent: slip * (zero - numbers.tangent_mass::<OWN>(mass, [&a, &b])),
+            normal: mass * approach_speed * (one + numbers.restitution),
+            tangent: stopping * (one + numbers.tangential_restitution),
         });
         let factors = numbers.inertia_factors;
         self.apply_impulse::<L, false>(batch, [a, b], spins, normal, impulse, factors);
