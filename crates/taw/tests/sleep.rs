@@ -424,3 +424,21 @@ fn who_must_wake_wakes_and_who_sleeps_does_not_move() {
     }
     assert!(slept > 10_000, "only {slept} times did any sleep");
 }
+
+/// One lies on the floor, one floats.
+#[test]
+fn marbles_of_infinite_mass_that_do_not_move_let_others_sleep() {
+    let (mut world, _, ids) = heap();
+    let mass = taw::world::Mass::Infinite;
+    let lies = Marble { mass, ..Marble::new(Point3::new(3.0, 0.31, 0.0), 0.3) };
+    let floats =
+        Marble { mass, gravity_scale: 0.0, ..Marble::new(Point3::new(0.0, 6.0, 0.0), 0.2) };
+    let heavy = [lies, floats].map(|marble| world.marbles.insert(marble).unwrap());
+    steps(&mut world, 600);
+    assert!(ids.iter().chain(&heavy).all(|id| world.is_asleep(*id).unwrap()));
+    // One that moves, however slowly, does not rest.
+    world.marbles.set_velocity(heavy[1], Vec3::new(1e-4, 0.0, 0.0)).unwrap();
+    steps(&mut world, 600);
+    assert!(!world.is_asleep(heavy[1]).unwrap());
+    assert!((world.marbles.get(heavy[1]).unwrap().position.x - 1e-3).abs() < 1e-5);
+}

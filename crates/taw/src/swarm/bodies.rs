@@ -394,6 +394,12 @@ impl Swarm {
         row.is_some_and(|row| self.velocity[row][3].is_sign_negative())
     }
 
+    /// Position and velocity of a ball.
+    pub(crate) fn motion_of<S: Scalar>(&self, ball: BallId) -> Option<(Point3<S>, Vec3<S>)> {
+        let row = self.ids.row(ball)?;
+        Some((Point3::from_vec(vector(&self.at[row])), vector(&self.velocity[row])))
+    }
+
     /// Number that changes whenever a ball falls asleep, wakes, comes or goes.
     pub(crate) fn sleep_version(&self) -> u64 {
         self.sleep_version

@@ -69,8 +69,8 @@ impl Chunk {
         };
         // The mark is that of the last step.
         let is_held = |row: usize| {
-            let moves = squared(velocity[row]) > 0.0;
-            !moves || velocity[row][3] > INFINITE_MASS && spin[row][3] > 0.0 || is_proxy(row)
+            let borne = velocity[row][3] > INFINITE_MASS && spin[row][3] > 0.0;
+            borne || !moves(&at[row], &velocity[row], dt) || is_proxy(row)
         };
         if !(0..at.len()).all(is_held) || self.wall_contacts.iter().any(is_carried) {
             self.rest.end();
@@ -94,4 +94,12 @@ impl Chunk {
         }
         self.rest.lasts(self.radii[1], length(gravity))
     }
+}
+
+/// Returns true if a ball moves on in `dt` seconds by more than its coordinates are rounded: what has
+/// infinite mass is borne by nothing, but the solver leaves it that much.
+fn moves(at: &Row, velocity: &Row, dt: f32) -> bool {
+    let size = at.iter().fold(0.0_f32, |most, x| most.max(x.abs()));
+    let rounding = if velocity[3] > INFINITE_MASS { 0.0 } else { f32::EPSILON * size };
+    squared(*velocity).sqrt() * dt > rounding
 }

@@ -49,6 +49,11 @@ impl ChangedRows {
         self.rows.0.clear();
     }
 
+    /// The listed rows.
+    pub fn rows(&self) -> &[u32] {
+        &self.rows.0
+    }
+
     /// Takes the listed rows out.
     pub fn take(&mut self) -> Vec<u32> {
         std::mem::take(&mut self.rows.0)

@@ -75,9 +75,10 @@ impl<S: Scalar> World<S> {
         within("dt", positive("dt", dt)?, least, most)
     }
 
-    /// Checks that the response supports the shapes of all marbles.
+    /// Checks that the response supports all marbles: their shapes, and their numbers.
     pub(crate) fn check_shapes(&self) -> Result<(), Error> {
         self.check_period(self.marbles.period)?;
+        self.check_rows()?;
         match self.marbles.first_capsule() {
             Some(id) if !self.settings.model.response.knows_capsules() => {
                 Err(Error::UnsupportedShape(id))

@@ -10,6 +10,7 @@ use super::{MarbleId, World};
 use crate::Error;
 use crate::broad::CollisionLayers;
 use crate::contact::Contacts;
+use crate::error::within;
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::Rotation;
 use crate::response::{Material, Response};
@@ -54,7 +55,7 @@ impl<S> Default for SoftRows<S> {
 const INVERSE_MASSES: [f32; 2] = [INFINITE_MASS, 1e25];
 
 /// Least radius of a row, in metres, as of the balls of a swarm.
-const LEAST_RADIUS: f32 = 1e-9;
+const LEAST_RADIUS: f64 = 1e-9;
 
 /// Soft contacts in small steps, all within the third verb.
 pub(super) struct SoftStep;
@@ -193,15 +194,69 @@ impl<S: Scalar> World<S> {
         self.swarm.sleep_version()
     }
 
+    /// What the correspondence of marbles and rows depends on.
+    fn row_identity(&self) -> (u64, usize, Rotation, bool) {
+        let plain = self.swarm.model().material == Material::default();
+        (self.marbles.removals(), self.marbles.len(), self.settings.model.rotation, plain)
+    }
+
+    /// Returns true if all marbles that differ from their rows are listed.
+    fn changes_are_listed(&self) -> bool {
+        let token = &self.scratch.soft_step.token;
+        self.scratch.soft_step.known == Some(self.row_identity())
+            && self.swarm.synced.agrees(token)
+            && self.marbles.changed.agrees(token)
+    }
+
+    /// Checks that the numbers of all marbles that were set fit into rows.
+    pub(super) fn check_rows(&self) -> Result<(), Error> {
+        if self.settings.model.response != Response::SoftStep {
+            return Ok(());
+        }
+        if self.changes_are_listed() {
+            self.marbles.changed.rows().iter().try_for_each(|row| self.check_row(*row as usize))
+        } else {
+            (0..self.marbles.len()).try_for_each(|row| self.check_row(row))
+        }
+    }
+
+    /// Checks that the numbers of a marble fit into a row. One that flew farther in steps may go on.
+    fn check_row(&self, row: usize) -> Result<(), Error> {
+        let marbles = &self.marbles;
+        let most = f64::from(MAX_COORDINATE);
+        let radius = marbles.radius[row].as_f64();
+        within("radius", radius, LEAST_RADIUS, most)?;
+        let position = cast_vector::<S, f64>(marbles.position[row].to_vec());
+        let velocity = cast_vector::<S, f64>(marbles.velocity[row]);
+        let as_set = within_vector(["position.x", "position.y", "position.z"], position, most)
+            .and_then(|()| {
+                within_vector(["velocity.x", "velocity.y", "velocity.z"], velocity, most)
+            });
+        if as_set.is_err() && !self.is_as_stepped(row) {
+            return as_set;
+        }
+        if marbles.rotation_of(row, self.settings.model.rotation) != Rotation::Dynamic {
+            return Ok(());
+        }
+        let spin = marbles.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero);
+        let names = ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
+        within_vector(names, cast_vector(spin), most / radius)
+    }
+
+    /// Returns true if a marble is where its row is, as fast.
+    fn is_as_stepped(&self, row: usize) -> bool {
+        let bodies = &self.swarm.body_balls;
+        let found = self.marbles.id(row).and_then(|id| {
+            let i = bodies.binary_search_by_key(&id, |(marble, _)| *marble).ok()?;
+            self.swarm.motion_of(bodies[i].1)
+        });
+        found == Some((self.marbles.position[row], self.marbles.velocity[row]))
+    }
+
     /// Brings rows up to date with marbles that came, went, or were set.
     fn sync_bodies(&mut self) -> Result<(), Error> {
         self.swarm.set_bodies_are_rows(true);
-        let rotation = self.settings.model.rotation;
-        let plain = self.swarm.model().material == Material::default();
-        let known = Some((self.marbles.removals(), self.marbles.len(), rotation, plain));
-        let token = &self.scratch.soft_step.token;
-        let listed = self.scratch.soft_step.known == known && self.swarm.synced.agrees(token);
-        if !listed || !self.marbles.changed.agrees(token) {
+        if !self.changes_are_listed() {
             self.remove_stale_bodies()?;
             self.insert_missing_bodies()?;
             self.match_slots();
@@ -210,7 +265,7 @@ impl<S: Scalar> World<S> {
             let [token, synced, changed] = SyncToken::unique();
             (self.scratch.soft_step.token, self.swarm.synced) = (token, synced);
             self.marbles.changed.reset(changed);
-            self.scratch.soft_step.known = known;
+            self.scratch.soft_step.known = Some(self.row_identity());
         } else {
             let rows = self.marbles.changed.take();
             self.find_changes(&rows);
@@ -278,9 +333,18 @@ fn inverse_mass<S: Scalar>(mass: S) -> f32 {
     ((S::one() / mass).as_f64() as f32).clamp(least, most)
 }
 
+/// Validates that no component of a vector is larger.
+fn within_vector(names: [&'static str; 3], v: Vec3<f64>, most: f64) -> Result<(), Error> {
+    let components: [f64; 3] = v.into();
+    names
+        .into_iter()
+        .zip(components)
+        .try_for_each(|(name, x)| within(name, x, -most, most).map(|_| ()))
+}
+
 /// Radius of a row, in metres.
 fn row_radius<S: Scalar>(radius: S) -> f32 {
-    (radius.as_f64() as f32).clamp(LEAST_RADIUS, MAX_COORDINATE)
+    (radius.as_f64() as f32).clamp(LEAST_RADIUS as f32, MAX_COORDINATE)
 }
 
 /// A marble as a row.

@@ -18,7 +18,9 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`; [`Error::OutOfRange`] if it, or a substep of it, is not in
     /// [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven,
     /// periodic, or steps by `SoftStep`; [`Error::OutOfRange`] for a marble too large for its
-    /// [period](Self::set_period). Then nothing has changed.
+    /// [period](Self::set_period), and by `SoftStep` for one that was set to a radius of less than
+    /// 1e-9 m, or to a position, velocity or surface speed of over 1e12 m or m/s. Then nothing has
+    /// changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
         let substep = self.validated_substep(dt)?;
         self.begin_step();

@@ -210,7 +210,7 @@ fn verbs_in_any_order_and_swarms_of_other_times_do_no_harm() {
     let mut light = self::world::<f64>(2);
     floor(&mut light);
     let mass = taw::world::Mass::Kilograms(1e-60);
-    let tiny = Marble { mass, ..Marble::new(Point3::new(0.0, 1e-3, 0.0), 1e-60) };
+    let tiny = Marble { mass, ..Marble::new(Point3::new(0.0, 1e-3, 0.0), 1e-9) };
     let tiny = light.marbles.insert(tiny).unwrap();
     for _ in 0..120 {
         world.step(1.0 / 60.0).unwrap();
@@ -283,4 +283,52 @@ fn a_spin_beyond_all_numbers_is_stopped_and_named() {
     let rotation = world.marbles.get(id).unwrap().rotation;
     assert!(rotation.s.is_finite() && rotation.v.x.is_finite(), "{rotation:?}");
     assert_eq!(world.stopped().collect::<Vec<_>>(), [id]);
+}
+
+type Change = fn(&mut Marble<f64>);
+
+#[test]
+fn numbers_that_rows_cannot_hold_are_refused_by_name() {
+    let changes: [(&str, f64, Change); 5] = [
+        ("position.y", 1e13, |marble| marble.position.y = 1e13),
+        ("velocity.z", -2e12, |marble| marble.velocity.z = -2e12),
+        ("angular_velocity.x", 3e13, |marble| marble.angular_velocity.x = 3e13),
+        ("radius", 1e-10, |marble| marble.radius = 1e-10),
+        ("radius", 1e13, |marble| marble.radius = 1e13),
+    ];
+    for (field, value, change) in changes {
+        let mut world = world::<f64>(2);
+        let other = world.marbles.insert(Marble::new(Point3::new(5.0, 0.0, 0.0), 0.1)).unwrap();
+        world.step(1.0 / 60.0).unwrap();
+        let mut marble = Marble::new(Point3::new(0.0, 0.0, 0.0), 0.1);
+        change(&mut marble);
+        let id = world.marbles.insert(marble).unwrap();
+        let before = world.clone();
+        match world.step(1.0 / 60.0) {
+            Err(taw::Error::OutOfRange { field: named, value: is, .. }) => {
+                assert_eq!((named, is), (field, value));
+            }
+            other => panic!("{field}: {other:?}"),
+        }
+        assert!(world == before, "{field}: something has changed");
+        world.marbles.remove(id).unwrap();
+        world.step(1.0 / 60.0).unwrap();
+        assert!(world.marbles.get(other).unwrap().velocity.y < -0.3);
+    }
+}
+
+#[test]
+fn a_marble_that_flies_far_may_fly_on() {
+    let mut world = world::<f64>(1);
+    world.set_gravity(Vec3::zero()).unwrap();
+    let far = Marble {
+        velocity: Vec3::new(9e11, 0.0, 0.0),
+        ..Marble::new(Point3::new(9e11, 0.0, 0.0), 0.1)
+    };
+    let id = world.marbles.insert(far).unwrap();
+    for _ in 0..3 {
+        world.step(0.25).unwrap();
+        world.marbles.insert(Marble::new(Point3::new(0.0, 0.0, 0.0), 0.1)).unwrap();
+    }
+    assert!(world.marbles.get(id).unwrap().position.x > 1.5e12);
 }
