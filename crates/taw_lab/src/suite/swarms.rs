@@ -162,7 +162,9 @@ fn bounce(stopwatch: &mut Stopwatch, owner: Owner) -> f64 {
     worst
 }
 
-/// A heap of 600 in a box, poured and left alone for 10 s: its fastest ball.
+/// A heap of 600 in a box, poured and left alone for 10 s: its fastest ball that lies on others. (One
+/// that lies on the floor alone rolls on for ever, as it should without rolling resistance; how fast
+/// is chance.)
 fn heap(stopwatch: &mut Stopwatch, owner: Owner) -> f64 {
     let mut world = world(owner, 0.3, 0.2, down());
     for inward in [Vec3::unit_x(), -Vec3::unit_x(), Vec3::unit_z(), -Vec3::unit_z()] {
@@ -174,13 +176,14 @@ fn heap(stopwatch: &mut Stopwatch, owner: Owner) -> f64 {
         let place = Point3::new(at(i % 10, 1), 0.5 + f32::from(i / 100) * 1.05, at(i / 10 % 10, 2));
         Ball::new(place, 0.3 + 0.2 * random(0))
     });
-    let bodies = insert(&mut world, &balls.collect::<Vec<_>>());
+    let balls: Vec<_> = balls.collect();
+    let bodies = insert(&mut world, &balls);
     stopwatch.run(&mut world, DT, 10.0);
-    let speeds = bodies.into_iter().map(|body| {
-        let Vec3 { x, y, z } = state(&world, body).1;
-        f64::from(x.hypot(y).hypot(z))
+    let on_others = bodies.into_iter().zip(&balls).filter_map(|(body, ball)| {
+        let (height, Vec3 { x, y, z }) = state(&world, body);
+        (height > f64::from(ball.radius) + 0.01).then(|| f64::from(x.hypot(y).hypot(z)))
     });
-    speeds.fold(0.0, f64::max)
+    on_others.fold(0.0, f64::max)
 }
 
 /// The deepest that a ball a thousand times as heavy is in a light one within 5 s, in radii.
@@ -305,10 +308,10 @@ pub static ROWS: &[SuiteCase] = &[
     },
     SuiteCase {
         name: "swarm/heap",
-        setup: "600 balls of 0.3 to 0.5 m poured into a box, after 10 s: all lie",
-        metric: "speed of the fastest in m/s",
+        setup: "600 balls of 0.3 to 0.5 m poured into a box, after 10 s: all that are on others lie",
+        metric: "speed of the fastest of these in m/s",
         model: MODEL,
-        target: 5e-2,
+        target: 1e-2,
         best: NONE,
         source: "friction holds a heap",
         effort: CostClass::Quick,
@@ -382,10 +385,10 @@ pub static ROWS: &[SuiteCase] = &[
     },
     SuiteCase {
         name: "soft-step/heap",
-        setup: "600 balls of 0.3 to 0.5 m poured into a box, after 10 s: all lie",
-        metric: "speed of the fastest in m/s",
+        setup: "600 balls of 0.3 to 0.5 m poured into a box, after 10 s: all that are on others lie",
+        metric: "speed of the fastest of these in m/s",
         model: SOFT_STEP,
-        target: 5e-2,
+        target: 1e-2,
         best: NONE,
         source: "friction holds a heap",
         effort: CostClass::Quick,
