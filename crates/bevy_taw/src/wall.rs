@@ -57,7 +57,8 @@ pub enum Wall {
         /// Three numbers of points each.
         triangles: Vec<[u32; 3]>,
     },
-    /// A landscape about the place of the entity, solid below.
+    /// A landscape about the place of the entity: a solid with vertical sides and a bottom, which is
+    /// below the lowest point by the diagonal of the landscape's bounding box.
     HeightField {
         /// How far apart the heights are along x and z, in metres.
         cell: Vec2,

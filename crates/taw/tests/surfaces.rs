@@ -3,24 +3,28 @@
 #[path = "common/things.rs"]
 mod things;
 
+use std::sync::Arc;
+
 use proptest::prelude::*;
 use taw::contact::{
     ClosestPoints, TriangleResult, closest_points, closest_points_of_surface, manifolds_of_surface,
     ray_cast_on_surface, shape_cast_on_surface,
 };
-use taw::frame::Ray;
+use taw::frame::{AxisAngle, Pose, Ray};
 use taw::prelude::*;
-use taw::shape::{HeightField, Mesh, Surface};
+use taw::shape::{BoundedShape, HeightField, Mesh, Surface};
 use things::{numbers, things};
 
 const COLUMNS: u32 = 9;
 const ROWS: u32 = 7;
+/// Of the top, the sides and the bottom.
+const TRIANGLES: u32 = 2 * (COLUMNS - 1) * (ROWS - 1) + 4 * (COLUMNS - 1 + ROWS - 1) + 2;
 
 /// Hills, and a mesh of the same triangles with the same numbers.
 fn hills(heights: &[f64]) -> (HeightField<f64>, Mesh<f64>) {
     let corner = Point3::new(-2.0, -0.5, -1.5);
     let field = HeightField::new(corner, [0.5, 0.4], COLUMNS, heights.to_vec()).unwrap();
-    let count = 2 * (COLUMNS - 1) * (ROWS - 1);
+    let count = TRIANGLES;
     let corners: Vec<_> =
         (0..count).flat_map(|number| field.triangle(number).unwrap().corners).collect();
     assert!(field.triangle(count).is_none());
@@ -44,7 +48,7 @@ proptest! {
         prop_assert_eq!(field.bounds(), mesh.bounds());
         for thing in things::<f64>(&shape, 0.3, 0.0) {
             each!(&thing, thing => {
-                let all = (0..2 * (COLUMNS - 1) * (ROWS - 1)).map(|triangle| {
+                let all = (0..TRIANGLES).map(|triangle| {
                     TriangleResult { triangle, result: closest_points(&field.triangle(triangle).unwrap(), thing) }
                 });
                 let key = |of: &TriangleResult<ClosestPoints<f64>>| (of.result.distance, of.triangle);
@@ -67,6 +71,54 @@ proptest! {
                 let first = shape_cast_on_surface(&field, thing, moves);
                 prop_assert_eq!(first, shape_cast_on_surface(&mesh, thing, moves));
             });
+        }
+    }
+
+    #[test]
+    fn a_height_field_is_a_solid_with_sides_and_a_bottom(
+        heights in heights(), at in [-4.0..4.0_f64, -9.0..2.0, -4.0..3.0],
+        to in [-2.0..2.0_f64, -7.0..0.5, -1.5..0.9], turned in any::<bool>(),
+    ) {
+        let (field, mesh) = hills(&heights);
+        let turn = AxisAngle::new(Vec3::new(1.0, 0.3, -2.0), if turned { 1.0 } else { 0.0 }).unwrap();
+        let pose = Pose { rotation: turn.into(), translation: Vec3::new(0.2, -0.4, 0.1) };
+        let mut world = World::<f64>::default();
+        world.walls.insert(WallShape::HeightField(Arc::new(field.clone()), pose)).unwrap();
+        let (at, to) = (Point3::from(at), Point3::from(to));
+        // As brute force has it: as far as the nearest triangle, and inside where an odd number of
+        // them is above.
+        let far = |point: Point3<f64>| {
+            let triangles = (0..TRIANGLES).map(|number| field.triangle(number).unwrap());
+            let far = triangles.map(|it| it.project_point(point).distance).fold(f64::MAX, f64::min);
+            let up = Ray { origin: point, direction: Vec3::new(1e-3, 1.0, 2e-3).normalize() };
+            let mut above = 0;
+            for number in 0..TRIANGLES {
+                let corners = field.triangle(number).unwrap().corners.to_vec();
+                let one = Mesh::new(corners, vec![[0, 1, 2]]).unwrap();
+                above += u32::from(ray_cast_on_surface(&one, &up, f64::INFINITY).is_some());
+            }
+            if above % 2 == 1 { -far } else { far }
+        };
+        let wall = world.walls.get(world.walls.id(0).unwrap()).unwrap().clone();
+        for point in [at, to, at + (to - at) * 0.8] {
+            let near = wall.project_point(pose.transform_point(point));
+            let expected = far(point);
+            prop_assert!((near.distance - expected).abs() < 1e-9, "{near:?} {expected} at {point:?}");
+            // Out along the normal, by the depth, the surface is.
+            let out = pose.transform_point(point) - near.normal * near.distance;
+            prop_assert!((out - near.point).magnitude() < 1e-9, "{near:?}");
+        }
+        // A ray from outside to what is inside enters where the surface is.
+        if far(at) > 1e-6 && far(to) < -1e-6 {
+            let origin = pose.transform_point(at);
+            let ray = Ray { origin, direction: (pose.transform_point(to) - origin).normalize() };
+            let mut tree = QueryTree::default();
+            let hit = world.queries(&mut tree).cast_ray(&ray, f64::INFINITY, |_| true);
+            let on_mesh = Ray { origin: at, direction: (to - at).normalize() };
+            let expected = ray_cast_on_surface(&mesh, &on_mesh, f64::INFINITY).unwrap().result;
+            let hit = hit.unwrap().result;
+            prop_assert!((hit.distance - expected.distance).abs() < 1e-9, "{hit:?} {expected:?}");
+            prop_assert!(hit.distance < (to - at).magnitude());
         }
     }
 

@@ -394,3 +394,56 @@ fn nothing_fast_passes_through_a_thin_wall() {
         }
     }
 }
+
+/// Shoots a ball at the sides and the bottom of a landscape that falls inward from its border.
+fn meets_the_sides<S: Scalar>(model: Model) {
+    let number = S::from_f64;
+    let heights = [1.0, 1.0, 1.0, 1.0, -0.9, 1.0, 1.0, 1.0, 1.0].map(number).to_vec();
+    let corner = Point3::from([S::zero(); 3]);
+    let field = HeightField::new(corner, [S::one(); 2], 3, heights).unwrap();
+    let bottom = -0.9 - (8.0_f64 + 1.9 * 1.9).sqrt();
+    let radius = 0.1;
+    for axis in 0..3 {
+        for away in [-1.0, 1.0] {
+            let [low, high] = if axis == 1 { [bottom, f64::INFINITY] } else { [0.0, 2.0] };
+            let border = if away < 0.0 { low } else { high };
+            if border.is_infinite() {
+                continue; // the top
+            }
+            let (mut start, mut velocity) = ([1.1, 0.8, 0.9], [0.0; 3]);
+            start[axis] = border + away * 0.3;
+            velocity[axis] = -away * 2.0;
+            let mut world = World::<S>::default();
+            world.set_model(model).unwrap();
+            world.set_gravity(Vec3::from([S::zero(); 3])).unwrap();
+            world.walls.insert(field.clone()).unwrap();
+            let marble = Marble::new(start.map(number).into(), number(radius));
+            let marble = Marble { velocity: velocity.map(number).into(), ..marble };
+            let id = world.marbles.insert(marble).unwrap();
+            let what = format!("{:?}, axis {axis}, {away}", model.response);
+            for step in 0..60 {
+                world.step(number(DT)).unwrap();
+                let at = world.marbles.position()[0];
+                let gap = (at[axis].as_f64() - border) * away - radius;
+                assert!(gap > -0.5 * radius, "{what}: {gap} in step {step}");
+                for contact in &world.contacts.wm {
+                    let normal = contact.normal[axis].as_f64() * away;
+                    assert!(normal > 0.999, "{what}: {:?}", contact.normal);
+                }
+            }
+            let end = world.marbles.get(id).unwrap();
+            assert!(end.velocity[axis].as_f64() * away > -1e-3, "{what}: {:?}", end.velocity);
+            let aside = (0..3).filter(|i| *i != axis).map(|i| end.velocity[i].as_f64().abs());
+            assert!(aside.fold(0.0, f64::max) < 1e-3, "{what}: {:?}", end.velocity);
+        }
+    }
+}
+
+#[test]
+fn the_sides_and_the_bottom_of_a_height_field_stop_a_ball() {
+    let soft = Model { response: Response::SoftStep, ..Model::default() };
+    for model in models().into_iter().chain([soft]) {
+        meets_the_sides::<f64>(model);
+        meets_the_sides::<f32>(model);
+    }
+}

@@ -53,12 +53,6 @@ fn things(world: &World<f64>) -> Vec<ColliderId> {
     marbles.chain(walls).collect()
 }
 
-/// Whether it is a height field: rays and shapes meet the surface of one, from below, too.
-fn is_field(world: &World<f64>, thing: ColliderId) -> bool {
-    let ColliderId::Wall(id) = thing else { return false };
-    matches!(world.walls.get(id), Ok(WallShape::HeightField(..)))
-}
-
 /// How far a thing's surface is from a point.
 fn distance(world: &World<f64>, thing: ColliderId, point: Point3<f64>) -> f64 {
     match thing {
@@ -109,11 +103,10 @@ proptest! {
                 let off = distance(&world, thing, found.result.point);
                 prop_assert!(off.abs() < 1e-9, "{found:?} {off}");
             }
-            let field = is_field(&world, thing);
             for part in 1..30 {
                 let at = ray.at(end * f64::from(part) / 30.0);
                 let inside = distance(&world, thing, at) < -1e-9;
-                prop_assert!(field || end == 0.0 || !inside, "{thing:?} {ray:?}");
+                prop_assert!(end == 0.0 || !inside, "{thing:?} {ray:?}");
             }
         }
     }
@@ -150,7 +143,6 @@ proptest! {
         let found = queries.overlaps(&Shape::Sphere(ball), |_| true);
         for thing in things(&world) {
             let surface = distance(&world, thing, ball.center);
-            let surface = if is_field(&world, thing) { surface.abs() } else { surface };
             let gap = surface - 0.4;
             prop_assert!(gap.abs() < 1e-9 || found.contains(&thing) == (gap <= 0.0), "{thing:?}");
         }
@@ -179,8 +171,7 @@ proptest! {
                 for part in 0..20 {
                     let there = ball.center + moves * (time.unwrap_or(1.0) * f64::from(part) / 20.0);
                     let surface = distance(&world, thing, there);
-                    let surface = if is_field(&world, thing) { surface.abs() } else { surface };
-                    let gap = surface - 0.4;
+                            let gap = surface - 0.4;
                     prop_assert!(gap > -1e-8, "{thing:?} {gap} before {time:?}");
                 }
             }

@@ -37,7 +37,7 @@ pub enum Build {
         /// Three vertex indices each, from zero.
         triangles: Vec<[u32; 3]>,
     },
-    /// A [height field](crate::shape::HeightField), solid below.
+    /// A [height field](crate::shape::HeightField): a solid with vertical sides and a bottom.
     HeightField {
         /// Corner of the first column and row, at height zero, in metres.
         #[cfg_attr(

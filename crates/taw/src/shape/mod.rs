@@ -25,7 +25,6 @@ pub use hull::{Face, Hull};
 pub use obb::Obb;
 pub use plane::Plane;
 pub use surface::{HeightField, Mesh, Surface};
-pub(crate) use triangle::Rectangle;
 pub use triangle::Triangle;
 
 use crate::math::{Point3, Scalar, Vec3};

@@ -3,7 +3,7 @@ use cgmath::EuclideanSpace;
 use super::{Aabb, Aabb3, BoundedShape, Bvh, Triangle};
 use crate::Error;
 use crate::error::{finite_point, positive, within};
-use crate::math::{Point3, Scalar, Vec3, is_finite_point};
+use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
 
 /// A triangle surface, such as a landscape or a track. It has no volume.
 pub trait Surface<S: Scalar> {
@@ -94,7 +94,9 @@ impl<S: Scalar> Surface<S> for Mesh<S> {
     }
 }
 
-/// Height field over a grid in the x–z plane, with two triangles per cell.
+/// Height field over a grid in the x–z plane, with two triangles per cell: the top of a solid that
+/// has vertical sides, two triangles per edge of the border, and a flat bottom, two more. It is
+/// below the lowest point by the diagonal of the field's bounding box.
 #[derive(Clone, Debug, PartialEq)]
 pub struct HeightField<S> {
     corner: Point3<S>,
@@ -102,8 +104,18 @@ pub struct HeightField<S> {
     columns: u32,
     rows: u32,
     heights: Vec<S>,
-    lowest: S,
+    bottom: S,
     highest: S,
+}
+
+/// Vertical side of the solid below a height field.
+struct Side<S> {
+    /// Axis that it is perpendicular to, and the one that it runs along.
+    axes: [usize; 2],
+    /// Coordinate along the former, in metres.
+    at: S,
+    /// Index of its first triangle.
+    first: u32,
 }
 
 impl<S: Scalar> HeightField<S> {
@@ -126,15 +138,18 @@ impl<S: Scalar> HeightField<S> {
         within("columns", f64::from(columns), 2.0, f64::from(u32::MAX))?;
         let count = u32::try_from(heights.len()).unwrap_or(u32::MAX);
         let rows = count / columns;
-        // Two triangles per cell are indexed with 32 bits.
+        // Two triangles per cell, and per edge of the border, are indexed with 32 bits.
         let whole = f64::from(rows.max(2)) * f64::from(columns);
-        within("heights.len()", f64::from(count), whole, whole.min(f64::from(u32::MAX / 2)))?;
+        within("heights.len()", f64::from(count), whole, whole.min(f64::from(u32::MAX / 4)))?;
         for height in &heights {
             crate::error::finite("heights", *height)?;
         }
         let lowest = heights.iter().fold(S::infinity(), |low, height| low.min(*height));
         let highest = heights.iter().fold(S::neg_infinity(), |high, height| high.max(*height));
-        let field = Self { corner, cell, columns, rows, heights, lowest, highest };
+        let bottom = corner.y + lowest;
+        let mut field = Self { corner, cell, columns, rows, heights, bottom, highest };
+        let top = field.bounds();
+        field.bottom -= length(top.max - top.min);
         // Individually valid numbers may overflow together.
         let Aabb { min, max } = field.bounds();
         finite_point(["corner.x", "corner.y", "corner.z"], min)?;
@@ -175,6 +190,92 @@ impl<S: Scalar> HeightField<S> {
 
     fn height(&self, column: u32, row: u32) -> S {
         self.corner.y + self.heights[row as usize * self.columns as usize + column as usize]
+    }
+
+    /// Tests if a point is in the solid.
+    pub(crate) fn has_inside(&self, point: Point3<S>) -> bool {
+        let below = self.signed_height(point).is_some_and(|height| height > S::zero());
+        below && point.y > self.bottom
+    }
+
+    /// Number of the triangles of the top, which come before those of the sides.
+    fn top_len(&self) -> u32 {
+        2 * (self.columns - 1) * (self.rows - 1)
+    }
+
+    /// Tests if the triangle with this index is one of the top.
+    pub(crate) fn is_top(&self, number: u32) -> bool {
+        number < self.top_len()
+    }
+
+    /// Sides: the first row, the last, the first column, the last.
+    fn sides(&self) -> [Side<S>; 4] {
+        let Aabb { min, max } = self.bounds();
+        let (along_x, along_z) = (2 * (self.columns - 1), 2 * (self.rows - 1));
+        let first = self.top_len();
+        let side = |axes, at, first| Side { axes, at, first };
+        [
+            side([2, 0], min.z, first),
+            side([2, 0], max.z, first + along_x),
+            side([0, 2], min.x, first + 2 * along_x),
+            side([0, 2], max.x, first + 2 * along_x + along_z),
+        ]
+    }
+
+    /// Triangle of the sides or of the bottom, by its index after those of the top.
+    fn side_triangle(&self, number: u32) -> Option<Triangle<S>> {
+        let (columns, rows) = (self.columns - 1, self.rows - 1);
+        let below = |point: Point3<S>| Point3::new(point.x, self.bottom, point.z);
+        let edge = number / 2;
+        // Points of the edge, from left to right as seen from outside with up as up.
+        let [p, q] = match edge {
+            _ if edge < columns => [(edge + 1, 0), (edge, 0)],
+            _ if edge < 2 * columns => [(edge - columns, rows), (edge - columns + 1, rows)],
+            _ if edge < 2 * columns + rows => {
+                [(0, edge - 2 * columns), (0, edge - 2 * columns + 1)]
+            }
+            _ if edge < 2 * (columns + rows) => {
+                let row = edge - 2 * columns - rows;
+                [(columns, row + 1), (columns, row)]
+            }
+            _ if edge == 2 * (columns + rows) => {
+                let far = below(self.point(columns, rows));
+                let near = below(self.point(0, 0));
+                let [right, left] = [(columns, 0), (0, rows)].map(|(x, z)| below(self.point(x, z)));
+                let is_first = number.is_multiple_of(2);
+                let corners = if is_first { [near, right, far] } else { [near, far, left] };
+                return Some(Triangle { corners });
+            }
+            _ => return None,
+        };
+        let [p, q] = [p, q].map(|(column, row)| self.point(column, row));
+        let corners =
+            if number.is_multiple_of(2) { [p, below(q), q] } else { [p, below(p), below(q)] };
+        Some(Triangle { corners })
+    }
+
+    /// Visits the triangles of the sides and of the bottom that may overlap a box, and some more.
+    fn for_each_side_in_box(&self, bounds: &Aabb3<S>, mut visit: impl FnMut(u32)) {
+        let whole = self.bounds();
+        if !whole.overlaps(bounds) {
+            return;
+        }
+        for Side { axes: [across, along], at, first } in self.sides() {
+            if at >= bounds.min[across] && at <= bounds.max[across] {
+                let edges = self.edges(along, [bounds.min[along], bounds.max[along]]);
+                (2 * edges.start..2 * edges.end).for_each(|number| visit(first + number));
+            }
+        }
+        if bounds.min.y <= self.bottom {
+            let first = self.top_len() + 4 * (self.columns - 1 + self.rows - 1);
+            visit(first);
+            visit(first + 1);
+        }
+    }
+
+    /// Edges of the border between two coordinates along an axis.
+    fn edges(&self, axis: usize, interval: [S; 2]) -> std::ops::Range<u32> {
+        if axis == 0 { self.columns(interval) } else { self.rows(interval) }
     }
 
     /// Range of the cells, of `count` points spaced by `width` from `start`, that overlap an
@@ -219,10 +320,10 @@ impl<S: Scalar> HeightField<S> {
 
 impl<S: Scalar> Surface<S> for HeightField<S> {
     fn triangle(&self, number: u32) -> Option<Triangle<S>> {
-        let (row, column) = self.place(number);
-        if row + 1 >= self.rows {
-            return None;
+        if let Some(side) = number.checked_sub(self.top_len()) {
+            return self.side_triangle(side);
         }
+        let (row, column) = self.place(number);
         let near = self.point(column, row);
         let far = self.point(column + 1, row + 1);
         // Counterclockwise as seen from above.
@@ -248,6 +349,7 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
                 visit(number);
             }
         });
+        self.for_each_side_in_box(bounds, visit);
     }
 
     fn for_each_near(&self, point: Point3<S>, mut reach: S, mut visit: impl FnMut(u32) -> S) {
@@ -281,11 +383,16 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
                 }
             }
         }
+        let far = Vec3::new(reach, reach, reach) * more;
+        let bounds = Aabb { min: point - far, max: point + far };
+        self.for_each_side_in_box(&bounds, |number| {
+            visit(number);
+        });
     }
 
     fn bounds(&self) -> Aabb3<S> {
         let far = self.point(self.columns - 1, self.rows - 1);
-        let low = Vec3::new(self.corner.x, self.corner.y + self.lowest, self.corner.z);
+        let low = Vec3::new(self.corner.x, self.bottom, self.corner.z);
         let high = Vec3::new(far.x, self.corner.y + self.highest, far.z);
         Aabb { min: Point3::from_vec(low), max: Point3::from_vec(high) }
     }
@@ -295,17 +402,36 @@ impl<S: Scalar> Surface<S> for HeightField<S> {
         if !is_finite_point(from) || !is_finite_point(to) {
             return;
         }
+        // Box of the part of the segment between two coordinates along an axis.
+        let between = |axis: usize, interval: [S; 2]| {
+            let part = |x: S, straight: S| {
+                let (start, motion) = (from[axis], motion[axis]);
+                let part = if motion == S::zero() { straight } else { (x - start) / motion };
+                part.max(S::zero()).min(S::one())
+            };
+            let ends = [part(interval[0], S::zero()), part(interval[1], S::one())];
+            let [p, q] = ends.map(|part| from + motion * part);
+            Aabb { min: p, max: p }.union(&Aabb { min: q, max: q })
+        };
         // Column by column, the rows that the segment crosses meanwhile.
         for column in self.columns([from.x.min(to.x), from.x.max(to.x)]) {
             let left = self.corner.x + S::from_f64(f64::from(column)) * self.cell[0];
-            let part = |x: S, straight: S| {
-                let part = if motion.x == S::zero() { straight } else { (x - from.x) / motion.x };
-                part.max(S::zero()).min(S::one())
-            };
-            let ends = [part(left, S::zero()), part(left + self.cell[0], S::one())];
-            let [p, q] = ends.map(|part| from + motion * part);
-            let meanwhile = Aabb { min: p, max: p }.union(&Aabb { min: q, max: q });
+            let meanwhile = between(0, [left, left + self.cell[0]]);
             self.cells(column..column + 1, &meanwhile, &mut visit);
+        }
+        for Side { axes: [across, along], at, first } in self.sides() {
+            let [start, end] = [from[across].min(to[across]), from[across].max(to[across])];
+            let rounding = S::epsilon() * S::from_f64(8.0) * start.abs().max(end.abs());
+            if at >= start - rounding && at <= end + rounding {
+                let meanwhile = between(across, [at - rounding, at + rounding]);
+                let edges = self.edges(along, [meanwhile.min[along], meanwhile.max[along]]);
+                (2 * edges.start..2 * edges.end).for_each(|number| visit(first + number));
+            }
+        }
+        let bottom = self.top_len() + 4 * (self.columns - 1 + self.rows - 1);
+        if from.y.min(to.y) <= self.bottom {
+            visit(bottom);
+            visit(bottom + 1);
         }
     }
 }

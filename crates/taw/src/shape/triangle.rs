@@ -1,7 +1,7 @@
 use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::polygon::project_on_segment;
-use super::{Aabb, Aabb3, BoundedShape, PointProjection};
+use super::{Aabb, Aabb3, BoundedShape, PointProjection, Shape};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
 
 /// A triangle: two-sided and without volume. It may be a sliver, a segment or a point.
@@ -9,25 +9,6 @@ use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_l
 pub struct Triangle<S> {
     /// Vertices in metres, counterclockwise as seen from where the normal points.
     pub corners: [Point3<S>; 3],
-}
-
-/// Rectangle: the base of a right prism.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Rectangle<S> {
-    pub corner: Point3<S>,
-    /// Sides from there, in metres.
-    pub sides: [Vec3<S>; 2],
-}
-
-impl<S: Scalar> Rectangle<S> {
-    /// Tests if a point is in the prism, at any height.
-    fn has_in_prism(&self, point: Point3<S>) -> bool {
-        let offset = point - self.corner;
-        self.sides.iter().all(|side| {
-            let along = offset.dot(*side);
-            along >= S::zero() && along <= side.magnitude2()
-        })
-    }
 }
 
 impl<S: Scalar> Triangle<S> {
@@ -42,12 +23,12 @@ impl<S: Scalar> Triangle<S> {
         (twice > longest * S::epsilon()).then_some(normal)
     }
 
-    /// Projects a point as if the volume behind the triangle were solid, within the prism over
-    /// `base`: a point straight behind the triangle, by no more than its width, is inside.
+    /// Projects a point as if the volume behind the triangle were solid, within `bounds`: a point
+    /// straight behind the triangle, by no more than its width, is inside.
     pub(crate) fn project_point_one_sided(
         &self,
         point: Point3<S>,
-        base: &Rectangle<S>,
+        bounds: &Shape<S>,
     ) -> PointProjection<S> {
         let [a, b, c] = self.corners;
         let deepest = (b - a).magnitude().min((c - a).magnitude());
@@ -58,7 +39,7 @@ impl<S: Scalar> Triangle<S> {
                 if near.distance > S::zero()
                     && near.distance <= deepest
                     && (near.normal + up).magnitude() < S::from_f64(1e-3)
-                    && base.has_in_prism(point) =>
+                    && bounds.contains(point) =>
             {
                 near.flipped()
             }

@@ -280,13 +280,14 @@ pub(super) fn candidate_sub_shapes<S: Scalar>(
     let bounds = Aabb { min: sphere.center - margin, max: sphere.center + margin };
     walls.for_each_colliding(&bounds, layers, |part| {
         let nearest = walls.project_point(part, sphere.center);
-        if nearest.distance <= far {
+        let shape = &walls.shapes()[part.wall as usize];
+        if nearest.distance <= far && !shape.is_behind_solid(part.index, &nearest) {
             candidates.push(Candidate { part, nearest });
         }
     });
     candidates.sort_unstable_by_key(|near| near.part);
     candidates.dedup_by_key(|near| near.part);
-    // Below a height field, only the nearest triangle gives the depth.
+    // In the solid of a height field, only the nearest triangle gives the depth.
     let under = |it: &Candidate<S>| {
         let landscape = matches!(walls.shapes()[it.part.wall as usize], WallShape::HeightField(..));
         landscape && it.nearest.distance < S::zero()

@@ -13,7 +13,9 @@ use crate::contact::{
 };
 use crate::frame::{Pose, Ray};
 use crate::math::{Point3, Scalar, Vec3, is_finite, is_finite_point, length};
-use crate::shape::{Aabb, Aabb3, BoundedShape, Bvh, Plane, PointProjection, Shape, Surface};
+use crate::shape::{
+    Aabb, Aabb3, BoundedShape, Bvh, HeightField, Plane, PointProjection, Shape, Surface,
+};
 
 /// A collider: a marble or a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -81,8 +83,7 @@ impl<S: Scalar> QueryTree<S> {
 /// Spatial queries of the current state, created by [`World::queries`]. Every query takes a filter
 /// that selects colliders; `|_| true` selects all.
 ///
-/// Ray and shape casts hit meshes and height fields on their surface, from either side; only
-/// [`Queries::project_point`] treats the volume below a height field as inside.
+/// Rays and shapes hit meshes on their surface, from either side.
 #[derive(Debug)]
 pub struct Queries<'a, S: Scalar> {
     world: &'a World<S>,
@@ -267,7 +268,8 @@ impl<S: Scalar> Queries<'_, S> {
                     offer(item, &|| near().is_some_and(|near| near.result.touching()));
                 }
                 Item::Wall(SubShape { wall, index: number }) => {
-                    match &self.world.walls.shapes()[wall as usize] {
+                    let wall = &self.world.walls.shapes()[wall as usize];
+                    match wall {
                         WallShape::Plane(_) => {}
                         solid @ WallShape::Solid(_) => offer(item, &|| {
                             let near = solid
@@ -279,7 +281,12 @@ impl<S: Scalar> Queries<'_, S> {
                             offer(item, &|| overlaps_transformed(&**mesh, *pose, shape));
                         }
                         WallShape::HeightField(field, pose) => {
-                            offer(item, &|| overlaps_transformed(&**field, *pose, shape));
+                            offer(item, &|| {
+                                overlaps_transformed(&**field, *pose, shape)
+                                    || sub_shapes(shape)
+                                        .into_iter()
+                                        .any(|part| wall.is_in_height_field(part.center()))
+                            });
                         }
                     }
                 }
@@ -383,6 +390,10 @@ fn cast_ray_on_wall<S: Scalar>(
             to_world(ray_cast_on_surface(&**mesh, &local(pose), max_distance), pose)
         }
         WallShape::HeightField(field, pose) => {
+            if wall.is_in_height_field(ray.origin) {
+                let normal = wall.project_point(ray.origin).normal;
+                return Some(RayHit { distance: S::zero(), point: ray.origin, normal });
+            }
             to_world(ray_cast_on_surface(&**field, &local(pose), max_distance), pose)
         }
     }
@@ -403,7 +414,7 @@ fn cast_shape_on_wall<S: Scalar>(
         }
         WallShape::Mesh(mesh, pose) => shape_cast_transformed(&**mesh, *pose, shape, translation),
         WallShape::HeightField(field, pose) => {
-            shape_cast_transformed(&**field, *pose, shape, translation)
+            shape_cast_on_field(wall, (field, *pose), shape, translation)
         }
     }
 }
@@ -436,6 +447,30 @@ fn shape_cast_transformed<S: Scalar>(
     let touch =
         |part: &dyn Convex<S>| Some(shape_cast_on_surface(surface, part, translation)?.result);
     Some(min_by_time(&to_local(shape, pose), touch)?.to_world(pose))
+}
+
+/// First contact of a translating shape with the solid of a transformed height field. A convex part
+/// whose center is inside at the start hits at once if it approaches the surface nearest to that.
+fn shape_cast_on_field<S: Scalar>(
+    wall: &WallShape<S>,
+    (field, pose): (&HeightField<S>, Pose<S>),
+    shape: &Shape<S>,
+    translation: Vec3<S>,
+) -> Option<ShapeCastHit<S>> {
+    let at_once = min_by_time(shape, |part| {
+        let inside = Some(part.center()).filter(|center| wall.is_in_height_field(*center))?;
+        let PointProjection { point, normal, .. } = wall.project_point(inside);
+        let approaches = translation.dot(normal) < S::zero();
+        approaches.then(|| ShapeCastHit { time: S::zero(), normal, point })
+    });
+    let along = pose.inverse_transform_vector(translation);
+    let later = || {
+        min_by_time(&to_local(shape, pose), |part| {
+            let outside = !field.has_inside(part.center());
+            outside.then(|| shape_cast_on_surface(field, part, along))?.map(|hit| hit.result)
+        })
+    };
+    at_once.or_else(|| Some(later()?.to_world(pose)))
 }
 
 fn overlaps_transformed<S: Scalar>(

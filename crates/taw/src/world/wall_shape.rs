@@ -10,8 +10,11 @@ use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
 use crate::response::event::WallCollider;
 use crate::shape::{
     Aabb3, BoundedShape, Capsule, Compound, HeightField, Hull, Mesh, Obb, Plane, PointProjection,
-    Rectangle, Shape, Sphere, Surface, Triangle,
+    Shape, Sphere, Surface, Triangle,
 };
+
+/// Place just before a nearest point, as a fraction of the way from there to the point projected.
+const BEFORE: f64 = 1.0 / 64.0;
 
 /// Shape of a wall.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,7 +25,7 @@ pub enum WallShape<S> {
     Solid(Shape<S>),
     /// Triangle mesh: two-sided and hollow. Copies share it.
     Mesh(Arc<Mesh<S>>, Pose<S>),
-    /// Height field, solid below. Copies share it.
+    /// Height field, the top of a solid with vertical sides and a bottom. Copies share it.
     HeightField(Arc<HeightField<S>>, Pose<S>),
 }
 
@@ -39,7 +42,7 @@ impl<S: Scalar> WallShape<S> {
             }
             Self::HeightField(field, pose) => {
                 let pose = pose.validated()?;
-                check_bounds(&solid_bounds(&field), pose)?;
+                check_bounds(&field.bounds(), pose)?;
                 Self::HeightField(field, pose)
             }
         })
@@ -57,7 +60,7 @@ impl<S: Scalar> WallShape<S> {
             Self::Solid(shape) => visit(0, shape.bounding_box()),
             Self::Mesh(mesh, pose) => visit(0, transformed_box(&mesh.bounds(), *pose)),
             Self::HeightField(field, pose) => {
-                visit(0, transformed_box(&solid_bounds(field), *pose));
+                visit(0, transformed_box(&field.bounds(), *pose));
             }
         }
     }
@@ -192,10 +195,29 @@ impl<S: Scalar> WallShape<S> {
             }),
             Self::HeightField(field, pose) => project_transformed(*pose, point, |point| {
                 let near = field.triangle(part)?.project_point(point);
-                let below = field.signed_height(point).is_some_and(|height| height > S::zero());
-                Some(if below { near.flipped() } else { near })
+                let inside = near.distance > S::zero() && field.has_inside(point);
+                Some(if inside { near.flipped() } else { near })
             }),
         }
+    }
+
+    /// Tests if the straight way from a point outside to the nearest one of this sub-shape leads
+    /// through the solid below a height field: another sub-shape is nearer, and in between.
+    pub(super) fn is_behind_solid(&self, part: u32, nearest: &PointProjection<S>) -> bool {
+        let Self::HeightField(field, pose) = self else { return false };
+        let normal = pose.inverse_transform_vector(nearest.normal);
+        let outward = field.triangle(part).and_then(|triangle| triangle.normal());
+        if nearest.distance <= S::zero() || outward.is_none_or(|n| n.dot(normal) >= S::zero()) {
+            return false;
+        }
+        let before = nearest.distance * S::from_f64(BEFORE);
+        self.is_in_height_field(nearest.point + nearest.normal * before)
+    }
+
+    /// Tests if this is a height field, with a point in its solid.
+    pub(super) fn is_in_height_field(&self, point: Point3<S>) -> bool {
+        let Self::HeightField(field, pose) = self else { return false };
+        field.has_inside(pose.inverse_transform_point(point))
     }
 
     /// Closest points of a sub-shape and a capsule, except for half-spaces.
@@ -241,14 +263,11 @@ impl<S: Scalar> WallShape<S> {
             }
             Self::HeightField(field, pose) => {
                 let surface = triangle(field.triangle(part), pose)?;
-                let Aabb3 { min, max } = field.bounds();
-                let diagonal = max - min;
-                let base = Rectangle {
-                    corner: cast_point(pose.transform_point(min)),
-                    sides: [Vec3::unit_x() * diagonal.x, Vec3::unit_z() * diagonal.z]
-                        .map(|side| cast_vector(pose.transform_vector(side))),
-                };
-                Some(WallCollider::OneSidedTriangle(surface, base))
+                if !field.is_top(part) {
+                    return Some(WallCollider::Triangle(surface));
+                }
+                let bounds = bounds_behind_top(field, *pose);
+                Some(WallCollider::OneSidedTriangle(surface, Shape::Obb(bounds).cast()))
             }
         }
     }
@@ -271,12 +290,16 @@ fn check_bounds<S: Scalar>(bounds: &Aabb3<S>, pose: Pose<S>) -> Result<(), Error
     finite_point(["shape.x", "shape.y", "shape.z"], max).map(|_| ())
 }
 
-/// Bounding box of a height field and of the solid below it, as deep as the field's diagonal, in
-/// metres.
-fn solid_bounds<S: Scalar>(field: &HeightField<S>) -> Aabb3<S> {
-    let mut bounds = field.bounds();
-    bounds.min.y -= length(bounds.max - bounds.min);
-    bounds
+/// Box in which what is behind a triangle of a height field's top is in the solid: its border is
+/// that of the sides and of the bottom, to within rounding.
+fn bounds_behind_top<S: Scalar>(field: &HeightField<S>, pose: Pose<S>) -> Obb<S> {
+    let Aabb3 { min, mut max } = field.bounds();
+    max.y += max.y - min.y; // the top limits itself
+    let bounds = Aabb3 { min, max }.obb().transformed(pose);
+    let size = length(bounds.center.to_vec()) + length(bounds.half_extents);
+    let rounding = size * S::epsilon() * S::from_f64(16.0);
+    let half_extents = bounds.half_extents.map(|half| (half - rounding).max(S::zero()));
+    Obb { half_extents, ..bounds }
 }
 
 /// Bounding box of a transformed box.

@@ -6,7 +6,7 @@ use crate::broad::CollisionLayers;
 use crate::math::{Point3, Quat, Vec3};
 use crate::motion::{WallMotion, integrate_rotation};
 use crate::response::{Colliders, Material};
-use crate::shape::{Aabb3, BoundedShape, PointProjection, Rectangle, Shape, Triangle};
+use crate::shape::{Aabb3, BoundedShape, PointProjection, Shape, Triangle};
 
 /// Rounding error of a distance, relative to it and the coordinates: many times that of a few
 /// operations.
@@ -46,8 +46,8 @@ pub(crate) enum WallCollider {
     },
     Solid(Shape<f64>),
     Triangle(Triangle<f64>),
-    /// Triangle of a height field, solid below, within the field's rectangle.
-    OneSidedTriangle(Triangle<f64>, Rectangle<f64>),
+    /// Triangle of a height field's top, solid behind within these bounds.
+    OneSidedTriangle(Triangle<f64>, Shape<f64>),
 }
 
 impl WallCollider {
@@ -70,8 +70,8 @@ impl WallCollider {
             }
             Self::Solid(shape) => shape.project_point(point),
             Self::Triangle(triangle) => triangle.project_point(point),
-            Self::OneSidedTriangle(triangle, field) => {
-                triangle.project_point_one_sided(point, field)
+            Self::OneSidedTriangle(triangle, bounds) => {
+                triangle.project_point_one_sided(point, bounds)
             }
         }
     }
