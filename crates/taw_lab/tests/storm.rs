@@ -17,9 +17,6 @@ const G: f64 = 9.81;
 
 /// Regression scenes that fail today: each is taken out of here when its cause is mended.
 const NOT_MENDED_YET: &[&str] = &[
-    // A light ball is wedged between a floor and one 2,000 times as heavy; where something bounces,
-    // the impulse solver searches along normals only, and friction takes more iterations than there are.
-    "swept-pair-before-floor",
     // A light ball goes to and fro between a lift and a ball 115 times as heavy, one bounce a substep,
     // while the heavy one comes 4 mm nearer in each: a bounce that carries it on by less than half a
     // radius is not stopped at the lift, so the next substep finds it there and not at the other one.

@@ -256,7 +256,11 @@ impl<S: Scalar> World<S> {
     /// Brings rows up to date with marbles that came, went, or were set.
     fn sync_bodies(&mut self) -> Result<(), Error> {
         self.swarm.set_bodies_are_rows(true);
-        if !self.changes_are_listed() {
+        if self.changes_are_listed() {
+            let rows = self.marbles.changed.take();
+            self.find_changes(&rows);
+            self.marbles.changed.recycle(rows);
+        } else {
             self.remove_stale_bodies()?;
             self.insert_missing_bodies()?;
             self.match_slots();
@@ -266,10 +270,6 @@ impl<S: Scalar> World<S> {
             (self.scratch.soft_step.token, self.swarm.synced) = (token, synced);
             self.marbles.changed.reset(changed);
             self.scratch.soft_step.known = Some(self.row_identity());
-        } else {
-            let rows = self.marbles.changed.take();
-            self.find_changes(&rows);
-            self.marbles.changed.recycle(rows);
         }
         self.swarm.write_bodies(&self.scratch.soft_step.changed);
         Ok(())

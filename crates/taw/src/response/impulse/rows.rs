@@ -19,6 +19,7 @@ pub(super) struct Row<S> {
     /// Index of its constraint.
     pub constraint: u32,
     pub island: u32,
+    pub bounces: bool,
     bodies: [u32; 2],
     /// Unit normal from the first body to the second.
     pub normal: Vec3<S>,
@@ -128,6 +129,7 @@ impl<S: Scalar> Row<S> {
         Self {
             constraint,
             island: c.island,
+            bounces: c.bounces,
             bodies: [a, c.b as u32],
             normal: c.normal,
             surface_velocity: c.surface_velocity,

@@ -88,16 +88,17 @@ impl<S: Scalar> Row<S> {
     }
 
     /// Restricts the search directions to those that the contact can follow.
-    fn restrict_directions(&self, search: &mut SearchDirections<S>, island_bounces: bool) {
+    fn restrict_directions(&self, search: &mut SearchDirections<S>) {
         if self.is_open() {
             search.directions = [Vec3::zero(); DIRECTIONS];
             search.velocities = search.directions;
-        } else if island_bounces
+        } else if self.bounces
             || length(self.impulse.tangent)
                 >= self.cone.max_friction(self.impulse.normal) * (S::one() - S::epsilon())
         {
-            // Sliding friction stays at the cone, whichever way it slides. And restitution can ask
-            // for more than friction in a corner can give, so that both would grow without end.
+            // Sliding friction stays at the cone, whichever way it slides. And the restitution of two
+            // contacts can ask for more than friction in a corner can give, so that both would grow
+            // without end; a contact that rests beside them asks for rest, which it can have.
             let normal = self.normal;
             search.directions = search.directions.map(|direction| normal * direction.dot(normal));
         }
@@ -132,9 +133,8 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
         islands.list.iter_mut().for_each(Island::begin_search);
         let arms = |row: &Row<S>| &constraints[row.constraint as usize].arms;
         for (row, search) in rows.iter().zip(searches.iter_mut()) {
-            let Island { accelerating, bounces, .. } = islands.of(row.island);
-            if *accelerating {
-                row.restrict_directions(search, *bounces);
+            if islands.of(row.island).accelerating {
+                row.restrict_directions(search);
             }
             if islands.accelerating(row).is_some() {
                 search.velocity_error = self.velocity_error(row, arms(row));
