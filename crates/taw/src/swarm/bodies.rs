@@ -394,10 +394,11 @@ impl Swarm {
         row.is_some_and(|row| self.velocity[row][3].is_sign_negative())
     }
 
-    /// Position and velocity of a ball.
-    pub(crate) fn motion_of<S: Scalar>(&self, ball: BallId) -> Option<(Point3<S>, Vec3<S>)> {
+    /// Position and velocity of a ball, and the speed of its surface by spin, in m/s.
+    pub(crate) fn motion_of<S: Scalar>(&self, ball: BallId) -> Option<(Point3<S>, Vec3<S>, f32)> {
         let row = self.ids.row(ball)?;
-        Some((Point3::from_vec(vector(&self.at[row])), vector(&self.velocity[row])))
+        let surface_speed = squared(self.spin[row]).sqrt();
+        Some((Point3::from_vec(vector(&self.at[row])), vector(&self.velocity[row]), surface_speed))
     }
 
     /// Number that changes whenever a ball falls asleep, wakes, comes or goes.

@@ -219,10 +219,10 @@ impl Swarm {
     /// Finds the pairs that meet beyond the reach of skins, where more balls go that far than there
     /// may be fast movers.
     fn find_crossing_pairs(&mut self, skin: f32, dt: f32, slack: f32) {
-        let (at, velocity) = (&self.at[..], &self.velocity[..]);
+        let (at, velocity, skin_left) = (&self.at[..], &self.velocity[..], &self.skin_left[..]);
         let axes = self.grid.axes();
         let FastMovers { crossing, .. } = &mut self.fast_movers;
-        let crowd = CrowdSweep { at, velocity, dt, skin, slack, axes };
+        let crowd = CrowdSweep { at, velocity, dt, skin_left, skin, slack, axes };
         crowd.find(&mut self.scratch.crowd, crossing);
         let (model, slots) = (self.model.material, self.ids.slots());
         let surfaces = SurfaceOf { model, surfaces: &self.surfaces, slots };

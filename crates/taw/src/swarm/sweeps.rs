@@ -25,7 +25,7 @@ pub(super) struct Sweep<'a> {
     pub dt: f32,
     /// Skins reach so far, in metres: balls with a wider one are swift.
     pub reach: f32,
-    /// How far balls come off their paths, in metres.
+    /// Distance that balls come off their paths, in metres.
     pub slack: f32,
 }
 
@@ -132,9 +132,11 @@ pub(super) struct CrowdSweep<'a> {
     pub at: &'a [Row],
     pub velocity: &'a [Row],
     pub dt: f32,
-    /// Common skin, in metres: two balls whose surfaces are within twice that are known already.
+    /// Remaining skin of each ball, in metres: two whose skins overlap are known already.
+    pub skin_left: &'a [f32],
+    /// Common skin, in metres.
     pub skin: f32,
-    /// How far balls come off their paths, in metres.
+    /// Distance that balls come off their paths, in metres.
     pub slack: f32,
     pub axes: [usize; 3],
 }
@@ -210,7 +212,7 @@ impl CrowdSweep<'_> {
         let apart = [0, 1, 2].map(|axis| self.at[b][axis] - self.at[a][axis]);
         let by = [0, 1, 2].map(|axis| paths[b][axis] - paths[a][axis]);
         let radii = self.at[a][3] + self.at[b][3];
-        let known = radii + 2.0 * self.skin;
+        let known = radii + self.skin_left[a].max(0.0) + self.skin_left[b].max(0.0);
         comes_near(apart, by, radii + 2.0 * self.slack) && dot(apart, apart) >= known * known
     }
 }

@@ -8,7 +8,7 @@ use super::penalty::Penalty;
 use super::soft_step::SoftStep;
 use crate::Error;
 use crate::math::Scalar;
-use crate::response::Response;
+use crate::response::{ContactLaw, Response};
 
 /// Method of a response.
 pub(super) trait Method<S: Scalar> {
@@ -50,7 +50,8 @@ pub(super) fn method_of<S: Scalar>(response: Response) -> &'static dyn Method<S>
         Response::Displacement => &Displacement,
         Response::Impulse => &Impulse,
         Response::SoftStep => &SoftStep,
-        Response::Penalty(_) => &Penalty,
+        Response::Penalty(ContactLaw::SpringDashpot) => &Penalty(ContactLaw::SpringDashpot),
+        Response::Penalty(ContactLaw::HertzMindlin) => &Penalty(ContactLaw::HertzMindlin),
         Response::EventDriven => &EventDriven,
     }
 }

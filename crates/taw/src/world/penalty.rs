@@ -1,13 +1,13 @@
-//! [`Response::Penalty`] in a world.
+//! [`Response::Penalty`](crate::response::Response) in a world.
 
 use super::World;
 use super::method::Method;
 use crate::math::Scalar;
+use crate::response::ContactLaw;
 use crate::response::penalty::{PenaltySettings, apply_penalty_forces};
-use crate::response::{ContactLaw, Response};
 
 /// Forces that grow with penetration.
-pub(super) struct Penalty;
+pub(super) struct Penalty(pub ContactLaw);
 
 impl<S: Scalar> Method<S> for Penalty {
     fn advance(&self, world: &mut World<S>, dt: S) {
@@ -21,13 +21,9 @@ impl<S: Scalar> Method<S> for Penalty {
     fn solve(&self, world: &mut World<S>, dt: S) {
         world.begin_bounces();
         let (model, scratch) = (world.settings.model, &mut world.scratch);
-        let law = match model.response {
-            Response::Penalty(law) => law,
-            _ => ContactLaw::SpringDashpot,
-        };
         let (mut bodies, material, position_weight) =
             scratch.columns.bodies(&mut world.marbles, model);
-        let settings = PenaltySettings { law, dt, material, position_weight };
+        let settings = PenaltySettings { law: self.0, dt, material, position_weight };
         apply_penalty_forces(
             &settings,
             &mut bodies,

@@ -1,5 +1,5 @@
-//! Scratch memory of a step: nothing that outlives it but the capacity of its lists, and what can be
-//! found again.
+//! Scratch memory of a step: lists kept for their capacity, what can be found again, and measurements
+//! (residual, energy audit).
 
 use super::contact_limit::ContactLimit;
 use super::continuous::Continuous;

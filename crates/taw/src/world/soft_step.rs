@@ -55,7 +55,7 @@ impl<S> Default for SoftRows<S> {
 const INVERSE_MASSES: [f32; 2] = [INFINITE_MASS, 1e25];
 
 /// Least radius of a row, in metres, as of the balls of a swarm.
-const LEAST_RADIUS: f64 = 1e-9;
+const LEAST_RADIUS: f32 = 1e-9;
 
 /// Soft contacts in small steps, all within the third verb.
 pub(super) struct SoftStep;
@@ -124,7 +124,7 @@ impl<S: Scalar> World<S> {
     /// The second verb: finds which pairs may touch within the step, and lists those of marbles.
     fn find_soft_contacts(&mut self) {
         self.walls.update_tree();
-        if self.sync_bodies().is_err() {
+        if self.check_rows().and_then(|()| self.sync_bodies()).is_err() {
             return; // the third verb says so
         }
         let (dt, gravity) = (self.scratch.soft_step.dt, cast_vector(self.settings.gravity));
@@ -143,6 +143,7 @@ impl<S: Scalar> World<S> {
 
     /// The third verb: moves marbles on in substeps, and solves their contacts.
     fn solve_soft_contacts(&mut self, dt: S) -> Result<(), Error> {
+        self.check_rows()?;
         self.audit_contacts();
         self.sync_bodies()?; // somebody may have moved some since the first verb
         self.walls.update_tree();
@@ -194,7 +195,8 @@ impl<S: Scalar> World<S> {
         self.swarm.sleep_version()
     }
 
-    /// What the correspondence of marbles and rows depends on.
+    /// Identity of the correspondence of marbles and rows: removals, number, rotation model, and
+    /// whether the swarm has the default material.
     fn row_identity(&self) -> (u64, usize, Rotation, bool) {
         let plain = self.swarm.model().material == Material::default();
         (self.marbles.removals(), self.marbles.len(), self.settings.model.rotation, plain)
@@ -225,32 +227,43 @@ impl<S: Scalar> World<S> {
         let marbles = &self.marbles;
         let most = f64::from(MAX_COORDINATE);
         let radius = marbles.radius[row].as_f64();
-        within("radius", radius, LEAST_RADIUS, most)?;
+        within("radius", radius, f64::from(LEAST_RADIUS), most)?;
         let position = cast_vector::<S, f64>(marbles.position[row].to_vec());
         let velocity = cast_vector::<S, f64>(marbles.velocity[row]);
-        let as_set = within_vector(["position.x", "position.y", "position.z"], position, most)
-            .and_then(|()| {
-                within_vector(["velocity.x", "velocity.y", "velocity.z"], velocity, most)
-            });
-        if as_set.is_err() && !self.is_as_stepped(row) {
-            return as_set;
+        let [same_place, same_velocity, same_spin] = self.same_as_row(row);
+        if !same_place {
+            within_vector(["position.x", "position.y", "position.z"], position, most)?;
         }
-        if marbles.rotation_of(row, self.settings.model.rotation) != Rotation::Dynamic {
-            return Ok(());
+        if !same_velocity {
+            within_vector(["velocity.x", "velocity.y", "velocity.z"], velocity, most)?;
         }
-        let spin = marbles.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero);
-        let names = ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
-        within_vector(names, cast_vector(spin), most / radius)
+        let turns = marbles.rotation_of(row, self.settings.model.rotation) == Rotation::Dynamic;
+        match marbles.angular_velocity.get(row) {
+            Some(spin) if turns && !same_spin => {
+                let names = ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
+                within_vector(names, cast_vector(*spin), most / radius)
+            }
+            _ => Ok(()),
+        }
     }
 
-    /// Returns true if a marble is where its row is, as fast.
-    fn is_as_stepped(&self, row: usize) -> bool {
+    /// Returns true for the position, the velocity and the spin of a marble that are those of its row,
+    /// or less.
+    fn same_as_row(&self, row: usize) -> [bool; 3] {
         let bodies = &self.swarm.body_balls;
         let found = self.marbles.id(row).and_then(|id| {
             let i = bodies.binary_search_by_key(&id, |(marble, _)| *marble).ok()?;
-            self.swarm.motion_of(bodies[i].1)
+            self.swarm.motion_of::<S>(bodies[i].1)
         });
-        found == Some((self.marbles.position[row], self.marbles.velocity[row]))
+        let Some((position, velocity, surface_speed)) = found else { return [false; 3] };
+        let (marbles, speed) = (&self.marbles, |v: Vec3<S>| length(v).as_f64());
+        let turning = marbles.angular_velocity.get(row).copied().map_or(0.0, speed);
+        let rounded = f64::from(surface_speed) * 1.000_001;
+        [
+            marbles.position[row] == position,
+            speed(marbles.velocity[row]) <= speed(velocity),
+            turning * marbles.radius[row].as_f64() <= rounded,
+        ]
     }
 
     /// Brings rows up to date with marbles that came, went, or were set.
@@ -344,7 +357,7 @@ fn within_vector(names: [&'static str; 3], v: Vec3<f64>, most: f64) -> Result<()
 
 /// Radius of a row, in metres.
 fn row_radius<S: Scalar>(radius: S) -> f32 {
-    (radius.as_f64() as f32).clamp(LEAST_RADIUS as f32, MAX_COORDINATE)
+    (radius.as_f64() as f32).clamp(LEAST_RADIUS, MAX_COORDINATE)
 }
 
 /// A marble as a row.

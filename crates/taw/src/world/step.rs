@@ -52,6 +52,7 @@ impl<S: Scalar> World<S> {
     pub(super) fn integrate_marbles(&mut self, method: &(impl Method<S> + ?Sized), dt: S) {
         self.store_poses();
         self.begin_continuous();
+        self.scratch.columns.velocity_before.clear();
         let rotation = self.settings.model.rotation;
         if rotation == Rotation::Dynamic {
             self.marbles.integrate_angular_velocity(dt);

@@ -311,6 +311,10 @@ fn numbers_that_rows_cannot_hold_are_refused_by_name() {
             other => panic!("{field}: {other:?}"),
         }
         assert!(world == before, "{field}: something has changed");
+        assert!(world.integrate(1.0 / 60.0).is_err());
+        world.generate_contacts();
+        assert!(world.restitute(1.0 / 60.0).is_err(), "{field}: each verb refuses it");
+        assert!(world.marbles == before.marbles, "{field}: a verb has changed something");
         world.marbles.remove(id).unwrap();
         world.step(1.0 / 60.0).unwrap();
         assert!(world.marbles.get(other).unwrap().velocity.y < -0.3);
@@ -318,9 +322,18 @@ fn numbers_that_rows_cannot_hold_are_refused_by_name() {
 }
 
 #[test]
+fn the_least_radius_is_accepted() {
+    let mut world = world::<f32>(1);
+    world.marbles.insert(Marble::new(Point3::new(0.0, 0.0, 0.0), 1e-9)).unwrap();
+    world.step(1.0 / 60.0).unwrap();
+}
+
+#[test]
 fn a_marble_that_flies_far_may_fly_on() {
     let mut world = world::<f64>(1);
     world.set_gravity(Vec3::zero()).unwrap();
+    let limits = SpeedLimits { linear: Some(8e11), ..SpeedLimits::default() };
+    world.set_speed_limits(limits).unwrap();
     let far = Marble {
         velocity: Vec3::new(9e11, 0.0, 0.0),
         ..Marble::new(Point3::new(9e11, 0.0, 0.0), 0.1)

@@ -220,3 +220,89 @@ fn a_bullet_wakes_what_it_hits() {
     }
     assert!(place(&world, ids[0]).magnitude() > 0.2, "{:?}", place(&world, ids[0]));
 }
+
+/// Bullets at balls that lie apart from each other, more than there may be fast movers: from one
+/// quarter of a diameter in front of them to ten diameters.
+#[test]
+fn of_many_bullets_none_passes_through_what_lies_still() {
+    for (diameters, threads) in [(3.0, 1), (30.0, 1), (30.0, 3)] {
+        let (mut world, material) = empty(2, 0.5);
+        let model = taw::swarm::SwarmModel { threads, ..world.swarm.model() };
+        world.swarm.set_model(model).unwrap();
+        let (radius, mut random) = (0.05, dice(11));
+        let mut pairs = Vec::new();
+        for i in 0..1_000_u16 {
+            let [x, z] = [i % 40, i / 40].map(|k| f64::from(k) * 0.4);
+            let mut insert = |y: f64, speed: f64| {
+                let velocity = Vec3::unit_y() * speed;
+                let position = Point3::new(x, y, z);
+                let marble =
+                    Marble { velocity, material: Some(material), ..Marble::new(position, radius) };
+                world.marbles.insert(marble).unwrap()
+            };
+            let still = insert(0.0, 0.0);
+            if i % 10 == 0 {
+                let gap = 2.0 * radius * (0.25 + 9.75 * random());
+                pairs.push([insert(-2.0 * radius - gap, 2.0 * radius * diameters / DT), still]);
+            }
+        }
+        for _ in 0..5 {
+            world.step(DT).unwrap();
+        }
+        for pair in pairs {
+            let [a, b] = pair.map(|id| world.marbles.get(id).unwrap());
+            let apart = b.position.y - a.position.y;
+            assert!(apart > radius, "{diameters}, {threads} threads: {apart}");
+        }
+    }
+}
+
+#[test]
+fn many_bullets_wake_what_they_hit_far_away() {
+    let (mut world, ids) = sleeping_rows();
+    let velocity = Vec3::new(65.0, -11.75, 0.0) / DT;
+    for i in 0..200_u16 {
+        let [x, z] = [i % 20, i / 20].map(|k| f64::from(k) * 0.25);
+        let position = Point3::new(-20.0 + x, 12.0, z);
+        world.marbles.insert(Marble { velocity, ..Marble::new(position, 0.1) }).unwrap();
+    }
+    world.step(DT).unwrap();
+    let hit = ids.iter().map(|id| world.marbles.get(*id).unwrap());
+    let hit = hit.filter(|ball| ball.velocity.magnitude() > 100.0).count();
+    assert!(hit > 20, "{hit}");
+}
+
+/// Three in a line, and a thin plate behind the last one.
+#[test]
+fn what_a_fast_ball_strikes_goes_through_no_wall() {
+    let mut random = dice(13);
+    for number in 0..300 {
+        let (mut world, material) = empty([1, 3][number % 2], [0.0, 0.5, 1.0][number / 2 % 3]);
+        let radius = 0.02;
+        let step = 2.0 * radius * 1000_f64.powf(random());
+        let mut x = 0.0;
+        let ids = [0, 1, 2].map(|i| {
+            let marble = Marble {
+                velocity: Vec3::unit_x() * (if i == 0 { step / DT } else { 0.0 }),
+                mass: taw::world::Mass::Kilograms(100_f64.powf(random() - 0.5)),
+                material: Some(material),
+                ..Marble::new(Point3::new(x, 0.002 * random(), 0.0), radius)
+            };
+            x += 2.0 * radius + 0.5 * radius * random() + 0.3 * step * random();
+            world.marbles.insert(marble).unwrap()
+        });
+        let far = 1e4;
+        let plate = taw::shape::Aabb {
+            min: Point3::new(x, -far, -far),
+            max: Point3::new(x + 0.01, far, far),
+        };
+        world.walls.insert(plate).unwrap();
+        for _ in 0..6 {
+            world.step(DT).unwrap();
+            for (i, id) in ids.iter().enumerate() {
+                let at = world.marbles.get(*id).unwrap().position.x;
+                assert!(at < x, "{number}: {step} a step, {i} at {at} of {x}");
+            }
+        }
+    }
+}

@@ -186,8 +186,9 @@ impl Swarm {
             self.save_proxies();
             self.integrate([0.0; 4], [h, h, h, 0.0], row(gravity * (-0.5 * h * h)));
             self.correct_free_flight(-0.5 * h / substeps);
-            let caught = self.stop_at_walls(walls, h, gravity * (0.5 * h * h));
             self.shorten_paths();
+            let caught = self.stop_at_walls(walls, h, gravity * (0.5 * h * h));
+            self.scratch.path_changes.clear();
             self.advance_proxies(parts, true, h);
             let (skin, left) = (self.skin, left - h);
             let left_it = |_: &Row, skin_left: f32| skin_left < -skin;

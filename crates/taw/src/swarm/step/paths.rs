@@ -54,9 +54,9 @@ impl Swarm {
         struck.dedup();
     }
 
-    /// Finds how balls have to go in the next `h` seconds so that none goes through another: three in
+    /// Finds paths for the next `h` seconds on which no ball goes through another: three in
     /// a row are solved one pair after another, and the last pair makes the first one close again.
-    /// What is too much of a pair's path is taken from both, and their center of mass goes on; from a
+    /// The excess of a pair's path is taken from both, and their center of mass goes on; from a
     /// proxy, which goes its own way, nothing.
     fn limit_paths(&mut self, h: f32) {
         let Self { at, velocity, fast_movers, proxies, scratch, .. } = self;
@@ -91,12 +91,22 @@ impl Swarm {
         }
     }
 
-    /// Changes the paths as [`Self::limit_paths`] found.
+    /// Changes the paths as [`Self::limit_paths`] found. The changes are kept until the paths have
+    /// been looked at for walls.
     pub(super) fn shorten_paths(&mut self) {
-        for (at, change) in self.at.iter_mut().zip(&self.scratch.path_changes) {
-            *at = sum(at, change);
+        let least = -self.skin;
+        for (row, change) in self.scratch.path_changes.iter().enumerate() {
+            let far = squared([change[0], change[1], change[2], 0.0]).sqrt();
+            if far == 0.0 {
+                continue;
+            }
+            self.at[row] = sum(&self.at[row], change);
+            self.skin_left[row] -= far;
+            if self.skin_left[row] < least {
+                let chunk = self.chunks.partition_point(|chunk| chunk.rows[1] as usize <= row);
+                self.chunks[chunk].overrun = true;
+            }
         }
-        self.scratch.path_changes.clear();
     }
 }
 

@@ -107,6 +107,16 @@ impl Swarm {
                 }
             }
         }
+        for [a, b] in &fast_movers.crossing {
+            let [a, b] = [*a as usize, *b as usize];
+            for [swift, met] in [[a, b], [b, a]] {
+                if self.velocity[swift][3].is_sign_positive()
+                    && self.velocity[met][3].is_sign_negative()
+                {
+                    self.wake(met);
+                }
+            }
+        }
         self.fast_movers = fast_movers;
     }
 

@@ -119,6 +119,7 @@ impl Swarm {
         }
         let count = self.chunks.len();
         let (chunks, velocity) = (DisjointSlice::new(&mut self.chunks), &self.velocity);
+        let path_changes = &self.scratch.path_changes;
         let surfaces = SurfaceOf {
             model: self.model.material,
             surfaces: &self.surfaces,
@@ -137,9 +138,11 @@ impl Swarm {
             let (at, skin_left) = unsafe { (at.part(rows.clone()), skin_left.part(rows.clone())) };
             let columns = at.iter_mut().zip(skin_left).zip(&velocity[rows.clone()]);
             for (((at, skin_left), velocity), row) in columns.zip(rows) {
-                if is_fast(velocity, h, at[3]) {
+                let change = path_changes.get(row).map_or_else(Vec3::zero, xyz);
+                if is_fast(velocity, h, at[3]) || !change.is_zero() {
                     let layers = surfaces.layers(row as u32);
-                    let back = stop_at_wall(walls, at, layers, xyz(velocity) * h - lower);
+                    let path = xyz(velocity) * h - lower + change;
+                    let back = stop_at_wall(walls, at, layers, path);
                     *skin_left -= back;
                     chunk.caught |= back > 0.0;
                 }
