@@ -332,7 +332,7 @@ fn the_least_radius_is_accepted() {
 fn a_marble_that_flies_far_may_fly_on() {
     let mut world = world::<f64>(1);
     world.set_gravity(Vec3::zero()).unwrap();
-    let limits = SpeedLimits { linear: Some(8e11), ..SpeedLimits::default() };
+    let limits = taw::world::SpeedLimits { linear: Some(8.9e11), angular: None };
     world.set_speed_limits(limits).unwrap();
     let far = Marble {
         velocity: Vec3::new(9e11, 0.0, 0.0),
