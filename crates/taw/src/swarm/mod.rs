@@ -118,6 +118,7 @@ pub struct Swarm {
     /// Set while pairs and balls at walls are up to date.
     pairs_valid: bool,
     walls_identity: Option<u64>,
+    rows_of_walls: Option<u64>,
     gravity: Option<Vec3<f32>>,
     planes: Vec<HalfSpace>,
     stopped: Vec<u32>,

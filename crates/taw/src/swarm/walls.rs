@@ -23,6 +23,9 @@ pub(crate) trait StaticGeometry: Sync {
     /// Visits the boxes in which walls changed since they had this identity. Returns false if all may
     /// have.
     fn visit_changes_since(&self, identity: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool;
+    /// Visits the removals of walls since they had this identity, in order: the row of the wall, and
+    /// that whose wall moved there. Returns false if they are not known.
+    fn visit_removals_since(&self, identity: u64, visit: &mut dyn FnMut([u32; 2])) -> bool;
     /// Says if there is anything else, and if some of it may be in a box.
     fn has_shapes(&self) -> bool;
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;

@@ -185,8 +185,12 @@ impl<S: Scalar> StaticGeometry for Walls<S> {
         !self.are_half_spaces()
     }
 
+    fn visit_removals_since(&self, identity: u64, visit: &mut dyn FnMut([u32; 2])) -> bool {
+        self.changes().visit_removals_since(identity, visit)
+    }
+
     fn visit_changes_since(&self, identity: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool {
-        Walls::visit_changes_since(self, identity, |region| {
+        self.changes().visit_since(identity, |region| {
             let corner = |point: Point3<S>| cast_point::<S, f32>(point).into();
             visit([corner(region.min), corner(region.max)]);
         })

@@ -15,10 +15,20 @@ const MAX_CHANGES: usize = 1024;
 pub(super) struct WallChanges<S> {
     /// Identity of the walls before the first change of the log.
     base: u64,
-    /// Identity of the walls after the change, and the region; none for one without bounds.
-    log: VecDeque<(u64, Option<Aabb3<S>>)>,
+    log: VecDeque<Change<S>>,
     /// Identity of the walls when the swarm last looked at them.
     seen: u64,
+}
+
+/// Change of a wall.
+#[derive(Clone, Copy, Debug)]
+struct Change<S> {
+    /// Identity of the walls after the change.
+    identity: u64,
+    /// None for one without bounds.
+    region: Option<Aabb3<S>>,
+    /// Row of a wall that was removed, and the row whose wall moved there.
+    removed: Option<[u32; 2]>,
 }
 
 impl<S: Scalar> PartialEq for WallChanges<S> {
@@ -35,20 +45,21 @@ impl<S> Default for WallChanges<S> {
 
 impl<S: Scalar> WallChanges<S> {
     /// Adds a change.
-    pub fn add(&mut self, region: Option<Aabb3<S>>) {
+    pub fn add(&mut self, region: Option<Aabb3<S>>, removed: Option<[u32; 2]>) {
         static NEXT: AtomicU64 = AtomicU64::new(1);
         if self.log.len() == MAX_CHANGES
-            && let Some((dropped, _)) = self.log.pop_front()
+            && let Some(dropped) = self.log.pop_front()
         {
-            self.base = dropped;
+            self.base = dropped.identity;
         }
-        self.log.push_back((NEXT.fetch_add(1, Ordering::Relaxed), region));
+        let identity = NEXT.fetch_add(1, Ordering::Relaxed);
+        self.log.push_back(Change { identity, region, removed });
     }
 
     /// Identity of the walls as they are: that of their clones until one of them changes, and of no
     /// others.
     pub fn identity(&self) -> u64 {
-        self.log.back().map_or(self.base, |(identity, _)| *identity)
+        self.log.back().map_or(self.base, |change| change.identity)
     }
 
     /// Notes that the swarm knows of all changes.
@@ -59,14 +70,26 @@ impl<S: Scalar> WallChanges<S> {
     /// Visits the regions that changed since the walls had this identity. Returns false if they are
     /// not known, or without bounds.
     pub fn visit_since(&self, identity: u64, mut visit: impl FnMut(&Aabb3<S>)) -> bool {
-        let known = self.log.iter().rposition(|(known, _)| *known == identity);
-        let Some(new) = known.map(|at| at + 1).or((identity == self.base).then_some(0)) else {
-            return false;
-        };
-        for (_, region) in self.log.range(new..) {
-            let Some(region) = region else { return false };
+        let Some(changes) = self.since(identity) else { return false };
+        for change in changes {
+            let Some(region) = &change.region else { return false };
             visit(region);
         }
         true
+    }
+
+    /// Visits the removals since the walls had this identity, in order: the row of the wall, and that
+    /// whose wall moved there. Returns false if they are not known.
+    pub fn visit_removals_since(&self, identity: u64, visit: impl FnMut([u32; 2])) -> bool {
+        let Some(changes) = self.since(identity) else { return false };
+        changes.filter_map(|change| change.removed).for_each(visit);
+        true
+    }
+
+    /// Changes since the walls had this identity; none if that is not known.
+    fn since(&self, identity: u64) -> Option<impl Iterator<Item = &Change<S>>> {
+        let known = self.log.iter().rposition(|change| change.identity == identity);
+        let new = known.map(|at| at + 1).or((identity == self.base).then_some(0))?;
+        Some(self.log.range(new..))
     }
 }

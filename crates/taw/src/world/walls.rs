@@ -129,7 +129,8 @@ impl<S: Scalar> Walls<S> {
         // Another wall has this index now.
         self.dirty = Dirty::All;
         self.version += 1;
-        self.log_change(None);
+        let last = self.shapes.len() - 1;
+        self.changes.add(None, Some([row as u32, last as u32]));
         let shape = self.shapes.swap_remove(row);
         self.collect_planes();
         Ok(shape)
@@ -188,7 +189,7 @@ impl<S: Scalar> Walls<S> {
 
     /// Logs the region of a change.
     fn log_change(&mut self, region: Option<Aabb3<S>>) {
-        self.changes.add(region);
+        self.changes.add(region, None);
     }
 
     /// Identity of the walls as they are: that of their clones until one of them changes, and of no
@@ -202,10 +203,9 @@ impl<S: Scalar> Walls<S> {
         self.changes.mark_seen();
     }
 
-    /// Visits the boxes in which walls changed since they had this identity. Returns false if all may
-    /// have.
-    pub(super) fn visit_changes_since(&self, identity: u64, visit: impl FnMut(&Aabb3<S>)) -> bool {
-        self.changes.visit_since(identity, visit)
+    /// Changes of walls, by region.
+    pub(super) fn changes(&self) -> &WallChanges<S> {
+        &self.changes
     }
 
     /// Updates the tree. Moved walls are refitted.

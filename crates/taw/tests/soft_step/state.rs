@@ -2,6 +2,7 @@
 
 use cgmath::{InnerSpace, Zero};
 use taw::prelude::*;
+use taw::shape::Aabb;
 use taw::swarm::Ball;
 
 use crate::{floor, world};
@@ -332,8 +333,6 @@ fn the_least_radius_is_accepted() {
 fn a_marble_that_flies_far_may_fly_on() {
     let mut world = world::<f64>(1);
     world.set_gravity(Vec3::zero()).unwrap();
-    let limits = taw::world::SpeedLimits { linear: Some(8.9e11), angular: None };
-    world.set_speed_limits(limits).unwrap();
     let far = Marble {
         velocity: Vec3::new(9e11, 0.0, 0.0),
         ..Marble::new(Point3::new(9e11, 0.0, 0.0), 0.1)
@@ -344,4 +343,36 @@ fn a_marble_that_flies_far_may_fly_on() {
         world.marbles.insert(Marble::new(Point3::new(0.0, 0.0, 0.0), 0.1)).unwrap();
     }
     assert!(world.marbles.get(id).unwrap().position.x > 1.5e12);
+}
+
+/// The wall in the last row moves into that of the removed one; contacts and their impulses go with it.
+#[test]
+fn a_wall_may_be_removed_while_marbles_touch_another() {
+    let box_ =
+        |x: f64| Aabb { min: Point3::new(x - 0.5, 0.0, -0.5), max: Point3::new(x + 0.5, 1.0, 0.5) };
+    for rotation in [Rotation::None, Rotation::Rolling, Rotation::Dynamic] {
+        for steps in 1..60 {
+            let mut world = world::<f64>(2);
+            world.set_model(Model { rotation, ..world.model() }).unwrap();
+            let ids = [10.0, 20.0, 0.0, 3.0].map(|x| world.walls.insert(box_(x)).unwrap());
+            for x in [0.0, 3.0] {
+                world.marbles.insert(Marble::new(Point3::new(x, 2.0, 0.0), 0.2)).unwrap();
+            }
+            (0..steps).for_each(|_| world.step(1.0 / 60.0).unwrap());
+            let mut with_all = world.clone();
+            world.walls.remove(ids[0]).unwrap();
+            world.walls.remove(ids[1]).unwrap();
+            for _ in 0..30 {
+                world.step(1.0 / 60.0).unwrap();
+                with_all.step(1.0 / 60.0).unwrap();
+                let named = |world: &World<f64>| -> Vec<_> {
+                    let contacts = world.contacts.wm.iter();
+                    contacts.map(|c| (world.walls.id(c.a as usize).unwrap(), c.b)).collect()
+                };
+                assert_eq!(named(&world), named(&with_all), "{rotation:?} after {steps}");
+            }
+            let places = |world: &World<f64>| world.marbles.position().to_vec();
+            assert_eq!(places(&world), places(&with_all), "{rotation:?} after {steps}");
+        }
+    }
 }

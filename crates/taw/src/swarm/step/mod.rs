@@ -95,8 +95,9 @@ impl Swarm {
         let walls_changed = self.walls_identity != Some(identity);
         if walls_changed {
             half_spaces(walls, &mut self.planes);
+            self.follow_removed_walls(walls);
             self.wake_beside_changes(walls);
-            self.walls_identity = Some(identity);
+            (self.walls_identity, self.rows_of_walls) = (Some(identity), Some(identity));
         }
         walls_changed
     }

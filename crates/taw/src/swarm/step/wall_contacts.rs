@@ -5,7 +5,7 @@ use cgmath::Zero;
 use crate::math::Vec3;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::surfaces::SurfaceOf;
-use crate::swarm::wall_contact::xyz;
+use crate::swarm::wall_contact::{WallContact, xyz};
 use crate::swarm::walls::{
     Balls, HalfSpace, WallQuery, find, is_fast, near_shapes, shapes_of, stop_at_wall,
 };
@@ -30,6 +30,29 @@ impl Swarm {
         if changed {
             observe(Stage::Walls);
             self.find_wall_contacts(dt, walls);
+        }
+    }
+
+    /// Takes the contacts of removed walls out, and renames the walls that moved into their rows.
+    pub(super) fn follow_removed_walls(&mut self, walls: &dyn StaticGeometry) {
+        let mut removals = Vec::new();
+        let known = self
+            .rows_of_walls
+            .is_some_and(|since| walls.visit_removals_since(since, &mut |it| removals.push(it)));
+        for chunk in &mut self.chunks {
+            if !known {
+                chunk.wall_contacts.clear();
+            }
+            for [row, last] in &removals {
+                chunk.wall_contacts.retain_mut(|contact| {
+                    let stays = contact.wall != *row;
+                    if contact.wall == *last {
+                        contact.wall = *row;
+                    }
+                    stays
+                });
+                chunk.wall_contacts.sort_unstable_by_key(WallContact::key);
+            }
         }
     }
 
