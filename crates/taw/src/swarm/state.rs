@@ -150,19 +150,17 @@ impl PartialEq for Swarm {
                 == (&other.skin_left, &other.displacement, &other.old_rows)
             && (max_radius, mean_radius, skin_scale)
                 == (&other.max_radius, &other.mean_radius, &other.skin_scale)
-            && *skin == other.skin
+            && (skin, rebuilds) == (&other.skin, &other.rebuilds)
             && (grid, chunks, fast_movers) == (&other.grid, &other.chunks, &other.fast_movers)
             && (self.has_friction() || bits(neighbours) == bits(&other.neighbours))
             && (cache_valid, pairs_valid) == (&other.cache_valid, &other.pairs_valid)
             && (!cache_valid || *impulse_cache == other.impulse_cache)
-            && *planes == other.planes
-            && (body_balls, proxies) == (&other.body_balls, &other.proxies)
+            && (planes, body_balls, proxies) == (&other.planes, &other.body_balls, &other.proxies)
             && (bodies_are_rows, velocity_changes, surfaces)
                 == (&other.bodies_are_rows, &other.velocity_changes, &other.surfaces)
-            && *gravity_scales == other.gravity_scales
+            && (gravity_scales, stopped) == (&other.gravity_scales, &other.stopped)
             && (body_slots, sleepless) == (&other.body_slots, &other.sleepless)
-            && *stopped == other.stopped
             && walls_identity.is_some() == other.walls_identity.is_some()
-            && (rebuilds, steps_since_build) == (&other.rebuilds, &other.steps_since_build)
+            && *steps_since_build == other.steps_since_build
     }
 }

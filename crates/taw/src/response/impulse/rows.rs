@@ -59,8 +59,8 @@ struct Body<S> {
 /// Rows and bodies of the islands that have not converged.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows<S> {
-    pub rows: Vec<Row<S>>,
-    pub searches: Vec<SearchDirections<S>>,
+    list: Vec<Row<S>>,
+    searches: Vec<SearchDirections<S>>,
     bodies: Vec<Body<S>>,
 }
 
@@ -82,12 +82,12 @@ impl<S: Scalar> Rows<S> {
     ) {
         let active =
             constraints.iter().enumerate().filter(|(_, c)| !islands.of(c.island).converged);
-        self.rows.clear();
-        self.rows.extend(active.map(|(index, c)| Row::new(index as u32, c, marbles)));
+        self.list.clear();
+        self.list.extend(active.map(|(index, c)| Row::new(index as u32, c, marbles)));
         let zero = [Vec3::from([S::zero(); 3]); DIRECTIONS];
         let none = SearchDirections { directions: zero, velocities: zero, velocity_error: zero[0] };
         self.searches.clear();
-        self.searches.resize(self.rows.len(), none);
+        self.searches.resize(self.list.len(), none);
         self.bodies.clear();
         self.bodies.extend((0..marbles.velocity.len()).map(|row| Body {
             motion: marbles.motion(row),
@@ -103,7 +103,7 @@ impl<S: Scalar> Rows<S> {
                 marbles.spin[row] = motion.spin;
             }
         }
-        for row in &self.rows {
+        for row in &self.list {
             constraints[row.constraint as usize].impulse = row.impulse;
         }
     }
@@ -114,7 +114,7 @@ impl<S: Scalar> Rows<S> {
         columns: &'a SolverBodies<'b, S>,
     ) -> (&'a mut [Row<S>], &'a mut [SearchDirections<S>], PackedBodies<'a, 'b, S>) {
         let bodies = PackedBodies { bodies: &mut self.bodies, columns };
-        (&mut self.rows, &mut self.searches, bodies)
+        (&mut self.list, &mut self.searches, bodies)
     }
 }
 
