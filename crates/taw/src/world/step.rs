@@ -35,7 +35,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// The first verb: forces change velocities, velocities change positions, over
-    /// `dt` seconds. For [`Response::EventDriven`], forces become accelerations only: what
+    /// `dt` seconds. For [`EventDriven`](crate::response::Response::EventDriven), forces become accelerations only: what
     /// moves when is decided by the third verb.
     ///
     /// # Errors
@@ -73,9 +73,9 @@ impl<S: Scalar> World<S> {
 
     /// The second verb: finds who touches whom, and by how much.
     ///
-    /// For [`Response::Impulse`], that is also who is so near that gravity closes the
+    /// For [`Impulse`](crate::response::Response::Impulse), that is also who is so near that gravity closes the
     /// gap within two substeps; the displacement of these is zero. For
-    /// [`Response::EventDriven`] it is who may rest on each other at the start; who comes
+    /// [`EventDriven`](crate::response::Response::EventDriven) it is who may rest on each other at the start; who comes
     /// together later is found later.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
