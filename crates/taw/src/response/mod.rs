@@ -51,7 +51,7 @@ pub enum Response {
     Impulse,
     /// Soft contacts in small steps (Catto, 2024, `Solver2D`): masses, restitution, friction,
     /// rolling and torsional friction, and spin if the model's rotation is dynamic. Made for games:
-    /// for thousands of balls, on all threads; nothing tunnels.
+    /// for thousands of balls, on all threads.
     ///
     /// Marbles and the balls of the [swarm](crate::world::World::swarm) are solved as one, with the
     /// threads and the sleep of its [model](crate::swarm::SwarmModel), in the
@@ -63,7 +63,9 @@ pub enum Response {
     /// Balls only, in `f32` in any world, and no periods. Marbles may have their own mass, material,
     /// gravity scale, damping, forces and rotation model; integrators have no effect, nor has tangential
     /// restitution where restitution is zero. Forces are evaluated once a step. A ball stops at thin
-    /// walls and other balls at any speed, whatever the world's [detection](crate::world::Detection).
+    /// walls and other balls at any speed, whatever the world's [detection](crate::world::Detection);
+    /// but rows of touching balls of very unlike masses that a fast one hits may end in another order,
+    /// and a ball that another very fast one drives into a thin wall may get through.
     /// It finds contacts itself, so removing some from the world's lists does not keep marbles apart.
     SoftStep,
     /// Penalty method: forces that grow with penetration. Contacts last for a finite time, many
