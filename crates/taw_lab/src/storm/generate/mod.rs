@@ -22,7 +22,7 @@ const LONGEST: f64 = 5.0;
 pub fn generate(name: Name) -> Case {
     let mut dice = Dice::of(name);
     let mut case = setting(name.kind, &mut dice);
-    let arena = walls::arena(&mut dice);
+    let arena = walls::arena(name.number, &mut dice);
     case.scene = arena.scene;
     case.closed = arena.closed;
     case.differenced = arena.differenced;

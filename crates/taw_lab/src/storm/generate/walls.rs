@@ -22,8 +22,13 @@ pub struct Arena {
     pub differenced: bool,
 }
 
+/// Builders of arenas of scenes whose number is `LATER` modulo `EVERY`: those that came later, so
+/// that all other names stand for the scenes that they always stood for.
+const EVERY: u64 = 12;
+const LATER: u64 = 1;
+
 /// One of many arenas.
-pub fn arena(dice: &mut Dice) -> Arena {
+pub fn arena(number: u64, dice: &mut Dice) -> Arena {
     let size = if dice.chance(0.6) { 1.0 } else { dice.magnitude(0.1, 5.0) };
     let mut arena = Arena {
         scene: Scene::default(),
@@ -40,7 +45,7 @@ pub fn arena(dice: &mut Dice) -> Arena {
         1 => arena.scene.gravity = (dice.upward(0.3) * -9.81).into(),
         _ => {}
     }
-    let builders: &[fn(&mut Arena, &mut Dice)] = &[
+    let first: &[fn(&mut Arena, &mut Dice)] = &[
         open_floor,
         space,
         corner,
@@ -60,6 +65,8 @@ pub fn arena(dice: &mut Dice) -> Arena {
         board,
         belt,
     ];
+    let later: &[fn(&mut Arena, &mut Dice)] = &[paddle, plate, ridge];
+    let builders = if number % EVERY == LATER { later } else { first };
     builders[dice.below(builders.len())](&mut arena, dice);
     arena
 }
@@ -384,4 +391,58 @@ fn belt(arena: &mut Arena, dice: &mut Dice) {
     let way = Vec3::new(dice.between(-3.0, 3.0), 0.0, dice.between(-3.0, 3.0));
     let shape = ShapeDesc::HalfSpace { normal: [0.0, 1.0, 0.0], point: [0.0; 3] };
     arena.wall(shape, Some(KinematicMotion::Conveyor { velocity: way.into() }));
+}
+
+/// A closed box with room for any body beside what moves in it.
+fn roomy_box(arena: &mut Arena, dice: &mut Dice) -> f64 {
+    if dice.chance(0.5) {
+        box_of_planes(arena, dice);
+    } else {
+        box_of_boxes(arena, dice);
+    }
+    let half = arena.high[0] / 0.9;
+    // Bodies are as wide as 0.7 of the size at most; what moves leaves half a box.
+    arena.size = 0.5 * half;
+    half
+}
+
+fn paddle(arena: &mut Arena, dice: &mut Dice) {
+    let half = roomy_box(arena, dice);
+    arena.about = "a paddle in a closed box";
+    let degrees_per_second = dice.magnitude(20.0, 1000.0) * dice.pick(&[-1.0, 1.0]);
+    let motion =
+        KinematicMotion::Rotate { pivot: [0.0; 3], axis: [0.0, 1.0, 0.0], degrees_per_second };
+    // Through the floor, so that nothing gets under it.
+    let sides = [half, 0.4 * half, half * dice.between(0.02, 0.2)];
+    arena.block([0.0, 0.1 * half, 0.0], sides, RotationDesc::default(), Some(motion));
+    (arena.low[1], arena.floor) = (0.4 * half, false);
+    arena.differenced = dice.chance(0.5);
+}
+
+fn plate(arena: &mut Arena, dice: &mut Dice) {
+    let half = roomy_box(arena, dice);
+    arena.about = "a plate that goes to and fro in a closed box";
+    let amplitude = 0.45 * half;
+    let period = TAU * amplitude / dice.magnitude(0.1, 20.0);
+    let motion = swing([amplitude, 0.0, 0.0], 0.0, [0.0, 1.0, 0.0], period);
+    let sides = [half * dice.between(0.02, 0.1), 1.2 * half, 2.2 * half];
+    arena.block([0.0, 0.5 * half, 0.0], sides, RotationDesc::default(), Some(motion));
+    (arena.low[1], arena.floor) = (1.2 * half, false);
+    arena.differenced = dice.chance(0.5);
+}
+
+fn ridge(arena: &mut Arena, dice: &mut Dice) {
+    arena.about = "a height field narrower than bodies";
+    arena.ground();
+    let size = arena.size;
+    let (columns, rows) = (2 + dice.below(2) as u32, 2 + dice.below(6) as u32);
+    let width = size * dice.magnitude(0.02, 0.5) / f64::from(columns - 1);
+    let length = 2.0 * size / f64::from(rows - 1);
+    let heights = (0..columns * rows).map(|_| size * dice.between(0.3, 0.6)).collect();
+    let corner = [-0.5 * width * f64::from(columns - 1), 0.0, -size];
+    arena.build(Build::HeightField { corner, cell: [width, length], columns, heights });
+    (arena.low[1], arena.floor) = (0.6 * size, false);
+    if dice.chance(0.5) {
+        (arena.low[0], arena.high[0]) = (-0.2 * size, 0.2 * size); // onto the ridge
+    }
 }
