@@ -167,12 +167,15 @@ fn a_lift_wakes_only_what_it_comes_to() {
     jump.walls.set(lift, at(0.0)).unwrap();
     steps(&mut jump, 1);
     assert_eq!(asleep(&jump, &ids), 0);
-    // More changes than anybody keeps.
-    for step in 0..3_000_u16 {
-        world.walls.set(lift, at(20.0 + f32::from(step % 7))).unwrap();
+    // More changes than the log has room for, of which one is in the heap.
+    for (there, sleep) in [(3_000, ids.len()), (2_000, 0)] {
+        for step in 0..3_000_u16 {
+            let x = if step == there { 0.0 } else { 20.0 + f32::from(step % 7) };
+            world.walls.set(lift, at(x)).unwrap();
+        }
+        steps(&mut world, 1);
+        assert_eq!(asleep(&world, &ids), sleep);
     }
-    steps(&mut world, 1);
-    assert_eq!(asleep(&world, &ids), 0);
 }
 
 /// Says if a ball touches a wall or another ball, or nearly.
@@ -274,6 +277,34 @@ fn walls_of_another_history_wake_all() {
         steps(world, 2);
     }
     assert_eq!(pair[0], pair[1]);
+}
+
+/// More walls than the log of changes has room for.
+#[test]
+fn a_thousand_walls_that_move_far_away_change_no_bit_of_a_heap() {
+    let (mut still, _, ids) = heap();
+    let at = |i: u16, x: f32| block([x, 0.0, f32::from(i)], [x + 1.0, 1.0, f32::from(i) + 0.5]);
+    let walls = (0..1500).map(|i| still.walls.insert(at(i, 20.0)).unwrap());
+    let walls: Vec<_> = walls.collect();
+    let mut moving = still.clone();
+    for step in 0..300_u16 {
+        for (i, wall) in (0..).zip(&walls) {
+            moving.walls.set(*wall, at(i, 20.0 + 0.01 * f32::from(step))).unwrap();
+        }
+        steps(&mut still, 1);
+        steps(&mut moving, 1);
+        assert_eq!(still.marbles.position(), moving.marbles.position(), "step {step}");
+    }
+    assert_eq!(asleep(&moving, &ids), ids.len());
+    for last in [0, 700, 1499] {
+        let mut world = moving.clone();
+        for (i, wall) in (0..).zip(&walls) {
+            let x = if i == last { -0.5 } else { 24.0 };
+            world.walls.set(*wall, block([x, 0.0, -0.5], [x + 1.0, 1.0, 0.5])).unwrap();
+        }
+        steps(&mut world, 1);
+        assert_eq!(asleep(&world, &ids), 0, "wall {last} came");
+    }
 }
 
 /// Numbers in [0, 1) that look random.

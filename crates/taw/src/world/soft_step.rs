@@ -341,7 +341,7 @@ impl<S: Scalar> World<S> {
 }
 
 /// Inverse mass of a row, in 1/kg.
-fn inverse_mass<S: Scalar>(mass: S) -> f32 {
+pub(super) fn inverse_mass<S: Scalar>(mass: S) -> f32 {
     let [least, most] = INVERSE_MASSES;
     ((S::one() / mass).as_f64() as f32).clamp(least, most)
 }

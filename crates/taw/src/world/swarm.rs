@@ -6,6 +6,7 @@ use super::MarbleId;
 use super::World;
 use super::continuous::{Frame, RelativePath};
 use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
+use super::soft_step::inverse_mass;
 use super::walls::{SubShape, Walls};
 use crate::Error;
 use crate::broad::CollisionLayers;
@@ -112,7 +113,7 @@ impl<S: Scalar> World<S> {
                 .angular_velocity()
                 .get(row)
                 .map_or([0.0; 4], |spin| rows(*spin * radius, 0.0));
-            let inverse_mass = (S::one() / marbles.mass(row)).as_f64() as f32;
+            let inverse_mass = inverse_mass(marbles.mass(row));
             let at = rows(marbles.position()[row].to_vec(), single(radius));
             Some(Proxy::new(*ball, at, rows(marbles.velocity()[row], inverse_mass), spin))
         });

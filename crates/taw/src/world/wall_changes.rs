@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::math::Scalar;
 use crate::shape::Aabb3;
 
-/// Changes kept at most; a reader that is further behind takes all walls for changed.
+/// Changes kept at most; of more than that since the swarm looked, the last one stands for the rest.
+/// A reader that is further behind takes all walls for changed.
 const MAX_CHANGES: usize = 1024;
 
 /// Regions in which walls changed, in order. Two are equal if the swarm knows of all changes, or has
@@ -47,12 +48,21 @@ impl<S: Scalar> WallChanges<S> {
     /// Adds a change.
     pub fn add(&mut self, region: Option<Aabb3<S>>, removed: Option<[u32; 2]>) {
         static NEXT: AtomicU64 = AtomicU64::new(1);
-        if self.log.len() == MAX_CHANGES
-            && let Some(dropped) = self.log.pop_front()
+        let identity = NEXT.fetch_add(1, Ordering::Relaxed);
+        let full = self.log.len() >= MAX_CHANGES;
+        if full
+            && self.base == self.seen
+            && let Some(last) = self.log.back_mut()
+            && last.removed.and(removed).is_none()
         {
+            last.identity = identity;
+            last.region = last.region.zip(region).map(|(one, other)| one.union(&other));
+            last.removed = last.removed.or(removed);
+            return;
+        }
+        if full && let Some(dropped) = self.log.pop_front() {
             self.base = dropped.identity;
         }
-        let identity = NEXT.fetch_add(1, Ordering::Relaxed);
         self.log.push_back(Change { identity, region, removed });
     }
 

@@ -172,3 +172,26 @@ fn marbles_stay_guests_whatever_is_taken_out() {
     assert_eq!(guests(&world), [0, 6]);
     assert!(balls.iter().all(|ball| world.swarm.row(*ball).is_ok()));
 }
+
+/// One lies deep in the floor, where nothing may move it, and a ball falls on it.
+#[test]
+fn a_marble_of_infinite_mass_in_a_wall_stays_a_number() {
+    let responses = [Response::Impulse, Response::SoftStep];
+    for (tier, response) in
+        [Tier::Full, Tier::Lab].into_iter().flat_map(|t| responses.map(|r| (t, r)))
+    {
+        let mut world = world(model(tier), None);
+        let model = Model { response, rotation: Rotation::Dynamic, ..Model::default() };
+        world.set_model(model).unwrap();
+        let mass = Mass::Infinite;
+        let marble = Marble { mass, ..Marble::new(Point3::new(0.0, 0.3, 0.0), 0.5) };
+        let marble = world.marbles.insert(marble).unwrap();
+        let id = world.swarm.insert(&[Ball::new(Point3::new(0.05, 1.4, 0.0), 0.5)]).unwrap()[0];
+        steps(&mut world, 30);
+        let marble = world.marbles.get(marble).unwrap();
+        let (place, velocity) = one(&world, id);
+        for v in [marble.position.to_vec(), marble.velocity, place, velocity] {
+            assert!(v.magnitude2().is_finite(), "{tier:?}, {response:?}: {v:?}");
+        }
+    }
+}
