@@ -399,7 +399,7 @@ mod tests {
     use crate::swarm::kernels::squared;
     use crate::swarm::sweeps::Sweep;
     use crate::swarm::{Ball, Swarm, SwarmModel, Tier};
-    use crate::world::World;
+    use crate::world::{SweptWalls, World};
 
     /// Every pair that might touch, by asking each ball about each.
     fn by_all(swarm: &Swarm) -> BTreeSet<[u32; 2]> {
@@ -450,7 +450,8 @@ mod tests {
                     balls.iter().map(|ball| crate::math::length(ball.velocity) / 60.0);
                 world.swarm.displacement = displacements.collect();
             }
-            world.swarm.build(1.0 / 60.0, &world.walls, &mut |_| ());
+            let walls = SweptWalls::new(&world.walls, 1.0 / 60.0);
+            world.swarm.build(1.0 / 60.0, &walls, &mut |_| ());
             let swarm = &world.swarm;
             assert!(swarm.chunks.len() > 3 && !swarm.fast_movers.rows.is_empty());
             let all = &swarm.chunks[..];

@@ -44,6 +44,7 @@ mod surfaces;
 mod sweeps;
 mod vec3_wide;
 mod wall_contact;
+mod wall_paths;
 mod walls;
 mod workers;
 
@@ -393,8 +394,7 @@ impl Swarm {
         within("pairs", all as f64, 0.0, listed as f64).map(|_| ())
     }
 
-    /// Number of candidate pairs of a ball and a wall. ([`Tier::Lab`] tests all balls against each
-    /// half-space, and does not count these.)
+    /// Number of candidate pairs of a ball and a wall, in [`Tier::Lab`] without half-spaces.
     #[must_use]
     pub fn near_walls(&self) -> usize {
         self.chunks.iter().map(|chunk| chunk.wall_contacts.len()).sum()

@@ -24,7 +24,8 @@ pub enum Tier {
     /// Position projection, the lecture's displacement: balls move straight, and overlapping ones
     /// are moved apart, half each. No masses, friction, restitution or spin. A heap never quite comes
     /// to rest, as nothing holds a ball but its neighbours. No correction makes a ball faster than it
-    /// was, so that overlap is no energy: a ball at rest that is hit moves aside, and stays there.
+    /// was, so that overlap is no energy: a ball at rest that is hit moves aside, and stays there. So
+    /// momentum is not conserved.
     Lab,
     /// Masses, restitution, Coulomb friction and spin, by soft contacts with substeps (TGS soft).
     #[default]

@@ -2,7 +2,6 @@ use std::ops::Range;
 
 use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
-use super::Tier;
 use super::chunk::Chunk;
 use super::impulse_cache::reserve_slack;
 use super::kernels::squared;
@@ -10,6 +9,7 @@ use super::proxies::Proxy;
 use super::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use super::surfaces::{SurfaceOf, WallNumbers};
 use super::wall_contact::WallContact;
+use super::wall_paths::{FAST, WallQuery, along_path};
 use crate::broad::CollisionLayers;
 use crate::constraint::ContactImpulse;
 use crate::math::{Point3, Vec3};
@@ -46,6 +46,20 @@ pub(crate) trait StaticGeometry: Sync {
         layers: CollisionLayers,
         displacement: Vec3<f32>,
     ) -> Option<([u32; 2], Vec3<f32>, f32)>;
+    /// Returns true if a wall may pass a ball within the step of which it goes `way` metres: one that goes
+    /// further itself than the ball is wide.
+    fn is_outrun(&self, ball: &Row, way: f32, layers: CollisionLayers) -> bool;
+    /// Visits the parts of such walls, which the other visits leave out: what the ball touches, and what
+    /// it meets on its way. The distance is that from the plane as it will be at the end of the step. The
+    /// times are what is left of the step and what the way takes, in seconds.
+    fn outrunning_at(
+        &self,
+        ball: &Row,
+        layers: CollisionLayers,
+        displacement: Vec3<f32>,
+        times: [f32; 2],
+        visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
+    );
     /// Layers of a wall.
     fn layers(&self, wall: u32) -> CollisionLayers;
     /// In m/s, and the wall's own material.
@@ -99,7 +113,7 @@ pub(super) fn half_spaces(walls: &dyn StaticGeometry, planes: &mut Vec<HalfSpace
     });
 }
 
-fn center(at: &Row) -> Point3<f32> {
+pub(super) fn center(at: &Row) -> Point3<f32> {
     Point3::new(at[0], at[1], at[2])
 }
 
@@ -197,17 +211,18 @@ impl Chunk {
         std::mem::swap(&mut self.wall_contacts, &mut self.old_wall_contacts);
         self.wall_contacts.clear();
         let old = &self.old_wall_contacts;
-        let kept = |contact: &&WallContact| {
-            contact.is_plane || only_fast && query.displacement(contact.row).is_none()
-        };
+        let is_fast = |row| query.displacement(row).is_some() || query.is_outrun(walls, row);
+        let kept = |contact: &&WallContact| contact.is_plane || only_fast && !is_fast(contact.row);
         self.wall_contacts.extend(old.iter().filter(kept));
         self.has_fast = false;
         for row in &self.near_shapes {
             let (displacement, layers) = (query.displacement(*row), query.surfaces.layers(*row));
             let ball = &query.ball(*row, displacement);
-            if only_fast && displacement.is_none() {
+            let is_outrun = query.is_outrun(walls, *row);
+            if only_fast && displacement.is_none() && !is_outrun {
                 continue;
             }
+            self.has_fast |= is_outrun || displacement.is_some();
             let first = self.wall_contacts.len();
             let wall_contacts = &mut self.wall_contacts;
             let mut visit = |ball: &Row, [wall, part]: [u32; 2], normal: Vec3<f32>, distance| {
@@ -224,9 +239,14 @@ impl Chunk {
                 }
                 wall_contacts.push(contact);
             };
+            if is_outrun {
+                let (ball, way, times) = query.path(*row);
+                walls.outrunning_at(&ball, layers, way, times, &mut |part, normal, distance| {
+                    visit(&ball, part, normal, distance);
+                });
+            }
             let mut reach = query.skin_left[*row as usize].max(0.0);
             if let Some(displacement) = displacement {
-                self.has_fast = true;
                 let way = displacement.magnitude();
                 reach = if query.whole_way { way } else { way.min(FAST * ball[3]) };
                 along_path(walls, (ball, layers), displacement, &mut visit);
@@ -236,114 +256,6 @@ impl Chunk {
             });
         }
         self.wall_contacts.sort_unstable_by_key(WallContact::key);
-    }
-}
-
-/// Visits the walls that a ball meets on its path, and along those that it met.
-fn along_path(
-    walls: &dyn StaticGeometry,
-    (ball, layers): (&Row, CollisionLayers),
-    displacement: Vec3<f32>,
-    visit: &mut impl FnMut(&Row, [u32; 2], Vec3<f32>, f32),
-) {
-    let (mut ball, mut displacement) = (*ball, displacement);
-    // In a corner, it meets three.
-    for _ in 0..3 {
-        if displacement.magnitude() <= FAST * ball[3] {
-            return;
-        }
-        let hit = walls.first_hit_on_path(&ball, layers, displacement);
-        let Some((part, normal, distance)) = hit else {
-            return;
-        };
-        visit(&ball, part, normal, distance);
-        let approach_speed = -displacement.dot(normal);
-        if approach_speed.is_nan() || approach_speed <= 0.0 {
-            return;
-        }
-        let time = ((distance - ball[3]) / approach_speed).clamp(0.0, 1.0);
-        for (x, displacement) in ball.iter_mut().zip::<[f32; 3]>(displacement.into()) {
-            *x += displacement * time;
-        }
-        displacement = (displacement + normal * approach_speed) * (1.0 - time);
-    }
-}
-
-/// Puts a ball that passed into a wall on this displacement back to where it met it. Returns how
-/// far that is, in metres.
-pub(super) fn stop_at_wall(
-    walls: &dyn StaticGeometry,
-    at: &mut Row,
-    layers: CollisionLayers,
-    displacement: Vec3<f32>,
-) -> f32 {
-    let start = center(at) - displacement;
-    let ball = [start.x, start.y, start.z, at[3]];
-    let Some((_, normal, distance)) = walls.first_hit_on_path(&ball, layers, displacement) else {
-        return 0.0;
-    };
-    let approach = -displacement.dot(normal);
-    if approach.is_nan() || approach <= 0.0 {
-        return 0.0;
-    }
-    let back = displacement * (1.0 - ((distance - at[3]) / approach).clamp(0.0, 1.0));
-    for (x, back) in at.iter_mut().zip::<[f32; 3]>(back.into()) {
-        *x -= back;
-    }
-    back.magnitude()
-}
-
-/// Returns true if a ball of this velocity and radius is fast for a step of so many seconds.
-pub(super) fn is_fast(velocity: &Row, time: f32, radius: f32) -> bool {
-    squared(*velocity) * time * time > FAST * FAST * radius * radius
-}
-
-/// A ball that goes further than this in a step, in radii, is fast: the plane across the nearest
-/// point of a wall says little about where it meets it, so it is looked where that is, and again
-/// in each substep.
-const FAST: f32 = 0.5;
-
-/// Input of an update of wall contacts.
-#[derive(Clone, Copy)]
-pub(super) struct WallQuery<'a> {
-    pub tier: Tier,
-    pub at: &'a [Row],
-    /// In the lab's tier, where they were: there, they have moved already.
-    pub velocity: &'a [Row],
-    pub skin_left: &'a [f32],
-    pub surfaces: SurfaceOf<'a>,
-    /// Walls are where they will be at the end of the step; so long before, in seconds, they were
-    /// elsewhere.
-    pub before: f32,
-    /// Lengths of a step and of a substep, in seconds.
-    pub times: [f32; 2],
-    /// Surfaces as far away as a fast ball goes are found, too, not only those that it may pass.
-    pub whole_way: bool,
-    pub gravity: Vec3<f32>,
-}
-
-impl WallQuery<'_> {
-    /// Way of a fast ball in a substep, in metres; none for slow ones.
-    fn displacement(&self, row: u32) -> Option<Vec3<f32>> {
-        let (at, [u, v, w, _]) = (&self.at[row as usize], self.velocity[row as usize]);
-        let [step, substep] = match self.tier {
-            Tier::Lab => [Vec3::new(at[0] - u, at[1] - v, at[2] - w); 2],
-            Tier::Full => {
-                self.times.map(|time| Vec3::new(u, v, w) * time + self.gravity * (time * time))
-            }
-        };
-        (step.magnitude2() > FAST * FAST * at[3] * at[3]).then_some(substep)
-    }
-
-    /// A ball where its way begins.
-    fn ball(&self, row: u32, displacement: Option<Vec3<f32>>) -> Row {
-        let at = self.at[row as usize];
-        match (self.tier, displacement) {
-            (Tier::Lab, Some(displacement)) => {
-                [at[0] - displacement.x, at[1] - displacement.y, at[2] - displacement.z, at[3]]
-            }
-            _ => at,
-        }
     }
 }
 

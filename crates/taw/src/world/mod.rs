@@ -31,6 +31,7 @@ mod solver_columns;
 mod sparse_column;
 mod step;
 mod swarm;
+mod swept_walls;
 #[cfg(test)]
 mod tests;
 mod wall_changes;
@@ -46,6 +47,8 @@ pub use marble::{Damping, Marble};
 pub use marbles::Marbles;
 pub use model::{Detection, Model, Precision};
 pub use query::{ColliderId, Queries, QueryHit, QueryTree};
+#[cfg(test)]
+pub(crate) use swept_walls::SweptWalls;
 pub use wall_shape::WallShape;
 pub use walls::{WallId, Walls};
 

@@ -6,6 +6,7 @@ use cgmath::{EuclideanSpace, Zero};
 use super::method::Method;
 use super::soft_impacts::PredictedImpacts;
 use super::swarm::MAX_COORDINATE;
+use super::swept_walls::SweptWalls;
 use super::{MarbleId, World};
 use crate::Error;
 use crate::broad::CollisionLayers;
@@ -128,7 +129,8 @@ impl<S: Scalar> World<S> {
             return; // the third verb says so
         }
         let (dt, gravity) = (self.scratch.soft_step.dt, cast_vector(self.settings.gravity));
-        self.swarm.prepare(dt, gravity, &self.walls, self.walls.identity());
+        let walls = SweptWalls::new(&self.walls, S::from_f64(dt.into()));
+        self.swarm.prepare(dt, gravity, &walls, self.walls.identity());
         self.walls.mark_seen();
         self.scratch.soft_step.found = Some((dt, self.walls.identity()));
         let reach = 2.0 * length(gravity) * dt * dt;
@@ -149,11 +151,12 @@ impl<S: Scalar> World<S> {
         self.walls.update_tree();
         let (step, identity) = (dt.as_f64() as f32, self.walls.identity());
         let found = self.scratch.soft_step.found.take();
+        let walls = SweptWalls::new(&self.walls, dt);
         if found != Some((step, identity)) || !self.swarm.is_prepared() {
-            self.swarm.prepare(step, cast_vector(self.settings.gravity), &self.walls, identity);
-            self.walls.mark_seen();
+            self.swarm.prepare(step, cast_vector(self.settings.gravity), &walls, identity);
         }
-        self.swarm.finish(step, self.settings.model.substeps, &self.walls);
+        self.swarm.finish(step, self.settings.model.substeps, &walls);
+        self.walls.mark_seen();
         let marbles = &self.scratch.soft_step.marble_of_slot;
         let stopped = self.swarm.stopped_slots();
         let stopped = stopped.filter_map(|slot| marbles.get(slot as usize).copied());

@@ -1,20 +1,16 @@
-//! The swarm of a world, and what its balls meet there.
+//! The swarm of a world.
 
-use cgmath::{EuclideanSpace, InnerSpace};
+use cgmath::EuclideanSpace;
 
 use super::MarbleId;
 use super::World;
-use super::continuous::{Frame, RelativePath};
-use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
 use super::soft_step::inverse_mass;
-use super::walls::{SubShape, Walls};
+use super::swept_walls::SweptWalls;
 use crate::Error;
-use crate::broad::CollisionLayers;
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+use crate::math::{Scalar, Vec3, cast_point, cast_vector};
 use crate::motion::{Motion, acceleration_in_step};
-use crate::response::{Material, Response};
-use crate::shape::{Aabb, Aabb3, BoundedShape, PointProjection, Sphere};
-use crate::swarm::{BallId, Proxy, Stage, StaticGeometry, VelocityChange};
+use crate::response::Response;
+use crate::swarm::{BallId, Proxy, Stage, VelocityChange};
 
 impl<S: Scalar> World<S> {
     /// Moves the [swarm](Self::swarm) on, which a step does after the marbles. `observe` is told
@@ -42,7 +38,8 @@ impl<S: Scalar> World<S> {
         let (gravity, changes) =
             (cast_vector(self.settings.gravity), self.field_changes_of_swarm(step));
         self.swarm.set_velocity_changes(changes);
-        self.swarm.step(dt, gravity, &self.walls, self.walls.identity(), observe);
+        let walls = SweptWalls::new(&self.walls, step);
+        self.swarm.step(dt, gravity, &walls, self.walls.identity(), observe);
         self.walls.mark_seen();
         self.write_back_proxies();
         Ok(())
@@ -139,141 +136,5 @@ impl<S: Scalar> World<S> {
     }
 }
 
-/// Overlap in radii at the end of a path up to which a ball only grazes a wall.
-const GRAZES: f64 = 0.02;
 /// In metres and m/s.
 pub(super) const MAX_COORDINATE: f32 = 1e12;
-
-impl<S: Scalar> Walls<S> {
-    /// Time at which a sphere meets the first part that it passes into on a path, as a fraction of
-    /// it. Its core, or how deep it comes in the end, says whether it passes into a wall: one that
-    /// grazes it goes on.
-    fn time_of_passage(
-        &self,
-        (sphere, layers): (&Sphere<S>, CollisionLayers),
-        displacement: Vec3<S>,
-        reached: &Aabb3<S>,
-    ) -> Option<S> {
-        let core = sphere.radius * S::from_f64(0.5);
-        let path = RelativePath { start: sphere.center, displacement, frame: Frame::Standing };
-        let deep = sphere.radius * S::from_f64(1.0 - GRAZES);
-        let mut first: Option<S> = None;
-        self.for_each_colliding(reached, layers, |part| {
-            let distance = |point| self.project_point(part, point).distance;
-            let ends_in_it = || {
-                let end = distance(sphere.center + displacement);
-                end < deep && end < distance(sphere.center)
-            };
-            let passes = ends_in_it() || self.time_of_impact(part, core, &path).is_some();
-            let stop = passes.then(|| self.time_of_impact(part, sphere.radius, &path)).flatten();
-            if let Some(stop) = stop {
-                first = Some(first.map_or(stop.time, |time| time.min(stop.time)));
-            }
-        });
-        first
-    }
-}
-
-impl<S: Scalar> StaticGeometry for Walls<S> {
-    fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<f32>, f32)) {
-        for (wall, plane) in Walls::planes(self) {
-            let normal: Vec3<f32> = cast_vector(plane.normal());
-            visit(wall, normal.normalize(), plane.offset().as_f64() as f32);
-        }
-    }
-
-    fn has_shapes(&self) -> bool {
-        !self.are_half_spaces()
-    }
-
-    fn visit_removals_since(&self, identity: u64, visit: &mut dyn FnMut([u32; 2])) -> bool {
-        self.changes().visit_removals_since(identity, visit)
-    }
-
-    fn visit_changes_since(&self, identity: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool {
-        self.changes().visit_since(identity, |region| {
-            let corner = |point: Point3<S>| cast_point::<S, f32>(point).into();
-            visit([corner(region.min), corner(region.max)]);
-        })
-    }
-
-    fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool {
-        let bounds = Aabb { min: cast_point(low.into()), max: cast_point(high.into()) };
-        let mut any = false;
-        Walls::for_each_in_box(self, &bounds, |_| any = true);
-        any
-    }
-
-    fn shapes_at(
-        &self,
-        &[x, y, z, radius]: &[f32; 4],
-        layers: CollisionLayers,
-        reach: f32,
-        visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
-    ) {
-        let number = |x: f32| S::from_f64(f64::from(x));
-        let center = cast_point(Point3::new(x, y, z));
-        let sphere = Sphere { center, radius: number(radius) };
-        let mut near = Vec::new();
-        candidate_sub_shapes(self, (&sphere, layers), number(reach), &mut near);
-        if near.len() > 1 {
-            remove_ghost_collisions(self, (&sphere, layers), &mut near);
-        }
-        for Candidate { part: SubShape { wall, index: part }, nearest } in near {
-            let normal: Vec3<f32> = cast_vector(nearest.normal);
-            visit([wall, part], normal, nearest.distance.as_f64() as f32);
-        }
-    }
-
-    fn first_hit_on_path(
-        &self,
-        &[x, y, z, radius]: &[f32; 4],
-        layers: CollisionLayers,
-        displacement: Vec3<f32>,
-    ) -> Option<([u32; 2], Vec3<f32>, f32)> {
-        let number = |x: f32| S::from_f64(f64::from(x));
-        let center: Point3<S> = cast_point(Point3::new(x, y, z));
-        let sphere = Sphere { center, radius: number(radius) };
-        let displacement: Vec3<S> = cast_vector(displacement);
-        let (start, end) =
-            (sphere.bounding_box(), Sphere { center: center + displacement, ..sphere });
-        let reached = start.union(&end.bounding_box());
-        let time = self.time_of_passage((&sphere, layers), displacement, &reached)?;
-        // Before the part that it passes into it may meet another one, of which that is the
-        // continuation: then the edge between them is no obstacle.
-        let path = RelativePath { start: center, displacement, frame: Frame::Standing };
-        let mut first: Option<(SubShape, S, PointProjection<S>)> = None;
-        self.for_each_colliding(&reached, layers, |part| {
-            let Some(stop) = self.time_of_impact(part, sphere.radius, &path) else { return };
-            if stop.time > time || first.as_ref().is_some_and(|(_, time, _)| stop.time >= *time) {
-                return;
-            }
-            let nearest = self.project_point(part, center + displacement * stop.time);
-            let approach = -displacement.dot(nearest.normal);
-            if stop.time == time || approach > displacement.magnitude() * S::from_f64(GRAZES) {
-                first = Some((part, stop.time, nearest));
-            }
-        });
-        let (part, time, nearest) = first?;
-        // The plane there is nearer by the displacement up to it.
-        let distance = nearest.distance - displacement.dot(nearest.normal) * time;
-        let normal: Vec3<f32> = cast_vector(nearest.normal);
-        Some(([part.wall, part.index], normal, distance.as_f64() as f32))
-    }
-
-    fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32> {
-        cast_vector(crate::response::Colliders::surface_velocity(
-            self,
-            wall as usize,
-            cast_point(point),
-        ))
-    }
-
-    fn layers(&self, wall: u32) -> CollisionLayers {
-        self.layers_of_row(wall)
-    }
-
-    fn material(&self, wall: u32) -> Option<Material<f32>> {
-        self.material_of_row(wall as usize).map(Material::cast)
-    }
-}

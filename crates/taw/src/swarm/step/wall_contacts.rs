@@ -6,9 +6,8 @@ use crate::math::Vec3;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::wall_contact::{WallContact, xyz};
-use crate::swarm::walls::{
-    Balls, HalfSpace, WallQuery, find, is_fast, near_shapes, shapes_of, stop_at_wall,
-};
+use crate::swarm::wall_paths::{WallQuery, is_fast, stop_at_wall};
+use crate::swarm::walls::{Balls, HalfSpace, find, near_shapes, shapes_of};
 use crate::swarm::workers::{DisjointSlice, parallel_for};
 use crate::swarm::{Stage, StaticGeometry, Swarm, Tier};
 

@@ -13,8 +13,7 @@ use super::{Detection, World};
 use crate::contact::Contact;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
 use marbles::{Meeting, Partners, Path};
-use moving_walls::MovingWall;
-pub(super) use moving_walls::{Frame, RelativePath};
+pub(super) use moving_walls::{Frame, MovingWall, RelativePath};
 use walls::Bend;
 
 /// Penetration of marbles that are stopped at each other, relative to the sum of their radii: a
@@ -23,7 +22,7 @@ const OVERLAP: f64 = 1e-5;
 
 /// Relative motion beyond this fraction of the smaller radius may tunnel, or be resolved to the
 /// wrong side, because the end of a step no longer tells where they met. Such marbles are stopped.
-const MAX_FREE_MOTION: f64 = 0.5;
+pub(super) const MAX_FREE_MOTION: f64 = 0.5;
 
 /// Maximum number of bends of a path in a substep: two surfaces hold a marble to an edge, three to
 /// a corner, and a bowl of triangles has one after the other.

@@ -10,7 +10,7 @@ use crate::world::walls::{SubShape, Walls};
 
 /// Wall, other than a half-space, that moves within the substep.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct MovingWall<S> {
+pub(in crate::world) struct MovingWall<S> {
     pub row: u32,
     pub motion: WallMotion<S>,
     /// Bounding boxes at the end of the substep, and of all its poses.

@@ -1,0 +1,140 @@
+//! Paths of fast balls to walls, and of balls to fast walls.
+
+use cgmath::InnerSpace;
+
+use super::Tier;
+use super::kernels::squared;
+use super::simd::Row;
+use super::surfaces::SurfaceOf;
+use super::walls::{StaticGeometry, center};
+use crate::broad::CollisionLayers;
+use crate::math::Vec3;
+
+/// Visits the walls that a ball meets on its path, and along those that it met.
+pub(super) fn along_path(
+    walls: &dyn StaticGeometry,
+    (ball, layers): (&Row, CollisionLayers),
+    displacement: Vec3<f32>,
+    visit: &mut impl FnMut(&Row, [u32; 2], Vec3<f32>, f32),
+) {
+    let (mut ball, mut displacement) = (*ball, displacement);
+    // In a corner, it meets three.
+    for _ in 0..3 {
+        if displacement.magnitude() <= FAST * ball[3] {
+            return;
+        }
+        let hit = walls.first_hit_on_path(&ball, layers, displacement);
+        let Some((part, normal, distance)) = hit else {
+            return;
+        };
+        visit(&ball, part, normal, distance);
+        let approach_speed = -displacement.dot(normal);
+        if approach_speed.is_nan() || approach_speed <= 0.0 {
+            return;
+        }
+        let time = ((distance - ball[3]) / approach_speed).clamp(0.0, 1.0);
+        for (x, displacement) in ball.iter_mut().zip::<[f32; 3]>(displacement.into()) {
+            *x += displacement * time;
+        }
+        displacement = (displacement + normal * approach_speed) * (1.0 - time);
+    }
+}
+
+/// Puts a ball that passed into a wall on this displacement back to where it met it. Returns how
+/// far that is, in metres.
+pub(super) fn stop_at_wall(
+    walls: &dyn StaticGeometry,
+    at: &mut Row,
+    layers: CollisionLayers,
+    displacement: Vec3<f32>,
+) -> f32 {
+    let start = center(at) - displacement;
+    let ball = [start.x, start.y, start.z, at[3]];
+    let Some((_, normal, distance)) = walls.first_hit_on_path(&ball, layers, displacement) else {
+        return 0.0;
+    };
+    let approach = -displacement.dot(normal);
+    if approach.is_nan() || approach <= 0.0 {
+        return 0.0;
+    }
+    let back = displacement * (1.0 - ((distance - at[3]) / approach).clamp(0.0, 1.0));
+    for (x, back) in at.iter_mut().zip::<[f32; 3]>(back.into()) {
+        *x -= back;
+    }
+    back.magnitude()
+}
+
+/// Returns true if a ball of this velocity and radius is fast for a step of so many seconds.
+pub(super) fn is_fast(velocity: &Row, time: f32, radius: f32) -> bool {
+    squared(*velocity) * time * time > FAST * FAST * radius * radius
+}
+
+/// A ball that goes further than this in a step, in radii, is fast: the plane across the nearest
+/// point of a wall says little about where it meets it, so it is looked where that is, and again
+/// in each substep.
+pub(super) const FAST: f32 = 0.5;
+
+/// Input of an update of wall contacts.
+#[derive(Clone, Copy)]
+pub(super) struct WallQuery<'a> {
+    pub tier: Tier,
+    pub at: &'a [Row],
+    /// In the lab's tier, where they were: there, they have moved already.
+    pub velocity: &'a [Row],
+    pub skin_left: &'a [f32],
+    pub surfaces: SurfaceOf<'a>,
+    /// Walls are where they will be at the end of the step; so long before, in seconds, they were
+    /// elsewhere.
+    pub before: f32,
+    /// Lengths of a step and of a substep, in seconds.
+    pub times: [f32; 2],
+    /// Surfaces as far away as a fast ball goes are found, too, not only those that it may pass.
+    pub whole_way: bool,
+    pub gravity: Vec3<f32>,
+}
+
+impl WallQuery<'_> {
+    /// Ways of a ball in the step and in a substep, in metres.
+    fn ways(&self, row: u32) -> [Vec3<f32>; 2] {
+        let (at, [u, v, w, _]) = (&self.at[row as usize], self.velocity[row as usize]);
+        match self.tier {
+            Tier::Lab => [Vec3::new(at[0] - u, at[1] - v, at[2] - w); 2],
+            Tier::Full => {
+                self.times.map(|time| Vec3::new(u, v, w) * time + self.gravity * (time * time))
+            }
+        }
+    }
+
+    /// Way of a fast ball in a substep, in metres; none for slow ones.
+    pub fn displacement(&self, row: u32) -> Option<Vec3<f32>> {
+        let [step, substep] = self.ways(row);
+        let far = FAST * self.at[row as usize][3];
+        (step.magnitude2() > far * far).then_some(substep)
+    }
+
+    /// Returns true if a wall may pass a ball within the step.
+    pub fn is_outrun(&self, walls: &dyn StaticGeometry, row: u32) -> bool {
+        let [step, _] = self.ways(row);
+        walls.is_outrun(&self.at[row as usize], step.magnitude(), self.surfaces.layers(row))
+    }
+
+    /// A ball where its way in a substep begins, that way in metres, and what is then left of the step
+    /// and how long the way takes, in seconds.
+    pub fn path(&self, row: u32) -> (Row, Vec3<f32>, [f32; 2]) {
+        let [_, way] = self.ways(row);
+        let [step, substep] = self.times;
+        let left = if self.tier == Tier::Lab { step } else { self.before };
+        (self.ball(row, Some(way)), way, [left, substep])
+    }
+
+    /// A ball where its way begins.
+    pub fn ball(&self, row: u32, displacement: Option<Vec3<f32>>) -> Row {
+        let at = self.at[row as usize];
+        match (self.tier, displacement) {
+            (Tier::Lab, Some(displacement)) => {
+                [at[0] - displacement.x, at[1] - displacement.y, at[2] - displacement.z, at[3]]
+            }
+            _ => at,
+        }
+    }
+}

@@ -1,0 +1,282 @@
+//! Walls in a step, as the balls of a swarm meet them.
+
+use cgmath::InnerSpace;
+
+use super::continuous::{Frame, MAX_FREE_MOTION, MovingWall, RelativePath};
+use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
+use super::walls::{SubShape, Walls};
+use crate::broad::CollisionLayers;
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
+use crate::motion::WallMotion;
+use crate::response::{Colliders as _, Material};
+use crate::shape::{Aabb, Aabb3, BoundedShape, PointProjection, Sphere};
+use crate::swarm::StaticGeometry;
+
+/// Overlap in radii at the end of a path up to which a ball only grazes a wall.
+const GRAZES: f64 = 0.02;
+
+/// Walls in a step, as the balls of a swarm meet them.
+///
+/// Walls are where they will be at the end of it. Of one that goes further in the step than a ball is
+/// wide, that says little: the ball may be beyond it by then. So it is met on the ball's path as the wall
+/// sees it.
+pub(crate) struct SweptWalls<'a, S> {
+    walls: &'a Walls<S>,
+    moving: Vec<MovingWall<S>>,
+    /// Length of the step, in seconds.
+    dt: S,
+}
+
+impl<'a, S: Scalar> SweptWalls<'a, S> {
+    /// Walls in a step of `dt` seconds.
+    pub fn new(walls: &'a Walls<S>, dt: S) -> Self {
+        let mut moving = Vec::new();
+        MovingWall::list(walls, dt, &mut moving);
+        Self { walls, moving, dt }
+    }
+
+    /// Returns true if a wall goes so far in the step that it may pass a ball there.
+    fn outruns(&self, wall: &MovingWall<S>, ball: &Sphere<S>) -> bool {
+        let WallMotion { velocity, angular_velocity, pivot } = wall.motion;
+        let speed = length(velocity) + length(angular_velocity) * length(ball.center - pivot);
+        speed * self.dt > ball.radius * S::from_f64(MAX_FREE_MOTION)
+    }
+
+    /// Returns true if the wall in a row may pass a ball.
+    fn is_outrunning(&self, row: u32, ball: &Sphere<S>) -> bool {
+        let moving = self.moving.binary_search_by_key(&row, |wall| wall.row);
+        moving.is_ok_and(|i| self.outruns(&self.moving[i], ball))
+    }
+
+    /// Visits what a ball touches of a wall that may pass it, as it was `before` seconds before the
+    /// end, and then what it meets of it on this path of `time` seconds: each with the plane there, as it
+    /// is at the end.
+    fn visit_outrunning(
+        &self,
+        wall: &MovingWall<S>,
+        ball: &Sphere<S>,
+        displacement: Vec3<S>,
+        [before, time]: [S; 2],
+        visit: &mut dyn FnMut(SubShape, Vec3<S>, S),
+    ) {
+        let motion = wall.motion;
+        // So long after the begin of the path the ball is there.
+        let mut visit_at = |part, center: Point3<S>, after: S| {
+            let pose = motion.pose_before(before - after);
+            let nearest = self.walls.project_point(part, pose.inverse_transform_point(center));
+            let normal = pose.rotation * nearest.normal;
+            let surface = motion.velocity_at(ball.center - normal * ball.radius).dot(normal);
+            let along = (ball.center - center).dot(normal);
+            visit(part, normal, nearest.distance + along - surface * (before - after));
+        };
+        // Up to the end, since that is where the wall is known.
+        let path = RelativePath {
+            start: ball.center,
+            displacement: displacement * (before / time),
+            frame: Frame::Moving(motion, before),
+        };
+        let mut first: Option<(S, SubShape)> = None;
+        wall.for_each_near_path(self.walls, &path, ball.radius, |part| {
+            let Some(hit) = self.walls.time_of_impact(part, ball.radius, &path) else { return };
+            if hit.time * before <= time && first.is_none_or(|(time, _)| hit.time < time) {
+                first = Some((hit.time, part));
+            }
+        });
+        if let Some((at, part)) = first {
+            visit_at(part, ball.center + path.displacement * at, before * at);
+        }
+        let here = Sphere { center: path.at(S::zero()), ..*ball };
+        let reach = ball.radius * S::from_f64(MAX_FREE_MOTION);
+        let mut near = Vec::new();
+        candidate_sub_shapes(self.walls, (&here, CollisionLayers::ALL), reach, &mut near);
+        near.retain(|it| it.part.wall == wall.row);
+        if near.len() > 1 {
+            remove_ghost_collisions(self.walls, (&here, CollisionLayers::ALL), &mut near);
+        }
+        for Candidate { part, .. } in near {
+            visit_at(part, ball.center, S::zero());
+        }
+    }
+
+    /// Time at which a sphere meets the first part that it passes into on a path, as a fraction of
+    /// it. Its core, or how deep it comes in the end, says whether it passes into a wall: one that
+    /// grazes it goes on.
+    fn time_of_passage(
+        &self,
+        (sphere, layers): (&Sphere<S>, CollisionLayers),
+        displacement: Vec3<S>,
+        reached: &Aabb3<S>,
+    ) -> Option<S> {
+        let core = sphere.radius * S::from_f64(0.5);
+        let path = RelativePath { start: sphere.center, displacement, frame: Frame::Standing };
+        let deep = sphere.radius * S::from_f64(1.0 - GRAZES);
+        let mut first: Option<S> = None;
+        self.for_each_standing(reached, (sphere, layers), |part| {
+            let distance = |point| self.walls.project_point(part, point).distance;
+            let ends_in_it = || {
+                let end = distance(sphere.center + displacement);
+                end < deep && end < distance(sphere.center)
+            };
+            let hits = |radius| self.walls.time_of_impact(part, radius, &path);
+            let passes = ends_in_it() || hits(core).is_some();
+            let stop = passes.then(|| hits(sphere.radius)).flatten();
+            if let Some(stop) = stop {
+                first = Some(first.map_or(stop.time, |time| time.min(stop.time)));
+            }
+        });
+        first
+    }
+
+    /// Visits the parts that may overlap a box, of walls that a ball collides with and that do not pass
+    /// it.
+    fn for_each_standing(
+        &self,
+        bounds: &Aabb3<S>,
+        (ball, layers): (&Sphere<S>, CollisionLayers),
+        mut visit: impl FnMut(SubShape),
+    ) {
+        self.walls.for_each_colliding(bounds, layers, |part| {
+            if !self.is_outrunning(part.wall, ball) {
+                visit(part);
+            }
+        });
+    }
+}
+
+impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
+    fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<f32>, f32)) {
+        for (wall, plane) in self.walls.planes() {
+            let normal: Vec3<f32> = cast_vector(plane.normal());
+            visit(wall, normal.normalize(), plane.offset().as_f64() as f32);
+        }
+    }
+
+    fn has_shapes(&self) -> bool {
+        !self.walls.are_half_spaces()
+    }
+
+    fn visit_removals_since(&self, identity: u64, visit: &mut dyn FnMut([u32; 2])) -> bool {
+        self.walls.changes().visit_removals_since(identity, visit)
+    }
+
+    fn visit_changes_since(&self, identity: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool {
+        self.walls.changes().visit_since(identity, |region| {
+            let corner = |point: Point3<S>| cast_point::<S, f32>(point).into();
+            visit([corner(region.min), corner(region.max)]);
+        })
+    }
+
+    fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool {
+        let bounds = Aabb { min: cast_point(low.into()), max: cast_point(high.into()) };
+        let mut any = self.moving.iter().any(|wall| wall.is_near(&bounds));
+        self.walls.for_each_in_box(&bounds, |_| any = true);
+        any
+    }
+
+    fn shapes_at(
+        &self,
+        ball: &[f32; 4],
+        layers: CollisionLayers,
+        reach: f32,
+        visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
+    ) {
+        let (sphere, reach) = (sphere(*ball), S::from_f64(reach.into()));
+        let mut near = Vec::new();
+        candidate_sub_shapes(self.walls, (&sphere, layers), reach, &mut near);
+        near.retain(|it| !self.is_outrunning(it.part.wall, &sphere));
+        if near.len() > 1 {
+            remove_ghost_collisions(self.walls, (&sphere, layers), &mut near);
+        }
+        for Candidate { part: SubShape { wall, index: part }, nearest } in near {
+            let normal: Vec3<f32> = cast_vector(nearest.normal);
+            visit([wall, part], normal, nearest.distance.as_f64() as f32);
+        }
+    }
+
+    fn first_hit_on_path(
+        &self,
+        ball: &[f32; 4],
+        layers: CollisionLayers,
+        displacement: Vec3<f32>,
+    ) -> Option<([u32; 2], Vec3<f32>, f32)> {
+        let sphere: Sphere<S> = sphere(*ball);
+        let center = sphere.center;
+        let displacement: Vec3<S> = cast_vector(displacement);
+        let (start, end) =
+            (sphere.bounding_box(), Sphere { center: center + displacement, ..sphere });
+        let reached = start.union(&end.bounding_box());
+        let time = self.time_of_passage((&sphere, layers), displacement, &reached)?;
+        // Before the part that it passes into it may meet another one, of which that is the
+        // continuation: then the edge between them is no obstacle.
+        let path = RelativePath { start: center, displacement, frame: Frame::Standing };
+        let mut first: Option<(SubShape, S, PointProjection<S>)> = None;
+        self.for_each_standing(&reached, (&sphere, layers), |part| {
+            let Some(stop) = self.walls.time_of_impact(part, sphere.radius, &path) else { return };
+            if stop.time > time || first.as_ref().is_some_and(|(_, time, _)| stop.time >= *time) {
+                return;
+            }
+            let nearest = self.walls.project_point(part, center + displacement * stop.time);
+            let approach = -displacement.dot(nearest.normal);
+            if stop.time == time || approach > displacement.magnitude() * S::from_f64(GRAZES) {
+                first = Some((part, stop.time, nearest));
+            }
+        });
+        let (part, time, nearest) = first?;
+        // The plane there is nearer by the displacement up to it.
+        let distance = nearest.distance - displacement.dot(nearest.normal) * time;
+        let normal: Vec3<f32> = cast_vector(nearest.normal);
+        Some(([part.wall, part.index], normal, distance.as_f64() as f32))
+    }
+
+    fn is_outrun(&self, &[x, y, z, radius]: &[f32; 4], way: f32, layers: CollisionLayers) -> bool {
+        let ball = sphere([x, y, z, radius]);
+        let bounds = Sphere { radius: S::from_f64((radius + way).into()), ..ball }.bounding_box();
+        let passes = |wall: &MovingWall<S>| {
+            wall.is_near(&bounds) && wall.collides(self.walls, layers) && self.outruns(wall, &ball)
+        };
+        self.moving.iter().any(passes)
+    }
+
+    fn outrunning_at(
+        &self,
+        ball: &[f32; 4],
+        layers: CollisionLayers,
+        displacement: Vec3<f32>,
+        times: [f32; 2],
+        visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
+    ) {
+        let (ball, displacement) = (sphere(*ball), cast_vector(displacement));
+        let times = times.map(|time| S::from_f64(time.into()));
+        for wall in &self.moving {
+            if wall.collides(self.walls, layers) && self.outruns(wall, &ball) {
+                self.visit_outrunning(
+                    wall,
+                    &ball,
+                    displacement,
+                    times,
+                    &mut |part, normal, far| {
+                        visit([part.wall, part.index], cast_vector(normal), far.as_f64() as f32);
+                    },
+                );
+            }
+        }
+    }
+
+    fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32> {
+        cast_vector(self.walls.surface_velocity(wall as usize, cast_point(point)))
+    }
+
+    fn layers(&self, wall: u32) -> CollisionLayers {
+        self.walls.layers_of_row(wall)
+    }
+
+    fn material(&self, wall: u32) -> Option<Material<f32>> {
+        self.walls.material_of_row(wall as usize).map(Material::cast)
+    }
+}
+
+/// A ball of a swarm.
+fn sphere<S: Scalar>(ball: [f32; 4]) -> Sphere<S> {
+    let [x, y, z, radius] = ball.map(|x| S::from_f64(x.into()));
+    Sphere { center: Point3::new(x, y, z), radius }
+}

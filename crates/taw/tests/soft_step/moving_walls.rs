@@ -1,0 +1,54 @@
+//! Walls that move further in a step than balls are wide.
+
+use taw::prelude::*;
+use taw::shape::Aabb;
+
+use crate::world;
+
+/// Returns true if a plate that comes along x passes through a ball, at these speeds in m/s.
+fn passes([speed, ball_speed]: [f64; 2], thickness: f64, substeps: u32, restitution: f64) -> bool {
+    const DT: f64 = 1.0 / 60.0;
+    let mut world = world::<f64>(substeps);
+    world.set_gravity(Vec3::new(0.0, 0.0, 0.0)).unwrap();
+    let at = |x: f64| Aabb {
+        min: Point3::new(x - thickness, -1.0, -1.0),
+        max: Point3::new(x, 1.0, 1.0),
+    };
+    let begin = -0.7 * speed.max(ball_speed) * 5.0 * DT - 0.2;
+    let wall = world.walls.insert(at(begin)).unwrap();
+    let material = Some(Material { restitution, ..Material::default() });
+    let velocity = Vec3::new(-ball_speed, 0.1, 0.05);
+    let ball = Marble { velocity, material, ..Marble::new(Point3::new(0.0, 0.02, 0.01), 0.05) };
+    let id = world.marbles.insert(ball).unwrap();
+    let motion = taw::motion::WallMotion {
+        velocity: Vec3::new(speed, 0.0, 0.0),
+        angular_velocity: Vec3::new(0.0, 0.0, 0.0),
+        pivot: Point3::new(0.0, 0.0, 0.0),
+    };
+    (1..=30).any(|step| {
+        let x = begin + speed * f64::from(step) * DT;
+        world.walls.set(wall, at(x)).unwrap();
+        world.walls.set_motion(wall, Some(motion)).unwrap();
+        world.step(DT).unwrap();
+        world.marbles.get(id).unwrap().position.x < x - 0.5 * thickness
+    })
+}
+
+#[test]
+fn no_plate_passes_through_a_ball() {
+    let mut passed = Vec::new();
+    for substeps in [1, 2, 4] {
+        for speed in [1.0, 3.0, 5.0, 8.0, 12.0, 20.0, 40.0] {
+            for ball_speed in [0.0, 1.0, 10.0, 40.0] {
+                for thickness in [0.01, 0.1, 0.5] {
+                    for restitution in [0.0, 0.5] {
+                        if passes([speed, ball_speed], thickness, substeps, restitution) {
+                            passed.push((substeps, speed, ball_speed, thickness, restitution));
+                        }
+                    }
+                }
+            }
+        }
+    }
+    assert!(passed.is_empty(), "{} of 504: {passed:?}", passed.len());
+}
