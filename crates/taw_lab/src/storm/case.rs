@@ -147,10 +147,14 @@ pub enum Kind {
     Impulse,
     /// [`Response::Impulse`], swept.
     ImpulseSwept,
-    /// [`Response::Penalty`] by springs and dashpots.
+    /// [`Response::Penalty`] by springs and dashpots, discrete.
     SpringDashpot,
-    /// [`Response::Penalty`] by Hertz and Mindlin.
+    /// [`Response::Penalty`] by springs and dashpots, swept.
+    SpringDashpotSwept,
+    /// [`Response::Penalty`] by Hertz and Mindlin, discrete.
     HertzMindlin,
+    /// [`Response::Penalty`] by Hertz and Mindlin, swept.
+    HertzMindlinSwept,
     /// [`Response::EventDriven`].
     EventDriven,
     /// [`Response::SoftStep`], with or without a swarm beside marbles.
@@ -163,13 +167,15 @@ pub enum Kind {
 
 impl Kind {
     /// All of them.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 12] = [
         Self::Displacement,
         Self::DisplacementSwept,
         Self::Impulse,
         Self::ImpulseSwept,
         Self::SpringDashpot,
+        Self::SpringDashpotSwept,
         Self::HertzMindlin,
+        Self::HertzMindlinSwept,
         Self::EventDriven,
         Self::SoftStep,
         Self::SwarmLab,
@@ -185,11 +191,23 @@ impl Kind {
             Self::Impulse => "impulse",
             Self::ImpulseSwept => "impulse/swept",
             Self::SpringDashpot => "spring-dashpot",
+            Self::SpringDashpotSwept => "spring-dashpot/swept",
             Self::HertzMindlin => "hertz-mindlin",
+            Self::HertzMindlinSwept => "hertz-mindlin/swept",
             Self::EventDriven => "event-driven",
             Self::SoftStep => "soft-step",
             Self::SwarmLab => "swarm/lab",
             Self::SwarmFull => "swarm/full",
+        }
+    }
+
+    /// Contact law of a kind whose contacts are springs.
+    #[must_use]
+    pub fn law(self) -> Option<ContactLaw> {
+        match self {
+            Self::SpringDashpot | Self::SpringDashpotSwept => Some(ContactLaw::SpringDashpot),
+            Self::HertzMindlin | Self::HertzMindlinSwept => Some(ContactLaw::HertzMindlin),
+            _ => None,
         }
     }
 
@@ -207,8 +225,12 @@ impl Kind {
             (Response::Displacement, Detection::Swept) => Self::DisplacementSwept,
             (Response::Impulse, Detection::Discrete) => Self::Impulse,
             (Response::Impulse, Detection::Swept) => Self::ImpulseSwept,
-            (Response::Penalty(ContactLaw::SpringDashpot), _) => Self::SpringDashpot,
-            (Response::Penalty(ContactLaw::HertzMindlin), _) => Self::HertzMindlin,
+            (Response::Penalty(law), detection) => match (law, detection) {
+                (ContactLaw::SpringDashpot, Detection::Discrete) => Self::SpringDashpot,
+                (ContactLaw::SpringDashpot, Detection::Swept) => Self::SpringDashpotSwept,
+                (ContactLaw::HertzMindlin, Detection::Discrete) => Self::HertzMindlin,
+                (ContactLaw::HertzMindlin, Detection::Swept) => Self::HertzMindlinSwept,
+            },
             (Response::EventDriven, _) => Self::EventDriven,
             (Response::SoftStep, _) => Self::SoftStep,
         }

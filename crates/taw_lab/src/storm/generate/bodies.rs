@@ -71,7 +71,7 @@ impl Crowd {
     }
 
     fn springs(&self) -> bool {
-        matches!(self.kind, Kind::SpringDashpot | Kind::HertzMindlin)
+        self.kind.law().is_some()
     }
 
     /// Makes masses and shapes such as the kind knows.

@@ -53,7 +53,11 @@ fn setting(kind: Kind, dice: &mut Dice) -> Case {
         Kind::Impulse | Kind::SwarmFull => (Response::Impulse, Detection::Discrete),
         Kind::ImpulseSwept => (Response::Impulse, Detection::Swept),
         Kind::SpringDashpot => (Response::Penalty(ContactLaw::SpringDashpot), Detection::Discrete),
+        Kind::SpringDashpotSwept => {
+            (Response::Penalty(ContactLaw::SpringDashpot), Detection::Swept)
+        }
         Kind::HertzMindlin => (Response::Penalty(ContactLaw::HertzMindlin), Detection::Discrete),
+        Kind::HertzMindlinSwept => (Response::Penalty(ContactLaw::HertzMindlin), Detection::Swept),
         Kind::EventDriven => (Response::EventDriven, Detection::Discrete),
         Kind::SoftStep => (Response::SoftStep, Detection::Swept),
     };
@@ -70,7 +74,7 @@ fn setting(kind: Kind, dice: &mut Dice) -> Case {
         iterations: dice.pick(&[1, 2, 4, 8, 8, 8, 10, 20, 50]),
     };
     // Springs are as soft as their substeps are long: those who choose them choose short ones.
-    let springs = matches!(kind, Kind::SpringDashpot | Kind::HertzMindlin);
+    let springs = kind.law().is_some();
     let substeps = if springs { dice.pick(&[2, 4, 8, 8]) } else { model.substeps };
     let model = Model { substeps, ..model };
     let steps: &[f64] =

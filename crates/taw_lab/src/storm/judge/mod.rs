@@ -171,12 +171,10 @@ impl Rules {
             integrator: case.model.integrator,
             moving: case.has_moving_walls(),
             modulus: softest(case),
-            // Springs are discrete or swept, and of one kind.
-            discrete: case.model.detection == Detection::Discrete
-                && matches!(
-                    kind,
-                    Kind::Displacement | Kind::Impulse | Kind::SpringDashpot | Kind::HertzMindlin
-                ),
+            discrete: matches!(
+                kind,
+                Kind::Displacement | Kind::Impulse | Kind::SpringDashpot | Kind::HertzMindlin
+            ),
             sag: (8.0 / iterations).max(1.0),
         }
     }
@@ -191,7 +189,7 @@ impl Rules {
     /// Returns true if contacts are springs, which store energy and release it.
     #[must_use]
     pub fn springs(&self) -> bool {
-        matches!(self.kind, Kind::SpringDashpot | Kind::HertzMindlin)
+        self.kind.law().is_some()
     }
 
     /// Returns true if marbles stop at the time of impact and lose the rest of their motion.

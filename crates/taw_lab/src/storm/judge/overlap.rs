@@ -37,7 +37,7 @@ pub fn deepest(snapshot: &Snapshot) -> (f64, f64) {
 /// goes into `8/15 E √R d^(5/2)`, and rest where `4/3 E √R d^(3/2)` bears all.
 fn softness(rules: &Rules, [speed, mass, radius]: [f64; 3], weight: f64) -> f64 {
     let way = speed * rules.substep;
-    if rules.kind == Kind::SpringDashpot {
+    if rules.kind.law() == Some(ContactLaw::SpringDashpot) {
         let time = 16.0 * rules.substep / std::f64::consts::PI;
         return speed * time + 2.0 * weight / mass * time * time + way;
     }
@@ -68,7 +68,7 @@ pub fn overlap(
         let rounding = 8.0 * rules.epsilon * after.bodies[body].at.magnitude();
         let bound = match rules.kind {
             Kind::EventDriven => 1e-3 * radius + slop,
-            Kind::SpringDashpot | Kind::HertzMindlin => {
+            _ if rules.springs() => {
                 // Half the radius for two balls alike, and the lighter of two.
                 // The speed is that when they met.
                 let contact = [speed.max(2.0 * fastest), mass, 0.5 * radius];
