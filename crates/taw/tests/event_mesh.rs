@@ -178,3 +178,34 @@ fn a_ball_goes_down_a_half_pipe_of_facets_without_sinking_into_them() {
         }
     }
 }
+
+/// Balls that roll and bounce down one flank of a ridge are not inside for the other one, which is
+/// straight behind it.
+#[test]
+fn balls_on_a_ridge_of_a_height_field_move_no_farther_than_they_fly() {
+    let mut random = fastrand::Rng::with_seed(1);
+    let mut fields = vec![(vec![3.75, 2.0, 2.0, 3.0], Point3::new(5.0, 3.0, -0.5))];
+    fields.extend((0..200).map(|_| {
+        let heights = (0..4).map(|_| 4.0 * random.f64()).collect();
+        let at = Point3::new(3.5 + 2.0 * random.f64(), 4.0, -0.9 + 0.8 * random.f64());
+        (heights, at)
+    }));
+    for (heights, at) in fields {
+        let mut world = world::<f64>();
+        let corner = Point3::new(3.0, -1.0, -1.0);
+        let field = HeightField::new(corner, [3.0, 1.0], 2, heights.clone()).unwrap();
+        world.walls.insert(field).unwrap();
+        let marble = Marble { material: Some(surface(0.3, 0.5)), ..Marble::new(at, 0.25) };
+        world.marbles.insert(marble).unwrap();
+        for step in 0..90 {
+            let (before, speed) = (world.marbles.position()[0], world.marbles.velocity()[0]);
+            world.step(DT).unwrap();
+            let fastest = speed.magnitude().max(world.marbles.velocity()[0].magnitude());
+            let moved = (world.marbles.position()[0] - before).magnitude();
+            assert!(
+                moved <= (fastest + 9.81 * DT) * DT + 4e-3 * 0.25,
+                "{heights:?}, {at:?}, step {step}: {moved}"
+            );
+        }
+    }
+}

@@ -161,8 +161,9 @@ struct Storm {
     /// Time limit of a step, after which it counts as hung.
     #[arg(long, value_parser = duration, default_value = "30s")]
     patience: f64,
-    /// Does not count an invariant of a model, as MODEL:INVARIANT: impulse/swept:speed.
-    #[arg(long, value_name = "MODEL:INVARIANT")]
+    /// Does not count an invariant of a model or of one scene, as NAME:INVARIANT:
+    /// impulse/swept:speed, impulse/swept:1:67:speed.
+    #[arg(long, value_name = "NAME:INVARIANT")]
     except: Vec<String>,
     /// Runs one scene, of a file or by its name (impulse:1:7), and says how it went.
     #[arg(long, value_name = "FILE")]
@@ -339,7 +340,9 @@ fn storm(options: Storm) -> Result<ExitCode, Box<dyn Error>> {
         let storm::Finding { invariant, value, bound, .. } = finding;
         let file = file.as_ref().map_or_else(String::new, |file| format!(", {}", file.display()));
         let invariant = invariant.name();
-        let known = options.except.contains(&format!("{}:{invariant}", name.kind));
+        let of_model = format!("{}:{invariant}", name.kind);
+        let of_scene = format!("{name}:{invariant}");
+        let known = options.except.iter().any(|known| [&of_model, &of_scene].contains(&known));
         held &= known;
         let known = if known { " (known)" } else { "" };
         println!(

@@ -7,8 +7,6 @@ const MISSED: &[(&str, &str)] = &[
     // The accelerations that hold a heap are constant over a step, while its balls roll
     // over each other: an error of the third order in the step.
     ("bouncing/666/10ms/gain", "event-driven"),
-    // It begins up to 8 mm deep in the cone, out of which it is lifted.
-    ("ordinary/cone", "event-driven"),
     // Springs give back a part of what overlap of the start holds.
     ("ordinary/overlap", "spring and dashpot"),
 ];

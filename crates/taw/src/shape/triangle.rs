@@ -1,7 +1,7 @@
 use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::polygon::project_on_segment;
-use super::{Aabb, Aabb3, BoundedShape, PointProjection, Shape};
+use super::{Aabb, Aabb3, BoundedShape, PointProjection};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
 
 /// A triangle: two-sided and without volume. It may be a sliver, a segment or a point.
@@ -23,12 +23,12 @@ impl<S: Scalar> Triangle<S> {
         (twice > longest * S::epsilon()).then_some(normal)
     }
 
-    /// Projects a point as if the volume behind the triangle were solid, within `bounds`: a point
+    /// Projects a point onto the triangle as a part of the surface of a solid: a point of that
     /// straight behind the triangle, by no more than its width, is inside.
     pub(crate) fn project_point_one_sided(
         &self,
         point: Point3<S>,
-        bounds: &Shape<S>,
+        is_in_solid: impl FnOnce(Point3<S>) -> bool,
     ) -> PointProjection<S> {
         let [a, b, c] = self.corners;
         let deepest = (b - a).magnitude().min((c - a).magnitude());
@@ -39,7 +39,7 @@ impl<S: Scalar> Triangle<S> {
                 if near.distance > S::zero()
                     && near.distance <= deepest
                     && (near.normal + up).magnitude() < S::from_f64(1e-3)
-                    && bounds.contains(point) =>
+                    && is_in_solid(point) =>
             {
                 near.flipped()
             }

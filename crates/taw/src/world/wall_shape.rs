@@ -6,8 +6,8 @@ use crate::Error;
 use crate::contact::{ClosestPoints, closest_points, sub_shapes};
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
-use crate::response::event::WallCollider;
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+use crate::response::event::{Solid, WallCollider};
 use crate::shape::{
     Aabb3, BoundedShape, Capsule, Compound, HeightField, Hull, Mesh, Obb, Plane, PointProjection,
     Shape, Sphere, Surface, Triangle,
@@ -266,8 +266,7 @@ impl<S: Scalar> WallShape<S> {
                 if !field.is_top(part) {
                     return Some(WallCollider::Triangle(surface));
                 }
-                let bounds = bounds_behind_top(field, *pose);
-                Some(WallCollider::OneSidedTriangle(surface, Shape::Obb(bounds).cast()))
+                Some(WallCollider::OneSidedTriangle(surface, Arc::new(self.clone())))
             }
         }
     }
@@ -282,24 +281,18 @@ impl<S: Scalar> WallShape<S> {
     }
 }
 
+impl<S: Scalar> Solid for WallShape<S> {
+    fn has_inside(&self, point: Point3<f64>) -> bool {
+        self.is_in_height_field(cast_point(point))
+    }
+}
+
 /// Checks that a surface in this box, transformed, is finite.
 fn check_bounds<S: Scalar>(bounds: &Aabb3<S>, pose: Pose<S>) -> Result<(), Error> {
     finite_vector(["size.x", "size.y", "size.z"], bounds.max - bounds.min)?;
     let Aabb3 { min, max } = transformed_box(bounds, pose);
     finite_point(["shape.x", "shape.y", "shape.z"], min)?;
     finite_point(["shape.x", "shape.y", "shape.z"], max).map(|_| ())
-}
-
-/// Box in which what is behind a triangle of a height field's top is in the solid: its border is
-/// that of the sides and of the bottom, to within rounding.
-fn bounds_behind_top<S: Scalar>(field: &HeightField<S>, pose: Pose<S>) -> Obb<S> {
-    let Aabb3 { min, mut max } = field.bounds();
-    max.y += max.y - min.y; // the top limits itself
-    let bounds = Aabb3 { min, max }.obb().transformed(pose);
-    let size = length(bounds.center.to_vec()) + length(bounds.half_extents);
-    let rounding = size * S::epsilon() * S::from_f64(16.0);
-    let half_extents = bounds.half_extents.map(|half| (half - rounding).max(S::zero()));
-    Obb { half_extents, ..bounds }
 }
 
 /// Bounding box of a transformed box.

@@ -94,9 +94,17 @@ fn cone(stopwatch: &mut Stopwatch, model: Model) -> f64 {
         let mut world = world::<f32>(Model { iterations, ..model });
         let mesh = Mesh::new(points, faces).expect("a cone");
         world.walls.insert(mesh).expect("finite");
-        let high = 0.25 * (1.0 + steep * steep).sqrt() + random.between(0.0, 0.05);
+        let gap = random.between(0.0, 0.05);
+        let [x, z] = [0; 2].map(|_| random.between(-0.01, 0.01));
+        // The middles of facets are nearer to the axis than the corners, and steeper.
+        let steep = steep / (0.5 * TAU / f64::from(sides)).cos();
+        let uphill = (0..sides).map(|i| {
+            let (sin, cos) = (TAU * (f64::from(i) + 0.5) / f64::from(sides)).sin_cos();
+            x * cos + z * sin
+        });
+        let touching = 0.25 * steep.hypot(1.0) + steep * uphill.fold(0.0, f64::max);
         let ball = Ball {
-            at: [random.between(-0.01, 0.01), high, random.between(-0.01, 0.01)],
+            at: [x, touching + gap, z],
             radius: 0.25,
             velocity: random.vector(0.8),
             angular_velocity: random.vector(10.0),

@@ -43,7 +43,7 @@ pub(crate) use candidates::WallSource;
 use cells::Cells;
 use cluster::Cluster;
 use collide::SimultaneousImpacts;
-pub(crate) use wall::{Wall, WallCollider};
+pub(crate) use wall::{Solid, Wall, WallCollider};
 
 /// Rest threshold over the speed that gravity adds in a substep. A slower ball rests on the wall:
 /// its remaining bounces would have taken a few thousandths of a substep.

@@ -1,5 +1,8 @@
 //! Walls within a substep, static or kinematic: shape, motion, and pose at each time.
 
+use std::fmt::Debug;
+use std::sync::Arc;
+
 use cgmath::{InnerSpace, One, Rotation as _, Zero};
 
 use crate::broad::CollisionLayers;
@@ -46,8 +49,14 @@ pub(crate) enum WallCollider {
     },
     Solid(Shape<f64>),
     Triangle(Triangle<f64>),
-    /// Triangle of a height field's top, solid behind within these bounds.
-    OneSidedTriangle(Triangle<f64>, Shape<f64>),
+    /// Triangle of a height field's top, and the solid below that.
+    OneSidedTriangle(Triangle<f64>, Arc<dyn Solid>),
+}
+
+/// Volume that triangles enclose.
+pub(crate) trait Solid: Debug + Send + Sync {
+    /// Tests if a point is in the solid.
+    fn has_inside(&self, point: Point3<f64>) -> bool;
 }
 
 impl WallCollider {
@@ -70,8 +79,8 @@ impl WallCollider {
             }
             Self::Solid(shape) => shape.project_point(point),
             Self::Triangle(triangle) => triangle.project_point(point),
-            Self::OneSidedTriangle(triangle, bounds) => {
-                triangle.project_point_one_sided(point, bounds)
+            Self::OneSidedTriangle(triangle, solid) => {
+                triangle.project_point_one_sided(point, |point| solid.has_inside(point))
             }
         }
     }
