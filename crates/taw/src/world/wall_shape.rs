@@ -6,7 +6,7 @@ use crate::Error;
 use crate::contact::{ClosestPoints, closest_points, sub_shapes};
 use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
 use crate::response::event::{Solid, WallCollider};
 use crate::shape::{
     Aabb3, BoundedShape, Capsule, Compound, HeightField, Hull, Mesh, Obb, Plane, PointProjection,
@@ -282,8 +282,16 @@ impl<S: Scalar> WallShape<S> {
 }
 
 impl<S: Scalar> Solid for WallShape<S> {
+    /// Points of the sides and of the bottom are not inside, whatever rounding says.
     fn has_inside(&self, point: Point3<f64>) -> bool {
-        self.is_in_height_field(cast_point(point))
+        let Self::HeightField(field, pose) = self else { return false };
+        let point = cast_point(point);
+        let (local, Aabb3 { min, max }) = (pose.inverse_transform_point(point), field.bounds());
+        let sizes = [point, local, min, max].map(|it| length(it.to_vec()));
+        let rounding = sizes.into_iter().fold(S::zero(), S::max) * S::epsilon() * S::from_f64(32.0);
+        let within = |axis: usize| (local[axis] - min[axis]).min(max[axis] - local[axis]);
+        let depth = within(0).min(within(2)).min(local.y - min.y);
+        depth > rounding && field.has_inside(local)
     }
 }
 
