@@ -164,7 +164,7 @@ fn add_step(app: &mut App) {
         )
             .chain(),
     )
-    .add_systems(Part::Step, (run_substeps, swarm::step).chain())
+    .add_systems(Part::Step, (run_substeps, swarm::step, end_step).chain())
     .add_systems(
         Part::Scatter,
         (
@@ -234,7 +234,10 @@ fn run_substeps(world: &mut World) {
             schedule.run(world);
         }
     });
-    world.resource_mut::<TawWorld>().end_step();
+}
+
+fn end_step(mut world: ResMut<TawWorld>) {
+    world.end_step();
 }
 
 fn integrate(mut world: ResMut<TawWorld>, delta: Res<SubstepDelta>, mut times: ResMut<StepTimes>) {

@@ -30,8 +30,9 @@ impl<S: Scalar> World<S> {
             self.generate_contacts();
             self.restitute(substep)?;
         }
+        self.step_swarm(dt, &mut |_| ())?;
         self.end_step();
-        self.step_swarm(dt, &mut |_| ())
+        Ok(())
     }
 
     /// The first verb: forces change velocities, velocities change positions, over
@@ -158,7 +159,8 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Ends a step: walls are at the end of their ways, and forces that were applied are forgotten.
+    /// Ends a step, that of the [swarm](Self::step_swarm) included: walls are at the end of their
+    /// ways, and forces that were applied are forgotten.
     pub fn end_step(&mut self) {
         self.walls.finish_step();
         self.marbles.clear_forces();

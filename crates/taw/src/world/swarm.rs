@@ -13,8 +13,8 @@ use crate::response::Response;
 use crate::swarm::{BallId, Proxy, Stage, VelocityChange};
 
 impl<S: Scalar> World<S> {
-    /// Moves the [swarm](Self::swarm) on, which a step does after the marbles. `observe` is told
-    /// what it goes about, as often as that changes.
+    /// Moves the [swarm](Self::swarm) on, which a step does after the marbles, before it
+    /// [ends](Self::end_step). `observe` is told what it goes about, as often as that changes.
     ///
     /// Marbles and the swarm push each other; the swarm takes a capsule for the ball in its
     /// middle.

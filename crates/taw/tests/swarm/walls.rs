@@ -195,3 +195,41 @@ fn a_marble_of_infinite_mass_in_a_wall_stays_a_number() {
         }
     }
 }
+
+/// A plate that goes further in a step than it is wide strikes what it meets, whatever steps the
+/// marbles.
+#[test]
+fn no_plate_passes_through_a_ball_of_the_swarm() {
+    let mut passed = Vec::new();
+    for response in [Response::Displacement, Response::Impulse, Response::SoftStep] {
+        for speed in [3.0_f32, 8.0, 20.0, 40.0] {
+            let mut world = world(model(Tier::Full), None);
+            world.set_model(Model { response, ..world.model() }).unwrap();
+            world.set_gravity(Vec3::new(0.0, 0.0, 0.0)).unwrap();
+            let begin = -0.7 * speed * 5.0 * DT - 0.2;
+            let at = |x: f32| taw::shape::Aabb3 {
+                min: Point3::new(x - 0.01, -1.0, -1.0),
+                max: Point3::new(x, 1.0, 1.0),
+            };
+            let wall = world.walls.insert(at(begin)).unwrap();
+            let ball =
+                world.swarm.insert(&[Ball::new(Point3::new(0.0, 0.52, 0.01), 0.05)]).unwrap();
+            for step in 1..=30_u8 {
+                let x = begin + speed * f32::from(step) * DT;
+                let motion = taw::motion::WallMotion {
+                    velocity: Vec3::new(speed, 0.0, 0.0),
+                    angular_velocity: Vec3::new(0.0, 0.0, 0.0),
+                    pivot: Point3::new(0.0, 0.0, 0.0),
+                };
+                world.walls.set(wall, at(x)).unwrap();
+                world.walls.set_motion(wall, Some(motion)).unwrap();
+                steps(&mut world, 1);
+                if one(&world, ball[0]).0.x < x {
+                    passed.push((response, speed, step));
+                    break;
+                }
+            }
+        }
+    }
+    assert!(passed.is_empty(), "{passed:?}");
+}

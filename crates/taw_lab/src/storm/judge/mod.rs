@@ -141,8 +141,10 @@ pub struct Rules {
     pub moving: bool,
     /// The softest contact's modulus: `E / (2 (1 − ν²))` of the softest material, in pascals.
     pub modulus: f64,
-    /// Contacts of marbles are looked for at the end of substeps only.
-    pub discrete: bool,
+    /// Number of bodies whose contacts are looked for at the end of substeps only: the first ones.
+    pub discrete: usize,
+    /// Substep of marbles, in seconds.
+    pub marble_substep: f64,
     /// Sag of heaps relative to that of eight iterations.
     pub sag: f64,
 }
@@ -162,6 +164,8 @@ impl Rules {
         let iterations = f64::from(case.model.iterations).min(if lab { parts } else { f64::MAX });
         let marbles = f64::from(case.model.substeps);
         let single = case.number == ScalarType::F32 || case.swarm.is_some() || soft_step;
+        let looks_ahead = matches!(case.model.response, Response::EventDriven | Response::SoftStep);
+        let discrete = case.model.detection == Detection::Discrete && !looks_ahead;
         Self {
             kind,
             step: case.step,
@@ -171,10 +175,8 @@ impl Rules {
             integrator: case.model.integrator,
             moving: case.has_moving_walls(),
             modulus: softest(case),
-            discrete: matches!(
-                kind,
-                Kind::Displacement | Kind::Impulse | Kind::SpringDashpot | Kind::HertzMindlin
-            ),
+            discrete: if discrete { case.scene.all_marbles().count() } else { 0 },
+            marble_substep: case.substep(),
             sag: (8.0 / iterations).max(1.0),
         }
     }
@@ -269,9 +271,7 @@ impl Bench {
         findings.extend(self.flight.judge(rules, before, after, &near));
         findings.extend(self.rest.judge(rules, before, after));
         findings.push(overlap::overlap(rules, before, after, [self.begin, self.fastest]));
-        if rules.discrete {
-            overlap::forget_the_fast(rules, after, &mut self.outside);
-        }
+        overlap::forget_the_fast(rules, after, &mut self.outside);
         let closed = |corners| overlap::closed(rules, after, self.fastest, &self.outside, corners);
         findings.extend(self.closed.map(closed));
         findings

@@ -107,8 +107,8 @@ pub fn overlap(
 /// Takes out of a box's inmates who moves by more than half of its radius in a substep: where
 /// contacts are looked for at the end of substeps only, it may pass walls, as documented.
 pub fn forget_the_fast(rules: &Rules, after: &Snapshot, outside: &mut [bool]) {
-    for (body, outside) in after.bodies.iter().zip(outside) {
-        *outside |= body.velocity.magnitude() * rules.substep > 0.5 * body.radius;
+    for (body, outside) in after.bodies.iter().zip(outside).take(rules.discrete) {
+        *outside |= body.velocity.magnitude() * rules.marble_substep > 0.5 * body.radius;
     }
 }
 
