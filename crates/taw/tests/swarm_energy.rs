@@ -198,3 +198,45 @@ fn a_tower_of_heavy_and_light_balls_collapses_without_energy_from_nothing() {
         }
     }
 }
+
+/// A heavy ball that falls on light ones is stopped by them, and not thrown by what stopped it.
+#[test]
+fn columns_of_heavy_and_light_balls_fall_without_energy_from_nothing() {
+    let mut seed = 3_u64;
+    let mut random = || {
+        seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+        (seed >> 40) as f32 / (1 << 24) as f32
+    };
+    let mut wrong = Vec::new();
+    for column in 0..400 {
+        let substeps = [1, 2, 4, 8][column % 4];
+        let restitution = [0.0, 0.5, 0.9][column % 3];
+        let mut world = swarm(substeps, random(), restitution, 9.81);
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        let balls: Vec<_> = (0..3 + column % 3)
+            .map(|i| {
+                let radius = 0.5 * (1.0_f32 / 30.0).powf(random());
+                let at = Point3::new(0.0, 1.0 + 1.01 * i as f32 + 3.0 * random(), 0.0);
+                Ball { mass: Mass::Density(1000.0), ..Ball::new(at, radius) }
+            })
+            .collect();
+        world.swarm.insert(&balls).unwrap();
+        let energy = |swarm: &Swarm| {
+            let weight = |(at, velocity): (&[f32; 4], &[f32; 4])| {
+                9.81 * f64::from(at[1]) / f64::from(velocity[3].abs())
+            };
+            let columns = swarm.balls().iter().zip(swarm.velocities());
+            kinetic(swarm) + columns.map(weight).sum::<f64>()
+        };
+        let begin = energy(&world.swarm);
+        for step in 0..120 {
+            world.step(DT).unwrap();
+            let now = energy(&world.swarm);
+            if now > 1.01 * begin {
+                wrong.push((column, step, now / begin));
+                break;
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "column, step, energy over that of the begin: {wrong:?}");
+}

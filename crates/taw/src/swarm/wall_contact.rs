@@ -32,6 +32,8 @@ pub(super) struct WallContact {
     /// itself, in N s.
     pub borne_for_others: f32,
     pub impulse: ContactImpulse<f32>,
+    /// Normal impulse before the wall was struck in this substep, in N s.
+    pub load: Option<f32>,
     /// Angular impulse against rolling and spinning, over the radius, in N s.
     pub torque: Vec3<f32>,
 }
@@ -79,8 +81,28 @@ impl WallContact {
 
     /// Takes over the impulses of an earlier contact of ball and wall.
     pub fn restore(&mut self, before: &Self) {
-        (self.impulse, self.torque) = (before.impulse, before.torque);
+        (self.impulse, self.torque, self.load) = (before.impulse, before.torque, before.load);
         self.borne_for_others = before.borne_for_others;
+    }
+
+    /// Notes what the wall bears before a ball of this velocity strikes it in a pass.
+    pub fn note_impact(&mut self, pass: Pass, velocity: &Row) {
+        let (Pass::Solve(params) | Pass::Relax(params)) = pass else { return };
+        let approach_speed = -(xyz(velocity) - self.surface).dot(self.normal);
+        let threshold = params.restitution_threshold;
+        if threshold > 0.0 && approach_speed > threshold {
+            self.load = Some(self.load.unwrap_or(f32::MAX).min(self.impulse.normal));
+        }
+    }
+
+    /// Forgets the impulse that stopped the ball, but not the load: see
+    /// [`StruckContact`](super::kernels::StruckContact).
+    pub fn forget_impact(&mut self) {
+        let Some(load) = self.load.take().filter(|load| *load < self.impulse.normal) else {
+            return;
+        };
+        self.impulse.tangent *= load / self.impulse.normal;
+        self.impulse.normal = load;
     }
 
     /// The impulse that the wall has borne for others, if it is the one behind the ball.

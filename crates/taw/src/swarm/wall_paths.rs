@@ -10,58 +10,58 @@ use super::walls::{StaticGeometry, center};
 use crate::broad::CollisionLayers;
 use crate::math::Vec3;
 
-/// Visits the walls that a ball meets on its path, and along those that it met.
+/// Visits the walls that a ball meets on its path, and along those that it met. A path of this length
+/// in metres or less is gone without looking. Returns the ball where it ends.
 pub(super) fn along_path(
     walls: &dyn StaticGeometry,
     (ball, layers): (&Row, CollisionLayers),
-    displacement: Vec3<f32>,
+    mut displacement: Vec3<f32>,
+    shortest: f32,
     visit: &mut impl FnMut(&Row, [u32; 2], Vec3<f32>, f32),
-) {
-    let (mut ball, mut displacement) = (*ball, displacement);
+) -> Row {
+    let mut ball = *ball;
     // In a corner, it meets three.
     for _ in 0..3 {
-        if displacement.magnitude() <= FAST * ball[3] {
-            return;
-        }
-        let hit = walls.first_hit_on_path(&ball, layers, displacement);
+        let hit = if displacement.magnitude() > shortest {
+            walls.first_hit_on_path(&ball, layers, displacement)
+        } else {
+            None
+        };
         let Some((part, normal, distance)) = hit else {
-            return;
+            return moved(&ball, displacement);
         };
         visit(&ball, part, normal, distance);
-        let approach_speed = -displacement.dot(normal);
-        if approach_speed.is_nan() || approach_speed <= 0.0 {
-            return;
+        let approach = -displacement.dot(normal);
+        if approach.is_nan() || approach <= 0.0 {
+            return moved(&ball, displacement);
         }
-        let time = ((distance - ball[3]) / approach_speed).clamp(0.0, 1.0);
-        for (x, displacement) in ball.iter_mut().zip::<[f32; 3]>(displacement.into()) {
-            *x += displacement * time;
-        }
-        displacement = (displacement + normal * approach_speed) * (1.0 - time);
+        let time = ((distance - ball[3]) / approach).clamp(0.0, 1.0);
+        ball = moved(&ball, displacement * time);
+        displacement = (displacement + normal * approach) * (1.0 - time);
     }
+    ball
 }
 
-/// Puts a ball that passed into a wall on this displacement back to where it met it. Returns how
-/// far that is, in metres.
-pub(super) fn stop_at_wall(
+fn moved(ball: &Row, by: Vec3<f32>) -> Row {
+    [ball[0] + by.x, ball[1] + by.y, ball[2] + by.z, ball[3]]
+}
+
+/// Puts a ball that passed into a wall on this displacement back to where it met it, from where it
+/// slides along the wall. Returns how far that is, in metres.
+pub(super) fn slide_along_wall(
     walls: &dyn StaticGeometry,
     at: &mut Row,
     layers: CollisionLayers,
     displacement: Vec3<f32>,
 ) -> f32 {
-    let start = center(at) - displacement;
-    let ball = [start.x, start.y, start.z, at[3]];
-    let Some((_, normal, distance)) = walls.first_hit_on_path(&ball, layers, displacement) else {
-        return 0.0;
-    };
-    let approach = -displacement.dot(normal);
-    if approach.is_nan() || approach <= 0.0 {
+    let (start, mut hits) = (moved(at, -displacement), false);
+    let end = along_path(walls, (&start, layers), displacement, 0.0, &mut |_, _, _, _| hits = true);
+    if !hits {
         return 0.0;
     }
-    let back = displacement * (1.0 - ((distance - at[3]) / approach).clamp(0.0, 1.0));
-    for (x, back) in at.iter_mut().zip::<[f32; 3]>(back.into()) {
-        *x -= back;
-    }
-    back.magnitude()
+    let back = (center(at) - center(&end)).magnitude();
+    *at = end;
+    back
 }
 
 /// Returns true if a ball of this velocity and radius is fast for a step of so many seconds.

@@ -249,7 +249,7 @@ impl Chunk {
             if let Some(displacement) = displacement {
                 let way = displacement.magnitude();
                 reach = if query.whole_way { way } else { way.min(FAST * ball[3]) };
-                along_path(walls, (ball, layers), displacement, &mut visit);
+                along_path(walls, (ball, layers), displacement, FAST * ball[3], &mut visit);
             }
             walls.shapes_at(ball, layers, reach, &mut |part, normal, distance| {
                 visit(ball, part, normal, distance);
@@ -398,6 +398,7 @@ impl WallContact {
             numbers,
             borne_for_others: 0.0,
             impulse: ContactImpulse::zero(),
+            load: None,
             torque: Vec3::zero(),
         }
     }

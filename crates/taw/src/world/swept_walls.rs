@@ -1,6 +1,6 @@
 //! Walls in a step, as the balls of a swarm meet them.
 
-use cgmath::InnerSpace;
+use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::continuous::{Frame, MAX_FREE_MOTION, MovingWall, RelativePath};
 use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
@@ -110,12 +110,15 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
         let core = sphere.radius * S::from_f64(0.5);
         let path = RelativePath { start: sphere.center, displacement, frame: Frame::Standing };
         let deep = sphere.radius * S::from_f64(1.0 - GRAZES);
+        // One that slides along a wall in which it is goes no deeper, but for the rounding of places.
+        let place = length(sphere.center.to_vec()) + sphere.radius + length(displacement);
+        let rounding = place * S::from_f64(16.0 * f64::from(f32::EPSILON));
         let mut first: Option<S> = None;
         self.for_each_standing(reached, (sphere, layers), |part| {
             let distance = |point| self.walls.project_point(part, point).distance;
             let ends_in_it = || {
                 let end = distance(sphere.center + displacement);
-                end < deep && end < distance(sphere.center)
+                end < deep && end < distance(sphere.center) - rounding
             };
             let hits = |radius| self.walls.time_of_impact(part, radius, &path);
             let passes = ends_in_it() || hits(core).is_some();

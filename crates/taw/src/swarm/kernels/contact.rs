@@ -367,8 +367,9 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
     #[inline(always)]
     fn solve<L: Simd, const FIRST: bool>(self, params: SolverParams) {
         let Self { columns, batches, impulses, friction, .. } = self;
-        let ContactImpulses { normal_impulse, tangent_impulse, torque, numbers: own, .. } =
-            impulses;
+        let ContactImpulses {
+            normal_impulse, tangent_impulse, torque, numbers: own, struck, ..
+        } = impulses;
         let (zero, softness) = (L::splat(0.0), params.softness);
         let per_second = L::splat(1.0 / params.time);
         for (i, batch) in batches.iter().enumerate() {
@@ -385,6 +386,12 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let gap = [separation, parting];
             let fresh = numbers.fresh::<FIRST>(&params, places, velocity, before, gap);
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
+            if BACKED && params.restitution_threshold > 0.0 {
+                let fast = (zero - parting).gt_mask(L::splat(params.restitution_threshold));
+                if fast != 0 {
+                    ContactImpulses::note_struck(struck, i, fast, normal_impulse[i]);
+                }
+            }
             let alone = effective_mass(&a, &b);
             let (target, softness) = if FIRST {
                 let (target, softness) = softness.at(separation, per_second);

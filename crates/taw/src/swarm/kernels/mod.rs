@@ -33,6 +33,21 @@ pub(super) struct ContactImpulses {
     pub numbers: Vec<PairNumbers>,
     /// Set if any of them bounced in the last round.
     pub bounced: bool,
+    /// Those that were struck in this substep.
+    pub struck: Vec<StruckContact>,
+}
+
+/// Contact whose balls came together fast in a substep.
+///
+/// The impulse that stops them is no load: applied again in the next substep, it would throw them
+/// apart. Of balls that weigh about as much, contacts take it back; a light one between heavy ones
+/// takes back only what moves itself.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct StruckContact {
+    batch: u32,
+    lane: u32,
+    /// Normal impulse before, in N s.
+    load: f32,
 }
 
 impl ContactImpulses {
@@ -41,6 +56,32 @@ impl ContactImpulses {
             + (self.tangent_impulse.capacity() + self.torque.capacity())
                 * size_of::<[[f32; LANES]; 3]>()
             + self.numbers.capacity() * size_of::<PairNumbers>()
+            + self.struck.capacity() * size_of::<StruckContact>()
+    }
+
+    /// Notes the lanes of a batch that are struck, as bits, and their normal impulses before.
+    #[cold]
+    fn note_struck(struck: &mut Vec<StruckContact>, batch: usize, lanes: u32, load: [f32; LANES]) {
+        let lanes = (0..LANES as u32).filter(|lane| lanes & 1 << lane != 0);
+        struck.extend(lanes.map(|lane| StruckContact {
+            batch: batch as u32,
+            lane,
+            load: load[lane as usize],
+        }));
+    }
+
+    /// Forgets the impulses that stopped balls, but not the loads.
+    pub fn forget_impacts(&mut self) {
+        for StruckContact { batch, lane, load } in self.struck.drain(..) {
+            let (batch, lane) = (batch as usize, lane as usize);
+            let normal_impulse = &mut self.normal_impulse[batch][lane];
+            if load < *normal_impulse {
+                for axis in &mut self.tangent_impulse[batch] {
+                    axis[lane] *= load / *normal_impulse;
+                }
+                *normal_impulse = load;
+            }
+        }
     }
 
     /// As many as there are batches, and none bears anything.
@@ -51,6 +92,7 @@ impl ContactImpulses {
             column.resize(batches, none);
             shrink_slack(column);
         }
+        self.struck.clear();
         reset(&mut self.normal_impulse, batches, [0.0; LANES]);
         reset(&mut self.tangent_impulse, batches, [[0.0; LANES]; 3]);
     }

@@ -6,6 +6,7 @@ use super::{row, wider};
 use crate::swarm::Swarm;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::LOST;
+use crate::swarm::wall_contact::WallContact;
 use crate::swarm::workers::{DisjointSlice, parallel_for};
 
 /// Where one ball weighs more than so many times as much as another, pairs look who has a wall
@@ -17,6 +18,41 @@ impl Swarm {
     /// Finds for each ball the wall that bears most of it, where masses differ so much that pairs
     /// need to know ([`SolverColumns::backing`]).
     pub(super) fn find_backing(&mut self) {
+        self.find_walls_behind(false);
+    }
+
+    /// Finds the walls behind balls again within a substep, after rows may have changed: those that
+    /// bear something for others go on bearing it.
+    pub(super) fn restore_backing(&mut self) {
+        self.find_walls_behind(true);
+    }
+
+    /// Saves what walls bear for others in their contacts, before rows change. (Pairs of fast movers
+    /// come after those of walls, so contacts do not know it yet.)
+    pub(super) fn save_backing(&mut self) {
+        if self.scratch.backing.is_empty() {
+            return;
+        }
+        self.forget_impacts();
+        for contact in self.chunks.iter_mut().flat_map(|chunk| &mut chunk.wall_contacts) {
+            contact.borne_for_others =
+                contact.share_of(&self.scratch.backing[contact.row as usize]);
+        }
+    }
+
+    /// Forgets the impulses that stopped balls in this substep, but not the loads.
+    pub(super) fn forget_impacts(&mut self) {
+        if self.scratch.backing.is_empty() {
+            return;
+        }
+        self.fast_movers.impulses.forget_impacts();
+        for chunk in &mut self.chunks {
+            chunk.impulses.forget_impacts();
+            chunk.wall_contacts.iter_mut().for_each(WallContact::forget_impact);
+        }
+    }
+
+    fn find_walls_behind(&mut self, again: bool) {
         let inverse = |chunk: &Chunk| chunk.inverse_masses;
         let [least, most] = self.chunks.iter().map(inverse).fold([f32::MAX, 0.0], wider);
         let rows = if most > UNEVEN * least { self.at.len() } else { 0 };
@@ -42,7 +78,11 @@ impl Swarm {
                         last = contact;
                     }
                 }
-                if last.borne_for_others > 0.0 && behind[..3] != row(last.normal)[..3] {
+                let bears = last.borne_for_others > 0.0;
+                if again && bears {
+                    behind = row(last.normal);
+                    behind[3] = last.borne_for_others;
+                } else if bears && behind[..3] != row(last.normal)[..3] {
                     behind = [0.0, 0.0, 0.0, LOST];
                 }
                 // SAFETY: a row of the chunk.

@@ -195,12 +195,13 @@ impl Swarm {
             let left_it = |_: &Row, skin_left: f32| skin_left < -skin;
             if self.find_pairs_within_step(|chunk| chunk.overrun, left_it, dt, walls, observe) {
                 self.update_wall_contacts(walls, left, times, all, false);
-                self.find_backing(); // rows may have changed
+                self.restore_backing(); // rows may have changed
             } else if caught {
                 self.update_wall_contacts(walls, left, times, |chunk| chunk.caught, true);
             }
             observe(Stage::Restitute);
             self.pass(Pass::Relax(params), |_, _| true);
+            self.forget_impacts();
             self.keep_out();
         }
     }
@@ -288,6 +289,7 @@ impl Swarm {
     ) -> bool {
         if !leaving.is_empty() {
             // Rows may change.
+            self.save_backing();
             for chunk in &mut self.chunks {
                 self.stopped.append(&mut chunk.stopped);
             }
@@ -422,6 +424,7 @@ impl Swarm {
                         let spin = &mut *columns.spin.row(row);
                         if columns.backed() {
                             contact.borne_for_others = contact.share_of(&*columns.backing.row(row));
+                            contact.note_impact(pass, &*velocity);
                         }
                         if let Some(displacement) =
                             contact.solve(pass, &mut *at, &mut *velocity, spin)

@@ -29,7 +29,7 @@ impl Swarm {
         self.list_struck(h, &mut struck);
         if self.find_pairs_of_listed(struck, dt, walls, observe) {
             self.update_wall_contacts(walls, left, [dt, h], |_| true, false);
-            self.find_backing(); // rows may have changed
+            self.restore_backing(); // rows may have changed
         }
         self.limit_paths(h);
     }

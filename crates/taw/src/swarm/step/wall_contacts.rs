@@ -6,7 +6,7 @@ use crate::math::Vec3;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::wall_contact::{WallContact, xyz};
-use crate::swarm::wall_paths::{WallQuery, is_fast, stop_at_wall};
+use crate::swarm::wall_paths::{WallQuery, is_fast, slide_along_wall};
 use crate::swarm::walls::{Balls, HalfSpace, find, near_shapes, shapes_of};
 use crate::swarm::workers::{DisjointSlice, parallel_for};
 use crate::swarm::{Stage, StaticGeometry, Swarm, Tier};
@@ -128,7 +128,7 @@ impl Swarm {
     }
 
     /// Puts back to the wall each ball that passed into one in these `h` seconds, because of a
-    /// contact that sent it another way than its wall contacts were sought on. It flew by its
+    /// contact that sent it another way than its wall contacts were sought on, and lets it slide on. It flew by its
     /// velocity, and that much lower. Returns true if there was any.
     pub(in crate::swarm) fn stop_at_walls(
         &mut self,
@@ -164,7 +164,7 @@ impl Swarm {
                 if is_fast(velocity, h, at[3]) || !change.is_zero() {
                     let layers = surfaces.layers(row as u32);
                     let path = xyz(velocity) * h - lower + change;
-                    let back = stop_at_wall(walls, at, layers, path);
+                    let back = slide_along_wall(walls, at, layers, path);
                     *skin_left -= back;
                     chunk.caught |= back > 0.0;
                 }
