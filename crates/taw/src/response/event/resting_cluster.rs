@@ -356,8 +356,13 @@ mod tests {
             let place = |of: usize| order.iter().position(|ball| *ball == of).unwrap();
             let mut method =
                 EventDriven { balls: order.map(|i| balls[i]).to_vec(), ..EventDriven::default() };
-            let settings =
-                EventSettings { dt: 0.01, iterations: 8, source: &NoWalls, cost: 0.into() };
+            let settings = EventSettings {
+                dt: 0.01,
+                iterations: 8,
+                source: &NoWalls,
+                budget_fraction: 1.0,
+                cost: 0.into(),
+            };
             method.assign_cells(settings.dt);
             method.find_candidates(&settings);
             method.rest_cluster([place(0), place(1)], f64::INFINITY, 0.0, &settings);
