@@ -21,6 +21,7 @@ mod predict_wall;
 mod rest_at_start;
 mod rest_on_wall;
 mod resting_cluster;
+mod segments;
 mod squeeze;
 mod toi;
 mod wall;
@@ -319,6 +320,11 @@ impl EventDriven {
                     self.stop_collapse([row, row], time, settings);
                 } else {
                     self.start_resting(row, wall, settings);
+                    self.predict(row, time, settings);
+                }
+            }
+            EventKind::RegimeChange if self.balls[row].trajectory.clustered => {
+                for row in self.rest_cluster([row, row], 0.0, time, settings).rows {
                     self.predict(row, time, settings);
                 }
             }

@@ -42,9 +42,7 @@ impl EventDriven {
         self.cluster.contact_counts = contact_counts;
         self.end_approach_to_walls(&near, settings);
         if !near.is_empty() {
-            let mut impulse_cache = std::mem::take(&mut self.impulse_cache);
-            self.solve_resting(&mut near, 0.0, settings, &mut impulse_cache);
-            self.impulse_cache = impulse_cache;
+            self.solve_all_resting(&mut near, settings);
         }
         self.near = near;
     }
