@@ -298,9 +298,7 @@ impl EventDriven {
                 for row in [row, other] {
                     self.balls[row].trajectory.dissipation_count += REST_COST;
                 }
-                for row in self.rest_cluster([row, other], 0.0, time, settings).rows {
-                    self.predict(row, time, settings);
-                }
+                self.rest_again([row, other], time, settings);
             }
             EventKind::WallImpact(_) if self.is_collapsing(row) => {
                 self.stop_collapse([row, row], time, settings);
@@ -324,9 +322,7 @@ impl EventDriven {
                 }
             }
             EventKind::RegimeChange if self.balls[row].trajectory.clustered => {
-                for row in self.rest_cluster([row, row], 0.0, time, settings).rows {
-                    self.predict(row, time, settings);
-                }
+                self.rest_again([row, row], time, settings);
             }
             EventKind::RegimeChange => {
                 self.advance(row, time);
@@ -343,6 +339,13 @@ impl EventDriven {
                 }
                 self.predict(row, time, settings);
             }
+        }
+    }
+
+    /// Puts balls to rest with all that touch them, and predicts their next events.
+    fn rest_again(&mut self, seeds: [usize; 2], time: f64, settings: &EventSettings) {
+        for row in self.rest_cluster(seeds, 0.0, time, settings).rows {
+            self.predict(row, time, settings);
         }
     }
 

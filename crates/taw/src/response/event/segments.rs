@@ -7,7 +7,7 @@ use super::cluster::Cluster;
 use super::{EventDriven, EventSettings};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Vec3, normalize_and_length};
-use crate::response::KeyedByContact as _;
+use crate::response::KeyedByContact;
 use crate::response::impulse::UnionFind;
 
 /// Largest rotation of a normal in a segment, in radians, as on curved walls.
@@ -48,7 +48,7 @@ impl EventDriven {
             self.solve_resting(contacts, 0.0, settings, &mut impulse_cache);
             self.solve_resting(&mut turning, 0.0, settings, &mut turning_cache);
             impulse_cache.append(&mut turning_cache);
-            impulse_cache.sort_unstable_by_key(|entry| entry.key());
+            impulse_cache.sort_unstable_by_key(KeyedByContact::key);
         }
         self.impulse_cache = impulse_cache;
     }
