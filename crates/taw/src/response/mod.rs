@@ -102,9 +102,10 @@ pub enum Response {
     /// a [motion](crate::world::WallMotion), moves through the step by that motion, and ends where
     /// it was set. A wall that only has a motion stays, and its surface carries what lies on it.
     ///
-    /// A substep has a budget: 32 million tests against one wall or one other marble, plus 20,000
-    /// per marble, about a second for a few hundred. A marble that has not finished the substep by
-    /// then stays where it is, loses its velocity, and is listed by
+    /// A step has a budget: 32 million tests against one wall or one other marble, plus 20,000 per
+    /// marble, about a second for a few hundred. Each substep may spend its share, in the ratio of
+    /// times, of what those before it have left. A marble that has not finished the substep by then
+    /// stays where it is, loses its velocity, and is listed by
     /// [`World::stopped`](crate::world::World::stopped).
     ///
     /// Computes in `f64` also in a world of `f32`; see [`Precision`](crate::world::Precision) for

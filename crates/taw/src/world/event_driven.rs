@@ -47,7 +47,9 @@ impl<S: Scalar> World<S> {
         let events = &mut self.scratch.events;
         let source = &Source::new(&self.walls, [dt.as_f64(), rest.as_f64()]);
         let iterations = self.settings.model.iterations;
-        let settings = EventSettings { dt: dt.as_f64(), iterations, source, cost: 0.into() };
+        let budget_fraction = (dt / (dt + rest)).as_f64();
+        let dt = dt.as_f64();
+        let settings = EventSettings { dt, iterations, source, budget_fraction, cost: 0.into() };
         events.work = self.scratch.audit_state.is_some().then(EnergyLedger::default);
         events.impulse_cache = std::mem::take(&mut self.memory.event_impulses);
         let mut impacts = Vec::new();
@@ -61,6 +63,7 @@ impl<S: Scalar> World<S> {
         }
         self.write_back_balls();
         if rest <= S::zero() {
+            self.scratch.events.spent = 0;
             self.walls.finish_step();
         }
     }

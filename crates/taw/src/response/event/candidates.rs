@@ -294,7 +294,13 @@ mod tests {
         for (distance, covered) in [(10.0, 5.0..10.0), (1e9, 2e4..1e9)] {
             let mut method = EventDriven { balls: vec![ball], ..EventDriven::default() };
             let source = &Crowd(distance);
-            let settings = EventSettings { dt: 0.01, iterations: 8, source, cost: 0.into() };
+            let settings = EventSettings {
+                dt: 0.01,
+                iterations: 8,
+                source,
+                budget_fraction: 1.0,
+                cost: 0.into(),
+            };
             method.assign_cells(settings.dt);
             method.find_candidates(&settings);
             assert!(

@@ -21,6 +21,7 @@ mod predict_wall;
 mod rest_at_start;
 mod rest_on_wall;
 mod resting_cluster;
+mod segments;
 mod squeeze;
 mod toi;
 mod wall;
@@ -74,9 +75,9 @@ const SLOP: f64 = 4e-3;
 /// Support check on a curved or bounded wall: after rolling this fraction of its radius, at most
 /// once per this fraction of a substep.
 const SUPPORT_CHECK: f64 = 0.05;
-/// Cost limit of a substep, and per ball, in tests of one ball against one half-space or ball (some
-/// fifty million per second). A ball that has not finished by then stays where it is, and is
-/// reported.
+/// Cost limit of a step, and per ball, in tests of one ball against one half-space or ball (some
+/// fifty million per second). A ball that has not finished its part of that by then stays where
+/// it is, and is reported.
 const MAX_COST: u64 = 32_000_000;
 const COST_PER_BALL: u64 = 20_000;
 /// Maximum number of contacts of a ball in a cluster; equal balls have twelve at most. Contacts
@@ -175,6 +176,8 @@ pub(crate) struct EventSettings<'a> {
     pub iterations: u32,
     /// Walls of the world.
     pub source: &'a dyn WallSource,
+    /// Fraction of the step's remaining budget that this substep may spend.
+    pub budget_fraction: f64,
     /// Cost of the substep so far, in tests.
     pub cost: Counter<u64>,
 }
@@ -197,6 +200,8 @@ pub(crate) struct EventDriven {
     walls: Vec<Wall>,
     /// Pairs of balls that may be in contact at the start.
     pub near: Contacts<f64>,
+    /// Cost of the step's substeps so far, in tests; the caller resets it.
+    pub spent: u64,
     /// Impulses of the clusters' contacts in the last substep, for the warm start.
     pub impulse_cache: Vec<CachedImpulse<f64>>,
     /// Energy bookkeeping, for the energy audit only.
@@ -227,13 +232,14 @@ impl EventDriven {
         for row in 0..self.balls.len() {
             self.predict(row, 0.0, settings);
         }
-        let max_cost = MAX_COST + COST_PER_BALL * self.balls.len() as u64;
+        let max_cost = self.max_cost(settings);
         while settings.cost.get() < max_cost {
             let Some(Reverse(event)) = self.queue.pop() else { break };
             if self.balls[event.row].trajectory.version == event.version {
                 self.process(event, settings, impacts);
             }
         }
+        self.spent += settings.cost.get();
         let mut stopped = self.stop_unfinished();
         (0..self.balls.len()).for_each(|row| self.advance(row, dt));
         for (row, (ball, initial_positions)) in
@@ -250,6 +256,12 @@ impl EventDriven {
         stopped.sort_unstable();
         stopped.dedup();
         stopped
+    }
+
+    /// Cost limit of a substep: its share of what the ones before have left, in the ratio of times.
+    fn max_cost(&self, settings: &EventSettings) -> u64 {
+        let budget = MAX_COST + COST_PER_BALL * self.balls.len() as u64;
+        (budget.saturating_sub(self.spent) as f64 * settings.budget_fraction) as u64
     }
 
     /// Freezes balls that still have events at the end of the budget, at the time of the first of
@@ -286,9 +298,7 @@ impl EventDriven {
                 for row in [row, other] {
                     self.balls[row].trajectory.dissipation_count += REST_COST;
                 }
-                for row in self.rest_cluster([row, other], 0.0, time, settings).rows {
-                    self.predict(row, time, settings);
-                }
+                self.rest_again([row, other], time, settings);
             }
             EventKind::WallImpact(_) if self.is_collapsing(row) => {
                 self.stop_collapse([row, row], time, settings);
@@ -311,6 +321,9 @@ impl EventDriven {
                     self.predict(row, time, settings);
                 }
             }
+            EventKind::RegimeChange if self.balls[row].trajectory.clustered => {
+                self.rest_again([row, row], time, settings);
+            }
             EventKind::RegimeChange => {
                 self.advance(row, time);
                 self.recheck_support(row, settings);
@@ -326,6 +339,13 @@ impl EventDriven {
                 }
                 self.predict(row, time, settings);
             }
+        }
+    }
+
+    /// Puts balls to rest with all that touch them, and predicts their next events.
+    fn rest_again(&mut self, seeds: [usize; 2], time: f64, settings: &EventSettings) {
+        for row in self.rest_cluster(seeds, 0.0, time, settings).rows {
+            self.predict(row, time, settings);
         }
     }
 

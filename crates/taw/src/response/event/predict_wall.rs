@@ -189,9 +189,11 @@ impl EventDriven {
     ) -> ControlFlow<Option<(f64, EventKind)>, f64> {
         let ball = &self.balls[row];
         let is_seam = || self.is_seam(row, wall, ball.position_at(time), time, settings);
-        let impact = |is_seam: bool| (!is_seam).then_some((0.0, EventKind::WallImpact(wall)));
+        // The other wall of a seam may let the ball pass, and then this one is in its way.
+        let recheck = (RECHECK_TIME * settings.dt, EventKind::RefreshCandidates);
+        let impact = || if is_seam() { recheck } else { (0.0, EventKind::WallImpact(wall)) };
         if separation.speed < -impact_threshold {
-            return ControlFlow::Break(impact(is_seam()));
+            return ControlFlow::Break(Some(impact()));
         }
         let normal_acceleration =
             self.normal_acceleration(row, wall, time, ball.trajectory.acceleration);
@@ -201,7 +203,8 @@ impl EventDriven {
                 > MIN_NORMAL_ACCELERATION * ball.external_acceleration.magnitude();
         if is_pressed && separation.speed <= impact_threshold {
             if is_seam() {
-                return ControlFlow::Break(None);
+                let is_resting = ball.trajectory.support.is_some() || ball.trajectory.clustered;
+                return ControlFlow::Break((!is_resting).then_some(recheck));
             }
             return ControlFlow::Break(Some(if ball.trajectory.clustered {
                 let after = (impact_threshold * 1.01 + separation.speed) / normal_acceleration;
@@ -216,7 +219,7 @@ impl EventDriven {
         let is_held_to_end = ball.trajectory.touches_balls
             || ball.trajectory.clustered && end_speed >= -rest_threshold;
         if !is_pressed && separation.speed < -rest_threshold && !is_held_to_end {
-            return ControlFlow::Break(impact(is_seam()));
+            return ControlFlow::Break(Some(impact()));
         }
         ControlFlow::Continue(if separation.speed > 0.0 && separation.acceleration < 0.0 {
             // Earliest return to this plane.

@@ -42,9 +42,7 @@ impl EventDriven {
         self.cluster.contact_counts = contact_counts;
         self.end_approach_to_walls(&near, settings);
         if !near.is_empty() {
-            let mut impulse_cache = std::mem::take(&mut self.impulse_cache);
-            self.solve_resting(&mut near, 0.0, settings, &mut impulse_cache);
-            self.impulse_cache = impulse_cache;
+            self.solve_all_resting(&mut near, settings);
         }
         self.near = near;
     }
@@ -83,10 +81,9 @@ impl EventDriven {
         let at = self.balls[row].position;
         self.for_each_wall(row, |wall| {
             let contact = Contact::with_wall(wall as u32, 0, row as u32);
-            let min_speed = if self.is_moving(wall) { f64::NEG_INFINITY } else { 0.0 };
-            if self
-                .wall_contact(&contact, 0.0, 0.0, settings)
-                .is_some_and(|speed| speed >= min_speed)
+            // A faster approach is an impact now, also of a wall that starts to move: spread over
+            // the substep, it would let the wall in by half of its way.
+            if self.wall_contact(&contact, 0.0, 0.0, settings).is_some_and(|margin| margin >= 0.0)
                 && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, 0.0, settings))
             {
                 near.push(contact);

@@ -345,7 +345,13 @@ mod tests {
                 trajectory: Trajectory::default(),
             };
             let mut method = EventDriven { balls: vec![ball], ..EventDriven::default() };
-            let settings = EventSettings { dt, iterations: 8, source: &Face, cost: 0.into() };
+            let settings = EventSettings {
+                dt,
+                iterations: 8,
+                source: &Face,
+                budget_fraction: 1.0,
+                cost: 0.into(),
+            };
             assert!(method.run(&settings, &mut Vec::new()).is_empty());
             let ball = &method.balls[0];
             let spin_velocity = Vec3::unit_y().cross(ball.spin) * ball.radius;

@@ -215,7 +215,7 @@ impl EventDriven {
     }
 
     /// Solves for the accelerations that keep contacts at rest from `now` to the end of the
-    /// substep.
+    /// substep, or until their normals have turned too far.
     pub(super) fn solve_resting(
         &mut self,
         contacts: &mut Contacts<f64>,
@@ -223,15 +223,16 @@ impl EventDriven {
         settings: &EventSettings,
         impulse_cache: &mut Vec<CachedImpulse<f64>>,
     ) {
-        let remaining = settings.dt - now;
         self.cluster.gather(contacts, &self.balls, self.period);
+        let end = now + self.cluster.segment(contacts, settings.dt - now);
+        let remaining = end - now;
         let max_acceleration = self.move_cluster_freely(remaining);
         rename_rows(impulse_cache, |row| self.cluster.local_index(row));
         let mut touches_balls = vec![false; self.cluster.rows.len()];
         for local in contacts.mm.iter().flat_map(|c| [c.a, c.b]) {
             touches_balls[local as usize] = true;
         }
-        self.solve_until_end(contacts, now, max_acceleration, settings, impulse_cache);
+        self.solve_until(contacts, [now, end], max_acceleration, settings, impulse_cache);
         let Cluster { rows, bodies, sets, scratch, .. } = &mut self.cluster;
         let ClusterBodies { position, velocity, spin, inverse_mass, .. } = bodies;
         rename_rows(impulse_cache, |at| rows.get(at).map(|row| *row as usize));
@@ -251,17 +252,18 @@ impl EventDriven {
             if ball.is_frozen() {
                 continue;
             }
-            let end = ball.position + (ball.velocity + velocity[at]) * (0.5 * remaining);
+            let there = ball.position + (ball.velocity + velocity[at]) * (0.5 * remaining);
             ball.trajectory = Trajectory {
                 acceleration: (velocity[at] - ball.velocity) / remaining,
                 spin_acceleration: (spin[at] - ball.spin) / remaining,
                 clustered: true,
                 touches_balls: touches_balls[at],
                 wall_power: wall_power.as_ref().map_or(0.0, |power| power[at]),
+                regime_end: if end < settings.dt { end } else { f64::INFINITY },
                 version: ball.trajectory.version + 1,
                 ..ball.trajectory
             };
-            corrections[at] = position[at] - end;
+            corrections[at] = position[at] - there;
             let (set, distance) = (sets.set_of(at) as usize, corrections[at].magnitude());
             if distance > 0.5 * ball.radius {
                 fractions[set] = fractions[set].min(0.5 * ball.radius / distance);
@@ -356,8 +358,13 @@ mod tests {
             let place = |of: usize| order.iter().position(|ball| *ball == of).unwrap();
             let mut method =
                 EventDriven { balls: order.map(|i| balls[i]).to_vec(), ..EventDriven::default() };
-            let settings =
-                EventSettings { dt: 0.01, iterations: 8, source: &NoWalls, cost: 0.into() };
+            let settings = EventSettings {
+                dt: 0.01,
+                iterations: 8,
+                source: &NoWalls,
+                budget_fraction: 1.0,
+                cost: 0.into(),
+            };
             method.assign_cells(settings.dt);
             method.find_candidates(&settings);
             method.rest_cluster([place(0), place(1)], f64::INFINITY, 0.0, &settings);

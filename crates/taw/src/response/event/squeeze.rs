@@ -56,19 +56,18 @@ impl EventDriven {
         }
     }
 
-    /// Solves the contacts of a gathered cluster, which has moved freely, until the end of the
-    /// substep. If walls squeeze it, they carry nothing along.
-    pub(super) fn solve_until_end(
+    /// Solves the contacts of a gathered cluster, which has moved freely, between two times. If walls
+    /// squeeze it, they carry nothing along.
+    pub(super) fn solve_until(
         &mut self,
         contacts: &mut Contacts<f64>,
-        now: f64,
+        [now, end]: [f64; 2],
         max_acceleration: f64,
         settings: &EventSettings,
         impulse_cache: &mut Vec<CachedImpulse<f64>>,
     ) {
-        let (remaining, cluster) = (settings.dt - now, &mut self.cluster);
-        let mut walls =
-            MovingWalls { walls: &self.walls, start: now, end: settings.dt, at_rest: false };
+        let (remaining, cluster) = (end - now, &mut self.cluster);
+        let mut walls = MovingWalls { walls: &self.walls, start: now, end, at_rest: false };
         let before = cluster
             .carried_energy(contacts, &walls)
             .map(|carried| (carried, cluster.kinetic_energy(), cluster.bodies.clone()));

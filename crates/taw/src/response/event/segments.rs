@@ -1,0 +1,85 @@
+//! Segments of a substep in which the accelerations of a resting cluster count as constant: balls
+//! that roll over each other turn the normals of their contacts, and so the forces.
+
+use cgmath::InnerSpace;
+
+use super::cluster::Cluster;
+use super::{EventDriven, EventSettings};
+use crate::contact::{Contact, Contacts};
+use crate::math::{Vec3, normalize_and_length};
+use crate::response::KeyedByContact;
+use crate::response::impulse::UnionFind;
+
+/// Largest rotation of a normal in a segment, in radians, as on curved walls.
+const MAX_TURN: f64 = 0.02;
+/// Maximum number of segments of the time that is left, so that fast balls cost no more.
+const MAX_SEGMENTS: f64 = 16.0;
+
+impl Cluster {
+    /// Time in which no normal of two gathered balls turns too far, in seconds: the remaining time
+    /// or a whole part of it.
+    pub fn segment(&self, contacts: &Contacts<f64>, remaining: f64) -> f64 {
+        let bodies = &self.bodies;
+        let rate = |c: &Contact<f64>| {
+            let (a, b) = (c.a as usize, c.b as usize);
+            let center_offset =
+                bodies.period.minimum_image(bodies.position[b] - bodies.position[a]);
+            turn_rate(center_offset, bodies.velocity[b] - bodies.velocity[a])
+        };
+        let fastest = contacts.mm.iter().map(rate).fold(0.0, f64::max);
+        remaining / (fastest * remaining / MAX_TURN).ceil().clamp(1.0, MAX_SEGMENTS)
+    }
+}
+
+impl EventDriven {
+    /// Solves for the accelerations of all resting clusters at the start of a substep. Those whose
+    /// normals turn in it do not shorten the segments of the others.
+    pub(super) fn solve_all_resting(
+        &mut self,
+        contacts: &mut Contacts<f64>,
+        settings: &EventSettings,
+    ) {
+        let mut turning = self.take_turning(contacts, settings.dt);
+        let mut impulse_cache = std::mem::take(&mut self.impulse_cache);
+        if turning.is_empty() {
+            self.solve_resting(contacts, 0.0, settings, &mut impulse_cache);
+        } else {
+            let mut turning_cache = impulse_cache.clone();
+            self.solve_resting(contacts, 0.0, settings, &mut impulse_cache);
+            self.solve_resting(&mut turning, 0.0, settings, &mut turning_cache);
+            impulse_cache.append(&mut turning_cache);
+            impulse_cache.sort_unstable_by_key(KeyedByContact::key);
+        }
+        self.impulse_cache = impulse_cache;
+    }
+
+    /// Takes the contacts of clusters whose normals turn too far for one segment of `dt` seconds.
+    fn take_turning(&self, contacts: &mut Contacts<f64>, dt: f64) -> Contacts<f64> {
+        let turns = |c: &Contact<f64>| {
+            let (first, second) = (&self.balls[c.a as usize], &self.balls[c.b as usize]);
+            let center_offset = self.center_offset(first, second);
+            turn_rate(center_offset, second.velocity - first.velocity) * dt > MAX_TURN
+        };
+        let mut turning = Contacts::default();
+        if !contacts.mm.iter().any(turns) {
+            return turning;
+        }
+        let mut sets = UnionFind::default();
+        let pairs = contacts.mm.iter().map(|c| (Some(c.a as usize), c.b as usize));
+        sets.build(pairs, self.balls.len());
+        let mut is_turning = vec![false; self.balls.len()];
+        for c in contacts.mm.iter().filter(|c| turns(c)) {
+            is_turning[sets.set_of(c.b as usize) as usize] = true;
+        }
+        let mut take = |c: &Contact<f64>| is_turning[sets.set_of(c.b as usize) as usize];
+        turning.wm.extend(contacts.wm.extract_if(.., |c| take(c)));
+        turning.mm.extend(contacts.mm.extract_if(.., |c| take(c)));
+        turning
+    }
+}
+
+/// Angular speed of the normal of two balls, in rad/s.
+fn turn_rate(center_offset: Vec3<f64>, relative_velocity: Vec3<f64>) -> f64 {
+    normalize_and_length(center_offset)
+        .map_or(0.0, |(normal, distance)| normal.cross(relative_velocity).magnitude() / distance)
+}
