@@ -64,7 +64,6 @@ impl<S: Scalar> World<S> {
         self.write_back_balls();
         if rest <= S::zero() {
             self.scratch.events.spent = 0;
-            self.walls.finish_step();
         }
     }
 

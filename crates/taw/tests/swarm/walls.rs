@@ -201,7 +201,9 @@ fn a_marble_of_infinite_mass_in_a_wall_stays_a_number() {
 #[test]
 fn no_plate_passes_through_a_ball_of_the_swarm() {
     let mut passed = Vec::new();
-    for response in [Response::Displacement, Response::Impulse, Response::SoftStep] {
+    let all =
+        [Response::Displacement, Response::Impulse, Response::EventDriven, Response::SoftStep];
+    for response in all {
         for speed in [3.0_f32, 8.0, 20.0, 40.0] {
             let mut world = world(model(Tier::Full), None);
             world.set_model(Model { response, ..world.model() }).unwrap();
