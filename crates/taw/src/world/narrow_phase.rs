@@ -287,20 +287,18 @@ pub(super) fn candidate_sub_shapes<S: Scalar>(
     });
     candidates.sort_unstable_by_key(|near| near.part);
     candidates.dedup_by_key(|near| near.part);
-    // In the solid of a height field, only the nearest triangle gives the depth.
-    let under = |it: &Candidate<S>| {
+    // In the solid of a height field, only its nearest triangle gives the depth, however far it is.
+    let under = |it: &&Candidate<S>| {
         let landscape = matches!(walls.shapes()[it.part.wall as usize], WallShape::HeightField(..));
         landscape && it.nearest.distance < S::zero()
     };
-    if candidates.iter().any(under) {
-        let all = candidates.clone();
-        candidates.retain(|it| {
-            let nearer = |other: &Candidate<S>| {
-                other.part.wall == it.part.wall
-                    && (-other.nearest.distance, other.part) < (-it.nearest.distance, it.part)
-            };
-            !(under(it) && all.iter().any(nearer))
-        });
+    let mut fields: SmallVec<[u32; 2]> =
+        candidates.iter().filter(under).map(|it| it.part.wall).collect();
+    fields.dedup();
+    for wall in fields {
+        let (index, nearest) = walls.shapes()[wall as usize].nearest_triangle(sphere.center);
+        candidates.retain(|it| it.part.wall != wall);
+        candidates.push(Candidate { part: SubShape { wall, index }, nearest });
     }
 }
 

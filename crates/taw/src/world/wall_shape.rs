@@ -156,27 +156,34 @@ impl<S: Scalar> WallShape<S> {
     /// Projects a point onto the surface.
     #[must_use]
     pub fn project_point(&self, point: Point3<S>) -> PointProjection<S> {
-        let on = |surface: &dyn Fn(&mut dyn FnMut(u32) -> S)| {
-            let mut best = no_projection(point);
-            surface(&mut |part| {
-                let next = self.project_point_on(part, point);
-                if next.distance.abs() < best.distance.abs() {
-                    best = next;
-                }
-                best.distance.abs()
-            });
-            best
-        };
         match self {
             Self::Plane(_) => self.project_point_on(0, point),
             Self::Solid(shape) => shape.project_point(point),
-            Self::Mesh(mesh, pose) => on(&|visit| {
-                mesh.for_each_near(pose.inverse_transform_point(point), S::infinity(), visit);
-            }),
-            Self::HeightField(field, pose) => on(&|visit| {
-                field.for_each_near(pose.inverse_transform_point(point), S::infinity(), visit);
-            }),
+            Self::Mesh(..) | Self::HeightField(..) => self.nearest_triangle(point).1,
         }
+    }
+
+    /// Nearest triangle of a surface, and the projection of the point onto it.
+    pub(super) fn nearest_triangle(&self, point: Point3<S>) -> (u32, PointProjection<S>) {
+        let mut best = (0, no_projection(point));
+        let visit = |part: u32| {
+            let next = (part, self.project_point_on(part, point));
+            let order = |(part, it): &(u32, PointProjection<S>)| (it.distance.abs(), *part);
+            if order(&next) < order(&best) {
+                best = next;
+            }
+            best.1.distance.abs()
+        };
+        match self {
+            Self::Plane(_) | Self::Solid(_) => {}
+            Self::Mesh(mesh, pose) => {
+                mesh.for_each_near(pose.inverse_transform_point(point), S::infinity(), visit);
+            }
+            Self::HeightField(field, pose) => {
+                field.for_each_near(pose.inverse_transform_point(point), S::infinity(), visit);
+            }
+        }
+        best
     }
 
     /// Projects a point onto a sub-shape.
