@@ -75,7 +75,7 @@ pub(crate) const CORE_ROUNDING: f64 = 1e-3;
 /// How continuous detection stopped a marble at walls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WallStop<S> {
-    /// Displacement that it lost, and that since the last stop, in metres.
+    /// Displacement that it lost, and that since the last stop over the wall there, in metres.
     pub lost: Vec3<S>,
     pub since: Vec3<S>,
     /// Fraction of the substep since then.
@@ -271,8 +271,9 @@ fn update_positions<S: Scalar>(
             continue;
         };
         followed[contact.b] = true;
-        let displacement =
-            marbles.velocity[contact.b] * (part * settings.context.settings.dt) - since;
+        let displacement = (marbles.velocity[contact.b] - contact.surface_velocity)
+            * (part * settings.context.settings.dt)
+            - since;
         if is_finite(displacement) {
             marbles.position[contact.b] += displacement;
         }

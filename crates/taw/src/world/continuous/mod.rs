@@ -152,11 +152,11 @@ impl<S: Scalar> Continuous<S> {
         if !self.bends.is_empty() {
             stops.resize(self.start.len(), None);
         }
-        for Bend { stop, displacement, left, .. } in &self.bends {
+        for Bend { stop, displacement, carried, left, .. } in &self.bends {
             let its = &mut stops[stop.row as usize];
             let before = its.map_or_else(Vec3::zero, |stop| stop.lost);
             let lost = before + stop.displacement;
-            *its = Some(WallStop { lost, since: *displacement, part: *left });
+            *its = Some(WallStop { lost, since: *displacement - *carried, part: *left });
         }
     }
 

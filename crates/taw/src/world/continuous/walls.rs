@@ -387,8 +387,8 @@ impl<S: Scalar> Walls<S> {
             let center = path.at(time);
             let PointProjection { normal, distance, .. } = self.project_point(part, center);
             let (gap, closing) = (distance - radius, -path.velocity(time, center).dot(normal));
-            // What slides along a surface closes by rounding.
-            let closes = closing > near;
+            // What slides along a surface closes by rounding; on a bent path it may do so faster.
+            let closes = closing > if bend > S::zero() { S::zero() } else { near };
             if closing.is_nan() || (!closes && bend <= S::zero()) {
                 return None;
             }
