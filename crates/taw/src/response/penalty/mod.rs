@@ -75,6 +75,8 @@ pub(crate) const CORE_ROUNDING: f64 = 1e-3;
 /// How continuous detection stopped a marble at walls.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WallStop<S> {
+    /// Index of the wall of the last stop.
+    pub wall: u32,
     /// Displacement that it lost, and that since the last stop over the wall there, in metres.
     pub lost: Vec3<S>,
     pub since: Vec3<S>,
@@ -247,9 +249,7 @@ fn bounce_cores<S: Scalar>(
     }
 }
 
-/// Moves marbles by their velocity changes, with the position weight. Of those that continuous
-/// detection stopped, one whose core was pushed goes on from there by its velocity; one that springs
-/// turned was never stopped.
+/// Moves marbles by their velocity changes, with the position weight.
 fn update_positions<S: Scalar>(
     settings: &PenaltySettings<
         S,
@@ -263,34 +263,75 @@ fn update_positions<S: Scalar>(
 ) {
     followed.clear();
     followed.resize(marbles.velocity.len(), false);
-    let stop = |row: usize| settings.wall_stops.get(row).copied().flatten();
-    let pushed = if settings.wall_stops.is_empty() { &[] } else { forces };
-    for ContactForce { contact, core_impulse, .. } in pushed {
-        let pushed = *core_impulse > S::zero() && !followed[contact.b];
-        let Some(WallStop { since, part, .. }) = stop(contact.b).filter(|_| pushed) else {
-            continue;
-        };
-        followed[contact.b] = true;
-        let displacement = (marbles.velocity[contact.b] - contact.surface_velocity)
-            * (part * settings.context.settings.dt)
-            - since;
-        if is_finite(displacement) {
-            marbles.position[contact.b] += displacement;
-        }
+    if !settings.wall_stops.is_empty() {
+        leave_walls(settings, marbles, forces, followed);
     }
     for ContactForce { contact, initial_velocities, .. } in forces {
         for (row, initial) in [contact.a, Some(contact.b)].into_iter().zip(initial_velocities) {
             let Some(row) = row.filter(|row| !std::mem::replace(&mut followed[*row], true)) else {
                 continue;
             };
-            let free = (marbles.velocity[row] - *initial)
-                * ((settings.context.position_weight)(row) * settings.context.settings.dt);
-            let displacement = free + stop(row).map_or_else(Vec3::zero, |stop| stop.lost);
+            let displacement = displacement_since(settings, marbles, row, *initial);
             if is_finite(displacement) {
                 marbles.position[row] += displacement;
             }
         }
     }
+}
+
+/// Moves marbles that continuous detection stopped at walls: one whose core was pushed goes on from
+/// there by its velocity; one that springs alone made part from the wall was never stopped.
+fn leave_walls<S: Scalar>(
+    settings: &PenaltySettings<
+        S,
+        impl Colliders<S>,
+        impl Fn(usize) -> Material<S>,
+        impl Fn(usize) -> S,
+    >,
+    marbles: &mut SolverBodies<S>,
+    forces: &[ContactForce<S>],
+    followed: &mut [bool],
+) {
+    for is_pushed in [true, false] {
+        for ContactForce { contact, initial_velocities, core_impulse, .. } in forces {
+            let row = contact.b;
+            let is_next = !followed[row] && (*core_impulse > S::zero()) == is_pushed;
+            let stop = settings.wall_stops.get(row).copied().flatten().filter(|_| is_next);
+            let Some(stop) = stop else { continue };
+            let is_parted = || {
+                matches!(contact.body_a, BodyA::Wall(wall, _) if wall == stop.wall)
+                    && contact.relative_velocity(marbles).dot(contact.normal) >= S::zero()
+            };
+            let displacement = if is_pushed {
+                let velocity = marbles.velocity[row] - contact.surface_velocity;
+                velocity * (stop.part * settings.context.settings.dt) - stop.since
+            } else if is_parted() {
+                displacement_since(settings, marbles, row, initial_velocities[1]) + stop.lost
+            } else {
+                continue;
+            };
+            followed[row] = true;
+            if is_finite(displacement) {
+                marbles.position[row] += displacement;
+            }
+        }
+    }
+}
+
+/// Displacement of a row by the change of its velocity since `initial`, in metres.
+fn displacement_since<S: Scalar>(
+    settings: &PenaltySettings<
+        S,
+        impl Colliders<S>,
+        impl Fn(usize) -> Material<S>,
+        impl Fn(usize) -> S,
+    >,
+    marbles: &SolverBodies<S>,
+    row: usize,
+    initial: Vec3<S>,
+) -> Vec3<S> {
+    (marbles.velocity[row] - initial)
+        * ((settings.context.position_weight)(row) * settings.context.settings.dt)
 }
 
 /// Sets the factors of each contact by mass splitting.

@@ -153,10 +153,11 @@ impl<S: Scalar> Continuous<S> {
             stops.resize(self.start.len(), None);
         }
         for Bend { stop, displacement, carried, left, .. } in &self.bends {
+            let Obstacle::Wall(wall) = stop.obstacle else { continue };
             let its = &mut stops[stop.row as usize];
             let before = its.map_or_else(Vec3::zero, |stop| stop.lost);
             let lost = before + stop.displacement;
-            *its = Some(WallStop { lost, since: *displacement - *carried, part: *left });
+            *its = Some(WallStop { wall, lost, since: *displacement - *carried, part: *left });
         }
     }
 
