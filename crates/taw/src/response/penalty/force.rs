@@ -286,7 +286,8 @@ impl<S: Scalar> ContactForce<S> {
         }
         let speed = self.contact.relative_velocity(marbles).dot(self.contact.normal);
         let inverse_mass = self.contact.inverse_effective_mass().normal;
-        let missing = (self.rebound_speed - speed) / inverse_mass;
+        // No faster than it came: beside other pushes that have slowed it, more would add energy.
+        let missing = (self.rebound_speed.min(speed.abs()) - speed) / inverse_mass;
         let total = (self.core_impulse + missing).max(S::zero());
         let impulse = total - self.core_impulse;
         if impulse == S::zero() || !total.is_finite() {
