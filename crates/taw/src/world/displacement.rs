@@ -4,7 +4,6 @@ use super::World;
 use super::method::Method;
 use crate::math::{Scalar, cast_vector, length};
 use crate::response::displacement::solve_displacement;
-use crate::response::impulse::{Context, SubstepStart};
 
 /// Position projection, without masses.
 pub(super) struct Displacement;
@@ -23,19 +22,13 @@ impl<S: Scalar> Method<S> for Displacement {
         world.begin_bounces();
         let (settings, model, scratch) =
             (world.solver_settings(dt), world.settings.model, &mut world.scratch);
-        let (mut bodies, material, position_weight) =
-            scratch.columns.bodies(&mut world.marbles, model);
-        let context = Context {
-            walls: &world.walls,
-            material,
-            position_weight,
-            start: SubstepStart {
-                position: &[],
-                velocity: &[],
-                ccd_stops: &scratch.continuous.projections,
-            },
-            settings: &settings,
-        };
+        let (mut bodies, context) = scratch.columns.constrained(
+            &mut world.marbles,
+            &world.walls,
+            &scratch.continuous,
+            model,
+            &settings,
+        );
         let mut pushes = scratch.audit_state.as_ref().map(|_| Vec::new());
         solve_displacement(
             &mut bodies,

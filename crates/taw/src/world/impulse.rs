@@ -4,7 +4,7 @@ use super::World;
 use super::energy_audit::AuditState;
 use super::method::Method;
 use crate::math::{Scalar, length};
-use crate::response::impulse::{Context, SubstepStart, solve_contacts};
+use crate::response::impulse::solve_contacts;
 
 /// Sequential impulses.
 pub(super) struct Impulse;
@@ -25,19 +25,13 @@ impl<S: Scalar> Method<S> for Impulse {
         world.begin_bounces();
         let (settings, model, scratch) =
             (world.solver_settings(dt), world.settings.model, &mut world.scratch);
-        let (mut bodies, material, position_weight) =
-            scratch.columns.bodies(&mut world.marbles, model);
-        let context = Context {
-            walls: &world.walls,
-            material,
-            position_weight,
-            start: SubstepStart {
-                position: &[],
-                velocity: &scratch.columns.velocity_before,
-                ccd_stops: &scratch.continuous.projections,
-            },
-            settings: &settings,
-        };
+        let (mut bodies, context) = scratch.columns.constrained(
+            &mut world.marbles,
+            &world.walls,
+            &scratch.continuous,
+            model,
+            &settings,
+        );
         solve_contacts(
             &mut bodies,
             &mut world.contacts,

@@ -302,6 +302,15 @@ pub(super) fn candidate_sub_shapes<S: Scalar>(
     }
 }
 
+/// Distance from another wall, in metres, at which a point nearest to a sphere still counts as on it.
+pub(super) fn flush_distance<S: Scalar>(sphere: &Sphere<S>) -> S {
+    let largest = [sphere.center.x, sphere.center.y, sphere.center.z]
+        .iter()
+        .fold(sphere.radius, |most, x| most.max(x.abs()));
+    let rounding = S::epsilon() * S::from_f64(4.0) * largest;
+    (sphere.radius * S::from_f64(INTERNAL_EDGE_TOLERANCE)).max(rounding)
+}
+
 /// Removes ghost collisions at internal edges: keeps the contacts that a sphere would have if all
 /// walls were one piece.
 ///
@@ -314,11 +323,7 @@ pub(super) fn remove_ghost_collisions<S: Scalar>(
     (sphere, layers): (&Sphere<S>, CollisionLayers),
     candidates: &mut Vec<Candidate<S>>,
 ) {
-    let largest = [sphere.center.x, sphere.center.y, sphere.center.z]
-        .iter()
-        .fold(sphere.radius, |most, x| most.max(x.abs()));
-    let rounding = S::epsilon() * S::from_f64(4.0) * largest;
-    let flush = (sphere.radius * S::from_f64(INTERNAL_EDGE_TOLERANCE)).max(rounding);
+    let flush = flush_distance(sphere);
     let on = |point: &Candidate<S>, other: &Candidate<S>| {
         walls.project_point(other.part, point.nearest.point).distance <= flush
     };

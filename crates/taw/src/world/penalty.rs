@@ -20,16 +20,23 @@ impl<S: Scalar> Method<S> for Penalty {
 
     fn solve(&self, world: &mut World<S>, dt: S) {
         world.begin_bounces();
-        let (model, scratch) = (world.settings.model, &mut world.scratch);
-        let (mut bodies, material, position_weight) =
-            scratch.columns.bodies(&mut world.marbles, model);
-        let settings = PenaltySettings { law: self.0, dt, material, position_weight };
+        let (settings, model, scratch) =
+            (world.solver_settings(dt), world.settings.model, &mut world.scratch);
+        scratch.continuous.list_wall_stops(&mut scratch.wall_stops);
+        let (mut bodies, context) = scratch.columns.constrained(
+            &mut world.marbles,
+            &world.walls,
+            &scratch.continuous,
+            model,
+            &settings,
+        );
+        let settings = PenaltySettings { law: self.0, context, wall_stops: &scratch.wall_stops };
         apply_penalty_forces(
             &settings,
             &mut bodies,
             &mut world.contacts,
-            &world.walls,
             &mut world.memory.springs,
+            &mut scratch.penalty,
             &mut scratch.stopped,
             scratch.audit_state.as_mut().map(|audit_state| &mut audit_state.work),
         );

@@ -11,7 +11,7 @@ use super::solver_columns::SolverColumns;
 use crate::broad::{Grid, Images};
 use crate::math::{Scalar, Vec3};
 use crate::response::event::EventDriven;
-use crate::response::{displacement, impulse};
+use crate::response::{displacement, impulse, penalty};
 
 /// Lists that the verbs of a step fill and read. All are equal, so that worlds can be compared.
 #[derive(Clone, Debug)]
@@ -28,6 +28,9 @@ pub(super) struct Scratch<S> {
     pub columns: SolverColumns<S>,
     pub displacement: displacement::Scratch<S>,
     pub impulse: impulse::Scratch<S>,
+    pub penalty: penalty::Scratch<S>,
+    /// How walls stopped each row; empty if they stopped none.
+    pub wall_stops: Vec<Option<penalty::WallStop<S>>>,
     /// Accelerations in m/s², for a response that integrates marbles by itself.
     pub accelerations: Vec<Vec3<f64>>,
     /// Time of the step that is left after the substep, in seconds; zero unless within one.
@@ -53,6 +56,8 @@ impl<S: Scalar> Default for Scratch<S> {
             columns: SolverColumns::default(),
             displacement: displacement::Scratch::default(),
             impulse: impulse::Scratch::default(),
+            penalty: penalty::Scratch::default(),
+            wall_stops: Vec::new(),
             accelerations: Vec::new(),
             rest_of_step: S::zero(),
             events: EventDriven::default(),

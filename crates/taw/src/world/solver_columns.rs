@@ -1,11 +1,13 @@
 //! Marbles as the solvers of listed contacts see them.
 
 use super::World;
+use super::continuous::Continuous;
 use super::marbles::Marbles;
 use super::model::Model;
+use super::walls::Walls;
 use crate::math::{Scalar, Vec3, length};
 use crate::motion::Rotation;
-use crate::response::impulse::SolverSettings;
+use crate::response::impulse::{Context, SolverSettings, SubstepStart};
 use crate::response::{CapsuleInertia, Material, Response, SolverBodies};
 
 /// Columns that a solver reads besides those of the marbles.
@@ -55,6 +57,33 @@ impl<S: Scalar> SolverColumns<S> {
         let position_weight =
             move |row| integrator.get(row).unwrap_or(model.integrator).position_weight();
         (bodies, move |row| material.get(row).unwrap_or_default(), position_weight)
+    }
+
+    /// Bodies, and what else a solver of contacts reads.
+    pub fn constrained<'a>(
+        &'a self,
+        marbles: &'a mut Marbles<S>,
+        walls: &'a Walls<S>,
+        continuous: &'a Continuous<S>,
+        model: Model,
+        settings: &'a SolverSettings<S>,
+    ) -> (
+        SolverBodies<'a, S>,
+        Context<
+            'a,
+            S,
+            Walls<S>,
+            impl Fn(usize) -> Material<S> + use<'a, S>,
+            impl Fn(usize) -> S + use<'a, S>,
+        >,
+    ) {
+        let (bodies, material, position_weight) = self.bodies(marbles, model);
+        let start = SubstepStart {
+            position: &[],
+            velocity: &self.velocity_before,
+            ccd_stops: &continuous.projections,
+        };
+        (bodies, Context { walls, material, position_weight, start, settings })
     }
 }
 

@@ -208,6 +208,21 @@ impl<S: Scalar> WallShape<S> {
         }
     }
 
+    /// Unit normal of a triangle on the side of a point; none for another shape, or from within a
+    /// height field.
+    pub(super) fn face_normal(&self, part: u32, from: Point3<S>) -> Option<Vec3<S>> {
+        let (triangle, pose) = match self {
+            Self::Mesh(mesh, pose) => (mesh.triangle(part)?, pose),
+            Self::HeightField(field, pose) => (field.triangle(part)?, pose),
+            Self::Plane(_) | Self::Solid(_) => return None,
+        };
+        let normal = pose.transform_vector(triangle.normal()?);
+        let is_outside =
+            (from - pose.transform_point(triangle.corners[0])).dot(normal) >= S::zero();
+        let is_two_sided = matches!(self, Self::Mesh(..));
+        (is_outside || is_two_sided).then_some(if is_outside { normal } else { -normal })
+    }
+
     /// Tests if the straight way from a point outside to the nearest one of this sub-shape leads
     /// through the solid below a height field: another sub-shape is nearer, and in between.
     pub(super) fn is_behind_solid(&self, part: u32, nearest: &PointProjection<S>) -> bool {

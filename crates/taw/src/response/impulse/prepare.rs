@@ -302,16 +302,19 @@ where
     }
 
     /// Tells if continuous collision detection stopped a row within the substep.
+    #[inline]
     pub(in crate::response) fn is_ccd_stopped(&self, row: usize) -> bool {
         self.ccd_stop(row).is_some()
     }
 
     /// Fraction of a velocity change that the position of a stopped row still follows, as a matrix.
+    #[inline]
     fn ccd_stop(&self, row: usize) -> Option<Mat3<S>> {
         self.start.ccd_stops.get(row).copied().flatten()
     }
 
     /// Displacement of a row by a velocity change, in metres.
+    #[inline]
     pub(in crate::response) fn displacement_of(&self, row: usize, change: Vec3<S>) -> Vec3<S> {
         let displacement = change * (self.position_weight)(row) * self.settings.dt;
         self.ccd_stop(row).map_or(displacement, |projection| projection * displacement)

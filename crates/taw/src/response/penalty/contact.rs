@@ -2,7 +2,7 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::PenaltySettings;
+use super::{CORE, CORE_ROUNDING, PenaltySettings};
 use crate::contact::Contact;
 use crate::math::{Scalar, Vec3, cast_vector, is_finite};
 use crate::response::impulse::BodyA;
@@ -13,6 +13,7 @@ use crate::response::{
 };
 
 /// Penalty contact: bodies, geometry and relative motion.
+#[derive(Clone, Debug)]
 pub(super) struct PenaltyContact<S> {
     pub key: ContactKey,
     pub body_a: BodyA,
@@ -29,6 +30,8 @@ pub(super) struct PenaltyContact<S> {
     pub surface_velocity: Vec3<S>,
     /// Inverse effective mass of each body, a first.
     pub inverse_effective_masses: [InverseEffectiveMass<S>; 2],
+    /// The marble was stopped by continuous detection, half inside of this wall.
+    pub core_touches: bool,
     pub has_capsule: bool,
     /// Sum of the curvatures, in 1/m.
     pub curvature: S,
@@ -39,9 +42,13 @@ pub(super) struct PenaltyContact<S> {
 
 /// State of a contact; none without penetration, or if nothing can move.
 pub(super) fn active_contact<S: Scalar>(
-    settings: &PenaltySettings<S, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    settings: &PenaltySettings<
+        S,
+        impl Colliders<S>,
+        impl Fn(usize) -> Material<S>,
+        impl Fn(usize) -> S,
+    >,
     marbles: &SolverBodies<S>,
-    walls: &impl Colliders<S>,
     body_a: BodyA,
     contact: &Contact<S>,
 ) -> Option<PenaltyContact<S>> {
@@ -49,11 +56,11 @@ pub(super) fn active_contact<S: Scalar>(
     let (a, b) = (body_a.marble(), contact.b as usize);
     // Displacement since the position of the step's own kick; see this module's docs. Along the
     // present normal, because internal edges are known for that one.
-    let moved =
-        |row: usize| marbles.velocity[row] * (settings.dt * (settings.position_weight)(row));
+    let moved = |row: usize| settings.context.displacement_of(row, marbles.velocity[row]);
     let displacement = moved(b) - a.map_or_else(Vec3::zero, moved);
-    let surface_velocity = marbles.surface_velocity(body_a, b, arms, walls);
-    let (material, compliance) = surfaces(settings, walls, a, contact);
+    let surface_velocity = marbles.surface_velocity(body_a, b, arms, settings.context.walls);
+    let (material, compliance) = surfaces(settings, a, contact);
+    let core = marbles.radius[b] * S::from_f64(CORE * (1.0 - CORE_ROUNDING));
     let none = InverseEffectiveMass { normal: S::zero(), tangent: S::zero() };
     let found = PenaltyContact {
         key: body_a.contact_key(contact),
@@ -69,6 +76,7 @@ pub(super) fn active_contact<S: Scalar>(
             a.map_or(none, |a| marbles.inverse_effective_mass(a, arms[0], -normal)),
             marbles.inverse_effective_mass(b, arms[1], normal),
         ],
+        core_touches: a.is_none() && settings.context.is_ccd_stopped(b) && -separation >= core,
         has_capsule: [a, Some(b)].into_iter().flatten().any(|row| marbles.capsule(row).is_some()),
         curvature: a.map_or_else(S::zero, |a| marbles.radius[a].recip())
             + marbles.radius[b].recip(),
@@ -80,15 +88,19 @@ pub(super) fn active_contact<S: Scalar>(
 
 /// Combined material and compliance of the surfaces of a contact.
 fn surfaces<S: Scalar>(
-    settings: &PenaltySettings<S, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
-    walls: &impl Colliders<S>,
+    settings: &PenaltySettings<
+        S,
+        impl Colliders<S>,
+        impl Fn(usize) -> Material<S>,
+        impl Fn(usize) -> S,
+    >,
     marble_a: Option<usize>,
     contact: &Contact<S>,
 ) -> (Material<S>, Compliance<S>) {
-    let own = (settings.material)(contact.b as usize);
+    let own = (settings.context.material)(contact.b as usize);
     let compliance = own.elasticity.compliance();
-    let wall = || walls.material(contact.a as usize);
-    let other = marble_a.map_or_else(wall, |a| Some((settings.material)(a)));
+    let wall = || settings.context.walls.material(contact.a as usize);
+    let other = marble_a.map_or_else(wall, |a| Some((settings.context.material)(a)));
     // A wall without a material of its own is rigid.
     let Some(other) = other else { return (own, compliance) };
     (own.combined_with(other), compliance.plus(other.elasticity.compliance()))
@@ -146,6 +158,7 @@ impl<S: Scalar> PenaltyContact<S> {
         work.record_impulse(ImpulseSample { impulse, normal, mean_velocity, fixed_velocity });
     }
 
+    #[inline]
     pub fn apply_impulse(&self, marbles: &mut SolverBodies<S>, impulse: Vec3<S>) {
         let [first, second] = self.arms;
         for (row, impulse, normal, arm) in

@@ -37,6 +37,7 @@ impl ContactLaw {
 }
 
 /// Stiffness and damping of a contact, normal and tangential.
+#[derive(Clone, Debug)]
 pub(super) struct Springs<S> {
     /// Elastic force at the penetration, in newtons.
     pub elastic_force: S,

@@ -13,7 +13,7 @@ use crate::math::Scalar;
 /// the total stays below the limit, no contact is softened. Springs and dashpots are split each by
 /// their own demand: springs that were softened because dashpots have a common limit would not
 /// bear what lies on them.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct ContactLoad<S> {
     /// Fraction of the velocity that all dashpots take in a substep; more than one would reverse
     /// it.
@@ -71,12 +71,14 @@ impl<S: Scalar> ContactLoad<S> {
 }
 
 /// Fraction of the velocity that a dashpot takes in a substep.
+#[inline]
 pub(super) fn damped_fraction<S: Scalar>(half_damping: S) -> S {
     half_damping * S::from_f64(2.0) / (S::one() + half_damping)
 }
 
 /// Fraction of a spring's impulse that its own dashpot, which acts half by the velocity before and
 /// half by that after, leaves of it.
+#[inline]
 pub(super) fn undamped_fraction<S: Scalar>(damped_fraction: S) -> S {
     S::one() - damped_fraction * S::from_f64(0.5)
 }

@@ -2,6 +2,19 @@ use super::*;
 use crate::broad::Period;
 use crate::math::Point3;
 use crate::response::Elasticity;
+use crate::response::impulse::{SolverSettings, SubstepStart};
+
+/// Settings of a substep, of which springs only use its length.
+fn solver_settings(dt: f64) -> SolverSettings<f64> {
+    SolverSettings {
+        iterations: 1,
+        dt,
+        restitution_threshold: 0.0,
+        tolerance: 0.0,
+        slop: 0.0,
+        max_relative_slop: 0.0,
+    }
+}
 
 /// Head-on collision of two balls at `speed` each, without gravity: contact time, maximum
 /// penetration, maximum force (by the velocity change).
@@ -41,15 +54,25 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
             capsules: &[],
         };
         let law = ContactLaw::HertzMindlin;
-        let settings = PenaltySettings { law, dt, material: |_| own, position_weight: |_| 0.0 };
+        let settings = PenaltySettings {
+            law,
+            wall_stops: &[],
+            context: Context {
+                walls: &walls,
+                material: |_| own,
+                position_weight: |_| 0.0,
+                start: SubstepStart { position: &[], velocity: &[], ccd_stops: &[] },
+                settings: &solver_settings(dt),
+            },
+        };
         columns.place_contacts(&mut contacts, &walls);
         let mut quarantined = vec![];
         apply_penalty_forces(
             &settings,
             &mut columns,
             &mut contacts,
-            &walls,
             &mut histories,
+            &mut Scratch::default(),
             &mut quarantined,
             None,
         );

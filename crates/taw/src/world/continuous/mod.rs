@@ -9,9 +9,12 @@ mod walls;
 use std::cmp::Reverse;
 use std::collections::{BinaryHeap, HashSet};
 
+use cgmath::Zero;
+
 use super::{Detection, World};
 use crate::contact::Contact;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
+use crate::response::penalty::WallStop;
 use marbles::{Meeting, Partners, Path};
 pub(super) use moving_walls::{Frame, MovingWall, RelativePath};
 use walls::Bend;
@@ -143,6 +146,21 @@ impl<S: Scalar> World<S> {
 }
 
 impl<S: Scalar> Continuous<S> {
+    /// Lists by row how walls stopped it; nothing if they stopped none.
+    pub fn list_wall_stops(&self, stops: &mut Vec<Option<WallStop<S>>>) {
+        stops.clear();
+        if !self.bends.is_empty() {
+            stops.resize(self.start.len(), None);
+        }
+        for Bend { stop, displacement, carried, left, .. } in &self.bends {
+            let Obstacle::Wall(wall) = stop.obstacle else { continue };
+            let its = &mut stops[stop.row as usize];
+            let before = its.map_or_else(Vec3::zero, |stop| stop.lost);
+            let lost = before + stop.displacement;
+            *its = Some(WallStop { wall, lost, since: *displacement - *carried, part: *left });
+        }
+    }
+
     /// Records a stop and the remaining freedom of the marble.
     fn stop(&mut self, stopped: StoppedMarble<S>, along: Mat3<S>) {
         self.projections.resize(self.start.len(), None);

@@ -5,10 +5,13 @@ use smallvec::SmallVec;
 
 use super::moving_walls::{Frame, MovingWall, Place, RelativePath, path_bounds};
 use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
+use crate::broad::CollisionLayers;
 use crate::math::{Mat3, Point3, Scalar, Vec3, is_finite_point, length};
+use crate::response::penalty::CORE;
 use crate::response::{Colliders as _, Response};
-use crate::shape::{PointProjection, Sphere};
+use crate::shape::{Aabb, PointProjection, Sphere};
 use crate::world::World;
+use crate::world::narrow_phase::flush_distance;
 use crate::world::walls::{SubShape, Walls};
 
 /// Enough iterations for any wall that a marble does not only graze.
@@ -144,7 +147,8 @@ impl<S: Scalar> World<S> {
             sphere.center = place.position;
             // From here on as the wall sees it.
             (displacement, change, left) = (place.rest, change * rest, left * rest);
-            let mut along = along_surfaces(displacement, normal, &surfaces);
+            let rounding = sphere.radius * S::from_f64(OVERLAP);
+            let mut along = along_surfaces(displacement, normal, &surfaces, rounding);
             surfaces.push(normal);
             let there = center + along * displacement;
             let slides_off = || {
@@ -259,11 +263,10 @@ impl<S: Scalar> World<S> {
         sphere: &Sphere<S>,
         motion: Motion<S>,
     ) -> Option<WallImpact<S>> {
-        let half = S::from_f64(0.5);
         // The core (half the radius) decides whether it passes into a wall, the full sphere when:
         // first wherever it touches, so that at the internal edge of two flush parts the one below
         // counts.
-        let core = sphere.radius * half;
+        let core = sphere.radius * S::from_f64(CORE);
         let passes = self.first_impact_of(core, (row, sphere, motion))?;
         if self.settings.model.response.needs_penetration() {
             return Some(passes);
@@ -279,9 +282,13 @@ impl<S: Scalar> World<S> {
         radius: S,
         (row, sphere, motion): (usize, &Sphere<S>, Motion<S>),
     ) -> Option<WallImpact<S>> {
+        let layers = self.marbles.layers_of_row(row);
         let mut best: Option<WallImpact<S>> = None;
         self.for_each_wall_on_path(row, sphere, motion, |part, path| {
             let Some(stop) = self.walls.time_of_impact(part, radius, path) else { return };
+            if self.walls.is_ghost_impact(&stop, &Sphere { radius, ..*sphere }, (path, layers)) {
+                return;
+            }
             let order = |stop: &WallImpact<S>| (stop.time, stop.gap);
             if best.as_ref().is_none_or(|best| order(&stop) < order(best)) {
                 best = Some(stop);
@@ -337,6 +344,32 @@ impl<S: Scalar> World<S> {
 }
 
 impl<S: Scalar> Walls<S> {
+    /// Tests if an impact is a ghost at an internal edge: the point that is hit lies on another part
+    /// too, and the path leads along the plane of this one or away, so that it cannot get deeper.
+    fn is_ghost_impact(
+        &self,
+        impact: &WallImpact<S>,
+        sphere: &Sphere<S>,
+        (path, layers): (&RelativePath<S>, CollisionLayers),
+    ) -> bool {
+        let WallImpact { time, part, normal, center, gap, .. } = *impact;
+        let Some(face) = self.shapes()[part.wall as usize].face_normal(part.index, center) else {
+            return false;
+        };
+        let closing = -path.velocity(time, center).dot(face);
+        if closing > sphere.radius * S::from_f64(OVERLAP) || path.max_acceleration() > S::zero() {
+            return false;
+        }
+        let flush = flush_distance(&Sphere { center, ..*sphere });
+        let point = center - normal * (gap + sphere.radius);
+        let margin = Vec3::new(flush, flush, flush);
+        let mut is_shared = false;
+        self.for_each_colliding(&Aabb { min: point - margin, max: point + margin }, layers, |it| {
+            is_shared |= it != part && self.project_point(it, point).distance <= flush;
+        });
+        is_shared
+    }
+
     /// Time of impact of a sphere of this radius with a sub-shape of a wall, by conservative
     /// advancement (Mirtich 1996): as the path is bent where the wall rotates, with a bound of its
     /// acceleration beside the velocity.
@@ -354,10 +387,12 @@ impl<S: Scalar> Walls<S> {
             let center = path.at(time);
             let PointProjection { normal, distance, .. } = self.project_point(part, center);
             let (gap, closing) = (distance - radius, -path.velocity(time, center).dot(normal));
-            if closing.is_nan() || (closing <= S::zero() && bend <= S::zero()) {
+            // What slides along a surface closes by rounding; on a bent path it may do so faster.
+            let closes = closing > if bend > S::zero() { S::zero() } else { near };
+            if closing.is_nan() || (!closes && bend <= S::zero()) {
                 return None;
             }
-            last = (closing > S::zero()).then_some(WallImpact {
+            last = closes.then_some(WallImpact {
                 time,
                 part,
                 normal,
@@ -370,7 +405,7 @@ impl<S: Scalar> Walls<S> {
             }
             // One that touches and parts may come back where the wall rotates.
             let overshoot = radius * S::from_f64(MAX_OVERSHOOT);
-            let gap = if closing > S::zero() { gap } else { gap.max(overshoot) };
+            let gap = if closes { gap } else { gap.max(overshoot) };
             time += if bend > S::zero() {
                 let root = (closing * closing + S::from_f64(2.0) * bend * gap).sqrt();
                 // Without cancellation.
@@ -398,15 +433,17 @@ pub(super) fn lost_fraction<S: Scalar>(change: S, end: S) -> S {
 }
 
 /// Projection of a motion onto the surface that it reaches: onto its plane, onto the edge with
-/// another touched surface in the way, or zero in a corner.
+/// another touched surface in the way, or zero in a corner. No surface is in the way by `rounding`
+/// metres.
 fn along_surfaces<S: Scalar>(
     displacement: Vec3<S>,
     normal: Vec3<S>,
     others: &[Vec3<S>],
+    rounding: S,
 ) -> Mat3<S> {
     let plane = Mat3::from_value(S::one()) - outer(normal);
     let slid = plane * displacement;
-    let blocks = |other: &&Vec3<S>, displacement: Vec3<S>| displacement.dot(**other) < S::zero();
+    let blocks = |other: &&Vec3<S>, displacement: Vec3<S>| displacement.dot(**other) < -rounding;
     let Some(other) = others.iter().find(|other| blocks(other, slid)) else { return plane };
     let edge = normal.cross(*other);
     // The edge between nearly parallel surfaces is undefined.
