@@ -143,6 +143,7 @@ impl<S: Scalar> World<S> {
     /// step begins with this; whoever calls the verbs one by one begins so too.
     pub fn begin_step(&mut self) {
         self.scratch.rest_of_step = S::zero();
+        self.scratch.events.spent = 0;
         self.scratch.stopped.clear();
         self.quarantined.clear();
         self.impacts.clear();
