@@ -37,7 +37,7 @@ fn the_substeps_of_a_step_share_its_budget() {
     let (count, stopped) = bounces(2e7, 8);
     assert!(stopped, "{count} bounces");
     assert!(count * HALF_SPACES <= BUDGET, "{count} bounces");
-    // What needs less than the budget ends its step, in substeps or without.
+    // A step that needs less than a substep's share ends, in substeps or without.
     for substeps in [1, 8] {
         let (count, stopped) = bounces(1e6, substeps);
         assert!(!stopped && count > 10_000, "{count} bounces in {substeps} substeps");

@@ -240,3 +240,24 @@ fn columns_of_heavy_and_light_balls_fall_without_energy_from_nothing() {
     }
     assert!(wrong.is_empty(), "column, step, energy over that of the begin: {wrong:?}");
 }
+
+/// Walls behind balls are known for one step: in the next one, rows are others.
+#[test]
+fn balls_of_unlike_masses_come_while_others_bounce() {
+    let mut world = swarm(1, 0.3, 0.9, 9.81);
+    world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+    for wave in 0..60_u8 {
+        let balls: Vec<_> = (0..1 + wave)
+            .map(|i| {
+                let radius = if i % 3 == 0 { 0.3 } else { 0.02 };
+                let [x, z] = [f32::from(i % 8), f32::from(i / 8)];
+                let at = Point3::new(0.61 * x, 0.5 + 0.1 * f32::from(wave % 5), 0.61 * z);
+                let velocity = Vec3::new(0.0, -20.0, 0.0);
+                Ball { velocity, mass: Mass::Density(1000.0), ..Ball::new(at, radius) }
+            })
+            .collect();
+        world.swarm.insert(&balls).unwrap();
+        (0..2).for_each(|_| world.step(DT).unwrap());
+        assert!(world.swarm.balls().iter().flatten().all(|x| x.is_finite()));
+    }
+}

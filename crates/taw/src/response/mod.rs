@@ -79,7 +79,9 @@ pub enum Response {
     /// 5 v dt at most. Where either is more than its radius, a marble may pass through another
     /// one, or with [`Detection::Discrete`](crate::world::Detection::Discrete) through a thin wall;
     /// if it sinks in beyond the middle of the wall without leaving it, it comes back on the side
-    /// that it came from. No contact releases more energy than it absorbed, and penetration from the
+    /// that it came from. With [`Detection::Swept`](crate::world::Detection::Swept) a marble goes no
+    /// deeper into a wall than half of its radius: there it bounces off as a rigid body, by its
+    /// restitution. No contact releases more energy than it absorbed, and penetration from the
     /// start separates at one radius per second at most.
     Penalty(ContactLaw),
     /// Event-driven: collisions in the order of time, each with its own normal at its own time of

@@ -10,8 +10,8 @@ use super::walls::{StaticGeometry, center};
 use crate::broad::CollisionLayers;
 use crate::math::Vec3;
 
-/// Visits the walls that a ball meets on its path, and along those that it met. A path of this length
-/// in metres or less is gone without looking. Returns the ball where it ends.
+/// Visits the walls that a ball meets on its path, and along those that it met. A path of at most
+/// `shortest` metres is not tested for hits. Returns the ball where it ends.
 pub(super) fn along_path(
     walls: &dyn StaticGeometry,
     (ball, layers): (&Row, CollisionLayers),

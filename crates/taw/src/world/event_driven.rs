@@ -62,6 +62,9 @@ impl<S: Scalar> World<S> {
             audit_state.work = work;
         }
         self.write_back_balls();
+        if rest <= S::zero() {
+            self.scratch.events.spent = 0;
+        }
     }
 
     /// Copies the marbles into the balls of the event-driven solver.

@@ -29,7 +29,8 @@ pub struct Model {
     /// Substeps per step, from 1 to 1,000. The cost is proportional.
     pub substeps: u32,
     /// Maximum number of solver iterations over all contacts in a substep, from 1 to 1,000, of
-    /// [`Response::Impulse`], of [`Response::Displacement`], and of the large clusters of
+    /// [`Response::Impulse`], of [`Response::Displacement`], of the rigid cores of
+    /// [`Response::Penalty`] with [`Detection::Swept`], and of the large clusters of
     /// [`Response::EventDriven`]. They end sooner once the contacts have converged.
     pub iterations: u32,
 }

@@ -299,6 +299,7 @@ pub(super) fn candidate_sub_shapes<S: Scalar>(
         let (index, nearest) = walls.shapes()[wall as usize].nearest_triangle(sphere.center);
         candidates.retain(|it| it.part.wall != wall);
         candidates.push(Candidate { part: SubShape { wall, index }, nearest });
+        candidates.sort_unstable_by_key(|near| near.part);
     }
 }
 

@@ -30,9 +30,9 @@ impl<S: Scalar> World<S> {
             self.generate_contacts();
             self.restitute(substep)?;
         }
-        self.step_swarm(dt, &mut |_| ())?;
+        let swarm = self.step_swarm(dt, &mut |_| ());
         self.end_step();
-        Ok(())
+        swarm
     }
 
     /// The first verb: forces change velocities, velocities change positions, over
@@ -143,7 +143,6 @@ impl<S: Scalar> World<S> {
     /// step begins with this; whoever calls the verbs one by one begins so too.
     pub fn begin_step(&mut self) {
         self.scratch.rest_of_step = S::zero();
-        self.scratch.events.spent = 0;
         self.scratch.stopped.clear();
         self.quarantined.clear();
         self.impacts.clear();

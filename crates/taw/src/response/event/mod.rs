@@ -76,7 +76,7 @@ const SLOP: f64 = 4e-3;
 /// once per this fraction of a substep.
 const SUPPORT_CHECK: f64 = 0.05;
 /// Cost limit of a step, and per ball, in tests of one ball against one half-space or ball (some
-/// fifty million per second). A ball that has not finished its part of that by then stays where
+/// fifty million per second). A ball that has not finished its share by then stays where
 /// it is, and is reported.
 const MAX_COST: u64 = 32_000_000;
 const COST_PER_BALL: u64 = 20_000;
@@ -232,7 +232,8 @@ impl EventDriven {
         for row in 0..self.balls.len() {
             self.predict(row, 0.0, settings);
         }
-        let max_cost = self.max_cost(settings);
+        // However little is left, each ball may have an event after what was done up to here.
+        let max_cost = self.max_cost(settings).max(settings.cost.get() + COST_PER_BALL);
         while settings.cost.get() < max_cost {
             let Some(Reverse(event)) = self.queue.pop() else { break };
             if self.balls[event.row].trajectory.version == event.version {

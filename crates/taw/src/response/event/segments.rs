@@ -12,12 +12,14 @@ use crate::response::impulse::UnionFind;
 
 /// Largest rotation of a normal in a segment, in radians, as on curved walls.
 const MAX_TURN: f64 = 0.02;
-/// Maximum number of segments of the time that is left, so that fast balls cost no more.
+/// A segment is at least this fraction of the time that is left, one over so many, which limits the
+/// cost of fast balls.
 const MAX_SEGMENTS: f64 = 16.0;
 
 impl Cluster {
-    /// Time in which no normal of two gathered balls turns too far, in seconds: the remaining time
-    /// or a whole part of it.
+    /// Time in which no normal of two gathered balls turns by more than [`MAX_TURN`] at the velocities
+    /// that they have now, in seconds: the remaining time or a whole part of it, at least a
+    /// sixteenth.
     pub fn segment(&self, contacts: &Contacts<f64>, remaining: f64) -> f64 {
         let bodies = &self.bodies;
         let rate = |c: &Contact<f64>| {

@@ -295,7 +295,7 @@ impl<S: Scalar> ContactForce<S> {
         }
         self.core_impulse = total;
         if self.rebound_speed > S::zero() {
-            // By which the spring does no work.
+            // The spring does no work by it.
             self.history.separation_speed -= impulse * inverse_mass;
         }
         self.apply_normal_impulse(marbles, impulse, work);

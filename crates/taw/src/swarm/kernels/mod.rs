@@ -37,7 +37,8 @@ pub(super) struct ContactImpulses {
     pub struck: Vec<StruckContact>,
 }
 
-/// Contact whose balls came together fast in a substep.
+/// Contact whose balls came together fast in a substep: faster than gravity makes balls at rest in two
+/// steps, so only where there is gravity.
 ///
 /// The impulse that stops them is no load: applied again in the next substep, it would throw them
 /// apart. Of balls that weigh about as much, contacts take it back; a light one between heavy ones

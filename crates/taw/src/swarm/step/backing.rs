@@ -27,14 +27,18 @@ impl Swarm {
         self.find_walls_behind(true);
     }
 
-    /// Saves what walls bear for others in their contacts, before rows change. (Pairs of fast movers
-    /// come after those of walls, so contacts do not know it yet.)
+    /// Saves what walls bear for others in their contacts, before rows change, and forgets the impacts
+    /// of pairs. (Pairs of fast movers come after those of walls, so contacts do not know it yet.)
     pub(super) fn save_backing(&mut self) {
         if self.scratch.backing.is_empty() {
             return;
         }
-        self.forget_impacts();
-        for contact in self.chunks.iter_mut().flat_map(|chunk| &mut chunk.wall_contacts) {
+        self.fast_movers.impulses.forget_impacts();
+        for chunk in self.chunks.iter_mut().filter(|chunk| !chunk.asleep) {
+            chunk.impulses.forget_impacts();
+        }
+        let awake = self.chunks.iter_mut().filter(|chunk| !chunk.asleep);
+        for contact in awake.flat_map(|chunk| &mut chunk.wall_contacts) {
             contact.borne_for_others =
                 contact.share_of(&self.scratch.backing[contact.row as usize]);
         }
@@ -46,7 +50,7 @@ impl Swarm {
             return;
         }
         self.fast_movers.impulses.forget_impacts();
-        for chunk in &mut self.chunks {
+        for chunk in self.chunks.iter_mut().filter(|chunk| !chunk.asleep) {
             chunk.impulses.forget_impacts();
             chunk.wall_contacts.iter_mut().for_each(WallContact::forget_impact);
         }

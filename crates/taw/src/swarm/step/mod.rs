@@ -151,6 +151,7 @@ impl Swarm {
         walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
     ) {
+        self.scratch.backing.clear(); // of other rows
         if !self.pairs_valid || self.chunks.iter().all(|chunk| chunk.asleep) {
             return;
         }

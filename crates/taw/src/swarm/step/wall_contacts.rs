@@ -128,8 +128,8 @@ impl Swarm {
     }
 
     /// Puts back to the wall each ball that passed into one in these `h` seconds, because of a
-    /// contact that sent it another way than its wall contacts were sought on, and lets it slide on. It flew by its
-    /// velocity, and that much lower. Returns true if there was any.
+    /// contact that sent it another way than its wall contacts were sought on, and lets it slide
+    /// on. It flew by its velocity, and that much lower. Returns true if there was any.
     pub(in crate::swarm) fn stop_at_walls(
         &mut self,
         walls: &dyn StaticGeometry,

@@ -387,7 +387,7 @@ impl<S: Scalar> Walls<S> {
             let center = path.at(time);
             let PointProjection { normal, distance, .. } = self.project_point(part, center);
             let (gap, closing) = (distance - radius, -path.velocity(time, center).dot(normal));
-            // What slides along a surface closes by rounding; on a bent path it may do so faster.
+            // A ball that slides along a surface closes by rounding; on a bent path perhaps faster.
             let closes = closing > if bend > S::zero() { S::zero() } else { near };
             if closing.is_nan() || (!closes && bend <= S::zero()) {
                 return None;
