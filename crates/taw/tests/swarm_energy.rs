@@ -247,7 +247,7 @@ fn balls_of_unlike_masses_come_while_others_bounce() {
     let mut world = swarm(1, 0.3, 0.9, 9.81);
     world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
     for wave in 0..60_u8 {
-        let balls: Vec<_> = (0..1 + wave)
+        let balls: Vec<_> = (0..=wave)
             .map(|i| {
                 let radius = if i % 3 == 0 { 0.3 } else { 0.02 };
                 let [x, z] = [f32::from(i % 8), f32::from(i / 8)];

@@ -5,7 +5,8 @@ use super::backing::borne_by_wall;
 use super::params::{Pass, SolverParams};
 use super::rolling::RollingInertia;
 use super::{
-    ALL, ContactImpulses, effective_mass, gather, inverse_mass, normal_and_separation, scatter,
+    ALL, ContactImpulses, StruckContact, effective_mass, gather, inverse_mass,
+    normal_and_separation, scatter,
 };
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::math::RealVector;
@@ -386,11 +387,8 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let gap = [separation, parting];
             let fresh = numbers.fresh::<FIRST>(&params, places, velocity, before, gap);
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
-            if BACKED && params.restitution_threshold > 0.0 {
-                let fast = (zero - parting).gt_mask(L::splat(params.restitution_threshold));
-                if fast != 0 {
-                    ContactImpulses::note_struck(struck, i, fast, normal_impulse[i]);
-                }
+            if BACKED {
+                note_struck(struck, &params, parting, (i, &normal_impulse[i]));
             }
             let alone = effective_mass(&a, &b);
             let (target, softness) = if FIRST {
@@ -429,6 +427,21 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
                 columns.push_apart(batch, at, [a, b], contact, params.slop, grounded);
             }
         }
+    }
+}
+
+/// Notes the pairs of a batch that come together fast, and their normal impulses before.
+#[inline(always)]
+fn note_struck<L: Simd>(
+    struck: &mut Vec<StruckContact>,
+    params: &SolverParams,
+    parting: L,
+    (batch, load): (usize, &[f32; LANES]),
+) {
+    let threshold = params.restitution_threshold;
+    let fast = (L::splat(0.0) - parting).gt_mask(L::splat(threshold));
+    if fast != 0 && threshold > 0.0 {
+        StruckContact::note(struck, batch, fast, load);
     }
 }
 

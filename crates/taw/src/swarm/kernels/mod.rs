@@ -51,6 +51,15 @@ pub(super) struct StruckContact {
     load: f32,
 }
 
+impl StruckContact {
+    /// Notes lanes of a batch, as bits, and their normal impulses.
+    #[cold]
+    fn note(struck: &mut Vec<Self>, batch: usize, lanes: u32, load: &[f32; LANES]) {
+        let lanes = load.iter().zip(0..).filter(|(_, lane)| lanes & 1 << lane != 0);
+        struck.extend(lanes.map(|(load, lane)| Self { batch: batch as u32, lane, load: *load }));
+    }
+}
+
 impl ContactImpulses {
     pub fn bytes(&self) -> usize {
         self.normal_impulse.capacity() * size_of::<[f32; LANES]>()
@@ -58,17 +67,6 @@ impl ContactImpulses {
                 * size_of::<[[f32; LANES]; 3]>()
             + self.numbers.capacity() * size_of::<PairNumbers>()
             + self.struck.capacity() * size_of::<StruckContact>()
-    }
-
-    /// Notes the lanes of a batch that are struck, as bits, and their normal impulses before.
-    #[cold]
-    fn note_struck(struck: &mut Vec<StruckContact>, batch: usize, lanes: u32, load: [f32; LANES]) {
-        let lanes = (0..LANES as u32).filter(|lane| lanes & 1 << lane != 0);
-        struck.extend(lanes.map(|lane| StruckContact {
-            batch: batch as u32,
-            lane,
-            load: load[lane as usize],
-        }));
     }
 
     /// Forgets the impulses that stopped balls, but not the loads.
