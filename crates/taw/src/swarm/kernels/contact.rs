@@ -388,7 +388,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let fresh = numbers.fresh::<FIRST>(&params, places, velocity, before, gap);
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
             if BACKED {
-                note_struck(struck, &params, parting, (i, &normal_impulse[i]));
+                StruckContact::note(struck, &params, parting, (i, &normal_impulse[i]));
             }
             let alone = effective_mass(&a, &b);
             let (target, softness) = if FIRST {
@@ -427,21 +427,6 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
                 columns.push_apart(batch, at, [a, b], contact, params.slop, grounded);
             }
         }
-    }
-}
-
-/// Notes the pairs of a batch that come together fast, and their normal impulses before.
-#[inline(always)]
-fn note_struck<L: Simd>(
-    struck: &mut Vec<StruckContact>,
-    params: &SolverParams,
-    parting: L,
-    (batch, load): (usize, &[f32; LANES]),
-) {
-    let threshold = params.restitution_threshold;
-    let fast = (L::splat(0.0) - parting).gt_mask(L::splat(threshold));
-    if fast != 0 && threshold > 0.0 {
-        StruckContact::note(struck, batch, fast, load);
     }
 }
 

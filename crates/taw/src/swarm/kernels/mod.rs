@@ -52,9 +52,24 @@ pub(super) struct StruckContact {
 }
 
 impl StruckContact {
-    /// Notes lanes of a batch, as bits, and their normal impulses.
+    /// Notes the pairs of a batch that come together fast, and their normal impulses before.
+    #[inline(always)]
+    fn note<L: Simd>(
+        struck: &mut Vec<Self>,
+        params: &SolverParams,
+        parting: L,
+        (batch, load): (usize, &[f32; LANES]),
+    ) {
+        let threshold = params.restitution_threshold;
+        let fast = (L::splat(0.0) - parting).gt_mask(L::splat(threshold));
+        if fast != 0 && threshold > 0.0 {
+            Self::add(struck, batch, fast, load);
+        }
+    }
+
+    /// Adds lanes of a batch, as bits, and their normal impulses.
     #[cold]
-    fn note(struck: &mut Vec<Self>, batch: usize, lanes: u32, load: &[f32; LANES]) {
+    fn add(struck: &mut Vec<Self>, batch: usize, lanes: u32, load: &[f32; LANES]) {
         let lanes = load.iter().zip(0..).filter(|(_, lane)| lanes & 1 << lane != 0);
         struck.extend(lanes.map(|(load, lane)| Self { batch: batch as u32, lane, load: *load }));
     }
