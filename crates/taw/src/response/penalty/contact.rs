@@ -30,7 +30,7 @@ pub(super) struct PenaltyContact<S> {
     pub surface_velocity: Vec3<S>,
     /// Inverse effective mass of each body, a first.
     pub inverse_effective_masses: [InverseEffectiveMass<S>; 2],
-    /// The marble was stopped by continuous detection, half inside of this wall.
+    /// True if continuous detection stopped the marble, and it is half inside of this wall.
     pub core_touches: bool,
     pub has_capsule: bool,
     /// Sum of the curvatures, in 1/m.

@@ -81,7 +81,7 @@ pub(crate) struct WallStop<S> {
     pub lost: Vec3<S>,
     pub since: Vec3<S>,
     /// Fraction of the substep since then.
-    pub part: S,
+    pub fraction: S,
 }
 
 /// Scratch buffers, kept for their memory.
@@ -304,7 +304,7 @@ fn leave_walls<S: Scalar>(
             };
             let displacement = if is_pushed {
                 let velocity = marbles.velocity[row] - contact.surface_velocity;
-                velocity * (stop.part * settings.context.settings.dt) - stop.since
+                velocity * (stop.fraction * settings.context.settings.dt) - stop.since
             } else if is_parted() {
                 displacement_since(settings, marbles, row, initial_velocities[1]) + stop.lost
             } else {

@@ -33,10 +33,7 @@ impl Swarm {
         if self.scratch.backing.is_empty() {
             return;
         }
-        self.fast_movers.impulses.forget_impacts();
-        for chunk in self.chunks.iter_mut().filter(|chunk| !chunk.asleep) {
-            chunk.impulses.forget_impacts();
-        }
+        self.forget_impacts_of_pairs();
         let awake = self.chunks.iter_mut().filter(|chunk| !chunk.asleep);
         for contact in awake.flat_map(|chunk| &mut chunk.wall_contacts) {
             contact.borne_for_others =
@@ -49,11 +46,15 @@ impl Swarm {
         if self.scratch.backing.is_empty() {
             return;
         }
+        self.forget_impacts_of_pairs();
+        let awake = self.chunks.iter_mut().filter(|chunk| !chunk.asleep);
+        awake.flat_map(|chunk| &mut chunk.wall_contacts).for_each(WallContact::forget_impact);
+    }
+
+    /// Forgets the impacts of pairs, in chunks asleep too: these hold pairs with the next one.
+    fn forget_impacts_of_pairs(&mut self) {
         self.fast_movers.impulses.forget_impacts();
-        for chunk in self.chunks.iter_mut().filter(|chunk| !chunk.asleep) {
-            chunk.impulses.forget_impacts();
-            chunk.wall_contacts.iter_mut().for_each(WallContact::forget_impact);
-        }
+        self.chunks.iter_mut().for_each(|chunk| chunk.impulses.forget_impacts());
     }
 
     fn find_walls_behind(&mut self, again: bool) {

@@ -157,7 +157,7 @@ impl<S: Scalar> Continuous<S> {
             let its = &mut stops[stop.row as usize];
             let before = its.map_or_else(Vec3::zero, |stop| stop.lost);
             let lost = before + stop.displacement;
-            *its = Some(WallStop { wall, lost, since: *displacement - *carried, part: *left });
+            *its = Some(WallStop { wall, lost, since: *displacement - *carried, fraction: *left });
         }
     }
 
