@@ -98,7 +98,6 @@ fn take_picture(path: &Path) -> RgbImage {
         .args([env!("CARGO"), "run", "--quiet", "--example", "marble_madness", "--"])
         .args(["--frames", "75", "--screenshot"])
         .arg(path)
-        .current_dir(env!("CARGO_MANIFEST_DIR"))
         .env("VK_DRIVER_FILES", software)
         .status()
         .expect("xvfb-run is installed");

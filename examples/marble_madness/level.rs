@@ -2,12 +2,13 @@
 //! the board, its other walls stand on it, its marbles are those of the game; how gravity changes
 //! in it is for the lab, since here the player tilts.
 
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use bevy::color::palettes::tailwind;
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
 use taw::scene::{KinematicMotion, MarbleDesc, MaterialDesc, Scene, ShapeDesc};
+use taw_examples::assets;
 
 use crate::board::{Board, HalfWidth};
 
@@ -26,8 +27,7 @@ impl Level {
     /// Reads a file, or one of `assets/levels` by its name.
     pub fn read(name: Option<&Path>) -> Result<Self, String> {
         let Some(name) = name else { return Ok(Self(None)) };
-        let shipped = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/assets/levels"));
-        let shipped = shipped.join(name).with_extension("ron");
+        let shipped = assets().join("levels").join(name).with_extension("ron");
         let file = if name.exists() { name } else { &shipped };
         let text = std::fs::read_to_string(file).map_err(|e| format!("{}: {e}", file.display()))?;
         Self::from_text(&text).map_err(|e| format!("{}:{e}", file.display()))

@@ -9,4 +9,4 @@ mod window;
 
 pub use camera::{OrbitCameraPlugin, orbit_camera, orbit_camera_at};
 pub use pointer::Pointer;
-pub use window::{ExamplePlugins, Picture};
+pub use window::{ExamplePlugins, Picture, assets};

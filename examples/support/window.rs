@@ -30,14 +30,20 @@ impl PluginGroup for ExamplePlugins {
     fn build(self) -> PluginGroupBuilder {
         let window =
             Window { title: self.title.into(), resolution: (1280, 720).into(), ..default() };
-        // Found from wherever the example is started.
-        let assets = concat!(env!("CARGO_MANIFEST_DIR"), "/assets");
+        let assets = assets().to_string_lossy().into_owned();
         DefaultPlugins
-            .set(AssetPlugin { file_path: assets.into(), ..default() })
+            .set(AssetPlugin { file_path: assets, ..default() })
             .set(WindowPlugin { primary_window: Some(window), ..default() })
             .set(LogPlugin { filter: "warn,taw=info,bevy_taw=info".into(), ..default() })
             .add(PicturePlugin(self.picture))
     }
+}
+
+/// Folder of textures and levels: of the checkout that Cargo runs, or, started without Cargo,
+/// of the one that the example was built in.
+pub fn assets() -> PathBuf {
+    let built = || env!("CARGO_MANIFEST_DIR").into();
+    std::env::var_os("CARGO_MANIFEST_DIR").map_or_else(built, PathBuf::from).join("assets")
 }
 
 struct PicturePlugin(Picture);

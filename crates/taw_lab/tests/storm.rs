@@ -24,8 +24,7 @@ const NOT_MENDED_YET: &[&str] = &[
 ];
 
 fn regressions() -> Vec<(String, Case)> {
-    let folder = PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/scenes/regressions"));
-    let mut files: Vec<_> = std::fs::read_dir(folder)
+    let mut files: Vec<_> = std::fs::read_dir("scenes/regressions")
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .filter(|path| path.extension().is_some_and(|extension| extension == "ron"))

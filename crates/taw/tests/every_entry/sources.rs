@@ -52,9 +52,9 @@ const TAKEN: &[(&str, &[&str])] = &[
 /// All of them: functions as `Type::name`, fields as `Type.name`, those of variants as
 /// `Type::Variant.name`.
 pub fn entries() -> BTreeSet<String> {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
+    let root = Path::new("src");
     let mut entries = BTreeSet::new();
-    functions_in(&root, &mut entries);
+    functions_in(root, &mut entries);
     for (file, types) in TAKEN {
         let source = std::fs::read_to_string(root.join(file)).unwrap();
         let scene = if file.starts_with("scene") { "scene::" } else { "" };
