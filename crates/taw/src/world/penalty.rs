@@ -4,7 +4,7 @@ use super::World;
 use super::method::Method;
 use crate::math::Scalar;
 use crate::response::ContactLaw;
-use crate::response::penalty::{PenaltySettings, apply_penalty_forces};
+use crate::response::penalty::PenaltySettings;
 
 /// Forces that grow with penetration.
 pub(super) struct Penalty(pub ContactLaw);
@@ -31,8 +31,7 @@ impl<S: Scalar> Method<S> for Penalty {
             &settings,
         );
         let settings = PenaltySettings { law: self.0, context, wall_stops: &scratch.wall_stops };
-        apply_penalty_forces(
-            &settings,
+        settings.apply(
             &mut bodies,
             &mut world.contacts,
             &mut world.memory.springs,

@@ -40,70 +40,71 @@ pub(super) struct PenaltyContact<S> {
     pub compliance: Compliance<S>,
 }
 
-/// State of a contact; none without penetration, or if nothing can move.
-pub(super) fn active_contact<S: Scalar>(
-    settings: &PenaltySettings<
-        S,
-        impl Colliders<S>,
-        impl Fn(usize) -> Material<S>,
-        impl Fn(usize) -> S,
-    >,
-    marbles: &SolverBodies<S>,
-    body_a: BodyA,
-    contact: &Contact<S>,
-) -> Option<PenaltyContact<S>> {
-    let Contact { normal, separation, arms, .. } = *contact;
-    let (a, b) = (body_a.marble(), contact.b as usize);
-    // Displacement since the position of the step's own kick; see this module's docs. Along the
-    // present normal, because internal edges are known for that one.
-    let moved = |row: usize| settings.context.displacement_of(row, marbles.velocity[row]);
-    let displacement = moved(b) - a.map_or_else(Vec3::zero, moved);
-    let surface_velocity = marbles.surface_velocity(body_a, b, arms, settings.context.walls);
-    let (material, compliance) = surfaces(settings, a, contact);
-    let core = marbles.radius[b] * S::from_f64(CORE * (1.0 - CORE_ROUNDING));
-    let none = InverseEffectiveMass { normal: S::zero(), tangent: S::zero() };
-    let found = PenaltyContact {
-        key: body_a.contact_key(contact),
-        body_a,
-        a,
-        b,
-        arms,
-        normal,
-        penetration: displacement.dot(normal) - separation,
-        relative_velocity: marbles.relative_velocity(body_a, b, arms, normal, surface_velocity),
-        surface_velocity,
-        inverse_effective_masses: [
-            a.map_or(none, |a| marbles.inverse_effective_mass(a, arms[0], -normal)),
-            marbles.inverse_effective_mass(b, arms[1], normal),
-        ],
-        core_touches: a.is_none() && settings.context.is_ccd_stopped(b) && -separation >= core,
-        has_capsule: [a, Some(b)].into_iter().flatten().any(|row| marbles.capsule(row).is_some()),
-        curvature: a.map_or_else(S::zero, |a| marbles.radius[a].recip())
-            + marbles.radius[b].recip(),
-        material,
-        compliance,
-    };
-    (separation < S::zero() && found.is_active()).then_some(found)
-}
+impl<S, W, M, F> PenaltySettings<'_, S, W, M, F>
+where
+    S: Scalar,
+    W: Colliders<S>,
+    M: Fn(usize) -> Material<S>,
+    F: Fn(usize) -> S,
+{
+    /// State of a contact; none without penetration, or if nothing can move.
+    pub(super) fn active_contact(
+        &self,
+        marbles: &SolverBodies<S>,
+        body_a: BodyA,
+        contact: &Contact<S>,
+    ) -> Option<PenaltyContact<S>> {
+        let Contact { normal, separation, arms, .. } = *contact;
+        let (a, b) = (body_a.marble(), contact.b as usize);
+        // Displacement since the position of the step's own kick; see this module's docs. Along the
+        // present normal, because internal edges are known for that one.
+        let moved = |row: usize| self.context.displacement_of(row, marbles.velocity[row]);
+        let displacement = moved(b) - a.map_or_else(Vec3::zero, moved);
+        let surface_velocity = marbles.surface_velocity(body_a, b, arms, self.context.walls);
+        let (material, compliance) = self.surfaces(a, contact);
+        let core = marbles.radius[b] * S::from_f64(CORE * (1.0 - CORE_ROUNDING));
+        let none = InverseEffectiveMass { normal: S::zero(), tangent: S::zero() };
+        let found = PenaltyContact {
+            key: body_a.contact_key(contact),
+            body_a,
+            a,
+            b,
+            arms,
+            normal,
+            penetration: displacement.dot(normal) - separation,
+            relative_velocity: marbles.relative_velocity(body_a, b, arms, normal, surface_velocity),
+            surface_velocity,
+            inverse_effective_masses: [
+                a.map_or(none, |a| marbles.inverse_effective_mass(a, arms[0], -normal)),
+                marbles.inverse_effective_mass(b, arms[1], normal),
+            ],
+            core_touches: a.is_none() && self.context.is_ccd_stopped(b) && -separation >= core,
+            has_capsule: [a, Some(b)]
+                .into_iter()
+                .flatten()
+                .any(|row| marbles.capsule(row).is_some()),
+            curvature: a.map_or_else(S::zero, |a| marbles.radius[a].recip())
+                + marbles.radius[b].recip(),
+            material,
+            compliance,
+        };
+        (separation < S::zero() && found.is_active()).then_some(found)
+    }
 
-/// Combined material and compliance of the surfaces of a contact.
-fn surfaces<S: Scalar>(
-    settings: &PenaltySettings<
-        S,
-        impl Colliders<S>,
-        impl Fn(usize) -> Material<S>,
-        impl Fn(usize) -> S,
-    >,
-    marble_a: Option<usize>,
-    contact: &Contact<S>,
-) -> (Material<S>, Compliance<S>) {
-    let own = (settings.context.material)(contact.b as usize);
-    let compliance = own.elasticity.compliance();
-    let wall = || settings.context.walls.material(contact.a as usize);
-    let other = marble_a.map_or_else(wall, |a| Some((settings.context.material)(a)));
-    // A wall without a material of its own is rigid.
-    let Some(other) = other else { return (own, compliance) };
-    (own.combined_with(other), compliance.plus(other.elasticity.compliance()))
+    /// Combined material and compliance of the surfaces of a contact.
+    fn surfaces(
+        &self,
+        marble_a: Option<usize>,
+        contact: &Contact<S>,
+    ) -> (Material<S>, Compliance<S>) {
+        let own = (self.context.material)(contact.b as usize);
+        let compliance = own.elasticity.compliance();
+        let wall = || self.context.walls.material(contact.a as usize);
+        let other = marble_a.map_or_else(wall, |a| Some((self.context.material)(a)));
+        // A wall without a material of its own is rigid.
+        let Some(other) = other else { return (own, compliance) };
+        (own.combined_with(other), compliance.plus(other.elasticity.compliance()))
+    }
 }
 
 impl<S: Scalar> PenaltyContact<S> {

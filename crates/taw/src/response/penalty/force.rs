@@ -42,33 +42,33 @@ pub(super) struct ContactForce<S> {
     pub ends: bool,
 }
 
-impl<S: Scalar> ContactForce<S> {
+impl<S, W, M, F> PenaltySettings<'_, S, W, M, F>
+where
+    S: Scalar,
+    W: Colliders<S>,
+    M: Fn(usize) -> Material<S>,
+    F: Fn(usize) -> S,
+{
     #[inline]
-    pub fn new(
-        settings: &PenaltySettings<
-            S,
-            impl Colliders<S>,
-            impl Fn(usize) -> Material<S>,
-            impl Fn(usize) -> S,
-        >,
+    pub(super) fn contact_force(
+        &self,
         index: usize,
         contact: PenaltyContact<S>,
         initial_velocities: [Vec3<S>; 2],
         before: &[SpringHistory<S>],
-    ) -> Self {
-        let dt = settings.context.settings.dt;
+    ) -> ContactForce<S> {
+        let dt = self.context.settings.dt;
         let separation_speed = contact.relative_velocity.dot(contact.normal);
         let known = before.binary_search_by_key(&contact.key, |history| history.key);
         let history = known.map(|at| before[at]);
-        let mut springs = settings.law.springs(&contact, contact.penetration, dt);
+        let mut springs = self.law.springs(&contact, contact.penetration, dt);
         let (mut damped_time, mut tangent_displacement) = (S::one(), Vec3::zero());
         if history.is_err() && separation_speed < S::zero() {
             // New contact: the dashpot acts since the contact began, after the last kick, and for
             // half of the time to the next one, at half of the penetration of then.
             let substep = -separation_speed * dt;
             damped_time = S::from_f64(0.5) + (contact.penetration / substep).min(S::one());
-            let middle =
-                settings.law.springs(&contact, damped_time * substep * S::from_f64(0.5), dt);
+            let middle = self.law.springs(&contact, damped_time * substep * S::from_f64(0.5), dt);
             (springs.damping, springs.tangent_damping) = (middle.damping, middle.tangent_damping);
             tangent_displacement = contact.relative_velocity.reject_from(contact.normal)
                 * (contact.penetration / -separation_speed).min(dt);
@@ -95,7 +95,7 @@ impl<S: Scalar> ContactForce<S> {
             separation_speed,
         });
         let (zero, none) = (S::zero(), Vec3::zero());
-        Self {
+        ContactForce {
             index,
             contact,
             springs,
@@ -117,6 +117,36 @@ impl<S: Scalar> ContactForce<S> {
         }
     }
 
+    /// Tells if the contact will have ended by the next substep although its spring still pushes.
+    #[inline]
+    pub(super) fn ends(&self, force: &ContactForce<S>, marbles: &SolverBodies<S>) -> bool {
+        let ahead = |row: usize| marbles.velocity[row] * (self.context.position_weight)(row);
+        let first = force.contact.a.map_or_else(Vec3::zero, ahead);
+        let displacement =
+            (ahead(force.contact.b) - first).dot(force.contact.normal) * self.context.settings.dt;
+        let next = force.next_penetration(self.context.settings.dt);
+        next > S::zero() && next - displacement <= S::zero()
+    }
+
+    /// Applies the last impulse of an ending contact.
+    pub(super) fn apply_last_impulse(
+        &self,
+        force: &mut ContactForce<S>,
+        marbles: &mut SolverBodies<S>,
+        work: Option<&mut EnergyLedger>,
+    ) {
+        let fraction = force.next_penetration(self.context.settings.dt) / force.contact.penetration;
+        let elastic_force = force.springs.elastic_force * fraction;
+        let [_, normal_impulse] = force.normal_impulses(
+            elastic_force,
+            force.separation_speed(),
+            self.context.settings.dt,
+        );
+        force.apply_normal_impulse(marbles, normal_impulse, work);
+    }
+}
+
+impl<S: Scalar> ContactForce<S> {
     /// Solves for the impulses of a substep of `dt` seconds.
     #[inline]
     pub fn solve(&mut self, dt: S) {
@@ -224,49 +254,6 @@ impl<S: Scalar> ContactForce<S> {
     /// Separation speed after the forces, in m/s.
     fn separation_speed(&self) -> S {
         self.relative_velocity.dot(self.contact.normal)
-    }
-
-    /// Tells if the contact will have ended by the next substep although its spring still pushes.
-    #[inline]
-    pub fn ends(
-        &self,
-        settings: &PenaltySettings<
-            S,
-            impl Colliders<S>,
-            impl Fn(usize) -> Material<S>,
-            impl Fn(usize) -> S,
-        >,
-        marbles: &SolverBodies<S>,
-    ) -> bool {
-        let ahead = |row: usize| marbles.velocity[row] * (settings.context.position_weight)(row);
-        let first = self.contact.a.map_or_else(Vec3::zero, ahead);
-        let displacement =
-            (ahead(self.contact.b) - first).dot(self.contact.normal) * settings.context.settings.dt;
-        let next = self.next_penetration(settings.context.settings.dt);
-        next > S::zero() && next - displacement <= S::zero()
-    }
-
-    /// Applies the last impulse of an ending contact.
-    pub fn apply_last_impulse(
-        &mut self,
-        settings: &PenaltySettings<
-            S,
-            impl Colliders<S>,
-            impl Fn(usize) -> Material<S>,
-            impl Fn(usize) -> S,
-        >,
-        marbles: &mut SolverBodies<S>,
-        work: Option<&mut EnergyLedger>,
-    ) {
-        let fraction =
-            self.next_penetration(settings.context.settings.dt) / self.contact.penetration;
-        let elastic_force = self.springs.elastic_force * fraction;
-        let [_, normal_impulse] = self.normal_impulses(
-            elastic_force,
-            self.separation_speed(),
-            settings.context.settings.dt,
-        );
-        self.apply_normal_impulse(marbles, normal_impulse, work);
     }
 
     /// Sets the speed at which the core of a marble that continuous detection stopped at a wall

@@ -23,7 +23,6 @@ use crate::response::impulse::{BodyA, Context, SolverSettings};
 use crate::response::{
     Colliders, ContactKey, EnergyLedger, KeyedByContact, Material, SolverBodies,
 };
-use contact::active_contact;
 use force::ContactForce;
 use mass_split::ContactLoad;
 
@@ -59,7 +58,7 @@ impl<S: Scalar> KeyedByContact for SpringHistory<S> {
     }
 }
 
-/// Settings of a substep of [`apply_penalty_forces`].
+/// Penalty method in a substep, by its settings.
 pub(crate) struct PenaltySettings<'a, S, W, M, F> {
     pub law: ContactLaw,
     pub context: Context<'a, S, W, M, F>,
@@ -94,107 +93,197 @@ pub(crate) struct Scratch<S> {
     followed: Vec<bool>,
 }
 
-/// Applies penalty forces: they change velocities, and positions by what the integrator moved too
-/// early. `histories` is the contact history.
-///
-/// The contacts' rows exist. Rows that end up infinite or NaN lose their velocity and are added to
-/// `quarantined`.
-pub(crate) fn apply_penalty_forces<S: Scalar>(
-    settings: &PenaltySettings<
-        S,
-        impl Colliders<S>,
-        impl Fn(usize) -> Material<S>,
-        impl Fn(usize) -> S,
-    >,
-    marbles: &mut SolverBodies<S>,
-    contacts: &mut Contacts<S>,
-    histories: &mut Vec<SpringHistory<S>>,
-    scratch: &mut Scratch<S>,
-    quarantined: &mut Vec<u32>,
-    mut work: Option<&mut EnergyLedger>,
-) {
-    let Scratch { before, forces, loads, followed } = scratch;
-    std::mem::swap(before, histories);
-    histories.clear();
-    keep_sides(settings, marbles, contacts, before);
-    forces.clear();
-    for (index, (a, contact)) in BodyA::of_each(contacts).enumerate() {
-        if let Some(contact) = active_contact(settings, marbles, a, contact) {
-            let initial_velocities = contact.velocities(marbles);
-            forces.push(ContactForce::new(settings, index, contact, initial_velocities, before));
+impl<S, W, M, F> PenaltySettings<'_, S, W, M, F>
+where
+    S: Scalar,
+    W: Colliders<S>,
+    M: Fn(usize) -> Material<S>,
+    F: Fn(usize) -> S,
+{
+    /// Applies penalty forces: they change velocities, and positions by what the integrator moved too
+    /// early. `histories` is the contact history.
+    ///
+    /// The contacts' rows exist. Rows that end up infinite or NaN lose their velocity and are added to
+    /// `quarantined`.
+    pub(crate) fn apply(
+        &self,
+        marbles: &mut SolverBodies<S>,
+        contacts: &mut Contacts<S>,
+        histories: &mut Vec<SpringHistory<S>>,
+        scratch: &mut Scratch<S>,
+        quarantined: &mut Vec<u32>,
+        mut work: Option<&mut EnergyLedger>,
+    ) {
+        let Scratch { before, forces, loads, followed } = scratch;
+        std::mem::swap(before, histories);
+        histories.clear();
+        self.keep_sides(marbles, contacts, before);
+        forces.clear();
+        for (index, (a, contact)) in BodyA::of_each(contacts).enumerate() {
+            if let Some(contact) = self.active_contact(marbles, a, contact) {
+                let initial_velocities = contact.velocities(marbles);
+                forces.push(self.contact_force(index, contact, initial_velocities, before));
+            }
         }
-    }
-    split_masses(marbles, forces, loads, settings.context.settings.dt);
-    // All forces are evaluated at the same time, so that their order does not matter.
-    for force in forces.iter_mut() {
-        force.solve(settings.context.settings.dt);
-    }
-    for ContactForce { contact, impulse, .. } in forces.iter() {
-        contact.apply_impulse(marbles, *impulse);
-    }
-    if let Some(work) = work.as_deref_mut() {
+        split_masses(marbles, forces, loads, self.context.settings.dt);
+        // All forces are evaluated at the same time, so that their order does not matter.
+        for force in forces.iter_mut() {
+            force.solve(self.context.settings.dt);
+        }
         for ContactForce { contact, impulse, .. } in forces.iter() {
-            contact.record_energy(marbles, *impulse, work);
+            contact.apply_impulse(marbles, *impulse);
         }
-    }
-    bounce_cores(settings, marbles, forces, work.as_deref_mut());
-    update_positions(settings, marbles, forces, followed);
-    // After friction has turned the marbles: what it adds in a substep is resisted in the same one.
-    for force in forces.iter_mut() {
-        force.solve_rolling(marbles);
-    }
-    for force in forces.iter() {
-        force.apply_rolling(marbles, work.as_deref_mut());
-    }
-    for force in forces.iter_mut() {
-        force.relative_velocity = force.contact.relative_velocity(marbles);
-        force.ends = force.ends(settings, marbles);
-    }
-    for force in forces.iter_mut() {
-        let Some(history) = force.next_history(settings.context.settings.dt) else { continue };
-        if force.ends {
-            force.history = history;
-            force.apply_last_impulse(settings, marbles, work.as_deref_mut());
-        } else {
-            histories.push(history);
+        if let Some(work) = work.as_deref_mut() {
+            for ContactForce { contact, impulse, .. } in forces.iter() {
+                contact.record_energy(marbles, *impulse, work);
+            }
         }
+        self.bounce_cores(marbles, forces, work.as_deref_mut());
+        self.update_positions(marbles, forces, followed);
+        // After friction has turned the marbles: what it adds in a substep is resisted in the same one.
+        for force in forces.iter_mut() {
+            force.solve_rolling(marbles);
+        }
+        for force in forces.iter() {
+            force.apply_rolling(marbles, work.as_deref_mut());
+        }
+        for force in forces.iter_mut() {
+            force.relative_velocity = force.contact.relative_velocity(marbles);
+            force.ends = self.ends(force, marbles);
+        }
+        for force in forces.iter_mut() {
+            let Some(history) = force.next_history(self.context.settings.dt) else { continue };
+            if force.ends {
+                force.history = history;
+                self.apply_last_impulse(force, marbles, work.as_deref_mut());
+            } else {
+                histories.push(history);
+            }
+        }
+        histories.sort_unstable_by_key(|history| history.key);
+        list_impulses(forces, contacts);
+        for contact in contacts.wm.iter().chain(&contacts.mm) {
+            quarantine_if_non_finite(marbles, contact.b, quarantined);
+        }
+        contacts
+            .mm
+            .iter()
+            .for_each(|contact| quarantine_if_non_finite(marbles, contact.a, quarantined));
     }
-    histories.sort_unstable_by_key(|history| history.key);
-    list_impulses(forces, contacts);
-    for contact in contacts.wm.iter().chain(&contacts.mm) {
-        quarantine_if_non_finite(marbles, contact.b, quarantined);
-    }
-    contacts
-        .mm
-        .iter()
-        .for_each(|contact| quarantine_if_non_finite(marbles, contact.a, quarantined));
-}
 
-/// Keeps marbles on the side of a wall from which they came: one that has sunk in beyond the middle
-/// of a thin wall is nearer to its other side, where it would be pushed out.
-fn keep_sides<S: Scalar>(
-    settings: &PenaltySettings<
-        S,
-        impl Colliders<S>,
-        impl Fn(usize) -> Material<S>,
-        impl Fn(usize) -> S,
-    >,
-    marbles: &SolverBodies<S>,
-    contacts: &mut Contacts<S>,
-    before: &[SpringHistory<S>],
-) {
-    for contact in &mut contacts.wm {
-        let key = ContactKey::with_wall(contact);
-        let Ok(at) = before.binary_search_by_key(&key, |history| history.key) else { continue };
-        let SpringHistory { normal, penetration, .. } = before[at];
-        if normal.dot(contact.normal) > S::from_f64(-0.5) {
-            continue;
+    /// Keeps marbles on the side of a wall from which they came: one that has sunk in beyond the middle
+    /// of a thin wall is nearer to its other side, where it would be pushed out.
+    fn keep_sides(
+        &self,
+        marbles: &SolverBodies<S>,
+        contacts: &mut Contacts<S>,
+        before: &[SpringHistory<S>],
+    ) {
+        for contact in &mut contacts.wm {
+            let key = ContactKey::with_wall(contact);
+            let Ok(at) = before.binary_search_by_key(&key, |history| history.key) else { continue };
+            let SpringHistory { normal, penetration, .. } = before[at];
+            if normal.dot(contact.normal) > S::from_f64(-0.5) {
+                continue;
+            }
+            let row = contact.b as usize;
+            contact.arms[1] += contact.normal * (marbles.radius[row] * S::from_f64(2.0));
+            contact.normal = -contact.normal;
+            let moved = self.context.displacement_of(row, marbles.velocity[row]);
+            contact.separation = moved.dot(contact.normal) - penetration;
         }
-        let row = contact.b as usize;
-        contact.arms[1] += contact.normal * (marbles.radius[row] * S::from_f64(2.0));
-        contact.normal = -contact.normal;
-        let moved = settings.context.displacement_of(row, marbles.velocity[row]);
-        contact.separation = moved.dot(contact.normal) - penetration;
+    }
+
+    /// Bounces the cores of marbles that continuous detection stopped at walls.
+    fn bounce_cores(
+        &self,
+        marbles: &mut SolverBodies<S>,
+        forces: &mut [ContactForce<S>],
+        mut work: Option<&mut EnergyLedger>,
+    ) {
+        if self.wall_stops.is_empty() {
+            return;
+        }
+        let SolverSettings { restitution_threshold, iterations, .. } = *self.context.settings;
+        for force in forces.iter_mut() {
+            force.find_rebound_speed(marbles, restitution_threshold);
+        }
+        for _ in 0..iterations {
+            for force in forces.iter_mut() {
+                force.push_core(marbles, work.as_deref_mut());
+            }
+        }
+    }
+
+    /// Moves marbles by their velocity changes, with the position weight.
+    fn update_positions(
+        &self,
+        marbles: &mut SolverBodies<S>,
+        forces: &[ContactForce<S>],
+        followed: &mut Vec<bool>,
+    ) {
+        followed.clear();
+        followed.resize(marbles.velocity.len(), false);
+        if !self.wall_stops.is_empty() {
+            self.leave_walls(marbles, forces, followed);
+        }
+        for ContactForce { contact, initial_velocities, .. } in forces {
+            for (row, initial) in [contact.a, Some(contact.b)].into_iter().zip(initial_velocities) {
+                let Some(row) = row.filter(|row| !std::mem::replace(&mut followed[*row], true))
+                else {
+                    continue;
+                };
+                let displacement = self.displacement_since(marbles, row, *initial);
+                if is_finite(displacement) {
+                    marbles.position[row] += displacement;
+                }
+            }
+        }
+    }
+
+    /// Moves marbles that continuous detection stopped at walls: one whose core was pushed goes on from
+    /// there by its velocity; one that springs alone made part from the wall was never stopped.
+    fn leave_walls(
+        &self,
+        marbles: &mut SolverBodies<S>,
+        forces: &[ContactForce<S>],
+        followed: &mut [bool],
+    ) {
+        for is_pushed in [true, false] {
+            for ContactForce { contact, initial_velocities, core_impulse, .. } in forces {
+                let row = contact.b;
+                let is_next = !followed[row] && (*core_impulse > S::zero()) == is_pushed;
+                let stop = self.wall_stops.get(row).copied().flatten().filter(|_| is_next);
+                let Some(stop) = stop else { continue };
+                let is_parted = || {
+                    matches!(contact.body_a, BodyA::Wall(wall, _) if wall == stop.wall)
+                        && contact.relative_velocity(marbles).dot(contact.normal) >= S::zero()
+                };
+                let displacement = if is_pushed {
+                    let velocity = marbles.velocity[row] - contact.surface_velocity;
+                    velocity * (stop.fraction * self.context.settings.dt) - stop.since
+                } else if is_parted() {
+                    self.displacement_since(marbles, row, initial_velocities[1]) + stop.lost
+                } else {
+                    continue;
+                };
+                followed[row] = true;
+                if is_finite(displacement) {
+                    marbles.position[row] += displacement;
+                }
+            }
+        }
+    }
+
+    /// Displacement of a row by the change of its velocity since `initial`, in metres.
+    fn displacement_since(
+        &self,
+        marbles: &SolverBodies<S>,
+        row: usize,
+        initial: Vec3<S>,
+    ) -> Vec3<S> {
+        (marbles.velocity[row] - initial)
+            * ((self.context.position_weight)(row) * self.context.settings.dt)
     }
 }
 
@@ -221,117 +310,6 @@ fn quarantine_if_non_finite<S: Scalar>(
         *spin = Vec3::zero();
     }
     quarantined.push(row);
-}
-
-/// Bounces the cores of marbles that continuous detection stopped at walls.
-fn bounce_cores<S: Scalar>(
-    settings: &PenaltySettings<
-        S,
-        impl Colliders<S>,
-        impl Fn(usize) -> Material<S>,
-        impl Fn(usize) -> S,
-    >,
-    marbles: &mut SolverBodies<S>,
-    forces: &mut [ContactForce<S>],
-    mut work: Option<&mut EnergyLedger>,
-) {
-    if settings.wall_stops.is_empty() {
-        return;
-    }
-    let SolverSettings { restitution_threshold, iterations, .. } = *settings.context.settings;
-    for force in forces.iter_mut() {
-        force.find_rebound_speed(marbles, restitution_threshold);
-    }
-    for _ in 0..iterations {
-        for force in forces.iter_mut() {
-            force.push_core(marbles, work.as_deref_mut());
-        }
-    }
-}
-
-/// Moves marbles by their velocity changes, with the position weight.
-fn update_positions<S: Scalar>(
-    settings: &PenaltySettings<
-        S,
-        impl Colliders<S>,
-        impl Fn(usize) -> Material<S>,
-        impl Fn(usize) -> S,
-    >,
-    marbles: &mut SolverBodies<S>,
-    forces: &[ContactForce<S>],
-    followed: &mut Vec<bool>,
-) {
-    followed.clear();
-    followed.resize(marbles.velocity.len(), false);
-    if !settings.wall_stops.is_empty() {
-        leave_walls(settings, marbles, forces, followed);
-    }
-    for ContactForce { contact, initial_velocities, .. } in forces {
-        for (row, initial) in [contact.a, Some(contact.b)].into_iter().zip(initial_velocities) {
-            let Some(row) = row.filter(|row| !std::mem::replace(&mut followed[*row], true)) else {
-                continue;
-            };
-            let displacement = displacement_since(settings, marbles, row, *initial);
-            if is_finite(displacement) {
-                marbles.position[row] += displacement;
-            }
-        }
-    }
-}
-
-/// Moves marbles that continuous detection stopped at walls: one whose core was pushed goes on from
-/// there by its velocity; one that springs alone made part from the wall was never stopped.
-fn leave_walls<S: Scalar>(
-    settings: &PenaltySettings<
-        S,
-        impl Colliders<S>,
-        impl Fn(usize) -> Material<S>,
-        impl Fn(usize) -> S,
-    >,
-    marbles: &mut SolverBodies<S>,
-    forces: &[ContactForce<S>],
-    followed: &mut [bool],
-) {
-    for is_pushed in [true, false] {
-        for ContactForce { contact, initial_velocities, core_impulse, .. } in forces {
-            let row = contact.b;
-            let is_next = !followed[row] && (*core_impulse > S::zero()) == is_pushed;
-            let stop = settings.wall_stops.get(row).copied().flatten().filter(|_| is_next);
-            let Some(stop) = stop else { continue };
-            let is_parted = || {
-                matches!(contact.body_a, BodyA::Wall(wall, _) if wall == stop.wall)
-                    && contact.relative_velocity(marbles).dot(contact.normal) >= S::zero()
-            };
-            let displacement = if is_pushed {
-                let velocity = marbles.velocity[row] - contact.surface_velocity;
-                velocity * (stop.fraction * settings.context.settings.dt) - stop.since
-            } else if is_parted() {
-                displacement_since(settings, marbles, row, initial_velocities[1]) + stop.lost
-            } else {
-                continue;
-            };
-            followed[row] = true;
-            if is_finite(displacement) {
-                marbles.position[row] += displacement;
-            }
-        }
-    }
-}
-
-/// Displacement of a row by the change of its velocity since `initial`, in metres.
-fn displacement_since<S: Scalar>(
-    settings: &PenaltySettings<
-        S,
-        impl Colliders<S>,
-        impl Fn(usize) -> Material<S>,
-        impl Fn(usize) -> S,
-    >,
-    marbles: &SolverBodies<S>,
-    row: usize,
-    initial: Vec3<S>,
-) -> Vec3<S> {
-    (marbles.velocity[row] - initial)
-        * ((settings.context.position_weight)(row) * settings.context.settings.dt)
 }
 
 /// Sets the factors of each contact by mass splitting.

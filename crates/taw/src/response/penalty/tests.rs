@@ -67,8 +67,7 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
         };
         columns.place_contacts(&mut contacts, &walls);
         let mut quarantined = vec![];
-        apply_penalty_forces(
-            &settings,
+        settings.apply(
             &mut columns,
             &mut contacts,
             &mut histories,
