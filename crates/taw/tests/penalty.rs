@@ -330,3 +330,80 @@ fn a_ball_that_sinks_beyond_the_middle_of_a_thin_wall_comes_back_on_its_side() {
         }
     }
 }
+
+/// Largest part by which the energy of a world without gravity is above its start at the end of one
+/// of these steps.
+fn gained(world: &mut World<f64>, steps: u32) -> f64 {
+    let before = world.energy().total();
+    let mut gained = 0.0_f64;
+    for _ in 0..steps {
+        world.step(1.0 / 60.0).unwrap();
+        gained = gained.max(world.energy().total() / before - 1.0);
+    }
+    gained
+}
+
+fn elastic_world(law: ContactLaw, integrator: Integrator, substeps: u32) -> World<f64> {
+    let mut world = world(law, integrator);
+    let model = Model { substeps, ..world.model() };
+    world.set_model(model).unwrap();
+    world.set_gravity(Vec3::zero()).unwrap();
+    world
+}
+
+/// Their normal turns while they overlap: a force along that of another moment changes energy.
+#[test]
+fn elastic_balls_that_meet_obliquely_gain_nothing() {
+    let mut random = fastrand::Rng::with_seed(3);
+    let mut coordinate = || random.f64() * 2.0 - 1.0;
+    let mut vector = || Vec3::new(coordinate(), coordinate(), coordinate());
+    for law in BOTH {
+        for integrator in INTEGRATORS {
+            for speed in [1.0, 3.0, 10.0, 30.0] {
+                for pair in 0..100 {
+                    let mut world = elastic_world(law, integrator, 16);
+                    for _ in 0..2 {
+                        let (velocity, aside) = (vector() * speed, vector() * 0.1);
+                        let from = aside - velocity * (0.3 / speed);
+                        let ball = ball(from.into(), 0.1, material(1.0, 0.0));
+                        world.marbles.insert(Marble { velocity, ..ball }).unwrap();
+                    }
+                    let [a, b] = [0, 1].map(|row: usize| world.marbles.position()[row]);
+                    if (a - b).magnitude() < 0.2 {
+                        continue; // they would begin with energy that is not counted
+                    }
+                    let gained = gained(&mut world, (72.0 / speed) as u32 + 20);
+                    let name = format!("{law:?}, {integrator:?}, {speed} m/s, pair {pair}");
+                    assert!(gained < 1e-9, "{name}: {gained:e}");
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_crowd_of_elastic_balls_in_a_box_gains_nothing() {
+    let mut random = fastrand::Rng::with_seed(3);
+    let mut coordinate = || random.f64() * 2.0 - 1.0;
+    for law in BOTH {
+        for (substeps, speed) in [(1, 3.0), (4, 3.0), (4, 10.0), (16, 3.0), (16, 10.0), (16, 30.0)]
+        {
+            let mut world = elastic_world(law, Integrator::default(), substeps);
+            for axis in 0..3 {
+                for side in [-1.0, 1.0] {
+                    let mut normal = Vec3::zero();
+                    normal[axis] = side;
+                    world.walls.insert(Plane::new(normal, -1.0).unwrap()).unwrap();
+                }
+            }
+            for i in 0..64 {
+                let at = [i % 4, i / 4 % 4, i / 16].map(|k| 0.4 * f64::from(k) - 0.6);
+                let velocity = Vec3::new(coordinate(), coordinate(), coordinate()) * speed;
+                let ball = ball(at, 0.1, material(1.0, 0.0));
+                world.marbles.insert(Marble { velocity, ..ball }).unwrap();
+            }
+            let gained = gained(&mut world, 240);
+            assert!(gained < 1e-3, "{law:?}, {substeps} substeps, {speed} m/s: {gained:e}");
+        }
+    }
+}

@@ -81,7 +81,8 @@ pub enum Response {
     /// if it sinks in beyond the middle of the wall without leaving it, it comes back on the side
     /// that it came from. With [`Detection::Swept`](crate::world::Detection::Swept) a marble goes no
     /// deeper into a wall than half of its radius: there it bounces off as a rigid body, by its
-    /// restitution. No contact releases more energy than it absorbed, and penetration from the
+    /// restitution. Half-spaces are the exception: they are solid all through, so springs alone turn
+    /// a marble round there, however deep. No contact releases more energy than it absorbed, and penetration from the
     /// start separates at one radius per second at most.
     Penalty(ContactLaw),
     /// Event-driven: collisions in the order of time, each with its own normal at its own time of

@@ -4,7 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::{CORE, CORE_ROUNDING, PenaltySettings};
 use crate::contact::Contact;
-use crate::math::{Scalar, Vec3, cast_vector, is_finite};
+use crate::math::{Scalar, Vec3, cast_vector, is_finite, length};
 use crate::response::impulse::BodyA;
 use crate::response::material::Compliance;
 use crate::response::{
@@ -54,12 +54,18 @@ where
         body_a: BodyA,
         contact: &Contact<S>,
     ) -> Option<PenaltyContact<S>> {
-        let Contact { normal, separation, arms, .. } = *contact;
+        let Contact { separation, .. } = *contact;
         let (a, b) = (body_a.marble(), contact.b as usize);
-        // Displacement since the position of the step's own kick; see this module's docs. Along the
-        // present normal, because internal edges are known for that one.
+        // Displacement since the position of the step's own kick; see this module's docs.
         let moved = |row: usize| self.context.displacement_of(row, marbles.velocity[row]);
-        let displacement = moved(b) - a.map_or_else(Vec3::zero, moved);
+        let (penetration, normal, arms) = match a {
+            // Along the present normal, because internal edges are known for that one.
+            None => (moved(b).dot(contact.normal) - separation, contact.normal, contact.arms),
+            Some(a) => {
+                let radii = [marbles.radius[a], marbles.radius[b]];
+                geometry_before(contact, radii, moved(b) - moved(a))
+            }
+        };
         let surface_velocity = marbles.surface_velocity(body_a, b, arms, self.context.walls);
         let (material, compliance) = self.surfaces(a, contact);
         let core = marbles.radius[b] * S::from_f64(CORE * (1.0 - CORE_ROUNDING));
@@ -71,7 +77,7 @@ where
             b,
             arms,
             normal,
-            penetration: displacement.dot(normal) - separation,
+            penetration,
             relative_velocity: marbles.relative_velocity(body_a, b, arms, normal, surface_velocity),
             surface_velocity,
             inverse_effective_masses: [
@@ -105,6 +111,29 @@ where
         let Some(other) = other else { return (own, compliance) };
         (own.combined_with(other), compliance.plus(other.elasticity.compliance()))
     }
+}
+
+/// Penetration, normal and arms of a contact of two marbles before a displacement of the second
+/// relative to the first: its normal turns by it, and forces along another one would change energy.
+fn geometry_before<S: Scalar>(
+    contact: &Contact<S>,
+    radii: [S; 2],
+    displacement: Vec3<S>,
+) -> (S, Vec3<S>, [Vec3<S>; 2]) {
+    let Contact { normal, separation, arms, .. } = *contact;
+    let touching = radii[0] + radii[1];
+    let apart = touching + separation;
+    let between = normal * apart - displacement;
+    let distance = length(between);
+    if distance == S::zero() {
+        return (touching, normal, arms);
+    }
+    // So that the penetration of a pebble in a boulder keeps its digits.
+    let nearer = displacement.dot(normal * apart + between) / (apart + distance);
+    let turned = between / distance;
+    let change = turned - normal;
+    let arms = [arms[0] + change * radii[0], arms[1] - change * radii[1]];
+    (nearer - separation, turned, arms)
 }
 
 impl<S: Scalar> PenaltyContact<S> {

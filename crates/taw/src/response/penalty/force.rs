@@ -92,7 +92,7 @@ where
             tangent_displacement,
             tangent_stiffness: S::zero(),
             stored_energy: S::zero(),
-            separation_speed,
+            relative_velocity: contact.relative_velocity,
         });
         let (zero, none) = (S::zero(), Vec3::zero());
         ContactForce {
@@ -212,7 +212,7 @@ impl<S: Scalar> ContactForce<S> {
     /// made it stiffer or deeper; penetration that it did not stop itself separates slowly.
     fn max_spring_impulse(&self, separation_speed: S) -> S {
         let inverse_mass = self.shared_inverse_mass;
-        let mean_speed = (self.history.separation_speed + separation_speed) * S::from_f64(0.5);
+        let mean_speed = self.mean_speed(separation_speed);
         let stored_energy = self.history.stored_energy.max(S::zero());
         let releasable =
             (mean_speed * mean_speed + inverse_mass * stored_energy * S::from_f64(2.0)).sqrt()
@@ -251,6 +251,13 @@ impl<S: Scalar> ContactForce<S> {
         self.contact.penetration - self.separation_speed() * dt
     }
 
+    /// Mean of the speeds along the normal at the end of the last substep and now, in m/s: that
+    /// along which an impulse of all forces together does its work.
+    fn mean_speed(&self, separation_speed: S) -> S {
+        let before = self.history.relative_velocity.dot(self.contact.normal);
+        (before + separation_speed) * S::from_f64(0.5)
+    }
+
     /// Separation speed after the forces, in m/s.
     fn separation_speed(&self) -> S {
         self.relative_velocity.dot(self.contact.normal)
@@ -283,7 +290,7 @@ impl<S: Scalar> ContactForce<S> {
         self.core_impulse = total;
         if self.rebound_speed > S::zero() {
             // The spring does no work by it.
-            self.history.separation_speed -= impulse * inverse_mass;
+            self.history.relative_velocity -= self.contact.normal * (impulse * inverse_mass);
         }
         self.apply_normal_impulse(marbles, impulse, work);
     }
@@ -309,24 +316,23 @@ impl<S: Scalar> ContactForce<S> {
     /// History for the next substep, if it is finite.
     #[inline]
     pub fn next_history(&self, dt: S) -> Option<SpringHistory<S>> {
-        let (normal, separation_speed) = (self.contact.normal, self.separation_speed());
-        let mean_speed = (self.history.separation_speed + separation_speed) * S::from_f64(0.5);
-        let stored_energy =
-            (self.history.stored_energy - self.spring_impulse * mean_speed).max(S::zero());
+        let Self { relative_velocity, contact: PenaltyContact { normal, .. }, .. } = *self;
+        let work = self.spring_impulse * self.mean_speed(self.separation_speed());
+        let stored_energy = (self.history.stored_energy - work).max(S::zero());
         let tangent_displacement =
-            self.history.tangent_displacement + self.relative_velocity.reject_from(normal) * dt;
+            self.history.tangent_displacement + relative_velocity.reject_from(normal) * dt;
         let history = SpringHistory {
             normal,
             penetration: self.next_penetration(dt),
             tangent_displacement,
             stored_energy,
-            separation_speed,
+            relative_velocity,
             ..self.history
         };
         let known = history.penetration.is_finite()
             && history.stored_energy.is_finite()
-            && history.separation_speed.is_finite();
-        (known && history.tangent_stiffness.is_finite() && is_finite(tangent_displacement))
+            && history.tangent_stiffness.is_finite();
+        (known && is_finite(relative_velocity) && is_finite(tangent_displacement))
             .then_some(history)
     }
 }

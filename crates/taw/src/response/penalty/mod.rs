@@ -39,8 +39,8 @@ pub(crate) struct SpringHistory<S> {
     tangent_stiffness: S,
     /// Energy stored in the normal spring, in joules.
     stored_energy: S,
-    /// Separation speed along the normal at the end of the substep, in m/s.
-    separation_speed: S,
+    /// Velocity of b's contact point relative to a's at the end of the substep, in m/s.
+    relative_velocity: Vec3<S>,
 }
 
 impl<S: Scalar> KeyedByContact for SpringHistory<S> {
@@ -55,6 +55,7 @@ impl<S: Scalar> KeyedByContact for SpringHistory<S> {
     fn reverse(&mut self) {
         self.normal = -self.normal;
         self.tangent_displacement = -self.tangent_displacement;
+        self.relative_velocity = -self.relative_velocity;
     }
 }
 
