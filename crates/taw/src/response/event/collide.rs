@@ -2,16 +2,13 @@
 
 use std::cmp::Reverse;
 
-use cgmath::{InnerSpace, Zero};
+use cgmath::InnerSpace;
 
 use super::resting_cluster::{PressedBy, RestingCluster};
 use super::{Event, EventDriven, EventKind, EventSettings, Impact, MAX_DISSIPATIONS, MAX_FREEZES};
-use crate::constraint::{ContactImpulse, FrictionCone};
+use crate::constraint::ContactImpulse;
 use crate::math::{Vec3, normalize_and_length};
 use crate::response::{ImpulseSample, InverseEffectiveMass, Material, impact};
-
-/// Maximum number of iterations for simultaneous collisions.
-const MAX_ROUNDS: u32 = 1000;
 
 /// Scratch buffers for collisions at the same time.
 #[derive(Clone, Debug, Default)]
@@ -25,16 +22,16 @@ pub(super) struct SimultaneousImpacts {
 
 /// Collision of two balls.
 #[derive(Clone, Copy, Debug)]
-struct Collision {
-    a: usize,
-    b: usize,
-    impact: Impact<f64>,
-    inverse_effective_mass: InverseEffectiveMass<f64>,
-    material: Material<f64>,
+pub(super) struct Collision {
+    pub a: usize,
+    pub b: usize,
+    pub impact: Impact<f64>,
+    pub inverse_effective_mass: InverseEffectiveMass<f64>,
+    pub material: Material<f64>,
     /// Relaxation factor, beside the other collisions of the two balls.
-    relaxation: f64,
+    pub relaxation: f64,
     /// Accumulated impulse, in N s.
-    impulse: ContactImpulse<f64>,
+    pub impulse: ContactImpulse<f64>,
 }
 
 impl EventDriven {
@@ -169,7 +166,7 @@ impl EventDriven {
     }
 
     /// Collision of two balls in contact, before its impulse.
-    fn collision(&mut self, a: usize, b: usize, settings: &EventSettings) -> Collision {
+    pub(super) fn collision(&mut self, a: usize, b: usize, settings: &EventSettings) -> Collision {
         let threshold = self.pressing_speed(a, b, settings);
         let (first, second) = (&self.balls[a], &self.balls[b]);
         let (normal, _) = normalize_and_length(self.center_offset(first, second))
@@ -198,75 +195,15 @@ impl EventDriven {
     }
 
     /// Relative velocity of the contact points, in m/s.
-    fn relative_velocity(&self, c: &Collision) -> Vec3<f64> {
+    pub(super) fn relative_velocity(&self, c: &Collision) -> Vec3<f64> {
         let (first, second) = (&self.balls[c.a], &self.balls[c.b]);
         let spin_velocities =
             first.spin_velocity(c.impact.normal) + second.spin_velocity(c.impact.normal);
         second.velocity - first.velocity + spin_velocities
     }
 
-    /// Solves simultaneous collisions with shared balls: each keeps its own restitution and
-    /// friction while all others act (Newton's law). Jacobi iterations, so that the result does not
-    /// depend on the order.
-    fn solve_simultaneous(&mut self, collisions: &mut [Collision], rows: &[usize]) {
-        let initial_velocity: Vec<_> =
-            collisions.iter().map(|c| self.relative_velocity(c)).collect();
-        let count_shared =
-            |row: usize| collisions.iter().filter(|c| c.a == row || c.b == row).count();
-        let shares: Vec<_> = collisions
-            .iter()
-            .map(|c| 1.0 / count_shared(c.a).max(count_shared(c.b)) as f64)
-            .collect();
-        collisions.iter_mut().zip(shares).for_each(|(c, relaxation)| c.relaxation = relaxation);
-        let max_speed = initial_velocity.iter().map(|v| v.magnitude()).fold(0.0, f64::max);
-        for _ in 0..MAX_ROUNDS {
-            let mut largest: f64 = 0.0;
-            let mut changes = vec![[Vec3::zero(); 2]; rows.len()];
-            let relative_velocity: Vec<_> =
-                collisions.iter().map(|c| self.relative_velocity(c)).collect();
-            for ((c, relative_velocity), initial_velocity) in
-                collisions.iter_mut().zip(relative_velocity).zip(&initial_velocity)
-            {
-                let normal = c.impact.normal;
-                let Material { restitution, friction, tangential_restitution, .. } = c.material;
-                let split = |velocity| ContactImpulse::split(velocity, normal);
-                let (initial, now) = (split(*initial_velocity), split(relative_velocity));
-                let target = ContactImpulse {
-                    normal: restitution * (-initial.normal).max(0.0),
-                    tangent: initial.tangent * -tangential_restitution,
-                };
-                let masses = c.inverse_effective_mass;
-                let wanted = ContactImpulse {
-                    normal: c.relaxation * (target.normal - now.normal) / masses.normal,
-                    tangent: (target.tangent - now.tangent) * (c.relaxation / masses.tangent),
-                };
-                let change = c.impulse.solve(wanted, None, &FrictionCone::new(friction));
-                let change = change.along(normal);
-                largest = largest.max(change.magnitude() * c.inverse_effective_mass.normal);
-                for (row, impulse, normal) in [(c.a, -change, -normal), (c.b, change, normal)] {
-                    if let Ok(index) = rows.binary_search(&row) {
-                        changes[index][0] += impulse;
-                        changes[index][1] += normal.cross(impulse);
-                    }
-                }
-            }
-            for (row, [impulse, angular_impulse]) in rows.iter().zip(changes) {
-                let ball = &mut self.balls[*row];
-                ball.velocity += impulse * ball.inverse_mass;
-                let factor: f64 = ball.rotation.inverse_inertia_factor();
-                ball.spin -= angular_impulse * (factor * ball.inverse_mass / ball.radius);
-            }
-            if largest <= 1e-15 * max_speed {
-                break;
-            }
-        }
-        for (c, initial_velocity) in collisions.iter().zip(initial_velocity) {
-            self.record_impact(c, c.impulse.along(c.impact.normal), initial_velocity);
-        }
-    }
-
     /// Books the energy of a collision; `before` is the relative velocity before it.
-    fn record_impact(&mut self, c: &Collision, impulse: Vec3<f64>, before: Vec3<f64>) {
+    pub(super) fn record_impact(&mut self, c: &Collision, impulse: Vec3<f64>, before: Vec3<f64>) {
         if self.work.is_none() {
             return;
         }

@@ -22,6 +22,7 @@ mod rest_at_start;
 mod rest_on_wall;
 mod resting_cluster;
 mod segments;
+mod simultaneous;
 mod squeeze;
 mod toi;
 mod wall;

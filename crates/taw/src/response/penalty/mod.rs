@@ -288,10 +288,11 @@ where
     }
 }
 
-/// Lists the impulses in their contacts.
+/// Lists the impulses in their contacts, and the normals along which they acted.
 fn list_impulses<S: Scalar>(forces: &[ContactForce<S>], contacts: &mut Contacts<S>) {
     for ContactForce { index, normal_impulse, impulse, contact, .. } in forces {
         let Some(listed) = contacts.get_mut(*index) else { continue };
+        listed.normal = contact.normal;
         listed.set_impulse(*normal_impulse, impulse.reject_from(contact.normal));
     }
 }
