@@ -411,3 +411,32 @@ fn what_is_taken_out_of_the_contacts_falls_through_a_half_space() {
         assert!(end.position.y < -4.0, "{response:?}: {end:?}");
     }
 }
+
+/// The lower of two balls bounces off the floor within the substep, into the upper one.
+#[test]
+fn balls_that_follow_each_other_onto_a_floor_do_not_pass_through_each_other() {
+    for response in [Response::Displacement, Response::Impulse] {
+        for (substeps, speed) in [(1, 1.0), (1, 4.0), (2, 4.0), (4, 4.0), (4, 8.0)] {
+            for phase in 0_u8..64 {
+                let mut world = World::<f32>::default();
+                let model = Model { response, substeps, ..Model::default() };
+                world.set_model(model).unwrap();
+                world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+                let [lower, upper] = [0.3, 0.34].map(|height| {
+                    let height = height + f32::from(phase) * (speed / 64.0 / 64.0);
+                    let ball = Marble::new(Point3::new(0.0, height, 0.0), 0.01);
+                    let velocity = Vec3::new(0.0, -speed, 0.0);
+                    world.marbles.insert(Marble { velocity, ..ball }).unwrap()
+                });
+                for _ in 0..40 {
+                    world.step(1.0 / 64.0).unwrap();
+                    let [lower, upper] = [lower, upper].map(|id| world.marbles.get(id).unwrap());
+                    let apart = (upper.position.y - lower.position.y) / 0.01;
+                    let name = format!("{response:?}, {substeps}, {speed} m/s, phase {phase}");
+                    // What moves by less than half a radius in a substep is not swept.
+                    assert!(apart > 1.5, "{name}: {apart} radii apart");
+                }
+            }
+        }
+    }
+}
