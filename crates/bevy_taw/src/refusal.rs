@@ -84,8 +84,9 @@ impl Refusals<'_> {
     }
 }
 
-/// A marble's motion overflowed. It keeps its last place and has lost its velocity;
-/// no other marble was affected. Also logged as a warning.
+/// A marble's motion overflowed, or by `EventDriven` the step's budget of events was spent with it.
+/// It keeps its last place and has lost its velocity; no other marble was affected. Also logged as a
+/// warning.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct MarbleStopped {
