@@ -58,12 +58,17 @@ where
         let (a, b) = (body_a.marble(), contact.b as usize);
         // Displacement since the position of the step's own kick; see this module's docs.
         let moved = |row: usize| self.context.displacement_of(row, marbles.velocity[row]);
+        let has_capsule = a.into_iter().chain([b]).any(|row| marbles.capsule(row).is_some());
         let (penetration, normal, arms) = match a {
-            // Along the present normal, because internal edges are known for that one.
-            None => (moved(b).dot(contact.normal) - separation, contact.normal, contact.arms),
-            Some(a) => {
+            Some(a) if !has_capsule => {
                 let radii = [marbles.radius[a], marbles.radius[b]];
                 geometry_before(contact, radii, moved(b) - moved(a))
+            }
+            // Along the present normal: internal edges are known for that one, and the nearest
+            // points of capsules move along them.
+            _ => {
+                let displacement = moved(b) - a.map_or_else(Vec3::zero, moved);
+                (displacement.dot(contact.normal) - separation, contact.normal, contact.arms)
             }
         };
         let surface_velocity = marbles.surface_velocity(body_a, b, arms, self.context.walls);
@@ -85,10 +90,7 @@ where
                 marbles.inverse_effective_mass(b, arms[1], normal),
             ],
             core_touches: a.is_none() && self.context.is_ccd_stopped(b) && -separation >= core,
-            has_capsule: [a, Some(b)]
-                .into_iter()
-                .flatten()
-                .any(|row| marbles.capsule(row).is_some()),
+            has_capsule,
             curvature: a.map_or_else(S::zero, |a| marbles.radius[a].recip())
                 + marbles.radius[b].recip(),
             material,
@@ -113,7 +115,7 @@ where
     }
 }
 
-/// Penetration, normal and arms of a contact of two marbles before a displacement of the second
+/// Penetration, normal and arms of a contact of two balls before a displacement of the second
 /// relative to the first: its normal turns by it, and forces along another one would change energy.
 fn geometry_before<S: Scalar>(
     contact: &Contact<S>,
@@ -122,7 +124,7 @@ fn geometry_before<S: Scalar>(
 ) -> (S, Vec3<S>, [Vec3<S>; 2]) {
     let Contact { normal, separation, arms, .. } = *contact;
     let touching = radii[0] + radii[1];
-    let apart = touching + separation;
+    let apart = (touching + separation).max(S::zero());
     let between = normal * apart - displacement;
     let distance = length(between);
     if distance == S::zero() {
@@ -157,6 +159,12 @@ impl<S: Scalar> PenaltyContact<S> {
     pub fn relative_velocity(&self, marbles: &SolverBodies<S>) -> Vec3<S> {
         let Self { body_a, b, arms, normal, surface_velocity, .. } = *self;
         marbles.relative_velocity(body_a, b, arms, normal, surface_velocity)
+    }
+
+    /// Velocity of b relative to a, in m/s, by their own velocities and that of the contact points:
+    /// spins of balls do no work along any normal.
+    pub fn without_spin(&self, [a, b]: [Vec3<S>; 2], relative_velocity: Vec3<S>) -> Vec3<S> {
+        if self.has_capsule { relative_velocity } else { b - a - self.surface_velocity }
     }
 
     /// Books the energy of an impulse, after all were applied.

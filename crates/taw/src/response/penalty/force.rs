@@ -35,6 +35,8 @@ pub(super) struct ContactForce<S> {
     /// Velocities of both bodies before the forces, and of the contact points after them, in m/s.
     pub initial_velocities: [Vec3<S>; 2],
     pub relative_velocity: Vec3<S>,
+    /// Relative velocity after the forces without the spins of balls, in m/s.
+    pub velocity: Vec3<S>,
     /// Speed at which the rigid core leaves the wall, in m/s, and its impulse, in N s.
     pub rebound_speed: S,
     pub core_impulse: S,
@@ -92,7 +94,7 @@ where
             tangent_displacement,
             tangent_stiffness: S::zero(),
             stored_energy: S::zero(),
-            relative_velocity: contact.relative_velocity,
+            velocity: contact.without_spin(initial_velocities, contact.relative_velocity),
         });
         let (zero, none) = (S::zero(), Vec3::zero());
         ContactForce {
@@ -111,6 +113,7 @@ where
             angular_impulse: none,
             initial_velocities,
             relative_velocity: none,
+            velocity: none,
             rebound_speed: zero,
             core_impulse: zero,
             ends: false,
@@ -254,7 +257,7 @@ impl<S: Scalar> ContactForce<S> {
     /// Mean of the speeds along the normal at the end of the last substep and now, in m/s: that
     /// along which an impulse of all forces together does its work.
     fn mean_speed(&self, separation_speed: S) -> S {
-        let before = self.history.relative_velocity.dot(self.contact.normal);
+        let before = self.history.velocity.dot(self.contact.normal);
         (before + separation_speed) * S::from_f64(0.5)
     }
 
@@ -290,7 +293,7 @@ impl<S: Scalar> ContactForce<S> {
         self.core_impulse = total;
         if self.rebound_speed > S::zero() {
             // The spring does no work by it.
-            self.history.relative_velocity -= self.contact.normal * (impulse * inverse_mass);
+            self.history.velocity -= self.contact.normal * (impulse * inverse_mass);
         }
         self.apply_normal_impulse(marbles, impulse, work);
     }
@@ -316,7 +319,8 @@ impl<S: Scalar> ContactForce<S> {
     /// History for the next substep, if it is finite.
     #[inline]
     pub fn next_history(&self, dt: S) -> Option<SpringHistory<S>> {
-        let Self { relative_velocity, contact: PenaltyContact { normal, .. }, .. } = *self;
+        let Self { relative_velocity, velocity, contact: PenaltyContact { normal, .. }, .. } =
+            *self;
         let work = self.spring_impulse * self.mean_speed(self.separation_speed());
         let stored_energy = (self.history.stored_energy - work).max(S::zero());
         let tangent_displacement =
@@ -326,13 +330,12 @@ impl<S: Scalar> ContactForce<S> {
             penetration: self.next_penetration(dt),
             tangent_displacement,
             stored_energy,
-            relative_velocity,
+            velocity,
             ..self.history
         };
         let known = history.penetration.is_finite()
             && history.stored_energy.is_finite()
             && history.tangent_stiffness.is_finite();
-        (known && is_finite(relative_velocity) && is_finite(tangent_displacement))
-            .then_some(history)
+        (known && is_finite(velocity) && is_finite(tangent_displacement)).then_some(history)
     }
 }

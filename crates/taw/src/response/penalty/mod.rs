@@ -39,8 +39,8 @@ pub(crate) struct SpringHistory<S> {
     tangent_stiffness: S,
     /// Energy stored in the normal spring, in joules.
     stored_energy: S,
-    /// Velocity of b's contact point relative to a's at the end of the substep, in m/s.
-    relative_velocity: Vec3<S>,
+    /// Velocity of b relative to a at the end of the substep, without the spins of balls, in m/s.
+    velocity: Vec3<S>,
 }
 
 impl<S: Scalar> KeyedByContact for SpringHistory<S> {
@@ -55,7 +55,7 @@ impl<S: Scalar> KeyedByContact for SpringHistory<S> {
     fn reverse(&mut self) {
         self.normal = -self.normal;
         self.tangent_displacement = -self.tangent_displacement;
-        self.relative_velocity = -self.relative_velocity;
+        self.velocity = -self.velocity;
     }
 }
 
@@ -149,7 +149,10 @@ where
             force.apply_rolling(marbles, work.as_deref_mut());
         }
         for force in forces.iter_mut() {
-            force.relative_velocity = force.contact.relative_velocity(marbles);
+            let contact = &force.contact;
+            force.relative_velocity = contact.relative_velocity(marbles);
+            force.velocity =
+                contact.without_spin(contact.velocities(marbles), force.relative_velocity);
             force.ends = self.ends(force, marbles);
         }
         for force in forces.iter_mut() {

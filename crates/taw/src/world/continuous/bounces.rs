@@ -20,8 +20,9 @@ impl<S: Scalar> World<S> {
             crowded.extend((0..self.marbles.len()).map(|row| self.passes_into_half_space(row)));
         }
         if crowded.contains(&true) {
-            let mut is_near = vec![false; crowded.len()];
-            let Continuous { start, reach, .. } = &mut self.scratch.continuous;
+            let Continuous { start, reach, near, .. } = &mut self.scratch.continuous;
+            near.clear();
+            near.resize(crowded.len(), false);
             reach.clear();
             let ends = self.marbles.position.iter().zip(&self.marbles.radius);
             reach.extend(start.iter().zip(ends).map(|(start, (end, r))| length(end - start) + *r));
@@ -32,18 +33,18 @@ impl<S: Scalar> World<S> {
                 self.marbles.period,
                 |a, b| {
                     if self.marbles.may_collide(a, b) {
-                        (is_near[a as usize], is_near[b as usize]) = (true, true);
+                        (near[a as usize], near[b as usize]) = (true, true);
                     }
                 },
             );
-            crowded.iter_mut().zip(is_near).for_each(|(crowded, is_near)| *crowded &= is_near);
+            crowded.iter_mut().zip(&*near).for_each(|(crowded, near)| *crowded &= near);
         } else {
             crowded.clear();
         }
         self.scratch.continuous.crowded = crowded;
     }
 
-    /// Tells if a fast marble ends in a half-space by more than half of its radius.
+    /// Tells if a fast marble ends in a half-space at rest by more than half of its radius.
     fn passes_into_half_space(&self, row: usize) -> bool {
         let Sphere { center, radius } = self.marbles.sphere(row);
         let max_depth = radius * S::from_f64(MAX_FREE_MOTION);
@@ -52,6 +53,7 @@ impl<S: Scalar> World<S> {
             && self
                 .walls
                 .colliding_planes(self.marbles.layers_of_row(row))
+                .filter(|(wall, _)| self.walls.swept_motion_of_row(*wall as usize).is_none())
                 .any(|(_, plane)| plane.signed_distance(center) < radius - max_depth)
     }
 

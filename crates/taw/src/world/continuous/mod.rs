@@ -61,6 +61,7 @@ pub(super) struct Continuous<S> {
     deep: Vec<u32>,
     /// By row, who would bounce off a half-space within reach of others; empty if nobody.
     crowded: Vec<bool>,
+    near: Vec<bool>,
     /// Positions before they follow the velocity changes of contacts, in metres.
     bounced_from: Vec<Point3<S>>,
 }

@@ -10,9 +10,9 @@ use crate::math::{Mat3, Point3, Scalar, Vec3, length};
 use crate::response::penalty::CORE;
 use crate::response::{Colliders as _, Response};
 use crate::shape::{Aabb, PointProjection, Sphere};
-use crate::world::World;
 use crate::world::narrow_phase::flush_distance;
 use crate::world::walls::{SubShape, Walls};
+use crate::world::{WallShape, World};
 
 /// Enough iterations for any wall that a marble does not only graze.
 const MAX_ITERATIONS: u32 = 32;
@@ -67,12 +67,12 @@ impl<S: Scalar> World<S> {
     /// radius. Half-spaces are solid, so that a marble by itself needs no such test there.
     pub(super) fn bend_at_walls(&mut self, dt: S) {
         self.walls.update_tree();
-        self.list_deep_marbles(|_, _| S::zero());
         self.list_crowded_bounces();
         if self.walls.are_half_spaces() && self.scratch.continuous.crowded.is_empty() {
             return;
         }
         MovingWall::list(&self.walls, dt, &mut self.scratch.continuous.moving_walls);
+        self.list_deep_marbles(|_, _| S::zero());
         for row in 0..self.marbles.len() {
             let Sphere { center, radius } = self.marbles.sphere(row);
             let start = self.scratch.continuous.start[row];
@@ -154,7 +154,8 @@ impl<S: Scalar> World<S> {
             let there = center + along * displacement;
             let slides_off = || {
                 let wall = &self.walls.shapes()[wall as usize];
-                wall.project_point(there).distance > sphere.radius
+                !matches!(wall, WallShape::Plane(_))
+                    && wall.project_point(there).distance > sphere.radius
             };
             let fast = -displacement.dot(normal) > resting_approach * left;
             if surfaces.len() == MAX_BENDS as usize || (fast && slides_off()) {
