@@ -123,7 +123,7 @@ impl Swarm {
             self.list_fast([dt, skin], Some(f32::MAX), &mut fast);
         }
         for row in &fast {
-            self.fast_movers.add(*row);
+            self.fast_movers.add(*row, self.skin_left[*row as usize] > skin * FAR);
         }
         self.scratch.leaving = fast;
     }
@@ -174,7 +174,6 @@ impl Swarm {
         observe(Stage::Pairs);
         let skin = self.skin;
         for row in rows {
-            self.fast_movers.add(*row);
             let at = *row as usize;
             let displacement = if self.has_friction() {
                 squared(self.velocity[at]).sqrt() * dt
@@ -186,6 +185,7 @@ impl Swarm {
                 let of_path = Sweep::skin_of_path(&self.velocity[at], dt);
                 self.skin_left[at] = self.skin_left[at].max(of_path);
             }
+            self.fast_movers.add(*row, self.skin_left[at] > skin * FAR);
         }
         self.find_fast_movers(skin, dt);
         self.find_wall_contacts_of(rows, dt, walls);

@@ -24,6 +24,8 @@ pub(super) struct FastMovers {
     /// Their rows, in order, and a bit for each row.
     pub rows: Vec<u32>,
     bits: BitSet,
+    /// Those of them whose pairs were found on their paths, and so hold for these paths only.
+    by_path: BitSet,
     /// Their pairs, and how many more there was no room for.
     pub batches: Vec<Batch>,
     pub unlisted: usize,
@@ -99,12 +101,25 @@ impl FastMovers {
         self.batches.clear();
         self.impulses.reset(0);
         self.bits.clear(balls);
+        self.by_path.clear(balls);
     }
 
-    pub fn add(&mut self, row: u32) {
+    /// Adds a ball; says whether its pairs are found on its path.
+    pub fn add(&mut self, row: u32, by_path: bool) {
         if self.bits.insert(row) {
             self.rows.push(row);
         }
+        if by_path {
+            self.by_path.insert(row);
+        } else {
+            self.by_path.remove(row);
+        }
+    }
+
+    /// Returns true if pairs of a ball hold for its path only.
+    #[inline]
+    pub fn is_by_path(&self, row: u32) -> bool {
+        self.by_path.contains(row)
     }
 
     #[inline]
@@ -256,6 +271,7 @@ impl FastMovers {
         (self.rows.capacity() + self.sorted.capacity() + self.beside.capacity()) * size_of::<u32>()
             + self.crossing.capacity() * size_of::<[u32; 2]>()
             + self.bits.bytes()
+            + self.by_path.bytes()
             + self.batches.capacity() * size_of::<Batch>()
             + self.impulses.bytes()
             + self.cached.capacity() * size_of::<CachedPair>()

@@ -37,6 +37,7 @@ mod model;
 mod neighbours;
 mod proxies;
 mod rest;
+mod scratch;
 mod simd;
 mod state;
 mod step;
@@ -70,10 +71,9 @@ use fast_movers::FastMovers;
 use grid::Grid;
 use ids::Ids;
 use impulse_cache::ImpulseCache;
-use neighbours::Search;
+use scratch::Scratch;
 use simd::Row;
 use surfaces::{SurfaceOf, Surfaces};
-use sweeps::Crowd;
 use walls::HalfSpace;
 
 /// Minimum and maximum radius, in metres: their third and fourth powers are finite, too.
@@ -149,30 +149,6 @@ pub struct Swarm {
     steps_since_build: u32,
     /// Width of the skin beyond the usual, as a fraction of that.
     skin_scale: f32,
-}
-
-/// Memory that a step writes before it reads it.
-#[derive(Clone, Debug, Default)]
-struct Scratch {
-    /// Number of threads that work on this step.
-    threads: usize,
-    /// See [`SolverColumns::backing`](kernels::SolverColumns::backing).
-    backing: Vec<Row>,
-    /// Rows that would leave their skin in this step.
-    leaving: Vec<u32>,
-    /// Displacements of the fast balls, while pairs are searched.
-    displacements: Vec<f32>,
-    /// Rows of proxies, in order, and which proxy each is.
-    proxy_rows: Vec<(u32, u32)>,
-    /// Positions and velocities of these rows before they are integrated.
-    saved_proxies: Vec<[Row; 2]>,
-    /// Rows that each thread found.
-    lists: Vec<Vec<u32>>,
-    /// Progress of each chunk, while they are worked on.
-    chunk_states: Vec<u32>,
-    searches: Vec<Search>,
-    crowd: Crowd,
-    path_changes: Vec<Row>,
 }
 
 impl Swarm {

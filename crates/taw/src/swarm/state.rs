@@ -1,9 +1,8 @@
 //! All of a swarm, field by field: its bytes, and whether two will go on alike.
 
 use super::chunk::Chunk;
-use super::neighbours::Search;
 use super::simd::Row;
-use super::{Scratch, Swarm, SwarmModel};
+use super::{Swarm, SwarmModel};
 
 impl Swarm {
     /// Number of threads that work on this step: of the last model until the first step begins.
@@ -68,31 +67,8 @@ impl Swarm {
     }
 }
 
-impl Scratch {
-    fn bytes(&self) -> usize {
-        let Self {
-            backing,
-            leaving,
-            displacements,
-            proxy_rows,
-            saved_proxies,
-            lists,
-            chunk_states,
-            searches,
-            threads: _,
-            crowd,
-            path_changes,
-        } = self;
-        (of(backing) + of(leaving) + of(displacements) + of(proxy_rows) + of(saved_proxies))
-            + (of(lists) + lists.iter().map(of).sum::<usize>())
-            + of(chunk_states)
-            + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
-            + (crowd.bytes() + of(path_changes))
-    }
-}
-
 /// Bytes of a column.
-fn of<T>(column: &Vec<T>) -> usize {
+pub(super) fn of<T>(column: &Vec<T>) -> usize {
     column.capacity() * size_of::<T>()
 }
 

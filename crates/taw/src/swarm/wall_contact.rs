@@ -38,6 +38,16 @@ pub(super) struct WallContact {
     pub torque: Vec3<f32>,
 }
 
+/// Meeting of a ball and a wall within a substep.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Bounce {
+    /// Distance that the ball has to go along the normal, in metres.
+    pub separation: f32,
+    /// Speed at which it approaches now, and when it is there, in m/s.
+    approach_speed: f32,
+    impact_speed: f32,
+}
+
 /// Separation in radii, and in roundings of the coordinates, up to which a ball stands on a wall. A
 /// larger one would hold balls in the air that come down beside others.
 const TOUCHES: f32 = 1e-4;
@@ -160,17 +170,9 @@ impl WallContact {
         None
     }
 
-    /// Turns the ball back if it meets the wall, with the speed that it then has. Says how far away
-    /// that is, in metres.
-    fn apply_restitution(
-        &self,
-        params: &SolverParams,
-        at: &mut Row,
-        velocity: &mut Row,
-        spin: &mut Row,
-    ) -> Option<f32> {
-        let relative = xyz(velocity) - self.surface;
-        let approach_speed = -relative.dot(self.normal);
+    /// Finds out if the ball meets the wall within a substep, fast enough to bounce.
+    pub fn bounce(&self, params: &SolverParams, at: &Row, velocity: &Row) -> Option<Bounce> {
+        let approach_speed = -(xyz(velocity) - self.surface).dot(self.normal);
         let separation = self.separation(at).max(0.0);
         // Gravity works on the ball as far as it comes nearer. As far as the contact reaches, by the
         // velocity after gravity: one that only stops the ball would take its bounce.
@@ -180,13 +182,29 @@ impl WallContact {
             return None;
         }
         let square = approach_speed * approach_speed + 2.0 * gravity * separation;
-        let meets = square.max(0.0).sqrt();
-        if meets <= params.restitution_threshold {
-            return None;
-        }
+        let impact_speed = square.max(0.0).sqrt();
+        (impact_speed > params.restitution_threshold).then_some(Bounce {
+            separation,
+            approach_speed,
+            impact_speed,
+        })
+    }
+
+    /// Turns the ball back if it meets the wall, with the speed that it then has. Says how far away
+    /// that is, in metres.
+    fn apply_restitution(
+        &self,
+        params: &SolverParams,
+        at: &mut Row,
+        velocity: &mut Row,
+        spin: &mut Row,
+    ) -> Option<f32> {
+        let Bounce { separation, approach_speed, impact_speed } =
+            self.bounce(params, at, velocity)?;
+        let relative = xyz(velocity) - self.surface;
         let stopping = self.slip(relative, spin) * (-self.tangent_mass() / velocity[3]);
         let impulse = FrictionCone::new(self.numbers.friction).clamp(ContactImpulse {
-            normal: (approach_speed + meets * self.numbers.restitution) / velocity[3],
+            normal: (approach_speed + impact_speed * self.numbers.restitution) / velocity[3],
             tangent: stopping * (1.0 + self.numbers.tangential_restitution),
         });
         set(at, xyz(at) - self.normal * separation);

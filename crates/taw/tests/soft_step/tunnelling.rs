@@ -306,3 +306,47 @@ fn what_a_fast_ball_strikes_goes_through_no_wall() {
         }
     }
 }
+
+/// Small balls fall one above the other onto a floor, and go up to 25 radii in a substep: the lower one
+/// bounces into the upper one within it. In one substep one pair may be left half inside each other,
+/// where they meet more often than once.
+#[test]
+fn small_balls_that_follow_each_other_onto_a_floor_keep_their_order() {
+    let mut random = dice(5);
+    for number in 0..2_000 {
+        let substeps = 1 + (4.0 * random()) as u32;
+        let (mut world, plain) = empty(substeps, random());
+        world.set_gravity(Vec3::new(0.0, -9.81, 0.0)).unwrap();
+        let floor = world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        world.walls.set_material(floor, Some(plain)).unwrap();
+        let (radius, speed) = (0.005 + 0.02 * random(), 1.0 + 7.0 * random());
+        let height = radius * (1.0 + 40.0 * random());
+        let gap = radius * (2.0 + 4.0 * random());
+        let ids = [0.0, gap].map(|gap| {
+            let position = Point3::new(0.0, height + gap, 0.0);
+            let velocity = Vec3::new(0.0, -speed, 0.0);
+            let marble =
+                Marble { velocity, material: Some(plain), ..Marble::new(position, radius) };
+            world.marbles.insert(marble).unwrap()
+        });
+        // As where they touch: parting what overlaps lifts it.
+        let energy_of = |world: &World<f64>| {
+            let [lower, upper] = ids.map(|id| world.marbles.get(id).unwrap());
+            let weight = 9.81 * lower.mass.of(radius);
+            let sunk = (radius - lower.position.y).max(0.0);
+            let overlap = (2.0 * radius - (upper.position.y - lower.position.y)).max(0.0);
+            world.energy().total() + weight * (2.0 * sunk + overlap)
+        };
+        let energy = energy_of(&world);
+        for step in 0..60 {
+            world.step(DT).unwrap();
+            let [lower, upper] = ids.map(|id| world.marbles.get(id).unwrap().position.y);
+            let apart = (upper - lower) / radius;
+            let about =
+                format!("{number}, step {step}: {substeps} substeps, r {radius}, {speed} m/s");
+            assert!(apart > 1.0, "{about}: {apart} radii apart");
+            let now = energy_of(&world);
+            assert!(now < energy * 1.001, "{about}: {energy} to {now} J");
+        }
+    }
+}

@@ -1,11 +1,13 @@
 //! A step of a swarm, and its parts in the full tier.
 
 mod backing;
+mod bounces;
 mod lab;
 mod paths;
 mod sleep;
 mod wall_contacts;
 
+pub(super) use bounces::WayToWall;
 pub(super) use sleep::sleep_speed;
 pub(super) use wall_contacts::listed_planes;
 
@@ -171,8 +173,13 @@ impl Swarm {
             if substep > 0 {
                 self.update_wall_contacts(walls, left, times, |chunk| chunk.has_fast, true);
             }
-            self.apply_restitution(params, faster);
-            self.find_pairs_after_bounces(substep > 0, [dt, h, left], walls, observe);
+            for _ in 0..ROUNDS {
+                let waits = self.apply_restitution(params, faster);
+                self.find_pairs_after_bounces(substep > 0, [dt, h, left], walls, observe);
+                if !waits {
+                    break;
+                }
+            }
             observe(Stage::Integrate);
             let parts = [substep as f32, (substep + 1) as f32].map(|part| part / substeps);
             self.apply_velocity_changes(1.0 / substeps);
@@ -193,7 +200,7 @@ impl Swarm {
             self.scratch.path_changes.clear();
             self.advance_proxies(parts, true, h);
             let (skin, left) = (self.skin, left - h);
-            let left_it = |_: &Row, skin_left: f32| skin_left < -skin;
+            let left_it = |_, _: &Row, skin_left: f32, _: &FastMovers| skin_left < -skin;
             if self.find_pairs_within_step(|chunk| chunk.overrun, left_it, dt, walls, observe) {
                 self.update_wall_contacts(walls, left, times, all, false);
                 self.restore_backing(); // rows may have changed
@@ -246,8 +253,9 @@ impl Swarm {
         observe: &mut dyn FnMut(Stage),
     ) {
         let reach = self.reach_of_skins();
-        let leaves =
-            |velocity: &Row, skin_left| leaves(velocity, skin_left, left) || skin_left > reach;
+        let leaves = |row: u32, velocity: &Row, skin_left: f32, movers: &FastMovers| {
+            leaves(velocity, skin_left, left) || skin_left > reach || movers.is_by_path(row)
+        };
         let later = later && !self.fast_movers.crowded;
         let turns = |chunk: &Chunk| chunk.struck || later && chunk.speed[0] * dt > reach;
         if self.find_pairs_within_step(turns, leaves, dt, walls, observe) {
@@ -260,7 +268,7 @@ impl Swarm {
     fn find_pairs_within_step(
         &mut self,
         which: impl Fn(&Chunk) -> bool,
-        leaves: impl Fn(&Row, f32) -> bool,
+        leaves: impl Fn(u32, &Row, f32, &FastMovers) -> bool,
         dt: f32,
         walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
@@ -272,7 +280,7 @@ impl Swarm {
         for chunk in self.chunks.iter().filter(|chunk| which(chunk) && !chunk.asleep) {
             let leaves = |row: &u32| {
                 let at = *row as usize;
-                leaves(&self.velocity[at], self.skin_left[at])
+                leaves(*row, &self.velocity[at], self.skin_left[at], &self.fast_movers)
             };
             let room = most.saturating_sub(leaving.len());
             leaving.extend((chunk.rows[0]..chunk.rows[1]).filter(leaves).take(room));
@@ -309,34 +317,6 @@ impl Swarm {
         let any = !leaving.is_empty();
         self.scratch.leaving = leaving;
         any
-    }
-
-    /// Lets bounce what meets, again where a bounce may have sent a ball on to the next one.
-    fn apply_restitution(
-        &mut self,
-        params: SolverParams,
-        faster: impl Fn(&Chunk, f32) -> bool + Sync,
-    ) {
-        self.chunks.iter_mut().for_each(|chunk| (chunk.again, chunk.struck) = (true, false));
-        for _ in 0..ROUNDS {
-            self.pass(Pass::Restitution(params), |chunk, next| chunk.again && faster(chunk, next));
-            let all = self.fast_movers.impulses.bounced;
-            let bounced = |chunk: Option<&Chunk>| chunk.is_some_and(|chunk| chunk.impulses.bounced);
-            let mut any = all;
-            for i in 0..self.chunks.len() {
-                let before = i.checked_sub(1).and_then(|i| self.chunks.get(i));
-                let [own, next] = [self.chunks.get(i), self.chunks.get(i + 1)];
-                let again = bounced(before) || bounced(own) || bounced(next);
-                any |= again;
-                self.chunks[i].again = all || again;
-                self.chunks[i].struck |= all || again;
-            }
-            self.fast_movers.impulses.bounced = false;
-            self.chunks.iter_mut().for_each(|chunk| chunk.impulses.bounced = false);
-            if !any {
-                break;
-            }
-        }
     }
 
     /// Moves out of walls what is in them. That comes last: whatever else moves balls apart,
@@ -407,6 +387,7 @@ impl Swarm {
         let simd_level = self.simd_level;
         let friction = self.common_material().friction;
         let mut fast_movers = std::mem::take(&mut self.fast_movers);
+        let held = std::mem::take(&mut self.scratch.held);
         self.for_each_chunk(|next, columns, chunk| {
             if chunk.asleep && next.is_none_or(|(asleep, _)| asleep)
                 || !condition(chunk, next.map_or(0.0, |(_, speed)| speed))
@@ -418,6 +399,9 @@ impl Swarm {
             // Walls come last, so that nothing is pushed into them.
             if !chunk.asleep {
                 for contact in &mut chunk.wall_contacts {
+                    if matches!(pass, Pass::Restitution(_)) && held.contains(contact.row) {
+                        continue;
+                    }
                     let row = contact.row as usize;
                     // SAFETY: a ball of the chunk.
                     unsafe {
@@ -446,7 +430,7 @@ impl Swarm {
         };
         let FastMovers { batches, impulses, .. } = &mut fast_movers;
         solve(simd_level, pass, columns, batches, impulses, friction);
-        self.fast_movers = fast_movers;
+        (self.fast_movers, self.scratch.held) = (fast_movers, held);
     }
 
     /// Works on all chunks, each with exclusive access to the balls of it and of the next one.

@@ -22,7 +22,7 @@ impl Swarm {
         walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
     ) {
-        if !self.has_swift() {
+        if !self.may_pass(h) {
             return;
         }
         let mut struck = std::mem::take(&mut self.scratch.leaving);
@@ -41,14 +41,24 @@ impl Swarm {
         !self.fast_movers.crossing.is_empty() || self.fast_movers.rows.iter().any(is_swift)
     }
 
+    /// Returns true if a fast mover may pass through another ball in `h` seconds. For that, two have to
+    /// come nearer by both radii, so one goes half of its own.
+    fn may_pass(&self, h: f32) -> bool {
+        let goes_far = |row: &u32| {
+            let (radius, velocity) = (self.at[*row as usize][3], &self.velocity[*row as usize]);
+            squared(*velocity) * (2.0 * h) * (2.0 * h) > radius * radius
+        };
+        !self.fast_movers.crossing.is_empty() || self.fast_movers.rows.iter().any(goes_far)
+    }
+
     /// Lists the partners of fast movers that would leave their skin in the next `h` seconds, since
     /// these struck them.
     fn list_struck(&self, h: f32, struck: &mut Vec<u32>) {
         struck.clear();
         let pairs = self.fast_movers.batches.iter().flat_map(Batch::pairs);
         struck.extend(pairs.flatten().filter(|row| {
-            let row = *row as usize;
-            leaves(&self.velocity[row], self.skin_left[row], h)
+            let at = *row as usize;
+            leaves(&self.velocity[at], self.skin_left[at], h)
         }));
         struck.sort_unstable();
         struck.dedup();

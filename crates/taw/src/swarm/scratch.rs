@@ -1,0 +1,61 @@
+//! Scratch memory of a swarm: neither state nor compared.
+
+use super::bit_set::BitSet;
+use super::neighbours::Search;
+use super::simd::Row;
+use super::state::of;
+use super::step::WayToWall;
+use super::sweeps::Crowd;
+
+/// Memory that a step writes before it reads it.
+#[derive(Clone, Debug, Default)]
+pub(super) struct Scratch {
+    /// Number of threads that work on this step.
+    pub threads: usize,
+    /// See [`SolverColumns::backing`](super::kernels::SolverColumns::backing).
+    pub backing: Vec<Row>,
+    /// Rows that would leave their skin in this step.
+    pub leaving: Vec<u32>,
+    /// Displacements of the fast balls, while pairs are searched.
+    pub displacements: Vec<f32>,
+    /// Rows of proxies, in order, and which proxy each is.
+    pub proxy_rows: Vec<(u32, u32)>,
+    /// Positions and velocities of these rows before they are integrated.
+    pub saved_proxies: Vec<[Row; 2]>,
+    /// Rows that each thread found.
+    pub lists: Vec<Vec<u32>>,
+    /// Progress of each chunk, while they are worked on.
+    pub chunk_states: Vec<u32>,
+    pub searches: Vec<Search>,
+    pub crowd: Crowd,
+    pub path_changes: Vec<Row>,
+    /// Balls that would bounce off a wall, and those of them that another one hinders.
+    pub ways_to_walls: Vec<WayToWall>,
+    pub held: BitSet,
+}
+
+impl Scratch {
+    /// Bytes that it has from the allocator.
+    pub fn bytes(&self) -> usize {
+        let Self {
+            backing,
+            leaving,
+            displacements,
+            proxy_rows,
+            saved_proxies,
+            lists,
+            chunk_states,
+            searches,
+            threads: _,
+            crowd,
+            path_changes,
+            ways_to_walls,
+            held,
+        } = self;
+        (of(backing) + of(leaving) + of(displacements) + of(proxy_rows) + of(saved_proxies))
+            + (of(lists) + lists.iter().map(of).sum::<usize>())
+            + of(chunk_states)
+            + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
+            + (crowd.bytes() + of(path_changes) + of(ways_to_walls) + held.bytes())
+    }
+}
