@@ -325,8 +325,25 @@ pub(super) fn remove_ghost_collisions<S: Scalar>(
     candidates: &mut Vec<Candidate<S>>,
 ) {
     let flush = flush_distance(sphere);
+    let is_field = |it: &Candidate<S>| {
+        matches!(walls.shapes()[it.part.wall as usize], WallShape::HeightField(..))
+    };
+    let distance = |point: &Candidate<S>, other: &Candidate<S>| {
+        walls.project_point(other.part, point.nearest.point).distance
+    };
+    // In the solid of a height field a point is not in each of its triangles. Rounding may put one
+    // there that is on the surface.
     let on = |point: &Candidate<S>, other: &Candidate<S>| {
-        walls.project_point(other.part, point.nearest.point).distance <= flush
+        let distance = distance(point, other);
+        if is_field(other) { distance.abs() <= flush } else { distance <= flush }
+    };
+    let is_buried = |it: &Candidate<S>| {
+        let mut of_fields = candidates
+            .iter()
+            .filter(|other| other.part.wall != it.part.wall && is_field(other))
+            .map(|other| distance(it, other))
+            .peekable();
+        of_fields.peek().is_some() && of_fields.all(|distance| distance < -flush)
     };
     let before = |x: &Candidate<S>, y: &Candidate<S>| {
         (x.nearest.distance, x.part) < (y.nearest.distance, y.part)
@@ -337,7 +354,7 @@ pub(super) fn remove_ghost_collisions<S: Scalar>(
         let mut on_planes =
             || planes.any(|(_, plane)| plane.signed_distance(it.nearest.point) <= flush);
         let covers = |other: &Candidate<S>| on(it, other) && (before(other, it) || !on(other, it));
-        others.into_iter().any(covers) || on_planes()
+        others.into_iter().any(covers) || is_buried(it) || on_planes()
     };
     let ghosts: Vec<bool> = candidates.iter().map(ghosts).collect();
     let mut row = 0;
