@@ -2,6 +2,8 @@
 
 #[path = "soft_step/impacts.rs"]
 mod impacts;
+#[path = "soft_step/leaning.rs"]
+mod leaning;
 #[path = "soft_step/moving_walls.rs"]
 mod moving_walls;
 #[path = "soft_step/state.rs"]

@@ -147,7 +147,9 @@ impl WallContact {
                 return self.apply_restitution(&params, at, velocity, spin);
             }
             Pass::WarmStart(_) => {
-                self.impulse.tangent = self.impulse.tangent.reject_from(self.normal);
+                // Those for whom the wall bore something may no longer press on the ball.
+                let tangent = self.impulse.tangent.reject_from(self.normal);
+                self.impulse = self.cone().clamp(ContactImpulse { tangent, ..self.impulse });
                 self.apply_impulse(velocity, spin, self.impulse);
                 let give = self.numbers.inertia_factor * velocity[3];
                 set(spin, xyz(spin) + self.torque * give);
@@ -240,16 +242,20 @@ impl WallContact {
             normal: mass * (target - relative.dot(self.normal)),
             tangent: self.slip(relative, spin) * (-mass * self.tangent_mass()),
         };
-        let cone = FrictionCone {
-            extra_friction: self.numbers.friction * self.borne_for_others,
-            ..FrictionCone::new(self.numbers.friction)
-        };
-        let change = self.impulse.solve(wanted, softness, &cone);
+        let change = self.impulse.solve(wanted, softness, &self.cone());
         if self.impulse.normal + self.borne_for_others > 0.0 {
             spin[3] = GROUNDED;
         }
         self.apply_impulse(velocity, spin, change);
         self.solve_rolling(velocity, spin);
+    }
+
+    /// Limits of its impulse, with the friction of what it bears for others.
+    fn cone(&self) -> FrictionCone<f32> {
+        FrictionCone {
+            extra_friction: self.numbers.friction * self.borne_for_others,
+            ..FrictionCone::new(self.numbers.friction)
+        }
     }
 
     fn apply_impulse(&self, velocity: &mut Row, spin: &mut Row, impulse: ContactImpulse<f32>) {

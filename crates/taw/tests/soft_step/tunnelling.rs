@@ -5,7 +5,7 @@ use super::*;
 const DT: f64 = 1.0 / 60.0;
 
 /// Uniform numbers from zero to one.
-fn dice(mut seed: u64) -> impl FnMut() -> f64 {
+pub fn dice(mut seed: u64) -> impl FnMut() -> f64 {
     move || {
         seed = seed.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
         (seed >> 33) as f64 / (1_u64 << 31) as f64
