@@ -12,7 +12,7 @@ use crate::broad::CollisionLayers;
 use crate::contact::Contact;
 use crate::math::{Scalar, Vec3, normal_and_distance};
 use crate::response::Response;
-use crate::shape::{Aabb, BoundedShape, PointProjection, Shape, Sphere};
+use crate::shape::{Aabb, Aabb3, BoundedShape, PointProjection, Shape, Sphere};
 
 /// Tolerance of internal edges, as a fraction of the radius: a point this far outside of another
 /// wall still counts as on it. It would tilt a normal by less than 1e-5 rad, and flush walls are no
@@ -345,11 +345,22 @@ pub(super) fn remove_ghost_collisions<S: Scalar>(
             .peekable();
         of_fields.peek().is_some() && of_fields.all(|distance| distance < -flush)
     };
+    // Of thousands of triangles near a ball, few are near a point.
+    let margin = Vec3::new(flush, flush, flush) * S::from_f64(4.0);
+    let box_of = |it: &Candidate<S>| {
+        let Aabb { min, max } =
+            walls.shapes()[it.part.wall as usize].sub_shape_box(it.part.index)?;
+        Some(Aabb { min: min - margin, max: max + margin })
+    };
+    let boxes: SmallVec<[Option<Aabb3<S>>; 8]> = candidates.iter().map(box_of).collect();
     let before = |x: &Candidate<S>, y: &Candidate<S>| {
         (x.nearest.distance, x.part) < (y.nearest.distance, y.part)
     };
     let ghosts = |it: &Candidate<S>| {
-        let others = candidates.iter().filter(|other| other.part != it.part);
+        let point = it.nearest.point;
+        let is_near = |bounds: &Option<Aabb3<S>>| bounds.is_none_or(|it| it.contains_point(point));
+        let near = candidates.iter().zip(&boxes).filter(|(_, bounds)| is_near(bounds));
+        let others = near.map(|(other, _)| other).filter(|other| other.part != it.part);
         let mut planes = walls.colliding_planes(layers);
         let mut on_planes =
             || planes.any(|(_, plane)| plane.signed_distance(it.nearest.point) <= flush);

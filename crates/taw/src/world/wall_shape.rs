@@ -293,6 +293,20 @@ impl<S: Scalar> WallShape<S> {
         }
     }
 
+    /// Bounding box of a sub-shape; none of a half-space.
+    pub(super) fn sub_shape_box(&self, part: u32) -> Option<Aabb3<S>> {
+        let of_triangle = |triangle: Option<Triangle<S>>, pose: &Pose<S>| {
+            let corners = triangle?.corners.map(|corner| pose.transform_point(corner));
+            Some(Triangle { corners }.bounding_box())
+        };
+        match self {
+            Self::Plane(_) => None,
+            Self::Solid(_) => self.sub_shape(part).map(BoundedShape::bounding_box),
+            Self::Mesh(mesh, pose) => of_triangle(mesh.triangle(part), pose),
+            Self::HeightField(field, pose) => of_triangle(field.triangle(part), pose),
+        }
+    }
+
     /// Convex sub-shape.
     pub(super) fn sub_shape(&self, part: u32) -> Option<&Shape<S>> {
         match self {
