@@ -295,7 +295,8 @@ impl<S: Scalar> World<S> {
         let start =
             Sphere { center: self.scratch.continuous.start[row], ..self.marbles.sphere(row) };
         let displacement = sphere.center - start.center;
-        let looks = met_marble && !self.walls.are_half_spaces();
+        let looks = met_marble
+            && !(self.walls.are_half_spaces() && self.scratch.continuous.crowded.is_empty());
         let motion = Motion { displacement, time: dt, carrier: None };
         let stop = if looks { self.first_wall_impact(row, &start, motion) } else { None };
         let Some(WallImpact { part, center, .. }) = stop else { return };
