@@ -254,10 +254,14 @@ impl<S: Scalar> SolverBodies<'_, S> {
         time_since_impact: Option<S>,
         context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) -> Vec3<S> {
+        let dt = context.settings.dt;
         let of = |row: usize| {
+            let change = context.start.velocity.get(row).map(|before| self.velocity[row] - before);
+            let (Some(change), true) = (change, dt > S::zero()) else { return Vec3::zero() };
             let follow_time = context.follow_time_of(row);
             let time = time_since_impact.filter(|_| !context.is_ccd_stopped(row));
-            self.acceleration(row, context) * (time.unwrap_or(follow_time) - context.lead_of(row))
+            // Not by the acceleration, which may overflow.
+            change * ((time.unwrap_or(follow_time) - context.lead_of(row)) / dt)
         };
         of(c.b) - c.a.marble().map_or_else(Vec3::zero, of)
     }

@@ -5,14 +5,15 @@ use cgmath::InnerSpace;
 
 use super::walls::Motion;
 use super::{Continuous, MAX_FREE_MOTION};
-use crate::math::{Scalar, is_finite_point, length};
+use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
 use crate::shape::Sphere;
 use crate::world::World;
 
 impl<S: Scalar> World<S> {
     /// Lists the marbles that would pass into a half-space by more than half of their radius while
-    /// others are within reach: on the way back they may pass through one, whose path no longer
-    /// tells when they met.
+    /// the paths of others lead through their reach: on the way back they may pass through one,
+    /// whose path no longer tells when they met. One that only others could reach is not listed:
+    /// what is fast far away must not change its bounce.
     pub(super) fn list_crowded_bounces(&mut self) {
         let mut crowded = std::mem::take(&mut self.scratch.continuous.crowded);
         crowded.clear();
@@ -33,7 +34,12 @@ impl<S: Scalar> World<S> {
                 self.marbles.period,
                 |a, b| {
                     if self.marbles.may_collide(a, b) {
-                        (near[a as usize], near[b as usize]) = (true, true);
+                        for (one, other) in [(a as usize, b as usize), (b as usize, a as usize)] {
+                            let others = self.marbles.period.image(start[other], start[one]);
+                            let motion = self.marbles.position[other] - start[other];
+                            let distance = distance_to_path(start[one], others, motion);
+                            near[one] |= distance <= reach[one] + self.marbles.radius[other];
+                        }
                     }
                 },
             );
@@ -128,4 +134,12 @@ impl<S: Scalar> World<S> {
             self.marbles.position[row] = center;
         }
     }
+}
+
+/// Distance of a point from a straight path, in metres.
+fn distance_to_path<S: Scalar>(point: Point3<S>, start: Point3<S>, motion: Vec3<S>) -> S {
+    let along = (point - start).dot(motion) / motion.magnitude2();
+    // No motion at all has no direction, either.
+    let along = if along > S::zero() { along.min(S::one()) } else { S::zero() };
+    length(point - (start + motion * along))
 }
