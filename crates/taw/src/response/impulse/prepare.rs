@@ -98,9 +98,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             rolling: self.rolling_constraint(a, b, material),
         };
         constraint.initial_relative_spin = self.relative_spin(&constraint);
-        let since_start = follow_time - context.integrator_lead(&constraint);
-        constraint.velocity_since_impact =
-            self.relative_acceleration(&constraint, context) * since_start;
+        constraint.velocity_since_impact = self.velocity_since(&constraint, None, context);
         if is_fast {
             self.detect_bounce(&mut constraint, separation, context);
         }
@@ -121,7 +119,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
             let time_since_impact = self.time_since_impact_of(c, separation, context);
             // Only if it is not back on the surface before the substep ends.
             let relative_acceleration = self.relative_acceleration(c, context);
-            let speed = c.restitution * self.approach_speed(c, time_since_impact, context);
+            let velocity_since_impact = self.velocity_since(c, Some(time_since_impact), context);
+            let speed = c.restitution * c.approach_speed(velocity_since_impact);
             if speed + relative_acceleration.dot(c.normal) * time_since_impact * S::from_f64(0.5)
                 >= S::zero()
             {
@@ -221,18 +220,6 @@ impl<S: Scalar> SolverBodies<'_, S> {
         time_since_impact.max(S::zero()).min(context.settings.dt)
     }
 
-    /// Approach speed at the time of impact, in m/s.
-    fn approach_speed(
-        &self,
-        c: &Constraint<S>,
-        time_since_impact: S,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
-    ) -> S {
-        let velocity_since_impact = self.relative_acceleration(c, context)
-            * (time_since_impact - context.integrator_lead(c));
-        (velocity_since_impact - c.initial_relative_velocity).dot(c.normal).max(S::zero())
-    }
-
     /// Sets the restitution target: at the time of the island's first impact, with the approach
     /// speed of that time, and positions follow from then on. So the height of a bounce does not
     /// depend on when it happens within a substep. A bounce among resting contacts follows for the
@@ -243,22 +230,40 @@ impl<S: Scalar> SolverBodies<'_, S> {
         island: &Island<S>,
         context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
     ) {
-        let time_since_impact = if island.has_resting_contact {
-            context.follow_time(c.a, c.b)
-        } else {
-            island.time_since_impact
-        };
-        let velocity_since_impact = self.relative_acceleration(c, context)
-            * (time_since_impact - context.integrator_lead(c));
-        let speed = c.restitution * self.approach_speed(c, time_since_impact, context);
+        let time_since_impact = (!island.has_resting_contact).then_some(island.time_since_impact);
+        let velocity_since_impact = self.velocity_since(c, time_since_impact, context);
+        let speed = c.restitution * c.approach_speed(velocity_since_impact);
         let velocity_at_impact = c.initial_relative_velocity - velocity_since_impact;
         let tangent_velocity = velocity_at_impact - c.normal * velocity_at_impact.dot(c.normal);
         let target_velocity = velocity_since_impact
             - tangent_velocity * context.material_of(c.a, c.b).tangential_restitution;
-        c.time_since_impact = c.time_since_impact.map(|_| time_since_impact);
+        c.time_since_impact = c.time_since_impact.and(time_since_impact);
         c.target_normal_velocity = speed + target_velocity.dot(c.normal);
         (c.target_tangent_velocity, c.velocity_since_impact) =
             (target_velocity - c.normal * target_velocity.dot(c.normal), velocity_since_impact);
+    }
+
+    /// Relative velocity that forces gave the two bodies of a contact since its impulse, in m/s:
+    /// since an impact so many seconds before the end of the substep, or since positions follow.
+    /// Each body has its own time: one that continuous collision detection stopped follows no more,
+    /// and feels the impulse where it stopped, while the other one is moved back along its path.
+    /// With a common time that one would keep speed of a fall that is undone.
+    fn velocity_since(
+        &self,
+        c: &Constraint<S>,
+        time_since_impact: Option<S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    ) -> Vec3<S> {
+        let dt = context.settings.dt;
+        let of = |row: usize| {
+            let change = context.start.velocity.get(row).map(|before| self.velocity[row] - before);
+            let (Some(change), true) = (change, dt > S::zero()) else { return Vec3::zero() };
+            let follow_time = context.follow_time_of(row);
+            let time = time_since_impact.filter(|_| !context.is_ccd_stopped(row));
+            // Not by the acceleration, which may overflow.
+            change * ((time.unwrap_or(follow_time) - context.lead_of(row)) / dt)
+        };
+        of(c.b) - c.a.marble().map_or_else(Vec3::zero, of)
     }
 
     /// Relative acceleration of a contact by forces in this substep, in m/s².
@@ -281,6 +286,13 @@ impl<S: Scalar> SolverBodies<'_, S> {
         change
             .filter(|_| context.settings.dt > S::zero())
             .map_or_else(Vec3::zero, |change| change / context.settings.dt)
+    }
+}
+
+impl<S: Scalar> Constraint<S> {
+    /// Approach speed at the impact, in m/s, by the relative velocity that forces gave since.
+    fn approach_speed(&self, velocity_since_impact: Vec3<S>) -> S {
+        (velocity_since_impact - self.initial_relative_velocity).dot(self.normal).max(S::zero())
     }
 }
 
@@ -336,8 +348,12 @@ where
 
     /// Lead of the integrator's velocities over those of the path, in seconds.
     fn integrator_lead(&self, c: &Constraint<S>) -> S {
-        let position_weight = mean(c.a, c.b, |row| (self.position_weight)(row));
-        (position_weight - S::from_f64(0.5)) * self.settings.dt
+        mean(c.a, c.b, |row| self.lead_of(row))
+    }
+
+    /// Lead of the integrator's velocity of a row, in seconds.
+    fn lead_of(&self, row: usize) -> S {
+        ((self.position_weight)(row) - S::from_f64(0.5)) * self.settings.dt
     }
 }
 

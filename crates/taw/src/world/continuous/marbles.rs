@@ -171,14 +171,16 @@ impl<S: Scalar> World<S> {
         partners.build(candidates, start.len());
         while let Some(Reverse(hit)) = self.scratch.continuous.meetings.pop() {
             let Meeting { time, pair, bends } = hit;
-            let bent = |row: u32| self.scratch.continuous.paths[row as usize].bends;
-            if bends != (bent(pair.0), bent(pair.1)) {
+            if bends != self.scratch.continuous.bends_of(pair) {
                 continue; // superseded by a newer prediction
             }
             if pair.0 == pair.1 {
                 self.bend_at_wall(pair.0 as usize);
             } else {
                 self.meet(pair, time, resting_approach);
+            }
+            if bends == self.scratch.continuous.bends_of(pair) {
+                continue; // it bent neither path, so that all predictions stand
             }
             let Continuous { partners, meetings, paths, bends, .. } = &mut self.scratch.continuous;
             let period = self.marbles.period;
@@ -295,7 +297,8 @@ impl<S: Scalar> World<S> {
         let start =
             Sphere { center: self.scratch.continuous.start[row], ..self.marbles.sphere(row) };
         let displacement = sphere.center - start.center;
-        let looks = met_marble && !self.walls.are_half_spaces();
+        let looks = met_marble
+            && !(self.walls.are_half_spaces() && self.scratch.continuous.crowded.is_empty());
         let motion = Motion { displacement, time: dt, carrier: None };
         let stop = if looks { self.first_wall_impact(row, &start, motion) } else { None };
         let Some(WallImpact { part, center, .. }) = stop else { return };
@@ -347,6 +350,11 @@ impl Partners {
 }
 
 impl<S: Scalar> Continuous<S> {
+    /// Bend counts of two paths.
+    fn bends_of(&self, (a, b): (u32, u32)) -> (u32, u32) {
+        (self.paths[a as usize].bends, self.paths[b as usize].bends)
+    }
+
     /// Lists pairs that graze each other within the substep though neither was stopped.
     fn collect_grazes(&mut self, period: Period<S>) {
         let Self { candidates, paths, grazes, .. } = self;

@@ -2,6 +2,7 @@
 //! impact with the velocity of that moment; resting and sliding ones continue along the surface.
 //! Slower ones that only graze each other within the substep are listed as contacts.
 
+mod bounces;
 mod marbles;
 mod moving_walls;
 mod walls;
@@ -58,6 +59,9 @@ pub(super) struct Continuous<S> {
     moving_walls: Vec<MovingWall<S>>,
     /// Marbles that were half inside of a wall, sorted.
     deep: Vec<u32>,
+    /// By row, who would bounce off a half-space within reach of others; empty if nobody.
+    crowded: Vec<bool>,
+    near: Vec<bool>,
     /// Positions before they follow the velocity changes of contacts, in metres.
     bounced_from: Vec<Point3<S>>,
 }
@@ -180,6 +184,7 @@ impl<S: Scalar> Continuous<S> {
         self.moving_walls.clear();
         self.deep.clear();
         self.bounced_from.clear();
+        self.crowded.clear();
     }
 }
 

@@ -6,13 +6,13 @@ use smallvec::SmallVec;
 use super::moving_walls::{Frame, MovingWall, Place, RelativePath, path_bounds};
 use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::broad::CollisionLayers;
-use crate::math::{Mat3, Point3, Scalar, Vec3, is_finite_point, length};
+use crate::math::{Mat3, Point3, Scalar, Vec3, length};
 use crate::response::penalty::CORE;
 use crate::response::{Colliders as _, Response};
 use crate::shape::{Aabb, PointProjection, Sphere};
-use crate::world::World;
 use crate::world::narrow_phase::flush_distance;
 use crate::world::walls::{SubShape, Walls};
+use crate::world::{WallShape, World};
 
 /// Enough iterations for any wall that a marble does not only graze.
 const MAX_ITERATIONS: u32 = 32;
@@ -64,10 +64,11 @@ pub(super) struct Bend<S> {
 
 impl<S: Scalar> World<S> {
     /// Finds the bends of paths that would pass into walls by more than half of the marble's
-    /// radius. Half-spaces are solid and need no such test.
+    /// radius. Half-spaces are solid, so that a marble by itself needs no such test there.
     pub(super) fn bend_at_walls(&mut self, dt: S) {
         self.walls.update_tree();
-        if self.walls.are_half_spaces() {
+        self.list_crowded_bounces();
+        if self.walls.are_half_spaces() && self.scratch.continuous.crowded.is_empty() {
             return;
         }
         MovingWall::list(&self.walls, dt, &mut self.scratch.continuous.moving_walls);
@@ -90,7 +91,7 @@ impl<S: Scalar> World<S> {
 
     /// Lists the marbles that contacts with walls, as they were found, show half inside of one after
     /// they have moved by `motion` metres: however slow, they must not come out on the other side.
-    fn list_deep_marbles(&mut self, motion: impl Fn(&Self, usize) -> S) {
+    pub(super) fn list_deep_marbles(&mut self, motion: impl Fn(&Self, usize) -> S) {
         let mut deep = std::mem::take(&mut self.scratch.continuous.deep);
         deep.clear();
         deep.extend(self.contacts.wm.iter().filter_map(|c| {
@@ -106,13 +107,13 @@ impl<S: Scalar> World<S> {
 
     /// Returns true for a marble of infinite mass, which contacts do not move, if the response knows
     /// masses.
-    fn is_kinematic(&self, row: usize) -> bool {
+    pub(super) fn is_kinematic(&self, row: usize) -> bool {
         self.settings.model.response != Response::Displacement
             && self.marbles.mass(row).is_infinite()
     }
 
     /// Motion of a marble against a wall that needs no sweep, in metres: beyond this it may pass.
-    fn free_motion(&self, row: usize) -> S {
+    pub(super) fn free_motion(&self, row: usize) -> S {
         if self.scratch.continuous.deep.binary_search(&(row as u32)).is_ok() {
             S::zero()
         } else {
@@ -153,7 +154,8 @@ impl<S: Scalar> World<S> {
             let there = center + along * displacement;
             let slides_off = || {
                 let wall = &self.walls.shapes()[wall as usize];
-                wall.project_point(there).distance > sphere.radius
+                !matches!(wall, WallShape::Plane(_))
+                    && wall.project_point(there).distance > sphere.radius
             };
             let fast = -displacement.dot(normal) > resting_approach * left;
             if surfaces.len() == MAX_BENDS as usize || (fast && slides_off()) {
@@ -181,78 +183,6 @@ impl<S: Scalar> World<S> {
                 change,
                 along: along * rest,
             });
-        }
-    }
-
-    /// Stops marbles at a second wall, half-spaces included, that a bounce would carry them into:
-    /// they keep their velocity, and bounce there in the next substep.
-    pub(in crate::world) fn stop_bounces_at_walls(&mut self) {
-        let rows = self.scratch.continuous.bounced_from.len().min(self.marbles.len());
-        if rows == 0 {
-            return;
-        }
-        self.list_deep_marbles(|world, row| {
-            let from = world.scratch.continuous.bounced_from.get(row);
-            from.map_or_else(S::zero, |from| length(world.marbles.position[row] - *from))
-        });
-        for row in 0..rows {
-            self.stop_bounce_at_walls(row);
-            self.push_out_of_half_spaces(row);
-        }
-    }
-
-    /// Stops a marble at the first wall that it would pass into by more than half of its radius, on
-    /// the way from where it was before contacts moved it.
-    fn stop_bounce_at_walls(&mut self, row: usize) {
-        let sphere = Sphere {
-            center: self.scratch.continuous.bounced_from[row],
-            ..self.marbles.sphere(row)
-        };
-        let displacement = self.marbles.position[row] - sphere.center;
-        if length(displacement) <= self.free_motion(row) {
-            return;
-        }
-        let layers = self.marbles.layers_of_row(row);
-        let planes = self.walls.colliding_planes(layers).filter_map(|(_, plane)| {
-            if self.settings.model.response.needs_penetration() {
-                return None; // its forces turn everything round within a half-space
-            }
-            let (gap, closing) = (
-                plane.signed_distance(sphere.center) - sphere.radius,
-                -displacement.dot(plane.normal()),
-            );
-            let passes =
-                closing > S::zero() && closing > gap + sphere.radius * S::from_f64(MAX_FREE_MOTION);
-            passes.then(|| (gap / closing).max(S::zero()))
-        });
-        let motion = Motion { displacement, time: S::zero(), carrier: None };
-        let other = self.first_wall_impact(row, &sphere, motion).map(|stop| stop.time);
-        let first = planes.chain(other).fold(S::one(), S::min);
-        if first < S::one() {
-            self.marbles.position[row] = sphere.center + displacement * first;
-        }
-    }
-
-    /// Moves a marble that the contacts leave in a half-space by more than half of its radius back
-    /// to its surface: nothing else would stop it there. One whose contact the user has removed
-    /// passes, and one that contacts do not move.
-    fn push_out_of_half_spaces(&mut self, row: usize) {
-        if self.settings.model.response.needs_penetration() || self.is_kinematic(row) {
-            return;
-        }
-        let Sphere { mut center, radius } = self.marbles.sphere(row);
-        let from = self.scratch.continuous.bounced_from[row];
-        for (wall, plane) in self.walls.colliding_planes(self.marbles.layers_of_row(row)) {
-            let gap = plane.signed_distance(center) - radius;
-            let is_deep = gap.is_finite() && gap < radius * S::from_f64(-MAX_FREE_MOTION);
-            let was_listed = || plane.signed_distance(from) - radius <= self.scratch.reach;
-            let is_listed = || self.contacts.wm.iter().any(|c| (c.a, c.b) == (wall, row as u32));
-            if is_deep && (!was_listed() || is_listed()) {
-                center -= plane.normal() * gap;
-            }
-        }
-        if is_finite_point(center) {
-            self.marbles.position[row] = center;
         }
     }
 
@@ -297,8 +227,8 @@ impl<S: Scalar> World<S> {
         best
     }
 
-    /// Visits the sub-shapes of walls that a marble may meet on its path, except half-spaces, and
-    /// the path as each of them sees it.
+    /// Visits the sub-shapes of walls that a marble may meet on its path, of half-spaces those at
+    /// rest that it would bounce off among others, and the path as each of them sees it.
     fn for_each_wall_on_path(
         &self,
         row: usize,
@@ -315,6 +245,14 @@ impl<S: Scalar> World<S> {
         let moves = |part: SubShape| {
             time > S::zero() && self.walls.swept_motion_of_row(part.wall as usize).is_some()
         };
+        if self.scratch.continuous.crowded.get(row).is_some_and(|crowded| *crowded) {
+            for (wall, _) in self.walls.colliding_planes(layers) {
+                let part = SubShape { wall, index: 0 };
+                if !moves(part) {
+                    visit(part, &path);
+                }
+            }
+        }
         if path.max_length() > free {
             self.walls.for_each_colliding(&bounds, layers, |part| {
                 if !moves(part) {
