@@ -191,13 +191,9 @@ impl<S: Scalar> SolverBodies<'_, S> {
             return (moving, S::zero());
         }
         let spin = self.spin[row] * inverse_speed_unit;
-        let turning = match self.capsule(row) {
-            Some(capsule) => capsule.spin_energy(spin),
-            None => {
-                let factor = self.ball_rotation(row).inverse_inertia_factor::<S>();
-                (spin * self.radius[row]).magnitude2() / factor
-            }
-        };
+        let inverse_inertia = self.ball_rotation(row).inverse_inertia_factor::<S>();
+        let of_ball = (spin * self.radius[row]).magnitude2() / inverse_inertia;
+        let turning = self.capsule(row).map_or(of_ball, |capsule| capsule.spin_energy(spin));
         (moving, turning)
     }
 }
