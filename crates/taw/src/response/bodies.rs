@@ -56,6 +56,16 @@ impl<S: Scalar> CapsuleInertia<S> {
         [axial, cylinder * cylinder_transverse + ends * ends_transverse]
     }
 
+    /// Twice the energy of a spin per mass, in m²/s²; zero if the rotation is locked.
+    pub fn spin_energy(&self, spin: Vec3<S>) -> S {
+        let axial = spin.dot(self.axis);
+        let transverse = (spin - self.axis * axial).magnitude2();
+        let energy =
+            |spin: S, inverse: S| if inverse > S::zero() { spin / inverse } else { inverse };
+        let [inverse_axial, inverse_transverse] = self.inverse_unit_inertia;
+        energy(axial * axial, inverse_axial) + energy(transverse, inverse_transverse)
+    }
+
     /// Change of angular velocity by a torque impulse per mass about the center.
     pub fn apply_inverse_inertia(&self, torque: Vec3<S>) -> Vec3<S> {
         let [axial, transverse] = self.inverse_unit_inertia;

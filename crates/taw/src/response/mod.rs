@@ -48,6 +48,10 @@ pub enum Response {
     /// A bounce acts at the end of its substep, so its height is exact only to first order in the
     /// substep. The restitution threshold is the speed that gravity adds in two substeps.
     /// Penetration is resolved by mass, without a change of velocity.
+    ///
+    /// Where walls that move squeeze marbles, no velocities satisfy all contacts: such marbles overlap
+    /// until there is room, get no more energy than the walls carry, and a contact bears at most a
+    /// thousand times the mass of all that are in contact times their largest relative velocity.
     Impulse,
     /// Soft contacts in small steps (Catto, 2024, `Solver2D`): masses, restitution, friction,
     /// rolling and torsional friction, and spin if the model's rotation is dynamic. Made for games:

@@ -75,7 +75,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             let Ok(at) = cache.binary_search_by_key(&c.key, |entry| entry.key) else { continue };
             let CachedImpulse { impulse, angular_impulse, .. } = cache[at];
             let tangent = impulse.tangent.reject_from(c.normal);
-            c.impulse = ContactImpulse { tangent, ..impulse };
+            c.impulse = c.saturate(ContactImpulse { tangent, ..impulse });
             self.apply_impulse_pair(c, c.impulse());
             if let Some(rolling) = &mut c.rolling {
                 rolling.angular_impulse = angular_impulse;

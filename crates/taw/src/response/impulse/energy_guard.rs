@@ -98,7 +98,15 @@ impl<S: Scalar> SolverBodies<'_, S> {
             self.measure_energy(constraints, islands, energies);
         }
         if energies.iter().any(IslandEnergy::gains) {
-            self.solve_normals_before_friction(constraints, islands, energies, rows, settings);
+            let gaining: Vec<_> = energies.iter().map(IslandEnergy::gains).collect();
+            self.solve_normals_before_friction(
+                constraints,
+                islands,
+                energies,
+                &gaining,
+                rows,
+                settings,
+            );
         }
         self.stop_approaches(constraints, islands);
     }
@@ -107,7 +115,11 @@ impl<S: Scalar> SolverBodies<'_, S> {
     /// into each other have no solution that iterations could reach; and a ball that went on into a
     /// wall would be lifted out again, which is energy. Stopping an approach only lowers it. Walls
     /// come first, so the backward pass ends with them.
-    fn stop_approaches(&mut self, constraints: &mut [Constraint<S>], islands: &Islands<S>) {
+    pub(super) fn stop_approaches(
+        &mut self,
+        constraints: &mut [Constraint<S>],
+        islands: &Islands<S>,
+    ) {
         let indices = 0..constraints.len();
         for index in indices.clone().chain(indices.rev()) {
             let c = &mut constraints[index];
@@ -185,20 +197,20 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Solves gaining islands in an order that cannot gain, however few the iterations. First the
+    /// Solves some islands in an order that cannot gain, however few the iterations. First the
     /// normal impulses, without friction: each step lowers the energy. Then restitution by
     /// Poisson's hypothesis, no further than energy allows. Then friction, with cones fixed by
     /// these normal impulses, while normal impulses may only grow: again each step lowers the
     /// energy.
-    fn solve_normals_before_friction(
+    pub(super) fn solve_normals_before_friction(
         &mut self,
         constraints: &mut [Constraint<S>],
         islands: &mut Islands<S>,
         energies: &mut Vec<IslandEnergy<S>>,
+        gaining: &[bool],
         rows: &mut Rows<S>,
         settings: &SolverSettings<S>,
     ) {
-        let gaining: Vec<_> = energies.iter().map(IslandEnergy::gains).collect();
         let mut gaining_constraints: Vec<_> =
             constraints.iter_mut().filter(|c| gaining[c.island as usize]).collect();
         let mut friction = Vec::with_capacity(gaining_constraints.len());
@@ -218,7 +230,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
         islands.restart(|island| gaining[island]);
         iterate(self, constraints, islands, rows, settings);
-        self.apply_poisson_restitution(constraints, islands, energies, &gaining);
+        self.apply_poisson_restitution(constraints, islands, energies, gaining);
         let gaining_constraints = constraints.iter_mut().filter(|c| gaining[c.island as usize]);
         for (c, friction) in gaining_constraints.zip(friction) {
             c.impulse.normal = c.impulse.normal.max(S::zero()); // rounding
@@ -302,14 +314,14 @@ impl<S: Scalar> SolverBodies<'_, S> {
     }
 
     /// Adds an impulse to a contact; the caller keeps it within the friction cone.
-    fn add_impulse(&mut self, c: &mut Constraint<S>, impulse: Vec3<S>) {
+    pub(super) fn add_impulse(&mut self, c: &mut Constraint<S>, impulse: Vec3<S>) {
         self.apply_impulse_pair(c, impulse);
         let change = ContactImpulse::split(impulse, c.normal);
         c.impulse.normal += change.normal;
         c.impulse.tangent += change.tangent;
     }
 
-    fn add_angular_impulse(&mut self, c: &mut Constraint<S>, impulse: Vec3<S>) {
+    pub(super) fn add_angular_impulse(&mut self, c: &mut Constraint<S>, impulse: Vec3<S>) {
         if let Some(rolling) = &mut c.rolling {
             rolling.angular_impulse += impulse;
             self.apply_angular_impulse_pair(c, impulse);
@@ -345,7 +357,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
 
 impl<S: Scalar> Constraint<S> {
     /// Target normal velocity without restitution, in m/s.
-    fn target_without_restitution(&self) -> S {
+    pub(super) fn target_without_restitution(&self) -> S {
         if self.bounces {
             self.velocity_since_impact.dot(self.normal)
         } else {

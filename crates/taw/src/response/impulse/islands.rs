@@ -3,6 +3,7 @@
 use cgmath::InnerSpace;
 
 use super::Constraint;
+use super::jam::Load;
 use super::rows::{Row, SearchDirections};
 use crate::math::{Scalar, Vec3};
 
@@ -56,6 +57,12 @@ impl UnionFind {
         self.island_of_root[root]
     }
 
+    /// Index of a row's set, if it has one.
+    fn known_set_of(&mut self, row: usize) -> Option<u32> {
+        let root = self.root(row);
+        Some(self.island_of_root[root]).filter(|set| *set != u32::MAX)
+    }
+
     /// Root of a row's tree, with path halving.
     fn root(&mut self, row: usize) -> usize {
         let mut row = row as u32;
@@ -74,8 +81,10 @@ impl UnionFind {
 pub(super) struct Island<S> {
     /// Energy units, so that squares do not underflow: mass in 1/kg, and speed as its reciprocal, in
     /// s/m.
-    inverse_mass_unit: S,
-    inverse_speed_unit: S,
+    pub inverse_mass_unit: S,
+    pub inverse_speed_unit: S,
+    /// Masses and velocities before contacts act.
+    pub load: Load<S>,
     /// True if one of its contacts bounces; true if one rests; and the time since the first bounce
     /// in this substep, in seconds.
     pub bounces: bool,
@@ -137,6 +146,11 @@ impl<S: Scalar> Islands<S> {
         &mut self.list[island as usize]
     }
 
+    /// Island of a marble, by its row; none if nothing touches it.
+    pub fn of_row(&mut self, row: usize) -> Option<&mut Island<S>> {
+        self.sets.known_set_of(row).map(|set| &mut self.list[set as usize])
+    }
+
     /// Island of a row, if it is accelerated and the row takes part in it.
     #[inline]
     pub fn accelerating(&mut self, row: &Row<S>) -> Option<&mut Island<S>> {
@@ -186,6 +200,7 @@ impl<S: Scalar> Island<S> {
         Self {
             inverse_mass_unit,
             inverse_speed_unit: Some(speed_unit.recip()).filter(|r| r.is_finite()).unwrap_or(one),
+            load: Load::none(),
             bounces: false,
             has_resting_contact: false,
             time_since_impact: zero,

@@ -5,6 +5,7 @@ mod cache;
 mod contact;
 mod energy_guard;
 mod islands;
+mod jam;
 mod positions;
 mod prepare;
 mod rows;
@@ -64,6 +65,8 @@ pub(crate) struct SolverSettings<S> {
     pub slop: S,
     /// Allowed penetration over the smaller radius, at most.
     pub max_relative_slop: S,
+    /// True to resolve jams; false where the caller does, which tries the walls' motion first.
+    pub resolve_jams: bool,
 }
 
 /// First body of a contact, by row.
@@ -207,8 +210,11 @@ pub(super) struct Constraint<S> {
     surface_velocity: Vec3<S>,
     inverse_effective_mass: InverseEffectiveMass<S>,
     restitution: S,
+    friction: S,
     /// Limits of the impulse, in m/s.
     cone: FrictionCone<S>,
+    /// Largest normal impulse that the contact can bear, in m/s.
+    max_normal_impulse: S,
     /// Relative velocity of the two points, in m/s, and relative spin, in rad/s, before any
     /// impulse.
     initial_relative_velocity: Vec3<S>,
@@ -281,10 +287,16 @@ pub(crate) fn solve_contacts<S: Scalar>(
     initial_velocity.clear();
     initial_velocity.extend_from_slice(marbles.velocity);
     prepare(marbles, contacts, context, constraints, islands);
+    if settings.resolve_jams {
+        marbles.measure_loads(constraints, islands);
+    }
     marbles.warm_start(constraints, cache);
     marbles.limit_warm_start(constraints, islands, energies);
     iterate(marbles, constraints, islands, rows, settings);
     marbles.limit_energy(constraints, islands, energies, full_restitution, rows, settings);
+    if settings.resolve_jams {
+        marbles.resolve_jams(constraints, islands, energies, rows, settings);
+    }
     marbles.update_positions(initial_velocity, constraints, context);
     marbles.solve_positions(constraints, context, separations);
     store_impulses(constraints, contacts, cache);

@@ -34,6 +34,8 @@ pub(super) struct Row<S> {
     /// Normal inverse effective mass, in 1/kg.
     pub inverse_effective_mass: S,
     pub cone: FrictionCone<S>,
+    /// Largest normal impulse, in m/s.
+    pub max_normal_impulse: S,
     /// Accumulated impulse, in m/s as in [`Constraint`].
     pub impulse: ContactImpulse<S>,
 }
@@ -138,6 +140,7 @@ impl<S: Scalar> Row<S> {
             tangent_ratio: inverse_effective_mass / c.inverse_effective_mass.tangent,
             inverse_effective_mass,
             cone: c.cone,
+            max_normal_impulse: c.max_normal_impulse.max(c.cone.min_normal_impulse),
             impulse: c.impulse,
         }
     }

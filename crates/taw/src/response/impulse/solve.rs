@@ -3,6 +3,7 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::islands::{DIRECTIONS, Island, Islands, SearchStep};
+use super::jam::saturate;
 use super::rows::{PackedBodies, Row, Rows, SearchDirections};
 use super::{Constraint, RollingConstraint, SolverSettings};
 use crate::constraint::{ContactImpulse, solve_rolling};
@@ -65,9 +66,20 @@ impl<S: Scalar> Row<S> {
         self.impulse.normal <= S::zero()
     }
 
+    /// True if the contact bears nothing or all that it can, so that the search leaves it as it is.
+    fn is_at_bound(&self) -> bool {
+        self.is_open() || self.impulse.normal >= self.max_normal_impulse
+    }
+
+    /// Bounds an impulse by what the contact can bear.
+    #[inline]
+    fn saturate(&self, impulse: ContactImpulse<S>) -> ContactImpulse<S> {
+        saturate(impulse, &self.cone, self.max_normal_impulse)
+    }
+
     /// Projection of an impulse to the friction cone: no tension, and Coulomb friction.
     fn project_to_cone(&self, impulse: Vec3<S>) -> ContactImpulse<S> {
-        self.cone.clamp(ContactImpulse::split(impulse, self.normal))
+        self.saturate(self.cone.clamp(ContactImpulse::split(impulse, self.normal)))
     }
 
     /// Change of the impulse, clamped to the cone.
@@ -82,6 +94,8 @@ impl<S: Scalar> Row<S> {
         let normal_part = direction.dot(self.normal);
         if normal_part < S::zero() {
             (self.cone.min_normal_impulse - self.impulse.normal) / normal_part
+        } else if normal_part > S::zero() {
+            (self.max_normal_impulse - self.impulse.normal) / normal_part
         } else {
             S::infinity()
         }
@@ -89,7 +103,7 @@ impl<S: Scalar> Row<S> {
 
     /// Restricts the search directions to those that the contact can follow.
     fn restrict_directions(&self, search: &mut SearchDirections<S>) {
-        if self.is_open() {
+        if self.is_at_bound() {
             search.directions = [Vec3::zero(); DIRECTIONS];
             search.velocities = search.directions;
         } else if self.bounces
@@ -111,7 +125,15 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
         let error = ContactImpulse::split(self.velocity_error(row, &c.arms), row.normal);
         let wanted = ContactImpulse { tangent: error.tangent * row.tangent_ratio, ..error };
         let mut impulse = row.impulse;
-        let change = impulse.solve(wanted, None, &row.cone).along(row.normal);
+        let mut change = impulse.solve(wanted, None, &row.cone);
+        if impulse.normal > row.max_normal_impulse {
+            impulse = row.saturate(impulse);
+            change = ContactImpulse {
+                normal: impulse.normal - row.impulse.normal,
+                tangent: impulse.tangent - row.impulse.tangent,
+            };
+        }
+        let change = change.along(row.normal);
         if !is_finite(change) {
             return S::zero(); // an overflow must not reach the other body
         }
