@@ -69,8 +69,7 @@ pub enum Response {
     /// restitution where restitution is zero. Forces are evaluated once a step. A ball stops at thin
     /// walls and other balls at any speed, whatever the world's [detection](crate::world::Detection);
     /// so it does at walls that were [set](crate::world::Walls::set) elsewhere and have a motion;
-    /// but of balls that move more than a radius in a substep and follow each other onto a wall, the
-    /// first may come back through the next one (more substeps prevent it), and rows of touching balls of very unlike masses that a fast one hits may end in another order,
+    /// but rows of touching balls of very unlike masses that a fast one hits may end in another order,
     /// and a ball that another very fast one drives into a thin wall may get through.
     /// It finds contacts itself, so removing some from the world's lists does not keep marbles apart.
     SoftStep,
