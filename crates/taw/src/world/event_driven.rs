@@ -8,7 +8,7 @@ use super::walls::{SubShape, Walls};
 use super::{Precision, World};
 use crate::broad::Period;
 use crate::contact::Contact;
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, is_finite};
 use crate::motion::{Motion, Rotation, WallMotion};
 use crate::response::event::{self, Ball, EventSettings, Trajectory, Wall};
 use crate::response::{BallRotation, EnergyLedger, Impact, Material};
@@ -55,7 +55,9 @@ impl<S: Scalar> World<S> {
         let mut impacts = Vec::new();
         self.scratch.stopped.extend(events.run(&settings, &mut impacts));
         self.memory.event_impulses = std::mem::take(&mut events.impulse_cache);
-        self.impacts.extend(impacts.into_iter().map(Impact::cast));
+        // Where numbers overflowed there is no speed to tell; those bodies are stopped.
+        let is_known = |it: &Impact<f64>| it.approach_speed.is_finite() && is_finite(it.normal);
+        self.impacts.extend(impacts.into_iter().filter(is_known).map(Impact::cast));
         if let (Some(audit_state), Some(work)) =
             (&mut self.scratch.audit_state, self.scratch.events.work)
         {
