@@ -50,8 +50,9 @@ pub enum Response {
     /// Penetration is resolved by mass, without a change of velocity.
     ///
     /// Where walls that move squeeze marbles, no velocities satisfy all contacts: such marbles overlap
-    /// until there is room, get no more energy than the walls carry, and a contact bears at most a
-    /// thousand times the mass of all that are in contact times their largest relative velocity.
+    /// until there is room, and get no more energy than they had and the walls could give them; so a
+    /// wedge that closes does not throw a marble out faster than that. A contact bears about a thousand
+    /// times the mass of all that are in contact times their largest relative velocity.
     Impulse,
     /// Soft contacts in small steps (Catto, 2024, `Solver2D`): masses, restitution, friction,
     /// rolling and torsional friction, and spin if the model's rotation is dynamic. Made for games:

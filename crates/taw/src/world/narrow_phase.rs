@@ -337,13 +337,13 @@ pub(super) fn remove_ghost_collisions<S: Scalar>(
         let distance = distance(point, other);
         if is_field(other) { distance.abs() <= flush } else { distance <= flush }
     };
+    // Candidates are in the order of their walls.
     let is_buried = |it: &Candidate<S>| {
-        let mut of_fields = candidates
-            .iter()
-            .filter(|other| other.part.wall != it.part.wall && is_field(other))
-            .map(|other| distance(it, other))
-            .peekable();
-        of_fields.peek().is_some() && of_fields.all(|distance| distance < -flush)
+        let mut of_walls = candidates.chunk_by(|a, b| a.part.wall == b.part.wall);
+        of_walls.any(|of_wall| {
+            let is_other_field = of_wall[0].part.wall != it.part.wall && is_field(&of_wall[0]);
+            is_other_field && of_wall.iter().all(|other| distance(it, other) < -flush)
+        })
     };
     // Of thousands of triangles near a ball, few are near a point.
     let margin = Vec3::new(flush, flush, flush) * S::from_f64(4.0);

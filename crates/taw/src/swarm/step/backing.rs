@@ -65,6 +65,9 @@ impl Swarm {
         self.scratch.backing.resize(rows, [0.0; 4]);
         if rows == 0 {
             self.scratch.backing.shrink_to_fit();
+            // A heavy ball may have gone that a wall bore.
+            let contacts = self.chunks.iter_mut().flat_map(|chunk| &mut chunk.wall_contacts);
+            contacts.for_each(|contact| contact.borne_for_others = 0.0);
             return;
         }
         let (chunks, backing, at) =

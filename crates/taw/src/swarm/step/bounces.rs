@@ -75,29 +75,32 @@ impl Swarm {
     }
 
     /// Finds the balls that another one hinders to reach the wall that they would bounce off: it comes
-    /// first, so they wait until pairs are found by the velocities that it then has. Of two that fall one above the other, both would
-    /// otherwise turn round at the wall, where they would be inside each other.
+    /// first, so they wait until pairs are found by the velocities that it then has. Of two that fall
+    /// one above the other, both would otherwise turn round at the wall, inside each other.
     fn hold_obstructed(&mut self) {
         let (held, ways) = (&mut self.scratch.held, &mut self.scratch.ways_to_walls);
         if ways.is_empty() {
             return;
         }
-        // Pairs are known of those that come nearer to each other,
-        let of_chunks = self.chunks.iter().flat_map(|chunk| &chunk.batches);
-        let batches = of_chunks.chain(&self.fast_movers.batches);
-        for [a, b] in batches.flat_map(Batch::pairs) {
+        // Pairs are known of balls that come nearer to each other. Those of a chunk are of its rows and
+        // of the next chunk's.
+        let first_way = |row: u32| ways.partition_point(|way| way.row < row);
+        let has_ways = |chunk: &&Chunk| first_way(chunk.rows[0]) < first_way(chunk.rows[2]);
+        let of_chunks = self.chunks.iter().filter(has_ways).flat_map(|chunk| &chunk.batches);
+        for [a, b] in of_chunks.chain(&self.fast_movers.batches).flat_map(Batch::pairs) {
             for [row, other] in [[a, b], [b, a]] {
-                let first = ways.partition_point(|way| way.row < row);
-                let mut of_row = ways[first..].iter().take_while(|way| way.row == row);
+                let mut of_row = ways[first_way(row)..].iter().take_while(|way| way.row == row);
                 if of_row.any(|way| way.leads_through(&self.at[other as usize])) {
                     held.insert(row);
                 }
             }
         }
-        // not of those that fly to the wall together.
-        ways.sort_unstable_by(|a, b| a.low.total_cmp(&b.low).then(a.row.cmp(&b.row)));
+        // Those that fly to the wall together are not listed as pairs.
+        let axis = widest_axis(ways);
+        let low = |way: &WayToWall| way.low[axis];
+        ways.sort_unstable_by(|a, b| low(a).total_cmp(&low(b)).then(a.row.cmp(&b.row)));
         for (i, a) in ways.iter().enumerate() {
-            for b in ways[i + 1..].iter().take_while(|b| b.low <= a.high) {
+            for b in ways[i + 1..].iter().take_while(|b| low(b) <= a.high[axis]) {
                 for (way, other) in [(a, b), (b, a)] {
                     if way.leads_through(&self.at[other.row as usize]) {
                         held.insert(way.row);
@@ -108,6 +111,18 @@ impl Swarm {
     }
 }
 
+/// Axis along which the balls are spread most.
+fn widest_axis(ways: &[WayToWall]) -> usize {
+    let spread = |axis: usize| {
+        let range = ways.iter().fold([f32::MAX, f32::MIN], |[low, high], way| {
+            [low.min(way.low[axis]), high.max(way.high[axis])]
+        });
+        range[1] - range[0]
+    };
+    let spreads = [0, 1, 2].map(spread);
+    (0..3).fold(0, |widest, axis| if spreads[axis] > spreads[widest] { axis } else { widest })
+}
+
 /// Straight way of a ball to the wall that it would bounce off.
 #[derive(Clone, Copy, Debug)]
 pub(in crate::swarm) struct WayToWall {
@@ -115,15 +130,16 @@ pub(in crate::swarm) struct WayToWall {
     from: Vec3<f32>,
     radius: f32,
     way: Vec3<f32>,
-    /// Lowest and highest coordinate of the ball along the x axis, in metres.
-    low: f32,
-    high: f32,
+    /// Lowest and highest coordinates of the ball on its way, in metres.
+    low: Vec3<f32>,
+    high: Vec3<f32>,
 }
 
 impl WayToWall {
     fn new(row: u32, at: &Row, way: Vec3<f32>) -> Self {
         let (from, radius) = (xyz(at), at[3]);
-        let (low, high) = (from.x + way.x.min(0.0) - radius, from.x + way.x.max(0.0) + radius);
+        let end = |f: fn(f32, f32) -> f32, by: f32| from + way.map(|x| f(x, 0.0) + by);
+        let (low, high) = (end(f32::min, -radius), end(f32::max, radius));
         Self { row, from, radius, way, low, high }
     }
 
@@ -133,9 +149,12 @@ impl WayToWall {
 
     /// Returns true if the way leads through another ball.
     fn leads_through(&self, other: &Row) -> bool {
+        if !self.is_long() {
+            return false;
+        }
         let (apart, way) = (xyz(other) - self.from, self.way);
         let fraction = (way.dot(apart) / way.magnitude2()).clamp(0.0, 1.0);
         let reach = IN_THE_WAY * (self.radius + other[3]);
-        self.is_long() && fraction > 0.0 && (apart - way * fraction).magnitude2() < reach * reach
+        fraction > 0.0 && (apart - way * fraction).magnitude2() < reach * reach
     }
 }
