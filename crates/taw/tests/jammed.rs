@@ -227,7 +227,7 @@ fn placed<S: Scalar>([center, half]: [[f64; 3]; 2], place: Place) -> Obb<S> {
     Obb::new(Point3::from(center), turn, Vec3::from(half)).unwrap()
 }
 
-/// What a jam did at worst, as fractions of what it may do.
+/// Largest energy and impulse of a jam, as fractions of their bounds.
 #[derive(Clone, Copy, Debug, Default)]
 struct Worst {
     energy: f64,

@@ -71,6 +71,7 @@ pub enum Response {
     /// walls and other balls at any speed, whatever the world's [detection](crate::world::Detection);
     /// so it does at walls that were [set](crate::world::Walls::set) elsewhere and have a motion;
     /// but rows of touching balls of very unlike masses that a fast one hits may end in another order,
+    /// a ball that leans on one over three thousand times lighter may gain energy by friction,
     /// and a ball that another very fast one drives into a thin wall may get through.
     /// It finds contacts itself, so removing some from the world's lists does not keep marbles apart.
     SoftStep,

@@ -22,8 +22,8 @@ use crate::response::{BallRotation, SolverBodies};
 const MAX_LEVERAGE: f64 = 1000.0;
 
 /// Relative rounding of energies, in roundings of the scalar: that of 256 terms, if all are equally
-/// wrong. A larger island that is taken for a jam by rounding is solved once more, and loses no
-/// contact by it.
+/// wrong. A larger island that is taken for a jam by rounding is solved with its walls at rest: it keeps
+/// its contacts, and lacks what they drive for a substep.
 const ROUNDING: f64 = 256.0;
 
 /// Masses and velocities of an island before its contacts act, in its units.
