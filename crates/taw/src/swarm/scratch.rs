@@ -4,7 +4,7 @@ use super::bit_set::BitSet;
 use super::neighbours::Search;
 use super::simd::Row;
 use super::state::of;
-use super::step::WayToWall;
+use super::step::{SavedPlace, WayToWall};
 use super::sweeps::Crowd;
 
 /// Memory that a step writes before it reads it.
@@ -29,6 +29,10 @@ pub(super) struct Scratch {
     pub searches: Vec<Search>,
     pub crowd: Crowd,
     pub path_changes: Vec<Row>,
+    /// By slot: centers of balls near shapes at the begin of a substep.
+    pub places: Vec<SavedPlace>,
+    /// Number of the substep.
+    pub substep: u32,
     /// Balls that would bounce off a wall, and those of them that another one hinders.
     pub ways_to_walls: Vec<WayToWall>,
     pub held: BitSet,
@@ -49,6 +53,8 @@ impl Scratch {
             threads: _,
             crowd,
             path_changes,
+            places,
+            substep: _,
             ways_to_walls,
             held,
         } = self;
@@ -56,6 +62,6 @@ impl Scratch {
             + (of(lists) + lists.iter().map(of).sum::<usize>())
             + of(chunk_states)
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
-            + (crowd.bytes() + of(path_changes) + of(ways_to_walls) + held.bytes())
+            + (crowd.bytes() + of(path_changes) + of(places) + of(ways_to_walls) + held.bytes())
     }
 }

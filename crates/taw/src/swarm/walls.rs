@@ -60,6 +60,15 @@ pub(crate) trait StaticGeometry: Sync {
         times: [f32; 2],
         visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
     );
+    /// Center of a ball that went from one place to another without passing through a surface, as the
+    /// walls see it; none if it passed through none. So long before the end of the step, in seconds,
+    /// it was there and is here.
+    fn stop_passage(
+        &self,
+        places: [&Row; 2],
+        layers: CollisionLayers,
+        before_end: [f32; 2],
+    ) -> Option<[f32; 3]>;
     /// Layers of a wall.
     fn layers(&self, wall: u32) -> CollisionLayers;
     /// In m/s, and the wall's own material.

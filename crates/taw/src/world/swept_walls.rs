@@ -15,6 +15,9 @@ use crate::swarm::StaticGeometry;
 /// Overlap in radii at the end of a path up to which a ball only grazes a wall.
 const GRAZES: f64 = 0.02;
 
+/// Radius of a ball's core, over its own: what a surface never passes.
+const CORE: f64 = 0.5;
+
 /// Walls in a step, as the balls of a swarm meet them.
 ///
 /// Walls are where they will be at the end of it. Of one that goes further in the step than a ball is
@@ -107,7 +110,7 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
         displacement: Vec3<S>,
         reached: &Aabb3<S>,
     ) -> Option<S> {
-        let core = sphere.radius * S::from_f64(0.5);
+        let core = sphere.radius * S::from_f64(CORE);
         let path = RelativePath { start: sphere.center, displacement, frame: Frame::Standing };
         let deep = sphere.radius * S::from_f64(1.0 - GRAZES);
         // One that slides along a wall in which it is goes no deeper, but for the rounding of places.
@@ -128,6 +131,39 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
             }
         });
         first
+    }
+
+    /// Center at the end of a path on which a core of this radius passes through none of these parts: it
+    /// slides along those that it meets. None if it meets none.
+    fn slide(
+        &self,
+        [mut start, end]: [Point3<S>; 2],
+        core: S,
+        visit_parts: &dyn Fn(&Aabb3<S>, &mut dyn FnMut(SubShape)),
+    ) -> Option<Point3<S>> {
+        let (mut displacement, mut stopped) = (end - start, false);
+        // In a corner, it meets three; where it meets more, it stays.
+        for _ in 0..3 {
+            let path = RelativePath { start, displacement, frame: Frame::Standing };
+            let [at, to] = [start, start + displacement];
+            let [at, to] = [at, to].map(|center| Sphere { center, radius: core }.bounding_box());
+            let mut first: Option<(S, SubShape)> = None;
+            visit_parts(&at.union(&to), &mut |part| {
+                let Some(hit) = self.walls.time_of_impact(part, core, &path) else { return };
+                if first.is_none_or(|(time, _)| hit.time < time) {
+                    first = Some((hit.time, part));
+                }
+            });
+            let Some((time, part)) = first else {
+                return stopped.then_some(start + displacement);
+            };
+            stopped = true;
+            start += displacement * time;
+            let normal = self.walls.project_point(part, start).normal;
+            let rest = displacement * (S::one() - time);
+            displacement = rest - normal * rest.dot(normal);
+        }
+        Some(start)
     }
 
     /// Visits the parts that may overlap a box, of walls that a ball collides with and that do not pass
@@ -263,6 +299,42 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
                 );
             }
         }
+    }
+
+    fn stop_passage(
+        &self,
+        [before, now]: [&[f32; 4]; 2],
+        layers: CollisionLayers,
+        before_end: [f32; 2],
+    ) -> Option<[f32; 3]> {
+        let [before, now]: [Sphere<S>; 2] = [sphere(*before), sphere(*now)];
+        let bounds = before.bounding_box().union(&now.bounding_box());
+        let core = now.radius * S::from_f64(CORE);
+        let (mut center, mut stopped) = (now.center, false);
+        for wall in &self.moving {
+            let meets = wall.is_near(&bounds) && wall.collides(self.walls, layers);
+            if !meets || !self.outruns(wall, &now) {
+                continue;
+            }
+            // In the frame of the wall at the end of the step.
+            let [then, here] =
+                before_end.map(|time| wall.motion.pose_before(S::from_f64(time.into())));
+            let path =
+                [then.inverse_transform_point(before.center), here.inverse_transform_point(center)];
+            let parts = |bounds: &Aabb3<S>, visit: &mut dyn FnMut(SubShape)| {
+                wall.for_each_in_box(self.walls, bounds, visit);
+            };
+            if let Some(end) = self.slide(path, core, &parts) {
+                (center, stopped) = (here.transform_point(end), true);
+            }
+        }
+        let parts = |bounds: &Aabb3<S>, visit: &mut dyn FnMut(SubShape)| {
+            self.for_each_standing(bounds, (&now, layers), visit);
+        };
+        if let Some(end) = self.slide([before.center, center], core, &parts) {
+            (center, stopped) = (end, true);
+        }
+        stopped.then(|| cast_point::<S, f32>(center).into())
     }
 
     fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32> {

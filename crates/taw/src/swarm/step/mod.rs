@@ -3,11 +3,13 @@
 mod backing;
 mod bounces;
 mod lab;
+mod passages;
 mod paths;
 mod sleep;
 mod wall_contacts;
 
 pub(super) use bounces::WayToWall;
+pub(super) use passages::SavedPlace;
 pub(super) use sleep::sleep_speed;
 pub(super) use wall_contacts::listed_planes;
 
@@ -170,6 +172,7 @@ impl Swarm {
         let faster = |chunk: &Chunk, next: f32| 2.0 * chunk.speed[0].max(next) > speed;
         for substep in 0..count {
             let left = dt - h * substep as f32;
+            self.save_places(walls);
             if substep > 0 {
                 self.update_wall_contacts(walls, left, times, |chunk| chunk.has_fast, true);
             }
@@ -199,7 +202,7 @@ impl Swarm {
             let caught = self.stop_at_walls(walls, h, gravity * (0.5 * h * h));
             self.scratch.path_changes.clear();
             self.advance_proxies(parts, true, h);
-            let (skin, left) = (self.skin, left - h);
+            let (skin, before, left) = (self.skin, left, left - h);
             let left_it = |_, _: &Row, skin_left: f32, _: &FastMovers| skin_left < -skin;
             if self.find_pairs_within_step(|chunk| chunk.overrun, left_it, dt, walls, observe) {
                 self.update_wall_contacts(walls, left, times, all, false);
@@ -211,6 +214,7 @@ impl Swarm {
             self.pass(Pass::Relax(params), |_, _| true);
             self.forget_impacts();
             self.keep_out();
+            self.stop_passages(walls, [before, left]);
         }
     }
 

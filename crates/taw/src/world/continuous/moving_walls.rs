@@ -191,14 +191,23 @@ impl<S: Scalar> MovingWall<S> {
         radius: S,
         mut visit: impl FnMut(SubShape),
     ) {
-        let reached = path.bounds(radius);
-        if !self.bounds.overlaps(&reached) {
+        self.for_each_in_box(walls, &path.bounds(radius), &mut visit);
+    }
+
+    /// Visits the sub-shapes that may overlap a box in the frame of the wall.
+    pub fn for_each_in_box(
+        &self,
+        walls: &Walls<S>,
+        reached: &Aabb3<S>,
+        visit: &mut dyn FnMut(SubShape),
+    ) {
+        if !self.bounds.overlaps(reached) {
             return;
         }
         let (wall, shape) = (self.row, &walls.shapes()[self.row as usize]);
         shape.for_each_box(|part, bounds| {
-            if bounds.overlaps(&reached) {
-                shape.for_each_in_box(part, &reached, |index| visit(SubShape { wall, index }));
+            if bounds.overlaps(reached) {
+                shape.for_each_in_box(part, reached, |index| visit(SubShape { wall, index }));
             }
         });
     }

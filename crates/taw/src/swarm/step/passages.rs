@@ -1,0 +1,78 @@
+//! Passages through walls: whatever moved a ball in a substep, its core stays on the side of each surface
+//! on which it was.
+
+use crate::swarm::Swarm;
+use crate::swarm::kernels::squared;
+use crate::swarm::simd::Row;
+use crate::swarm::surfaces::SurfaceOf;
+use crate::swarm::wall_paths::FAST;
+use crate::swarm::walls::StaticGeometry;
+use crate::swarm::workers::{DisjointSlice, parallel_for};
+
+/// Place of a ball at the begin of a substep.
+#[derive(Clone, Copy, Debug, Default)]
+pub(in crate::swarm) struct SavedPlace {
+    /// Number of the substep.
+    substep: u32,
+    center: [f32; 3],
+}
+
+impl Swarm {
+    /// Saves where the balls near shapes are, by slot, since rows may change within a substep.
+    pub(super) fn save_places(&mut self, walls: &dyn StaticGeometry) {
+        if !walls.has_shapes() {
+            return;
+        }
+        let (slots, places) = (self.ids.slots(), &mut self.scratch.places);
+        places.resize(self.ids.rows().len(), SavedPlace::default());
+        self.scratch.substep = self.scratch.substep.wrapping_add(1);
+        for row in self.chunks.iter().filter(|chunk| !chunk.asleep).flat_map(|it| &it.near_shapes) {
+            let [x, y, z, _] = self.at[*row as usize];
+            places[slots[*row as usize] as usize] =
+                SavedPlace { substep: self.scratch.substep, center: [x, y, z] };
+        }
+    }
+
+    /// Puts each ball that passed through a surface since places were saved back to it, from where it
+    /// slides along it. So long before the end of the step, in seconds, places were saved and balls
+    /// are here.
+    pub(super) fn stop_passages(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
+        if !walls.has_shapes() {
+            return;
+        }
+        let (chunks, slots) = (&self.chunks, self.ids.slots());
+        let (places, substep) = (&self.scratch.places, self.scratch.substep);
+        let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
+        let (at, skin_left) =
+            (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
+            let chunk = &chunks[chunk];
+            for row in chunk.near_shapes.iter().filter(|_| !chunk.asleep) {
+                let row = *row as usize;
+                let saved = &places[slots[row] as usize];
+                if saved.substep != substep {
+                    continue; // nobody knew that it is near
+                }
+                // SAFETY: a ball of the chunk, and nobody works on others meanwhile.
+                let (at, skin_left) = unsafe { (&mut *at.row(row), &mut *skin_left.row(row)) };
+                let [x, y, z] = saved.center;
+                let place = [x, y, z, at[3]];
+                let gone = distance(at, &place);
+                let (far, layers) = (FAST * at[3], surfaces.layers(row as u32));
+                if gone <= far && !walls.is_outrun(at, gone, layers) {
+                    continue;
+                }
+                if let Some([x, y, z]) = walls.stop_passage([&place, at], layers, before_end) {
+                    let end = [x, y, z, at[3]];
+                    *skin_left -= distance(at, &end);
+                    *at = end;
+                }
+            }
+        });
+    }
+}
+
+/// Distance between the centers of two balls, in metres.
+fn distance(a: &Row, b: &Row) -> f32 {
+    squared([0, 1, 2, 0].map(|axis| b[axis] - a[axis])).sqrt()
+}
