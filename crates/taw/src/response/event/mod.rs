@@ -12,6 +12,7 @@ mod candidates;
 mod cells;
 mod cluster;
 mod collide;
+mod crowd;
 mod curved_support;
 mod flat_support;
 mod ledger;
@@ -46,6 +47,7 @@ use cells::Cells;
 use cluster::Cluster;
 use collide::SimultaneousImpacts;
 pub(crate) use wall::{Solid, Wall, WallCollider};
+use crowd::Crowds;
 
 /// Rest threshold over the speed that gravity adds in a substep. A slower ball rests on the wall:
 /// its remaining bounces would have taken a few thousandths of a substep.
@@ -211,6 +213,7 @@ pub(crate) struct EventDriven {
     cells: Cells,
     unbounded: Vec<usize>,
     queue: BinaryHeap<Reverse<Event>>,
+    crowds: Crowds,
     simultaneous_impacts: SimultaneousImpacts,
     cluster: Cluster,
 }

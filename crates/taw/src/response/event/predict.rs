@@ -58,7 +58,7 @@ impl EventDriven {
                 consider(Some(after), kind);
             }
         };
-        self.for_each_near(row, &mut other);
+        self.for_each_near(row, settings, &mut other);
         self.for_each_crossing(ball, now, consider);
         let (time, kind) = next;
         if time <= now + remaining && time.is_finite() {
@@ -89,21 +89,31 @@ impl EventDriven {
         }
     }
 
-    /// Visits balls that a ball may touch soon and collides with; itself may be among them.
-    pub(super) fn for_each_near(&self, row: usize, mut visit: impl FnMut(usize)) {
-        let layers = self.balls[row].layers;
+    /// Visits balls that a ball may touch soon and collides with, outside of its crowd; itself may
+    /// be among them.
+    pub(super) fn for_each_near(
+        &self,
+        row: usize,
+        settings: &EventSettings,
+        mut visit: impl FnMut(usize),
+    ) {
+        let (layers, crowd) = (self.balls[row].layers, self.crowds.of(row));
+        let mut in_crowd = 0;
         let mut visit = |other: usize| {
-            if self.balls[other].layers.interacts_with(layers) {
+            if crowd.is_some() && self.crowds.of(other) == crowd {
+                in_crowd += 1;
+            } else if self.balls[other].layers.interacts_with(layers) {
                 visit(other);
             }
         };
         match self.balls[row].trajectory.cell_slot {
             CellSlot::Cell(cell) => {
                 self.cells.for_each_near(cell, &mut visit);
-                self.unbounded.iter().copied().for_each(visit);
+                self.unbounded.iter().copied().for_each(&mut visit);
             }
-            CellSlot::Unbounded => (0..self.balls.len()).for_each(visit),
+            CellSlot::Unbounded => (0..self.balls.len()).for_each(&mut visit),
         }
+        settings.add_cost(Self::crowd_cost(in_crowd));
     }
 }
 

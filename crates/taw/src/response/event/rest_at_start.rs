@@ -23,9 +23,12 @@ impl EventDriven {
             self.find_wall_contacts(row, settings);
         }
         let mut near = std::mem::take(&mut self.near);
+        self.find_crowds(&near.mm);
         near.mm.retain(|c| {
-            self.ball_contact(c, 0.0, settings)
-                .map_or(self.is_deep_in_ball(c), |speed| speed >= 0.0)
+            self.crowds.are_together(c.a as usize, c.b as usize)
+                || self
+                    .ball_contact(c, 0.0, settings)
+                    .map_or(self.is_deep_in_ball(c), |speed| speed >= 0.0)
         });
         let mut contact_counts = std::mem::take(&mut self.cluster.contact_counts);
         contact_counts.clear();
@@ -222,7 +225,7 @@ impl EventDriven {
 
     /// Tests for penetration beyond the slop: such balls are separated, however fast they move
     /// apart.
-    fn is_deep_in_ball(&self, contact: &Contact<f64>) -> bool {
+    pub(super) fn is_deep_in_ball(&self, contact: &Contact<f64>) -> bool {
         let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
         let center_offset = self.center_offset(first, second);
         let slop = SLOP * first.radius.min(second.radius);

@@ -152,7 +152,7 @@ impl EventDriven {
             self.release(row, now);
             self.add_wall_contacts(row, max_separation_speed, now, settings, &mut contacts.wm);
             near.clear();
-            self.for_each_near(row, |other| near.push(other));
+            self.for_each_near(row, settings, |other| near.push(other));
             settings.add_cost(near.len() as u64);
             near.sort_unstable();
             near.dedup();
@@ -224,7 +224,7 @@ impl EventDriven {
         impulse_cache: &mut Vec<CachedImpulse<f64>>,
     ) {
         self.cluster.gather(contacts, &self.balls, self.period);
-        let end = now + self.cluster.segment(contacts, settings.dt - now);
+        let end = now + self.cluster.segment(contacts, &self.crowds, settings.dt - now);
         let remaining = end - now;
         let max_acceleration = self.move_cluster_freely(remaining);
         rename_rows(impulse_cache, |row| self.cluster.local_index(row));
