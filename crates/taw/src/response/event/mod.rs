@@ -25,6 +25,7 @@ mod resting_cluster;
 mod segments;
 mod simultaneous;
 mod squeeze;
+mod support_candidates;
 mod toi;
 mod wall;
 
@@ -46,8 +47,8 @@ pub(crate) use candidates::WallSource;
 use cells::Cells;
 use cluster::Cluster;
 use collide::SimultaneousImpacts;
-pub(crate) use wall::{Solid, Wall, WallCollider};
 use crowd::Crowds;
+pub(crate) use wall::{Solid, Wall, WallCollider};
 
 /// Rest threshold over the speed that gravity adds in a substep. A slower ball rests on the wall:
 /// its remaining bounces would have taken a few thousandths of a substep.
@@ -212,8 +213,8 @@ pub(crate) struct EventDriven {
     candidates: WallCandidates,
     cells: Cells,
     unbounded: Vec<usize>,
-    queue: BinaryHeap<Reverse<Event>>,
     crowds: Crowds,
+    queue: BinaryHeap<Reverse<Event>>,
     simultaneous_impacts: SimultaneousImpacts,
     cluster: Cluster,
 }

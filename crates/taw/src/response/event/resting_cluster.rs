@@ -4,7 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::cluster::{Cluster, ClusterBodies};
 use super::wall::MovingWalls;
-use super::{EventDriven, EventSettings, MAX_CONTACTS, Trajectory};
+use super::{Ball, EventDriven, EventSettings, MAX_CONTACTS, Trajectory};
 use crate::contact::{Contact, Contacts};
 use crate::math::Vec3;
 use crate::response::impulse::CachedImpulse;
@@ -202,9 +202,9 @@ impl EventDriven {
         settings: &EventSettings,
         contacts: &mut Vec<Contact<f64>>,
     ) {
-        settings.add_cost(1 + self.wall_cost(row));
-        let at = self.balls[row].position;
-        self.for_each_wall(row, |wall| {
+        let Ball { position: at, radius, .. } = self.balls[row];
+        let range = (at, radius + self.contact_tolerance(row as u32, settings));
+        let cost = self.for_each_wall_within(row, range, |wall| {
             let contact = Contact::with_wall(wall as u32, 0, row as u32);
             if self.wall_contact(&contact, now, max_separation_speed, settings).is_some()
                 && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, now, settings))
@@ -212,6 +212,7 @@ impl EventDriven {
                 contacts.push(contact);
             }
         });
+        settings.add_cost(1 + cost);
     }
 
     /// Solves for the accelerations that keep contacts at rest from `now` to the end of the
@@ -308,7 +309,7 @@ impl EventDriven {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Ball, MAX_FREEZES, Wall, WallSource};
+    use super::super::{MAX_FREEZES, Wall, WallSource};
     use super::*;
     use crate::broad::CollisionLayers;
     use crate::math::Point3;
