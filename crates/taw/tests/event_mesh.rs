@@ -209,3 +209,21 @@ fn balls_on_a_ridge_of_a_height_field_move_no_farther_than_they_fly() {
         }
     }
 }
+
+/// It lands askew on thousands of faces: to ask all that are near for each that it rolls over would
+/// take more than the budget of a step.
+#[test]
+fn a_large_ball_on_a_fine_mesh_finishes_its_steps() {
+    let mut world = world::<f64>();
+    world.walls.insert(meadow(400)).unwrap();
+    let marble = Marble {
+        material: Some(surface(0.0, 0.5)),
+        velocity: Vec3::new(3.0, 0.0, 0.3),
+        ..Marble::new(Point3::new(0.0, 1.25, 0.0), 1.0)
+    };
+    world.marbles.insert(marble).unwrap();
+    for step in 0..12 {
+        world.step(DT).unwrap();
+        assert_eq!(world.stopped().count(), 0, "step {step}");
+    }
+}

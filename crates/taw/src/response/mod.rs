@@ -111,6 +111,12 @@ pub enum Response {
     /// a [motion](crate::world::WallMotion), moves through the step by that motion, and ends where
     /// it was set. A wall that only has a motion stays, and its surface carries what lies on it.
     ///
+    /// Marbles that overlap more than twelve others of their size or larger are a crowd: no more than
+    /// twelve can touch one. A crowd is solved once per substep, as by [`Response::Impulse`], with
+    /// the 32 deepest contacts of each marble, and reports no impacts among its own. Overlap gives
+    /// positions, not speeds: a marble is pushed by half of its radius per substep at most, so that
+    /// a thousand at one point part within about three seconds.
+    ///
     /// A step has a budget: 32 million tests against one wall or one other marble, plus 20,000 per
     /// marble, about a second for a few hundred. Each substep may spend its share, in the ratio of
     /// times, of what those before it have left. A marble that has not finished the substep by then

@@ -57,18 +57,24 @@ impl<S: Scalar> Triangle<S> {
         // Thinner than this, rounding would choose the normal.
         if squared > longest * longest * S::epsilon() {
             let beside = |p: Vec3<S>, along: Vec3<S>| along.cross(normal).dot(p) < S::zero();
-            if !beside(a, ab) && !beside(b, c - b) && !beside(a, -ac) {
+            let beside = [beside(a, ab), beside(b, c - b), beside(a, -ac)];
+            if beside == [false; 3] {
                 return Point3::from_vec(normal * (a.dot(normal) / squared));
             }
+            // The nearest edge is one that the point is beside.
+            return self.project_on_edges(Point3::origin(), beside);
         }
-        self.project_on_edges(Point3::origin())
+        self.project_on_edges(Point3::origin(), [true; 3])
     }
 
-    fn project_on_edges(&self, point: Point3<S>) -> Point3<S> {
+    /// Projects a point onto the nearest of some edges, of which there is one at least.
+    fn project_on_edges(&self, point: Point3<S>, chosen: [bool; 3]) -> Point3<S> {
         let [a, b, c] = self.corners;
-        let nearest = [[a, b], [b, c], [c, a]].map(|[p, q]| project_on_segment(p, q, point));
+        let edges = [[a, b], [b, c], [c, a]].into_iter().zip(chosen);
+        let edges = edges.filter(|(_, is_chosen)| *is_chosen);
+        let nearest = edges.map(|([p, q], _)| project_on_segment(p, q, point));
         let far = |p: Point3<S>| (p - point).magnitude2();
-        nearest.into_iter().fold(a, |best, next| if far(next) < far(best) { next } else { best })
+        nearest.fold(a, |best, next| if far(next) < far(best) { next } else { best })
     }
 }
 

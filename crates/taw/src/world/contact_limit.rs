@@ -2,7 +2,7 @@
 
 use super::marbles::Marbles;
 use crate::contact::Contact;
-use crate::math::Scalar;
+use crate::math::{Scalar, length};
 
 /// Maximum number of contacts of a ball with marbles of its own size or larger. Twelve can touch
 /// one without overlap (Schütte and van der Waerden, *Das Problem der dreizehn Kugeln*, 1953), and
@@ -71,6 +71,20 @@ impl<S: Scalar> ContactLimit<S> {
         self.last.clear();
         // Four times the total maximum, so that dropping is rarely needed.
         self.limit = (4 * MAX_CONTACTS * rows).max(1024);
+    }
+
+    /// Tests if enough deeper contacts than that of two balls are known, before all of it is
+    /// computed.
+    #[inline]
+    pub fn drops(&self, marbles: &Marbles<S>, [a, b]: [u32; 2]) -> bool {
+        if self.last.is_empty() {
+            return false;
+        }
+        let (first, second) = (a as usize, b as usize);
+        let [r, s] = [first, second].map(|row| marbles.radius()[row]);
+        let Some(last) = self.last[if r < s { first } else { second }] else { return false };
+        let separation = length(marbles.apart(first, second)) - r - s;
+        Rank::of(&Contact { separation, ..Contact::between_marbles(a, b) }) > last
     }
 
     /// Adds a contact, unless enough deeper ones are known.

@@ -155,6 +155,9 @@ impl<S: Scalar> World<S> {
                 contact_distance,
                 period,
                 |a, b| {
+                    if self.scratch.contact_limit.drops(&self.marbles, [a, b]) {
+                        return;
+                    }
                     let zero = S::zero();
                     let contact =
                         marble_contact(&self.marbles, [a, b], [zero; 2], contact_distance);

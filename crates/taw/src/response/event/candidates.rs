@@ -5,6 +5,7 @@
 use std::collections::BTreeMap;
 
 use cgmath::InnerSpace;
+use smallvec::SmallVec;
 
 use super::{Ball, EventDriven, EventSettings, SEAM_TOLERANCE, Wall};
 use crate::math::Point3;
@@ -42,8 +43,8 @@ pub(super) struct WallCandidates {
     previous_ids: Vec<(u32, u32)>,
     planes: Vec<u32>,
     has_parts: bool,
-    /// Indices of candidate walls, ball after ball.
-    lists: Vec<u32>,
+    /// Candidate walls, ball after ball.
+    lists: Vec<CandidateWall>,
     per_ball: Vec<BallCandidates>,
 }
 
@@ -58,6 +59,25 @@ struct BallCandidates {
     walls: [usize; 2],
 }
 
+/// Candidate wall of a ball, in the order of distances.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct CandidateWall {
+    /// Lower bound of the distance from the center of the search, in metres; minus infinity for a
+    /// wall that moves.
+    distance: f64,
+    wall: u32,
+}
+
+/// Range of a search for the candidate walls of a ball.
+#[derive(Clone, Copy, Debug)]
+struct Search {
+    center: Point3<f64>,
+    /// Range to be searched, in metres.
+    covered: f64,
+    /// Upper bound of its travel in the rest of the substep, in metres.
+    max_range: f64,
+}
+
 impl EventDriven {
     /// Finds the candidate walls of all balls at the start of a substep.
     pub(super) fn find_candidates(&mut self, settings: &EventSettings) {
@@ -68,18 +88,19 @@ impl EventDriven {
         candidates.lists.clear();
         candidates.per_ball.clear();
         candidates.has_parts = source.has_parts();
-        source.planes(&mut |row| candidates.ids.push((row, 0)));
-        let planes = candidates.ids.len();
+        let mut flat = Vec::new();
+        source.planes(&mut |row| flat.push((row, 0)));
+        flat.sort_unstable();
+        candidates.ids.extend_from_slice(&flat);
+        let mut searches = Vec::new();
         if candidates.has_parts {
             for row in 0..self.balls.len() {
-                let (center, covered) = self.position_and_range(row, 0.0, settings);
-                let visit = &mut |row, part| candidates.ids.push((row, part));
-                let covered = covered.min(MAX_CELLS_AROUND * self.cells.min_width());
-                source.near(center, covered + self.margin(row), visit);
+                let search = self.search_range(row, 0.0, settings);
+                let ids = self.ids_within(row, &search, settings);
+                candidates.ids.extend_from_slice(&ids);
+                searches.push((search, ids));
             }
         }
-        let mut flat = candidates.ids[..planes].to_vec();
-        flat.sort_unstable();
         candidates.ids.sort_unstable();
         candidates.ids.dedup();
         self.walls.clear();
@@ -90,60 +111,71 @@ impl EventDriven {
         if candidates.ids != candidates.previous_ids {
             self.impulse_cache.clear(); // its keys are indices of walls
         }
-        candidates.index.clear();
-        candidates.index.extend(candidates.ids.iter().copied().zip(0..));
+        candidates.index = candidates.ids.iter().copied().zip(0..).collect();
         candidates.planes.clear();
         candidates.planes.extend(flat.iter().filter_map(|id| candidates.index.get(id).copied()));
         self.candidates = candidates;
-        if self.candidates.has_parts {
-            for row in 0..self.balls.len() {
-                let none = BallCandidates {
-                    center: self.balls[row].position,
-                    covered: -1.0,
-                    walls: [0; 2],
-                };
-                self.candidates.per_ball.push(none);
-                self.refresh_candidates(row, 0.0, settings);
-            }
+        for (row, (search, ids)) in searches.into_iter().enumerate() {
+            let known = self.list_candidates(row, search, ids, settings);
+            self.candidates.per_ball.push(known);
         }
     }
 
-    /// Searches the candidate walls of a ball, up to the distance that it can travel, or as far as
-    /// they are few.
-    pub(super) fn refresh_candidates(&mut self, row: usize, now: f64, settings: &EventSettings) {
-        let (center, max_range) = self.position_and_range(row, now, settings);
-        let margin = self.margin(row);
-        let mut covered = max_range.min(MAX_CELLS_AROUND * self.cells.min_width());
-        let ids_within = |range: f64| {
-            let mut ids = Vec::new();
-            settings.source.near(center, range + margin, &mut |row, part| ids.push((row, part)));
-            settings.add_cost(ids.len() as u64 + SEARCH_COST);
-            ids
-        };
-        let mut ids = ids_within(covered);
-        while ids.len() <= FEW_PARTS && covered < max_range {
-            let next_range = max_range.min(2.0 * covered);
-            let next_ids = ids_within(next_range);
+    /// Searches the candidate walls of a ball again.
+    fn refresh_candidates(&mut self, row: usize, now: f64, settings: &EventSettings) {
+        let search = self.search_range(row, now, settings);
+        let ids = self.ids_within(row, &search, settings);
+        self.candidates.per_ball[row] = self.list_candidates(row, search, ids, settings);
+    }
+
+    /// Lists the candidate walls of a ball: those found, or as far as they are few, those up to the
+    /// distance that it can travel.
+    fn list_candidates(
+        &mut self,
+        row: usize,
+        mut search: Search,
+        mut ids: Vec<(u32, u32)>,
+        settings: &EventSettings,
+    ) -> BallCandidates {
+        while ids.len() <= FEW_PARTS && search.covered < search.max_range {
+            let next = Search { covered: search.max_range.min(2.0 * search.covered), ..search };
+            let next_ids = self.ids_within(row, &next, settings);
             if next_ids.len() > FEW_PARTS {
                 break;
             }
-            (covered, ids) = (next_range, next_ids);
+            (search, ids) = (next, next_ids);
         }
-        let layers = self.balls[row].layers;
-        let Self { candidates: WallCandidates { index, lists, per_ball, .. }, walls, .. } = self;
+        let Search { center, covered, .. } = search;
+        let (layers, max_distance) = (self.balls[row].layers, covered + self.margin(row));
+        let Self { candidates: WallCandidates { index, lists, .. }, walls, .. } = self;
         let start = lists.len();
         lists.extend(ids.into_iter().filter_map(|(row, part)| {
-            let wall = index.get(&(row, part)).copied().or_else(|| {
+            let number = index.get(&(row, part)).copied().or_else(|| {
                 walls.push(settings.source.wall(row, part)?);
-                let wall = walls.len() as u32 - 1;
-                index.insert((row, part), wall);
-                Some(wall)
+                let number = walls.len() as u32 - 1;
+                index.insert((row, part), number);
+                Some(number)
             })?;
-            walls[wall as usize].layers.interacts_with(layers).then_some(wall)
+            let wall = &walls[number as usize];
+            let distance = match wall.motion_at(0.0) {
+                Some(_) => f64::NEG_INFINITY,
+                None => wall.distance_lower_bound(center, 0.0),
+            };
+            let is_candidate = distance <= max_distance && wall.layers.interacts_with(layers);
+            is_candidate.then_some(CandidateWall { distance, wall: number })
         }));
         settings.add_cost((lists.len() - start) as u64 * super::PART_COST);
-        lists[start..].sort_unstable();
-        per_ball[row] = BallCandidates { center, covered, walls: [start, lists.len()] };
+        lists[start..]
+            .sort_unstable_by(|x, y| x.distance.total_cmp(&y.distance).then(x.wall.cmp(&y.wall)));
+        BallCandidates { center, covered, walls: [start, lists.len()] }
+    }
+
+    /// Sub-shapes of walls within the range of a search.
+    fn ids_within(&self, row: usize, search: &Search, settings: &EventSettings) -> Vec<(u32, u32)> {
+        let (mut ids, range) = (Vec::new(), search.covered + self.margin(row));
+        settings.source.near(search.center, range, &mut |row, part| ids.push((row, part)));
+        settings.add_cost(ids.len() as u64 + SEARCH_COST);
+        ids
     }
 
     /// Time until a ball may leave the range of its candidates, in seconds from now; none within
@@ -180,17 +212,14 @@ impl EventDriven {
         }
     }
 
-    /// Position of a ball, and an upper bound of its travel in the rest of the substep, in metres.
-    fn position_and_range(
-        &self,
-        row: usize,
-        now: f64,
-        settings: &EventSettings,
-    ) -> (Point3<f64>, f64) {
+    /// Range of a first search around a ball.
+    fn search_range(&self, row: usize, now: f64, settings: &EventSettings) -> Search {
         let ball = &self.balls[row];
         let remaining = settings.dt - now;
-        let range = 2.0 * max_speed(ball, now, remaining) * remaining + EXTRA_RANGE * ball.radius;
-        (ball.position_at(now), range)
+        let max_range =
+            2.0 * max_speed(ball, now, remaining) * remaining + EXTRA_RANGE * ball.radius;
+        let covered = max_range.min(MAX_CELLS_AROUND * self.cells.min_width());
+        Search { center: ball.position_at(now), covered, max_range }
     }
 
     fn margin(&self, row: usize) -> f64 {
@@ -198,14 +227,51 @@ impl EventDriven {
         ball.radius * (1.0 + SEAM_TOLERANCE) + ball.position_error
     }
 
-    /// Visits the candidate walls of a ball.
-    pub(super) fn for_each_wall(&self, row: usize, mut visit: impl FnMut(usize)) {
-        self.planes_of(row).for_each(|wall| visit(wall as usize));
-        self.parts_of(row).iter().for_each(|wall| visit(*wall as usize));
+    /// Visits the candidate walls of a ball that move, are half-spaces, or may be within a distance
+    /// of a point, in metres. Returns the cost of testing them.
+    pub(super) fn for_each_wall_within(
+        &self,
+        row: usize,
+        (point, distance): (Point3<f64>, f64),
+        mut visit: impl FnMut(usize),
+    ) -> u64 {
+        let parts = self.parts_within(row, (point, distance));
+        let mut cost = super::PART_COST * parts.len() as u64;
+        for wall in self.planes_of(row) {
+            cost += 1;
+            visit(wall as usize);
+        }
+        parts.into_iter().for_each(|wall| visit(wall as usize));
+        cost
+    }
+
+    /// Candidate walls other than half-spaces that move or may be within a distance of a point, in
+    /// metres, in the order of their indices.
+    pub(super) fn parts_within(
+        &self,
+        row: usize,
+        (point, distance): (Point3<f64>, f64),
+    ) -> SmallVec<[u32; 32]> {
+        let parts = self.parts_of(row);
+        let (Some(known), Some(first)) = (self.candidates.per_ball.get(row), parts.first()) else {
+            return SmallVec::new();
+        };
+        let travel = (point - known.center).magnitude();
+        // A shorter way crosses no surface, so that no distance falls by more than that.
+        let travel = if travel < first.distance { travel } else { f64::INFINITY };
+        let may_be_near = |candidate: &&CandidateWall| candidate.distance - travel <= distance;
+        let is_near = |number: &u32| {
+            let wall = &self.walls[*number as usize];
+            wall.motion_at(0.0).is_some() || wall.distance_lower_bound(point, 0.0) <= distance
+        };
+        let near = parts.iter().take_while(may_be_near).map(|candidate| candidate.wall);
+        let mut near: SmallVec<_> = near.filter(is_near).collect();
+        near.sort_unstable();
+        near
     }
 
     /// Candidate walls of a ball other than half-spaces.
-    pub(super) fn parts_of(&self, row: usize) -> &[u32] {
+    pub(super) fn parts_of(&self, row: usize) -> &[CandidateWall] {
         let [start, end] = self.candidates.per_ball.get(row).map_or([0; 2], |known| known.walls);
         &self.candidates.lists[start..end]
     }
@@ -215,11 +281,6 @@ impl EventDriven {
         let layers = self.balls[row].layers;
         let collides = move |wall: &u32| self.walls[*wall as usize].layers.interacts_with(layers);
         self.candidates.planes.iter().copied().filter(collides)
-    }
-
-    /// Cost of testing a ball against all its candidate walls.
-    pub(super) fn wall_cost(&self, row: usize) -> u64 {
-        self.candidates.planes.len() as u64 + super::PART_COST * self.parts_of(row).len() as u64
     }
 }
 

@@ -134,7 +134,7 @@ impl EventDriven {
     ) {
         let Event { time, row, .. } = first;
         let mut add_all_of = |row: usize| {
-            self.for_each_near(row, |other| {
+            self.for_each_near(row, settings, |other| {
                 let event = (other != row).then(|| self.predict_ball(row, other, time, settings));
                 if let Some(Some((after, EventKind::BallImpact(..)))) = event
                     && time + after <= time

@@ -12,6 +12,7 @@ use std::cell::Cell;
 use cgmath::{InnerSpace, Zero};
 
 use super::flat_support::Regime;
+use super::support_candidates::SupportCandidates;
 use super::{Ball, Wall};
 use crate::math::{Point3, Vec3, normalize_and_length};
 use crate::response::{BallRotation, Material};
@@ -44,7 +45,7 @@ const FLATNESS: f64 = 1e-9;
 pub(super) struct CurvedSupport<'a> {
     pub walls: &'a [Wall],
     /// Walls that may support it before the step is over.
-    pub candidates: &'a [u32],
+    pub candidates: &'a SupportCandidates,
     pub external_acceleration: Vec3<f64>,
     pub radius: f64,
     pub rotation: BallRotation,
@@ -112,19 +113,9 @@ pub(super) struct Step {
 }
 
 impl CurvedSupport<'_> {
-    /// Nearest wall, the first of several.
+    /// Nearest wall.
     fn nearest(&self, at: Point3<f64>, time: f64) -> (usize, PointProjection<f64>) {
-        self.cost.set(self.cost.get() + super::PART_COST * self.candidates.len() as u64);
-        let nowhere = PointProjection { point: at, normal: Vec3::zero(), distance: f64::INFINITY };
-        self.candidates.iter().fold((usize::MAX, nowhere), |best, wall| {
-            let wall = *wall as usize;
-            if self.walls[wall].distance_lower_bound(at, time) > best.1.distance {
-                return best;
-            }
-            let next = (wall, self.walls[wall].nearest(at, time));
-            let nearer = (next.1.distance, next.0) < (best.1.distance, best.0);
-            if nearer { next } else { best }
-        })
+        self.candidates.nearest(self.walls, (at, time), &self.cost)
     }
 
     /// Rate of change of the normal for a point that moves over the wall, in 1/s.
@@ -161,7 +152,7 @@ impl CurvedSupport<'_> {
         let is_curved = |direction| {
             !self.normal_rate_over(state.position, state.time, normal, direction).is_zero()
         };
-        self.candidates.len() == 1 && matches!(wall.collider, super::WallCollider::Plane { .. })
+        self.candidates.is_single() && matches!(wall.collider, super::WallCollider::Plane { .. })
             || ![x, -x, y, -y].into_iter().any(is_curved)
     }
 
@@ -333,7 +324,7 @@ impl CurvedSupport<'_> {
         if regime == Regime::Sliding && !contact.slip.is_zero() && contact.material.friction > 0.0 {
             duration = duration.min(self.time_to_roll(start, &contact, rate).max(min_step));
         }
-        let end = |duration: f64| self.runge_kutta(start, duration, regime);
+        let end = |duration: f64| self.runge_kutta(start, rate, duration, regime);
         let mut state = end(duration)?;
         // A step ends at the border of a face, edge or corner, where the curvature changes.
         if duration > min_step && !self.has_same_curvature(start, &state, &contact) {
@@ -428,8 +419,14 @@ impl CurvedSupport<'_> {
         if decrease > 0.999 * slip * change.magnitude() { end } else { 0.25 * end }
     }
 
-    fn runge_kutta(&self, start: &BallState, dt: f64, regime: Regime) -> Option<BallState> {
-        let k1 = self.rate(start, regime)?;
+    /// Integrates over `dt` seconds, from the rate `k1` at the start.
+    fn runge_kutta(
+        &self,
+        start: &BallState,
+        k1: Rate,
+        dt: f64,
+        regime: Regime,
+    ) -> Option<BallState> {
         let k2 = self.rate(&start.after(k1, 0.5 * dt), regime)?;
         let k3 = self.rate(&start.after(k2, 0.5 * dt), regime)?;
         let k4 = self.rate(&start.after(k3, dt), regime)?;

@@ -12,6 +12,7 @@ mod candidates;
 mod cells;
 mod cluster;
 mod collide;
+mod crowd;
 mod curved_support;
 mod flat_support;
 mod ledger;
@@ -24,6 +25,7 @@ mod resting_cluster;
 mod segments;
 mod simultaneous;
 mod squeeze;
+mod support_candidates;
 mod toi;
 mod wall;
 
@@ -45,6 +47,7 @@ pub(crate) use candidates::WallSource;
 use cells::Cells;
 use cluster::Cluster;
 use collide::SimultaneousImpacts;
+use crowd::Crowds;
 pub(crate) use wall::{Solid, Wall, WallCollider};
 
 /// Rest threshold over the speed that gravity adds in a substep. A slower ball rests on the wall:
@@ -210,6 +213,7 @@ pub(crate) struct EventDriven {
     candidates: WallCandidates,
     cells: Cells,
     unbounded: Vec<usize>,
+    crowds: Crowds,
     queue: BinaryHeap<Reverse<Event>>,
     simultaneous_impacts: SimultaneousImpacts,
     cluster: Cluster,

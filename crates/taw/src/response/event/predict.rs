@@ -12,8 +12,7 @@ impl EventDriven {
     pub(super) fn predict(&mut self, row: usize, now: f64, settings: &EventSettings) {
         self.update_cell(row, now, settings.dt);
         let refresh = self.candidates_expiry(row, now, settings);
-        let walls = self.planes_of(row).count() + self.parts_of(row).len();
-        settings.add_cost(1 + walls as u64);
+        settings.add_cost(1);
         let ball = &self.balls[row];
         let remaining = settings.dt - now;
         let mut next = (ball.trajectory.regime_end.max(now), EventKind::RegimeChange);
@@ -33,18 +32,16 @@ impl EventDriven {
             }
         };
         consider(refresh, EventKind::RefreshCandidates);
-        // Walls at rest beyond this distance cannot matter in the rest of the substep.
-        let at = ball.position_at(now);
+        // Walls at rest beyond this distance from where it is halfway cannot matter in the rest of
+        // the substep.
+        let halfway = ball.position_at(now + 0.5 * remaining);
         let speed = ball.velocity_at(now).magnitude();
         let acceleration = ball.trajectory.acceleration.magnitude();
-        let max_distance =
-            ball.radius + ball.position_error + (speed + acceleration * remaining) * remaining;
-        let max_distance = max_distance * (1.0 + 1e-9);
-        self.for_each_wall(row, |wall| {
-            let near = self.walls[wall].motion_at(now).is_some()
-                || self.walls[wall].distance_lower_bound(at, now) <= max_distance;
-            if near
-                && ball.trajectory.support != Some(wall)
+        let travel = (speed + acceleration * remaining) * remaining;
+        let max_distance = (ball.radius + ball.position_error + 0.5 * travel) * (1.0 + 1e-9);
+        self.for_each_wall_within(row, (halfway, max_distance), |wall| {
+            settings.add_cost(1);
+            if ball.trajectory.support != Some(wall)
                 && let Some((after, kind)) = self.predict_wall(row, wall, now, settings)
             {
                 consider(Some(after), kind);
@@ -58,7 +55,7 @@ impl EventDriven {
                 consider(Some(after), kind);
             }
         };
-        self.for_each_near(row, &mut other);
+        self.for_each_near(row, settings, &mut other);
         self.for_each_crossing(ball, now, consider);
         let (time, kind) = next;
         if time <= now + remaining && time.is_finite() {
@@ -89,21 +86,31 @@ impl EventDriven {
         }
     }
 
-    /// Visits balls that a ball may touch soon and collides with; itself may be among them.
-    pub(super) fn for_each_near(&self, row: usize, mut visit: impl FnMut(usize)) {
-        let layers = self.balls[row].layers;
+    /// Visits balls that a ball may touch soon and collides with, outside of its crowd; itself may
+    /// be among them.
+    pub(super) fn for_each_near(
+        &self,
+        row: usize,
+        settings: &EventSettings,
+        mut visit: impl FnMut(usize),
+    ) {
+        let (layers, crowd) = (self.balls[row].layers, self.crowds.of(row));
+        let mut in_crowd = 0;
         let mut visit = |other: usize| {
-            if self.balls[other].layers.interacts_with(layers) {
+            if crowd.is_some() && self.crowds.of(other) == crowd {
+                in_crowd += 1;
+            } else if self.balls[other].layers.interacts_with(layers) {
                 visit(other);
             }
         };
         match self.balls[row].trajectory.cell_slot {
             CellSlot::Cell(cell) => {
                 self.cells.for_each_near(cell, &mut visit);
-                self.unbounded.iter().copied().for_each(visit);
+                self.unbounded.iter().copied().for_each(&mut visit);
             }
-            CellSlot::Unbounded => (0..self.balls.len()).for_each(visit),
+            CellSlot::Unbounded => (0..self.balls.len()).for_each(&mut visit),
         }
+        settings.add_cost(Self::crowd_cost(in_crowd));
     }
 }
 

@@ -263,14 +263,14 @@ impl EventDriven {
         time: f64,
         settings: &EventSettings,
     ) -> bool {
-        settings.add_cost(self.wall_cost(row));
         let ball = &self.balls[row];
         let tolerance = (SEAM_TOLERANCE * ball.radius).max(ball.position_error);
         let nearest = |wall: usize, point: Point3<f64>| self.walls[wall].nearest(point, time);
         let nearest_here = nearest(wall, at);
         let rounding = distance_rounding(at, nearest_here.distance);
         let mut covered = false;
-        self.for_each_wall(row, |other| {
+        let range = (at, nearest_here.distance.abs() + tolerance + rounding);
+        let cost = self.for_each_wall_within(row, range, |other| {
             if !covered
                 && other != wall
                 && self.walls[other].distance_lower_bound(nearest_here.point, time) <= tolerance
@@ -285,6 +285,7 @@ impl EventDriven {
                 covered = before || nearest(wall, nearest_other.point).distance > tolerance;
             }
         });
+        settings.add_cost(cost);
         covered
     }
 }

@@ -4,9 +4,10 @@
 use std::collections::BTreeSet;
 
 use cgmath::{InnerSpace, Zero};
+use smallvec::SmallVec;
 
 use super::wall::Wall;
-use super::{EventDriven, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
+use super::{Ball, EventDriven, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Vec3, normalize_and_length};
 use crate::shape::PointProjection;
@@ -23,9 +24,12 @@ impl EventDriven {
             self.find_wall_contacts(row, settings);
         }
         let mut near = std::mem::take(&mut self.near);
+        self.find_crowds(&near.mm);
         near.mm.retain(|c| {
-            self.ball_contact(c, 0.0, settings)
-                .map_or(self.is_deep_in_ball(c), |speed| speed >= 0.0)
+            self.crowds.are_together(c.a as usize, c.b as usize)
+                || self
+                    .ball_contact(c, 0.0, settings)
+                    .map_or(self.is_deep_in_ball(c), |speed| speed >= 0.0)
         });
         let mut contact_counts = std::mem::take(&mut self.cluster.contact_counts);
         contact_counts.clear();
@@ -78,8 +82,9 @@ impl EventDriven {
     fn find_wall_contacts(&mut self, row: usize, settings: &EventSettings) {
         self.push_out_of_walls(row, 0.0);
         let mut near = std::mem::take(&mut self.near.wm);
-        let at = self.balls[row].position;
-        self.for_each_wall(row, |wall| {
+        let Ball { position: at, radius, .. } = self.balls[row];
+        let range = (at, radius + self.contact_tolerance(row as u32, settings));
+        let cost = self.for_each_wall_within(row, range, |wall| {
             let contact = Contact::with_wall(wall as u32, 0, row as u32);
             // A faster approach is an impact now, also of a wall that starts to move: spread over
             // the substep, it would let the wall in by half of its way.
@@ -89,7 +94,7 @@ impl EventDriven {
                 near.push(contact);
             }
         });
-        settings.add_cost(2 * self.wall_cost(row));
+        settings.add_cost(2 * cost);
         self.near.wm = near;
     }
 
@@ -98,24 +103,28 @@ impl EventDriven {
         if self.balls[row].inverse_mass <= 0.0 {
             return; // infinite mass: walls do not stop it
         }
-        self.push_out(row, now, self.parts_of(row).to_vec());
+        self.push_out(row, now, |method| {
+            let Ball { position, radius, .. } = method.balls[row];
+            method.parts_within(row, (position, radius))
+        });
         // Half-spaces come last, and static ones after moving ones: behind them there is nothing.
         for is_moving in [true, false] {
-            let planes = self.planes_of(row);
-            let planes =
-                planes.filter(|wall| self.is_moving(*wall as usize) == is_moving).collect();
-            self.push_out(row, now, planes);
+            self.push_out(row, now, |method| {
+                let planes = method.planes_of(row);
+                planes.filter(|wall| method.is_moving(*wall as usize) == is_moving).collect()
+            });
         }
     }
 
-    /// Projects a ball out of the deepest wall, again and again until it penetrates none, or too
-    /// often, as in a gap that is too narrow (von Neumann 1933, alternating projections).
-    fn push_out(&mut self, row: usize, now: f64, walls: Vec<u32>) {
+    /// Projects a ball out of the deepest of some walls near it, again and again until it penetrates
+    /// none, or too often, as in a gap that is too narrow (von Neumann 1933, alternating
+    /// projections).
+    fn push_out(&mut self, row: usize, now: f64, walls: impl Fn(&Self) -> SmallVec<[u32; 32]>) {
         for _ in 0..MAX_MOVES {
             let ball = &self.balls[row];
             let mut deepest = (SLOP * ball.radius, Vec3::zero());
-            for wall in &walls {
-                let wall = &self.walls[*wall as usize];
+            for wall in walls(self) {
+                let wall = &self.walls[wall as usize];
                 if wall.distance_lower_bound(ball.position, now) >= ball.radius {
                     continue;
                 }
@@ -140,7 +149,8 @@ impl EventDriven {
         settings: &EventSettings,
     ) -> bool {
         let mut touches = false;
-        self.for_each_wall(row, |wall| {
+        let Ball { position, radius, .. } = self.balls[row];
+        self.for_each_wall_within(row, (position, radius), |wall| {
             let contact = Contact::with_wall(wall as u32, 0, row as u32);
             touches |= self.is_moving(wall)
                 && self.wall_contact(&contact, now, f64::INFINITY, settings).is_some();
@@ -222,7 +232,7 @@ impl EventDriven {
 
     /// Tests for penetration beyond the slop: such balls are separated, however fast they move
     /// apart.
-    fn is_deep_in_ball(&self, contact: &Contact<f64>) -> bool {
+    pub(super) fn is_deep_in_ball(&self, contact: &Contact<f64>) -> bool {
         let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
         let center_offset = self.center_offset(first, second);
         let slop = SLOP * first.radius.min(second.radius);
@@ -231,7 +241,7 @@ impl EventDriven {
 
     /// Largest separation that counts as contact, in metres: the height of a fall that reaches the
     /// resting speed.
-    fn contact_tolerance(&self, row: u32, settings: &EventSettings) -> f64 {
+    pub(super) fn contact_tolerance(&self, row: u32, settings: &EventSettings) -> f64 {
         let ball = &self.balls[row as usize];
         0.5 * PRESS_SPEED
             * PRESS_SPEED

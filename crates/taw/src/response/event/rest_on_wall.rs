@@ -6,6 +6,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::curved_support::{BallState, CurvedSupport, min_step_at};
 use super::flat_support::FlatSupport;
+use super::support_candidates::SupportCandidates;
 use super::{
     Ball, EventDriven, EventSettings, REST_SPEED, SEAM_TOLERANCE, SUPPORT_CHECK, WallCollider,
 };
@@ -15,10 +16,6 @@ use crate::shape::PointProjection;
 
 /// Bisections of a time to find the end of a face.
 const BISECTIONS: u32 = 24;
-
-/// A neighbouring face that rises by less than this angle, in radians, continues the supporting
-/// one.
-const MIN_RISE: f64 = 1e-6;
 
 impl EventDriven {
     /// Starts the rest of a ball on a wall that it touches.
@@ -70,22 +67,20 @@ impl EventDriven {
             self.update_support_motion(row, settings);
             return;
         }
-        let candidates = self.support_candidates(row, support);
         let ball = &self.balls[row];
         let (at, now) = (ball.position, ball.trajectory.start);
-        let distance = |wall: usize| self.walls[wall].nearest(at, now).distance;
-        let nearest = candidates.iter().map(|wall| (distance(*wall as usize), *wall as usize));
-        let nearest = nearest.fold((f64::INFINITY, support), |x, y| if y < x { y } else { x });
+        let candidates = self.support_candidates(row, support, settings);
+        let (wall, nearest) = candidates.nearest(&self.walls, (at, now), &settings.cost);
+        let wall = if nearest.distance < f64::INFINITY { wall } else { support };
         let fall_distance = ball.external_acceleration.magnitude() * settings.dt * settings.dt;
-        let position_error = ball.position_error + self.walls[nearest.1].position_error(at);
-        let is_touching = nearest.0 - ball.radius
+        let position_error = ball.position_error + self.walls[wall].position_error(at);
+        let is_touching = nearest.distance - ball.radius
             <= REST_SPEED * fall_distance + position_error + SEAM_TOLERANCE * ball.radius;
-        if is_touching
-            && self.normal_acceleration(row, nearest.1, now, ball.external_acceleration) > 0.0
+        if is_touching && self.normal_acceleration(row, wall, now, ball.external_acceleration) > 0.0
         {
-            self.start_resting(row, nearest.1, settings);
+            self.start_resting(row, wall, settings);
         } else {
-            self.balls[row].leave_wall(nearest.1);
+            self.balls[row].leave_wall(wall);
         }
     }
 
@@ -109,7 +104,7 @@ impl EventDriven {
         external_acceleration: Vec3<f64>,
     ) -> f64 {
         let mut ball = self.balls[row];
-        let candidates = [wall as u32];
+        let candidates = SupportCandidates::only(wall);
         let ground = CurvedSupport {
             external_acceleration,
             ..support_of(&self.walls, &candidates, &ball, 0.0)
@@ -123,10 +118,12 @@ impl EventDriven {
     /// Updates the motion of a ball on a wall: starts its next segment.
     pub(super) fn update_support_motion(&mut self, row: usize, settings: &EventSettings) {
         let Some(support) = self.balls[row].trajectory.support else { return };
-        settings.add_cost(self.wall_cost(row));
         let is_fixed = self.has_fixed_normal(support);
-        let candidates =
-            if is_fixed { vec![support as u32] } else { self.support_candidates(row, support) };
+        let candidates = if is_fixed {
+            SupportCandidates::only(support)
+        } else {
+            self.support_candidates(row, support, settings)
+        };
         let Self { balls, walls, .. } = self;
         let min_step = min_step_at(balls[row].trajectory.support_steps, settings.dt);
         balls[row].trajectory.support_steps += u32::from(!is_fixed);
@@ -139,28 +136,6 @@ impl EventDriven {
             balls[row].leave_wall(support);
         }
         settings.add_cost(ground.cost.get());
-    }
-
-    /// Walls that may support a ball soon: the present one, and those near that do not rise in
-    /// front of it. (Walls in front are collided with.)
-    fn support_candidates(&self, row: usize, support: usize) -> Vec<u32> {
-        let ball = &self.balls[row];
-        let (at, now) = (ball.position, ball.trajectory.start);
-        let max_distance = ball.radius * (1.0 + 2.0 * SUPPORT_CHECK) + ball.position_error;
-        let PointProjection { point, normal, .. } = self.walls[support].nearest(at, now);
-        let mut candidates = vec![support as u32];
-        self.for_each_wall(row, |wall| {
-            if wall == support || self.walls[wall].distance_lower_bound(at, now) > max_distance {
-                return;
-            }
-            let nearest_other = self.walls[wall].nearest(at, now);
-            let offset = nearest_other.point - point;
-            let in_front = offset.dot(normal) > MIN_RISE * offset.magnitude() + ball.position_error;
-            if nearest_other.distance <= max_distance && !in_front {
-                candidates.push(wall as u32);
-            }
-        });
-        candidates
     }
 
     /// Starts a segment on a flat surface, in closed form.
@@ -251,7 +226,7 @@ impl Ball {
 
 fn support_of<'a>(
     walls: &'a [super::Wall],
-    candidates: &'a [u32],
+    candidates: &'a SupportCandidates,
     ball: &Ball,
     min_step: f64,
 ) -> CurvedSupport<'a> {

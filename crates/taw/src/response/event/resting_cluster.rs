@@ -4,7 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::cluster::{Cluster, ClusterBodies};
 use super::wall::MovingWalls;
-use super::{EventDriven, EventSettings, MAX_CONTACTS, Trajectory};
+use super::{Ball, EventDriven, EventSettings, MAX_CONTACTS, Trajectory};
 use crate::contact::{Contact, Contacts};
 use crate::math::Vec3;
 use crate::response::impulse::CachedImpulse;
@@ -152,7 +152,7 @@ impl EventDriven {
             self.release(row, now);
             self.add_wall_contacts(row, max_separation_speed, now, settings, &mut contacts.wm);
             near.clear();
-            self.for_each_near(row, |other| near.push(other));
+            self.for_each_near(row, settings, |other| near.push(other));
             settings.add_cost(near.len() as u64);
             near.sort_unstable();
             near.dedup();
@@ -202,9 +202,9 @@ impl EventDriven {
         settings: &EventSettings,
         contacts: &mut Vec<Contact<f64>>,
     ) {
-        settings.add_cost(1 + self.wall_cost(row));
-        let at = self.balls[row].position;
-        self.for_each_wall(row, |wall| {
+        let Ball { position: at, radius, .. } = self.balls[row];
+        let range = (at, radius + self.contact_tolerance(row as u32, settings));
+        let cost = self.for_each_wall_within(row, range, |wall| {
             let contact = Contact::with_wall(wall as u32, 0, row as u32);
             if self.wall_contact(&contact, now, max_separation_speed, settings).is_some()
                 && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, now, settings))
@@ -212,6 +212,7 @@ impl EventDriven {
                 contacts.push(contact);
             }
         });
+        settings.add_cost(1 + cost);
     }
 
     /// Solves for the accelerations that keep contacts at rest from `now` to the end of the
@@ -224,7 +225,7 @@ impl EventDriven {
         impulse_cache: &mut Vec<CachedImpulse<f64>>,
     ) {
         self.cluster.gather(contacts, &self.balls, self.period);
-        let end = now + self.cluster.segment(contacts, settings.dt - now);
+        let end = now + self.cluster.segment(contacts, &self.crowds, settings.dt - now);
         let remaining = end - now;
         let max_acceleration = self.move_cluster_freely(remaining);
         rename_rows(impulse_cache, |row| self.cluster.local_index(row));
@@ -308,7 +309,7 @@ impl EventDriven {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{Ball, MAX_FREEZES, Wall, WallSource};
+    use super::super::{MAX_FREEZES, Wall, WallSource};
     use super::*;
     use crate::broad::CollisionLayers;
     use crate::math::Point3;

@@ -4,6 +4,7 @@
 use cgmath::InnerSpace;
 
 use super::cluster::Cluster;
+use super::crowd::Crowds;
 use super::{EventDriven, EventSettings};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Vec3, normalize_and_length};
@@ -19,9 +20,12 @@ const MAX_SEGMENTS: f64 = 16.0;
 impl Cluster {
     /// Time in which no normal of two gathered balls turns by more than [`MAX_TURN`] at the velocities
     /// that they have now, in seconds: the remaining time or a whole part of it, at least a
-    /// sixteenth.
-    pub fn segment(&self, contacts: &Contacts<f64>, remaining: f64) -> f64 {
+    /// sixteenth. A cluster with a crowd, whose normals are as good as random, is solved once.
+    pub fn segment(&self, contacts: &Contacts<f64>, crowds: &Crowds, remaining: f64) -> f64 {
         let bodies = &self.bodies;
+        if self.rows.iter().any(|row| crowds.of(*row as usize).is_some()) {
+            return remaining;
+        }
         let rate = |c: &Contact<f64>| {
             let (a, b) = (c.a as usize, c.b as usize);
             let center_offset =
@@ -72,6 +76,9 @@ impl EventDriven {
         let mut is_turning = vec![false; self.balls.len()];
         for c in contacts.mm.iter().filter(|c| turns(c)) {
             is_turning[sets.set_of(c.b as usize) as usize] = true;
+        }
+        for row in (0..self.balls.len()).filter(|row| self.crowds.of(*row).is_some()) {
+            is_turning[sets.set_of(row) as usize] = false;
         }
         let mut take = |c: &Contact<f64>| is_turning[sets.set_of(c.b as usize) as usize];
         turning.wm.extend(contacts.wm.extract_if(.., |c| take(c)));

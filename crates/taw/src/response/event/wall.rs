@@ -6,7 +6,7 @@ use std::sync::Arc;
 use cgmath::{InnerSpace, One, Rotation as _, Zero};
 
 use crate::broad::CollisionLayers;
-use crate::math::{Point3, Quat, Vec3};
+use crate::math::{Point3, Quat, Vec3, normalize_and_length};
 use crate::motion::{WallMotion, integrate_rotation};
 use crate::response::{Colliders, Material};
 use crate::shape::{Aabb3, BoundedShape, PointProjection, Shape, Triangle};
@@ -14,6 +14,10 @@ use crate::shape::{Aabb3, BoundedShape, PointProjection, Shape, Triangle};
 /// Rounding error of a distance, relative to it and the coordinates: many times that of a few
 /// operations.
 const ROUNDING: f64 = 1e-12;
+
+/// Smallest width of a triangle over its length for which a normal is exact to a hundredth of
+/// [`ROUNDING`].
+const MIN_WIDTH: f64 = 0.05;
 
 /// Rounding error of a distance from a point, both in metres.
 pub(super) fn distance_rounding(point: Point3<f64>, distance: f64) -> f64 {
@@ -25,8 +29,8 @@ pub(super) fn distance_rounding(point: Point3<f64>, distance: f64) -> f64 {
 pub(crate) struct Wall {
     /// Shape at `arrival_time`, or at all times.
     pub collider: WallCollider,
-    /// Bounding box of the shape, if it is bounded.
-    pub bounds: Option<Aabb3<f64>>,
+    /// Bounding volume of the shape, if it is bounded.
+    pub bounds: Option<Bounds>,
     /// Row of the wall in the world.
     pub row: u32,
     pub motion: Option<WallMotion<f64>>,
@@ -53,6 +57,64 @@ pub(crate) enum WallCollider {
     OneSidedTriangle(Triangle<f64>, Arc<dyn Solid>),
 }
 
+/// Bounding volume of a [`Wall`].
+#[derive(Clone, Copy, Debug)]
+pub(crate) enum Bounds {
+    Box(Aabb3<f64>),
+    /// Disc in the plane of a triangle, which is closer around a steep one than its box.
+    Disc {
+        center: Point3<f64>,
+        normal: Vec3<f64>,
+        radius: f64,
+    },
+}
+
+impl Bounds {
+    /// Disc around the centroid of a triangle; the box of one so thin that rounding might tilt its
+    /// normal by about [`ROUNDING`].
+    fn of_triangle(triangle: &Triangle<f64>) -> Self {
+        let [a, b, c] = triangle.corners;
+        let longest = [b - a, c - b, a - c].map(InnerSpace::magnitude2).into_iter();
+        match normalize_and_length((b - a).cross(c - a)) {
+            Some((normal, twice)) if twice > MIN_WIDTH * longest.fold(0.0, f64::max) => {
+                let center = a + (b - a) / 3.0 + (c - a) / 3.0;
+                let radius = [a, b, c].map(|corner| (corner - center).magnitude()).into_iter();
+                Self::Disc { center, normal, radius: radius.fold(0.0, f64::max) }
+            }
+            _ => Self::Box(triangle.bounding_box()),
+        }
+    }
+
+    /// Lower bound of the distance from a point; minus infinity for one that may be in the solid
+    /// behind a triangle, if `is_one_sided`.
+    fn distance_lower_bound(&self, point: Point3<f64>, is_one_sided: bool) -> f64 {
+        let (distance, far, size, is_in_front) = match *self {
+            Self::Box(bounds) => {
+                let distance = bounds.distance_to_point(point);
+                (distance, distance, (bounds.max - bounds.min).magnitude(), false)
+            }
+            Self::Disc { center, normal, radius } => {
+                let offset = point - center;
+                let height = offset.dot(normal);
+                let far = offset.x.abs() + offset.y.abs() + offset.z.abs(); // at least so far
+                let in_plane = offset.magnitude2() - height * height;
+                let distance = if in_plane <= radius * radius {
+                    height.abs()
+                } else {
+                    let beside = in_plane.sqrt() - radius;
+                    (height * height + beside * beside).sqrt()
+                };
+                let is_in_front = height > distance_rounding(point, far);
+                (distance, far, 2.0 * radius, is_in_front)
+            }
+        };
+        let may_be_inside = is_one_sided && !is_in_front && distance <= size * (1.0 + ROUNDING);
+        let bound = distance - distance_rounding(point, far);
+        // Negative if it is inside; unknown where a square overflows.
+        if may_be_inside || !bound.is_finite() { f64::NEG_INFINITY } else { bound }
+    }
+}
+
 /// Volume that triangles enclose.
 pub(crate) trait Solid: Debug + Send + Sync {
     /// Tests if a point is in the solid.
@@ -60,13 +122,13 @@ pub(crate) trait Solid: Debug + Send + Sync {
 }
 
 impl WallCollider {
-    /// Bounding box, if the shape is bounded.
-    pub fn bounds(&self) -> Option<Aabb3<f64>> {
+    /// Bounding volume, if the shape is bounded.
+    pub fn bounds(&self) -> Option<Bounds> {
         match self {
             Self::Plane { .. } => None,
-            Self::Solid(shape) => Some(shape.bounding_box()),
+            Self::Solid(shape) => Some(Bounds::Box(shape.bounding_box())),
             Self::Triangle(triangle) | Self::OneSidedTriangle(triangle, _) => {
-                Some(triangle.bounding_box())
+                Some(Bounds::of_triangle(triangle))
             }
         }
     }
@@ -125,13 +187,8 @@ impl Wall {
             Some((motion, remaining)) => point + motion.velocity * remaining,
             None => point,
         };
-        let distance = bounds.distance_to_point(shifted);
-        let may_be_inside = matches!(self.collider, WallCollider::OneSidedTriangle(..))
-            && distance <= (bounds.max - bounds.min).magnitude() * (1.0 + ROUNDING);
-        if may_be_inside {
-            return f64::NEG_INFINITY; // negative if it is inside
-        }
-        distance - distance_rounding(shifted, distance)
+        let is_one_sided = matches!(self.collider, WallCollider::OneSidedTriangle(..));
+        bounds.distance_lower_bound(shifted, is_one_sided)
     }
 
     /// Velocity of a point that moves with the wall; zero for a static one.
