@@ -13,7 +13,8 @@ use crate::constraint::ContactImpulse;
 use crate::math::{Scalar, Vec3};
 use crate::response::SolverBodies;
 
-/// A gain below this fraction of the energy of the velocity changes is the residual of the iterations.
+/// A gain below this fraction of the energy of the velocity changes is the residual of the
+/// iterations.
 const GAIN_TOLERANCE: f64 = 1e-5;
 
 /// Energy balance of an island's impulses, in units of the island.
