@@ -13,7 +13,8 @@ use crate::constraint::ContactImpulse;
 use crate::math::{Scalar, Vec3};
 use crate::response::SolverBodies;
 
-/// A gain below this fraction of the exchanged energy is the residual of the iterations.
+/// A gain below this fraction of the energy of the velocity changes is the residual of the
+/// iterations.
 const GAIN_TOLERANCE: f64 = 1e-5;
 
 /// Energy balance of an island's impulses, in units of the island.
@@ -22,8 +23,9 @@ pub(super) struct IslandEnergy<S> {
     bounces: bool,
     /// Energy that the impulses bring in as they are.
     work: S,
-    /// Energy exchanged through the contacts, the scale for `work`.
-    exchanged: S,
+    /// Twice the kinetic energy of the velocity changes, the scale for `work`. Impulses that cancel,
+    /// as of two walls that press a ball, do not count, however large they are.
+    changed: S,
     /// Coefficients of the energy `linear x + quadratic x²` that a fraction `x` of some impulses
     /// brings in.
     linear: S,
@@ -33,11 +35,11 @@ pub(super) struct IslandEnergy<S> {
 impl<S: Scalar> IslandEnergy<S> {
     fn new() -> Self {
         let zero = S::zero();
-        Self { bounces: false, work: zero, exchanged: zero, linear: zero, quadratic: zero }
+        Self { bounces: false, work: zero, changed: zero, linear: zero, quadratic: zero }
     }
 
     fn gains(&self) -> bool {
-        self.work > self.exchanged * S::from_f64(GAIN_TOLERANCE)
+        self.work > self.changed * S::from_f64(GAIN_TOLERANCE)
     }
 
     /// Largest fraction of the restitution that gains no energy.
@@ -342,15 +344,17 @@ impl<S: Scalar> SolverBodies<'_, S> {
             let energy = &mut energies[c.island as usize];
             let island = islands.of(c.island);
             energy.bounces |= c.bounces;
-            let relative_spin = (c.initial_relative_spin + self.relative_spin(c)) * half;
-            energy.work += island.energy(
-                c.inverse_effective_mass.normal,
-                c.impulse(),
-                c.mean_velocity(self.relative_velocity_of(c)),
-            ) + island.angular_energy(c.angular_impulse(), relative_spin);
-            energy.exchanged += island
-                .energy(c.inverse_effective_mass.normal, c.impulse(), c.initial_relative_velocity)
-                .abs();
+            let (after, spin_after) = (self.relative_velocity_of(c), self.relative_spin(c));
+            let energy_of = |velocity: Vec3<S>, spin: Vec3<S>| {
+                island.energy(c.inverse_effective_mass.normal, c.impulse(), velocity)
+                    + island.angular_energy(c.angular_impulse(), spin)
+            };
+            energy.work +=
+                energy_of(c.mean_velocity(after), (c.initial_relative_spin + spin_after) * half);
+            energy.changed += energy_of(
+                after - c.initial_relative_velocity,
+                spin_after - c.initial_relative_spin,
+            );
         }
     }
 }
