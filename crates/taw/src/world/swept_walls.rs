@@ -133,31 +133,37 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
         first
     }
 
-    /// Center at the end of a path on which a core of this radius passes through none of these parts: it
-    /// slides along those that it meets. None if it meets none.
+    /// Center at the end of a path on which a ball's core passes through none of these parts: it slides
+    /// along those that it meets. None if it meets none.
     fn slide(
         &self,
         [mut start, end]: [Point3<S>; 2],
-        core: S,
+        radius: S,
         visit_parts: &dyn Fn(&Aabb3<S>, &mut dyn FnMut(SubShape)),
     ) -> Option<Point3<S>> {
+        let core = radius * S::from_f64(CORE);
         let (mut displacement, mut stopped) = (end - start, false);
         // In a corner, it meets three; where it meets more, it stays.
         for _ in 0..3 {
             let path = RelativePath { start, displacement, frame: Frame::Standing };
-            let [at, to] = [start, start + displacement];
-            let [at, to] = [at, to].map(|center| Sphere { center, radius: core }.bounding_box());
+            let [at, to] = [start, start + displacement]
+                .map(|center| Sphere { center, radius: core }.bounding_box());
+            let hits = |part, radius| {
+                let hit = self.walls.time_of_impact(part, radius, &path);
+                hit.map(|hit| hit.time)
+            };
             let mut first: Option<(S, SubShape)> = None;
             visit_parts(&at.union(&to), &mut |part| {
-                let Some(hit) = self.walls.time_of_impact(part, core, &path) else { return };
-                if first.is_none_or(|(time, _)| hit.time < time) {
-                    first = Some((hit.time, part));
+                let Some(hit) = hits(part, core) else { return };
+                if first.is_none_or(|(time, _)| hit < time) {
+                    first = Some((hit, part));
                 }
             });
-            let Some((time, part)) = first else {
+            let Some((passage, part)) = first else {
                 return stopped.then_some(start + displacement);
             };
             stopped = true;
+            let time = hits(part, radius).map_or(passage, |touch| touch.min(passage));
             start += displacement * time;
             let normal = self.walls.project_point(part, start).normal;
             let rest = displacement * (S::one() - time);
@@ -309,7 +315,6 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
     ) -> Option<[f32; 3]> {
         let [before, now]: [Sphere<S>; 2] = [sphere(*before), sphere(*now)];
         let bounds = before.bounding_box().union(&now.bounding_box());
-        let core = now.radius * S::from_f64(CORE);
         let (mut center, mut stopped) = (now.center, false);
         for wall in &self.moving {
             let meets = wall.is_near(&bounds) && wall.collides(self.walls, layers);
@@ -324,14 +329,14 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
             let parts = |bounds: &Aabb3<S>, visit: &mut dyn FnMut(SubShape)| {
                 wall.for_each_in_box(self.walls, bounds, visit);
             };
-            if let Some(end) = self.slide(path, core, &parts) {
+            if let Some(end) = self.slide(path, now.radius, &parts) {
                 (center, stopped) = (here.transform_point(end), true);
             }
         }
         let parts = |bounds: &Aabb3<S>, visit: &mut dyn FnMut(SubShape)| {
             self.for_each_standing(bounds, (&now, layers), visit);
         };
-        if let Some(end) = self.slide([before.center, center], core, &parts) {
+        if let Some(end) = self.slide([before.center, center], now.radius, &parts) {
             (center, stopped) = (end, true);
         }
         stopped.then(|| cast_point::<S, f32>(center).into())

@@ -33,7 +33,7 @@ fn drum(faces: u32) -> Mesh<f32> {
 #[test]
 fn nothing_leaves_a_drum_of_triangles() {
     let mut random = dice(17);
-    for number in 0..150 {
+    for number in 0..96 {
         let (substeps, dt) = ([1, 2, 4][number % 3], [1.0 / 60.0, 1.0 / 30.0][number / 3 % 2]);
         let mut world = world::<f32>(substeps);
         let mesh = Arc::new(drum(12 + (40.0 * random()) as u32));
@@ -53,7 +53,7 @@ fn nothing_leaves_a_drum_of_triangles() {
             let center = Point3::new(out * angle.cos(), out * angle.sin(), z);
             world.marbles.insert(Marble::new(center, radius)).unwrap();
         }
-        for step in 1..=(8.0 / dt) as u32 {
+        for step in 1..=(5.0 / dt) as u32 {
             let rotation =
                 integrate_rotation(Quat::new(1.0, 0.0, 0.0, 0.0), speed, dt * step as f32);
             world.walls.set(wall, turned(rotation)).unwrap();
@@ -62,6 +62,32 @@ fn nothing_leaves_a_drum_of_triangles() {
                 let out = center.x.hypot(center.y).max(center.z.abs() / HALF);
                 assert!(out < 1.0, "{number}, {count} balls, step {step}: {center:?}");
             }
+        }
+    }
+}
+
+/// Balls so small that gravity moves them by many radii in a substep, on slopes of two triangles. One that
+/// landed and was put back to the slope came out beneath it.
+#[test]
+fn tiny_balls_stay_on_a_slope_of_triangles() {
+    let mut random = dice(23);
+    for number in 0..200 {
+        let mut world = world::<f32>([1, 3, 8][number % 3]);
+        let rise = (0.1 + 0.8 * random()) as f32;
+        let points = [[-9.0, -1.0], [9.0, -1.0], [9.0, 1.0], [-9.0, 1.0]]
+            .map(|[x, z]| Point3::new(x, -rise * x, z));
+        let mesh = Arc::new(Mesh::new(points.to_vec(), vec![[0, 2, 1], [0, 3, 2]]).unwrap());
+        world.walls.insert(WallShape::Mesh(mesh, Pose::identity())).unwrap();
+        let radius = 1e-4 * 30_f32.powf(random() as f32);
+        let normal = Vec3::new(rise, 1.0, 0.0).normalize();
+        let height = (0.001 + 0.1 * random()) as f32;
+        let center = Point3::new(-2.0, 2.0 * rise + height, 0.1 * random() as f32);
+        let ball = world.marbles.insert(Marble::new(center, radius)).unwrap();
+        for step in 0..60 {
+            world.step([1.0 / 60.0, 1.0 / 30.0][number / 3 % 2]).unwrap();
+            let at = world.marbles.get(ball).unwrap().position;
+            let distance = normal.dot(at - Point3::new(0.0, 0.0, 0.0));
+            assert!(distance > 0.0, "{number}, step {step}: {} radii", distance / radius);
         }
     }
 }

@@ -17,6 +17,13 @@ pub(in crate::swarm) struct SavedPlace {
     center: [f32; 3],
 }
 
+impl SavedPlace {
+    /// Center at the begin of this substep, if it was saved then.
+    pub fn of(&self, substep: u32) -> Option<[f32; 3]> {
+        (self.substep == substep).then_some(self.center)
+    }
+}
+
 impl Swarm {
     /// Saves where the balls near shapes are, by slot, since rows may change within a substep.
     pub(super) fn save_places(&mut self, walls: &dyn StaticGeometry) {
@@ -42,6 +49,7 @@ impl Swarm {
         }
         let (chunks, slots) = (&self.chunks, self.ids.slots());
         let (places, substep) = (&self.scratch.places, self.scratch.substep);
+        let (proxies, proxy_rows) = (&self.proxies[..], &self.scratch.proxy_rows[..]);
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
         let (at, skin_left) =
             (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
@@ -49,13 +57,15 @@ impl Swarm {
             let chunk = &chunks[chunk];
             for row in chunk.near_shapes.iter().filter(|_| !chunk.asleep) {
                 let row = *row as usize;
-                let saved = &places[slots[row] as usize];
-                if saved.substep != substep {
+                let saved = places.get(slots[row] as usize);
+                let Some([x, y, z]) = saved.and_then(|place| place.of(substep)) else {
                     continue; // nobody knew that it is near
+                };
+                if Self::proxy_at(proxies, proxy_rows, row as u32).is_some() {
+                    continue; // the world moves it
                 }
                 // SAFETY: a ball of the chunk, and nobody works on others meanwhile.
                 let (at, skin_left) = unsafe { (&mut *at.row(row), &mut *skin_left.row(row)) };
-                let [x, y, z] = saved.center;
                 let place = [x, y, z, at[3]];
                 let gone = distance(at, &place);
                 let (far, layers) = (FAST * at[3], surfaces.layers(row as u32));

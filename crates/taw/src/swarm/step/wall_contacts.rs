@@ -1,12 +1,13 @@
 //! Balls at walls: who is near one, and where it is touched.
 
-use cgmath::Zero;
+use cgmath::{InnerSpace, Zero};
 
 use crate::math::Vec3;
 use crate::swarm::chunk::Chunk;
+use crate::swarm::scratch::Scratch;
 use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::wall_contact::{WallContact, xyz};
-use crate::swarm::wall_paths::{WallQuery, is_fast, slide_along_wall};
+use crate::swarm::wall_paths::{FAST, WallQuery, is_fast, slide_along_wall};
 use crate::swarm::walls::{Balls, HalfSpace, find, near_shapes, shapes_of};
 use crate::swarm::workers::{DisjointSlice, parallel_for};
 use crate::swarm::{Stage, StaticGeometry, Swarm, Tier};
@@ -129,7 +130,7 @@ impl Swarm {
 
     /// Puts back to the wall each ball that passed into one in these `h` seconds, because of a
     /// contact that sent it another way than its wall contacts were sought on, and lets it slide
-    /// on. It flew by its velocity, and that much lower. Returns true if there was any.
+    /// on. One that was far from shapes flew by its velocity, and that much lower. Returns true if there was any.
     pub(in crate::swarm) fn stop_at_walls(
         &mut self,
         walls: &dyn StaticGeometry,
@@ -141,7 +142,7 @@ impl Swarm {
         }
         let count = self.chunks.len();
         let (chunks, velocity) = (DisjointSlice::new(&mut self.chunks), &self.velocity);
-        let path_changes = &self.scratch.path_changes;
+        let Scratch { path_changes, places, substep, .. } = &self.scratch;
         let surfaces = SurfaceOf {
             model: self.model.material,
             surfaces: &self.surfaces,
@@ -161,9 +162,16 @@ impl Swarm {
             let columns = at.iter_mut().zip(skin_left).zip(&velocity[rows.clone()]);
             for (((at, skin_left), velocity), row) in columns.zip(rows) {
                 let change = path_changes.get(row).map_or_else(Vec3::zero, xyz);
-                if is_fast(velocity, h, at[3]) || !change.is_zero() {
+                // One that lies on a wall does not fly.
+                let saved = places.get(surfaces.slots[row] as usize);
+                let path = saved.and_then(|place| place.of(*substep)).map_or_else(
+                    || xyz(velocity) * h - lower + change,
+                    |place| xyz(at) - Vec3::from(place),
+                );
+                let far = FAST * at[3];
+                if is_fast(velocity, h, at[3]) || !change.is_zero() || path.magnitude2() > far * far
+                {
                     let layers = surfaces.layers(row as u32);
-                    let path = xyz(velocity) * h - lower + change;
                     let back = slide_along_wall(walls, at, layers, path);
                     *skin_left -= back;
                     chunk.caught |= back > 0.0;
