@@ -115,7 +115,7 @@ pub enum Response {
     /// twelve can touch one. A crowd is solved once per substep, as by [`Response::Impulse`], with
     /// the 32 deepest contacts of each marble, and reports no impacts among its own. Overlap gives
     /// positions, not speeds: a marble is pushed by half of its radius per substep at most, so that
-    /// a thousand at one point part within about three seconds.
+    /// a thousand at one point part within about four seconds.
     ///
     /// A step has a budget: 32 million tests against one wall or one other marble, plus 20,000 per
     /// marble, about a second for a few hundred. Each substep may spend its share, in the ratio of
