@@ -30,14 +30,19 @@ impl Swarm {
         if !walls.has_shapes() {
             return;
         }
-        let (slots, places) = (self.ids.slots(), &mut self.scratch.places);
-        places.resize(self.ids.rows().len(), SavedPlace::default());
+        self.scratch.places.resize(self.ids.rows().len(), SavedPlace::default());
         self.scratch.substep = self.scratch.substep.wrapping_add(1);
-        for row in self.chunks.iter().filter(|chunk| !chunk.asleep).flat_map(|it| &it.near_shapes) {
-            let [x, y, z, _] = self.at[*row as usize];
-            places[slots[*row as usize] as usize] =
-                SavedPlace { substep: self.scratch.substep, center: [x, y, z] };
-        }
+        let (substep, slots, at) = (self.scratch.substep, self.ids.slots(), &self.at[..]);
+        let (chunks, places) = (&self.chunks, DisjointSlice::new(&mut self.scratch.places));
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
+            let chunk = &chunks[chunk];
+            for row in chunk.near_shapes.iter().filter(|_| !chunk.asleep) {
+                let [x, y, z, _] = at[*row as usize];
+                let slot = slots[*row as usize] as usize;
+                // SAFETY: the slot of a ball of the chunk.
+                unsafe { *places.row(slot) = SavedPlace { substep, center: [x, y, z] } };
+            }
+        });
     }
 
     /// Puts each ball that passed through a surface since places were saved back to it, from where it
