@@ -216,7 +216,7 @@ pub struct SleepingDisabled;
 /// Makes a capsule of a marble: all points within its radius of a line along the entity's y
 /// axis, which goes this far both ways, in metres; like Bevy's `Capsule3d`. Zero is a ball.
 ///
-/// Every response knows capsules but the event-driven one: there a capsule is refused, and
+/// All responses but `EventDriven` and `SoftStep` know capsules: there a capsule is refused, and
 /// left out of the world until the model changes.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]

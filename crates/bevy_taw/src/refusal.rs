@@ -27,7 +27,7 @@ pub enum Refusal {
     Value(#[from] taw::Error),
     /// A capsule in a model that knows balls only: a new one is left out of the world until
     /// the model changes, a ball stays a ball.
-    #[error("HalfLength must be 0 for the event-driven response, but is {0}")]
+    #[error("HalfLength must be 0 for this response, which knows balls only, but is {0}")]
     Capsule(f32),
     /// An entity that would push itself: it is a marble, and no wall.
     #[error("an entity is both a Marble and a Wall; it is a marble only")]
