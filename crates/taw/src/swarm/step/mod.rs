@@ -213,8 +213,7 @@ impl Swarm {
             observe(Stage::Restitute);
             self.pass(Pass::Relax(params), |_, _| true);
             self.forget_impacts();
-            self.keep_out();
-            self.stop_passages(walls, [before, left]);
+            self.keep_out(walls, [before, left]);
         }
     }
 
@@ -323,9 +322,10 @@ impl Swarm {
         any
     }
 
-    /// Moves out of walls what is in them. That comes last: whatever else moves balls apart,
-    /// nothing is pressed through a wall.
-    fn keep_out(&mut self) {
+    /// Moves out of walls what is in them, and back what passed one: so long before the end of the step, in
+    /// seconds, the substep began, and is now. That comes last: whatever else moves balls apart, nothing is
+    /// pressed through a wall.
+    fn keep_out(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
         let (at, skin_left) =
             (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
         let chunks = &self.chunks;
@@ -337,6 +337,7 @@ impl Swarm {
                 unsafe { *skin_left.row(row) -= contact.keep_out(&mut *at.row(row)) };
             }
         });
+        self.stop_passages(walls, before_end);
     }
 
     /// Changes velocities and moves the balls that are awake.
