@@ -209,15 +209,9 @@ impl WallContact {
             normal: (approach_speed + impact_speed * self.numbers.restitution) / velocity[3],
             tangent: stopping * (1.0 + self.numbers.tangential_restitution),
         });
-        // The plane stands for a shape only where the ball meets that.
-        let way = if self.is_plane {
-            self.normal * -separation
-        } else {
-            relative * (separation / approach_speed).min(params.time)
-        };
-        set(at, xyz(at) + way);
+        set(at, xyz(at) - self.normal * separation);
         self.apply_impulse(velocity, spin, impulse);
-        Some(way.magnitude())
+        Some(separation)
     }
 
     /// Velocity at which the ball's surface slides over the wall's, in m/s.
