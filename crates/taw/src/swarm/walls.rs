@@ -60,9 +60,8 @@ pub(crate) trait StaticGeometry: Sync {
         times: [f32; 2],
         visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
     );
-    /// Center of a ball that went from one place to another without passing through a surface, as the
-    /// walls see it; none if it passed through none. So long before the end of the step, in seconds,
-    /// it was there and is here.
+    /// Center, in metres, at which a ball ends that surfaces stop on its way between two places; none if
+    /// none stops it. `before_end` holds the times of both places, in seconds before the end of the step.
     fn stop_passage(
         &self,
         places: [&Row; 2],
