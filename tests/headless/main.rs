@@ -9,6 +9,7 @@ mod input;
 mod interpolation;
 mod layers;
 mod motion;
+mod moving_walls;
 mod nasty;
 mod scene;
 mod snapshots;

@@ -86,6 +86,31 @@ fn a_marble_that_must_not_sleep_keeps_those_about_it_awake() {
 }
 
 #[test]
+fn a_wall_that_is_written_as_it_was_wakes_nobody() {
+    let mut app = app();
+    heap(&mut app, 32);
+    let corners = [[-9.0, -9.0], [9.0, -9.0], [9.0, 9.0], [-9.0, 9.0]];
+    let corners = corners.map(|[x, z]| Vec3::new(x, 0.0, z));
+    let ground = Wall::Mesh { points: corners.into(), triangles: vec![[0, 2, 1], [0, 3, 2]] };
+    app.world_mut().spawn((ground, Transform::default()));
+    scene::frames(&mut app, 500);
+    for _ in 0..60 {
+        for mut wall in app.world_mut().query::<&mut Wall>().iter_mut(app.world_mut()) {
+            wall.set_changed();
+        }
+        app.update();
+        assert_eq!(count_sleeping(&mut app), 32);
+    }
+    for mut wall in app.world_mut().query::<&mut Wall>().iter_mut(app.world_mut()) {
+        if let Wall::Mesh { points, .. } = &mut *wall {
+            points[0].y = 0.01;
+        }
+    }
+    scene::frames(&mut app, 2);
+    assert!(count_sleeping(&mut app) < 32, "another ground wakes what lies on it");
+}
+
+#[test]
 fn sleepers_that_are_disabled_or_lose_a_component_or_their_parent_are_noticed() {
     let mut app = app();
     let marbles = heap(&mut app, 32);

@@ -86,6 +86,7 @@ fn a_lift_is_as_fast_as_it_is_at_any_frame_rate() {
         app.world_mut().entity_mut(ball).insert((Velocity::default(), soft));
         scene::frames(&mut app, 20);
         scene::frame_length(&mut app, 1.0 / rate);
+        scene::frames(&mut app, (0.1 * rate) as u32);
         // At 3 m/s, moved by a system of every frame.
         let rise = move |time: Res<Time>, mut transforms: Query<&mut Transform>| {
             transforms.get_mut(lift).unwrap().translation.y += 3.0 * time.delta_secs();

@@ -127,3 +127,26 @@ fn a_parent_of_scale_zero_leaves_transforms_finite_and_is_told_once() {
         }
     }
 }
+
+#[test]
+fn a_parent_of_a_scale_beyond_numbers_is_told_once_and_its_marble_tried_again() {
+    for app in [scene::app, scene::smooth_app] {
+        for scale in [1e20, 1e30, f32::MAX, 1e-25] {
+            let mut app = app();
+            let parent = app.world_mut().spawn(Transform::from_scale(Vec3::splat(scale))).id();
+            let marble = (Marble::new(0.5), Transform::default(), ChildOf(parent));
+            let marble = app.world_mut().spawn(marble).id();
+            let mut told = Vec::new();
+            for _ in 0..8 {
+                app.update();
+                let messages = app.world().resource::<Messages<InputRefused>>();
+                told.extend(messages.iter_current_update_messages().copied());
+            }
+            assert_eq!(told.len(), 1, "{scale}: {told:?}");
+            assert!(matches!(told[0].error, Refusal::NoFrame(..)), "{scale}: {told:?}");
+            app.world_mut().get_mut::<Transform>(parent).unwrap().scale = Vec3::ONE;
+            scene::frames(&mut app, 4);
+            assert!(scene::position(&app, marble).y < 0.0, "{scale}: it falls");
+        }
+    }
+}

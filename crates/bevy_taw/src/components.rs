@@ -1,7 +1,6 @@
 //! What an entity may be to the physics. Marbles and walls need nothing but their
 //! own component; the rest is optional.
 
-use bevy::math::Isometry3d;
 use bevy::prelude::*;
 use taw::motion::{Integrator, Rotation};
 use taw::response::{Combine, Elasticity, Material};
@@ -9,6 +8,7 @@ use taw::world::{MarbleId, Mass, WallId, WallShape};
 
 use crate::layers::CollisionLayers;
 use crate::reflect::{CombineReflect, IntegratorReflect, RotationReflect};
+use crate::wall_motion::PoseTracker;
 
 /// A marble: a ball that moves and collides.
 ///
@@ -227,7 +227,8 @@ pub struct HalfLength(pub f32);
 /// there. The step takes this off again.
 ///
 /// Without it, what changes the speed of a wall's surface by more than
-/// [`LARGEST_CHANGE_OF_SPEED`](crate::wall::LARGEST_CHANGE_OF_SPEED) within a step is a jump, too.
+/// [`LARGEST_CHANGE_OF_SPEED`](crate::wall_motion::LARGEST_CHANGE_OF_SPEED) within a step is a jump,
+/// too, unless the wall is [`Kinematic`].
 /// On a marble it makes a place of what might be a nudge; see
 /// [`interpolation`](crate::interpolation).
 ///
@@ -243,6 +244,24 @@ pub struct HalfLength(pub f32);
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct Teleport;
+
+/// Marker of a wall, or of what carries walls, that is driven: each change of its [`Transform`] is
+/// motion, however sudden, unless it comes with a [`Teleport`].
+///
+/// A flipper needs it, or a piston: something that goes from rest to more than
+/// [`LARGEST_CHANGE_OF_SPEED`](crate::wall_motion::LARGEST_CHANGE_OF_SPEED) within a step. Without it
+/// that is taken for a jump, which carries nothing along, and said once in the log.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// fn spawn(mut commands: Commands) {
+///     commands.spawn((Wall::from(Cuboid::new(0.3, 0.05, 0.05)), Kinematic));
+/// }
+/// ```
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct Kinematic;
 
 /// What the physics knows of a marble entity.
 #[derive(Component, Clone, Copy, Debug, Default)]
@@ -306,8 +325,10 @@ pub(crate) struct WallState {
     pub material: Option<([u32; 7], Combine)>,
     /// Its layers as last gathered.
     pub layers: CollisionLayers,
-    /// How it came where it is.
-    pub way: Way,
+    /// How it moves.
+    pub motion: PoseTracker,
+    /// Whether it was said that a change of its place is taken for a jump.
+    pub jumped: bool,
 }
 
 impl WallState {
@@ -324,25 +345,6 @@ pub(crate) struct LocalShape {
     pub shape: WallShape<f32>,
     /// How far from the origin it goes, in metres.
     pub reach: f32,
-}
-
-/// How a wall came where it is.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct Way {
-    /// Where it was at the last gather.
-    pub last: Option<Isometry3d>,
-    /// Where it was before the first fixed step of this frame.
-    pub framed: Option<Isometry3d>,
-    /// How fast it came there, and how fast it was believed to.
-    pub measured: Speed,
-    pub believed: Speed,
-}
-
-/// Velocity, and angular velocity about the wall's own position.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Speed {
-    pub velocity: Vec3,
-    pub angular_velocity: Vec3,
 }
 
 impl SurfaceMaterial {

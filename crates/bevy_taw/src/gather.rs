@@ -280,7 +280,7 @@ fn take_over(
         return state.id.is_some();
     };
     let [x, y, z] = place.scale.to_array();
-    if is_child && !place.rotation.is_finite() && transform.rotation.is_finite() {
+    if is_child && transform.is_finite() && !place.is_finite() {
         refusals.check(Some(entity), Err(Refusal::NoFrame(x, y, z)));
         return state.id.is_some();
     }
@@ -294,8 +294,8 @@ fn take_over(
         update(&mut world.marbles, id, &now, &last, &seen, (all, balls_only), check);
         return true;
     }
-    // What was refused is tried again when it changes.
-    if state.refused && last == seen {
+    // What was refused is tried again when it changes; of a child, its parents may have.
+    if state.refused && last == seen && !is_child {
         return false;
     }
     if let Some(away) = world.away.get(&entity) {

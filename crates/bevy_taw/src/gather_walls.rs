@@ -8,7 +8,7 @@ use taw::frame::Pose;
 use taw::world::WallMotion;
 
 use crate::components::{
-    LocalShape, Marble, SurfaceMaterial, Teleport, WallState, Way, bits, rotation_bits,
+    Kinematic, LocalShape, Marble, SurfaceMaterial, Teleport, WallState, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::layers::CollisionLayers;
@@ -16,39 +16,61 @@ use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 use crate::snapshot::{self, RowRemoved};
 use crate::wall::Wall;
+use crate::wall_motion::{Change, Clock, LARGEST_CHANGE_OF_SPEED, PoseTracker, TrackedPose};
 
 /// Two scales that differ by no larger part than this are one. A rotation leaves its columns a
 /// few epsilons longer or shorter, and each ancestor a few more: 32 of them are reached by none
 /// of ten ancestors, and move the surface by four millionths of the wall's size.
 const SAME_SCALE: f32 = 32.0 * f32::EPSILON;
 
-/// The time since fixed steps last began, which is what the rest of the game had to move walls.
+/// Lengths of frames, in seconds of virtual time.
 #[derive(Resource, Default)]
 pub struct FrameTime {
-    seconds: f32,
-    /// Whether the next fixed step is the first since then.
+    /// Of this frame.
+    this: f32,
+    /// Of all frames that ended since the last fixed step.
+    since_step: f32,
+    /// Whether the next fixed step is the first in this frame.
     first: bool,
 }
 
 /// Counts a frame.
 pub fn count_frame(mut frame: ResMut<FrameTime>, time: Res<Time<Virtual>>) {
-    frame.seconds += time.delta_secs();
+    frame.since_step += frame.this;
+    frame.this = time.delta_secs();
     frame.first = true;
 }
 
-/// Notes where walls are before the first fixed step of a frame: so far they came in a frame.
-pub fn note_places(
+/// Notes where walls are before the first fixed step of a frame.
+pub fn note_before_steps(
+    frame: Res<FrameTime>,
+    mut walls: Query<(Entity, &mut WallState)>,
+    transforms: TransformHelper,
+) {
+    if frame.first {
+        for (entity, mut state) in &mut walls {
+            state.motion.before_steps = finite_place(&transforms, entity);
+        }
+    }
+}
+
+/// Notes where walls are after the last fixed step of a frame.
+pub fn note_after_steps(
     frame: Res<FrameTime>,
     mut walls: Query<(Entity, &mut WallState)>,
     transforms: TransformHelper,
 ) {
     if !frame.first {
-        return;
+        for (entity, mut state) in &mut walls {
+            state.motion.after_steps = finite_place(&transforms, entity);
+        }
     }
-    for (entity, mut state) in &mut walls {
-        let place = transforms.compute_global_transform(entity).map(|t| t.to_isometry());
-        state.way.framed = place.ok().filter(|place| is_finite(*place));
-    }
+}
+
+/// Place of an entity in the world, if it has one.
+fn finite_place(transforms: &TransformHelper, entity: Entity) -> Option<Isometry3d> {
+    let place = transforms.compute_global_transform(entity).ok()?.to_isometry();
+    is_finite(place).then_some(place)
 }
 
 type WallComponents<'a> = (
@@ -64,16 +86,20 @@ type WallItem<'a> = (
     Mut<'a, WallState>,
 );
 
-/// Who was put elsewhere, and who carries whom.
-type Jumps<'w, 's> = (Query<'w, 's, Entity, With<Teleport>>, Query<'w, 's, &'static ChildOf>);
+/// Entities that are marked as put elsewhere and as driven, and the parents of all.
+type Marked<'w, 's> = (
+    Query<'w, 's, (), With<Teleport>>,
+    Query<'w, 's, (), With<Kinematic>>,
+    Query<'w, 's, &'static ChildOf>,
+);
 
 /// Puts new walls in and moves those that moved.
 pub fn walls(
     mut world: ResMut<TawWorld>,
     mut walls: Query<WallComponents>,
     transforms: TransformHelper,
-    (jumps, parents): Jumps,
-    (time, mut frame): (Res<Time>, ResMut<FrameTime>),
+    (teleports, kinematic, parents): Marked,
+    (time, fixed, mut frame): (Res<Time>, Res<Time<Fixed>>, ResMut<FrameTime>),
     entities: &Entities,
     (mut refusals, mut removed): (Refusals, MessageWriter<RowRemoved>),
 ) {
@@ -82,17 +108,24 @@ pub fn walls(
     }
     // Somebody else changed walls, or the world is another one.
     let all = world.just_restored || world.walls.version() != world.walls_gathered;
-    let dt = time.delta_secs();
-    let clock = Clock { dt, frame: if frame.first { frame.seconds } else { dt } };
-    (frame.seconds, frame.first) = (0.0, false);
+    let clock = Clock {
+        dt: time.delta_secs(),
+        overstep: fixed.overstep().as_secs_f32(),
+        frames: frame.since_step,
+    };
+    (frame.since_step, frame.first) = (0.0, false);
     let mut rows = 0;
     for item in &mut walls {
         let entity = item.0.0;
-        let jumps = !jumps.is_empty()
-            && (jumps.contains(entity)
-                || parents.iter_ancestors(entity).any(|it| jumps.contains(it)));
+        let change = if is_marked(&teleports, &parents, entity) {
+            Change::Jump
+        } else if is_marked(&kinematic, &parents, entity) {
+            Change::Motion
+        } else {
+            Change::Judged
+        };
         let place = transforms.compute_global_transform(entity).ok();
-        let mut gathering = Gathering { world: &mut world, refusals: &mut refusals, all, jumps };
+        let mut gathering = Gathering { world: &mut world, refusals: &mut refusals, all, change };
         rows += usize::from(gathering.take_over(item, place, clock));
     }
     if rows != world.walls.len() {
@@ -106,18 +139,21 @@ pub fn walls(
     world.walls_gathered = world.walls.version();
 }
 
+/// Tests for a mark on an entity, or on what carries it.
+fn is_marked<M: Component>(
+    marks: &Query<(), With<M>>,
+    parents: &Query<&ChildOf>,
+    entity: Entity,
+) -> bool {
+    !marks.is_empty()
+        && (marks.contains(entity) || parents.iter_ancestors(entity).any(|it| marks.contains(it)))
+}
+
 /// Takes the marks off again.
 pub fn land(jumps: Query<Entity, With<Teleport>>, mut commands: Commands) {
     for entity in &jumps {
         commands.entity(entity).try_remove::<Teleport>();
     }
-}
-
-/// How long a step is, and how long the frame was, in seconds.
-#[derive(Clone, Copy)]
-struct Clock {
-    dt: f32,
-    frame: f32,
 }
 
 /// One wall on its way into the world.
@@ -126,7 +162,7 @@ struct Gathering<'a, 'w> {
     refusals: &'a mut Refusals<'w>,
     /// Whether the world may not be what gather left.
     all: bool,
-    jumps: bool,
+    change: Change,
 }
 
 impl Gathering<'_, '_> {
@@ -189,32 +225,40 @@ impl Gathering<'_, '_> {
 
     /// Leaves a wall where it is, at rest. Gives whether it has a row.
     fn stop(&mut self, state: &mut WallState) -> bool {
-        state.way = Way::default();
+        state.motion = PoseTracker::default();
         if let Some(id) = state.id {
             let _ = self.world.walls.set_motion(id, None);
         }
         state.id.is_some()
     }
 
-    /// Puts a wall where it is now, and says how it came there.
+    /// Puts a wall where it is now, with the velocity at which it came there.
     fn put(&mut self, entity: Entity, state: &mut WallState, now: Isometry3d, clock: Clock) {
         let Some(LocalShape { shape, reach }) = &state.shape else { return };
-        let translation = Vec3::from(now.translation);
-        let speed = state.way.go_on(now, clock.dt, clock.frame, *reach, self.jumps);
+        let TrackedPose { pose, velocity, jumped } =
+            state.motion.advance(now, clock, *reach, self.change);
+        if jumped && !std::mem::replace(&mut state.jumped, true) {
+            log::warn!(
+                "taw takes a move of {entity} for a jump, which carries nothing along: it changed the \
+                 speed of the wall by more than {LARGEST_CHANGE_OF_SPEED} m/s in a step; mark what is \
+                 driven with Kinematic, what is put elsewhere with Teleport"
+            );
+        }
+        let translation = Vec3::from(pose.translation);
         if let Some(id) = state.id {
-            let motion = speed.map(|speed| WallMotion {
-                velocity: to_vector(speed.velocity),
-                angular_velocity: to_vector(speed.angular_velocity),
+            let motion = velocity.map(|velocity| WallMotion {
+                velocity: to_vector(velocity.linear),
+                angular_velocity: to_vector(velocity.angular),
                 pivot: to_point(translation),
             });
             self.refusals.check(Some(entity), self.world.walls.set_motion(id, motion));
         }
-        let seen = (bits(translation), rotation_bits(now.rotation));
+        let seen = (bits(translation), rotation_bits(pose.rotation));
         if state.posed == Some(seen) && !self.all {
             return;
         }
         state.posed = Some(seen);
-        let rotation = to_rotation(now.rotation);
+        let rotation = to_rotation(pose.rotation);
         let shape = shape.transformed(Pose { rotation, translation: to_vector(translation) });
         let put = shape.and_then(|shape| match state.id {
             Some(id) => self.world.walls.set(id, shape),

@@ -43,6 +43,7 @@
 //! | [`snapshot`] | back in time, and rows without entities |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
 //! | [`diagnostics`] | step time and counts |
+//! | [`wall_motion`] | speed of walls that move |
 //! | [`interpolation`] | smooth motion between fixed steps |
 //! | `gizmos` (feature `render`) | contacts, normals, velocities and the grid, drawn |
 //! | `swarm_render` (feature `render`) | swarms on the screen |
@@ -88,6 +89,7 @@ pub mod swarm_render;
 #[cfg(feature = "trade")]
 pub mod trade;
 pub mod wall;
+pub mod wall_motion;
 
 pub use plugin::{Substep, SubstepDelta, TawPlugin, TawPlugins, TawSystems};
 pub use taw;
@@ -95,9 +97,9 @@ pub use taw;
 /// What nearly every game needs.
 pub mod prelude {
     pub use crate::components::{
-        AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
-        MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
-        SurfaceMaterial, Teleport, Velocity,
+        AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Kinematic,
+        Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping,
+        SleepingDisabled, SurfaceMaterial, Teleport, Velocity,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;

@@ -1,9 +1,10 @@
 use bevy::app::PluginGroupBuilder;
 use bevy::ecs::schedule::{ScheduleLabel, SingleThreadedExecutor};
 use bevy::prelude::*;
+use bevy_transform_interpolation::TransformEasingSystems;
 
 use crate::components::{
-    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
+    AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Kinematic, Marble,
     MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
     SurfaceMaterial, Teleport, Velocity,
 };
@@ -102,7 +103,7 @@ impl Plugin for TawPlugin {
         app.register_type::<(Marble, Velocity, AngularVelocity, MarbleMass, GravityScale)>()
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
-            .register_type::<(Wall, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
+            .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
         observe(app);
@@ -130,9 +131,18 @@ fn observe(app: &mut App) {
         .add_observer(swarm::forget);
     app.add_systems(
         RunFixedMainLoop,
-        gather_walls::count_frame.in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
+        (
+            gather_walls::count_frame.in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
+            // Before something is drawn elsewhere.
+            gather_walls::note_after_steps
+                .after(RunFixedMainLoopSystems::FixedMainLoop)
+                .before(RunFixedMainLoopSystems::AfterFixedMainLoop),
+        ),
     )
-    .add_systems(FixedPreUpdate, gather_walls::note_places)
+    .add_systems(
+        FixedFirst,
+        gather_walls::note_before_steps.after(TransformEasingSystems::UpdateStart),
+    )
     .add_systems(PostUpdate, scatter::stay.before(TransformSystems::Propagate));
 }
 

@@ -1,28 +1,19 @@
 //! What marbles bounce off.
 
-use bevy::math::Isometry3d;
 use bevy::prelude::*;
 use taw::shape as core;
 use taw::world::WallShape;
 
-use crate::components::{Speed, WallState, Way};
+use crate::components::WallState;
 use crate::convert::{to_point, to_vector};
-
-/// The most that the speed of a wall's surface is believed to change within a step, in m/s: the
-/// speed after a fall of five metres, which no hand and no motor gives a wall at once. What
-/// changes by more was put elsewhere, and carries nothing along; if it goes on so fast in the
-/// next step, it does move, and counts from then on.
-///
-/// A half-space is thought to be a metre in size.
-pub const LARGEST_CHANGE_OF_SPEED: f32 = 10.0;
 
 /// A wall: something solid that no contact can move. Any number of them may form one body,
 /// as children of one entity say; where they are flush, a marble feels one flat floor.
 ///
 /// It lies in the entity's own frame, about the place of its [`Transform`], and its scale
-/// counts. Move or turn that (or a parent's) and the wall follows, pushing marbles before
-/// it; how far it came since the last step, or in the last frame, is how fast it is. A jump
-/// is no motion: see [`LARGEST_CHANGE_OF_SPEED`], and [`Teleport`](crate::components::Teleport).
+/// counts. Move or turn that (or a parent's), in any schedule, and the wall follows, pushing marbles
+/// before it, as fast as it was moved: see [`wall_motion`](crate::wall_motion). A jump is no motion:
+/// see [`Teleport`](crate::components::Teleport) and [`Kinematic`](crate::components::Kinematic).
 ///
 /// An entity that is a marble, too, is no wall. While its entity is
 /// [`Disabled`](bevy::ecs::entity_disabling::Disabled), a wall is out of the world.
@@ -151,60 +142,6 @@ impl Wall {
                 let wide = Vec2::new(*columns as f32, rows) * *cell * 0.5;
                 (Vec3::new(wide.x, highest, wide.y) * scale).length()
             }
-        }
-    }
-}
-
-impl Way {
-    /// Takes the wall to where it is now, a step of `dt` seconds and a frame later. Gives how
-    /// fast it came there, or `None` if it did not move or jumped.
-    ///
-    /// What it moved between fixed steps took it the frame; what it moved within this one took
-    /// it the step.
-    pub(crate) fn go_on(
-        &mut self,
-        now: Isometry3d,
-        dt: f32,
-        frame: f32,
-        reach: f32,
-        jumps: bool,
-    ) -> Option<Speed> {
-        let last = self.last.replace(now);
-        let framed = self.framed.take();
-        let last = last.filter(|_| dt > 0.0)?;
-        let framed = framed.unwrap_or(last);
-        let frame = if frame > 0.0 { frame } else { dt };
-        let (outside, inside) =
-            (Speed::between(last, framed, frame), Speed::between(framed, now, dt));
-        let measured = Speed {
-            velocity: outside.velocity + inside.velocity,
-            angular_velocity: outside.angular_velocity + inside.angular_velocity,
-        };
-        let smooth = |before: Speed| {
-            let change = (measured.velocity - before.velocity).length()
-                + (measured.angular_velocity - before.angular_velocity).length() * reach;
-            change <= LARGEST_CHANGE_OF_SPEED
-        };
-        if jumps {
-            (self.measured, self.believed) = default();
-        } else {
-            let goes_on = smooth(self.measured) || smooth(self.believed);
-            self.measured = measured;
-            self.believed = if goes_on { measured } else { Speed::default() };
-        }
-        (self.believed != Speed::default()).then_some(self.believed)
-    }
-}
-
-impl Speed {
-    /// How fast something goes from one place to the other in so many seconds.
-    fn between(last: Isometry3d, now: Isometry3d, seconds: f32) -> Self {
-        if last == now {
-            return Self::default();
-        }
-        Self {
-            velocity: Vec3::from(now.translation - last.translation) / seconds,
-            angular_velocity: (now.rotation * last.rotation.inverse()).to_scaled_axis() / seconds,
         }
     }
 }

@@ -121,14 +121,15 @@ impl<S: Scalar> WallShape<S> {
         }
     }
 
-    /// Tests for equal shapes in one place; shared meshes and height fields compare by pointer.
-    pub(super) fn is_same_placement(&self, other: &Self) -> bool {
+    /// Tests for equal shapes in one place; that of large ones is asked first.
+    pub(super) fn is_same(&self, other: &Self) -> bool {
         match (self, other) {
-            (Self::Mesh(one, pose), Self::Mesh(two, at)) => Arc::ptr_eq(one, two) && pose == at,
-            (Self::HeightField(one, pose), Self::HeightField(two, at)) => {
-                Arc::ptr_eq(one, two) && pose == at
+            (Self::Mesh(one, pose), Self::Mesh(two, at)) => {
+                pose == at && (Arc::ptr_eq(one, two) || one == two)
             }
-            (Self::Mesh(..) | Self::HeightField(..), _) => false,
+            (Self::HeightField(one, pose), Self::HeightField(two, at)) => {
+                pose == at && (Arc::ptr_eq(one, two) || one == two)
+            }
             _ => self == other,
         }
     }

@@ -157,9 +157,10 @@ impl<S: Scalar> Walls<S> {
             count
         };
         let same = parts(&shape) == parts(&self.shapes[row]);
-        if !shape.is_same_placement(&self.shapes[row]) {
-            self.moved.set(row, Some(()), self.shapes.len());
+        if shape.is_same(&self.shapes[row]) {
+            return Ok(());
         }
+        self.moved.set(row, Some(()), self.shapes.len());
         self.change(&shape, if same { Dirty::Poses } else { Dirty::All });
         let [old, new] = [&self.shapes[row], &shape].map(WallShape::bounding_box);
         self.log_change(old.zip(new).map(|(old, new)| old.union(&new)));
