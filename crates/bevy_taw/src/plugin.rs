@@ -12,7 +12,7 @@ use crate::diagnostics::{self, StepTimes};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::layers::CollisionLayers;
 use crate::messages::{self, Touches};
-use crate::refusal::{self, InputRefused, MarbleStopped, Told, report};
+use crate::refusal::{self, InputRefused, MarbleStopped, Refusals, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::snapshot::RowRemoved;
 use crate::swarm::{self, TawSwarmModel};
@@ -250,14 +250,24 @@ fn end_step(mut world: ResMut<TawWorld>) {
     world.end_step();
 }
 
-fn integrate(mut world: ResMut<TawWorld>, delta: Res<SubstepDelta>, mut times: ResMut<StepTimes>) {
-    times.integrate.time(|| report("integrate", world.integrate(delta.0)));
+fn integrate(
+    mut world: ResMut<TawWorld>,
+    delta: Res<SubstepDelta>,
+    mut times: ResMut<StepTimes>,
+    mut refusals: Refusals,
+) {
+    let integrated = times.integrate.time(|| world.integrate(delta.0));
+    world.refused = !refusals.check(None, integrated);
 }
 
 fn generate_contacts(mut world: ResMut<TawWorld>, mut times: ResMut<StepTimes>) {
-    times.generate_contacts.time(|| world.generate_contacts());
+    if !world.refused {
+        times.generate_contacts.time(|| world.generate_contacts());
+    }
 }
 
 fn restitute(mut world: ResMut<TawWorld>, delta: Res<SubstepDelta>, mut times: ResMut<StepTimes>) {
-    times.restitute.time(|| report("restitute", world.restitute(delta.0)));
+    if !world.refused {
+        times.restitute.time(|| report("restitute", world.restitute(delta.0)));
+    }
 }

@@ -55,6 +55,8 @@ pub struct TawWorld {
     pub(crate) just_restored: bool,
     /// The walls' version when they were last gathered.
     pub(crate) walls_gathered: u64,
+    /// Whether the world refused to integrate, and with it the rest of the substep.
+    pub(crate) refused: bool,
 }
 
 impl TawWorld {

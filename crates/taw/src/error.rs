@@ -79,6 +79,14 @@ pub enum Error {
     /// A node would become its own ancestor.
     #[error("the node {0:?} carries its new parent")]
     Cycle(NodeId),
+    /// More pairs of marbles overlap than a step takes.
+    #[error("at least {pairs} pairs of marbles overlap, and a step takes at most {max}")]
+    TooManyPairs {
+        /// Number of pairs that overlap for certain.
+        pairs: u64,
+        /// Largest allowed number.
+        max: u64,
+    },
     /// Indices of 32 bits are exhausted.
     #[error("the world holds {0} rows already, which is all that a handle can name")]
     Full(usize),

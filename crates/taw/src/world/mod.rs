@@ -4,6 +4,7 @@ mod changed_rows;
 mod contact_limit;
 mod contact_memory;
 mod continuous;
+mod crowding;
 mod displacement;
 mod energy;
 mod energy_audit;

@@ -3,6 +3,7 @@
 
 use super::contact_limit::ContactLimit;
 use super::continuous::Continuous;
+use super::crowding::CrowdCell;
 use super::energy_audit::AuditState;
 use super::narrow_phase::Candidate;
 use super::quarantine::StoredPoses;
@@ -21,6 +22,8 @@ pub(super) struct Scratch<S> {
     /// Rows that the current verb has stopped.
     pub stopped: Vec<u32>,
     pub stored_poses: StoredPoses<S>,
+    /// Cells of marbles, to count those that share one.
+    pub crowd_cells: Vec<CrowdCell>,
     pub contact_limit: ContactLimit<S>,
     /// Speculative margin: maximum separation of a contact, in metres. Gravity closes it within two
     /// substeps, for a response that looks ahead.
@@ -51,6 +54,7 @@ impl<S: Scalar> Default for Scratch<S> {
             images: Images::default(),
             stopped: Vec::new(),
             stored_poses: StoredPoses::default(),
+            crowd_cells: Vec::new(),
             contact_limit: ContactLimit::default(),
             reach: S::zero(),
             columns: SolverColumns::default(),

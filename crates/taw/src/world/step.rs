@@ -19,8 +19,9 @@ impl<S: Scalar> World<S> {
     /// [`World::TIMES`]; [`Error::UnsupportedShape`] for a capsule in a world that is event-driven,
     /// periodic, or steps by `SoftStep`; [`Error::OutOfRange`] for a marble too large for its
     /// [period](Self::set_period), and by `SoftStep` for one that was set to a radius of less than
-    /// 1e-9 m, or to a position, velocity or surface speed of over 1e12 m or m/s. Then nothing has
-    /// changed.
+    /// 1e-9 m, or to a position, velocity or surface speed of over 1e12 m or m/s;
+    /// [`Error::TooManyPairs`] if more than [`World::MAX_PAIRS`] overlap, as from some 16,400 marbles
+    /// at one point on. Then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
         let substep = self.validated_substep(dt)?;
         self.begin_step();
@@ -45,6 +46,7 @@ impl<S: Scalar> World<S> {
     pub fn integrate(&mut self, dt: S) -> Result<(), Error> {
         let dt = Self::validated_dt(dt)?;
         self.check_shapes()?;
+        self.check_crowding()?;
         self.audit_before();
         method_of(self.settings.model.response).integrate(self, dt)
     }
