@@ -149,7 +149,7 @@ struct Storm {
     /// Iterations of all marbles [default: random]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     iterations: Option<u32>,
-    /// Where failures go, as files for --replay [default: nowhere]
+    /// Where failures go, as files for --replay; of --replay, too [default: nowhere]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Writes failures as they are.
@@ -309,10 +309,19 @@ fn storm(options: Storm) -> Result<ExitCode, Box<dyn Error>> {
                 name.parse().map_err(|other| format!("{name}: {error}, and {other}"))?,
             ),
         };
-        let text = storm::replay(&settings.apply(case));
+        let case = settings.apply(case);
+        let (text, failures) = storm::replay(&case);
         print!("{text}");
-        let held = text.ends_with("all held\n");
-        return Ok(if held { ExitCode::SUCCESS } else { ExitCode::FAILURE });
+        if let Some(out) = &options.out {
+            let stem = std::path::Path::new(&name).file_stem().unwrap_or_default();
+            for failure in &failures {
+                let case = case.clone();
+                let stem = stem.to_string_lossy();
+                let file = storm::write(&stem, case, failure, !options.no_shrink, out)?;
+                println!("{}", file.display());
+            }
+        }
+        return Ok(if failures.is_empty() { ExitCode::SUCCESS } else { ExitCode::FAILURE });
     }
     let plan = storm::Plan {
         scenes: options.scenes,

@@ -22,4 +22,4 @@ pub use observe::{Body, Snapshot};
 pub use report::{Tally, table};
 pub use run::{Failure, Pulse, Verdict, run, run_for};
 pub use shrink::{shrink, shrink_by};
-pub use weather::{Plan, Settings, Storm, replay, weather};
+pub use weather::{Plan, Settings, Storm, replay, weather, write};

@@ -180,7 +180,8 @@ fn report(plan: &Plan, verdicts: &BTreeMap<Name, Verdict>) -> std::io::Result<St
             if let Some(out) = &plan.out
                 && *count <= plan.keep
             {
-                file = Some(write(plan, *name, failure, out)?);
+                let case = plan.settings.apply(generate(*name));
+                file = Some(write(&name.to_string(), case, failure, plan.shrink, out)?);
             }
             storm.failures.push((*name, failure.clone(), file));
         }
@@ -188,17 +189,22 @@ fn report(plan: &Plan, verdicts: &BTreeMap<Name, Verdict>) -> std::io::Result<St
     Ok(storm)
 }
 
-fn write(
-    plan: &Plan,
-    name: Name,
+/// Writes a case that failed, up to the step in which it did, or the smallest that still fails. Returns
+/// the file.
+///
+/// # Errors
+/// What writing a file to `out` may give.
+pub fn write(
+    name: &str,
+    case: Case,
     failure: &Failure,
+    shrinks: bool,
     out: &std::path::Path,
 ) -> std::io::Result<PathBuf> {
     let invariant = failure.finding.invariant;
-    let mut case = Case { broke: Some(invariant), ..plan.settings.apply(generate(name)) };
-    case.steps = failure.step.max(1);
+    let mut case = Case { broke: Some(invariant), steps: failure.step.max(1), ..case };
     // A hung case cannot be run again.
-    if plan.shrink && invariant != Invariant::Ends {
+    if shrinks && invariant != Invariant::Ends {
         case = shrink(&case, invariant, SHRINK_FOR);
     }
     std::fs::create_dir_all(out)?;
@@ -208,9 +214,10 @@ fn write(
     Ok(file)
 }
 
-/// Runs a case and says what came of it, with the last steps of the body that it is about.
+/// Runs a case and says what came of it, with the last steps of the body that it is about, and what
+/// failed.
 #[must_use]
-pub fn replay(case: &Case) -> String {
+pub fn replay(case: &Case) -> (String, Vec<Failure>) {
     let verdict = run_for(case, case.broke, &Pulse::default());
     let mut text = format!("{}\n", case.scene.description);
     let _ = writeln!(text, "{:?} {} step {} s", case.model, case.number, case.step);
@@ -230,5 +237,5 @@ pub fn replay(case: &Case) -> String {
     if verdict.failures.is_empty() {
         text += "all held\n";
     }
-    text
+    (text, verdict.failures)
 }

@@ -109,6 +109,7 @@ pub(crate) struct Scratch<S> {
     energies: Vec<IslandEnergy<S>>,
     full_restitution: Vec<FullRestitution<S>>,
     separations: Vec<S>,
+    uncorrected: Vec<Point3<S>>,
 }
 
 impl<S: Scalar> Scratch<S> {
@@ -283,6 +284,7 @@ pub(crate) fn solve_contacts<S: Scalar>(
         energies,
         full_restitution,
         separations,
+        uncorrected,
     } = scratch;
     initial_velocity.clear();
     initial_velocity.extend_from_slice(marbles.velocity);
@@ -298,7 +300,7 @@ pub(crate) fn solve_contacts<S: Scalar>(
         marbles.resolve_jams(constraints, islands, energies, rows, settings);
     }
     marbles.update_positions(initial_velocity, constraints, context);
-    marbles.solve_positions(constraints, context, separations);
+    marbles.solve_positions(constraints, context, separations, uncorrected);
     store_impulses(constraints, contacts, cache);
     marbles.quarantine_non_finite(constraints, quarantined);
 }

@@ -1,11 +1,15 @@
 //! Position update and position correction, after velocities are solved.
 
 use super::{Colliders, Constraint, Context};
-use crate::math::{Point3, Scalar, Vec3, is_finite_point};
+use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
 use crate::response::{Material, SolverBodies};
 
 /// Iterations of the position solver over penetrating contacts.
 const POSITION_ITERATIONS: u32 = 3;
+
+/// Largest distance by which marbles push each other apart in a substep, over the radius of the one that
+/// moves: its center stays where its contacts with walls are known.
+const MAX_CORRECTION: f64 = 0.5;
 
 impl<S: Scalar> SolverBodies<'_, S> {
     /// Updates positions by the solver's velocity changes since `initial_velocity`: those of a
@@ -38,19 +42,23 @@ impl<S: Scalar> SolverBodies<'_, S> {
     }
 
     /// Solves positions (nonlinear Gauss–Seidel): resolves half of the penetration beyond the slop
-    /// per iteration, by mass, without pushing anything deeper into a wall than it was.
+    /// per iteration, by mass, without pushing anything deeper into a wall than it was, nor far by
+    /// other marbles.
     pub(super) fn solve_positions(
         &mut self,
         constraints: &[Constraint<S>],
         context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
         separations: &mut Vec<S>,
+        uncorrected: &mut Vec<Point3<S>>,
     ) {
+        uncorrected.clear();
+        uncorrected.extend_from_slice(self.position);
         let walls = constraints.iter().take_while(|c| c.a.marble().is_none());
         separations.clear();
         separations.extend(walls.clone().map(|c| self.min_separation(c, context)));
         for _ in 0..POSITION_ITERATIONS {
             for c in constraints {
-                self.solve_position(c, context);
+                self.solve_position(c, context, uncorrected);
             }
             for (c, separation) in walls.clone().zip(&*separations) {
                 self.restore_wall_separation(c, *separation, context);
@@ -104,6 +112,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &mut self,
         c: &Constraint<S>,
         context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        uncorrected: &[Point3<S>],
     ) {
         let contact =
             self.normal_and_separation(self.position, c.a, c.b, c.axis_offset, context.walls);
@@ -113,10 +122,19 @@ impl<S: Scalar> SolverBodies<'_, S> {
             return;
         }
         let pseudo_impulse = normal * (excess * S::from_f64(0.5) / c.inverse_effective_mass.normal);
-        for (row, pseudo_impulse) in [(Some(c.b), pseudo_impulse), (c.a.marble(), -pseudo_impulse)]
-        {
-            let Some(row) = row else { continue };
-            self.set_position(row, self.position[row] + pseudo_impulse * self.inverse_mass[row]);
+        let moves = [(Some(c.b), pseudo_impulse), (c.a.marble(), -pseudo_impulse)]
+            .map(|(row, impulse)| row.map(|row| (row, impulse * self.inverse_mass[row])));
+        let mut part = S::one();
+        if c.a.marble().is_some() {
+            for (row, displacement) in moves.into_iter().flatten() {
+                let left = self.radius[row] * S::from_f64(MAX_CORRECTION)
+                    - length(self.position[row] - uncorrected[row]);
+                // One part for both, which keeps their center of mass.
+                part = part.min(left.max(S::zero()) / length(displacement).max(left));
+            }
+        }
+        for (row, displacement) in moves.into_iter().flatten() {
+            self.set_position(row, self.position[row] + displacement * part);
         }
     }
 
