@@ -18,11 +18,6 @@ fn main() -> AppExit {
     let Options { picture } = Options::parse();
     App::new()
         .add_plugins((ExamplePlugins { title: "Hello", picture }, TawPlugins))
-        .insert_resource(TawModel(Model {
-            response: Response::Impulse,
-            rotation: Rotation::Dynamic,
-            ..default()
-        }))
         .add_systems(Startup, spawn)
         .run()
 }

@@ -74,7 +74,7 @@ fn panels(
     mut bag: ResMut<Bag>,
     mut tilt: ResMut<Tilt>,
     mut score: ResMut<Score>,
-    mut physics: (ResMut<TawModel>, ResMut<Gravity>, ResMut<MadeOfBoxes>),
+    mut physics: (ResMut<TawModel>, ResMut<Gravity>, ResMut<MadeOfBoxes>, Res<IgnoredComponents>),
     mut time: ResMut<Time<Virtual>>,
     mut orders: MessageWriter<Order>,
     mut steps: MessageWriter<SingleStep>,
@@ -90,6 +90,7 @@ fn panels(
         section(ui, "Time", true, |ui| game_time(ui, &mut time, &mut orders, &mut steps));
         section(ui, "Physics", true, |ui| {
             debug_ui::model(ui, &mut physics.0);
+            debug_ui::ignored(ui, &physics.3);
             debug_ui::gravity(ui, &mut physics.1);
             let mut degrees = tilt.limit.to_degrees();
             let slider = egui::Slider::new(&mut degrees, 0.0..=45.0).suffix("°").text("Tilt limit");

@@ -5,6 +5,7 @@ mod board;
 mod capsules;
 mod contacts;
 mod disabling;
+mod first_contact;
 mod input;
 mod interpolation;
 mod layers;

@@ -8,8 +8,8 @@ use bevy_taw::prelude::*;
 /// The length of a fixed step. A power of two, so that frames add up exactly.
 pub const STEP: f32 = 1.0 / 64.0;
 
-/// An app whose frames are one fixed step long each, and whose `Transform`s are
-/// those of the last step.
+/// An app with the lecture's model whose frames are one fixed step long each, and whose
+/// `Transform`s are those of the last step.
 pub fn app() -> App {
     app_with(TawPlugin)
 }
@@ -23,6 +23,7 @@ pub fn app_with<M>(physics: impl Plugins<M>) -> App {
     let mut app = App::new();
     app.add_plugins((MinimalPlugins, TransformPlugin));
     app.add_plugins(physics);
+    app.insert_resource(TawModel(Model::default()));
     app.insert_resource(Time::<Fixed>::from_seconds(f64::from(STEP)));
     frame_length(&mut app, STEP);
     app.finish();

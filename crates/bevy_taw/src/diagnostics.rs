@@ -214,10 +214,11 @@ pub(crate) struct Stopwatch(Duration);
 
 impl Stopwatch {
     /// Runs `work` and adds the time that it took.
-    pub fn time(&mut self, work: impl FnOnce()) {
+    pub fn time<T>(&mut self, work: impl FnOnce() -> T) -> T {
         let start = Instant::now();
-        work();
+        let result = work();
         self.0 += start.elapsed();
+        result
     }
 }
 

@@ -41,6 +41,7 @@
 //! | [`swarm`] | marbles in bulk that are no entities |
 //! | [`messages`] | contacts that start, go on and end |
 //! | [`snapshot`] | back in time, and rows without entities |
+//! | [`ignored`] | components that the model does not read |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
 //! | [`diagnostics`] | step time and counts |
 //! | [`wall_motion`] | speed of walls that move |
@@ -73,6 +74,7 @@ mod gather_walls;
 pub mod gizmos;
 #[cfg(feature = "trade")]
 pub mod governor;
+pub mod ignored;
 pub mod interpolation;
 pub mod layers;
 pub mod messages;
@@ -103,6 +105,7 @@ pub mod prelude {
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;
+    pub use crate::ignored::IgnoredComponents;
     pub use crate::layers::{CollisionLayers, LayerMask, PhysicsLayer};
     pub use crate::messages::{ContactEnded, ContactOngoing, ContactPair, ContactStarted};
     pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};

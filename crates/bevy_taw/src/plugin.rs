@@ -9,6 +9,7 @@ use crate::components::{
     SurfaceMaterial, Teleport, Velocity,
 };
 use crate::diagnostics::{self, StepTimes};
+use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::layers::CollisionLayers;
 use crate::messages::{self, Touches};
@@ -62,12 +63,14 @@ pub enum TawSystems {
 /// The schedule of one substep.
 ///
 /// A system between [`TawSystems::GenerateContacts`] and [`TawSystems::Restitute`]
-/// can look at the contacts and change them:
+/// can look at the contacts, and change them for responses other than
+/// [`SoftStep`](taw::response::Response::SoftStep), which finds its own:
 ///
 /// ```
 /// # use bevy::prelude::*;
 /// # use bevy_taw::prelude::*;
 /// # let mut app = App::new();
+/// app.insert_resource(TawModel(Model { response: Response::Impulse, ..Model::GAME }));
 /// // A ghost world: marbles meet walls only.
 /// let ghosts = |mut world: ResMut<TawWorld>| world.contacts.mm.clear();
 /// app.add_systems(
@@ -96,6 +99,7 @@ impl Plugin for TawPlugin {
             .init_resource::<gather::ChangedMarbles>()
             .init_resource::<Touches>()
             .init_resource::<Told>()
+            .init_resource::<IgnoredComponents>()
             .init_resource::<gather_walls::FrameTime>()
             .add_message::<InputRefused>()
             .add_message::<RowRemoved>()
@@ -165,6 +169,7 @@ fn add_step(app: &mut App) {
         (
             diagnostics::update_energy_audit,
             gather::settings,
+            ignored::find,
             gather_walls::walls,
             gather::marbles,
             gather::forces,

@@ -7,11 +7,30 @@ use taw::world::{Marble, MarbleId, Model, WallId};
 
 use crate::reflect::ModelReflect;
 
-/// How to step. May change at any time; what cannot be right is refused with an
-/// [`InputRefused`](crate::refusal::InputRefused), and the last good one stays.
-#[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Eq, Deref, DerefMut, Reflect)]
+/// Simulation settings: by default [`Model::GAME`].
+///
+/// They may change at any time; what cannot be right is refused with an
+/// [`InputRefused`](crate::refusal::InputRefused), and the last good one stays. Components that a
+/// model does not read are listed in [`IgnoredComponents`](crate::ignored::IgnoredComponents).
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// # let mut app = App::new();
+/// app.insert_resource(TawModel(Model { substeps: 8, ..Model::GAME })) // finer than by default
+///     .insert_resource(TawModel(Model::EXACT)) // few marbles: each collision at its time of impact
+///     .insert_resource(TawModel(Model::default())); // the lecture's: positions only
+/// ```
+#[derive(Resource, Clone, Copy, Debug, PartialEq, Eq, Deref, DerefMut, Reflect)]
 #[reflect(Resource, Debug, Default, PartialEq)]
 pub struct TawModel(#[reflect(remote = ModelReflect)] pub Model);
+
+impl Default for TawModel {
+    /// [`Model::GAME`].
+    fn default() -> Self {
+        Self(Model::GAME)
+    }
+}
 
 /// The gravity on every marble, in m/s² in world space. A gravity that is not
 /// finite is refused like a wrong [`TawModel`].

@@ -32,6 +32,7 @@ use taw::swarm::{SwarmModel, Tier};
 use taw::world::{Detection, Precision};
 
 use crate::diagnostics as paths;
+use crate::ignored::IgnoredComponents;
 use crate::resources::{Gravity, TawModel};
 use crate::swarm::TawSwarmModel;
 
@@ -65,6 +66,14 @@ pub fn model(ui: &mut Ui, model: &mut ResMut<TawModel>) {
         ui.end_row();
     });
     model.set_if_neq(TawModel(chosen));
+}
+
+/// Components that the model does not read, if there are any.
+pub fn ignored(ui: &mut Ui, ignored: &IgnoredComponents) {
+    if !ignored.is_empty() {
+        let names = ignored.join(", ");
+        ui.colored_label(ui.visuals().warn_fg_color, format!("The model ignores {names}"));
+    }
 }
 
 /// A row with a name and a box to choose from.

@@ -9,8 +9,9 @@ use crate::response::Response;
 /// ```
 /// use taw::prelude::*;
 ///
-/// let finer = Model { substeps: 4, ..Model::default() };
-/// assert_eq!(finer.response, Response::Displacement);
+/// let finer = Model { substeps: 8, ..Model::GAME };
+/// assert_eq!(finer.response, Response::SoftStep);
+/// assert_eq!(Model::default().response, Response::Displacement);
 /// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -74,20 +75,32 @@ pub enum Precision {
 }
 
 impl Default for Model {
+    /// The lecture's: positions only, by [`Response::Displacement`], without rotation, in one step.
     fn default() -> Self {
-        Self {
-            integrator: Integrator::SemiImplicitEuler,
-            response: Response::Displacement,
-            rotation: Rotation::None,
-            precision: Precision::Plain,
-            detection: Detection::Swept,
-            substeps: 1,
-            iterations: 8,
-        }
+        let (response, rotation) = (Response::Displacement, Rotation::None);
+        Self { response, rotation, substeps: 1, ..Self::GAME }
     }
 }
 
 impl Model {
+    /// Marbles of a game: masses, restitution, friction and rotation, by [`Response::SoftStep`] in four
+    /// substeps. Nothing tunnels, walls may move, what lies still sleeps; made for
+    /// thousands of balls. Balls only.
+    pub const GAME: Self = Self {
+        integrator: Integrator::SemiImplicitEuler,
+        response: Response::SoftStep,
+        rotation: Rotation::Dynamic,
+        precision: Precision::Plain,
+        detection: Detection::Swept,
+        substeps: 4,
+        iterations: 8,
+    };
+
+    /// Few marbles that have to be exact, as in billiards, cradles and mazes: each collision at its
+    /// time of impact, by [`Response::EventDriven`]. Balls only.
+    pub const EXACT: Self =
+        Self { response: Response::EventDriven, substeps: 1, iterations: 50, ..Self::GAME };
+
     /// Maximum number of [substeps](Model::substeps).
     pub const MAX_SUBSTEPS: u32 = 1000;
     /// Maximum number of [iterations](Model::iterations).

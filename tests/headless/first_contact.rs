@@ -1,0 +1,113 @@
+//! Games that set no model.
+
+use bevy::prelude::*;
+use bevy_taw::prelude::*;
+
+use crate::scene;
+
+/// An app as it is when nothing but the plugin is added.
+fn app() -> App {
+    let mut app = scene::app();
+    app.insert_resource(TawModel::default());
+    app
+}
+
+#[test]
+fn the_default_knows_mass_friction_bounce_and_rotation() {
+    let mut app = app();
+    scene::floor(&mut app);
+    let bouncy = SurfaceMaterial { restitution: 0.8, ..default() };
+    let high = scene::drop_marble(&mut app, 0.1, Vec3::new(0.0, 1.1, 0.0));
+    let rough = SurfaceMaterial { friction: 0.5, restitution: 0.0, ..default() };
+    let slider = scene::drop_marble(&mut app, 0.1, Vec3::new(3.0, 0.1, 0.0));
+    let (light, heavy) = (MarbleMass::Kilograms(1.0), MarbleMass::Kilograms(9.0));
+    let hits = scene::drop_marble(&mut app, 0.1, Vec3::new(0.0, 0.1, 5.0));
+    let hit = scene::drop_marble(&mut app, 0.1, Vec3::new(1.0, 0.1, 5.0));
+    let smooth = SurfaceMaterial { friction: 0.0, restitution: 1.0, ..default() };
+    let mut insert = |entity: Entity, bundle: (SurfaceMaterial, Velocity, MarbleMass)| {
+        app.world_mut().entity_mut(entity).insert((bundle, AngularVelocity::default()));
+    };
+    insert(high, (bouncy, Velocity::default(), light));
+    insert(slider, (rough, Velocity(Vec3::Z), light));
+    insert(hits, (smooth, Velocity(Vec3::X * 2.0), heavy));
+    insert(hit, (smooth, Velocity::default(), light));
+    let mut highest = 0.0_f32;
+    for frame in 0..120 {
+        app.update();
+        // The first bounce is after .45 s.
+        if frame > 35 {
+            highest = highest.max(scene::position(&app, high).y - 0.1);
+        }
+    }
+    assert!((highest - 0.64).abs() < 0.02, "bounces {highest} m high");
+    // Five sevenths of the speed are left when friction has made it roll.
+    let velocity = |entity| **app.world().get::<Velocity>(entity).unwrap();
+    let spin = **app.world().get::<AngularVelocity>(slider).unwrap();
+    assert!((velocity(slider).z - 5.0 / 7.0).abs() < 0.01, "rolls at {}", velocity(slider));
+    assert!((spin.x - velocity(slider).z / 0.1).abs() < 0.1, "turns at {spin}");
+    let momentum = velocity(hits) * 9.0 + velocity(hit);
+    assert!((momentum.x - 18.0).abs() < 0.01, "momentum {momentum}");
+    assert!((velocity(hits).x - 1.6).abs() < 0.02 && (velocity(hit).x - 3.6).abs() < 0.02);
+}
+
+#[test]
+fn by_default_nothing_tunnels_and_a_tilting_board_keeps_its_marbles() {
+    let mut app = app();
+    let board = scene::board(&mut app);
+    let plate = Wall::from(Cuboid::new(0.02, 2.0, 2.0));
+    app.world_mut().spawn((plate, Transform::from_xyz(30.0, 1.0, 0.0)));
+    let fast = scene::drop_marble(&mut app, 0.1, Vec3::new(29.0, 1.0, 0.0));
+    app.world_mut().entity_mut(fast).insert((Velocity(Vec3::X * 300.0), GravityScale(0.0)));
+    let marbles = scene::drop_marbles(&mut app, 60);
+    let tilt = move |time: Res<Time>, mut transforms: Query<&mut Transform>| {
+        let angle = 0.2 * (time.elapsed_secs() * 1.5).sin();
+        transforms.get_mut(board).unwrap().rotation = Quat::from_rotation_z(angle);
+    };
+    app.add_systems(Update, tilt);
+    scene::frames(&mut app, 640);
+    assert!(scene::position(&app, fast).x < 30.0);
+    let frame = *app.world().get::<Transform>(board).unwrap();
+    for marble in marbles {
+        let place = frame.rotation.inverse() * scene::position(&app, marble);
+        assert!(place.x.abs() < scene::HALF && place.z.abs() < scene::HALF, "{place}");
+        assert!((0.1..4.0).contains(&place.y), "{place}");
+    }
+}
+
+#[test]
+fn components_that_the_model_ignores_are_named() {
+    let mut app = app();
+    let ignored = |app: &App| app.world().resource::<IgnoredComponents>().to_vec();
+    let marble = scene::drop_marble(&mut app, 0.1, Vec3::ZERO);
+    let optional =
+        (SurfaceMaterial::default(), MarbleMass::Kilograms(2.0), AngularVelocity::default());
+    app.world_mut().entity_mut(marble).insert((optional, MarbleRotation::default()));
+    app.update();
+    assert_eq!(ignored(&app), [""; 0]);
+    app.world_mut().entity_mut(marble).insert(MarbleIntegrator::default());
+    app.update();
+    assert_eq!(ignored(&app), ["MarbleIntegrator"]);
+    app.insert_resource(TawModel(Model::default()));
+    app.update();
+    assert_eq!(
+        ignored(&app),
+        ["SurfaceMaterial", "MarbleMass", "AngularVelocity", "MarbleRotation"]
+    );
+    app.insert_resource(TawModel(Model::EXACT));
+    app.update();
+    assert_eq!(ignored(&app), [""; 0]);
+}
+
+#[test]
+fn a_spawner_at_one_point_makes_a_heap_and_no_tower() {
+    let mut app = app();
+    scene::floor(&mut app);
+    let mut marbles = Vec::new();
+    for _ in 0..60 {
+        marbles.push(scene::drop_marble(&mut app, 0.1, Vec3::new(0.0, 8.0, 0.0)));
+        scene::frames(&mut app, 16);
+    }
+    scene::frames(&mut app, 128);
+    let highest = marbles.iter().map(|it| scene::position(&app, *it).y).fold(0.0, f32::max);
+    assert!(highest < 1.0, "{highest} m high");
+}
