@@ -6,7 +6,7 @@ use super::params::{Pass, SolverParams};
 use super::rolling::RollingInertia;
 use super::{
     ALL, ContactImpulses, StruckContact, effective_mass, gather, inverse_mass,
-    normal_and_separation, scatter,
+    normal_and_separation, scatter, tipping,
 };
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::math::RealVector;
@@ -242,13 +242,15 @@ impl SolverColumns<'_> {
     ) -> bool {
         let zero = L::splat(0.0);
         let (normal, approach_speed) = meeting(params, [&at_a, &at_b], [&a, &b]);
+        let tipping = tipping::tip(batch, params, normal, approach_speed);
         // What does not bounce is stopped by its contact.
         let approach_speed = if OWN {
             numbers.restitution.select_gt(zero, approach_speed, zero)
         } else {
             approach_speed
         };
-        if approach_speed.gt_mask(zero) == 0 {
+        let bounces = approach_speed.gt_mask(zero) != 0;
+        if !bounces && tipping.is_none() {
             return false;
         }
         let relative = Vec3Wide::of(&b) - Vec3Wide::of(&a);
@@ -257,13 +259,19 @@ impl SolverColumns<'_> {
         let slip = slip(relative, normal, &spins);
         let one = L::splat(1.0);
         let stopping = slip * (zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
-        let impulse = FrictionCone::new(numbers.friction).clamp(ContactImpulse {
-            normal: mass * approach_speed * (one + numbers.restitution),
+        let restitution = tipping.map_or(numbers.restitution, |tipping| {
+            tipping::restitution(tipping, numbers.restitution)
+        });
+        let mut impulse = FrictionCone::new(numbers.friction).clamp(ContactImpulse {
+            normal: mass * approach_speed * (one + restitution),
             tangent: stopping * (one + numbers.tangential_restitution),
         });
+        if let Some(tipping) = tipping {
+            impulse.tangent = impulse.tangent + tipping * mass;
+        }
         let factors = numbers.inertia_factors;
         self.apply_impulse::<L, false>(batch, [a, b], spins, normal, impulse, factors);
-        true
+        bounces
     }
 
     /// Moves apart what overlaps. That changes no velocity: overlap is not energy.

@@ -13,6 +13,7 @@ mod displace;
 mod integrate;
 mod params;
 mod rolling;
+mod tipping;
 
 pub(super) use backing::LOST;
 pub(super) use contact::{SolverColumns, solve};

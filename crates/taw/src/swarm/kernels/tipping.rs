@@ -1,0 +1,52 @@
+//! Balls that fall exactly onto the top of others. In numbers they could stand there for ever, one upon
+//! the other; no real ones are that even.
+
+use super::direction;
+use super::params::SolverParams;
+use crate::math::RealVector;
+use crate::swarm::batches::Batch;
+use crate::swarm::simd::{LANES, Simd};
+use crate::swarm::vec3_wide::Vec3Wide;
+
+/// Sine of the angle between normal and gravity up to which a ball is on the top of another.
+const UPRIGHT: f32 = 1e-6;
+/// Speed across the normal after an impact, over the approach speed.
+const TIPPING: f32 = 1e-3;
+/// Largest coefficient of restitution of such an impact: what moves across the normal takes its energy
+/// from the bounce, `TIPPING`² and at most five halves as much in spin.
+const RESTITUTION: f32 = 1.0 - 4.0 * TIPPING * TIPPING;
+
+/// Velocities by which pairs leave the top that one falls onto at this approach speed, across the normal, in
+/// a direction of each pair's own. None if there is no such pair.
+#[inline(always)]
+pub(super) fn tip<L: Simd>(
+    batch: &Batch,
+    params: &SolverParams,
+    normal: Vec3Wide<L>,
+    approach_speed: L,
+) -> Option<Vec3Wide<L>> {
+    let zero = L::splat(0.0);
+    let gravity = Vec3Wide::of(&params.gravity.map(L::splat));
+    let across = normal.cross(gravity);
+    let limit = gravity.dot(gravity) * L::splat(UPRIGHT * UPRIGHT);
+    let speed = limit.select_gt(across.dot(across), approach_speed, zero);
+    if speed.gt_mask(zero) == 0 {
+        return None;
+    }
+    let mut directions = [[0.0; LANES]; 3];
+    for lane in 0..LANES {
+        let direction = direction(batch.pair(lane));
+        for (axis, x) in directions.iter_mut().zip(direction) {
+            axis[lane] = x;
+        }
+    }
+    Some(Vec3Wide::load(&directions).reject_from(normal) * (speed * L::splat(TIPPING)))
+}
+
+/// Coefficient of restitution of pairs that leave a top by these velocities.
+#[inline(always)]
+pub(super) fn restitution<L: Simd>(tipping: Vec3Wide<L>, restitution: L) -> L {
+    let most = L::splat(RESTITUTION);
+    let most = restitution.select_gt(most, most, restitution);
+    tipping.dot(tipping).select_gt(L::splat(0.0), most, restitution)
+}
