@@ -8,6 +8,8 @@ mod impacts;
 mod leaning;
 #[path = "soft_step/moving_walls.rs"]
 mod moving_walls;
+#[path = "soft_step/overlaps.rs"]
+mod overlaps;
 #[path = "soft_step/state.rs"]
 mod state;
 #[path = "soft_step/tangential.rs"]

@@ -98,6 +98,7 @@ impl<S: Scalar> World<S> {
             tolerance: restitution_threshold * S::epsilon(),
             slop: length(self.settings.gravity) * dt * dt,
             max_relative_slop: S::from_f64(0.001),
+            max_relative_push: S::from_f64(0.5),
             resolve_jams: true,
         }
     }

@@ -51,6 +51,7 @@ fn restituted<S: Scalar>(
         tolerance: zero,
         slop: zero,
         max_relative_slop: zero,
+        max_relative_push: zero,
         resolve_jams: false,
     };
     let context = Context {

@@ -136,6 +136,7 @@ impl Cluster {
             // As deep as the largest separation that counts as contact.
             slop: 0.5 * PRESS_SPEED * PRESS_SPEED * acceleration * settings.dt * settings.dt,
             max_relative_slop: SLOP,
+            max_relative_push: f64::INFINITY,
             resolve_jams: false,
         };
         let mut quarantined = Vec::new(); // non-finite balls are quarantined after the substep

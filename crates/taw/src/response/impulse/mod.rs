@@ -65,6 +65,9 @@ pub(crate) struct SolverSettings<S> {
     pub slop: S,
     /// Allowed penetration over the smaller radius, at most.
     pub max_relative_slop: S,
+    /// Largest distance by which marbles push each other apart in a substep, over the radius of the one
+    /// that moves: its center stays where its contacts with walls are known.
+    pub max_relative_push: S,
     /// True to resolve jams; false where the caller does, which tries the walls' motion first.
     pub resolve_jams: bool,
 }

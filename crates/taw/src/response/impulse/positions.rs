@@ -7,10 +7,6 @@ use crate::response::{Material, SolverBodies};
 /// Iterations of the position solver over penetrating contacts.
 const POSITION_ITERATIONS: u32 = 3;
 
-/// Largest distance by which marbles push each other apart in a substep, over the radius of the one that
-/// moves: its center stays where its contacts with walls are known.
-const MAX_CORRECTION: f64 = 0.5;
-
 impl<S: Scalar> SolverBodies<'_, S> {
     /// Updates positions by the solver's velocity changes since `initial_velocity`: those of a
     /// bounce from its time of impact on, all others with the integrator's position weight.
@@ -127,10 +123,13 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let mut part = S::one();
         if c.a.marble().is_some() {
             for (row, displacement) in moves.into_iter().flatten() {
-                let left = self.radius[row] * S::from_f64(MAX_CORRECTION)
+                let distance = length(displacement);
+                let left = self.radius[row] * context.settings.max_relative_push
                     - length(self.position[row] - uncorrected[row]);
-                // One part for both, which keeps their center of mass.
-                part = part.min(left.max(S::zero()) / length(displacement).max(left));
+                if left < distance {
+                    // One part for both, which keeps their center of mass.
+                    part = part.min(left.max(S::zero()) / distance);
+                }
             }
         }
         for (row, displacement) in moves.into_iter().flatten() {

@@ -13,6 +13,7 @@ fn solver_settings(dt: f64) -> SolverSettings<f64> {
         tolerance: 0.0,
         slop: 0.0,
         max_relative_slop: 0.0,
+        max_relative_push: 0.0,
         resolve_jams: false,
     }
 }

@@ -395,12 +395,17 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let gap = [separation, parting];
             let fresh = numbers.fresh::<FIRST>(&params, places, velocity, before, gap);
             let mut spins: [[L; 4]; 2] = columns.spins(batch);
+            let grounded = spins[0][3].max(spins[1][3]);
             if BACKED {
                 StruckContact::note(struck, &params, parting, (i, &normal_impulse[i]));
             }
             let alone = effective_mass(&a, &b);
             let (target, softness) = if FIRST {
-                let (target, softness) = softness.at(separation, per_second);
+                // A load is soft. What overlaps without one, or deeper, is moved apart.
+                let [a, b] = [at[0][3], at[1][3]];
+                let slop = (a.max(b) - (a + b)) * L::splat(2.0 * params.slop);
+                let deepest = grounded.select_gt(L::splat(TOUCHING), slop, zero);
+                let (target, softness) = softness.at(separation.max(deepest), per_second);
                 (target, Some(softness))
             } else {
                 (zero - separation.max(zero) * per_second, None)
@@ -419,7 +424,6 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let change = impulse.solve(wanted, softness, &FrictionCone::new(numbers.friction));
             impulse.normal.store(&mut normal_impulse[i]);
             impulse.tangent.store(&mut tangent_impulse[i]);
-            let grounded = spins[0][3].max(spins[1][3]);
             for spin in &mut spins {
                 spin[3] = impulse.normal.select_gt(zero, grounded.max(L::splat(TOUCHING)), spin[3]);
             }
