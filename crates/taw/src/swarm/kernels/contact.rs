@@ -401,11 +401,10 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             }
             let alone = effective_mass(&a, &b);
             let (target, softness) = if FIRST {
-                // A load is soft. What overlaps without one, or deeper, is moved apart.
-                let [a, b] = [at[0][3], at[1][3]];
-                let slop = (a.max(b) - (a + b)) * L::splat(2.0 * params.slop);
-                let deepest = grounded.select_gt(L::splat(TOUCHING), slop, zero);
-                let (target, softness) = softness.at(separation.max(deepest), per_second);
+                // What nothing bears is moved apart without speed.
+                let resting = separation.max(zero);
+                let loaded = grounded.select_gt(L::splat(TOUCHING), separation, resting);
+                let (target, softness) = softness.at(loaded, per_second);
                 (target, Some(softness))
             } else {
                 (zero - separation.max(zero) * per_second, None)
