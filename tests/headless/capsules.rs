@@ -59,7 +59,7 @@ fn a_capsule_and_the_event_driven_response_refuse_each_other() {
     let refused = app.world().resource::<Messages<InputRefused>>();
     let why: Vec<_> =
         refused.iter_current_update_messages().map(|it| it.error.to_string()).collect();
-    assert!(why.iter().any(|why| why.ends_with("the model knows balls only")), "{why:?}");
+    assert!(why.iter().any(|why| why.ends_with("EventDriven knows balls only")), "{why:?}");
     let world = app.world().resource::<TawWorld>();
     assert_eq!(world.model().response, Response::Displacement, "it stays as it was");
     assert!(world.marbles.get(world.marbles.id(0).unwrap()).is_ok(), "{marble}");

@@ -111,3 +111,66 @@ fn a_spawner_at_one_point_makes_a_heap_and_no_tower() {
     let highest = marbles.iter().map(|it| scene::position(&app, *it).y).fold(0.0, f32::max);
     assert!(highest < 1.0, "{highest} m high");
 }
+
+#[test]
+fn a_marble_beyond_the_limits_is_refused_by_name_and_the_others_go_on() {
+    let far = |app: &mut App, entity: Entity| {
+        app.world_mut().get_mut::<Transform>(entity).unwrap().translation.x = 1e13;
+    };
+    let fast = |app: &mut App, entity: Entity| {
+        app.world_mut().entity_mut(entity).insert(Velocity(Vec3::X * 1e13));
+    };
+    let hit = |app: &mut App, entity: Entity| {
+        let impulse = ExternalImpulse { impulse: Vec3::X * 1e20, ..default() };
+        app.world_mut().entity_mut(entity).insert(impulse);
+    };
+    let whirl = |app: &mut App, entity: Entity| {
+        app.world_mut().entity_mut(entity).insert(AngularVelocity(Vec3::X * 1e14));
+    };
+    let ways: [&dyn Fn(&mut App, Entity); 4] = [&far, &fast, &hit, &whirl];
+    for (i, go) in ways.iter().enumerate() {
+        let mut app = app();
+        let bystander = scene::drop_marble(&mut app, 0.1, Vec3::Y * 40.0);
+        let bad = [1.0, 2.0].map(|x| scene::drop_marble(&mut app, 0.1, Vec3::X * x));
+        scene::frames(&mut app, 3);
+        for marble in bad {
+            go(&mut app, marble);
+        }
+        let mut told = Vec::new();
+        for _ in 0..64 {
+            app.update();
+            let messages = app.world().resource::<Messages<InputRefused>>();
+            told.extend(messages.iter_current_update_messages().map(|it| it.entity));
+        }
+        assert!(
+            told.len() == 2 && bad.iter().all(|bad| told.contains(&Some(*bad))),
+            "{i}: {told:?}"
+        );
+        let y = scene::position(&app, bystander).y;
+        assert!((y - 40.0 + 0.5 * 9.81 * 1.05_f32.powi(2)).abs() < 0.2, "{i}: at {y}");
+        // Set right, it is there again.
+        let right =
+            (Velocity::default(), AngularVelocity::default(), Transform::from_xyz(5.0, 0.0, 0.0));
+        app.world_mut().entity_mut(bad[0]).insert(right);
+        scene::frames(&mut app, 32);
+        assert!(scene::position(&app, bad[0]).y < -0.5, "{i}");
+    }
+}
+
+#[test]
+fn a_model_that_a_capsule_forbids_is_refused_each_time() {
+    let mut app = app();
+    app.insert_resource(TawModel(Model { response: Response::Impulse, ..Model::GAME }));
+    let capsule = scene::drop_marble(&mut app, 0.1, Vec3::ZERO);
+    app.world_mut().entity_mut(capsule).insert(HalfLength(0.3));
+    app.update();
+    for model in [Model::GAME, Model::EXACT] {
+        app.insert_resource(TawModel(model));
+        app.update();
+        let refused = app.world().resource::<Messages<InputRefused>>();
+        let refused: Vec<_> = refused.iter_current_update_messages().copied().collect();
+        let error = Refusal::ModelOfBalls(model.response);
+        assert_eq!(refused, [InputRefused { entity: Some(capsule), error }]);
+        assert_eq!(app.world().resource::<TawWorld>().model().response, Response::Impulse);
+    }
+}

@@ -216,8 +216,9 @@ pub struct SleepingDisabled;
 /// Makes a capsule of a marble: all points within its radius of a line along the entity's y
 /// axis, which goes this far both ways, in metres; like Bevy's `Capsule3d`. Zero is a ball.
 ///
-/// All responses but `EventDriven` and `SoftStep` know capsules: there a capsule is refused, and
-/// left out of the world until the model changes.
+/// All responses but `EventDriven` and `SoftStep`, the default, know capsules. By these two a new
+/// capsule is refused, and left out of the world until the model changes; and while the world has
+/// capsules, a [`TawModel`](crate::resources::TawModel) with one of the two is refused.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct HalfLength(pub f32);

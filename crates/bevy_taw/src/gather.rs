@@ -43,7 +43,11 @@ pub fn settings(
             taw::Error::UnsupportedShape(id) => world.marble_entities.get(&id).copied(),
             _ => None,
         };
-        refusals.check(capsule, Err(error));
+        let refusal = match capsule {
+            Some(_) => Refusal::ModelOfBalls(model.response),
+            None => error.into(),
+        };
+        refusals.check(capsule, Err(refusal));
     }
     let pull = to_vector(**gravity);
     if pull != world.gravity() {
@@ -452,6 +456,22 @@ pub fn forces(
             refusals.check(Some(entity), world.marbles.apply_angular_impulse(id, angular));
             *hit = ExternalImpulse::default();
         }
+    }
+}
+
+/// Leaves marbles out of the world by which it would refuse to step, until they change.
+pub fn leave_out(
+    mut world: ResMut<TawWorld>,
+    mut states: Query<&mut MarbleState>,
+    mut refusals: Refusals,
+) {
+    for (id, error) in world.unsupported_marbles() {
+        let _ = world.marbles.remove(id); // it is there: the world named it
+        let Some(entity) = world.marble_entities.remove(&id) else { continue };
+        if let Ok(mut state) = states.get_mut(entity) {
+            (state.id, state.refused) = (None, true);
+        }
+        refusals.check(Some(entity), Err(error));
     }
 }
 

@@ -11,8 +11,8 @@ use crate::components::{
 use crate::resources::TawWorld;
 
 /// Names of the components that entities have and that the [`TawModel`](crate::resources::TawModel)
-/// does not read: of `SurfaceMaterial` and `MarbleMass` its response knows nothing, say. Each is also
-/// logged as a warning, once until the model reads it.
+/// does not read: of `SurfaceMaterial` its response knows nothing, say. A `MarbleMass` that contacts do
+/// not read counts for forces still. Each is also logged as a warning, once until the model reads it.
 ///
 /// Updated in each step, in [`TawSystems::Gather`](crate::TawSystems::Gather).
 #[derive(Resource, Clone, Debug, Default, PartialEq, Eq, Deref)]
@@ -44,7 +44,8 @@ pub(crate) fn find(world: Res<TawWorld>, carriers: Carriers, mut found: ResMut<I
     let ignored: Vec<_> = ignored.collect();
     for name in ignored.iter().filter(|name| !found.contains(name)) {
         log::warn!(
-            "taw ignores {name}: the TawModel's response is {response:?} and its rotation {rotation:?}"
+            "taw ignores {name}{}: the TawModel's response is {response:?} and its rotation {rotation:?}",
+            if *name == "MarbleMass" { " in contacts" } else { "" }
         );
     }
     found.set_if_neq(IgnoredComponents(ignored));

@@ -173,6 +173,7 @@ fn add_step(app: &mut App) {
             gather_walls::walls,
             gather::marbles,
             gather::forces,
+            gather::leave_out,
             swarm::gather,
             gather_walls::land,
             gather::finish,

@@ -5,6 +5,7 @@ use std::collections::HashSet;
 
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;
+use taw::response::Response;
 
 use crate::resources::TawWorld;
 
@@ -29,6 +30,10 @@ pub enum Refusal {
     /// the model changes, a ball stays a ball.
     #[error("HalfLength must be 0 for this response, which knows balls only, but is {0}")]
     Capsule(f32),
+    /// A [`TawModel`](crate::resources::TawModel) whose response knows balls only, because of this
+    /// capsule: the model before stays.
+    #[error("TawModel is not taken over: this is a capsule, and {0:?} knows balls only")]
+    ModelOfBalls(Response),
     /// An entity that would push itself: it is a marble, and no wall.
     #[error("an entity is both a Marble and a Wall; it is a marble only")]
     MarbleAndWall,

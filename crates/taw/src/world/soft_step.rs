@@ -225,6 +225,20 @@ impl<S: Scalar> World<S> {
         }
     }
 
+    /// Marbles by which the next [step](Self::step) would be refused, each with the reason: of
+    /// [`Response::SoftStep`], those that were set to numbers that do not fit into its rows.
+    pub fn unsupported_marbles(&self) -> Vec<(MarbleId, Error)> {
+        if self.settings.model.response != Response::SoftStep {
+            return Vec::new();
+        }
+        let find = |row: usize| Some((self.marbles.id(row)?, self.check_row(row).err()?));
+        if self.changes_are_listed() {
+            self.marbles.changed.rows().iter().filter_map(|row| find(*row as usize)).collect()
+        } else {
+            (0..self.marbles.len()).filter_map(find).collect()
+        }
+    }
+
     /// Checks that the numbers of a marble fit into a row. One that flew farther in steps may go on.
     fn check_row(&self, row: usize) -> Result<(), Error> {
         let marbles = &self.marbles;

@@ -8,7 +8,7 @@ use super::{
     ALL, ContactImpulses, StruckContact, effective_mass, gather, inverse_mass,
     normal_and_separation, scatter, tipping,
 };
-use crate::constraint::{ContactImpulse, FrictionCone};
+use crate::constraint::{ContactImpulse, FrictionCone, Softness};
 use crate::math::RealVector;
 use crate::swarm::batches::Batch;
 use crate::swarm::simd::{Kernel, LANES, Row, Simd, SimdLevel};
@@ -379,8 +379,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
         let ContactImpulses {
             normal_impulse, tangent_impulse, torque, numbers: own, struck, ..
         } = impulses;
-        let (zero, softness) = (L::splat(0.0), params.softness);
-        let per_second = L::splat(1.0 / params.time);
+        let zero = L::splat(0.0);
         for (i, batch) in batches.iter().enumerate() {
             let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
             let at = gather::<L>(columns.at, batch);
@@ -400,15 +399,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
                 StruckContact::note(struck, &params, parting, (i, &normal_impulse[i]));
             }
             let alone = effective_mass(&a, &b);
-            let (target, softness) = if FIRST {
-                // What nothing bears is moved apart without speed.
-                let resting = separation.max(zero);
-                let loaded = grounded.select_gt(L::splat(TOUCHING), separation, resting);
-                let (target, softness) = softness.at(loaded, per_second);
-                (target, Some(softness))
-            } else {
-                (zero - separation.max(zero) * per_second, None)
-            };
+            let (target, softness) = target::<L, FIRST>(&params, separation, grounded);
             let slower = parting - target;
             let wanted = if BACKED {
                 columns.backing_of(batch, velocity, normal).impulse(alone, slower)
@@ -439,6 +430,24 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             }
         }
     }
+}
+
+/// Target velocity of pairs along their normal, and the softness of the first solve.
+#[inline(always)]
+fn target<L: Simd, const FIRST: bool>(
+    params: &SolverParams,
+    separation: L,
+    grounded: L,
+) -> (L, Option<Softness<L>>) {
+    let per_second = L::splat(1.0 / params.time);
+    let gap = separation.max(L::splat(0.0));
+    if !FIRST {
+        return (L::splat(0.0) - gap * per_second, None);
+    }
+    // What nothing bears is moved apart without speed.
+    let loaded = grounded.select_gt(L::splat(TOUCHING), separation, gap);
+    let (target, softness) = params.softness.at(loaded, per_second);
+    (target, Some(softness))
 }
 
 /// The accumulated impulses of a batch.
