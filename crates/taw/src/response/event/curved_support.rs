@@ -36,6 +36,9 @@ const MIN_DISPLACEMENT: f64 = 1e-9;
 const PROBE_DISTANCE: f64 = 1e-5;
 /// Change of curvature times radius that tells one face, edge or corner from another.
 const CURVATURE_TOLERANCE: f64 = 0.1;
+/// Curvature of the offset surface times radius above which it may be a crease between two faces: that
+/// of edges and corners is 1, that of hollows may be any.
+const MAX_CURVATURE: f64 = 2.0;
 /// Bisections of a time to find the end of a condition.
 const BISECTIONS: u32 = 24;
 /// Rotation of the normal over a radius below which a surface is flat: rounding.
@@ -130,9 +133,20 @@ impl CurvedSupport<'_> {
             return Vec3::zero();
         };
         let probe = PROBE_DISTANCE * self.radius;
-        let normal_change = self.nearest(at + tangential * probe, time).1.normal - normal;
-        let normal_change = normal_change - normal * normal_change.dot(normal);
-        if normal_change.magnitude() * self.radius <= FLATNESS * probe {
+        let change_to = |distance: f64| {
+            let change = self.nearest(at + tangential * distance, time).1.normal - normal;
+            change - normal * change.dot(normal)
+        };
+        let relative_curvature = |change: Vec3<f64>| change.magnitude() * self.radius / probe;
+        let mut normal_change = change_to(probe);
+        if relative_curvature(normal_change) > MAX_CURVATURE {
+            // A crease ahead is no curvature, but a wall that the ball is about to meet.
+            let behind = -change_to(-probe);
+            if relative_curvature(behind) <= MAX_CURVATURE {
+                normal_change = behind;
+            }
+        }
+        if relative_curvature(normal_change) <= FLATNESS {
             return Vec3::zero();
         }
         normal_change * (speed / probe)
