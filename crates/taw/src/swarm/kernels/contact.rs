@@ -2,6 +2,7 @@
 //! The constraint itself is in [`crate::constraint`].
 
 use super::backing::borne_by_wall;
+use super::meeting::meeting;
 use super::params::{Pass, SolverParams};
 use super::rolling::RollingInertia;
 use super::{
@@ -457,47 +458,6 @@ fn load<L: Simd>(
     tangent: &[[f32; LANES]; 3],
 ) -> ContactImpulse<L, Vec3Wide<L>> {
     ContactImpulse { normal: L::load(normal), tangent: Vec3Wide::load(tangent) }
-}
-
-/// Which pairs meet within a substep: the normal then, and how fast they come together, or zero for
-/// those that do not meet or too slowly.
-#[inline(always)]
-fn meeting<L: Simd>(
-    params: &SolverParams,
-    [at_a, at_b]: [&[L; 4]; 2],
-    [a, b]: [&[L; 4]; 2],
-) -> (Vec3Wide<L>, L) {
-    let (zero, one, least) = (L::splat(0.0), L::splat(1.0), L::splat(f32::MIN_POSITIVE));
-    let displacement = Vec3Wide::of(at_b) - Vec3Wide::of(at_a);
-    let relative = Vec3Wide::of(b) - Vec3Wide::of(a);
-    let reach = at_a[3] + at_b[3];
-    let approach = zero - displacement.dot(relative);
-    // Where a sphere as wide as both meets a point.
-    let apart = (displacement.dot(displacement) - reach * reach).max(zero);
-    let limit = L::splat(params.time);
-    // Nobody is there before half of the time that the approach would take.
-    let farthest = approach * (limit * L::splat(2.0 * (1.0 + 1e-5)));
-    if apart.gt_mask(farthest) == ALL {
-        return (displacement, zero);
-    }
-    // By how far it goes past the point, which is exact from afar too.
-    let speed = relative.dot(relative);
-    let across = displacement + relative * speed.select_gt(least, approach / speed, zero);
-    let square = speed * (reach * reach - across.dot(across));
-    let time = approach.select_gt(zero, apart / (approach + square.max(zero).sqrt()), zero);
-    // Of what does not meet, any time will do: what hardly moves would take longer than a number
-    // is.
-    let meets = limit.select_gt(time, one, zero);
-    let time = limit.select_gt(time, time, zero);
-    let then = displacement + relative * time;
-    let length = then.dot(then).sqrt();
-    let inverse = length.select_gt(zero, one / length, zero);
-    let normal = then * inverse;
-    let approach_speed = zero - relative.dot(normal);
-    let approach_speed =
-        approach_speed.select_gt(L::splat(params.restitution_threshold), approach_speed, zero);
-    let approach_speed = square.select_gt(zero, approach_speed, zero);
-    (normal, meets.select_gt(zero, approach_speed, zero))
 }
 
 /// Velocity at which the surfaces of two balls slide over each other.

@@ -11,6 +11,7 @@ mod backing;
 mod contact;
 mod displace;
 mod integrate;
+mod meeting;
 mod params;
 mod rolling;
 mod tipping;
