@@ -13,7 +13,7 @@ use crate::resources::TawWorld;
 /// Also logged as a warning. Told once, and again after it was right or another wrong one.
 #[derive(Message, Clone, Copy, Debug, PartialEq)]
 pub struct InputRefused {
-    /// Whose, or `None` for a resource.
+    /// Whose, or `None` for a resource, and for the world as a whole: then it stands still.
     pub entity: Option<Entity>,
     /// Which field, and what was in it.
     pub error: Refusal,
@@ -80,7 +80,7 @@ impl Refusals<'_> {
         if !self.told.before.contains(&this) && !self.told.now.contains(&this) {
             match entity {
                 Some(entity) => log::warn!("taw refused a value of {entity}: {error}"),
-                None => log::warn!("taw refused a resource: {error}"),
+                None => log::warn!("taw refused an input: {error}"),
             }
             self.messages.write(InputRefused { entity, error });
         }
