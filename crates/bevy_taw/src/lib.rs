@@ -68,6 +68,7 @@ mod convert;
 #[cfg(feature = "debug_ui")]
 pub mod debug_ui;
 pub mod diagnostics;
+mod forget;
 mod gather;
 mod gather_walls;
 #[cfg(feature = "render")]

@@ -18,7 +18,7 @@ use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::snapshot::RowRemoved;
 use crate::swarm::{self, TawSwarmModel};
 use crate::wall::Wall;
-use crate::{gather, gather_walls, scatter, sleep};
+use crate::{forget, gather, gather_walls, scatter, sleep};
 
 /// Everything: the physics, interpolation between its steps, and with the feature
 /// `render` the gizmos, and swarms on the screen.
@@ -130,8 +130,8 @@ fn observe(app: &mut App) {
         .add_observer(gather::note_lost_component::<SleepingDisabled>)
         .add_observer(gather::note_lost_component::<CollisionLayers>)
         .add_observer(gather::note_lost_component::<ChildOf>)
-        .add_observer(gather::forget_marble)
-        .add_observer(gather::forget_wall)
+        .add_observer(forget::forget_marble)
+        .add_observer(forget::forget_wall)
         .add_observer(swarm::forget);
     app.add_systems(
         RunFixedMainLoop,
