@@ -11,7 +11,7 @@ use taw::world::{self as core, Model};
 use crate::components::{
     AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Marble,
     MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, MarbleState, SeenMarble, Sleeping,
-    SleepingDisabled, SurfaceMaterial, Velocity, WallState, bits, rotation_bits,
+    SleepingDisabled, SurfaceMaterial, Velocity, bits, rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
@@ -19,7 +19,6 @@ use crate::layers::CollisionLayers;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::snapshot::{self, RowRemoved};
-use crate::wall::Wall;
 
 /// Takes the model, gravity and forces over, if they can be stepped with.
 pub fn settings(
