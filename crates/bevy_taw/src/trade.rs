@@ -144,7 +144,7 @@ fn take_in(mut trade: ResMut<TawTrade>, mut done: MessageWriter<TradeMeasured>) 
     let mut told = measuring.told.lock().unwrap_or_else(PoisonError::into_inner);
     measuring.part = told.part;
     if let Some(mut news) = told.news.take() {
-        news.candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+        news.sort();
         trade.advice = news;
     }
     drop(told);

@@ -275,7 +275,7 @@ pub async fn advise(
             }
         }
     }
-    advice.candidates.sort_by(|a, b| a.cost.total_cmp(&b.cost));
+    advice.sort();
     advice
 }
 
@@ -367,6 +367,13 @@ impl Advice {
             Some(_) => right.min_by(|a, b| a.cost.total_cmp(&b.cost)),
             None => right.min_by(|a, b| a.total_error().total_cmp(&b.total_error())),
         }
+    }
+
+    /// Sorts the candidates by cost; of equal costs, that with the smallest error comes first.
+    pub fn sort(&mut self) {
+        self.candidates.sort_by(|a, b| {
+            a.cost.total_cmp(&b.cost).then(a.total_error().total_cmp(&b.total_error()))
+        });
     }
 
     /// Pareto front of error and cost.
