@@ -326,9 +326,9 @@ pub(crate) struct WallState {
     pub material: Option<([u32; 7], Combine)>,
     /// Its layers as last gathered.
     pub layers: CollisionLayers,
-    /// How it moves.
+    /// Motion of its entity.
     pub motion: PoseTracker,
-    /// Whether it was said that a change of its place is taken for a jump.
+    /// True once the log has said that a change of its place is taken for a jump.
     pub jumped: bool,
 }
 

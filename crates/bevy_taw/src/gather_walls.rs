@@ -30,7 +30,7 @@ pub struct FrameTime {
     this: f32,
     /// Of all frames that ended since the last fixed step.
     since_step: f32,
-    /// Whether the next fixed step is the first in this frame.
+    /// True until the first fixed step of this frame.
     first: bool,
 }
 

@@ -74,7 +74,7 @@ pub struct TawWorld {
     pub(crate) just_restored: bool,
     /// The walls' version when they were last gathered.
     pub(crate) walls_gathered: u64,
-    /// Whether the world refused to integrate, and with it the rest of the substep.
+    /// True if the world refused to integrate, and the rest of the substep is left out.
     pub(crate) refused: bool,
 }
 

@@ -1,13 +1,13 @@
 //! Motion of walls, measured from the places of their entities.
 //!
-//! A wall whose [`Transform`] (or a parent's) is written in a fixed schedule is there in the next
-//! step, which takes it there.
+//! A wall whose [`Transform`] (or a parent's) is written in a fixed schedule moves there within the next
+//! step.
 //!
-//! Written in any other schedule, as in [`Update`], it follows at the speed that it has there: what it
-//! came in a frame is spread over the fixed steps that run for that frame, be they many or none. In
-//! the steps it is later than its entity by no more than a frame and a step, and with the next frame
-//! in which it is not moved it gets there. After a frame that took much longer than others it catches
-//! up half as fast again as it was moved.
+//! Written in any other schedule, as in [`Update`], it follows at the same speed: its displacement in a
+//! frame is spread over the fixed steps that run for that frame, which may be many or none. It lags
+//! behind its entity by no more than a frame and a step, and arrives in the first frame in which the
+//! entity rests. After a frame that took much longer than others it catches up half as fast again as
+//! the entity was moved.
 
 use bevy::math::Isometry3d;
 use bevy::prelude::*;
@@ -63,7 +63,7 @@ pub(crate) struct TrackedPose {
     pub pose: Isometry3d,
     /// None if the wall is at rest, or was put there.
     pub velocity: Option<WallVelocity>,
-    /// Whether a change was judged to be a jump.
+    /// True if a change was judged to be a jump.
     pub jumped: bool,
 }
 
@@ -80,7 +80,7 @@ pub(crate) struct PoseTracker {
     lag: Displacement,
     /// Time in which the entity came so far, in seconds.
     lag_time: f32,
-    /// Whether the entity was moved between the steps of this frame and those before.
+    /// True if the entity was moved between the steps of this frame and those before.
     follows: bool,
     /// Velocity in the last step, and the part of it that passed for motion.
     measured: WallVelocity,

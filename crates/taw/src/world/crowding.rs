@@ -22,8 +22,8 @@ impl<S: Scalar> World<S> {
     /// [`SoftStep`](Response::SoftStep) takes. As candidates of contacts they fill a gigabyte.
     pub const MAX_PAIRS: u64 = 1 << 27;
 
-    /// Checks that no more pairs than a step takes overlap for certain. So many that lie about one
-    /// point are found: those of about equal radii that share a cell whose diagonal is their diameter.
+    /// Checks that no more pairs than a step takes overlap for certain: a lower bound of their number,
+    /// from marbles of radii within a factor of two that share a cell in which all such overlap.
     ///
     /// # Errors
     /// [`Error::TooManyPairs`].
