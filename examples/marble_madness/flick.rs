@@ -2,7 +2,6 @@
 
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
-use bevy_taw::taw::prelude::{ColliderId, QueryTree};
 use taw_examples::Pointer;
 
 use crate::controls::{Action, just_pressed};
@@ -14,18 +13,10 @@ pub fn plugin(app: &mut App) {
     app.add_systems(Update, flick.run_if(just_pressed(Action::Flick)));
 }
 
-fn flick(
-    pointer: Pointer,
-    world: Res<TawWorld>,
-    mut tree: Local<QueryTree<f32>>,
-    mut marbles: Query<&mut Velocity, With<Marble>>,
-) {
-    let Some(ray) = pointer.ray() else { return };
-    let queries = world.queries(&mut tree);
-    let hit = queries.cast_ray(&ray, f32::INFINITY, |thing| matches!(thing, ColliderId::Marble(_)));
-    let Some(ColliderId::Marble(id)) = hit.map(|found| found.collider) else { return };
-    let entity = world.marbles.row(id).ok().and_then(|row| world.marble_entity(row as u32));
-    if let Some(mut velocity) = entity.and_then(|entity| marbles.get_mut(entity).ok()) {
+fn flick(pointer: Pointer, spatial: SpatialQuery, mut marbles: Query<&mut Velocity, With<Marble>>) {
+    let Some(ray) = pointer.bevy_ray() else { return };
+    let hit = spatial.cast_ray(ray, f32::INFINITY, &SpatialQueryFilter::marbles());
+    if let Some(mut velocity) = hit.and_then(|hit| marbles.get_mut(hit.entity).ok()) {
         // Up, and away from the eye.
         let away = Vec3::new(ray.direction.x, 0.0, ray.direction.z);
         **velocity = (Vec3::Y + away.normalize_or_zero()).normalize() * SPEED;

@@ -31,4 +31,12 @@ impl Pointer<'_, '_> {
         let (across, up) = (2.0 * at.x / size.x - 1.0, 1.0 - 2.0 * at.y / size.y);
         Some(camera.ray([across, up].into()))
     }
+
+    /// Ray to all that is under the mouse, in Bevy's types.
+    #[must_use]
+    pub fn bevy_ray(&self) -> Option<Ray3d> {
+        let Ray { origin, direction } = self.ray()?;
+        let direction = Dir3::from_xyz(direction.x, direction.y, direction.z).ok()?;
+        Some(Ray3d::new(Vec3::new(origin.x, origin.y, origin.z), direction))
+    }
 }

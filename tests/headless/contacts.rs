@@ -157,3 +157,87 @@ fn a_system_between_the_verbs_can_take_contacts_out() {
     assert!(scene::position(&app, marble).y < -3.0);
     assert_eq!(told(&mut app), []);
 }
+
+/// Events that observers heard: by whom, of which pair.
+#[derive(Resource, Default)]
+struct Heard(Vec<(&'static str, ContactStarted)>);
+
+#[test]
+fn observers_hear_contacts_as_their_entity_sees_them() {
+    for response in [Response::Impulse, Response::EventDriven, Response::SoftStep] {
+        let mut app = scene::app();
+        app.world_mut().resource_mut::<TawModel>().response = response;
+        app.init_resource::<Heard>();
+        let floor = scene::floor(&mut app);
+        let marble = scene::drop_marble(&mut app, 0.5, Vec3::new(1.0, 1.0, 0.0));
+        let other = scene::drop_marble(&mut app, 0.5, Vec3::new(9.0, 40.0, 0.0));
+        let hear = |who| {
+            move |hit: On<ContactStarted>, mut heard: ResMut<Heard>| heard.0.push((who, *hit))
+        };
+        app.world_mut().entity_mut(floor).observe(hear("floor"));
+        app.world_mut().entity_mut(marble).observe(hear("marble"));
+        app.world_mut().entity_mut(other).observe(hear("other"));
+        scene::frames(&mut app, 32);
+        assert!(!app.world().contains_resource::<Messages<ContactStarted>>());
+        let heard = std::mem::take(&mut app.world_mut().resource_mut::<Heard>().0);
+        assert!(heard.len() >= 2, "{response:?}: {heard:?}");
+        let [floors, marbles] = ["floor", "marble"].map(|who| {
+            let first = heard.iter().find(|(by, _)| *by == who).expect("it heard nothing");
+            first.1
+        });
+        assert_eq!((floors.pair.a, floors.pair.b, floors.normal), (floor, marble, Vec3::Y));
+        assert_eq!((marbles.pair.a, marbles.pair.b, marbles.normal), (marble, floor, -Vec3::Y));
+        assert_eq!(floors.approach_speed, marbles.approach_speed);
+        assert!((floors.approach_speed - (2.0 * 9.81 * 0.5_f32).sqrt()).abs() < 0.1, "{floors:?}");
+        let off = floors.point.distance(Vec3::X);
+        assert!(off < 4.0 * scene::STEP, "{response:?}: {floors:?}");
+        assert!(heard.iter().all(|(by, _)| *by != "other"), "{heard:?}");
+    }
+}
+
+#[test]
+fn a_global_observer_hears_both_sides_and_one_that_comes_late_hears_the_rest() {
+    let mut app = scene::app();
+    app.init_resource::<Heard>();
+    scene::floor(&mut app);
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.75);
+    scene::frames(&mut app, 30); // it fell while nobody listened
+    app.add_observer(|hit: On<ContactStarted>, mut heard: ResMut<Heard>| {
+        heard.0.push(("all", *hit))
+    });
+    app.world_mut().get_mut::<Transform>(marble).unwrap().translation.y = 2.0;
+    scene::frames(&mut app, 60);
+    let heard = &app.world().resource::<Heard>().0;
+    assert_eq!(heard.len(), 2, "{heard:?}");
+    assert_eq!(heard[0].1.pair.a, heard[1].1.pair.b);
+    assert_eq!(heard[0].1.normal, -heard[1].1.normal);
+}
+
+/// An observer may do what it likes to the world, also to those of whom it hears.
+#[test]
+fn what_an_observer_despawns_is_gone_and_ends_its_contacts() {
+    #[derive(Resource, Default)]
+    struct Ended(Vec<ContactEnded>);
+    let mut app = scene::app();
+    app.init_resource::<Ended>();
+    let floor = scene::floor(&mut app);
+    app.world_mut()
+        .entity_mut(floor)
+        .observe(|hit: On<ContactStarted>, mut commands: Commands| {
+            commands.entity(hit.pair.b).despawn();
+        })
+        .observe(|end: On<ContactEnded>, mut ended: ResMut<Ended>| ended.0.push(*end));
+    let marbles: Vec<_> = (0..10_u8)
+        .map(|i| scene::drop_marble(&mut app, 0.5, Vec3::new(f32::from(i) * 0.9, 1.0, 0.0)))
+        .collect();
+    scene::frames(&mut app, 60);
+    for marble in &marbles {
+        assert!(app.world().get_entity(*marble).is_err());
+    }
+    let ended = &app.world().resource::<Ended>().0;
+    let mut of: Vec<_> = ended.iter().map(|end| end.pair.b).collect();
+    of.sort_unstable();
+    of.dedup();
+    assert_eq!(of.len(), marbles.len(), "{ended:?}");
+    assert!(app.world().resource::<TawWorld>().marbles.is_empty());
+}

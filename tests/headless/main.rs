@@ -12,6 +12,7 @@ mod layers;
 mod motion;
 mod moving_walls;
 mod nasty;
+mod queries;
 mod scene;
 mod snapshots;
 mod soft_step;

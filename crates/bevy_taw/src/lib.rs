@@ -40,6 +40,7 @@
 //! | [`resources`] | the model, gravity, the world |
 //! | [`swarm`] | marbles in bulk that are no entities |
 //! | [`messages`] | contacts that start, go on and end |
+//! | [`spatial_query`] | rays, shapes and points among marbles and walls |
 //! | [`snapshot`] | back in time, and rows without entities |
 //! | [`ignored`] | components that the model does not read |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
@@ -86,6 +87,7 @@ pub mod resources;
 mod scatter;
 mod sleep;
 pub mod snapshot;
+pub mod spatial_query;
 pub mod swarm;
 #[cfg(feature = "render")]
 pub mod swarm_render;
@@ -111,6 +113,7 @@ pub mod prelude {
     pub use crate::messages::{ContactEnded, ContactOngoing, ContactPair, ContactStarted};
     pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
+    pub use crate::spatial_query::{SpatialQuery, SpatialQueryFilter};
     pub use crate::swarm::{Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;
     pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};

@@ -1,7 +1,9 @@
-//! Contacts that start, go on and end.
+//! Contacts that start, go on and end, as messages and as events of the entities that touch.
 //!
-//! Messages are opt-in, as in Bevy: kinds that you register are sent, and contacts are collected only
-//! if at least one kind is.
+//! Messages are opt-in, as in Bevy: kinds that you register are sent. Observers need nothing else:
+//! [`ContactStarted`], [`ContactOngoing`] and [`ContactEnded`] are triggered once for each of the two
+//! entities if somebody observes them, with that entity as `pair.a`. Contacts are collected only if at
+//! least one kind is read or observed.
 //!
 //! ```
 //! # use bevy::prelude::*;
@@ -13,18 +15,26 @@
 //!     }
 //! }
 //! app.add_message::<ContactStarted>().add_systems(FixedUpdate, click.after(TawSystems::Scatter));
+//!
+//! fn spawn_bumper(mut commands: Commands) {
+//!     let flash = |hit: On<ContactStarted>| println!("hit by {} at {}", hit.pair.b, hit.point);
+//!     commands.spawn(Wall::from(Sphere::new(0.5))).observe(flash);
+//! }
 //! ```
 
+use bevy::ecs::event::EntityTrigger;
 use bevy::ecs::message::Messages;
+use bevy::ecs::observer::CachedObservers;
 use bevy::prelude::*;
+use taw::contact::Contact;
 use taw::math::{Vec3 as TawVec3, length};
 
 use crate::SubstepDelta;
 use crate::components::{MarbleState, WallState};
-use crate::convert::from_vector;
+use crate::convert::{from_point, from_vector};
 use crate::resources::TawWorld;
 
-/// Two entities that touch.
+/// Two entities that touch. In an observer, `a` is the entity that is observed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Reflect)]
 #[reflect(Debug, PartialEq, Hash)]
 pub struct ContactPair {
@@ -53,10 +63,12 @@ impl ContactPair {
 pub struct ContactStarted {
     /// The two entities.
     pub pair: ContactPair,
-    /// The unit vector from `a` toward `b`.
+    /// Unit normal from `a` to `b`.
     pub normal: Vec3,
-    /// How fast the two marbles, or the marble and a wall thought at rest, came
-    /// together along the normal, in m/s. Negative if they were already parting.
+    /// Contact point, in metres in world space.
+    pub point: Vec3,
+    /// Approach speed of the two along the normal, of a wall thought at rest, in m/s. Negative if they
+    /// were already parting.
     pub approach_speed: f32,
 }
 
@@ -80,7 +92,52 @@ pub struct ContactEnded {
     pub pair: ContactPair,
 }
 
-/// The touches of this step and of the last.
+/// Contact event of two entities, as one of them sees it.
+trait ContactEvent: EntityEvent + for<'a> Event<Trigger<'a> = EntityTrigger> + Copy {
+    /// The event as the other one sees it.
+    fn swapped(self) -> Self;
+}
+
+impl ContactPair {
+    fn swapped(self) -> Self {
+        Self { a: self.b, b: self.a }
+    }
+}
+
+impl ContactEvent for ContactStarted {
+    fn swapped(self) -> Self {
+        Self { pair: self.pair.swapped(), normal: -self.normal, ..self }
+    }
+}
+
+impl ContactEvent for ContactOngoing {
+    fn swapped(self) -> Self {
+        Self { pair: self.pair.swapped() }
+    }
+}
+
+impl ContactEvent for ContactEnded {
+    fn swapped(self) -> Self {
+        Self { pair: self.pair.swapped() }
+    }
+}
+
+macro_rules! entity_event {
+    ($($event:ty),*) => {$(
+        impl Event for $event {
+            type Trigger<'a> = EntityTrigger;
+        }
+
+        impl EntityEvent for $event {
+            fn event_target(&self) -> Entity {
+                self.pair.a
+            }
+        }
+    )*};
+}
+entity_event!(ContactStarted, ContactOngoing, ContactEnded);
+
+/// Contacts of this step and of the last.
 #[derive(Resource, Default)]
 pub(crate) struct Touches {
     /// In the order found, several to a pair if there are substeps.
@@ -89,6 +146,16 @@ pub(crate) struct Touches {
     before: Vec<ContactPair>,
     /// Number of this step's impacts already noted.
     impacts: usize,
+    /// Events of this step for observers.
+    events: Events,
+}
+
+/// Events of a step, by kind.
+#[derive(Default)]
+struct Events {
+    started: Vec<ContactStarted>,
+    ongoing: Vec<ContactOngoing>,
+    ended: Vec<ContactEnded>,
 }
 
 type Readers<'w> = (
@@ -97,39 +164,82 @@ type Readers<'w> = (
     Option<ResMut<'w, Messages<ContactEnded>>>,
 );
 
-/// Run condition: at least one kind of contact message is registered.
-pub(crate) fn are_read(
-    started: Option<Res<Messages<ContactStarted>>>,
-    ongoing: Option<Res<Messages<ContactOngoing>>>,
-    ended: Option<Res<Messages<ContactEnded>>>,
-) -> bool {
-    started.is_some() || ongoing.is_some() || ended.is_some()
+/// Run condition: somebody reads or observes contacts.
+pub(crate) fn are_read(world: &World) -> bool {
+    is_read::<ContactStarted>(world)
+        || is_read::<ContactOngoing>(world)
+        || is_read::<ContactEnded>(world)
+        || are_observed(world)
+}
+
+fn is_read<M: Message>(world: &World) -> bool {
+    world.contains_resource::<Messages<M>>()
+}
+
+/// Run condition: somebody observes contacts.
+pub(crate) fn are_observed(world: &World) -> bool {
+    observers::<ContactStarted>(world).is_some()
+        || observers::<ContactOngoing>(world).is_some()
+        || observers::<ContactEnded>(world).is_some()
+}
+
+/// Observers of an event, if there are any.
+fn observers<E: Event>(world: &World) -> Option<&CachedObservers> {
+    let observers = world.observers().try_get_observers(world.event_key::<E>()?)?;
+    let nobody = observers.global_observers().is_empty() && observers.entity_observers().is_empty();
+    (!nobody).then_some(observers)
+}
+
+/// Triggers this step's events where they are observed.
+pub(crate) fn trigger(world: &mut World) {
+    let mut events = std::mem::take(&mut world.resource_mut::<Touches>().events);
+    trigger_observed(world, &mut events.started);
+    trigger_observed(world, &mut events.ongoing);
+    trigger_observed(world, &mut events.ended);
+    world.resource_mut::<Touches>().events = events; // for their memory
+}
+
+fn trigger_observed<E: ContactEvent>(world: &mut World, events: &mut Vec<E>) {
+    for event in events.drain(..).flat_map(|event| [event, event.swapped()]) {
+        let is_observed = observers::<E>(world).is_some_and(|observers| {
+            !observers.global_observers().is_empty()
+                || observers.entity_observers().contains_key(&event.event_target())
+        });
+        if is_observed {
+            world.trigger(event);
+        }
+    }
+}
+
+impl Events {
+    fn clear(&mut self) {
+        self.started.clear();
+        self.ongoing.clear();
+        self.ended.clear();
+    }
 }
 
 /// Notes who touches in this substep, before anything is restituted.
 pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
     let velocity = |row: u32| world.marbles.velocity()[row as usize];
-    let started = |pair: ContactPair, normal: TawVec3<f32>, closing: TawVec3<f32>| {
-        let (normal, closing) = (from_vector(normal), from_vector(closing));
-        ContactStarted { pair, normal, approach_speed: -closing.dot(normal) }
+    let started = |pair: ContactPair, contact: &Contact<f32>, closing: TawVec3<f32>| {
+        let normal = from_vector(contact.normal);
+        let center = world.marbles.position()[contact.b as usize];
+        let point = from_point(center + contact.arms[1]);
+        ContactStarted { pair, normal, point, approach_speed: -from_vector(closing).dot(normal) }
     };
     for contact in world.contacts.wm.iter().filter(|contact| contact.is_touching()) {
         if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
-            let touch = started(ContactPair { a, b }, contact.normal, velocity(contact.b));
-            touches.now.push(touch);
+            touches.now.push(started(ContactPair { a, b }, contact, velocity(contact.b)));
         }
     }
     for contact in world.contacts.mm.iter().filter(|contact| contact.is_touching()) {
         if let (Some(a), Some(b)) = (world.marble_entity(contact.a), world.marble_entity(contact.b))
         {
             let closing = velocity(contact.b) - velocity(contact.a);
-            let mut touch = started(ContactPair { a, b }, contact.normal, closing);
-            if b < a {
-                // Rows move about; the order of entities does not.
-                touch.pair = ContactPair { a: b, b: a };
-                touch.normal = -touch.normal;
-            }
-            touches.now.push(touch);
+            let touch = started(ContactPair { a, b }, contact, closing);
+            // Rows move about; the order of entities does not.
+            touches.now.push(if b < a { touch.swapped() } else { touch });
         }
     }
 }
@@ -142,18 +252,18 @@ pub(crate) fn collect_impacts(world: Res<TawWorld>, mut touches: ResMut<Touches>
         let (Some(a), Some(b)) = (first(&world, impact.a), world.marble_entity(impact.b)) else {
             continue;
         };
-        let normal = from_vector(impact.normal);
-        let swap = !impact.on_wall && b < a;
-        touches.now.push(ContactStarted {
-            pair: if swap { ContactPair { a: b, b: a } } else { ContactPair { a, b } },
-            normal: if swap { -normal } else { normal },
+        let touch = ContactStarted {
+            pair: ContactPair { a, b },
+            normal: from_vector(impact.normal),
+            point: from_point(impact.point),
             approach_speed: impact.approach_speed,
-        });
+        };
+        touches.now.push(if !impact.on_wall && b < a { touch.swapped() } else { touch });
     }
     touches.impacts = world.impacts().len();
 }
 
-/// Compares this step's touches with the last one's.
+/// Compares this step's contacts with the last one's.
 pub(crate) fn write(
     mut touches: ResMut<Touches>,
     mut readers: Readers,
@@ -162,13 +272,15 @@ pub(crate) fn write(
     marbles: Query<&MarbleState>,
     walls: Query<&WallState>,
 ) {
-    let Touches { now, before, impacts } = &mut *touches;
+    let Touches { now, before, impacts, events } = &mut *touches;
     *impacts = 0;
+    events.clear(); // nobody observed those of the last step
     let fall = from_vector(world.gravity()).length() * delta.0 * delta.0;
     now.extend(before.iter().filter_map(|&pair| {
         let gap = gap(pair, &world, &marbles, &walls)?;
         let hovers = gap.width <= fall.max(gap.radius / 50.0);
-        hovers.then_some(ContactStarted { pair, normal: Vec3::ZERO, approach_speed: 0.0 })
+        let (normal, point) = (Vec3::ZERO, Vec3::ZERO); // read by nobody, as it goes on
+        hovers.then_some(ContactStarted { pair, normal, point, approach_speed: 0.0 })
     }));
     // Stable, so that the first substep's touch stands for its pair.
     now.sort_by_key(|touch| touch.pair);
@@ -177,15 +289,15 @@ pub(crate) fn write(
     let mut last = before.iter().copied().peekable();
     for touch in now.iter() {
         while let Some(pair) = last.next_if(|pair| *pair < touch.pair) {
-            tell(ended, ContactEnded { pair });
+            tell(ended, &mut events.ended, ContactEnded { pair });
         }
         if last.next_if_eq(&touch.pair).is_some() {
-            tell(ongoing, ContactOngoing { pair: touch.pair });
+            tell(ongoing, &mut events.ongoing, ContactOngoing { pair: touch.pair });
         } else {
-            tell(started, *touch);
+            tell(started, &mut events.started, *touch);
         }
     }
-    last.for_each(|pair| tell(ended, ContactEnded { pair }));
+    last.for_each(|pair| tell(ended, &mut events.ended, ContactEnded { pair }));
     before.clear();
     before.extend(now.drain(..).map(|touch| touch.pair));
 }
@@ -215,7 +327,13 @@ fn gap(
     }
 }
 
-fn tell<M: Message>(reader: &mut Option<ResMut<Messages<M>>>, message: M) {
+/// Writes a message, and keeps it for observers.
+fn tell<M: Message + Copy>(
+    reader: &mut Option<ResMut<Messages<M>>>,
+    events: &mut Vec<M>,
+    message: M,
+) {
+    events.push(message);
     if let Some(messages) = reader {
         messages.write(message);
     }

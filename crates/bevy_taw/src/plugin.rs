@@ -16,6 +16,7 @@ use crate::messages::{self, Touches};
 use crate::refusal::{self, InputRefused, MarbleStopped, Refusals, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::snapshot::RowRemoved;
+use crate::spatial_query::SpatialTree;
 use crate::swarm::{self, TawSwarmModel};
 use crate::wall::Wall;
 use crate::{forget, gather, gather_walls, scatter, sleep};
@@ -99,6 +100,7 @@ impl Plugin for TawPlugin {
             .init_resource::<gather::ChangedMarbles>()
             .init_resource::<Touches>()
             .init_resource::<Told>()
+            .init_resource::<SpatialTree>()
             .init_resource::<IgnoredComponents>()
             .init_resource::<gather_walls::FrameTime>()
             .add_message::<InputRefused>()
@@ -191,6 +193,7 @@ fn add_step(app: &mut App) {
             swarm::report_stopped,
             messages::write.run_if(messages::are_read),
             diagnostics::measure,
+            messages::trigger.run_if(messages::are_observed),
         )
             .chain(),
     );

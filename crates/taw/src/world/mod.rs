@@ -24,6 +24,7 @@ mod narrow_phase;
 mod penalty;
 mod quarantine;
 mod query;
+mod query_walls;
 mod scratch;
 mod settings;
 mod soft_impacts;

@@ -69,8 +69,12 @@ impl<S: Scalar> World<S> {
         if !later && !self.meet_now(contact, approach_speed, dt) {
             return None;
         }
+        let begin_speed = approach_speed;
         let (normal, approach_speed) = (contact.normal, square.sqrt());
-        let impact = Impact { a: wall, on_wall: true, b: contact.b, normal, approach_speed };
+        let time = separation * two / (begin_speed + approach_speed);
+        let fall = self.soft_acceleration(b) * (time * time * half);
+        let point = position + contact.arms[1] + velocity * time + fall;
+        let impact = Impact { a: wall, on_wall: true, b: contact.b, normal, point, approach_speed };
         Some(PredictedImpact { impact, velocity: [surface, velocity] })
     }
 
@@ -86,8 +90,9 @@ impl<S: Scalar> World<S> {
         let apart = b.center - a.center + (ways[1] - ways[0]) * time;
         let (normal, _) = normal_and_distance(apart, [contact.a, contact.b]);
         let approach_speed = (velocity[0] - velocity[1]).dot(normal);
+        let point = a.center + ways[0] * time + normal * a.radius;
         let Contact { a, b, .. } = *contact;
-        let impact = Impact { a, on_wall: false, b, normal, approach_speed };
+        let impact = Impact { a, on_wall: false, b, normal, point, approach_speed };
         Some(PredictedImpact { impact, velocity })
     }
 

@@ -32,6 +32,9 @@ fn bounces<S: Scalar>(substeps: u32, restitution: f64, seconds: f64, on_box: boo
     for _ in 0..(seconds * 64.0) as u32 {
         world.step(S::from_f64(1.0 / 64.0)).unwrap();
         assert!(world.impacts().len() <= 1);
+        for point in world.impacts().iter().map(|impact| impact.point) {
+            assert!(point.y.as_f64().abs() < 1e-3 && point.x == S::zero(), "{point:?}");
+        }
         told.extend(world.impacts().iter().map(|impact| impact.approach_speed.as_f64()));
     }
     told
@@ -160,6 +163,9 @@ fn marbles_that_come_and_go_between_the_verbs_are_no_impacts() {
         }
         world.restitute(1.0 / 60.0).unwrap();
         assert!(world.impacts().len() <= 1);
+        for point in world.impacts().iter().map(|impact| impact.point) {
+            assert!(point.y.as_f64().abs() < 1e-3 && point.x == S::zero(), "{point:?}");
+        }
         assert!(world.impacts().iter().all(|impact| impact.on_wall && impact.approach_speed > 2.9));
     }
 }

@@ -182,7 +182,8 @@ impl EventDriven {
         self.balls[a].collide(material, settings);
         self.balls[b].collide(material, settings);
         let (first, second) = (a as u32, b as u32);
-        let impact = Impact { a: first, on_wall: false, b: second, normal, approach_speed };
+        let point = self.balls[a].position + normal * self.balls[a].radius;
+        let impact = Impact { a: first, on_wall: false, b: second, normal, point, approach_speed };
         Collision {
             a,
             b,
@@ -249,6 +250,7 @@ impl EventDriven {
             work.record_impulse(ImpulseSample { impulse, normal, mean_velocity, fixed_velocity });
             work.collisions += 1;
         }
-        Impact { a: self.walls[wall].row, on_wall: true, b: row as u32, normal, approach_speed }
+        let (a, b) = (self.walls[wall].row, row as u32);
+        Impact { a, on_wall: true, b, normal, point: contact_point, approach_speed }
     }
 }

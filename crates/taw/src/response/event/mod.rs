@@ -37,7 +37,7 @@ use cgmath::{InnerSpace, Zero};
 
 use crate::broad::Period;
 use crate::contact::Contacts;
-use crate::math::{Scalar, Vec3, cast_vector, is_finite, is_finite_point};
+use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
 use crate::response::EnergyLedger;
 use crate::response::impulse::CachedImpulse;
 use ball::CellSlot;
@@ -103,6 +103,8 @@ pub struct Impact<S> {
     pub b: u32,
     /// Unit normal from the first to the second.
     pub normal: Vec3<S>,
+    /// Contact point at that time, in metres.
+    pub point: Point3<S>,
     /// Approach speed along the normal, in m/s.
     pub approach_speed: S,
 }
@@ -115,6 +117,7 @@ impl Impact<f64> {
             on_wall: self.on_wall,
             b: self.b,
             normal: cast_vector(self.normal),
+            point: cast_point(self.point),
             approach_speed: S::from_f64(self.approach_speed),
         }
     }
