@@ -14,6 +14,7 @@ mod moving_walls;
 mod nasty;
 mod queries;
 mod scene;
+mod sensors;
 mod snapshots;
 mod soft_step;
 mod spawning;

@@ -71,7 +71,8 @@ fn rays_hit_what_the_formula_says() {
         .map(|i| {
             let random = |k: u64| scene::random(1_000_000 + 7 * i + k) - 0.5;
             let origin = Vec3::new(random(0), random(1), random(2)) * 60.0;
-            ray(origin, Vec3::new(random(3), random(4), random(5)) + Vec3::splat(1e-6))
+            let target = Vec3::new(random(3), random(4), random(5)) * 40.0;
+            ray(origin, target - origin)
         })
         .collect();
     let asked = rays.clone();

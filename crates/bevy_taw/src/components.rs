@@ -4,7 +4,7 @@
 use bevy::prelude::*;
 use taw::motion::{Integrator, Rotation};
 use taw::response::{Combine, Elasticity, Material};
-use taw::world::{MarbleId, Mass, WallId, WallShape};
+use taw::world::{MarbleId, Mass, SensorId, WallId, WallShape};
 
 use crate::layers::CollisionLayers;
 use crate::reflect::{CombineReflect, IntegratorReflect, RotationReflect};
@@ -314,6 +314,8 @@ pub(crate) struct SeenMarble {
 pub(crate) struct WallState {
     /// `None` before the first gather, while disabled, and when the input was refused.
     pub id: Option<WallId>,
+    /// `None` of what is no sensor, and as above.
+    pub sensor: Option<SensorId>,
     /// What it is in its own frame.
     pub shape: Option<LocalShape>,
     /// The scale that it was last built for, whether or not it could be.

@@ -26,13 +26,17 @@ pub fn forget_marble(removed: On<Remove, Marble>, mut app: DeferredWorld) {
 /// Takes a wall out of the world when its component or entity goes, also of an entity that
 /// queries do not see.
 pub fn forget_wall(removed: On<Remove, Wall>, mut app: DeferredWorld) {
-    let id = app.get::<WallState>(removed.entity).and_then(|state| state.id);
+    let state = app.get::<WallState>(removed.entity);
+    let (id, sensor) = (state.and_then(|it| it.id), state.and_then(|it| it.sensor));
     let mut world = app.resource_mut::<TawWorld>();
     if let Some(id) = id
         && world.wall_entities.get(&id) == Some(&removed.entity)
     {
         let _ = world.walls.remove(id);
         world.wall_entities.remove(&id);
+    }
+    if let Some(id) = sensor {
+        world.remove_sensor(id);
     }
     app.commands().entity(removed.entity).try_remove::<WallState>();
 }

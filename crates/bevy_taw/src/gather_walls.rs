@@ -14,6 +14,7 @@ use crate::convert::{to_point, to_rotation, to_vector};
 use crate::layers::CollisionLayers;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
+use crate::sensor::Sensor;
 use crate::snapshot::{self, RowRemoved};
 use crate::wall::Wall;
 use crate::wall_motion::{Change, Clock, LARGEST_CHANGE_OF_SPEED, PoseTracker, TrackedPose};
@@ -74,13 +75,13 @@ fn finite_place(transforms: &TransformHelper, entity: Entity) -> Option<Isometry
 }
 
 type WallComponents<'a> = (
-    (Entity, &'a Transform, Has<Marble>),
+    (Entity, &'a Transform, Has<Marble>, Has<Sensor>),
     Ref<'a, Wall>,
     (Option<&'a SurfaceMaterial>, Option<&'a CollisionLayers>),
     &'a mut WallState,
 );
 type WallItem<'a> = (
-    (Entity, &'a Transform, bool),
+    (Entity, &'a Transform, bool, bool),
     Ref<'a, Wall>,
     (Option<&'a SurfaceMaterial>, Option<&'a CollisionLayers>),
     Mut<'a, WallState>,
@@ -114,8 +115,8 @@ pub fn walls(
         frames: frame.since_step,
     };
     (frame.since_step, frame.first) = (0.0, false);
-    let mut rows = 0;
-    for item in &mut walls {
+    let (mut rows, mut sensors) = (0, 0);
+    for mut item in &mut walls {
         let entity = item.0.0;
         let change = if is_marked(&teleports, &parents, entity) {
             Change::Jump
@@ -126,7 +127,9 @@ pub fn walls(
         };
         let place = transforms.compute_global_transform(entity).ok();
         let mut gathering = Gathering { world: &mut world, refusals: &mut refusals, all, change };
-        rows += usize::from(gathering.take_over(item, place, clock));
+        gathering.take_over(&mut item, place, clock);
+        rows += usize::from(item.3.id.is_some());
+        sensors += usize::from(item.3.sensor.is_some());
     }
     if rows != world.walls.len() {
         snapshot::take_out_walls(
@@ -135,6 +138,9 @@ pub fn walls(
             entities,
             &mut removed,
         );
+    }
+    if sensors != world.sensors.len() {
+        snapshot::take_out_sensors(&mut world, |it| walls.get(it).ok()?.3.sensor);
     }
     world.walls_gathered = world.walls.version();
 }
@@ -166,27 +172,26 @@ struct Gathering<'a, 'w> {
 }
 
 impl Gathering<'_, '_> {
-    /// Takes over one wall. Gives whether it has a row.
+    /// Takes over one wall or sensor.
     fn take_over(
         &mut self,
-        ((entity, own, is_marble), wall, (material, layers), mut state): WallItem,
+        ((entity, own, is_marble, is_sensor), wall, (material, layers), state): &mut WallItem,
         place: Option<GlobalTransform>,
         clock: Clock,
-    ) -> bool {
-        let state = &mut *state;
-        if let Some(id) = state.id
-            && self.world.walls.row(id).is_err()
-        {
+    ) {
+        let (entity, state) = (*entity, &mut **state);
+        if state.id.is_some_and(|id| self.world.walls.row(id).is_err()) {
             *state = state.without_row();
         }
-        if is_marble {
+        if *is_marble {
             self.refusals.check(Some(entity), Err(Refusal::MarbleAndWall));
-            if let Some(id) = state.id {
-                let _ = self.world.walls.remove(id); // it is there: its row was found
-                self.world.wall_entities.remove(&id);
-            }
+            self.take_out(state);
             *state = WallState::default();
-            return false;
+            return;
+        }
+        if *is_sensor && state.id.is_some() || !*is_sensor && state.sensor.is_some() {
+            self.take_out(state);
+            *state = state.without_row();
         }
         let Some(place) = place else {
             self.refusals.check(Some(entity), Err(Refusal::NoPlace));
@@ -217,23 +222,49 @@ impl Gathering<'_, '_> {
             self.refusals.check(Some(entity), Err(no_frame));
             return self.stop(state);
         }
-        self.put(entity, state, now, clock);
-        self.make_of(entity, state, material);
+        self.put(entity, state, now, (clock, *is_sensor));
+        self.make_of(entity, state, *material);
         self.put_into_layers(entity, state, layers.copied().unwrap_or_default());
-        state.id.is_some()
     }
 
-    /// Leaves a wall where it is, at rest. Gives whether it has a row.
-    fn stop(&mut self, state: &mut WallState) -> bool {
-        state.motion = PoseTracker::default();
+    /// Takes a wall or sensor out of the world.
+    fn take_out(&mut self, state: &WallState) {
         if let Some(id) = state.id {
-            let _ = self.world.walls.set_motion(id, None);
+            let _ = self.world.walls.remove(id); // it is there: its row was found
+            self.world.wall_entities.remove(&id);
         }
-        state.id.is_some()
+        if let Some(id) = state.sensor {
+            self.world.remove_sensor(id);
+        }
     }
 
-    /// Puts a wall where it is now, with the velocity at which it came there.
-    fn put(&mut self, entity: Entity, state: &mut WallState, now: Isometry3d, clock: Clock) {
+    /// Leaves a wall where it is, at rest.
+    fn stop(&mut self, state: &mut WallState) {
+        state.motion = PoseTracker::default();
+        let _ = self.set_motion(state, None);
+    }
+
+    /// Sets the motion of a wall or sensor.
+    fn set_motion(
+        &mut self,
+        state: &WallState,
+        motion: Option<WallMotion<f32>>,
+    ) -> Result<(), taw::Error> {
+        match (state.id, state.sensor) {
+            (Some(id), _) => self.world.walls.set_motion(id, motion),
+            (None, Some(id)) => self.world.sensors.set_motion(id, motion),
+            (None, None) => Ok(()),
+        }
+    }
+
+    /// Puts a wall or sensor where it is now, with the velocity at which it came there.
+    fn put(
+        &mut self,
+        entity: Entity,
+        state: &mut WallState,
+        now: Isometry3d,
+        (clock, is_sensor): (Clock, bool),
+    ) {
         let Some(LocalShape { shape, reach }) = &state.shape else { return };
         let TrackedPose { pose, velocity, jumped } =
             state.motion.advance(now, clock, *reach, self.change);
@@ -245,14 +276,13 @@ impl Gathering<'_, '_> {
             );
         }
         let translation = Vec3::from(pose.translation);
-        if let Some(id) = state.id {
-            let motion = velocity.map(|velocity| WallMotion {
-                velocity: to_vector(velocity.linear),
-                angular_velocity: to_vector(velocity.angular),
-                pivot: to_point(translation),
-            });
-            self.refusals.check(Some(entity), self.world.walls.set_motion(id, motion));
-        }
+        let motion = velocity.map(|velocity| WallMotion {
+            velocity: to_vector(velocity.linear),
+            angular_velocity: to_vector(velocity.angular),
+            pivot: to_point(translation),
+        });
+        let set = self.set_motion(state, motion);
+        self.refusals.check(Some(entity), set);
         let seen = (bits(translation), rotation_bits(pose.rotation));
         if state.posed == Some(seen) && !self.all {
             return;
@@ -260,24 +290,33 @@ impl Gathering<'_, '_> {
         state.posed = Some(seen);
         let rotation = to_rotation(pose.rotation);
         let shape = shape.transformed(Pose { rotation, translation: to_vector(translation) });
-        let put = shape.and_then(|shape| match state.id {
-            Some(id) => self.world.walls.set(id, shape),
-            None => self.world.walls.insert(shape).map(|id| {
+        let put = shape.and_then(|shape| match (is_sensor, state.id, state.sensor) {
+            (false, Some(id), _) => self.world.walls.set(id, shape),
+            (false, None, _) => self.world.walls.insert(shape).map(|id| {
                 self.world.wall_entities.insert(id, entity);
                 state.id = Some(id);
+            }),
+            (true, _, Some(id)) => self.world.sensors.set(id, shape),
+            (true, _, None) => self.world.sensors.insert(shape).map(|id| {
+                self.world.sensor_entities.insert(id, entity);
+                state.sensor = Some(id);
             }),
         });
         self.refusals.check(Some(entity), put);
     }
 
-    /// Gives a wall its layers.
+    /// Gives a wall or sensor its layers.
     fn put_into_layers(&mut self, entity: Entity, state: &mut WallState, layers: CollisionLayers) {
-        if let Some(id) = state.id
-            && (state.layers != layers || self.all)
-        {
-            state.layers = layers;
-            self.refusals.check(Some(entity), self.world.walls.set_layers(id, layers.into()));
+        if state.layers == layers && !self.all {
+            return;
         }
+        let set = match (state.id, state.sensor) {
+            (Some(id), _) => self.world.walls.set_layers(id, layers.into()),
+            (None, Some(id)) => self.world.sensors.set_layers(id, layers.into()),
+            (None, None) => return,
+        };
+        state.layers = layers;
+        self.refusals.check(Some(entity), set);
     }
 
     /// Gives a wall its material.

@@ -40,6 +40,7 @@
 //! | [`resources`] | the model, gravity, the world |
 //! | [`swarm`] | marbles in bulk that are no entities |
 //! | [`messages`] | contacts that start, go on and end |
+//! | [`sensor`] | shapes that tell who enters and leaves |
 //! | [`spatial_query`] | rays, shapes and points among marbles and walls |
 //! | [`snapshot`] | back in time, and rows without entities |
 //! | [`ignored`] | components that the model does not read |
@@ -85,6 +86,7 @@ mod reflect;
 pub mod refusal;
 pub mod resources;
 mod scatter;
+pub mod sensor;
 mod sleep;
 pub mod snapshot;
 pub mod spatial_query;
@@ -113,6 +115,7 @@ pub mod prelude {
     pub use crate::messages::{ContactEnded, ContactOngoing, ContactPair, ContactStarted};
     pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
+    pub use crate::sensor::{CollidingEntities, Sensor, SensorEntered, SensorLeft};
     pub use crate::spatial_query::{SpatialQuery, SpatialQueryFilter};
     pub use crate::swarm::{Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;

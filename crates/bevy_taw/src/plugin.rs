@@ -19,7 +19,7 @@ use crate::snapshot::RowRemoved;
 use crate::spatial_query::SpatialTree;
 use crate::swarm::{self, TawSwarmModel};
 use crate::wall::Wall;
-use crate::{forget, gather, gather_walls, scatter, sleep};
+use crate::{forget, gather, gather_walls, scatter, sensor, sleep};
 
 /// Everything: the physics, interpolation between its steps, and with the feature
 /// `render` the gizmos, and swarms on the screen.
@@ -112,6 +112,7 @@ impl Plugin for TawPlugin {
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(TawModel, Gravity, SubstepDelta)>();
         diagnostics::register(app);
+        sensor::register(app);
         observe(app);
         add_step(app);
         add_substep(app);
@@ -191,6 +192,7 @@ fn add_step(app: &mut App) {
             sleep::mark,
             refusal::report_stopped,
             swarm::report_stopped,
+            sensor::scatter,
             messages::write.run_if(messages::are_read),
             diagnostics::measure,
             messages::trigger.run_if(messages::are_observed),

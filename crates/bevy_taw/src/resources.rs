@@ -3,7 +3,7 @@
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 use taw::motion::ForceField;
-use taw::world::{Marble, MarbleId, Model, WallId};
+use taw::world::{Marble, MarbleId, Model, SensorId, WallId};
 
 use crate::reflect::ModelReflect;
 
@@ -67,6 +67,7 @@ pub struct TawWorld {
     pub(crate) world: taw::world::World<f32>,
     pub(crate) marble_entities: HashMap<MarbleId, Entity>,
     pub(crate) wall_entities: HashMap<WallId, Entity>,
+    pub(crate) sensor_entities: HashMap<SensorId, Entity>,
     /// Marbles whose entities are disabled, as they were when they left.
     pub(crate) away: HashMap<Entity, Marble<f32>>,
     /// How often the world went back in time, and whether it did since the last gather.

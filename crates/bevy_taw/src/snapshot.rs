@@ -4,7 +4,7 @@ use bevy::ecs::entity::Entities;
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 use taw::swarm::BallId;
-use taw::world::{MarbleId, WallId};
+use taw::world::{MarbleId, SensorId, WallId};
 
 use crate::components::{MarbleState, Sleeping, WallState};
 use crate::resources::TawWorld;
@@ -15,6 +15,7 @@ pub struct TawSnapshot {
     world: taw::world::World<f32>,
     marble_entities: HashMap<MarbleId, Entity>,
     wall_entities: HashMap<WallId, Entity>,
+    sensor_entities: HashMap<SensorId, Entity>,
 }
 
 /// A row of the world that no entity stood behind was taken out, as after a
@@ -38,6 +39,7 @@ impl TawWorld {
             world: self.world.clone(),
             marble_entities: self.marble_entities.clone(),
             wall_entities: self.wall_entities.clone(),
+            sensor_entities: self.sensor_entities.clone(),
         }
     }
 
@@ -67,6 +69,7 @@ impl TawWorld {
         self.world = snapshot.world.clone();
         self.marble_entities.clone_from(&snapshot.marble_entities);
         self.wall_entities.clone_from(&snapshot.wall_entities);
+        self.sensor_entities.clone_from(&snapshot.sensor_entities);
         self.restored = self.restored.wrapping_add(1);
         self.just_restored = true;
     }
@@ -92,9 +95,12 @@ pub(crate) fn name_walls<'a>(
     states: impl Iterator<Item = (Entity, Mut<'a, WallState>)>,
 ) {
     let ids: HashMap<_, _> = world.wall_entities.iter().map(|(id, wall)| (*wall, *id)).collect();
+    let sensors: HashMap<_, _> = world.sensor_entities.iter().map(|(id, it)| (*it, *id)).collect();
     for (entity, mut state) in states {
         let id = ids.get(&entity).copied().filter(|id| world.walls.row(*id).is_ok());
-        *state = WallState { id, ..state.without_row() };
+        let sensor = sensors.get(&entity).copied();
+        let sensor = sensor.filter(|id| world.sensors.shape(*id).is_ok());
+        *state = WallState { id, sensor, ..state.without_row() };
     }
 }
 
@@ -149,6 +155,15 @@ pub(crate) fn take_out_walls(
         }
     }
     world.wall_entities.retain(|id, _| world.world.walls.row(*id).is_ok());
+}
+
+/// Takes out the sensors that no entity stands behind, or one that is disabled.
+pub(crate) fn take_out_sensors(world: &mut TawWorld, id_of: impl Fn(Entity) -> Option<SensorId>) {
+    let known = world.sensor_entities.iter().map(|(id, entity)| (*id, *entity));
+    let gone: Vec<_> = known.filter(|(id, entity)| id_of(*entity) != Some(*id)).collect();
+    for (id, _) in gone {
+        world.remove_sensor(id);
+    }
 }
 
 /// Balls that are neither a swarm's nor guests.

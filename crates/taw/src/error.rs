@@ -3,7 +3,7 @@ use cgmath::{Array, InnerSpace};
 use crate::frame::NodeId;
 use crate::math::{Point3, Quat, Scalar, Vec3, length};
 use crate::swarm::BallId;
-use crate::world::{MarbleId, WallId};
+use crate::world::{MarbleId, SensorId, WallId};
 
 /// Reason why an input was rejected. A function that returns one has changed nothing.
 ///
@@ -73,6 +73,9 @@ pub enum Error {
     /// No wall has this handle: it was removed, or belongs to another world.
     #[error("no wall has the handle {0:?}")]
     NoSuchWall(WallId),
+    /// No sensor has this handle: it was removed, or belongs to another world.
+    #[error("no sensor has the handle {0:?}")]
+    NoSuchSensor(SensorId),
     /// No node has this handle: it was removed, or belongs to another tree.
     #[error("no node has the handle {0:?}")]
     NoSuchNode(NodeId),

@@ -79,7 +79,7 @@ pub mod prelude {
     pub use crate::shape::{Plane, Sphere};
     pub use crate::world::{
         ColliderId, Detection, Marble, MarbleId, Mass, Model, Precision, QueryHit, QueryTree,
-        WallId, WallShape, World,
+        SensorEvent, SensorId, WallId, WallShape, World,
     };
     pub use cgmath::prelude::*;
 }

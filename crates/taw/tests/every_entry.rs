@@ -62,6 +62,7 @@ struct Place<S: Scalar> {
     /// Far away: one that lies, and one that falls.
     far: [MarbleId; 2],
     wall: WallId,
+    sensor: SensorId,
     /// Which of several ways to do it.
     case: usize,
 }
@@ -79,7 +80,9 @@ impl<S: Scalar> Place<S> {
         let subject = ball(0.0, 0.5, 0.0);
         ball(0.9, 0.6, 0.1);
         let far = [ball(700.0, 0.5, -900.0), ball(-800.0, 3.0, 650.0)];
-        Self { world, subject, far, wall, case: 0 }
+        let around = Sphere::new(point(0.0, 0.0, 0.0), S::one()).unwrap();
+        let sensor = world.sensors.insert(around).unwrap();
+        Self { world, subject, far, wall, sensor, case: 0 }
     }
 
     fn step(&mut self) {

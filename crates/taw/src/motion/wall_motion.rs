@@ -1,6 +1,8 @@
 use cgmath::{EuclideanSpace, One, Rotation};
 
 use super::integrate_rotation;
+use crate::Error;
+use crate::error::{finite_point, finite_vector};
 use crate::frame::Pose;
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_point, cast_vector};
 
@@ -26,6 +28,15 @@ impl<S: Scalar> WallMotion<S> {
     #[must_use]
     pub fn velocity_at(&self, point: Point3<S>) -> Vec3<S> {
         self.velocity + self.angular_velocity.cross(point - self.pivot)
+    }
+
+    /// The motion, if it is finite.
+    pub(crate) fn validated(self) -> Result<Self, Error> {
+        finite_vector(["velocity.x", "velocity.y", "velocity.z"], self.velocity)?;
+        let names = ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"];
+        finite_vector(names, self.angular_velocity)?;
+        finite_point(["pivot.x", "pivot.y", "pivot.z"], self.pivot)?;
+        Ok(self)
     }
 
     /// Relative pose of the wall `time` seconds ago.

@@ -26,6 +26,7 @@ mod quarantine;
 mod query;
 mod query_walls;
 mod scratch;
+mod sensors;
 mod settings;
 mod soft_impacts;
 mod soft_step;
@@ -49,6 +50,7 @@ pub use marble::{Damping, Marble};
 pub use marbles::Marbles;
 pub use model::{Detection, Model, Precision};
 pub use query::{ColliderId, Queries, QueryHit, QueryTree};
+pub use sensors::{SensorEvent, SensorId, Sensors};
 #[cfg(test)]
 pub(crate) use swept_walls::SweptWalls;
 pub use wall_shape::WallShape;
@@ -81,6 +83,8 @@ pub struct World<S: Scalar> {
     /// Particle system of balls, which collide with walls, marbles and each other. (Their contacts
     /// are not listed.)
     pub swarm: Swarm,
+    /// Sensors: shapes that tell which marbles enter and leave.
+    pub sensors: Sensors<S>,
     /// Contacts of the last substep, except those of marbles [asleep](Self::is_asleep) with each
     /// other and with walls. Between [`World::generate_contacts`] and [`World::restitute`] they may
     /// be edited: a removed contact is not solved, a changed normal or separation is the one that

@@ -1,15 +1,15 @@
 //! Spatial queries through a bounding volume hierarchy.
 
 use super::query_walls::{
-    cast_ray_on_wall, cast_shape_on_wall, min_by_time, overlaps_transformed, shape_cast_half_space,
+    cast_ray_on_wall, cast_shape_on_half_space, cast_shape_on_wall, overlaps_half_space,
+    overlaps_on_wall,
 };
 use super::walls::SubShape;
 use super::{MarbleId, WallId, WallShape, World};
 use crate::Error;
 use crate::broad::CollisionLayers;
 use crate::contact::{
-    RayCast, RayHit, ShapeCastHit, closest_points_of_plane, closest_points_of_shapes,
-    shape_cast_of_shapes, sub_shapes,
+    RayCast, RayHit, ShapeCastHit, closest_points_of_shapes, shape_cast_of_shapes,
 };
 use crate::frame::Ray;
 use crate::math::{Point3, Scalar, Vec3, is_finite, is_finite_point, length};
@@ -215,9 +215,7 @@ impl<S: Scalar> Queries<'_, S> {
         };
         let still = Vec3::new(S::zero(), S::zero(), S::zero());
         for (item, plane) in self.planes() {
-            offer(item, &|| {
-                min_by_time(shape, |part| shape_cast_half_space(plane, part, translation))
-            });
+            offer(item, &|| cast_shape_on_half_space(plane, shape, translation));
         }
         let start = shape.bounding_box();
         let end = Aabb { min: start.min + translation, max: start.max + translation };
@@ -251,7 +249,7 @@ impl<S: Scalar> Queries<'_, S> {
             found.extend(collider.filter(|_| touches()));
         };
         for (item, plane) in self.planes() {
-            offer(item, &|| closest_points_of_plane(plane, shape).touching());
+            offer(item, &|| overlaps_half_space(plane, shape));
         }
         self.tree.tree.for_each_in_box(&shape.bounding_box(), |number| {
             let item = self.tree.items[number as usize];
@@ -263,26 +261,7 @@ impl<S: Scalar> Queries<'_, S> {
                 }
                 Item::Wall(SubShape { wall, index: number }) => {
                     let Some(wall) = self.world.walls.shapes().get(wall as usize) else { return };
-                    match wall {
-                        WallShape::Plane(_) => {}
-                        solid @ WallShape::Solid(_) => offer(item, &|| {
-                            let near = solid
-                                .sub_shape(number)
-                                .and_then(|wall| closest_points_of_shapes(wall, shape));
-                            near.is_some_and(|near| near.result.touching())
-                        }),
-                        WallShape::Mesh(mesh, pose) => {
-                            offer(item, &|| overlaps_transformed(&**mesh, *pose, shape));
-                        }
-                        WallShape::HeightField(field, pose) => {
-                            offer(item, &|| {
-                                overlaps_transformed(&**field, *pose, shape)
-                                    || sub_shapes(shape)
-                                        .into_iter()
-                                        .any(|part| wall.is_in_height_field(part.center()))
-                            });
-                        }
-                    }
+                    offer(item, &|| overlaps_on_wall(wall, number, shape));
                 }
             }
         });

@@ -1,4 +1,4 @@
-//! Rays and shapes cast on single walls, for [`Queries`](super::Queries).
+//! Rays and shapes cast on single walls, for [`Queries`](super::Queries) and [`Sensors`](super::Sensors).
 
 use std::borrow::Cow;
 
@@ -7,8 +7,9 @@ use cgmath::InnerSpace;
 use super::WallShape;
 use super::walls::SubShape;
 use crate::contact::{
-    Convex, RayCast, RayHit, ShapeCastHit, TriangleResult, closest_points_of_surface,
-    ray_cast_on_surface, shape_cast_of_shapes, shape_cast_on_surface, sub_shapes,
+    Convex, RayCast, RayHit, ShapeCastHit, TriangleResult, closest_points_of_plane,
+    closest_points_of_shapes, closest_points_of_surface, ray_cast_on_surface, shape_cast_of_shapes,
+    shape_cast_on_surface, sub_shapes,
 };
 use crate::frame::{Pose, Ray};
 use crate::math::{Scalar, Vec3};
@@ -88,8 +89,70 @@ pub(super) fn cast_shape_on_wall<S: Scalar>(
     }
 }
 
+/// First contact of a translating shape with a half-space.
+pub(super) fn cast_shape_on_half_space<S: Scalar>(
+    plane: &Plane<S>,
+    shape: &Shape<S>,
+    translation: Vec3<S>,
+) -> Option<ShapeCastHit<S>> {
+    min_by_time(shape, |part| shape_cast_half_space(plane, part, translation))
+}
+
+/// Tests if a shape overlaps a half-space.
+pub(super) fn overlaps_half_space<S: Scalar>(plane: &Plane<S>, shape: &Shape<S>) -> bool {
+    closest_points_of_plane(plane, shape).touching()
+}
+
+/// Tests if a shape overlaps a sub-shape of a wall that is no half-space: its surface, or the solid.
+pub(super) fn overlaps_on_wall<S: Scalar>(
+    wall: &WallShape<S>,
+    part: u32,
+    shape: &Shape<S>,
+) -> bool {
+    match wall {
+        WallShape::Plane(_) => false,
+        WallShape::Solid(_) => {
+            let near = wall.sub_shape(part).and_then(|wall| closest_points_of_shapes(wall, shape));
+            near.is_some_and(|near| near.result.touching())
+        }
+        WallShape::Mesh(mesh, pose) => overlaps_transformed(&**mesh, *pose, shape),
+        WallShape::HeightField(field, pose) => {
+            let inside = |part: &dyn Convex<S>| wall.is_in_height_field(part.center());
+            overlaps_transformed(&**field, *pose, shape)
+                || sub_shapes(shape).into_iter().any(inside)
+        }
+    }
+}
+
+impl<S: Scalar> WallShape<S> {
+    /// Tests if a shape overlaps the wall.
+    pub(super) fn overlaps(&self, shape: &Shape<S>) -> bool {
+        if let Self::Plane(plane) = self {
+            return overlaps_half_space(plane, shape);
+        }
+        let mut found = false;
+        self.for_each_box(|part, _| found = found || overlaps_on_wall(self, part, shape));
+        found
+    }
+
+    /// Time of the first contact of a translating shape with the wall, as a fraction of the motion.
+    /// What separates from it at the start does not count.
+    pub(super) fn cast_shape(&self, shape: &Shape<S>, translation: Vec3<S>) -> Option<S> {
+        if let Self::Plane(plane) = self {
+            return cast_shape_on_half_space(plane, shape, translation).map(|hit| hit.time);
+        }
+        let mut first: Option<S> = None;
+        self.for_each_box(|part, _| {
+            if let Some(hit) = cast_shape_on_wall(self, part, shape, translation) {
+                first = Some(first.map_or(hit.time, |first| first.min(hit.time)));
+            }
+        });
+        first
+    }
+}
+
 /// Earliest hit among the sub-shapes of a shape.
-pub(super) fn min_by_time<S: Scalar>(
+fn min_by_time<S: Scalar>(
     shape: &Shape<S>,
     query: impl Fn(&dyn Convex<S>) -> Option<ShapeCastHit<S>>,
 ) -> Option<ShapeCastHit<S>> {
@@ -142,7 +205,7 @@ fn shape_cast_on_field<S: Scalar>(
     at_once.or_else(|| Some(later()?.to_world(pose)))
 }
 
-pub(super) fn overlaps_transformed<S: Scalar>(
+fn overlaps_transformed<S: Scalar>(
     surface: &impl Surface<S>,
     pose: Pose<S>,
     shape: &Shape<S>,
@@ -152,7 +215,7 @@ pub(super) fn overlaps_transformed<S: Scalar>(
 }
 
 /// First contact of a translating convex shape with a half-space.
-pub(super) fn shape_cast_half_space<S: Scalar>(
+fn shape_cast_half_space<S: Scalar>(
     plane: &Plane<S>,
     shape: &dyn Convex<S>,
     translation: Vec3<S>,

@@ -47,6 +47,7 @@ impl<S: Scalar> World<S> {
         let dt = Self::validated_dt(dt)?;
         self.check_shapes()?;
         self.check_crowding()?;
+        self.sensors.begin_substep(&self.marbles);
         self.audit_before();
         method_of(self.settings.model.response).integrate(self, dt)
     }
@@ -100,7 +101,9 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`].
     pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
         let dt = Self::validated_dt(dt)?;
-        method_of(self.settings.model.response).restitute(self, dt)
+        method_of(self.settings.model.response).restitute(self, dt)?;
+        self.sense(dt);
+        Ok(())
     }
 
     /// Solves the listed contacts by a method.
@@ -148,6 +151,7 @@ impl<S: Scalar> World<S> {
         self.scratch.stopped.clear();
         self.quarantined.clear();
         self.impacts.clear();
+        self.sensors.begin_step();
         self.reset_audit();
     }
 

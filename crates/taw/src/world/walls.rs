@@ -7,7 +7,6 @@ use super::wall_shape::WallShape;
 use crate::Error;
 use crate::broad::CollisionLayers;
 use crate::contact::ClosestPoints;
-use crate::error::{finite_point, finite_vector};
 use crate::handle::{Handle, Handles};
 use crate::math::{Point3, Scalar, Vec3, is_finite_point};
 use crate::motion::WallMotion;
@@ -316,14 +315,7 @@ impl<S: Scalar> Walls<S> {
     /// [`Error::NoSuchWall`], [`Error::NotFinite`].
     pub fn set_motion(&mut self, id: WallId, motion: Option<WallMotion<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
-        if let Some(motion) = motion {
-            finite_vector(["velocity.x", "velocity.y", "velocity.z"], motion.velocity)?;
-            finite_vector(
-                ["angular_velocity.x", "angular_velocity.y", "angular_velocity.z"],
-                motion.angular_velocity,
-            )?;
-            finite_point(["pivot.x", "pivot.y", "pivot.z"], motion.pivot)?;
-        }
+        let motion = motion.map(WallMotion::validated).transpose()?;
         if self.motion.get(row) != motion {
             self.version += 1;
             self.log_change(self.shapes[row].bounding_box());

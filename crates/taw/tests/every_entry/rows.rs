@@ -325,6 +325,7 @@ fn swarms<S: Scalar>() -> Vec<Row<S>> {
             let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
             p.world.swarm.set_layers(&[ball], taw::broad::CollisionLayers::new(x.as_f64() as u32, !0))
         };
+        World 1 "Sensors::set_layers": |p, x| p.world.sensors.set_layers(p.sensor, taw::broad::CollisionLayers::new(!0, x.as_f64() as u32));
         World 1 "Walls::set_layers": |p, x| p.world.walls.set_layers(p.wall, taw::broad::CollisionLayers::new(!0, x.as_f64() as u32));
         World 1 "Swarm::set_gravity_scale": |p, x| {
             let before = p.world.clone();
@@ -377,6 +378,15 @@ fn walls<S: Scalar>() -> Vec<Row<S>> {
             let pose = pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x));
             let moved = p.world.walls.get(p.wall)?.transformed(pose)?;
             p.world.walls.set(p.wall, moved)
+        };
+        World 4 "Sensors::set_motion": |p, x| {
+            let motion = WallMotion { velocity: on_axis(p.case, x), angular_velocity: on_axis(p.case, x), pivot: point(x, x, x) };
+            p.world.sensors.set_motion(p.sensor, Some(motion))
+        };
+        World 4 "Sensors::set Sensors::insert": |p, x| {
+            let (at, radius) = if p.case < 2 { (x, one()) } else { (zero(), x) };
+            let ball = Sphere { center: point(at, at, at), radius };
+            if p.case % 2 == 0 { p.world.sensors.set(p.sensor, ball) } else { p.world.sensors.insert(ball).map(|_| ()) }
         };
         World 4 "Walls::set_motion WallMotion.velocity": |p, x| {
             let (none, pivot) = (vector(zero(), zero(), zero()), point(zero(), zero(), zero()));

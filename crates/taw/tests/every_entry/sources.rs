@@ -9,6 +9,8 @@ const NAMES: &[&str] = &[
     "&mut self",
     "MarbleId",
     "WallId",
+    "SensorId",
+    "ColliderId",
     "NodeId",
     "BallId",
     "&[BallId]",

@@ -1,0 +1,273 @@
+//! Sensors: shapes that marbles pass through, and that tell who enters and leaves.
+
+use cgmath::{One, Zero};
+
+use super::{MarbleId, Marbles, WallShape, World};
+use crate::Error;
+use crate::broad::CollisionLayers;
+use crate::frame::Pose;
+use crate::handle::{Handle, Handles};
+use crate::math::{Point3, Quat, Scalar, Vec3};
+use crate::motion::WallMotion;
+use crate::shape::{Aabb3, BoundedShape, Shape};
+
+/// Stable handle of a sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SensorId(Handle);
+
+/// Marble that entered or left a sensor in a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SensorEvent<S> {
+    /// The sensor.
+    pub sensor: SensorId,
+    /// The marble; one that left may have been removed.
+    pub marble: MarbleId,
+    /// True if it entered, false if it left.
+    pub entered: bool,
+    /// Time from then to the end of the step, in seconds.
+    pub time_left: S,
+}
+
+/// Sensors of a world. Marbles do not feel them.
+///
+/// A marble is inside of a sensor if their shapes overlap; of a mesh, that is its surface. One that
+/// passes through within a substep enters and leaves in it, at any speed: its path is taken to be
+/// straight within a substep (of [`SoftStep`](crate::response::Response::SoftStep), within a step),
+/// relative to a sensor that moves. Balls of the swarm are not sensed.
+///
+/// ```
+/// use taw::prelude::*;
+///
+/// # fn main() -> Result<(), taw::Error> {
+/// let mut world = World::<f32>::default();
+/// let gate = world.sensors.insert(Sphere::new(Point3::new(0.0, 0.0, 0.0), 1.0)?)?;
+/// let ball = world.marbles.insert(Marble::new(Point3::new(0.0, 1.3, 0.0), 0.2))?;
+/// while world.sensors.events().is_empty() {
+///     world.step(1.0 / 60.0)?;
+/// }
+/// assert_eq!(world.sensors.inside(gate)?, [ball]);
+/// # Ok(())
+/// # }
+/// ```
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Sensors<S> {
+    handles: Handles,
+    sensors: Vec<Sensor<S>>,
+    events: Vec<SensorEvent<S>>,
+    /// Positions of the marbles at the beginning of the substep, by index, and their number of
+    /// removals then.
+    start: Vec<Point3<S>>,
+    removals: u64,
+}
+
+#[derive(Clone, Debug, PartialEq)]
+struct Sensor<S> {
+    shape: WallShape<S>,
+    motion: Option<WallMotion<S>>,
+    layers: CollisionLayers,
+    /// Sorted.
+    inside: Vec<MarbleId>,
+}
+
+impl<S: Scalar> Sensors<S> {
+    /// Adds a sensor: any shape that a wall may have.
+    ///
+    /// # Errors
+    /// As [`Walls::insert`](super::Walls::insert).
+    pub fn insert(&mut self, shape: impl Into<WallShape<S>>) -> Result<SensorId, Error> {
+        let shape = shape.into().validated()?;
+        let id = SensorId(self.handles.push()?);
+        let layers = CollisionLayers::ALL;
+        self.sensors.push(Sensor { shape, motion: None, layers, inside: Vec::new() });
+        Ok(id)
+    }
+
+    /// Removes a sensor. Whoever is inside leaves without an event.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchSensor`].
+    pub fn remove(&mut self, id: SensorId) -> Result<(), Error> {
+        let row = self.handles.swap_remove(id.0).ok_or(Error::NoSuchSensor(id))?;
+        self.sensors.swap_remove(row);
+        self.events.retain(|event| event.sensor != id);
+        Ok(())
+    }
+
+    /// Sets the shape of a sensor, which is also its place.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchSensor`], and as [`Sensors::insert`]; then nothing has changed.
+    pub fn set(&mut self, id: SensorId, shape: impl Into<WallShape<S>>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        self.sensors[row].shape = shape.into().validated()?;
+        Ok(())
+    }
+
+    /// Sets the motion by which a sensor gets where it is at the end of a step, or with `None` puts
+    /// it at rest. The caller moves it accordingly.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchSensor`]; [`Error::NotFinite`] for a field of the motion.
+    pub fn set_motion(&mut self, id: SensorId, motion: Option<WallMotion<S>>) -> Result<(), Error> {
+        let row = self.row(id)?;
+        self.sensors[row].motion = motion.map(WallMotion::validated).transpose()?;
+        Ok(())
+    }
+
+    /// Sets the layers of a sensor: it senses marbles whose layers interact with these.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchSensor`].
+    pub fn set_layers(&mut self, id: SensorId, layers: CollisionLayers) -> Result<(), Error> {
+        let row = self.row(id)?;
+        self.sensors[row].layers = layers;
+        Ok(())
+    }
+
+    /// Marbles inside of a sensor at the end of the last step, sorted.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchSensor`].
+    pub fn inside(&self, id: SensorId) -> Result<&[MarbleId], Error> {
+        self.row(id).map(|row| self.sensors[row].inside.as_slice())
+    }
+
+    /// Shape of a sensor.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchSensor`].
+    pub fn shape(&self, id: SensorId) -> Result<&WallShape<S>, Error> {
+        self.row(id).map(|row| &self.sensors[row].shape)
+    }
+
+    /// Marbles that entered and left in the last step, by substep and sensor. One that passed through
+    /// within a substep enters first.
+    #[must_use]
+    pub fn events(&self) -> &[SensorEvent<S>] {
+        &self.events
+    }
+
+    /// Number of sensors.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.sensors.len()
+    }
+
+    /// Returns true if there is no sensor.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.sensors.is_empty()
+    }
+
+    fn row(&self, id: SensorId) -> Result<usize, Error> {
+        self.handles.row(id.0).ok_or(Error::NoSuchSensor(id))
+    }
+
+    /// Forgets the events of the last step.
+    pub(super) fn begin_step(&mut self) {
+        self.events.clear();
+    }
+
+    /// Notes where marbles are at the beginning of a substep.
+    pub(super) fn begin_substep(&mut self, marbles: &Marbles<S>) {
+        self.start.clear();
+        if !self.sensors.is_empty() {
+            self.start.extend_from_slice(marbles.position());
+            self.removals = marbles.removals();
+        }
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// Finds who entered and left sensors in a substep of `dt` seconds.
+    pub(super) fn sense(&mut self, dt: S) {
+        let rest = self.scratch.rest_of_step;
+        let Sensors { handles, sensors, events, start, removals } = &mut self.sensors;
+        if *removals != self.marbles.removals() {
+            start.clear(); // indices have other marbles now
+        }
+        for (row, sensor) in sensors.iter_mut().enumerate() {
+            let Some(id) = handles.handle(row).map(SensorId) else { continue };
+            let first = events.len();
+            let mut tell = |marble: MarbleId, entered: bool, part: S| {
+                let time_left = rest + dt * (S::one() - part).max(S::zero());
+                events.push(SensorEvent { sensor: id, marble, entered, time_left });
+            };
+            let before = std::mem::take(&mut sensor.inside);
+            for (marble, path) in paths(&self.marbles, start, sensor, dt) {
+                let was_inside = before.binary_search(&marble).is_ok();
+                let is_inside = sensor.shape.overlaps(&path.end);
+                let enters = || sensor.shape.cast_shape(&path.start(), path.way);
+                let leaves = || sensor.shape.cast_shape(&path.end, -path.way);
+                match (was_inside, is_inside) {
+                    (true, true) => {}
+                    // Who was put inside is there from the beginning.
+                    (false, true) => tell(marble, true, enters().unwrap_or(S::zero())),
+                    (true, false) => tell(marble, false, S::one() - leaves().unwrap_or(S::one())),
+                    (false, false) => {
+                        if let Some(part) = enters() {
+                            tell(marble, true, part);
+                            let back = leaves().unwrap_or(S::one() - part);
+                            tell(marble, false, (S::one() - back).max(part));
+                        }
+                    }
+                }
+                if is_inside {
+                    sensor.inside.push(marble);
+                }
+            }
+            sensor.inside.sort_unstable();
+            for marble in before.into_iter().filter(|it| sensor.inside.binary_search(it).is_err()) {
+                if !events[first..].iter().any(|event| event.marble == marble) {
+                    let time_left = rest + dt; // it was put elsewhere, or is gone
+                    events.push(SensorEvent { sensor: id, marble, entered: false, time_left });
+                }
+            }
+        }
+    }
+}
+
+/// Path of a marble in a substep, relative to a sensor.
+struct Path<S> {
+    /// The marble at its end.
+    end: Shape<S>,
+    /// Displacement, in metres.
+    way: Vec3<S>,
+}
+
+impl<S: Scalar> Path<S> {
+    /// The marble at its beginning.
+    fn start(&self) -> Shape<S> {
+        self.end.transformed(Pose { rotation: Quat::one(), translation: -self.way })
+    }
+}
+
+/// Marbles whose paths may touch a sensor.
+fn paths<'a, S: Scalar>(
+    marbles: &'a Marbles<S>,
+    start: &'a [Point3<S>],
+    sensor: &Sensor<S>,
+    dt: S,
+) -> impl Iterator<Item = (MarbleId, Path<S>)> + use<'a, S> {
+    let (bounds, motion, layers) = (sensor.shape.bounding_box(), sensor.motion, sensor.layers);
+    (0..marbles.len()).filter_map(move |row| {
+        let end = marbles.position()[row];
+        let moved = start.get(row).map_or_else(Vec3::zero, |start| end - start);
+        let carried = motion.map_or_else(Vec3::zero, |motion| motion.velocity_at(end) * dt);
+        let way = marbles.period.minimum_image(moved) - carried;
+        let end = marbles.shape_of_row(row);
+        let is_near = bounds.is_none_or(|bounds| meets(&end.bounding_box(), way, &bounds));
+        if !is_near || !marbles.layers_of_row(row).interacts_with(layers) {
+            return None;
+        }
+        Some((marbles.id(row)?, Path { end, way }))
+    })
+}
+
+/// Tests if a box that came by a displacement may have met another one.
+fn meets<S: Scalar>(end: &Aabb3<S>, way: Vec3<S>, other: &Aabb3<S>) -> bool {
+    (0..3).all(|axis| {
+        let (back, ahead) = (way[axis].max(S::zero()), (-way[axis]).max(S::zero()));
+        end.min[axis] - back <= other.max[axis] && end.max[axis] + ahead >= other.min[axis]
+    })
+}

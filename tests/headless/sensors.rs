@@ -1,0 +1,181 @@
+//! Sensors: who enters, who leaves, who is inside.
+
+use bevy::ecs::message::Messages;
+use bevy::prelude::*;
+use bevy_taw::prelude::*;
+
+use crate::scene;
+
+const RESPONSES: [Response; 4] =
+    [Response::Displacement, Response::Impulse, Response::EventDriven, Response::SoftStep];
+
+/// What was told, in order.
+#[derive(Resource, Default)]
+struct Told(Vec<(bool, Entity, Entity)>);
+
+fn listen(
+    mut told: ResMut<Told>,
+    mut entered: MessageReader<SensorEntered>,
+    mut left: MessageReader<SensorLeft>,
+) {
+    // Of one step: who passed through entered first.
+    told.0.extend(entered.read().map(|it| (true, it.sensor, it.marble)));
+    told.0.extend(left.read().map(|it| (false, it.sensor, it.marble)));
+}
+
+fn app(response: Response) -> App {
+    let mut app = scene::app();
+    app.world_mut().resource_mut::<TawModel>().response = response;
+    app.insert_resource(Gravity(Vec3::ZERO))
+        .init_resource::<Told>()
+        .add_systems(FixedUpdate, listen.after(TawSystems::Scatter));
+    app
+}
+
+fn told(app: &mut App) -> Vec<(bool, Entity, Entity)> {
+    std::mem::take(&mut app.world_mut().resource_mut::<Told>().0)
+}
+
+fn gate(app: &mut App, size: Vec3, at: Vec3) -> Entity {
+    let wall = Wall::from(Cuboid::from_size(size));
+    app.world_mut().spawn((wall, Sensor, Transform::from_translation(at))).id()
+}
+
+fn shoot(app: &mut App, radius: f32, at: Vec3, velocity: Vec3) -> Entity {
+    let marble = scene::drop_marble(app, radius, at);
+    app.world_mut().entity_mut(marble).insert(Velocity(velocity));
+    marble
+}
+
+fn inside(app: &App, sensor: Entity) -> Vec<Entity> {
+    app.world().get::<CollidingEntities>(sensor).unwrap().to_vec()
+}
+
+#[test]
+fn a_gate_notices_marbles_of_any_speed_and_stops_none() {
+    for response in RESPONSES {
+        for rate in [10.0, 60.0, 1000.0] {
+            for speed in [0.5, 5.0, 100.0, 300.0_f32] {
+                let mut app = app(response);
+                app.insert_resource(Time::<Fixed>::from_hz(rate));
+                let gate = gate(&mut app, Vec3::new(0.002, 2.0, 2.0), Vec3::ZERO);
+                let start = -0.3 - 0.1 * speed.sqrt();
+                let marble = shoot(&mut app, 0.05, Vec3::X * start, Vec3::X * speed);
+                scene::frames(&mut app, (64.0 * (1.0 - start) / speed) as u32 + 20);
+                let case = format!("{response:?} at {rate} Hz, {speed} m/s");
+                assert_eq!(told(&mut app), [(true, gate, marble), (false, gate, marble)], "{case}");
+                let velocity = app.world().get::<Velocity>(marble).unwrap();
+                assert_eq!(**velocity, Vec3::X * speed, "{case}");
+                assert!(inside(&app, gate).is_empty(), "{case}");
+            }
+        }
+    }
+}
+
+#[test]
+fn who_is_inside_is_listed_until_it_leaves_or_is_gone() {
+    let mut app = app(Response::Impulse);
+    let zone = gate(&mut app, Vec3::splat(2.0), Vec3::ZERO);
+    let stays = scene::drop_marble(&mut app, 0.1, Vec3::ZERO);
+    let goes = shoot(&mut app, 0.1, Vec3::Y * 0.5, Vec3::Y * 4.0);
+    let dies = scene::drop_marble(&mut app, 0.1, Vec3::Z * 0.5);
+    app.update();
+    let mut all = vec![stays, goes, dies];
+    all.sort_unstable();
+    assert_eq!(inside(&app, zone), all);
+    told(&mut app);
+    scene::frames(&mut app, 20);
+    assert_eq!(told(&mut app), [(false, zone, goes)]);
+    app.world_mut().despawn(dies);
+    app.update();
+    assert_eq!(told(&mut app), [(false, zone, dies)]);
+    assert_eq!(inside(&app, zone), [stays]);
+    // A jump across meets nothing; one into it enters.
+    app.world_mut().get_mut::<Transform>(stays).unwrap().translation = Vec3::X * -9.0;
+    app.update();
+    assert_eq!(told(&mut app), [(false, zone, stays)]);
+    app.world_mut().get_mut::<Transform>(stays).unwrap().translation = Vec3::X * 9.0;
+    app.update();
+    assert_eq!(told(&mut app), []);
+    app.world_mut().get_mut::<Transform>(stays).unwrap().translation = Vec3::ZERO;
+    app.update();
+    assert_eq!(told(&mut app), [(true, zone, stays)]);
+}
+
+#[test]
+fn a_sensor_moves_with_what_carries_it() {
+    for response in RESPONSES {
+        let mut app = app(response);
+        let marble = scene::drop_marble(&mut app, 0.1, Vec3::ZERO);
+        let cart = app.world_mut().spawn(Transform::from_xyz(-2.0, 0.0, 0.0)).id();
+        let wall = Wall::from(Cuboid::new(0.01, 1.0, 1.0));
+        let gate = app.world_mut().spawn((wall, Sensor, ChildOf(cart))).id();
+        app.add_systems(
+            FixedUpdate,
+            (move |mut places: Query<&mut Transform>, time: Res<Time>| {
+                places.get_mut(cart).unwrap().translation.x += 9.0 * time.delta_secs();
+            })
+            .before(TawSystems::Gather),
+        );
+        scene::frames(&mut app, 32);
+        assert_eq!(told(&mut app), [(true, gate, marble), (false, gate, marble)], "{response:?}");
+        assert_eq!(scene::position(&app, marble), Vec3::ZERO);
+    }
+}
+
+#[test]
+fn a_wall_becomes_a_sensor_and_a_wall_again() {
+    let mut app = app(Response::SoftStep);
+    app.insert_resource(Gravity(Vec3::NEG_Y * 9.81));
+    let floor = scene::floor(&mut app);
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
+    scene::frames(&mut app, 10);
+    assert!((scene::position(&app, marble).y - 0.5).abs() < 0.01);
+    assert_eq!(told(&mut app), []);
+    app.world_mut().entity_mut(floor).insert(Sensor);
+    scene::frames(&mut app, 10);
+    assert!(scene::position(&app, marble).y < 0.45, "it falls through");
+    assert_eq!(told(&mut app), [(true, floor, marble)]);
+    assert_eq!(inside(&app, floor), [marble]);
+    app.world_mut().entity_mut(floor).remove::<Sensor>();
+    scene::frames(&mut app, 100);
+    assert!((scene::position(&app, marble).y - 0.5).abs() < 0.01, "it is borne again");
+    app.world_mut().entity_mut(floor).insert(Sensor).remove::<Wall>();
+    scene::frames(&mut app, 5);
+    assert!(app.world().resource::<TawWorld>().walls.is_empty());
+    assert!(app.world().resource::<TawWorld>().sensors.is_empty());
+    let zone = gate(&mut app, Vec3::ONE, Vec3::ZERO);
+    app.update();
+    assert_eq!(app.world().resource::<TawWorld>().sensors.len(), 1);
+    app.world_mut().despawn(zone);
+    app.update();
+    assert!(app.world().resource::<TawWorld>().sensors.is_empty());
+}
+
+#[test]
+fn layers_observers_and_snapshots() {
+    #[derive(Resource, Default)]
+    struct Seen(Vec<Entity>);
+    let mut app = app(Response::Impulse);
+    app.init_resource::<Seen>();
+    let zone = gate(&mut app, Vec3::splat(2.0), Vec3::ZERO);
+    app.world_mut()
+        .entity_mut(zone)
+        .insert(CollisionLayers::new(LayerMask::ALL, 1_u32))
+        .observe(|it: On<SensorEntered>, mut seen: ResMut<Seen>| seen.0.push(it.marble));
+    let unseen = scene::drop_marble(&mut app, 0.1, Vec3::Y * 0.4);
+    app.world_mut().entity_mut(unseen).insert(CollisionLayers::new(2_u32, LayerMask::ALL));
+    app.update();
+    let saved = app.world().resource::<TawWorld>().snapshot();
+    let marble = shoot(&mut app, 0.1, Vec3::X * 1.5, Vec3::NEG_X);
+    scene::frames(&mut app, 60);
+    assert_eq!(app.world().resource::<Seen>().0, [marble]);
+    assert_eq!(inside(&app, zone), [marble]);
+    assert_eq!(app.world().resource::<Messages<SensorLeft>>().len(), 0);
+    app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+    scene::frames(&mut app, 3);
+    assert_eq!(app.world().resource::<TawWorld>().sensors.len(), 1);
+    app.world_mut().entity_mut(zone).remove::<CollisionLayers>();
+    scene::frames(&mut app, 3);
+    assert!(inside(&app, zone).contains(&unseen));
+}
