@@ -67,7 +67,7 @@ fn rays_hit_what_the_formula_says() {
         .iter(app.world())
         .map(|(entity, place, marble)| (entity, place.translation, marble.radius))
         .collect();
-    let rays: Vec<_> = (0..500_u64)
+    let rays: Vec<_> = (0..2_000_u64)
         .map(|i| {
             let random = |k: u64| scene::random(1_000_000 + 7 * i + k) - 0.5;
             let origin = Vec3::new(random(0), random(1), random(2)) * 60.0;
