@@ -178,3 +178,34 @@ fn a_turning_mesh_costs_no_more_than_one_that_moves() {
         println!("a mesh of 180,000 triangles that {what}: gather {:.4} ms", times[30]);
     }
 }
+
+/// A belt drags what lies on it, in its own frame, and its ends push nobody.
+#[test]
+fn a_conveyor_belt_drags_and_pushes_nobody() {
+    for response in [Response::Impulse, Response::EventDriven, Response::SoftStep] {
+        let mut app = scene::app();
+        let model = Model { response, rotation: Rotation::Dynamic, substeps: 4, ..Model::GAME };
+        app.insert_resource(TawModel(model));
+        scene::floor(&mut app);
+        let turned = Transform::from_xyz(0.0, 0.5, 0.0).with_rotation(Quat::from_rotation_y(1.0));
+        let along = turned.rotation * Vec3::X;
+        let belt = Wall::from(Cuboid::new(4.0, 1.0, 2.0));
+        let belt = app.world_mut().spawn((belt, turned, SurfaceVelocity(Vec3::X * 2.0))).id();
+        let rough = SurfaceMaterial { restitution: 0.0, friction: 0.8, ..default() };
+        let on_top = scene::drop_marble(&mut app, 0.1, Vec3::Y * 1.1 - along * 1.8);
+        let at_end = scene::drop_marble(&mut app, 0.1, Vec3::Y * 0.1 + along * 2.1);
+        for marble in [on_top, at_end] {
+            app.world_mut().entity_mut(marble).insert((rough, Velocity::default()));
+        }
+        scene::frames(&mut app, 64);
+        let velocity = |app: &App, marble| **app.world().get::<Velocity>(marble).unwrap();
+        let off = velocity(&app, on_top).distance(along * 2.0 * 2.0 / 7.0);
+        assert!(off < 0.02, "{response:?}: {}", velocity(&app, on_top));
+        assert!(velocity(&app, at_end).length() < 0.02, "{response:?}");
+        app.world_mut().entity_mut(belt).remove::<SurfaceVelocity>();
+        app.update();
+        let world = app.world().resource::<TawWorld>();
+        let motions = (0..world.walls.len()).filter_map(|row| world.walls.id(row));
+        assert!(motions.into_iter().all(|id| world.walls.motion(id) == Ok(None)), "{response:?}");
+    }
+}

@@ -264,6 +264,13 @@ pub struct Teleport;
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct Kinematic;
 
+/// Velocity of the surface of a [`Wall`](crate::wall::Wall), in m/s in the entity's own frame, as of a
+/// conveyor belt: it drags what touches it along the surface, and pushes nobody. It does not count in
+/// steps in which the wall itself moves.
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct SurfaceVelocity(pub Vec3);
+
 /// What the physics knows of a marble entity.
 #[derive(Component, Clone, Copy, Debug, Default)]
 pub(crate) struct MarbleState {

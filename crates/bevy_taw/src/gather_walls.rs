@@ -8,7 +8,8 @@ use taw::frame::Pose;
 use taw::world::WallMotion;
 
 use crate::components::{
-    Kinematic, LocalShape, Marble, SurfaceMaterial, Teleport, WallState, bits, rotation_bits,
+    Kinematic, LocalShape, Marble, SurfaceMaterial, SurfaceVelocity, Teleport, WallState, bits,
+    rotation_bits,
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::layers::CollisionLayers;
@@ -17,7 +18,9 @@ use crate::resources::TawWorld;
 use crate::sensor::Sensor;
 use crate::snapshot::{self, RowRemoved};
 use crate::wall::Wall;
-use crate::wall_motion::{Change, Clock, LARGEST_CHANGE_OF_SPEED, PoseTracker, TrackedPose};
+use crate::wall_motion::{
+    Change, Clock, LARGEST_CHANGE_OF_SPEED, PoseTracker, TrackedPose, WallVelocity,
+};
 
 /// Two scales that differ by no larger part than this are one. A rotation leaves its columns a
 /// few epsilons longer or shorter, and each ancestor a few more: 32 of them are reached by none
@@ -77,13 +80,13 @@ fn finite_place(transforms: &TransformHelper, entity: Entity) -> Option<Isometry
 type WallComponents<'a> = (
     (Entity, &'a Transform, Has<Marble>, Has<Sensor>),
     Ref<'a, Wall>,
-    (Option<&'a SurfaceMaterial>, Option<&'a CollisionLayers>),
+    (Option<&'a SurfaceMaterial>, Option<&'a CollisionLayers>, Option<&'a SurfaceVelocity>),
     &'a mut WallState,
 );
 type WallItem<'a> = (
     (Entity, &'a Transform, bool, bool),
     Ref<'a, Wall>,
-    (Option<&'a SurfaceMaterial>, Option<&'a CollisionLayers>),
+    (Option<&'a SurfaceMaterial>, Option<&'a CollisionLayers>, Option<&'a SurfaceVelocity>),
     Mut<'a, WallState>,
 );
 
@@ -175,7 +178,7 @@ impl Gathering<'_, '_> {
     /// Takes over one wall or sensor.
     fn take_over(
         &mut self,
-        ((entity, own, is_marble, is_sensor), wall, (material, layers), state): &mut WallItem,
+        ((entity, own, is_marble, is_sensor), wall, (material, layers, surface), state): &mut WallItem,
         place: Option<GlobalTransform>,
         clock: Clock,
     ) {
@@ -222,7 +225,7 @@ impl Gathering<'_, '_> {
             self.refusals.check(Some(entity), Err(no_frame));
             return self.stop(state);
         }
-        self.put(entity, state, now, (clock, *is_sensor));
+        self.put(entity, state, now, (clock, *is_sensor, surface.copied()));
         self.make_of(entity, state, *material);
         self.put_into_layers(entity, state, layers.copied().unwrap_or_default());
     }
@@ -263,7 +266,7 @@ impl Gathering<'_, '_> {
         entity: Entity,
         state: &mut WallState,
         now: Isometry3d,
-        (clock, is_sensor): (Clock, bool),
+        (clock, is_sensor, surface): (Clock, bool, Option<SurfaceVelocity>),
     ) {
         let Some(LocalShape { shape, reach }) = &state.shape else { return };
         let TrackedPose { pose, velocity, jumped } =
@@ -276,7 +279,11 @@ impl Gathering<'_, '_> {
             );
         }
         let translation = Vec3::from(pose.translation);
-        let motion = velocity.map(|velocity| WallMotion {
+        let on_surface = |SurfaceVelocity(surface): SurfaceVelocity| WallVelocity {
+            linear: pose.rotation * surface,
+            angular: Vec3::ZERO,
+        };
+        let motion = velocity.or_else(|| surface.map(on_surface)).map(|velocity| WallMotion {
             velocity: to_vector(velocity.linear),
             angular_velocity: to_vector(velocity.angular),
             pivot: to_point(translation),

@@ -106,7 +106,7 @@ pub mod prelude {
     pub use crate::components::{
         AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Kinematic,
         Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping,
-        SleepingDisabled, SurfaceMaterial, Teleport, Velocity,
+        SleepingDisabled, SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
     };
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;

@@ -6,7 +6,7 @@ use bevy_transform_interpolation::TransformEasingSystems;
 use crate::components::{
     AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Kinematic, Marble,
     MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
-    SurfaceMaterial, Teleport, Velocity,
+    SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
 };
 use crate::diagnostics::{self, StepTimes};
 use crate::ignored::{self, IgnoredComponents};
@@ -110,7 +110,7 @@ impl Plugin for TawPlugin {
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
-            .register_type::<(TawModel, Gravity, SubstepDelta)>();
+            .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity)>();
         diagnostics::register(app);
         sensor::register(app);
         observe(app);

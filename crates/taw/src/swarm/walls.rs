@@ -70,8 +70,9 @@ pub(crate) trait StaticGeometry: Sync {
     ) -> Option<[f32; 3]>;
     /// Layers of a wall.
     fn layers(&self, wall: u32) -> CollisionLayers;
-    /// In m/s, and the wall's own material.
-    fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32>;
+    /// Velocity of the surface at a point with this normal, in m/s.
+    fn surface_velocity(&self, wall: u32, point: Point3<f32>, normal: Vec3<f32>) -> Vec3<f32>;
+    /// The wall's own material.
     fn material(&self, wall: u32) -> Option<Material<f32>>;
 }
 
@@ -204,7 +205,7 @@ impl Chunk {
             let ball = &query.at[contact.row as usize];
             let point = center(ball) - contact.normal * ball[3];
             contact.bears_proxy = false;
-            contact.surface = walls.surface_velocity(contact.wall, point);
+            contact.surface = walls.surface_velocity(contact.wall, point, contact.normal);
             contact.offset = contact.offset_at_end;
             contact.advance(-query.before);
         }

@@ -58,7 +58,10 @@ impl<S: Scalar> World<S> {
     fn predict_wall_impact(&self, contact: &Contact<S>, dt: S) -> Option<PredictedImpact<S>> {
         let (wall, b) = (contact.a, contact.b as usize);
         let (position, velocity) = (*self.marbles.position.get(b)?, *self.marbles.velocity.get(b)?);
-        let surface = self.walls.surface_velocity(wall as usize, position + contact.arms[1]);
+        let surface = {
+            let point = position + contact.arms[1];
+            self.walls.surface_velocity(wall as usize, point, contact.normal)
+        };
         let approach_speed = (surface - velocity).dot(contact.normal);
         let acceleration = -self.soft_acceleration(b).dot(contact.normal);
         let separation = contact.separation.max(S::zero());

@@ -342,8 +342,9 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         stopped.then(|| cast_point::<S, f32>(center).into())
     }
 
-    fn surface_velocity(&self, wall: u32, point: Point3<f32>) -> Vec3<f32> {
-        cast_vector(self.walls.surface_velocity(wall as usize, cast_point(point)))
+    fn surface_velocity(&self, wall: u32, point: Point3<f32>, normal: Vec3<f32>) -> Vec3<f32> {
+        let (point, normal) = (cast_point(point), cast_vector(normal));
+        cast_vector(self.walls.surface_velocity(wall as usize, point, normal))
     }
 
     fn layers(&self, wall: u32) -> CollisionLayers {

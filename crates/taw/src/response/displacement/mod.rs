@@ -138,7 +138,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             return None;
         }
         let b = contact.b as usize;
-        let surface_speed = self.surface_velocity(a, b, arms, context.walls).dot(normal);
+        let surface_speed = self.surface_velocity(a, b, (arms, normal), context.walls).dot(normal);
         let zero = S::zero();
         let mut c = ApproachConstraint {
             a,

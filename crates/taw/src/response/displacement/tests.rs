@@ -10,7 +10,7 @@ impl<S: Scalar> Colliders<S> for Vec<Plane<S>> {
         (self[wall].normal(), self[wall].signed_distance(point))
     }
 
-    fn surface_velocity(&self, _: usize, _: Point3<S>) -> Vec3<S> {
+    fn surface_velocity(&self, _: usize, _: Point3<S>, _: Vec3<S>) -> Vec3<S> {
         Vec3::zero()
     }
 

@@ -251,12 +251,11 @@ impl Colliders<f64> for MovingWalls<'_> {
         (normal, distance)
     }
 
-    fn surface_velocity(&self, wall: usize, point: Point3<f64>) -> Vec3<f64> {
+    fn surface_velocity(&self, wall: usize, point: Point3<f64>, normal: Vec3<f64>) -> Vec3<f64> {
         if self.at_rest {
             return Vec3::zero();
         }
-        let wall = &self.walls[wall];
-        wall.surface_velocity(wall.nearest(point, self.end).normal, point, self.end)
+        self.walls[wall].surface_velocity(normal, point, self.end)
     }
 
     fn material(&self, wall: usize) -> Option<Material<f64>> {

@@ -71,12 +71,12 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &self,
         a: BodyA,
         b: usize,
-        arms: [Vec3<S>; 2],
+        (arms, normal): ([Vec3<S>; 2], Vec3<S>),
         walls: &impl Colliders<S>,
     ) -> Vec3<S> {
         match a {
             BodyA::Wall(wall, _) => {
-                walls.surface_velocity(wall as usize, self.position[b] + arms[1])
+                walls.surface_velocity(wall as usize, self.position[b] + arms[1], normal)
             }
             BodyA::Marble(_) => Vec3::zero(),
         }

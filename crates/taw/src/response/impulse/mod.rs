@@ -321,8 +321,9 @@ pub(crate) trait Colliders<S> {
     ) -> (Vec3<S>, S) {
         self.normal_and_distance(wall, part, point)
     }
-    /// Velocity of the surface at a point, in m/s.
-    fn surface_velocity(&self, wall: usize, point: Point3<S>) -> Vec3<S>;
+    /// Velocity of the surface at a point with this normal, in m/s; tangential if the wall stays where
+    /// it is, as a conveyor belt does.
+    fn surface_velocity(&self, wall: usize, point: Point3<S>, normal: Vec3<S>) -> Vec3<S>;
     /// Material of the wall, if it has its own.
     fn material(&self, wall: usize) -> Option<Material<S>>;
 }
@@ -335,8 +336,8 @@ impl<S, W: Colliders<S>> Colliders<S> for WallsAtStart<'_, W> {
         self.0.normal_and_distance_at_start(wall, part, point)
     }
 
-    fn surface_velocity(&self, wall: usize, point: Point3<S>) -> Vec3<S> {
-        self.0.surface_velocity(wall, point)
+    fn surface_velocity(&self, wall: usize, point: Point3<S>, normal: Vec3<S>) -> Vec3<S> {
+        self.0.surface_velocity(wall, point, normal)
     }
 
     fn material(&self, wall: usize) -> Option<Material<S>> {

@@ -56,7 +56,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         let (normal, separation) = self.contact_geometry(a, contact, context)?;
         let arms = self.arms(a, b, axis_offset, normal);
         let material = context.material_of(a, b);
-        let surface_velocity = self.surface_velocity(a, b, arms, context.walls);
+        let surface_velocity = self.surface_velocity(a, b, (arms, normal), context.walls);
         let inverse_effective_mass = self.pair_inverse_effective_mass(a, b, arms, normal);
         let relative_velocity = self.relative_velocity(a, b, arms, normal, surface_velocity);
         let approach_speed = -relative_velocity.dot(normal);

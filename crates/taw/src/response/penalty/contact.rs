@@ -71,7 +71,8 @@ where
                 (displacement.dot(contact.normal) - separation, contact.normal, contact.arms)
             }
         };
-        let surface_velocity = marbles.surface_velocity(body_a, b, arms, self.context.walls);
+        let surface_velocity =
+            marbles.surface_velocity(body_a, b, (arms, normal), self.context.walls);
         let (material, compliance) = self.surfaces(a, contact);
         let core = marbles.radius[b] * S::from_f64(CORE * (1.0 - CORE_ROUNDING));
         let none = InverseEffectiveMass { normal: S::zero(), tangent: S::zero() };

@@ -162,7 +162,7 @@ impl<S: Scalar> World<S> {
                 along = Mat3::from_value(S::zero());
             }
             let (slid, kept) = (along * displacement, along * change);
-            let surface = self.walls.surface_velocity(wall as usize, center);
+            let surface = self.walls.surface_velocity(wall as usize, center, normal);
             let closing = (velocity - surface).dot(normal);
             let part = lost_fraction((change - kept).dot(normal), closing);
             let stop = StoppedMarble {
