@@ -241,3 +241,68 @@ fn what_an_observer_despawns_is_gone_and_ends_its_contacts() {
     assert_eq!(of.len(), marbles.len(), "{ended:?}");
     assert!(app.world().resource::<TawWorld>().marbles.is_empty());
 }
+
+/// A track of one mesh: what rolls along it touches it all the time, and hits the wall at its end.
+#[test]
+fn the_end_of_a_track_is_hit() {
+    for response in [Response::Impulse, Response::EventDriven, Response::SoftStep] {
+        let mut app = scene::app();
+        let model = Model { response, rotation: Rotation::Dynamic, substeps: 4, ..Model::GAME };
+        app.insert_resource(TawModel(model)).add_message::<ContactHit>();
+        let corner = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+        let points = vec![
+            corner(-5.0, 0.0, -1.0),
+            corner(-5.0, 0.0, 1.0),
+            corner(2.0, 0.0, -1.0),
+            corner(2.0, 0.0, 1.0),
+            corner(2.0, 2.0, -1.0),
+            corner(2.0, 2.0, 1.0),
+        ];
+        let triangles = vec![[0, 1, 2], [2, 1, 3], [2, 3, 4], [4, 3, 5]];
+        let track = app.world_mut().spawn(Wall::Mesh { points, triangles }).id();
+        let marble = scene::drop_marble(&mut app, 0.2, Vec3::new(-1.0, 0.2, 0.0));
+        let rolling = AngularVelocity(Vec3::NEG_Z * 15.0);
+        app.world_mut().entity_mut(marble).insert((Velocity(Vec3::X * 3.0), rolling));
+        let mut hits = Vec::new();
+        for _ in 0..64 {
+            app.update();
+            let messages = app.world().resource::<Messages<ContactHit>>();
+            hits.extend(messages.iter_current_update_messages().copied());
+        }
+        let ends: Vec<_> = hits.iter().filter(|hit| hit.normal.x < -0.9).collect();
+        let case = format!("{response:?}: {hits:?}");
+        assert_eq!(ends.len(), 1, "{case}");
+        assert_eq!((ends[0].pair.a, ends[0].pair.b), (track, marble), "{case}");
+        assert!((ends[0].approach_speed - 3.0).abs() < 0.1, "{case}");
+        assert!(ends[0].point.distance(Vec3::new(2.0, 0.2, 0.0)) < 0.1, "{case}");
+        // It may hop a little at the end, and is heard by no more than that.
+        assert!(hits.iter().all(|hit| hit.normal.x < -0.9 || hit.approach_speed < 1.5), "{case}");
+    }
+}
+
+/// A flipper that strikes a marble at rest is heard as hard as it strikes.
+#[test]
+fn what_a_wall_strikes_is_heard_at_its_speed() {
+    for response in [Response::Impulse, Response::EventDriven, Response::SoftStep] {
+        let mut app = scene::app();
+        app.world_mut().resource_mut::<TawModel>().response = response;
+        app.insert_resource(Gravity(Vec3::ZERO)).add_message::<ContactHit>();
+        let plate = Wall::from(Cuboid::new(0.1, 1.0, 1.0));
+        let plate = app.world_mut().spawn((plate, Transform::from_xyz(-1.0, 0.0, 0.0))).id();
+        scene::drop_marble(&mut app, 0.2, Vec3::ZERO);
+        app.add_systems(
+            FixedUpdate,
+            (move |mut places: Query<&mut Transform>, time: Res<Time>| {
+                places.get_mut(plate).unwrap().translation.x += 4.0 * time.delta_secs();
+            })
+            .before(TawSystems::Gather),
+        );
+        let mut hits = Vec::new();
+        for _ in 0..20 {
+            app.update();
+            let messages = app.world().resource::<Messages<ContactHit>>();
+            hits.extend(messages.iter_current_update_messages().map(|hit| hit.approach_speed));
+        }
+        assert!((hits[0] - 4.0).abs() < 0.05, "{response:?}: {hits:?}");
+    }
+}

@@ -112,7 +112,9 @@ pub mod prelude {
     pub use crate::gizmos::TawGizmos;
     pub use crate::ignored::IgnoredComponents;
     pub use crate::layers::{CollisionLayers, LayerMask, PhysicsLayer};
-    pub use crate::messages::{ContactEnded, ContactOngoing, ContactPair, ContactStarted};
+    pub use crate::messages::{
+        ContactEnded, ContactHit, ContactOngoing, ContactPair, ContactStarted,
+    };
     pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
     pub use crate::sensor::{CollidingEntities, Sensor, SensorEntered, SensorLeft};

@@ -1,8 +1,8 @@
-//! Contacts that start, go on and end, as messages and as events of the entities that touch.
+//! Contacts that start, go on and end, and hits, as messages and as events of the entities that touch.
 //!
 //! Messages are opt-in, as in Bevy: kinds that you register are sent. Observers need nothing else:
-//! [`ContactStarted`], [`ContactOngoing`] and [`ContactEnded`] are triggered once for each of the two
-//! entities if somebody observes them, with that entity as `pair.a`. Contacts are collected only if at
+//! [`ContactStarted`], [`ContactOngoing`], [`ContactEnded`] and [`ContactHit`] are triggered once for each
+//! of the two entities if somebody observes them, with that entity as `pair.a`. Contacts are collected only if at
 //! least one kind is read or observed.
 //!
 //! ```
@@ -33,6 +33,12 @@ use crate::SubstepDelta;
 use crate::components::{MarbleState, WallState};
 use crate::convert::{from_point, from_vector};
 use crate::resources::TawWorld;
+
+/// Slowest hit, in m/s.
+const SLOWEST_HIT: f32 = 1e-3;
+
+/// Cosine of the angle up to which two normals are one direction: 18 degrees.
+const ONE_DIRECTION: f32 = 0.95;
 
 /// Two entities that touch. In an observer, `a` is the entity that is observed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Reflect)]
@@ -67,8 +73,26 @@ pub struct ContactStarted {
     pub normal: Vec3,
     /// Contact point, in metres in world space.
     pub point: Vec3,
-    /// Approach speed of the two along the normal, of a wall thought at rest, in m/s. Negative if they
-    /// were already parting.
+    /// Approach speed of the two along the normal, in m/s. Negative if they were already parting.
+    pub approach_speed: f32,
+}
+
+/// Two came together faster than what rests does, whether or not they touched before: a marble that
+/// runs along a mesh hits the end of it. Good for sounds and sparks.
+///
+/// Told of approach speeds over a millimetre a second, and over those that gravity makes in two
+/// substeps. A pair that touches in several places has a hit for each of them; of those in one
+/// direction, within a step, the fastest.
+#[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Debug, PartialEq)]
+pub struct ContactHit {
+    /// The two entities.
+    pub pair: ContactPair,
+    /// Unit normal from `a` to `b`.
+    pub normal: Vec3,
+    /// Contact point, in metres in world space.
+    pub point: Vec3,
+    /// Approach speed along the normal, in m/s.
     pub approach_speed: f32,
 }
 
@@ -110,6 +134,12 @@ impl ContactEvent for ContactStarted {
     }
 }
 
+impl ContactEvent for ContactHit {
+    fn swapped(self) -> Self {
+        Self { pair: self.pair.swapped(), normal: -self.normal, ..self }
+    }
+}
+
 impl ContactEvent for ContactOngoing {
     fn swapped(self) -> Self {
         Self { pair: self.pair.swapped() }
@@ -135,7 +165,7 @@ macro_rules! entity_event {
         }
     )*};
 }
-entity_event!(ContactStarted, ContactOngoing, ContactEnded);
+entity_event!(ContactStarted, ContactHit, ContactOngoing, ContactEnded);
 
 /// Contacts of this step and of the last.
 #[derive(Resource, Default)]
@@ -154,12 +184,14 @@ pub(crate) struct Touches {
 #[derive(Default)]
 struct Events {
     started: Vec<ContactStarted>,
+    hits: Vec<ContactHit>,
     ongoing: Vec<ContactOngoing>,
     ended: Vec<ContactEnded>,
 }
 
 type Readers<'w> = (
     Option<ResMut<'w, Messages<ContactStarted>>>,
+    Option<ResMut<'w, Messages<ContactHit>>>,
     Option<ResMut<'w, Messages<ContactOngoing>>>,
     Option<ResMut<'w, Messages<ContactEnded>>>,
 );
@@ -167,6 +199,7 @@ type Readers<'w> = (
 /// Run condition: somebody reads or observes contacts.
 pub(crate) fn are_read(world: &World) -> bool {
     is_read::<ContactStarted>(world)
+        || is_read::<ContactHit>(world)
         || is_read::<ContactOngoing>(world)
         || is_read::<ContactEnded>(world)
         || are_observed(world)
@@ -179,6 +212,7 @@ fn is_read<M: Message>(world: &World) -> bool {
 /// Run condition: somebody observes contacts.
 pub(crate) fn are_observed(world: &World) -> bool {
     observers::<ContactStarted>(world).is_some()
+        || observers::<ContactHit>(world).is_some()
         || observers::<ContactOngoing>(world).is_some()
         || observers::<ContactEnded>(world).is_some()
 }
@@ -194,6 +228,7 @@ fn observers<E: Event>(world: &World) -> Option<&CachedObservers> {
 pub(crate) fn trigger(world: &mut World) {
     let mut events = std::mem::take(&mut world.resource_mut::<Touches>().events);
     trigger_observed(world, &mut events.started);
+    trigger_observed(world, &mut events.hits);
     trigger_observed(world, &mut events.ongoing);
     trigger_observed(world, &mut events.ended);
     world.resource_mut::<Touches>().events = events; // for their memory
@@ -214,6 +249,7 @@ fn trigger_observed<E: ContactEvent>(world: &mut World, events: &mut Vec<E>) {
 impl Events {
     fn clear(&mut self) {
         self.started.clear();
+        self.hits.clear();
         self.ongoing.clear();
         self.ended.clear();
     }
@@ -222,15 +258,21 @@ impl Events {
 /// Notes who touches in this substep, before anything is restituted.
 pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
     let velocity = |row: u32| world.marbles.velocity()[row as usize];
+    let point_of =
+        |contact: &Contact<f32>| world.marbles.position()[contact.b as usize] + contact.arms[1];
     let started = |pair: ContactPair, contact: &Contact<f32>, closing: TawVec3<f32>| {
-        let normal = from_vector(contact.normal);
-        let center = world.marbles.position()[contact.b as usize];
-        let point = from_point(center + contact.arms[1]);
+        let (normal, point) = (from_vector(contact.normal), from_point(point_of(contact)));
         ContactStarted { pair, normal, point, approach_speed: -from_vector(closing).dot(normal) }
+    };
+    let wall_velocity = |contact: &Contact<f32>| {
+        let id = world.walls.id(contact.a as usize)?;
+        Some(world.walls.motion(id).ok()??.velocity_at(point_of(contact)))
     };
     for contact in world.contacts.wm.iter().filter(|contact| contact.is_touching()) {
         if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
-            touches.now.push(started(ContactPair { a, b }, contact, velocity(contact.b)));
+            let closing = velocity(contact.b);
+            let closing = wall_velocity(contact).map_or(closing, |of_wall| closing - of_wall);
+            touches.now.push(started(ContactPair { a, b }, contact, closing));
         }
     }
     for contact in world.contacts.mm.iter().filter(|contact| contact.is_touching()) {
@@ -276,6 +318,11 @@ pub(crate) fn write(
     *impacts = 0;
     events.clear(); // nobody observed those of the last step
     let fall = from_vector(world.gravity()).length() * delta.0 * delta.0;
+    let (started, hits, ongoing, ended) = &mut readers;
+    find_hits(now, 2.0 * fall / delta.0, &mut events.hits);
+    if let Some(messages) = hits {
+        messages.write_batch(events.hits.iter().copied());
+    }
     now.extend(before.iter().filter_map(|&pair| {
         let gap = gap(pair, &world, &marbles, &walls)?;
         let hovers = gap.width <= fall.max(gap.radius / 50.0);
@@ -285,7 +332,6 @@ pub(crate) fn write(
     // Stable, so that the first substep's touch stands for its pair.
     now.sort_by_key(|touch| touch.pair);
     now.dedup_by_key(|touch| touch.pair);
-    let (started, ongoing, ended) = &mut readers;
     let mut last = before.iter().copied().peekable();
     for touch in now.iter() {
         while let Some(pair) = last.next_if(|pair| *pair < touch.pair) {
@@ -300,6 +346,26 @@ pub(crate) fn write(
     last.for_each(|pair| tell(ended, &mut events.ended, ContactEnded { pair }));
     before.clear();
     before.extend(now.drain(..).map(|touch| touch.pair));
+}
+
+/// Finds the hits among the contacts of a step, of over `least` m/s.
+fn find_hits(contacts: &[ContactStarted], least: f32, hits: &mut Vec<ContactHit>) {
+    let fast = |contact: &&ContactStarted| contact.approach_speed > least.max(SLOWEST_HIT);
+    hits.extend(contacts.iter().filter(fast).map(|contact| {
+        let ContactStarted { pair, normal, point, approach_speed } = *contact;
+        ContactHit { pair, normal, point, approach_speed }
+    }));
+    hits.sort_by(|x, y| x.pair.cmp(&y.pair).then(y.approach_speed.total_cmp(&x.approach_speed)));
+    let mut kept = 0;
+    for i in 0..hits.len() {
+        let hit = hits[i];
+        let mut of_pair = hits[..kept].iter().rev().take_while(|it| it.pair == hit.pair);
+        if !of_pair.any(|it| it.normal.dot(hit.normal) > ONE_DIRECTION) {
+            hits[kept] = hit;
+            kept += 1;
+        }
+    }
+    hits.truncate(kept);
 }
 
 /// Separation of two surfaces, and the smaller radius, in metres.
