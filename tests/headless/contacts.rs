@@ -288,7 +288,7 @@ fn what_a_wall_strikes_is_heard_at_its_speed() {
         app.world_mut().resource_mut::<TawModel>().response = response;
         app.insert_resource(Gravity(Vec3::ZERO)).add_message::<ContactHit>();
         let plate = Wall::from(Cuboid::new(0.1, 1.0, 1.0));
-        let plate = app.world_mut().spawn((plate, Transform::from_xyz(-1.0, 0.0, 0.0))).id();
+        let plate = app.world_mut().spawn((plate, Transform::from_xyz(-1.02, 0.0, 0.0))).id();
         scene::drop_marble(&mut app, 0.2, Vec3::ZERO);
         app.add_systems(
             FixedUpdate,
@@ -302,6 +302,18 @@ fn what_a_wall_strikes_is_heard_at_its_speed() {
             app.update();
             let messages = app.world().resource::<Messages<ContactHit>>();
             hits.extend(messages.iter_current_update_messages().map(|hit| hit.approach_speed));
+            let w = app.world().resource::<TawWorld>();
+            println!(
+                "DBG {response:?} {:?} {:?} v {:?} imp {}",
+                w.contacts
+                    .wm
+                    .iter()
+                    .map(|c| (c.separation, c.is_touching(), c.normal_impulse))
+                    .collect::<Vec<_>>(),
+                w.marbles.position(),
+                w.marbles.velocity(),
+                w.impacts().len()
+            );
         }
         assert!((hits[0] - 4.0).abs() < 0.05, "{response:?}: {hits:?}");
     }

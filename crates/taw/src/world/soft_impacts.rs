@@ -4,14 +4,18 @@
 use cgmath::InnerSpace;
 
 use super::World;
+use super::continuous::{Frame, MovingWall, RelativePath, WallImpact};
 use crate::contact::{Contact, time_of_impact_sphere_sphere};
 use crate::math::{Scalar, Vec3, cast_vector, length, normal_and_distance};
 use crate::response::{Colliders as _, Impact};
+use crate::shape::{BoundedShape, Sphere};
 
 /// Impacts that free motion has in the step.
 #[derive(Clone, Debug)]
 pub(super) struct PredictedImpacts<S> {
     list: Vec<PredictedImpact<S>>,
+    /// Walls other than half-spaces that move.
+    moving: Vec<MovingWall<S>>,
     /// Number of removals and of marbles when they were predicted.
     rows: (u64, usize),
 }
@@ -25,7 +29,7 @@ struct PredictedImpact<S> {
 
 impl<S> Default for PredictedImpacts<S> {
     fn default() -> Self {
-        Self { list: Vec::new(), rows: (0, 0) }
+        Self { list: Vec::new(), moving: Vec::new(), rows: (0, 0) }
     }
 }
 
@@ -37,21 +41,69 @@ const CONFIRMING: f64 = 1e-3;
 impl<S: Scalar> World<S> {
     /// Predicts which listed contacts begin within the step of `dt` seconds.
     pub(super) fn predict_impacts(&mut self, dt: S) {
-        let mut list = std::mem::take(&mut self.scratch.soft_step.predicted.list);
+        let PredictedImpacts { mut list, mut moving, .. } =
+            std::mem::take(&mut self.scratch.soft_step.predicted);
         list.clear();
         let at_walls = self.contacts.wm.iter();
         list.extend(at_walls.filter_map(|contact| self.predict_wall_impact(contact, dt)));
         let of_pairs = self.contacts.mm.iter();
         list.extend(of_pairs.filter_map(|contact| self.predict_pair_impact(contact, dt)));
+        MovingWall::list(&self.walls, dt, &mut moving);
+        for wall in &moving {
+            self.predict_impacts_of(wall, dt, &mut list);
+        }
         let rows = (self.marbles.removals(), self.marbles.len());
-        self.scratch.soft_step.predicted = PredictedImpacts { list, rows };
+        self.scratch.soft_step.predicted = PredictedImpacts { list, moving, rows };
+    }
+
+    /// Predicts the impacts of a wall that moves: its contacts are found anew in each substep, and
+    /// those that are listed are of the places of the last one.
+    fn predict_impacts_of(&self, wall: &MovingWall<S>, dt: S, list: &mut Vec<PredictedImpact<S>>) {
+        for row in 0..self.marbles.len() {
+            let (sphere, velocity) = (self.marbles.sphere(row), self.marbles.velocity[row]);
+            let half = S::from_f64(0.5) * dt;
+            let displacement = (velocity + self.soft_acceleration(row) * half) * dt;
+            let end = Sphere { center: sphere.center + displacement, ..sphere };
+            if !wall.is_near(&sphere.bounding_box().union(&end.bounding_box()))
+                || !wall.collides(&self.walls, self.marbles.layers_of_row(row))
+            {
+                continue;
+            }
+            let frame = Frame::Moving(wall.motion, dt);
+            let path = RelativePath { start: sphere.center, displacement, frame };
+            let mut first: Option<WallImpact<S>> = None;
+            wall.for_each_near_path(&self.walls, &path, sphere.radius, |part| {
+                let impact = self.walls.time_of_impact(part, sphere.radius, &path);
+                if let Some(impact) = impact
+                    && first.as_ref().is_none_or(|first| impact.time < first.time)
+                {
+                    first = Some(impact);
+                }
+            });
+            let Some(WallImpact { time, normal, .. }) = first else { continue };
+            let point = sphere.center + displacement * time - normal * sphere.radius;
+            let surface = wall.motion.velocity_at(point);
+            let approach_speed = (surface - velocity).dot(normal);
+            let at_once = time <= S::zero() && !self.is_fast(approach_speed, dt);
+            let b = row as u32;
+            let known = |it: &PredictedImpact<S>| it.impact.on_wall && it.impact.a == wall.row;
+            if at_once || list.iter().any(|it| known(it) && it.impact.b == b) {
+                continue;
+            }
+            let impact = Impact { a: wall.row, on_wall: true, b, normal, point, approach_speed };
+            list.push(PredictedImpact { impact, velocity: [surface, velocity] });
+        }
     }
 
     /// Returns true if two that touch already come together faster than gravity makes rest within
     /// two steps: their impact is now.
     fn meet_now(&self, contact: &Contact<S>, approach_speed: S, dt: S) -> bool {
-        contact.is_touching()
-            && approach_speed > length(self.settings.gravity) * dt * S::from_f64(2.0)
+        contact.is_touching() && self.is_fast(approach_speed, dt)
+    }
+
+    /// Returns true for an approach faster than gravity makes rest within two steps.
+    fn is_fast(&self, approach_speed: S, dt: S) -> bool {
+        approach_speed > length(self.settings.gravity) * dt * S::from_f64(2.0)
     }
 
     /// Impact of a marble that flies along its parabola to the plane of its contact.

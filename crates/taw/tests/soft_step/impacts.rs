@@ -1,6 +1,7 @@
 //! Impacts within a step are told, with the speed at which they happen.
 
 use cgmath::{InnerSpace, Zero};
+use taw::motion::WallMotion;
 use taw::prelude::*;
 use taw::shape::Aabb;
 
@@ -164,5 +165,40 @@ fn marbles_that_come_and_go_between_the_verbs_are_no_impacts() {
         world.restitute(1.0 / 60.0).unwrap();
         assert!(world.impacts().len() <= 1);
         assert!(world.impacts().iter().all(|impact| impact.on_wall && impact.approach_speed > 2.9));
+    }
+}
+
+/// A plate that strikes a ball at rest is told once, with its speed, however it lies in the step.
+#[test]
+fn what_a_moving_wall_strikes_is_told() {
+    for (i, substeps) in [1, 2, 4, 1, 2, 4, 1, 4].into_iter().enumerate() {
+        for restitution in [0.0, 0.6] {
+            let mut world = world::<f64>(substeps);
+            world.set_gravity(Vec3::zero()).unwrap();
+            let id = world.marbles.insert(ball([0.0; 3], [0.0; 3], 0.2, restitution)).unwrap();
+            let row = world.marbles.row(id).unwrap() as u32;
+            let plate = |x: f64| Aabb {
+                min: Point3::new(x - 0.1, -1.0, -1.0),
+                max: Point3::new(x, 1.0, 1.0),
+            };
+            let start = -0.6 - 0.01 * i as f64;
+            let (dt, speed) = (1.0 / 64.0, 4.0);
+            let wall = world.walls.insert(plate(start)).unwrap();
+            let mut told = Vec::new();
+            for step in 1..=20 {
+                let x = start + speed * dt * f64::from(step);
+                world.walls.set(wall, plate(x)).unwrap();
+                let (velocity, pivot) = (Vec3::unit_x() * speed, Point3::new(x, 0.0, 0.0));
+                let motion = WallMotion { velocity, angular_velocity: Vec3::zero(), pivot };
+                world.walls.set_motion(wall, Some(motion)).unwrap();
+                world.step(dt).unwrap();
+                told.extend(world.impacts().iter().filter(|it| it.approach_speed > 0.5).copied());
+            }
+            let case = format!("{substeps}, {start}, {restitution}: {told:?}");
+            assert_eq!(told.len(), 1, "{case}");
+            assert_eq!((told[0].on_wall, told[0].b, told[0].normal), (true, row, Vec3::unit_x()));
+            assert!((told[0].approach_speed - speed).abs() < 1e-3, "{case}");
+            assert!((told[0].point.x + 0.2).abs() < 1e-3, "{case}");
+        }
     }
 }

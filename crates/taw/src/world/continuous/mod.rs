@@ -19,6 +19,7 @@ use crate::response::penalty::WallStop;
 use marbles::{Meeting, Partners, Path};
 pub(super) use moving_walls::{Frame, MovingWall, RelativePath};
 use walls::Bend;
+pub(super) use walls::WallImpact;
 
 /// Penetration of marbles that are stopped at each other, relative to the sum of their radii: a
 /// merely touching pair would be missed by a response that needs overlap.
