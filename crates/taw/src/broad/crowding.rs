@@ -31,6 +31,10 @@ struct CrowdCell {
     layers: [u32; 2],
 }
 
+/// Balls for each count: where they are spread, hashes make four pairs of each ball, far less than are
+/// too many, and the table takes half a byte for it.
+const BALLS_PER_COUNT: usize = 8;
+
 /// Number of pairs of so many.
 pub(crate) fn pairs_among(count: usize) -> u64 {
     let count = count as u64;
@@ -48,7 +52,7 @@ impl Crowding {
         // Balls of a cell have a hash in common, so no fewer pairs than overlap for certain have. That
         // needs no order, and in all but crowds it is the answer.
         let cells = balls.filter_map(CrowdCell::of);
-        let size = cells.clone().count().next_power_of_two().max(2);
+        let size = (cells.clone().count() / BALLS_PER_COUNT).next_power_of_two().max(2);
         self.counts.clear();
         self.counts.resize(size, 0);
         for cell in cells.clone() {
