@@ -82,7 +82,7 @@ pub enum Error {
     /// A node would become its own ancestor.
     #[error("the node {0:?} carries its new parent")]
     Cycle(NodeId),
-    /// More pairs of marbles overlap than a step takes.
+    /// More pairs of marbles, or balls of a swarm, overlap than a step takes.
     #[error("at least {pairs} pairs of marbles overlap, and a step takes at most {max}")]
     TooManyPairs {
         /// Number of pairs that overlap for certain.

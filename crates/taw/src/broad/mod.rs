@@ -2,11 +2,13 @@
 //! Whether they touch is tested in [`contact`](crate::contact).
 
 mod brute_force;
+mod crowding;
 mod grid;
 mod layers;
 mod period;
 
 pub use brute_force::brute_force_pairs;
+pub(crate) use crowding::{CrowdBall, Crowding, pairs_among};
 pub use grid::Grid;
 pub use layers::CollisionLayers;
 pub(crate) use period::{Images, Period};

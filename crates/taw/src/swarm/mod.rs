@@ -28,6 +28,7 @@ mod bit_set;
 mod bodies;
 mod build;
 mod chunk;
+mod crowding;
 mod fast_movers;
 mod grid;
 mod ids;

@@ -1,73 +1,61 @@
-//! The budget of pairs: how many marbles may lie in one place.
+//! The budget of pairs: how many marbles and balls may lie in one place.
 
 use super::World;
 use crate::Error;
-use crate::broad::CollisionLayers;
+use crate::broad::{CrowdBall, pairs_among};
 use crate::math::Scalar;
 use crate::response::Response;
 
-/// Cell in which all marbles of a size overlap.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-pub(super) struct CrowdCell {
-    /// Exponent of the radii: from 2^size to twice that.
-    size: i16,
-    /// Cell along each axis.
-    cell: [i64; 3],
-    /// Memberships and filters.
-    layers: [u32; 2],
-}
-
 impl<S: Scalar> World<S> {
-    /// Largest number of pairs of overlapping marbles that a step of a response other than
-    /// [`SoftStep`](Response::SoftStep) takes. As candidates of contacts they fill a gigabyte.
+    /// Largest number of pairs of overlapping marbles, and balls of the [swarm](Self::swarm), that a
+    /// step takes.
+    ///
+    /// As candidates of contacts they fill a gigabyte. [`SoftStep`](Response::SoftStep) and swarms
+    /// list at most 64 pairs for each ball, which takes less than half of that, and look at all in
+    /// each search, which takes about a second.
     pub const MAX_PAIRS: u64 = 1 << 27;
 
     /// Checks that no more pairs than a step takes overlap for certain: a lower bound of their number,
-    /// from marbles of radii within a factor of two that share a cell in which all such overlap.
+    /// from balls of radii within a factor of two that share a cell in which all such overlap.
     ///
     /// # Errors
     /// [`Error::TooManyPairs`].
     pub(super) fn check_crowding(&mut self) -> Result<(), Error> {
-        let pairs = |count: usize| count as u64 * (count as u64).saturating_sub(1) / 2;
-        let marbles = &self.marbles;
-        if self.settings.model.response == Response::SoftStep
-            || pairs(marbles.len()) <= Self::MAX_PAIRS
-        {
+        let others = self.swarm.len().saturating_sub(self.swarm.body_balls.len());
+        if pairs_among(self.marbles.len() + others) <= Self::MAX_PAIRS || !self.may_be_crowded() {
             return Ok(());
         }
-        let cells = &mut self.scratch.crowd_cells;
-        cells.clear();
-        cells.extend((0..marbles.len()).filter_map(|row| {
-            cell_of(marbles.position()[row], marbles.radius()[row], marbles.layers_of_row(row))
-        }));
-        cells.sort_unstable();
-        let overlapping: u64 = cells.chunk_by(|a, b| a == b).map(|cell| pairs(cell.len())).sum();
-        if overlapping > Self::MAX_PAIRS {
-            return Err(Error::TooManyPairs { pairs: overlapping, max: Self::MAX_PAIRS });
+        let (marbles, swarm) = (&self.marbles, &self.swarm);
+        let of_marbles = (0..marbles.len()).map(|row| {
+            let center = marbles.position()[row];
+            CrowdBall {
+                center: [center.x, center.y, center.z].map(S::as_f64),
+                radius: marbles.radius()[row].as_f64(),
+                layers: marbles.layers_of_row(row),
+            }
+        });
+        let balls = of_marbles.chain(swarm.crowd_balls());
+        match self.scratch.crowding.pairs_beyond(Self::MAX_PAIRS, balls) {
+            Some(pairs) => Err(Error::TooManyPairs { pairs, max: Self::MAX_PAIRS }),
+            None => Ok(()),
         }
-        Ok(())
     }
-}
 
-/// Cell of a marble that collides with such as itself, if numbers have a place for it.
-fn cell_of<S: Scalar>(
-    position: crate::math::Point3<S>,
-    radius: S,
-    layers: CollisionLayers,
-) -> Option<CrowdCell> {
-    /// Integers up to here are exact.
-    const EXACT: f64 = (1_u64 << 53) as f64;
-    if !layers.interacts_with(layers) {
-        return None;
+    /// Returns false if the last step took what overlaps now. Solved contacts part marbles, so by
+    /// [`SoftStep`](Response::SoftStep) and in swarms, which take millions, they are counted only where
+    /// somebody else moved them, or where not all pairs were listed.
+    fn may_be_crowded(&self) -> bool {
+        if self.swarm.may_be_crowded() {
+            return true;
+        }
+        let count = self.marbles.len();
+        if self.settings.model.response == Response::SoftStep {
+            // Each marble that was set overlaps at most all others.
+            self.changed_marbles().is_none_or(|changed| {
+                (changed as u64).saturating_mul(count as u64) > Self::MAX_PAIRS
+            })
+        } else {
+            pairs_among(count) > Self::MAX_PAIRS
+        }
     }
-    let size = radius.as_f64().log2().floor();
-    // The diagonal of a cube of side 1 is less than 2.
-    let side = size.exp2();
-    let cell: [f64; 3] =
-        [position.x, position.y, position.z].map(|it| (it.as_f64() / side).floor());
-    cell.iter().all(|at| at.abs() < EXACT).then(|| CrowdCell {
-        size: size as i16,
-        cell: cell.map(|at| at as i64),
-        layers: [layers.memberships, layers.filters],
-    })
 }

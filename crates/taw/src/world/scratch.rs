@@ -3,13 +3,12 @@
 
 use super::contact_limit::ContactLimit;
 use super::continuous::Continuous;
-use super::crowding::CrowdCell;
 use super::energy_audit::AuditState;
 use super::narrow_phase::Candidate;
 use super::quarantine::StoredPoses;
 use super::soft_step::SoftRows;
 use super::solver_columns::SolverColumns;
-use crate::broad::{Grid, Images};
+use crate::broad::{Crowding, Grid, Images};
 use crate::math::{Scalar, Vec3};
 use crate::response::event::EventDriven;
 use crate::response::{displacement, impulse, penalty};
@@ -23,7 +22,7 @@ pub(super) struct Scratch<S> {
     pub stopped: Vec<u32>,
     pub stored_poses: StoredPoses<S>,
     /// Cells of marbles, to count those that share one.
-    pub crowd_cells: Vec<CrowdCell>,
+    pub crowding: Crowding,
     pub contact_limit: ContactLimit<S>,
     /// Speculative margin: maximum separation of a contact, in metres. Gravity closes it within two
     /// substeps, for a response that looks ahead.
@@ -54,7 +53,7 @@ impl<S: Scalar> Default for Scratch<S> {
             images: Images::default(),
             stopped: Vec::new(),
             stored_poses: StoredPoses::default(),
-            crowd_cells: Vec::new(),
+            crowding: Crowding::default(),
             contact_limit: ContactLimit::default(),
             reach: S::zero(),
             columns: SolverColumns::default(),

@@ -213,6 +213,11 @@ impl<S: Scalar> World<S> {
             && self.marbles.changed.agrees(token)
     }
 
+    /// Number of marbles that were set since the last step; none if nobody knows.
+    pub(super) fn changed_marbles(&self) -> Option<usize> {
+        self.changes_are_listed().then(|| self.marbles.changed.rows().len())
+    }
+
     /// Checks that the numbers of all marbles that were set fit into rows.
     pub(super) fn check_rows(&self) -> Result<(), Error> {
         if self.settings.model.response != Response::SoftStep {

@@ -21,7 +21,7 @@ impl<S: Scalar> World<S> {
     /// [period](Self::set_period), and by `SoftStep` for one that was set to a radius of less than
     /// 1e-9 m, or to a position, velocity or surface speed of over 1e12 m or m/s;
     /// [`Error::TooManyPairs`] if more than [`World::MAX_PAIRS`] overlap, as from some 16,400 marbles
-    /// at one point on. Then nothing has changed.
+    /// or balls of the swarm at one point on. Then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
         let substep = self.validated_substep(dt)?;
         self.begin_step();
@@ -31,7 +31,7 @@ impl<S: Scalar> World<S> {
             self.generate_contacts();
             self.restitute(substep)?;
         }
-        let swarm = self.step_swarm(dt, &mut |_| ());
+        let swarm = self.move_swarm(dt, &mut |_| ()); // counted with the marbles
         self.end_step();
         swarm
     }

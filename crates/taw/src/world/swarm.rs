@@ -21,8 +21,21 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
-    /// [`Error::Full`] at 2³² balls.
+    /// [`Error::TooManyPairs`] if more than [`World::MAX_PAIRS`] overlap, [`Error::Full`] at 2³²
+    /// balls.
     pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
+        if self.settings.model.response != Response::SoftStep {
+            self.check_crowding()?;
+        }
+        self.move_swarm(dt, observe)
+    }
+
+    /// Moves the swarm on, of which pairs are not too many.
+    pub(super) fn move_swarm(
+        &mut self,
+        dt: S,
+        observe: &mut dyn FnMut(Stage),
+    ) -> Result<(), Error> {
         let step = Self::validated_dt(dt)?;
         let dt = step.as_f64() as f32;
         if self.settings.model.response == Response::SoftStep {

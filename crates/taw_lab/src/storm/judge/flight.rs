@@ -20,18 +20,44 @@ pub struct Near {
 impl Near {
     /// Those that are, before or after the step, as near to each other as both can move in it at
     /// the larger of their speeds, and gravity in two steps, and a hundredth of their radii.
+    ///
+    /// Soft contacts bounce several times in a step. A light ball that a heavy one strikes leaves at
+    /// up to twice the speed of that one beside its own, and may come back from a wall or a third ball
+    /// before anybody sees its speed. So clusters touch, and have touched a wall, as far as
+    /// that goes at the speed of their fastest.
     #[must_use]
     pub fn find(rules: &Rules, before: &Snapshot, after: &Snapshot) -> Self {
-        let count = after.bodies.len();
         let gravity = after.gravity().magnitude();
-        let reach: Vec<f64> = (0..count)
-            .map(|i| {
-                let (old, new) = (&before.bodies[i], &after.bodies[i]);
-                let speed = old.velocity.magnitude().max(new.velocity.magnitude());
+        let bodies = || before.bodies.iter().zip(&after.bodies);
+        let speed =
+            |(old, new): (&Body, &Body)| old.velocity.magnitude().max(new.velocity.magnitude());
+        let mut reach: Vec<f64> = bodies()
+            .map(|(old, new)| {
                 let carried = old.carried.max(new.carried);
-                (speed + carried + 2.0 * gravity * rules.step) * rules.step + 0.01 * new.radius
+                (speed((old, new)) + carried + 2.0 * gravity * rules.step) * rules.step
+                    + 0.01 * new.radius
             })
             .collect();
+        let near = Self::within(&reach, before, after);
+        if !matches!(rules.kind, Kind::SoftStep | Kind::SwarmFull) {
+            return near;
+        }
+        let mut fastest = vec![0.0_f64; reach.len()];
+        let mut members = vec![0; reach.len()];
+        for (first, both) in near.first.iter().zip(bodies()) {
+            fastest[*first] = fastest[*first].max(speed(both));
+            members[*first] += 1;
+        }
+        for (first, reach) in near.first.iter().zip(&mut reach) {
+            let struck = if members[*first] > 1 { 2.0 * fastest[*first] } else { 0.0 };
+            *reach += struck * rules.step;
+        }
+        Self { touched: near.touched, ..Self::within(&reach, before, after) }
+    }
+
+    /// Those that are as near to each other as this, in metres, before or after a step.
+    fn within(reach: &[f64], before: &Snapshot, after: &Snapshot) -> Self {
+        let count = reach.len();
         let mut near =
             Self { first: (0..count).collect(), grounded: vec![false; count], touched: vec![] };
         near.touched = vec![false; count];
@@ -93,6 +119,8 @@ const LATE: u32 = 5;
 #[derive(Clone, Copy, Default)]
 struct Sum {
     count: usize,
+    /// Has a ball of the lab's tier, and others: they part by half, and keep no momentum.
+    by_half: bool,
     mass: f64,
     momentum: [f64; 3],
     /// Mass times displacement, beyond that of the mean velocity.
@@ -100,6 +128,21 @@ struct Sum {
     /// Of all that moves, for the rounding: kg m/s and kg m.
     moving: f64,
     placed: f64,
+}
+
+impl Sum {
+    /// Empty sums, by the first of each cluster.
+    fn of_clusters(rules: &Rules, near: &Near) -> Vec<Self> {
+        let mut sums = vec![Self::default(); near.first.len()];
+        if rules.kind == Kind::SwarmLab {
+            // Marbles come first.
+            for first in &near.first[rules.discrete..] {
+                let members = near.first.iter().filter(|other| *other == first).count();
+                sums[*first].by_half = members > 1;
+            }
+        }
+        sums
+    }
 }
 
 impl Falls {
@@ -111,6 +154,12 @@ impl Falls {
     /// - moves its centre of mass by its velocity: at the least with the one before, at the most
     ///   with the one after, so within half a step of gravity of the mean. Bound: that, and the
     ///   rounding of places. Where bodies stop where they meet, see [`LATE`].
+    ///
+    /// A swarm of the lab's tier has no momentum, as documented
+    /// ([`Tier::Lab`](taw::swarm::Tier::Lab)): no ball is faster than it was, so one at rest that is
+    /// hit moves aside and stays there, and the other one loses what it gave. Balls are moved apart
+    /// by half, though, whatever they weigh. So the mean place of a cluster with such a ball moves
+    /// on by the velocities before the step, within half a step of gravity, and in rounding.
     pub fn judge(
         &mut self,
         rules: &Rules,
@@ -121,14 +170,18 @@ impl Falls {
         let count = after.bodies.len();
         self.late.resize(count, 0);
         let gravity = after.gravity();
-        let mut sums = vec![Sum::default(); count];
+        let mut sums = Sum::of_clusters(rules, near);
         for i in 0..count {
             let (old, new) = (&before.bodies[i], &after.bodies[i]);
             let sum = &mut sums[near.first[i]];
-            let gained = new.velocity - old.velocity - gravity * rules.step;
-            let mean = (new.velocity + old.velocity) * 0.5;
+            let fall = gravity * rules.step;
+            let (gained, mean, mass) = if sum.by_half {
+                (Vec3::zero(), old.velocity + fall * 0.5, 1.0)
+            } else {
+                let gained = new.velocity - old.velocity - fall;
+                (gained, (new.velocity + old.velocity) * 0.5, new.mass)
+            };
             let aside = new.at - old.at - mean * rules.step;
-            let mass = new.mass;
             sum.count += 1;
             sum.mass += mass;
             for axis in 0..3 {
