@@ -83,7 +83,7 @@ pub enum Error {
     #[error("the node {0:?} carries its new parent")]
     Cycle(NodeId),
     /// More pairs of marbles, or balls of a swarm, overlap than a step takes.
-    #[error("at least {pairs} pairs of marbles overlap, and a step takes at most {max}")]
+    #[error("at least {pairs} pairs of marbles or balls overlap, and a step takes at most {max}")]
     TooManyPairs {
         /// Number of pairs that overlap for certain.
         pairs: u64,
