@@ -17,9 +17,6 @@ const G: f64 = 9.81;
 
 /// Regression scenes that fail today: each is taken out of here when its cause is mended.
 const NOT_MENDED_YET: &[&str] = &[
-    // A ball that is put to rest between others takes restitution of the wall's own material. Where it
-    // takes none, a heap that lies at rest gets 4e-5 m/s when marbles elsewhere are removed.
-    "event-driven-pushed-into-a-corner",
     // A light ball goes to and fro between a lift and a ball 115 times as heavy, one bounce a substep,
     // while the heavy one comes 4 mm nearer in each: a bounce that carries it on by less than half a
     // radius is not stopped at the lift, so the next substep finds it there and not at the other one.

@@ -44,16 +44,29 @@ impl EventDriven {
     /// they separate just now. Between a wall and a heavy ball, a light one always separates from
     /// one of them.
     pub(super) fn stop_collapse(&mut self, rows: [usize; 2], time: f64, settings: &EventSettings) {
-        let RestingCluster { rows, pressed_by, squeezed } =
-            self.rest_cluster(rows, f64::INFINITY, time, settings);
-        for row in rows {
+        let seeds = rows;
+        let RestingCluster { mut rows, pressed_by, squeezed } =
+            self.rest_cluster(seeds, f64::INFINITY, time, settings);
+        let mut freezes = false;
+        for row in rows.iter().copied() {
             let trajectory = &mut self.balls[row].trajectory;
             trajectory.dissipation_count = 0.0;
             // What walls squeeze gives way to those that move.
             let gives_way = squeezed && self.touches_moving_wall(row, time, settings);
             if !self.balls[row].is_frozen() && (gives_way || self.count_freeze(row, pressed_by)) {
                 self.balls[row].freeze();
+                freezes = true;
             }
+        }
+        if freezes {
+            // What is frozen carries nothing on from a wall, so the others rest against it anew: the
+            // force that it had would drive them without a reaction.
+            let again = self.rest_cluster(seeds, f64::INFINITY, time, settings);
+            rows.extend(again.rows);
+            rows.sort_unstable();
+            rows.dedup();
+        }
+        for row in rows {
             self.predict(row, time, settings);
         }
     }

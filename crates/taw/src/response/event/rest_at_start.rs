@@ -29,7 +29,7 @@ impl EventDriven {
             self.crowds.are_together(c.a as usize, c.b as usize)
                 || self
                     .ball_contact(c, 0.0, settings)
-                    .map_or(self.is_deep_in_ball(c), |speed| speed >= 0.0)
+                    .map_or_else(|| self.overlaps_ball(c, settings), |speed| speed >= 0.0)
         });
         let mut contact_counts = std::mem::take(&mut self.cluster.contact_counts);
         contact_counts.clear();
@@ -40,6 +40,8 @@ impl EventDriven {
             let is_alone = contact_counts[c.b as usize] == 1;
             if is_alone && self.rests_on(c, settings) {
                 self.start_resting(c.b as usize, c.a as usize, settings);
+            } else if is_alone {
+                self.part_from_wall(c, settings);
             }
             !is_alone
         });
@@ -88,7 +90,8 @@ impl EventDriven {
             let contact = Contact::with_wall(wall as u32, 0, row as u32);
             // A faster approach is an impact now, also of a wall that starts to move: spread over
             // the substep, it would let the wall in by half of its way.
-            if self.wall_contact(&contact, 0.0, 0.0, settings).is_some_and(|margin| margin >= 0.0)
+            let margin = self.wall_contact(&contact, 0.0, 0.0, settings);
+            if margin.map_or_else(|| self.overlaps_wall(&contact, settings), |margin| margin >= 0.0)
                 && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, 0.0, settings))
             {
                 near.push(contact);
@@ -194,8 +197,7 @@ impl EventDriven {
     ) -> Option<f64> {
         let ball = &self.balls[contact.b as usize];
         let wall = &self.walls[contact.a as usize];
-        let tolerance =
-            self.contact_tolerance(contact.b, settings) + wall.position_error(ball.position);
+        let tolerance = self.wall_tolerance(contact, settings);
         if wall.distance_lower_bound(ball.position, now) > ball.radius + tolerance {
             return None;
         }
@@ -230,13 +232,55 @@ impl EventDriven {
             .then_some(threshold + speed)
     }
 
-    /// Tests for penetration beyond the slop: such balls are separated, however fast they move
-    /// apart.
+    /// Tests for penetration beyond the slop.
     pub(super) fn is_deep_in_ball(&self, contact: &Contact<f64>) -> bool {
+        self.ball_separation(contact) < -self.ball_slop(contact)
+    }
+
+    /// Tests for penetration that counts as more than contact: such balls are separated, however
+    /// slowly or fast they move apart.
+    fn overlaps_ball(&self, contact: &Contact<f64>, settings: &EventSettings) -> bool {
+        let tolerance = self
+            .contact_tolerance(contact.a, settings)
+            .max(self.contact_tolerance(contact.b, settings));
+        self.ball_separation(contact) < -tolerance.min(self.ball_slop(contact))
+    }
+
+    fn ball_slop(&self, contact: &Contact<f64>) -> f64 {
+        let radius = |row: u32| self.balls[row as usize].radius;
+        SLOP * radius(contact.a).min(radius(contact.b))
+    }
+
+    /// Separation of two balls, in metres.
+    fn ball_separation(&self, contact: &Contact<f64>) -> f64 {
         let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
-        let center_offset = self.center_offset(first, second);
-        let slop = SLOP * first.radius.min(second.radius);
-        center_offset.magnitude() < first.radius + second.radius - slop
+        self.center_offset(first, second).magnitude() - first.radius - second.radius
+    }
+
+    /// Tests for penetration of a ball into a wall that counts as more than contact.
+    fn overlaps_wall(&self, contact: &Contact<f64>, settings: &EventSettings) -> bool {
+        let (ball, wall) = (&self.balls[contact.b as usize], &self.walls[contact.a as usize]);
+        wall.distance_lower_bound(ball.position, 0.0) < ball.radius
+            && self.wall_separation(contact, 0.0).0 < -self.wall_tolerance(contact, settings)
+    }
+
+    /// Moves a ball that touches nothing else out of a wall that does not press it. Nothing rests on
+    /// the ball, so that its overlap needs no slop.
+    fn part_from_wall(&mut self, contact: &Contact<f64>, settings: &EventSettings) {
+        let row = contact.b as usize;
+        if self.balls[row].inverse_mass > 0.0 && self.overlaps_wall(contact, settings) {
+            let Ball { position, radius, .. } = self.balls[row];
+            let PointProjection { normal, distance, .. } =
+                self.walls[contact.a as usize].nearest(position, 0.0);
+            self.balls[row].position += normal * (radius - distance);
+        }
+    }
+
+    /// Largest separation of a ball and a wall that counts as contact, in metres.
+    fn wall_tolerance(&self, contact: &Contact<f64>, settings: &EventSettings) -> f64 {
+        let ball = &self.balls[contact.b as usize];
+        let wall: &Wall = &self.walls[contact.a as usize];
+        self.contact_tolerance(contact.b, settings) + wall.position_error(ball.position)
     }
 
     /// Largest separation that counts as contact, in metres: the height of a fall that reaches the

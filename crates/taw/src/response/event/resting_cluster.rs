@@ -309,10 +309,11 @@ impl EventDriven {
 
 #[cfg(test)]
 mod tests {
-    use super::super::{MAX_FREEZES, Wall, WallSource};
+    use super::super::{MAX_FREEZES, Wall, WallCollider, WallSource};
     use super::*;
     use crate::broad::CollisionLayers;
     use crate::math::Point3;
+    use crate::motion::WallMotion;
     use crate::response::{BallRotation, Material};
 
     struct NoWalls;
@@ -375,5 +376,55 @@ mod tests {
             assert!(light.spin.magnitude() <= 0.1, "{order:?}: {light:?}");
             assert!(light.velocity_at(settings.dt).magnitude() <= 0.1, "{order:?}: {light:?}");
         }
+    }
+
+    /// Plane that rises by 1 m/s, from the origin.
+    struct Lift;
+
+    impl WallSource for Lift {
+        fn planes(&self, visit: &mut dyn FnMut(u32)) {
+            visit(0);
+        }
+
+        fn has_parts(&self) -> bool {
+            false
+        }
+
+        fn near(&self, _: Point3<f64>, _: f64, _: &mut dyn FnMut(u32, u32)) {}
+
+        fn wall(&self, row: u32, _: u32) -> Option<Wall> {
+            let (normal, arrival_time) = (Vec3::unit_y(), Some(0.01));
+            let (angular_velocity, pivot) = (Vec3::zero(), Point3::new(0.0, 0.0, 0.0));
+            Some(Wall {
+                collider: WallCollider::Plane { normal, offset: 0.01 },
+                bounds: None,
+                row,
+                motion: Some(WallMotion { velocity: normal, angular_velocity, pivot }),
+                arrival_time,
+                material: None,
+                layers: CollisionLayers::ALL,
+                relative_rounding: 0.0,
+            })
+        }
+    }
+
+    #[test]
+    fn a_ball_that_freezes_carries_no_other_on() {
+        let balls = vec![ball([0.0, 1.0], 0.0, MAX_FREEZES - 1), ball([0.0, 3.0], 0.0, 0)];
+        let mut method = EventDriven { balls, ..EventDriven::default() };
+        let settings = EventSettings {
+            dt: 0.01,
+            iterations: 8,
+            source: &Lift,
+            budget_fraction: 1.0,
+            cost: 0.into(),
+        };
+        method.assign_cells(settings.dt);
+        method.find_candidates(&settings);
+        method.stop_collapse([0, 1], 0.0, &settings);
+        assert!(method.balls[0].is_frozen());
+        let upper = &method.balls[1];
+        let acceleration = upper.trajectory.acceleration;
+        assert!((acceleration - upper.external_acceleration).magnitude() < 1e-9, "{upper:?}");
     }
 }
