@@ -302,18 +302,6 @@ fn what_a_wall_strikes_is_heard_at_its_speed() {
             app.update();
             let messages = app.world().resource::<Messages<ContactHit>>();
             hits.extend(messages.iter_current_update_messages().map(|hit| hit.approach_speed));
-            let w = app.world().resource::<TawWorld>();
-            println!(
-                "DBG {response:?} {:?} {:?} v {:?} imp {}",
-                w.contacts
-                    .wm
-                    .iter()
-                    .map(|c| (c.separation, c.is_touching(), c.normal_impulse))
-                    .collect::<Vec<_>>(),
-                w.marbles.position(),
-                w.marbles.velocity(),
-                w.impacts().len()
-            );
         }
         assert!((hits[0] - 4.0).abs() < 0.05, "{response:?}: {hits:?}");
     }
