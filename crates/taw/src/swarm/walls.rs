@@ -4,7 +4,7 @@ use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
 use super::chunk::Chunk;
 use super::impulse_cache::reserve_slack;
-use super::kernels::{WALL_SLOP, squared};
+use super::kernels::squared;
 use super::proxies::Proxy;
 use super::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use super::surfaces::{SurfaceOf, WallNumbers};
@@ -269,16 +269,6 @@ impl Chunk {
 }
 
 impl HalfSpace {
-    /// Moves a ball out, but for what a contact bears. Says how far, in metres.
-    pub fn keep_out(&self, at: &mut Row) -> f32 {
-        let separation = self.normal.dot(center(at).to_vec()) - self.offset - at[3];
-        let overlap = (-separation - at[3] * WALL_SLOP).max(0.0);
-        for (x, normal) in at.iter_mut().zip::<[f32; 3]>(self.normal.into()) {
-            *x += normal * overlap;
-        }
-        overlap
-    }
-
     /// Moves a proxy out, except by how deep it was inside.
     pub fn bear(&self, proxy: &Proxy, at: &mut Row) {
         let separation =

@@ -17,10 +17,8 @@ use crate::swarm::surfaces::{PairNumbers, SOLID_BALL};
 use crate::swarm::vec3_wide::Vec3Wide;
 use crate::swarm::workers::DisjointSlice;
 
-/// The part of an overlap that goes in a substep where something bears the balls: where two neighbours
-/// of one both push it on, it goes no further than it should, and a heap lies still. What flies has to
-/// part, not to lie, and goes all of it, as in any position projection: thousands at one point part
-/// from the outside in, each by what its neighbours leave it.
+/// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
+/// it goes no further than it should.
 const PUSH: f32 = 0.5;
 
 /// Mark of a ball that presses another one in this step and that no wall bears: neither flies.
@@ -218,10 +216,9 @@ impl SolverColumns<'_> {
         scatter(self.velocity, batch, velocity);
     }
 
-    /// Counts how far the balls of the pairs went. Returns true if one left its skin.
+    /// Counts how far the balls of the pairs went.
     #[inline(always)]
-    fn spend<L: Simd>(&self, batch: &Batch, displacements: [Vec3Wide<L>; 2]) -> bool {
-        let mut least = 0.0_f32;
+    fn spend<L: Simd>(&self, batch: &Batch, displacements: [Vec3Wide<L>; 2]) {
         let mut lengths = [[0.0; LANES]; 2];
         for (lengths, displacement) in lengths.iter_mut().zip(displacements) {
             displacement.dot(displacement).sqrt().store(lengths);
@@ -229,12 +226,9 @@ impl SolverColumns<'_> {
         for lane in 0..batch.count as usize {
             for (row, lengths) in batch.pair(lane).into_iter().zip(&lengths) {
                 // SAFETY: as in `scatter`.
-                let skin_left = unsafe { &mut *self.skin_left.row(row as usize) };
-                *skin_left -= lengths[lane];
-                least = least.min(*skin_left);
+                unsafe { *self.skin_left.row(row as usize) -= lengths[lane] };
             }
         }
-        least < 0.0
     }
 
     /// Lets those pairs bounce that meet. Says whether any does.
@@ -281,8 +275,7 @@ impl SolverColumns<'_> {
         bounces
     }
 
-    /// Moves apart what overlaps. That changes no velocity: overlap is not energy. Returns true if a
-    /// ball left its skin by it.
+    /// Moves apart what overlaps. That changes no velocity: overlap is not energy.
     #[inline(always)]
     fn push_apart<L: Simd>(
         &self,
@@ -292,20 +285,19 @@ impl SolverColumns<'_> {
         (normal, separation): (Vec3Wide<L>, L),
         slop: f32,
         grounded: L,
-    ) -> bool {
+    ) {
         let zero = L::splat(0.0);
         let smaller = at_a[3] + at_b[3] - at_a[3].max(at_b[3]);
         let overlap = zero - separation - smaller * L::splat(2.0 * slop);
         if overlap.gt_mask(zero) == 0 {
-            return false;
+            return;
         }
         // What flies keeps its center of mass. What a wall bears goes half each, whatever they
         // weigh: a light ball that a heavy one presses on something has nowhere to go. What sleeps
         // stays.
-        let one = L::splat(1.0);
+        let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
         let [free_a, free_b] = [inverse_mass(&a), inverse_mass(&b)];
         let borne = grounded.select_gt(L::splat(TOUCHING), one, zero);
-        let push = overlap.max(zero) * borne.select_gt(zero, L::splat(PUSH), one);
         let a = free_a.select_gt(zero, borne.select_gt(zero, one, free_a), zero);
         let b = free_b.select_gt(zero, borne.select_gt(zero, one, free_b), zero);
         let by = (a + b).select_gt(zero, push / (a + b), zero);
@@ -315,7 +307,7 @@ impl SolverColumns<'_> {
             (Vec3Wide::of(&at_b) + displacements[1]).with(at_b[3]),
         ];
         scatter(self.at, batch, places);
-        self.spend(batch, displacements)
+        self.spend(batch, displacements);
     }
 
     /// The spins of a batch.
@@ -389,7 +381,6 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             normal_impulse, tangent_impulse, torque, numbers: own, struck, ..
         } = impulses;
         let zero = L::splat(0.0);
-        impulses.pushed_out = false;
         for (i, batch) in batches.iter().enumerate() {
             let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
             let at = gather::<L>(columns.at, batch);
@@ -436,8 +427,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             }
             if !FIRST {
                 let contact = (normal, separation);
-                impulses.pushed_out |=
-                    columns.push_apart(batch, at, [a, b], contact, params.slop, grounded);
+                columns.push_apart(batch, at, [a, b], contact, params.slop, grounded);
             }
         }
     }

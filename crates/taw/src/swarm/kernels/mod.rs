@@ -35,8 +35,6 @@ pub(super) struct ContactImpulses {
     pub numbers: Vec<PairNumbers>,
     /// Set if any of them bounced in the last round.
     pub bounced: bool,
-    /// Set if one of their balls left its skin in this substep because it overlapped another one.
-    pub pushed_out: bool,
     /// Those that were struck in this substep.
     pub struck: Vec<StruckContact>,
 }

@@ -322,6 +322,24 @@ impl Swarm {
         any
     }
 
+    /// Moves out of walls what is in them, and back what passed one: so long before the end of the step, in
+    /// seconds, the substep began, and is now. That comes last: whatever else moves balls apart, nothing is
+    /// pressed through a wall.
+    fn keep_out(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
+        let (at, skin_left) =
+            (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
+        let chunks = &self.chunks;
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
+            let chunk = &chunks[chunk];
+            for contact in chunk.wall_contacts.iter().filter(|_| !chunk.asleep) {
+                let row = contact.row as usize;
+                // SAFETY: a ball of the chunk, and nobody works on others meanwhile.
+                unsafe { *skin_left.row(row) -= contact.keep_out(&mut *at.row(row)) };
+            }
+        });
+        self.stop_passages(walls, before_end);
+    }
+
     /// Changes velocities and moves the balls that are awake.
     fn integrate(&mut self, change: Row, time: Row, correction: Row) {
         let simd_level = self.simd_level;

@@ -193,49 +193,6 @@ impl Swarm {
         }
     }
 
-    /// Moves out of walls what is in them, and back what passed one: so long before the end of the step, in
-    /// seconds, the substep began, and is now. That comes last: whatever else moves balls apart, nothing is
-    /// pressed through a wall.
-    pub(super) fn keep_out(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
-        let surfaces = SurfaceOf {
-            model: self.model.material,
-            surfaces: &self.surfaces,
-            slots: self.ids.slots(),
-        };
-        let (apart, bodies) = (!self.proxies.is_empty(), &self.body_slots);
-        let is_proxy = |row: usize| apart && bodies.contains(surfaces.slots[row]);
-        let (at, skin_left) =
-            (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
-        let (chunks, planes) = (&self.chunks, &self.planes[..]);
-        let by_fast_movers = self.fast_movers.impulses.pushed_out;
-        parallel_for(self.scratch.threads, chunks.len(), |_, number| {
-            let chunk = &chunks[number];
-            if chunk.asleep {
-                return;
-            }
-            for contact in &chunk.wall_contacts {
-                let row = contact.row as usize;
-                // SAFETY: a ball of the chunk, and nobody works on others meanwhile.
-                unsafe { *skin_left.row(row) -= contact.keep_out(&mut *at.row(row)) };
-            }
-            // Walls are listed for as far as a skin reaches.
-            let before = number.checked_sub(1).and_then(|before| chunks.get(before));
-            let pushed = by_fast_movers
-                || [Some(chunk), before].into_iter().flatten().any(|of| of.impulses.pushed_out);
-            for row in chunk.own_rows().filter(|row| pushed && !is_proxy(*row)) {
-                // SAFETY: as above.
-                let (at, skin_left) = unsafe { (&mut *at.row(row), &mut *skin_left.row(row)) };
-                let layers = surfaces.layers(row as u32);
-                for plane in planes {
-                    if *skin_left < 0.0 && plane.layers.interacts_with(layers) {
-                        *skin_left -= plane.keep_out(at);
-                    }
-                }
-            }
-        });
-        self.stop_passages(walls, before_end);
-    }
-
     /// Brings the contacts of some chunks up to date. Walls are where they will be at the end; so
     /// long `before`, in seconds, they were elsewhere.
     pub(in crate::swarm) fn update_wall_contacts(
