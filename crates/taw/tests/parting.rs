@@ -1,0 +1,121 @@
+//! Thousands at one point part within seconds, without energy from nothing.
+
+use taw::prelude::*;
+use taw::shape::Plane;
+use taw::swarm::{Ball, SwarmModel, Tier};
+
+const DT: f32 = 1.0 / 60.0;
+const RADIUS: f32 = 0.1;
+
+/// So many at one point, as balls of a swarm of the full tier or as marbles.
+fn at_one_point(count: usize, height: f32, swarm: bool) -> World<f32> {
+    let mut world = World::default();
+    let point = Point3::new(0.3, height, -2.0);
+    if swarm {
+        world.swarm.insert(&vec![Ball::new(point, RADIUS); count]).unwrap();
+    } else {
+        world.set_model(Model::GAME).unwrap();
+        for _ in 0..count {
+            world.marbles.insert(Marble::new(point, RADIUS)).unwrap();
+        }
+    }
+    world
+}
+
+/// Places, and velocities.
+fn state(world: &World<f32>) -> [Vec<Vec3<f64>>; 2] {
+    // Each marble of `SoftStep` is a ball of the swarm, too.
+    let vectors = |rows: &[[f32; 4]]| {
+        rows.iter().map(|row| Vec3::new(row[0], row[1], row[2]).map(f64::from)).collect()
+    };
+    [vectors(world.swarm.balls()), vectors(world.swarm.velocities())]
+}
+
+fn mean(vectors: &[Vec3<f64>]) -> Vec3<f64> {
+    vectors.iter().fold(Vec3::zero(), |sum, v| sum + v) / vectors.len() as f64
+}
+
+/// The deepest overlap of two, in radii: along x, only those within a diameter can.
+fn deepest(at: &[Vec3<f64>]) -> f64 {
+    let diameter = 2.0 * f64::from(RADIUS);
+    let mut at = at.to_vec();
+    at.sort_unstable_by(|a, b| a.x.total_cmp(&b.x));
+    let mut nearest = diameter;
+    for (i, a) in at.iter().enumerate() {
+        for b in at[i + 1..].iter().take_while(|b| b.x - a.x < diameter) {
+            nearest = nearest.min((*b - *a).magnitude());
+        }
+    }
+    (diameter - nearest) / f64::from(RADIUS)
+}
+
+/// Kinetic and potential energy of each on average, by its mass, in J/kg.
+fn energy(world: &World<f32>) -> f64 {
+    let [at, velocity] = state(world);
+    let kinetic = velocity.iter().map(|v| 0.5 * v.magnitude2()).sum::<f64>();
+    kinetic / at.len() as f64 + f64::from(-world.gravity().y) * mean(&at).y
+}
+
+#[test]
+fn thousands_at_one_point_part_within_seconds_and_their_center_stays() {
+    for (count, swarm, seconds) in
+        [(1_000, true, 2), (1_000, false, 1), (10_000, true, 7), (10_000, false, 5)]
+    {
+        let mut world = at_one_point(count, 1.0, swarm);
+        world.set_gravity(Vec3::zero()).unwrap();
+        for _ in 0..60 * seconds {
+            world.step(DT).unwrap();
+        }
+        let [at, velocity] = state(&world);
+        let (depth, moved) = (deepest(&at), mean(&at) - Vec3::new(0.3, 1.0, -2.0));
+        assert!(depth < 0.1, "{count} in a swarm {swarm}: {depth} radii deep");
+        assert!(moved.magnitude() < 1e-5, "{count}: their center moved by {moved:?}");
+        assert!(velocity.iter().all(|v| *v == Vec3::zero()), "{count}: overlap became speed");
+    }
+}
+
+/// High enough above a floor to part before they reach it: a floor lifts what has no room above it.
+#[test]
+fn a_thousand_at_one_point_that_fall_on_a_floor_part_and_gain_no_energy() {
+    for swarm in [true, false] {
+        let mut world = at_one_point(1_000, 6.0, swarm);
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        // A step of the first order is right to what gravity does in it.
+        let most = (6.0 + 0.1 * f64::from(RADIUS)) * 9.81;
+        for step in 0..180 {
+            world.step(DT).unwrap();
+            let now = energy(&world);
+            assert!(now < most, "in a swarm {swarm}: {now} of {most} J/kg in step {step}");
+        }
+        let deepest = deepest(&state(&world)[0]);
+        assert!(deepest < 0.1, "in a swarm {swarm}: {deepest} radii deep");
+    }
+}
+
+/// A light one is pushed out of heavy ones by many radii in a step.
+#[test]
+fn what_parts_from_others_stays_in_its_box() {
+    let mut random = fastrand::Rng::with_seed(3);
+    for scene in 0..60 {
+        let mut world = World::<f32>::default();
+        world.swarm.set_model(SwarmModel { tier: Tier::Full, ..SwarmModel::default() }).unwrap();
+        for axis in [Vec3::unit_x(), Vec3::unit_y(), Vec3::unit_z()] {
+            for normal in [axis, -axis] {
+                world.walls.insert(Plane::new(normal, -0.5).unwrap()).unwrap();
+            }
+        }
+        let place = [0; 3].map(|_| 0.8 * (random.f32() - 0.5));
+        let balls = (0..40).map(|_| Ball {
+            mass: Mass::Density(10.0_f32.powf(4.0 * random.f32())),
+            ..Ball::new(place.into(), 0.01 + 0.01 * random.f32())
+        });
+        world.swarm.insert(&balls.collect::<Vec<_>>()).unwrap();
+        for step in 0..20 {
+            world.step(DT).unwrap();
+            for [x, y, z, _] in world.swarm.balls() {
+                let out = [x, y, z].iter().any(|x| x.abs() > 0.5);
+                assert!(!out, "scene {scene}, step {step}: {x} {y} {z}");
+            }
+        }
+    }
+}
