@@ -20,16 +20,21 @@ impl EventDriven {
     /// Finds balls at rest at the start of a substep.
     pub(super) fn find_resting(&mut self, settings: &EventSettings) {
         self.near.wm.clear();
+        let mut overlaps = Contacts::default();
         for row in 0..self.balls.len() {
-            self.find_wall_contacts(row, settings);
+            self.find_wall_contacts(row, settings, &mut overlaps.wm);
         }
         let mut near = std::mem::take(&mut self.near);
         self.find_crowds(&near.mm);
         near.mm.retain(|c| {
-            self.crowds.are_together(c.a as usize, c.b as usize)
+            let rests = self.crowds.are_together(c.a as usize, c.b as usize)
                 || self
                     .ball_contact(c, 0.0, settings)
-                    .map_or_else(|| self.overlaps_ball(c, settings), |speed| speed >= 0.0)
+                    .map_or(self.is_deep_in_ball(c), |speed| speed >= 0.0);
+            if !rests && self.overlaps_ball(c, settings) {
+                overlaps.mm.push(*c);
+            }
+            rests
         });
         let mut contact_counts = std::mem::take(&mut self.cluster.contact_counts);
         contact_counts.clear();
@@ -45,6 +50,7 @@ impl EventDriven {
             }
             !is_alone
         });
+        self.part_freely(&overlaps, &contact_counts, settings);
         self.cluster.contact_counts = contact_counts;
         self.end_approach_to_walls(&near, settings);
         if !near.is_empty() {
@@ -81,7 +87,12 @@ impl EventDriven {
 
     /// Finds the walls that a ball touches at the start. Penetration, beyond the slop, is resolved
     /// at once: it is no energy.
-    fn find_wall_contacts(&mut self, row: usize, settings: &EventSettings) {
+    fn find_wall_contacts(
+        &mut self,
+        row: usize,
+        settings: &EventSettings,
+        overlaps: &mut Vec<Contact<f64>>,
+    ) {
         self.push_out_of_walls(row, 0.0);
         let mut near = std::mem::take(&mut self.near.wm);
         let Ball { position: at, radius, .. } = self.balls[row];
@@ -91,7 +102,10 @@ impl EventDriven {
             // A faster approach is an impact now, also of a wall that starts to move: spread over
             // the substep, it would let the wall in by half of its way.
             let margin = self.wall_contact(&contact, 0.0, 0.0, settings);
-            if margin.map_or_else(|| self.overlaps_wall(&contact, settings), |margin| margin >= 0.0)
+            if margin.is_none() && self.overlaps_wall(&contact, settings) {
+                overlaps.push(contact);
+            }
+            if margin.is_some_and(|margin| margin >= 0.0)
                 && (self.parts_of(row).is_empty() || !self.is_seam(row, wall, at, 0.0, settings))
             {
                 near.push(contact);
@@ -264,8 +278,32 @@ impl EventDriven {
             && self.wall_separation(contact, 0.0).0 < -self.wall_tolerance(contact, settings)
     }
 
-    /// Moves a ball that touches nothing else out of a wall that does not press it. Nothing rests on
-    /// the ball, so that its overlap needs no slop.
+    /// Parts what overlaps below the slop and rests on nothing: nothing lies on it either, so that it
+    /// needs no slop. Changes no velocity.
+    fn part_freely(
+        &mut self,
+        overlaps: &Contacts<f64>,
+        contact_counts: &[u32],
+        settings: &EventSettings,
+    ) {
+        let is_free = |row: u32| contact_counts[row as usize] == 0;
+        for contact in overlaps.mm.iter().filter(|c| is_free(c.a) && is_free(c.b)) {
+            let (a, b) = (contact.a as usize, contact.b as usize);
+            let separation = self.ball_separation(contact);
+            let offset = self.center_offset(&self.balls[a], &self.balls[b]);
+            let [first, second] = [a, b].map(|row| self.balls[row].inverse_mass);
+            if separation < 0.0 && offset.magnitude() > 0.0 && first + second > 0.0 {
+                let push = offset.normalize() * (separation / (first + second));
+                self.balls[a].position += push * first;
+                self.balls[b].position -= push * second;
+            }
+        }
+        for contact in overlaps.wm.iter().filter(|c| is_free(c.b)) {
+            self.part_from_wall(contact, settings);
+        }
+    }
+
+    /// Moves a ball that touches nothing else out of a wall.
     fn part_from_wall(&mut self, contact: &Contact<f64>, settings: &EventSettings) {
         let row = contact.b as usize;
         if self.balls[row].inverse_mass > 0.0 && self.overlaps_wall(contact, settings) {
