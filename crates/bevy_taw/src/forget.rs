@@ -36,7 +36,7 @@ pub fn forget_wall(removed: On<Remove, Wall>, mut app: DeferredWorld) {
         world.wall_entities.remove(&id);
     }
     if let Some(id) = sensor {
-        world.remove_sensor(id);
+        world.remove_sensor(id, removed.entity);
     }
     app.commands().entity(removed.entity).try_remove::<WallState>();
 }

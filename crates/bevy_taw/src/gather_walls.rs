@@ -183,17 +183,19 @@ impl Gathering<'_, '_> {
         clock: Clock,
     ) {
         let (entity, state) = (*entity, &mut **state);
-        if state.id.is_some_and(|id| self.world.walls.row(id).is_err()) {
+        if state.id.is_some_and(|id| self.world.walls.row(id).is_err())
+            || state.sensor.is_some_and(|id| self.world.sensors.shape(id).is_err())
+        {
             *state = state.without_row();
         }
         if *is_marble {
             self.refusals.check(Some(entity), Err(Refusal::MarbleAndWall));
-            self.take_out(state);
+            self.take_out(entity, state);
             *state = WallState::default();
             return;
         }
         if *is_sensor && state.id.is_some() || !*is_sensor && state.sensor.is_some() {
-            self.take_out(state);
+            self.take_out(entity, state);
             *state = state.without_row();
         }
         let Some(place) = place else {
@@ -231,13 +233,13 @@ impl Gathering<'_, '_> {
     }
 
     /// Takes a wall or sensor out of the world.
-    fn take_out(&mut self, state: &WallState) {
+    fn take_out(&mut self, entity: Entity, state: &WallState) {
         if let Some(id) = state.id {
             let _ = self.world.walls.remove(id); // it is there: its row was found
             self.world.wall_entities.remove(&id);
         }
         if let Some(id) = state.sensor {
-            self.world.remove_sensor(id);
+            self.world.remove_sensor(id, entity);
         }
     }
 
@@ -279,6 +281,9 @@ impl Gathering<'_, '_> {
             );
         }
         let translation = Vec3::from(pose.translation);
+        let seen = (bits(translation), rotation_bits(pose.rotation));
+        // A wall that moves or jumps has no surface velocity, nor has a sensor.
+        let surface = surface.filter(|_| !is_sensor && state.posed == Some(seen));
         let on_surface = |SurfaceVelocity(surface): SurfaceVelocity| WallVelocity {
             linear: pose.rotation * surface,
             angular: Vec3::ZERO,
@@ -290,7 +295,6 @@ impl Gathering<'_, '_> {
         });
         let set = self.set_motion(state, motion);
         self.refusals.check(Some(entity), set);
-        let seen = (bits(translation), rotation_bits(pose.rotation));
         if state.posed == Some(seen) && !self.all {
             return;
         }

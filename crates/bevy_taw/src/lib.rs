@@ -40,7 +40,7 @@
 //! | [`resources`] | the model, gravity, the world |
 //! | [`swarm`] | marbles in bulk that are no entities |
 //! | [`messages`] | contacts that start, go on and end |
-//! | [`sensor`] | shapes that tell who enters and leaves |
+//! | [`sensor`] | shapes that report which marbles enter and leave |
 //! | [`spatial_query`] | rays, shapes and points among marbles and walls |
 //! | [`snapshot`] | back in time, and rows without entities |
 //! | [`ignored`] | components that the model does not read |

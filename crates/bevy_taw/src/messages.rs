@@ -77,10 +77,10 @@ pub struct ContactStarted {
     pub approach_speed: f32,
 }
 
-/// Two came together faster than what rests does, whether or not they touched before: a marble that
-/// runs along a mesh hits the end of it. Good for sounds and sparks.
+/// Impact of two entities, faster than a resting contact, whether or not they touched before: a marble
+/// that runs along a mesh hits the end of it. Good for sounds and sparks.
 ///
-/// Told of approach speeds over a millimetre a second, and over those that gravity makes in two
+/// Sent for approach speeds over a millimetre a second, and over those that gravity makes in two
 /// substeps. A pair that touches in several places has a hit for each of them; of those in one
 /// direction, within a step, the fastest.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
@@ -255,6 +255,15 @@ impl Events {
     }
 }
 
+/// Forgets contacts while nobody reads or observes them: who listens later hears of those that start
+/// then.
+pub(crate) fn forget(mut touches: ResMut<Touches>) {
+    touches.now.clear();
+    touches.before.clear();
+    touches.impacts = 0;
+    touches.events.clear();
+}
+
 /// Notes who touches in this substep, before anything is restituted.
 pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
     let velocity = |row: u32| world.marbles.velocity()[row as usize];
@@ -265,13 +274,12 @@ pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
         ContactStarted { pair, normal, point, approach_speed: -from_vector(closing).dot(normal) }
     };
     let wall_velocity = |contact: &Contact<f32>| {
-        let id = world.walls.id(contact.a as usize)?;
-        Some(world.walls.motion(id).ok()??.velocity_at(point_of(contact)))
+        let (row, normal) = (contact.a as usize, contact.normal);
+        world.walls.surface_velocity_of_row(row, point_of(contact), normal)
     };
     for contact in world.contacts.wm.iter().filter(|contact| contact.is_touching()) {
         if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
-            let closing = velocity(contact.b);
-            let closing = wall_velocity(contact).map_or(closing, |of_wall| closing - of_wall);
+            let closing = velocity(contact.b) - wall_velocity(contact);
             touches.now.push(started(ContactPair { a, b }, contact, closing));
         }
     }

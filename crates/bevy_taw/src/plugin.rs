@@ -194,6 +194,7 @@ fn add_step(app: &mut App) {
             swarm::report_stopped,
             sensor::scatter,
             messages::write.run_if(messages::are_read),
+            messages::forget.run_if(not(messages::are_read)),
             diagnostics::measure,
             messages::trigger.run_if(messages::are_observed),
         )

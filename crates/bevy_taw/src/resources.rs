@@ -68,6 +68,10 @@ pub struct TawWorld {
     pub(crate) marble_entities: HashMap<MarbleId, Entity>,
     pub(crate) wall_entities: HashMap<WallId, Entity>,
     pub(crate) sensor_entities: HashMap<SensorId, Entity>,
+    /// Marbles inside of sensors, also those that are gone.
+    pub(crate) sensed: HashMap<(SensorId, MarbleId), Entity>,
+    /// Sensor entities whose list of marbles inside is to be written anew.
+    pub(crate) stale_sensors: Vec<Entity>,
     /// Marbles whose entities are disabled, as they were when they left.
     pub(crate) away: HashMap<Entity, Marble<f32>>,
     /// How often the world went back in time, and whether it did since the last gather.

@@ -1,4 +1,4 @@
-//! Sensors: shapes that marbles pass through, and that tell who enters and leaves.
+//! Sensors: shapes that marbles pass through, and that report which of them enter and leave.
 //!
 //! ```
 //! # use bevy::prelude::*;
@@ -15,7 +15,7 @@
 //! # app.add_systems(Startup, spawn).update();
 //! ```
 
-use bevy::platform::collections::HashMap;
+use bevy::ecs::world::DeferredWorld;
 use bevy::prelude::*;
 use taw::world::{MarbleId, SensorId};
 
@@ -23,8 +23,8 @@ use crate::components::WallState;
 use crate::resources::TawWorld;
 use crate::wall::Wall;
 
-/// Makes a sensor of a [`Wall`]: marbles pass through it, and it tells who enters and leaves, by
-/// [`SensorEntered`] and [`SensorLeft`], and who is inside, by [`CollidingEntities`].
+/// Makes a sensor of a [`Wall`]: marbles pass through it, and it reports which of them enter and leave,
+/// by [`SensorEntered`] and [`SensorLeft`], and which are inside, by [`CollidingEntities`].
 ///
 /// It may be moved as a wall, by itself or by what carries it, and has [`CollisionLayers`]. A marble
 /// that passes through within a step enters and leaves in it, at any speed; one that is put elsewhere
@@ -42,7 +42,7 @@ pub struct Sensor;
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct CollidingEntities(Vec<Entity>);
 
-/// A marble entered a sensor: as a message, and as an event of the sensor's entity.
+/// Message, and event of the sensor's entity: a marble entered a sensor.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct SensorEntered {
@@ -55,7 +55,7 @@ pub struct SensorEntered {
     pub time_left: f32,
 }
 
-/// A marble left a sensor, or is gone: as a message, and as an event of the sensor's entity.
+/// Message, and event of the sensor's entity: a marble left a sensor, or is gone.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct SensorLeft {
@@ -68,71 +68,73 @@ pub struct SensorLeft {
     pub time_left: f32,
 }
 
-/// Entities of marbles inside of sensors, also of those that are gone.
-#[derive(Resource, Default)]
-pub(crate) struct Insiders(HashMap<(SensorId, MarbleId), Entity>);
-
 pub(crate) fn register(app: &mut App) {
-    app.init_resource::<Insiders>()
-        .add_message::<SensorEntered>()
+    app.add_message::<SensorEntered>()
         .add_message::<SensorLeft>()
         .register_type::<(Sensor, CollidingEntities, SensorEntered, SensorLeft)>()
         .add_observer(forget);
 }
 
-/// Takes a sensor out of the world when its component, its wall or its entity goes. What is left is a
-/// wall from the next step on.
-fn forget(removed: On<Remove, Sensor>, states: Query<&WallState>, mut world: ResMut<TawWorld>) {
-    if let Some(id) = states.get(removed.entity).ok().and_then(|state| state.sensor) {
-        world.remove_sensor(id);
+/// Takes a sensor out of the world when its component or its entity goes, also of an entity that
+/// queries do not see. What is left is a wall from the next step on.
+fn forget(removed: On<Remove, Sensor>, mut app: DeferredWorld) {
+    let sensor = app.get::<WallState>(removed.entity).and_then(|state| state.sensor);
+    if let Some(id) = sensor {
+        app.resource_mut::<TawWorld>().remove_sensor(id, removed.entity);
     }
 }
 
 impl TawWorld {
-    /// Takes a sensor out, if it is there.
-    pub(crate) fn remove_sensor(&mut self, id: SensorId) {
-        if self.sensor_entities.remove(&id).is_some() {
+    /// Takes the sensor of an entity out, if it is there.
+    pub(crate) fn remove_sensor(&mut self, id: SensorId, entity: Entity) {
+        if self.sensor_entities.get(&id) == Some(&entity) {
+            self.sensor_entities.remove(&id);
+            self.sensed.retain(|(sensor, _), _| *sensor != id);
+            self.stale_sensors.push(entity);
             let _ = self.world.sensors.remove(id); // a restored world may not have it
         }
     }
 }
 
-/// Tells who entered and left in the step.
+/// Writes the sensor events of the step, and updates [`CollidingEntities`].
 pub(crate) fn scatter(
-    world: Res<TawWorld>,
-    mut insiders: ResMut<Insiders>,
+    mut world: ResMut<TawWorld>,
+    states: Query<&WallState>,
     mut colliding: Query<&mut CollidingEntities>,
     mut entered: MessageWriter<SensorEntered>,
     mut left: MessageWriter<SensorLeft>,
     mut commands: Commands,
 ) {
-    let mut changed = Vec::new();
-    for event in world.sensors.events() {
+    if world.sensors.is_empty() && world.stale_sensors.is_empty() {
+        return;
+    }
+    let world = &mut *world;
+    for event in world.world.sensors.events() {
         let time_left = event.time_left;
         let Some(sensor) = world.sensor_entities.get(&event.sensor).copied() else { continue };
         let key = (event.sensor, event.marble);
-        changed.push(event.sensor);
+        world.stale_sensors.push(sensor);
         if event.entered {
             let Some(marble) = world.marble_entities.get(&event.marble).copied() else { continue };
-            insiders.0.insert(key, marble);
+            world.sensed.insert(key, marble);
             let event = SensorEntered { sensor, marble, time_left };
             entered.write(event);
             commands.trigger(event);
-        } else if let Some(marble) = insiders.0.remove(&key) {
+        } else if let Some(marble) = world.sensed.remove(&key) {
             let event = SensorLeft { sensor, marble, time_left };
             left.write(event);
             commands.trigger(event);
         }
     }
-    changed.dedup();
-    for id in changed {
-        let entity = world.sensor_entities.get(&id).copied();
-        let Some(mut colliding) = entity.and_then(|it| colliding.get_mut(it).ok()) else {
-            continue;
-        };
-        let inside = world.sensors.inside(id).unwrap_or_default();
+    world.stale_sensors.sort_unstable();
+    world.stale_sensors.dedup();
+    for entity in world.stale_sensors.drain(..) {
+        let Ok(mut colliding) = colliding.get_mut(entity) else { continue };
+        let id = states.get(entity).ok().and_then(|state| state.sensor);
+        let inside = id.and_then(|id| world.world.sensors.inside(id).ok()).unwrap_or_default();
+        let of_sensor = |marble: &MarbleId| world.sensed.get(&(id?, *marble));
         colliding.0.clear();
-        colliding.0.extend(inside.iter().filter_map(|it| insiders.0.get(&(id, *it))));
+        colliding.0.extend(inside.iter().filter_map(of_sensor));
         colliding.0.sort_unstable();
     }
 }

@@ -16,6 +16,7 @@ pub struct TawSnapshot {
     marble_entities: HashMap<MarbleId, Entity>,
     wall_entities: HashMap<WallId, Entity>,
     sensor_entities: HashMap<SensorId, Entity>,
+    sensed: HashMap<(SensorId, MarbleId), Entity>,
 }
 
 /// A row of the world that no entity stood behind was taken out, as after a
@@ -40,6 +41,7 @@ impl TawWorld {
             marble_entities: self.marble_entities.clone(),
             wall_entities: self.wall_entities.clone(),
             sensor_entities: self.sensor_entities.clone(),
+            sensed: self.sensed.clone(),
         }
     }
 
@@ -69,7 +71,10 @@ impl TawWorld {
         self.world = snapshot.world.clone();
         self.marble_entities.clone_from(&snapshot.marble_entities);
         self.wall_entities.clone_from(&snapshot.wall_entities);
+        self.stale_sensors.extend(self.sensor_entities.values());
         self.sensor_entities.clone_from(&snapshot.sensor_entities);
+        self.sensed.clone_from(&snapshot.sensed);
+        self.stale_sensors.extend(self.sensor_entities.values());
         self.restored = self.restored.wrapping_add(1);
         self.just_restored = true;
     }
@@ -161,8 +166,8 @@ pub(crate) fn take_out_walls(
 pub(crate) fn take_out_sensors(world: &mut TawWorld, id_of: impl Fn(Entity) -> Option<SensorId>) {
     let known = world.sensor_entities.iter().map(|(id, entity)| (*id, *entity));
     let gone: Vec<_> = known.filter(|(id, entity)| id_of(*entity) != Some(*id)).collect();
-    for (id, _) in gone {
-        world.remove_sensor(id);
+    for (id, entity) in gone {
+        world.remove_sensor(id, entity);
     }
 }
 

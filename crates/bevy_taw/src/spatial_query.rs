@@ -1,6 +1,6 @@
 //! Rays, shapes and points among marbles and walls, in Bevy's types and entities.
 //!
-//! Everything is where the last fixed step left it, which is up to a step ahead of what
+//! Positions are those after the last fixed step, up to a step ahead of what
 //! [`TawInterpolationPlugin`](crate::interpolation::TawInterpolationPlugin) draws. Balls of swarms are
 //! not found.
 //!
@@ -23,7 +23,7 @@
 //! # app.update();
 //! ```
 
-use std::sync::{PoisonError, RwLock};
+use std::sync::{Arc, Mutex, PoisonError};
 
 use bevy::ecs::change_detection::Tick;
 use bevy::ecs::entity::EntityHashSet;
@@ -51,12 +51,12 @@ pub struct SpatialQuery<'w, 's> {
 
 /// Query tree of the world, with the change of the world that it was last fitted to.
 #[derive(Resource, Default)]
-pub(crate) struct SpatialTree(RwLock<FittedTree>);
+pub(crate) struct SpatialTree(Mutex<FittedTree>);
 
 #[derive(Default)]
 struct FittedTree {
     fitted_to: Option<Tick>,
-    tree: QueryTree<f32>,
+    tree: Arc<QueryTree<f32>>,
 }
 
 /// Colliders that a query looks at: by default all marbles and walls.
@@ -98,21 +98,21 @@ impl<'a> SpatialQueryFilter<'a> {
         Self { kind: Some(Kind::Walls), ..Self::default() }
     }
 
-    /// Only those that are in one of these layers: a [`PhysicsLayer`](crate::layers::PhysicsLayer), an
+    /// Restricts to those in one of these layers: a [`PhysicsLayer`](crate::layers::PhysicsLayer), an
     /// array of them, or bits.
     #[must_use]
     pub fn with_mask(self, layers: impl Into<LayerMask>) -> Self {
         Self { mask: Some(layers.into()), ..self }
     }
 
-    /// None of these entities.
+    /// Excludes these entities.
     #[must_use]
     pub fn with_excluded_entities(mut self, entities: impl IntoIterator<Item = Entity>) -> Self {
         self.excluded.extend(entities);
         self
     }
 
-    /// Only those for which this returns true.
+    /// Restricts to entities for which this returns true.
     #[must_use]
     pub fn with_predicate(self, predicate: &'a dyn Fn(Entity) -> bool) -> Self {
         Self { predicate: Some(predicate), ..self }
@@ -141,7 +141,7 @@ pub struct RayHit {
     pub entity: Entity,
     /// Distance from the origin of the ray, in metres; zero if that is inside.
     pub distance: f32,
-    /// Point on the surface, or the origin.
+    /// Point on the surface, or the origin, in metres in world space.
     pub point: Vec3,
     /// Outward unit normal; from inside, that of the nearest surface.
     pub normal: Vec3,
@@ -165,7 +165,7 @@ pub struct ShapeHit {
 pub struct ProjectedPoint {
     /// The marble or wall.
     pub entity: Entity,
-    /// Point on its surface.
+    /// Point on its surface, in metres in world space.
     pub point: Vec3,
     /// Outward unit normal there.
     pub normal: Vec3,
@@ -173,7 +173,7 @@ pub struct ProjectedPoint {
     pub distance: f32,
 }
 
-/// Shape to ask with: a [`Sphere`], a [`Cuboid`] or a [`Capsule3d`] of Bevy's.
+/// Shape of a query: a [`Sphere`], a [`Cuboid`] or a [`Capsule3d`] of Bevy's.
 pub trait QueryShape {
     /// The shape at a place.
     ///
@@ -308,21 +308,18 @@ impl SpatialQuery<'_, '_> {
         marble().or_else(wall)
     }
 
-    /// Asks through a tree that is up to date.
+    /// Runs a query on a tree that is up to date. It may run others.
     fn ask<R>(&self, question: impl FnOnce(&Queries<f32>) -> R) -> R {
         let now = Some(self.world.last_changed());
-        let is_old = {
-            let tree = self.tree.0.read().unwrap_or_else(PoisonError::into_inner);
-            tree.fitted_to != now
+        let tree = {
+            let mut fitted = self.tree.0.lock().unwrap_or_else(PoisonError::into_inner);
+            if fitted.fitted_to != now {
+                Arc::make_mut(&mut fitted.tree).update(&self.world);
+                fitted.fitted_to = now;
+            }
+            Arc::clone(&fitted.tree)
         };
-        if is_old {
-            let mut tree = self.tree.0.write().unwrap_or_else(PoisonError::into_inner);
-            tree.tree.update(&self.world);
-            tree.fitted_to = now;
-        }
-        // Not while it is locked for writing: a predicate may ask, too.
-        let tree = self.tree.0.read().unwrap_or_else(PoisonError::into_inner);
-        question(&self.world.queries_of(&tree.tree))
+        question(&self.world.queries_of(&tree))
     }
 }
 

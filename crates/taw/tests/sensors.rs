@@ -1,7 +1,9 @@
 //! Sensors: who enters and leaves, and when.
 
-use cgmath::Zero;
+use cgmath::{Rotation3, Zero};
 use taw::broad::CollisionLayers;
+use taw::frame::Pose;
+use taw::math::Quat;
 use taw::motion::WallMotion;
 use taw::prelude::*;
 use taw::shape::{Aabb, Capsule};
@@ -154,35 +156,81 @@ fn inside_are_those_that_overlap_and_events_are_the_changes() {
     }
 }
 
-/// A sensor that sweeps over a ball at rest notices it, as a ball does that flies through one at rest.
+/// A sensor that sweeps over a ball at rest notices it, as a ball does that flies through one at rest,
+/// however many substeps there are.
 #[test]
 fn a_sensor_that_moves_sweeps() {
-    for response in RESPONSES {
-        let mut world = world::<f64>(response, 1);
-        let plate = |x: f64| cuboid([x, -1.0, -1.0], [x + 0.01, 1.0, 1.0]);
-        let gate = world.sensors.insert(plate(-3.0)).unwrap();
-        let id = world.marbles.insert(ball([0.0; 3], [0.0; 3], 0.1)).unwrap();
-        let (dt, speed) = (1.0 / 60.0, 90.0);
-        let velocity = Vec3::new(speed, 0.0, 0.0);
-        let mut told = Vec::new();
-        for step in 1..=5 {
-            let x = -3.0 + speed * dt * f64::from(step);
-            world.sensors.set(gate, plate(x)).unwrap();
-            let motion =
-                WallMotion { velocity, angular_velocity: Vec3::zero(), pivot: point(x, 0.0, 0.0) };
+    for (response, substeps) in RESPONSES.into_iter().flat_map(|it| [(it, 1), (it, 3), (it, 4)]) {
+        for radius in [0.1, 0.01] {
+            let mut world = world::<f64>(response, substeps);
+            let plate = |x: f64| cuboid([x, -1.0, -1.0], [x + 0.01, 1.0, 1.0]);
+            let gate = world.sensors.insert(plate(-3.0)).unwrap();
+            let id = world.marbles.insert(ball([0.0; 3], [0.0; 3], radius)).unwrap();
+            let (dt, speed) = (1.0 / 60.0, 90.0);
+            let velocity = Vec3::new(speed, 0.0, 0.0);
+            let mut told = Vec::new();
+            for step in 1..=5 {
+                let x = -3.0 + speed * dt * f64::from(step);
+                world.sensors.set(gate, plate(x)).unwrap();
+                let (angular_velocity, pivot) = (Vec3::zero(), point(x, 0.0, 0.0));
+                let motion = WallMotion { velocity, angular_velocity, pivot };
+                world.sensors.set_motion(gate, Some(motion)).unwrap();
+                world.step(dt).unwrap();
+                let time = |left: f64| f64::from(step) * dt - left;
+                let events = world.sensors.events().iter();
+                told.extend(events.map(|it| (it.marble, it.entered, time(it.time_left))));
+            }
+            let case = format!("{response:?}, {substeps}, {radius}: {told:?}");
+            let [(first, true, enters), (second, false, leaves)] = told[..] else {
+                panic!("{case}")
+            };
+            assert_eq!((first, second), (id, id), "{case}");
+            assert!((enters - (2.99 - radius) / speed).abs() < 1e-7, "{case}");
+            assert!((leaves - (3.0 + radius) / speed).abs() < 1e-7, "{case}");
+        }
+    }
+}
+
+/// A paddle that turns half a radian a step passes over small balls at rest all around it, each once.
+#[test]
+fn a_paddle_that_turns_misses_nobody() {
+    for (response, substeps) in RESPONSES.into_iter().flat_map(|it| [(it, 1), (it, 4)]) {
+        let mut world = world::<f64>(response, substeps);
+        let pose = |angle: f64| Pose {
+            rotation: Quat::from_angle_y(cgmath::Rad(angle)),
+            translation: Vec3::zero(),
+        };
+        let arm = cuboid::<f64>([0.2, -1.0, -0.005], [2.0, 1.0, 0.005]);
+        let arm = |angle: f64| WallShape::from(arm).transformed(pose(angle)).unwrap();
+        let gate = world.sensors.insert(arm(0.0)).unwrap();
+        for i in 0..40 {
+            let (angle, reach) = (0.1 + 0.15 * f64::from(i), 0.3 + 1.6 * random(i as u64));
+            let at = [reach * angle.cos(), 0.0, -reach * angle.sin()];
+            world.marbles.insert(ball(at, [0.0; 3], 0.005)).unwrap();
+        }
+        let (dt, speed) = (1.0 / 60.0, 30.0);
+        let mut entered = Vec::new();
+        let mut left = 0;
+        for step in 1..=12 {
+            world.sensors.set(gate, arm(speed * dt * f64::from(step))).unwrap();
+            let (velocity, pivot) = (Vec3::zero(), point(0.0, 0.0, 0.0));
+            let motion = WallMotion { velocity, angular_velocity: Vec3::unit_y() * speed, pivot };
             world.sensors.set_motion(gate, Some(motion)).unwrap();
             world.step(dt).unwrap();
-            let time = |left: f64| f64::from(step) * dt - left;
-            told.extend(
-                world.sensors.events().iter().map(|it| (it.marble, it.entered, time(it.time_left))),
-            );
+            for event in world.sensors.events() {
+                if event.entered {
+                    entered.push(event.marble);
+                } else {
+                    left += 1;
+                }
+            }
         }
-        let [(first, true, enters), (second, false, leaves)] = told[..] else {
-            panic!("{response:?}: {told:?}")
-        };
-        assert_eq!((first, second), (id, id));
-        assert!((enters - 2.89 / speed).abs() < 1e-7, "{response:?}: {told:?}");
-        assert!((leaves - 3.1 / speed).abs() < 1e-7, "{response:?}: {told:?}");
+        let count = entered.len();
+        entered.sort_unstable();
+        entered.dedup();
+        let case = format!("{response:?}, {substeps}: {count} entered, {left} left");
+        assert_eq!((entered.len(), count), (40, 40), "{case}");
+        assert!((39..=40).contains(&left), "{case}");
     }
 }
 

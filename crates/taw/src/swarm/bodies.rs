@@ -388,6 +388,12 @@ impl Swarm {
         }
     }
 
+    /// Slots of the balls near walls other than half-spaces.
+    pub(crate) fn slots_near_shapes(&self) -> impl Iterator<Item = u32> + '_ {
+        let awake = self.chunks.iter().filter(|chunk| !chunk.asleep);
+        awake.flat_map(|chunk| &chunk.near_shapes).map(|row| self.ids.slots()[*row as usize])
+    }
+
     /// Returns true if a ball sleeps.
     pub(crate) fn is_asleep(&self, ball: BallId) -> bool {
         let row = self.ids.row(ball);

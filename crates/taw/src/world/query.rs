@@ -126,8 +126,9 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Queries through a tree that is up to date ([`QueryTree::update`]), so that many share it. One
-    /// that is older finds what was there, where that is now, and may miss what came or moved since.
+    /// Queries through a tree that is up to date ([`QueryTree::update`]), so that many share it. Of
+    /// one that is older, hits are true, but some may be missed: of what came or moved since, and after
+    /// removals, of any.
     #[must_use]
     pub fn queries_of<'a>(&'a self, tree: &'a QueryTree<S>) -> Queries<'a, S> {
         Queries { world: self, tree }
@@ -202,6 +203,9 @@ impl<S: Scalar> Queries<'_, S> {
         filter: impl Fn(ColliderId) -> bool,
     ) -> Option<QueryHit<ShapeCastHit<S>>> {
         let mut best: Option<QueryHit<ShapeCastHit<S>>> = None;
+        if !is_finite(translation) {
+            return best;
+        }
         let mut offer = |item: Item, query: &dyn Fn() -> Option<ShapeCastHit<S>>| {
             let Some(collider) = self.collider(item).filter(|collider| filter(*collider)) else {
                 return;

@@ -1,4 +1,4 @@
-//! Sensors: shapes that marbles pass through, and that tell who enters and leaves.
+//! Sensors: shapes that marbles pass through, and that report which of them enter and leave.
 
 use cgmath::{One, Zero};
 
@@ -9,7 +9,7 @@ use crate::frame::Pose;
 use crate::handle::{Handle, Handles};
 use crate::math::{Point3, Quat, Scalar, Vec3};
 use crate::motion::WallMotion;
-use crate::shape::{Aabb3, BoundedShape, Shape};
+use crate::shape::{Aabb3, Shape};
 
 /// Stable handle of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -65,7 +65,7 @@ struct Sensor<S> {
     shape: WallShape<S>,
     motion: Option<WallMotion<S>>,
     layers: CollisionLayers,
-    /// Sorted.
+    /// Marbles inside, sorted.
     inside: Vec<MarbleId>,
 }
 
@@ -82,7 +82,7 @@ impl<S: Scalar> Sensors<S> {
         Ok(id)
     }
 
-    /// Removes a sensor. Whoever is inside leaves without an event.
+    /// Removes a sensor, and its events. Whoever is inside leaves without one.
     ///
     /// # Errors
     /// [`Error::NoSuchSensor`].
@@ -93,7 +93,7 @@ impl<S: Scalar> Sensors<S> {
         Ok(())
     }
 
-    /// Sets the shape of a sensor, which is also its place.
+    /// Sets the shape and pose of a sensor.
     ///
     /// # Errors
     /// [`Error::NoSuchSensor`], and as [`Sensors::insert`]; then nothing has changed.
@@ -140,8 +140,8 @@ impl<S: Scalar> Sensors<S> {
         self.row(id).map(|row| &self.sensors[row].shape)
     }
 
-    /// Marbles that entered and left in the last step, by substep and sensor. One that passed through
-    /// within a substep enters first.
+    /// Marbles that entered and left in the last step, in the order of substeps, sensors and marbles. One
+    /// that passed through within a substep enters first.
     #[must_use]
     pub fn events(&self) -> &[SensorEvent<S>] {
         &self.events
@@ -163,12 +163,12 @@ impl<S: Scalar> Sensors<S> {
         self.handles.row(id.0).ok_or(Error::NoSuchSensor(id))
     }
 
-    /// Forgets the events of the last step.
+    /// Clears the events of the last step.
     pub(super) fn begin_step(&mut self) {
         self.events.clear();
     }
 
-    /// Notes where marbles are at the beginning of a substep.
+    /// Stores the positions of marbles at the beginning of a substep.
     pub(super) fn begin_substep(&mut self, marbles: &Marbles<S>) {
         self.start.clear();
         if !self.sensors.is_empty() {
@@ -179,8 +179,8 @@ impl<S: Scalar> Sensors<S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// Finds who entered and left sensors in a substep of `dt` seconds.
-    pub(super) fn sense(&mut self, dt: S) {
+    /// Updates sensors after a substep of `dt` seconds.
+    pub(super) fn update_sensors(&mut self, dt: S) {
         let rest = self.scratch.rest_of_step;
         let Sensors { handles, sensors, events, start, removals } = &mut self.sensors;
         if *removals != self.marbles.removals() {
@@ -189,26 +189,31 @@ impl<S: Scalar> World<S> {
         for (row, sensor) in sensors.iter_mut().enumerate() {
             let Some(id) = handles.handle(row).map(SensorId) else { continue };
             let first = events.len();
-            let mut tell = |marble: MarbleId, entered: bool, part: S| {
-                let time_left = rest + dt * (S::one() - part).max(S::zero());
+            let mut push_event = |marble: MarbleId, entered: bool, fraction: S| {
+                let time_left = rest + dt * (S::one() - fraction).max(S::zero());
                 events.push(SensorEvent { sensor: id, marble, entered, time_left });
             };
             let before = std::mem::take(&mut sensor.inside);
-            for (marble, path) in paths(&self.marbles, start, sensor, dt) {
+            for (marble, path) in paths(&self.marbles, start, sensor, [rest, dt]) {
                 let was_inside = before.binary_search(&marble).is_ok();
                 let is_inside = sensor.shape.overlaps(&path.end);
-                let enters = || sensor.shape.cast_shape(&path.start(), path.way);
-                let leaves = || sensor.shape.cast_shape(&path.end, -path.way);
+                let enters = || sensor.shape.cast_shape(&path.start(), path.displacement);
+                let leaves = || {
+                    let back = sensor.shape.cast_shape(&path.end, -path.displacement);
+                    back.map(|back| S::one() - back)
+                };
                 match (was_inside, is_inside) {
                     (true, true) => {}
                     // Who was put inside is there from the beginning.
-                    (false, true) => tell(marble, true, enters().unwrap_or(S::zero())),
-                    (true, false) => tell(marble, false, S::one() - leaves().unwrap_or(S::one())),
+                    (false, true) => push_event(marble, true, enters().unwrap_or(S::zero())),
+                    (true, false) => push_event(marble, false, leaves().unwrap_or(S::zero())),
+                    // Who only reaches the surface does not leave it again.
                     (false, false) => {
-                        if let Some(part) = enters() {
-                            tell(marble, true, part);
-                            let back = leaves().unwrap_or(S::one() - part);
-                            tell(marble, false, (S::one() - back).max(part));
+                        if let Some(entry) = enters()
+                            && let Some(exit) = leaves().filter(|exit| *exit > entry)
+                        {
+                            push_event(marble, true, entry);
+                            push_event(marble, false, exit);
                         }
                     }
                 }
@@ -224,50 +229,65 @@ impl<S: Scalar> World<S> {
                 }
             }
         }
+        start.clear();
     }
 }
 
-/// Path of a marble in a substep, relative to a sensor.
+/// Path of a marble in a substep, in the frame of a sensor: that of the world at the end of the step.
 struct Path<S> {
     /// The marble at its end.
     end: Shape<S>,
-    /// Displacement, in metres.
-    way: Vec3<S>,
+    /// In metres.
+    displacement: Vec3<S>,
 }
 
 impl<S: Scalar> Path<S> {
     /// The marble at its beginning.
     fn start(&self) -> Shape<S> {
-        self.end.transformed(Pose { rotation: Quat::one(), translation: -self.way })
+        self.end.transformed(Pose { rotation: Quat::one(), translation: -self.displacement })
     }
 }
 
-/// Marbles whose paths may touch a sensor.
+/// Marbles whose paths may touch a sensor, in a substep of `dt` seconds, `rest` seconds before the end
+/// of the step.
 fn paths<'a, S: Scalar>(
     marbles: &'a Marbles<S>,
     start: &'a [Point3<S>],
     sensor: &Sensor<S>,
-    dt: S,
+    [rest, dt]: [S; 2],
 ) -> impl Iterator<Item = (MarbleId, Path<S>)> + use<'a, S> {
-    let (bounds, motion, layers) = (sensor.shape.bounding_box(), sensor.motion, sensor.layers);
+    let (bounds, layers) = (sensor.shape.bounding_box(), sensor.layers);
+    let frame = |time: S| sensor.motion.map(|motion| motion.pose_before(time).inverse());
+    let [at_start, at_end] = [frame(rest + dt), frame(rest)];
     (0..marbles.len()).filter_map(move |row| {
-        let end = marbles.position()[row];
-        let moved = start.get(row).map_or_else(Vec3::zero, |start| end - start);
-        let carried = motion.map_or_else(Vec3::zero, |motion| motion.velocity_at(end) * dt);
-        let way = marbles.period.minimum_image(moved) - carried;
-        let end = marbles.shape_of_row(row);
-        let is_near = bounds.is_none_or(|bounds| meets(&end.bounding_box(), way, &bounds));
-        if !is_near || !marbles.layers_of_row(row).interacts_with(layers) {
+        if !marbles.layers_of_row(row).interacts_with(layers) {
             return None;
         }
-        Some((marbles.id(row)?, Path { end, way }))
+        let to = marbles.position()[row];
+        let moved = start.get(row).map_or_else(Vec3::zero, |from| to - from);
+        let from = to - marbles.period.minimum_image(moved);
+        let place = |frame: Option<Pose<S>>, point: Point3<S>| {
+            frame.map_or(point, |frame| frame.transform_point(point))
+        };
+        let (from, to) = (place(at_start, from), place(at_end, to));
+        let reach = marbles.radius()[row] + marbles.half_length(row);
+        if bounds.is_some_and(|bounds| !swept_sphere_overlaps([from, to], reach, &bounds)) {
+            return None;
+        }
+        let shape = marbles.shape_of_row(row);
+        let end = at_end.map_or_else(|| shape.clone(), |frame| shape.transformed(frame));
+        Some((marbles.id(row)?, Path { end, displacement: to - from }))
     })
 }
 
-/// Tests if a box that came by a displacement may have met another one.
-fn meets<S: Scalar>(end: &Aabb3<S>, way: Vec3<S>, other: &Aabb3<S>) -> bool {
+/// Tests if the box around the path of a sphere overlaps another one.
+fn swept_sphere_overlaps<S: Scalar>(
+    [from, to]: [Point3<S>; 2],
+    radius: S,
+    bounds: &Aabb3<S>,
+) -> bool {
     (0..3).all(|axis| {
-        let (back, ahead) = (way[axis].max(S::zero()), (-way[axis]).max(S::zero()));
-        end.min[axis] - back <= other.max[axis] && end.max[axis] + ahead >= other.min[axis]
+        from[axis].min(to[axis]) - radius <= bounds.max[axis]
+            && from[axis].max(to[axis]) + radius >= bounds.min[axis]
     })
 }

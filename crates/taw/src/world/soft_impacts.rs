@@ -9,6 +9,7 @@ use crate::contact::{Contact, time_of_impact_sphere_sphere};
 use crate::math::{Scalar, Vec3, cast_vector, length, normal_and_distance};
 use crate::response::{Colliders as _, Impact};
 use crate::shape::{BoundedShape, Sphere};
+use crate::swarm::NO_ROW;
 
 /// Impacts that free motion has in the step.
 #[derive(Clone, Debug)]
@@ -16,6 +17,8 @@ pub(super) struct PredictedImpacts<S> {
     list: Vec<PredictedImpact<S>>,
     /// Walls other than half-spaces that move.
     moving: Vec<MovingWall<S>>,
+    /// Whether each marble has a listed contact with the wall at hand.
+    listed: Vec<bool>,
     /// Number of removals and of marbles when they were predicted.
     rows: (u64, usize),
 }
@@ -29,7 +32,7 @@ struct PredictedImpact<S> {
 
 impl<S> Default for PredictedImpacts<S> {
     fn default() -> Self {
-        Self { list: Vec::new(), moving: Vec::new(), rows: (0, 0) }
+        Self { list: Vec::new(), moving: Vec::new(), listed: Vec::new(), rows: (0, 0) }
     }
 }
 
@@ -41,69 +44,92 @@ const CONFIRMING: f64 = 1e-3;
 impl<S: Scalar> World<S> {
     /// Predicts which listed contacts begin within the step of `dt` seconds.
     pub(super) fn predict_impacts(&mut self, dt: S) {
-        let PredictedImpacts { mut list, mut moving, .. } =
+        let PredictedImpacts { mut list, mut moving, mut listed, .. } =
             std::mem::take(&mut self.scratch.soft_step.predicted);
         list.clear();
-        let at_walls = self.contacts.wm.iter();
+        MovingWall::list(&self.walls, dt, &mut moving);
+        let is_current = |contact: &&Contact<S>| {
+            contact.is_touching() || moving.iter().all(|wall| wall.row != contact.a)
+        };
+        let at_walls = self.contacts.wm.iter().filter(is_current);
         list.extend(at_walls.filter_map(|contact| self.predict_wall_impact(contact, dt)));
         let of_pairs = self.contacts.mm.iter();
         list.extend(of_pairs.filter_map(|contact| self.predict_pair_impact(contact, dt)));
-        MovingWall::list(&self.walls, dt, &mut moving);
         for wall in &moving {
-            self.predict_impacts_of(wall, dt, &mut list);
+            self.predict_impacts_of(wall, dt, (&mut listed, &mut list));
         }
         let rows = (self.marbles.removals(), self.marbles.len());
-        self.scratch.soft_step.predicted = PredictedImpacts { list, moving, rows };
+        self.scratch.soft_step.predicted = PredictedImpacts { list, moving, listed, rows };
     }
 
-    /// Predicts the impacts of a wall that moves: its contacts are found anew in each substep, and
-    /// those that are listed are of the places of the last one.
-    fn predict_impacts_of(&self, wall: &MovingWall<S>, dt: S, list: &mut Vec<PredictedImpact<S>>) {
-        for row in 0..self.marbles.len() {
-            let (sphere, velocity) = (self.marbles.sphere(row), self.marbles.velocity[row]);
-            let half = S::from_f64(0.5) * dt;
-            let displacement = (velocity + self.soft_acceleration(row) * half) * dt;
-            let end = Sphere { center: sphere.center + displacement, ..sphere };
-            if !wall.is_near(&sphere.bounding_box().union(&end.bounding_box()))
-                || !wall.collides(&self.walls, self.marbles.layers_of_row(row))
-            {
-                continue;
-            }
-            let frame = Frame::Moving(wall.motion, dt);
-            let path = RelativePath { start: sphere.center, displacement, frame };
-            let mut first: Option<WallImpact<S>> = None;
-            wall.for_each_near_path(&self.walls, &path, sphere.radius, |part| {
-                let impact = self.walls.time_of_impact(part, sphere.radius, &path);
-                if let Some(impact) = impact
-                    && first.as_ref().is_none_or(|first| impact.time < first.time)
-                {
-                    first = Some(impact);
-                }
-            });
-            let Some(WallImpact { time, normal, .. }) = first else { continue };
-            let point = sphere.center + displacement * time - normal * sphere.radius;
-            let surface = wall.motion.velocity_at(point);
-            let approach_speed = (surface - velocity).dot(normal);
-            let at_once = time <= S::zero() && !self.is_fast(approach_speed, dt);
-            let b = row as u32;
-            let known = |it: &PredictedImpact<S>| it.impact.on_wall && it.impact.a == wall.row;
-            if at_once || list.iter().any(|it| known(it) && it.impact.b == b) {
-                continue;
-            }
-            let impact = Impact { a: wall.row, on_wall: true, b, normal, point, approach_speed };
-            list.push(PredictedImpact { impact, velocity: [surface, velocity] });
+    /// Predicts the impacts of a wall that moves on marbles that have no listed contact with it: contacts
+    /// with shapes are listed of where these were at the end of the last step.
+    fn predict_impacts_of(
+        &self,
+        wall: &MovingWall<S>,
+        dt: S,
+        (listed, list): (&mut Vec<bool>, &mut Vec<PredictedImpact<S>>),
+    ) {
+        listed.clear();
+        listed.resize(self.marbles.len(), false);
+        let of_wall = |contact: &&Contact<S>| contact.a == wall.row && contact.is_touching();
+        for contact in self.contacts.wm.iter().filter(of_wall) {
+            listed[contact.b as usize] = true;
         }
+        let marbles = &self.scratch.soft_step.marble_of_slot;
+        for slot in self.swarm.slots_near_shapes() {
+            let row = marbles.get(slot as usize).map_or(NO_ROW, |row| *row);
+            if row != NO_ROW && !std::mem::replace(&mut listed[row as usize], true) {
+                list.extend(self.predict_moving_wall_impact(wall, row, dt));
+            }
+        }
+    }
+
+    /// Impact of a wall that moves on a marble that it does not touch yet.
+    fn predict_moving_wall_impact(
+        &self,
+        wall: &MovingWall<S>,
+        b: u32,
+        dt: S,
+    ) -> Option<PredictedImpact<S>> {
+        let row = b as usize;
+        let (sphere, velocity) = (self.marbles.sphere(row), self.marbles.velocity[row]);
+        let half = S::from_f64(0.5) * dt;
+        let displacement = (velocity + self.soft_acceleration(row) * half) * dt;
+        let end = Sphere { center: sphere.center + displacement, ..sphere };
+        let bounds = sphere.bounding_box().union(&end.bounding_box());
+        if !wall.is_near(&bounds) || !wall.collides(&self.walls, self.marbles.layers_of_row(row)) {
+            return None;
+        }
+        let frame = Frame::Moving(wall.motion, dt);
+        let path = RelativePath { start: sphere.center, displacement, frame };
+        let mut first: Option<WallImpact<S>> = None;
+        wall.for_each_near_path(&self.walls, &path, sphere.radius, |part| {
+            let impact = self.walls.time_of_impact(part, sphere.radius, &path);
+            let is_first = |impact: &WallImpact<S>| {
+                first.as_ref().is_none_or(|first| impact.time < first.time)
+            };
+            if let Some(impact) = impact.filter(is_first) {
+                first = Some(impact);
+            }
+        });
+        let WallImpact { time, normal, .. } = first?;
+        let point = sphere.center + displacement * time - normal * sphere.radius;
+        let surface = wall.motion.velocity_at(point);
+        let at_impact = velocity + self.soft_acceleration(row) * (dt * time);
+        let approach_speed = (surface - at_impact).dot(normal);
+        if approach_speed <= S::zero() {
+            return None;
+        }
+        let impact = Impact { a: wall.row, on_wall: true, b, normal, point, approach_speed };
+        Some(PredictedImpact { impact, velocity: [surface, velocity] })
     }
 
     /// Returns true if two that touch already come together faster than gravity makes rest within
     /// two steps: their impact is now.
     fn meet_now(&self, contact: &Contact<S>, approach_speed: S, dt: S) -> bool {
-        contact.is_touching() && self.is_fast(approach_speed, dt)
-    }
-
-    /// Returns true for an approach faster than gravity makes rest within two steps.
-    fn is_fast(&self, approach_speed: S, dt: S) -> bool {
-        approach_speed > length(self.settings.gravity) * dt * S::from_f64(2.0)
+        contact.is_touching()
+            && approach_speed > length(self.settings.gravity) * dt * S::from_f64(2.0)
     }
 
     /// Impact of a marble that flies along its parabola to the plane of its contact.
@@ -124,9 +150,9 @@ impl<S: Scalar> World<S> {
         if !later && !self.meet_now(contact, approach_speed, dt) {
             return None;
         }
-        let begin_speed = approach_speed;
+        let start_speed = approach_speed;
         let (normal, approach_speed) = (contact.normal, square.sqrt());
-        let time = separation * two / (begin_speed + approach_speed);
+        let time = (separation * two / (start_speed + approach_speed)).min(dt);
         let fall = self.soft_acceleration(b) * (time * time * half);
         let point = position + contact.arms[1] + velocity * time + fall;
         let impact = Impact { a: wall, on_wall: true, b: contact.b, normal, point, approach_speed };

@@ -25,7 +25,7 @@ pub(super) struct SoftRows<S> {
     known: Option<(u64, usize, Rotation, bool)>,
     token: SyncToken,
     slot_of_marble: Vec<u32>,
-    marble_of_slot: Vec<u32>,
+    pub marble_of_slot: Vec<u32>,
     changed: Vec<Body>,
     lists: Vec<Contacts<S>>,
     /// Length of the step that was integrated, in seconds.

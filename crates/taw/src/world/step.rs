@@ -102,7 +102,7 @@ impl<S: Scalar> World<S> {
     pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
         let dt = Self::validated_dt(dt)?;
         method_of(self.settings.model.response).restitute(self, dt)?;
-        self.sense(dt);
+        self.update_sensors(dt);
         Ok(())
     }
 

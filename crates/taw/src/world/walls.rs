@@ -1,5 +1,3 @@
-use cgmath::Zero;
-
 use super::marble::non_default;
 use super::sparse_column::SparseColumn;
 use super::wall_changes::WallChanges;
@@ -8,7 +6,7 @@ use crate::Error;
 use crate::broad::CollisionLayers;
 use crate::contact::ClosestPoints;
 use crate::handle::{Handle, Handles};
-use crate::math::{Point3, RealVector as _, Scalar, Vec3, is_finite_point};
+use crate::math::{Point3, Scalar, Vec3, is_finite_point};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};
 use crate::shape::{Aabb3, Bvh, Capsule, Plane, PointProjection};
@@ -481,9 +479,7 @@ impl<S: Scalar> response::Colliders<S> for Walls<S> {
     }
 
     fn surface_velocity(&self, wall: usize, point: Point3<S>, normal: Vec3<S>) -> Vec3<S> {
-        let Some(motion) = self.motion.get(wall) else { return Vec3::zero() };
-        let velocity = motion.velocity_at(point);
-        if self.has_moved(wall) { velocity } else { velocity.reject_from(normal) }
+        self.surface_velocity_of_row(wall, point, normal)
     }
 
     fn material(&self, wall: usize) -> Option<Material<S>> {

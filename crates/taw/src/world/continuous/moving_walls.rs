@@ -3,7 +3,7 @@
 use cgmath::{InnerSpace, Zero};
 
 use crate::broad::CollisionLayers;
-use crate::math::{Point3, Scalar, Vec3, length};
+use crate::math::{Point3, RealVector as _, Scalar, Vec3, length};
 use crate::motion::WallMotion;
 use crate::shape::{Aabb, Aabb3};
 use crate::world::walls::{SubShape, Walls};
@@ -151,6 +151,20 @@ pub(super) fn path_bounds<S: Scalar>(
 }
 
 impl<S: Scalar> Walls<S> {
+    /// Velocity of the surface of the wall at an index, at a point with this normal, in m/s: along the
+    /// surface, if the wall was not set to another pose since the last step.
+    #[must_use]
+    pub fn surface_velocity_of_row(
+        &self,
+        row: usize,
+        point: Point3<S>,
+        normal: Vec3<S>,
+    ) -> Vec3<S> {
+        let Some(motion) = self.motion_of_row(row) else { return Vec3::zero() };
+        let velocity = motion.velocity_at(point);
+        if self.has_moved(row) { velocity } else { velocity.reject_from(normal) }
+    }
+
     /// Motion of the wall at an index, if it was set to another pose since the last step.
     pub(super) fn swept_motion_of_row(&self, row: usize) -> Option<WallMotion<S>> {
         let motion = self.motion_of_row(row).filter(|_| self.has_moved(row))?;
