@@ -306,3 +306,47 @@ fn what_a_wall_strikes_is_heard_at_its_speed() {
         assert!((hits[0] - 4.0).abs() < 0.05, "{response:?}: {hits:?}");
     }
 }
+
+/// An observer that goes and comes back hears of no contact that ended meanwhile.
+#[test]
+fn who_listens_again_hears_nothing_stale() {
+    #[derive(Resource, Default)]
+    struct Ended(u32);
+    let mut app = scene::app();
+    app.init_resource::<Ended>();
+    scene::floor(&mut app);
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
+    let count = |_: On<ContactEnded>, mut ended: ResMut<Ended>| ended.0 += 1;
+    app.add_observer(count);
+    let observers: Vec<_> = app
+        .world_mut()
+        .query_filtered::<Entity, With<bevy::ecs::observer::Observer>>()
+        .iter(app.world())
+        .collect();
+    scene::frames(&mut app, 5);
+    // Away while nobody listens, and back.
+    let ours = *observers.last().expect("it was added");
+    app.world_mut().despawn(ours);
+    app.world_mut().get_mut::<Transform>(marble).unwrap().translation.y = 9.0;
+    scene::frames(&mut app, 3);
+    app.add_observer(count);
+    scene::frames(&mut app, 3);
+    assert_eq!(app.world().resource::<Ended>().0, 0);
+}
+
+/// The end face of a belt pushes nobody, so what stands at it is not hit.
+#[test]
+fn the_end_of_a_belt_hits_nobody() {
+    let mut app = scene::app();
+    let model = Model { response: Response::Impulse, ..Model::GAME };
+    app.insert_resource(TawModel(model)).add_message::<ContactHit>();
+    scene::floor(&mut app);
+    let belt = (Wall::from(Cuboid::new(2.0, 1.0, 2.0)), SurfaceVelocity(Vec3::X * 2.0));
+    app.world_mut().spawn((belt, Transform::from_xyz(0.0, 0.5, 0.0)));
+    scene::drop_marble(&mut app, 0.1, Vec3::new(1.1, 0.1, 0.0));
+    for _ in 0..30 {
+        app.update();
+        let messages = app.world().resource::<Messages<ContactHit>>();
+        assert_eq!(messages.iter_current_update_messages().count(), 0);
+    }
+}

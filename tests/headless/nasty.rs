@@ -45,6 +45,7 @@ const TABLE: &[(&str, &str, Takes)] = &[
     ("AngularVelocity", ".0", Takes::Finite),
     ("MarbleMass", ".0", Takes::Positive),
     ("GravityScale", ".0", Takes::Finite),
+    ("SurfaceVelocity", ".0", Takes::Finite),
     ("SurfaceMaterial", ".restitution", Takes::Within(0.0, 1.0)),
     ("SurfaceMaterial", ".friction", Takes::AtLeastZero),
     ("SurfaceMaterial", ".tangential_restitution", Takes::Within(-1.0, 1.0)),
@@ -118,7 +119,8 @@ fn marble(entity: &mut EntityWorldMut) {
 }
 
 fn wall(entity: &mut EntityWorldMut, wall: Wall) {
-    entity.insert((wall, SurfaceMaterial::default(), Transform::from_xyz(0.0, -5.0, 0.0)));
+    let surface = (SurfaceMaterial::default(), SurfaceVelocity::default());
+    entity.insert((wall, surface, Transform::from_xyz(0.0, -5.0, 0.0)));
 }
 
 const OF_MARBLES: &[&str] = &[
@@ -134,7 +136,7 @@ const OF_MARBLES: &[&str] = &[
     "HalfLength",
     "Transform",
 ];
-const OF_WALLS: &[&str] = &["Wall", "SurfaceMaterial", "Transform"];
+const OF_WALLS: &[&str] = &["Wall", "SurfaceMaterial", "SurfaceVelocity", "Transform"];
 
 fn samples() -> Vec<Sample> {
     let mut samples: Vec<Sample> = vec![
@@ -471,10 +473,12 @@ fn every_public_component_and_resource_has_a_row() {
     let registry = app.world().resource::<AppTypeRegistry>().read();
     // They hold no numbers, or counts that the test above tries.
     let without = [
+        "CollidingEntities",
         "CollisionLayers",
         "Kinematic",
         "MarbleIntegrator",
         "MarbleRotation",
+        "Sensor",
         "Sleeping",
         "SleepingDisabled",
         "TawModel",

@@ -173,9 +173,44 @@ fn layers_observers_and_snapshots() {
     assert_eq!(inside(&app, zone), [marble]);
     assert_eq!(app.world().resource::<Messages<SensorLeft>>().len(), 0);
     app.world_mut().resource_mut::<TawWorld>().restore(&saved);
-    scene::frames(&mut app, 3);
+    scene::frames(&mut app, 1);
     assert_eq!(app.world().resource::<TawWorld>().sensors.len(), 1);
+    assert!(!inside(&app, zone).contains(&unseen), "its layers are not sensed");
+    // A restored marble that was inside then leaves, and is told.
+    let inside_then = app.world().resource::<TawWorld>().snapshot();
+    app.world_mut().get_mut::<Transform>(marble).unwrap().translation = Vec3::X * 9.0;
+    scene::frames(&mut app, 2);
+    assert!(inside(&app, zone).is_empty());
+    app.world_mut().resource_mut::<TawWorld>().restore(&inside_then);
+    scene::frames(&mut app, 1);
+    assert_eq!(inside(&app, zone).contains(&marble), {
+        scene::position(&app, marble).x.abs() < 1.1
+    });
     app.world_mut().entity_mut(zone).remove::<CollisionLayers>();
     scene::frames(&mut app, 3);
     assert!(inside(&app, zone).contains(&unseen));
+}
+
+#[test]
+fn a_sensor_that_comes_back_lists_nobody_who_is_gone() {
+    let mut app = app(Response::Impulse);
+    let zone = gate(&mut app, Vec3::splat(2.0), Vec3::ZERO);
+    let marble = scene::drop_marble(&mut app, 0.1, Vec3::ZERO);
+    app.update();
+    assert_eq!(inside(&app, zone), [marble]);
+    // Removed and inserted before anybody looks.
+    app.world_mut().entity_mut(zone).remove::<Sensor>();
+    app.world_mut().entity_mut(zone).insert(Sensor);
+    scene::frames(&mut app, 2);
+    assert_eq!(inside(&app, zone), [marble]);
+    app.world_mut().entity_mut(zone).remove::<Wall>();
+    app.world_mut().despawn(marble);
+    scene::frames(&mut app, 2);
+    assert!(inside(&app, zone).is_empty());
+    app.world_mut().entity_mut(zone).insert(Wall::from(Cuboid::from_length(2.0)));
+    scene::frames(&mut app, 2);
+    assert!(inside(&app, zone).is_empty());
+    let other = scene::drop_marble(&mut app, 0.1, Vec3::ZERO);
+    scene::frames(&mut app, 2);
+    assert_eq!(inside(&app, zone), [other]);
 }

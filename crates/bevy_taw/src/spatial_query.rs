@@ -12,7 +12,7 @@
 //!     for (entity, place, marble, mut velocity) in &mut marbles {
 //!         let down = Ray3d::new(place.translation, Dir3::NEG_Y);
 //!         let others = SpatialQueryFilter::default().with_excluded_entities([entity]);
-//!         let floor = spatial.cast_ray(down, 1.05 * marble.radius(), &others);
+//!         let floor = spatial.cast_ray(down, 1.05 * marble.radius, &others);
 //!         if floor.is_some_and(|hit| hit.normal.y > 0.7) {
 //!             velocity.y = 5.0;
 //!         }
