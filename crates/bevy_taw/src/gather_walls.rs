@@ -227,7 +227,10 @@ impl Gathering<'_, '_> {
             self.refusals.check(Some(entity), Err(no_frame));
             return self.stop(state);
         }
-        self.put(entity, state, now, (clock, *is_sensor, surface.copied()));
+        let surface = surface
+            .copied()
+            .filter(|surface| self.refusals.check(Some(entity), finite_surface(*surface)));
+        self.put(entity, state, now, (clock, *is_sensor, surface));
         self.make_of(entity, state, *material);
         self.put_into_layers(entity, state, layers.copied().unwrap_or_default());
     }
@@ -363,6 +366,15 @@ fn finite(own: &Transform) -> Result<(), taw::Error> {
         ("scale.y", scale.y),
         ("scale.z", scale.z),
     ];
+    all_finite(fields)
+}
+
+/// Checks that all numbers of a surface velocity are finite.
+fn finite_surface(SurfaceVelocity(Vec3 { x, y, z }): SurfaceVelocity) -> Result<(), taw::Error> {
+    all_finite([("surface_velocity.x", x), ("surface_velocity.y", y), ("surface_velocity.z", z)])
+}
+
+fn all_finite<const N: usize>(fields: [(&'static str, f32); N]) -> Result<(), taw::Error> {
     let bad = fields.into_iter().find(|(_, value)| !value.is_finite());
     bad.map_or(Ok(()), |(field, value)| Err(taw::Error::NotFinite { field, value: value.into() }))
 }
