@@ -203,7 +203,7 @@ fn a_global_observer_hears_both_sides_and_one_that_comes_late_hears_the_rest() {
     let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.75);
     scene::frames(&mut app, 30); // it fell while nobody listened
     app.add_observer(|hit: On<ContactStarted>, mut heard: ResMut<Heard>| {
-        heard.0.push(("all", *hit))
+        heard.0.push(("all", *hit));
     });
     app.world_mut().get_mut::<Transform>(marble).unwrap().translation.y = 2.0;
     scene::frames(&mut app, 60);

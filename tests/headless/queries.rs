@@ -240,7 +240,7 @@ fn bad_shapes_and_rays_are_refused_or_find_nothing() {
             hits += spatial.cast_ray_all(ray(from, Vec3::X), f32::INFINITY, &all()).len()
                 * usize::from(x.is_nan());
             hits += spatial.cast_ray_all(ray(Vec3::ZERO, Vec3::X), x, &all()).len()
-                * usize::from(!(x > 0.0));
+                * usize::from(x.is_nan() || x <= 0.0);
             let _ = spatial.project_point(from, x, &all());
             let there = Isometry3d::from_translation(from);
             let _ = spatial.cast_shape(&Sphere::new(1.0), there, Vec3::splat(x), &all());

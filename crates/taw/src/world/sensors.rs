@@ -52,7 +52,7 @@ pub struct SensorEvent<S> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Sensors<S> {
     handles: Handles,
-    sensors: Vec<Sensor<S>>,
+    rows: Vec<Sensor<S>>,
     events: Vec<SensorEvent<S>>,
     /// Positions of the marbles at the beginning of the substep, by index, and their number of
     /// removals then.
@@ -78,7 +78,7 @@ impl<S: Scalar> Sensors<S> {
         let shape = shape.into().validated()?;
         let id = SensorId(self.handles.push()?);
         let layers = CollisionLayers::ALL;
-        self.sensors.push(Sensor { shape, motion: None, layers, inside: Vec::new() });
+        self.rows.push(Sensor { shape, motion: None, layers, inside: Vec::new() });
         Ok(id)
     }
 
@@ -88,7 +88,7 @@ impl<S: Scalar> Sensors<S> {
     /// [`Error::NoSuchSensor`].
     pub fn remove(&mut self, id: SensorId) -> Result<(), Error> {
         let row = self.handles.swap_remove(id.0).ok_or(Error::NoSuchSensor(id))?;
-        self.sensors.swap_remove(row);
+        self.rows.swap_remove(row);
         self.events.retain(|event| event.sensor != id);
         Ok(())
     }
@@ -99,7 +99,7 @@ impl<S: Scalar> Sensors<S> {
     /// [`Error::NoSuchSensor`], and as [`Sensors::insert`]; then nothing has changed.
     pub fn set(&mut self, id: SensorId, shape: impl Into<WallShape<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.sensors[row].shape = shape.into().validated()?;
+        self.rows[row].shape = shape.into().validated()?;
         Ok(())
     }
 
@@ -110,7 +110,7 @@ impl<S: Scalar> Sensors<S> {
     /// [`Error::NoSuchSensor`]; [`Error::NotFinite`] for a field of the motion.
     pub fn set_motion(&mut self, id: SensorId, motion: Option<WallMotion<S>>) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.sensors[row].motion = motion.map(WallMotion::validated).transpose()?;
+        self.rows[row].motion = motion.map(WallMotion::validated).transpose()?;
         Ok(())
     }
 
@@ -120,7 +120,7 @@ impl<S: Scalar> Sensors<S> {
     /// [`Error::NoSuchSensor`].
     pub fn set_layers(&mut self, id: SensorId, layers: CollisionLayers) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.sensors[row].layers = layers;
+        self.rows[row].layers = layers;
         Ok(())
     }
 
@@ -129,7 +129,7 @@ impl<S: Scalar> Sensors<S> {
     /// # Errors
     /// [`Error::NoSuchSensor`].
     pub fn inside(&self, id: SensorId) -> Result<&[MarbleId], Error> {
-        self.row(id).map(|row| self.sensors[row].inside.as_slice())
+        self.row(id).map(|row| self.rows[row].inside.as_slice())
     }
 
     /// Shape of a sensor.
@@ -137,7 +137,7 @@ impl<S: Scalar> Sensors<S> {
     /// # Errors
     /// [`Error::NoSuchSensor`].
     pub fn shape(&self, id: SensorId) -> Result<&WallShape<S>, Error> {
-        self.row(id).map(|row| &self.sensors[row].shape)
+        self.row(id).map(|row| &self.rows[row].shape)
     }
 
     /// Marbles that entered and left in the last step, in the order of substeps, sensors and marbles. One
@@ -150,13 +150,13 @@ impl<S: Scalar> Sensors<S> {
     /// Number of sensors.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.sensors.len()
+        self.rows.len()
     }
 
     /// Returns true if there is no sensor.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.sensors.is_empty()
+        self.rows.is_empty()
     }
 
     fn row(&self, id: SensorId) -> Result<usize, Error> {
@@ -171,7 +171,7 @@ impl<S: Scalar> Sensors<S> {
     /// Stores the positions of marbles at the beginning of a substep.
     pub(super) fn begin_substep(&mut self, marbles: &Marbles<S>) {
         self.start.clear();
-        if !self.sensors.is_empty() {
+        if !self.rows.is_empty() {
             self.start.extend_from_slice(marbles.position());
             self.removals = marbles.removals();
         }
@@ -182,11 +182,11 @@ impl<S: Scalar> World<S> {
     /// Updates sensors after a substep of `dt` seconds.
     pub(super) fn update_sensors(&mut self, dt: S) {
         let rest = self.scratch.rest_of_step;
-        let Sensors { handles, sensors, events, start, removals } = &mut self.sensors;
+        let Sensors { handles, rows, events, start, removals } = &mut self.sensors;
         if *removals != self.marbles.removals() {
             start.clear(); // indices have other marbles now
         }
-        for (row, sensor) in sensors.iter_mut().enumerate() {
+        for (row, sensor) in rows.iter_mut().enumerate() {
             let Some(id) = handles.handle(row).map(SensorId) else { continue };
             let first = events.len();
             let mut push_event = |marble: MarbleId, entered: bool, fraction: S| {
