@@ -65,8 +65,7 @@ const TABLE: &[(&str, &str, Takes)] = &[
     ("Transform", ".scale", Takes::All),
     ("Wall", "", Takes::Some),
     ("Gravity", ".0", Takes::Finite),
-    // Set before each step.
-    ("SubstepDelta", ".0", Takes::All),
+    ("SubstepDelta", ".0", Takes::All), // set before each step
 ];
 
 fn takes(kind: &str, path: &str) -> Takes {
@@ -119,8 +118,7 @@ fn marble(entity: &mut EntityWorldMut) {
 }
 
 fn wall(entity: &mut EntityWorldMut, wall: Wall) {
-    let surface = (SurfaceMaterial::default(), SurfaceVelocity::default());
-    entity.insert((wall, surface, Transform::from_xyz(0.0, -5.0, 0.0)));
+    entity.insert((wall, SurfaceMaterial::default(), SurfaceVelocity(Vec3::ZERO), BELOW));
 }
 
 const OF_MARBLES: &[&str] = &[
@@ -136,6 +134,7 @@ const OF_MARBLES: &[&str] = &[
     "HalfLength",
     "Transform",
 ];
+const BELOW: Transform = Transform::from_xyz(0.0, -5.0, 0.0);
 const OF_WALLS: &[&str] = &["Wall", "SurfaceMaterial", "SurfaceVelocity", "Transform"];
 
 fn samples() -> Vec<Sample> {
