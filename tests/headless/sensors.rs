@@ -9,7 +9,7 @@ use crate::scene;
 const RESPONSES: [Response; 4] =
     [Response::Displacement, Response::Impulse, Response::EventDriven, Response::SoftStep];
 
-/// What was told, in order.
+/// Sensor events, in order.
 #[derive(Resource, Default)]
 struct Told(Vec<(bool, Entity, Entity)>);
 

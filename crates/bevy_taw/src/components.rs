@@ -321,7 +321,7 @@ pub(crate) struct SeenMarble {
 pub(crate) struct WallState {
     /// `None` before the first gather, while disabled, and when the input was refused.
     pub id: Option<WallId>,
-    /// `None` of what is no sensor, and as above.
+    /// Handle of a sensor; `None` for a solid wall, and in the cases of `id`.
     pub sensor: Option<SensorId>,
     /// What it is in its own frame.
     pub shape: Option<LocalShape>,

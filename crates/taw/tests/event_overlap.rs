@@ -1,5 +1,5 @@
-//! What overlaps by less than the slop is parted by `Response::EventDriven`, too, if nothing else touches
-//! it: soon, and without energy. (In heaps the slop stays: parting would lift what lies on it.)
+//! Overlap below the slop is resolved by `Response::EventDriven`, too, where nothing else touches the
+//! two: soon, and without energy. (In heaps the slop stays: parting would lift what lies on it.)
 
 use taw::prelude::*;
 use taw::shape::Aabb;

@@ -7,7 +7,7 @@ use taw::swarm::{Ball, SwarmModel, Tier};
 const DT: f32 = 1.0 / 60.0;
 const RADIUS: f32 = 0.1;
 
-/// So many at one point, as balls of a swarm of the full tier or as marbles.
+/// World with `count` at one point, as balls of a swarm of the full tier or as marbles.
 fn at_one_point(count: usize, height: f32, swarm: bool) -> World<f32> {
     let mut world = World::default();
     let point = Point3::new(0.3, height, -2.0);

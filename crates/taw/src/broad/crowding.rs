@@ -35,7 +35,7 @@ struct CrowdCell {
 /// too many, and the table takes half a byte for it.
 const BALLS_PER_COUNT: usize = 8;
 
-/// Number of pairs of so many.
+/// Number of pairs among `count` items, n (n − 1) / 2.
 pub(crate) fn pairs_among(count: usize) -> u64 {
     let count = count as u64;
     count.saturating_mul(count.saturating_sub(1)) / 2

@@ -136,7 +136,7 @@ impl<S: Scalar> WallShape<S> {
     }
 
     /// Time of the first contact of a translating shape with the wall, as a fraction of the motion.
-    /// What separates from it at the start does not count.
+    /// Ignores a contact that separates at the start.
     pub(super) fn cast_shape(&self, shape: &Shape<S>, translation: Vec3<S>) -> Option<S> {
         if let Self::Plane(plane) = self {
             return cast_shape_on_half_space(plane, shape, translation).map(|hit| hit.time);

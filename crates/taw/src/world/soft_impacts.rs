@@ -17,7 +17,7 @@ pub(super) struct PredictedImpacts<S> {
     list: Vec<PredictedImpact<S>>,
     /// Walls other than half-spaces that move.
     moving: Vec<MovingWall<S>>,
-    /// Whether each marble has a listed contact with the wall at hand.
+    /// For each marble, true if it has a listed contact with the wall at hand.
     listed: Vec<bool>,
     /// Number of removals and of marbles when they were predicted.
     rows: (u64, usize),

@@ -213,7 +213,7 @@ impl<S: Scalar> World<S> {
             && self.marbles.changed.agrees(token)
     }
 
-    /// Number of marbles that were set since the last step; none if nobody knows.
+    /// Number of marbles that were set since the last step; `None` if changes are not tracked.
     pub(super) fn changed_marbles(&self) -> Option<usize> {
         self.changes_are_listed().then(|| self.marbles.changed.rows().len())
     }

@@ -55,7 +55,7 @@ impl Near {
         Self { touched: near.touched, ..Self::within(&reach, before, after) }
     }
 
-    /// Those that are as near to each other as this, in metres, before or after a step.
+    /// Clusters of bodies within this reach of each other, in metres, before or after a step.
     fn within(reach: &[f64], before: &Snapshot, after: &Snapshot) -> Self {
         let count = reach.len();
         let mut near =
