@@ -337,6 +337,8 @@ pub(crate) struct WallState {
     pub layers: CollisionLayers,
     /// Motion of its entity.
     pub motion: PoseTracker,
+    /// True while its surface moves and it does not: a conveyor belt.
+    pub is_belt: bool,
     /// True once the log has said that a change of its place is taken for a jump.
     pub jumped: bool,
 }

@@ -1,4 +1,4 @@
-//! Between Bevy's glam and the core's cgmath. No other file converts.
+//! Between Bevy's glam and the core's cgmath, which no other file converts; numbers on their way to the core.
 
 use bevy::math::{Quat, Vec3};
 use taw::math::{Point3, Quat as TawQuat, Vec3 as TawVec3};
@@ -31,4 +31,10 @@ pub fn to_rotation(q: Quat) -> TawQuat<f32> {
 /// A rotation for glam.
 pub fn from_rotation(q: TawQuat<f32>) -> Quat {
     Quat::from_xyzw(q.v.x, q.v.y, q.v.z, q.s)
+}
+
+/// Checks that fields are finite, by their names.
+pub fn all_finite<const N: usize>(fields: [(&'static str, f32); N]) -> Result<(), taw::Error> {
+    let bad = fields.into_iter().find(|(_, value)| !value.is_finite());
+    bad.map_or(Ok(()), |(field, value)| Err(taw::Error::NotFinite { field, value: value.into() }))
 }

@@ -11,7 +11,7 @@ use crate::components::{
     Kinematic, LocalShape, Marble, SurfaceMaterial, SurfaceVelocity, Teleport, WallState, bits,
     rotation_bits,
 };
-use crate::convert::{to_point, to_rotation, to_vector};
+use crate::convert::{all_finite, to_point, to_rotation, to_vector};
 use crate::layers::CollisionLayers;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
@@ -291,6 +291,7 @@ impl Gathering<'_, '_> {
             linear: pose.rotation * surface,
             angular: Vec3::ZERO,
         };
+        state.is_belt = velocity.is_none() && surface.is_some();
         let motion = velocity.or_else(|| surface.map(on_surface)).map(|velocity| WallMotion {
             velocity: to_vector(velocity.linear),
             angular_velocity: to_vector(velocity.angular),
@@ -372,11 +373,6 @@ fn finite(own: &Transform) -> Result<(), taw::Error> {
 /// Checks that all numbers of a surface velocity are finite.
 fn finite_surface(SurfaceVelocity(Vec3 { x, y, z }): SurfaceVelocity) -> Result<(), taw::Error> {
     all_finite([("surface_velocity.x", x), ("surface_velocity.y", y), ("surface_velocity.z", z)])
-}
-
-fn all_finite<const N: usize>(fields: [(&'static str, f32); N]) -> Result<(), taw::Error> {
-    let bad = fields.into_iter().find(|(_, value)| !value.is_finite());
-    bad.map_or(Ok(()), |(field, value)| Err(taw::Error::NotFinite { field, value: value.into() }))
 }
 
 /// Whether a shape that was built for one scale does for another.

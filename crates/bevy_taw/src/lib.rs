@@ -41,6 +41,9 @@
 //! | [`swarm`] | marbles in bulk that are no entities |
 //! | [`messages`] | contacts that start, go on and end |
 //! | [`sensor`] | shapes that report which marbles enter and leave |
+//! | [`grounded`] | the ground under marbles |
+//! | [`controller`] | marbles that a player rolls |
+//! | [`zones`] | gravity and wind of their own in places |
 //! | [`spatial_query`] | rays, shapes and points among marbles and walls |
 //! | [`snapshot`] | back in time, and rows without entities |
 //! | [`ignored`] | components that the model does not read |
@@ -48,6 +51,7 @@
 //! | [`diagnostics`] | step time and counts |
 //! | [`wall_motion`] | speed of walls that move |
 //! | [`interpolation`] | smooth motion between fixed steps |
+//! | `mesh_walls` (feature `render`) | walls of meshes, meshes of walls |
 //! | `gizmos` (feature `render`) | contacts, normals, velocities and the grid, drawn |
 //! | `swarm_render` (feature `render`) | swarms on the screen |
 //! | `debug_ui` (feature `debug_ui`) | egui panels for any game |
@@ -66,6 +70,7 @@
 #![cfg_attr(not(test), warn(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
 pub mod components;
+pub mod controller;
 mod convert;
 #[cfg(feature = "debug_ui")]
 pub mod debug_ui;
@@ -77,9 +82,12 @@ mod gather_walls;
 pub mod gizmos;
 #[cfg(feature = "trade")]
 pub mod governor;
+pub mod grounded;
 pub mod ignored;
 pub mod interpolation;
 pub mod layers;
+#[cfg(feature = "render")]
+pub mod mesh_walls;
 pub mod messages;
 mod plugin;
 mod reflect;
@@ -97,6 +105,7 @@ pub mod swarm_render;
 pub mod trade;
 pub mod wall;
 pub mod wall_motion;
+pub mod zones;
 
 pub use plugin::{Substep, SubstepDelta, TawPlugin, TawPlugins, TawSystems};
 pub use taw;
@@ -108,10 +117,14 @@ pub mod prelude {
         Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping,
         SleepingDisabled, SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
     };
+    pub use crate::controller::{Drive, MarbleController};
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;
+    pub use crate::grounded::{Ground, Grounded};
     pub use crate::ignored::IgnoredComponents;
     pub use crate::layers::{CollisionLayers, LayerMask, PhysicsLayer};
+    #[cfg(feature = "render")]
+    pub use crate::mesh_walls::{MeshShape, MeshWalls};
     pub use crate::messages::{
         ContactEnded, ContactHit, ContactOngoing, ContactPair, ContactStarted,
     };
@@ -121,6 +134,7 @@ pub mod prelude {
     pub use crate::spatial_query::{SpatialQuery, SpatialQueryFilter};
     pub use crate::swarm::{Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;
+    pub use crate::zones::{GravityZone, WindZone};
     pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
     pub use taw::motion::{ForceField, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};

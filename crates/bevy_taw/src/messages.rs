@@ -333,9 +333,8 @@ pub(crate) fn write(
     }
     now.extend(before.iter().filter_map(|&pair| {
         let gap = gap(pair, &world, &marbles, &walls)?;
-        let hovers = gap.width <= fall.max(gap.radius / 50.0);
         let (normal, point) = (Vec3::ZERO, Vec3::ZERO); // read by nobody, as it goes on
-        hovers.then_some(ContactStarted { pair, normal, point, approach_speed: 0.0 })
+        gap.is_closed(fall).then_some(ContactStarted { pair, normal, point, approach_speed: 0.0 })
     }));
     // Stable, so that the first substep's touch stands for its pair.
     now.sort_by_key(|touch| touch.pair);
@@ -377,13 +376,21 @@ fn find_hits(contacts: &[ContactStarted], least: f32, hits: &mut Vec<ContactHit>
 }
 
 /// Separation of two surfaces, and the smaller radius, in metres.
-struct Gap {
+pub(crate) struct Gap {
     width: f32,
     radius: f32,
 }
 
+impl Gap {
+    /// Returns true if two that touched still do: what rests touches in one step and hovers in the
+    /// next. `fall` is the distance that gravity closes in a substep, in metres.
+    pub(crate) fn is_closed(&self, fall: f32) -> bool {
+        self.width <= fall.max(self.radius / 50.0)
+    }
+}
+
 /// The gap of a pair, or `None` if one of the two is gone.
-fn gap(
+pub(crate) fn gap(
     pair: ContactPair,
     world: &TawWorld,
     marbles: &Query<&MarbleState>,

@@ -8,7 +8,9 @@ use crate::components::{
     MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
     SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
 };
+use crate::controller::MarbleController;
 use crate::diagnostics::{self, StepTimes};
+use crate::grounded::Grounded;
 use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::layers::CollisionLayers;
@@ -19,7 +21,8 @@ use crate::snapshot::RowRemoved;
 use crate::spatial_query::SpatialTree;
 use crate::swarm::{self, TawSwarmModel};
 use crate::wall::Wall;
-use crate::{forget, gather, gather_walls, scatter, sensor, sleep};
+use crate::zones::{GravityZone, WindZone, ZoneGravity};
+use crate::{controller, forget, gather, gather_walls, grounded, scatter, sensor, sleep, zones};
 
 /// Everything: the physics, interpolation between its steps, and with the feature
 /// `render` the gizmos, and swarms on the screen.
@@ -33,6 +36,7 @@ impl PluginGroup for TawPlugins {
         let group = PluginGroupBuilder::start::<Self>().add(TawPlugin).add(TawInterpolationPlugin);
         #[cfg(feature = "render")]
         let group = group
+            .add(crate::mesh_walls::TawMeshWallsPlugin)
             .add(crate::gizmos::TawGizmosPlugin)
             .add(crate::swarm_render::TawSwarmRenderPlugin);
         group
@@ -47,6 +51,8 @@ pub struct TawPlugin;
 /// Where the physics is in a frame.
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TawSystems {
+    /// In [`FixedUpdate`]: marbles with a [`MarbleController`] are driven.
+    Control,
     /// In [`FixedUpdate`]: components and resources go into the world.
     Gather,
     /// In [`FixedUpdate`]: runs the schedule [`Substep`], once per substep.
@@ -101,6 +107,7 @@ impl Plugin for TawPlugin {
             .init_resource::<Touches>()
             .init_resource::<Told>()
             .init_resource::<SpatialTree>()
+            .init_resource::<ZoneGravity>()
             .init_resource::<IgnoredComponents>()
             .init_resource::<gather_walls::FrameTime>()
             .add_message::<InputRefused>()
@@ -110,6 +117,7 @@ impl Plugin for TawPlugin {
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
+            .register_type::<(Grounded, MarbleController, GravityZone, WindZone)>()
             .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity)>();
         diagnostics::register(app);
         sensor::register(app);
@@ -157,11 +165,14 @@ fn observe(app: &mut App) {
 fn add_step(app: &mut App) {
     app.configure_sets(
         FixedUpdate,
-        (TawSystems::Gather, TawSystems::Step, TawSystems::Scatter).chain(),
+        (TawSystems::Control, TawSystems::Gather, TawSystems::Step, TawSystems::Scatter).chain(),
     )
     .add_systems(
         FixedUpdate,
         (
+            controller::drive
+                .run_if(any_with_component::<MarbleController>)
+                .in_set(TawSystems::Control),
             run_part(Part::Gather).in_set(TawSystems::Gather),
             run_part(Part::Step).in_set(TawSystems::Step),
             run_part(Part::Scatter).in_set(TawSystems::Scatter),
@@ -176,6 +187,7 @@ fn add_step(app: &mut App) {
             gather_walls::walls,
             gather::marbles,
             gather::forces,
+            zones::act,
             gather::leave_out,
             swarm::gather,
             gather_walls::land,
@@ -193,6 +205,7 @@ fn add_step(app: &mut App) {
             refusal::report_stopped,
             swarm::report_stopped,
             sensor::scatter,
+            grounded::find.run_if(any_with_component::<Grounded>),
             messages::write.run_if(messages::are_read),
             messages::forget.run_if(not(messages::are_read)),
             diagnostics::measure,

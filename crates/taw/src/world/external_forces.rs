@@ -10,6 +10,7 @@ use crate::frame::Bivector;
 use crate::math::{Point3, Scalar, Vec3, cast_vector};
 use crate::response::CapsuleInertia;
 
+const ACCELERATION: [&str; 3] = ["acceleration.x", "acceleration.y", "acceleration.z"];
 const FORCE: [&str; 3] = ["force.x", "force.y", "force.z"];
 const IMPULSE: [&str; 3] = ["impulse.x", "impulse.y", "impulse.z"];
 const POINT: [&str; 3] = ["point.x", "point.y", "point.z"];
@@ -28,6 +29,18 @@ impl<S: Scalar> Marbles<S> {
         let sum = self.force_with(row, force)?;
         self.force.set(row, Some(sum), self.len());
         Ok(())
+    }
+
+    /// Accelerates a marble in m/s² throughout the next step: a force of that times its mass, at its
+    /// center. What is infinitely heavy is not accelerated.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`]; [`Error::NotFinite`] for the acceleration, or for the accumulated sum
+    /// of forces.
+    pub fn apply_acceleration(&mut self, id: MarbleId, acceleration: Vec3<S>) -> Result<(), Error> {
+        let mass = self.mass(self.row(id)?);
+        finite_vector(ACCELERATION, acceleration)?;
+        if mass.is_finite() { self.apply_force(id, acceleration * mass) } else { Ok(()) }
     }
 
     /// Accumulated force of a marble plus another one.

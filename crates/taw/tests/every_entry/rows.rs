@@ -186,6 +186,7 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
             p.world.marbles.set_material(p.subject, Some(material))
         };
         Marble 4 "Marbles::apply_force": |p, x| { let v = on_axis(p.case, x); p.world.marbles.apply_force(p.subject, v) };
+        Marble 1 "Marbles::apply_acceleration": |p, x| { let v = on_axis(p.case, x); p.world.marbles.apply_acceleration(p.subject, v) };
         Marble 1 "Marbles::apply_force_at": |p, x| {
             let up = vector(zero(), one(), zero());
             p.world.marbles.apply_force_at(p.subject, up * x, point(one(), x, zero()))

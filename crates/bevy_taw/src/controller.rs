@@ -1,0 +1,254 @@
+//! Marbles that a player rolls.
+
+use std::ops::DerefMut;
+
+use bevy::prelude::*;
+use taw::motion::Rotation;
+
+use crate::components::{AngularVelocity, GravityScale, Marble, MarbleRotation, Velocity};
+use crate::grounded::{Ground, Grounded};
+use crate::resources::TawModel;
+use crate::zones::ZoneGravity;
+
+/// Lets a player roll a marble: write [`direction`](Self::direction) and [`jump`](Self::jump), in any
+/// schedule, and the plugin turns, pushes and lifts it, before each step, in
+/// [`TawSystems::Control`](crate::TawSystems::Control).
+///
+/// What it stands on carries it along, and is not pushed back by a jump.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// fn steer(
+///     keys: Res<ButtonInput<KeyCode>>,
+///     camera: Single<&GlobalTransform, With<Camera>>,
+///     mut hero: Single<&mut MarbleController>,
+/// ) {
+///     let pressed = |key| f32::from(keys.pressed(key));
+///     let input = Vec2::new(
+///         pressed(KeyCode::KeyD) - pressed(KeyCode::KeyA),
+///         pressed(KeyCode::KeyW) - pressed(KeyCode::KeyS),
+///     );
+///     hero.direction = MarbleController::seen_from(&camera, input, Dir3::Y);
+///     if keys.just_pressed(KeyCode::Space) {
+///         hero.jump = true;
+///     }
+/// }
+/// ```
+#[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+#[require(Marble, Velocity, AngularVelocity, Grounded, ControllerState)]
+pub struct MarbleController {
+    /// Direction to roll in, in world space; of length 1 for the whole speed, and shortened to it.
+    pub direction: Vec3,
+    /// Asks for a jump: now, or once it is on the ground within [`jump_buffer`](Self::jump_buffer). The
+    /// next step takes it back.
+    pub jump: bool,
+    /// How it is driven on the ground.
+    pub drive: Drive,
+    /// Speed that it is driven to, in m/s.
+    pub max_speed: f32,
+    /// Acceleration on the ground, in m/s².
+    pub acceleration: f32,
+    /// Acceleration in the air, in m/s².
+    pub air_acceleration: f32,
+    /// Deceleration on the ground without a direction, in m/s²; zero lets it roll on.
+    pub braking: f32,
+    /// Speed of a jump, in m/s, against gravity and relative to the ground.
+    pub jump_speed: f32,
+    /// Time in which it may still jump after it has left the ground, in seconds.
+    pub coyote_time: f32,
+    /// Time for which a jump that was asked for in the air waits for the ground, in seconds.
+    pub jump_buffer: f32,
+}
+
+/// Memory of a [`MarbleController`].
+#[derive(Component, Clone, Copy, Debug)]
+pub(crate) struct ControllerState {
+    /// Rest of the jump buffer, in seconds; negative if no jump waits.
+    waits: f32,
+    /// Time since it was on the ground, in seconds.
+    in_air: f32,
+    /// Last ground that it was on.
+    last_ground: Option<Ground>,
+}
+
+impl Default for ControllerState {
+    fn default() -> Self {
+        Self { waits: -1.0, in_air: f32::INFINITY, last_ground: None }
+    }
+}
+
+/// How a [`MarbleController`] drives its marble on the ground.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
+#[reflect(Debug, Default, PartialEq)]
+pub enum Drive {
+    /// By a torque: friction makes speed of spin, and on ice it slips. By models without rotation, as
+    /// [`Force`](Self::Force).
+    #[default]
+    Torque,
+    /// By a force at the center, along the ground.
+    Force,
+}
+
+impl Default for MarbleController {
+    /// Rolls at up to 6 m/s, jumps 1.2 m high.
+    fn default() -> Self {
+        Self {
+            direction: Vec3::ZERO,
+            jump: false,
+            drive: Drive::Torque,
+            max_speed: 6.0,
+            acceleration: 12.0,
+            air_acceleration: 3.0,
+            braking: 4.0,
+            jump_speed: 4.9,
+            coyote_time: 0.1,
+            jump_buffer: 0.1,
+        }
+    }
+}
+
+/// Surface acceleration of a solid ball over the acceleration of its center while it rolls without
+/// slip: `1 + m r² / I`.
+const SPIN_UP: f32 = 3.5;
+
+impl MarbleController {
+    /// Direction in the plane across `up` for an input as seen from a camera: y away from it, x to its
+    /// right. At most of length 1.
+    #[must_use]
+    pub fn seen_from(camera: &GlobalTransform, input: Vec2, up: Dir3) -> Vec3 {
+        let level = |direction: Dir3| direction.reject_from_normalized(*up).normalize_or_zero();
+        // Seen straight from above, away is the top of the picture.
+        let ahead = match level(camera.forward()) {
+            Vec3::ZERO => level(camera.up()),
+            ahead => ahead,
+        };
+        (level(camera.right()) * input.x + ahead * input.y).clamp_length_max(1.0)
+    }
+
+    /// Velocity of the drive along a plane, in m/s.
+    fn wish(&self, normal: Vec3) -> Vec3 {
+        let direction = self.direction - normal * self.direction.dot(normal);
+        direction.clamp_length_max(1.0) * self.max_speed
+    }
+
+    /// Change of the surface velocity of its spin, in m/s, by a torque in a step.
+    fn torque(&self, ground: &Ground, surface: Vec3, dt: f32) -> Vec3 {
+        let along = surface.reject_from_normalized(ground.normal);
+        let change = ground.normal.cross(self.wish(ground.normal)) - along;
+        change.clamp_length_max(SPIN_UP * self.ground_acceleration() * dt)
+    }
+
+    /// Change of its velocity, in m/s, by a force along the ground in a step.
+    fn force(&self, ground: &Ground, velocity: Vec3, dt: f32) -> Vec3 {
+        let along = (velocity - ground.velocity).reject_from_normalized(ground.normal);
+        let change = self.wish(ground.normal) - along;
+        change.clamp_length_max(self.ground_acceleration() * dt)
+    }
+
+    fn ground_acceleration(&self) -> f32 {
+        if self.direction == Vec3::ZERO { self.braking } else { self.acceleration }
+    }
+
+    /// Returns true if a drive can be made of all numbers.
+    fn is_valid(&self) -> bool {
+        let numbers = [self.max_speed, self.acceleration, self.air_acceleration, self.braking];
+        self.direction.is_finite()
+            && self.jump_speed.is_finite()
+            && numbers.iter().all(|number| *number >= 0.0 && number.is_finite())
+    }
+}
+
+impl ControllerState {
+    /// Begins a step of `dt` seconds.
+    fn begin(&mut self, ground: Option<Ground>, dt: f32) {
+        self.in_air = if ground.is_some() { 0.0 } else { self.in_air + dt };
+        self.last_ground = ground.or(self.last_ground);
+    }
+
+    /// Change of a velocity, in m/s, by the jump that waits, if it may jump in this step of `dt` seconds.
+    fn jump(&mut self, hero: &MarbleController, (up, velocity): (Vec3, Vec3), dt: f32) -> Vec3 {
+        if self.waits < 0.0 {
+            return Vec3::ZERO;
+        }
+        self.waits -= dt;
+        match self.last_ground.filter(|_| self.in_air <= hero.coyote_time) {
+            None => Vec3::ZERO,
+            Some(ground) => {
+                (self.waits, self.in_air) = (-1.0, f32::INFINITY);
+                let rising = (velocity - ground.velocity).dot(up);
+                up * (hero.jump_speed - rising).max(0.0)
+            }
+        }
+    }
+}
+
+type Driven<'a> = (
+    Entity,
+    (&'a mut MarbleController, &'a mut ControllerState),
+    &'a Grounded,
+    &'a Marble,
+    &'a mut Velocity,
+    &'a mut AngularVelocity,
+    Option<&'a GravityScale>,
+    Option<&'a MarbleRotation>,
+);
+
+/// Drives all marbles with a [`MarbleController`].
+pub(crate) fn drive(
+    mut marbles: Query<Driven>,
+    gravity: Res<ZoneGravity>,
+    model: Res<TawModel>,
+    time: Res<Time>,
+) {
+    let dt = time.delta_secs();
+    for (
+        entity,
+        (mut hero, mut state),
+        grounded,
+        marble,
+        mut velocity,
+        mut spin,
+        scale,
+        rotation,
+    ) in &mut marbles
+    {
+        let jumps = std::mem::take(&mut hero.bypass_change_detection().jump);
+        if !(hero.is_valid() && dt > 0.0 && marble.radius > 0.0) {
+            continue;
+        }
+        state.begin(grounded.ground, dt);
+        if jumps {
+            state.waits = hero.jump_buffer;
+        }
+        let turns = model.rotation == Rotation::Dynamic
+            && rotation.is_none_or(|rotation| **rotation == Rotation::Dynamic);
+        let up = (-gravity.on(entity, scale)).normalize_or_zero();
+        match grounded.ground {
+            Some(ground) if hero.drive == Drive::Torque && turns => {
+                let change = hero.torque(&ground, **spin * marble.radius, dt);
+                add(&mut spin, change / marble.radius);
+            }
+            Some(ground) => {
+                let change = hero.force(&ground, **velocity, dt);
+                add(&mut velocity, change);
+            }
+            None if hero.direction != Vec3::ZERO => {
+                let level = **velocity - up * velocity.dot(up);
+                let change = hero.wish(up) - level;
+                add(&mut velocity, change.clamp_length_max(hero.air_acceleration * dt));
+            }
+            None => {}
+        }
+        let jump = state.jump(&hero, (up, **velocity), dt);
+        add(&mut velocity, jump);
+    }
+}
+
+/// Adds a change, if it is one: what does not change may sleep.
+fn add<V: DerefMut<Target = Vec3>>(vector: &mut Mut<V>, change: Vec3) {
+    if change != Vec3::ZERO {
+        ***vector += change;
+    }
+}
