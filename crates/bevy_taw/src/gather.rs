@@ -245,11 +245,11 @@ fn find_stale(
     };
     // What sleeps is looked at only where it was written.
     let all = begins_to_turn || knows_capsules || restored || last.marbles != rows.len();
-    match (all, rows.len() >= MANY) {
-        (true, false) => queries.p0().iter_mut().for_each(look),
-        (true, true) => queries.p0().par_iter_mut().for_each(look),
-        (false, false) => queries.p2().iter_mut().for_each(look),
-        (false, true) => queries.p2().par_iter_mut().for_each(look),
+    match (all, rows.len() >= MANY, queries.p2().iter().len() >= MANY) {
+        (true, false, _) => queries.p0().iter_mut().for_each(look),
+        (true, true, _) => queries.p0().par_iter_mut().for_each(look),
+        (false, _, false) => queries.p2().iter_mut().for_each(look),
+        (false, _, true) => queries.p2().par_iter_mut().for_each(look),
     }
     let lost_component = changed.lost_component.drain(..);
     if !all {

@@ -154,11 +154,13 @@ fn observe(app: &mut App) {
                 .before(RunFixedMainLoopSystems::AfterFixedMainLoop),
         ),
     )
+    .add_systems(Part::Begin, gather_walls::note_before_steps)
+    .add_systems(FixedFirst, run_part(Part::Begin).after(TransformEasingSystems::UpdateStart))
     .add_systems(
-        FixedFirst,
-        gather_walls::note_before_steps.after(TransformEasingSystems::UpdateStart),
-    )
-    .add_systems(PostUpdate, scatter::stay.before(TransformSystems::Propagate));
+        PostUpdate,
+        scatter::stay.run_if(scatter::any_child).before(TransformSystems::Propagate),
+    );
+    app.edit_schedule(Part::Begin, one_by_one);
 }
 
 /// Adds the step to `FixedUpdate`.
@@ -170,7 +172,7 @@ fn add_step(app: &mut App) {
     .add_systems(
         FixedUpdate,
         (
-            controller::drive
+            run_part(Part::Control)
                 .run_if(any_with_component::<MarbleController>)
                 .in_set(TawSystems::Control),
             run_part(Part::Gather).in_set(TawSystems::Gather),
@@ -178,6 +180,7 @@ fn add_step(app: &mut App) {
             run_part(Part::Scatter).in_set(TawSystems::Scatter),
         ),
     )
+    .add_systems(Part::Control, controller::drive)
     .add_systems(
         Part::Gather,
         (
@@ -213,7 +216,8 @@ fn add_step(app: &mut App) {
         )
             .chain(),
     );
-    app.edit_schedule(Part::Gather, one_by_one)
+    app.edit_schedule(Part::Control, one_by_one)
+        .edit_schedule(Part::Gather, one_by_one)
         .edit_schedule(Part::Step, one_by_one)
         .edit_schedule(Part::Scatter, one_by_one);
 }
@@ -244,9 +248,12 @@ fn one_by_one(schedule: &mut Schedule) {
     schedule.set_executor(SingleThreadedExecutor::new());
 }
 
-/// Schedules of the systems of a step. Each is one exclusive system of `FixedUpdate`.
+/// Schedules of the systems of a step. Each is one exclusive system of `FixedFirst` or `FixedUpdate`:
+/// to give each to a thread would cost more than most of them do.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Part {
+    Begin,
+    Control,
     Gather,
     Step,
     Scatter,

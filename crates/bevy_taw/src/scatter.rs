@@ -94,7 +94,7 @@ pub fn marbles(
     mut refusals: Refusals,
 ) {
     let write_one = |moved: MovedItem| write(&world, moved, &Frame::WORLD);
-    if world.marbles.len() < MANY {
+    if transforms.p0().iter().len() < MANY {
         transforms.p0().iter_mut().for_each(write_one);
     } else {
         transforms.p0().par_iter_mut().for_each(write_one);
@@ -124,6 +124,11 @@ pub fn marbles(
             write(&world, moved, frame);
         }
     }
+}
+
+/// Run condition: there are marbles that are children.
+pub fn any_child(marbles: Query<(), (With<Marble>, With<ChildOf>)>) -> bool {
+    !marbles.is_empty()
 }
 
 /// Keeps marbles that are children where they are while their parents move between steps, unless

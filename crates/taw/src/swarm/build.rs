@@ -41,6 +41,7 @@ impl Swarm {
         walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
     ) {
+        self.scratch.threads = self.model.threads_for(self.at.len());
         let threads = self.threads();
         self.rebuilds += 1;
         observe(Stage::Pairs);

@@ -90,7 +90,6 @@ impl Swarm {
     /// Begins a step: gravity and walls. Returns whether these changed.
     fn begin(&mut self, gravity: Vec3<f32>, walls: &dyn StaticGeometry, identity: u64) -> bool {
         self.stopped.clear();
-        self.scratch.threads = self.model.threads_for(self.at.len());
         self.steps_since_build = (self.steps_since_build + 1).min(SOON);
         if self.gravity != Some(gravity) {
             self.gravity = Some(gravity);
@@ -103,7 +102,20 @@ impl Swarm {
             self.wake_beside_changes(walls);
             (self.walls_identity, self.rows_of_walls) = (Some(identity), Some(identity));
         }
+        self.scratch.threads = self.threads_for_awake();
         walls_changed
+    }
+
+    /// Number of threads that a step pays for: none is woken for what sleeps.
+    fn threads_for_awake(&self) -> usize {
+        if !self.pairs_valid {
+            return self.model.threads_for(self.at.len());
+        }
+        let awake = self.chunks.iter().filter(|chunk| !chunk.asleep);
+        match awake.map(|chunk| chunk.own_rows().len()).sum() {
+            0 => 1,
+            rows => self.model.threads_for(rows),
+        }
     }
 
     fn end(&mut self) {
