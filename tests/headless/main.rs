@@ -6,6 +6,7 @@ mod capsules;
 mod contacts;
 mod disabling;
 mod first_contact;
+mod games;
 mod heroes;
 mod input;
 mod interpolation;
