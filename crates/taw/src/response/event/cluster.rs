@@ -111,6 +111,12 @@ impl Cluster {
         (self.rows.get(local).copied() == Some(row as u32)).then_some(local)
     }
 
+    /// Largest acceleration of the balls by external forces, in m/s².
+    pub fn max_acceleration(&self, balls: &[Ball]) -> f64 {
+        let of = |row: &u32| balls[*row as usize].external_acceleration.magnitude();
+        self.rows.iter().map(of).fold(0.0, f64::max)
+    }
+
     /// Convergence tolerance, in m/s.
     pub fn tolerance(&self, acceleration: f64, settings: &EventSettings) -> f64 {
         let max_speed = self.bodies.velocity.iter().map(|v| v.magnitude()).fold(0.0, f64::max);

@@ -52,13 +52,7 @@ impl EventDriven {
         let ends_all = max_separation_speed == f64::INFINITY;
         let tolerance = ends_all.then(|| self.cluster.tolerance(max_acceleration, settings));
         let squeezed = self.end_approach(&mut contacts, now, max_acceleration, tolerance, settings);
-        for (local, row) in self.cluster.rows.iter().enumerate() {
-            let ball = &mut self.balls[*row as usize];
-            if !ball.is_frozen() {
-                (ball.velocity, ball.spin) =
-                    (self.cluster.bodies.velocity[local], self.cluster.bodies.spin[local]);
-            }
-        }
+        self.take_cluster_velocities();
         let row_of = |local: u32| self.cluster.rows[local as usize];
         contacts.wm.iter_mut().for_each(|c| c.b = row_of(c.b));
         contacts.mm.iter_mut().for_each(|c| (c.a, c.b) = (row_of(c.a), row_of(c.b)));
@@ -73,6 +67,17 @@ impl EventDriven {
             self.keep_velocity(&found);
         }
         RestingCluster { rows: found, pressed_by, squeezed }
+    }
+
+    /// Gives balls the velocities that they have in the gathered cluster.
+    pub(super) fn take_cluster_velocities(&mut self) {
+        for (local, row) in self.cluster.rows.iter().enumerate() {
+            let ball = &mut self.balls[*row as usize];
+            if !ball.is_frozen() {
+                (ball.velocity, ball.spin) =
+                    (self.cluster.bodies.velocity[local], self.cluster.bodies.spin[local]);
+            }
+        }
     }
 
     /// Solves the approach of a gathered cluster as one collision without restitution;
