@@ -279,6 +279,7 @@ impl EventDriven {
             self.balls[rows[at] as usize].position +=
                 correction * fractions[sets.set_of(at) as usize];
         }
+        self.note_partners();
         self.push_cluster_out_of_walls(now, settings);
     }
 

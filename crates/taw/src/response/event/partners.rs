@@ -1,0 +1,49 @@
+//! Partners: balls of a resting cluster that press each other. One that leaves the cluster within
+//! the substep, by a collision, takes its own force along, and the force on its partners has lost its
+//! reaction: they rest anew.
+
+use super::{EventDriven, EventSettings, PRESS_SPEED};
+
+/// Ball that presses another one while both have these trajectories.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Partner {
+    row: u32,
+    /// Versions of the trajectories: of the ball itself, and of its partner.
+    versions: [u32; 2],
+}
+
+impl EventDriven {
+    /// Notes who presses whom in the cluster that has just been solved.
+    pub(super) fn note_partners(&mut self) {
+        self.partners.resize_with(self.balls.len(), Vec::new);
+        let Self { cluster, partners, balls, .. } = self;
+        cluster.scratch.for_each_pressed_pair(|a, b| {
+            let [a, b] = [a, b].map(|local| cluster.rows[local]);
+            for (row, other) in [(a, b), (b, a)] {
+                let versions = [row, other].map(|row| balls[row as usize].trajectory.version);
+                partners[row as usize].push(Partner { row: other, versions });
+            }
+        });
+    }
+
+    /// Lets the partners rest anew that a ball has left, at once or as soon as they have had a
+    /// trajectory for as long as pressed balls take to collide again.
+    pub(super) fn leave_partners(&mut self, row: usize, now: f64, settings: &EventSettings) {
+        let Some(list) = self.partners.get_mut(row) else { return };
+        let version = self.balls[row].trajectory.version;
+        let left: Vec<_> = list.extract_if(.., |partner| partner.versions[0] != version).collect();
+        for partner in left {
+            let other = partner.row as usize;
+            let trajectory = &mut self.balls[other].trajectory;
+            if trajectory.version != partner.versions[1] || !trajectory.clustered {
+                continue;
+            }
+            let soonest = trajectory.start + PRESS_SPEED * settings.dt;
+            let time = soonest.max(now);
+            if time < trajectory.regime_end {
+                trajectory.regime_end = time;
+                self.predict(other, now, settings);
+            }
+        }
+    }
+}
