@@ -230,7 +230,7 @@ impl EventDriven {
         impulse_cache: &mut Vec<CachedImpulse<f64>>,
     ) {
         self.cluster.gather(contacts, &self.balls, self.period);
-        let end = now + self.cluster.segment(contacts, &self.crowds, settings.dt - now);
+        let end = now + self.segment(contacts, now, settings.dt - now);
         let remaining = end - now;
         let max_acceleration = self.move_cluster_freely(remaining);
         rename_rows(impulse_cache, |row| self.cluster.local_index(row));
