@@ -2,7 +2,11 @@
 //! the substep, by a collision, takes its own force along, and the force on its partners has lost its
 //! reaction: they rest anew.
 
-use super::{EventDriven, EventSettings, PRESS_SPEED};
+use super::{EventDriven, EventSettings, MAX_DISSIPATIONS, PRESS_SPEED, REST_COST, REST_SPEED};
+
+/// Number of times in a substep that a ball may rest anew soon after a partner has left it, as often as
+/// it may start to rest on others.
+const MAX_SOON: f64 = MAX_DISSIPATIONS / REST_COST;
 
 /// Ball that presses another one while both have these trajectories.
 #[derive(Clone, Copy, Debug)]
@@ -26,8 +30,8 @@ impl EventDriven {
         });
     }
 
-    /// Lets the partners rest anew that a ball has left, at once or as soon as they have had a
-    /// trajectory for as long as pressed balls take to collide again.
+    /// Lets the partners rest anew that a ball has left: soon, when the collisions of this moment
+    /// are over; or after as long as pressed balls take to collide again, if that has been too often.
     pub(super) fn leave_partners(&mut self, row: usize, now: f64, settings: &EventSettings) {
         let Some(list) = self.partners.get_mut(row) else { return };
         let version = self.balls[row].trajectory.version;
@@ -38,8 +42,12 @@ impl EventDriven {
             if trajectory.version != partner.versions[1] || !trajectory.clustered {
                 continue;
             }
-            let soonest = trajectory.start + PRESS_SPEED * settings.dt;
-            let time = soonest.max(now);
+            let soon = now + REST_SPEED * settings.dt;
+            let time = if f64::from(trajectory.rest_count) < MAX_SOON {
+                soon
+            } else {
+                soon.max(trajectory.start + PRESS_SPEED * settings.dt)
+            };
             if time < trajectory.regime_end {
                 trajectory.regime_end = time;
                 self.predict(other, now, settings);

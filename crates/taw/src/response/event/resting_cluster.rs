@@ -266,6 +266,7 @@ impl EventDriven {
                 touches_balls: touches_balls[at],
                 wall_power: wall_power.as_ref().map_or(0.0, |power| power[at]),
                 regime_end: if end < settings.dt { end } else { f64::INFINITY },
+                rest_count: ball.trajectory.rest_count + u32::from(now > 0.0),
                 version: ball.trajectory.version + 1,
                 ..ball.trajectory
             };
