@@ -17,12 +17,16 @@ pub(super) struct Partner {
 }
 
 impl EventDriven {
-    /// Notes who presses whom in the cluster that has just been solved.
+    /// Notes who presses whom in the cluster that has just been solved. A crowd is solved once per
+    /// substep, so nobody in it has partners.
     pub(super) fn note_partners(&mut self) {
         self.partners.resize_with(self.balls.len(), Vec::new);
-        let Self { cluster, partners, balls, .. } = self;
+        let Self { cluster, partners, balls, crowds, .. } = self;
         cluster.scratch.for_each_pressed_pair(|a, b| {
             let [a, b] = [a, b].map(|local| cluster.rows[local]);
+            if [a, b].iter().any(|row| crowds.of(*row as usize).is_some()) {
+                return;
+            }
             for (row, other) in [(a, b), (b, a)] {
                 let versions = [row, other].map(|row| balls[row as usize].trajectory.version);
                 partners[row as usize].push(Partner { row: other, versions });
