@@ -1,6 +1,6 @@
 //! Ball with its trajectory between two events.
 
-use cgmath::Zero;
+use cgmath::{InnerSpace, Zero};
 
 use super::cells::Cell;
 use super::curved_support::BallState;
@@ -64,6 +64,8 @@ pub(crate) struct Trajectory {
     /// Number of times that it was put to rest for too many collisions. Each time doubles the
     /// energy that wakes it.
     pub(super) freeze_count: i32,
+    /// Number of times that it came to rest in a cluster within this substep.
+    pub(super) rest_count: u32,
     /// Number of steps in this substep on curved or bounded walls.
     pub(super) support_steps: u32,
     /// Time of the next change of regime.
@@ -97,6 +99,7 @@ impl Default for Trajectory {
             dissipation_count: 0.0,
             last_collision: f64::NEG_INFINITY,
             freeze_count: 0,
+            rest_count: 0,
             support_steps: 0,
             regime_end: f64::INFINITY,
             version: 0,
@@ -179,6 +182,7 @@ impl Ball {
             dissipation_count: self.trajectory.dissipation_count,
             last_collision: self.trajectory.last_collision,
             freeze_count: self.trajectory.freeze_count,
+            rest_count: self.trajectory.rest_count,
             support_steps: self.trajectory.support_steps,
             cell_slot: self.trajectory.cell_slot,
             ..Trajectory::default()
@@ -199,6 +203,12 @@ impl Ball {
         self.velocity += impulse * self.inverse_mass;
         let factor: f64 = self.rotation.inverse_inertia_factor();
         self.spin -= normal.cross(impulse) * (factor * self.inverse_mass / self.radius);
+    }
+
+    /// Upper bound of the speed of its surface, in m/s.
+    pub(super) fn max_surface_speed(&self) -> f64 {
+        let arm = if self.rotation == BallRotation::Free { self.radius } else { 0.0 };
+        self.velocity.magnitude() + self.spin.magnitude() * arm
     }
 
     /// Velocity of the contact point by spin alone; `normal` points from there to the center.

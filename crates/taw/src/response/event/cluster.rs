@@ -111,9 +111,20 @@ impl Cluster {
         (self.rows.get(local).copied() == Some(row as u32)).then_some(local)
     }
 
-    /// Convergence tolerance, in m/s.
+    /// Largest acceleration of the balls by external forces, in m/s².
+    pub fn max_acceleration(&self, balls: &[Ball]) -> f64 {
+        let of = |row: &u32| balls[*row as usize].external_acceleration.magnitude();
+        self.rows.iter().map(of).fold(0.0, f64::max)
+    }
+
+    /// Convergence tolerance, in m/s. A surface that spins has the rounding of its speed, too.
     pub fn tolerance(&self, acceleration: f64, settings: &EventSettings) -> f64 {
-        let max_speed = self.bodies.velocity.iter().map(|v| v.magnitude()).fold(0.0, f64::max);
+        let ClusterBodies { velocity, spin, radius, rotation_locked, .. } = &self.bodies;
+        let speed = |at: usize| {
+            let arm = if rotation_locked[at] { 0.0 } else { radius[at] };
+            velocity[at].magnitude() + spin[at].magnitude() * arm
+        };
+        let max_speed = (0..velocity.len()).map(speed).fold(0.0, f64::max);
         (TOLERANCE * acceleration * settings.dt).max(ROUNDING * max_speed)
     }
 

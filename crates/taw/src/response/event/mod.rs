@@ -16,6 +16,7 @@ mod crowd;
 mod curved_support;
 mod flat_support;
 mod ledger;
+mod partners;
 mod predict;
 mod predict_ball;
 mod predict_wall;
@@ -48,6 +49,7 @@ use cells::Cells;
 use cluster::Cluster;
 use collide::SimultaneousImpacts;
 use crowd::Crowds;
+use partners::Partner;
 pub(crate) use wall::{Solid, Wall, WallCollider};
 
 /// Rest threshold over the speed that gravity adds in a substep. A slower ball rests on the wall:
@@ -220,6 +222,8 @@ pub(crate) struct EventDriven {
     queue: BinaryHeap<Reverse<Event>>,
     simultaneous_impacts: SimultaneousImpacts,
     cluster: Cluster,
+    /// Partners of each ball in its cluster.
+    partners: Vec<Vec<Partner>>,
 }
 
 impl EventDriven {
@@ -233,6 +237,7 @@ impl EventDriven {
                 Trajectory { acceleration: ball.external_acceleration, ..Trajectory::default() };
             ball.rotation_increment = Vec3::zero();
         }
+        self.partners.iter_mut().for_each(Vec::clear);
         self.assign_cells(dt);
         self.find_candidates(settings);
         self.find_resting(settings);

@@ -10,6 +10,7 @@ use super::{Ball, CellSlot, Event, EventDriven, EventKind, EventSettings};
 impl EventDriven {
     /// Predicts the next event of a ball and queues it.
     pub(super) fn predict(&mut self, row: usize, now: f64, settings: &EventSettings) {
+        self.leave_partners(row, now, settings);
         self.update_cell(row, now, settings.dt);
         let refresh = self.candidates_expiry(row, now, settings);
         settings.add_cost(1);

@@ -5,7 +5,7 @@ use std::f64::consts::SQRT_2;
 use cgmath::{InnerSpace, Zero};
 
 use super::toi::time_of_impact_spheres;
-use super::{EventDriven, EventKind, EventSettings, PRESS_SPEED};
+use super::{EventDriven, EventKind, EventSettings, PRESS_SPEED, REST_SPEED};
 use crate::math::{Vec3, is_finite, normalize_and_length};
 
 /// Relative motion of two balls, of the second to the first.
@@ -122,10 +122,15 @@ impl EventDriven {
         let max_acceleration =
             first.external_acceleration.magnitude().max(second.external_acceleration.magnitude());
         let loss = 1.0 - first.material.combined_with(second.material).restitution;
-        let speeds = first.velocity.magnitude() + second.velocity.magnitude();
+        // Collisions round the speeds of spinning surfaces, too.
+        let speeds = first.max_surface_speed() + second.max_surface_speed();
         let freeze_count = first.trajectory.freeze_count.max(second.trajectory.freeze_count);
         let press_speed = PRESS_SPEED * SQRT_2.powi(freeze_count) * settings.dt;
+        // Two that rest together approach each other by what the solver has left, no faster.
+        let rests = first.trajectory.clustered && second.trajectory.clustered;
+        let residual = if rests { REST_SPEED * max_acceleration * settings.dt } else { 0.0 };
         (press_speed * relative_acceleration.max(loss * max_acceleration))
             .max((1e-13 + 1e-6 * loss) * speeds)
+            .max(residual)
     }
 }

@@ -1,7 +1,7 @@
 //! Rest at the start of a substep: on one wall, in [closed form](super::flat_support), or in
 //! clusters, by the [impulse solver](super::resting_cluster).
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 
 use cgmath::{InnerSpace, Zero};
 use smallvec::SmallVec;
@@ -10,6 +10,7 @@ use super::wall::Wall;
 use super::{Ball, EventDriven, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Vec3, normalize_and_length};
+use crate::response::impulse::UnionFind;
 use crate::shape::PointProjection;
 
 /// Maximum number of projections out of the deepest wall; between two walls at a right angle or
@@ -53,6 +54,7 @@ impl EventDriven {
         self.part_freely(&overlaps, &contact_counts, settings);
         self.cluster.contact_counts = contact_counts;
         self.end_approach_to_walls(&near, settings);
+        self.end_approach_of_clusters(&near, settings);
         if !near.is_empty() {
             self.solve_all_resting(&mut near, settings);
         }
@@ -83,6 +85,60 @@ impl EventDriven {
             (ball.velocity, ball.spin) =
                 (self.cluster.bodies.velocity[0], self.cluster.bodies.spin[0]);
         }
+    }
+
+    /// Ends the remaining approach in clusters of balls. Spread over the substep, it would let them
+    /// into each other, and the solver would lift them out of that at the start: energy that the
+    /// approach has not paid for yet if a collision breaks the cluster up before the end.
+    fn end_approach_of_clusters(&mut self, near: &Contacts<f64>, settings: &EventSettings) {
+        let mut sets = UnionFind::default();
+        let pairs = near.mm.iter().map(|c| (Some(c.a as usize), c.b as usize));
+        sets.build(pairs, self.balls.len());
+        // Contacts of each cluster with an approach.
+        let mut clusters: BTreeMap<u32, Contacts<f64>> = BTreeMap::new();
+        for c in near
+            .wm
+            .iter()
+            .filter(|c| self.approaches(self.wall_separation(c, 0.0).1, [c.b; 2], settings))
+        {
+            clusters.entry(sets.set_of(c.b as usize)).or_default();
+        }
+        for c in near
+            .mm
+            .iter()
+            .filter(|c| self.approaches(self.ball_separation_speed(c), [c.a, c.b], settings))
+        {
+            clusters.entry(sets.set_of(c.b as usize)).or_default();
+        }
+        for row in (0..self.balls.len()).filter(|row| self.crowds.of(*row).is_some()) {
+            clusters.remove(&sets.set_of(row)); // its normals are as good as random
+        }
+        if clusters.is_empty() {
+            return;
+        }
+        for c in &near.wm {
+            if let Some(contacts) = clusters.get_mut(&sets.set_of(c.b as usize)) {
+                contacts.wm.push(*c);
+            }
+        }
+        for c in &near.mm {
+            if let Some(contacts) = clusters.get_mut(&sets.set_of(c.b as usize)) {
+                contacts.mm.push(*c);
+            }
+        }
+        for mut contacts in clusters.into_values().filter(|contacts| !contacts.mm.is_empty()) {
+            self.cluster.gather(&mut contacts, &self.balls, self.period);
+            let max_acceleration = self.cluster.max_acceleration(&self.balls);
+            self.end_approach(&mut contacts, 0.0, max_acceleration, None, settings);
+            self.take_cluster_velocities();
+        }
+    }
+
+    /// Tests if a separation speed of two balls, or of a ball and a wall, in m/s, is an approach that
+    /// does not count as rest.
+    fn approaches(&self, speed: f64, rows: [u32; 2], settings: &EventSettings) -> bool {
+        let acceleration = |row: u32| self.balls[row as usize].external_acceleration.magnitude();
+        speed < -REST_SPEED * acceleration(rows[0]).max(acceleration(rows[1])) * settings.dt
     }
 
     /// Finds the walls that a ball touches at the start. Penetration, beyond the slop, is resolved
@@ -269,6 +325,13 @@ impl EventDriven {
     fn ball_separation(&self, contact: &Contact<f64>) -> f64 {
         let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
         self.center_offset(first, second).magnitude() - first.radius - second.radius
+    }
+
+    /// Separation speed of two balls, in m/s.
+    fn ball_separation_speed(&self, contact: &Contact<f64>) -> f64 {
+        let (first, second) = (&self.balls[contact.a as usize], &self.balls[contact.b as usize]);
+        normalize_and_length(self.center_offset(first, second))
+            .map_or(0.0, |(normal, _)| (second.velocity - first.velocity).dot(normal))
     }
 
     /// Tests for penetration of a ball into a wall that counts as more than contact.

@@ -52,13 +52,7 @@ impl EventDriven {
         let ends_all = max_separation_speed == f64::INFINITY;
         let tolerance = ends_all.then(|| self.cluster.tolerance(max_acceleration, settings));
         let squeezed = self.end_approach(&mut contacts, now, max_acceleration, tolerance, settings);
-        for (local, row) in self.cluster.rows.iter().enumerate() {
-            let ball = &mut self.balls[*row as usize];
-            if !ball.is_frozen() {
-                (ball.velocity, ball.spin) =
-                    (self.cluster.bodies.velocity[local], self.cluster.bodies.spin[local]);
-            }
-        }
+        self.take_cluster_velocities();
         let row_of = |local: u32| self.cluster.rows[local as usize];
         contacts.wm.iter_mut().for_each(|c| c.b = row_of(c.b));
         contacts.mm.iter_mut().for_each(|c| (c.a, c.b) = (row_of(c.a), row_of(c.b)));
@@ -73,6 +67,17 @@ impl EventDriven {
             self.keep_velocity(&found);
         }
         RestingCluster { rows: found, pressed_by, squeezed }
+    }
+
+    /// Gives balls the velocities that they have in the gathered cluster.
+    pub(super) fn take_cluster_velocities(&mut self) {
+        for (local, row) in self.cluster.rows.iter().enumerate() {
+            let ball = &mut self.balls[*row as usize];
+            if !ball.is_frozen() {
+                (ball.velocity, ball.spin) =
+                    (self.cluster.bodies.velocity[local], self.cluster.bodies.spin[local]);
+            }
+        }
     }
 
     /// Solves the approach of a gathered cluster as one collision without restitution;
@@ -225,7 +230,7 @@ impl EventDriven {
         impulse_cache: &mut Vec<CachedImpulse<f64>>,
     ) {
         self.cluster.gather(contacts, &self.balls, self.period);
-        let end = now + self.cluster.segment(contacts, &self.crowds, settings.dt - now);
+        let end = now + self.segment(contacts, now, settings.dt - now);
         let remaining = end - now;
         let max_acceleration = self.move_cluster_freely(remaining);
         rename_rows(impulse_cache, |row| self.cluster.local_index(row));
@@ -261,6 +266,7 @@ impl EventDriven {
                 touches_balls: touches_balls[at],
                 wall_power: wall_power.as_ref().map_or(0.0, |power| power[at]),
                 regime_end: if end < settings.dt { end } else { f64::INFINITY },
+                rest_count: ball.trajectory.rest_count + u32::from(now > 0.0),
                 version: ball.trajectory.version + 1,
                 ..ball.trajectory
             };
@@ -274,6 +280,7 @@ impl EventDriven {
             self.balls[rows[at] as usize].position +=
                 correction * fractions[sets.set_of(at) as usize];
         }
+        self.note_partners();
         self.push_cluster_out_of_walls(now, settings);
     }
 

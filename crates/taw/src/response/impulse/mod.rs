@@ -150,6 +150,15 @@ impl<S: Scalar> Scratch<S> {
         }
     }
 
+    /// Visits the pairs of marbles that press each other, by row.
+    pub fn for_each_pressed_pair(&self, mut visit: impl FnMut(usize, usize)) {
+        for c in self.constraints.iter().filter(|c| c.impulse.normal > S::zero()) {
+            if let Some(a) = c.a.marble() {
+                visit(a, c.b);
+            }
+        }
+    }
+
     /// Books the energy of the last substep's contacts. `velocity` and `spin` are those at the
     /// start of the substep, so that a resting contact, whose velocity there is zero, does no work.
     /// A bounce counts at the time of impact, after the forces of the substep.
