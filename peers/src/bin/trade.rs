@@ -2,7 +2,8 @@
 //! written as the same points.
 //!
 //! `cargo run --release --bin trade -- FILE` in this folder, then `taw-lab trade --with FILE`.
-//! `--quick` runs the settings of a quick sweep. Both engines by default but for what is swept:
+//! `--quick` runs the settings of a quick sweep; a word after FILE only the scenes whose name contains it.
+//! Both engines by default but for what is swept:
 //! steps, and solver iterations (Rapier) or substeps (Avian). Nothing sleeps. Fields are forces
 //! that are set before each step. Cost is the processor time of all threads; Rapier has one.
 
@@ -381,13 +382,14 @@ fn run<E: Engine>(judged: &ReferenceCase, step: (&str, f64), count: u32) -> Poin
 fn main() -> std::io::Result<()> {
     let arguments: Vec<_> = std::env::args().skip(1).collect();
     let quick = arguments.iter().any(|word| word == "--quick");
-    let file = arguments.iter().find(|word| !word.starts_with("--"));
-    let file = file.map_or("peers.jsonl", String::as_str);
+    let mut words = arguments.iter().filter(|word| !word.starts_with("--"));
+    let file = words.next().map_or("peers.jsonl", String::as_str);
+    let only = words.next().map_or("", String::as_str);
     rayon::ThreadPoolBuilder::new().num_threads(1).build_global().expect("once");
     eprintln!("{}: {}", Rapier::NAME, Rapier::defaults());
     eprintln!("{}: {}", Avian::NAME, Avian::defaults());
     let mut points = Vec::new();
-    for judged in &SCENES {
+    for judged in SCENES.iter().filter(|scene| scene.name.contains(only)) {
         for (i, step) in STEPS.into_iter().enumerate() {
             for count in COUNTS {
                 if quick && !([1, 3].contains(&i) && [1, 4, 8].contains(&count)) {
