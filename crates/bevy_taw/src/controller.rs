@@ -6,7 +6,9 @@ use bevy::prelude::*;
 use taw::motion::Rotation;
 
 use crate::components::{AngularVelocity, GravityScale, Marble, MarbleRotation, Velocity};
+use crate::convert::{all_finite, at_least_zero};
 use crate::grounded::{Ground, Grounded};
+use crate::refusal::Refusals;
 use crate::resources::TawModel;
 use crate::zones::ZoneGravity;
 
@@ -151,12 +153,17 @@ impl MarbleController {
         if self.direction == Vec3::ZERO { self.braking } else { self.acceleration }
     }
 
-    /// Returns true if a drive can be made of all numbers.
-    fn is_valid(&self) -> bool {
-        let numbers = [self.max_speed, self.acceleration, self.air_acceleration, self.braking];
-        self.direction.is_finite()
-            && self.jump_speed.is_finite()
-            && numbers.iter().all(|number| *number >= 0.0 && number.is_finite())
+    /// Checks that a drive can be made of its numbers.
+    fn validate(&self) -> Result<(), taw::Error> {
+        let Vec3 { x, y, z } = self.direction;
+        all_finite([("direction.x", x), ("direction.y", y), ("direction.z", z)])?;
+        all_finite([("jump_speed", self.jump_speed)])?;
+        at_least_zero("max_speed", self.max_speed)?;
+        at_least_zero("acceleration", self.acceleration)?;
+        at_least_zero("air_acceleration", self.air_acceleration)?;
+        at_least_zero("braking", self.braking)?;
+        at_least_zero("coyote_time", self.coyote_time)?;
+        at_least_zero("jump_buffer", self.jump_buffer)
     }
 }
 
@@ -201,6 +208,7 @@ pub(crate) fn drive(
     gravity: Res<ZoneGravity>,
     model: Res<TawModel>,
     time: Res<Time>,
+    mut refusals: Refusals,
 ) {
     let dt = time.delta_secs();
     for (
@@ -215,7 +223,8 @@ pub(crate) fn drive(
     ) in &mut marbles
     {
         let jumps = std::mem::take(&mut hero.bypass_change_detection().jump);
-        if !(hero.is_valid() && dt > 0.0 && marble.radius > 0.0) {
+        let is_valid = refusals.check(Some(entity), hero.validate());
+        if !(is_valid && dt > 0.0 && marble.radius > 0.0) {
             continue;
         }
         state.begin(grounded.ground, dt);

@@ -38,3 +38,17 @@ pub fn all_finite<const N: usize>(fields: [(&'static str, f32); N]) -> Result<()
     let bad = fields.into_iter().find(|(_, value)| !value.is_finite());
     bad.map_or(Ok(()), |(field, value)| Err(taw::Error::NotFinite { field, value: value.into() }))
 }
+
+/// Checks that a field is finite and at least zero.
+pub fn at_least_zero(field: &'static str, value: f32) -> Result<(), taw::Error> {
+    within(field, value, 0.0, f32::MAX)
+}
+
+/// Checks that a field is in a range.
+pub fn within(field: &'static str, value: f32, min: f32, max: f32) -> Result<(), taw::Error> {
+    if (min..=max).contains(&value) {
+        return Ok(());
+    }
+    let [value, min, max] = [value, min, max].map(f64::from);
+    Err(taw::Error::OutOfRange { field, value, min, max })
+}

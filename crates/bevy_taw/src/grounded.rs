@@ -1,13 +1,16 @@
 //! Ground under marbles.
 
+use std::f32::consts::PI;
+
 use bevy::prelude::*;
 use taw::contact::Contact;
 use taw::math::{Point3, Vec3 as TawVec3};
 
 use crate::SubstepDelta;
 use crate::components::{GravityScale, MarbleState, Sleeping, WallState};
-use crate::convert::{from_point, from_vector};
+use crate::convert::{from_point, from_vector, within};
 use crate::messages::{ContactPair, gap};
+use crate::refusal::Refusals;
 use crate::resources::TawWorld;
 use crate::zones::ZoneGravity;
 
@@ -29,7 +32,7 @@ use crate::zones::ZoneGravity;
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct Grounded {
-    /// Angle of the steepest ground, in radians from level; what is steeper is a wall.
+    /// Angle of the steepest ground, in radians from level, in [0, π]; what is steeper is a wall.
     pub max_slope: f32,
     /// Ground after the last step: the most level of what touches the marble from below.
     pub ground: Option<Ground>,
@@ -88,7 +91,11 @@ pub(crate) fn find(
         Without<Sleeping>,
     >,
     (states, walls): (Query<&MarbleState>, Query<&WallState>),
+    mut refusals: Refusals,
 ) {
+    for (entity, grounded, ..) in &marbles {
+        refusals.check(Some(entity), within("max_slope", grounded.max_slope, 0.0, PI));
+    }
     let seekers = marbles.iter().filter_map(|(entity, grounded, state, scale)| {
         let row = world.marbles.row(state.id?).ok()? as u32;
         let up = (-zones.on(entity, scale)).normalize_or_zero();

@@ -4,7 +4,7 @@ use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
 
 use crate::components::{GravityScale, MarbleState};
-use crate::convert::{all_finite, from_point, from_vector, to_vector};
+use crate::convert::{all_finite, at_least_zero, from_point, from_vector, to_vector};
 use crate::refusal::Refusals;
 use crate::resources::TawWorld;
 use crate::sensor::{CollidingEntities, Sensor};
@@ -186,11 +186,7 @@ impl WindZone {
     /// Checks that its numbers are finite, and the rate not negative.
     fn validate(&self) -> Result<(), taw::Error> {
         let (Vec3 { x, y, z }, drag) = (self.velocity, self.drag);
-        all_finite([("velocity.x", x), ("velocity.y", y), ("velocity.z", z), ("drag", drag)])?;
-        if drag >= 0.0 {
-            return Ok(());
-        }
-        let (field, value, max) = ("drag", f64::from(drag), f64::from(f32::MAX));
-        Err(taw::Error::OutOfRange { field, value, min: 0.0, max })
+        all_finite([("velocity.x", x), ("velocity.y", y), ("velocity.z", z)])?;
+        at_least_zero("drag", drag)
     }
 }
