@@ -69,7 +69,7 @@ fn steer(
     camera: Single<&GlobalTransform, With<Camera>>,
     mut hero: Single<&mut MarbleController>,
 ) {
-    let pressed = |key| f32::from(u8::from(keys.pressed(key)));
+    let pressed = |key| f32::from(keys.pressed(key));
     let x = pressed(KeyCode::KeyD) - pressed(KeyCode::KeyA);
     let y = pressed(KeyCode::KeyW) - pressed(KeyCode::KeyS);
     hero.direction = MarbleController::seen_from(&camera, Vec2::new(x, y), Dir3::Y);

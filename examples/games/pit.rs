@@ -58,7 +58,7 @@ fn balls(mut commands: Commands, mut paint: Paint) {
 }
 
 fn read_keys(keys: Res<ButtonInput<KeyCode>>, mut push: ResMut<Push>) {
-    let pressed = |key| f32::from(u8::from(keys.pressed(key)));
+    let pressed = |key| f32::from(keys.pressed(key));
     push.0 = Vec2::new(
         pressed(KeyCode::ArrowRight) - pressed(KeyCode::ArrowLeft),
         pressed(KeyCode::ArrowDown) - pressed(KeyCode::ArrowUp),

@@ -77,6 +77,89 @@ fn slopes_are_ground_up_to_their_limit() {
     }
 }
 
+/// The wall and the floor of a mesh, whose corner is at the origin.
+fn corner(app: &mut App) {
+    let x = |x: f32, y: f32, z: f32| Vec3::new(x, y, z);
+    let points = vec![
+        x(0.0, 0.0, -9.0),
+        x(9.0, 0.0, -9.0),
+        x(9.0, 0.0, 9.0),
+        x(0.0, 0.0, 9.0),
+        x(0.0, 9.0, -9.0),
+        x(0.0, 9.0, 9.0),
+    ];
+    let triangles = vec![[0, 2, 1], [0, 3, 2], [0, 4, 5], [0, 5, 3]];
+    app.world_mut().spawn(Wall::Mesh { points, triangles });
+}
+
+#[test]
+fn a_wall_is_no_ground_though_it_is_one_mesh_with_the_floor() {
+    let mut app = app(Response::SoftStep);
+    corner(&mut app);
+    let marble = grounded(&mut app, 0.25, Vec3::new(0.25, 0.25, 0.0));
+    app.world_mut()
+        .entity_mut(marble)
+        .insert(ExternalForce { force: Vec3::NEG_X * 500.0, ..default() });
+    scene::frames(&mut app, 30);
+    assert!(ground(&app, marble).is_some());
+    app.world_mut().entity_mut(marble).insert(Velocity(Vec3::Y * 5.0));
+    app.update();
+    for frame in 0..15 {
+        app.update();
+        assert_eq!(ground(&app, marble), None, "in frame {frame}");
+    }
+}
+
+#[test]
+fn the_side_of_a_ball_is_no_ground() {
+    for response in [Response::SoftStep, Response::Impulse, Response::EventDriven] {
+        let mut app = app(response);
+        app.world_mut().spawn(Wall::from(Sphere::new(2.0)));
+        let marble = grounded(&mut app, 0.25, Vec3::new(0.0, 2.25, 0.0));
+        app.world_mut().entity_mut(marble).insert(Velocity(Vec3::X));
+        for _ in 0..200 {
+            app.update();
+            let at = scene::position(&app, marble);
+            let slope = at.angle_between(Vec3::Y).to_degrees();
+            if let Some(found) = ground(&app, marble) {
+                assert!(slope < 53.0 && at.y > 0.0, "{response:?}: {slope}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn capsules_stand_on_ground() {
+    for response in [Response::Impulse, Response::Displacement] {
+        let mut app = app(response);
+        scene::floor(&mut app);
+        for turn in [0.0, 0.7, std::f32::consts::FRAC_PI_2] {
+            let height = 0.25 + 0.5 * turn.cos().abs();
+            let place =
+                Transform::from_xyz(0.0, height, 0.0).with_rotation(Quat::from_rotation_z(turn));
+            let capsule = (Marble::new(0.25), HalfLength(0.5), Grounded::default(), place);
+            let capsule = app.world_mut().spawn(capsule).id();
+            scene::frames(&mut app, 2);
+            assert!(ground(&app, capsule).is_some(), "{response:?}, {turn}");
+            app.world_mut().despawn(capsule);
+        }
+    }
+}
+
+#[test]
+fn what_asks_asleep_is_answered() {
+    let mut app = app(Response::SoftStep);
+    let floor = scene::floor(&mut app);
+    let marble = scene::drop_marble(&mut app, 0.1, Vec3::Y * 0.1);
+    scene::frames(&mut app, 200);
+    assert!(app.world().get::<Sleeping>(marble).is_some());
+    app.world_mut().entity_mut(marble).insert(MarbleController::default());
+    scene::frames(&mut app, 3);
+    assert_eq!(ground(&app, marble).map(|ground| ground.entity), Some(floor));
+    control(&mut app, marble).jump = true;
+    assert!(apex(&mut app, marble, 60) + 0.15 > 1.0);
+}
+
 #[derive(Component)]
 struct Lift(Vec3);
 
@@ -191,9 +274,31 @@ fn a_jump_is_as_high_as_its_speed() {
             let height = jump_speed * jump_speed / (2.0 * 9.81);
             let reached = apex(&mut app, hero, 120);
             assert!((reached - height).abs() < 0.03 * height + 0.01, "{response:?}: {reached}");
-            // Once.
+            // Once, though it is asked for in each frame of the rise.
             assert!(apex(&mut app, hero, 60) < 0.02, "{response:?} jumps again");
         }
+    }
+}
+
+#[test]
+fn a_second_jump_in_the_air_is_none() {
+    for (radius, rate) in [(0.5, 240.0), (0.25, 64.0), (2.0, 1000.0)] {
+        let mut app = app(Response::SoftStep);
+        app.insert_resource(Time::<Fixed>::from_hz(rate));
+        scene::frame_length(&mut app, 1.0 / rate as f32);
+        scene::floor(&mut app);
+        let controller = MarbleController { jump_speed: 2.0, ..default() };
+        let place = Transform::from_xyz(0.0, radius, 0.0);
+        let hero = app.world_mut().spawn((controller, Marble::new(radius), place)).id();
+        scene::frames(&mut app, 30);
+        let mut highest = 0.0_f32;
+        for frame in 0..(rate * 0.25) as u32 {
+            // For a tenth of a second, in each frame.
+            control(&mut app, hero).jump = f64::from(frame) < rate * 0.1;
+            app.update();
+            highest = highest.max(scene::position(&app, hero).y - radius);
+        }
+        assert!((highest - 0.204).abs() < 0.02, "{radius}, {rate}: {highest}");
     }
 }
 

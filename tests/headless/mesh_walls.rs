@@ -89,6 +89,24 @@ fn of_a_scene_those_with_the_names_are_walls() {
 }
 
 #[test]
+fn what_is_taken_away_is_no_wall() {
+    let mut app = app();
+    let mesh = add(&mut app, Cuboid::from_length(1.0));
+    let root = app.world_mut().spawn((MeshWalls::default(), Transform::default())).id();
+    let mut part = || app.world_mut().spawn((Mesh3d(mesh.clone()), ChildOf(root))).id();
+    let [erased, orphan, marble] = [part(), part(), part()];
+    let zone = app.world_mut().spawn((Mesh3d(mesh), MeshWalls::default(), Sensor)).id();
+    scene::frames(&mut app, 2);
+    assert!([erased, orphan, marble].iter().all(|entity| is_wall(&app, *entity)));
+    assert!(matches!(app.world().get::<Wall>(zone), Some(Wall::Mesh { .. })));
+    app.world_mut().entity_mut(erased).remove::<Mesh3d>();
+    app.world_mut().entity_mut(orphan).remove::<ChildOf>();
+    app.world_mut().entity_mut(marble).insert(Marble::new(0.5));
+    scene::frames(&mut app, 2);
+    assert!([erased, orphan, marble].iter().all(|entity| !is_wall(&app, *entity)));
+}
+
+#[test]
 fn a_mesh_that_loads_late_or_changes_is_followed() {
     let mut app = app();
     let handle = app.world().resource::<Assets<Mesh>>().reserve_handle();
@@ -123,8 +141,6 @@ fn what_is_no_solid_is_no_wall() {
     assert!(Wall::Hull(vec![Vec3::ZERO; 4]).to_mesh().is_none());
 }
 
-/// The wall of a wall's mesh: where the two differ most in the height at which marbles lie, over a
-/// grid of places.
 #[test]
 fn a_wall_its_mesh_and_the_wall_of_that_are_one_shape() {
     for case in 0..12 {

@@ -105,6 +105,20 @@ fn wind_drags_as_its_equation_says() {
 }
 
 #[test]
+fn winds_that_overlap_blow_together() {
+    let mut app = app(Response::SoftStep);
+    app.insert_resource(Gravity(Vec3::ZERO));
+    for (velocity, drag) in [(Vec3::X, 1e3), (Vec3::Y, 1e3), (Vec3::Z, 2e3)] {
+        let wind = WindZone { velocity, drag };
+        app.world_mut().spawn((Wall::from(Cuboid::from_length(40.0)), wind));
+    }
+    let marble = marble(&mut app, Vec3::ZERO);
+    scene::frames(&mut app, 20);
+    let expected = Vec3::new(0.25, 0.25, 0.5);
+    assert!(velocity(&app, marble).distance(expected) < 1e-3, "{}", velocity(&app, marble));
+}
+
+#[test]
 fn wrong_numbers_are_refused_by_name_and_do_nothing() {
     for wrong in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY] {
         let mut app = app(Response::SoftStep);

@@ -5,18 +5,18 @@ use std::ops::DerefMut;
 use bevy::prelude::*;
 use taw::motion::Rotation;
 
-use crate::components::{AngularVelocity, GravityScale, Marble, MarbleRotation, Velocity};
+use crate::components::{AngularVelocity, Marble, MarbleRotation, MarbleState, Velocity};
 use crate::convert::{all_finite, at_least_zero};
 use crate::grounded::{Ground, Grounded};
 use crate::refusal::Refusals;
-use crate::resources::TawModel;
+use crate::resources::{TawModel, TawWorld};
 use crate::zones::ZoneGravity;
 
 /// Lets a player roll a marble: write [`direction`](Self::direction) and [`jump`](Self::jump), in any
 /// schedule, and the plugin turns, pushes and lifts it, before each step, in
 /// [`TawSystems::Control`](crate::TawSystems::Control).
 ///
-/// What it stands on carries it along, and is not pushed back by a jump.
+/// The ground carries it along, and is not pushed back by a jump. Snapshots do not remember jumps.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -46,7 +46,7 @@ pub struct MarbleController {
     /// Asks for a jump: now, or once it is on the ground within [`jump_buffer`](Self::jump_buffer). The
     /// next step takes it back.
     pub jump: bool,
-    /// How it is driven on the ground.
+    /// Drive on the ground.
     pub drive: Drive,
     /// Speed that it is driven to, in m/s.
     pub max_speed: f32,
@@ -73,23 +73,25 @@ pub(crate) struct ControllerState {
     in_air: f32,
     /// Last ground that it was on.
     last_ground: Option<Ground>,
+    /// True from a jump on until it has left the ground, or rises no more.
+    leaves: bool,
 }
 
 impl Default for ControllerState {
     fn default() -> Self {
-        Self { waits: -1.0, in_air: f32::INFINITY, last_ground: None }
+        Self { waits: -1.0, in_air: f32::INFINITY, last_ground: None, leaves: false }
     }
 }
 
-/// How a [`MarbleController`] drives its marble on the ground.
+/// Means by which a [`MarbleController`] drives its marble on the ground.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Debug, Default, PartialEq)]
 pub enum Drive {
-    /// By a torque: friction makes speed of spin, and on ice it slips. By models without rotation, as
+    /// Torque: friction makes speed of spin, and on ice it slips. By models without rotation, as
     /// [`Force`](Self::Force).
     #[default]
     Torque,
-    /// By a force at the center, along the ground.
+    /// Force at the center, along the ground.
     Force,
 }
 
@@ -114,6 +116,9 @@ impl Default for MarbleController {
 /// Surface acceleration of a solid ball over the acceleration of its center while it rolls without
 /// slip: `1 + m r² / I`.
 const SPIN_UP: f32 = 3.5;
+
+/// Speed against gravity that a marble on the ground may have, in m/s.
+const STILL: f32 = 0.01;
 
 impl MarbleController {
     /// Direction in the plane across `up` for an input as seen from a camera: y away from it, x to its
@@ -168,22 +173,31 @@ impl MarbleController {
 }
 
 impl ControllerState {
-    /// Begins a step of `dt` seconds.
-    fn begin(&mut self, ground: Option<Ground>, dt: f32) {
+    /// Begins a step of `dt` seconds. Returns the ground that it may use.
+    fn begin(
+        &mut self,
+        ground: Option<Ground>,
+        (up, velocity): (Vec3, Vec3),
+        dt: f32,
+    ) -> Option<Ground> {
+        let rises = |ground: Ground| (velocity - ground.velocity).dot(up) > STILL;
+        self.leaves &= ground.is_some_and(rises);
+        let ground = ground.filter(|_| !self.leaves);
         self.in_air = if ground.is_some() { 0.0 } else { self.in_air + dt };
         self.last_ground = ground.or(self.last_ground);
+        ground
     }
 
     /// Change of a velocity, in m/s, by the jump that waits, if it may jump in this step of `dt` seconds.
     fn jump(&mut self, hero: &MarbleController, (up, velocity): (Vec3, Vec3), dt: f32) -> Vec3 {
-        if self.waits < 0.0 {
+        if self.waits < 0.0 || up == Vec3::ZERO {
             return Vec3::ZERO;
         }
         self.waits -= dt;
         match self.last_ground.filter(|_| self.in_air <= hero.coyote_time) {
             None => Vec3::ZERO,
             Some(ground) => {
-                (self.waits, self.in_air) = (-1.0, f32::INFINITY);
+                (self.waits, self.in_air, self.leaves) = (-1.0, f32::INFINITY, true);
                 let rising = (velocity - ground.velocity).dot(up);
                 up * (hero.jump_speed - rising).max(0.0)
             }
@@ -198,43 +212,35 @@ type Driven<'a> = (
     &'a Marble,
     &'a mut Velocity,
     &'a mut AngularVelocity,
-    Option<&'a GravityScale>,
+    &'a MarbleState,
     Option<&'a MarbleRotation>,
 );
 
 /// Drives all marbles with a [`MarbleController`].
 pub(crate) fn drive(
     mut marbles: Query<Driven>,
-    gravity: Res<ZoneGravity>,
+    (world, gravity): (Res<TawWorld>, Res<ZoneGravity>),
     model: Res<TawModel>,
     time: Res<Time>,
     mut refusals: Refusals,
 ) {
     let dt = time.delta_secs();
-    for (
-        entity,
-        (mut hero, mut state),
-        grounded,
-        marble,
-        mut velocity,
-        mut spin,
-        scale,
-        rotation,
-    ) in &mut marbles
+    for (entity, (mut hero, mut state), grounded, marble, mut velocity, mut spin, body, rotation) in
+        &mut marbles
     {
         let jumps = std::mem::take(&mut hero.bypass_change_detection().jump);
         let is_valid = refusals.check(Some(entity), hero.validate());
         if !(is_valid && dt > 0.0 && marble.radius > 0.0) {
             continue;
         }
-        state.begin(grounded.ground, dt);
+        let up = (-gravity.on(&world, body.id)).normalize_or_zero();
+        let ground = state.begin(grounded.ground, (up, **velocity), dt);
         if jumps {
             state.waits = hero.jump_buffer;
         }
         let turns = model.rotation == Rotation::Dynamic
             && rotation.is_none_or(|rotation| **rotation == Rotation::Dynamic);
-        let up = (-gravity.on(entity, scale)).normalize_or_zero();
-        match grounded.ground {
+        match ground {
             Some(ground) if hero.drive == Drive::Torque && turns => {
                 let change = hero.torque(&ground, **spin * marble.radius, dt);
                 add(&mut spin, change / marble.radius);

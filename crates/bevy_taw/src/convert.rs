@@ -1,4 +1,4 @@
-//! Between Bevy's glam and the core's cgmath, which no other file converts; numbers on their way to the core.
+//! Conversion between Bevy's glam and the core's cgmath, and checks of numbers.
 
 use bevy::math::{Quat, Vec3};
 use taw::math::{Point3, Quat as TawQuat, Vec3 as TawVec3};

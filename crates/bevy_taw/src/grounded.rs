@@ -5,11 +5,12 @@ use std::f32::consts::PI;
 use bevy::prelude::*;
 use taw::contact::Contact;
 use taw::math::{Point3, Vec3 as TawVec3};
+use taw::world::{ColliderId, QueryTree};
 
 use crate::SubstepDelta;
-use crate::components::{GravityScale, MarbleState, Sleeping, WallState};
+use crate::components::{MarbleState, Sleeping, WallState};
 use crate::convert::{from_point, from_vector, within};
-use crate::messages::{ContactPair, gap};
+use crate::messages::{ContactPair, Gap, gap};
 use crate::refusal::Refusals;
 use crate::resources::TawWorld;
 use crate::zones::ZoneGravity;
@@ -34,7 +35,8 @@ use crate::zones::ZoneGravity;
 pub struct Grounded {
     /// Angle of the steepest ground, in radians from level, in [0, π]; what is steeper is a wall.
     pub max_slope: f32,
-    /// Ground after the last step: the most level of what touches the marble from below.
+    /// Ground after the last step: the most level of what touches the marble from below. What sleeps keeps
+    /// its ground.
     pub ground: Option<Ground>,
 }
 
@@ -65,8 +67,12 @@ struct Seeker {
     up: Vec3,
     /// Least height of a unit normal of ground.
     least: f32,
+    /// Ground after the step before.
+    before: Option<Ground>,
     /// The most level ground so far.
     ground: Option<Ground>,
+    /// True if a contact with the ground of before is listed, whatever its slope.
+    listed: bool,
 }
 
 impl Seeker {
@@ -74,69 +80,101 @@ impl Seeker {
         ground.normal.dot(self.up)
     }
 
-    fn offer(&mut self, ground: Ground) {
+    /// Takes what a contact touches, if it is better ground. Open contacts are no ground.
+    fn offer(&mut self, ground: Ground, is_closed: bool) {
+        self.listed |= self.before.is_some_and(|before| before.entity == ground.entity);
         let level = self.level(&ground);
-        if level >= self.least && self.ground.is_none_or(|best| level > self.level(&best)) {
+        let best = self.ground.map_or(self.least, |best| self.level(&best));
+        if is_closed && level >= best {
             self.ground = Some(ground);
         }
     }
 }
 
-/// Finds the ground of all marbles that ask for it. What sleeps keeps its ground.
+/// Marbles that seek their ground.
+type Seekers<'w, 's> =
+    Query<'w, 's, (Entity, &'static mut Grounded, &'static MarbleState, Has<Sleeping>)>;
+
+/// Finds the ground of all marbles that ask for it.
 pub(crate) fn find(
     world: Res<TawWorld>,
     (delta, zones): (Res<SubstepDelta>, Res<ZoneGravity>),
-    mut marbles: Query<
-        (Entity, &mut Grounded, &MarbleState, Option<&GravityScale>),
-        Without<Sleeping>,
-    >,
+    mut marbles: Seekers,
     (states, walls): (Query<&MarbleState>, Query<&WallState>),
+    (mut tree, mut restored): (Local<QueryTree<f32>>, Local<u32>),
     mut refusals: Refusals,
 ) {
-    for (entity, grounded, ..) in &marbles {
+    let just_restored = std::mem::replace(&mut *restored, world.restored) != world.restored;
+    let mut seekers = Vec::new();
+    for (entity, grounded, state, _) in &marbles {
         refusals.check(Some(entity), within("max_slope", grounded.max_slope, 0.0, PI));
-    }
-    let seekers = marbles.iter().filter_map(|(entity, grounded, state, scale)| {
-        let row = world.marbles.row(state.id?).ok()? as u32;
-        let up = (-zones.on(entity, scale)).normalize_or_zero();
-        let least = grounded.max_slope.cos() - f32::EPSILON;
-        (up != Vec3::ZERO).then_some(Seeker { row, up, least, ground: None })
-    });
-    let mut seekers: Vec<_> = seekers.collect();
-    seekers.sort_unstable_by_key(|seeker| seeker.row);
-    look_below(&world, &walls, &mut seekers);
-    let fall = from_vector(world.gravity()).length() * delta.0 * delta.0;
-    let touches = |marble: Entity, ground: &Ground| {
-        let pair = ContactPair { a: ground.entity, b: marble };
-        gap(pair, &world, &states, &walls).is_some_and(|gap| gap.is_closed(fall))
-    };
-    for (entity, grounded, state, _) in &mut marbles {
         let row = state.id.and_then(|id| world.marbles.row(id).ok());
-        let seeker = row
-            .and_then(|row| seekers.binary_search_by_key(&(row as u32), |seeker| seeker.row).ok());
-        // A ball that rests touches in one step and hovers in the next.
-        let found = seeker.and_then(|i| seekers[i].ground.or(grounded.ground));
-        let ground = found.filter(|ground| touches(entity, ground));
+        let up = (-zones.on(&world, state.id)).normalize_or_zero();
+        if let Some(row) = row.filter(|_| up != Vec3::ZERO) {
+            let (row, least) = (row as u32, grounded.max_slope.cos() - f32::EPSILON);
+            let before = grounded.ground;
+            seekers.push(Seeker { row, up, least, before, ground: None, listed: false });
+        }
+    }
+    seekers.sort_unstable_by_key(|seeker| seeker.row);
+    look_below(&world, &walls, &mut seekers, delta.0);
+    let still_touches = |marble: Entity, ground: &Ground| {
+        let pair = ContactPair { a: ground.entity, b: marble };
+        let gap = gap(pair, &world, &states, &walls);
+        gap.is_some_and(|gap| gap.is_closed(fall(&world, delta.0)))
+    };
+    for (entity, grounded, state, is_asleep) in &mut marbles {
+        let row = state.id.and_then(|id| world.marbles.row(id).ok());
+        let seeker = row.and_then(|row| {
+            let i = seekers.binary_search_by_key(&(row as u32), |seeker| seeker.row).ok()?;
+            Some(&seekers[i])
+        });
+        let ground = seeker.and_then(|seeker| {
+            // Contacts of what sleeps are not listed.
+            let is_new = is_asleep && (grounded.is_added() || just_restored);
+            let mut below = || nearest(&world, &walls, &mut tree, seeker);
+            // A ball that rests touches in one step and hovers in the next.
+            let is_kept = |before: &Ground| {
+                !seeker.listed
+                    && seeker.level(before) >= seeker.least
+                    && still_touches(entity, before)
+            };
+            let found = if is_new { below() } else { seeker.ground };
+            found.or_else(|| seeker.before.filter(is_kept))
+        });
         grounded.map_unchanged(|grounded| &mut grounded.ground).set_if_neq(ground);
     }
 }
 
-/// Looks for ground among the contacts of the last substep.
-fn look_below(world: &TawWorld, walls: &Query<&WallState>, seekers: &mut [Seeker]) {
+/// Distance that gravity closes in a substep, in metres.
+fn fall(world: &TawWorld, dt: f32) -> f32 {
+    from_vector(world.gravity()).length() * dt * dt
+}
+
+/// Looks for ground among the contacts of the last substep, of `dt` seconds.
+fn look_below(world: &TawWorld, walls: &Query<&WallState>, seekers: &mut [Seeker], dt: f32) {
     if seekers.is_empty() {
         return;
     }
+    let (marbles, fall) = (&world.marbles, fall(world, dt));
+    // Two that part have a wider gap by the end of the substep.
+    let is_closed = |contact: &Contact<f32>, parting: f32| {
+        let width = contact.separation + parting.max(0.0) * dt;
+        Gap { width, radius: marbles.radius()[contact.b as usize] }.is_closed(fall)
+    };
     let find =
         |seekers: &[Seeker], row: u32| seekers.binary_search_by_key(&row, |seeker| seeker.row).ok();
-    let point =
-        |contact: &Contact<f32>| world.marbles.position()[contact.b as usize] + contact.arms[1];
+    let point = |contact: &Contact<f32>| marbles.position()[contact.b as usize] + contact.arms[1];
+    let velocity = |row: u32| from_vector(marbles.velocity()[row as usize]);
     for contact in &world.contacts.wm {
         if let Some(i) = find(seekers, contact.b)
             && let Some(entity) = world.wall_entity(contact.a)
         {
             let point = point(contact);
-            let velocity = wall_velocity(world, walls, entity, (point, contact.normal));
-            seekers[i].offer(ground(entity, contact.normal, point, velocity));
+            let surface = wall_velocity(world, walls, entity, (point, contact.normal));
+            let found = ground(entity, contact.normal, point, surface);
+            let parting = (velocity(contact.b) - surface).dot(found.normal);
+            seekers[i].offer(found, is_closed(contact, parting));
         }
     }
     for contact in &world.contacts.mm {
@@ -147,11 +185,34 @@ fn look_below(world: &TawWorld, walls: &Query<&WallState>, seekers: &mut [Seeker
             if let Some(i) = find(seekers, marble)
                 && let Some(entity) = world.marble_entity(other)
             {
-                let velocity = surface_velocity(world, other as usize, arm);
-                seekers[i].offer(ground(entity, normal, point(contact), velocity));
+                let surface = surface_velocity(world, other as usize, arm);
+                let found = ground(entity, normal, point(contact), surface);
+                let parting = (velocity(marble) - velocity(other)).dot(found.normal);
+                seekers[i].offer(found, is_closed(contact, parting));
             }
         }
     }
+}
+
+/// The nearest surface below a marble, if it is ground.
+fn nearest(
+    world: &TawWorld,
+    walls: &Query<&WallState>,
+    tree: &mut QueryTree<f32>,
+    seeker: &Seeker,
+) -> Option<Ground> {
+    let row = seeker.row as usize;
+    let (id, position) = (world.marbles.id(row)?, world.marbles.position()[row]);
+    let reach = world.marbles.radius()[row] * 1.02;
+    let is_other = |collider| collider != ColliderId::Marble(id);
+    let hit = world.queries(tree).project_point(position, reach, is_other)?;
+    let (entity, point) = (world.collider_entity(hit.collider)?, hit.result.point);
+    let surface = match hit.collider {
+        ColliderId::Wall(_) => wall_velocity(world, walls, entity, (point, hit.result.normal)),
+        ColliderId::Marble(id) => from_vector(world.marbles.get(id).ok()?.velocity),
+    };
+    let found = ground(entity, hit.result.normal, point, surface);
+    (seeker.level(&found) >= seeker.least).then_some(found)
 }
 
 fn ground(entity: Entity, normal: TawVec3<f32>, point: Point3<f32>, velocity: Vec3) -> Ground {

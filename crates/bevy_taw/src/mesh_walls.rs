@@ -6,7 +6,6 @@ use bevy::mesh::{Indices, MeshTrianglesError, PrimitiveTopology};
 use bevy::platform::collections::{HashMap, HashSet};
 use bevy::prelude::*;
 
-use crate::TawSystems;
 use crate::components::Marble;
 use crate::convert::{from_point, to_point};
 use crate::wall::Wall;
@@ -17,13 +16,16 @@ pub struct TawMeshWallsPlugin;
 
 impl Plugin for TawMeshWallsPlugin {
     fn build(&self, app: &mut App) {
-        app.register_type::<MeshWalls>().add_systems(FixedUpdate, make.before(TawSystems::Gather));
+        app.register_type::<MeshWalls>().add_systems(
+            RunFixedMainLoop,
+            make.in_set(RunFixedMainLoopSystems::BeforeFixedMainLoop),
+        );
     }
 }
 
 /// Makes walls of the meshes of its entity and of all that descends from it, also of what comes later:
-/// the `Mesh3d` of a level, or a whole glTF scene. An entity that is a marble, or a [`Wall`] of its own,
-/// stays what it is. A mesh that cannot be a wall is named in the log.
+/// the `Mesh3d` of a level, or a whole glTF scene. An entity that is a marble, or was a [`Wall`]
+/// before, stays what it is, unless it has this component itself. A mesh that cannot be a wall is named in the log.
 ///
 /// Each wall follows its entity, and its mesh when that asset changes. The mesh must stay in the main world
 /// ([`RenderAssetUsages::MAIN_WORLD`], as it does by default).
@@ -41,7 +43,7 @@ impl Plugin for TawMeshWallsPlugin {
 #[reflect(Component, Debug, Default, PartialEq)]
 #[require(Transform)]
 pub struct MeshWalls {
-    /// How each mesh becomes a wall.
+    /// Shape of each wall.
     pub shape: MeshShape,
     /// Names of the entities whose meshes count, or that carry such meshes; empty for all.
     pub names: Vec<String>,
@@ -87,7 +89,8 @@ impl Wall {
     /// A wall of a mesh's triangles. Corners at the same place become one.
     ///
     /// # Errors
-    /// A mesh that has no triangles of finite places, or whose data is in the render world only.
+    /// A mesh whose data is in the render world only, or that has no triangles; then, and if a corner is not
+    /// finite, it is `BadIndices`.
     pub fn from_mesh(mesh: &Mesh) -> Result<Self, MeshTrianglesError> {
         let mut corners = HashMap::new();
         let mut points = Vec::new();
@@ -108,7 +111,8 @@ impl Wall {
         Ok(Self::Mesh { points, triangles })
     }
 
-    /// The wall as a mesh, to draw it: `None` if it cannot be one. Of a half-space, a square of 100 m.
+    /// The wall as a mesh, to draw it: of a half-space a square of 100 m. `None` for a hull, a mesh or a
+    /// landscape that cannot be one.
     #[must_use]
     pub fn to_mesh(&self) -> Option<Mesh> {
         Some(match self {
@@ -194,15 +198,17 @@ fn triangles_of(mesh: &Mesh) -> Result<Vec<[Vec3; 3]>, MeshTrianglesError> {
 type Candidates<'w, 's> = Query<
     'w,
     's,
-    (Entity, &'static Mesh3d, Option<&'static MadeOf>),
-    (Without<Marble>, Or<(Without<Wall>, With<MadeOf>)>),
+    (Entity, Option<&'static Mesh3d>, Option<&'static MadeOf>, Has<Marble>),
+    Or<((With<Mesh3d>, Without<Wall>), (With<Mesh3d>, With<MeshWalls>), With<MadeOf>)>,
 >;
 
-/// What makes another look necessary.
+/// Changes that make another look necessary.
 type Changes<'w, 's> = (
     Query<'w, 's, (), Or<(Changed<Mesh3d>, Changed<ChildOf>, Changed<Name>, Changed<MeshWalls>)>>,
     Query<'w, 's, (), With<MeshWalls>>,
     Option<Res<'w, Messages<AssetEvent<Mesh>>>>,
+    (RemovedComponents<'w, 's, Mesh3d>, RemovedComponents<'w, 's, ChildOf>),
+    (RemovedComponents<'w, 's, Name>, Query<'w, 's, (), (With<MadeOf>, Added<Marble>)>),
 );
 
 /// Ancestors, with their names, and what they make of meshes.
@@ -213,7 +219,7 @@ type Ancestors<'w, 's> =
 pub(crate) fn make(
     candidates: Candidates,
     ancestors: Ancestors,
-    (changed, roots, events): Changes,
+    (changed, roots, events, (mut lost, mut orphans), (mut nameless, marbles)): Changes,
     meshes: Option<Res<Assets<Mesh>>>,
     mut read: Local<MessageCursor<AssetEvent<Mesh>>>,
     mut number_of_roots: Local<usize>,
@@ -222,24 +228,28 @@ pub(crate) fn make(
     let (Some(meshes), Some(events)) = (meshes, events) else { return };
     let before = std::mem::replace(&mut *number_of_roots, roots.iter().len());
     let mut modified = HashSet::new();
-    let mut any = before != *number_of_roots || !changed.is_empty();
+    let removed = lost.read().count() + orphans.read().count() + nameless.read().count();
     for event in read.read(&events) {
-        any = true;
-        if let AssetEvent::Modified { id } = event {
+        if let AssetEvent::Modified { id } | AssetEvent::Added { id } = event {
             modified.insert(*id);
         }
     }
-    if !any || before.max(*number_of_roots) == 0 {
+    if before.max(*number_of_roots) == 0 {
         return;
     }
-    for (entity, Mesh3d(handle), made) in &candidates {
-        let id = handle.id();
-        let Some(shape) = wanted_shape(&ancestors, entity) else {
+    let any = before != *number_of_roots || removed > 0 || !modified.is_empty();
+    if !any && changed.is_empty() && marbles.is_empty() {
+        return;
+    }
+    for (entity, mesh, made, is_marble) in &candidates {
+        let wanted = mesh.filter(|_| !is_marble).zip(wanted_shape(&ancestors, entity));
+        let Some((Mesh3d(handle), shape)) = wanted else {
             if made.is_some() {
                 commands.entity(entity).try_remove::<(Wall, MadeOf)>();
             }
             continue;
         };
+        let id = handle.id();
         let made_of = MadeOf { mesh: id, shape };
         if made == Some(&made_of) && !modified.contains(&id) {
             continue;

@@ -377,8 +377,8 @@ fn find_hits(contacts: &[ContactStarted], least: f32, hits: &mut Vec<ContactHit>
 
 /// Separation of two surfaces, and the smaller radius, in metres.
 pub(crate) struct Gap {
-    width: f32,
-    radius: f32,
+    pub width: f32,
+    pub radius: f32,
 }
 
 impl Gap {

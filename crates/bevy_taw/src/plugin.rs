@@ -248,8 +248,8 @@ fn one_by_one(schedule: &mut Schedule) {
     schedule.set_executor(SingleThreadedExecutor::new());
 }
 
-/// Schedules of the systems of a step. Each is one exclusive system of `FixedFirst` or `FixedUpdate`:
-/// to give each to a thread would cost more than most of them do.
+/// Schedules of the systems of a step. Each is one exclusive system of `FixedFirst` or `FixedUpdate`: most of
+/// them take less time than giving them to a thread would.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Part {
     Begin,

@@ -2,15 +2,17 @@
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
+use taw::world::MarbleId;
 
-use crate::components::{GravityScale, MarbleState};
+use crate::components::WallState;
 use crate::convert::{all_finite, at_least_zero, from_point, from_vector, to_vector};
 use crate::refusal::Refusals;
 use crate::resources::TawWorld;
-use crate::sensor::{CollidingEntities, Sensor};
+use crate::sensor::Sensor;
 
 /// Gravity of its own inside of a [`Sensor`]'s shape, in m/s² in world space. A marble's
-/// [`GravityScale`] counts for it.
+/// [`GravityScale`](crate::components::GravityScale) counts for it. Marbles do not sleep in a world without a
+/// gravity of its own.
 ///
 /// Acts in each step on the marbles that were inside after the last one. Where zones overlap, what they
 /// add is summed up; of those that replace gravity, that of the highest entity counts.
@@ -74,98 +76,106 @@ struct Pull {
 
 /// Gravity inside of zones.
 #[derive(Resource, Default)]
-pub(crate) struct ZoneGravity {
-    pulls: HashMap<Entity, Pull>,
-    /// Gravity of the world, in m/s².
-    elsewhere: Vec3,
-}
+pub(crate) struct ZoneGravity(HashMap<MarbleId, Pull>);
 
 impl ZoneGravity {
-    /// Gravity that acts on a marble, its [`GravityScale`] included, in m/s².
-    pub fn on(&self, marble: Entity, scale: Option<&GravityScale>) -> Vec3 {
-        let pull = self.pulls.get(&marble).copied().unwrap_or_default();
-        let gravity = pull.instead.unwrap_or(self.elsewhere) + pull.besides;
-        gravity * scale.map_or(1.0, |scale| **scale)
+    /// Gravity that acts on a marble, its gravity scale included, in m/s².
+    pub fn on(&self, world: &TawWorld, marble: Option<MarbleId>) -> Vec3 {
+        let Some((id, marble)) = marble.and_then(|id| Some((id, world.marbles.get(id).ok()?)))
+        else {
+            return Vec3::ZERO;
+        };
+        let elsewhere = from_vector(world.gravity());
+        let Pull { instead, besides } = self.0.get(&id).copied().unwrap_or_default();
+        (instead.unwrap_or(elsewhere) + besides) * marble.gravity_scale
     }
 }
-
-/// Marbles, as zones see them.
-type Marbles<'w, 's> = Query<'w, 's, (&'static MarbleState, Option<&'static GravityScale>)>;
 
 /// Pulls and blows the marbles that are in zones.
 pub(crate) fn act(
     mut world: ResMut<TawWorld>,
     mut gravity: ResMut<ZoneGravity>,
-    zones: Query<(Entity, &GravityZone, &CollidingEntities)>,
-    winds: Query<(Entity, &WindZone, &CollidingEntities)>,
-    (marbles, transforms, time): (Marbles, TransformHelper, Res<Time>),
+    zones: Query<(Entity, &GravityZone, &WallState)>,
+    winds: Query<(Entity, &WindZone, &WallState)>,
+    (transforms, time): (TransformHelper, Res<Time>),
     mut refusals: Refusals,
 ) {
-    gravity.pulls.clear();
-    gravity.elsewhere = from_vector(world.gravity());
+    gravity.0.clear();
     let mut in_order: Vec<_> = zones.iter().collect();
     in_order.sort_unstable_by_key(|(zone, ..)| *zone);
-    for (zone, kind, inside) in in_order {
+    for (zone, kind, state) in in_order {
         if !refusals.check(Some(zone), kind.validate()) {
             continue;
         }
         let middle = transforms.compute_global_transform(zone).ok();
-        for &marble in inside.iter() {
-            let pull = gravity.pulls.entry(marble).or_default();
+        for &marble in inside(&world, state) {
+            let pull = gravity.0.entry(marble).or_default();
             match kind {
                 GravityZone::Replace(gravity) => pull.instead = Some(*gravity),
                 GravityZone::Add(gravity) => pull.besides += gravity,
                 GravityZone::Toward(size) => {
-                    let place = place(&world, &marbles, marble);
+                    let place = world.marbles.get(marble).map(|it| from_point(it.position)).ok();
                     let way = middle.zip(place).map(|(middle, at)| middle.translation() - at);
                     pull.instead = Some(way.unwrap_or_default().normalize_or_zero() * *size);
                 }
             }
         }
     }
-    for &marble in gravity.pulls.keys() {
-        let scale = marbles.get(marble).ok().and_then(|(_, scale)| scale);
-        let whole = gravity.elsewhere * scale.map_or(1.0, |scale| **scale);
-        let change = gravity.on(marble, scale) - whole;
-        accelerate(&mut world, &marbles, (marble, change), &mut refusals);
+    let elsewhere = from_vector(world.gravity());
+    for (&marble, Pull { instead, besides }) in &gravity.0 {
+        let scale = world.marbles.get(marble).map_or(1.0, |marble| marble.gravity_scale);
+        let change = (instead.map_or(Vec3::ZERO, |it| it - elsewhere) + *besides) * scale;
+        accelerate(&mut world, (marble, change), &mut refusals);
     }
-    let dt = time.delta_secs();
-    for (zone, wind, inside) in &winds {
-        if !refusals.check(Some(zone), wind.validate()) || dt <= 0.0 {
-            continue;
-        }
-        // As much as the exact solution of dv/dt = drag (velocity - v) does in a step.
-        let rate = -(-wind.drag * dt).exp_m1() / dt;
-        for &marble in inside.iter() {
-            let velocity = |world: &TawWorld| {
-                let id = marbles.get(marble).ok()?.0.id?;
-                Some(from_vector(world.marbles.get(id).ok()?.velocity))
-            };
-            if let Some(velocity) = velocity(&world) {
-                let change = (wind.velocity - velocity) * rate;
-                accelerate(&mut world, &marbles, (marble, change), &mut refusals);
+    blow(&mut world, &winds, time.delta_secs(), &mut refusals);
+}
+
+/// Blows in a step of `dt` seconds.
+fn blow(
+    world: &mut TawWorld,
+    winds: &Query<(Entity, &WindZone, &WallState)>,
+    dt: f32,
+    refusals: &mut Refusals,
+) {
+    let mut in_order: Vec<_> = winds.iter().collect();
+    in_order.sort_unstable_by_key(|(zone, ..)| *zone);
+    // Sums of the rates, and of velocities times rates.
+    let mut sums = HashMap::<MarbleId, (f32, Vec3)>::new();
+    for (zone, wind, state) in in_order {
+        if refusals.check(Some(zone), wind.validate()) {
+            for &marble in inside(world, state) {
+                let (rate, flow) = sums.entry(marble).or_default();
+                *rate += wind.drag;
+                *flow += wind.drag * wind.velocity;
             }
+        }
+    }
+    for (marble, (rate, flow)) in sums.into_iter().filter(|(_, (rate, _))| *rate > 0.0 && dt > 0.0)
+    {
+        if let Ok(body) = world.marbles.get(marble) {
+            // As much as the exact solution of dv/dt = flow - rate v does in a step.
+            let part = -(-rate * dt).exp_m1() / dt;
+            let change = (flow / rate - from_vector(body.velocity)) * part;
+            accelerate(world, (marble, change), refusals);
         }
     }
 }
 
-/// Place of a marble in the world, in metres.
-fn place(world: &TawWorld, marbles: &Marbles, marble: Entity) -> Option<Vec3> {
-    let id = marbles.get(marble).ok()?.0.id?;
-    Some(from_point(world.marbles.get(id).ok()?.position))
+/// Marbles that were inside of a sensor after the last step.
+fn inside<'a>(world: &'a TawWorld, sensor: &WallState) -> &'a [MarbleId] {
+    sensor.sensor.and_then(|id| world.sensors.inside(id).ok()).unwrap_or_default()
 }
 
 /// Accelerates a marble in this step, in m/s².
 fn accelerate(
     world: &mut TawWorld,
-    marbles: &Marbles,
-    (marble, acceleration): (Entity, Vec3),
+    (marble, acceleration): (MarbleId, Vec3),
     refusals: &mut Refusals,
 ) {
-    let id = marbles.get(marble).ok().and_then(|(state, _)| state.id);
-    if let Some(id) = id.filter(|id| acceleration != Vec3::ZERO && world.marbles.get(*id).is_ok()) {
-        let applied = world.marbles.apply_acceleration(id, to_vector(acceleration));
-        refusals.check(Some(marble), applied);
+    if acceleration != Vec3::ZERO && world.marbles.row(marble).is_ok() {
+        let entity = world.marble_entities.get(&marble).copied();
+        let applied = world.marbles.apply_acceleration(marble, to_vector(acceleration));
+        refusals.check(entity, applied);
     }
 }
 
