@@ -4,9 +4,6 @@ use taw_lab::suite::{CostClass, Report, measure, rows};
 
 /// What is known to be missed, as name and model, with what stops it.
 const MISSED: &[(&str, &str)] = &[
-    // 9.5e-7 instead of 1e-7. Accelerations that hold only while normals turn by .02 rad do not change
-    // it, so its cause is not that balls roll over each other within a step: not found yet.
-    ("bouncing/666/10ms/gain", "event-driven"),
     // Springs give back a part of what overlap of the start holds.
     ("ordinary/overlap", "spring and dashpot"),
 ];
