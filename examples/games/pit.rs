@@ -72,7 +72,6 @@ fn wade(push: Res<Push>, mut wader: Single<&mut ExternalForce, With<Wader>>) {
     }
 }
 
-fn show(wader: Single<(&Transform, &Velocity), With<Wader>>, mut said: ResMut<Said>) {
-    let (at, velocity) = *wader;
-    said.0 = format!("{:.1} m/s, {:.2} m deep", velocity.length(), 0.4 - at.translation.y);
+fn show(velocity: Single<&Velocity, With<Wader>>, mut said: ResMut<Said>) {
+    said.0 = format!("{:.1} m/s", velocity.length());
 }
