@@ -21,7 +21,7 @@ use taw_examples::{ExamplePlugins, Picture};
 
 #[derive(Parser)]
 struct Options {
-    /// Which one
+    /// Game to play
     #[arg(value_enum, default_value_t = Game::Pachinko)]
     game: Game,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! How the games look: colours, light, a camera, a line of text.
+//! Looks of the games: colours, light, a camera, a line of text.
 
 use bevy::core_pipeline::tonemapping::Tonemapping;
 use bevy::ecs::system::SystemParam;

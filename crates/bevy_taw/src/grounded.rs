@@ -10,7 +10,7 @@ use taw::world::{ColliderId, QueryTree};
 use crate::SubstepDelta;
 use crate::components::{MarbleState, Sleeping, WallState};
 use crate::convert::{from_point, from_vector, within};
-use crate::messages::{ContactPair, Gap, gap};
+use crate::messages::{ContactPair, Gap, fall, gap};
 use crate::refusal::Refusals;
 use crate::resources::TawWorld;
 use crate::zones::ZoneGravity;
@@ -125,10 +125,7 @@ pub(crate) fn find(
     };
     for (entity, grounded, state, is_asleep) in &mut marbles {
         let row = state.id.and_then(|id| world.marbles.row(id).ok());
-        let seeker = row.and_then(|row| {
-            let i = seekers.binary_search_by_key(&(row as u32), |seeker| seeker.row).ok()?;
-            Some(&seekers[i])
-        });
+        let seeker = row.and_then(|row| seeker_of(&seekers, row as u32)).map(|i| &seekers[i]);
         let ground = seeker.and_then(|seeker| {
             // Contacts of what sleeps are not listed.
             let is_new = is_asleep && (grounded.is_added() || just_restored);
@@ -146,9 +143,9 @@ pub(crate) fn find(
     }
 }
 
-/// Distance that gravity closes in a substep, in metres.
-fn fall(world: &TawWorld, dt: f32) -> f32 {
-    from_vector(world.gravity()).length() * dt * dt
+/// Index of the seeker of a row; they are sorted.
+fn seeker_of(seekers: &[Seeker], row: u32) -> Option<usize> {
+    seekers.binary_search_by_key(&row, |seeker| seeker.row).ok()
 }
 
 /// Looks for ground among the contacts of the last substep, of `dt` seconds.
@@ -162,12 +159,10 @@ fn look_below(world: &TawWorld, walls: &Query<&WallState>, seekers: &mut [Seeker
         let width = contact.separation + parting.max(0.0) * dt;
         Gap { width, radius: marbles.radius()[contact.b as usize] }.is_closed(fall)
     };
-    let find =
-        |seekers: &[Seeker], row: u32| seekers.binary_search_by_key(&row, |seeker| seeker.row).ok();
     let point = |contact: &Contact<f32>| marbles.position()[contact.b as usize] + contact.arms[1];
     let velocity = |row: u32| from_vector(marbles.velocity()[row as usize]);
     for contact in &world.contacts.wm {
-        if let Some(i) = find(seekers, contact.b)
+        if let Some(i) = seeker_of(seekers, contact.b)
             && let Some(entity) = world.wall_entity(contact.a)
         {
             let point = point(contact);
@@ -182,7 +177,7 @@ fn look_below(world: &TawWorld, walls: &Query<&WallState>, seekers: &mut [Seeker
             (contact.b, contact.a, contact.normal, contact.arms[0]),
             (contact.a, contact.b, -contact.normal, contact.arms[1]),
         ] {
-            if let Some(i) = find(seekers, marble)
+            if let Some(i) = seeker_of(seekers, marble)
                 && let Some(entity) = world.marble_entity(other)
             {
                 let surface = surface_velocity(world, other as usize, arm);

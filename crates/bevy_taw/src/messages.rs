@@ -325,7 +325,7 @@ pub(crate) fn write(
     let Touches { now, before, impacts, events } = &mut *touches;
     *impacts = 0;
     events.clear(); // nobody observed those of the last step
-    let fall = from_vector(world.gravity()).length() * delta.0 * delta.0;
+    let fall = fall(&world, delta.0);
     let (started, hits, ongoing, ended) = &mut readers;
     find_hits(now, 2.0 * fall / delta.0, &mut events.hits);
     if let Some(messages) = hits {
@@ -373,6 +373,11 @@ fn find_hits(contacts: &[ContactStarted], least: f32, hits: &mut Vec<ContactHit>
         }
     }
     hits.truncate(kept);
+}
+
+/// Distance that gravity closes in a substep of `dt` seconds, in metres.
+pub(crate) fn fall(world: &TawWorld, dt: f32) -> f32 {
+    from_vector(world.gravity()).length() * dt * dt
 }
 
 /// Separation of two surfaces, and the smaller radius, in metres.

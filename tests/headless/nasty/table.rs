@@ -1,4 +1,4 @@
-//! What every number of every component takes, and entities with all of them.
+//! Table of the numbers that every field of every component takes, and entities with all of them.
 
 use bevy::prelude::*;
 use bevy::reflect::ReflectRef;
@@ -7,21 +7,22 @@ use bevy_taw::prelude::*;
 pub const NUMBERS: [f32; 10] =
     [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, 0.0, -0.0, -1.0, 1e-40, 1e-30, 1e30, f32::MAX];
 
-/// Which numbers a field takes.
+/// Numbers that a field takes.
 #[derive(Clone, Copy, Debug)]
 pub enum Takes {
     Finite,
     Positive,
     AtLeastZero,
     Within(f32, f32),
-    /// Whatever the physics does not read.
+    /// All numbers: the physics does not read it.
     All,
-    /// What no other field agrees with is refused, too: a part of a rotation or of a shape.
+    /// Finite ones, of which those are refused, too, that no other field agrees with: a part of a rotation
+    /// or of a shape.
     Some,
 }
 
 impl Takes {
-    /// Whether it must be refused, if that depends on the number alone.
+    /// Returns true for a number that must be refused, if that depends on the number alone.
     pub fn refuses(self, x: f32) -> Option<bool> {
         match self {
             Self::Finite => Some(!x.is_finite()),
