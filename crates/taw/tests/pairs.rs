@@ -232,6 +232,29 @@ fn the_deepest_point_may_lie_beyond_the_edge_of_a_face() {
     }
 }
 
+/// Found by the test of millions: the hull's face lies on the plane through the middle of the box,
+/// so that a face of the polytope on the other side, not yet expanded, was as near the origin.
+#[test]
+fn a_face_as_near_on_the_other_side_is_not_the_way_out() {
+    let zero = [0.0; 3];
+    let flat = vec![
+        [1.0, 0.0, 1.340_977_820_863_106],
+        [1.326_265_905_891_47, 0.0, 0.0],
+        [1.0, 0.0, 0.0],
+        [1.0, -1.298_187_764_632_104, -0.720_366_568_415_099_5],
+        [1.0, 0.158_040_613_432_331_3, 1.297_393_221_916_471_7],
+        [1.0, 1.0, 0.0],
+    ];
+    let place = [0.0, 1.011_594_178_746_741_5, -1.023_366_671_987_299_1];
+    let first = (place, [0.0, 0.0, 0.1], 0.0, flat);
+    let half = [0.338_567_145_803_579_9, 0.919_911_287_692_814_7, 1.334_609_400_018_261_1];
+    let second = ([1.0; 3], [0.0, 0.0, 0.1], 0.0, vec![half, zero, zero, zero, zero, zero]);
+    for scale in [1e-6, 1.0, 1e6] {
+        check_all(&first, &second, scale, 0.0, 200).unwrap();
+        check_all(&second, &first, scale, 0.0, 200).unwrap();
+    }
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(500))]
 

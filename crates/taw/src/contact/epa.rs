@@ -105,10 +105,16 @@ fn closest_points_on(
         parts.map(|part| part / all)
     };
     let least = |face: &PolytopeFace| weights(face).into_iter().fold(f64::INFINITY, f64::min);
+    // As far from the origin is not enough: a face on the other side may be by chance.
+    let coplanar = |face: &PolytopeFace| {
+        face.corners.iter().all(|i| {
+            let height = vertices[*i].difference.dot(nearest.normal);
+            (height - nearest.height).abs() <= 4.0 * TOLERANCE * size
+        })
+    };
     let mut best = (least(nearest), nearest);
     for face in faces {
-        let same = face.height <= nearest.height + 4.0 * TOLERANCE * size;
-        if best.0 < 0.0 && same && least(face) > best.0 {
+        if best.0 < 0.0 && coplanar(face) && least(face) > best.0 {
             best = (least(face), face);
         }
     }
@@ -119,6 +125,6 @@ fn closest_points_on(
         sum + vertices[*i].on_a * (weight / all)
     });
     // The difference is `B − A`, so `B` has to go the opposite way.
-    let (normal, distance) = (-best.1.normal, -reach);
+    let (normal, distance) = (-nearest.normal, -reach);
     LocalClosestPoints { distance, normal, on_a, on_b: on_a + normal * distance }
 }
