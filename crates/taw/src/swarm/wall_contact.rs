@@ -66,17 +66,20 @@ impl WallContact {
         self.normal.dot(xyz(at)) - self.offset - at[3]
     }
 
-    /// The wall moves on for so long, in seconds; one that bears a proxy, as the proxy does.
+    /// The wall moves on for so long, in seconds; one that bears a proxy may give way to it.
     pub fn advance(&mut self, time: f32) {
         self.offset += self.surface.dot(self.normal) * time;
     }
 
-    /// Limits it to what the swarm presses on a proxy: the proxy's own motion and its depth in the
-    /// wall are left to the world's solver. The step goes on for so long, in seconds.
+    /// Limits it to what the swarm presses on a proxy: the proxy's own motion into the wall and its
+    /// depth there are left to the world's solver, as if the wall gave way. It follows no proxy that
+    /// leaves it. The step goes on for so long, in seconds.
     pub fn bear(&mut self, proxy: &Proxy, left: f32) {
         self.bears_proxy = true;
         (self.numbers.friction, self.numbers.restitution) = (0.0, 0.0);
-        self.surface = xyz(&proxy.velocity);
+        let own = xyz(&proxy.velocity);
+        let leaves = (own - self.surface).dot(self.normal).max(0.0);
+        self.surface = own - self.normal * leaves;
         self.offset = self.offset_at_end;
         self.offset += self.separation(&proxy.at).min(0.0);
         self.advance(-left);

@@ -16,6 +16,8 @@ use crate::response::SolverBodies;
 /// A gain below this fraction of the energy of the velocity changes is the residual of the
 /// iterations.
 const GAIN_TOLERANCE: f64 = 1e-5;
+/// As large a fraction is the rounding of the sum, in roundings of the scalar.
+const GAIN_ROUNDING: f64 = 2.0;
 
 /// Energy balance of an island's impulses, in units of the island.
 #[derive(Clone, Copy, Debug)]
@@ -42,6 +44,11 @@ impl<S: Scalar> IslandEnergy<S> {
         self.work > self.changed * S::from_f64(GAIN_TOLERANCE)
     }
 
+    /// Tells if collisions gained a residual of the iterations. What rests loses it again.
+    fn bounces_with_residual(&self) -> bool {
+        self.bounces && self.work > self.changed * S::epsilon() * S::from_f64(GAIN_ROUNDING)
+    }
+
     /// Largest fraction of the restitution that gains no energy.
     fn max_restitution_fraction(&self) -> S {
         let Self { work, linear, quadratic, .. } = *self;
@@ -53,6 +60,12 @@ impl<S: Scalar> IslandEnergy<S> {
             (root - linear) / (quadratic * S::from_f64(2.0))
         };
         if fraction > S::zero() { fraction.min(S::one()) } else { S::zero() }
+    }
+
+    /// Fraction of all impulses that neither gains nor loses energy.
+    fn lossless_fraction(&self) -> S {
+        let fraction = -self.linear / self.quadratic;
+        if fraction > S::zero() { fraction.min(S::one()) } else { S::one() }
     }
 
     /// Fraction of all impulses that leaves the least energy.
@@ -109,8 +122,42 @@ impl<S: Scalar> SolverBodies<'_, S> {
                 rows,
                 settings,
             );
+            self.measure_energy(constraints, islands, energies);
         }
+        self.remove_residual_gain(constraints, islands, energies);
         self.stop_approaches(constraints, islands);
+    }
+
+    /// Scales the impulses of collisions down by the little energy that unconverged iterations
+    /// gained: elastic collisions would add it up.
+    fn remove_residual_gain(
+        &mut self,
+        constraints: &mut [Constraint<S>],
+        islands: &Islands<S>,
+        energies: &mut Vec<IslandEnergy<S>>,
+    ) {
+        if energies.iter().any(IslandEnergy::bounces_with_residual) {
+            let gaining: Vec<_> =
+                energies.iter().map(IslandEnergy::bounces_with_residual).collect();
+            self.measure_scaling(constraints, islands, energies);
+            self.scale_impulses(constraints, &gaining, |island| {
+                energies[island].lossless_fraction()
+            });
+        }
+    }
+
+    /// Scales all impulses of some islands.
+    fn scale_impulses(
+        &mut self,
+        constraints: &mut [Constraint<S>],
+        which: &[bool],
+        fraction: impl Fn(usize) -> S,
+    ) {
+        for c in constraints.iter_mut().filter(|c| which[c.island as usize]) {
+            let change = fraction(c.island as usize) - S::one();
+            self.add_impulse(c, c.impulse() * change);
+            self.add_angular_impulse(c, c.angular_impulse() * change);
+        }
     }
 
     /// Stops remaining approaches by normal impulses alone. Two walls whose friction presses a ball
@@ -282,11 +329,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
         let gaining: Vec<_> = energies.iter().map(IslandEnergy::gains).collect();
         self.measure_scaling(constraints, islands, energies);
-        for c in constraints.iter_mut().filter(|c| gaining[c.island as usize]) {
-            let change = energies[c.island as usize].min_energy_fraction().min(S::one()) - S::one();
-            self.add_impulse(c, c.impulse() * change);
-            self.add_angular_impulse(c, c.angular_impulse() * change);
-        }
+        let fraction = |island: usize| energies[island].min_energy_fraction().min(S::one());
+        self.scale_impulses(constraints, &gaining, fraction);
     }
 
     /// Measures the energy that a fraction of all impulses would bring in.
