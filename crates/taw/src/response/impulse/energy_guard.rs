@@ -62,10 +62,10 @@ impl<S: Scalar> IslandEnergy<S> {
         if fraction > S::zero() { fraction.min(S::one()) } else { S::zero() }
     }
 
-    /// Fraction of all impulses that neither gains nor loses energy.
+    /// Largest fraction of all impulses that gains no energy.
     fn lossless_fraction(&self) -> S {
         let fraction = -self.linear / self.quadratic;
-        if fraction > S::zero() { fraction.min(S::one()) } else { S::one() }
+        if fraction > S::zero() { fraction.min(S::one()) } else { S::zero() }
     }
 
     /// Fraction of all impulses that leaves the least energy.
@@ -136,27 +136,28 @@ impl<S: Scalar> SolverBodies<'_, S> {
         islands: &Islands<S>,
         energies: &mut Vec<IslandEnergy<S>>,
     ) {
-        if energies.iter().any(IslandEnergy::bounces_with_residual) {
-            let gaining: Vec<_> =
-                energies.iter().map(IslandEnergy::bounces_with_residual).collect();
-            self.measure_scaling(constraints, islands, energies);
-            self.scale_impulses(constraints, &gaining, |island| {
-                energies[island].lossless_fraction()
-            });
+        if !energies.iter().any(IslandEnergy::bounces_with_residual) {
+            return;
         }
+        let gaining: Vec<_> = energies.iter().map(IslandEnergy::bounces_with_residual).collect();
+        self.measure_scaling(constraints, islands, energies, Constraint::velocity_at_impact);
+        self.scale_impulses(constraints, |island| {
+            if gaining[island] { energies[island].lossless_fraction() } else { S::one() }
+        });
     }
 
-    /// Scales all impulses of some islands.
+    /// Scales all impulses by the fraction of their island.
     fn scale_impulses(
         &mut self,
         constraints: &mut [Constraint<S>],
-        which: &[bool],
-        fraction: impl Fn(usize) -> S,
+        fraction_of: impl Fn(usize) -> S,
     ) {
-        for c in constraints.iter_mut().filter(|c| which[c.island as usize]) {
-            let change = fraction(c.island as usize) - S::one();
-            self.add_impulse(c, c.impulse() * change);
-            self.add_angular_impulse(c, c.angular_impulse() * change);
+        for c in constraints {
+            let fraction = fraction_of(c.island as usize);
+            if fraction < S::one() {
+                self.add_impulse(c, c.impulse() * (fraction - S::one()));
+                self.add_angular_impulse(c, c.angular_impulse() * (fraction - S::one()));
+            }
         }
     }
 
@@ -299,7 +300,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         energies: &mut Vec<IslandEnergy<S>>,
         gaining: &[bool],
     ) {
-        self.measure_scaling(constraints, islands, energies);
+        self.measure_scaling(constraints, islands, energies, Constraint::velocity_at_impact);
         let mut min_restitution = vec![S::one(); energies.len()];
         for c in constraints.iter().filter(|c| c.impulse.normal > S::zero()) {
             let restitution = if c.bounces { c.restitution } else { S::zero() };
@@ -315,47 +316,46 @@ impl<S: Scalar> SolverBodies<'_, S> {
         }
     }
 
-    /// Scales the warm start of an island down to the fraction that leaves the least energy, where
-    /// it would bring energy in: the guess no longer fits.
-    pub(super) fn limit_warm_start(
+    /// Scales the warm start of each island down to where it is nearest to the target velocities, by
+    /// the exact line search of what [`iterate`] lowers: the guess may no longer fit.
+    pub(super) fn scale_warm_start(
         &mut self,
         constraints: &mut [Constraint<S>],
         islands: &Islands<S>,
         energies: &mut Vec<IslandEnergy<S>>,
     ) {
-        self.measure_energy(constraints, islands, energies);
-        if !energies.iter().any(IslandEnergy::gains) {
-            return;
-        }
-        let gaining: Vec<_> = energies.iter().map(IslandEnergy::gains).collect();
-        self.measure_scaling(constraints, islands, energies);
-        let fraction = |island: usize| energies[island].min_energy_fraction().min(S::one());
-        self.scale_impulses(constraints, &gaining, fraction);
+        self.measure_scaling(constraints, islands, energies, |c| {
+            let target = c.normal * c.target_normal_velocity + c.target_tangent_velocity;
+            c.initial_relative_velocity - target
+        });
+        self.scale_impulses(constraints, |island| {
+            energies[island].min_energy_fraction().min(S::one())
+        });
     }
 
-    /// Measures the energy that a fraction of all impulses would bring in.
+    /// Measures the energy that a fraction of all impulses would bring in, where it acts on these
+    /// velocities of the contacts, in m/s.
     fn measure_scaling(
         &self,
         constraints: &[Constraint<S>],
         islands: &Islands<S>,
         energies: &mut Vec<IslandEnergy<S>>,
+        initial_velocity: impl Fn(&Constraint<S>) -> Vec3<S>,
     ) {
-        self.measure_energy(constraints, islands, energies);
+        energies.clear();
+        energies.resize(islands.len(), IslandEnergy::new());
         let half = S::from_f64(0.5);
         for c in constraints {
             let energy = &mut energies[c.island as usize];
             let island = islands.of(c.island);
+            let energy_of = |velocity: Vec3<S>, spin: Vec3<S>| {
+                island.energy(c.inverse_effective_mass.normal, c.impulse(), velocity)
+                    + island.angular_energy(c.angular_impulse(), spin)
+            };
             let velocity_change = self.relative_velocity_of(c) - c.initial_relative_velocity;
             let spin_change = self.relative_spin(c) - c.initial_relative_spin;
-            energy.linear += island.energy(
-                c.inverse_effective_mass.normal,
-                c.impulse(),
-                c.mean_velocity(c.initial_relative_velocity),
-            ) + island
-                .angular_energy(c.angular_impulse(), c.initial_relative_spin);
-            energy.quadratic +=
-                island.energy(c.inverse_effective_mass.normal, c.impulse(), velocity_change * half)
-                    + island.angular_energy(c.angular_impulse(), spin_change * half);
+            energy.linear += energy_of(initial_velocity(c), c.initial_relative_spin);
+            energy.quadratic += energy_of(velocity_change * half, spin_change * half);
         }
     }
 
@@ -411,6 +411,11 @@ impl<S: Scalar> Constraint<S> {
         } else {
             self.target_normal_velocity
         }
+    }
+
+    /// Relative velocity before the impulse, at the time of impact, in m/s.
+    fn velocity_at_impact(&self) -> Vec3<S> {
+        self.initial_relative_velocity - self.velocity_since_impact
     }
 
     /// Mean of the relative velocities before and after the impulse, at the time of impact, in m/s.

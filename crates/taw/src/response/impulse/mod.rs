@@ -305,7 +305,7 @@ pub(crate) fn solve_contacts<S: Scalar>(
         marbles.measure_loads(constraints, islands);
     }
     marbles.warm_start(constraints, cache);
-    marbles.limit_warm_start(constraints, islands, energies);
+    marbles.scale_warm_start(constraints, islands, energies);
     iterate(marbles, constraints, islands, rows, settings);
     marbles.limit_energy(constraints, islands, energies, full_restitution, rows, settings);
     if settings.resolve_jams {
