@@ -8,6 +8,7 @@ mod disabling;
 mod first_contact;
 mod games;
 mod heroes;
+mod ignore;
 mod input;
 mod interpolation;
 mod layers;

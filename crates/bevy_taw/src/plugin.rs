@@ -11,6 +11,7 @@ use crate::components::{
 use crate::controller::MarbleController;
 use crate::diagnostics::{self, StepTimes};
 use crate::grounded::Grounded;
+use crate::ignore::{self, ColliderDisabled, IgnoreCollisions};
 use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::layers::CollisionLayers;
@@ -118,6 +119,7 @@ impl Plugin for TawPlugin {
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(Grounded, MarbleController, GravityZone, WindZone)>()
+            .register_type::<(IgnoreCollisions, ColliderDisabled)>()
             .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity)>();
         diagnostics::register(app);
         sensor::register(app);
@@ -140,6 +142,7 @@ fn observe(app: &mut App) {
         .add_observer(gather::note_lost_component::<MarbleRotation>)
         .add_observer(gather::note_lost_component::<SleepingDisabled>)
         .add_observer(gather::note_lost_component::<CollisionLayers>)
+        .add_observer(gather::note_lost_component::<ColliderDisabled>)
         .add_observer(gather::note_lost_component::<ChildOf>)
         .add_observer(forget::forget_marble)
         .add_observer(forget::forget_wall)
@@ -188,7 +191,9 @@ fn add_step(app: &mut App) {
             gather::settings,
             ignored::find,
             gather_walls::walls,
+            ignore::count_down.run_if(any_with_component::<ColliderDisabled>),
             gather::marbles,
+            ignore::gather.run_if(ignore::any),
             gather::forces,
             zones::act,
             gather::leave_out,

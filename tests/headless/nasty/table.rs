@@ -57,6 +57,7 @@ pub const TABLE: &[(&str, &str, Takes)] = &[
     ("ExternalImpulse", ".impulse", Takes::Finite),
     ("ExternalImpulse", ".angular", Takes::Finite),
     ("HalfLength", ".0", Takes::AtLeastZero),
+    ("ColliderDisabled", ".time_left", Takes::AtLeastZero),
     ("Transform", ".translation", Takes::Finite),
     ("Transform", ".rotation", Takes::Some),
     ("Transform", ".scale", Takes::All),
@@ -157,6 +158,13 @@ pub fn samples() -> Vec<Sample> {
                 it.insert(MarbleMass::Kilograms(2.0));
             },
             &["MarbleMass"],
+        ),
+        (
+            |it| {
+                marble(it);
+                it.insert(ColliderDisabled::for_seconds(1.0));
+            },
+            &["ColliderDisabled"],
         ),
         (|it| wall(it, Wall::HalfSpace(Dir3::Y)), OF_WALLS),
     ];

@@ -10,6 +10,7 @@ mod energy;
 mod energy_audit;
 mod event_driven;
 mod external_forces;
+mod ignored;
 mod impulse;
 mod integrate;
 mod limits;

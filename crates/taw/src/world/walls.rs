@@ -3,7 +3,7 @@ use super::sparse_column::SparseColumn;
 use super::wall_changes::WallChanges;
 use super::wall_shape::WallShape;
 use crate::Error;
-use crate::broad::CollisionLayers;
+use crate::broad::{CollisionFilter, CollisionLayers};
 use crate::contact::ClosestPoints;
 use crate::handle::{Handle, Handles};
 use crate::math::{Point3, Scalar, Vec3, is_finite_point};
@@ -241,27 +241,33 @@ impl<S: Scalar> Walls<S> {
         });
     }
 
-    /// Visits the sub-shapes that may overlap a box, of walls that a collider of these layers
-    /// collides with, except half-spaces.
+    /// Visits the sub-shapes that may overlap a box, of walls that a filter lets collide, except
+    /// half-spaces.
     pub(super) fn for_each_colliding(
         &self,
         bounds: &Aabb3<S>,
-        layers: CollisionLayers,
+        filter: CollisionFilter,
         mut visit: impl FnMut(SubShape),
     ) {
         self.for_each_in_box(bounds, |part| {
-            if self.layers_of_row(part.wall).interacts_with(layers) {
+            if self.collides(part.wall, filter) {
                 visit(part);
             }
         });
     }
 
-    /// Half-spaces that a collider of these layers collides with, with their rows.
-    pub(super) fn colliding_planes(
-        &self,
-        layers: CollisionLayers,
-    ) -> impl Iterator<Item = (u32, &Plane<S>)> {
-        self.planes().filter(move |(wall, _)| self.layers_of_row(*wall).interacts_with(layers))
+    /// Half-spaces that a filter lets collide, with their rows.
+    pub(super) fn colliding_planes<'a>(
+        &'a self,
+        filter: CollisionFilter<'a>,
+    ) -> impl Iterator<Item = (u32, &'a Plane<S>)> {
+        self.planes().filter(move |(wall, _)| self.collides(*wall, filter))
+    }
+
+    /// Returns true if a filter lets the wall in a row collide.
+    #[inline]
+    pub(super) fn collides(&self, row: u32, filter: CollisionFilter) -> bool {
+        filter.meets_wall(row, self.layers_of_row(row))
     }
 
     /// Visits the sub-shapes of walls, except half-spaces, that may be within `reach` metres of a
