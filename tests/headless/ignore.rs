@@ -1,4 +1,4 @@
-//! Marbles that pass through those whom they name, and through all for a time.
+//! Marbles that pass through those whom they name, through all for a time, and through one-way walls.
 
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
@@ -157,4 +157,55 @@ fn without_a_time_it_stays_until_somebody_removes_it() {
     app.world_mut().entity_mut(marble).remove::<ColliderDisabled>();
     frames(&mut app, 128);
     assert!(height(&app, marble) > 0.4);
+}
+
+/// A platform that is turned, on a parent that is turned and moves.
+#[test]
+fn a_marble_jumps_through_a_one_way_wall_and_lands_on_it() {
+    for response in RESPONSES {
+        let mut app = app(response);
+        let turn = Quat::from_rotation_z(1.0);
+        let carrier = Transform::from_rotation(turn).with_translation(Vec3::Y * 3.0);
+        let carrier = app.world_mut().spawn(carrier).id();
+        let wall = (Wall::from(Cuboid::new(6.0, 0.3, 6.0)), OneWay::default(), ChildOf(carrier));
+        let wall = app.world_mut().spawn(wall).id();
+        app.world_mut().entity_mut(wall).insert(Transform::from_rotation(turn.inverse()));
+        let marble = scene::drop_marble(&mut app, 0.5, Vec3::ZERO);
+        app.world_mut().entity_mut(marble).insert(Velocity(Vec3::Y * 11.0));
+        frames(&mut app, 64);
+        assert!(height(&app, marble) > 3.6, "{response:?}: {}", height(&app, marble));
+        frames(&mut app, 128);
+        assert!((height(&app, marble) - 3.65).abs() < 0.1, "{response:?}");
+        // It drops through as soon as it names the wall, or the wall lets it pass the other way.
+        name(&mut app, marble, &[wall]);
+        frames(&mut app, 128);
+        assert!(height(&app, marble) < -5.0, "{response:?}");
+        let next = scene::drop_marble(&mut app, 0.5, Vec3::Y * 3.7);
+        frames(&mut app, 64);
+        assert!((height(&app, next) - 3.65).abs() < 0.1, "{response:?}");
+        app.world_mut().entity_mut(wall).insert(OneWay(Dir3::NEG_Y));
+        frames(&mut app, 64);
+        assert!(height(&app, next) < 0.0, "{response:?}");
+    }
+}
+
+#[test]
+fn without_the_component_a_wall_is_solid_from_all_sides() {
+    let mut app = app(Response::SoftStep);
+    let place = Transform::from_xyz(0.0, 3.0, 0.0);
+    let wall = (Wall::from(Cuboid::new(6.0, 0.3, 6.0)), OneWay::default(), place);
+    let wall = app.world_mut().spawn(wall).id();
+    let jump = |app: &mut App| {
+        let marble = scene::drop_marble(app, 0.5, Vec3::ZERO);
+        app.world_mut().entity_mut(marble).insert(Velocity(Vec3::Y * 11.0));
+        frames(app, 64);
+        let at = height(app, marble);
+        app.world_mut().entity_mut(marble).despawn();
+        at
+    };
+    assert!(jump(&mut app) > 3.6);
+    app.world_mut().entity_mut(wall).remove::<OneWay>();
+    assert!(jump(&mut app) < 2.4);
+    app.world_mut().entity_mut(wall).insert(OneWay(Dir3::Y));
+    assert!(jump(&mut app) > 3.6);
 }

@@ -1,5 +1,5 @@
-//! Marbles that pass through others: through some for as long as they are named, or through all for a
-//! time.
+//! Marbles that pass through others: through those that they name, through all for a time, and through
+//! one-way walls.
 
 use bevy::prelude::*;
 use taw::world::ColliderId;
@@ -52,6 +52,35 @@ impl ColliderDisabled {
     #[must_use]
     pub const fn for_seconds(seconds: f32) -> Self {
         Self { time_left: Some(seconds) }
+    }
+}
+
+/// Makes a one-way wall of a [`Wall`](crate::wall::Wall): marbles that come from behind or from the side
+/// pass through it, and land on what of it faces along this direction, in the frame of the entity. A
+/// platform to jump through, a turnstile.
+///
+/// A marble that is in the wall or comes from behind is not touched until it is wholly out. To drop a
+/// marble through, let it name the wall by [`IgnoreCollisions`] for a while. May change at any time. Balls
+/// of swarms and queries meet it from all sides.
+///
+/// Before each substep (of `SoftStep`, each step), all marbles are looked at for each such wall.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// fn spawn(mut commands: Commands) {
+///     let platform = Wall::from(Cuboid::new(4.0, 0.2, 4.0));
+///     commands.spawn((platform, OneWay::default(), Transform::from_xyz(0.0, 2.0, 0.0)));
+/// }
+/// ```
+#[derive(Component, Clone, Copy, Debug, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct OneWay(pub Dir3);
+
+impl Default for OneWay {
+    /// Upwards.
+    fn default() -> Self {
+        Self(Dir3::Y)
     }
 }
 

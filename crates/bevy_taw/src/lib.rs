@@ -46,7 +46,7 @@
 //! | [`zones`] | gravity and wind of their own in places |
 //! | [`spatial_query`] | rays, shapes and points among marbles and walls |
 //! | [`snapshot`] | back in time, and rows without entities |
-//! | [`ignore`] | marbles that pass through others |
+//! | [`ignore`] | marbles that pass through others, one-way walls |
 //! | [`ignored`] | components that the model does not read |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
 //! | [`diagnostics`] | step time and counts |
@@ -123,7 +123,7 @@ pub mod prelude {
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;
     pub use crate::grounded::{Ground, Grounded};
-    pub use crate::ignore::{ColliderDisabled, IgnoreCollisions};
+    pub use crate::ignore::{ColliderDisabled, IgnoreCollisions, OneWay};
     pub use crate::ignored::IgnoredComponents;
     pub use crate::layers::{CollisionLayers, LayerMask, PhysicsLayer};
     #[cfg(feature = "render")]

@@ -11,7 +11,7 @@ use crate::components::{
 use crate::controller::MarbleController;
 use crate::diagnostics::{self, StepTimes};
 use crate::grounded::Grounded;
-use crate::ignore::{self, ColliderDisabled, IgnoreCollisions};
+use crate::ignore::{self, ColliderDisabled, IgnoreCollisions, OneWay};
 use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::layers::CollisionLayers;
@@ -119,7 +119,7 @@ impl Plugin for TawPlugin {
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(Grounded, MarbleController, GravityZone, WindZone)>()
-            .register_type::<(IgnoreCollisions, ColliderDisabled)>()
+            .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay)>()
             .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity)>();
         diagnostics::register(app);
         sensor::register(app);

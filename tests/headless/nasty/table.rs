@@ -62,6 +62,7 @@ pub const TABLE: &[(&str, &str, Takes)] = &[
     ("Transform", ".rotation", Takes::Some),
     ("Transform", ".scale", Takes::All),
     ("Wall", "", Takes::Some),
+    ("OneWay", ".0", Takes::Some),
     ("Grounded", ".max_slope", Takes::Within(0.0, std::f32::consts::PI)),
     ("MarbleController", ".direction", Takes::Finite),
     ("MarbleController", ".jump_speed", Takes::Finite),
@@ -124,7 +125,8 @@ fn marble(entity: &mut EntityWorldMut) {
 }
 
 fn wall(entity: &mut EntityWorldMut, wall: Wall) {
-    entity.insert((wall, SurfaceMaterial::default(), SurfaceVelocity(Vec3::ZERO), BELOW));
+    let optional = (SurfaceMaterial::default(), SurfaceVelocity(Vec3::ZERO), OneWay::default());
+    entity.insert((wall, optional, BELOW));
 }
 
 fn zone(entity: &mut EntityWorldMut, zone: GravityZone) {
@@ -147,7 +149,8 @@ const OF_MARBLES: &[&str] = &[
     "Transform",
 ];
 const BELOW: Transform = Transform::from_xyz(0.0, -5.0, 0.0);
-pub const OF_WALLS: &[&str] = &["Wall", "SurfaceMaterial", "SurfaceVelocity", "Transform"];
+pub const OF_WALLS: &[&str] =
+    &["Wall", "SurfaceMaterial", "SurfaceVelocity", "OneWay", "Transform"];
 
 pub fn samples() -> Vec<Sample> {
     let mut samples: Vec<Sample> = vec![

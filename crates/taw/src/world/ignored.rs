@@ -1,5 +1,6 @@
 //! Pairs that pass through each other.
 
+use super::one_way::OneWayState;
 use super::{ColliderId, MarbleId, Marbles, World};
 use crate::Error;
 use crate::broad::{CollisionFilter, IgnoredPairs};
@@ -57,10 +58,11 @@ impl<S: Scalar> Marbles<S> {
 }
 
 impl<S: Scalar> World<S> {
-    /// Finds the rows of the pairs that pass through each other. Each verb begins with it, since the
+    /// Finds the rows of the pairs that pass through each other: those that are named, and those of
+    /// one-way walls and what these let through. Each verb begins with it, since the
     /// user may have added and removed some before.
     pub(super) fn find_ignored_rows(&mut self) {
-        if self.marbles.ignored.is_empty() {
+        if self.marbles.ignored.is_empty() && self.memory.one_way.is_empty() {
             self.marbles.ignored_rows = IgnoredPairs::default();
             return;
         }
@@ -73,6 +75,11 @@ impl<S: Scalar> World<S> {
                     ColliderId::Wall(wall) => (&mut of_walls, self.walls.row(wall)),
                 };
                 pairs.extend(other.map(|other| [row as u32, other as u32]));
+            }
+        }
+        for OneWayState { wall, marble, .. } in self.memory.one_way.iter().filter(|it| !it.held) {
+            if let (Ok(marble), Ok(wall)) = (self.marbles.row(*marble), self.walls.row(*wall)) {
+                of_walls.push([marble as u32, wall as u32]);
             }
         }
         self.marbles.ignored_rows = IgnoredPairs::new(of_marbles, of_walls);

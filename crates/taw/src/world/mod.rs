@@ -22,6 +22,7 @@ mod marbles;
 mod method;
 mod model;
 mod narrow_phase;
+mod one_way;
 mod penalty;
 mod quarantine;
 mod query;
@@ -39,6 +40,7 @@ mod swept_walls;
 #[cfg(test)]
 mod tests;
 mod wall_changes;
+mod wall_layers;
 mod wall_shape;
 mod walls;
 

@@ -47,6 +47,7 @@ impl<S: Scalar> World<S> {
         let dt = Self::validated_dt(dt)?;
         self.check_shapes()?;
         self.check_crowding()?;
+        self.decide_one_way(dt);
         self.find_ignored_rows();
         self.sensors.begin_substep(&self.marbles);
         self.audit_before();

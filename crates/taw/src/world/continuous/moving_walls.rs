@@ -166,7 +166,7 @@ impl<S: Scalar> Walls<S> {
     }
 
     /// Motion of the wall at an index, if it was set to another pose since the last step.
-    pub(super) fn swept_motion_of_row(&self, row: usize) -> Option<WallMotion<S>> {
+    pub(in crate::world) fn swept_motion_of_row(&self, row: usize) -> Option<WallMotion<S>> {
         let motion = self.motion_of_row(row).filter(|_| self.has_moved(row))?;
         (!motion.velocity.is_zero() || !motion.angular_velocity.is_zero()).then_some(motion)
     }
