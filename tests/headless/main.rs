@@ -18,6 +18,7 @@ mod moving_walls;
 mod nasty;
 mod queries;
 mod scene;
+mod schedules;
 mod sensors;
 mod snapshots;
 mod soft_step;

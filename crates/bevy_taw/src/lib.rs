@@ -23,7 +23,8 @@
 //! ```
 //!
 //! # What a step does
-//! Once per [`FixedUpdate`], in the sets of [`TawSystems`]:
+//! Once per [`FixedUpdate`] (or another schedule: [`TawPlugins::in_schedule`]), in the sets of
+//! [`TawSystems`]:
 //!
 //! 1. **Gather**: what changed in components and resources goes into the
 //!    [`TawWorld`]. A `Transform` that somebody else wrote teleports its marble.
@@ -96,6 +97,7 @@ mod reflect;
 pub mod refusal;
 pub mod resources;
 mod scatter;
+mod schedule;
 pub mod sensor;
 mod sleep;
 pub mod snapshot;
@@ -110,6 +112,7 @@ pub mod wall_motion;
 pub mod zones;
 
 pub use plugin::{Substep, SubstepDelta, TawPlugin, TawPlugins, TawSystems};
+pub use schedule::TawSchedule;
 pub use taw;
 
 /// What nearly every game needs.
@@ -138,7 +141,7 @@ pub mod prelude {
     pub use crate::swarm::{Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;
     pub use crate::zones::{GravityZone, WindZone};
-    pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
+    pub use crate::{Substep, TawPlugin, TawPlugins, TawSchedule, TawSystems};
     pub use taw::motion::{ForceField, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};
     pub use taw::swarm::{Ball, SwarmModel, Tier};
