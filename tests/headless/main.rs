@@ -16,6 +16,7 @@ mod mesh_walls;
 mod motion;
 mod moving_walls;
 mod nasty;
+mod picking;
 mod queries;
 mod scene;
 mod schedules;

@@ -7,7 +7,7 @@ use bevy_taw::prelude::*;
 
 use crate::scene::{self, STEP, frame_length, frames, position, random};
 
-/// What a game notes in its steps.
+/// Notes of a game in its steps.
 #[derive(Resource, Default, Clone, Debug, PartialEq)]
 struct Notes {
     contacts: Vec<(ContactPair, Vec3)>,

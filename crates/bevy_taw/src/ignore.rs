@@ -48,7 +48,7 @@ pub struct ColliderDisabled {
 }
 
 impl ColliderDisabled {
-    /// For some seconds, at least zero.
+    /// Ghost for so many seconds, at least zero.
     #[must_use]
     pub const fn for_seconds(seconds: f32) -> Self {
         Self { time_left: Some(seconds) }

@@ -53,6 +53,7 @@
 //! | [`diagnostics`] | step time and counts |
 //! | [`wall_motion`] | speed of walls that move |
 //! | [`interpolation`] | smooth motion between fixed steps |
+//! | `picking` (feature `picking`) | pointers on marbles and walls |
 //! | `mesh_walls` (feature `render`) | walls of meshes, meshes of walls |
 //! | `gizmos` (feature `render`) | contacts, normals, velocities and the grid, drawn |
 //! | `swarm_render` (feature `render`) | swarms on the screen |
@@ -92,6 +93,8 @@ pub mod layers;
 #[cfg(feature = "render")]
 pub mod mesh_walls;
 pub mod messages;
+#[cfg(feature = "picking")]
+pub mod picking;
 mod plugin;
 mod reflect;
 pub mod refusal;
@@ -134,6 +137,8 @@ pub mod prelude {
     pub use crate::messages::{
         ContactEnded, ContactHit, ContactOngoing, ContactPair, ContactStarted,
     };
+    #[cfg(feature = "picking")]
+    pub use crate::picking::TawPickingPlugin;
     pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
     pub use crate::sensor::{CollidingEntities, Sensor, SensorEntered, SensorLeft};
