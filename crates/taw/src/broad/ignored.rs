@@ -10,6 +10,8 @@ pub(crate) struct IgnoredPairs {
     pub balls: Vec<[u32; 2]>,
     /// A ball and a wall; sorted.
     pub walls: Vec<[u32; 2]>,
+    /// Number of removals of marbles and of walls when they were found; none while others are named.
+    pub found_at: Option<[u64; 2]>,
 }
 
 impl IgnoredPairs {
@@ -22,7 +24,7 @@ impl IgnoredPairs {
             pairs.sort_unstable();
             pairs.dedup();
         }
-        Self { balls, walls }
+        Self { balls, walls, found_at: None }
     }
 
     /// Returns true without any pair.
@@ -75,7 +77,7 @@ impl PartialEq for IgnoredPairs {
     }
 }
 
-/// What a ball collides with.
+/// Collision filter of a ball.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CollisionFilter<'a> {
     pub layers: CollisionLayers,

@@ -156,7 +156,7 @@ impl SurfaceOf<'_> {
         }
     }
 
-    /// What the ball in a row collides with.
+    /// Collision filter of the ball in a row.
     #[inline]
     pub fn filter(&self, row: u32) -> CollisionFilter<'_> {
         let ignored = &self.surfaces.ignored;

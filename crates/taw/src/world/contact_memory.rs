@@ -15,7 +15,7 @@ pub(super) struct ContactMemory<S> {
     pub springs: Vec<SpringHistory<S>>,
     /// Impulses of the clusters at rest of [`Response::EventDriven`](crate::response::Response).
     pub event_impulses: Vec<CachedImpulse<f64>>,
-    /// What one-way walls decided, sorted by wall and marble.
+    /// Decisions of one-way walls, sorted by wall and marble.
     pub one_way: Vec<OneWayState>,
     /// Who had which row then: a removal moves another marble or wall into its row.
     marbles: Vec<MarbleId>,

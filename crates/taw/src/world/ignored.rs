@@ -24,6 +24,7 @@ impl<S: Scalar> Marbles<S> {
         } else {
             self.ignored.insert(id, ignored.to_vec());
         }
+        self.ignored_rows.found_at = None;
         Ok(())
     }
 
@@ -41,7 +42,7 @@ impl<S: Scalar> Marbles<S> {
         self.ignored.keys().copied()
     }
 
-    /// What a marble collides with.
+    /// Collision filter of a marble.
     #[inline]
     pub(super) fn filter_of_row(&self, row: usize) -> CollisionFilter<'_> {
         let ignored = self.ignored_rows.walls_of(row as u32);
@@ -62,8 +63,8 @@ impl<S: Scalar> World<S> {
     /// one-way walls and what these let through. Each verb begins with it, since the
     /// user may have added and removed some before.
     pub(super) fn find_ignored_rows(&mut self) {
-        if self.marbles.ignored.is_empty() && self.memory.one_way.is_empty() {
-            self.marbles.ignored_rows = IgnoredPairs::default();
+        let now = Some([self.marbles.removals(), self.walls.removals()]);
+        if self.marbles.ignored_rows.found_at == now {
             return;
         }
         let (mut of_marbles, mut of_walls) = (Vec::new(), Vec::new());
@@ -82,14 +83,15 @@ impl<S: Scalar> World<S> {
                 of_walls.push([marble as u32, wall as u32]);
             }
         }
-        self.marbles.ignored_rows = IgnoredPairs::new(of_marbles, of_walls);
+        let found = IgnoredPairs::new(of_marbles, of_walls);
+        self.marbles.ignored_rows = IgnoredPairs { found_at: now, ..found };
     }
 
     /// Tells the swarm which marbles pass through each other and through walls.
     pub(super) fn tell_ignored_to_swarm(&mut self) {
         let (marbles, swarm) = (&self.marbles, &self.swarm);
         let slot = |row: u32| slot_of(marbles, swarm, row);
-        let IgnoredPairs { balls, walls } = &marbles.ignored_rows;
+        let IgnoredPairs { balls, walls, .. } = &marbles.ignored_rows;
         let balls = balls.iter().filter_map(|[a, b]| Some([slot(*a)?, slot(*b)?])).collect();
         let walls = walls.iter().filter_map(|[row, wall]| Some([slot(*row)?, *wall])).collect();
         self.swarm.set_ignored(IgnoredPairs::new(balls, walls));

@@ -70,7 +70,7 @@ pub struct Marbles<S> {
     pub(super) layers: SparseColumn<CollisionLayers>,
     /// Marbles that never sleep.
     pub(super) sleeping_disabled: SparseColumn<()>,
-    /// What marbles pass through; see `ignored.rs`.
+    /// Lists of whom marbles pass through; see `ignored.rs`.
     pub(super) ignored: BTreeMap<MarbleId, Vec<ColliderId>>,
     /// Rows of these pairs.
     pub(super) ignored_rows: IgnoredPairs,

@@ -24,7 +24,7 @@ const SIDE: f64 = 0.05;
 /// responses with springs let it sink in by a tenth.
 const LIES: f64 = 0.5;
 
-/// What a one-way wall decided of a marble before the last substep.
+/// Decision of a one-way wall about a marble before the last substep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct OneWayState {
     pub wall: WallId,
@@ -82,10 +82,11 @@ fn unit_direction<S: Scalar>(direction: Vec3<S>) -> Result<Vec3<S>, Error> {
 impl<S: Scalar> World<S> {
     /// Decides which marbles one-way walls hold in a substep of `dt` seconds.
     pub(super) fn decide_one_way(&mut self, dt: S) {
-        let before = std::mem::take(&mut self.memory.one_way);
-        if self.walls.one_way.is_empty() {
+        if self.walls.one_way.is_empty() && self.memory.one_way.is_empty() {
             return;
         }
+        let before = std::mem::take(&mut self.memory.one_way);
+        self.marbles.ignored_rows.found_at = None;
         // Walls that move are where they will be at the end of the substep, or of the step.
         let interpolates = method_of::<S>(self.settings.model.response).interpolates_walls();
         let time = if interpolates { dt } else { dt + self.scratch.rest_of_step };

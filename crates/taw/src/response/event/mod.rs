@@ -274,7 +274,7 @@ impl EventDriven {
         stopped
     }
 
-    /// What a ball collides with.
+    /// Collision filter of a ball.
     fn filter(&self, row: usize) -> CollisionFilter<'_> {
         let ignored = self.ignored.walls_of(row as u32);
         CollisionFilter { layers: self.balls[row].layers, ignored }
