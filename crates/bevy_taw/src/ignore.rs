@@ -27,8 +27,8 @@ use crate::resources::TawWorld;
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct IgnoreCollisions(#[entities] pub Vec<Entity>);
 
-/// A marble that meets nothing: no marble, wall, ball or sensor, as if it were in no layer. Removed when
-/// its time is over.
+/// A marble that meets nothing: no marble, wall, ball or sensor, and so no zone, as if it were in no layer.
+/// Queries without a mask find it. Removed when its time is over.
 ///
 /// A marble that is within another or in a wall by then is moved out as any other that begins so: by the
 /// response, most of them slowly.

@@ -55,7 +55,7 @@
 //! | [`interpolation`] | smooth motion between fixed steps |
 //! | `picking` (feature `picking`) | pointers on marbles and walls |
 //! | `mesh_walls` (feature `render`) | walls of meshes, meshes of walls |
-//! | `gizmos` (feature `render`) | contacts, normals, velocities and the grid, drawn |
+//! | `gizmos` (feature `render`) | contacts, normals, velocities, sensors and the grid, drawn |
 //! | `swarm_render` (feature `render`) | swarms on the screen |
 //! | `debug_ui` (feature `debug_ui`) | egui panels for any game |
 //! | `trade` (feature `trade`) | what every model would cost and buy, measured beside the game |
@@ -93,6 +93,8 @@ pub mod layers;
 #[cfg(feature = "render")]
 pub mod mesh_walls;
 pub mod messages;
+#[cfg(feature = "render")]
+mod outline;
 #[cfg(feature = "picking")]
 pub mod picking;
 mod plugin;
