@@ -303,6 +303,29 @@ fn judge(world: &mut World<f64>, model: Model, round: u32) {
     assert!(*world == copy, "{model:?} {round}");
 }
 
+/// A field of marbles sleeps at its far end while one jumps through a platform at the other.
+#[test]
+fn a_marble_that_passes_wakes_none_that_is_far_away() {
+    let (mut world, _) = world::<f32>(Model::GAME, platform(2.0, 0.3));
+    world.walls.insert(Plane::new(Vec3::unit_y(), -3.0).unwrap()).unwrap();
+    let ids: Vec<_> = (0..2_400_u32)
+        .map(|i| [f64::from(i / 8) * 1.2, -2.5, f64::from(i % 8) * 1.2])
+        .map(|at| world.marbles.insert(marble(at, [0.0; 3])).unwrap())
+        .collect();
+    run(&mut world, 3.0);
+    assert!(ids.iter().all(|id| world.is_asleep(*id).unwrap()));
+    world.marbles.set_velocity(ids[0], vector([0.0, 11.0, 0.0])).unwrap();
+    let mut highest = f64::MIN;
+    for _ in 0..192 {
+        run(&mut world, STEP);
+        highest = highest.max(height(&world, ids[0]));
+        assert!(world.is_asleep(ids[2_399]).unwrap(), "at {} m", height(&world, ids[0]));
+    }
+    assert!(highest > 1.0, "{highest} m");
+    let at = height(&world, ids[0]);
+    assert!((at - 0.5).abs() < 0.06, "it lies on the platform: {at} m");
+}
+
 #[test]
 fn a_direction_has_a_length_and_a_wall() {
     let (mut world, wall) = world::<f32>(Model::default(), plane());

@@ -92,7 +92,9 @@ impl Swarm {
             }
         }
         self.surfaces.ignored = ignored;
-        self.forget_contacts();
+        // Unlike other walls, that would wake all.
+        self.cache_impulses();
+        self.pairs_valid = false;
     }
 
     /// Has pairs and balls at walls found anew, with the impulses that they have.

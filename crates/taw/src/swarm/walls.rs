@@ -29,8 +29,8 @@ pub(crate) trait StaticGeometry: Sync {
     /// Says if there is anything else, and if some of it may be in a box.
     fn has_shapes(&self) -> bool;
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;
-    /// Visits what else is within `reach` metres of a ball that its filter lets collide, without ghost collisions:
-    /// the wall and its part, the normal, and the distance of the center.
+    /// Visits what else is within `reach` metres of a ball and collides with it by this filter, without
+    /// ghost collisions: the wall and its part, the normal, and the distance of the center.
     fn shapes_at(
         &self,
         ball: &Row,

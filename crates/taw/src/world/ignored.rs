@@ -60,8 +60,8 @@ impl<S: Scalar> Marbles<S> {
 
 impl<S: Scalar> World<S> {
     /// Finds the rows of the pairs that pass through each other: those that are named, and those of
-    /// one-way walls and what these let through. Each verb begins with it, since the
-    /// user may have added and removed some before.
+    /// one-way walls and what these let through. Each verb begins with it: the user may have named others
+    /// before, or taken some out.
     pub(super) fn find_ignored_rows(&mut self) {
         let now = Some([self.marbles.removals(), self.walls.removals()]);
         if self.marbles.ignored_rows.found_at == now {

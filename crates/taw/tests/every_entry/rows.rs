@@ -372,9 +372,7 @@ fn walls<S: Scalar>() -> Vec<Row<S>> {
             pose.validated()?;
             with_pose(p, pose)
         };
-        World 6 "Pose.translation": |p, x| {
-            with_pose(p, pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x)))
-        };
+        World 6 "Pose.translation": |p, x| with_pose(p, pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x)));
         World 1 "WallShape::transformed": |p, x| {
             let pose = pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x));
             let moved = p.world.walls.get(p.wall)?.transformed(pose)?;
