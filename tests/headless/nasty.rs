@@ -319,6 +319,7 @@ fn every_public_component_and_resource_has_a_row() {
     let without = [
         "CollidingEntities",
         "CollisionLayers",
+        "IgnoreCollisions",
         "Kinematic",
         "MarbleIntegrator",
         "MarbleRotation",

@@ -15,6 +15,7 @@ use crate::components::{
 };
 use crate::convert::{to_point, to_rotation, to_vector};
 use crate::diagnostics::StepTimes;
+use crate::ignore::ColliderDisabled;
 use crate::layers::CollisionLayers;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
@@ -75,6 +76,7 @@ type OptionalComponents<'a> = (
     Option<&'a MarbleRotation>,
     Option<&'a SleepingDisabled>,
     Option<&'a CollisionLayers>,
+    Option<&'a ColliderDisabled>,
 );
 
 impl SeenMarble {
@@ -91,6 +93,7 @@ impl SeenMarble {
             rotation_model,
             sleeping_disabled,
             layers,
+            disabled,
         ) = optional;
         Self {
             translation: bits(transform.translation),
@@ -105,7 +108,11 @@ impl SeenMarble {
             material: material.map(SurfaceMaterial::bits),
             integrator: integrator.map(|i| **i),
             rotation_model: rotation_model.map(|r| **r),
-            layers: layers.copied().unwrap_or_default(),
+            layers: if disabled.is_some() {
+                CollisionLayers::NONE
+            } else {
+                layers.copied().unwrap_or_default()
+            },
             sleeping_disabled: sleeping_disabled.is_some(),
         }
     }
@@ -156,6 +163,7 @@ type WrittenAsleep = (
         Changed<MarbleRotation>,
         Changed<SleepingDisabled>,
         Changed<CollisionLayers>,
+        Changed<ColliderDisabled>,
     )>,
 );
 

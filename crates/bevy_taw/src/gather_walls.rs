@@ -12,6 +12,7 @@ use crate::components::{
     rotation_bits,
 };
 use crate::convert::{all_finite, to_point, to_rotation, to_vector};
+use crate::ignore::OneWay;
 use crate::layers::CollisionLayers;
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
@@ -77,16 +78,22 @@ fn finite_place(transforms: &TransformHelper, entity: Entity) -> Option<Isometry
     is_finite(place).then_some(place)
 }
 
+type OptionalComponents<'a> = (
+    Option<&'a SurfaceMaterial>,
+    Option<&'a CollisionLayers>,
+    Option<&'a SurfaceVelocity>,
+    Option<&'a OneWay>,
+);
 type WallComponents<'a> = (
     (Entity, &'a Transform, Has<Marble>, Has<Sensor>),
     Ref<'a, Wall>,
-    (Option<&'a SurfaceMaterial>, Option<&'a CollisionLayers>, Option<&'a SurfaceVelocity>),
+    OptionalComponents<'a>,
     &'a mut WallState,
 );
 type WallItem<'a> = (
     (Entity, &'a Transform, bool, bool),
     Ref<'a, Wall>,
-    (Option<&'a SurfaceMaterial>, Option<&'a CollisionLayers>, Option<&'a SurfaceVelocity>),
+    OptionalComponents<'a>,
     Mut<'a, WallState>,
 );
 
@@ -178,7 +185,7 @@ impl Gathering<'_, '_> {
     /// Takes over one wall or sensor.
     fn take_over(
         &mut self,
-        ((entity, own, is_marble, is_sensor), wall, (material, layers, surface), state): &mut WallItem,
+        ((entity, own, is_marble, is_sensor), wall, optional, state): &mut WallItem,
         place: Option<GlobalTransform>,
         clock: Clock,
     ) {
@@ -227,12 +234,14 @@ impl Gathering<'_, '_> {
             self.refusals.check(Some(entity), Err(no_frame));
             return self.stop(state);
         }
+        let (material, layers, surface, one_way) = *optional;
         let surface = surface
             .copied()
             .filter(|surface| self.refusals.check(Some(entity), finite_surface(*surface)));
         self.put(entity, state, now, (clock, *is_sensor, surface));
-        self.make_of(entity, state, *material);
+        self.make_of(entity, state, material);
         self.put_into_layers(entity, state, layers.copied().unwrap_or_default());
+        self.let_through(entity, state, one_way);
     }
 
     /// Takes a wall or sensor out of the world.
@@ -332,6 +341,18 @@ impl Gathering<'_, '_> {
         };
         state.layers = layers;
         self.refusals.check(Some(entity), set);
+    }
+
+    /// Makes a one-way wall of a wall, or one that is solid from all sides.
+    fn let_through(&mut self, entity: Entity, state: &WallState, one_way: Option<&OneWay>) {
+        let (Some(id), Some((_, rotation))) = (state.id, state.posed) else { return };
+        let rotation = Quat::from_array(rotation.map(f32::from_bits));
+        let direction =
+            one_way.map(|OneWay(direction)| to_vector(rotation * Vec3::from(*direction)));
+        if direction.is_some() || self.world.walls.one_way(id) != Ok(None) {
+            let set = self.world.walls.set_one_way(id, direction);
+            self.refusals.check(Some(entity), set);
+        }
     }
 
     /// Gives a wall its material.

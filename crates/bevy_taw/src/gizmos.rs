@@ -1,4 +1,4 @@
-//! The physics, drawn: contacts, normals, velocities and the grid.
+//! The physics, drawn: contacts, normals, velocities, sensors and the grid.
 //!
 //! All of it is in one [`GizmoConfigGroup`], [`TawGizmos`], and off until switched
 //! on there.
@@ -9,6 +9,7 @@ use bevy::prelude::*;
 use taw::contact::Contact;
 
 use crate::convert::{from_point, from_vector};
+use crate::outline;
 use crate::resources::TawWorld;
 
 /// What to draw, and how large. Change it through Bevy's [`GizmoConfigStore`].
@@ -22,6 +23,9 @@ pub struct TawGizmos {
     pub normals: bool,
     /// Velocities times [`TawGizmos::velocity_scale`].
     pub velocities: bool,
+    /// The outlines of sensors, in another color while a marble is inside. Of a half-space, a part of its
+    /// surface.
+    pub sensors: bool,
     /// The occupied cells of the grid's coarsest level.
     pub grid: bool,
     /// In metres.
@@ -36,6 +40,7 @@ impl Default for TawGizmos {
             contacts: false,
             normals: false,
             velocities: false,
+            sensors: false,
             grid: false,
             normal_length: 0.5,
             velocity_scale: 0.1,
@@ -60,7 +65,7 @@ impl Plugin for TawGizmosPlugin {
     }
 }
 
-fn draw(world: Res<TawWorld>, mut gizmos: Gizmos<TawGizmos>) {
+fn draw(world: Res<TawWorld>, places: Query<&GlobalTransform>, mut gizmos: Gizmos<TawGizmos>) {
     let config = gizmos.config_ext.clone();
     if config.contacts || config.normals {
         let mut contact = |contact: &Contact<f32>| {
@@ -84,6 +89,9 @@ fn draw(world: Res<TawWorld>, mut gizmos: Gizmos<TawGizmos>) {
             let end = position + from_vector(*velocity) * config.velocity_scale;
             gizmos.arrow(position, end, tailwind::SKY_300);
         }
+    }
+    if config.sensors {
+        outline::sensors(&world, &places, &mut gizmos);
     }
     if config.grid {
         let (cells, width) = world.grid().occupied_cells();

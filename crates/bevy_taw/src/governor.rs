@@ -99,7 +99,7 @@ pub(crate) fn govern(
     mut model: ResMut<TawModel>,
     mut told: MessageWriter<ModelGoverned>,
     times: Res<StepTimes>,
-    time: Res<Time<Fixed>>,
+    time: Res<Time>,
 ) {
     let governor = governor.bypass_change_detection();
     let Some(budget) = governor.budget else {
@@ -112,7 +112,7 @@ pub(crate) fn govern(
     let front: Vec<_> = trade.front().map(|choice| (choice.setting.model, choice.cost)).collect();
     if front.is_empty() {
         if !governor.asked && !world.marbles.is_empty() {
-            trade.measure(world.bypass_change_detection(), time.timestep());
+            trade.measure(world.bypass_change_detection(), time.delta());
             governor.asked = true;
         }
         return;

@@ -34,16 +34,22 @@ use crate::components::{Eased, Marble, MarbleState, Teleport, bits, rotation_bit
 use crate::convert::{from_point, from_rotation, to_point, to_rotation};
 use crate::resources::TawWorld;
 use crate::scatter::{Frame, put};
+use crate::schedule::TawSchedule;
 
 pub use bevy_transform_interpolation as transform_interpolation;
 
 /// Interpolates every marble's translation, and its rotation if the model has one.
-/// A marble with `NoTransformEasing` is left out.
+/// A marble with `NoTransformEasing` is left out. Does nothing where the step is
+/// [in a schedule](crate::TawPlugins::in_schedule) outside of the fixed main loop.
 #[derive(Debug, Default)]
 pub struct TawInterpolationPlugin;
 
 impl Plugin for TawInterpolationPlugin {
     fn build(&self, app: &mut App) {
+        let schedule = TawSchedule::of(app);
+        if !schedule.is_fixed(app.world()) {
+            return;
+        }
         if !app.is_plugin_added::<TransformInterpolationPlugin>() {
             app.add_plugins(TransformInterpolationPlugin::default());
         }
@@ -62,8 +68,14 @@ impl Plugin for TawInterpolationPlugin {
             ),
         )
         // By then, what carries marbles is where its last step took it.
-        .add_systems(FixedFirst, undo_children.after(TransformEasingSystems::Reset))
-        .add_systems(FixedUpdate, note_start.after(TawSystems::Gather).before(TawSystems::Step))
+        .add_systems(
+            FixedFirst,
+            undo_children.after(TransformEasingSystems::Reset).before(TawSystems::Control),
+        )
+        .add_systems(
+            schedule.label(),
+            note_start.after(TawSystems::Gather).before(TawSystems::Step),
+        )
         // And by now, where this frame took it.
         .add_systems(PostUpdate, ease_children.before(TransformSystems::Propagate));
     }

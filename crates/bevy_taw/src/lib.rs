@@ -23,7 +23,8 @@
 //! ```
 //!
 //! # What a step does
-//! Once per [`FixedUpdate`], in the sets of [`TawSystems`]:
+//! Once per [`FixedUpdate`] (or another schedule: [`TawPlugins::in_schedule`]), in the sets of
+//! [`TawSystems`]:
 //!
 //! 1. **Gather**: what changed in components and resources goes into the
 //!    [`TawWorld`]. A `Transform` that somebody else wrote teleports its marble.
@@ -46,13 +47,15 @@
 //! | [`zones`] | gravity and wind of their own in places |
 //! | [`spatial_query`] | rays, shapes and points among marbles and walls |
 //! | [`snapshot`] | back in time, and rows without entities |
+//! | [`ignore`] | marbles that pass through others, one-way walls |
 //! | [`ignored`] | components that the model does not read |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
 //! | [`diagnostics`] | step time and counts |
 //! | [`wall_motion`] | speed of walls that move |
 //! | [`interpolation`] | smooth motion between fixed steps |
+//! | `picking` (feature `picking`) | pointers on marbles and walls |
 //! | `mesh_walls` (feature `render`) | walls of meshes, meshes of walls |
-//! | `gizmos` (feature `render`) | contacts, normals, velocities and the grid, drawn |
+//! | `gizmos` (feature `render`) | contacts, normals, velocities, sensors and the grid, drawn |
 //! | `swarm_render` (feature `render`) | swarms on the screen |
 //! | `debug_ui` (feature `debug_ui`) | egui panels for any game |
 //! | `trade` (feature `trade`) | what every model would cost and buy, measured beside the game |
@@ -83,17 +86,23 @@ pub mod gizmos;
 #[cfg(feature = "trade")]
 pub mod governor;
 pub mod grounded;
+pub mod ignore;
 pub mod ignored;
 pub mod interpolation;
 pub mod layers;
 #[cfg(feature = "render")]
 pub mod mesh_walls;
 pub mod messages;
+#[cfg(feature = "render")]
+mod outline;
+#[cfg(feature = "picking")]
+pub mod picking;
 mod plugin;
 mod reflect;
 pub mod refusal;
 pub mod resources;
 mod scatter;
+mod schedule;
 pub mod sensor;
 mod sleep;
 pub mod snapshot;
@@ -108,6 +117,7 @@ pub mod wall_motion;
 pub mod zones;
 
 pub use plugin::{Substep, SubstepDelta, TawPlugin, TawPlugins, TawSystems};
+pub use schedule::TawSchedule;
 pub use taw;
 
 /// What nearly every game needs.
@@ -121,6 +131,7 @@ pub mod prelude {
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;
     pub use crate::grounded::{Ground, Grounded};
+    pub use crate::ignore::{ColliderDisabled, IgnoreCollisions, OneWay};
     pub use crate::ignored::IgnoredComponents;
     pub use crate::layers::{CollisionLayers, LayerMask, PhysicsLayer};
     #[cfg(feature = "render")]
@@ -128,6 +139,8 @@ pub mod prelude {
     pub use crate::messages::{
         ContactEnded, ContactHit, ContactOngoing, ContactPair, ContactStarted,
     };
+    #[cfg(feature = "picking")]
+    pub use crate::picking::TawPickingPlugin;
     pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
     pub use crate::sensor::{CollidingEntities, Sensor, SensorEntered, SensorLeft};
@@ -135,7 +148,7 @@ pub mod prelude {
     pub use crate::swarm::{Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;
     pub use crate::zones::{GravityZone, WindZone};
-    pub use crate::{Substep, TawPlugin, TawPlugins, TawSystems};
+    pub use crate::{Substep, TawPlugin, TawPlugins, TawSchedule, TawSystems};
     pub use taw::motion::{ForceField, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};
     pub use taw::swarm::{Ball, SwarmModel, Tier};

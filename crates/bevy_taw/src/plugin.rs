@@ -11,12 +11,14 @@ use crate::components::{
 use crate::controller::MarbleController;
 use crate::diagnostics::{self, StepTimes};
 use crate::grounded::Grounded;
+use crate::ignore::{self, ColliderDisabled, IgnoreCollisions, OneWay};
 use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::layers::CollisionLayers;
 use crate::messages::{self, Touches};
 use crate::refusal::{self, InputRefused, MarbleStopped, Refusals, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
+use crate::schedule::{SchedulePlugin, TawSchedule};
 use crate::snapshot::RowRemoved;
 use crate::spatial_query::SpatialTree;
 use crate::swarm::{self, TawSwarmModel};
@@ -30,6 +32,31 @@ use crate::{controller, forget, gather, gather_walls, grounded, scatter, sensor,
 /// Leave one out with `TawPlugins.build().disable::<TawInterpolationPlugin>()`.
 #[derive(Debug, Default)]
 pub struct TawPlugins;
+
+impl TawPlugins {
+    /// All plugins, with the step in this schedule instead of [`FixedUpdate`]: another one of the fixed main
+    /// loop, or one that the game runs. A step takes the time that [`Time`] passes there, and none is made
+    /// where none passes.
+    ///
+    /// Outside of the fixed main loop (the [`FixedMainScheduleOrder`] when the plugins are added), nothing is
+    /// interpolated.
+    ///
+    /// ```
+    /// # use bevy::prelude::*;
+    /// # use bevy_taw::prelude::*;
+    /// # let mut app = App::new();
+    /// # app.add_plugins(MinimalPlugins);
+    /// // What `FixedUpdate` moves is stepped in the same tick.
+    /// app.add_plugins(TawPlugins::in_schedule(FixedPostUpdate));
+    /// # app.update();
+    /// ```
+    ///
+    /// [`FixedMainScheduleOrder`]: bevy::app::FixedMainScheduleOrder
+    #[must_use]
+    pub fn in_schedule(label: impl ScheduleLabel) -> PluginGroupBuilder {
+        Self.build().add_before::<TawPlugin>(SchedulePlugin::new(label))
+    }
+}
 
 impl PluginGroup for TawPlugins {
     fn build(self) -> PluginGroupBuilder {
@@ -48,16 +75,17 @@ impl PluginGroup for TawPlugins {
 #[derive(Debug, Default)]
 pub struct TawPlugin;
 
-/// Where the physics is in a frame.
+/// Where the physics is in a frame. The schedule of the step is [`FixedUpdate`], or another
+/// [`TawSchedule`].
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TawSystems {
-    /// In [`FixedUpdate`]: marbles with a [`MarbleController`] are driven.
+    /// In the schedule of the step: marbles with a [`MarbleController`] are driven.
     Control,
-    /// In [`FixedUpdate`]: components and resources go into the world.
+    /// In the schedule of the step: components and resources go into the world.
     Gather,
-    /// In [`FixedUpdate`]: runs the schedule [`Substep`], once per substep.
+    /// In the schedule of the step: runs [`Substep`], once per substep.
     Step,
-    /// In [`FixedUpdate`]: the world goes back to components and messages.
+    /// In the schedule of the step: the world goes back to components and messages.
     Scatter,
     /// In [`Substep`]: the first verb.
     Integrate,
@@ -118,6 +146,7 @@ impl Plugin for TawPlugin {
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(Grounded, MarbleController, GravityZone, WindZone)>()
+            .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay)>()
             .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity)>();
         diagnostics::register(app);
         sensor::register(app);
@@ -127,7 +156,7 @@ impl Plugin for TawPlugin {
     }
 }
 
-/// Adds what watches components go, and what runs outside of `FixedUpdate`.
+/// Adds what watches components go, and what runs outside of the step.
 fn observe(app: &mut App) {
     app.add_observer(gather::note_lost_component::<HalfLength>)
         .add_observer(gather::note_lost_component::<Velocity>)
@@ -140,10 +169,23 @@ fn observe(app: &mut App) {
         .add_observer(gather::note_lost_component::<MarbleRotation>)
         .add_observer(gather::note_lost_component::<SleepingDisabled>)
         .add_observer(gather::note_lost_component::<CollisionLayers>)
+        .add_observer(gather::note_lost_component::<ColliderDisabled>)
         .add_observer(gather::note_lost_component::<ChildOf>)
         .add_observer(forget::forget_marble)
         .add_observer(forget::forget_wall)
         .add_observer(swarm::forget);
+    app.add_systems(
+        PostUpdate,
+        scatter::stay.run_if(scatter::any_child).before(TransformSystems::Propagate),
+    );
+    if TawSchedule::of(app).is_fixed(app.world()) {
+        note_walls_between_steps(app);
+    }
+}
+
+/// Notes where walls are before and after the fixed steps of a frame, which may be many or none. (A schedule
+/// that the game runs sees where they are in each step.)
+fn note_walls_between_steps(app: &mut App) {
     app.add_systems(
         RunFixedMainLoop,
         (
@@ -155,22 +197,26 @@ fn observe(app: &mut App) {
         ),
     )
     .add_systems(Part::Begin, gather_walls::note_before_steps)
-    .add_systems(FixedFirst, run_part(Part::Begin).after(TransformEasingSystems::UpdateStart))
     .add_systems(
-        PostUpdate,
-        scatter::stay.run_if(scatter::any_child).before(TransformSystems::Propagate),
+        FixedFirst,
+        run_part(Part::Begin)
+            .after(TransformEasingSystems::UpdateStart)
+            .before(TawSystems::Control),
     );
     app.edit_schedule(Part::Begin, one_by_one);
 }
 
-/// Adds the step to `FixedUpdate`.
+/// Adds the step to its schedule.
 fn add_step(app: &mut App) {
+    let schedule = TawSchedule::of(app).label();
     app.configure_sets(
-        FixedUpdate,
-        (TawSystems::Control, TawSystems::Gather, TawSystems::Step, TawSystems::Scatter).chain(),
+        schedule,
+        (TawSystems::Control, TawSystems::Gather, TawSystems::Step, TawSystems::Scatter)
+            .chain()
+            .run_if(time_passes),
     )
     .add_systems(
-        FixedUpdate,
+        schedule,
         (
             run_part(Part::Control)
                 .run_if(any_with_component::<MarbleController>)
@@ -188,7 +234,9 @@ fn add_step(app: &mut App) {
             gather::settings,
             ignored::find,
             gather_walls::walls,
+            ignore::count_down.run_if(any_with_component::<ColliderDisabled>),
             gather::marbles,
+            ignore::gather.run_if(ignore::any),
             gather::forces,
             zones::act,
             gather::leave_out,
@@ -248,7 +296,7 @@ fn one_by_one(schedule: &mut Schedule) {
     schedule.set_executor(SingleThreadedExecutor::new());
 }
 
-/// Schedules of the systems of a step. Each is one exclusive system of `FixedFirst` or `FixedUpdate`: most of
+/// Schedules of the systems of a step. Each is one exclusive system of `FixedFirst` or the step's: most of
 /// them take less time than giving them to a thread would.
 #[derive(ScheduleLabel, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 enum Part {
@@ -257,6 +305,11 @@ enum Part {
     Gather,
     Step,
     Scatter,
+}
+
+/// Run condition: a step has a length.
+fn time_passes(time: Res<Time>) -> bool {
+    !time.delta().is_zero()
 }
 
 fn run_part(part: Part) -> impl FnMut(&mut World) {

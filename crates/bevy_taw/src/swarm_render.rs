@@ -11,6 +11,7 @@ use bevy::shader::ShaderRef;
 use bevy::tasks::ComputeTaskPool;
 
 use crate::resources::TawWorld;
+use crate::schedule::TawSchedule;
 use crate::swarm::{Owners, Swarm, Tint, heat};
 
 /// Draws all [swarms](Swarm): lit, shadowed and casting shadows as meshes are.
@@ -31,9 +32,10 @@ impl Plugin for TawSwarmRenderPlugin {
         if !app.is_plugin_added::<bevy::pbr::PbrPlugin>() {
             return;
         }
+        let between_steps = TawSchedule::of(app).is_fixed(app.world());
         embedded_asset!(app, "swarm.wgsl");
         app.add_plugins(MaterialPlugin::<SwarmMaterial>::default())
-            .init_resource::<Drawn>()
+            .insert_resource(Drawn { between_steps, ..default() })
             .add_systems(PostUpdate, draw);
     }
 }
@@ -80,6 +82,8 @@ struct Drawn {
     buffer: Handle<ShaderBuffer>,
     material: Handle<SwarmMaterial>,
     blocks: Vec<Entity>,
+    /// True where steps run at a rate of their own.
+    between_steps: bool,
 }
 
 /// A block of quads: two coordinates of a corner, and the number of the quad.
@@ -124,7 +128,11 @@ fn draw(
         tint.map_or(Tint::Id, |(_, tint)| *tint)
     };
     // A step behind, on the way to where they are.
-    let ago = fixed.timestep().as_secs_f32() * (1.0 - fixed.overstep_fraction());
+    let ago = if drawn.between_steps {
+        fixed.timestep().as_secs_f32() * (1.0 - fixed.overstep_fraction())
+    } else {
+        0.0
+    };
     let data = quads(swarm, blocks, ago, &tint_of);
     // A buffer of the same size is written, not made anew.
     let buffer = drawn.buffer.clone();

@@ -35,6 +35,7 @@ pub use taw_lab::advise::Candidate;
 
 use crate::governor::{self, Governor, ModelGoverned};
 use crate::resources::TawWorld;
+use crate::schedule::TawSchedule;
 
 /// Measures models beside the game, and governs which one is used if that is asked for.
 #[derive(Debug, Default)]
@@ -42,12 +43,13 @@ pub struct TawTradePlugin;
 
 impl Plugin for TawTradePlugin {
     fn build(&self, app: &mut App) {
+        let schedule = TawSchedule::of(app).label();
         app.init_resource::<TawTrade>()
             .init_resource::<Governor>()
             .add_message::<TradeMeasured>()
             .add_message::<ModelGoverned>()
             .add_systems(Update, take_in)
-            .add_systems(FixedUpdate, governor::govern.after(crate::TawSystems::Scatter));
+            .add_systems(schedule, governor::govern.after(crate::TawSystems::Scatter));
     }
 }
 

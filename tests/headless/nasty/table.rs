@@ -57,10 +57,12 @@ pub const TABLE: &[(&str, &str, Takes)] = &[
     ("ExternalImpulse", ".impulse", Takes::Finite),
     ("ExternalImpulse", ".angular", Takes::Finite),
     ("HalfLength", ".0", Takes::AtLeastZero),
+    ("ColliderDisabled", ".time_left", Takes::AtLeastZero),
     ("Transform", ".translation", Takes::Finite),
     ("Transform", ".rotation", Takes::Some),
     ("Transform", ".scale", Takes::All),
     ("Wall", "", Takes::Some),
+    ("OneWay", ".0", Takes::Some),
     ("Grounded", ".max_slope", Takes::Within(0.0, std::f32::consts::PI)),
     ("MarbleController", ".direction", Takes::Finite),
     ("MarbleController", ".jump_speed", Takes::Finite),
@@ -123,7 +125,8 @@ fn marble(entity: &mut EntityWorldMut) {
 }
 
 fn wall(entity: &mut EntityWorldMut, wall: Wall) {
-    entity.insert((wall, SurfaceMaterial::default(), SurfaceVelocity(Vec3::ZERO), BELOW));
+    let optional = (SurfaceMaterial::default(), SurfaceVelocity(Vec3::ZERO), OneWay::default());
+    entity.insert((wall, optional, BELOW));
 }
 
 fn zone(entity: &mut EntityWorldMut, zone: GravityZone) {
@@ -146,7 +149,8 @@ const OF_MARBLES: &[&str] = &[
     "Transform",
 ];
 const BELOW: Transform = Transform::from_xyz(0.0, -5.0, 0.0);
-pub const OF_WALLS: &[&str] = &["Wall", "SurfaceMaterial", "SurfaceVelocity", "Transform"];
+pub const OF_WALLS: &[&str] =
+    &["Wall", "SurfaceMaterial", "SurfaceVelocity", "OneWay", "Transform"];
 
 pub fn samples() -> Vec<Sample> {
     let mut samples: Vec<Sample> = vec![
@@ -157,6 +161,13 @@ pub fn samples() -> Vec<Sample> {
                 it.insert(MarbleMass::Kilograms(2.0));
             },
             &["MarbleMass"],
+        ),
+        (
+            |it| {
+                marble(it);
+                it.insert(ColliderDisabled::for_seconds(1.0));
+            },
+            &["ColliderDisabled"],
         ),
         (|it| wall(it, Wall::HalfSpace(Dir3::Y)), OF_WALLS),
     ];

@@ -299,6 +299,7 @@ pub fn gizmos(ui: &mut Ui, store: &mut GizmoConfigStore) {
     ui.checkbox(&mut config.contacts, "Contacts");
     ui.checkbox(&mut config.normals, "Normals");
     ui.checkbox(&mut config.velocities, "Velocities");
+    ui.checkbox(&mut config.sensors, "Sensors");
     ui.checkbox(&mut config.grid, "Grid");
 }
 

@@ -2,12 +2,12 @@
 
 use cgmath::Zero;
 
-use super::bodies::VelocityChange;
+use super::bodies::{NO_ROW, VelocityChange};
 use super::surfaces::Surface;
 use super::workers::{DisjointSlice, parallel_for_rows};
 use super::{BallId, MAX_COORDINATE, Swarm};
 use crate::Error;
-use crate::broad::CollisionLayers;
+use crate::broad::{CollisionLayers, IgnoredPairs};
 use crate::error::finite;
 use crate::math::{Point3, Vec3};
 use crate::motion::Motion;
@@ -76,6 +76,25 @@ impl Swarm {
             self.wake_all(); // one that bore others may be gone for them
             self.forget_contacts();
         }
+    }
+
+    /// Sets which slots pass through each other and through which walls, and wakes those for which that
+    /// is new.
+    pub(crate) fn set_ignored(&mut self, ignored: IgnoredPairs) {
+        let slots = self.surfaces.ignored.differences(&ignored);
+        if slots.is_empty() {
+            return;
+        }
+        for slot in slots {
+            // The ball may be gone.
+            if let Some(row) = self.ids.rows().get(slot as usize).filter(|row| **row != NO_ROW) {
+                self.wake(*row as usize);
+            }
+        }
+        self.surfaces.ignored = ignored;
+        // Unlike other walls, that would wake all.
+        self.cache_impulses();
+        self.pairs_valid = false;
     }
 
     /// Has pairs and balls at walls found anew, with the impulses that they have.

@@ -227,7 +227,7 @@ impl Swarm {
         crowd.find(&mut self.scratch.crowd, crossing);
         let (model, slots) = (self.model.material, self.ids.slots());
         let surfaces = SurfaceOf { model, surfaces: &self.surfaces, slots };
-        if surfaces.has_layers() {
+        if surfaces.have_filters() {
             crossing.retain(|[a, b]| surfaces.may_collide(*a, *b));
         }
         if self.proxies.len() > 1 {

@@ -385,7 +385,7 @@ impl<'a> CandidateBlocks<'a> {
                 count += hits.count_ones() as usize;
             }
         }
-        if self.surfaces.has_layers() {
+        if self.surfaces.have_filters() {
             count = self.retain_colliding(ball, count);
         }
         let found = &self.found[..count];
@@ -394,7 +394,7 @@ impl<'a> CandidateBlocks<'a> {
         &found[before..]
     }
 
-    /// Keeps those of the first `count` rows that were found whose layers collide with a ball's.
+    /// Keeps those of the first `count` rows that were found that a ball collides with.
     /// Returns their number.
     #[cold]
     fn retain_colliding(&mut self, ball: u32, count: usize) -> usize {

@@ -2,7 +2,7 @@
 
 use super::batches::Batch;
 use super::simd::LANES;
-use crate::broad::CollisionLayers;
+use crate::broad::{CollisionFilter, CollisionLayers, IgnoredPairs};
 use crate::response::Material;
 
 /// Mass times radius squared over the moment of inertia of a solid ball.
@@ -34,6 +34,8 @@ pub(super) struct Surfaces {
     of_slot: Vec<u32>,
     /// Layers, by slot; all beyond the end.
     layers: Vec<CollisionLayers>,
+    /// Pairs of marbles' slots, and of those with walls, that pass through each other.
+    pub ignored: IgnoredPairs,
 }
 
 impl Surfaces {
@@ -110,6 +112,7 @@ impl Surfaces {
         self.list.capacity() * size_of::<Surface>()
             + (self.counts.capacity() + self.of_slot.capacity()) * size_of::<u32>()
             + self.layers.capacity() * size_of::<CollisionLayers>()
+            + self.ignored.bytes()
     }
 }
 
@@ -131,6 +134,12 @@ impl SurfaceOf<'_> {
         if self.surfaces.list.is_empty() { plain } else { own().unwrap_or(plain) }
     }
 
+    /// True if some balls may not collide with all others.
+    #[inline]
+    pub fn have_filters(&self) -> bool {
+        self.has_layers() || !self.surfaces.ignored.is_empty()
+    }
+
     /// True if a ball may have layers other than all.
     #[inline]
     pub fn has_layers(&self) -> bool {
@@ -147,10 +156,24 @@ impl SurfaceOf<'_> {
         }
     }
 
-    /// Returns true if the layers of the balls in two rows let them collide.
+    /// Collision filter of the ball in a row.
+    #[inline]
+    pub fn filter(&self, row: u32) -> CollisionFilter<'_> {
+        let ignored = &self.surfaces.ignored;
+        let ignored =
+            if ignored.is_empty() { &[] } else { ignored.walls_of(self.slots[row as usize]) };
+        CollisionFilter { layers: self.layers(row), ignored }
+    }
+
+    /// Returns true if the balls in two rows collide with each other.
     #[inline]
     pub fn may_collide(&self, a: u32, b: u32) -> bool {
-        !self.has_layers() || self.layers(a).interacts_with(self.layers(b))
+        let is_ignored = || {
+            let ignored = &self.surfaces.ignored;
+            let slot = |row: u32| self.slots[row as usize];
+            !ignored.is_empty() && ignored.has_balls(slot(a), slot(b))
+        };
+        (!self.has_layers() || self.layers(a).interacts_with(self.layers(b))) && !is_ignored()
     }
 
     /// True if pairs need numbers of their own.

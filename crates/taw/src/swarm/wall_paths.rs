@@ -7,14 +7,14 @@ use super::kernels::squared;
 use super::simd::Row;
 use super::surfaces::SurfaceOf;
 use super::walls::{StaticGeometry, center};
-use crate::broad::CollisionLayers;
+use crate::broad::CollisionFilter;
 use crate::math::Vec3;
 
 /// Visits the walls that a ball meets on its path, and along those that it met. A path of at most
 /// `shortest` metres is not tested for hits. Returns the ball where it ends.
 pub(super) fn along_path(
     walls: &dyn StaticGeometry,
-    (ball, layers): (&Row, CollisionLayers),
+    (ball, filter): (&Row, CollisionFilter),
     mut displacement: Vec3<f32>,
     shortest: f32,
     visit: &mut impl FnMut(&Row, [u32; 2], Vec3<f32>, f32),
@@ -23,7 +23,7 @@ pub(super) fn along_path(
     // In a corner, it meets three.
     for _ in 0..3 {
         let hit = if displacement.magnitude() > shortest {
-            walls.first_hit_on_path(&ball, layers, displacement)
+            walls.first_hit_on_path(&ball, filter, displacement)
         } else {
             None
         };
@@ -51,11 +51,11 @@ fn moved(ball: &Row, by: Vec3<f32>) -> Row {
 pub(super) fn slide_along_wall(
     walls: &dyn StaticGeometry,
     at: &mut Row,
-    layers: CollisionLayers,
+    filter: CollisionFilter,
     displacement: Vec3<f32>,
 ) -> f32 {
     let (start, mut hits) = (moved(at, -displacement), false);
-    let end = along_path(walls, (&start, layers), displacement, 0.0, &mut |_, _, _, _| hits = true);
+    let end = along_path(walls, (&start, filter), displacement, 0.0, &mut |_, _, _, _| hits = true);
     if !hits {
         return 0.0;
     }
@@ -115,7 +115,7 @@ impl WallQuery<'_> {
     /// Returns true if a wall may pass a ball within the step.
     pub fn is_outrun(&self, walls: &dyn StaticGeometry, row: u32) -> bool {
         let [step, _] = self.ways(row);
-        walls.is_outrun(&self.at[row as usize], step.magnitude(), self.surfaces.layers(row))
+        walls.is_outrun(&self.at[row as usize], step.magnitude(), self.surfaces.filter(row))
     }
 
     /// A ball where its way in a substep begins, that way in metres, and what is then left of the step

@@ -10,7 +10,7 @@ use super::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use super::surfaces::{SurfaceOf, WallNumbers};
 use super::wall_contact::WallContact;
 use super::wall_paths::{FAST, WallQuery, along_path};
-use crate::broad::CollisionLayers;
+use crate::broad::{CollisionFilter, CollisionLayers};
 use crate::constraint::ContactImpulse;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
@@ -29,12 +29,12 @@ pub(crate) trait StaticGeometry: Sync {
     /// Says if there is anything else, and if some of it may be in a box.
     fn has_shapes(&self) -> bool;
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;
-    /// Visits what else is within `reach` metres of a ball of these layers, without ghost collisions:
-    /// the wall and its part, the normal, and the distance of the center.
+    /// Visits what else is within `reach` metres of a ball and collides with it by this filter, without
+    /// ghost collisions: the wall and its part, the normal, and the distance of the center.
     fn shapes_at(
         &self,
         ball: &Row,
-        layers: CollisionLayers,
+        filter: CollisionFilter,
         reach: f32,
         visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
     );
@@ -43,19 +43,19 @@ pub(crate) trait StaticGeometry: Sync {
     fn first_hit_on_path(
         &self,
         ball: &Row,
-        layers: CollisionLayers,
+        filter: CollisionFilter,
         displacement: Vec3<f32>,
     ) -> Option<([u32; 2], Vec3<f32>, f32)>;
     /// Returns true if a wall may pass a ball within the step of which it goes `way` metres: one that goes
     /// further itself than the ball is wide.
-    fn is_outrun(&self, ball: &Row, way: f32, layers: CollisionLayers) -> bool;
+    fn is_outrun(&self, ball: &Row, way: f32, filter: CollisionFilter) -> bool;
     /// Visits the parts of such walls, which the other visits leave out: what the ball touches, and what
     /// it meets on its way. The distance is that from the plane as it will be at the end of the step. The
     /// times are what is left of the step and what the way takes, in seconds.
     fn outrunning_at(
         &self,
         ball: &Row,
-        layers: CollisionLayers,
+        filter: CollisionFilter,
         displacement: Vec3<f32>,
         times: [f32; 2],
         visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
@@ -65,7 +65,7 @@ pub(crate) trait StaticGeometry: Sync {
     fn stop_passage(
         &self,
         places: [&Row; 2],
-        layers: CollisionLayers,
+        filter: CollisionFilter,
         before_end: [f32; 2],
     ) -> Option<[f32; 3]>;
     /// Layers of a wall.
@@ -225,7 +225,7 @@ impl Chunk {
         self.wall_contacts.extend(old.iter().filter(kept));
         self.has_fast = false;
         for row in &self.near_shapes {
-            let (displacement, layers) = (query.displacement(*row), query.surfaces.layers(*row));
+            let (displacement, filter) = (query.displacement(*row), query.surfaces.filter(*row));
             let ball = &query.ball(*row, displacement);
             let is_outrun = query.is_outrun(walls, *row);
             if only_fast && displacement.is_none() && !is_outrun {
@@ -250,7 +250,7 @@ impl Chunk {
             };
             if is_outrun {
                 let (ball, way, times) = query.path(*row);
-                walls.outrunning_at(&ball, layers, way, times, &mut |part, normal, distance| {
+                walls.outrunning_at(&ball, filter, way, times, &mut |part, normal, distance| {
                     visit(&ball, part, normal, distance);
                 });
             }
@@ -258,9 +258,9 @@ impl Chunk {
             if let Some(displacement) = displacement {
                 let way = displacement.magnitude();
                 reach = if query.whole_way { way } else { way.min(FAST * ball[3]) };
-                along_path(walls, (ball, layers), displacement, FAST * ball[3], &mut visit);
+                along_path(walls, (ball, filter), displacement, FAST * ball[3], &mut visit);
             }
-            walls.shapes_at(ball, layers, reach, &mut |part, normal, distance| {
+            walls.shapes_at(ball, filter, reach, &mut |part, normal, distance| {
                 visit(ball, part, normal, distance);
             });
         }
@@ -292,7 +292,7 @@ fn find_plane_contacts(
         let HalfSpace { wall, normal, offset, material, layers } = *plane;
         let separation = normal.dot(center(ball).to_vec()) - offset - ball[3];
         // A wall may also come nearer; a move of it starts another search.
-        if separation < reach && layers.interacts_with(balls.surfaces.layers(row)) {
+        if separation < reach && balls.surfaces.filter(row).meets_wall(wall, layers) {
             let numbers = WallNumbers::new(balls.surfaces.row(row), material);
             visit(WallContact::new(row, [wall, 0], normal, offset, numbers));
         }

@@ -1,6 +1,7 @@
 //! Memory of contacts from substep to substep, which follows marbles and walls as they come and go.
 
 use super::World;
+use super::one_way::OneWayState;
 use super::walls::WallId;
 use crate::handle::MarbleId;
 use crate::math::Scalar;
@@ -14,6 +15,8 @@ pub(super) struct ContactMemory<S> {
     pub springs: Vec<SpringHistory<S>>,
     /// Impulses of the clusters at rest of [`Response::EventDriven`](crate::response::Response).
     pub event_impulses: Vec<CachedImpulse<f64>>,
+    /// Decisions of one-way walls, sorted by wall and marble.
+    pub one_way: Vec<OneWayState>,
     /// Who had which row then: a removal moves another marble or wall into its row.
     marbles: Vec<MarbleId>,
     walls: Vec<WallId>,
@@ -27,6 +30,7 @@ impl<S> Default for ContactMemory<S> {
             impulses: Vec::new(),
             springs: Vec::new(),
             event_impulses: Vec::new(),
+            one_way: Vec::new(),
             marbles: Vec::new(),
             walls: Vec::new(),
             removals: [0; 2],

@@ -1,13 +1,15 @@
 //! Marbles as columns.
 
+use std::collections::BTreeMap;
+
 use cgmath::{One, Zero};
 
+use super::ColliderId;
 use super::changed_rows::ChangedRows;
 use super::marble::{Damping, Marble, non_default, validated_half_length, validated_rotation};
 use super::sparse_column::SparseColumn;
 use crate::Error;
-use crate::broad::CollisionLayers;
-use crate::broad::Period;
+use crate::broad::{CollisionLayers, IgnoredPairs, Period};
 use crate::error::{finite, finite_point, finite_vector, positive};
 use crate::frame::Bivector;
 use crate::handle::{Handles, MarbleId};
@@ -68,6 +70,10 @@ pub struct Marbles<S> {
     pub(super) layers: SparseColumn<CollisionLayers>,
     /// Marbles that never sleep.
     pub(super) sleeping_disabled: SparseColumn<()>,
+    /// Lists of whom marbles pass through; see `ignored.rs`.
+    pub(super) ignored: BTreeMap<MarbleId, Vec<ColliderId>>,
+    /// Rows of these pairs.
+    pub(super) ignored_rows: IgnoredPairs,
 }
 
 impl<S> Default for Marbles<S> {
@@ -95,6 +101,8 @@ impl<S> Default for Marbles<S> {
             material: SparseColumn::default(),
             layers: SparseColumn::default(),
             sleeping_disabled: SparseColumn::default(),
+            ignored: BTreeMap::new(),
+            ignored_rows: IgnoredPairs::default(),
         }
     }
 }
@@ -182,6 +190,7 @@ impl<S: Scalar> Marbles<S> {
             self.material.swap_remove(row);
             self.layers.swap_remove(row);
             self.sleeping_disabled.swap_remove(row);
+            self.ignored.remove(&id);
         }
         Ok(marble)
     }
@@ -243,13 +252,6 @@ impl<S: Scalar> Marbles<S> {
     #[inline]
     pub(super) fn layers_of_row(&self, row: usize) -> CollisionLayers {
         self.layers.get(row).unwrap_or_default()
-    }
-
-    /// Returns true if the layers of two marbles let them collide.
-    #[inline]
-    pub(super) fn may_collide(&self, a: u32, b: u32) -> bool {
-        let layers = |row: u32| self.layers_of_row(row as usize);
-        self.layers.is_empty() || layers(a).interacts_with(layers(b))
     }
 
     /// Returns true if any marble has applied forces, torques or damping.

@@ -10,6 +10,7 @@ mod energy;
 mod energy_audit;
 mod event_driven;
 mod external_forces;
+mod ignored;
 mod impulse;
 mod integrate;
 mod limits;
@@ -21,6 +22,7 @@ mod marbles;
 mod method;
 mod model;
 mod narrow_phase;
+mod one_way;
 mod penalty;
 mod quarantine;
 mod query;
@@ -38,6 +40,7 @@ mod swept_walls;
 #[cfg(test)]
 mod tests;
 mod wall_changes;
+mod wall_layers;
 mod wall_shape;
 mod walls;
 

@@ -8,7 +8,7 @@ use smallvec::SmallVec;
 use super::marbles::Marbles;
 use super::walls::{SubShape, Walls};
 use super::{WallShape, World};
-use crate::broad::CollisionLayers;
+use crate::broad::CollisionFilter;
 use crate::contact::Contact;
 use crate::math::{Scalar, Vec3, normal_and_distance};
 use crate::response::Response;
@@ -58,9 +58,8 @@ impl<S: Scalar> World<S> {
     /// Collides half-spaces with marbles and capsules, which touch with their ends.
     fn collide_half_spaces(&mut self, contact_distance: S) {
         for (wall, plane) in self.walls.planes() {
-            let layers = self.walls.layers_of_row(wall);
             for b in 0..self.marbles.len() {
-                if !layers.interacts_with(self.marbles.layers_of_row(b)) {
+                if !self.walls.collides(wall, self.marbles.filter_of_row(b)) {
                     continue;
                 }
                 let half = self.marbles.half_length(b);
@@ -108,10 +107,10 @@ impl<S: Scalar> World<S> {
         candidates: &mut Vec<Candidate<S>>,
     ) {
         candidates.clear();
-        let layers = self.marbles.layers_of_row(b);
-        candidate_sub_shapes(&self.walls, (sphere, layers), contact_distance, candidates);
+        let filter = self.marbles.filter_of_row(b);
+        candidate_sub_shapes(&self.walls, (sphere, filter), contact_distance, candidates);
         if candidates.len() > 1 {
-            remove_ghost_collisions(&self.walls, (sphere, layers), candidates);
+            remove_ghost_collisions(&self.walls, (sphere, filter), candidates);
         }
         for Candidate { part, nearest } in candidates.iter() {
             let place = (nearest.normal, nearest.distance);
@@ -131,7 +130,7 @@ impl<S: Scalar> World<S> {
         let Aabb { min, max } = capsule.bounding_box();
         let (center, axis) = (self.marbles.sphere(b).center, self.marbles.axis(b));
         let bounds = Aabb { min: min - margin, max: max + margin };
-        self.walls.for_each_colliding(&bounds, self.marbles.layers_of_row(b), |part| {
+        self.walls.for_each_colliding(&bounds, self.marbles.filter_of_row(b), |part| {
             let Some(touch) = self.walls.closest_points(part, capsule) else { return };
             let along = (touch.on_b - center).dot(axis);
             let inside = along.abs() < half * S::from_f64(0.999);
@@ -215,7 +214,7 @@ impl<S: Scalar> World<S> {
 }
 
 /// Contact of two marbles, or of two spheres at `along` on the axes of capsules; none if they are
-/// farther apart than `contact_distance` metres, or their layers do not collide.
+/// farther apart than `contact_distance` metres, or one that passes through the other.
 #[inline]
 fn marble_contact<S: Scalar>(
     marbles: &Marbles<S>,
@@ -271,17 +270,17 @@ fn closest_points_of_segments<S: Scalar>(
 }
 
 /// Collects the sub-shapes of walls, except half-spaces, within `contact_distance` metres of a
-/// sphere with these layers, in order.
+/// sphere that its filter lets collide, in order.
 pub(super) fn candidate_sub_shapes<S: Scalar>(
     walls: &Walls<S>,
-    (sphere, layers): (&Sphere<S>, CollisionLayers),
+    (sphere, filter): (&Sphere<S>, CollisionFilter),
     contact_distance: S,
     candidates: &mut Vec<Candidate<S>>,
 ) {
     let far = sphere.radius + contact_distance;
     let margin = Vec3::new(far, far, far);
     let bounds = Aabb { min: sphere.center - margin, max: sphere.center + margin };
-    walls.for_each_colliding(&bounds, layers, |part| {
+    walls.for_each_colliding(&bounds, filter, |part| {
         let nearest = walls.project_point(part, sphere.center);
         let shape = &walls.shapes()[part.wall as usize];
         if nearest.distance <= far && !shape.is_behind_solid(part.index, &nearest) {
@@ -324,7 +323,7 @@ pub(super) fn flush_distance<S: Scalar>(sphere: &Sphere<S>) -> S {
 /// nearest points, and one suffices.
 pub(super) fn remove_ghost_collisions<S: Scalar>(
     walls: &Walls<S>,
-    (sphere, layers): (&Sphere<S>, CollisionLayers),
+    (sphere, filter): (&Sphere<S>, CollisionFilter),
     candidates: &mut Vec<Candidate<S>>,
 ) {
     let flush = flush_distance(sphere);
@@ -364,7 +363,7 @@ pub(super) fn remove_ghost_collisions<S: Scalar>(
         let is_near = |bounds: &Option<Aabb3<S>>| bounds.is_none_or(|it| it.contains_point(point));
         let near = candidates.iter().zip(&boxes).filter(|(_, bounds)| is_near(bounds));
         let others = near.map(|(other, _)| other).filter(|other| other.part != it.part);
-        let mut planes = walls.colliding_planes(layers);
+        let mut planes = walls.colliding_planes(filter);
         let mut on_planes =
             || planes.any(|(_, plane)| plane.signed_distance(it.nearest.point) <= flush);
         let covers = |other: &Candidate<S>| on(it, other) && (before(other, it) || !on(other, it));

@@ -98,7 +98,7 @@ impl<S: Scalar> World<S> {
         let displacement = (velocity + self.soft_acceleration(row) * half) * dt;
         let end = Sphere { center: sphere.center + displacement, ..sphere };
         let bounds = sphere.bounding_box().union(&end.bounding_box());
-        if !wall.is_near(&bounds) || !wall.collides(&self.walls, self.marbles.layers_of_row(row)) {
+        if !wall.is_near(&bounds) || !wall.collides(&self.walls, self.marbles.filter_of_row(row)) {
             return None;
         }
         let frame = Frame::Moving(wall.motion, dt);

@@ -47,6 +47,8 @@ impl<S: Scalar> World<S> {
         let dt = Self::validated_dt(dt)?;
         self.check_shapes()?;
         self.check_crowding()?;
+        self.decide_one_way(dt);
+        self.find_ignored_rows();
         self.sensors.begin_substep(&self.marbles);
         self.audit_before();
         method_of(self.settings.model.response).integrate(self, dt)
@@ -83,6 +85,7 @@ impl<S: Scalar> World<S> {
     /// together later is found later.
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
+        self.find_ignored_rows();
         method_of(self.settings.model.response).generate_contacts(self);
     }
 
@@ -101,6 +104,7 @@ impl<S: Scalar> World<S> {
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`].
     pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
         let dt = Self::validated_dt(dt)?;
+        self.find_ignored_rows();
         method_of(self.settings.model.response).restitute(self, dt)?;
         self.update_sensors(dt);
         Ok(())

@@ -5,7 +5,7 @@ use cgmath::{EuclideanSpace, InnerSpace};
 use super::continuous::{Frame, MAX_FREE_MOTION, MovingWall, RelativePath};
 use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
 use super::walls::{SubShape, Walls};
-use crate::broad::CollisionLayers;
+use crate::broad::{CollisionFilter, CollisionLayers};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
 use crate::motion::WallMotion;
 use crate::response::{Colliders as _, Material};
@@ -91,10 +91,10 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
         let here = Sphere { center: path.at(S::zero()), ..*ball };
         let reach = ball.radius * S::from_f64(MAX_FREE_MOTION);
         let mut near = Vec::new();
-        candidate_sub_shapes(self.walls, (&here, CollisionLayers::ALL), reach, &mut near);
+        candidate_sub_shapes(self.walls, (&here, CollisionFilter::ALL), reach, &mut near);
         near.retain(|it| it.part.wall == wall.row);
         if near.len() > 1 {
-            remove_ghost_collisions(self.walls, (&here, CollisionLayers::ALL), &mut near);
+            remove_ghost_collisions(self.walls, (&here, CollisionFilter::ALL), &mut near);
         }
         for Candidate { part, .. } in near {
             visit_at(part, ball.center, S::zero());
@@ -106,7 +106,7 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
     /// grazes it goes on.
     fn time_of_passage(
         &self,
-        (sphere, layers): (&Sphere<S>, CollisionLayers),
+        (sphere, filter): (&Sphere<S>, CollisionFilter),
         displacement: Vec3<S>,
         reached: &Aabb3<S>,
     ) -> Option<S> {
@@ -117,7 +117,7 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
         let place = length(sphere.center.to_vec()) + sphere.radius + length(displacement);
         let rounding = place * S::from_f64(16.0 * f64::from(f32::EPSILON));
         let mut first: Option<S> = None;
-        self.for_each_standing(reached, (sphere, layers), |part| {
+        self.for_each_standing(reached, (sphere, filter), |part| {
             let distance = |point| self.walls.project_point(part, point).distance;
             let ends_in_it = || {
                 let end = distance(sphere.center + displacement);
@@ -177,10 +177,10 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
     fn for_each_standing(
         &self,
         bounds: &Aabb3<S>,
-        (ball, layers): (&Sphere<S>, CollisionLayers),
+        (ball, filter): (&Sphere<S>, CollisionFilter),
         mut visit: impl FnMut(SubShape),
     ) {
-        self.walls.for_each_colliding(bounds, layers, |part| {
+        self.walls.for_each_colliding(bounds, filter, |part| {
             if !self.is_outrunning(part.wall, ball) {
                 visit(part);
             }
@@ -221,16 +221,16 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
     fn shapes_at(
         &self,
         ball: &[f32; 4],
-        layers: CollisionLayers,
+        filter: CollisionFilter,
         reach: f32,
         visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
     ) {
         let (sphere, reach) = (sphere(*ball), S::from_f64(reach.into()));
         let mut near = Vec::new();
-        candidate_sub_shapes(self.walls, (&sphere, layers), reach, &mut near);
+        candidate_sub_shapes(self.walls, (&sphere, filter), reach, &mut near);
         near.retain(|it| !self.is_outrunning(it.part.wall, &sphere));
         if near.len() > 1 {
-            remove_ghost_collisions(self.walls, (&sphere, layers), &mut near);
+            remove_ghost_collisions(self.walls, (&sphere, filter), &mut near);
         }
         for Candidate { part: SubShape { wall, index: part }, nearest } in near {
             let normal: Vec3<f32> = cast_vector(nearest.normal);
@@ -241,7 +241,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
     fn first_hit_on_path(
         &self,
         ball: &[f32; 4],
-        layers: CollisionLayers,
+        filter: CollisionFilter,
         displacement: Vec3<f32>,
     ) -> Option<([u32; 2], Vec3<f32>, f32)> {
         let sphere: Sphere<S> = sphere(*ball);
@@ -250,12 +250,12 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         let (start, end) =
             (sphere.bounding_box(), Sphere { center: center + displacement, ..sphere });
         let reached = start.union(&end.bounding_box());
-        let time = self.time_of_passage((&sphere, layers), displacement, &reached)?;
+        let time = self.time_of_passage((&sphere, filter), displacement, &reached)?;
         // Before the part that it passes into it may meet another one, of which that is the
         // continuation: then the edge between them is no obstacle.
         let path = RelativePath { start: center, displacement, frame: Frame::Standing };
         let mut first: Option<(SubShape, S, PointProjection<S>)> = None;
-        self.for_each_standing(&reached, (&sphere, layers), |part| {
+        self.for_each_standing(&reached, (&sphere, filter), |part| {
             let Some(stop) = self.walls.time_of_impact(part, sphere.radius, &path) else { return };
             if stop.time > time || first.as_ref().is_some_and(|(_, time, _)| stop.time >= *time) {
                 return;
@@ -273,11 +273,11 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         Some(([part.wall, part.index], normal, distance.as_f64() as f32))
     }
 
-    fn is_outrun(&self, &[x, y, z, radius]: &[f32; 4], way: f32, layers: CollisionLayers) -> bool {
+    fn is_outrun(&self, &[x, y, z, radius]: &[f32; 4], way: f32, filter: CollisionFilter) -> bool {
         let ball = sphere([x, y, z, radius]);
         let bounds = Sphere { radius: S::from_f64((radius + way).into()), ..ball }.bounding_box();
         let passes = |wall: &MovingWall<S>| {
-            wall.is_near(&bounds) && wall.collides(self.walls, layers) && self.outruns(wall, &ball)
+            wall.is_near(&bounds) && wall.collides(self.walls, filter) && self.outruns(wall, &ball)
         };
         self.moving.iter().any(passes)
     }
@@ -285,7 +285,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
     fn outrunning_at(
         &self,
         ball: &[f32; 4],
-        layers: CollisionLayers,
+        filter: CollisionFilter,
         displacement: Vec3<f32>,
         times: [f32; 2],
         visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
@@ -293,7 +293,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         let (ball, displacement) = (sphere(*ball), cast_vector(displacement));
         let times = times.map(|time| S::from_f64(time.into()));
         for wall in &self.moving {
-            if wall.collides(self.walls, layers) && self.outruns(wall, &ball) {
+            if wall.collides(self.walls, filter) && self.outruns(wall, &ball) {
                 self.visit_outrunning(
                     wall,
                     &ball,
@@ -310,14 +310,14 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
     fn stop_passage(
         &self,
         [before, now]: [&[f32; 4]; 2],
-        layers: CollisionLayers,
+        filter: CollisionFilter,
         before_end: [f32; 2],
     ) -> Option<[f32; 3]> {
         let [before, now]: [Sphere<S>; 2] = [sphere(*before), sphere(*now)];
         let bounds = before.bounding_box().union(&now.bounding_box());
         let (mut center, mut stopped) = (now.center, false);
         for wall in &self.moving {
-            let meets = wall.is_near(&bounds) && wall.collides(self.walls, layers);
+            let meets = wall.is_near(&bounds) && wall.collides(self.walls, filter);
             if !meets || !self.outruns(wall, &now) {
                 continue;
             }
@@ -334,7 +334,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
             }
         }
         let parts = |bounds: &Aabb3<S>, visit: &mut dyn FnMut(SubShape)| {
-            self.for_each_standing(bounds, (&now, layers), visit);
+            self.for_each_standing(bounds, (&now, filter), visit);
         };
         if let Some(end) = self.slide([before.center, center], now.radius, &parts) {
             (center, stopped) = (end, true);

@@ -1,4 +1,3 @@
-use super::marble::non_default;
 use super::sparse_column::SparseColumn;
 use super::wall_changes::WallChanges;
 use super::wall_shape::WallShape;
@@ -34,7 +33,9 @@ pub struct Walls<S> {
     /// Materials of walls that have their own.
     material: SparseColumn<Material<S>>,
     /// Layers other than all.
-    layers: SparseColumn<CollisionLayers>,
+    pub(super) layers: SparseColumn<CollisionLayers>,
+    /// Unit vectors along which marbles pass through.
+    pub(super) one_way: SparseColumn<Vec3<S>>,
     /// Walls that were set to another pose since the last step.
     moved: SparseColumn<()>,
     /// Final shapes and motions, by index, of walls on their way through a step.
@@ -67,6 +68,7 @@ impl<S> Default for Walls<S> {
             motion: SparseColumn::default(),
             material: SparseColumn::default(),
             layers: SparseColumn::default(),
+            one_way: SparseColumn::default(),
             moved: SparseColumn::default(),
             ends: Vec::new(),
             boxes: Vec::new(),
@@ -82,10 +84,10 @@ impl<S> Default for Walls<S> {
 impl<S: Scalar> PartialEq for Walls<S> {
     fn eq(&self, other: &Self) -> bool {
         // The other fields follow from the shapes.
-        let Self { handles, shapes, motion, material, layers, moved, changes, .. } = self;
+        let Self { handles, shapes, motion, material, layers, one_way, moved, changes, .. } = self;
         (handles, shapes, changes) == (&other.handles, &other.shapes, &other.changes)
             && (motion, material) == (&other.motion, &other.material)
-            && (layers, moved) == (&other.layers, &other.moved)
+            && (layers, one_way, moved) == (&other.layers, &other.one_way, &other.moved)
     }
 }
 
@@ -108,6 +110,7 @@ impl<S: Scalar> Walls<S> {
         self.motion.set(rows - 1, None, rows);
         self.material.set(rows - 1, None, rows);
         self.layers.set(rows - 1, None, rows);
+        self.one_way.set(rows - 1, None, rows);
         self.moved.set(rows - 1, None, rows);
         Ok(WallId(handle))
     }
@@ -122,6 +125,7 @@ impl<S: Scalar> Walls<S> {
         self.motion.swap_remove(row);
         self.material.swap_remove(row);
         self.layers.swap_remove(row);
+        self.one_way.swap_remove(row);
         self.moved.swap_remove(row);
         // Another wall has this index now.
         self.dirty = Dirty::All;
@@ -185,6 +189,12 @@ impl<S: Scalar> Walls<S> {
         }
     }
 
+    /// Records that a wall is as it was not, where it is.
+    pub(super) fn mark_changed(&mut self, row: usize) {
+        self.version += 1;
+        self.log_change(self.shapes[row].bounding_box());
+    }
+
     /// Logs the region of a change.
     fn log_change(&mut self, region: Option<Aabb3<S>>) {
         self.changes.add(region, None);
@@ -241,29 +251,6 @@ impl<S: Scalar> Walls<S> {
         });
     }
 
-    /// Visits the sub-shapes that may overlap a box, of walls that a collider of these layers
-    /// collides with, except half-spaces.
-    pub(super) fn for_each_colliding(
-        &self,
-        bounds: &Aabb3<S>,
-        layers: CollisionLayers,
-        mut visit: impl FnMut(SubShape),
-    ) {
-        self.for_each_in_box(bounds, |part| {
-            if self.layers_of_row(part.wall).interacts_with(layers) {
-                visit(part);
-            }
-        });
-    }
-
-    /// Half-spaces that a collider of these layers collides with, with their rows.
-    pub(super) fn colliding_planes(
-        &self,
-        layers: CollisionLayers,
-    ) -> impl Iterator<Item = (u32, &Plane<S>)> {
-        self.planes().filter(move |(wall, _)| self.layers_of_row(*wall).interacts_with(layers))
-    }
-
     /// Visits the sub-shapes of walls, except half-spaces, that may be within `reach` metres of a
     /// point.
     pub(super) fn for_each_near(
@@ -315,8 +302,7 @@ impl<S: Scalar> Walls<S> {
         let row = self.row(id)?;
         let motion = motion.map(WallMotion::validated).transpose()?;
         if self.motion.get(row) != motion {
-            self.version += 1;
-            self.log_change(self.shapes[row].bounding_box());
+            self.mark_changed(row);
         }
         self.motion.set(row, motion, self.shapes.len());
         Ok(())
@@ -339,8 +325,7 @@ impl<S: Scalar> Walls<S> {
         let row = self.row(id)?;
         let material = material.map(Material::validated).transpose()?;
         if self.material.get(row) != material {
-            self.version += 1;
-            self.log_change(self.shapes[row].bounding_box());
+            self.mark_changed(row);
         }
         self.material.set(row, material, self.shapes.len());
         Ok(())
@@ -352,29 +337,6 @@ impl<S: Scalar> Walls<S> {
     /// [`Error::NoSuchWall`].
     pub fn material(&self, id: WallId) -> Result<Option<Material<S>>, Error> {
         self.row(id).map(|row| self.material.get(row))
-    }
-
-    /// Changes the layers of a wall: which marbles and balls collide with it. Sleeping ones near it
-    /// wake.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchWall`].
-    pub fn set_layers(&mut self, id: WallId, layers: CollisionLayers) -> Result<(), Error> {
-        let row = self.row(id)?;
-        if self.layers_of_row(row as u32) != layers {
-            self.version += 1;
-            self.log_change(self.shapes[row].bounding_box());
-        }
-        self.layers.set(row, non_default(layers, CollisionLayers::ALL), self.shapes.len());
-        Ok(())
-    }
-
-    /// Layers of a wall.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchWall`].
-    pub fn layers(&self, id: WallId) -> Result<CollisionLayers, Error> {
-        self.row(id).map(|row| self.layers_of_row(row as u32))
     }
 
     /// Shapes of all walls, by index.
@@ -439,12 +401,6 @@ impl<S: Scalar> Walls<S> {
     /// The wall's own material, by index.
     pub(super) fn material_of_row(&self, row: usize) -> Option<Material<S>> {
         self.material.get(row)
-    }
-
-    /// Layers of the wall at an index.
-    #[inline]
-    pub(super) fn layers_of_row(&self, row: u32) -> CollisionLayers {
-        self.layers.get(row as usize).unwrap_or_default()
     }
 
     /// Number of insertions, removals and changes so far: unchanged as long as the walls are.

@@ -372,9 +372,7 @@ fn walls<S: Scalar>() -> Vec<Row<S>> {
             pose.validated()?;
             with_pose(p, pose)
         };
-        World 6 "Pose.translation": |p, x| {
-            with_pose(p, pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x)))
-        };
+        World 6 "Pose.translation": |p, x| with_pose(p, pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x)));
         World 1 "WallShape::transformed": |p, x| {
             let pose = pose(Quat::new(one(), zero(), zero(), zero()), vector(x, x, x));
             let moved = p.world.walls.get(p.wall)?.transformed(pose)?;
@@ -389,6 +387,7 @@ fn walls<S: Scalar>() -> Vec<Row<S>> {
             let ball = Sphere { center: point(at, at, at), radius };
             if p.case % 2 == 0 { p.world.sensors.set(p.sensor, ball) } else { p.world.sensors.insert(ball).map(|_| ()) }
         };
+        World 4 "Walls::set_one_way": |p, x| p.world.walls.set_one_way(p.wall, Some(on_axis(p.case, x)));
         World 4 "Walls::set_motion WallMotion.velocity": |p, x| {
             let (none, pivot) = (vector(zero(), zero(), zero()), point(zero(), zero(), zero()));
             { let v = on_axis(p.case, x); p.world.walls.set_motion(p.wall, Some(WallMotion { velocity: v, angular_velocity: none, pivot })) }

@@ -14,6 +14,7 @@ const NAMES: &[&str] = &[
     "NodeId",
     "BallId",
     "&[BallId]",
+    "&[ColliderId]",
     "Option<NodeId>",
     "Option<Integrator>",
     "Option<Rotation>",

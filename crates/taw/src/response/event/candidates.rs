@@ -8,6 +8,7 @@ use cgmath::InnerSpace;
 use smallvec::SmallVec;
 
 use super::{Ball, EventDriven, EventSettings, SEAM_TOLERANCE, Wall};
+use crate::broad::CollisionFilter;
 use crate::math::Point3;
 
 /// Search range in cells of the grid; enough for most balls.
@@ -146,8 +147,10 @@ impl EventDriven {
             (search, ids) = (next, next_ids);
         }
         let Search { center, covered, .. } = search;
-        let (layers, max_distance) = (self.balls[row].layers, covered + self.margin(row));
-        let Self { candidates: WallCandidates { index, lists, .. }, walls, .. } = self;
+        let max_distance = covered + self.margin(row);
+        let Self { candidates: WallCandidates { index, lists, .. }, walls, ignored, .. } = self;
+        let ignored = ignored.walls_of(row as u32);
+        let filter = CollisionFilter { layers: self.balls[row].layers, ignored };
         let start = lists.len();
         lists.extend(ids.into_iter().filter_map(|(row, part)| {
             let number = index.get(&(row, part)).copied().or_else(|| {
@@ -161,7 +164,7 @@ impl EventDriven {
                 Some(_) => f64::NEG_INFINITY,
                 None => wall.distance_lower_bound(center, 0.0),
             };
-            let is_candidate = distance <= max_distance && wall.layers.interacts_with(layers);
+            let is_candidate = distance <= max_distance && filter.meets_wall(wall.row, wall.layers);
             is_candidate.then_some(CandidateWall { distance, wall: number })
         }));
         settings.add_cost((lists.len() - start) as u64 * super::PART_COST);
@@ -278,8 +281,11 @@ impl EventDriven {
 
     /// Half-spaces that a ball collides with.
     pub(super) fn planes_of(&self, row: usize) -> impl Iterator<Item = u32> {
-        let layers = self.balls[row].layers;
-        let collides = move |wall: &u32| self.walls[*wall as usize].layers.interacts_with(layers);
+        let filter = self.filter(row);
+        let collides = move |wall: &u32| {
+            let wall = &self.walls[*wall as usize];
+            filter.meets_wall(wall.row, wall.layers)
+        };
         self.candidates.planes.iter().copied().filter(collides)
     }
 }

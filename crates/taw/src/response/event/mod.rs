@@ -36,7 +36,7 @@ use std::collections::BinaryHeap;
 
 use cgmath::{InnerSpace, Zero};
 
-use crate::broad::Period;
+use crate::broad::{CollisionFilter, IgnoredPairs, Period};
 use crate::contact::Contacts;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, is_finite, is_finite_point};
 use crate::response::EnergyLedger;
@@ -205,6 +205,8 @@ pub(crate) struct EventDriven {
     pub balls: Vec<Ball>,
     /// Period of the world.
     pub period: Period<f64>,
+    /// Balls that pass through each other, and through walls, by their rows in the world.
+    pub ignored: IgnoredPairs,
     /// Candidate walls.
     walls: Vec<Wall>,
     /// Pairs of balls that may be in contact at the start.
@@ -270,6 +272,12 @@ impl EventDriven {
         stopped.sort_unstable();
         stopped.dedup();
         stopped
+    }
+
+    /// Collision filter of a ball.
+    fn filter(&self, row: usize) -> CollisionFilter<'_> {
+        let ignored = self.ignored.walls_of(row as u32);
+        CollisionFilter { layers: self.balls[row].layers, ignored }
     }
 
     /// Cost limit of a substep: its share of what the ones before have left, in the ratio of times.

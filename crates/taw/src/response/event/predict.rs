@@ -100,7 +100,9 @@ impl EventDriven {
         let mut visit = |other: usize| {
             if crowd.is_some() && self.crowds.of(other) == crowd {
                 in_crowd += 1;
-            } else if self.balls[other].layers.interacts_with(layers) {
+            } else if self.balls[other].layers.interacts_with(layers)
+                && !self.ignored.has_balls(row as u32, other as u32)
+            {
                 visit(other);
             }
         };

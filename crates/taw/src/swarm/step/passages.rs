@@ -73,11 +73,11 @@ impl Swarm {
                 let (at, skin_left) = unsafe { (&mut *at.row(row), &mut *skin_left.row(row)) };
                 let place = [x, y, z, at[3]];
                 let gone = distance(at, &place);
-                let (far, layers) = (FAST * at[3], surfaces.layers(row as u32));
-                if gone <= far && !walls.is_outrun(at, gone, layers) {
+                let (far, filter) = (FAST * at[3], surfaces.filter(row as u32));
+                if gone <= far && !walls.is_outrun(at, gone, filter) {
                     continue;
                 }
-                if let Some([x, y, z]) = walls.stop_passage([&place, at], layers, before_end) {
+                if let Some([x, y, z]) = walls.stop_passage([&place, at], filter, before_end) {
                     let end = [x, y, z, at[3]];
                     *skin_left -= distance(at, &end);
                     *at = end;

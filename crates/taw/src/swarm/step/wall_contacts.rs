@@ -171,8 +171,8 @@ impl Swarm {
                 let far = FAST * at[3];
                 if is_fast(velocity, h, at[3]) || !change.is_zero() || path.magnitude2() > far * far
                 {
-                    let layers = surfaces.layers(row as u32);
-                    let back = slide_along_wall(walls, at, layers, path);
+                    let filter = surfaces.filter(row as u32);
+                    let back = slide_along_wall(walls, at, filter, path);
                     *skin_left -= back;
                     chunk.caught |= back > 0.0;
                 }

@@ -58,7 +58,7 @@ impl<S: Scalar> World<S> {
             && !self.is_kinematic(row)
             && self
                 .walls
-                .colliding_planes(self.marbles.layers_of_row(row))
+                .colliding_planes(self.marbles.filter_of_row(row))
                 .filter(|(wall, _)| self.walls.swept_motion_of_row(*wall as usize).is_none())
                 .any(|(_, plane)| plane.signed_distance(center) < radius - max_depth)
     }
@@ -91,8 +91,8 @@ impl<S: Scalar> World<S> {
         if length(displacement) <= self.free_motion(row) {
             return;
         }
-        let layers = self.marbles.layers_of_row(row);
-        let planes = self.walls.colliding_planes(layers).filter_map(|(_, plane)| {
+        let filter = self.marbles.filter_of_row(row);
+        let planes = self.walls.colliding_planes(filter).filter_map(|(_, plane)| {
             if self.settings.model.response.needs_penetration() {
                 return None; // its forces turn everything round within a half-space
             }
@@ -121,7 +121,7 @@ impl<S: Scalar> World<S> {
         }
         let Sphere { mut center, radius } = self.marbles.sphere(row);
         let from = self.scratch.continuous.bounced_from[row];
-        for (wall, plane) in self.walls.colliding_planes(self.marbles.layers_of_row(row)) {
+        for (wall, plane) in self.walls.colliding_planes(self.marbles.filter_of_row(row)) {
             let gap = plane.signed_distance(center) - radius;
             let is_deep = gap.is_finite() && gap < radius * S::from_f64(-MAX_FREE_MOTION);
             let was_listed = || plane.signed_distance(from) - radius <= self.scratch.reach;

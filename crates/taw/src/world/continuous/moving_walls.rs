@@ -2,7 +2,7 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use crate::broad::CollisionLayers;
+use crate::broad::CollisionFilter;
 use crate::math::{Point3, RealVector as _, Scalar, Vec3, length};
 use crate::motion::WallMotion;
 use crate::shape::{Aabb, Aabb3};
@@ -166,7 +166,7 @@ impl<S: Scalar> Walls<S> {
     }
 
     /// Motion of the wall at an index, if it was set to another pose since the last step.
-    pub(super) fn swept_motion_of_row(&self, row: usize) -> Option<WallMotion<S>> {
+    pub(in crate::world) fn swept_motion_of_row(&self, row: usize) -> Option<WallMotion<S>> {
         let motion = self.motion_of_row(row).filter(|_| self.has_moved(row))?;
         (!motion.velocity.is_zero() || !motion.angular_velocity.is_zero()).then_some(motion)
     }
@@ -226,8 +226,8 @@ impl<S: Scalar> MovingWall<S> {
         });
     }
 
-    /// Returns true if a marble with these layers collides with the wall.
-    pub fn collides(&self, walls: &Walls<S>, layers: CollisionLayers) -> bool {
-        walls.layers_of_row(self.row).interacts_with(layers)
+    /// Returns true if a filter lets the wall collide.
+    pub fn collides(&self, walls: &Walls<S>, filter: CollisionFilter) -> bool {
+        walls.collides(self.row, filter)
     }
 }

@@ -5,7 +5,7 @@ use smallvec::SmallVec;
 
 use super::moving_walls::{Frame, MovingWall, Place, RelativePath, path_bounds};
 use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
-use crate::broad::CollisionLayers;
+use crate::broad::CollisionFilter;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
 use crate::response::penalty::CORE;
 use crate::response::{Colliders as _, Response};
@@ -212,11 +212,11 @@ impl<S: Scalar> World<S> {
         radius: S,
         (row, sphere, motion): (usize, &Sphere<S>, Motion<S>),
     ) -> Option<WallImpact<S>> {
-        let layers = self.marbles.layers_of_row(row);
+        let filter = self.marbles.filter_of_row(row);
         let mut best: Option<WallImpact<S>> = None;
         self.for_each_wall_on_path(row, sphere, motion, |part, path| {
             let Some(stop) = self.walls.time_of_impact(part, radius, path) else { return };
-            if self.walls.is_ghost_impact(&stop, &Sphere { radius, ..*sphere }, (path, layers)) {
+            if self.walls.is_ghost_impact(&stop, &Sphere { radius, ..*sphere }, (path, filter)) {
                 return;
             }
             let order = |stop: &WallImpact<S>| (stop.time, stop.gap);
@@ -236,7 +236,7 @@ impl<S: Scalar> World<S> {
         Motion { displacement, time, carrier }: Motion<S>,
         mut visit: impl FnMut(SubShape, &RelativePath<S>),
     ) {
-        let layers = self.marbles.layers_of_row(row);
+        let filter = self.marbles.filter_of_row(row);
         let free = self.free_motion(row);
         let bounds = path_bounds(sphere.center, displacement, sphere.radius);
         let moving_walls =
@@ -246,7 +246,7 @@ impl<S: Scalar> World<S> {
             time > S::zero() && self.walls.swept_motion_of_row(part.wall as usize).is_some()
         };
         if self.scratch.continuous.crowded.get(row).is_some_and(|crowded| *crowded) {
-            for (wall, _) in self.walls.colliding_planes(layers) {
+            for (wall, _) in self.walls.colliding_planes(filter) {
                 let part = SubShape { wall, index: 0 };
                 if !moves(part) {
                     visit(part, &path);
@@ -254,7 +254,7 @@ impl<S: Scalar> World<S> {
             }
         }
         if path.max_length() > free {
-            self.walls.for_each_colliding(&bounds, layers, |part| {
+            self.walls.for_each_colliding(&bounds, filter, |part| {
                 if !moves(part) {
                     visit(part, &path);
                 }
@@ -270,7 +270,7 @@ impl<S: Scalar> World<S> {
                 None => RelativePath { frame: Frame::Moving(wall.motion, time), ..path },
             };
             if (carried.is_some() || wall.is_near(&bounds))
-                && wall.collides(&self.walls, layers)
+                && wall.collides(&self.walls, filter)
                 && path.max_length() > free
             {
                 wall.for_each_near_path(&self.walls, &path, sphere.radius, |part| {
@@ -288,7 +288,7 @@ impl<S: Scalar> Walls<S> {
         &self,
         impact: &WallImpact<S>,
         sphere: &Sphere<S>,
-        (path, layers): (&RelativePath<S>, CollisionLayers),
+        (path, filter): (&RelativePath<S>, CollisionFilter),
     ) -> bool {
         let WallImpact { time, part, normal, center, gap, .. } = *impact;
         let Some(face) = self.shapes()[part.wall as usize].face_normal(part.index, center) else {
@@ -302,7 +302,7 @@ impl<S: Scalar> Walls<S> {
         let point = center - normal * (gap + sphere.radius);
         let margin = Vec3::new(flush, flush, flush);
         let mut is_shared = false;
-        self.for_each_colliding(&Aabb { min: point - margin, max: point + margin }, layers, |it| {
+        self.for_each_colliding(&Aabb { min: point - margin, max: point + margin }, filter, |it| {
             is_shared |= it != part && self.project_point(it, point).distance <= flush;
         });
         is_shared

@@ -1,0 +1,138 @@
+//! Marbles that pass through others: through those that they name, through all for a time, and through
+//! one-way walls.
+
+use bevy::prelude::*;
+use taw::world::ColliderId;
+
+use crate::components::{MarbleState, WallState};
+use crate::convert::at_least_zero;
+use crate::refusal::Refusals;
+use crate::resources::TawWorld;
+
+/// Marbles and walls that a marble passes through, whatever their
+/// [`CollisionLayers`](crate::layers::CollisionLayers). One of a pair is enough. May change at any time;
+/// entities that are no marbles or walls, or not yet, do no harm. Sensors, queries and balls of swarms
+/// do not go by it.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// fn spawn(mut commands: Commands) {
+///     let gate = commands.spawn(Wall::from(Cuboid::new(1.0, 2.0, 0.1))).id();
+///     // The one who holds the key.
+///     commands.spawn((Marble::new(0.5), IgnoreCollisions(vec![gate])));
+/// }
+/// ```
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct IgnoreCollisions(#[entities] pub Vec<Entity>);
+
+/// A marble that meets nothing: no marble, wall, ball or sensor, and so no zone, as if it were in no layer.
+/// Queries without a mask find it. Removed when its time is over.
+///
+/// A marble that is within another or in a wall by then is moved out as any other that begins so: by the
+/// response, most of them slowly.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// fn hit(ghost: Entity, mut commands: Commands) {
+///     commands.entity(ghost).insert(ColliderDisabled::for_seconds(1.5));
+/// }
+/// ```
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct ColliderDisabled {
+    /// Seconds of steps until it is removed, at least zero; none for as long as nobody removes it.
+    pub time_left: Option<f32>,
+}
+
+impl ColliderDisabled {
+    /// Ghost for so many seconds, at least zero.
+    #[must_use]
+    pub const fn for_seconds(seconds: f32) -> Self {
+        Self { time_left: Some(seconds) }
+    }
+}
+
+/// Makes a one-way wall of a [`Wall`](crate::wall::Wall): marbles that come from behind or from the side
+/// pass through it, and land on what of it faces along this direction, in the frame of the entity. A
+/// platform to jump through, a turnstile.
+///
+/// A marble that is in the wall or comes from behind is not touched until it is wholly out. To drop a
+/// marble through, let it name the wall by [`IgnoreCollisions`] for a while. May change at any time. Balls
+/// of swarms and queries meet it from all sides.
+///
+/// Before each substep (of `SoftStep`, each step), all marbles are looked at for each such wall.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// fn spawn(mut commands: Commands) {
+///     let platform = Wall::from(Cuboid::new(4.0, 0.2, 4.0));
+///     commands.spawn((platform, OneWay::default(), Transform::from_xyz(0.0, 2.0, 0.0)));
+/// }
+/// ```
+#[derive(Component, Clone, Copy, Debug, PartialEq, Deref, DerefMut, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct OneWay(pub Dir3);
+
+impl Default for OneWay {
+    /// Upwards.
+    fn default() -> Self {
+        Self(Dir3::Y)
+    }
+}
+
+/// Counts the time of marbles that meet nothing.
+pub(crate) fn count_down(
+    mut marbles: Query<(Entity, &mut ColliderDisabled)>,
+    time: Res<Time>,
+    mut refusals: Refusals,
+    mut commands: Commands,
+) {
+    for (entity, mut disabled) in &mut marbles {
+        let Some(left) = &mut disabled.bypass_change_detection().time_left else { continue };
+        if !refusals.check(Some(entity), at_least_zero("time_left", *left)) {
+            continue;
+        }
+        if *left == 0.0 {
+            commands.entity(entity).try_remove::<ColliderDisabled>();
+        }
+        *left = (*left - time.delta_secs()).max(0.0);
+    }
+}
+
+/// Run condition: a marble names others, or did.
+pub(crate) fn any(world: Res<TawWorld>, marbles: Query<(), With<IgnoreCollisions>>) -> bool {
+    world.marbles.ignoring().next().is_some() || !marbles.is_empty()
+}
+
+/// Takes over whom marbles pass through.
+pub(crate) fn gather(
+    mut world: ResMut<TawWorld>,
+    marbles: Query<(&MarbleState, &IgnoreCollisions)>,
+    colliders: Query<(Option<&MarbleState>, Option<&WallState>)>,
+) {
+    let collider = |entity: &Entity| match colliders.get(*entity).ok()? {
+        (Some(MarbleState { id: Some(id), .. }), _) => Some(ColliderId::Marble(*id)),
+        (_, Some(WallState { id: Some(id), .. })) => Some(ColliderId::Wall(*id)),
+        _ => None,
+    };
+    for (state, IgnoreCollisions(others)) in &marbles {
+        let Some(id) = state.id else { continue };
+        let others: Vec<_> = others.iter().filter_map(collider).collect();
+        if world.marbles.ignored(id).is_ok_and(|before| before != others) {
+            let _ = world.marbles.set_ignored(id, &others); // it is there
+        }
+    }
+    let names_some = |id| {
+        let (state, _) = marbles.get(*world.marble_entities.get(&id)?).ok()?;
+        (state.id == Some(id)).then_some(())
+    };
+    let ignoring = world.marbles.ignoring();
+    let over: Vec<_> = ignoring.filter(|id| names_some(*id).is_none()).collect();
+    for id in over {
+        let _ = world.marbles.set_ignored(id, &[]); // it is there
+    }
+}

@@ -1,0 +1,106 @@
+//! Pairs that pass through each other.
+
+use super::one_way::OneWayState;
+use super::{ColliderId, MarbleId, Marbles, World};
+use crate::Error;
+use crate::broad::{CollisionFilter, IgnoredPairs};
+use crate::math::Scalar;
+use crate::swarm::Swarm;
+
+impl<S: Scalar> Marbles<S> {
+    /// Sets the marbles and walls that a marble passes through, whatever their layers: a pair passes
+    /// if one of the two names the other. Handles that are not there, or not yet, do no harm. An empty
+    /// list is the default.
+    ///
+    /// Balls of the [swarm](World::swarm), sensors and queries do not go by it. The steps look at all
+    /// pairs that are named.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn set_ignored(&mut self, id: MarbleId, ignored: &[ColliderId]) -> Result<(), Error> {
+        self.row(id)?;
+        if ignored.is_empty() {
+            self.ignored.remove(&id);
+        } else {
+            self.ignored.insert(id, ignored.to_vec());
+        }
+        self.ignored_rows.found_at = None;
+        Ok(())
+    }
+
+    /// Marbles and walls that a marble passes through, as they were set.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn ignored(&self, id: MarbleId) -> Result<&[ColliderId], Error> {
+        self.row(id)?;
+        Ok(self.ignored.get(&id).map_or(&[], Vec::as_slice))
+    }
+
+    /// Marbles that name others to pass through, sorted.
+    pub fn ignoring(&self) -> impl Iterator<Item = MarbleId> + '_ {
+        self.ignored.keys().copied()
+    }
+
+    /// Collision filter of a marble.
+    #[inline]
+    pub(super) fn filter_of_row(&self, row: usize) -> CollisionFilter<'_> {
+        let ignored = self.ignored_rows.walls_of(row as u32);
+        CollisionFilter { layers: self.layers_of_row(row), ignored }
+    }
+
+    /// Returns true if two marbles collide with each other.
+    #[inline]
+    pub(super) fn may_collide(&self, a: u32, b: u32) -> bool {
+        let layers = |row: u32| self.layers_of_row(row as usize);
+        (self.layers.is_empty() || layers(a).interacts_with(layers(b)))
+            && !self.ignored_rows.has_balls(a, b)
+    }
+}
+
+impl<S: Scalar> World<S> {
+    /// Finds the rows of the pairs that pass through each other: those that are named, and those of
+    /// one-way walls and what these let through. Each verb begins with it: the user may have named others
+    /// before, or taken some out.
+    pub(super) fn find_ignored_rows(&mut self) {
+        let now = Some([self.marbles.removals(), self.walls.removals()]);
+        if self.marbles.ignored_rows.found_at == now {
+            return;
+        }
+        let (mut of_marbles, mut of_walls) = (Vec::new(), Vec::new());
+        for (id, ignored) in &self.marbles.ignored {
+            let Ok(row) = self.marbles.row(*id) else { continue };
+            for other in ignored {
+                let (pairs, other) = match *other {
+                    ColliderId::Marble(other) => (&mut of_marbles, self.marbles.row(other)),
+                    ColliderId::Wall(wall) => (&mut of_walls, self.walls.row(wall)),
+                };
+                pairs.extend(other.map(|other| [row as u32, other as u32]));
+            }
+        }
+        for OneWayState { wall, marble, .. } in self.memory.one_way.iter().filter(|it| !it.held) {
+            if let (Ok(marble), Ok(wall)) = (self.marbles.row(*marble), self.walls.row(*wall)) {
+                of_walls.push([marble as u32, wall as u32]);
+            }
+        }
+        let found = IgnoredPairs::new(of_marbles, of_walls);
+        self.marbles.ignored_rows = IgnoredPairs { found_at: now, ..found };
+    }
+
+    /// Tells the swarm which marbles pass through each other and through walls.
+    pub(super) fn tell_ignored_to_swarm(&mut self) {
+        let (marbles, swarm) = (&self.marbles, &self.swarm);
+        let slot = |row: u32| slot_of(marbles, swarm, row);
+        let IgnoredPairs { balls, walls, .. } = &marbles.ignored_rows;
+        let balls = balls.iter().filter_map(|[a, b]| Some([slot(*a)?, slot(*b)?])).collect();
+        let walls = walls.iter().filter_map(|[row, wall]| Some([slot(*row)?, *wall])).collect();
+        self.swarm.set_ignored(IgnoredPairs::new(balls, walls));
+    }
+}
+
+/// Slot of the ball of a marble.
+fn slot_of<S: Scalar>(marbles: &Marbles<S>, swarm: &Swarm, row: u32) -> Option<u32> {
+    let id = marbles.id(row as usize)?;
+    let body = swarm.body_balls.binary_search_by_key(&id, |(marble, _)| *marble).ok()?;
+    swarm.slot_of(swarm.body_balls[body].1)
+}
