@@ -5,7 +5,7 @@ use taw::frame::Pose;
 use taw::math::Quat;
 use taw::motion::WallMotion;
 use taw::prelude::*;
-use taw::shape::{Aabb, BoundedShape as _, Mesh, Obb};
+use taw::shape::{Aabb, BoundedShape as _, Compound, Mesh, Obb, Shape};
 use taw::swarm::SwarmModel;
 use taw::world::WallShape;
 
@@ -340,4 +340,41 @@ fn a_direction_has_a_length_and_a_wall() {
     assert!(world == before);
     world.walls.remove(wall).unwrap();
     assert_eq!(world.walls.set_one_way(wall, None), Err(Error::NoSuchWall(wall)));
+}
+
+#[test]
+fn a_marble_that_lies_beside_a_rim_stays_on_its_platform() {
+    for model in models() {
+        let part =
+            |min, max| Shape::Obb(Obb::from_aabb(&Aabb { min: point(min), max: point(max) }));
+        let floor = part([-4.0, -0.2, -4.0], [4.0, 0.0, 4.0]);
+        let rim = part([3.0, 0.0, -4.0], [4.0, 2.0, 4.0]);
+        let tray = Compound::new(vec![floor, rim]).unwrap();
+        let (mut world, _) = world::<f64>(model, tray.into());
+        world.set_gravity(vector([6.0, -9.0, 0.0])).unwrap(); // onto the rim, too
+        let id = world.marbles.insert(marble([0.0, 0.6, 0.3], [0.0; 3])).unwrap();
+        run(&mut world, 4.0);
+        let at = world.marbles.get(id).unwrap().position;
+        assert!((at.y - 0.5).abs() < 0.06 && (at.x - 2.5).abs() < 0.06, "{model:?}: {at:?}");
+    }
+}
+
+#[test]
+fn one_that_no_longer_passes_by_name_falls_on_out_of_the_wall() {
+    for model in models() {
+        let (mut world, wall) = world::<f64>(model, platform(4.0, 0.2));
+        let id = world.marbles.insert(marble([0.0, 0.5, 0.0], [0.0; 3])).unwrap();
+        run(&mut world, 0.5);
+        world.marbles.set_ignored(id, &[ColliderId::Wall(wall)]).unwrap();
+        let mut within = height(&world, id);
+        while within > 0.1 {
+            run(&mut world, STEP);
+            within = height(&world, id);
+        }
+        world.marbles.set_ignored(id, &[]).unwrap();
+        run(&mut world, STEP);
+        assert!(height(&world, id) < within, "{model:?}: {within} m, then {}", height(&world, id));
+        run(&mut world, 2.0);
+        assert!(height(&world, id) < -2.0, "{model:?}: {}", height(&world, id));
+    }
 }

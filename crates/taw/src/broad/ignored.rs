@@ -10,8 +10,9 @@ pub(crate) struct IgnoredPairs {
     pub balls: Vec<[u32; 2]>,
     /// A ball and a wall; sorted.
     pub walls: Vec<[u32; 2]>,
-    /// Number of removals of marbles and of walls when they were found; none while others are named.
-    pub found_at: Option<[u64; 2]>,
+    /// Number of marbles and of walls, and of removals of both, when they were found; none while others
+    /// are named.
+    pub found_at: Option<[u64; 4]>,
 }
 
 impl IgnoredPairs {

@@ -92,9 +92,8 @@ impl Swarm {
             }
         }
         self.surfaces.ignored = ignored;
-        // Unlike other walls, that would wake all.
         self.cache_impulses();
-        self.pairs_valid = false;
+        self.filters_changed = true;
     }
 
     /// Has pairs and balls at walls found anew, with the impulses that they have.

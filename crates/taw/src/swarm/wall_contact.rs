@@ -81,8 +81,10 @@ impl WallContact {
         let leaves = (own - self.surface).dot(self.normal).max(0.0);
         self.surface = own - self.normal * leaves;
         self.offset = self.offset_at_end;
-        self.offset += self.separation(&proxy.at).min(0.0);
+        let at_end = self.separation(&proxy.at).min(0.0);
         self.advance(-left);
+        let leaving = if leaves > 0.0 { self.separation(&proxy.from[0]).min(0.0) } else { 0.0 };
+        self.offset += at_end.min(leaving);
     }
 
     /// Normal impulse in the last substep, in N s; zero if the ball has left the wall.

@@ -79,7 +79,7 @@ pub(crate) trait StaticGeometry: Sync {
 /// A half-space.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct HalfSpace {
-    wall: u32,
+    pub wall: u32,
     pub normal: Vec3<f32>,
     pub offset: f32,
     /// Of the wall itself, if it has one.

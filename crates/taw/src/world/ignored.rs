@@ -63,7 +63,9 @@ impl<S: Scalar> World<S> {
     /// one-way walls and what these let through. Each verb begins with it: the user may have named others
     /// before, or taken some out.
     pub(super) fn find_ignored_rows(&mut self) {
-        let now = Some([self.marbles.removals(), self.walls.removals()]);
+        let (marbles, walls) = (&self.marbles, &self.walls);
+        let counts = [marbles.len() as u64, walls.len() as u64];
+        let now = Some([counts[0], counts[1], marbles.removals(), walls.removals()]);
         if self.marbles.ignored_rows.found_at == now {
             return;
         }
@@ -87,8 +89,9 @@ impl<S: Scalar> World<S> {
         self.marbles.ignored_rows = IgnoredPairs { found_at: now, ..found };
     }
 
-    /// Tells the swarm which marbles pass through each other and through walls.
-    pub(super) fn tell_ignored_to_swarm(&mut self) {
+    /// Gives the swarm the pairs that pass through each other.
+    pub(super) fn sync_ignored_pairs(&mut self) {
+        self.find_ignored_rows();
         let (marbles, swarm) = (&self.marbles, &self.swarm);
         let slot = |row: u32| slot_of(marbles, swarm, row);
         let IgnoredPairs { balls, walls, .. } = &marbles.ignored_rows;

@@ -307,7 +307,7 @@ impl<S: Scalar> World<S> {
             self.scratch.soft_step.known = Some(self.row_identity());
         }
         self.swarm.write_bodies(&self.scratch.soft_step.changed);
-        self.tell_ignored_to_swarm();
+        self.sync_ignored_pairs();
         Ok(())
     }
 

@@ -47,7 +47,7 @@ impl<S: Scalar> World<S> {
             return Ok(());
         }
         self.sync_proxies(dt)?;
-        self.tell_ignored_to_swarm();
+        self.sync_ignored_pairs();
         self.walls.update_tree();
         let (gravity, changes) =
             (cast_vector(self.settings.gravity), self.field_changes_of_swarm(step));

@@ -16,7 +16,8 @@ use crate::response::SolverBodies;
 /// A gain below this fraction of the energy of the velocity changes is the residual of the
 /// iterations.
 const GAIN_TOLERANCE: f64 = 1e-5;
-/// As large a fraction is the rounding of the sum, in roundings of the scalar.
+/// A gain below this fraction is the rounding of a sum over a few contacts, in roundings of the scalar.
+/// That of more contacts is larger; then as little as that is taken from them for nothing.
 const GAIN_ROUNDING: f64 = 2.0;
 
 /// Energy balance of an island's impulses, in units of the island.
@@ -62,10 +63,11 @@ impl<S: Scalar> IslandEnergy<S> {
         if fraction > S::zero() { fraction.min(S::one()) } else { S::zero() }
     }
 
-    /// Largest fraction of all impulses that gains no energy.
+    /// Largest fraction of all impulses that gains no energy, where it gained a small part of theirs.
     fn lossless_fraction(&self) -> S {
-        let fraction = -self.linear / self.quadratic;
-        if fraction > S::zero() { fraction.min(S::one()) } else { S::zero() }
+        let best = self.min_energy_fraction();
+        let fraction = best + best;
+        if fraction > S::from_f64(0.5) { fraction.min(S::one()) } else { S::one() }
     }
 
     /// Fraction of all impulses that leaves the least energy.
@@ -329,7 +331,9 @@ impl<S: Scalar> SolverBodies<'_, S> {
             c.initial_relative_velocity - target
         });
         self.scale_impulses(constraints, |island| {
-            energies[island].min_energy_fraction().min(S::one())
+            let energy = &energies[island];
+            let is_cached = energy.quadratic > S::zero();
+            if is_cached { energy.min_energy_fraction().min(S::one()) } else { S::one() }
         });
     }
 

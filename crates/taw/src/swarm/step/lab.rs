@@ -1,7 +1,7 @@
 //! A step in the lab's tier: *predict*, *displace*, *update velocities*.
 
 use super::row;
-use crate::broad::CollisionLayers;
+use crate::broad::{CollisionFilter, CollisionLayers, IgnoredPairs};
 use crate::math::Vec3;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::{
@@ -120,13 +120,14 @@ impl Swarm {
         let planes = std::mem::take(&mut self.planes);
         let scratch = std::mem::take(&mut self.neighbours);
         let neighbours: &[u16] = bytemuck::cast_slice(&scratch);
-        let layers = self.layers_by_row(&planes);
+        let (layers, passing) = (self.layers_by_row(&planes), self.passed_walls_by_row());
         let walls = WallDisplacement {
             simd_level,
             rows: &rows,
             proxies: &proxies,
             planes: &planes,
             layers: &layers,
+            passing: &passing,
         };
         for _ in 0..self.model.substeps {
             self.for_each_chunk(|_, columns, chunk| {
@@ -146,6 +147,14 @@ impl Swarm {
         });
         (self.scratch.proxy_rows, self.proxies) = (rows, proxies);
         (self.planes, self.neighbours) = (planes, scratch);
+    }
+
+    /// Walls through which proxies pass, by row.
+    fn passed_walls_by_row(&self) -> IgnoredPairs {
+        let rows = self.ids.rows();
+        let walls = self.surfaces.ignored.walls.iter();
+        let by_row = walls.filter_map(|[slot, wall]| Some([*rows.get(*slot as usize)?, *wall]));
+        IgnoredPairs::new(Vec::new(), by_row.collect())
     }
 
     /// Layers of all balls by row; none if all balls collide with all half-spaces.
@@ -184,6 +193,7 @@ struct WallDisplacement<'a> {
     planes: &'a [HalfSpace],
     /// Layers of all balls, if they matter.
     layers: &'a [CollisionLayers],
+    passing: &'a IgnoredPairs,
 }
 
 impl WallDisplacement<'_> {
@@ -193,7 +203,7 @@ impl WallDisplacement<'_> {
     /// # Safety
     /// No other thread touches the balls of the chunk meanwhile.
     unsafe fn apply(&self, chunk: &Chunk, all: DisjointSlice<Row>) {
-        let Self { rows, proxies, planes, layers, .. } = *self;
+        let Self { rows, proxies, planes, layers, passing, .. } = *self;
         let mut from = chunk.rows[0];
         let its = rows.partition_point(|(row, _)| *row < chunk.rows[0])
             ..rows.partition_point(|(row, _)| *row < chunk.rows[1]);
@@ -204,7 +214,8 @@ impl WallDisplacement<'_> {
             from = to + 1;
             let Some(proxy) = proxies.get(*proxy as usize) else { continue };
             let layers = layers.get(*to as usize).copied().unwrap_or_default();
-            for plane in planes.iter().filter(|plane| plane.layers.interacts_with(layers)) {
+            let filter = CollisionFilter { layers, ignored: passing.walls_of(*to) };
+            for plane in planes.iter().filter(|plane| filter.meets_wall(plane.wall, plane.layers)) {
                 // SAFETY: as above.
                 plane.bear(proxy, unsafe { &mut *all.row(*to as usize) });
             }

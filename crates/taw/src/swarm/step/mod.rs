@@ -102,6 +102,8 @@ impl Swarm {
             self.wake_beside_changes(walls);
             (self.walls_identity, self.rows_of_walls) = (Some(identity), Some(identity));
         }
+        // Not before: balls beside walls that changed are known by the pairs of the last step.
+        self.pairs_valid &= !std::mem::take(&mut self.filters_changed);
         self.scratch.threads = self.threads_for_awake();
         walls_changed
     }
@@ -190,8 +192,10 @@ impl Swarm {
             }
             for _ in 0..ROUNDS {
                 let waits = self.apply_restitution(params, faster);
-                self.find_pairs_after_bounces(substep > 0, [dt, h, left], walls, observe);
-                if !waits {
+                // A ball that was struck may reach others within the substep, and bounces there, too.
+                let reaches =
+                    self.find_pairs_after_bounces(substep > 0, [dt, h, left], walls, observe);
+                if !waits && !reaches {
                     break;
                 }
             }
@@ -259,23 +263,26 @@ impl Swarm {
     }
 
     /// Finds pairs and walls for balls that bounced, and along the paths that may have changed since
-    /// the begin of the step. Given are the seconds of it, of a substep, and what is left of it.
+    /// the begin of the step. Given are the seconds of it, of a substep, and what is left of it. Returns
+    /// true if it looked for any.
     fn find_pairs_after_bounces(
         &mut self,
         later: bool,
         [dt, h, left]: [f32; 3],
         walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
-    ) {
+    ) -> bool {
         let reach = self.reach_of_skins();
         let leaves = |row: u32, velocity: &Row, skin_left: f32, movers: &FastMovers| {
             leaves(velocity, skin_left, left) || skin_left > reach || movers.is_by_path(row)
         };
         let later = later && !self.fast_movers.crowded;
         let turns = |chunk: &Chunk| chunk.struck || later && chunk.speed[0] * dt > reach;
-        if self.find_pairs_within_step(turns, leaves, dt, walls, observe) {
+        let any = self.find_pairs_within_step(turns, leaves, dt, walls, observe);
+        if any {
             self.update_wall_contacts(walls, left, [dt, h], |_| true, false);
         }
+        any
     }
 
     /// Finds pairs and walls for balls of some chunks that leave their remaining skin within a
