@@ -350,3 +350,47 @@ fn the_end_of_a_belt_hits_nobody() {
         assert_eq!(messages.iter_current_update_messages().count(), 0);
     }
 }
+
+/// Though its place is still that of one that touches: it has fallen two millimetres.
+#[test]
+fn a_pair_that_passes_through_each_other_touches_no_longer() {
+    let ways: [fn(&mut App, [Entity; 2]); 4] = [
+        |app, [wall, marble]| {
+            app.world_mut().entity_mut(marble).insert(IgnoreCollisions(vec![wall]));
+        },
+        |app, [_, marble]| {
+            app.world_mut().entity_mut(marble).insert(ColliderDisabled::default());
+        },
+        |app, [wall, _]| {
+            app.world_mut().entity_mut(wall).insert(CollisionLayers::NONE);
+        },
+        |app, [wall, _]| {
+            app.world_mut().entity_mut(wall).insert(OneWay(Dir3::NEG_Y));
+        },
+    ];
+    for (case, pass) in ways.into_iter().enumerate() {
+        for response in [Response::Impulse, Response::EventDriven, Response::SoftStep] {
+            let mut app = listening_app();
+            app.world_mut().resource_mut::<TawModel>().response = response;
+            let floor = scene::floor(&mut app);
+            let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
+            scene::frames(&mut app, 64);
+            assert_eq!(told(&mut app).last(), Some(&('o', floor, marble)), "{case}, {response:?}");
+            pass(&mut app, [floor, marble]);
+            scene::frames(&mut app, 3);
+            assert_eq!(told(&mut app), [('e', floor, marble)], "{case}, {response:?}");
+        }
+    }
+}
+
+#[test]
+fn two_marbles_of_which_one_names_the_other_touch_no_longer() {
+    let mut app = listening_app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    let [a, b] = [0.0, 1.0].map(|x| scene::drop_marble(&mut app, 0.5, Vec3::X * x));
+    scene::frames(&mut app, 3);
+    assert_eq!(told(&mut app).last(), Some(&('o', a.min(b), a.max(b))));
+    app.world_mut().entity_mut(a).insert(IgnoreCollisions(vec![b]));
+    scene::frames(&mut app, 3);
+    assert_eq!(told(&mut app), [('e', a.min(b), a.max(b))]);
+}

@@ -382,3 +382,43 @@ fn a_camera_says_where_ahead_is() {
     assert!(seen(&above, 0.0, 0.5).distance(Vec3::NEG_X * 0.5) < 1e-5);
     assert!((seen(&behind, 1.0, 1.0).length() - 1.0).abs() < 1e-5);
 }
+
+#[test]
+fn who_passes_through_the_platform_does_not_stand_on_it_and_cannot_jump() {
+    for response in RESPONSES {
+        let mut app = app(response);
+        let platform = (Wall::from(Cuboid::new(6.0, 0.2, 6.0)), Transform::from_xyz(0.0, 4.9, 0.0));
+        let platform = app.world_mut().spawn(platform).id();
+        let hero = grounded(&mut app, 0.5, Vec3::Y * 5.5);
+        let controller = MarbleController { coyote_time: 0.0, ..default() };
+        app.world_mut().entity_mut(hero).insert(controller);
+        scene::frames(&mut app, 20);
+        assert_eq!(ground(&app, hero).map(|it| it.entity), Some(platform), "{response:?}");
+        app.world_mut().entity_mut(hero).insert(IgnoreCollisions(vec![platform]));
+        app.update();
+        assert_eq!(ground(&app, hero), None, "{response:?}");
+        control(&mut app, hero).jump = true;
+        assert!(apex(&mut app, hero, 60) < 5.51, "{response:?}");
+    }
+}
+
+/// A marble sleeps on a floor, within three walls that it passes through.
+#[test]
+fn asleep_it_stands_on_what_it_collides_with() {
+    let mut app = app(Response::SoftStep);
+    let floor = scene::floor(&mut app);
+    let mut wall = || {
+        let wall = (Wall::from(Cuboid::new(6.0, 0.1, 6.0)), Transform::from_xyz(0.0, 0.35, 0.0));
+        app.world_mut().spawn(wall).id()
+    };
+    let [other_layer, named, one_way] = [wall(), wall(), wall()];
+    app.world_mut().entity_mut(other_layer).insert(CollisionLayers::NONE);
+    app.world_mut().entity_mut(one_way).insert(OneWay::default());
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
+    app.world_mut().entity_mut(marble).insert(IgnoreCollisions(vec![named]));
+    scene::frames(&mut app, 200);
+    assert!(app.world().get::<Sleeping>(marble).is_some());
+    app.world_mut().entity_mut(marble).insert(Grounded::default());
+    app.update();
+    assert_eq!(ground(&app, marble).map(|ground| ground.entity), Some(floor));
+}

@@ -117,6 +117,23 @@ fn a_marble_meets_nothing_until_its_time_is_over() {
     }
 }
 
+/// Sums of such steps are 1e-7 s off.
+#[test]
+fn its_time_is_over_after_as_many_steps_as_it_has() {
+    for (rate, seconds, steps) in
+        [(60.0, 0.1, 6), (50.0, 1.0, 50), (144.0, 2.0, 288), (60.0, 0.3, 18)]
+    {
+        let mut app = scene::app_with(TawPlugins::in_schedule(Update));
+        scene::frame_length(&mut app, 1.0 / rate);
+        let marble = scene::drop_marble(&mut app, 0.5, Vec3::ZERO);
+        app.world_mut().entity_mut(marble).insert(ColliderDisabled::for_seconds(seconds));
+        frames(&mut app, steps);
+        assert!(app.world().get::<ColliderDisabled>(marble).is_some(), "{seconds} s at {rate} Hz");
+        frames(&mut app, 1);
+        assert!(app.world().get::<ColliderDisabled>(marble).is_none(), "{seconds} s at {rate} Hz");
+    }
+}
+
 /// It is solid again by a third of its radius in the floor, and by less in others.
 #[test]
 fn a_marble_that_is_solid_again_within_others_is_not_thrown() {

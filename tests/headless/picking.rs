@@ -1,6 +1,7 @@
 //! Pointers on marbles and walls, through a camera.
 
 use bevy::asset::uuid::Uuid;
+use bevy::camera::visibility::RenderLayers;
 use bevy::camera::{
     CameraProjection, ComputedCameraValues, NormalizedRenderTarget, RenderTarget, RenderTargetInfo,
 };
@@ -144,4 +145,29 @@ fn a_pointer_that_is_nowhere_hits_nothing() {
     frames(&mut app, 2);
     app.world_mut().resource_mut::<Heard>().0.clear();
     assert!(!is_over(&mut app));
+}
+
+#[test]
+fn what_the_camera_does_not_draw_by_its_render_layers_is_looked_through() {
+    let mut app = app();
+    let back = marble(&mut app, Vec3::NEG_Z * 2.0);
+    let front = marble(&mut app, Vec3::ZERO);
+    app.world_mut().entity_mut(front).insert(RenderLayers::layer(1));
+    assert_eq!(point_at(&mut app, 0.0, 0.0), [("over", back)]);
+    let camera = app.world_mut().query_filtered::<Entity, With<Camera>>().single(app.world());
+    app.world_mut().entity_mut(camera.unwrap()).insert(RenderLayers::from_layers(&[1, 2]));
+    assert_eq!(point_at(&mut app, 0.0, 0.1), [("out", back), ("over", front)]);
+    app.world_mut().entity_mut(front).insert(RenderLayers::layer(3));
+    assert_eq!(point_at(&mut app, 0.0, 0.0), [("out", front)]);
+    app.world_mut().entity_mut(back).insert(RenderLayers::from_layers(&[0, 2]));
+    assert_eq!(point_at(&mut app, 0.0, 0.1), [("over", back)]);
+}
+
+#[test]
+fn a_camera_within_a_wall_looks_out_of_it() {
+    let mut app = app();
+    let wall = (Wall::from(Cuboid::new(4.0, 4.0, 4.0)), Transform::from_xyz(0.0, 0.0, 10.0));
+    app.world_mut().spawn(wall);
+    let target = marble(&mut app, Vec3::ZERO);
+    assert_eq!(point_at(&mut app, 0.0, 0.0), [("over", target)]);
 }

@@ -7,7 +7,7 @@ use bevy_taw::governor::{Governor, ModelGoverned, WINDOW};
 use bevy_taw::prelude::*;
 use bevy_taw::trade::{TawTrade, TawTradePlugin, TradeMeasured};
 
-use crate::scene::{STEP, app_with, drop_marble, floor, frames, position};
+use crate::scene::{STEP, app_with, drop_marble, floor, frame_length, frames, position};
 
 /// Some marbles that fall on a floor.
 fn game() -> (App, Vec<Entity>) {
@@ -128,6 +128,22 @@ fn the_governor_goes_down_when_steps_run_over_and_up_when_there_is_room() {
         }
     }
     panic!("it stays at {now} of {}", front.len());
+}
+
+/// As a game does that pauses before anything was measured.
+#[test]
+fn the_governor_measures_when_time_passes() {
+    let mut app = app_with((TawPlugins::in_schedule(Update), TawTradePlugin));
+    drop_marble(&mut app, 0.4, Vec3::Y);
+    frames(&mut app, 1);
+    frame_length(&mut app, 0.0);
+    app.world_mut().resource_mut::<Governor>().budget = Some(Duration::from_millis(5));
+    frames(&mut app, 3);
+    assert!(app.world().resource::<TawTrade>().progress().is_none());
+    frame_length(&mut app, STEP);
+    frames(&mut app, 2);
+    let trade = app.world().resource::<TawTrade>();
+    assert!(trade.progress().is_some() || !trade.advice().candidates.is_empty());
 }
 
 /// How long frames take while models are measured, and while they are not. Prints.

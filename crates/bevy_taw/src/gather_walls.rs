@@ -241,7 +241,7 @@ impl Gathering<'_, '_> {
         self.put(entity, state, now, (clock, *is_sensor, surface));
         self.make_of(entity, state, material);
         self.put_into_layers(entity, state, layers.copied().unwrap_or_default());
-        self.let_through(entity, state, one_way);
+        self.put_one_way(entity, state, one_way);
     }
 
     /// Takes a wall or sensor out of the world.
@@ -344,7 +344,7 @@ impl Gathering<'_, '_> {
     }
 
     /// Makes a one-way wall of a wall, or one that is solid from all sides.
-    fn let_through(&mut self, entity: Entity, state: &WallState, one_way: Option<&OneWay>) {
+    fn put_one_way(&mut self, entity: Entity, state: &WallState, one_way: Option<&OneWay>) {
         let (Some(id), Some((_, rotation))) = (state.id, state.posed) else { return };
         let rotation = Quat::from_array(rotation.map(f32::from_bits));
         let direction =

@@ -113,7 +113,7 @@ pub(crate) fn govern(
     if front.is_empty() {
         if !governor.asked && !world.marbles.is_empty() {
             trade.measure(world.bypass_change_detection(), time.delta());
-            governor.asked = true;
+            governor.asked = trade.progress().is_some();
         }
         return;
     }

@@ -161,8 +161,15 @@ fn look_below(world: &TawWorld, walls: &Query<&WallState>, seekers: &mut [Seeker
     };
     let point = |contact: &Contact<f32>| marbles.position()[contact.b as usize] + contact.arms[1];
     let velocity = |row: u32| from_vector(marbles.velocity()[row as usize]);
+    // `SoftStep` lists a wall once more after a marble began to pass through it.
+    let collides = |contact: &Contact<f32>| {
+        let marble = world.marbles.id(contact.b as usize);
+        let wall = world.walls.id(contact.a as usize).map(ColliderId::Wall);
+        marble.zip(wall).is_some_and(|(marble, wall)| world.may_collide(marble, wall) == Ok(true))
+    };
     for contact in &world.contacts.wm {
         if let Some(i) = seeker_of(seekers, contact.b)
+            && collides(contact)
             && let Some(entity) = world.wall_entity(contact.a)
         {
             let point = point(contact);
@@ -189,7 +196,7 @@ fn look_below(world: &TawWorld, walls: &Query<&WallState>, seekers: &mut [Seeker
     }
 }
 
-/// The nearest surface below a marble, if it is ground.
+/// The nearest surface below a marble with which it collides, if it is ground.
 fn nearest(
     world: &TawWorld,
     walls: &Query<&WallState>,
@@ -199,8 +206,8 @@ fn nearest(
     let row = seeker.row as usize;
     let (id, position) = (world.marbles.id(row)?, world.marbles.position()[row]);
     let reach = world.marbles.radius()[row] * 1.02;
-    let is_other = |collider| collider != ColliderId::Marble(id);
-    let hit = world.queries(tree).project_point(position, reach, is_other)?;
+    let collides = |other| world.may_collide(id, other) == Ok(true);
+    let hit = world.queries(tree).project_point(position, reach, collides)?;
     let (entity, point) = (world.collider_entity(hit.collider)?, hit.result.point);
     let surface = match hit.collider {
         ColliderId::Wall(_) => wall_velocity(world, walls, entity, (point, hit.result.normal)),

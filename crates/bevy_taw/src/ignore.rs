@@ -43,7 +43,8 @@ pub struct IgnoreCollisions(#[entities] pub Vec<Entity>);
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct ColliderDisabled {
-    /// Seconds of steps until it is removed, at least zero; none for as long as nobody removes it.
+    /// Seconds of steps until it is removed, at least zero; none for as long as nobody removes it. Over
+    /// when less than half a step is left.
     pub time_left: Option<f32>,
 }
 
@@ -96,7 +97,7 @@ pub(crate) fn count_down(
         if !refusals.check(Some(entity), at_least_zero("time_left", *left)) {
             continue;
         }
-        if *left == 0.0 {
+        if *left < 0.5 * time.delta_secs() {
             commands.entity(entity).try_remove::<ColliderDisabled>();
         }
         *left = (*left - time.delta_secs()).max(0.0);

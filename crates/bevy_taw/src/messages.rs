@@ -28,6 +28,7 @@ use bevy::ecs::observer::CachedObservers;
 use bevy::prelude::*;
 use taw::contact::Contact;
 use taw::math::{Vec3 as TawVec3, length};
+use taw::world::ColliderId;
 
 use crate::SubstepDelta;
 use crate::components::{MarbleState, WallState};
@@ -104,7 +105,7 @@ pub struct ContactOngoing {
     pub pair: ContactPair,
 }
 
-/// Two that touched in the last step no longer do. One of them may be gone.
+/// Two that touched in the last step no longer do. One of them may be gone, or pass through the other.
 ///
 /// What rests touches in one step and hovers in the next, so a contact ends only
 /// when the gap is wider than a fiftieth of the smaller radius and than gravity
@@ -394,20 +395,24 @@ impl Gap {
     }
 }
 
-/// The gap of a pair, or `None` if one of the two is gone.
+/// The gap of a pair, or `None` if one of the two is gone or passes through the other.
 pub(crate) fn gap(
     pair: ContactPair,
     world: &TawWorld,
     marbles: &Query<&MarbleState>,
     walls: &Query<&WallState>,
 ) -> Option<Gap> {
-    let marble = |entity| world.marbles.get(marbles.get(entity).ok()?.id?).ok();
-    let b = marble(pair.b)?;
+    let id = marbles.get(pair.b).ok()?.id?;
+    let collides = |other| world.may_collide(id, other) == Ok(true);
+    let b = world.marbles.get(id).ok()?;
     if let Ok(wall) = walls.get(pair.a) {
-        let wall = world.walls.get(wall.id?).ok()?;
+        let id = wall.id.filter(|id| collides(ColliderId::Wall(*id)))?;
+        let wall = world.walls.get(id).ok()?;
         Some(Gap { width: wall.project_point(b.position).distance - b.radius, radius: b.radius })
     } else {
-        let a = marble(pair.a)?;
+        let id = marbles.get(pair.a).ok()?.id;
+        let id = id.filter(|id| collides(ColliderId::Marble(*id)))?;
+        let a = world.marbles.get(id).ok()?;
         let width = length(b.position - a.position) - a.radius - b.radius;
         Some(Gap { width, radius: a.radius.min(b.radius) })
     }

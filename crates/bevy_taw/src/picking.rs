@@ -19,6 +19,7 @@
 //! ```
 
 use bevy::camera::Camera;
+use bevy::camera::visibility::RenderLayers;
 use bevy::picking::backend::ray::RayMap;
 use bevy::picking::backend::{HitData, PointerHits};
 use bevy::picking::{Pickable, PickingSystems};
@@ -29,8 +30,9 @@ use crate::spatial_query::{SpatialQuery, SpatialQueryFilter};
 /// Reports what is below each pointer to Bevy's picking, whose plugins the game adds (they are in
 /// `DefaultPlugins`).
 ///
-/// All marbles and walls count, where they were after the last step, drawn or not, but for those with a
-/// [`Pickable`] that is not hoverable, as `Pickable::IGNORE` of a wall that nobody sees. Positions and normals
+/// All marbles and walls count, where they were after the last step, drawn or not, except those with a
+/// [`Pickable`] that is not hoverable, as `Pickable::IGNORE` of a wall that nobody sees, those in no
+/// [`RenderLayers`] of the camera, and those that the camera is in. Positions and normals
 /// of hits are those of the surface, in world space. Balls of swarms and sensors are not found.
 #[derive(Debug, Default)]
 pub struct TawPickingPlugin;
@@ -44,17 +46,21 @@ impl Plugin for TawPickingPlugin {
 /// Casts the ray of each pointer in each camera, and reports what it hits, nearest first.
 fn report_hits(
     rays: Res<RayMap>,
-    cameras: Query<&Camera>,
-    pickables: Query<&Pickable>,
+    cameras: Query<(&Camera, Option<&RenderLayers>)>,
+    (pickables, layers): (Query<&Pickable>, Query<&RenderLayers>),
     spatial: SpatialQuery,
     mut hits: MessageWriter<PointerHits>,
 ) {
-    let is_hoverable = |entity| pickables.get(entity).map_or(true, |it| it.is_hoverable);
-    let filter = SpatialQueryFilter::default().with_predicate(&is_hoverable);
     for (id, ray) in rays.iter() {
-        let Ok(camera) = cameras.get(id.camera) else { continue };
+        let Ok((camera, drawn)) = cameras.get(id.camera) else { continue };
+        let drawn = drawn.unwrap_or_default();
+        let is_picked = |entity| {
+            drawn.intersects(layers.get(entity).unwrap_or_default())
+                && pickables.get(entity).map_or(true, |it| it.is_hoverable)
+        };
+        let filter = SpatialQueryFilter::default().with_predicate(&is_picked);
         let of_ray = spatial.cast_ray_all(*ray, f32::INFINITY, &filter);
-        let picks = of_ray.into_iter().map(|hit| {
+        let picks = of_ray.into_iter().filter(|hit| hit.distance > 0.0).map(|hit| {
             let (point, normal) = (Some(hit.point), Some(hit.normal));
             (hit.entity, HitData::new(id.camera, hit.distance, point, normal))
         });

@@ -35,8 +35,11 @@ pub struct TawPlugins;
 
 impl TawPlugins {
     /// All plugins, with the step in this schedule instead of [`FixedUpdate`]: another one of the fixed main
-    /// loop, or one that the game runs. A step takes the time that [`Time`] passes there, and none is made
-    /// where none passes.
+    /// loop, or one that the game runs. A step takes the delta of [`Time`] there; no step is made if the
+    /// delta is zero.
+    ///
+    /// Comes before other plugins of taw, as `TawTradePlugin`: those that were added earlier are in
+    /// [`FixedUpdate`], and a warning says so.
     ///
     /// Outside of the fixed main loop (the [`FixedMainScheduleOrder`] when the plugins are added), nothing is
     /// interpolated.
@@ -227,7 +230,15 @@ fn add_step(app: &mut App) {
         ),
     )
     .add_systems(Part::Control, controller::drive)
-    .add_systems(
+    .add_systems(Part::Step, (run_substeps, swarm::step, end_step).chain());
+    add_gather(app);
+    add_scatter(app);
+    app.edit_schedule(Part::Control, one_by_one).edit_schedule(Part::Step, one_by_one);
+}
+
+/// Adds what goes into the world.
+fn add_gather(app: &mut App) {
+    app.add_systems(
         Part::Gather,
         (
             diagnostics::update_energy_audit,
@@ -246,8 +257,12 @@ fn add_step(app: &mut App) {
         )
             .chain(),
     )
-    .add_systems(Part::Step, (run_substeps, swarm::step, end_step).chain())
-    .add_systems(
+    .edit_schedule(Part::Gather, one_by_one);
+}
+
+/// Adds what goes back to components and messages.
+fn add_scatter(app: &mut App) {
+    app.add_systems(
         Part::Scatter,
         (
             sleep::unmark,
@@ -263,11 +278,8 @@ fn add_step(app: &mut App) {
             messages::trigger.run_if(messages::are_observed),
         )
             .chain(),
-    );
-    app.edit_schedule(Part::Control, one_by_one)
-        .edit_schedule(Part::Gather, one_by_one)
-        .edit_schedule(Part::Step, one_by_one)
-        .edit_schedule(Part::Scatter, one_by_one);
+    )
+    .edit_schedule(Part::Scatter, one_by_one);
 }
 
 /// Adds the verbs to the substep.
@@ -308,7 +320,7 @@ enum Part {
 }
 
 /// Run condition: a step has a length.
-fn time_passes(time: Res<Time>) -> bool {
+pub(crate) fn time_passes(time: Res<Time>) -> bool {
     !time.delta().is_zero()
 }
 

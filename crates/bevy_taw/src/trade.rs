@@ -34,6 +34,7 @@ use taw_lab::advise::{Advice, Requirements, Snapshot, advise};
 pub use taw_lab::advise::Candidate;
 
 use crate::governor::{self, Governor, ModelGoverned};
+use crate::plugin::time_passes;
 use crate::resources::TawWorld;
 use crate::schedule::TawSchedule;
 
@@ -49,7 +50,10 @@ impl Plugin for TawTradePlugin {
             .add_message::<TradeMeasured>()
             .add_message::<ModelGoverned>()
             .add_systems(Update, take_in)
-            .add_systems(schedule, governor::govern.after(crate::TawSystems::Scatter));
+            .add_systems(
+                schedule,
+                governor::govern.run_if(time_passes).after(crate::TawSystems::Scatter),
+            );
     }
 }
 

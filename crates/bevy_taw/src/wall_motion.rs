@@ -8,6 +8,10 @@
 //! behind its entity by no more than a frame and a step, and arrives in the first frame in which the
 //! entity rests. After a frame that took much longer than others it catches up half as fast again as
 //! the entity was moved.
+//!
+//! All this holds where the step is in the fixed main loop. In a schedule that the game runs
+//! ([`TawPlugins::in_schedule`](crate::TawPlugins::in_schedule)), a wall moves within each step to where its
+//! entity is then.
 
 use bevy::math::Isometry3d;
 use bevy::prelude::*;

@@ -286,3 +286,32 @@ fn a_marble_that_is_gone_names_nobody() {
     assert_eq!(world.marbles.set_ignored(id, &[]), Err(Error::NoSuchMarble(id)));
     assert_eq!(world.marbles.ignored(id), Err(Error::NoSuchMarble(id)));
 }
+
+#[test]
+fn who_may_collide_is_told_of_each_pair() {
+    let mut world = world::<f64>(Model::default());
+    let wall = world.walls.insert(plane()).unwrap();
+    let [a, b] = [0.0, 9.0].map(|x| world.marbles.insert(marble([x, 0.5, 0.0])).unwrap());
+    let others = [ColliderId::Marble(b), ColliderId::Wall(wall)];
+    let told = |world: &World<f64>| others.map(|other| world.may_collide(a, other).unwrap());
+    let from_b = |world: &World<f64>| world.may_collide(b, ColliderId::Marble(a)).unwrap();
+    assert_eq!((told(&world), from_b(&world)), ([true, true], true));
+    assert_eq!(world.may_collide(a, ColliderId::Marble(a)), Ok(false));
+    // At once, before a step; whichever of the two names the other.
+    ignore(&mut world, a, &others);
+    assert_eq!((told(&world), from_b(&world)), ([false, false], false));
+    ignore(&mut world, a, &[]);
+    ignore(&mut world, b, &[ColliderId::Marble(a)]);
+    assert_eq!((told(&world), from_b(&world)), ([false, true], false));
+    ignore(&mut world, b, &[]);
+    world.walls.set_layers(wall, CollisionLayers::new(2, 2)).unwrap();
+    world.marbles.set_layers(a, CollisionLayers::new(1, u32::MAX)).unwrap();
+    assert_eq!((told(&world), from_b(&world)), ([true, false], true));
+    world.marbles.set_layers(a, CollisionLayers::NONE).unwrap();
+    assert_eq!((told(&world), from_b(&world)), ([false, false], false));
+    world.marbles.remove(b).unwrap();
+    world.walls.remove(wall).unwrap();
+    assert_eq!(world.may_collide(a, ColliderId::Marble(b)), Err(Error::NoSuchMarble(b)));
+    assert_eq!(world.may_collide(b, ColliderId::Marble(a)), Err(Error::NoSuchMarble(b)));
+    assert_eq!(world.may_collide(a, ColliderId::Wall(wall)), Err(Error::NoSuchWall(wall)));
+}

@@ -7,7 +7,7 @@ use taw::motion::WallMotion;
 use taw::prelude::*;
 use taw::shape::{Aabb, BoundedShape as _, Compound, Mesh, Obb, Shape};
 use taw::swarm::SwarmModel;
-use taw::world::WallShape;
+use taw::world::{ColliderId, WallShape};
 
 const RESPONSES: [Response; 6] = [
     Response::Displacement,
@@ -376,5 +376,27 @@ fn one_that_no_longer_passes_by_name_falls_on_out_of_the_wall() {
         assert!(height(&world, id) < within, "{model:?}: {within} m, then {}", height(&world, id));
         run(&mut world, 2.0);
         assert!(height(&world, id) < -2.0, "{model:?}: {}", height(&world, id));
+    }
+}
+
+#[test]
+fn a_one_way_wall_may_collide_with_whom_it_holds() {
+    for model in models() {
+        let (mut world, wall) = world::<f64>(model, platform(6.0, 0.3));
+        let lies = world.marbles.insert(marble([0.0, 0.5, 0.0], [0.0; 3])).unwrap();
+        let jumps = world.marbles.insert(marble([3.0, -0.9, 0.0], [0.0, 9.0, 0.0])).unwrap();
+        let told = |world: &World<f64>| {
+            [lies, jumps].map(|id| world.may_collide(id, ColliderId::Wall(wall)).unwrap())
+        };
+        run(&mut world, 4.0 * STEP);
+        assert_eq!(told(&world), [true, false], "{model:?}");
+        run(&mut world, 3.0);
+        assert_eq!(told(&world), [true, true], "{model:?}");
+        world.walls.set_one_way(wall, Some(-Vec3::unit_y())).unwrap();
+        run(&mut world, STEP);
+        assert_eq!(told(&world), [false, false], "{model:?}");
+        world.walls.set_one_way(wall, None).unwrap();
+        run(&mut world, STEP);
+        assert_eq!(told(&world), [true, true], "{model:?}");
     }
 }

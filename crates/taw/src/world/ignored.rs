@@ -59,6 +59,24 @@ impl<S: Scalar> Marbles<S> {
 }
 
 impl<S: Scalar> World<S> {
+    /// Returns true if a marble collides with another marble or a wall where they meet: their layers
+    /// interact, none of the two [names the other](Marbles::set_ignored), and it is no
+    /// [one-way wall](super::Walls::set_one_way) that let the marble pass in the last substep. A marble
+    /// does not collide with itself.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`], [`Error::NoSuchWall`].
+    pub fn may_collide(&self, marble: MarbleId, other: ColliderId) -> Result<bool, Error> {
+        let own = ColliderId::Marble(marble);
+        let interact = self.layers(own)?.interacts_with(self.layers(other)?);
+        let names = |id, other| self.marbles.ignored(id).is_ok_and(|them| them.contains(&other));
+        let passes = match other {
+            ColliderId::Marble(id) => id == marble || names(id, own),
+            ColliderId::Wall(wall) => self.lets_pass(wall, marble),
+        };
+        Ok(interact && !passes && !names(marble, other))
+    }
+
     /// Finds the rows of the pairs that pass through each other: those that are named, and those of
     /// one-way walls and what these let through. Each verb begins with it: the user may have named others
     /// before, or taken some out.

@@ -86,6 +86,13 @@ fn unit_direction<S: Scalar>(direction: Vec3<S>) -> Result<Vec3<S>, Error> {
 }
 
 impl<S: Scalar> World<S> {
+    /// Returns true if a one-way wall let a marble pass in the last substep.
+    pub(super) fn lets_pass(&self, wall: WallId, marble: MarbleId) -> bool {
+        let decided = &self.memory.one_way;
+        let found = decided.binary_search_by_key(&(wall, marble), |it| (it.wall, it.marble));
+        found.is_ok_and(|i| !decided[i].held)
+    }
+
     /// Decides which marbles one-way walls hold in a substep of `dt` seconds.
     pub(super) fn decide_one_way(&mut self, dt: S) {
         if self.walls.one_way.is_empty() && self.memory.one_way.is_empty() {

@@ -140,6 +140,11 @@ impl<S: Scalar> World<S> {
         self.swarm.read_bodies(marbles, columns, None, &mut self.scratch.stopped);
         let lists = &mut self.scratch.soft_step.lists;
         self.swarm.list_contacts(marbles, [reach, dt], lists, &mut self.contacts);
+        let (walls, marbles) = (&self.walls, &self.marbles);
+        if !marbles.ignored_rows.is_empty() {
+            // Those of the step before are listed, too.
+            self.contacts.wm.retain(|c| walls.collides(c.a, marbles.filter_of_row(c.b as usize)));
+        }
         self.predict_impacts(S::from_f64(dt.into()));
     }
 

@@ -78,7 +78,7 @@ impl Swarm {
 
     /// Returns true if pairs are known, so that a step can be finished.
     pub(crate) fn is_prepared(&self) -> bool {
-        self.pairs_valid
+        self.pairs_valid && !self.filters_changed
     }
 
     /// Ends it: moves all on in substeps, and solves the contacts.
@@ -262,9 +262,8 @@ impl Swarm {
         });
     }
 
-    /// Finds pairs and walls for balls that bounced, and along the paths that may have changed since
-    /// the begin of the step. Given are the seconds of it, of a substep, and what is left of it. Returns
-    /// true if it looked for any.
+    /// Finds pairs and walls for balls that bounced, and along paths that may have changed since the begin
+    /// of the step. Given are its seconds, those of a substep, and what is left. True if it looked for any.
     fn find_pairs_after_bounces(
         &mut self,
         later: bool,
