@@ -422,3 +422,40 @@ fn asleep_it_stands_on_what_it_collides_with() {
     app.update();
     assert_eq!(ground(&app, marble).map(|ground| ground.entity), Some(floor));
 }
+
+#[test]
+fn a_hero_that_ran_is_at_rest_again_where_it_was_restored_at_rest() {
+    for drive in [Drive::Torque, Drive::Force] {
+        let mut app = app(Response::SoftStep);
+        scene::floor(&mut app);
+        let hero = hero(&mut app, MarbleController { drive, ..default() }, 2.0);
+        scene::frames(&mut app, 60);
+        let (at, saved) =
+            (scene::position(&app, hero), app.world().resource::<TawWorld>().snapshot());
+        control(&mut app, hero).direction = Vec3::X;
+        app.world_mut().entity_mut(hero).insert(Velocity(Vec3::X * 30.0));
+        scene::frames(&mut app, 30);
+        assert!(scene::position(&app, hero).distance(at) > 1.0, "{drive:?}");
+        control(&mut app, hero).direction = Vec3::ZERO;
+        app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+        scene::frames(&mut app, 10);
+        let moved = scene::position(&app, hero).distance(at);
+        assert!(moved < 1e-3, "{drive:?}: {moved} m");
+    }
+}
+
+#[test]
+fn a_hero_restored_in_the_air_does_not_jump_from_the_ground_of_before() {
+    let mut app = app(Response::SoftStep);
+    scene::floor(&mut app);
+    let hero = hero(&mut app, MarbleController::default(), 0.5);
+    app.world_mut().get_mut::<Transform>(hero).unwrap().translation.y = 8.0;
+    scene::frames(&mut app, 5);
+    let saved = app.world().resource::<TawWorld>().snapshot();
+    scene::frames(&mut app, 200);
+    app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+    control(&mut app, hero).jump = true;
+    scene::frames(&mut app, 5);
+    let speed = app.world().get::<Velocity>(hero).unwrap().y;
+    assert!(speed < 0.0, "{speed} m/s");
+}

@@ -224,6 +224,9 @@ pub(crate) fn drive(
     time: Res<Time>,
     mut refusals: Refusals,
 ) {
+    if world.just_restored {
+        return; // components and grounds are those of before
+    }
     let dt = time.delta_secs();
     for (entity, (mut hero, mut state), grounded, marble, mut velocity, mut spin, body, rotation) in
         &mut marbles

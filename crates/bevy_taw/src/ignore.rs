@@ -31,7 +31,8 @@ pub struct IgnoreCollisions(#[entities] pub Vec<Entity>);
 /// Queries without a mask find it. Removed when its time is over.
 ///
 /// A marble that is within another or in a wall by then is moved out as any other that begins so: by the
-/// response, most of them slowly.
+/// response, without speed, most of it in the first steps. A ghost falls through floors; one that stands on
+/// them has a layer of its own ([`CollisionLayers`](crate::prelude::CollisionLayers)).
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -57,14 +58,15 @@ impl ColliderDisabled {
 }
 
 /// Makes a one-way wall of a [`Wall`](crate::wall::Wall): marbles that come from behind or from the side
-/// pass through it, and land on what of it faces along this direction, in the frame of the entity. A
-/// platform to jump through, a turnstile.
+/// pass through it, and those that come from where it faces along this direction, in the frame of the
+/// entity, land on it. A platform to jump through, a turnstile.
 ///
-/// A marble that is in the wall or comes from behind is not touched until it is wholly out. To drop a
-/// marble through, let it name the wall by [`IgnoreCollisions`] for a while. May change at any time. Balls
-/// of swarms and queries meet it from all sides.
+/// A marble that is in the wall or comes from behind is not touched until it is wholly out; one that it
+/// holds collides with all of it. To drop a marble through, let it name the wall by [`IgnoreCollisions`] for
+/// a while. A closed mesh is hollow, and holds by its bottom what fits in: platforms are boxes, half-spaces or
+/// open sheets. May change at any time. Balls of swarms and queries meet it from all sides.
 ///
-/// Before each substep (of `SoftStep`, each step), all marbles are looked at for each such wall.
+/// Before each substep (of `SoftStep`, each step), all marbles near each such wall are looked at.
 ///
 /// ```
 /// # use bevy::prelude::*;

@@ -67,6 +67,9 @@ impl TawWorld {
     ///     world.restore(&saved.0);
     /// }
     /// ```
+    ///
+    /// [Controllers](crate::controller::MarbleController) drive nothing in the step after it: what they
+    /// would go by is of the time before.
     pub fn restore(&mut self, snapshot: &TawSnapshot) {
         self.world = snapshot.world.clone();
         self.marble_entities.clone_from(&snapshot.marble_entities);
