@@ -225,7 +225,9 @@ pub(crate) fn drive(
     mut refusals: Refusals,
 ) {
     if world.just_restored {
-        return; // components and grounds are those of before
+        // Components, grounds and jumps are those of before.
+        marbles.iter_mut().for_each(|(_, (_, mut state), ..)| *state = ControllerState::default());
+        return;
     }
     let dt = time.delta_secs();
     for (entity, (mut hero, mut state), grounded, marble, mut velocity, mut spin, body, rotation) in

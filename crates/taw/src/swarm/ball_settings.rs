@@ -93,7 +93,7 @@ impl Swarm {
         }
         self.surfaces.ignored = ignored;
         self.cache_impulses();
-        self.filters_changed = true;
+        self.scratch.filters_changed = true;
     }
 
     /// Has pairs and balls at walls found anew, with the impulses that they have.

@@ -119,8 +119,6 @@ pub struct Swarm {
     cache_valid: bool,
     /// Set while pairs and balls at walls are up to date.
     pairs_valid: bool,
-    /// Set while other pairs pass through each other than when pairs were found.
-    filters_changed: bool,
     walls_identity: Option<u64>,
     rows_of_walls: Option<u64>,
     gravity: Option<Vec3<f32>>,

@@ -12,6 +12,8 @@ use super::sweeps::Crowd;
 pub(super) struct Scratch {
     /// Number of threads that work on this step.
     pub threads: usize,
+    /// Set while other pairs pass through each other than when pairs were found, until the step begins.
+    pub filters_changed: bool,
     /// See [`SolverColumns::backing`](super::kernels::SolverColumns::backing).
     pub backing: Vec<Row>,
     /// Rows that would leave their skin in this step.
@@ -51,6 +53,7 @@ impl Scratch {
             chunk_states,
             searches,
             threads: _,
+            filters_changed: _,
             crowd,
             path_changes,
             places,

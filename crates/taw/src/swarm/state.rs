@@ -33,7 +33,6 @@ impl Swarm {
             old_rows,
             cache_valid: _,
             pairs_valid: _,
-            filters_changed: _,
             walls_identity: _,
             rows_of_walls: _,
             gravity: _,
@@ -97,7 +96,6 @@ impl PartialEq for Swarm {
             old_rows,
             cache_valid,
             pairs_valid,
-            filters_changed,
             walls_identity,
             rows_of_walls: _,
             gravity,
@@ -132,7 +130,6 @@ impl PartialEq for Swarm {
             && (grid, chunks, fast_movers) == (&other.grid, &other.chunks, &other.fast_movers)
             && (self.has_friction() || bits(neighbours) == bits(&other.neighbours))
             && (cache_valid, pairs_valid) == (&other.cache_valid, &other.pairs_valid)
-            && *filters_changed == other.filters_changed
             && (!cache_valid || *impulse_cache == other.impulse_cache)
             && (planes, body_balls, proxies) == (&other.planes, &other.body_balls, &other.proxies)
             && (bodies_are_rows, velocity_changes, surfaces)

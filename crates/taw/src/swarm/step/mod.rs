@@ -78,7 +78,7 @@ impl Swarm {
 
     /// Returns true if pairs are known, so that a step can be finished.
     pub(crate) fn is_prepared(&self) -> bool {
-        self.pairs_valid && !self.filters_changed
+        self.pairs_valid && !self.scratch.filters_changed
     }
 
     /// Ends it: moves all on in substeps, and solves the contacts.
@@ -103,7 +103,7 @@ impl Swarm {
             (self.walls_identity, self.rows_of_walls) = (Some(identity), Some(identity));
         }
         // Not before: balls beside walls that changed are known by the pairs of the last step.
-        self.pairs_valid &= !std::mem::take(&mut self.filters_changed);
+        self.pairs_valid &= !std::mem::take(&mut self.scratch.filters_changed);
         self.scratch.threads = self.threads_for_awake();
         walls_changed
     }
@@ -192,10 +192,9 @@ impl Swarm {
             }
             for _ in 0..ROUNDS {
                 let waits = self.apply_restitution(params, faster);
-                // A ball that was struck may reach others within the substep, and bounces there, too.
-                let reaches =
-                    self.find_pairs_after_bounces(substep > 0, [dt, h, left], walls, observe);
-                if !waits && !reaches {
+                // Who was struck may reach others within the substep, and bounces there, too.
+                let more = self.find_pairs_after_bounces(substep, [dt, h, left], walls, observe);
+                if !waits && !more {
                     break;
                 }
             }
@@ -266,7 +265,7 @@ impl Swarm {
     /// of the step. Given are its seconds, those of a substep, and what is left. True if it looked for any.
     fn find_pairs_after_bounces(
         &mut self,
-        later: bool,
+        substep: u32,
         [dt, h, left]: [f32; 3],
         walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
@@ -275,7 +274,7 @@ impl Swarm {
         let leaves = |row: u32, velocity: &Row, skin_left: f32, movers: &FastMovers| {
             leaves(velocity, skin_left, left) || skin_left > reach || movers.is_by_path(row)
         };
-        let later = later && !self.fast_movers.crowded;
+        let later = substep > 0 && !self.fast_movers.crowded;
         let turns = |chunk: &Chunk| chunk.struck || later && chunk.speed[0] * dt > reach;
         let any = self.find_pairs_within_step(turns, leaves, dt, walls, observe);
         if any {
