@@ -20,6 +20,10 @@ const GAIN_TOLERANCE: f64 = 1e-5;
 /// That of more contacts is larger; then as little as that is taken from them for nothing.
 const GAIN_ROUNDING: f64 = 2.0;
 
+/// Fraction of the warm start from which on it fits, but for what the iterations left of the last
+/// substep: a heap at rest keeps its impulses to the bit.
+const FITS: f64 = 0.99;
+
 /// Energy balance of an island's impulses, in units of the island.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct IslandEnergy<S> {
@@ -331,9 +335,10 @@ impl<S: Scalar> SolverBodies<'_, S> {
             c.initial_relative_velocity - target
         });
         self.scale_impulses(constraints, |island| {
-            let energy = &energies[island];
-            let is_cached = energy.quadratic > S::zero();
-            if is_cached { energy.min_energy_fraction().min(S::one()) } else { S::one() }
+            let fraction = energies[island].min_energy_fraction();
+            let is_outdated =
+                fraction < S::from_f64(FITS) && energies[island].quadratic > S::zero();
+            if is_outdated { fraction } else { S::one() }
         });
     }
 

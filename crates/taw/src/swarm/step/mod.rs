@@ -192,9 +192,8 @@ impl Swarm {
             }
             for _ in 0..ROUNDS {
                 let waits = self.apply_restitution(params, faster);
-                // Who was struck may reach others within the substep, and bounces there, too.
-                let more = self.find_pairs_after_bounces(substep, [dt, h, left], walls, observe);
-                if !waits && !more {
+                self.find_pairs_after_bounces(substep, [dt, h, left], walls, observe);
+                if !waits {
                     break;
                 }
             }
@@ -262,25 +261,23 @@ impl Swarm {
     }
 
     /// Finds pairs and walls for balls that bounced, and along paths that may have changed since the begin
-    /// of the step. Given are its seconds, those of a substep, and what is left. True if it looked for any.
+    /// of the step. Given are its seconds, those of a substep, and what is left.
     fn find_pairs_after_bounces(
         &mut self,
         substep: u32,
         [dt, h, left]: [f32; 3],
         walls: &dyn StaticGeometry,
         observe: &mut dyn FnMut(Stage),
-    ) -> bool {
+    ) {
         let reach = self.reach_of_skins();
         let leaves = |row: u32, velocity: &Row, skin_left: f32, movers: &FastMovers| {
             leaves(velocity, skin_left, left) || skin_left > reach || movers.is_by_path(row)
         };
         let later = substep > 0 && !self.fast_movers.crowded;
         let turns = |chunk: &Chunk| chunk.struck || later && chunk.speed[0] * dt > reach;
-        let any = self.find_pairs_within_step(turns, leaves, dt, walls, observe);
-        if any {
+        if self.find_pairs_within_step(turns, leaves, dt, walls, observe) {
             self.update_wall_contacts(walls, left, [dt, h], |_| true, false);
         }
-        any
     }
 
     /// Finds pairs and walls for balls of some chunks that leave their remaining skin within a
