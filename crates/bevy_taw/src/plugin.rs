@@ -78,7 +78,7 @@ impl PluginGroup for TawPlugins {
 #[derive(Debug, Default)]
 pub struct TawPlugin;
 
-/// Where the physics is in a frame. The schedule of the step is [`FixedUpdate`], or another
+/// Place of the physics in a frame. The schedule of the step is [`FixedUpdate`], or another
 /// [`TawSchedule`].
 #[derive(SystemSet, Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub enum TawSystems {

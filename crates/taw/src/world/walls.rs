@@ -189,7 +189,7 @@ impl<S: Scalar> Walls<S> {
         }
     }
 
-    /// Records that a wall is as it was not, where it is.
+    /// Records a change of a wall that stays in place.
     pub(super) fn mark_changed(&mut self, row: usize) {
         self.version += 1;
         self.log_change(self.shapes[row].bounding_box());

@@ -16,12 +16,13 @@ use crate::response::SolverBodies;
 /// A gain below this fraction of the energy of the velocity changes is the residual of the
 /// iterations.
 const GAIN_TOLERANCE: f64 = 1e-5;
-/// A gain below this fraction is the rounding of a sum over a few contacts, in roundings of the scalar.
-/// That of more contacts is larger; then as little as that is taken from them for nothing.
+/// Gain below which collisions are left as they are, over the energy of the velocity changes, in machine
+/// epsilons: the rounding of a few contacts. A large island may exceed it by rounding alone, and loses as
+/// little.
 const GAIN_ROUNDING: f64 = 2.0;
 
-/// Fraction of the warm start from which on it fits, but for what the iterations left of the last
-/// substep: a heap at rest keeps its impulses to the bit.
+/// Fraction from which on the warm start is not scaled: the rest is what the iterations left in the last
+/// substep, and a heap at rest keeps its impulses to the bit.
 const FITS: f64 = 0.99;
 
 /// Energy balance of an island's impulses, in units of the island.
@@ -67,7 +68,7 @@ impl<S: Scalar> IslandEnergy<S> {
         if fraction > S::zero() { fraction.min(S::one()) } else { S::zero() }
     }
 
-    /// Largest fraction of all impulses that gains no energy, where it gained a small part of theirs.
+    /// Largest fraction of all impulses that gains no energy; one where that is not a small correction.
     fn lossless_fraction(&self) -> S {
         let best = self.min_energy_fraction();
         let fraction = best + best;
