@@ -1,5 +1,7 @@
 //! `Response::SoftStep`: marbles on the rows of the swarm.
 
+#[path = "soft_step/breaks.rs"]
+mod breaks;
 #[path = "soft_step/drums.rs"]
 mod drums;
 #[path = "soft_step/impacts.rs"]

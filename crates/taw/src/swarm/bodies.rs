@@ -16,6 +16,7 @@ use crate::broad::CollisionLayers;
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite};
 use crate::motion::integrate_rotation;
+use crate::response::Impact;
 
 /// State of a marble as a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -386,6 +387,11 @@ impl Swarm {
                 }
             }
         }
+    }
+
+    /// Bounces of the step, if bodies are rows: of slots, in the order in which they were solved.
+    pub(crate) fn noted_impacts(&self) -> &[Impact<f32>] {
+        &self.scratch.impacts
     }
 
     /// Slots of the balls near walls other than half-spaces.

@@ -33,6 +33,8 @@ pub(super) struct Chunk {
     pub has_fast: bool,
     /// Largest speed of a ball, in m/s: of any, of one in the first layer, of one in the last.
     pub speed: [f32; 3],
+    /// Largest speed of a wall at one of its balls, in m/s.
+    pub wall_speed: f32,
     /// The least and the largest inverse mass, in 1/kg.
     pub inverse_masses: [f32; 2],
     /// The least and the largest radius, in metres.
@@ -83,6 +85,7 @@ impl Chunk {
             near_shapes,
             has_fast: _,
             speed: _,
+            wall_speed: _,
             inverse_masses: _,
             radii: _,
             asleep: _,

@@ -6,6 +6,7 @@ use super::simd::Row;
 use super::state::of;
 use super::step::{SavedPlace, WayToWall};
 use super::sweeps::Crowd;
+use crate::response::Impact;
 
 /// Memory that a step writes before it reads it.
 #[derive(Clone, Debug, Default)]
@@ -38,6 +39,8 @@ pub(super) struct Scratch {
     /// Balls that would bounce off a wall, and those of them that another one hinders.
     pub ways_to_walls: Vec<WayToWall>,
     pub held: BitSet,
+    /// Impacts of the step, if they are noted: of slots.
+    pub impacts: Vec<Impact<f32>>,
 }
 
 impl Scratch {
@@ -60,11 +63,17 @@ impl Scratch {
             substep: _,
             ways_to_walls,
             held,
+            impacts,
         } = self;
         (of(backing) + of(leaving) + of(displacements) + of(proxy_rows) + of(saved_proxies))
             + (of(lists) + lists.iter().map(of).sum::<usize>())
             + of(chunk_states)
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
-            + (crowd.bytes() + of(path_changes) + of(places) + of(ways_to_walls) + held.bytes())
+            + (crowd.bytes()
+                + of(path_changes)
+                + of(places)
+                + of(ways_to_walls)
+                + held.bytes()
+                + of(impacts))
     }
 }

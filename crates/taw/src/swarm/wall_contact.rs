@@ -1,6 +1,6 @@
 //! Contacts with walls, one at a time: few balls lie at a wall.
 
-use cgmath::InnerSpace;
+use cgmath::{EuclideanSpace, InnerSpace, Point3};
 
 use super::kernels::{GROUNDED, Pass, SolverParams, WALL_SLOP};
 use super::proxies::Proxy;
@@ -8,6 +8,7 @@ use super::simd::Row;
 use super::surfaces::WallNumbers;
 use crate::constraint::{ContactImpulse, ContactSoftness, FrictionCone, solve_rolling};
 use crate::math::{RealVector, Vec3};
+use crate::response::Impact;
 
 /// Contact constraint of a ball and a part of a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -139,14 +140,15 @@ impl WallContact {
         overlap
     }
 
-    /// A pass as for the pairs of balls. Says how far it moved the ball if that bounced, in metres.
+    /// A pass as for the pairs of balls. Returns the bounce if there was one: then it moved the ball by its
+    /// separation.
     pub fn solve(
         &mut self,
         pass: Pass,
         at: &mut Row,
         velocity: &mut Row,
         spin: &mut Row,
-    ) -> Option<f32> {
+    ) -> Option<Bounce> {
         match pass {
             Pass::Restitution(params) => {
                 return self.apply_restitution(&params, at, velocity, spin);
@@ -197,17 +199,33 @@ impl WallContact {
         })
     }
 
-    /// Turns the ball back if it meets the wall, with the speed that it then has. Says how far away
-    /// that is, in metres.
+    /// Impact of such a bounce, of a ball that was here.
+    pub fn impact(&self, bounce: &Bounce, at: &Row, velocity: &Row) -> Impact<f32> {
+        let Bounce { separation, approach_speed, impact_speed } = *bounce;
+        let time = separation / (0.5 * (approach_speed + impact_speed));
+        let along = xyz(velocity).reject_from(self.normal) * time;
+        let to_wall = self.surface.dot(self.normal) * time - separation - at[3];
+        let point = xyz(at) + along + self.normal * to_wall;
+        Impact {
+            a: self.wall,
+            on_wall: true,
+            b: self.row,
+            normal: self.normal,
+            point: Point3::from_vec(point),
+            approach_speed: impact_speed,
+        }
+    }
+
+    /// Turns the ball back if it meets the wall, with the speed that it then has.
     fn apply_restitution(
         &self,
         params: &SolverParams,
         at: &mut Row,
         velocity: &mut Row,
         spin: &mut Row,
-    ) -> Option<f32> {
-        let Bounce { separation, approach_speed, impact_speed } =
-            self.bounce(params, at, velocity)?;
+    ) -> Option<Bounce> {
+        let bounce = self.bounce(params, at, velocity)?;
+        let Bounce { separation, approach_speed, impact_speed } = bounce;
         let relative = xyz(velocity) - self.surface;
         let stopping = self.slip(relative, spin) * (-self.tangent_mass() / velocity[3]);
         let impulse = FrictionCone::new(self.numbers.friction).clamp(ContactImpulse {
@@ -216,7 +234,7 @@ impl WallContact {
         });
         set(at, xyz(at) - self.normal * separation);
         self.apply_impulse(velocity, spin, impulse);
-        Some(separation)
+        Some(bounce)
     }
 
     /// Velocity at which the ball's surface slides over the wall's, in m/s.

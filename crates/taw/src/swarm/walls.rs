@@ -201,14 +201,17 @@ impl Chunk {
         if !self.near_shapes.is_empty() {
             self.find_shape_contacts(walls, query, only_fast);
         }
+        let mut fastest = 0.0_f32;
         for contact in &mut self.wall_contacts {
             let ball = &query.at[contact.row as usize];
             let point = center(ball) - contact.normal * ball[3];
             contact.bears_proxy = false;
             contact.surface = walls.surface_velocity(contact.wall, point, contact.normal);
+            fastest = fastest.max(contact.surface.magnitude2());
             contact.offset = contact.offset_at_end;
             contact.advance(-query.before);
         }
+        self.wall_speed = fastest.sqrt();
     }
 
     fn find_shape_contacts(

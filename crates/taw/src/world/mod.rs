@@ -238,8 +238,9 @@ impl<S: Scalar> World<S> {
 
     /// Impacts of the last step that are in no list of contacts: those of
     /// [`Response::EventDriven`], in the order of time within each substep, and of
-    /// [`Response::SoftStep`] those of marbles that came together within the step, at most one for
-    /// each contact, in the order of [`World::contacts`]. (Without restitution an impact may take two
+    /// [`Response::SoftStep`] those of marbles: bounces in the order in which they were solved, each with
+    /// the speed and the normal of its impulse, and then the impacts of what does not bounce, at most one
+    /// for each contact, in the order of [`World::contacts`]. (Without restitution an impact may take two
     /// steps, and is told in both, with the speed that is left.) Other responses list contacts where
     /// surfaces overlap, and no impacts.
     #[must_use]

@@ -40,6 +40,23 @@ impl<S> Default for PredictedImpacts<S> {
 /// rounding, and less than any: a speculative contact may stop one body at the surface of the other
 /// in this step, and take the rest of the speed in the next one.
 const CONFIRMING: f64 = 1e-3;
+/// Part by which an approach speed may differ from the one in single precision that decided what bounces.
+const ROUNDING: f64 = 1e-3;
+
+/// Identity of the two that meet.
+fn pair_of<S>(impact: &Impact<S>) -> (bool, u32, u32) {
+    (impact.on_wall, impact.a, impact.b)
+}
+
+/// Impact of marbles, given that of slots; none if balls of the swarm take part.
+fn of_marbles<S: Scalar>(impact: &Impact<f32>, marbles: &[u32]) -> Option<Impact<S>> {
+    let marble = |slot: u32| marbles.get(slot as usize).copied().filter(|marble| *marble != NO_ROW);
+    let b = marble(impact.b)?;
+    let a = if impact.on_wall { impact.a } else { marble(impact.a)? };
+    let listed = Impact { a, b, ..*impact }.cast();
+    let reversed = !impact.on_wall && b < a;
+    Some(if reversed { Impact { a: b, b: a, normal: -listed.normal, ..listed } } else { listed })
+}
 
 impl<S: Scalar> World<S> {
     /// Predicts which listed contacts begin within the step of `dt` seconds.
@@ -177,18 +194,43 @@ impl<S: Scalar> World<S> {
         Some(PredictedImpact { impact, velocity })
     }
 
-    /// Lists the predicted impacts that took place: both bodies were pushed apart. (Who was stopped
-    /// by something else on the way left the other one as it was.)
+    /// Lists the bounces as they were solved. What does not bounce is stopped by its contact: of these,
+    /// the predicted impacts that took place, as both bodies were pushed apart. (Who was stopped by
+    /// something else on the way left the other one as it was.)
     pub(super) fn list_impacts(&mut self, dt: S) {
+        let before = self.impacts.len();
+        let marbles = &self.scratch.soft_step.marble_of_slot;
+        let noted = self.swarm.noted_impacts().iter();
+        self.impacts.extend(noted.filter_map(|impact| of_marbles(impact, marbles)));
+        let mut told: Vec<_> = self.impacts[before..].iter().map(pair_of).collect();
+        told.sort_unstable();
         let predicted = std::mem::take(&mut self.scratch.soft_step.predicted);
         if predicted.rows == (self.marbles.removals(), self.marbles.len()) {
-            let took_place =
-                predicted.list.iter().filter(|predicted| self.took_place(predicted, dt));
+            let took_place = predicted.list.iter().filter(|predicted| {
+                let impact = &predicted.impact;
+                told.binary_search(&pair_of(impact)).is_err()
+                    && !self.bounces(impact, dt)
+                    && self.took_place(predicted, dt)
+            });
             let impacts: Vec<_> = took_place.map(|predicted| predicted.impact).collect();
             self.impacts.extend(impacts);
         }
         self.scratch.soft_step.predicted = predicted;
         self.scratch.soft_step.predicted.list.clear();
+    }
+
+    /// Returns true for an impact that the solver notes if it happens: one fast enough to bounce.
+    fn bounces(&self, impact: &Impact<S>, dt: S) -> bool {
+        let material = |row: u32| self.marbles.material.get(row as usize).unwrap_or_default();
+        let of_wall = |row: u32| self.walls.material_of_row(row as usize);
+        let own = material(impact.b);
+        let of_both = if impact.on_wall {
+            of_wall(impact.a).map_or(own, |its| own.combined_with(its))
+        } else {
+            own.combined_with(material(impact.a))
+        };
+        let threshold = length(self.settings.gravity) * dt * S::from_f64(2.0 * (1.0 + ROUNDING));
+        of_both.restitution > S::zero() && impact.approach_speed > threshold
     }
 
     fn took_place(&self, PredictedImpact { impact, velocity }: &PredictedImpact<S>, dt: S) -> bool {

@@ -8,7 +8,7 @@ use taw::shape::Aabb;
 use crate::{floor, world};
 
 /// Marble of this restitution, without friction.
-fn ball<S: Scalar>(position: [f64; 3], velocity: [f64; 3], radius: f64, e: f64) -> Marble<S> {
+pub fn ball<S: Scalar>(position: [f64; 3], velocity: [f64; 3], radius: f64, e: f64) -> Marble<S> {
     let material =
         Material { restitution: S::from_f64(e), friction: S::zero(), ..Material::default() };
     Marble {
@@ -168,7 +168,8 @@ fn marbles_that_come_and_go_between_the_verbs_are_no_impacts() {
     }
 }
 
-/// A plate that strikes a ball at rest is told once, with its speed, however it lies in the step.
+/// A plate that strikes a ball at rest throws it by its restitution, and is told once, with its speed,
+/// however it lies in the step.
 #[test]
 fn what_a_moving_wall_strikes_is_told() {
     for (i, substeps) in [1, 2, 4, 1, 2, 4, 1, 4].into_iter().enumerate() {
@@ -199,6 +200,8 @@ fn what_a_moving_wall_strikes_is_told() {
             assert_eq!((told[0].on_wall, told[0].b, told[0].normal), (true, row, Vec3::unit_x()));
             assert!((told[0].approach_speed - speed).abs() < 1e-3, "{case}");
             assert!((told[0].point.x + 0.2).abs() < 1e-3, "{case}");
+            let leaves = world.marbles.velocity()[row as usize].x;
+            assert!((leaves - (1.0 + restitution) * speed).abs() < 1e-3, "{leaves} m/s, {case}");
         }
     }
 }

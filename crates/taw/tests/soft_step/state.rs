@@ -156,7 +156,8 @@ fn in_f64_and_on_a_lift_a_heap_goes_along() {
     assert!(fastest < 1e-6, "{fastest}");
     let mut world = self::world::<f32>(2);
     let wall = floor(&mut world);
-    let id = world.marbles.insert(Marble::new(Point3::new(0.0, 0.1, 0.0), 0.1)).unwrap();
+    let taw = Marble::new(Point3::new(0.0, 0.1, 0.0), 0.1);
+    let id = world.marbles.insert(Marble { velocity: Vec3::unit_y(), ..taw }).unwrap();
     for step in 1..=300_u16 {
         let height = f32::from(step) / 60.0;
         let motion = taw::world::WallMotion {

@@ -111,7 +111,7 @@ pub struct Impact<S> {
     pub approach_speed: S,
 }
 
-impl Impact<f64> {
+impl<T: Scalar> Impact<T> {
     /// Conversion to another scalar.
     pub(crate) fn cast<S: Scalar>(self) -> Impact<S> {
         Impact {
@@ -120,7 +120,7 @@ impl Impact<f64> {
             b: self.b,
             normal: cast_vector(self.normal),
             point: cast_point(self.point),
-            approach_speed: S::from_f64(self.approach_speed),
+            approach_speed: S::from_f64(self.approach_speed.as_f64()),
         }
     }
 }

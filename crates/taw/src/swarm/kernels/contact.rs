@@ -1,8 +1,10 @@
 //! Contacts of pairs in the full tier, eight at a time: restitution, warm start, solve and relax.
 //! The constraint itself is in [`crate::constraint`].
 
+use cgmath::EuclideanSpace;
+
 use super::backing::borne_by_wall;
-use super::meeting::meeting;
+use super::meeting::{Meeting, meeting};
 use super::params::{Pass, SolverParams};
 use super::rolling::RollingInertia;
 use super::{
@@ -10,7 +12,8 @@ use super::{
     normal_and_separation, scatter, tipping,
 };
 use crate::constraint::{ContactImpulse, FrictionCone, Softness};
-use crate::math::RealVector;
+use crate::math::{Point3, RealVector, Vec3};
+use crate::response::Impact;
 use crate::swarm::batches::Batch;
 use crate::swarm::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use crate::swarm::surfaces::{PairNumbers, SOLID_BALL};
@@ -160,7 +163,7 @@ impl<L: Simd> Numbers<L> {
         }
         // What meets nevertheless is stopped: it may come so fast only because of impulses that were
         // applied again, and are taken back by the contacts that bear them.
-        let (_, meets) = meeting(params, at, velocity);
+        let meets = meeting(params, at, velocity).approach_speed;
         let missed = meets.select_gt(zero, zero, unsure);
         if FIRST { missed } else { bounces + missed }
     }
@@ -238,11 +241,11 @@ impl SolverColumns<'_> {
         batch: &Batch,
         params: &SolverParams,
         numbers: &Numbers<L>,
-        [at_a, at_b]: [[L; 4]; 2],
-        [a, b]: [[L; 4]; 2],
+        ([at_a, at_b], [a, b]): ([[L; 4]; 2], [[L; 4]; 2]),
+        impacts: &mut Vec<Impact<f32>>,
     ) -> bool {
         let zero = L::splat(0.0);
-        let (normal, approach_speed) = meeting(params, [&at_a, &at_b], [&a, &b]);
+        let Meeting { normal, approach_speed, time } = meeting(params, [&at_a, &at_b], [&a, &b]);
         let tipping = tipping::tip(batch, params, normal, approach_speed);
         // What does not bounce is stopped by its contact.
         let approach_speed = if OWN {
@@ -253,6 +256,10 @@ impl SolverColumns<'_> {
         let bounces = approach_speed.gt_mask(zero) != 0;
         if !bounces && tipping.is_none() {
             return false;
+        }
+        if params.notes_impacts {
+            let point = Vec3Wide::of(&at_a) + Vec3Wide::of(&a) * time + normal * at_a[3];
+            note_impacts(impacts, batch, approach_speed, [normal, point]);
         }
         let relative = Vec3Wide::of(&b) - Vec3Wide::of(&a);
         let mass = effective_mass(&a, &b);
@@ -329,8 +336,9 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let velocity = gather::<L>(columns.velocity, batch);
             let numbers =
                 Numbers::<L>::load::<OWN>(&impulses.numbers, i, friction, params.restitution);
+            let (rows, impacts) = ((at, velocity), &mut impulses.impacts);
             impulses.bounced |=
-                columns.apply_restitution::<L, OWN>(batch, &params, &numbers, at, velocity);
+                columns.apply_restitution::<L, OWN>(batch, &params, &numbers, rows, impacts);
         }
     }
 
@@ -430,6 +438,25 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
                 columns.push_apart(batch, at, [a, b], contact, params.slop, grounded);
             }
         }
+    }
+}
+
+/// Notes the pairs of a batch that bounce, with their approach speeds, normals and points.
+#[cold]
+fn note_impacts<L: Simd>(
+    impacts: &mut Vec<Impact<f32>>,
+    batch: &Batch,
+    approach_speed: L,
+    vectors: [Vec3Wide<L>; 2],
+) {
+    let (mut speeds, mut places) = ([0.0; LANES], [[[0.0; LANES]; 3]; 2]);
+    approach_speed.store(&mut speeds);
+    vectors.iter().zip(&mut places).for_each(|(vector, place)| vector.store(place));
+    for ([a, b], lane) in batch.pairs().zip(0..).filter(|(_, lane)| speeds[*lane] > 0.0) {
+        let [normal, point] = places.map(|[x, y, z]| Vec3::new(x[lane], y[lane], z[lane]));
+        let point = Point3::from_vec(point);
+        let approach_speed = speeds[lane];
+        impacts.push(Impact { a, on_wall: false, b, normal, point, approach_speed });
     }
 }
 

@@ -5,14 +5,24 @@ use super::params::SolverParams;
 use crate::swarm::simd::Simd;
 use crate::swarm::vec3_wide::Vec3Wide;
 
-/// Which pairs meet within a substep: the normal then, and how fast they come together, or zero for
-/// those that do not meet or too slowly.
+/// Meetings of the pairs of a batch within a substep.
+#[derive(Clone, Copy)]
+pub(super) struct Meeting<L> {
+    /// Normal when they meet.
+    pub normal: Vec3Wide<L>,
+    /// Speed at which they then approach, in m/s: zero for those that do not meet, or too slowly.
+    pub approach_speed: L,
+    /// Time until they meet, in seconds.
+    pub time: L,
+}
+
+/// Finds out which pairs meet within a substep.
 #[inline(always)]
 pub(super) fn meeting<L: Simd>(
     params: &SolverParams,
     [at_a, at_b]: [&[L; 4]; 2],
     [a, b]: [&[L; 4]; 2],
-) -> (Vec3Wide<L>, L) {
+) -> Meeting<L> {
     let (zero, one, least) = (L::splat(0.0), L::splat(1.0), L::splat(f32::MIN_POSITIVE));
     let displacement = Vec3Wide::of(at_b) - Vec3Wide::of(at_a);
     let relative = Vec3Wide::of(b) - Vec3Wide::of(a);
@@ -24,7 +34,7 @@ pub(super) fn meeting<L: Simd>(
     // Nobody is there before half of the time that the approach would take.
     let farthest = approach * (limit * L::splat(2.0 * (1.0 + 1e-5)));
     if apart.gt_mask(farthest) == ALL {
-        return (displacement, zero);
+        return Meeting { normal: displacement, approach_speed: zero, time: zero };
     }
     // By how far it goes past the point, which is exact from afar too.
     let speed = relative.dot(relative);
@@ -43,5 +53,5 @@ pub(super) fn meeting<L: Simd>(
     let approach_speed =
         approach_speed.select_gt(L::splat(params.restitution_threshold), approach_speed, zero);
     let approach_speed = square.select_gt(zero, approach_speed, zero);
-    (normal, meets.select_gt(zero, approach_speed, zero))
+    Meeting { normal, approach_speed: meets.select_gt(zero, approach_speed, zero), time }
 }

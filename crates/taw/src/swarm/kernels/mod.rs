@@ -6,6 +6,7 @@ use super::simd::{LANES, Row, Simd};
 use super::surfaces::{PairNumbers, SurfaceOf};
 use super::vec3_wide::Vec3Wide;
 use super::workers::DisjointSlice;
+use crate::response::Impact;
 
 mod backing;
 mod contact;
@@ -35,6 +36,8 @@ pub(super) struct ContactImpulses {
     pub numbers: Vec<PairNumbers>,
     /// Set if any of them bounced in the last round.
     pub bounced: bool,
+    /// Impacts of the last round, if they are noted: of rows.
+    pub impacts: Vec<Impact<f32>>,
     /// Those that were struck in this substep.
     pub struck: Vec<StruckContact>,
 }
@@ -84,6 +87,7 @@ impl ContactImpulses {
                 * size_of::<[[f32; LANES]; 3]>()
             + self.numbers.capacity() * size_of::<PairNumbers>()
             + self.struck.capacity() * size_of::<StruckContact>()
+            + self.impacts.capacity() * size_of::<Impact<f32>>()
     }
 
     /// Forgets the impulses that stopped balls, but not the loads.

@@ -38,6 +38,8 @@ pub(in crate::swarm) struct SolverParams {
     pub softness: ContactSoftness,
     /// Overlap of two balls that is left alone, over twice the smaller radius.
     pub slop: f32,
+    /// Set if bounces are noted as impacts.
+    pub notes_impacts: bool,
 }
 
 /// So much of its radius a ball may be in a wall: more than what bears a heap gets.

@@ -2,14 +2,16 @@
 
 use cgmath::InnerSpace;
 
-use super::ROUNDS;
+use super::{ROUNDS, leaves};
 use crate::math::Vec3;
-use crate::swarm::Swarm;
+use crate::response::Impact;
 use crate::swarm::batches::Batch;
 use crate::swarm::chunk::Chunk;
-use crate::swarm::kernels::{Pass, SolverParams};
+use crate::swarm::fast_movers::FastMovers;
+use crate::swarm::kernels::{Pass, SolverParams, squared};
 use crate::swarm::simd::Row;
 use crate::swarm::wall_contact::xyz;
+use crate::swarm::{Stage, StaticGeometry, Swarm};
 
 /// Part of both radii that another ball has to be in the way: balls that lie on each other overlap by
 /// less.
@@ -19,6 +21,33 @@ const IN_THE_WAY: f32 = 0.9;
 const SHORT: f32 = 0.43;
 
 impl Swarm {
+    /// Lets bounce what meets in a substep: again where a ball had to wait for another one, and where
+    /// one that was struck may reach what is not listed with it yet, a wall say. Given are the seconds of
+    /// the step, of a substep, and what is left.
+    pub(super) fn bounce(
+        &mut self,
+        substep: u32,
+        times: [f32; 3],
+        params: SolverParams,
+        walls: &dyn StaticGeometry,
+        observe: &mut dyn FnMut(Stage),
+    ) {
+        let speed = params.restitution_threshold;
+        let faster =
+            |chunk: &Chunk, next: f32| 2.0 * chunk.speed[0].max(next) + chunk.wall_speed > speed;
+        let mut all = true;
+        for _ in 0..ROUNDS {
+            let first = |chunk: &mut Chunk| chunk.again = all || std::mem::take(&mut chunk.struck);
+            self.chunks.iter_mut().for_each(first);
+            let (waits, rebuilds) = (self.apply_restitution(params, faster), self.rebuilds);
+            let found = self.find_pairs_after_bounces(substep, times, walls, observe);
+            if !waits && !found {
+                break;
+            }
+            all = waits || self.rebuilds != rebuilds;
+        }
+    }
+
     /// Lets bounce what meets, again where a bounce may have sent a ball on to the next one. Returns
     /// true if one waits for another; pairs have to be found before the next call.
     pub(super) fn apply_restitution(
@@ -26,7 +55,7 @@ impl Swarm {
         params: SolverParams,
         faster: impl Fn(&Chunk, f32) -> bool + Sync,
     ) -> bool {
-        self.chunks.iter_mut().for_each(|chunk| (chunk.again, chunk.struck) = (true, false));
+        self.chunks.iter_mut().for_each(|chunk| chunk.struck = false);
         self.scratch.held.clear(0);
         for _ in 0..ROUNDS {
             self.list_ways_to_walls(&params, &faster);
@@ -43,6 +72,8 @@ impl Swarm {
                 self.chunks[i].again = all || again;
                 self.chunks[i].struck |= all || again;
             }
+            self.note_speeds();
+            self.note_impacts();
             self.fast_movers.impulses.bounced = false;
             self.chunks.iter_mut().for_each(|chunk| chunk.impulses.bounced = false);
             if !any {
@@ -50,6 +81,51 @@ impl Swarm {
             }
         }
         !self.scratch.held.is_empty()
+    }
+
+    /// Finds pairs and walls for balls that bounced, and along paths that may have changed since the begin
+    /// of the step. Given are its seconds, those of a substep, and what is left. Returns
+    /// true if there were such balls.
+    fn find_pairs_after_bounces(
+        &mut self,
+        substep: u32,
+        [dt, h, left]: [f32; 3],
+        walls: &dyn StaticGeometry,
+        observe: &mut dyn FnMut(Stage),
+    ) -> bool {
+        let reach = self.reach_of_skins();
+        let leaves = |row: u32, velocity: &Row, skin_left: f32, movers: &FastMovers| {
+            leaves(velocity, skin_left, left) || skin_left > reach || movers.is_by_path(row)
+        };
+        let later = substep > 0 && !self.fast_movers.crowded;
+        let turns = |chunk: &Chunk| chunk.struck || later && chunk.speed[0] * dt > reach;
+        let found = self.find_pairs_within_step(turns, leaves, dt, walls, observe);
+        if found {
+            self.update_wall_contacts(walls, left, [dt, h], |_| true, false);
+        }
+        found
+    }
+
+    /// Notes how fast the balls are in chunks with a bounce: some may strike what was at rest until now.
+    fn note_speeds(&mut self) {
+        for chunk in self.chunks.iter_mut().filter(|chunk| chunk.again && !chunk.asleep) {
+            let velocities = &self.velocity[chunk.own_rows()];
+            let fastest = velocities.iter().fold(0.0_f32, |most, v| most.max(squared(*v)));
+            chunk.speed[0] = chunk.speed[0].max(fastest.sqrt());
+        }
+    }
+
+    /// Moves the impacts of a round to those of the step, by slots: rows may change before it ends.
+    fn note_impacts(&mut self) {
+        let (slots, impacts) = (self.ids.slots(), &mut self.scratch.impacts);
+        let of_chunks = self.chunks.iter_mut().map(|chunk| &mut chunk.impulses.impacts);
+        for impact in
+            of_chunks.chain([&mut self.fast_movers.impulses.impacts]).flat_map(|l| l.drain(..))
+        {
+            let slot = |row: u32| slots[row as usize];
+            let a = if impact.on_wall { impact.a } else { slot(impact.a) };
+            impacts.push(Impact { a, b: slot(impact.b), ..impact });
+        }
     }
 
     /// Lists the balls that would bounce off a wall in this round, if one of them comes from so far away

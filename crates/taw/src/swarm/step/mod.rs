@@ -90,6 +90,7 @@ impl Swarm {
     /// Begins a step: gravity and walls. Returns whether these changed.
     fn begin(&mut self, gravity: Vec3<f32>, walls: &dyn StaticGeometry, identity: u64) -> bool {
         self.stopped.clear();
+        self.scratch.impacts.clear();
         self.steps_since_build = (self.steps_since_build + 1).min(SOON);
         if self.gravity != Some(gravity) {
             self.gravity = Some(gravity);
@@ -182,21 +183,13 @@ impl Swarm {
         self.age_marks();
         self.update_wall_contacts(walls, dt, times, all, false);
         let params = self.solver_params(dt, h);
-        let speed = params.restitution_threshold;
-        let faster = |chunk: &Chunk, next: f32| 2.0 * chunk.speed[0].max(next) > speed;
         for substep in 0..count {
             let left = dt - h * substep as f32;
             self.save_places(walls);
             if substep > 0 {
                 self.update_wall_contacts(walls, left, times, |chunk| chunk.has_fast, true);
             }
-            for _ in 0..ROUNDS {
-                let waits = self.apply_restitution(params, faster);
-                self.find_pairs_after_bounces(substep, [dt, h, left], walls, observe);
-                if !waits {
-                    break;
-                }
-            }
+            self.bounce(substep, [dt, h, left], params, walls, observe);
             observe(Stage::Integrate);
             let parts = [substep as f32, (substep + 1) as f32].map(|part| part / substeps);
             self.apply_velocity_changes(1.0 / substeps);
@@ -244,6 +237,7 @@ impl Swarm {
             // nothing has weight, overlap makes no speed at all.
             softness: ContactSoftness::new(h, HERTZ, DAMPING, PUSHING * length(gravity)),
             slop: if length(gravity) > 0.0 { SLOP } else { SLOP_WEIGHTLESS },
+            notes_impacts: self.bodies_are_rows,
         }
     }
 
@@ -258,26 +252,6 @@ impl Swarm {
                 }
             }
         });
-    }
-
-    /// Finds pairs and walls for balls that bounced, and along paths that may have changed since the begin
-    /// of the step. Given are its seconds, those of a substep, and what is left.
-    fn find_pairs_after_bounces(
-        &mut self,
-        substep: u32,
-        [dt, h, left]: [f32; 3],
-        walls: &dyn StaticGeometry,
-        observe: &mut dyn FnMut(Stage),
-    ) {
-        let reach = self.reach_of_skins();
-        let leaves = |row: u32, velocity: &Row, skin_left: f32, movers: &FastMovers| {
-            leaves(velocity, skin_left, left) || skin_left > reach || movers.is_by_path(row)
-        };
-        let later = substep > 0 && !self.fast_movers.crowded;
-        let turns = |chunk: &Chunk| chunk.struck || later && chunk.speed[0] * dt > reach;
-        if self.find_pairs_within_step(turns, leaves, dt, walls, observe) {
-            self.update_wall_contacts(walls, left, [dt, h], |_| true, false);
-        }
     }
 
     /// Finds pairs and walls for balls of some chunks that leave their remaining skin within a
@@ -403,7 +377,7 @@ impl Swarm {
     /// Goes over all contacts of the chunks that are awake or beside one, and of which the
     /// condition holds, given how fast a ball of the next one is.
     fn pass(&mut self, pass: Pass, condition: impl Fn(&Chunk, f32) -> bool + Sync) {
-        let simd_level = self.simd_level;
+        let (simd_level, notes_impacts) = (self.simd_level, self.bodies_are_rows);
         let friction = self.common_material().friction;
         let mut fast_movers = std::mem::take(&mut self.fast_movers);
         let held = std::mem::take(&mut self.scratch.held);
@@ -430,11 +404,14 @@ impl Swarm {
                             contact.borne_for_others = contact.share_of(&*columns.backing.row(row));
                             contact.note_impact(pass, &*velocity);
                         }
-                        if let Some(displacement) =
-                            contact.solve(pass, &mut *at, &mut *velocity, spin)
-                        {
-                            *columns.skin_left.row(row) -= displacement;
+                        let before = (*at, *velocity);
+                        if let Some(bounce) = contact.solve(pass, &mut *at, &mut *velocity, spin) {
+                            *columns.skin_left.row(row) -= bounce.separation;
                             chunk.impulses.bounced = true;
+                            if notes_impacts {
+                                let impact = contact.impact(&bounce, &before.0, &before.1);
+                                chunk.impulses.impacts.push(impact);
+                            }
                         }
                     }
                 }
