@@ -282,7 +282,8 @@ impl SolverColumns<'_> {
         bounces
     }
 
-    /// Moves apart what overlaps. That changes no velocity: overlap is not energy.
+    /// Moves apart what overlaps. That changes no velocity: overlap is not energy. Returns true if any pair
+    /// is jammed: it overlaps, and its contact had to take back more speed than [`SolverParams::jam_speed`].
     #[inline(always)]
     fn push_apart<L: Simd>(
         &self,
@@ -290,14 +291,19 @@ impl SolverColumns<'_> {
         [at_a, at_b]: [[L; 4]; 2],
         [a, b]: [[L; 4]; 2],
         (normal, separation): (Vec3Wide<L>, L),
-        slop: f32,
-        grounded: L,
-    ) {
+        params: &SolverParams,
+        (grounded, change): (L, L),
+    ) -> bool {
         let zero = L::splat(0.0);
         let smaller = at_a[3] + at_b[3] - at_a[3].max(at_b[3]);
-        let overlap = zero - separation - smaller * L::splat(2.0 * slop);
+        let overlap = zero - separation - smaller * L::splat(2.0 * params.slop);
         if overlap.gt_mask(zero) == 0 {
-            return;
+            return false;
+        }
+        let stirred = (zero - change).select_gt(L::splat(params.jam_speed), overlap, zero);
+        let jammed = stirred.gt_mask(zero) != 0;
+        if !params.moves_apart {
+            return jammed;
         }
         // What flies keeps its center of mass. What a wall bears goes half each, whatever they
         // weigh: a light ball that a heavy one presses on something has nowhere to go. What sleeps
@@ -315,6 +321,7 @@ impl SolverColumns<'_> {
         ];
         scatter(self.at, batch, places);
         self.spend(batch, displacements);
+        jammed
     }
 
     /// The spins of a batch.
@@ -386,7 +393,13 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
     fn solve<L: Simd, const FIRST: bool>(self, params: SolverParams) {
         let Self { columns, batches, impulses, friction, .. } = self;
         let ContactImpulses {
-            normal_impulse, tangent_impulse, torque, numbers: own, struck, ..
+            normal_impulse,
+            tangent_impulse,
+            torque,
+            numbers: own,
+            struck,
+            jammed,
+            ..
         } = impulses;
         let zero = L::splat(0.0);
         for (i, batch) in batches.iter().enumerate() {
@@ -435,7 +448,9 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             }
             if !FIRST {
                 let contact = (normal, separation);
-                columns.push_apart(batch, at, [a, b], contact, params.slop, grounded);
+                let free = inverse_mass(&a) + inverse_mass(&b);
+                let changes = (grounded, change.normal * free);
+                *jammed |= columns.push_apart(batch, at, [a, b], contact, &params, changes);
             }
         }
     }

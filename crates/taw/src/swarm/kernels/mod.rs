@@ -36,6 +36,8 @@ pub(super) struct ContactImpulses {
     pub numbers: Vec<PairNumbers>,
     /// Set if any of them bounced in the last round.
     pub bounced: bool,
+    /// Set if any of them is jammed: see [`Swarm::relax`](super::Swarm::relax).
+    pub jammed: bool,
     /// Impacts of the last round, if they are noted: of rows.
     pub impacts: Vec<Impact<f32>>,
     /// Those that were struck in this substep.

@@ -38,6 +38,10 @@ pub(in crate::swarm) struct SolverParams {
     pub softness: ContactSoftness,
     /// Overlap of two balls that is left alone, over twice the smaller radius.
     pub slop: f32,
+    /// Speed that the relax pass has to take back of a pair that is jammed, in m/s.
+    pub jam_speed: f32,
+    /// Set if the relax pass moves apart what overlaps by more.
+    pub moves_apart: bool,
     /// Set if bounces are noted as impacts.
     pub notes_impacts: bool,
 }

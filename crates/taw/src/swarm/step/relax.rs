@@ -1,0 +1,37 @@
+//! Relaxation of contacts after balls have moved.
+
+use super::RELAXATIONS;
+use crate::swarm::Swarm;
+use crate::swarm::chunk::Chunk;
+use crate::swarm::kernels::{Pass, SolverParams};
+
+impl Swarm {
+    /// Takes the speed back by which overlaps were pushed out, and moves apart what overlaps too much.
+    ///
+    /// A ball between two others that walls press together is thrown out sideways by their pushes. One
+    /// pass over the contacts takes back little of that: each undoes what the ones before it did. Each
+    /// lowers the kinetic energy (projected Gauss–Seidel on rigid contacts is a descent), so chunks that are
+    /// jammed are relaxed until their contacts agree.
+    pub(super) fn relax(&mut self, params: SolverParams) {
+        self.pass(Pass::Relax(params), |_, _| true);
+        // Nothing is moved apart twice in a substep.
+        let stays = SolverParams { moves_apart: false, ..params };
+        for _ in 0..RELAXATIONS {
+            let all = std::mem::take(&mut self.fast_movers.impulses.jammed);
+            let jammed = |chunk: Option<&Chunk>| chunk.is_some_and(|chunk| chunk.impulses.jammed);
+            let mut any = all;
+            for i in 0..self.chunks.len() {
+                let before = i.checked_sub(1).and_then(|i| self.chunks.get(i));
+                let [own, next] = [self.chunks.get(i), self.chunks.get(i + 1)];
+                let again = all || jammed(before) || jammed(own) || jammed(next);
+                any |= again;
+                self.chunks[i].again = again;
+            }
+            if !any {
+                break;
+            }
+            self.chunks.iter_mut().for_each(|chunk| chunk.impulses.jammed = false);
+            self.pass(Pass::Relax(stays), |chunk, _| chunk.again);
+        }
+    }
+}
