@@ -192,7 +192,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
     fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<f32>, f32)) {
         for (wall, plane) in self.walls.planes() {
             let normal: Vec3<f32> = cast_vector(plane.normal());
-            visit(wall, normal.normalize(), plane.offset().as_f64() as f32);
+            visit(wall, normal.normalize(), single(plane.offset()));
         }
     }
 
@@ -234,7 +234,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         }
         for Candidate { part: SubShape { wall, index: part }, nearest } in near {
             let normal: Vec3<f32> = cast_vector(nearest.normal);
-            visit([wall, part], normal, nearest.distance.as_f64() as f32);
+            visit([wall, part], normal, single(nearest.distance));
         }
     }
 
@@ -270,7 +270,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         // The plane there is nearer by the displacement up to it.
         let distance = nearest.distance - displacement.dot(nearest.normal) * time;
         let normal: Vec3<f32> = cast_vector(nearest.normal);
-        Some(([part.wall, part.index], normal, distance.as_f64() as f32))
+        Some(([part.wall, part.index], normal, single(distance)))
     }
 
     fn is_outrun(&self, &[x, y, z, radius]: &[f32; 4], way: f32, filter: CollisionFilter) -> bool {
@@ -300,7 +300,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
                     displacement,
                     times,
                     &mut |part, normal, far| {
-                        visit([part.wall, part.index], cast_vector(normal), far.as_f64() as f32);
+                        visit([part.wall, part.index], cast_vector(normal), single(far));
                     },
                 );
             }
@@ -360,4 +360,10 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
 fn sphere<S: Scalar>(ball: [f32; 4]) -> Sphere<S> {
     let [x, y, z, radius] = ball.map(|x| S::from_f64(x.into()));
     Sphere { center: Point3::new(x, y, z), radius }
+}
+
+/// The nearest number of `f32`: what lies beyond all of them is as far away as they go, since with an
+/// infinite distance nothing can be computed.
+fn single<S: Scalar>(x: S) -> f32 {
+    (x.as_f64() as f32).clamp(f32::MIN, f32::MAX)
 }
