@@ -20,8 +20,8 @@ const HALF: f32 = 10.0;
 struct Storm {
     app: App,
     random: Rng,
-    /// Whether this one is of soft contacts, which give way to what is fast or heavy, so that
-    /// the box is not closed; else its models change.
+    /// Whether contacts are springs, which give way to what is fast or heavy, so that the box is not
+    /// closed.
     soft: bool,
     parents: Vec<(Entity, Vec3, Vec3)>,
     walls: Vec<Entity>,
@@ -280,12 +280,17 @@ impl Storm {
     }
 }
 
+/// Of those that keep the box closed, the plugin's own as often as all others together.
 fn model(random: &mut Rng, soft: bool) -> Model {
-    let hard = [Response::Displacement, Response::Impulse, Response::EventDriven];
-    let penalty = Response::Penalty(ContactLaw::SpringDashpot);
-    let response = if soft { penalty } else { hard[random.usize(0..3)] };
+    let laws = [ContactLaw::SpringDashpot, ContactLaw::HertzMindlin].map(Response::Penalty);
+    let others = [Response::Displacement, Response::Impulse, Response::EventDriven];
+    let response = match (soft, random.bool()) {
+        (true, _) => laws[random.usize(0..2)],
+        (false, true) => Response::SoftStep,
+        (false, false) => others[random.usize(0..3)],
+    };
     let rotation = [Rotation::None, Rotation::Rolling, Rotation::Dynamic][random.usize(0..3)];
-    Model { response, rotation, substeps: random.u32(1..4), ..Model::default() }
+    Model { response, rotation, substeps: random.u32(1..5), ..Model::default() }
 }
 
 /// Some seconds of one app, and how long its frames are.

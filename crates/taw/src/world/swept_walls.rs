@@ -4,6 +4,7 @@ use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::continuous::{Frame, MAX_FREE_MOTION, MovingWall, RelativePath};
 use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
+use super::swarm::MAX_COORDINATE;
 use super::walls::{SubShape, Walls};
 use crate::broad::{CollisionFilter, CollisionLayers};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
@@ -344,7 +345,10 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
 
     fn surface_velocity(&self, wall: u32, point: Point3<f32>, normal: Vec3<f32>) -> Vec3<f32> {
         let (point, normal) = (cast_point(point), cast_vector(normal));
-        cast_vector(self.walls.surface_velocity(wall as usize, point, normal))
+        let velocity = self.walls.surface_velocity(wall as usize, point, normal);
+        // No ball is set to more either: squares and products with masses stay numbers.
+        let zero_or = |x: S| if x.is_finite() { single(x) } else { 0.0 };
+        velocity.map(|x| zero_or(x).clamp(-MAX_COORDINATE, MAX_COORDINATE))
     }
 
     fn layers(&self, wall: u32) -> CollisionLayers {
@@ -362,8 +366,13 @@ fn sphere<S: Scalar>(ball: [f32; 4]) -> Sphere<S> {
     Sphere { center: Point3::new(x, y, z), radius }
 }
 
-/// The nearest number of `f32`: what lies beyond all of them is as far away as they go, since with an
-/// infinite distance nothing can be computed.
+/// Beyond this, in metres, a wall is as far away as this, so that squares of distances are numbers: no
+/// ball gets there.
+const FARTHEST: f32 = 1e15;
+
+/// A distance or an offset, in metres. What is no number, as of walls that move too fast for numbers,
+/// is far away.
 fn single<S: Scalar>(x: S) -> f32 {
-    (x.as_f64() as f32).clamp(f32::MIN, f32::MAX)
+    let x = x.as_f64() as f32;
+    if x.is_nan() { FARTHEST } else { x.clamp(-FARTHEST, FARTHEST) }
 }

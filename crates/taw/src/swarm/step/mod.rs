@@ -3,6 +3,7 @@
 mod backing;
 mod bounces;
 mod lab;
+mod overflow;
 mod passages;
 mod paths;
 mod sleep;
@@ -122,9 +123,12 @@ impl Swarm {
     }
 
     fn end(&mut self) {
+        self.stop_what_overflowed();
         for chunk in &mut self.chunks {
             self.stopped.append(&mut chunk.stopped);
         }
+        self.stopped.sort_unstable();
+        self.stopped.dedup();
     }
 
     /// Brings up to date which pairs are near, and which balls are near walls; and who sleeps.
