@@ -59,6 +59,7 @@ impl Swarm {
             Tier::Full => {
                 self.find_contacts(dt, gravity, walls, walls_changed, observe);
                 self.solve(dt, self.model.substeps, walls, observe);
+                self.stop_what_overflowed();
             }
         }
         self.end();
@@ -85,6 +86,7 @@ impl Swarm {
     /// Ends it: moves all on in substeps, and solves the contacts.
     pub(crate) fn finish(&mut self, dt: f32, substeps: u32, walls: &dyn StaticGeometry) {
         self.solve(dt, substeps, walls, &mut |_| ());
+        self.stop_what_overflowed();
         self.end();
     }
 
@@ -123,7 +125,6 @@ impl Swarm {
     }
 
     fn end(&mut self) {
-        self.stop_what_overflowed();
         for chunk in &mut self.chunks {
             self.stopped.append(&mut chunk.stopped);
         }

@@ -5,6 +5,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use super::super::Swarm;
 use super::super::kernels::{MAX_MAGNITUDE, largest};
+use super::super::wall_contact::WallContact;
 use super::super::workers::{DisjointSlice, parallel_for};
 
 impl Swarm {
@@ -34,7 +35,7 @@ impl Swarm {
         if any.into_inner() {
             for chunk in &mut self.chunks {
                 chunk.impulses.forget_non_finite();
-                chunk.wall_contacts.iter_mut().for_each(|contact| contact.forget_non_finite());
+                chunk.wall_contacts.iter_mut().for_each(WallContact::forget_non_finite);
             }
         }
     }
