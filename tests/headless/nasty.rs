@@ -30,13 +30,14 @@ fn component(app: &App, name: &str) -> ReflectComponent {
     it.data::<ReflectComponent>().expect(name).clone()
 }
 
-fn models() -> [Model; 4] {
+fn models() -> [Model; 5] {
     let of = |response, rotation| Model { response, rotation, ..Model::default() };
     [
         of(Response::Displacement, Rotation::None),
         of(Response::Impulse, Rotation::Dynamic),
         of(Response::Penalty(ContactLaw::SpringDashpot), Rotation::Dynamic),
         of(Response::EventDriven, Rotation::Dynamic),
+        Model::GAME,
     ]
 }
 
@@ -112,8 +113,9 @@ fn try_component(
     assert!(refused.len() <= 1, "{what}: {refused:?}");
     assert!(refused.iter().all(|(entity, _)| *entity == Some(target)), "{what}: {refused:?}");
     let takes = if kind == "Transform" && !is_marble { Takes::Some } else { takes(kind, path) };
-    let balls_only = kind == "HalfLength"
-        && app.world().resource::<TawModel>().response == Response::EventDriven;
+    let response = app.world().resource::<TawModel>().response;
+    let balls_only =
+        kind == "HalfLength" && matches!(response, Response::EventDriven | Response::SoftStep);
     match takes.refuses(x) {
         Some(true) => {
             assert_eq!(refused.len(), 1, "{what}");

@@ -20,8 +20,8 @@ const HALF: f32 = 10.0;
 struct Storm {
     app: App,
     random: Rng,
-    /// Whether this one is of soft contacts, which give way to what is fast or heavy, so that
-    /// the box is not closed; else its models change.
+    /// Whether contacts are springs, which give way to what is fast or heavy, so that the box is not
+    /// closed.
     soft: bool,
     parents: Vec<(Entity, Vec3, Vec3)>,
     walls: Vec<Entity>,
@@ -252,8 +252,10 @@ impl Storm {
     }
 
     /// Ends the storm: nothing moves walls or pushes marbles any more. What was put into each
-    /// other has half a second to part.
+    /// other has half a second to part. Velocities are those of the end of a step from now on: by
+    /// other integrators they are half a step off, so that a bounce seems to gain `m g v dt`.
     fn calm_down(&mut self, frame: f32) {
+        self.app.world_mut().resource_mut::<TawModel>().integrator = Integrator::VelocityVerlet;
         for marble in &self.marbles {
             self.app.world_mut().entity_mut(*marble).remove::<ExternalForce>();
         }
@@ -280,12 +282,17 @@ impl Storm {
     }
 }
 
+/// Of those that keep the box closed, the plugin's own as often as all others together.
 fn model(random: &mut Rng, soft: bool) -> Model {
-    let hard = [Response::Displacement, Response::Impulse, Response::EventDriven];
-    let penalty = Response::Penalty(ContactLaw::SpringDashpot);
-    let response = if soft { penalty } else { hard[random.usize(0..3)] };
+    let laws = [ContactLaw::SpringDashpot, ContactLaw::HertzMindlin].map(Response::Penalty);
+    let others = [Response::Displacement, Response::Impulse, Response::EventDriven];
+    let response = match (soft, random.bool()) {
+        (true, _) => laws[random.usize(0..2)],
+        (false, true) => Response::SoftStep,
+        (false, false) => others[random.usize(0..3)],
+    };
     let rotation = [Rotation::None, Rotation::Rolling, Rotation::Dynamic][random.usize(0..3)];
-    Model { response, rotation, substeps: random.u32(1..4), ..Model::default() }
+    Model { response, rotation, substeps: random.u32(1..5), ..Model::default() }
 }
 
 /// Some seconds of one app, and how long its frames are.
@@ -336,9 +343,7 @@ fn a_short_storm() {
     }
 }
 
-/// Not yet: what parts after teleports or slides on may gain energy by the core's models.
 #[test]
-#[ignore = "9 of 60 seeds gain energy in the core"]
 fn a_calm_after_a_short_storm() {
     for seed in 0..60 {
         let (storm, frame) = run(seed);

@@ -12,13 +12,15 @@ use taw::scene::{
     GravityKeyframe, KinematicMotion, Lattice, MarbleDesc, Scene, ShapeDesc, WallDesc,
 };
 use taw::shape::{Aabb, Capsule, Compound, HeightField, Mesh, Obb, Shape};
+use taw::swarm::Ball;
 
-const RESPONSES: [Response; 5] = [
+const RESPONSES: [Response; 6] = [
     Response::Displacement,
     Response::Impulse,
     Response::Penalty(ContactLaw::SpringDashpot),
     Response::Penalty(ContactLaw::HertzMindlin),
     Response::EventDriven,
+    Response::SoftStep,
 ];
 
 fn model(response: Response) -> Model {
@@ -53,11 +55,16 @@ fn all_sane<S: Scalar>(world: &World<S>) -> bool {
     ids.map(|id| world.marbles.get(id).unwrap()).all(|marble| is_sane(&marble))
 }
 
+/// Such a speed, or, in m/s, that beyond which a response refuses its marble.
+fn fastest(response: Response, speed: f64) -> f64 {
+    if response == Response::SoftStep { 9e11 } else { speed }
+}
+
 fn a_step_of_no_use_is_refused<S: Scalar>() {
     for response in RESPONSES {
         for substeps in [1, 8] {
             let mut world = on_a_floor::<S>(Model { substeps, ..model(response) });
-            let fast = Vec3::unit_x() * number::<S>(2e38);
+            let fast = Vec3::unit_x() * number::<S>(fastest(response, 2e38));
             let mad = Marble { velocity: fast, ..Marble::new(at(0.0, 9.0, 0.0), number(0.5)) };
             world.marbles.insert(mad).unwrap();
             world.marbles.insert(Marble::new(at(5.0, 0.4, 0.0), number(0.5))).unwrap();
@@ -89,6 +96,55 @@ fn a_step_of_no_use_is_refused<S: Scalar>() {
 fn a_step_that_cannot_be_made_is_refused_before_anything_moved() {
     a_step_of_no_use_is_refused::<f32>();
     a_step_of_no_use_is_refused::<f64>();
+}
+
+fn a_step_of_no_use_is_refused_beside_a_swarm<S: Scalar>() {
+    for response in RESPONSES {
+        let mut world = on_a_floor::<S>(Model { substeps: 4, ..model(response) });
+        // Two that meet, one of which lands within six steps.
+        for (x, y) in [(0.0, 0.55), (0.9, 1.6)] {
+            let velocity = Vec3::new(0.0, -3.0, 0.0).map(number);
+            let marble = Marble { velocity, ..Marble::new(at(x, y, 0.0), number(0.5)) };
+            world.marbles.insert(marble).unwrap();
+        }
+        world.swarm.insert(&[Ball::new(Point3::new(5.0, 0.3, 0.0), 0.2)]).unwrap();
+        for _ in 0..6 {
+            world.step(number(1.0 / 60.0)).unwrap();
+        }
+        let before = world.clone();
+        for dt in [1e-46, 1e-40, 1e-30, 1e39, 1e30, 1e300, 0.0, -1.0, f64::NAN, f64::INFINITY] {
+            assert!(world.step(number(dt)).is_err(), "{response:?}: {dt}");
+            assert!(world == before, "{response:?}: {dt} has changed the world");
+            assert_eq!(world.impacts(), before.impacts(), "{response:?}: {dt}");
+            assert!(world.stopped().eq(before.stopped()), "{response:?}: {dt}");
+        }
+    }
+}
+
+#[test]
+fn a_step_that_cannot_be_made_is_refused_before_a_swarm_moved() {
+    a_step_of_no_use_is_refused_beside_a_swarm::<f32>();
+    a_step_of_no_use_is_refused_beside_a_swarm::<f64>();
+}
+
+#[test]
+fn what_f64_holds_and_f32_does_not_stops_by_springs_too() {
+    for law in [ContactLaw::SpringDashpot, ContactLaw::HertzMindlin] {
+        for substeps in [1, 4] {
+            let precision = Precision::Compensated;
+            let model = Model { precision, substeps, ..model(Response::Penalty(law)) };
+            let mut world = World::<f32>::default();
+            world.set_model(model).unwrap();
+            world.set_gravity(Vec3::new(1e38, 0.0, 0.0)).unwrap();
+            let velocity = Vec3::new(3e38, 0.0, 0.0);
+            let marble = Marble { velocity, ..Marble::new(at(3e38, 0.0, 0.0), 1.0) };
+            let id = world.marbles.insert(marble).unwrap();
+            world.step(1.0).unwrap();
+            assert_eq!(world.stopped().collect::<Vec<_>>(), [id], "{law:?}, {substeps}");
+            // In later substeps gravity begins anew.
+            assert!(all_sane(&world), "{law:?}: {:?}", world.marbles.get(id));
+        }
+    }
 }
 
 #[test]
@@ -143,7 +199,8 @@ fn masses_that_the_scalar_has_no_number_for_are_refused_by_what_was_given() {
 
 #[test]
 fn a_spin_that_overflows_is_stopped_named_once_and_leaves_a_rotation() {
-    for response in RESPONSES {
+    // `SoftStep` refuses it.
+    for response in RESPONSES.into_iter().filter(|response| *response != Response::SoftStep) {
         let mut world = on_a_floor::<f32>(Model { substeps: 4, ..model(response) });
         let spin = Vec3::new(3e38, 3e38, 3e38);
         let mad = Marble { angular_velocity: spin, ..Marble::new(at(0.0, 0.49, 0.0), 0.5) };

@@ -1,5 +1,5 @@
 //! Overlap below the slop is resolved by `Response::EventDriven`, too, where nothing else touches the
-//! two: soon, and without energy. (In heaps the slop stays: parting would lift what lies on it.)
+//! two: soon, and without energy. (In wide heaps the slop stays: parting would lift what lies on it.)
 
 use taw::prelude::*;
 use taw::shape::Aabb;
@@ -117,4 +117,30 @@ fn what_overlaps_a_little_parts() {
         }
     }
     assert!(wrong.is_empty(), "{}:\n{}", wrong.len(), wrong.join("\n"));
+}
+
+#[test]
+fn a_tower_that_overlaps_a_little_parts() {
+    for deep in [0.001, 0.002, 0.004] {
+        let mut world = world([0.0, -9.81, 0.0]);
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        for i in 0..4 {
+            let height = (1.0 - deep) + f64::from(i) * (2.0 - deep);
+            world.marbles.insert(ball([0.0, 0.1 * height, 0.0], [0.0; 3])).unwrap();
+        }
+        for _ in 0..300 {
+            world.step(DT).unwrap();
+        }
+        // What counts as touching, as above.
+        let touching = 0.5 * 0.01 * 9.81 * DT * DT / 0.1;
+        let rest = overlap(&world);
+        assert!(rest < 2.0 * touching, "{deep}: overlap {rest:e} of {touching:e}");
+        let floor_and_gaps = world.marbles.position().iter().scan(-0.1, |below, at| {
+            let gap = at.y - *below - 0.2;
+            *below = at.y;
+            Some(gap / 0.1)
+        });
+        let gap = floor_and_gaps.fold(0.0, f64::max);
+        assert!(gap < 2.0 * touching, "{deep}: a gap of {gap:e} of {touching:e}");
+    }
 }

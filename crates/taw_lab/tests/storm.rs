@@ -8,7 +8,7 @@ use taw::prelude::*;
 use taw::scene::{MarbleDesc, MaterialDesc, Scene, ShapeDesc, WallDesc};
 use taw_lab::storm::{
     Bench, Body, Case, Finding, Invariant, Kind, Name, Plan, Pulse, Settings, Snapshot, generate,
-    run, shrink_by, weather,
+    judge, run, shrink_by, weather,
 };
 use taw_lab::trade::trace::ScalarType;
 
@@ -244,6 +244,42 @@ fn a_pair_that_hangs_where_bodies_stop_as_they_meet_is_seen() {
 }
 
 #[test]
+fn what_moves_again_without_a_touch_is_seen() {
+    let scene = case(Scene::default());
+    let rested = vec![vec![lying()]; 30];
+    let goes_on = |body: Body| {
+        let mut states = rested.clone();
+        states.push(vec![body]);
+        broken(&scene, &states).contains(&Invariant::Stays)
+    };
+    let kicked = |speed: f64| Body { velocity: Vec3::new(speed, 0.0, 0.0), ..lying() };
+    assert!(goes_on(kicked(1.0)));
+    assert!(!goes_on(kicked(0.1)), "no faster than what gravity adds in a step");
+    assert!(goes_on(Body { angular_velocity: Vec3::new(0.0, 20.0, 0.0), ..lying() }));
+    assert!(goes_on(Body { at: lying().at + Vec3::unit_y() * 0.05, wall_gap: 0.05, ..lying() }));
+    // It falls over an edge: what it gains in speed it loses in height.
+    let mut states = rested.clone();
+    for i in 1..20 {
+        let velocity = Vec3::new(0.0, -G * STEP * f64::from(i), 0.0);
+        let at = states.last().unwrap()[0].at + velocity * STEP;
+        states.push(vec![Body { at, velocity, ..lying() }]);
+    }
+    assert!(!broken(&scene, &states).contains(&Invariant::Stays));
+    // Before it rested, nobody asks; and where another one comes by, nobody knows.
+    assert!(!broken(&scene, &[vec![lying()], vec![kicked(1.0)]]).contains(&Invariant::Stays));
+    let visitor = |x: f64| Body { at: Vec3::new(x, 0.1, 0.0), ..kicked(-4.0) };
+    let mut states: Vec<_> = rested.iter().map(|_| vec![lying(), visitor(5.0)]).collect();
+    states.push(vec![lying(), visitor(0.24)]);
+    states.push(vec![kicked(-3.9), visitor(0.2)]);
+    assert!(!broken(&scene, &states).contains(&Invariant::Stays));
+}
+
+#[test]
+fn a_step_that_takes_too_long_is_seen() {
+    assert!(judge::time(0.9).holds() && !judge::time(1.1).holds());
+}
+
+#[test]
 fn a_jump_and_a_wrong_speed_are_seen() {
     let jumped = Body { at: fallen(body()).at + Vec3::unit_x() * 0.01, ..fallen(body()) };
     assert_eq!(step_of(body(), jumped), [Invariant::Support]);
@@ -287,7 +323,8 @@ fn a_scene_that_is_right_holds() {
     let verdict = run(&case(scene), &Pulse::default());
     assert_eq!(verdict.failures, []);
     let judged = |invariant| verdict.worst.iter().any(|worst| worst.invariant == invariant);
-    for invariant in [Invariant::EnergyOfStep, Invariant::Support, Invariant::Mirror] {
+    let all = [Invariant::EnergyOfStep, Invariant::Support, Invariant::Mirror];
+    for invariant in all.into_iter().chain([Invariant::Stays, Invariant::Time]) {
         assert!(judged(invariant), "{invariant:?}");
     }
 }

@@ -12,7 +12,7 @@ use super::wall_contact::WallContact;
 use super::wall_paths::{FAST, WallQuery, along_path};
 use crate::broad::{CollisionFilter, CollisionLayers};
 use crate::constraint::ContactImpulse;
-use crate::math::{Point3, Vec3};
+use crate::math::{Point3, Vec3, is_finite};
 use crate::response::Material;
 
 /// Static and kinematic colliders of the world, as the balls of a swarm meet them.
@@ -412,6 +412,18 @@ impl WallContact {
             impulse: ContactImpulse::zero(),
             load: None,
             torque: Vec3::zero(),
+        }
+    }
+
+    /// Forgets impulses, unless all of them are finite.
+    pub fn forget_non_finite(&mut self) {
+        let [tangent, torque] = [self.impulse.tangent, self.torque];
+        let all = [self.borne_for_others, self.impulse.normal, self.load.unwrap_or(0.0)];
+        if !(all.iter().all(|x| x.is_finite()) && is_finite(tangent) && is_finite(torque)) {
+            self.borne_for_others = 0.0;
+            self.impulse = ContactImpulse::zero();
+            self.load = None;
+            self.torque = Vec3::zero();
         }
     }
 

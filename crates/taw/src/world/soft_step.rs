@@ -1,6 +1,8 @@
 //! The three verbs of [`Response::SoftStep`](crate::response::Response::SoftStep): marbles are rows of the same solve as the balls of
 //! the swarm.
 
+use std::collections::BTreeSet;
+
 use cgmath::{EuclideanSpace, Zero};
 
 use super::method::Method;
@@ -243,7 +245,9 @@ impl<S: Scalar> World<S> {
         }
         let find = |row: usize| Some((self.marbles.id(row)?, self.check_row(row).err()?));
         if self.changes_are_listed() {
-            self.marbles.changed.rows().iter().filter_map(|row| find(*row as usize)).collect()
+            // One that was set more than once is listed as often.
+            let rows: BTreeSet<u32> = self.marbles.changed.rows().iter().copied().collect();
+            rows.into_iter().filter_map(|row| find(row as usize)).collect()
         } else {
             (0..self.marbles.len()).filter_map(find).collect()
         }

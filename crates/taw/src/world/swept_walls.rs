@@ -4,6 +4,7 @@ use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::continuous::{Frame, MAX_FREE_MOTION, MovingWall, RelativePath};
 use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
+use super::swarm::MAX_COORDINATE;
 use super::walls::{SubShape, Walls};
 use crate::broad::{CollisionFilter, CollisionLayers};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
@@ -192,7 +193,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
     fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<f32>, f32)) {
         for (wall, plane) in self.walls.planes() {
             let normal: Vec3<f32> = cast_vector(plane.normal());
-            visit(wall, normal.normalize(), plane.offset().as_f64() as f32);
+            visit(wall, normal.normalize(), single(plane.offset()));
         }
     }
 
@@ -234,7 +235,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         }
         for Candidate { part: SubShape { wall, index: part }, nearest } in near {
             let normal: Vec3<f32> = cast_vector(nearest.normal);
-            visit([wall, part], normal, nearest.distance.as_f64() as f32);
+            visit([wall, part], normal, single(nearest.distance));
         }
     }
 
@@ -270,7 +271,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         // The plane there is nearer by the displacement up to it.
         let distance = nearest.distance - displacement.dot(nearest.normal) * time;
         let normal: Vec3<f32> = cast_vector(nearest.normal);
-        Some(([part.wall, part.index], normal, distance.as_f64() as f32))
+        Some(([part.wall, part.index], normal, single(distance)))
     }
 
     fn is_outrun(&self, &[x, y, z, radius]: &[f32; 4], way: f32, filter: CollisionFilter) -> bool {
@@ -300,7 +301,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
                     displacement,
                     times,
                     &mut |part, normal, far| {
-                        visit([part.wall, part.index], cast_vector(normal), far.as_f64() as f32);
+                        visit([part.wall, part.index], cast_vector(normal), single(far));
                     },
                 );
             }
@@ -344,7 +345,10 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
 
     fn surface_velocity(&self, wall: u32, point: Point3<f32>, normal: Vec3<f32>) -> Vec3<f32> {
         let (point, normal) = (cast_point(point), cast_vector(normal));
-        cast_vector(self.walls.surface_velocity(wall as usize, point, normal))
+        let velocity = self.walls.surface_velocity(wall as usize, point, normal);
+        // No ball is set to more either: squares and products with masses stay numbers.
+        let zero_or = |x: S| if x.is_finite() { single(x) } else { 0.0 };
+        velocity.map(|x| zero_or(x).clamp(-MAX_COORDINATE, MAX_COORDINATE))
     }
 
     fn layers(&self, wall: u32) -> CollisionLayers {
@@ -360,4 +364,15 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
 fn sphere<S: Scalar>(ball: [f32; 4]) -> Sphere<S> {
     let [x, y, z, radius] = ball.map(|x| S::from_f64(x.into()));
     Sphere { center: Point3::new(x, y, z), radius }
+}
+
+/// Beyond this, in metres, a wall is as far away as this, so that squares of distances are numbers: no
+/// ball gets there.
+const FARTHEST: f32 = 1e15;
+
+/// A distance or an offset, in metres. What is no number, as of walls that move too fast for numbers,
+/// is far away.
+fn single<S: Scalar>(x: S) -> f32 {
+    let x = x.as_f64() as f32;
+    if x.is_nan() { FARTHEST } else { x.clamp(-FARTHEST, FARTHEST) }
 }

@@ -150,7 +150,7 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
         Marble 4 "Marbles::insert Marble.position": |p, x| { let v = on_axis(p.case, x); insert(p, |m| m.position = Point3::from_vec(v)) };
         Marble 1 "Marble.radius": |p, x| insert(p, |m| m.radius = x);
         Marble 1 "Marble.half_length": |p, x| {
-            if p.world.model().response == Response::EventDriven { return Ok(()) }
+            if p.knows_balls_only() { return Ok(()) }
             insert(p, |m| m.half_length = x)
         };
         Marble 4 "Marble.velocity": |p, x| { let v = on_axis(p.case, x); insert(p, |m| m.velocity = v) };
@@ -171,7 +171,7 @@ fn marbles<S: Scalar>() -> Vec<Row<S>> {
         Marble 4 "Marbles::set_velocity": |p, x| { let v = on_axis(p.case, x); p.world.marbles.set_velocity(p.subject, v) };
         Marble 1 "Marbles::set_radius": |p, x| p.world.marbles.set_radius(p.subject, x);
         Marble 1 "Marbles::set_half_length": |p, x| {
-            if p.world.model().response == Response::EventDriven && x > zero() { return Ok(()) }
+            if p.knows_balls_only() && x > zero() { return Ok(()) }
             p.world.marbles.set_half_length(p.subject, x)
         };
         Marble 3 "Marbles::set_rotation": |p, x| p.world.marbles.set_rotation(p.subject, quaternions(x)[p.case]);

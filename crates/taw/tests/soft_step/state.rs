@@ -324,6 +324,19 @@ fn numbers_that_rows_cannot_hold_are_refused_by_name() {
 }
 
 #[test]
+fn a_marble_is_named_once_however_often_it_was_set() {
+    let mut world = world::<f64>(1);
+    let ids = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0]
+        .map(|x| world.marbles.insert(Marble::new(Point3::new(x, 0.0, 0.0), 0.1)).unwrap());
+    world.step(1.0 / 60.0).unwrap();
+    for speed in [2e12, 3e12] {
+        world.marbles.set_velocity(ids[3], Vec3::new(speed, 0.0, 0.0)).unwrap();
+    }
+    let named: Vec<_> = world.unsupported_marbles().into_iter().map(|(id, _)| id).collect();
+    assert_eq!(named, [ids[3]]);
+}
+
+#[test]
 fn the_least_radius_is_accepted() {
     let mut world = world::<f32>(1);
     world.marbles.insert(Marble::new(Point3::new(0.0, 0.0, 0.0), 1e-9)).unwrap();

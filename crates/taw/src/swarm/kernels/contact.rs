@@ -1,9 +1,8 @@
 //! Contacts of pairs in the full tier, eight at a time: restitution, warm start, solve and relax.
 //! The constraint itself is in [`crate::constraint`].
 
-use cgmath::EuclideanSpace;
-
 use super::backing::borne_by_wall;
+use super::impacts::note_impacts;
 use super::meeting::{Meeting, meeting};
 use super::params::{Pass, SolverParams};
 use super::rolling::RollingInertia;
@@ -12,7 +11,7 @@ use super::{
     normal_and_separation, scatter, tipping,
 };
 use crate::constraint::{ContactImpulse, FrictionCone, Softness};
-use crate::math::{Point3, RealVector, Vec3};
+use crate::math::RealVector;
 use crate::response::Impact;
 use crate::swarm::batches::Batch;
 use crate::swarm::simd::{Kernel, LANES, Row, Simd, SimdLevel};
@@ -300,7 +299,9 @@ impl SolverColumns<'_> {
         if overlap.gt_mask(zero) == 0 {
             return false;
         }
-        let stirred = (zero - change).select_gt(L::splat(params.jam_speed), overlap, zero);
+        let [free_a, free_b] = [inverse_mass(&a), inverse_mass(&b)];
+        let taken_back = zero - change * (free_a + free_b);
+        let stirred = taken_back.select_gt(L::splat(params.jam_speed), overlap, zero);
         let jammed = stirred.gt_mask(zero) != 0;
         if !params.moves_apart {
             return jammed;
@@ -309,7 +310,6 @@ impl SolverColumns<'_> {
         // weigh: a light ball that a heavy one presses on something has nowhere to go. What sleeps
         // stays.
         let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
-        let [free_a, free_b] = [inverse_mass(&a), inverse_mass(&b)];
         let borne = grounded.select_gt(L::splat(TOUCHING), one, zero);
         let a = free_a.select_gt(zero, borne.select_gt(zero, one, free_a), zero);
         let b = free_b.select_gt(zero, borne.select_gt(zero, one, free_b), zero);
@@ -447,31 +447,10 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
                 columns.solve_rolling(batch, &inertia, normal, load, &own[i], &mut torque[i]);
             }
             if !FIRST {
-                let contact = (normal, separation);
-                let free = inverse_mass(&a) + inverse_mass(&b);
-                let changes = (grounded, change.normal * free);
-                *jammed |= columns.push_apart(batch, at, [a, b], contact, &params, changes);
+                let (contact, mark) = ((normal, separation), (grounded, change.normal));
+                *jammed |= columns.push_apart(batch, at, [a, b], contact, &params, mark);
             }
         }
-    }
-}
-
-/// Notes the pairs of a batch that bounce, with their approach speeds, normals and points.
-#[cold]
-fn note_impacts<L: Simd>(
-    impacts: &mut Vec<Impact<f32>>,
-    batch: &Batch,
-    approach_speed: L,
-    vectors: [Vec3Wide<L>; 2],
-) {
-    let (mut speeds, mut places) = ([0.0; LANES], [[[0.0; LANES]; 3]; 2]);
-    approach_speed.store(&mut speeds);
-    vectors.iter().zip(&mut places).for_each(|(vector, place)| vector.store(place));
-    for ([a, b], lane) in batch.pairs().zip(0..).filter(|(_, lane)| speeds[*lane] > 0.0) {
-        let [normal, point] = places.map(|[x, y, z]| Vec3::new(x[lane], y[lane], z[lane]));
-        let point = Point3::from_vec(point);
-        let approach_speed = speeds[lane];
-        impacts.push(Impact { a, on_wall: false, b, normal, point, approach_speed });
     }
 }
 

@@ -5,7 +5,7 @@ use crate::swarm::simd::{Kernel, Row, Simd};
 
 /// Faster than this, in m/s, or further out, in metres, a ball is no longer a ball: squares of
 /// such numbers and of sums of them are still finite.
-const MAX_MAGNITUDE: f32 = 1e15;
+pub(in crate::swarm) const MAX_MAGNITUDE: f32 = 1e15;
 
 /// Integrates velocities, and positions by these.
 pub(in crate::swarm) struct IntegratePositions<'a> {
@@ -73,7 +73,7 @@ pub(in crate::swarm) fn squared(a: Row) -> f32 {
 
 /// Of the three coordinates; NaN if one of them is.
 #[inline(always)]
-fn largest(a: Row) -> f32 {
+pub(in crate::swarm) fn largest(a: Row) -> f32 {
     a[0].abs() + a[1].abs() + a[2].abs()
 }
 

@@ -11,6 +11,7 @@ use crate::response::Impact;
 mod backing;
 mod contact;
 mod displace;
+mod impacts;
 mod integrate;
 mod meeting;
 mod params;
@@ -20,7 +21,9 @@ mod tipping;
 pub(super) use backing::LOST;
 pub(super) use contact::{SolverColumns, solve};
 pub(super) use displace::{Displace, DisplaceFromPlanes, DisplaceNeighbours};
-pub(super) use integrate::{IntegratePositions, Predict, UpdateVelocities, squared};
+pub(super) use integrate::{
+    IntegratePositions, MAX_MAGNITUDE, Predict, UpdateVelocities, largest, squared,
+};
 pub(super) use params::{GROUNDED, Pass, SolverParams, WALL_SLOP};
 
 /// Accumulated impulses of batches of pairs, batch by batch; none in the lab's tier.
@@ -90,6 +93,16 @@ impl ContactImpulses {
             + self.numbers.capacity() * size_of::<PairNumbers>()
             + self.struck.capacity() * size_of::<StruckContact>()
             + self.impacts.capacity() * size_of::<Impact<f32>>()
+    }
+
+    /// Forgets impulses that are no finite numbers.
+    pub fn forget_non_finite(&mut self) {
+        let all = self.normal_impulse.as_flattened_mut().iter_mut();
+        let all = all.chain(self.tangent_impulse.as_flattened_mut().as_flattened_mut());
+        let all = all.chain(self.torque.as_flattened_mut().as_flattened_mut());
+        all.filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
+        self.struck.retain(|struck| struck.load.is_finite());
+        self.impacts.retain(|impact| impact.approach_speed.is_finite());
     }
 
     /// Forgets the impulses that stopped balls, but not the loads.

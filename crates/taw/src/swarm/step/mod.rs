@@ -3,6 +3,7 @@
 mod backing;
 mod bounces;
 mod lab;
+mod overflow;
 mod passages;
 mod paths;
 mod relax;
@@ -61,6 +62,7 @@ impl Swarm {
             Tier::Full => {
                 self.find_contacts(dt, gravity, walls, walls_changed, observe);
                 self.solve(dt, self.model.substeps, walls, observe);
+                self.stop_what_overflowed();
             }
         }
         self.end();
@@ -87,6 +89,7 @@ impl Swarm {
     /// Ends it: moves all on in substeps, and solves the contacts.
     pub(crate) fn finish(&mut self, dt: f32, substeps: u32, walls: &dyn StaticGeometry) {
         self.solve(dt, substeps, walls, &mut |_| ());
+        self.stop_what_overflowed();
         self.end();
     }
 
@@ -128,6 +131,8 @@ impl Swarm {
         for chunk in &mut self.chunks {
             self.stopped.append(&mut chunk.stopped);
         }
+        self.stopped.sort_unstable();
+        self.stopped.dedup();
     }
 
     /// Brings up to date which pairs are near, and which balls are near walls; and who sleeps.

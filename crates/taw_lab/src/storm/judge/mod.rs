@@ -5,6 +5,7 @@ mod energy;
 mod flight;
 mod overlap;
 mod rest;
+mod stays;
 
 pub use overlap::deepest;
 
@@ -36,6 +37,10 @@ pub enum Invariant {
     Support,
     /// The speed reported is the speed moved.
     Speed,
+    /// What has come to rest stays at rest, unless it falls.
+    Stays,
+    /// A step takes no longer than a game can wait.
+    Time,
     /// Nothing sinks into anything.
     Overlap,
     /// Nothing leaves a closed box.
@@ -50,7 +55,7 @@ pub enum Invariant {
 
 impl Invariant {
     /// All of them.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 16] = [
         Self::Refused,
         Self::Panics,
         Self::Ends,
@@ -60,6 +65,8 @@ impl Invariant {
         Self::Momentum,
         Self::Support,
         Self::Speed,
+        Self::Stays,
+        Self::Time,
         Self::Overlap,
         Self::Closed,
         Self::Clone,
@@ -80,6 +87,8 @@ impl Invariant {
             Self::Momentum => "momentum",
             Self::Support => "support",
             Self::Speed => "speed",
+            Self::Stays => "stays",
+            Self::Time => "time",
             Self::Overlap => "overlap",
             Self::Closed => "closed",
             Self::Clone => "clone",
@@ -120,6 +129,13 @@ impl Finding {
     pub fn holds(&self) -> bool {
         self.ratio() <= 1.0
     }
+}
+
+/// A step of at most 300 bodies takes less than a second of processor time, some thousand times what
+/// most take: a player may see it stutter, but not hang.
+#[must_use]
+pub fn time(seconds: f64) -> Finding {
+    Finding { invariant: Invariant::Time, value: seconds, bound: 1.0, body: None }
 }
 
 /// Properties of a case that all invariants use.
@@ -230,6 +246,7 @@ pub struct Bench {
     energy: energy::Ledger,
     flight: flight::Falls,
     rest: rest::Lies,
+    rested: stays::Rested,
     /// The deepest overlap at the beginning, in metres, and the largest speed so far, in m/s.
     begin: f64,
     fastest: f64,
@@ -249,6 +266,7 @@ impl Bench {
             energy: energy::Ledger::new(begin),
             flight: flight::Falls::default(),
             rest: rest::Lies::default(),
+            rested: stays::Rested::default(),
             begin: overlap::deepest(begin).0,
             fastest: 0.0,
         }
@@ -270,6 +288,7 @@ impl Bench {
         findings.extend(self.energy.judge(rules, before, after, &near));
         findings.extend(self.flight.judge(rules, before, after, &near));
         findings.extend(self.rest.judge(rules, before, after));
+        findings.extend(self.rested.judge(rules, before, after, &near));
         findings.push(overlap::overlap(rules, before, after, [self.begin, self.fastest]));
         overlap::forget_the_fast(rules, after, &mut self.outside);
         let closed = |corners| overlap::closed(rules, after, self.fastest, &self.outside, corners);

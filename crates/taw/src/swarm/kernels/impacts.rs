@@ -1,0 +1,28 @@
+//! Impacts of pairs, for those who are told of them.
+
+use cgmath::EuclideanSpace;
+
+use crate::math::{Point3, Vec3};
+use crate::response::Impact;
+use crate::swarm::batches::Batch;
+use crate::swarm::simd::{LANES, Simd};
+use crate::swarm::vec3_wide::Vec3Wide;
+
+/// Notes the pairs of a batch that bounce, with their approach speeds, normals and points.
+#[cold]
+pub(super) fn note_impacts<L: Simd>(
+    impacts: &mut Vec<Impact<f32>>,
+    batch: &Batch,
+    approach_speed: L,
+    vectors: [Vec3Wide<L>; 2],
+) {
+    let (mut speeds, mut places) = ([0.0; LANES], [[[0.0; LANES]; 3]; 2]);
+    approach_speed.store(&mut speeds);
+    vectors.iter().zip(&mut places).for_each(|(vector, place)| vector.store(place));
+    for ([a, b], lane) in batch.pairs().zip(0..).filter(|(_, lane)| speeds[*lane] > 0.0) {
+        let [normal, point] = places.map(|[x, y, z]| Vec3::new(x[lane], y[lane], z[lane]));
+        let point = Point3::from_vec(point);
+        let approach_speed = speeds[lane];
+        impacts.push(Impact { a, on_wall: false, b, normal, point, approach_speed });
+    }
+}
