@@ -1,7 +1,7 @@
 //! Walls that move further in a step than balls are wide.
 
 use taw::prelude::*;
-use taw::shape::Aabb;
+use taw::shape::{Aabb, Shape};
 
 use crate::world;
 
@@ -51,4 +51,40 @@ fn no_plate_passes_through_a_ball() {
         }
     }
     assert!(passed.is_empty(), "{} of 504: {passed:?}", passed.len());
+}
+
+/// At any speed: contacts with shapes were listed of where these were a step before, and with half-spaces
+/// of where they will be.
+#[test]
+fn what_rides_on_a_lift_has_a_contact_with_it() {
+    const DT: f32 = 1.0 / 64.0;
+    for (speed, is_plane) in
+        [0.2, 0.5, 1.0, 3.0, -0.2, -1.0].into_iter().flat_map(|v| [(v, true), (v, false)])
+    {
+        let mut world = world::<f32>(4);
+        let slab = |y: f32| -> Shape<f32> {
+            if is_plane {
+                return Plane::new(Vec3::unit_y(), y).unwrap().into();
+            }
+            Aabb { min: Point3::new(-4.0, y - 1.0, -4.0), max: Point3::new(4.0, y, 4.0) }.into()
+        };
+        let wall = world.walls.insert(slab(0.0)).unwrap();
+        let velocity = Vec3::unit_y() * speed;
+        let rides = Marble { velocity, ..Marble::new(Point3::new(0.0, 0.25, 0.0), 0.25) };
+        world.marbles.insert(rides).unwrap();
+        for step in 1..=64_u16 {
+            let y = speed * DT * f32::from(step);
+            let motion = taw::motion::WallMotion {
+                velocity,
+                angular_velocity: Vec3::new(0.0, 0.0, 0.0),
+                pivot: Point3::new(0.0, y, 0.0),
+            };
+            world.walls.set(wall, slab(y)).unwrap();
+            world.walls.set_motion(wall, Some(motion)).unwrap();
+            world.step(DT).unwrap();
+            let contacts = &world.contacts.wm;
+            let touches = contacts.len() == 1 && contacts[0].separation.abs() < 1e-3;
+            assert!(touches, "{speed} m/s, {is_plane}, step {step}: {contacts:?}");
+        }
+    }
 }

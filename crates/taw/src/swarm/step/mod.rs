@@ -78,7 +78,7 @@ impl Swarm {
     ) {
         let walls_changed = self.begin(gravity, walls, walls_identity);
         self.find_contacts(dt, gravity, walls, walls_changed, &mut |_| ());
-        self.update_contacts_on_the_way(walls, dt);
+        self.update_contacts_on_the_way(walls, walls_changed, dt);
     }
 
     /// Returns true if pairs are known, so that a step can be finished.

@@ -181,15 +181,16 @@ impl Swarm {
         self.chunks.iter().any(|chunk| chunk.caught)
     }
 
-    /// Finds the contacts of fast balls with all that they may meet in the step of `dt` seconds. (The
-    /// solver finds them anew in each substep, and more exactly.)
+    /// Finds the contacts of fast balls with all that they may meet in the step of `dt` seconds, and of
+    /// all if walls moved. (The solver finds them anew in each substep, and more exactly.)
     pub(in crate::swarm) fn update_contacts_on_the_way(
         &mut self,
         walls: &dyn StaticGeometry,
+        walls_changed: bool,
         dt: f32,
     ) {
-        if walls.has_shapes() {
-            self.update_contacts_of(walls, dt, [dt, dt], |_| true, [true, true]);
+        if walls.has_shapes() || walls_changed {
+            self.update_contacts_of(walls, dt, [dt, dt], |_| true, [!walls_changed, true]);
         }
     }
 
