@@ -1,7 +1,8 @@
 //! Walls that move further in a step than balls are wide.
 
 use taw::prelude::*;
-use taw::shape::{Aabb, Shape};
+use taw::shape::Aabb;
+use taw::world::WallShape;
 
 use crate::world;
 
@@ -62,7 +63,7 @@ fn what_rides_on_a_lift_has_a_contact_with_it() {
         [0.2, 0.5, 1.0, 3.0, -0.2, -1.0].into_iter().flat_map(|v| [(v, true), (v, false)])
     {
         let mut world = world::<f32>(4);
-        let slab = |y: f32| -> Shape<f32> {
+        let slab = |y: f32| -> WallShape<f32> {
             if is_plane {
                 return Plane::new(Vec3::unit_y(), y).unwrap().into();
             }
