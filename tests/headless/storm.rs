@@ -20,7 +20,7 @@ const HALF: f32 = 10.0;
 struct Storm {
     app: App,
     random: Rng,
-    /// Whether contacts are springs, which give way to what is fast or heavy, so that the box is not
+    /// True if contacts are springs, which give way to what is fast or heavy, so that the box is not
     /// closed.
     soft: bool,
     parents: Vec<(Entity, Vec3, Vec3)>,

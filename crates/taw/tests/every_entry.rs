@@ -19,7 +19,7 @@ use taw::prelude::*;
 use taw::scene::{MarbleDesc, Scene};
 use taw::swarm::SwarmModel;
 
-/// How much processor time ten steps of four balls may take, in a build without optimization. It is a
+/// Processor time that ten steps of four balls may take, in a build without optimization. It is a
 /// few microseconds a step. What others do on the machine does not count.
 const PATIENCE: Duration = Duration::from_secs(5);
 

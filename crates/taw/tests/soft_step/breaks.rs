@@ -101,7 +101,7 @@ fn the_impacts_of_a_break_account_for_every_change_of_velocity() {
     }
 }
 
-/// Where balls are many, each thread works on some of them; and large ones are struck without going far.
+/// Thousands of balls, of which each thread works on some; and large ones, struck without going far.
 #[test]
 fn so_do_those_of_a_bullet_among_thousands() {
     for (radius, gap, speed) in [(RADIUS, 0.8, 10.0), (1.0, 0.02, 4.0)] {

@@ -37,7 +37,7 @@ pub enum Invariant {
     Support,
     /// The speed reported is the speed moved.
     Speed,
-    /// What has come to rest stays at rest, unless it falls.
+    /// Bodies at rest stay at rest, unless they fall.
     Stays,
     /// A step takes no longer than a game can wait.
     Time,

@@ -1,4 +1,4 @@
-//! What has come to rest stays at rest, unless it falls.
+//! Bodies at rest stay at rest, unless they fall.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use super::flight::Near;
 use super::{Finding, Invariant, Rules};
 use crate::storm::observe::{Body, Snapshot};
 
-/// How long a cluster has to be slow, in seconds and in steps at least, so that it rests and does not
+/// Least time for which a cluster has to be slow, in seconds and in steps, so that it rests and does not
 /// only turn back: a body that flies up at the speed of rest comes down after two steps.
 const REST: f64 = 0.25;
 const STEPS: u32 = 8;
@@ -33,8 +33,8 @@ pub struct Rested {
 }
 
 impl Rested {
-    /// What rested moves again only if another body touches it or if it falls: its energy rises by no
-    /// more than
+    /// Judges clusters at rest. One moves again only if another body touches it or if it falls: its energy
+    /// rises by no more than
     /// - that of the speed of rest, `m (g dt)² / 2`, and of a flight at that speed, which is as much;
     /// - first order, as a bounce happens at the end of its substep: `m g v dt` for its speed now;
     /// - what it takes to part what overlapped, which is also the most that soft contacts store;
@@ -101,17 +101,17 @@ fn clusters(near: &Near) -> BTreeMap<usize, Vec<usize>> {
     clusters
 }
 
-/// Of the center or of the surface about it, whichever is faster, in m/s.
+/// Speed of the center or of the surface about it, whichever is faster, in m/s.
 fn speed(body: &Body) -> f64 {
     body.velocity.magnitude().max(body.angular_velocity.magnitude() * body.reach())
 }
 
-/// Of motion and in gravity, in joules.
+/// Energy of motion and in gravity, in joules.
 fn energy(body: &Body, snapshot: &Snapshot) -> f64 {
     body.kinetic() + body.spin_energy() - body.mass * snapshot.gravity().dot(body.at)
 }
 
-/// What the energy of one body may rise by, in joules.
+/// Allowed rise of the energy of one body, in joules.
 fn slack(rules: &Rules, body: &Body, g: f64, root_of_steps: f64) -> f64 {
     let rest = g * rules.step;
     let height = 8.0 * rules.epsilon * rules.substeps * body.at.magnitude();
