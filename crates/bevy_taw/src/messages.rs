@@ -26,7 +26,7 @@ use bevy::ecs::event::EntityTrigger;
 use bevy::ecs::message::Messages;
 use bevy::ecs::observer::CachedObservers;
 use bevy::prelude::*;
-use taw::contact::Contact;
+use taw::contact::{Contact, touch_goes_on};
 use taw::math::{Vec3 as TawVec3, length};
 use taw::world::ColliderId;
 
@@ -391,7 +391,7 @@ impl Gap {
     /// Returns true if two that touched still do: what rests touches in one step and hovers in the
     /// next. `fall` is the distance that gravity closes in a substep, in metres.
     pub(crate) fn is_closed(&self, fall: f32) -> bool {
-        self.width <= fall.max(self.radius / 50.0)
+        touch_goes_on(self.width, self.radius, fall)
     }
 }
 

@@ -1,5 +1,7 @@
 //! Thousands at one point part within seconds, without energy from nothing.
 
+use std::time::{Duration, Instant};
+
 use taw::prelude::*;
 use taw::shape::Plane;
 use taw::swarm::{Ball, SwarmModel, Tier};
@@ -71,6 +73,70 @@ fn thousands_at_one_point_part_within_seconds_and_their_center_stays() {
         assert!(depth < 0.1, "{count} in a swarm {swarm}: {depth} radii deep");
         assert!(moved.magnitude() < 1e-5, "{count}: their center moved by {moved:?}");
         assert!(velocity.iter().all(|v| *v == Vec3::zero()), "{count}: overlap became speed");
+    }
+}
+
+/// A step of these costs no more than its contacts do, of which a marble has a few dozen: not all of the
+/// fifty million pairs. By time, since a count would be of one cause only; the bound is many times
+/// what it takes, and a fourth of what it took.
+#[test]
+fn a_step_of_ten_thousand_at_one_point_does_not_look_at_all_pairs() {
+    let responses = [
+        Response::Displacement,
+        Response::Impulse,
+        Response::Penalty(ContactLaw::SpringDashpot),
+        Response::Penalty(ContactLaw::HertzMindlin),
+        Response::EventDriven,
+    ];
+    for response in responses {
+        let mut world = at_one_point(0, 1.0, false);
+        let rotation = Rotation::Dynamic;
+        world.set_model(Model { response, rotation, ..Model::default() }).unwrap();
+        world.set_gravity(Vec3::zero()).unwrap();
+        for _ in 0..10_000 {
+            world.marbles.insert(Marble::new(Point3::new(0.3, 1.0, -2.0), RADIUS)).unwrap();
+        }
+        let begin = Instant::now();
+        world.step(DT).unwrap();
+        let took = begin.elapsed();
+        println!("{response:?}: {took:?}");
+        assert!(took < Duration::from_secs(2), "{response:?}: {took:?}");
+        let most = 32 * world.marbles.len();
+        assert!(world.contacts.mm.len() <= most, "{response:?}: {}", world.contacts.mm.len());
+    }
+}
+
+#[test]
+fn a_thousand_at_one_point_part_by_each_response_without_speed() {
+    for (response, seconds) in [
+        (Response::Displacement, 2),
+        (Response::Impulse, 3),
+        (Response::Penalty(ContactLaw::SpringDashpot), 3),
+        (Response::Penalty(ContactLaw::HertzMindlin), 3),
+        (Response::EventDriven, 4),
+    ] {
+        let mut world = at_one_point(0, 1.0, false);
+        let rotation = Rotation::Dynamic;
+        world.set_model(Model { response, rotation, ..Model::default() }).unwrap();
+        world.set_gravity(Vec3::zero()).unwrap();
+        for _ in 0..1_000 {
+            world.marbles.insert(Marble::new(Point3::new(0.3, 1.0, -2.0), RADIUS)).unwrap();
+        }
+        let mut parted = None;
+        for step in 0..60 * seconds {
+            world.step(DT).unwrap();
+            let at: Vec<_> =
+                world.marbles.position().iter().map(|p| p.to_vec().cast().unwrap()).collect();
+            if deepest(&at) < 0.1 {
+                parted = Some(step);
+                break;
+            }
+        }
+        let fastest = world.marbles.velocity().iter().map(|v| v.magnitude()).fold(0.0, f32::max);
+        println!("{response:?}: parted after {parted:?} steps, fastest {fastest} m/s");
+        assert!(parted.is_some(), "{response:?} has not parted them");
+        // A rounding of the places, 2e-7 m, in a step.
+        assert!(fastest < 2e-7 * 60.0, "{response:?}: overlap became {fastest} m/s");
     }
 }
 

@@ -29,6 +29,12 @@ const LEVELS: u32 = 16;
 /// Cells are wider than the spheres by this factor, which is more than rounding takes from a
 /// distance in `f32`.
 const CELL_MARGIN: f64 = 1.0 + 1e-6;
+/// Number of others that a sphere overlaps in three cells side by side, from which on it looks at no more
+/// there: as many as contacts are kept of it. Twelve of its size can touch it without overlap.
+const MOST: usize = 32;
+/// A prime, larger than the number of spheres, near 2^32 over the golden ratio (Knuth, *The Art of Computer
+/// Programming*, vol. 3, §6.4).
+const STRIDE: u64 = 2_654_435_761;
 /// Smallest cell width in metres: below it the reciprocal overflows.
 const LEAST_CELL: f64 = 1e-300;
 
@@ -72,6 +78,20 @@ impl Grid {
     /// Visits every pair of spheres in equal or neighbouring cells once, the lower index first.
     /// `center` must be that of the last rebuild.
     pub fn pairs<S: Scalar>(&self, center: &[Point3<S>], mut pair: impl FnMut(u32, u32)) {
+        self.pairs_up_to_crowds(center, |a, b| {
+            pair(a, b);
+            false
+        });
+    }
+
+    /// Visits pairs as [`Grid::pairs`] does, but fewer of crowds: `pair` says if the two overlap, and a
+    /// sphere that overlaps [`MOST`] in three cells side by side looks at no more there. Which it looks
+    /// at varies between spheres.
+    pub(crate) fn pairs_up_to_crowds<S: Scalar>(
+        &self,
+        center: &[Point3<S>],
+        mut pair: impl FnMut(u32, u32) -> bool,
+    ) {
         let mut emit = |a: &Cell, b: &Cell| pair(a.row.min(b.row), a.row.max(b.row));
         for level in 0..LEVELS {
             let cells = &self.cells[self.level(level)];
@@ -129,7 +149,7 @@ impl Grid {
         cells: &[Cell],
         coarser: u32,
         center: &[Point3<S>],
-        emit: &mut impl FnMut(&Cell, &Cell),
+        emit: &mut impl FnMut(&Cell, &Cell) -> bool,
     ) {
         let others = &self.cells[self.level(coarser)];
         if others.is_empty() {
@@ -143,10 +163,8 @@ impl Grid {
             for row in ROWS_AROUND {
                 let middle = key.wrapping_add_signed(row);
                 let start = others.partition_point(|other| other.key < middle - 1);
-                others[start..]
-                    .iter()
-                    .take_while(|other| other.key <= middle + 1)
-                    .for_each(|other| emit(cell, other));
+                let count = others[start..].partition_point(|other| other.key <= middle + 1);
+                visit_run(cell, &others[start..start + count], emit);
             }
         }
     }
@@ -164,25 +182,49 @@ const ROWS_AHEAD: [i64; 4] = [ROW, LAYER - ROW, LAYER, LAYER + ROW];
 
 /// Pairs within equal and neighbouring cells of one level. Only later neighbours are visited, so
 /// that each pair is reported once.
-fn pairs_in_level(cells: &[Cell], emit: &mut impl FnMut(&Cell, &Cell)) {
+fn pairs_in_level(cells: &[Cell], emit: &mut impl FnMut(&Cell, &Cell) -> bool) {
+    let mut end = 0;
     for (i, cell) in cells.iter().enumerate() {
-        cells[i + 1..]
-            .iter()
-            .take_while(|other| other.key <= cell.key + 1)
-            .for_each(|other| emit(cell, other));
+        while end < cells.len() && cells[end].key <= cell.key + 1 {
+            end += 1;
+        }
+        visit_run(cell, &cells[i + 1..end], emit);
     }
     for row in ROWS_AHEAD {
-        let mut start = 0;
+        let (mut start, mut end) = (0, 0);
         for cell in cells {
             let middle = cell.key.wrapping_add_signed(row);
             while start < cells.len() && cells[start].key < middle - 1 {
                 start += 1;
             }
-            cells[start..]
-                .iter()
-                .take_while(|other| other.key <= middle + 1)
-                .for_each(|other| emit(cell, other));
+            end = end.max(start);
+            while end < cells.len() && cells[end].key <= middle + 1 {
+                end += 1;
+            }
+            visit_run(cell, &cells[start..end], emit);
         }
+    }
+}
+
+/// Visits the others in three cells side by side, until [`MOST`] of them overlap.
+fn visit_run(cell: &Cell, others: &[Cell], emit: &mut impl FnMut(&Cell, &Cell) -> bool) {
+    if others.len() <= MOST {
+        for other in others {
+            emit(cell, other);
+        }
+        return;
+    }
+    // Multiples of a number without a divisor in common with their count name each once, in an order
+    // that is as good as random.
+    let (count, stride) = (others.len() as u64, STRIDE % others.len() as u64);
+    let mut at = u64::from(cell.row) * STRIDE % count;
+    let mut overlapping = 0;
+    for _ in 0..count {
+        overlapping += usize::from(emit(cell, &others[at as usize]));
+        if overlapping == MOST {
+            break;
+        }
+        at = (at + stride) % count;
     }
 }
 

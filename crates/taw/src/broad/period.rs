@@ -88,18 +88,19 @@ impl<S> Default for Images<S> {
 
 impl<S: Scalar> Images<S> {
     /// Visits every pair of spheres at most `reach` metres apart, and some more, once, the lower
-    /// index first, also across the sides of a periodic box.
+    /// index first, also across the sides of a periodic box. `pair` says if the two overlap: of crowds
+    /// in an open world fewer are visited (see [`Grid::pairs_up_to_crowds`]).
     pub fn pairs(
         &mut self,
         grid: &mut Grid,
         (center, radius): (&[Point3<S>], &[S]),
         reach: S,
         period: Period<S>,
-        mut pair: impl FnMut(u32, u32),
+        mut pair: impl FnMut(u32, u32) -> bool,
     ) {
         if period.is_open() {
             grid.rebuild(center, radius, reach);
-            grid.pairs(center, pair);
+            grid.pairs_up_to_crowds(center, pair);
             return;
         }
         self.list(center, radius, reach, period);
@@ -180,6 +181,7 @@ mod tests {
             let mut named = Vec::new();
             Images::default().pairs(&mut Grid::default(), (&center, &radius), reach, period, |a, b| {
                 named.push((a, b));
+                false
             });
             let count = named.len();
             named.dedup();

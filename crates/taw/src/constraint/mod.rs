@@ -31,6 +31,8 @@
 
 mod contact_impulse;
 mod softness;
+mod tipping;
 
 pub(crate) use contact_impulse::{ContactImpulse, FrictionCone, solve_rolling};
 pub(crate) use softness::{ContactSoftness, Softness};
+pub(crate) use tipping::{TIPPING, tipped, tipping_speed};

@@ -7,6 +7,20 @@ use crate::math::{Scalar, Vec3, is_finite, length};
 /// Gap between two that touch, as a fraction of the shorter lever arm, at most.
 const TOUCHING: f64 = 5e-6;
 
+/// Gap up to which a touch goes on, as a fraction of the smaller radius. Impacts of what rests in a heap reach
+/// less; a marble that leaves is beyond it within a step or two.
+const PARTING: f64 = 0.02;
+
+/// Tells if a touch of the last step goes on in this one (hysteresis): two that touched touch until the
+/// gap between their surfaces is wider than a fiftieth of the smaller radius, and than the distance that
+/// gravity closes in a substep, both in metres. What rests in a heap touches in one step and hovers in
+/// the next, by less than that; a touch begins anew only by
+/// [`is_touching`](Contact::is_touching) after it has ended.
+#[must_use]
+pub fn touch_goes_on<S: Scalar>(separation: S, smaller_radius: S, fall: S) -> bool {
+    separation <= fall.max(smaller_radius * S::from_f64(PARTING))
+}
+
 /// Contact point between two bodies, given by their indices in the world's columns. Indices are
 /// stable within a step only.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -59,7 +59,7 @@ pub use closest::{
 pub use compound::{
     SubShapeResult, closest_points_of_shapes, manifolds_of_shapes, shape_cast_of_shapes, sub_shapes,
 };
-pub use contacts::{Contact, Contacts};
+pub use contacts::{Contact, Contacts, touch_goes_on};
 pub use core::{Convex, Core};
 pub use manifold::{Manifold, ManifoldPoint, Points, manifold};
 pub use ray_cast::{RayCast, RayHit};

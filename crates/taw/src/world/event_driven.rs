@@ -49,7 +49,9 @@ impl<S: Scalar> World<S> {
         let iterations = self.settings.model.iterations;
         let budget_fraction = (dt / (dt + rest)).as_f64();
         let dt = dt.as_f64();
-        let settings = EventSettings { dt, iterations, source, budget_fraction, cost: 0.into() };
+        let gravity = cast_vector(self.settings.gravity);
+        let cost = 0.into();
+        let settings = EventSettings { dt, iterations, gravity, source, budget_fraction, cost };
         events.work = self.scratch.audit_state.is_some().then(EnergyLedger::default);
         events.impulse_cache = std::mem::take(&mut self.memory.event_impulses);
         let mut impacts = Vec::new();

@@ -155,18 +155,14 @@ impl<S: Scalar> World<S> {
                 period,
                 |a, b| {
                     if self.scratch.contact_limit.drops(&self.marbles, [a, b]) {
-                        return;
+                        return true; // it overlaps deeper ones
                     }
                     let zero = S::zero();
                     let contact =
                         marble_contact(&self.marbles, [a, b], [zero; 2], contact_distance);
-                    if let Some(contact) = contact {
-                        self.scratch.contact_limit.add(
-                            &mut self.contacts.mm,
-                            &self.marbles,
-                            contact,
-                        );
-                    }
+                    let Some(contact) = contact else { return false };
+                    self.scratch.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
+                    contact.separation < zero
                 },
             );
             self.scratch.contact_limit.drop_excess(&mut self.contacts.mm, &self.marbles);

@@ -99,6 +99,7 @@ impl<S: Scalar> World<S> {
             slop: length(self.settings.gravity) * dt * dt,
             max_relative_slop: S::from_f64(0.001),
             max_relative_push: S::from_f64(0.5),
+            gravity: self.settings.gravity,
             resolve_jams: true,
         }
     }

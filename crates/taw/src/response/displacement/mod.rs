@@ -118,9 +118,9 @@ pub(crate) fn solve_displacement<S: Scalar>(
         marbles.separate(c, context);
     }
     cache.clear();
-    cache.extend(
-        constraints.iter().map(|c| CachedImpulse::of_normal_impulse(c.key, c.velocity_change)),
-    );
+    // What bears nothing begins from nothing.
+    let bearing = constraints.iter().filter(|c| c.velocity_change > S::zero());
+    cache.extend(bearing.map(|c| CachedImpulse::of_normal_impulse(c.key, c.velocity_change)));
     cache.sort_unstable_by_key(CachedImpulse::key);
 }
 
@@ -138,6 +138,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             return None;
         }
         let b = contact.b as usize;
+        let normal = self.impact_normal(a, b, (normal, separation), context);
         let surface_speed = self.surface_velocity(a, b, (arms, normal), context.walls).dot(normal);
         let zero = S::zero();
         let mut c = ApproachConstraint {

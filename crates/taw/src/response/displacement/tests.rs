@@ -52,6 +52,7 @@ fn restituted<S: Scalar>(
         slop: zero,
         max_relative_slop: zero,
         max_relative_push: zero,
+        gravity: Vec3::zero(),
         resolve_jams: false,
     };
     let context = Context {

@@ -364,6 +364,7 @@ mod tests {
             let settings = EventSettings {
                 dt: 0.01,
                 iterations: 8,
+                gravity: Vec3::new(0.0, 0.0, 0.0),
                 source,
                 budget_fraction: 1.0,
                 cost: 0.into(),

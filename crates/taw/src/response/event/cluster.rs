@@ -148,6 +148,7 @@ impl Cluster {
             slop: 0.5 * PRESS_SPEED * PRESS_SPEED * acceleration * settings.dt * settings.dt,
             max_relative_slop: SLOP,
             max_relative_push: f64::INFINITY,
+            gravity: Vec3::zero(), // what rests does not tip
             resolve_jams: false,
         };
         let mut quarantined = Vec::new(); // non-finite balls are quarantined after the substep

@@ -6,7 +6,7 @@ use cgmath::InnerSpace;
 
 use super::resting_cluster::{PressedBy, RestingCluster};
 use super::{Event, EventDriven, EventKind, EventSettings, Impact, MAX_DISSIPATIONS, MAX_FREEZES};
-use crate::constraint::ContactImpulse;
+use crate::constraint::{ContactImpulse, tipped};
 use crate::math::{Vec3, normalize_and_length};
 use crate::response::{ImpulseSample, InverseEffectiveMass, Material, impact};
 
@@ -186,8 +186,11 @@ impl EventDriven {
             .unwrap_or((Vec3::unit_x(), 0.0));
         let approach_speed = -(second.velocity - first.velocity).dot(normal);
         let mut material = first.material.combined_with(second.material);
+        let mut normal = normal;
         if approach_speed <= 2.0 * threshold {
             material.restitution = 0.0;
+        } else {
+            normal = tipped(normal, settings.gravity, [a as u32, b as u32]);
         }
         let inverse_effective_mass = InverseEffectiveMass::of(
             [first, second].map(|ball| (ball.inverse_mass, ball.rotation)),

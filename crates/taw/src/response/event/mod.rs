@@ -183,6 +183,8 @@ pub(crate) struct EventSettings<'a> {
     pub dt: f64,
     /// Iterations for clusters of resting balls.
     pub iterations: u32,
+    /// Gravity, in m/s².
+    pub gravity: Vec3<f64>,
     /// Walls of the world.
     pub source: &'a dyn WallSource,
     /// Fraction of the step's remaining budget that this substep may spend.
@@ -354,9 +356,9 @@ impl EventDriven {
             EventKind::RefreshCandidates => self.predict(row, time, settings),
             EventKind::CellCrossing { axis, to } => {
                 if let CellSlot::Cell(mut cell) = self.balls[row].trajectory.cell_slot {
-                    self.cells.remove(row as u32);
+                    self.cells_of(row).remove(row as u32);
                     cell[axis] = to;
-                    self.cells.insert(row as u32, cell);
+                    self.cells_of(row).insert(row as u32, cell);
                     self.balls[row].trajectory.cell_slot = CellSlot::Cell(cell);
                 }
                 self.predict(row, time, settings);
@@ -378,9 +380,7 @@ impl EventDriven {
 
     /// Assigns balls to cells of the grid.
     fn assign_cells(&mut self, dt: f64) {
-        let largest = self.balls.iter().fold(0.0_f64, |max, ball| max.max(ball.radius));
-        // Rounding must not move a touching ball out of the neighbouring cell.
-        self.cells.reset(self.balls.len(), 2.001 * largest, self.period);
+        self.cells.reset(self.balls.len(), self.cell_width(), self.period);
         self.unbounded.clear();
         for row in 0..self.balls.len() {
             if self.exceeds_cell_limit(row, dt) {
@@ -391,6 +391,11 @@ impl EventDriven {
                 self.balls[row].trajectory.cell_slot = CellSlot::Cell(cell);
             }
         }
+    }
+
+    /// Width of cells, in metres: rounding must not move a touching ball out of the neighbouring one.
+    fn cell_width(&self) -> f64 {
+        2.001 * self.balls.iter().fold(0.0_f64, |max, ball| max.max(ball.radius))
     }
 
     fn exceeds_cell_limit(&self, row: usize, remaining: f64) -> bool {
@@ -412,7 +417,7 @@ impl EventDriven {
         if self.balls[row].trajectory.cell_slot != CellSlot::Unbounded
             && self.exceeds_cell_limit(row, dt - now)
         {
-            self.cells.remove(row as u32);
+            self.cells_of(row).remove(row as u32);
             self.unbounded.push(row);
             self.balls[row].trajectory.cell_slot = CellSlot::Unbounded;
         }

@@ -108,7 +108,7 @@ impl EventDriven {
         };
         match self.balls[row].trajectory.cell_slot {
             CellSlot::Cell(cell) => {
-                self.cells.for_each_near(cell, &mut visit);
+                self.for_each_around(row, cell, &mut visit);
                 self.unbounded.iter().copied().for_each(&mut visit);
             }
             CellSlot::Unbounded => (0..self.balls.len()).for_each(&mut visit),

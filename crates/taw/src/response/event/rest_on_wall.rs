@@ -323,6 +323,7 @@ mod tests {
             let settings = EventSettings {
                 dt,
                 iterations: 8,
+                gravity: Vec3::new(0.0, 0.0, 0.0),
                 source: &Face,
                 budget_fraction: 1.0,
                 cost: 0.into(),

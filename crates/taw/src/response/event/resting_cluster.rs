@@ -370,6 +370,7 @@ mod tests {
             let settings = EventSettings {
                 dt: 0.01,
                 iterations: 8,
+                gravity: Vec3::new(0.0, 0.0, 0.0),
                 source: &NoWalls,
                 budget_fraction: 1.0,
                 cost: 0.into(),
@@ -422,6 +423,7 @@ mod tests {
         let settings = EventSettings {
             dt: 0.01,
             iterations: 8,
+            gravity: Vec3::new(0.0, 0.0, 0.0),
             source: &Lift,
             budget_fraction: 1.0,
             cost: 0.into(),

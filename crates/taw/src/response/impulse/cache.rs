@@ -55,7 +55,9 @@ pub(super) fn store_impulses<S: Scalar>(
         contact.set_impulse(c.impulse.normal / inverse_mass, c.impulse.tangent / inverse_mass);
     }
     cache.clear();
-    cache.extend(constraints.iter().map(|c| CachedImpulse {
+    // What bears nothing begins from nothing.
+    let bearing = constraints.iter().filter(|c| c.impulse.normal > S::zero());
+    cache.extend(bearing.map(|c| CachedImpulse {
         key: c.key,
         impulse: c.impulse,
         angular_impulse: c.angular_impulse(),

@@ -1,9 +1,10 @@
 //! Contact kinematics: separation, relative velocity and effective mass of two bodies, and impulses
 //! applied to both.
 
-use cgmath::Zero;
+use cgmath::{InnerSpace, Zero};
 
-use super::{BodyA, Colliders, Constraint, RollingConstraint};
+use super::{BodyA, Colliders, Constraint, Context, RollingConstraint};
+use crate::constraint::tipped;
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, Scalar, Vec3, cast_vector, is_finite, normal_and_distance};
 use crate::response::bodies::relative_velocity;
@@ -34,6 +35,32 @@ impl<S: Scalar> SolverBodies<'_, S> {
         };
         let separation = distance - self.radius[b];
         separation.is_finite().then_some((normal, separation))
+    }
+
+    /// Normal by which two balls meet that overlap, or that continuous detection stopped: it
+    /// [leans](tipped) where one falls exactly onto the top of the other.
+    pub(in crate::response) fn impact_normal<W, M, F>(
+        &self,
+        a: BodyA,
+        b: usize,
+        (normal, separation): (Vec3<S>, S),
+        context: &Context<S, W, M, F>,
+    ) -> Vec3<S>
+    where
+        W: Colliders<S>,
+        M: Fn(usize) -> Material<S>,
+        F: Fn(usize) -> S,
+    {
+        let BodyA::Marble(first) = a else { return normal };
+        let a = first as usize;
+        let meets =
+            separation < S::zero() || context.is_ccd_stopped(a) || context.is_ccd_stopped(b);
+        let approach_speed = (self.velocity[a] - self.velocity[b]).dot(normal);
+        let is_impact = meets && approach_speed > context.settings.restitution_threshold;
+        if !is_impact || [a, b].iter().any(|row| self.capsule(*row).is_some()) {
+            return normal;
+        }
+        tipped(normal, context.settings.gravity, [first, b as u32])
     }
 
     /// Places contacts where the bodies are.

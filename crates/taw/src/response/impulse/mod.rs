@@ -68,6 +68,9 @@ pub(crate) struct SolverSettings<S> {
     /// Largest distance by which marbles push each other apart in a substep, over the radius of the one
     /// that moves: its center stays where its contacts with walls are known.
     pub max_relative_push: S,
+    /// Acceleration that says where the [top](crate::constraint::tipped) of a marble is, in m/s²; zero where
+    /// none matters.
+    pub gravity: Vec3<S>,
     /// True to resolve jams; false where the caller does, which tries the walls' motion first.
     pub resolve_jams: bool,
 }

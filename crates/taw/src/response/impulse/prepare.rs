@@ -54,6 +54,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     ) -> Option<Constraint<S>> {
         let (b, axis_offset) = (contact.b as usize, contact.along);
         let (normal, separation) = self.contact_geometry(a, contact, context)?;
+        let normal = self.impact_normal(a, b, (normal, separation), context);
         let arms = self.arms(a, b, axis_offset, normal);
         let material = context.material_of(a, b);
         let surface_velocity = self.surface_velocity(a, b, (arms, normal), context.walls);

@@ -2,7 +2,7 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::{CORE, CORE_ROUNDING, PenaltySettings};
+use super::{CORE, CORE_ROUNDING, PenaltySettings, SpringHistory};
 use crate::contact::Contact;
 use crate::math::{Scalar, Vec3, cast_vector, is_finite, length};
 use crate::response::impulse::BodyA;
@@ -24,6 +24,7 @@ pub(super) struct PenaltyContact<S> {
     pub arms: [Vec3<S>; 2],
     /// Unit normal from a to b.
     pub normal: Vec3<S>,
+    /// Penetration, in metres; of a contact with its forces, the part that loads its spring.
     pub penetration: S,
     /// Velocity of b's contact point relative to a's, and of the wall's surface, in m/s.
     pub relative_velocity: Vec3<S>,
@@ -53,6 +54,7 @@ where
         marbles: &SolverBodies<S>,
         body_a: BodyA,
         contact: &Contact<S>,
+        before: &[SpringHistory<S>],
     ) -> Option<PenaltyContact<S>> {
         let Contact { separation, .. } = *contact;
         let (a, b) = (body_a.marble(), contact.b as usize);
@@ -62,7 +64,20 @@ where
         let (penetration, normal, arms) = match a {
             Some(a) if !has_capsule => {
                 let radii = [marbles.radius[a], marbles.radius[b]];
-                geometry_before(contact, radii, moved(b) - moved(a))
+                let (penetration, normal, arms) =
+                    geometry_before(contact, radii, moved(b) - moved(a));
+                // An impact is where a contact begins; in between, what rests sways.
+                let key = body_a.contact_key(contact);
+                let begins = before.binary_search_by_key(&key, |history| history.key).is_err();
+                let place = (normal, -penetration);
+                let leaning = if begins {
+                    marbles.impact_normal(body_a, b, place, &self.context)
+                } else {
+                    normal
+                };
+                let change = leaning - normal;
+                let arms = [arms[0] + change * radii[0], arms[1] - change * radii[1]];
+                (penetration, leaning, arms)
             }
             // Along the present normal: internal edges are known for that one, and the nearest
             // points of capsules move along them.

@@ -55,7 +55,7 @@ where
     pub(super) fn contact_force(
         &self,
         index: usize,
-        contact: PenaltyContact<S>,
+        mut contact: PenaltyContact<S>,
         initial_velocities: [Vec3<S>; 2],
         before: &[SpringHistory<S>],
     ) -> ContactForce<S> {
@@ -63,6 +63,11 @@ where
         let separation_speed = contact.relative_velocity.dot(contact.normal);
         let known = before.binary_search_by_key(&contact.key, |history| history.key);
         let history = known.map(|at| before[at]);
+        let overlap = history.map_or_else(
+            |_| self.initial_overlap(&contact),
+            |history| history.overlap.min(contact.penetration),
+        );
+        contact.penetration -= overlap;
         let mut springs = self.law.springs(&contact, contact.penetration, dt);
         let (mut damped_time, mut tangent_displacement) = (S::one(), Vec3::zero());
         if history.is_err() && separation_speed < S::zero() {
@@ -91,6 +96,7 @@ where
             key: contact.key,
             normal: contact.normal,
             penetration: contact.penetration,
+            overlap,
             tangent_displacement,
             tangent_stiffness: S::zero(),
             stored_energy: S::zero(),
@@ -102,7 +108,7 @@ where
             contact,
             springs,
             half_damping,
-            history,
+            history: SpringHistory { overlap, ..history },
             spring_scale: S::one(),
             dashpot_scale: S::one(),
             counts: [zero; 2],
@@ -138,6 +144,7 @@ where
         marbles: &mut SolverBodies<S>,
         work: Option<&mut EnergyLedger>,
     ) {
+        // Above zero: it ends although its spring pushes.
         let fraction = force.next_penetration(self.context.settings.dt) / force.contact.penetration;
         let elastic_force = force.springs.elastic_force * fraction;
         let [_, normal_impulse] = force.normal_impulses(
@@ -249,7 +256,7 @@ impl<S: Scalar> ContactForce<S> {
         }
     }
 
-    /// Penetration at the next kick, in metres.
+    /// Penetration at the next kick that loads the spring, in metres.
     fn next_penetration(&self, dt: S) -> S {
         self.contact.penetration - self.separation_speed() * dt
     }
@@ -327,7 +334,7 @@ impl<S: Scalar> ContactForce<S> {
             self.history.tangent_displacement + relative_velocity.reject_from(normal) * dt;
         let history = SpringHistory {
             normal,
-            penetration: self.next_penetration(dt),
+            penetration: self.next_penetration(dt) + self.history.overlap,
             tangent_displacement,
             stored_energy,
             velocity,

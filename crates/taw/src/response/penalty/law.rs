@@ -107,7 +107,12 @@ impl ContactLaw {
         };
         // Damping follows 5/6 of the stiffness of Hertz's spring (Tsuji, Tanaka and Ishida 1992),
         // all of a linear one.
-        let hertz_correction = (S::one() + elastic_force / (stiffness * penetration)) * number(0.5);
+        let linear_force = stiffness * penetration;
+        let hertz_correction = if linear_force > S::zero() {
+            (S::one() + elastic_force / linear_force) * number(0.5)
+        } else {
+            S::one() // no force yet
+        };
         Springs {
             elastic_force,
             stiffness,

@@ -10,6 +10,7 @@ mod contact;
 mod force;
 mod law;
 mod mass_split;
+mod parting;
 #[cfg(test)]
 mod tests;
 
@@ -33,6 +34,8 @@ pub(crate) struct SpringHistory<S> {
     /// Unit normal, and penetration at the position of the next kick, in metres.
     normal: Vec3<S>,
     penetration: S,
+    /// Part of the penetration that no motion of the two brought about, in metres.
+    overlap: S,
     /// Tangential displacement of the two points while they stick, in metres, at the position of the
     /// next kick, and its stiffness, in N/m.
     tangent_displacement: Vec3<S>,
@@ -92,6 +95,8 @@ pub(crate) struct Scratch<S> {
     loads: Vec<ContactLoad<S>>,
     /// Rows whose positions have followed their velocity changes.
     followed: Vec<bool>,
+    /// Displacements that part what overlaps, in metres.
+    pushes: Vec<Vec3<S>>,
 }
 
 impl<S, W, M, F> PenaltySettings<'_, S, W, M, F>
@@ -115,13 +120,13 @@ where
         quarantined: &mut Vec<u32>,
         mut work: Option<&mut EnergyLedger>,
     ) {
-        let Scratch { before, forces, loads, followed } = scratch;
+        let Scratch { before, forces, loads, followed, pushes } = scratch;
         std::mem::swap(before, histories);
         histories.clear();
         self.keep_sides(marbles, contacts, before);
         forces.clear();
         for (index, (a, contact)) in BodyA::of_each(contacts).enumerate() {
-            if let Some(contact) = self.active_contact(marbles, a, contact) {
+            if let Some(contact) = self.active_contact(marbles, a, contact, before) {
                 let initial_velocities = contact.velocities(marbles);
                 forces.push(self.contact_force(index, contact, initial_velocities, before));
             }
@@ -141,6 +146,7 @@ where
         }
         self.bounce_cores(marbles, forces, work.as_deref_mut());
         self.update_positions(marbles, forces, followed);
+        self.part_overlaps(marbles, forces, pushes);
         // After friction has turned the marbles: what it adds in a substep is resisted in the same one.
         for force in forces.iter_mut() {
             force.solve_rolling(marbles);

@@ -14,6 +14,7 @@ fn solver_settings(dt: f64) -> SolverSettings<f64> {
         slop: 0.0,
         max_relative_slop: 0.0,
         max_relative_push: 0.0,
+        gravity: Vec3::zero(),
         resolve_jams: false,
     }
 }

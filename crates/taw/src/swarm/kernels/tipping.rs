@@ -1,17 +1,13 @@
-//! Balls that fall exactly onto the top of others. In numbers they could stand there for ever, one upon
-//! the other; no real ones are that even.
+//! Balls that fall exactly onto the top of others, as in [`tipping`](crate::constraint::tipping_speed).
 
 use super::direction;
 use super::params::SolverParams;
+use crate::constraint::{TIPPING, tipping_speed};
 use crate::math::RealVector;
 use crate::swarm::batches::Batch;
 use crate::swarm::simd::{LANES, Simd};
 use crate::swarm::vec3_wide::Vec3Wide;
 
-/// Sine of the angle between normal and gravity up to which a ball is on the top of another.
-const UPRIGHT: f32 = 1e-6;
-/// Speed across the normal after an impact, over the approach speed.
-const TIPPING: f32 = 1e-3;
 /// Largest coefficient of restitution of such an impact: what moves across the normal takes its energy
 /// from the bounce, `TIPPING`² and at most five halves as much in spin.
 const RESTITUTION: f32 = 1.0 - 4.0 * TIPPING * TIPPING;
@@ -27,9 +23,7 @@ pub(super) fn tip<L: Simd>(
 ) -> Option<Vec3Wide<L>> {
     let zero = L::splat(0.0);
     let gravity = Vec3Wide::of(&params.gravity.map(L::splat));
-    let across = normal.cross(gravity);
-    let limit = gravity.dot(gravity) * L::splat(UPRIGHT * UPRIGHT);
-    let speed = limit.select_gt(across.dot(across), approach_speed, zero);
+    let speed = tipping_speed(normal, gravity, approach_speed);
     if speed.gt_mask(zero) == 0 {
         return None;
     }
@@ -40,7 +34,7 @@ pub(super) fn tip<L: Simd>(
             axis[lane] = x;
         }
     }
-    Some(Vec3Wide::load(&directions).reject_from(normal) * (speed * L::splat(TIPPING)))
+    Some(Vec3Wide::load(&directions).reject_from(normal) * speed)
 }
 
 /// Coefficient of restitution of pairs that leave a top by these velocities.

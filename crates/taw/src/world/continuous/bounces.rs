@@ -33,14 +33,18 @@ impl<S: Scalar> World<S> {
                 S::zero(),
                 self.marbles.period,
                 |a, b| {
-                    if self.marbles.may_collide(a, b) {
-                        for (one, other) in [(a as usize, b as usize), (b as usize, a as usize)] {
-                            let others = self.marbles.period.image(start[other], start[one]);
-                            let motion = self.marbles.position[other] - start[other];
-                            let distance = distance_to_path(start[one], others, motion);
-                            near[one] |= distance <= reach[one] + self.marbles.radius[other];
-                        }
+                    if !self.marbles.may_collide(a, b) {
+                        return false;
                     }
+                    let (a, b) = (a as usize, b as usize);
+                    for (one, other) in [(a, b), (b, a)] {
+                        let others = self.marbles.period.image(start[other], start[one]);
+                        let motion = self.marbles.position[other] - start[other];
+                        let distance = distance_to_path(start[one], others, motion);
+                        near[one] |= distance <= reach[one] + self.marbles.radius[other];
+                    }
+                    let touching = self.marbles.radius[a] + self.marbles.radius[b];
+                    (start[b] - start[a]).magnitude2() < touching * touching
                 },
             );
             crowded.iter_mut().zip(&*near).for_each(|(crowded, near)| *crowded &= near);

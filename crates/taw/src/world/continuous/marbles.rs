@@ -153,9 +153,14 @@ impl<S: Scalar> World<S> {
             S::zero(),
             self.marbles.period,
             |a, b| {
-                if (fast[a as usize] || fast[b as usize]) && self.marbles.may_collide(a, b) {
-                    candidates.push((a, b));
+                let (first, second) = (a as usize, b as usize);
+                if !(fast[first] || fast[second]) || !self.marbles.may_collide(a, b) {
+                    return false;
                 }
+                candidates.push((a, b));
+                let touching = paths[first].sphere.radius + paths[second].sphere.radius;
+                let offset = paths[second].sphere.center - paths[first].sphere.center;
+                offset.magnitude2() < touching * touching
             },
         );
         let (pairs, period) = (candidates.iter(), self.marbles.period);

@@ -1,0 +1,116 @@
+//! Overlap that no motion brought about: of balls inserted into each other, of a radius or a wall that was
+//! set. It is no energy, so it loads no spring, and is resolved by positions alone (Macklin et al.,
+//! *Unified particle physics for real-time applications*, 2014, §4.4).
+
+use cgmath::{InnerSpace, Zero};
+
+use super::PenaltySettings;
+use super::contact::PenaltyContact;
+use super::force::ContactForce;
+use crate::math::{Scalar, Vec3, is_finite_point, length};
+use crate::response::{Colliders, Material, SolverBodies};
+
+/// Passes over all contacts per substep, each of which resolves half of what is left.
+const PASSES: u32 = 3;
+
+impl<S, W, M, F> PenaltySettings<'_, S, W, M, F>
+where
+    S: Scalar,
+    W: Colliders<S>,
+    M: Fn(usize) -> Material<S>,
+    F: Fn(usize) -> S,
+{
+    /// Overlap of a new contact that its two did not move into, in metres. In a substep they come no deeper
+    /// than they approach in it, twice that where forces slowed them, and what gravity adds.
+    pub(super) fn initial_overlap(&self, contact: &PenaltyContact<S>) -> S {
+        let settings = self.context.settings;
+        let approach_speed = -contact.relative_velocity.dot(contact.normal);
+        let approach = approach_speed.max(S::zero()) * settings.dt;
+        let fall = length(settings.gravity) * settings.dt * settings.dt;
+        if contact.penetration > approach + approach + fall {
+            contact.penetration - approach
+        } else {
+            S::zero()
+        }
+    }
+
+    /// Moves apart what overlaps by no motion of its own, by mass, each marble by a part of its radius at
+    /// most, and none deeper into a wall. What is pushed into another one overlaps that by no motion
+    /// either.
+    pub(super) fn part_overlaps(
+        &self,
+        marbles: &mut SolverBodies<S>,
+        forces: &mut [ContactForce<S>],
+        pushes: &mut Vec<Vec3<S>>,
+    ) {
+        if forces.iter().all(|force| force.history.overlap == S::zero()) {
+            return;
+        }
+        pushes.clear();
+        pushes.resize(marbles.position.len(), Vec3::zero());
+        for _ in 0..PASSES {
+            for force in forces.iter().filter(|force| force.history.overlap > S::zero()) {
+                self.push_apart(marbles, force, pushes);
+            }
+            for ContactForce { contact, .. } in forces.iter().filter(|it| it.contact.a.is_none()) {
+                let inward = pushes[contact.b].dot(contact.normal).min(S::zero());
+                pushes[contact.b] -= contact.normal * inward;
+            }
+        }
+        for (position, push) in marbles.position.iter_mut().zip(&*pushes) {
+            let pushed = *position + *push;
+            if is_finite_point(pushed) {
+                *position = pushed;
+            }
+        }
+        for force in forces {
+            let left = force.history.overlap - force.parted(pushes);
+            force.history.overlap = if left.is_finite() { left.max(S::zero()) } else { S::zero() };
+        }
+    }
+
+    /// Pushes the two of a contact apart by half of what is left of their overlap.
+    fn push_apart(
+        &self,
+        marbles: &SolverBodies<S>,
+        force: &ContactForce<S>,
+        pushes: &mut [Vec3<S>],
+    ) {
+        let contact = &force.contact;
+        let left = force.history.overlap - force.parted(pushes);
+        let rows = [contact.a, Some(contact.b)];
+        let inverse_mass = |row: &usize| marbles.inverse_mass[*row];
+        let sum = rows.iter().flatten().map(inverse_mass).fold(S::zero(), |sum, x| sum + x);
+        if left <= S::zero() || sum <= S::zero() {
+            return;
+        }
+        let push = contact.normal * (left * S::from_f64(0.5) / sum);
+        let moves = [(contact.a, -push), (Some(contact.b), push)]
+            .map(|(row, push)| row.map(|row| (row, push * marbles.inverse_mass[row])));
+        // One fraction for both, which keeps their center of mass.
+        let mut fraction = S::one();
+        for (row, push) in moves.iter().flatten() {
+            let (distance, most) = (length(*push), self.max_push(marbles, *row));
+            let free = (most - length(pushes[*row])).max(S::zero());
+            if contact.a.is_some() && free < distance {
+                fraction = fraction.min(free / distance);
+            }
+        }
+        for (row, push) in moves.into_iter().flatten() {
+            pushes[row] += push * fraction;
+        }
+    }
+
+    /// Largest distance by which other marbles push one in a substep, in metres.
+    fn max_push(&self, marbles: &SolverBodies<S>, row: usize) -> S {
+        marbles.radius[row] * self.context.settings.max_relative_push
+    }
+}
+
+impl<S: Scalar> ContactForce<S> {
+    /// Distance by which pushes part the two, in metres.
+    fn parted(&self, pushes: &[Vec3<S>]) -> S {
+        let first = self.contact.a.map_or_else(Vec3::zero, |a| pushes[a]);
+        (pushes[self.contact.b] - first).dot(self.contact.normal)
+    }
+}
