@@ -412,10 +412,13 @@ fn balls_that_follow_each_other_onto_a_floor_do_not_pass_through_each_other() {
                 for _ in 0..40 {
                     world.step(1.0 / 64.0).unwrap();
                     let [lower, upper] = [lower, upper].map(|id| world.marbles.get(id).unwrap());
-                    let apart = (upper.position.y - lower.position.y) / 0.01;
+                    let offset = (upper.position - lower.position) / 0.01;
+                    let (apart, beside) = (offset.magnitude(), offset.x.hypot(offset.z));
                     let name = format!("{response:?}, {substeps}, {speed} m/s, phase {phase}");
-                    // What moves by less than half a radius in a substep is not swept.
+                    // What moves by less than half a radius in a substep is not swept. Once they have met, the
+                    // upper one tips over.
                     assert!(apart > 1.5, "{name}: {apart} radii apart");
+                    assert!(offset.y > 0.0 || beside > 1.0, "{name}: {offset:?} radii");
                 }
             }
         }

@@ -436,6 +436,12 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let change = impulse.solve(wanted, softness, &FrictionCone::new(numbers.friction));
             impulse.normal.store(&mut normal_impulse[i]);
             impulse.tangent.store(&mut tangent_impulse[i]);
+            let change = if params.notes_impacts {
+                let (struck, speeds) = ((before, change), (parting, alone));
+                tipping::lean(batch, &params, normal, struck, speeds)
+            } else {
+                change
+            };
             for spin in &mut spins {
                 spin[3] = impulse.normal.select_gt(zero, grounded.max(L::splat(TOUCHING)), spin[3]);
             }

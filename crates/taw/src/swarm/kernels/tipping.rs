@@ -2,7 +2,7 @@
 
 use super::direction;
 use super::params::SolverParams;
-use crate::constraint::{TIPPING, tipping_speed};
+use crate::constraint::{ContactImpulse, TIPPING, tipping_speed};
 use crate::math::RealVector;
 use crate::swarm::batches::Batch;
 use crate::swarm::simd::{LANES, Simd};
@@ -43,4 +43,26 @@ pub(super) fn restitution<L: Simd>(tipping: Vec3Wide<L>, restitution: L) -> L {
     let most = L::splat(RESTITUTION);
     let most = restitution.select_gt(most, most, restitution);
     tipping.dot(tipping).select_gt(L::splat(0.0), most, restitution)
+}
+
+/// Change of an impulse that stops a pair, for pairs of this normal impulse before, parting speed, and
+/// effective mass. Those that had none and came fast tip over: without restitution, nothing else lets them.
+#[inline(always)]
+pub(super) fn lean<L: Simd>(
+    batch: &Batch,
+    params: &SolverParams,
+    normal: Vec3Wide<L>,
+    (before, mut change): (L, ContactImpulse<L, Vec3Wide<L>>),
+    (parting, mass): (L, L),
+) -> ContactImpulse<L, Vec3Wide<L>> {
+    let (zero, threshold) = (L::splat(0.0), L::splat(params.restitution_threshold));
+    let fast = (zero - parting).select_gt(threshold, zero - parting, zero);
+    if fast.gt_mask(zero) == 0 {
+        return change;
+    }
+    let struck = before.select_gt(zero, zero, change.normal.select_gt(zero, fast, zero));
+    if let Some(tipping) = tip(batch, params, normal, struck) {
+        change.tangent = change.tangent + tipping * mass;
+    }
+    change
 }
