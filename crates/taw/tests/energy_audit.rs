@@ -221,6 +221,7 @@ fn off_it_says_nothing_and_on_it_changes_nothing() {
         Response::Penalty(ContactLaw::HertzMindlin),
         Response::Penalty(ContactLaw::SpringDashpot),
         Response::EventDriven,
+        Response::SoftStep,
     ] {
         let marbles: Vec<_> = (0..20)
             .map(f64::from)
@@ -239,4 +240,58 @@ fn off_it_says_nothing_and_on_it_changes_nothing() {
         assert!(on == off, "{response:?}");
         assert_eq!(off.energy_audit(), None);
     }
+}
+
+fn moved_floor(world: &mut World<f64>, velocity: Vec3<f64>) {
+    let floor = world.walls.id(0).unwrap();
+    let motion = taw::motion::WallMotion {
+        velocity,
+        angular_velocity: Vec3::zero(),
+        pivot: Point3::origin(),
+    };
+    world.walls.set_motion(floor, Some(motion)).unwrap();
+}
+
+/// Soft contacts are solved in `f32`, and a thousandth of a radius is pressed in: hence the tolerances.
+#[test]
+fn soft_contacts_count_what_walls_and_forces_do() {
+    let material = material(0.0, 0.3);
+    let one = [([0.0, 0.1, 0.0], [0.0; 3])];
+    // A belt brings the ball to 2/7 of its speed.
+    let mut belt = world(Response::SoftStep, material, &one);
+    moved_floor(&mut belt, Vec3::new(1.4, 0.0, 0.0));
+    let sum = run(&mut belt, 1.0, 1.0 / 240.0);
+    near(sum.walls, 0.4 * 1.4, 1e-3);
+    near(sum.momentum, 0.0, 1e-5);
+    // A lift bears a light ball and a heavy one on it, and goes up by a metre from their speed on.
+    let tower = [([0.0, 0.1, 0.0], [0.0, 1.0, 0.0]), ([0.0, 0.3, 0.0], [0.0, 1.0, 0.0])];
+    let mut lift = world(Response::SoftStep, material, &tower);
+    let heavy = lift.marbles.id(1).unwrap();
+    lift.marbles.set_mass(heavy, Mass::Kilograms(50.0)).unwrap();
+    moved_floor(&mut lift, Vec3::unit_y());
+    let sum = run(&mut lift, 1.0, 1.0 / 60.0);
+    near(sum.walls, 51.0 * 9.81, 0.5);
+    near(sum.solver, 0.0, 0.5);
+    near(sum.momentum, 0.0, 1e-3);
+    // The same on a floor at rest: the wall behind the light ball bears the heavy one for it.
+    let mut still = world(Response::SoftStep, material, &tower);
+    still.marbles.set_mass(heavy, Mass::Kilograms(50.0)).unwrap();
+    let sum = run(&mut still, 1.0, 1.0 / 60.0);
+    near(sum.walls, 0.0, 0.0);
+    near(sum.momentum, 0.0, 1e-3);
+    // Weight scaled is no force, drag is one.
+    let mut flight = world(Response::SoftStep, material, &[([0.0, 9.0, 0.0], [3.0, 0.0, 0.0])]);
+    let ball = flight.marbles.id(0).unwrap();
+    flight.marbles.set_gravity_scale(ball, 0.5).unwrap();
+    let sum = run(&mut flight, 0.5, 1.0 / 240.0);
+    near(sum.forces, 0.0, 1e-4);
+    near(sum.solver, 0.0, 1e-3);
+    flight.set_gravity(Vec3::zero()).unwrap();
+    let medium = taw::motion::Medium { velocity: Vec3::zero(), linear: 0.5, quadratic: 0.0 };
+    flight.set_forces(vec![ForceField::Drag(medium)]).unwrap();
+    let before = flight.energy().total();
+    let sum = run(&mut flight, 1.0, 1.0 / 240.0);
+    near(sum.forces, before * ((-1.0_f64).exp() - 1.0), 1e-2 * before);
+    near(sum.solver, 0.0, 1e-4);
+    near(sum.momentum, 0.0, 1e-5);
 }

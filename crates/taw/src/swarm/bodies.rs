@@ -226,8 +226,12 @@ impl Swarm {
                 continue;
             };
             if !velocity[3].is_sign_negative() {
+                let before = *velocity;
                 for (speed, change) in velocity.iter_mut().zip(change) {
                     *speed += change * part;
+                }
+                if let Some(work) = self.scratch.outside_work.get_mut(*slot as usize) {
+                    work.record_force(&before, velocity);
                 }
             }
         }

@@ -36,6 +36,7 @@ mod impulse_cache;
 mod kernels;
 mod model;
 mod neighbours;
+mod outside_work;
 mod proxies;
 mod rest;
 mod scratch;

@@ -2,6 +2,7 @@
 
 use super::bit_set::BitSet;
 use super::neighbours::Search;
+use super::outside_work::OutsideWork;
 use super::simd::Row;
 use super::state::of;
 use super::step::{SavedPlace, WayToWall};
@@ -41,6 +42,8 @@ pub(super) struct Scratch {
     pub held: BitSet,
     /// Impacts of the step, if they are noted: of slots.
     pub impacts: Vec<Impact<f32>>,
+    /// Impulse and work on each ball in the step, if they are recorded: by slot.
+    pub outside_work: Vec<OutsideWork>,
 }
 
 impl Scratch {
@@ -64,6 +67,7 @@ impl Scratch {
             ways_to_walls,
             held,
             impacts,
+            outside_work,
         } = self;
         (of(backing) + of(leaving) + of(displacements) + of(proxy_rows) + of(saved_proxies))
             + (of(lists) + lists.iter().map(of).sum::<usize>())
@@ -74,6 +78,7 @@ impl Scratch {
                 + of(places)
                 + of(ways_to_walls)
                 + held.bytes()
-                + of(impacts))
+                + of(impacts)
+                + of(outside_work))
     }
 }

@@ -42,6 +42,17 @@ impl<S: Scalar> World<S> {
         energy
     }
 
+    /// Potential energy of those whose gravity is scaled, less that which they would have without, in joules.
+    pub(super) fn excess_potential(&self) -> f64 {
+        let gravity = cast_vector::<S, f64>(self.gravity());
+        let excess = |row| {
+            let scale = self.marbles.gravity_scale.get(row)?.as_f64();
+            let position = self.marbles.motion_f64(row).position.to_vec();
+            Some(-self.marbles.mass(row).as_f64() * (scale - 1.0) * gravity.dot(position))
+        };
+        self.finite_mass_indices().filter_map(excess).sum()
+    }
+
     /// Momentum of all marbles except those of infinite mass, in kg m/s.
     #[must_use]
     pub fn momentum(&self) -> Vec3<f64> {

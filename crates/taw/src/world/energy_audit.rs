@@ -6,6 +6,7 @@ use cgmath::{InnerSpace, Zero};
 use super::World;
 use crate::math::{Scalar, Vec3};
 use crate::response::{EnergyLedger, Response};
+use crate::swarm::NO_ROW;
 
 /// Energy audit of a step, in joules. Dissipated energy counts positive.
 ///
@@ -15,8 +16,13 @@ use crate::response::{EnergyLedger, Response};
 pub struct EnergyAudit {
     /// Work of force fields, applied forces and damping; zero where only gravity acts.
     pub forces: f64,
-    /// Work of moving walls and marbles of infinite mass.
+    /// Work of moving walls and marbles of infinite mass; for [`Response::SoftStep`], of walls only.
+    ///
+    /// [`Response::SoftStep`]: crate::response::Response::SoftStep
     pub walls: f64,
+    /// Work of moving walls on the balls of the [swarm](World::swarm), which is in no other field; none in the
+    /// lab's tier, which moves balls by positions.
+    pub walls_on_swarm: f64,
     /// Dissipation by sliding friction.
     pub friction: f64,
     /// Dissipation by collisions along their normals. For [`Response::Penalty`], including energy
@@ -28,8 +34,10 @@ pub struct EnergyAudit {
     pub resistance: f64,
     /// Numerical error: energy lost without a physical cause. The error of the integrator, the lift
     /// by position correction, everything that [`Response::Displacement`] does; for
-    /// [`Response::EventDriven`], also the dissipation of resting contacts.
+    /// [`Response::EventDriven`], also the dissipation of resting contacts; for
+    /// [`Response::SoftStep`], that of all contacts.
     ///
+    /// [`Response::SoftStep`]: crate::response::Response::SoftStep
     /// [`Response::Displacement`]: crate::response::Response::Displacement
     /// [`Response::EventDriven`]: crate::response::Response::EventDriven
     pub solver: f64,
@@ -55,8 +63,9 @@ pub(super) struct AuditState<S> {
     pub velocity: Vec<Vec3<S>>,
     pub angular_velocity: Vec<Vec3<S>>,
     energy: f64,
-    /// Potential energy and momentum after contacts were generated.
+    /// Potential energy, that beyond a gravity scale of one, and momentum after contacts were generated.
     potential: f64,
+    excess_potential: f64,
     moment: Vec3<f64>,
     pub work: EnergyLedger,
 }
@@ -74,6 +83,7 @@ impl<S: Scalar> World<S> {
                     angular_velocity: Vec::new(),
                     energy: 0.0,
                     potential: 0.0,
+                    excess_potential: 0.0,
                     moment: Vec3::zero(),
                     work: EnergyLedger::default(),
                 })
@@ -132,19 +142,53 @@ impl<S: Scalar> World<S> {
             contacts.map(|contact| contact.penetration().as_f64()).fold(0.0, f64::max);
         audit_state.audit.max_penetration = audit_state.audit.max_penetration.max(max_penetration);
         audit_state.potential = self.energy().potential;
+        audit_state.excess_potential = self.excess_potential();
         audit_state.moment = self.momentum();
         audit_state.work = EnergyLedger::default();
         self.scratch.audit_state = Some(audit_state);
     }
 
+    /// Records what walls and forces do to the rows of the swarm in the step that follows.
+    pub(super) fn audit_rows_before(&mut self) {
+        if self.scratch.audit_state.is_some() {
+            self.swarm.record_outside_work();
+        }
+    }
+
+    /// Adds up what walls and forces did to balls of the swarm and, if they are rows of it, to marbles.
+    pub(super) fn audit_rows_after(&mut self) {
+        let Some(audit_state) = &mut self.scratch.audit_state else { return };
+        let soft = self.settings.model.response == Response::SoftStep;
+        let rows = if soft { &self.scratch.soft_step.marble_of_slot[..] } else { &[] };
+        audit_state.work.collisions += if soft { self.impacts.len() as u32 } else { 0 };
+        for (slot, work) in self.swarm.take_outside_work().into_iter().enumerate() {
+            match rows.get(slot).filter(|row| **row != NO_ROW) {
+                None => audit_state.audit.walls_on_swarm += work.walls,
+                Some(row) if self.marbles.mass(*row as usize).is_finite() => {
+                    audit_state.work.momentum += work.impulse;
+                    audit_state.work.walls += work.walls;
+                    audit_state.work.forces += work.forces;
+                }
+                Some(_) => {}
+            }
+        }
+    }
+
     /// Completes the audit of a substep.
     pub(super) fn audit_after(&mut self) {
         let Some(mut audit_state) = self.scratch.audit_state.take() else { return };
-        let AuditState { audit, residual, energy, potential, moment, work, .. } = &mut *audit_state;
+        let AuditState {
+            audit, residual, energy, potential, excess_potential, moment, work, ..
+        } = &mut *audit_state;
         let now = self.energy();
-        // Work of forces without that of gravity, for a response that moves marbles itself.
-        let moves = self.settings.model.response == Response::EventDriven && self.has_forces();
-        let forces = if moves { work.forces - (*potential - now.potential) } else { 0.0 };
+        // Work of forces without that of gravity, for responses that move marbles themselves.
+        let forces = match self.settings.model.response {
+            Response::EventDriven if self.has_forces() => {
+                work.forces - (*potential - now.potential)
+            }
+            Response::SoftStep => work.forces + self.excess_potential() - *excess_potential,
+            _ => 0.0,
+        };
         let expected =
             *energy + forces + work.walls - work.friction - work.restitution - work.resistance;
         audit.forces += forces;

@@ -158,6 +158,7 @@ impl<S: Scalar> World<S> {
         self.walls.update_tree();
         let (step, identity) = (dt.as_f64() as f32, self.walls.identity());
         let found = self.scratch.soft_step.found.take();
+        self.audit_rows_before();
         let walls = SweptWalls::new(&self.walls, dt);
         if found != Some((step, identity)) || !self.swarm.is_prepared() {
             self.swarm.prepare(step, cast_vector(self.settings.gravity), &walls, identity);
@@ -173,6 +174,7 @@ impl<S: Scalar> World<S> {
         self.swarm.read_bodies(marbles, columns, Some(dt), &mut self.scratch.stopped);
         self.quarantine_stopped();
         self.list_impacts(dt);
+        self.audit_rows_after();
         self.roll_what_only_shows();
         self.settings.limits.apply(&mut self.marbles);
         self.audit_after();

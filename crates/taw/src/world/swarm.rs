@@ -52,8 +52,10 @@ impl<S: Scalar> World<S> {
         let (gravity, changes) =
             (cast_vector(self.settings.gravity), self.field_changes_of_swarm(step));
         self.swarm.set_velocity_changes(changes);
+        self.audit_rows_before();
         let walls = SweptWalls::new(&self.walls, step);
         self.swarm.step(dt, gravity, &walls, self.walls.identity(), observe);
+        self.audit_rows_after();
         self.walls.mark_seen();
         self.write_back_proxies();
         Ok(())

@@ -87,12 +87,12 @@ impl Snapshot {
     #[must_use]
     pub fn of<S: Scalar>(world: &World<S>) -> Self {
         let gravity = world.gravity();
-        let account = world.energy_audit().unwrap_or_default();
+        let audit = world.energy_audit().unwrap_or_default();
         let mut bodies = marbles(world);
         bodies.extend(balls(world));
         let stopped = world.stopped().count() + world.swarm.stopped().count();
         let gravity = [gravity.x, gravity.y, gravity.z].map(S::as_f64);
-        Self { bodies, gravity, walls_work: account.walls, stopped }
+        Self { bodies, gravity, walls_work: audit.walls + audit.walls_on_swarm, stopped }
     }
 
     /// In m/s².

@@ -13,6 +13,7 @@ mod wall_contacts;
 pub(super) use bounces::WayToWall;
 pub(super) use passages::SavedPlace;
 pub(super) use sleep::sleep_speed;
+use wall_contacts::WallPass;
 pub(super) use wall_contacts::listed_planes;
 
 use super::build::SOON;
@@ -201,6 +202,7 @@ impl Swarm {
             observe(Stage::Integrate);
             let parts = [substep as f32, (substep + 1) as f32].map(|part| part / substeps);
             self.apply_velocity_changes(1.0 / substeps);
+            self.record_gravity(h);
             self.save_proxies();
             self.integrate(row(gravity * h), [0.0; 4], [0.0; 4]);
             self.advance_proxies(parts, false, 0.0);
@@ -227,6 +229,7 @@ impl Swarm {
             }
             observe(Stage::Restitute);
             self.relax(params);
+            self.record_borne();
             self.forget_impacts();
             self.keep_out(walls, [before, left]);
         }
@@ -330,13 +333,22 @@ impl Swarm {
     fn keep_out(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
         let (at, skin_left) =
             (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
-        let chunks = &self.chunks;
+        let (chunks, slots, velocity) = (&self.chunks, self.ids.slots(), &self.velocity[..]);
+        let work = DisjointSlice::new(&mut self.scratch.outside_work);
+        let (gravity, h) = (self.gravity.unwrap_or_else(Vec3::zero), before_end[0] - before_end[1]);
         parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             let chunk = &chunks[chunk];
             for contact in chunk.wall_contacts.iter().filter(|_| !chunk.asleep) {
                 let row = contact.row as usize;
                 // SAFETY: a ball of the chunk, and nobody works on others meanwhile.
-                unsafe { *skin_left.row(row) -= contact.keep_out(&mut *at.row(row)) };
+                unsafe {
+                    let push = contact.keep_out(&mut *at.row(row));
+                    *skin_left.row(row) -= push;
+                    if work.len() > 0 && !contact.bears_proxy {
+                        let work = &mut *work.row(slots[row] as usize);
+                        work.record_push(contact, [push, h], velocity[row][3], gravity);
+                    }
+                }
             }
         });
         self.stop_passages(walls, before_end);
@@ -391,10 +403,18 @@ impl Swarm {
     /// Goes over all contacts of the chunks that are awake or beside one, and of which the
     /// condition holds, given how fast a ball of the next one is.
     fn pass(&mut self, pass: Pass, condition: impl Fn(&Chunk, f32) -> bool + Sync) {
-        let (simd_level, notes_impacts) = (self.simd_level, self.bodies_are_rows);
+        let simd_level = self.simd_level;
         let friction = self.common_material().friction;
         let mut fast_movers = std::mem::take(&mut self.fast_movers);
         let held = std::mem::take(&mut self.scratch.held);
+        let mut outside_work = std::mem::take(&mut self.scratch.outside_work);
+        let slots = if outside_work.is_empty() { &[][..] } else { self.ids.slots() }.to_vec();
+        let of_walls = WallPass {
+            held: &held,
+            notes_impacts: self.bodies_are_rows,
+            work: DisjointSlice::new(&mut outside_work),
+            slots: &slots,
+        };
         self.for_each_chunk(|next, columns, chunk| {
             if chunk.asleep && next.is_none_or(|(asleep, _)| asleep)
                 || !condition(chunk, next.map_or(0.0, |(_, speed)| speed))
@@ -405,30 +425,7 @@ impl Swarm {
             solve(simd_level, pass, columns, batches, impulses, friction);
             // Walls come last, so that nothing is pushed into them.
             if !chunk.asleep {
-                for contact in &mut chunk.wall_contacts {
-                    if matches!(pass, Pass::Restitution(_)) && held.contains(contact.row) {
-                        continue;
-                    }
-                    let row = contact.row as usize;
-                    // SAFETY: a ball of the chunk.
-                    unsafe {
-                        let (at, velocity) = (columns.at.row(row), columns.velocity.row(row));
-                        let spin = &mut *columns.spin.row(row);
-                        if columns.backed() {
-                            contact.borne_for_others = contact.share_of(&*columns.backing.row(row));
-                            contact.note_impact(pass, &*velocity);
-                        }
-                        let before = (*at, *velocity);
-                        if let Some(bounce) = contact.solve(pass, &mut *at, &mut *velocity, spin) {
-                            *columns.skin_left.row(row) -= bounce.separation;
-                            chunk.impulses.bounced = true;
-                            if notes_impacts {
-                                let impact = contact.impact(&bounce, &before.0, &before.1);
-                                chunk.impulses.impacts.push(impact);
-                            }
-                        }
-                    }
-                }
+                of_walls.solve(pass, columns, chunk);
             }
         });
         let columns = SolverColumns {
@@ -441,6 +438,7 @@ impl Swarm {
         let FastMovers { batches, impulses, .. } = &mut fast_movers;
         solve(simd_level, pass, columns, batches, impulses, friction);
         (self.fast_movers, self.scratch.held) = (fast_movers, held);
+        self.scratch.outside_work = outside_work;
     }
 
     /// Works on all chunks, each with exclusive access to the balls of it and of the next one.

@@ -3,7 +3,10 @@
 use cgmath::{InnerSpace, Zero};
 
 use crate::math::Vec3;
+use crate::swarm::bit_set::BitSet;
 use crate::swarm::chunk::Chunk;
+use crate::swarm::kernels::{Pass, SolverColumns};
+use crate::swarm::outside_work::OutsideWork;
 use crate::swarm::scratch::Scratch;
 use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::wall_contact::{WallContact, xyz};
@@ -247,6 +250,51 @@ impl Swarm {
                 }
             }
         });
+    }
+}
+
+/// Pass over the contacts with walls of a chunk.
+pub(super) struct WallPass<'a> {
+    /// Balls that another one hinders to bounce.
+    pub held: &'a BitSet,
+    pub notes_impacts: bool,
+    /// By slot, if recorded, with the slot of each row.
+    pub work: DisjointSlice<'a, OutsideWork>,
+    pub slots: &'a [u32],
+}
+
+impl WallPass<'_> {
+    pub fn solve(&self, pass: Pass, columns: SolverColumns, chunk: &mut Chunk) {
+        for contact in &mut chunk.wall_contacts {
+            if matches!(pass, Pass::Restitution(_)) && self.held.contains(contact.row) {
+                continue;
+            }
+            let row = contact.row as usize;
+            // SAFETY: a ball of the chunk, and its slot.
+            let (at, velocity, spin) = unsafe {
+                (
+                    &mut *columns.at.row(row),
+                    &mut *columns.velocity.row(row),
+                    &mut *columns.spin.row(row),
+                )
+            };
+            if columns.backed() {
+                contact.borne_for_others = contact.share_of(unsafe { &*columns.backing.row(row) });
+                contact.note_impact(pass, velocity);
+            }
+            let before = (*at, *velocity);
+            let bounce = contact.solve(pass, at, velocity, spin);
+            if let Some(slot) = self.slots.get(row).filter(|_| !contact.bears_proxy) {
+                let work = unsafe { &mut *self.work.row(*slot as usize) };
+                work.record_wall(contact, &before.1, velocity);
+            }
+            let Some(bounce) = bounce else { continue };
+            unsafe { *columns.skin_left.row(row) -= bounce.separation };
+            chunk.impulses.bounced = true;
+            if self.notes_impacts {
+                chunk.impulses.impacts.push(contact.impact(&bounce, &before.0, &before.1));
+            }
+        }
     }
 }
 

@@ -84,14 +84,8 @@ impl Ledger {
         after: &Snapshot,
         near: &Near,
     ) -> Vec<Finding> {
-        let uncounted = matches!(
-            rules.kind,
-            Kind::Displacement
-                | Kind::DisplacementSwept
-                | Kind::SoftStep
-                | Kind::SwarmLab
-                | Kind::SwarmFull
-        );
+        let uncounted =
+            matches!(rules.kind, Kind::Displacement | Kind::DisplacementSwept | Kind::SwarmLab);
         if rules.moving && uncounted {
             return Vec::new(); // nobody counts what walls do there
         }

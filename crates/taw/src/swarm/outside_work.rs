@@ -1,0 +1,94 @@
+//! Impulse and work of walls and forces on balls, for the energy audit.
+
+use cgmath::{InnerSpace, Zero};
+
+use super::Swarm;
+use super::chunk::Chunk;
+use super::simd::Row;
+use super::wall_contact::{WallContact, xyz};
+use crate::math::{Vec3, cast_vector};
+
+/// Impulse and work on a ball in a step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct OutsideWork {
+    /// Impulse of walls, gravity and forces, in N s.
+    pub impulse: Vec3<f64>,
+    /// Work of moving walls, in joules.
+    pub walls: f64,
+    /// Work of forces other than gravity, in joules.
+    pub forces: f64,
+}
+
+impl OutsideWork {
+    const NONE: Self = Self { impulse: Vec3::new(0.0, 0.0, 0.0), walls: 0.0, forces: 0.0 };
+
+    /// Records what a wall did to the velocity of a ball.
+    pub(super) fn record_wall(&mut self, contact: &WallContact, before: &Row, after: &Row) {
+        let impulse = impulse(before, after);
+        self.impulse += impulse;
+        self.walls += impulse.dot(cast_vector(contact.surface));
+    }
+
+    /// Records the lift of a ball of this inverse mass that a wall pushes out: as far as the wall came in
+    /// `h` seconds, its work against gravity.
+    pub(super) fn record_push(
+        &mut self,
+        contact: &WallContact,
+        [push, h]: [f32; 2],
+        inverse_mass: f32,
+        gravity: Vec3<f32>,
+    ) {
+        let came = (contact.surface.dot(contact.normal) * h).max(0.0).min(push);
+        self.walls -= f64::from(contact.normal.dot(gravity) * came) / f64::from(inverse_mass);
+    }
+
+    /// Records what a force did to the velocity of a ball.
+    pub(super) fn record_force(&mut self, before: &Row, after: &Row) {
+        let impulse = impulse(before, after);
+        self.impulse += impulse;
+        self.forces += 0.5 * impulse.dot(cast_vector::<f32, f64>(xyz(before) + xyz(after)));
+    }
+}
+
+/// Impulse that changes the velocity of a row, in N s.
+fn impulse(before: &Row, after: &Row) -> Vec3<f64> {
+    let [before_it, after_it] = [before, after].map(|row| cast_vector::<f32, f64>(xyz(row)));
+    (after_it - before_it) / f64::from(before[3].abs())
+}
+
+impl Swarm {
+    /// Records [impulse and work](OutsideWork) on each ball in the next step.
+    pub(crate) fn record_outside_work(&mut self) {
+        let slots = self.ids.rows().len();
+        self.scratch.outside_work.clear();
+        self.scratch.outside_work.resize(slots, OutsideWork::NONE);
+    }
+
+    /// Impulse and work by slot in the last step, if they were recorded.
+    pub(crate) fn take_outside_work(&mut self) -> Vec<OutsideWork> {
+        std::mem::take(&mut self.scratch.outside_work)
+    }
+
+    /// Records what gravity does in a substep of `h` seconds.
+    pub(super) fn record_gravity(&mut self, h: f32) {
+        if self.scratch.outside_work.is_empty() {
+            return;
+        }
+        let fall = cast_vector::<f32, f64>(self.gravity.unwrap_or_else(Vec3::zero) * h);
+        for at in self.chunks.iter().filter(|chunk| !chunk.asleep).flat_map(Chunk::own_rows) {
+            let slot = self.ids.slots()[at] as usize;
+            self.scratch.outside_work[slot].impulse += fall / f64::from(self.velocity[at][3].abs());
+        }
+    }
+
+    /// Records what walls behind balls bore in a substep for others that press on the ball.
+    pub(super) fn record_borne(&mut self) {
+        if self.scratch.outside_work.is_empty() {
+            return;
+        }
+        for (behind, slot) in self.scratch.backing.iter().zip(self.ids.slots()) {
+            let borne = xyz(behind) * behind[3].max(0.0);
+            self.scratch.outside_work[*slot as usize].impulse += cast_vector::<f32, f64>(borne);
+        }
+    }
+}
