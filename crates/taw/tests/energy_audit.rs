@@ -269,10 +269,19 @@ fn soft_contacts_count_what_walls_and_forces_do() {
     let heavy = lift.marbles.id(1).unwrap();
     lift.marbles.set_mass(heavy, Mass::Kilograms(50.0)).unwrap();
     moved_floor(&mut lift, Vec3::unit_y());
-    let sum = run(&mut lift, 1.0, 1.0 / 60.0);
-    near(sum.walls, 51.0 * 9.81, 0.5);
-    near(sum.solver, 0.0, 0.5);
-    near(sum.momentum, 0.0, 1e-3);
+    let floor = lift.walls.id(0).unwrap();
+    let (mut walls, mut solver) = (0.0, 0.0);
+    for step in 1..=60 {
+        lift.walls.set(floor, Plane::new(Vec3::unit_y(), f64::from(step) / 60.0).unwrap()).unwrap();
+        let sum = run(&mut lift, 1.0 / 60.0, 1.0 / 60.0);
+        near(sum.momentum, 0.0, 1e-3);
+        // In the first two they meet.
+        if step > 2 {
+            (walls, solver) = (walls + sum.walls, solver + sum.solver);
+        }
+    }
+    near(walls, 51.0 * 9.81 * 58.0 / 60.0, 0.02);
+    near(solver, 0.0, 0.5);
     // The same on a floor at rest: the wall behind the light ball bears the heavy one for it.
     let mut still = world(Response::SoftStep, material, &tower);
     still.marbles.set_mass(heavy, Mass::Kilograms(50.0)).unwrap();
@@ -284,7 +293,7 @@ fn soft_contacts_count_what_walls_and_forces_do() {
     let ball = flight.marbles.id(0).unwrap();
     flight.marbles.set_gravity_scale(ball, 0.5).unwrap();
     let sum = run(&mut flight, 0.5, 1.0 / 240.0);
-    near(sum.forces, 0.0, 1e-4);
+    near(sum.forces, 0.0, 1e-3);
     near(sum.solver, 0.0, 1e-3);
     flight.set_gravity(Vec3::zero()).unwrap();
     let medium = taw::motion::Medium { velocity: Vec3::zero(), linear: 0.5, quadratic: 0.0 };

@@ -218,8 +218,8 @@ impl Swarm {
         self.velocity_changes = now;
     }
 
-    /// Applies a fraction of these, where bodies are awake.
-    pub(super) fn apply_velocity_changes(&mut self, part: f32) {
+    /// Applies a fraction of these, where bodies are awake. In that time gravity adds `fall`, in m/s.
+    pub(super) fn apply_velocity_changes(&mut self, part: f32, fall: Vec3<f32>) {
         let rows = self.ids.rows();
         for VelocityChange { slot, change } in &self.velocity_changes {
             let Some(velocity) = self.velocity.get_mut(rows[*slot as usize] as usize) else {
@@ -231,7 +231,7 @@ impl Swarm {
                     *speed += change * part;
                 }
                 if let Some(work) = self.scratch.outside_work.get_mut(*slot as usize) {
-                    work.record_force(&before, velocity);
+                    work.record_force(&before, velocity, fall);
                 }
             }
         }

@@ -4,6 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::Swarm;
 use super::chunk::Chunk;
+use super::scratch::Scratch;
 use super::simd::Row;
 use super::wall_contact::{WallContact, xyz};
 use crate::math::{Vec3, cast_vector};
@@ -42,11 +43,12 @@ impl OutsideWork {
         self.walls -= f64::from(contact.normal.dot(gravity) * came) / f64::from(inverse_mass);
     }
 
-    /// Records what a force did to the velocity of a ball.
-    pub(super) fn record_force(&mut self, before: &Row, after: &Row) {
+    /// Records what a force did to the velocity of a ball, to which gravity adds this much.
+    pub(super) fn record_force(&mut self, before: &Row, after: &Row, fall: Vec3<f32>) {
         let impulse = impulse(before, after);
         self.impulse += impulse;
-        self.forces += 0.5 * impulse.dot(cast_vector::<f32, f64>(xyz(before) + xyz(after)));
+        let mean = (xyz(before) + xyz(after) + fall) * 0.5;
+        self.forces += impulse.dot(cast_vector(mean));
     }
 }
 
@@ -86,9 +88,11 @@ impl Swarm {
         if self.scratch.outside_work.is_empty() {
             return;
         }
-        for (behind, slot) in self.scratch.backing.iter().zip(self.ids.slots()) {
-            let borne = xyz(behind) * behind[3].max(0.0);
-            self.scratch.outside_work[*slot as usize].impulse += cast_vector::<f32, f64>(borne);
+        let Scratch { backing, backing_speed, outside_work, .. } = &mut self.scratch;
+        for (row, (behind, slot)) in backing.iter().zip(self.ids.slots()).enumerate() {
+            let (borne, work) = (behind[3].max(0.0), &mut outside_work[*slot as usize]);
+            work.impulse += cast_vector::<f32, f64>(xyz(behind) * borne);
+            work.walls += f64::from(borne * backing_speed.get(row).copied().unwrap_or(0.0));
         }
     }
 }

@@ -18,6 +18,8 @@ pub(super) struct Scratch {
     pub filters_changed: bool,
     /// See [`SolverColumns::backing`](super::kernels::SolverColumns::backing).
     pub backing: Vec<Row>,
+    /// See [`SolverColumns::backing_speed`](super::kernels::SolverColumns::backing_speed).
+    pub backing_speed: Vec<f32>,
     /// Rows that would leave their skin in this step.
     pub leaving: Vec<u32>,
     /// Displacements of the fast balls, while pairs are searched.
@@ -51,6 +53,7 @@ impl Scratch {
     pub fn bytes(&self) -> usize {
         let Self {
             backing,
+            backing_speed,
             leaving,
             displacements,
             proxy_rows,
@@ -69,7 +72,12 @@ impl Scratch {
             impacts,
             outside_work,
         } = self;
-        (of(backing) + of(leaving) + of(displacements) + of(proxy_rows) + of(saved_proxies))
+        (of(backing)
+            + of(backing_speed)
+            + of(leaving)
+            + of(displacements)
+            + of(proxy_rows)
+            + of(saved_proxies))
             + (of(lists) + lists.iter().map(of).sum::<usize>())
             + of(chunk_states)
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())

@@ -4,7 +4,7 @@
 use super::contact::SolverColumns;
 use super::{gather, inverse_mass};
 use crate::swarm::batches::Batch;
-use crate::swarm::simd::Simd;
+use crate::swarm::simd::{LANES, Simd};
 use crate::swarm::vec3_wide::Vec3Wide;
 
 /// In place of the impulse of [`SolverColumns::backing`]: the ball has left the wall behind it. The
@@ -42,6 +42,22 @@ impl SolverColumns<'_> {
         self.backing.len() > 0
     }
 
+    /// Velocities of the walls behind two balls along their normals, in m/s.
+    #[inline(always)]
+    pub(super) fn backing_speeds<L: Simd>(&self, batch: &Batch) -> [L; 2] {
+        if self.backing_speed.len() == 0 {
+            return [L::splat(0.0); 2];
+        }
+        let mut speeds = [[0.0; LANES]; 2];
+        for lane in 0..batch.count as usize {
+            for (speeds, row) in speeds.iter_mut().zip(batch.pair(lane)) {
+                // SAFETY: as in `gather`.
+                speeds[lane] = unsafe { *self.backing_speed.row(row as usize) };
+            }
+        }
+        [L::load(&speeds[0]), L::load(&speeds[1])]
+    }
+
     /// The walls behind two balls.
     #[inline(always)]
     pub(super) fn backing_of<L: Simd>(
@@ -60,30 +76,33 @@ impl SolverColumns<'_> {
         // Two that have a wall behind them each weigh no more than the heavier one.
         let heavier = of_a + of_b - of_a.max(of_b);
         let sum = (of_a * free(into_a) + of_b * free(into_b)).max(heavier);
-        let away =
-            |ball: &[L; 4], back: &[L; 4]| Vec3Wide::of(ball).dot(Vec3Wide::of(back)).max(zero);
+        let [speed_a, speed_b] = self.backing_speeds(batch);
+        let away = |ball: &[L; 4], back: &[L; 4], speed: L| {
+            (Vec3Wide::of(ball).dot(Vec3Wide::of(back)) - speed).max(zero)
+        };
         Backing {
             load: sum.select_gt(zero, one / sum, zero),
-            leaving: away(a, &back_a) * into_a + away(b, &back_b) * into_b,
+            leaving: away(a, &back_a, speed_a) * into_a + away(b, &back_b, speed_b) * into_b,
             bears: (back_a[3] * into_a).max(back_b[3] * into_b),
         }
     }
 }
 
 /// An impulse on a ball, and with it what the wall behind takes so that the ball does not come
-/// nearer, or gives back of that; and the wall, with what it bears then.
+/// nearer, or gives back of that; and the wall, of this speed along its normal, with what it bears then.
 #[inline(always)]
 pub(super) fn borne_by_wall<L: Simd>(
     impulse: Vec3Wide<L>,
     ball: &[L; 4],
     back: &[L; 4],
+    speed: L,
 ) -> (Vec3Wide<L>, [L; 4]) {
     let (zero, one) = (L::splat(0.0), L::splat(1.0));
     let (normal, free) = (Vec3Wide::of(back), inverse_mass(ball));
     let some = free.select_gt(zero, normal.dot(normal), zero);
     let mass = free.select_gt(zero, one / free, zero);
     let before = back[3].max(zero);
-    let away = Vec3Wide::of(ball).dot(normal) * mass + impulse.dot(normal);
+    let away = (Vec3Wide::of(ball).dot(normal) - speed) * mass + impulse.dot(normal);
     let borne = (before - away).max(zero) * some;
     (impulse + normal * (borne - before), normal.with(borne))
 }

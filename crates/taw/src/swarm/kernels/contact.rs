@@ -45,6 +45,8 @@ pub(in crate::swarm) struct SolverColumns<'a> {
     /// were solved together: the ball is moved only by what goes along the wall, and weighs as much
     /// more along the normal of the pair (the Schur complement of the wall's contact).
     pub backing: DisjointSlice<'a, Row>,
+    /// Velocity of that wall along its normal, in m/s; empty if all are at rest.
+    pub backing_speed: DisjointSlice<'a, f32>,
 }
 
 /// One pass over the pairs for their impulses.
@@ -206,9 +208,10 @@ impl SolverColumns<'_> {
         let [mut by_a, mut by_b] = [none - impulse, impulse];
         if BACKED {
             let [back_a, back_b] = gather::<L>(self.backing, batch);
+            let [speed_a, speed_b] = self.backing_speeds(batch);
             let (borne_a, borne_b);
-            (by_a, borne_a) = borne_by_wall(by_a, &a, &back_a);
-            (by_b, borne_b) = borne_by_wall(by_b, &b, &back_b);
+            (by_a, borne_a) = borne_by_wall(by_a, &a, &back_a, speed_a);
+            (by_b, borne_b) = borne_by_wall(by_b, &b, &back_b, speed_b);
             scatter(self.backing, batch, [borne_a, borne_b]);
         }
         let velocity = [

@@ -63,24 +63,32 @@ impl Swarm {
         let rows = if most > UNEVEN * least { self.at.len() } else { 0 };
         self.scratch.backing.clear();
         self.scratch.backing.resize(rows, [0.0; 4]);
+        self.scratch.backing_speed.clear();
+        if self.chunks.iter().any(|chunk| chunk.wall_speed > 0.0) {
+            self.scratch.backing_speed.resize(rows, 0.0);
+        }
         if rows == 0 {
             self.scratch.backing.shrink_to_fit();
+            self.scratch.backing_speed.shrink_to_fit();
             // A heavy ball may have gone that a wall bore.
             let contacts = self.chunks.iter_mut().flat_map(|chunk| &mut chunk.wall_contacts);
             contacts.for_each(|contact| contact.borne_for_others = 0.0);
             return;
         }
-        let (chunks, backing, at) =
-            (&self.chunks, DisjointSlice::new(&mut self.scratch.backing), &self.at[..]);
+        let (chunks, at) = (&self.chunks, &self.at[..]);
+        let backing = DisjointSlice::new(&mut self.scratch.backing);
+        let backing_speed = DisjointSlice::new(&mut self.scratch.backing_speed);
         parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             // Those of a ball follow each other.
             for of_ball in chunks[chunk].wall_contacts.chunk_by(|a, b| a.row == b.row) {
                 let (mut most, mut behind, mut last) = (0.0, [0.0; 4], &of_ball[0]);
+                let mut speed = 0.0;
+                let along = |contact: &WallContact| contact.surface.dot(contact.normal);
                 for contact in of_ball {
                     let bears = contact.bears(&at[contact.row as usize]);
-                    // Of a wall that comes nearer or gives way, each has to ask for itself.
-                    if bears > most && contact.surface.dot(contact.normal) == 0.0 {
-                        (most, behind) = (bears, row(contact.normal));
+                    // A wall that bears a proxy gives way to it.
+                    if bears > most && !(contact.bears_proxy && along(contact) != 0.0) {
+                        (most, behind, speed) = (bears, row(contact.normal), along(contact));
                     }
                     if contact.borne_for_others > last.borne_for_others {
                         last = contact;
@@ -88,13 +96,18 @@ impl Swarm {
                 }
                 let bears = last.borne_for_others > 0.0;
                 if again && bears {
-                    behind = row(last.normal);
+                    (behind, speed) = (row(last.normal), along(last));
                     behind[3] = last.borne_for_others;
                 } else if bears && behind[..3] != row(last.normal)[..3] {
                     behind = [0.0, 0.0, 0.0, LOST];
                 }
                 // SAFETY: a row of the chunk.
-                unsafe { *backing.row(last.row as usize) = behind };
+                unsafe {
+                    *backing.row(last.row as usize) = behind;
+                    if backing_speed.len() > 0 {
+                        *backing_speed.row(last.row as usize) = speed;
+                    }
+                }
             }
         });
     }

@@ -23,7 +23,7 @@ impl Swarm {
         observe: &mut dyn FnMut(Stage),
     ) {
         observe(Stage::Integrate);
-        self.apply_velocity_changes(1.0);
+        self.apply_velocity_changes(1.0, gravity * dt);
         self.predict(dt, gravity);
         self.reset_proxies_in_lab();
         self.find_pairs_after_prediction(dt, walls, walls_changed, observe);

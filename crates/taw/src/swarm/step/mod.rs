@@ -180,6 +180,7 @@ impl Swarm {
         observe: &mut dyn FnMut(Stage),
     ) {
         self.scratch.backing.clear(); // of other rows
+        self.scratch.backing_speed.clear();
         if !self.pairs_valid || self.chunks.iter().all(|chunk| chunk.asleep) {
             return;
         }
@@ -201,7 +202,7 @@ impl Swarm {
             self.bounce(substep, [dt, h, left], params, walls, observe);
             observe(Stage::Integrate);
             let parts = [substep as f32, (substep + 1) as f32].map(|part| part / substeps);
-            self.apply_velocity_changes(1.0 / substeps);
+            self.apply_velocity_changes(1.0 / substeps, gravity * h);
             self.record_gravity(h);
             self.save_proxies();
             self.integrate(row(gravity * h), [0.0; 4], [0.0; 4]);
@@ -363,6 +364,7 @@ impl Swarm {
             spin: DisjointSlice::new(&mut self.spin),
             skin_left: DisjointSlice::new(&mut self.skin_left),
             backing: DisjointSlice::new(&mut self.scratch.backing),
+            backing_speed: DisjointSlice::new(&mut self.scratch.backing_speed),
         };
         let chunks = DisjointSlice::new(&mut self.chunks);
         let least = -self.skin;
@@ -434,6 +436,7 @@ impl Swarm {
             spin: DisjointSlice::new(&mut self.spin),
             skin_left: DisjointSlice::new(&mut self.skin_left),
             backing: DisjointSlice::new(&mut self.scratch.backing),
+            backing_speed: DisjointSlice::new(&mut self.scratch.backing_speed),
         };
         let FastMovers { batches, impulses, .. } = &mut fast_movers;
         solve(simd_level, pass, columns, batches, impulses, friction);
@@ -453,6 +456,7 @@ impl Swarm {
             spin: DisjointSlice::new(&mut self.spin),
             skin_left: DisjointSlice::new(&mut self.skin_left),
             backing: DisjointSlice::new(&mut self.scratch.backing),
+            backing_speed: DisjointSlice::new(&mut self.scratch.backing_speed),
         };
         let chunks = DisjointSlice::new(&mut self.chunks);
         let (threads, states) = (self.scratch.threads, &mut self.scratch.chunk_states);
