@@ -19,6 +19,21 @@ pub(crate) struct ContactKey {
 }
 
 impl ContactKey {
+    /// Lowest key of the same two.
+    pub fn first_of_both(self) -> Self {
+        Self { part: 0, ends: [i8::MIN; 2], ..self }
+    }
+
+    /// Returns true if both keys are of the same two, whatever parts of them touch.
+    pub fn has_bodies_of(self, other: Self) -> bool {
+        self.first_of_both() == other.first_of_both()
+    }
+
+    /// Row of the marble, if it touches a wall.
+    pub fn marble_at_wall(&self) -> Option<usize> {
+        (!self.is_pair).then_some(self.b as usize)
+    }
+
     /// Key of a contact with a wall.
     pub fn with_wall<S: Scalar>(contact: &Contact<S>) -> Self {
         Self { is_pair: false, ..Self::between_marbles(contact) }

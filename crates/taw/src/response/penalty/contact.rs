@@ -82,7 +82,11 @@ where
             // Along the present normal: internal edges are known for that one, and the nearest
             // points of capsules move along them.
             _ => {
-                let displacement = moved(b) - a.map_or_else(Vec3::zero, moved);
+                let place = (contact.arms, contact.normal);
+                let surface_velocity =
+                    marbles.surface_velocity(body_a, b, place, self.context.walls);
+                let wall_moved = surface_velocity * self.context.follow_time_of(b);
+                let displacement = moved(b) - a.map_or(wall_moved, moved);
                 (displacement.dot(contact.normal) - separation, contact.normal, contact.arms)
             }
         };

@@ -57,20 +57,21 @@ where
         index: usize,
         mut contact: PenaltyContact<S>,
         initial_velocities: [Vec3<S>; 2],
-        before: &[SpringHistory<S>],
+        (before, depths): (&[SpringHistory<S>], &[S]),
     ) -> ContactForce<S> {
         let dt = self.context.settings.dt;
         let separation_speed = contact.relative_velocity.dot(contact.normal);
-        let known = before.binary_search_by_key(&contact.key, |history| history.key);
-        let history = known.map(|at| before[at]);
-        let overlap = history.map_or_else(
-            |_| self.initial_overlap(&contact),
+        let known = before.binary_search_by_key(&contact.key, |history| history.key).ok();
+        let known = known.map(|at| before[at]);
+        let overlap = known.map_or_else(
+            || self.initial_overlap(&contact, before, depths),
             |history| history.overlap.min(contact.penetration),
         );
+        let history = known.filter(|history| !history.ended);
         contact.penetration -= overlap;
         let mut springs = self.law.springs(&contact, contact.penetration, dt);
         let (mut damped_time, mut tangent_displacement) = (S::one(), Vec3::zero());
-        if history.is_err() && separation_speed < S::zero() {
+        if history.is_none() && separation_speed < S::zero() {
             // New contact: the dashpot acts since the contact began, after the last kick, and for
             // half of the time to the next one, at half of the penetration of then.
             let substep = -separation_speed * dt;
@@ -97,6 +98,7 @@ where
             normal: contact.normal,
             penetration: contact.penetration,
             overlap,
+            ended: false,
             tangent_displacement,
             tangent_stiffness: S::zero(),
             stored_energy: S::zero(),

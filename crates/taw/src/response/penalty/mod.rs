@@ -26,6 +26,7 @@ use crate::response::{
 };
 use force::ContactForce;
 use mass_split::ContactLoad;
+use parting::depths_in_walls;
 
 /// Contact history: state of a contact's springs from the last substep.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +37,9 @@ pub(crate) struct SpringHistory<S> {
     penetration: S,
     /// Part of the penetration that no motion of the two brought about, in metres.
     overlap: S,
+    /// Set once the spring has pushed for the last time: if the two still overlap in the next substep, they
+    /// did not come together in it.
+    ended: bool,
     /// Tangential displacement of the two points while they stick, in metres, at the position of the
     /// next kick, and its stiffness, in N/m.
     tangent_displacement: Vec3<S>,
@@ -97,6 +101,8 @@ pub(crate) struct Scratch<S> {
     followed: Vec<bool>,
     /// Displacements that part what overlaps, in metres.
     pushes: Vec<Vec3<S>>,
+    /// How deep each marble was in a wall at the last kick, in metres.
+    depths: Vec<S>,
 }
 
 impl<S, W, M, F> PenaltySettings<'_, S, W, M, F>
@@ -120,15 +126,21 @@ where
         quarantined: &mut Vec<u32>,
         mut work: Option<&mut EnergyLedger>,
     ) {
-        let Scratch { before, forces, loads, followed, pushes } = scratch;
+        let Scratch { before, forces, loads, followed, pushes, depths } = scratch;
         std::mem::swap(before, histories);
         histories.clear();
         self.keep_sides(marbles, contacts, before);
         forces.clear();
+        depths_in_walls(before, marbles.position.len(), depths);
         for (index, (a, contact)) in BodyA::of_each(contacts).enumerate() {
             if let Some(contact) = self.active_contact(marbles, a, contact, before) {
                 let initial_velocities = contact.velocities(marbles);
-                forces.push(self.contact_force(index, contact, initial_velocities, before));
+                forces.push(self.contact_force(
+                    index,
+                    contact,
+                    initial_velocities,
+                    (before, depths),
+                ));
             }
         }
         split_masses(marbles, forces, loads, self.context.settings.dt);
@@ -166,9 +178,8 @@ where
             if force.ends {
                 force.history = history;
                 self.apply_last_impulse(force, marbles, work.as_deref_mut());
-            } else {
-                histories.push(history);
             }
+            histories.push(SpringHistory { ended: force.ends, ..history });
         }
         histories.sort_unstable_by_key(|history| history.key);
         list_impulses(forces, contacts);

@@ -4,9 +4,9 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::PenaltySettings;
 use super::contact::PenaltyContact;
 use super::force::ContactForce;
+use super::{PenaltySettings, SpringHistory};
 use crate::math::{Scalar, Vec3, is_finite_point, length};
 use crate::response::{Colliders, Material, SolverBodies};
 
@@ -20,14 +20,26 @@ where
     M: Fn(usize) -> Material<S>,
     F: Fn(usize) -> S,
 {
-    /// Overlap of a new contact that its two did not move into, in metres. In a substep they come no deeper
-    /// than they approach in it, twice that where forces slowed them, and what gravity adds.
-    pub(super) fn initial_overlap(&self, contact: &PenaltyContact<S>) -> S {
+    /// Overlap of a new contact that its two did not move into, in metres; zero where they touched at the last
+    /// kick. In a substep they come no deeper than they approach in it, twice that where forces slowed
+    /// them, and what gravity adds; and in a wall, than the marble was in others, from which it may have come.
+    pub(super) fn initial_overlap(
+        &self,
+        contact: &PenaltyContact<S>,
+        before: &[SpringHistory<S>],
+        depths: &[S],
+    ) -> S {
+        let key = contact.key;
+        let first = before.partition_point(|history| history.key < key.first_of_both());
+        if before.get(first).is_some_and(|history| history.key.has_bodies_of(key)) {
+            return S::zero();
+        }
         let settings = self.context.settings;
         let approach_speed = -contact.relative_velocity.dot(contact.normal);
         let approach = approach_speed.max(S::zero()) * settings.dt;
         let fall = length(settings.gravity) * settings.dt * settings.dt;
-        if contact.penetration > approach + approach + fall {
+        let depth = if contact.a.is_none() { depths[contact.b] } else { S::zero() };
+        if contact.penetration > depth + approach + approach + fall {
             contact.penetration - approach
         } else {
             S::zero()
@@ -104,6 +116,21 @@ where
     /// Largest distance by which other marbles push one in a substep, in metres.
     fn max_push(&self, marbles: &SolverBodies<S>, row: usize) -> S {
         marbles.radius[row] * self.context.settings.max_relative_push
+    }
+}
+
+/// Deepest penetration of each of so many marbles into a wall at the last kick, in metres.
+pub(super) fn depths_in_walls<S: Scalar>(
+    before: &[SpringHistory<S>],
+    marbles: usize,
+    depths: &mut Vec<S>,
+) {
+    depths.clear();
+    depths.resize(marbles, S::zero());
+    for history in before {
+        if let Some(depth) = history.key.marble_at_wall().and_then(|row| depths.get_mut(row)) {
+            *depth = depth.max(history.penetration);
+        }
     }
 }
 
