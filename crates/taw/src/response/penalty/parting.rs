@@ -22,7 +22,8 @@ where
 {
     /// Overlap of a new contact that its two did not move into, in metres; zero where they touched at the last
     /// kick. In a substep they come no deeper than they approach in it, twice that where forces slowed
-    /// them, and what gravity adds; and in a wall, than the marble was in others, from which it may have come.
+    /// them, and what gravity adds; and in a wall, than twice as deep as the marble was in others, from which it
+    /// may have come.
     pub(super) fn initial_overlap(
         &self,
         contact: &PenaltyContact<S>,
@@ -39,7 +40,8 @@ where
         let approach = approach_speed.max(S::zero()) * settings.dt;
         let fall = length(settings.gravity) * settings.dt * settings.dt;
         let depth = if contact.a.is_none() { depths[contact.b] } else { S::zero() };
-        if contact.penetration > depth + approach + approach + fall {
+        let motion = depth + approach;
+        if contact.penetration > motion + motion + fall {
             contact.penetration - approach
         } else {
             S::zero()
