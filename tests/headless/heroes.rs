@@ -191,6 +191,31 @@ fn ground_that_moves_says_how_fast_and_marbles_are_ground_too() {
 }
 
 #[test]
+fn who_lands_on_a_lift_stays_grounded_up_and_down() {
+    for response in [Response::SoftStep, Response::Impulse, Response::EventDriven] {
+        for (substeps, speed) in [(1, -2.0), (4, -2.0), (1, -0.3), (1, 0.3), (4, 2.0)] {
+            let mut app = app(response);
+            app.world_mut().resource_mut::<TawModel>().substeps = substeps;
+            app.add_systems(FixedUpdate, lift.before(TawSystems::Gather));
+            let slab = Wall::from(Cuboid::new(8.0, 1.0, 8.0));
+            let slab = (slab, Lift(Vec3::Y * speed), Transform::default());
+            let slab = app.world_mut().spawn(slab).id();
+            let marble = grounded(&mut app, 0.25, Vec3::Y * 0.8);
+            let surface = SurfaceMaterial { restitution: 0.0, ..default() };
+            app.world_mut().entity_mut(marble).insert((surface, Velocity(Vec3::Y * speed)));
+            scene::frames(&mut app, 40);
+            let case = format!("{response:?} in {substeps} substeps, lift at {speed} m/s");
+            for frame in 0..40 {
+                app.update();
+                let found = ground(&app, marble).unwrap_or_else(|| panic!("{case}: frame {frame}"));
+                assert_eq!((found.entity, found.normal), (slab, Vec3::Y), "{case}");
+                assert!((found.velocity.y - speed).abs() < 1e-3, "{case}: {found:?}");
+            }
+        }
+    }
+}
+
+#[test]
 fn what_sleeps_keeps_its_ground() {
     let mut app = app(Response::SoftStep);
     let floor = scene::floor(&mut app);
@@ -239,6 +264,29 @@ fn a_hero_rolls_to_its_speed_and_brakes() {
             control(&mut app, hero).direction = Vec3::ZERO;
             scene::frames(&mut app, 128);
             assert!(velocity(&app, hero).length() < 0.05, "{case}: {}", velocity(&app, hero));
+        }
+    }
+}
+
+#[test]
+fn the_default_hero_rolls_without_slip_on_the_default_floor() {
+    for response in [Response::SoftStep, Response::Impulse, Response::EventDriven] {
+        let mut app = app(response);
+        scene::floor(&mut app);
+        let place = Transform::from_xyz(0.0, 0.25, 0.0);
+        let hero = (MarbleController::default(), Marble::new(0.25), place);
+        let hero = app.world_mut().spawn(hero).id();
+        scene::frames(&mut app, 2);
+        for (direction, frames) in [(Vec3::X, 64), (Vec3::X, 128), (Vec3::ZERO, 64)] {
+            control(&mut app, hero).direction = direction;
+            let before = velocity(&app, hero).x;
+            scene::frames(&mut app, frames);
+            let (speed, spin) = (velocity(&app, hero), app.world().get::<AngularVelocity>(hero));
+            let slip = speed + spin.unwrap().cross(Vec3::Y * -0.25);
+            assert!(slip.length() < 0.1, "{response:?} at {speed}: {slip}");
+            let gained = (speed.x - before).abs() * 64.0 / frames as f32;
+            let reached = (speed.x - 6.0).abs() < 0.1;
+            assert!(reached || (gained - 2.5).abs() < 0.2, "{response:?}: {gained} m/s²");
         }
     }
 }

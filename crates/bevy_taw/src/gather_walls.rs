@@ -257,7 +257,7 @@ impl Gathering<'_, '_> {
 
     /// Leaves a wall where it is, at rest.
     fn stop(&mut self, state: &mut WallState) {
-        state.motion = PoseTracker::default();
+        (state.motion, state.poses) = default();
         let _ = self.set_motion(state, None);
     }
 
@@ -294,6 +294,11 @@ impl Gathering<'_, '_> {
         }
         let translation = Vec3::from(pose.translation);
         let seen = (bits(translation), rotation_bits(pose.rotation));
+        let before = state.posed.filter(|_| velocity.is_some()).map(|(translation, rotation)| {
+            let translation = Vec3::from_array(translation.map(f32::from_bits));
+            Isometry3d::new(translation, Quat::from_array(rotation.map(f32::from_bits)))
+        });
+        state.poses = Some([before.unwrap_or(pose), pose]);
         // A wall that moves or jumps has no surface velocity, nor has a sensor.
         let surface = surface.filter(|_| !is_sensor && state.posed == Some(seen));
         let on_surface = |SurfaceVelocity(surface): SurfaceVelocity| WallVelocity {

@@ -64,7 +64,29 @@ impl<S: Scalar> PartialEq for ForceField<S> {
     }
 }
 
+impl<S: Scalar> Medium<S> {
+    /// Medium of a velocity in m/s, as an array or as a vector of any library that makes one of it, with
+    /// its [linear](Self::linear) and [quadratic](Self::quadratic) drag.
+    #[must_use]
+    pub fn new(velocity: impl Into<[S; 3]>, linear: S, quadratic: S) -> Self {
+        Self { velocity: velocity.into().into(), linear, quadratic }
+    }
+}
+
 impl<S: Scalar> ForceField<S> {
+    /// [`Spring`](Self::Spring) to an anchor in metres, of a rest length in metres and a spring constant in
+    /// N/m.
+    #[must_use]
+    pub fn spring(anchor: impl Into<[S; 3]>, rest_length: S, stiffness: S) -> Self {
+        Self::Spring { anchor: anchor.into().into(), rest_length, stiffness }
+    }
+
+    /// [`Attraction`](Self::Attraction) to a center in metres, with a strength in m³/s².
+    #[must_use]
+    pub fn attraction(center: impl Into<[S; 3]>, strength: S) -> Self {
+        Self::Attraction { center: center.into().into(), strength }
+    }
+
     /// Validates the numbers.
     pub(crate) fn validated(self) -> Result<Self, Error> {
         let not_negative = |field, value| within(field, value, S::zero(), S::max_value());

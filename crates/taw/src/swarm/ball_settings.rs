@@ -1,4 +1,4 @@
-//! Settings of single balls: material, layers and gravity scale; and what force fields do to them.
+//! Settings of single balls: material, layers and gravity scale; and what accelerates them.
 
 use cgmath::Zero;
 
@@ -8,7 +8,7 @@ use super::workers::{DisjointSlice, parallel_for_rows};
 use super::{BallId, MAX_COORDINATE, Swarm};
 use crate::Error;
 use crate::broad::{CollisionLayers, IgnoredPairs};
-use crate::error::finite;
+use crate::error::{finite, finite_vector};
 use crate::math::{Point3, Vec3};
 use crate::motion::Motion;
 use crate::response::Material;
@@ -50,6 +50,12 @@ impl Swarm {
     /// [`Error::NoSuchBall`], also for a marble's.
     pub fn layers(&self, ball: BallId) -> Result<CollisionLayers, Error> {
         self.own_slot(ball).map(|slot| self.surfaces.layers(slot))
+    }
+
+    /// Layers of the ball in a row, if that is no marble.
+    pub(crate) fn layers_of_own_row(&self, row: usize) -> Option<CollisionLayers> {
+        let slot = self.ids.slots().get(row).copied()?;
+        (!self.body_slots.contains(slot)).then(|| self.surfaces.layers(slot))
     }
 
     /// Changes the layers of balls, all or none: which walls, marbles and other balls they collide
@@ -126,6 +132,37 @@ impl Swarm {
             *scale = gravity_scale;
         }
         Ok(())
+    }
+
+    /// Accelerates a ball in m/s² throughout the next [`World::step`](crate::world::World::step), besides
+    /// gravity. Accelerations of one ball add up. Wakes it in that step if it is accelerated in another
+    /// way than in the last one.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`], also for a marble's; [`Error::NotFinite`].
+    pub fn apply_acceleration(
+        &mut self,
+        ball: BallId,
+        acceleration: Vec3<f32>,
+    ) -> Result<(), Error> {
+        self.own_slot(ball)?;
+        let names = ["acceleration.x", "acceleration.y", "acceleration.z"];
+        self.accelerations.push((ball, finite_vector(names, acceleration)?));
+        Ok(())
+    }
+
+    /// Clears all applied accelerations.
+    pub(crate) fn clear_accelerations(&mut self) {
+        self.accelerations.clear();
+    }
+
+    /// Changes of velocity by applied accelerations in a step of `dt` seconds.
+    pub(crate) fn applied_changes(&self, dt: f32) -> impl Iterator<Item = VelocityChange> + '_ {
+        self.accelerations.iter().filter_map(move |(ball, acceleration)| {
+            let change: [f32; 3] = (acceleration * dt).into();
+            let change = change.map(|x| x.clamp(-MAX_COORDINATE, MAX_COORDINATE));
+            Some(VelocityChange { slot: self.slot_of(*ball)?, change })
+        })
     }
 
     /// Drops the settings of a slot, as its ball goes.

@@ -64,6 +64,7 @@ use crate::Error;
 use crate::error::{finite_point, finite_vector, positive, within};
 use crate::handle::MarbleId;
 use crate::math::{Point3, Vec3};
+use crate::motion::Mass;
 use crate::response::Material;
 use batches::pairs_in;
 use bit_set::BitSet;
@@ -133,6 +134,10 @@ pub struct Swarm {
     surfaces: Surfaces,
     /// Factors on gravity, by slot; one beyond the end.
     gravity_scales: Vec<f32>,
+    /// Accelerations of balls in the next step, in m/s².
+    accelerations: Vec<(BallId, Vec3<f32>)>,
+    /// Number of removals so far.
+    removals: u64,
     /// Agreement of bodies with the marbles.
     pub(crate) synced: SyncToken,
     proxies: Vec<Proxy>,
@@ -237,7 +242,10 @@ impl Swarm {
     /// Takes balls out, those of marbles too.
     pub(crate) fn take_out(&mut self, balls: &[BallId]) -> Result<(), Error> {
         self.ids.check(balls)?;
-        self.sleep_version += 1;
+        if balls.is_empty() {
+            return Ok(());
+        }
+        (self.sleep_version, self.removals) = (self.sleep_version + 1, self.removals + 1);
         self.cache_impulses();
         for ball in balls {
             if let Some(slot) = self.slot_of(*ball) {
@@ -255,6 +263,12 @@ impl Swarm {
         self.wake_all();
         self.pairs_valid = false;
         Ok(())
+    }
+
+    /// Number that changes whenever balls are removed; to look only then which are gone.
+    #[must_use]
+    pub fn removals(&self) -> u64 {
+        self.removals
     }
 
     /// Number of balls.
@@ -314,6 +328,21 @@ impl Swarm {
     /// [`Error::NoSuchBall`].
     pub fn row(&self, ball: BallId) -> Result<usize, Error> {
         self.ids.row(ball).ok_or(Error::NoSuchBall(ball))
+    }
+
+    /// State of a ball: what to insert to have another one like it.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`].
+    pub fn get(&self, ball: BallId) -> Result<Ball, Error> {
+        let row = self.row(ball)?;
+        let ([x, y, z, radius], [u, v, w, inverse_mass]) = (self.at[row], self.velocity[row]);
+        Ok(Ball {
+            position: Point3::new(x, y, z),
+            radius,
+            velocity: Vec3::new(u, v, w),
+            mass: Mass::Kilograms(inverse_mass.abs().recip()),
+        })
     }
 
     /// Sets the position of a ball (teleports it), in metres, and wakes it.

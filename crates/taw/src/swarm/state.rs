@@ -43,6 +43,8 @@ impl Swarm {
             velocity_changes,
             surfaces,
             gravity_scales,
+            accelerations,
+            removals: _,
             synced: _,
             proxies,
             body_slots,
@@ -62,6 +64,7 @@ impl Swarm {
             + (of(planes) + of(body_balls) + of(proxies))
             + (body_slots.bytes() + sleepless.bytes())
             + (of(velocity_changes) + surfaces.bytes() + of(gravity_scales))
+            + of(accelerations)
             + (ids.bytes() + grid.bytes() + impulse_cache.bytes() + fast_movers.bytes())
             + scratch.bytes()
     }
@@ -106,6 +109,8 @@ impl PartialEq for Swarm {
             velocity_changes,
             surfaces,
             gravity_scales,
+            accelerations,
+            removals: _,
             synced: _,
             proxies,
             body_slots,
@@ -134,7 +139,8 @@ impl PartialEq for Swarm {
             && (planes, body_balls, proxies) == (&other.planes, &other.body_balls, &other.proxies)
             && (bodies_are_rows, velocity_changes, surfaces)
                 == (&other.bodies_are_rows, &other.velocity_changes, &other.surfaces)
-            && (gravity_scales, stopped) == (&other.gravity_scales, &other.stopped)
+            && (gravity_scales, accelerations, stopped)
+                == (&other.gravity_scales, &other.accelerations, &other.stopped)
             && (body_slots, sleepless) == (&other.body_slots, &other.sleepless)
             && walls_identity.is_some() == other.walls_identity.is_some()
             && *steps_since_build == other.steps_since_build

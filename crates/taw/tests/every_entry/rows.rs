@@ -333,6 +333,12 @@ fn swarms<S: Scalar>() -> Vec<Row<S>> {
             let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
             p.world.swarm.set_gravity_scale(ball, single(x)).inspect_err(|_| p.world = before)
         };
+        World 3 "Swarm::apply_acceleration": |p, x| {
+            let before = p.world.clone();
+            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
+            let acceleration = on_axis(p.case, single(x));
+            p.world.swarm.apply_acceleration(ball, acceleration).inspect_err(|_| p.world = before)
+        };
         World 1 "Swarm::set_model": |p, x| {
             let mut model = p.world.swarm.model();
             model.material.friction = single(x);
