@@ -74,7 +74,7 @@ fn marbles_that_are_entities_and_swarms_touch() {
 fn bad_models_and_balls_are_refused() {
     let mut app = app();
     app.world_mut().resource_mut::<TawSwarmModel>().substeps = 0;
-    let bad = Ball::new(Vec3::Y * f32::NAN, 0.5);
+    let bad = Ball::new(Vec3::new(0.0, f32::NAN, 0.0), 0.5);
     app.world_mut().spawn(Swarm::new(vec![bad]));
     app.update();
     app.update();

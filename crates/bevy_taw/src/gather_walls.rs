@@ -19,9 +19,7 @@ use crate::resources::TawWorld;
 use crate::sensor::Sensor;
 use crate::snapshot::{self, RowRemoved};
 use crate::wall::Wall;
-use crate::wall_motion::{
-    Change, Clock, LARGEST_CHANGE_OF_SPEED, PoseTracker, TrackedPose, WallVelocity,
-};
+use crate::wall_motion::{Change, Clock, LARGEST_CHANGE_OF_SPEED, TrackedPose, WallVelocity};
 
 /// Two scales that differ by no larger part than this are one. A rotation leaves its columns a
 /// few epsilons longer or shorter, and each ancestor a few more: 32 of them are reached by none

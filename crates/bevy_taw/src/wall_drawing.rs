@@ -59,13 +59,15 @@ pub(crate) fn draw(
     let before = std::mem::take(&mut drawing.walls);
     let mut moves = Vec::new();
     for (wall, state, global) in &globals.p0() {
-        let Some([from, to]) = state.poses else { continue };
-        if from == to && !global.is_changed() && !before.contains(&wall) {
+        let moves_now = state.poses.is_some_and(|[from, to]| from != to);
+        if !(moves_now || global.is_changed() || before.contains(&wall)) {
             continue;
         }
         let carrier = drawing.carrier(wall, &hierarchy, (&time, &fixed));
         let place = hierarchy.places.compute_global_transform(wall);
-        let Some((carrier, place)) = carrier.zip(place.ok()) else { continue };
+        let (Some(carrier), Ok(place), Some([from, to])) = (carrier, place, state.poses) else {
+            continue;
+        };
         let now = place.to_isometry();
         let drawn = between(from, to, fixed.overstep_fraction());
         if drawn != now && place.affine().is_finite() {

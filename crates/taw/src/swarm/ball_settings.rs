@@ -3,6 +3,7 @@
 use cgmath::Zero;
 
 use super::bodies::{NO_ROW, VelocityChange};
+use super::state::of;
 use super::surfaces::Surface;
 use super::workers::{DisjointSlice, parallel_for_rows};
 use super::{BallId, MAX_COORDINATE, Swarm};
@@ -12,6 +13,21 @@ use crate::error::{finite, finite_vector};
 use crate::math::{Point3, Vec3};
 use crate::motion::Motion;
 use crate::response::Material;
+
+/// Forces on single balls.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct BallForces {
+    /// Factors on gravity, by slot; one beyond the end.
+    gravity_scales: Vec<f32>,
+    /// Accelerations in the next step, in m/s².
+    accelerations: Vec<(BallId, Vec3<f32>)>,
+}
+
+impl BallForces {
+    pub fn bytes(&self) -> usize {
+        of(&self.gravity_scales) + of(&self.accelerations)
+    }
+}
 
 impl Swarm {
     /// Material of a ball.
@@ -114,7 +130,7 @@ impl Swarm {
     /// [`Error::NoSuchBall`], also for a marble's.
     pub fn gravity_scale(&self, ball: BallId) -> Result<f32, Error> {
         let slot = self.own_slot(ball)?;
-        Ok(self.gravity_scales.get(slot as usize).copied().unwrap_or(1.0))
+        Ok(self.ball_forces.gravity_scales.get(slot as usize).copied().unwrap_or(1.0))
     }
 
     /// Changes the factor on gravity for a ball: zero for one that floats, negative for one that
@@ -125,10 +141,10 @@ impl Swarm {
     pub fn set_gravity_scale(&mut self, ball: BallId, gravity_scale: f32) -> Result<(), Error> {
         let slot = self.own_slot(ball)? as usize;
         let gravity_scale = finite("gravity_scale", gravity_scale)?;
-        if gravity_scale != 1.0 && self.gravity_scales.len() <= slot {
-            self.gravity_scales.resize(slot + 1, 1.0);
+        if gravity_scale != 1.0 && self.ball_forces.gravity_scales.len() <= slot {
+            self.ball_forces.gravity_scales.resize(slot + 1, 1.0);
         }
-        if let Some(scale) = self.gravity_scales.get_mut(slot) {
+        if let Some(scale) = self.ball_forces.gravity_scales.get_mut(slot) {
             *scale = gravity_scale;
         }
         Ok(())
@@ -147,18 +163,18 @@ impl Swarm {
     ) -> Result<(), Error> {
         self.own_slot(ball)?;
         let names = ["acceleration.x", "acceleration.y", "acceleration.z"];
-        self.accelerations.push((ball, finite_vector(names, acceleration)?));
+        self.ball_forces.accelerations.push((ball, finite_vector(names, acceleration)?));
         Ok(())
     }
 
     /// Clears all applied accelerations.
     pub(crate) fn clear_accelerations(&mut self) {
-        self.accelerations.clear();
+        self.ball_forces.accelerations.clear();
     }
 
     /// Changes of velocity by applied accelerations in a step of `dt` seconds.
     pub(crate) fn applied_changes(&self, dt: f32) -> impl Iterator<Item = VelocityChange> + '_ {
-        self.accelerations.iter().filter_map(move |(ball, acceleration)| {
+        self.ball_forces.accelerations.iter().filter_map(move |(ball, acceleration)| {
             let change: [f32; 3] = (acceleration * dt).into();
             let change = change.map(|x| x.clamp(-MAX_COORDINATE, MAX_COORDINATE));
             Some(VelocityChange { slot: self.slot_of(*ball)?, change })
@@ -170,7 +186,7 @@ impl Swarm {
         self.surfaces.set(slot, None);
         self.surfaces.set_layers(slot, CollisionLayers::ALL);
         self.sleepless.remove(slot);
-        if let Some(scale) = self.gravity_scales.get_mut(slot as usize) {
+        if let Some(scale) = self.ball_forces.gravity_scales.get_mut(slot as usize) {
             *scale = 1.0;
         }
     }
@@ -190,7 +206,7 @@ impl Swarm {
         gravity: Vec3<f32>,
         dt: f32,
     ) -> Vec<VelocityChange> {
-        if acceleration.is_none() && self.gravity_scales.is_empty() {
+        if acceleration.is_none() && self.ball_forces.gravity_scales.is_empty() {
             return Vec::new();
         }
         let rows = self.ids.rows();
@@ -209,7 +225,8 @@ impl Swarm {
                 };
                 let motion =
                     Motion { position: Point3::new(x, y, z), velocity: Vec3::new(u, v, w) };
-                let scale = self.gravity_scales.get(slot as usize).copied().unwrap_or(1.0);
+                let scale =
+                    self.ball_forces.gravity_scales.get(slot as usize).copied().unwrap_or(1.0);
                 let fields = acceleration.as_ref().map_or_else(Vec3::zero, |acceleration| {
                     acceleration(motion, inverse_mass.abs().recip())
                 });

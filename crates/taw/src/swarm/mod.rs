@@ -66,6 +66,7 @@ use crate::handle::MarbleId;
 use crate::math::{Point3, Vec3};
 use crate::motion::Mass;
 use crate::response::Material;
+use ball_settings::BallForces;
 use batches::pairs_in;
 use bit_set::BitSet;
 use chunk::Chunk;
@@ -132,12 +133,7 @@ pub struct Swarm {
     /// Velocity changes of bodies besides gravity.
     velocity_changes: Vec<bodies::VelocityChange>,
     surfaces: Surfaces,
-    /// Factors on gravity, by slot; one beyond the end.
-    gravity_scales: Vec<f32>,
-    /// Accelerations of balls in the next step, in m/s².
-    accelerations: Vec<(BallId, Vec3<f32>)>,
-    /// Number of removals so far.
-    removals: u64,
+    ball_forces: BallForces,
     /// Agreement of bodies with the marbles.
     pub(crate) synced: SyncToken,
     proxies: Vec<Proxy>,
@@ -227,7 +223,8 @@ impl Swarm {
         Ok(ids)
     }
 
-    /// Removes balls, all or none.
+    /// Removes balls, all or none. To remove many at once takes as long as to remove one, which grows with the
+    /// number of all balls.
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], also for one that is listed twice, and for a marble's.
@@ -245,7 +242,7 @@ impl Swarm {
         if balls.is_empty() {
             return Ok(());
         }
-        (self.sleep_version, self.removals) = (self.sleep_version + 1, self.removals + 1);
+        self.sleep_version += 1;
         self.cache_impulses();
         for ball in balls {
             if let Some(slot) = self.slot_of(*ball) {
@@ -265,10 +262,10 @@ impl Swarm {
         Ok(())
     }
 
-    /// Number that changes whenever balls are removed; to look only then which are gone.
+    /// Number of balls that were removed so far; to look only when it changes which are gone.
     #[must_use]
     pub fn removals(&self) -> u64 {
-        self.removals
+        self.ids.removed()
     }
 
     /// Number of balls.
