@@ -323,3 +323,23 @@ fn a_wall_that_is_moved_while_time_stands_still_is_drawn_there() {
     scene::frames(&mut app, 9);
     assert_eq!([lift, picture].map(|it| drawn(&app, it)), [3.0; 2]);
 }
+
+/// Prints what it costs: `cargo test -p taw_examples --test headless -- --ignored --nocapture walls_that_stay`.
+#[test]
+#[ignore = "a measurement"]
+fn ten_thousand_walls_that_stay() {
+    for (name, mut app) in
+        [("with drawing", scene::smooth_app()), ("without", scene::app_with(TawPlugin))]
+    {
+        for i in 0..10_000_u16 {
+            let at = Vec3::new(f32::from(i % 100), 0.0, f32::from(i / 100)) * 2.0;
+            let place = Transform::from_translation(at);
+            app.world_mut().spawn((Wall::from(Cuboid::from_length(1.0)), place));
+        }
+        scene::frames(&mut app, 10);
+        scene::frame_length(&mut app, 0.0);
+        let start = std::time::Instant::now();
+        scene::frames(&mut app, 200);
+        println!("{name}: {:?} in a frame without a step", start.elapsed() / 200);
+    }
+}

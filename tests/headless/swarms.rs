@@ -183,3 +183,52 @@ fn sensors_tell_which_balls_are_inside() {
     app.update();
     assert_eq!(inside(&app), []);
 }
+
+#[test]
+fn a_ray_picks_the_nearest_ball_and_no_marble() {
+    let mut app = app();
+    app.insert_resource(Gravity(Vec3::ZERO));
+    app.insert_resource(TawModel::default()); // marbles are rows among the balls
+    let balls = [1.0, 4.0, 9.0].map(|x| Ball::new(Vec3::new(x, 0.3, 0.0), 0.5)).to_vec();
+    let swarm = app.world_mut().spawn(Swarm::new(balls)).id();
+    crate::scene::drop_marble(&mut app, 0.5, Vec3::X * 2.5);
+    app.update();
+    let ids = app.world().get::<Swarm>(swarm).unwrap().balls().to_vec();
+    let world = app.world().resource::<TawWorld>();
+    let pick = |x: f32, toward: Dir3, most: f32| {
+        let hit = world.cast_ray_on_balls(Ray3d::new(Vec3::X * x, toward), most);
+        hit.map(|hit| (hit.ball, [hit.distance, hit.point.x].map(|x| (x * 100.0).round())))
+    };
+    assert_eq!(pick(-1.0, Dir3::X, 1.5), None); // 1.6 m
+    assert_eq!(pick(-1.0, Dir3::X, f32::INFINITY), Some((ids[0], [160.0, 60.0])));
+    assert_eq!(pick(2.0, Dir3::X, 9.0), Some((ids[1], [160.0, 360.0])));
+    assert_eq!(pick(2.0, Dir3::NEG_X, 9.0).map(|it| it.0), Some(ids[0]));
+    assert_eq!(pick(9.1, Dir3::Z, 9.0), Some((ids[2], [0.0, 910.0])));
+    assert_eq!(pick(2.5, Dir3::Y, 9.0), None);
+}
+
+/// Prints what it costs: `cargo test -p taw_examples --test headless -- --ignored --nocapture ten_thousand_balls`.
+#[test]
+#[ignore = "a measurement"]
+fn ten_thousand_balls_in_the_wind() {
+    let frame = |sensor: bool, wind: Option<WindZone>| {
+        let mut app = app();
+        app.insert_resource(TawModel::default());
+        app.world_mut().spawn(Wall::default());
+        let region = Aabb3d::new(Vec3::Y * 4.0, Vec3::new(3.0, 3.0, 3.0));
+        app.world_mut().spawn(Swarm::filling(region, 10_000, 0.1..=0.12, 7));
+        let room = Wall::from(Cuboid::from_length(40.0));
+        if sensor {
+            let room = app.world_mut().spawn((room, Sensor)).id();
+            wind.map(|wind| app.world_mut().entity_mut(room).insert(wind).id());
+        }
+        crate::scene::frames(&mut app, 60);
+        let start = std::time::Instant::now();
+        crate::scene::frames(&mut app, 60);
+        start.elapsed() / 60
+    };
+    let wind = WindZone { velocity: Vec3::X, drag: 0.1 };
+    println!("without a sensor: {:?} a frame", frame(false, None));
+    println!("within a sensor: {:?} a frame", frame(true, None));
+    println!("in the wind: {:?} a frame", frame(true, Some(wind)));
+}

@@ -50,6 +50,17 @@ impl From<taw::swarm::Ball> for Ball {
     }
 }
 
+/// Hit of a ray on a ball of a swarm.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BallHit {
+    /// The ball.
+    pub ball: BallId,
+    /// Distance from the origin of the ray, in metres; zero if that is inside.
+    pub distance: f32,
+    /// Point on the surface, or the origin, in metres in world space.
+    pub point: Vec3,
+}
+
 /// State of balls is in the world alone, so it may be set in any schedule.
 ///
 /// ```
@@ -89,5 +100,36 @@ impl TawWorld {
     /// [`OutOfRange`](taw::Error::OutOfRange) for a component of more than 1e12.
     pub fn set_ball_velocity(&mut self, ball: BallId, velocity: Vec3) -> Result<(), taw::Error> {
         self.world.swarm.set_velocity(ball, to_vector(velocity))
+    }
+
+    /// First ball of a swarm on a ray, after the last step, within a distance in metres, which may be
+    /// infinite: to pick one. It looks at each ball, some ten microseconds for ten thousand.
+    ///
+    /// ```
+    /// # use bevy::prelude::*;
+    /// # use bevy_taw::prelude::*;
+    /// fn shoot(gun: Single<&GlobalTransform>, world: Res<TawWorld>, mut swarm: Single<&mut Swarm>) {
+    ///     let ray = Ray3d::new(gun.translation(), gun.forward());
+    ///     if let Some(hit) = world.cast_ray_on_balls(ray, 100.0) {
+    ///         swarm.remove(hit.ball);
+    ///     }
+    /// }
+    /// ```
+    #[must_use]
+    pub fn cast_ray_on_balls(&self, ray: Ray3d, max_distance: f32) -> Option<BallHit> {
+        let swarm = &self.world.swarm;
+        let hit = |(row, [x, y, z, radius]): (usize, &[f32; 4])| {
+            let to_center = Vec3::new(*x, *y, *z) - ray.origin;
+            let along = to_center.dot(*ray.direction);
+            let beside = (to_center - along * *ray.direction).length_squared();
+            let half_chord = (radius * radius - beside).sqrt(); // NaN if the line passes by
+            let distance = (along - half_chord).max(0.0);
+            let is_hit = along + half_chord >= 0.0 && distance <= max_distance;
+            (is_hit && !swarm.is_marble(row)).then_some((row, distance))
+        };
+        let hits = swarm.balls().iter().enumerate().filter_map(hit);
+        let (row, distance) = hits.min_by(|a, b| a.1.total_cmp(&b.1))?;
+        let point = ray.get_point(distance);
+        Some(BallHit { ball: swarm.id(row)?, distance, point })
     }
 }

@@ -13,7 +13,7 @@ use crate::refusal::{Refusals, report};
 use crate::resources::TawWorld;
 use crate::snapshot::{RowRemoved, lost_balls};
 
-pub use crate::ball::Ball;
+pub use crate::ball::{Ball, BallHit};
 pub use taw::swarm::BallId;
 
 /// Marbles in bulk, up to millions, which collide with each other, with walls, and with the
