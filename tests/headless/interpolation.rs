@@ -324,6 +324,27 @@ fn a_wall_that_is_moved_while_time_stands_still_is_drawn_there() {
     assert_eq!([lift, picture].map(|it| drawn(&app, it)), [3.0; 2]);
 }
 
+#[test]
+fn a_wall_that_is_moved_while_the_physics_is_kept_from_running_is_drawn_there() {
+    let mut app = scene::smooth_app();
+    let sets = (TawSystems::Gather, TawSystems::Step, TawSystems::Scatter);
+    app.init_resource::<Halt>();
+    app.configure_sets(FixedUpdate, sets.run_if(|halt: Res<Halt>| !halt.0));
+    let [lift, _, picture, _] = lift(&mut app, true);
+    scene::frame_length(&mut app, STEP);
+    scene::frames(&mut app, 8);
+    app.world_mut().resource_mut::<Halt>().0 = true;
+    for _ in 0..3 {
+        app.world_mut().get_mut::<Transform>(lift).unwrap().translation.y += 0.01;
+        app.update();
+        let at = scene::position(&app, lift).y;
+        assert_eq!([lift, picture].map(|it| drawn(&app, it)), [at; 2]);
+    }
+}
+
+#[derive(Resource, Default)]
+struct Halt(bool);
+
 /// Prints what it costs: `cargo test -p taw_examples --test headless -- --ignored --nocapture walls_that_stay`.
 #[test]
 #[ignore = "a measurement"]

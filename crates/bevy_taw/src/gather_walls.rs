@@ -1,6 +1,8 @@
 //! Walls, from components into the world: shapes are built once, in their own frames, and then
 //! only put where they are.
 
+use std::time::Duration;
+
 use bevy::ecs::entity::Entities;
 use bevy::math::Isometry3d;
 use bevy::prelude::*;
@@ -35,6 +37,8 @@ pub struct FrameTime {
     since_step: f32,
     /// True until the first fixed step of this frame.
     first: bool,
+    /// Fixed time of the last gather.
+    pub gathered_at: Duration,
 }
 
 /// Counts a frame.
@@ -122,7 +126,8 @@ pub fn walls(
         overstep: fixed.overstep().as_secs_f32(),
         frames: frame.since_step,
     };
-    (frame.since_step, frame.first) = (0.0, false);
+    *frame =
+        FrameTime { this: frame.this, since_step: 0.0, first: false, gathered_at: fixed.elapsed() };
     let (mut rows, mut sensors) = (0, 0);
     for mut item in &mut walls {
         let entity = item.0.0;

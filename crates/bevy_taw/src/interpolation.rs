@@ -6,7 +6,8 @@
 //! Marbles get it by themselves, in world space, whatever carries them, and so do walls that move, in
 //! whatever schedule: a lift and its riders are drawn together. Of walls it is the `GlobalTransform` that is
 //! drawn, with those of what carries them or is carried along; their `Transform` is what the game wrote.
-//! While [`Time<Virtual>`] stands still, a wall that is moved is drawn where its `Transform` is.
+//! While [`Time<Virtual>`] stands still or the physics does not run, a wall that is moved is drawn where its
+//! `Transform` is.
 //! A marble or wall with `NoTransformEasing` is left out. Give what carries marbles and has no wall a
 //! [`TransformInterpolation`] of [`bevy_transform_interpolation`].
 //!

@@ -11,13 +11,15 @@ use bevy::prelude::*;
 use bevy_transform_interpolation::prelude::NoTransformEasing;
 
 use crate::components::{Marble, WallState};
+use crate::gather_walls::FrameTime;
 
 /// Memory of what is drawn.
 #[derive(Default)]
 pub(crate) struct Drawing {
     known: EntityHashMap<Known>,
-    /// Walls that are drawn elsewhere than their `Transform`s are, and what moves with them.
+    /// Walls that move, or are drawn elsewhere than their `Transform`s are.
     walls: EntityHashSet,
+    /// What is drawn elsewhere with them.
     carriers: Vec<Entity>,
 }
 
@@ -39,30 +41,28 @@ pub(crate) struct Hierarchy<'w, 's> {
     marbles: Query<'w, 's, (), With<Marble>>,
 }
 
-type Walls<'a> = (Entity, &'a WallState, Ref<'a, GlobalTransform>);
+type MovedWall = (With<WallState>, Changed<GlobalTransform>);
 
 /// Draws walls that move between the last two steps.
 pub(crate) fn draw(
     mut drawing: Local<Drawing>,
-    mut globals: ParamSet<(
-        Query<Walls, Without<NoTransformEasing>>,
-        Query<&'static mut GlobalTransform>,
-    )>,
+    mut globals: ParamSet<(Query<Entity, MovedWall>, Query<&'static mut GlobalTransform>)>,
+    walls: Query<&WallState, Without<NoTransformEasing>>,
     hierarchy: Hierarchy,
-    (time, fixed): (Res<Time<Virtual>>, Res<Time<Fixed>>),
+    (time, fixed, frame): (Res<Time<Virtual>>, Res<Time<Fixed>>, Res<FrameTime>),
     mut removed: RemovedComponents<WallState>,
 ) {
     let drawing = &mut *drawing;
     if removed.read().count() > 0 {
         drawing.known.retain(|entity, _| hierarchy.transforms.contains(*entity));
     }
-    let before = std::mem::take(&mut drawing.walls);
+    let mut candidates = std::mem::take(&mut drawing.walls);
+    candidates.extend(&globals.p0());
+    // The game may keep the physics from running.
+    let is_running = frame.gathered_at == fixed.elapsed();
     let mut moves = Vec::new();
-    for (wall, state, global) in &globals.p0() {
-        let moves_now = state.poses.is_some_and(|[from, to]| from != to);
-        if !(moves_now || global.is_changed() || before.contains(&wall)) {
-            continue;
-        }
+    for wall in candidates {
+        let Ok(state) = walls.get(wall) else { continue };
         let carrier = drawing.carrier(wall, &hierarchy, (&time, &fixed));
         let place = hierarchy.places.compute_global_transform(wall);
         let (Some(carrier), Ok(place), Some([from, to])) = (carrier, place, state.poses) else {
@@ -70,8 +70,10 @@ pub(crate) fn draw(
         };
         let now = place.to_isometry();
         let drawn = between(from, to, fixed.overstep_fraction());
-        if drawn != now && place.affine().is_finite() {
+        if from != to || drawn != now {
             drawing.walls.insert(wall);
+        }
+        if is_running && drawn != now && place.affine().is_finite() {
             moves.push((carrier, Affine3A::from(drawn * now.inverse())));
         }
     }

@@ -184,6 +184,21 @@ mod tests {
     const ORIGIN: Point3<f64> = Point3::new(0.0, 0.0, 0.0);
 
     #[test]
+    fn constructors_take_vectors_of_any_library_that_makes_arrays_of_them() {
+        let (center, numbers) = (Point3::new(1.0, 2.0, 3.0), [1.0, 2.0, 3.0]);
+        assert_eq!(
+            [ForceField::attraction(center, 4.0), ForceField::spring(numbers, 5.0, 6.0)],
+            [
+                ForceField::Attraction { center, strength: 4.0 },
+                ForceField::Spring { anchor: center, rest_length: 5.0, stiffness: 6.0 }
+            ]
+        );
+        let velocity = Vec3::from(numbers);
+        let expected = Medium { velocity, linear: 7.0, quadratic: 8.0 };
+        assert_eq!(Medium::new(velocity, 7.0, 8.0), expected);
+    }
+
+    #[test]
     fn linear_drag_decays_exponentially_toward_the_wind() {
         let wind = Vec3::new(3.0, 0.0, 0.0);
         let medium = Medium { velocity: wind, linear: 0.5, quadratic: 0.0 };

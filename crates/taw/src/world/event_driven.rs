@@ -34,7 +34,7 @@ impl<S: Scalar> Method<S> for EventDriven {
         // Marbles are where the substep begins, so walls have to be there, too.
         world.walls.interpolate_to(world.scratch.rest_of_step + world.scratch.substep);
         world.list_contacts();
-        world.walls.interpolate_to(S::zero());
+        world.walls.end_interpolation();
     }
 
     fn solve(&self, world: &mut World<S>, dt: S) {
