@@ -1,4 +1,4 @@
-//! Settings of single balls: material, layers and gravity scale; and what accelerates them.
+//! State and settings of single balls: material, layers and gravity scale; and what accelerates them.
 
 use cgmath::Zero;
 
@@ -6,12 +6,12 @@ use super::bodies::{NO_ROW, VelocityChange};
 use super::state::of;
 use super::surfaces::Surface;
 use super::workers::{DisjointSlice, parallel_for_rows};
-use super::{BallId, MAX_COORDINATE, Swarm};
+use super::{Ball, BallId, MAX_COORDINATE, Swarm};
 use crate::Error;
 use crate::broad::{CollisionLayers, IgnoredPairs};
 use crate::error::{finite, finite_vector};
 use crate::math::{Point3, Vec3};
-use crate::motion::Motion;
+use crate::motion::{Mass, Motion};
 use crate::response::Material;
 
 /// Forces on single balls.
@@ -30,6 +30,21 @@ impl BallForces {
 }
 
 impl Swarm {
+    /// State of a ball: what to insert to have another one like it.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`].
+    pub fn get(&self, ball: BallId) -> Result<Ball, Error> {
+        let row = self.row(ball)?;
+        let ([x, y, z, radius], [u, v, w, inverse_mass]) = (self.at[row], self.velocity[row]);
+        Ok(Ball {
+            position: Point3::new(x, y, z),
+            radius,
+            velocity: Vec3::new(u, v, w),
+            mass: Mass::Kilograms(inverse_mass.abs().recip()),
+        })
+    }
+
     /// Material of a ball.
     ///
     /// # Errors

@@ -64,7 +64,6 @@ use crate::Error;
 use crate::error::{finite_point, finite_vector, positive, within};
 use crate::handle::MarbleId;
 use crate::math::{Point3, Vec3};
-use crate::motion::Mass;
 use crate::response::Material;
 use ball_settings::BallForces;
 use batches::pairs_in;
@@ -325,21 +324,6 @@ impl Swarm {
     /// [`Error::NoSuchBall`].
     pub fn row(&self, ball: BallId) -> Result<usize, Error> {
         self.ids.row(ball).ok_or(Error::NoSuchBall(ball))
-    }
-
-    /// State of a ball: what to insert to have another one like it.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchBall`].
-    pub fn get(&self, ball: BallId) -> Result<Ball, Error> {
-        let row = self.row(ball)?;
-        let ([x, y, z, radius], [u, v, w, inverse_mass]) = (self.at[row], self.velocity[row]);
-        Ok(Ball {
-            position: Point3::new(x, y, z),
-            radius,
-            velocity: Vec3::new(u, v, w),
-            mass: Mass::Kilograms(inverse_mass.abs().recip()),
-        })
     }
 
     /// Sets the position of a ball (teleports it), in metres, and wakes it.
