@@ -56,7 +56,7 @@ fn spawn(mut commands: Commands, mut paint: Paint) {
         commands.spawn((Wall::from(coin), Sensor, place, drawn)).observe(take);
     }
     commands.spawn((
-        MarbleController::default(),
+        MarbleController { acceleration: 8.0, braking: 4.0, ..default() }, // friction: 0.9 × 9.81
         Marble::new(0.35),
         SurfaceMaterial { friction: 0.9, restitution: 0.2, ..default() },
         Transform::from_translation(START),

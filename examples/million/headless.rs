@@ -36,7 +36,9 @@ fn pour(options: &Options) -> Result<(), taw::Error> {
     }
     world.swarm.set_model(options.model())?;
     let began = Instant::now();
-    world.swarm.insert(crate::scene::marbles(options.marbles).coming())?;
+    let marbles = crate::scene::marbles(options.marbles);
+    let balls: Vec<_> = marbles.coming().iter().map(|ball| (*ball).into()).collect();
+    world.swarm.insert(&balls)?;
     let inserted = began.elapsed();
     println!(
         "{} marbles, {:?} tier, {} substeps, {} threads; made and put in within {} ms",

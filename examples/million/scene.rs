@@ -40,8 +40,7 @@ pub fn marbles(count: u32) -> Swarm {
     let half = half_side(count);
     let region = Aabb3d::new(Vec3::Y * half, Vec3::splat(half));
     // As light as in the table that this is compared with.
-    Swarm::filling(region, count as usize, RADII, 1)
-        .with_mass(bevy_taw::taw::world::Mass::Density(1.0))
+    Swarm::filling(region, count as usize, RADII, 1).with_mass(MarbleMass::Density(1.0))
 }
 
 pub fn plugin(app: &mut App) {

@@ -13,18 +13,18 @@ const RESPONSES: [Response; 5] = [
     Response::Penalty(ContactLaw::SpringDashpot),
 ];
 
-fn app(response: Response) -> App {
+pub fn app(response: Response) -> App {
     let mut app = scene::app();
     let substeps = if response == Response::EventDriven { 1 } else { 4 };
     app.insert_resource(TawModel(Model { response, substeps, ..Model::GAME }));
     app
 }
 
-fn ground(app: &App, marble: Entity) -> Option<Ground> {
+pub fn ground(app: &App, marble: Entity) -> Option<Ground> {
     app.world().get::<Grounded>(marble).unwrap().ground
 }
 
-fn grounded(app: &mut App, radius: f32, at: Vec3) -> Entity {
+pub fn grounded(app: &mut App, radius: f32, at: Vec3) -> Entity {
     let marble = scene::drop_marble(app, radius, at);
     app.world_mut().entity_mut(marble).insert(Grounded::default());
     marble
@@ -160,36 +160,6 @@ fn what_asks_asleep_is_answered() {
     assert!(apex(&mut app, marble, 60) + 0.15 > 1.0);
 }
 
-#[derive(Component)]
-struct Lift(Vec3);
-
-fn lift(mut lifts: Query<(&Lift, &mut Transform)>, time: Res<Time>) {
-    for (Lift(velocity), mut place) in &mut lifts {
-        place.translation += *velocity * time.delta_secs();
-    }
-}
-
-#[test]
-fn ground_that_moves_says_how_fast_and_marbles_are_ground_too() {
-    for response in [Response::SoftStep, Response::Impulse, Response::EventDriven] {
-        let mut app = app(response);
-        app.add_systems(FixedUpdate, lift.before(TawSystems::Gather));
-        let velocity = Vec3::new(0.5, 0.25, 0.0);
-        let slab = Wall::from(Cuboid::new(8.0, 1.0, 8.0));
-        let slab = app.world_mut().spawn((slab, Lift(velocity), Transform::default())).id();
-        let below = scene::drop_marble(&mut app, 0.5, Vec3::Y);
-        app.world_mut().entity_mut(below).insert((MarbleMass::Kilograms(1e3), Velocity(velocity)));
-        let above = grounded(&mut app, 0.25, Vec3::Y * 1.75);
-        app.world_mut().entity_mut(above).insert(Velocity(velocity));
-        app.world_mut().entity_mut(below).insert(Grounded::default());
-        scene::frames(&mut app, 20);
-        let (low, high) = (ground(&app, below).unwrap(), ground(&app, above).unwrap());
-        assert_eq!((low.entity, high.entity), (slab, below), "{response:?}");
-        assert!(low.velocity.distance(velocity) < 1e-4, "{response:?}: {low:?}");
-        assert!(high.velocity.distance(velocity) < 0.05, "{response:?}: {high:?}");
-    }
-}
-
 #[test]
 fn what_sleeps_keeps_its_ground() {
     let mut app = app(Response::SoftStep);
@@ -210,11 +180,11 @@ fn hero(app: &mut App, controller: MarbleController, friction: f32) -> Entity {
     hero
 }
 
-fn control(app: &mut App, hero: Entity) -> Mut<'_, MarbleController> {
+pub fn control(app: &mut App, hero: Entity) -> Mut<'_, MarbleController> {
     app.world_mut().get_mut::<MarbleController>(hero).unwrap()
 }
 
-fn velocity(app: &App, marble: Entity) -> Vec3 {
+pub fn velocity(app: &App, marble: Entity) -> Vec3 {
     **app.world().get::<Velocity>(marble).unwrap()
 }
 
@@ -239,6 +209,29 @@ fn a_hero_rolls_to_its_speed_and_brakes() {
             control(&mut app, hero).direction = Vec3::ZERO;
             scene::frames(&mut app, 128);
             assert!(velocity(&app, hero).length() < 0.05, "{case}: {}", velocity(&app, hero));
+        }
+    }
+}
+
+#[test]
+fn the_default_hero_rolls_without_slip_on_the_default_floor() {
+    for response in [Response::SoftStep, Response::Impulse, Response::EventDriven] {
+        let mut app = app(response);
+        scene::floor(&mut app);
+        let place = Transform::from_xyz(0.0, 0.25, 0.0);
+        let hero = (MarbleController::default(), Marble::new(0.25), place);
+        let hero = app.world_mut().spawn(hero).id();
+        scene::frames(&mut app, 2);
+        for (direction, frames) in [(Vec3::X, 64), (Vec3::X, 128), (Vec3::ZERO, 64)] {
+            control(&mut app, hero).direction = direction;
+            let before = velocity(&app, hero).x;
+            scene::frames(&mut app, frames);
+            let (speed, spin) = (velocity(&app, hero), app.world().get::<AngularVelocity>(hero));
+            let slip = speed + spin.unwrap().cross(Vec3::Y * -0.25);
+            assert!(slip.length() < 0.1, "{response:?} at {speed}: {slip}");
+            let gained = (speed.x - before).abs() * 64.0 / frames as f32;
+            let reached = (speed.x - 6.0).abs() < 0.1;
+            assert!(reached || (gained - 2.5).abs() < 0.2, "{response:?}: {gained} m/s²");
         }
     }
 }
@@ -323,22 +316,6 @@ fn a_jump_waits_for_the_ground_and_may_come_a_bit_late() {
         app.update();
         assert_eq!(velocity(&app, hero).y > 4.0, jumps, "{late} frames late");
     }
-}
-
-#[test]
-fn a_jump_from_a_lift_is_relative_to_it() {
-    let mut app = app(Response::SoftStep);
-    app.add_systems(FixedUpdate, lift.before(TawSystems::Gather));
-    let slab = Wall::from(Cuboid::new(8.0, 1.0, 8.0));
-    app.world_mut().spawn((slab, Lift(Vec3::new(0.5, 1.0, 0.0)), Transform::default()));
-    let place = Transform::from_xyz(0.0, 0.75, 0.0);
-    let controller = MarbleController { jump_speed: 4.0, ..default() };
-    let hero = app.world_mut().spawn((controller, Marble::new(0.25), place)).id();
-    scene::frames(&mut app, 64);
-    control(&mut app, hero).jump = true;
-    app.update();
-    let rises = velocity(&app, hero).y;
-    assert!((rises - 5.0).abs() < 0.25, "{rises}");
 }
 
 #[test]

@@ -235,3 +235,132 @@ fn a_child_of_what_moves_in_every_frame_is_drawn_where_it_is() {
         }
     }
 }
+
+#[derive(Component)]
+struct Lift;
+
+/// Where an entity is drawn, in metres up.
+fn drawn(app: &App, entity: Entity) -> f32 {
+    app.world().get::<GlobalTransform>(entity).unwrap().translation().y
+}
+
+/// Lift with a rider: the entities of the lift, its wall, what is drawn of it, and the rider. The wall is
+/// the lift, or a child of it.
+fn lift(app: &mut App, has_child: bool) -> [Entity; 4] {
+    let wall = || Wall::from(Cuboid::new(8.0, 1.0, 8.0));
+    let picture = app.world_mut().spawn(Transform::default()).id();
+    let lift = app.world_mut().spawn((Lift, Transform::default())).add_child(picture).id();
+    let wall = if has_child {
+        let wall = app.world_mut().spawn((wall(), Transform::default())).id();
+        app.world_mut().entity_mut(lift).add_child(wall);
+        wall
+    } else {
+        app.world_mut().entity_mut(lift).insert(wall());
+        lift
+    };
+    let surface = SurfaceMaterial { restitution: 0.0, ..default() };
+    let rider = (Marble::new(0.25), surface, Transform::from_xyz(0.0, 0.75, 0.0));
+    let rider = app.world_mut().spawn(rider).id();
+    [lift, wall, picture, rider]
+}
+
+#[test]
+fn a_lift_is_drawn_under_its_rider_at_any_frame_rate_in_any_schedule() {
+    for rate in [10.0, 24.0, 60.0, 64.0, 144.0, 500.0] {
+        for (in_update, has_child) in [(false, false), (true, false), (false, true), (true, true)] {
+            let mut app = scene::smooth_app();
+            app.insert_resource(TawModel::default());
+            let [lift, wall, picture, rider] = lift(&mut app, has_child);
+            let rise = |mut lifts: Query<&mut Transform, With<Lift>>, time: Res<Time>| {
+                for mut place in &mut lifts {
+                    place.translation.y += time.delta_secs();
+                }
+            };
+            if in_update {
+                app.add_systems(Update, rise);
+            } else {
+                app.add_systems(FixedUpdate, rise.before(TawSystems::Gather));
+            }
+            scene::frame_length(&mut app, 1.0 / rate);
+            scene::frames(&mut app, rate as u32);
+            let case =
+                format!("{rate} frames a second, in Update: {in_update}, child: {has_child}");
+            let mut last = drawn(&app, wall);
+            for frame in 0..(rate as u32).min(100) {
+                app.update();
+                let [wall, picture] = [wall, picture].map(|it| drawn(&app, it));
+                let apart = drawn(&app, rider) - wall - 0.75;
+                assert!(apart.abs() < 2e-3, "{case}, frame {frame}: {apart} m");
+                assert!((wall - picture).abs() < 1e-5, "{case}, frame {frame}: {wall}, {picture}");
+                let uneven = wall - last - 1.0 / rate;
+                assert!(uneven.abs() < 1e-3, "{case}, frame {frame}: {uneven} m");
+                last = wall;
+            }
+            // It stops, and is drawn where it is.
+            app.world_mut().entity_mut(lift).remove::<Lift>();
+            scene::frames(&mut app, 3 + (0.1 * rate) as u32);
+            let at = scene::position(&app, lift).y;
+            assert_eq!([wall, picture].map(|it| drawn(&app, it)), [at; 2], "{case}");
+        }
+    }
+}
+
+#[test]
+fn a_wall_that_is_moved_while_time_stands_still_is_drawn_there() {
+    let mut app = scene::smooth_app();
+    let [lift, _, picture, _] = lift(&mut app, false);
+    scene::frame_length(&mut app, STEP / 4.0);
+    scene::frames(&mut app, 8);
+    app.world_mut().resource_mut::<Time<Virtual>>().pause();
+    app.update();
+    for _ in 0..3 {
+        app.world_mut().get_mut::<Transform>(lift).unwrap().translation.y += 1.0;
+        app.update();
+        let at = scene::position(&app, lift).y;
+        assert_eq!([lift, picture].map(|it| drawn(&app, it)), [at; 2]);
+    }
+    app.world_mut().resource_mut::<Time<Virtual>>().unpause();
+    scene::frames(&mut app, 9);
+    assert_eq!([lift, picture].map(|it| drawn(&app, it)), [3.0; 2]);
+}
+
+#[test]
+fn a_wall_that_is_moved_while_the_physics_is_kept_from_running_is_drawn_there() {
+    let mut app = scene::smooth_app();
+    let sets = (TawSystems::Gather, TawSystems::Step, TawSystems::Scatter);
+    app.init_resource::<Halt>();
+    app.configure_sets(FixedUpdate, sets.run_if(|halt: Res<Halt>| !halt.0));
+    let [lift, _, picture, _] = lift(&mut app, true);
+    scene::frame_length(&mut app, STEP);
+    scene::frames(&mut app, 8);
+    app.world_mut().resource_mut::<Halt>().0 = true;
+    for _ in 0..3 {
+        app.world_mut().get_mut::<Transform>(lift).unwrap().translation.y += 0.01;
+        app.update();
+        let at = scene::position(&app, lift).y;
+        assert_eq!([lift, picture].map(|it| drawn(&app, it)), [at; 2]);
+    }
+}
+
+#[derive(Resource, Default)]
+struct Halt(bool);
+
+/// Prints what it costs: `cargo test -p taw_examples --test headless -- --ignored --nocapture walls_that_stay`.
+#[test]
+#[ignore = "a measurement"]
+fn ten_thousand_walls_that_stay() {
+    for (name, mut app) in
+        [("with drawing", scene::smooth_app()), ("without", scene::app_with(TawPlugin))]
+    {
+        for i in 0..10_000_u16 {
+            let at = Vec3::new(f32::from(i % 100), 0.0, f32::from(i / 100)) * 2.0;
+            let place = Transform::from_translation(at);
+            app.world_mut().spawn((Wall::from(Cuboid::from_length(1.0)), place));
+        }
+        scene::frames(&mut app, 10);
+        scene::frame_length(&mut app, 0.0);
+        let start = std::time::Instant::now();
+        scene::frames(&mut app, 200);
+        println!("{name}: {:?} in a frame without a step", start.elapsed() / 200);
+    }
+}

@@ -12,6 +12,7 @@ mod ignore;
 mod input;
 mod interpolation;
 mod layers;
+mod lifts;
 mod mesh_walls;
 mod motion;
 mod moving_walls;

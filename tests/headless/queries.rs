@@ -252,3 +252,75 @@ fn bad_shapes_and_rays_are_refused_or_find_nothing() {
     assert_eq!(refused[..3], [true; 3]);
     assert_eq!(hits, 0);
 }
+
+#[test]
+fn who_is_despawned_is_hit_no_more_and_the_tree_stays() {
+    let (mut app, marbles) = cloud(300);
+    let changed = |app: &App| app.world().resource_ref::<TawWorld>().last_changed();
+    let before = changed(&app);
+    let places = marbles.iter().map(|it| (it.0, scene::position(&app, it.0), it.2));
+    let mut left: Vec<(Entity, Vec3, f32)> = places.collect();
+    let _ = ask(&mut app, |spatial| spatial.cast_ray(ray(Vec3::ZERO, Vec3::X), 1.0, &all()));
+    for i in 0..100_usize {
+        let (gone, target, _) = left.swap_remove(i * 7 % left.len());
+        app.world_mut().entity_mut(gone).despawn();
+        let from = Vec3::new(30.0, 40.0, 50.0);
+        let direction = (target - from).normalize();
+        let hits =
+            ask(&mut app, move |spatial| spatial.cast_ray_all(ray(from, direction), 200.0, &all()));
+        let found: Vec<_> = hits.iter().map(|hit| hit.entity).collect();
+        assert!(found.iter().all(|hit| left.iter().any(|it| it.0 == *hit)), "{i}");
+        for (marble, at, radius) in &left {
+            let beside = (*at - from).reject_from(direction).length();
+            assert!(beside > 0.99 * radius || found.contains(marble), "{i}: {beside} m beside");
+        }
+        let near = ask(&mut app, move |spatial| spatial.project_point(target, 1e3, &all()));
+        let distance = |it: &(Entity, Vec3, f32)| it.1.distance(target) - it.2;
+        let nearest = left.iter().map(distance).fold(f32::INFINITY, f32::min);
+        assert!((near.unwrap().distance - nearest).abs() < 1e-4, "{i}");
+    }
+    assert_eq!(changed(&app), before, "the tree was fitted anew");
+}
+
+/// Prints what it costs: `cargo test -p taw_examples --test headless -- --ignored --nocapture despawning`.
+#[test]
+#[ignore = "a measurement"]
+fn picking_and_despawning_fifty_of_ten_thousand() {
+    let (mut app, _) = cloud(10_000);
+    app.update();
+    let start = std::time::Instant::now();
+    for i in 0..50_u16 {
+        let from = Vec3::new(f32::from(i) - 25.0, 100.0, 0.0);
+        let hit = ask(&mut app, move |spatial| {
+            spatial.cast_ray(ray(from, Vec3::NEG_Y + Vec3::X * 1e-3), 200.0, &all())
+        });
+        if let Some(hit) = hit {
+            app.world_mut().entity_mut(hit.entity).despawn();
+        }
+    }
+    println!("marbles: {:?} each", start.elapsed() / 50);
+    let start = std::time::Instant::now();
+    app.update();
+    println!("marbles: {:?} in the next frame", start.elapsed());
+    let region = bevy::math::bounding::Aabb3d::new(Vec3::Y * 200.0, Vec3::splat(10.0));
+    let swarm = app.world_mut().spawn(Swarm::filling(region, 10_000, 0.3..=0.4, 1)).id();
+    scene::frames(&mut app, 2);
+    let start = std::time::Instant::now();
+    app.update();
+    println!("{:?} in a frame without removals", start.elapsed());
+    let ids = app.world().get::<Swarm>(swarm).unwrap().balls().to_vec();
+    let start = std::time::Instant::now();
+    for ball in ids.iter().step_by(200) {
+        app.world_mut().get_mut::<Swarm>(swarm).unwrap().remove(*ball);
+    }
+    println!("balls of a swarm: {:?} each", start.elapsed() / 50);
+    let start = std::time::Instant::now();
+    app.update();
+    println!("balls of a swarm: {:?} in the next frame", start.elapsed());
+    let start = std::time::Instant::now();
+    for ball in ids.iter().skip(1).step_by(200) {
+        let mut world = app.world_mut().resource_mut::<TawWorld>();
+        world.swarm.remove(&[*ball]).unwrap();
+    }
+    println!("balls through the world: {:?} each", start.elapsed() / 50);
+}

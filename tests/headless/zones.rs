@@ -64,6 +64,80 @@ fn a_zone_has_its_own_gravity() {
     }
 }
 
+/// A swarm of one ball, which is at rest.
+fn ball(app: &mut App, at: Vec3, gravity_scale: f32) -> BallId {
+    let swarm = app.world_mut().spawn(Swarm::new(vec![Ball::new(at, 0.1)])).id();
+    app.update();
+    let ball = app.world().get::<Swarm>(swarm).unwrap().balls()[0];
+    let mut world = app.world_mut().resource_mut::<TawWorld>();
+    world.swarm.set_gravity_scale(ball, gravity_scale).unwrap();
+    ball
+}
+
+#[test]
+fn balls_of_swarms_feel_gravity_zones_and_winds_as_marbles_do() {
+    let wind = WindZone { velocity: Vec3::new(1.0, 2.0, 0.0), drag: 2.0 };
+    for (response, tier) in [
+        (Response::SoftStep, Tier::Full),
+        (Response::Impulse, Tier::Full),
+        (Response::EventDriven, Tier::Lab),
+    ] {
+        let mut app = app(response);
+        app.world_mut().resource_mut::<TawSwarmModel>().tier = tier;
+        app.insert_resource(Gravity(Vec3::Y * -2.0));
+        let zones = [GravityZone::Replace(Vec3::X * 2.0), GravityZone::Add(Vec3::Z)];
+        for zone in zones {
+            app.world_mut().spawn((room(), zone));
+        }
+        app.world_mut().spawn((
+            room(),
+            GravityZone::Toward(4.0),
+            Transform::from_xyz(9.0, 0.0, 0.0),
+        ));
+        app.world_mut().spawn((room(), wind, Transform::from_xyz(-9.0, 0.0, 0.0)));
+        let places = [0.5, 9.5, -9.0, 30.0].map(|x| Vec3::X * x);
+        let scales = [-1.0, 1.0, 0.0, 1.0];
+        let pairs: Vec<_> = places.into_iter().zip(scales).collect();
+        let balls = pairs.iter().map(|(at, scale)| ball(&mut app, *at, *scale));
+        let balls: Vec<_> = balls.collect();
+        let mut world = app.world_mut().resource_mut::<TawWorld>();
+        for (ball, at) in balls.iter().zip(places) {
+            world.set_ball_position(*ball, at).unwrap();
+            world.set_ball_velocity(*ball, Vec3::ZERO).unwrap();
+        }
+        let marbles = pairs.iter().map(|(at, scale)| {
+            let marble = marble(&mut app, *at + Vec3::Z * 0.4);
+            app.world_mut().entity_mut(marble).insert(GravityScale(*scale));
+            marble
+        });
+        let marbles: Vec<_> = marbles.collect();
+        app.update(); // they are noticed
+        let speed = |app: &App| {
+            let world = app.world().resource::<TawWorld>();
+            let balls = balls.iter().map(|ball| world.ball(*ball).unwrap().velocity);
+            balls.collect::<Vec<_>>()
+        };
+        let before =
+            (speed(&app), marbles.iter().map(|it| velocity(&app, *it)).collect::<Vec<_>>());
+        scene::frames(&mut app, 8);
+        let after = speed(&app);
+        let time = 8.0 * scene::STEP;
+        let case = format!("{response:?}, {tier:?}");
+        let expected = [Vec3::new(-2.0, 0.0, -1.0), Vec3::X * -4.0, Vec3::ZERO, Vec3::Y * -2.0];
+        for i in [0, 1, 3] {
+            let of_ball = (after[i] - before.0[i]) / time;
+            assert!(of_ball.distance(expected[i]) < 0.05, "{case}: {of_ball} for {}", expected[i]);
+        }
+        let left = (-wind.drag * time).exp();
+        let blown = |before: Vec3| wind.velocity + (before - wind.velocity) * left;
+        for (before, after) in [(before.0[2], after[2]), (before.1[2], velocity(&app, marbles[2]))]
+        {
+            let expected = blown(before);
+            assert!(after.distance(expected) < 1e-3, "{case}: {after} for {expected}");
+        }
+    }
+}
+
 #[test]
 fn a_planet_holds_marbles_all_around_it_and_is_their_ground() {
     let mut app = app(Response::SoftStep);

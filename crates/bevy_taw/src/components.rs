@@ -1,6 +1,7 @@
 //! What an entity may be to the physics. Marbles and walls need nothing but their
 //! own component; the rest is optional.
 
+use bevy::math::Isometry3d;
 use bevy::prelude::*;
 use taw::motion::{Integrator, Rotation};
 use taw::response::{Combine, Elasticity, Material};
@@ -331,6 +332,8 @@ pub(crate) struct WallState {
     pub refused: bool,
     /// Its place in world space as last gathered, to the bit: translation and rotation.
     pub posed: Option<([u32; 3], [u32; 4])>,
+    /// Its poses in the physics before and after the last step, alike if it did not move.
+    pub poses: Option<[Isometry3d; 2]>,
     /// Its material as last gathered, to the bit.
     pub material: Option<([u32; 7], Combine)>,
     /// Its layers as last gathered.

@@ -18,6 +18,24 @@ use crate::zones::ZoneGravity;
 ///
 /// The ground carries it along, and is not pushed back by a jump. Snapshots do not remember jumps.
 ///
+/// # What the ground can transmit
+/// Friction times gravity is the greatest acceleration and deceleration of a ball that is driven by
+/// [torque](Drive::Torque): 0.3 × 9.81 m/s² = 2.9 m/s² for marbles and walls without a
+/// [`SurfaceMaterial`](crate::components::SurfaceMaterial). With more than that in
+/// [`acceleration`](Self::acceleration) or [`braking`](Self::braking), the ball spins in place or slides. By a
+/// [force](Drive::Force), it rolls without slip up to 3.5 times as much, and 5/7 of the force's
+/// acceleration is that of the center. A nimble hero has friction:
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// fn spawn(mut commands: Commands) {
+///     let controller = MarbleController { acceleration: 9.0, braking: 9.0, ..default() };
+///     let rubber = SurfaceMaterial { friction: 1.0, restitution: 0.2, ..default() }; // up to 9.8 m/s²
+///     commands.spawn((controller, rubber, Marble::new(0.25)));
+/// }
+/// ```
+///
 /// ```
 /// # use bevy::prelude::*;
 /// # use bevy_taw::prelude::*;
@@ -50,11 +68,13 @@ pub struct MarbleController {
     pub drive: Drive,
     /// Speed that it is driven to, in m/s.
     pub max_speed: f32,
-    /// Acceleration on the ground, in m/s².
+    /// Acceleration on the ground, in m/s², as far as friction
+    /// [transmits it](Self#what-the-ground-can-transmit).
     pub acceleration: f32,
     /// Acceleration in the air, in m/s².
     pub air_acceleration: f32,
-    /// Deceleration on the ground without a direction, in m/s²; zero lets it roll on.
+    /// Deceleration on the ground without a direction, in m/s², as far as friction transmits it; zero lets
+    /// it roll on.
     pub braking: f32,
     /// Speed of a jump, in m/s, against gravity and relative to the ground.
     pub jump_speed: f32,
@@ -96,16 +116,16 @@ pub enum Drive {
 }
 
 impl Default for MarbleController {
-    /// Rolls at up to 6 m/s, jumps 1.2 m high.
+    /// Rolls at up to 6 m/s without slip on surfaces of the default friction, jumps 1.2 m high.
     fn default() -> Self {
         Self {
             direction: Vec3::ZERO,
             jump: false,
             drive: Drive::Torque,
             max_speed: 6.0,
-            acceleration: 12.0,
+            acceleration: 2.5,
             air_acceleration: 3.0,
-            braking: 4.0,
+            braking: 2.5,
             jump_speed: 4.9,
             coyote_time: 0.1,
             jump_buffer: 0.1,

@@ -11,7 +11,9 @@ use crate::wall::Wall;
 /// queries do not see.
 pub fn forget_marble(removed: On<Remove, Marble>, mut app: DeferredWorld) {
     let id = app.get::<MarbleState>(removed.entity).and_then(|state| state.id);
+    // Spatial queries go on with the tree that they have.
     let mut world = app.resource_mut::<TawWorld>();
+    let world = world.bypass_change_detection();
     world.away.remove(&removed.entity);
     if let Some(id) = id
         && world.marble_entities.get(&id) == Some(&removed.entity)

@@ -1,6 +1,8 @@
 //! Walls, from components into the world: shapes are built once, in their own frames, and then
 //! only put where they are.
 
+use std::time::Duration;
+
 use bevy::ecs::entity::Entities;
 use bevy::math::Isometry3d;
 use bevy::prelude::*;
@@ -19,9 +21,7 @@ use crate::resources::TawWorld;
 use crate::sensor::Sensor;
 use crate::snapshot::{self, RowRemoved};
 use crate::wall::Wall;
-use crate::wall_motion::{
-    Change, Clock, LARGEST_CHANGE_OF_SPEED, PoseTracker, TrackedPose, WallVelocity,
-};
+use crate::wall_motion::{Change, Clock, LARGEST_CHANGE_OF_SPEED, TrackedPose, WallVelocity};
 
 /// Two scales that differ by no larger part than this are one. A rotation leaves its columns a
 /// few epsilons longer or shorter, and each ancestor a few more: 32 of them are reached by none
@@ -37,6 +37,8 @@ pub struct FrameTime {
     since_step: f32,
     /// True until the first fixed step of this frame.
     first: bool,
+    /// Fixed time of the last gather.
+    pub gathered_at: Duration,
 }
 
 /// Counts a frame.
@@ -124,7 +126,8 @@ pub fn walls(
         overstep: fixed.overstep().as_secs_f32(),
         frames: frame.since_step,
     };
-    (frame.since_step, frame.first) = (0.0, false);
+    *frame =
+        FrameTime { this: frame.this, since_step: 0.0, first: false, gathered_at: fixed.elapsed() };
     let (mut rows, mut sensors) = (0, 0);
     for mut item in &mut walls {
         let entity = item.0.0;
@@ -257,7 +260,7 @@ impl Gathering<'_, '_> {
 
     /// Leaves a wall where it is, at rest.
     fn stop(&mut self, state: &mut WallState) {
-        state.motion = PoseTracker::default();
+        (state.motion, state.poses) = default();
         let _ = self.set_motion(state, None);
     }
 
@@ -294,6 +297,11 @@ impl Gathering<'_, '_> {
         }
         let translation = Vec3::from(pose.translation);
         let seen = (bits(translation), rotation_bits(pose.rotation));
+        let before = state.posed.filter(|_| velocity.is_some()).map(|(translation, rotation)| {
+            let translation = Vec3::from_array(translation.map(f32::from_bits));
+            Isometry3d::new(translation, Quat::from_array(rotation.map(f32::from_bits)))
+        });
+        state.poses = Some([before.unwrap_or(pose), pose]);
         // A wall that moves or jumps has no surface velocity, nor has a sensor.
         let surface = surface.filter(|_| !is_sensor && state.posed == Some(seen));
         let on_surface = |SurfaceVelocity(surface): SurfaceVelocity| WallVelocity {

@@ -3,9 +3,13 @@
 //! What is on the screen lies between the last two steps, so it lags by up to one:
 //! outside the fixed schedules, read a marble's true place from the
 //! [`TawWorld`], or leave this plugin out.
-//! Marbles get it by themselves, in world space, whatever carries them; give moving walls,
-//! and what carries marbles, a [`TransformInterpolation`] of
-//! [`bevy_transform_interpolation`]. A marble with `NoTransformEasing` is left out.
+//! Marbles get it by themselves, in world space, whatever carries them, and so do walls that move, in
+//! whatever schedule: a lift and its riders are drawn together. Of walls it is the `GlobalTransform` that is
+//! drawn, with those of what carries them or is carried along; their `Transform` is what the game wrote.
+//! While [`Time<Virtual>`] stands still or the physics does not run, a wall that is moved is drawn where its
+//! `Transform` is.
+//! A marble or wall with `NoTransformEasing` is left out. Give what carries marbles and has no wall a
+//! [`TransformInterpolation`] of [`bevy_transform_interpolation`].
 //!
 //! # What is written between steps
 //! A system in `Update` sees the `Transform` that is drawn. If it writes there,
@@ -26,6 +30,7 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 use bevy::prelude::*;
+use bevy::transform::systems::sync_simple_transforms;
 use bevy_transform_interpolation::TransformEasingSystems;
 use bevy_transform_interpolation::prelude::*;
 
@@ -35,11 +40,12 @@ use crate::convert::{from_point, from_rotation, to_point, to_rotation};
 use crate::resources::TawWorld;
 use crate::scatter::{Frame, put};
 use crate::schedule::TawSchedule;
+use crate::wall_drawing;
 
 pub use bevy_transform_interpolation as transform_interpolation;
 
-/// Interpolates every marble's translation, and its rotation if the model has one.
-/// A marble with `NoTransformEasing` is left out. Does nothing where the step is
+/// Interpolates every marble's translation, and its rotation if the model has one, and draws walls that
+/// move where the marbles that are drawn meet them. What has `NoTransformEasing` is left out. Does nothing where the step is
 /// [in a schedule](crate::TawPlugins::in_schedule) outside of the fixed main loop.
 #[derive(Debug, Default)]
 pub struct TawInterpolationPlugin;
@@ -77,7 +83,15 @@ impl Plugin for TawInterpolationPlugin {
             note_start.after(TawSystems::Gather).before(TawSystems::Step),
         )
         // And by now, where this frame took it.
-        .add_systems(PostUpdate, ease_children.before(TransformSystems::Propagate));
+        .add_systems(
+            PostUpdate,
+            (
+                ease_children.before(TransformSystems::Propagate),
+                wall_drawing::draw
+                    .in_set(TransformSystems::Propagate)
+                    .after(sync_simple_transforms),
+            ),
+        );
     }
 }
 

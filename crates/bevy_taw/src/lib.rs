@@ -52,7 +52,7 @@
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
 //! | [`diagnostics`] | step time and counts |
 //! | [`wall_motion`] | speed of walls that move |
-//! | [`interpolation`] | smooth motion between fixed steps |
+//! | [`interpolation`] | smooth motion between fixed steps, of marbles and of walls that move |
 //! | `picking` (feature `picking`) | pointers on marbles and walls |
 //! | `mesh_walls` (feature `render`) | walls of meshes, meshes of walls |
 //! | `gizmos` (feature `render`) | contacts, normals, velocities, sensors and the grid, drawn |
@@ -60,6 +60,33 @@
 //! | `debug_ui` (feature `debug_ui`) | egui panels for any game |
 //! | `trade` (feature `trade`) | what every model would cost and buy, measured beside the game |
 //! | `governor` (feature `trade`) | keeps steps within a budget |
+//!
+//! # Tests without a window
+//! A frame that is as long as a fixed step makes exactly one step, on every machine:
+//!
+//! ```
+//! use bevy::prelude::*;
+//! use bevy::time::TimeUpdateStrategy;
+//! use bevy_taw::prelude::*;
+//!
+//! let mut app = App::new();
+//! // Not `TawPlugins`, which draw between steps: a `Transform` is that of the last step.
+//! app.add_plugins((MinimalPlugins, TransformPlugin, TawPlugin));
+//! app.insert_resource(Time::<Fixed>::from_hz(64.0));
+//! let step = app.world().resource::<Time<Fixed>>().timestep();
+//! app.insert_resource(TimeUpdateStrategy::ManualDuration(step));
+//! app.update(); // Bevy's first frame takes no time
+//!
+//! let ball = app.world_mut().spawn((Marble::new(0.5), Transform::from_xyz(0.0, 10.0, 0.0))).id();
+//! for _ in 0..64 {
+//!     app.update();
+//! }
+//! let fallen = 10.0 - app.world().get::<Transform>(ball).unwrap().translation.y;
+//! assert!((fallen - 9.81 / 2.0).abs() < 0.01); // in a second
+//! ```
+//!
+//! A longer frame makes as many steps as fit in; of one of more than 250 ms, Bevy passes over the rest
+//! ([`Time::<Virtual>::max_delta`](bevy::time::Time::max_delta)).
 //!
 //! # Units
 //! Metres, seconds. `Transform::scale` does not change a marble's radius.
@@ -72,6 +99,7 @@
 
 #![cfg_attr(not(test), warn(clippy::unwrap_used, clippy::expect_used, clippy::panic))]
 
+mod ball;
 pub mod components;
 pub mod controller;
 mod convert;
@@ -113,6 +141,7 @@ pub mod swarm_render;
 #[cfg(feature = "trade")]
 pub mod trade;
 pub mod wall;
+mod wall_drawing;
 pub mod wall_motion;
 pub mod zones;
 
@@ -143,15 +172,15 @@ pub mod prelude {
     pub use crate::picking::TawPickingPlugin;
     pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
-    pub use crate::sensor::{CollidingEntities, Sensor, SensorEntered, SensorLeft};
+    pub use crate::sensor::{CollidingBalls, CollidingEntities, Sensor, SensorEntered, SensorLeft};
     pub use crate::spatial_query::{SpatialQuery, SpatialQueryFilter};
-    pub use crate::swarm::{Swarm, TawSwarmModel, Tint};
+    pub use crate::swarm::{Ball, BallId, Swarm, TawSwarmModel, Tint};
     pub use crate::wall::Wall;
     pub use crate::zones::{GravityZone, WindZone};
     pub use crate::{Substep, TawPlugin, TawPlugins, TawSchedule, TawSystems};
     pub use taw::motion::{ForceField, Integrator, Medium, Rotation};
     pub use taw::response::{Combine, ContactLaw, Response};
-    pub use taw::swarm::{Ball, SwarmModel, Tier};
+    pub use taw::swarm::{SwarmModel, Tier};
     pub use taw::world::{Detection, Model, Precision};
 }
 

@@ -271,6 +271,7 @@ fn add_scatter(app: &mut App) {
             refusal::report_stopped,
             swarm::report_stopped,
             sensor::scatter,
+            sensor::scatter_balls,
             grounded::find.run_if(any_with_component::<Grounded>),
             messages::write.run_if(messages::are_read),
             messages::forget.run_if(not(messages::are_read)),

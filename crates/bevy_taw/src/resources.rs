@@ -47,6 +47,15 @@ impl Default for Gravity {
 
 /// The force fields that act on every marble besides gravity. A field whose numbers
 /// cannot be right is refused like a wrong [`TawModel`], with all the others.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// # let mut app = App::new();
+/// let wind = Medium::new(Vec3::X * 8.0, 0.01, 0.0);
+/// let planet = ForceField::attraction(Vec3::NEG_Y * 50.0, 2.5e4);
+/// app.insert_resource(Forces(vec![ForceField::Drag(wind), planet]));
+/// ```
 #[derive(Resource, Clone, Debug, Default, PartialEq, Deref, DerefMut)]
 pub struct Forces(pub Vec<ForceField<f32>>);
 

@@ -17,6 +17,7 @@
 
 use bevy::ecs::world::DeferredWorld;
 use bevy::prelude::*;
+use taw::swarm::BallId;
 use taw::world::{MarbleId, SensorId};
 
 use crate::components::WallState;
@@ -24,23 +25,40 @@ use crate::resources::TawWorld;
 use crate::wall::Wall;
 
 /// Makes a sensor of a [`Wall`]: marbles pass through it, and it reports which of them enter and leave,
-/// by [`SensorEntered`] and [`SensorLeft`], and which are inside, by [`CollidingEntities`].
+/// by [`SensorEntered`] and [`SensorLeft`], and which are inside, by [`CollidingEntities`]; of the balls of
+/// swarms, which are inside after each step, by [`CollidingBalls`].
 ///
 /// It may be moved as a wall, by itself or by what carries it, and has [`CollisionLayers`]. A marble
 /// that passes through within a step enters and leaves in it, at any speed; one that is put elsewhere
 /// meets nothing on the way. Within a substep (of `SoftStep` within a step), paths are taken to be
-/// straight. Of a mesh, inside is what touches its surface. Balls of swarms are not sensed.
+/// straight. Of a mesh, inside is what touches its surface.
 ///
 /// [`CollisionLayers`]: crate::layers::CollisionLayers
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
-#[require(Wall, CollidingEntities)]
+#[require(Wall, CollidingEntities, CollidingBalls)]
 pub struct Sensor;
 
 /// Marbles inside of a sensor after the last step, sorted.
 #[derive(Component, Clone, Debug, Default, PartialEq, Eq, Deref, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct CollidingEntities(Vec<Entity>);
+
+/// Balls of swarms inside of a sensor after the last step, sorted. One that passes through within a step is
+/// not noticed.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// /// Whoever falls into a hole is gone.
+/// fn swallow(holes: Query<&CollidingBalls, Changed<CollidingBalls>>, mut swarm: Single<&mut Swarm>) {
+///     for hole in holes {
+///         swarm.retain(|ball| !hole.contains(&ball));
+///     }
+/// }
+/// ```
+#[derive(Component, Clone, Debug, Default, PartialEq, Eq, Deref)]
+pub struct CollidingBalls(Vec<BallId>);
 
 /// Message, and event of the sensor's entity: a marble entered a sensor.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Reflect)]
@@ -136,5 +154,20 @@ pub(crate) fn scatter(
         colliding.0.clear();
         colliding.0.extend(inside.iter().filter_map(of_sensor));
         colliding.0.sort_unstable();
+    }
+}
+
+/// Updates [`CollidingBalls`].
+pub(crate) fn scatter_balls(
+    world: Res<TawWorld>,
+    mut sensors: Query<(&WallState, &mut CollidingBalls)>,
+) {
+    for (state, mut colliding) in &mut sensors {
+        let inside = state.sensor.and_then(|id| world.sensors.balls_inside(id).ok());
+        let inside = inside.unwrap_or_default();
+        if colliding.0 != inside {
+            colliding.0.clear();
+            colliding.0.extend_from_slice(inside);
+        }
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! Positions are those after the last fixed step, up to a step ahead of what
 //! [`TawInterpolationPlugin`](crate::interpolation::TawInterpolationPlugin) draws. Balls of swarms are
-//! not found.
+//! not found: a ray on them is [`TawWorld::cast_ray_on_balls`].
 //!
 //! ```
 //! # use bevy::prelude::*;

@@ -4,22 +4,26 @@ use bevy::ecs::world::DeferredWorld;
 use bevy::math::bounding::Aabb3d;
 use bevy::platform::collections::HashSet;
 use bevy::prelude::*;
-use taw::swarm::{Ball, BallId, Stage, SwarmModel};
-use taw::world::Mass;
+use taw::swarm::{Stage, SwarmModel};
 
-use crate::convert::to_point;
+use crate::components::MarbleMass;
 use crate::diagnostics::StepTimes;
 use crate::layers::CollisionLayers;
 use crate::refusal::{Refusals, report};
 use crate::resources::TawWorld;
 use crate::snapshot::{RowRemoved, lost_balls};
 
+pub use crate::ball::{Ball, BallHit};
+pub use taw::swarm::BallId;
+
 /// Marbles in bulk, up to millions, which collide with each other, with walls, and with the
 /// marbles that are entities. How they step is in [`TawSwarmModel`].
 ///
 /// A [`CollisionLayers`] beside it holds for all its balls.
 /// They live in world space; a `Transform` beside this component says nothing. They go when it
-/// goes. With the feature `render`, a camera sees them.
+/// goes, and one by one by [`Swarm::remove`]. Where one is, and how fast, is read and set by
+/// [`TawWorld::ball`], [`TawWorld::set_ball_position`] and [`TawWorld::set_ball_velocity`]. With the
+/// feature `render`, a camera sees them.
 ///
 /// ```
 /// # use bevy::math::bounding::Aabb3d;
@@ -92,7 +96,7 @@ impl Swarm {
             let radius = radii.start() + (radii.end() - radii.start()) * random(0);
             // Or they would stand on each other's heads for a while.
             let aside = Vec3::new(random(1) - 0.5, 0.0, random(2) - 0.5) * 0.05 * pitch;
-            Ball::new(to_point(place + aside), radius)
+            Ball::new(place + aside, radius)
         });
         Self::new(balls.collect())
     }
@@ -105,7 +109,8 @@ impl Swarm {
 
     /// Another mass for all that are not in the world yet.
     #[must_use]
-    pub fn with_mass(mut self, mass: Mass<f32>) -> Self {
+    pub fn with_mass(mut self, mass: impl Into<MarbleMass>) -> Self {
+        let mass = mass.into();
         self.coming.iter_mut().for_each(|ball| ball.mass = mass);
         self
     }
@@ -122,6 +127,20 @@ impl Swarm {
         if count < all.min(self.balls.len()) {
             self.going.extend(self.balls.drain(count..));
         }
+    }
+
+    /// Takes one ball out with the next step. Returns false if it is none of these. Takes longer the more
+    /// there are: [`retain`](Self::retain) takes out many at once.
+    pub fn remove(&mut self, ball: BallId) -> bool {
+        let found = self.balls.iter().position(|it| *it == ball);
+        self.going.extend(found.map(|i| self.balls.remove(i)));
+        found.is_some()
+    }
+
+    /// Takes balls out with the next step: those for which this returns false. Balls that are not in the
+    /// world yet have no name, and stay.
+    pub fn retain(&mut self, mut stays: impl FnMut(BallId) -> bool) {
+        self.going.extend(self.balls.extract_if(.., |ball| !stays(*ball)));
     }
 
     /// How many there are, with those that come with the next step.
@@ -142,8 +161,9 @@ impl Swarm {
         &self.coming
     }
 
-    /// Those that are in the world, in the order in which they came: names for
-    /// `TawWorld::swarm`, which has all else about them.
+    /// Those that are in the world, in the order in which they came: names for [`TawWorld::ball`], and for
+    /// `TawWorld::swarm`, which has all else about them. One that is removed there goes from here with
+    /// the next step.
     #[must_use]
     pub fn balls(&self) -> &[BallId] {
         &self.balls
@@ -169,6 +189,8 @@ fn draw(seed: u64, n: u64) -> f32 {
 pub(crate) struct Owners {
     /// The entity of each slot of the swarm.
     pub of_slot: Vec<Option<Entity>>,
+    /// The swarm's removals when it was last gathered.
+    removals: u64,
 }
 
 /// Puts new marbles in, and takes those out that go.
@@ -187,7 +209,11 @@ pub(crate) fn gather(
         let named = swarms.iter_mut().map(|(entity, swarm, _)| (entity, swarm));
         name_balls(&mut world, named, &mut owners, &mut removed);
     }
+    let any_gone = world.swarm.removals() != owners.removals;
     for (entity, mut swarm, layers) in &mut swarms {
+        if any_gone {
+            forget_gone(&world, &mut swarm);
+        }
         let layers = layers.copied().unwrap_or_default();
         let moved = swarm.layers != layers || world.just_restored;
         if swarm.coming.is_empty() && swarm.going.is_empty() && !moved {
@@ -196,7 +222,7 @@ pub(crate) fn gather(
         let swarm = &mut *swarm;
         let going = std::mem::take(&mut swarm.going);
         refusals.check(Some(entity), world.swarm.remove(&going));
-        let coming = std::mem::take(&mut swarm.coming);
+        let coming: Vec<_> = swarm.coming.drain(..).map(taw::swarm::Ball::from).collect();
         let old = if moved { 0 } else { swarm.balls.len() };
         let inserted = world.swarm.insert(&coming).map(|balls| {
             owners.note(&world, entity, &balls);
@@ -205,6 +231,16 @@ pub(crate) fn gather(
         refusals.check(Some(entity), inserted);
         swarm.layers = layers;
         refusals.check(Some(entity), world.swarm.set_layers(&swarm.balls[old..], layers.into()));
+    }
+    owners.removals = world.swarm.removals();
+}
+
+/// Forgets the balls of a swarm that somebody else removed.
+fn forget_gone(world: &TawWorld, swarm: &mut Mut<Swarm>) {
+    let is_there = |ball: &BallId| world.swarm.row(*ball).is_ok();
+    if !swarm.balls.iter().chain(&swarm.going).all(is_there) {
+        swarm.balls.retain(is_there);
+        swarm.going.retain(is_there);
     }
 }
 
@@ -297,12 +333,11 @@ mod tests {
         let region = Aabb3d::new(Vec3::ZERO, Vec3::splat(2.0));
         let swarm = Swarm::filling(region, 500, 0.1..=0.2, 3);
         assert_eq!(swarm.len(), 500);
-        let at = |ball: &Ball| Vec3::new(ball.position.x, ball.position.y, ball.position.z);
         for (i, a) in swarm.coming.iter().enumerate() {
             assert!(a.radius >= 0.1 && a.radius <= 0.2);
-            assert!(at(a).abs().max_element() < 2.0 - 0.9 * a.radius);
+            assert!(a.position.abs().max_element() < 2.0 - 0.9 * a.radius);
             for b in &swarm.coming[..i] {
-                assert!(at(a).distance(at(b)) > a.radius + b.radius);
+                assert!(a.position.distance(b.position) > a.radius + b.radius);
             }
         }
     }

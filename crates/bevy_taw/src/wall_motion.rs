@@ -7,7 +7,8 @@
 //! frame is spread over the fixed steps that run for that frame, which may be many or none. It lags
 //! behind its entity by no more than a frame and a step, and arrives in the first frame in which the
 //! entity rests. After a frame that took much longer than others it catches up half as fast again as
-//! the entity was moved.
+//! the entity was moved. [`TawInterpolationPlugin`](crate::interpolation::TawInterpolationPlugin) draws it
+//! where the marbles that are drawn meet it.
 //!
 //! All this holds where the step is in the fixed main loop. In a schedule that the game runs
 //! ([`TawPlugins::in_schedule`](crate::TawPlugins::in_schedule)), a wall moves within each step to where its

@@ -1,7 +1,9 @@
-//! Zones of another gravity, and of wind: sensors whose marbles are pulled and blown.
+//! Zones of another gravity, and of wind: sensors in which marbles and balls of swarms are pulled and
+//! blown.
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
+use taw::swarm::BallId;
 use taw::world::MarbleId;
 
 use crate::components::WallState;
@@ -11,10 +13,10 @@ use crate::resources::TawWorld;
 use crate::sensor::Sensor;
 
 /// Gravity of its own inside of a [`Sensor`]'s shape, in m/s² in world space. A marble's
-/// [`GravityScale`](crate::components::GravityScale) counts for it. Marbles do not sleep in a world without a
-/// gravity of its own.
+/// [`GravityScale`](crate::components::GravityScale) counts for it, as does a ball's. Marbles do not sleep in
+/// a world without a gravity of its own.
 ///
-/// Acts in each step on the marbles that were inside after the last one. Where zones overlap, what they
+/// Acts in each step on the marbles and the balls of swarms that were inside after the last one. Where zones overlap, what they
 /// add is summed up; of those that replace gravity, that of the highest entity counts.
 ///
 /// ```
@@ -45,8 +47,8 @@ impl Default for GravityZone {
     }
 }
 
-/// Wind inside of a [`Sensor`]'s shape: marbles are dragged along. Acts in each step on those that were
-/// inside after the last one; winds that overlap all drag.
+/// Wind inside of a [`Sensor`]'s shape: marbles and balls of swarms are dragged along. Acts in each step on
+/// those that were inside after the last one; winds that overlap all drag.
 ///
 /// ```
 /// # use bevy::prelude::*;
@@ -67,7 +69,39 @@ pub struct WindZone {
     pub drag: f32,
 }
 
-/// Pull of zones on a marble, in m/s².
+/// Marble, or ball of a swarm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+enum Body {
+    Marble(MarbleId),
+    Ball(BallId),
+}
+
+/// State of a body in a zone.
+struct BodyState {
+    position: Vec3,
+    velocity: Vec3,
+    gravity_scale: f32,
+}
+
+impl Body {
+    /// State of it, if it is still there.
+    fn state(self, world: &TawWorld) -> Option<BodyState> {
+        let (position, velocity, gravity_scale) = match self {
+            Self::Marble(id) => {
+                let marble = world.marbles.get(id).ok()?;
+                (marble.position, marble.velocity, marble.gravity_scale)
+            }
+            Self::Ball(id) => {
+                let ball = world.swarm.get(id).ok()?;
+                (ball.position, ball.velocity, world.swarm.gravity_scale(id).ok()?)
+            }
+        };
+        let (position, velocity) = (from_point(position), from_vector(velocity));
+        Some(BodyState { position, velocity, gravity_scale })
+    }
+}
+
+/// Pull of zones on a body, in m/s².
 #[derive(Clone, Copy, Debug, Default)]
 struct Pull {
     instead: Option<Vec3>,
@@ -76,22 +110,22 @@ struct Pull {
 
 /// Gravity inside of zones.
 #[derive(Resource, Default)]
-pub(crate) struct ZoneGravity(HashMap<MarbleId, Pull>);
+pub(crate) struct ZoneGravity(HashMap<Body, Pull>);
 
 impl ZoneGravity {
     /// Gravity that acts on a marble, its gravity scale included, in m/s².
     pub fn on(&self, world: &TawWorld, marble: Option<MarbleId>) -> Vec3 {
-        let Some((id, marble)) = marble.and_then(|id| Some((id, world.marbles.get(id).ok()?)))
-        else {
+        let body = marble.map(Body::Marble);
+        let Some((body, state)) = body.and_then(|body| Some((body, body.state(world)?))) else {
             return Vec3::ZERO;
         };
         let elsewhere = from_vector(world.gravity());
-        let Pull { instead, besides } = self.0.get(&id).copied().unwrap_or_default();
-        (instead.unwrap_or(elsewhere) + besides) * marble.gravity_scale
+        let Pull { instead, besides } = self.0.get(&body).copied().unwrap_or_default();
+        (instead.unwrap_or(elsewhere) + besides) * state.gravity_scale
     }
 }
 
-/// Pulls and blows the marbles that are in zones.
+/// Pulls and blows what is in zones.
 pub(crate) fn act(
     mut world: ResMut<TawWorld>,
     mut gravity: ResMut<ZoneGravity>,
@@ -108,24 +142,24 @@ pub(crate) fn act(
             continue;
         }
         let middle = transforms.compute_global_transform(zone).ok();
-        for &marble in inside(&world, state) {
-            let pull = gravity.0.entry(marble).or_default();
+        for body in inside(&world, state) {
+            let pull = gravity.0.entry(body).or_default();
             match kind {
                 GravityZone::Replace(gravity) => pull.instead = Some(*gravity),
                 GravityZone::Add(gravity) => pull.besides += gravity,
                 GravityZone::Toward(size) => {
-                    let place = world.marbles.get(marble).map(|it| from_point(it.position)).ok();
-                    let way = middle.zip(place).map(|(middle, at)| middle.translation() - at);
+                    let way = middle.zip(body.state(&world));
+                    let way = way.map(|(middle, body)| middle.translation() - body.position);
                     pull.instead = Some(way.unwrap_or_default().normalize_or_zero() * *size);
                 }
             }
         }
     }
     let elsewhere = from_vector(world.gravity());
-    for (&marble, Pull { instead, besides }) in &gravity.0 {
-        let scale = world.marbles.get(marble).map_or(1.0, |marble| marble.gravity_scale);
-        let change = (instead.map_or(Vec3::ZERO, |it| it - elsewhere) + *besides) * scale;
-        accelerate(&mut world, (marble, change), &mut refusals);
+    for (&body, Pull { instead, besides }) in &gravity.0 {
+        let Some(BodyState { gravity_scale, .. }) = body.state(&world) else { continue };
+        let change = (instead.map_or(Vec3::ZERO, |it| it - elsewhere) + *besides) * gravity_scale;
+        accelerate(&mut world, (body, change), &mut refusals);
     }
     blow(&mut world, &winds, time.delta_secs(), &mut refusals);
 }
@@ -140,42 +174,49 @@ fn blow(
     let mut in_order: Vec<_> = winds.iter().collect();
     in_order.sort_unstable_by_key(|(zone, ..)| *zone);
     // Sums of the rates, and of velocities times rates.
-    let mut sums = HashMap::<MarbleId, (f32, Vec3)>::new();
+    let mut sums = HashMap::<Body, (f32, Vec3)>::new();
     for (zone, wind, state) in in_order {
         if refusals.check(Some(zone), wind.validate()) {
-            for &marble in inside(world, state) {
-                let (rate, flow) = sums.entry(marble).or_default();
+            for body in inside(world, state) {
+                let (rate, flow) = sums.entry(body).or_default();
                 *rate += wind.drag;
                 *flow += wind.drag * wind.velocity;
             }
         }
     }
-    for (marble, (rate, flow)) in sums.into_iter().filter(|(_, (rate, _))| *rate > 0.0 && dt > 0.0)
-    {
-        if let Ok(body) = world.marbles.get(marble) {
+    for (body, (rate, flow)) in sums.into_iter().filter(|(_, (rate, _))| *rate > 0.0 && dt > 0.0) {
+        if let Some(BodyState { velocity, .. }) = body.state(world) {
             // As much as the exact solution of dv/dt = flow - rate v does in a step.
             let part = -(-rate * dt).exp_m1() / dt;
-            let change = (flow / rate - from_vector(body.velocity)) * part;
-            accelerate(world, (marble, change), refusals);
+            let change = (flow / rate - velocity) * part;
+            accelerate(world, (body, change), refusals);
         }
     }
 }
 
-/// Marbles that were inside of a sensor after the last step.
-fn inside<'a>(world: &'a TawWorld, sensor: &WallState) -> &'a [MarbleId] {
-    sensor.sensor.and_then(|id| world.sensors.inside(id).ok()).unwrap_or_default()
+/// Marbles and balls that were inside of a sensor after the last step.
+fn inside(world: &TawWorld, sensor: &WallState) -> impl Iterator<Item = Body> {
+    let marbles = sensor.sensor.and_then(|id| world.sensors.inside(id).ok()).unwrap_or_default();
+    let balls =
+        sensor.sensor.and_then(|id| world.sensors.balls_inside(id).ok()).unwrap_or_default();
+    let marbles = marbles.iter().copied().map(Body::Marble);
+    marbles.chain(balls.iter().copied().map(Body::Ball))
 }
 
-/// Accelerates a marble in this step, in m/s².
-fn accelerate(
-    world: &mut TawWorld,
-    (marble, acceleration): (MarbleId, Vec3),
-    refusals: &mut Refusals,
-) {
-    if acceleration != Vec3::ZERO && world.marbles.row(marble).is_ok() {
-        let entity = world.marble_entities.get(&marble).copied();
-        let applied = world.marbles.apply_acceleration(marble, to_vector(acceleration));
-        refusals.check(entity, applied);
+/// Accelerates a body in this step, in m/s².
+fn accelerate(world: &mut TawWorld, (body, acceleration): (Body, Vec3), refusals: &mut Refusals) {
+    if acceleration == Vec3::ZERO {
+        return;
+    }
+    let acceleration = to_vector(acceleration);
+    match body {
+        Body::Marble(id) => {
+            let entity = world.marble_entities.get(&id).copied();
+            refusals.check(entity, world.marbles.apply_acceleration(id, acceleration));
+        }
+        Body::Ball(id) => {
+            refusals.check(None, world.swarm.apply_acceleration(id, acceleration));
+        }
     }
 }
 

@@ -86,3 +86,40 @@ fn a_ball_stays_on_a_board_that_tilts() {
         }
     }
 }
+
+#[test]
+fn who_rides_has_a_contact_with_the_lift_in_each_substep_by_event_driven() {
+    for (substeps, speed) in [(1, 3.0), (1, -3.0), (4, 0.5), (4, -0.5)] {
+        let mut world = world(substeps, Detection::Swept);
+        let response = Response::EventDriven;
+        world.set_model(Model { response, ..world.model() }).unwrap();
+        let lift = world.walls.insert(board()).unwrap();
+        let motion = WallMotion {
+            velocity: Vec3::unit_y() * speed,
+            angular_velocity: Vec3::new(0.0, 0.0, 0.0),
+            pivot: Point3::new(0.0, 0.0, 0.0),
+        };
+        world.walls.set_motion(lift, Some(motion)).unwrap();
+        let id = ball(&mut world, 0.0);
+        world.marbles.set_velocity(id, motion.velocity).unwrap();
+        let substep = DT / f64::from(substeps);
+        for step in 1..=30 {
+            let at = Vec3::unit_y() * (speed * DT * f64::from(step));
+            let end = board().transformed(Pose { translation: at, ..Pose::identity() }).unwrap();
+            world.walls.set(lift, end.clone()).unwrap();
+            world.begin_step();
+            for after in (0..substeps).rev() {
+                world.begin_substep(substep * f64::from(after));
+                world.integrate(substep).unwrap();
+                world.generate_contacts();
+                let case =
+                    format!("{substeps} substeps at {speed} m/s, step {step}, {after} after");
+                let contact = world.contacts.wm.first().unwrap_or_else(|| panic!("{case}"));
+                assert!(contact.separation.abs() < 1e-6, "{case}: {}", contact.separation);
+                assert_eq!(world.walls.get(lift).unwrap(), &end, "{case}");
+                world.restitute(substep).unwrap();
+            }
+            world.end_step();
+        }
+    }
+}

@@ -288,3 +288,40 @@ fn marbles_do_not_feel_sensors() {
         assert_eq!(build(true), build(false), "{response:?}");
     }
 }
+
+fn balls_inside_at_the_end<S: Scalar>(response: Response) {
+    let mut world = world::<S>(response, 2);
+    // Many far away, so that there are blocks that are passed over, and one ball at each x.
+    let at = |x: f32, y: f32| taw::swarm::Ball::new(Point3::new(x, y, 0.0), 0.25);
+    let far: Vec<_> = (0..600_u16).map(|i| at(f32::from(i) * 2.0, 100.0)).collect();
+    world.swarm.insert(&far).unwrap();
+    let row: Vec<_> = (-5..=5_i16).map(|x| at(f32::from(x), 0.0)).collect();
+    let ids = world.swarm.insert(&row).unwrap();
+    let marble = world.marbles.insert(ball([0.5, 0.5, 0.0], [0.0; 3], 0.1)).unwrap();
+    let room = world.sensors.insert(cuboid([-2.5, -1.0, -1.0], [2.5, 1.0, 1.0])).unwrap();
+    let deaf = world.sensors.insert(cuboid([-2.5, -1.0, -1.0], [2.5, 1.0, 1.0])).unwrap();
+    world.sensors.set_layers(deaf, CollisionLayers::new(2, 2)).unwrap();
+    let half = world.sensors.insert(Plane::new(Vec3::unit_x(), S::zero()).unwrap()).unwrap();
+    world.swarm.set_layers(&ids, CollisionLayers::new(1, 1)).unwrap();
+    world.step(S::from_f64(1e-3)).unwrap();
+    assert_eq!(world.sensors.balls_inside(room).unwrap(), &ids[3..8], "{response:?}");
+    assert_eq!(world.sensors.inside(room).unwrap(), [marble]);
+    assert_eq!(world.sensors.balls_inside(deaf).unwrap(), []);
+    assert_eq!(world.sensors.balls_inside(half).unwrap().len(), 6 + 1);
+    world.swarm.remove(&ids[4..5]).unwrap();
+    world.swarm.set_position(ids[0], Point3::new(0.0, 0.6, 0.0)).unwrap();
+    world.step(S::from_f64(1e-3)).unwrap();
+    let mut expected = [&ids[..1], &ids[3..4], &ids[5..8]].concat();
+    expected.sort_unstable();
+    assert_eq!(world.sensors.balls_inside(room).unwrap(), expected, "{response:?}");
+}
+
+#[test]
+fn balls_of_the_swarm_are_inside_whose_shapes_overlap_at_the_end_of_a_step() {
+    for response in RESPONSES {
+        balls_inside_at_the_end::<f32>(response);
+        if response != Response::SoftStep {
+            balls_inside_at_the_end::<f64>(response);
+        }
+    }
+}

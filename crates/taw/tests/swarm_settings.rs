@@ -1,5 +1,6 @@
 //! Settings of single balls of a swarm, and force fields: the same physics as marbles have.
 
+use cgmath::InnerSpace;
 use taw::Error;
 use taw::motion::{ForceField, Medium};
 use taw::prelude::*;
@@ -225,4 +226,51 @@ fn bad_settings_are_refused_and_change_nothing() {
     assert_eq!(world.swarm.set_gravity_scale(of_marble, 2.0), refused);
     assert_eq!(world.swarm.set_material(of_marble, None), refused);
     assert!(world == before);
+}
+
+#[test]
+fn accelerations_act_for_one_step_and_add_up() {
+    for (tier, response) in [
+        (Tier::Full, Response::SoftStep),
+        (Tier::Full, Response::Impulse),
+        (Tier::Lab, Response::Impulse),
+    ] {
+        let mut world = world(tier, 1);
+        world.set_model(Model { response, ..Model::default() }).unwrap();
+        world.set_gravity(Vec3::new(0.0, 0.0, 0.0)).unwrap();
+        let high = |x: f32| ball([x, 20.0, 0.0], [0.0; 3]);
+        let ids = world.swarm.insert(&[high(0.0), high(5.0)]).unwrap();
+        world.swarm.set_gravity_scale(ids[1], 2.0).unwrap();
+        for acceleration in [Vec3::new(3.0, 0.0, 0.0), Vec3::new(0.0, 0.0, -2.0)] {
+            world.swarm.apply_acceleration(ids[0], acceleration).unwrap();
+        }
+        steps(&mut world, 3);
+        let expected = Vec3::new(3.0, 0.0, -2.0) * DT;
+        let is = velocity(&world, ids[0]);
+        assert!((is - expected).magnitude() < 1e-5, "{tier:?}, {response:?}: {is:?}");
+        assert_eq!(velocity(&world, ids[1]), Vec3::new(0.0, 0.0, 0.0));
+        let state = world.swarm.get(ids[0]).unwrap();
+        assert_eq!((state.velocity, state.radius), (is, 0.5));
+        let mass = state.mass.of(0.5) / Mass::default().of(0.5);
+        assert!((mass - 1.0).abs() < 1e-6, "{mass}");
+        world.swarm.apply_acceleration(ids[0], expected).unwrap();
+        world.swarm.remove(&ids[..1]).unwrap();
+        assert_eq!(world.swarm.get(ids[0]), Err(Error::NoSuchBall(ids[0])));
+        steps(&mut world, 1);
+    }
+}
+
+#[test]
+fn an_acceleration_wakes_whom_it_moves_and_lets_sleep_who_leans_on_a_wall_by_it() {
+    let mut world = world(Tier::Full, 1);
+    let id = world.swarm.insert(&[ball([0.0, 0.5, 0.0], [0.0; 3])]).unwrap()[0];
+    let mut blow = |speed: f32, count: u32| {
+        for _ in 0..count {
+            world.swarm.apply_acceleration(id, Vec3::new(0.0, speed, 0.0)).unwrap();
+            steps(&mut world, 1);
+        }
+        world.swarm.asleep()
+    };
+    assert_eq!(blow(-1.0, 200), 1);
+    assert_eq!(blow(20.0, 2), 0);
 }

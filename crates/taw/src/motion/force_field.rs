@@ -64,7 +64,29 @@ impl<S: Scalar> PartialEq for ForceField<S> {
     }
 }
 
+impl<S: Scalar> Medium<S> {
+    /// Medium of a velocity in m/s, as an array or as a vector of any library that makes one of it, with
+    /// its [linear](Self::linear) and [quadratic](Self::quadratic) drag.
+    #[must_use]
+    pub fn new(velocity: impl Into<[S; 3]>, linear: S, quadratic: S) -> Self {
+        Self { velocity: velocity.into().into(), linear, quadratic }
+    }
+}
+
 impl<S: Scalar> ForceField<S> {
+    /// [`Spring`](Self::Spring) to an anchor in metres, of a rest length in metres and a spring constant in
+    /// N/m.
+    #[must_use]
+    pub fn spring(anchor: impl Into<[S; 3]>, rest_length: S, stiffness: S) -> Self {
+        Self::Spring { anchor: anchor.into().into(), rest_length, stiffness }
+    }
+
+    /// [`Attraction`](Self::Attraction) to a center in metres, with a strength in m³/s².
+    #[must_use]
+    pub fn attraction(center: impl Into<[S; 3]>, strength: S) -> Self {
+        Self::Attraction { center: center.into().into(), strength }
+    }
+
     /// Validates the numbers.
     pub(crate) fn validated(self) -> Result<Self, Error> {
         let not_negative = |field, value| within(field, value, S::zero(), S::max_value());
@@ -160,6 +182,21 @@ mod tests {
     }
 
     const ORIGIN: Point3<f64> = Point3::new(0.0, 0.0, 0.0);
+
+    #[test]
+    fn constructors_take_vectors_of_any_library_that_makes_arrays_of_them() {
+        let (center, numbers) = (Point3::new(1.0, 2.0, 3.0), [1.0, 2.0, 3.0]);
+        assert_eq!(
+            [ForceField::attraction(center, 4.0), ForceField::spring(numbers, 5.0, 6.0)],
+            [
+                ForceField::Attraction { center, strength: 4.0 },
+                ForceField::Spring { anchor: center, rest_length: 5.0, stiffness: 6.0 }
+            ]
+        );
+        let velocity = Vec3::from(numbers);
+        let expected = Medium { velocity, linear: 7.0, quadratic: 8.0 };
+        assert_eq!(Medium::new(velocity, 7.0, 8.0), expected);
+    }
 
     #[test]
     fn linear_drag_decays_exponentially_toward_the_wind() {

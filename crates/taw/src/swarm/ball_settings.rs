@@ -1,19 +1,50 @@
-//! Settings of single balls: material, layers and gravity scale; and what force fields do to them.
+//! State and settings of single balls: material, layers and gravity scale; and what accelerates them.
 
 use cgmath::Zero;
 
 use super::bodies::{NO_ROW, VelocityChange};
+use super::state::of;
 use super::surfaces::Surface;
 use super::workers::{DisjointSlice, parallel_for_rows};
-use super::{BallId, MAX_COORDINATE, Swarm};
+use super::{Ball, BallId, MAX_COORDINATE, Swarm};
 use crate::Error;
 use crate::broad::{CollisionLayers, IgnoredPairs};
-use crate::error::finite;
+use crate::error::{finite, finite_vector};
 use crate::math::{Point3, Vec3};
-use crate::motion::Motion;
+use crate::motion::{Mass, Motion};
 use crate::response::Material;
 
+/// Forces on single balls.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct BallForces {
+    /// Factors on gravity, by slot; one beyond the end.
+    gravity_scales: Vec<f32>,
+    /// Accelerations in the next step, in m/s².
+    accelerations: Vec<(BallId, Vec3<f32>)>,
+}
+
+impl BallForces {
+    pub fn bytes(&self) -> usize {
+        of(&self.gravity_scales) + of(&self.accelerations)
+    }
+}
+
 impl Swarm {
+    /// State of a ball: what to insert to have another one like it.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`].
+    pub fn get(&self, ball: BallId) -> Result<Ball, Error> {
+        let row = self.row(ball)?;
+        let ([x, y, z, radius], [u, v, w, inverse_mass]) = (self.at[row], self.velocity[row]);
+        Ok(Ball {
+            position: Point3::new(x, y, z),
+            radius,
+            velocity: Vec3::new(u, v, w),
+            mass: Mass::Kilograms(inverse_mass.abs().recip()),
+        })
+    }
+
     /// Material of a ball.
     ///
     /// # Errors
@@ -50,6 +81,12 @@ impl Swarm {
     /// [`Error::NoSuchBall`], also for a marble's.
     pub fn layers(&self, ball: BallId) -> Result<CollisionLayers, Error> {
         self.own_slot(ball).map(|slot| self.surfaces.layers(slot))
+    }
+
+    /// Layers of the ball in a row, if that is no marble.
+    pub(crate) fn layers_of_own_row(&self, row: usize) -> Option<CollisionLayers> {
+        let slot = self.ids.slots().get(row).copied()?;
+        (!self.body_slots.contains(slot)).then(|| self.surfaces.layers(slot))
     }
 
     /// Changes the layers of balls, all or none: which walls, marbles and other balls they collide
@@ -108,7 +145,7 @@ impl Swarm {
     /// [`Error::NoSuchBall`], also for a marble's.
     pub fn gravity_scale(&self, ball: BallId) -> Result<f32, Error> {
         let slot = self.own_slot(ball)?;
-        Ok(self.gravity_scales.get(slot as usize).copied().unwrap_or(1.0))
+        Ok(self.ball_forces.gravity_scales.get(slot as usize).copied().unwrap_or(1.0))
     }
 
     /// Changes the factor on gravity for a ball: zero for one that floats, negative for one that
@@ -119,13 +156,44 @@ impl Swarm {
     pub fn set_gravity_scale(&mut self, ball: BallId, gravity_scale: f32) -> Result<(), Error> {
         let slot = self.own_slot(ball)? as usize;
         let gravity_scale = finite("gravity_scale", gravity_scale)?;
-        if gravity_scale != 1.0 && self.gravity_scales.len() <= slot {
-            self.gravity_scales.resize(slot + 1, 1.0);
+        if gravity_scale != 1.0 && self.ball_forces.gravity_scales.len() <= slot {
+            self.ball_forces.gravity_scales.resize(slot + 1, 1.0);
         }
-        if let Some(scale) = self.gravity_scales.get_mut(slot) {
+        if let Some(scale) = self.ball_forces.gravity_scales.get_mut(slot) {
             *scale = gravity_scale;
         }
         Ok(())
+    }
+
+    /// Accelerates a ball in m/s² throughout the next [`World::step`](crate::world::World::step), besides
+    /// gravity. Accelerations of one ball add up. Wakes it in that step if it is accelerated in another
+    /// way than in the last one.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchBall`], also for a marble's; [`Error::NotFinite`].
+    pub fn apply_acceleration(
+        &mut self,
+        ball: BallId,
+        acceleration: Vec3<f32>,
+    ) -> Result<(), Error> {
+        self.own_slot(ball)?;
+        let names = ["acceleration.x", "acceleration.y", "acceleration.z"];
+        self.ball_forces.accelerations.push((ball, finite_vector(names, acceleration)?));
+        Ok(())
+    }
+
+    /// Clears all applied accelerations.
+    pub(crate) fn clear_accelerations(&mut self) {
+        self.ball_forces.accelerations.clear();
+    }
+
+    /// Changes of velocity by applied accelerations in a step of `dt` seconds.
+    pub(crate) fn applied_changes(&self, dt: f32) -> impl Iterator<Item = VelocityChange> + '_ {
+        self.ball_forces.accelerations.iter().filter_map(move |(ball, acceleration)| {
+            let change: [f32; 3] = (acceleration * dt).into();
+            let change = change.map(|x| x.clamp(-MAX_COORDINATE, MAX_COORDINATE));
+            Some(VelocityChange { slot: self.slot_of(*ball)?, change })
+        })
     }
 
     /// Drops the settings of a slot, as its ball goes.
@@ -133,7 +201,7 @@ impl Swarm {
         self.surfaces.set(slot, None);
         self.surfaces.set_layers(slot, CollisionLayers::ALL);
         self.sleepless.remove(slot);
-        if let Some(scale) = self.gravity_scales.get_mut(slot as usize) {
+        if let Some(scale) = self.ball_forces.gravity_scales.get_mut(slot as usize) {
             *scale = 1.0;
         }
     }
@@ -153,7 +221,7 @@ impl Swarm {
         gravity: Vec3<f32>,
         dt: f32,
     ) -> Vec<VelocityChange> {
-        if acceleration.is_none() && self.gravity_scales.is_empty() {
+        if acceleration.is_none() && self.ball_forces.gravity_scales.is_empty() {
             return Vec::new();
         }
         let rows = self.ids.rows();
@@ -172,7 +240,8 @@ impl Swarm {
                 };
                 let motion =
                     Motion { position: Point3::new(x, y, z), velocity: Vec3::new(u, v, w) };
-                let scale = self.gravity_scales.get(slot as usize).copied().unwrap_or(1.0);
+                let scale =
+                    self.ball_forces.gravity_scales.get(slot as usize).copied().unwrap_or(1.0);
                 let fields = acceleration.as_ref().map_or_else(Vec3::zero, |acceleration| {
                     acceleration(motion, inverse_mass.abs().recip())
                 });

@@ -199,10 +199,17 @@ impl Swarm {
         }
     }
 
-    /// Sets the velocity changes besides gravity in the next step, in m/s, at most one of a slot.
+    /// Sets the velocity changes besides gravity in the next step, in m/s; those of one slot add up.
     /// Wakes those for which it is another one than in the last step.
     pub(crate) fn set_velocity_changes(&mut self, mut now: Vec<VelocityChange>) {
-        now.sort_unstable_by_key(|change| change.slot);
+        now.sort_by_key(|change| change.slot);
+        now.dedup_by(|next, sum| {
+            let is_same = next.slot == sum.slot;
+            if is_same {
+                sum.change = [0, 1, 2].map(|axis| sum.change[axis] + next.change[axis]);
+            }
+            is_same
+        });
         let before = std::mem::take(&mut self.velocity_changes);
         let (mut old, mut new) = (before.iter().peekable(), now.iter().peekable());
         while let Some(slot) = [old.peek(), new.peek()].into_iter().flatten().map(|c| c.slot).min()

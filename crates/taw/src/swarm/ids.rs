@@ -17,6 +17,7 @@ pub(super) struct Ids {
     /// Number of balls that each slot had before; of slots that had none, nothing.
     generations: Vec<u32>,
     free: Vec<u32>,
+    removed: u64,
 }
 
 const NONE: u32 = u32::MAX;
@@ -24,6 +25,11 @@ const NONE: u32 = u32::MAX;
 impl Ids {
     pub fn slots(&self) -> &[u32] {
         &self.slots
+    }
+
+    /// Number of balls that were removed.
+    pub fn removed(&self) -> u64 {
+        self.removed
     }
 
     /// The row of each slot.
@@ -78,6 +84,7 @@ impl Ids {
 
     /// Forgets what was checked, and says which rows are left; these move up.
     pub fn remove(&mut self, balls: &[BallId]) -> Vec<bool> {
+        self.removed += balls.len() as u64;
         let mut kept = vec![true; self.slots.len()];
         self.generations.resize(self.rows.len(), 0);
         for ball in balls {

@@ -66,6 +66,7 @@ use crate::error::{finite_point, finite_vector, positive, within};
 use crate::handle::MarbleId;
 use crate::math::{Point3, Vec3};
 use crate::response::Material;
+use ball_settings::BallForces;
 use batches::pairs_in;
 use bit_set::BitSet;
 use chunk::Chunk;
@@ -132,8 +133,7 @@ pub struct Swarm {
     /// Velocity changes of bodies besides gravity.
     velocity_changes: Vec<bodies::VelocityChange>,
     surfaces: Surfaces,
-    /// Factors on gravity, by slot; one beyond the end.
-    gravity_scales: Vec<f32>,
+    ball_forces: BallForces,
     /// Agreement of bodies with the marbles.
     pub(crate) synced: SyncToken,
     proxies: Vec<Proxy>,
@@ -223,7 +223,8 @@ impl Swarm {
         Ok(ids)
     }
 
-    /// Removes balls, all or none.
+    /// Removes balls, all or none. To remove many at once takes as long as to remove one, which grows with the
+    /// number of all balls.
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], also for one that is listed twice, and for a marble's.
@@ -238,6 +239,9 @@ impl Swarm {
     /// Takes balls out, those of marbles too.
     pub(crate) fn take_out(&mut self, balls: &[BallId]) -> Result<(), Error> {
         self.ids.check(balls)?;
+        if balls.is_empty() {
+            return Ok(());
+        }
         self.sleep_version += 1;
         self.cache_impulses();
         for ball in balls {
@@ -256,6 +260,12 @@ impl Swarm {
         self.wake_all();
         self.pairs_valid = false;
         Ok(())
+    }
+
+    /// Number of balls that were removed so far; to look only when it changes which are gone.
+    #[must_use]
+    pub fn removals(&self) -> u64 {
+        self.ids.removed()
     }
 
     /// Number of balls.

@@ -42,7 +42,7 @@ impl Swarm {
             bodies_are_rows: _,
             velocity_changes,
             surfaces,
-            gravity_scales,
+            ball_forces,
             synced: _,
             proxies,
             body_slots,
@@ -61,7 +61,7 @@ impl Swarm {
             + (of(chunks) + chunks.iter().map(Chunk::bytes).sum::<usize>())
             + (of(planes) + of(body_balls) + of(proxies))
             + (body_slots.bytes() + sleepless.bytes())
-            + (of(velocity_changes) + surfaces.bytes() + of(gravity_scales))
+            + (of(velocity_changes) + surfaces.bytes() + ball_forces.bytes())
             + (ids.bytes() + grid.bytes() + impulse_cache.bytes() + fast_movers.bytes())
             + scratch.bytes()
     }
@@ -105,7 +105,7 @@ impl PartialEq for Swarm {
             bodies_are_rows,
             velocity_changes,
             surfaces,
-            gravity_scales,
+            ball_forces,
             synced: _,
             proxies,
             body_slots,
@@ -134,7 +134,7 @@ impl PartialEq for Swarm {
             && (planes, body_balls, proxies) == (&other.planes, &other.body_balls, &other.proxies)
             && (bodies_are_rows, velocity_changes, surfaces)
                 == (&other.bodies_are_rows, &other.velocity_changes, &other.surfaces)
-            && (gravity_scales, stopped) == (&other.gravity_scales, &other.stopped)
+            && (ball_forces, stopped) == (&other.ball_forces, &other.stopped)
             && (body_slots, sleepless) == (&other.body_slots, &other.sleepless)
             && walls_identity.is_some() == other.walls_identity.is_some()
             && *steps_since_build == other.steps_since_build

@@ -18,6 +18,7 @@ pub(super) struct EventDriven;
 
 impl<S: Scalar> Method<S> for EventDriven {
     fn advance(&self, world: &mut World<S>, dt: S) {
+        world.scratch.substep = dt;
         let context = world.settings.step_context(dt);
         world.marbles.mean_accelerations(context, &mut world.scratch.accelerations);
         if world.settings.model.rotation != Rotation::Dynamic {
@@ -27,6 +28,13 @@ impl<S: Scalar> Method<S> for EventDriven {
 
     fn contact_distance(&self, world: &World<S>, dt: S) -> S {
         world.resting_contact_distance(dt)
+    }
+
+    fn generate_contacts(&self, world: &mut World<S>) {
+        // Marbles are where the substep begins, so walls have to be there, too.
+        world.walls.interpolate_to(world.scratch.rest_of_step + world.scratch.substep);
+        world.list_contacts();
+        world.walls.end_interpolation();
     }
 
     fn solve(&self, world: &mut World<S>, dt: S) {

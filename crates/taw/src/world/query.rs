@@ -45,8 +45,7 @@ pub struct QueryTree<S> {
 /// Item of a leaf.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Item {
-    /// Index of a marble.
-    Marble(u32),
+    Marble(MarbleId),
     Wall(SubShape),
 }
 
@@ -61,8 +60,10 @@ impl<S: Scalar> QueryTree<S> {
     pub fn update(&mut self, world: &World<S>) {
         let before = std::mem::take(&mut self.items);
         self.boxes.clear();
-        for row in 0..world.marbles.len() {
-            self.items.push(Item::Marble(row as u32));
+        for (row, id) in
+            (0..world.marbles.len()).filter_map(|row| Some((row, world.marbles.id(row)?)))
+        {
+            self.items.push(Item::Marble(id));
             self.boxes.push(world.marbles.shape_of_row(row).bounding_box());
         }
         for (wall, shape) in (0..).zip(world.walls.shapes()) {
@@ -126,9 +127,9 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Queries through a tree that is up to date ([`QueryTree::update`]), so that many share it. Of
-    /// one that is older, hits are true, but some may be missed: of what came or moved since, and after
-    /// removals, of any.
+    /// Queries through a tree that is up to date ([`QueryTree::update`]), so that many share it. It still is
+    /// after marbles were removed. Of one that is older, hits are true, but some may be missed: of what came
+    /// or moved since, and after a wall was removed, of any.
     #[must_use]
     pub fn queries_of<'a>(&'a self, tree: &'a QueryTree<S>) -> Queries<'a, S> {
         Queries { world: self, tree }
@@ -138,7 +139,7 @@ impl<S: Scalar> World<S> {
 impl<S: Scalar> Queries<'_, S> {
     fn collider(&self, item: Item) -> Option<ColliderId> {
         match item {
-            Item::Marble(row) => self.world.marbles.id(row as usize).map(ColliderId::Marble),
+            Item::Marble(id) => self.world.marbles.row(id).ok().map(|_| ColliderId::Marble(id)),
             Item::Wall(part) => self.world.walls.id(part.wall as usize).map(ColliderId::Wall),
         }
     }
@@ -180,9 +181,7 @@ impl<S: Scalar> Queries<'_, S> {
         self.tree.tree.for_each_on_segment(ray.origin, motion, |number| {
             let item = self.tree.items[number as usize];
             hits.add(item, || match item {
-                Item::Marble(row) => {
-                    self.world.marbles.shape_of_row(row as usize).cast_ray(ray, max_distance)
-                }
+                Item::Marble(id) => self.world.marbles.shape(id).ok()?.cast_ray(ray, max_distance),
                 Item::Wall(part) => cast_ray_on_wall(
                     &self.world.walls.shapes()[part.wall as usize],
                     part,
@@ -226,8 +225,8 @@ impl<S: Scalar> Queries<'_, S> {
         self.tree.tree.for_each_in_box(&start.union(&end), |number| {
             let item = self.tree.items[number as usize];
             match item {
-                Item::Marble(row) => {
-                    let marble = self.world.marbles.shape_of_row(row as usize);
+                Item::Marble(id) => {
+                    let Ok(marble) = self.world.marbles.shape(id) else { return };
                     offer(item, &|| {
                         Some(shape_cast_of_shapes(&marble, still, shape, translation)?.result)
                     });
@@ -258,8 +257,8 @@ impl<S: Scalar> Queries<'_, S> {
         self.tree.tree.for_each_in_box(&shape.bounding_box(), |number| {
             let item = self.tree.items[number as usize];
             match item {
-                Item::Marble(row) => {
-                    let marble = self.world.marbles.shape_of_row(row as usize);
+                Item::Marble(id) => {
+                    let Ok(marble) = self.world.marbles.shape(id) else { return };
                     let near = || closest_points_of_shapes(&marble, shape);
                     offer(item, &|| near().is_some_and(|near| near.result.touching()));
                 }
@@ -284,11 +283,12 @@ impl<S: Scalar> Queries<'_, S> {
     ) -> Option<QueryHit<PointProjection<S>>> {
         let mut best: Option<QueryHit<PointProjection<S>>> = None;
         let mut reach = within;
-        let mut offer = |item: Item, query: &dyn Fn() -> PointProjection<S>| {
-            let Some(collider) = self.collider(item).filter(|collider| filter(*collider)) else {
+        let mut offer = |item: Item, query: &dyn Fn() -> Option<PointProjection<S>>| {
+            let collider = self.collider(item).filter(|collider| filter(*collider));
+            let Some((collider, result)) = collider.and_then(|it| Some((it, query()?))) else {
                 return reach;
             };
-            let next = QueryHit { collider, result: query() };
+            let next = QueryHit { collider, result };
             let key =
                 |found: &QueryHit<PointProjection<S>>| (found.result.distance, found.collider);
             let near = next.result.distance <= within;
@@ -300,17 +300,15 @@ impl<S: Scalar> Queries<'_, S> {
         };
         let walls = self.world.walls.shapes();
         for (item, plane) in self.planes() {
-            offer(item, &|| WallShape::Plane(*plane).project_point(point));
+            offer(item, &|| Some(WallShape::Plane(*plane).project_point(point)));
         }
         self.tree.tree.for_each_near(point, within, |number| {
             let item = self.tree.items[number as usize];
             offer(item, &|| match item {
-                Item::Marble(row) => {
-                    self.world.marbles.shape_of_row(row as usize).project_point(point)
-                }
-                Item::Wall(SubShape { wall, index: part }) => match &walls[wall as usize] {
-                    solid @ WallShape::Solid(_) => solid.project_point_on(part, point),
-                    other => other.project_point(point),
+                Item::Marble(id) => Some(self.world.marbles.shape(id).ok()?.project_point(point)),
+                Item::Wall(SubShape { wall, index: part }) => match walls.get(wall as usize)? {
+                    solid @ WallShape::Solid(_) => Some(solid.project_point_on(part, point)),
+                    other => Some(other.project_point(point)),
                 },
             })
         });

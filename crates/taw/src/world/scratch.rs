@@ -37,6 +37,8 @@ pub(super) struct Scratch<S> {
     pub accelerations: Vec<Vec3<f64>>,
     /// Time of the step that is left after the substep, in seconds; zero unless within one.
     pub rest_of_step: S,
+    /// Length of the substep in seconds, for a response that moves walls by itself.
+    pub substep: S,
     pub events: EventDriven,
     pub soft_step: SoftRows<S>,
     pub continuous: Continuous<S>,
@@ -63,6 +65,7 @@ impl<S: Scalar> Default for Scratch<S> {
             wall_stops: Vec::new(),
             accelerations: Vec::new(),
             rest_of_step: S::zero(),
+            substep: S::zero(),
             events: EventDriven::default(),
             soft_step: SoftRows::default(),
             continuous: Continuous::default(),

@@ -9,7 +9,8 @@ use crate::frame::Pose;
 use crate::handle::{Handle, Handles};
 use crate::math::{Point3, Quat, Scalar, Vec3};
 use crate::motion::WallMotion;
-use crate::shape::{Aabb3, Shape};
+use crate::shape::{Aabb3, Shape, Sphere};
+use crate::swarm::BallId;
 
 /// Stable handle of a sensor.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -33,7 +34,7 @@ pub struct SensorEvent<S> {
 /// A marble is inside of a sensor if their shapes overlap; of a mesh, that is its surface. One that
 /// passes through within a substep enters and leaves in it, at any speed: its path is taken to be
 /// straight within a substep (of [`SoftStep`](crate::response::Response::SoftStep), within a step),
-/// relative to a sensor that moves. Balls of the swarm are not sensed.
+/// relative to a sensor that moves. Balls of the swarm are looked for at the end of each step only.
 ///
 /// ```
 /// use taw::prelude::*;
@@ -67,6 +68,8 @@ struct Sensor<S> {
     layers: CollisionLayers,
     /// Marbles inside, sorted.
     inside: Vec<MarbleId>,
+    /// Balls of the swarm inside, sorted.
+    balls: Vec<BallId>,
 }
 
 impl<S: Scalar> Sensors<S> {
@@ -78,7 +81,13 @@ impl<S: Scalar> Sensors<S> {
         let shape = shape.into().validated()?;
         let id = SensorId(self.handles.push()?);
         let layers = CollisionLayers::ALL;
-        self.rows.push(Sensor { shape, motion: None, layers, inside: Vec::new() });
+        self.rows.push(Sensor {
+            shape,
+            motion: None,
+            layers,
+            inside: Vec::new(),
+            balls: Vec::new(),
+        });
         Ok(id)
     }
 
@@ -130,6 +139,15 @@ impl<S: Scalar> Sensors<S> {
     /// [`Error::NoSuchSensor`].
     pub fn inside(&self, id: SensorId) -> Result<&[MarbleId], Error> {
         self.row(id).map(|row| self.rows[row].inside.as_slice())
+    }
+
+    /// Balls of the swarm inside of a sensor at the end of the last step, sorted. One that passes through
+    /// within a step is not noticed.
+    ///
+    /// # Errors
+    /// [`Error::NoSuchSensor`].
+    pub fn balls_inside(&self, id: SensorId) -> Result<&[BallId], Error> {
+        self.row(id).map(|row| self.rows[row].balls.as_slice())
     }
 
     /// Shape of a sensor.
@@ -230,6 +248,51 @@ impl<S: Scalar> World<S> {
             }
         }
         start.clear();
+    }
+}
+
+/// Number of balls that a sensor passes over at once if it is far from all of them: neighbours in memory
+/// are mostly neighbours in space.
+const BLOCK: usize = 256;
+
+impl<S: Scalar> World<S> {
+    /// Finds which balls of the swarm are inside of sensors.
+    pub(super) fn sense_balls(&mut self) {
+        let swarm = &self.swarm;
+        if self.sensors.is_empty() {
+            return;
+        }
+        let ball = |[x, y, z, radius]: [f32; 4]| {
+            let [x, y, z, radius] = [x, y, z, radius].map(|x| S::from_f64(f64::from(x)));
+            Sphere { center: Point3::new(x, y, z), radius }
+        };
+        let has_own = swarm.len() > swarm.body_balls.len();
+        let blocks = swarm.balls().chunks(BLOCK).filter(|_| has_own);
+        let bounds = |block: &[[f32; 4]]| {
+            let all = block.iter().map(|row| ball(*row).bounds());
+            all.reduce(|all, one| all.union(&one))
+        };
+        let blocks: Vec<_> = blocks.map(bounds).collect();
+        for sensor in &mut self.sensors.rows {
+            sensor.balls.clear();
+            let reach = sensor.shape.bounding_box();
+            let is_near = |bounds: &Aabb3<S>| reach.is_none_or(|reach| reach.overlaps(bounds));
+            let near =
+                (0..).zip(&blocks).filter(|(_, bounds)| bounds.as_ref().is_some_and(is_near));
+            let rows = near.flat_map(|(block, _)| BLOCK * block..BLOCK * (block + 1));
+            for (row, at) in rows.filter_map(|row| Some((row, *swarm.balls().get(row)?))) {
+                let ball = ball(at);
+                if is_near(&ball.bounds())
+                    && swarm
+                        .layers_of_own_row(row)
+                        .is_some_and(|it| it.interacts_with(sensor.layers))
+                    && sensor.shape.overlaps(&Shape::Sphere(ball))
+                {
+                    sensor.balls.extend(swarm.id(row));
+                }
+            }
+            sensor.balls.sort_unstable();
+        }
     }
 }
 

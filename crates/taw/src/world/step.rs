@@ -170,9 +170,11 @@ impl<S: Scalar> World<S> {
     }
 
     /// Ends a step, that of the [swarm](Self::step_swarm) included: walls are at the end of their
-    /// ways, and forces that were applied are forgotten.
+    /// ways, forces that were applied are forgotten, and sensors find the balls of the swarm.
     pub fn end_step(&mut self) {
         self.walls.finish_step();
         self.marbles.clear_forces();
+        self.swarm.clear_accelerations();
+        self.sense_balls();
     }
 }

@@ -61,8 +61,8 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Changes of velocity by force fields and gravity scales of the swarm's own balls in a step of
-    /// `dt` seconds.
+    /// Changes of velocity by force fields, gravity scales and applied accelerations of the swarm's own
+    /// balls in a step of `dt` seconds.
     pub(super) fn field_changes_of_swarm(&self, dt: S) -> Vec<VelocityChange> {
         let acceleration = |motion: Motion<f32>, mass: f32| {
             let motion = Motion {
@@ -74,7 +74,9 @@ impl<S: Scalar> World<S> {
         };
         let acceleration = (!self.settings.forces.is_empty()).then_some(acceleration);
         let (gravity, dt) = (cast_vector(self.settings.gravity), dt.as_f64() as f32);
-        self.swarm.field_changes(acceleration, gravity, dt)
+        let mut changes = self.swarm.field_changes(acceleration, gravity, dt);
+        changes.extend(self.swarm.applied_changes(dt));
+        changes
     }
 
     /// Forgets proxies of which the world lost the marble or the swarm the ball, whoever took

@@ -391,10 +391,15 @@ impl<S: Scalar> Walls<S> {
         }
     }
 
-    /// Ends a step: all walls are at their final poses.
-    pub(super) fn finish_step(&mut self) {
+    /// Moves walls back to their final poses, and forgets these.
+    pub(super) fn end_interpolation(&mut self) {
         self.interpolate_to(S::zero());
         self.ends.clear();
+    }
+
+    /// Ends a step: all walls are at their final poses.
+    pub(super) fn finish_step(&mut self) {
+        self.end_interpolation();
         self.moved.clear();
     }
 

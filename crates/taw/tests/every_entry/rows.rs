@@ -302,14 +302,12 @@ fn swarms<S: Scalar>() -> Vec<Row<S>> {
         World 1 "Swarm::set_position": |p, x| {
             let before = p.world.clone();
             let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
-            let x = single(x);
-            p.world.swarm.set_position(ball, Point3::new(x, x, x)).inspect_err(|_| p.world = before)
+            p.world.swarm.set_position(ball, Point3::from([single(x); 3])).inspect_err(|_| p.world = before)
         };
         World 1 "Swarm::set_velocity": |p, x| {
             let before = p.world.clone();
             let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
-            let x = single(x);
-            p.world.swarm.set_velocity(ball, Vec3::new(x, x, x)).inspect_err(|_| p.world = before)
+            p.world.swarm.set_velocity(ball, Vec3::from([single(x); 3])).inspect_err(|_| p.world = before)
         };
         World 3 "Swarm::set_material": |p, x| {
             let before = p.world.clone();
@@ -333,10 +331,14 @@ fn swarms<S: Scalar>() -> Vec<Row<S>> {
             let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
             p.world.swarm.set_gravity_scale(ball, single(x)).inspect_err(|_| p.world = before)
         };
+        World 3 "Swarm::apply_acceleration": |p, x| {
+            let before = p.world.clone();
+            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
+            p.world.swarm.apply_acceleration(ball, on_axis(p.case, single(x))).inspect_err(|_| p.world = before)
+        };
         World 1 "Swarm::set_model": |p, x| {
-            let mut model = p.world.swarm.model();
-            model.material.friction = single(x);
-            p.world.swarm.set_model(model)
+            let material = Material { friction: single(x), ..Material::default() };
+            p.world.swarm.set_model(swarm::SwarmModel { material, ..p.world.swarm.model() })
         };
     }
 }

@@ -86,11 +86,10 @@ where
         }
         // Half of the step by the velocity before, half by that after; a dashpot stops motion, but
         // never reverses it.
-        let half = S::from_f64(0.5) * dt;
-        let inverse_effective_mass = contact.inverse_effective_mass();
+        let (half, inverse_mass) = (S::from_f64(0.5) * dt, contact.inverse_effective_mass());
         let half_damping = [
-            springs.damping * inverse_effective_mass.normal * half * damped_time,
-            springs.tangent_damping * inverse_effective_mass.tangent * half * damped_time,
+            springs.damping * inverse_mass.normal * half * damped_time,
+            springs.tangent_damping * inverse_mass.tangent * half * damped_time,
         ]
         .map(|damping| damping.min(S::one()));
         let history = history.unwrap_or(SpringHistory {
