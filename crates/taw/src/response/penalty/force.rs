@@ -61,12 +61,9 @@ where
     ) -> ContactForce<S> {
         let dt = self.context.settings.dt;
         let separation_speed = contact.relative_velocity.dot(contact.normal);
-        let known = before.binary_search_by_key(&contact.key, |history| history.key).ok();
-        let known = known.map(|at| before[at]);
-        let overlap = known.map_or_else(
-            || self.initial_overlap(&contact, before, depths),
-            |history| history.overlap.min(contact.penetration),
-        );
+        let found = before.binary_search_by_key(&contact.key, |history| history.key);
+        let known = found.ok().map(|at| before[at]);
+        let overlap = self.overlap(&contact, known, before, depths);
         let history = known.filter(|history| !history.ended);
         contact.penetration -= overlap;
         let mut springs = self.law.springs(&contact, contact.penetration, dt);

@@ -173,15 +173,7 @@ where
                 contact.without_spin(contact.velocities(marbles), force.relative_velocity);
             force.ends = self.ends(force, marbles);
         }
-        for force in forces.iter_mut() {
-            let Some(history) = force.next_history(self.context.settings.dt) else { continue };
-            if force.ends {
-                force.history = history;
-                self.apply_last_impulse(force, marbles, work.as_deref_mut());
-            }
-            histories.push(SpringHistory { ended: force.ends, ..history });
-        }
-        histories.sort_unstable_by_key(|history| history.key);
+        self.store_histories(marbles, forces, histories, work);
         list_impulses(forces, contacts);
         for contact in contacts.wm.iter().chain(&contacts.mm) {
             quarantine_if_non_finite(marbles, contact.b, quarantined);
@@ -213,6 +205,25 @@ where
             let moved = self.context.displacement_of(row, marbles.velocity[row]);
             contact.separation = moved.dot(contact.normal) - penetration;
         }
+    }
+
+    /// Keeps the histories of contacts, after the last impulse of those that end.
+    fn store_histories(
+        &self,
+        marbles: &mut SolverBodies<S>,
+        forces: &mut [ContactForce<S>],
+        histories: &mut Vec<SpringHistory<S>>,
+        mut work: Option<&mut EnergyLedger>,
+    ) {
+        for force in forces {
+            let Some(history) = force.next_history(self.context.settings.dt) else { continue };
+            if force.ends {
+                force.history = history;
+                self.apply_last_impulse(force, marbles, work.as_deref_mut());
+            }
+            histories.push(SpringHistory { ended: force.ends, ..history });
+        }
+        histories.sort_unstable_by_key(|history| history.key);
     }
 
     /// Bounces the cores of marbles that continuous detection stopped at walls.

@@ -20,11 +20,25 @@ where
     M: Fn(usize) -> Material<S>,
     F: Fn(usize) -> S,
 {
+    /// Overlap of a contact that loads no spring, in metres.
+    pub(super) fn overlap(
+        &self,
+        contact: &PenaltyContact<S>,
+        known: Option<SpringHistory<S>>,
+        before: &[SpringHistory<S>],
+        depths: &[S],
+    ) -> S {
+        known.map_or_else(
+            || self.initial_overlap(contact, before, depths),
+            |history| history.overlap.min(contact.penetration),
+        )
+    }
+
     /// Overlap of a new contact that its two did not move into, in metres; zero where they touched at the last
     /// kick. In a substep they come no deeper than they approach in it, twice that where forces slowed
     /// them, and what gravity adds; and in a wall, than twice as deep as the marble was in others, from which it
     /// may have come.
-    pub(super) fn initial_overlap(
+    fn initial_overlap(
         &self,
         contact: &PenaltyContact<S>,
         before: &[SpringHistory<S>],

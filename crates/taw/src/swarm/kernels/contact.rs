@@ -395,15 +395,8 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
     #[inline(always)]
     fn solve<L: Simd, const FIRST: bool>(self, params: SolverParams) {
         let Self { columns, batches, impulses, friction, .. } = self;
-        let ContactImpulses {
-            normal_impulse,
-            tangent_impulse,
-            torque,
-            numbers: own,
-            struck,
-            jammed,
-            ..
-        } = impulses;
+        let ContactImpulses { normal_impulse, tangent_impulse, torque, .. } = impulses;
+        let (own, struck, jammed) = (&impulses.numbers, &mut impulses.struck, &mut impulses.jammed);
         let zero = L::splat(0.0);
         for (i, batch) in batches.iter().enumerate() {
             let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
@@ -426,25 +419,21 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let alone = effective_mass(&a, &b);
             let (target, softness) = target::<L, FIRST>(&params, separation, grounded);
             let slower = parting - target;
-            let wanted = if BACKED {
+            let excess = if BACKED {
                 columns.backing_of(batch, velocity, normal).impulse(alone, slower)
             } else {
                 alone * slower
             };
             let wanted = ContactImpulse {
-                normal: fresh.select_gt(zero, zero, zero - wanted),
+                normal: fresh.select_gt(zero, zero, zero - excess),
                 tangent: slip(relative, normal, &spins)
                     * (zero - numbers.tangent_mass::<OWN>(alone, velocity)),
             };
             let change = impulse.solve(wanted, softness, &FrictionCone::new(numbers.friction));
             impulse.normal.store(&mut normal_impulse[i]);
             impulse.tangent.store(&mut tangent_impulse[i]);
-            let change = if params.notes_impacts {
-                let (struck, speeds) = ((before, change), (parting, alone));
-                tipping::lean(batch, &params, normal, struck, speeds)
-            } else {
-                change
-            };
+            let (struck_by, speeds) = ((before, change), (parting, alone));
+            let change = tipping::lean(batch, &params, normal, struck_by, speeds);
             for spin in &mut spins {
                 spin[3] = impulse.normal.select_gt(zero, grounded.max(L::splat(TOUCHING)), spin[3]);
             }

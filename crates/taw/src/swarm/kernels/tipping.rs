@@ -56,6 +56,9 @@ pub(super) fn lean<L: Simd>(
     (parting, mass): (L, L),
 ) -> ContactImpulse<L, Vec3Wide<L>> {
     let (zero, threshold) = (L::splat(0.0), L::splat(params.restitution_threshold));
+    if !params.notes_impacts {
+        return change; // in swarms alone nothing has to
+    }
     let fast = (zero - parting).select_gt(threshold, zero - parting, zero);
     if fast.gt_mask(zero) == 0 {
         return change;
