@@ -77,8 +77,8 @@ fn thousands_at_one_point_part_within_seconds_and_their_center_stays() {
 }
 
 /// A step of these costs no more than its contacts do, of which a marble has a few dozen: not all of the
-/// fifty million pairs. By time, since a count would be of one cause only; the bound is many times
-/// what it takes, and a fourth of what it took.
+/// fifty million pairs. By time, since a count would be of one cause only: the best of three tries, as others
+/// may have the processor. It takes .1 to .4 s on a quiet machine, 1.4 on a crowded one, and took 3.5 to 9.9.
 #[test]
 fn a_step_of_ten_thousand_at_one_point_does_not_look_at_all_pairs() {
     let responses = [
@@ -96,13 +96,17 @@ fn a_step_of_ten_thousand_at_one_point_does_not_look_at_all_pairs() {
         for _ in 0..10_000 {
             world.marbles.insert(Marble::new(Point3::new(0.3, 1.0, -2.0), RADIUS)).unwrap();
         }
-        let begin = Instant::now();
-        world.step(DT).unwrap();
-        let took = begin.elapsed();
-        println!("{response:?}: {took:?}");
-        assert!(took < Duration::from_secs(2), "{response:?}: {took:?}");
-        let most = 32 * world.marbles.len();
-        assert!(world.contacts.mm.len() <= most, "{response:?}: {}", world.contacts.mm.len());
+        let is_quick = |_| {
+            let mut world = world.clone();
+            let begin = Instant::now();
+            world.step(DT).unwrap();
+            let took = begin.elapsed();
+            println!("{response:?}: {took:?}");
+            let most = 32 * world.marbles.len();
+            assert!(world.contacts.mm.len() <= most, "{response:?}: {}", world.contacts.mm.len());
+            took < Duration::from_secs(3)
+        };
+        assert!((0..3).any(is_quick), "{response:?}");
     }
 }
 
