@@ -19,7 +19,7 @@ pub(crate) struct Drawing {
     known: EntityHashMap<Known>,
     /// Walls that move, or are drawn elsewhere than their `Transform`s are.
     walls: EntityHashSet,
-    /// What is drawn elsewhere with them.
+    /// Entities that are drawn elsewhere with them.
     carriers: Vec<Entity>,
 }
 

@@ -16,6 +16,12 @@ fn board() -> WallShape<f64> {
     Shape::Aabb(Aabb::new(min, max).unwrap()).into()
 }
 
+/// Motion of a lift, in m/s.
+fn rising(speed: f64) -> WallMotion<f64> {
+    let (angular_velocity, pivot) = (Vec3::new(0.0, 0.0, 0.0), Point3::new(0.0, 0.0, 0.0));
+    WallMotion { velocity: Vec3::unit_y() * speed, angular_velocity, pivot }
+}
+
 fn world(substeps: u32, detection: Detection) -> World<f64> {
     let mut world = World::default();
     let integrator = Integrator::VelocityVerlet;
@@ -36,11 +42,7 @@ fn a_ball_stays_on_a_lift() {
         for detection in [Detection::Discrete, Detection::Swept] {
             let mut world = world(substeps, detection);
             let lift = world.walls.insert(board()).unwrap();
-            let motion = WallMotion {
-                velocity: Vec3::unit_y() * speed,
-                angular_velocity: Vec3::new(0.0, 0.0, 0.0),
-                pivot: Point3::new(0.0, 0.0, 0.0),
-            };
+            let motion = rising(speed);
             world.walls.set_motion(lift, Some(motion)).unwrap();
             let id = ball(&mut world, 0.0);
             world.marbles.set_velocity(id, motion.velocity).unwrap();
@@ -94,11 +96,7 @@ fn who_rides_has_a_contact_with_the_lift_in_each_substep_by_event_driven() {
         let response = Response::EventDriven;
         world.set_model(Model { response, ..world.model() }).unwrap();
         let lift = world.walls.insert(board()).unwrap();
-        let motion = WallMotion {
-            velocity: Vec3::unit_y() * speed,
-            angular_velocity: Vec3::new(0.0, 0.0, 0.0),
-            pivot: Point3::new(0.0, 0.0, 0.0),
-        };
+        let motion = rising(speed);
         world.walls.set_motion(lift, Some(motion)).unwrap();
         let id = ball(&mut world, 0.0);
         world.marbles.set_velocity(id, motion.velocity).unwrap();
@@ -134,14 +132,12 @@ fn springs_give_way_on_a_lift_as_on_a_floor() {
         world.set_model(model).unwrap();
         let lift = world.walls.insert(board()).unwrap();
         let id = ball(&mut world, 0.0);
-        let velocity = Vec3::unit_y() * speed;
-        world.marbles.set_velocity(id, velocity).unwrap();
-        let (angular_velocity, pivot) = (Vec3::new(0.0, 0.0, 0.0), Point3::new(0.0, 0.0, 0.0));
-        let motion = WallMotion { velocity, angular_velocity, pivot };
+        let motion = rising(speed);
+        world.marbles.set_velocity(id, motion.velocity).unwrap();
         world.walls.set_motion(lift, Some(motion)).unwrap();
         let mut gap = 0.0;
         for step in 1..=480 {
-            let at = velocity * (DT * f64::from(step));
+            let at = motion.velocity * (DT * f64::from(step));
             let pose = Pose { translation: at, ..Pose::identity() };
             world.walls.set(lift, board().transformed(pose).unwrap()).unwrap();
             world.step(DT).unwrap();

@@ -103,7 +103,7 @@ fn one_that_falls_on_another_tips_over_and_gains_nothing() {
     }
 }
 
-/// What was placed there stays.
+/// A column of balls that were placed onto each other stays.
 #[test]
 fn a_column_that_was_placed_stays() {
     for (name, model) in models() {

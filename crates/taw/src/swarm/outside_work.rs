@@ -54,8 +54,8 @@ impl OutsideWork {
 
 /// Impulse that changes the velocity of a row, in N s.
 fn impulse(before: &Row, after: &Row) -> Vec3<f64> {
-    let [before_it, after_it] = [before, after].map(|row| cast_vector::<f32, f64>(xyz(row)));
-    (after_it - before_it) / f64::from(before[3].abs())
+    let [old, new] = [before, after].map(|row| cast_vector::<f32, f64>(xyz(row)));
+    (new - old) / f64::from(before[3].abs())
 }
 
 impl Swarm {

@@ -101,7 +101,7 @@ pub(crate) struct Scratch<S> {
     followed: Vec<bool>,
     /// Displacements that part what overlaps, in metres.
     pushes: Vec<Vec3<S>>,
-    /// How deep each marble was in a wall at the last kick, in metres.
+    /// Deepest penetration of each marble into a wall at the last kick, in metres.
     depths: Vec<S>,
 }
 
