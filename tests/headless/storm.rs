@@ -265,18 +265,33 @@ impl Storm {
     /// The energy of a fall of all marbles through the box, in joules.
     fn most_energy(&self) -> f64 {
         let world = self.app.world().resource::<TawWorld>();
-        let marbles = (0..world.marbles.len()).filter_map(|row| world.marbles.id(row));
-        let masses = marbles.filter_map(|id| {
-            let marble = world.marbles.get(id).ok()?;
-            Some(f64::from(marble.mass.of_capsule(marble.radius, marble.half_length)))
-        });
+        let masses = (0..world.marbles.len()).map(|row| self.mass(row));
         masses.sum::<f64>() * 9.81 * f64::from(2.0 * HALF)
     }
 
-    /// In joules, of all marbles together.
+    /// Mass that contacts count with, in kilograms: one for all by `Displacement`, which ignores masses.
+    fn mass(&self, row: usize) -> f64 {
+        if self.app.world().resource::<TawModel>().response == Response::Displacement {
+            return 1.0;
+        }
+        let world = self.app.world().resource::<TawWorld>();
+        let marble = world.marbles.id(row).and_then(|id| world.marbles.get(id).ok());
+        marble.map_or(0.0, |it| f64::from(it.mass.of_capsule(it.radius, it.half_length)))
+    }
+
+    /// Kinetic and potential energy of all marbles together, in joules. `Displacement` turns none.
     fn energy(&self) -> f64 {
-        let energy = self.app.world().resource::<TawWorld>().energy();
-        energy.kinetic + energy.rotational + energy.potential
+        let world = self.app.world().resource::<TawWorld>();
+        if self.app.world().resource::<TawModel>().response != Response::Displacement {
+            let energy = world.energy();
+            return energy.kinetic + energy.rotational + energy.potential;
+        }
+        let of_row = |row: usize| {
+            let (v, at) = (world.marbles.velocity()[row], world.marbles.position()[row]);
+            let square = v.x * v.x + v.y * v.y + v.z * v.z;
+            self.mass(row) * (0.5 * f64::from(square) + 9.81 * f64::from(at.y))
+        };
+        (0..world.marbles.len()).map(of_row).sum()
     }
 }
 
