@@ -5,7 +5,7 @@ use cgmath::{InnerSpace, Zero};
 use super::moving_walls::RelativePath;
 use super::swept_marble::SweptMarble;
 use super::walls::{MAX_ITERATIONS, MAX_OVERSHOOT, WallImpact, time_to_close};
-use crate::math::{Scalar, Vec3};
+use crate::math::{Scalar, Vec3, length};
 use crate::shape::Capsule;
 use crate::world::walls::{SubShape, Walls};
 use crate::world::{WallShape, World};
@@ -21,7 +21,7 @@ struct Nearest<S> {
 
 impl<S: Scalar> Walls<S> {
     /// Time of impact of a capsule with a sub-shape of a wall, by conservative advancement (Mirtich
-    /// 1996): a plane separates the two until one of its ends may reach it.
+    /// 1996): a plane separates the two until one of its ends may get there.
     pub(super) fn time_of_impact_of_capsule(
         &self,
         part: SubShape,
@@ -60,7 +60,14 @@ impl<S: Scalar> Walls<S> {
                 let gap = gap + (end - anchor).dot(normal);
                 time_to_close(gap.max(overshoot), closing(end), bend)
             });
-            time += first.min(second);
+            // However it turns, it stays within its reach.
+            let outside = gap - anchor.dot(normal) - length(half);
+            let around = if outside > S::zero() {
+                time_to_close(outside, closing(Vec3::zero()), path.max_acceleration())
+            } else {
+                S::zero()
+            };
+            time += first.min(second).max(around);
             // Nor if it is no number.
             if !time.is_finite() || time > S::one() {
                 return None;

@@ -1,11 +1,11 @@
 //! Marbles as continuous detection sweeps them: balls, and capsules that turn on their way.
 
-use cgmath::{One, Rotation as _, Zero};
+use cgmath::{InnerSpace, One, Rotation as _, Zero};
 
-use super::moving_walls::RelativePath;
+use super::moving_walls::{RelativePath, path_bounds};
 use crate::math::{Point3, Quat, Scalar, Vec3, length};
 use crate::motion::{Rotation, integrate_rotation};
-use crate::shape::{Capsule, Sphere};
+use crate::shape::{Aabb3, BoundedShape as _, Capsule, Sphere};
 use crate::world::marbles::Marbles;
 use crate::world::narrow_phase::flush_distance;
 
@@ -81,6 +81,23 @@ impl<S: Scalar> SweptMarble<S> {
     /// Radius around its center that it keeps within, in metres.
     pub fn reach(&self) -> S {
         self.sphere.radius + length(self.half_axis)
+    }
+
+    /// Box around a straight path of its center, in world space.
+    pub fn bounds(&self, displacement: Vec3<S>) -> Aabb3<S> {
+        let Sphere { center, radius } = self.sphere;
+        if self.is_ball() {
+            return path_bounds(center, displacement, radius);
+        }
+        // Farthest that its ends are from the chords of their arcs, by the error of linear
+        // interpolation.
+        let bulge = self.turn.magnitude2() * length(self.half_axis) * S::from_f64(0.125);
+        let far = radius + bulge.min(self.reach());
+        let pose = |center: Point3<S>, half: Vec3<S>| {
+            Capsule { a: center - half, b: center + half, radius: far }.bounding_box()
+        };
+        let end = integrate_rotation(Quat::one(), self.turn, S::one()) * self.half_axis;
+        pose(center, self.half_axis).union(&pose(center + displacement, end))
     }
 
     /// Capsule of this radius at a place on a path, in the frame of the wall.

@@ -3,7 +3,7 @@
 use cgmath::{InnerSpace, SquareMatrix, Zero};
 use smallvec::SmallVec;
 
-use super::moving_walls::{Frame, MovingWall, Place, RelativePath, path_bounds};
+use super::moving_walls::{Frame, MovingWall, Place, RelativePath};
 use super::swept_marble::{SweptMarble, Turn};
 use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::broad::CollisionFilter;
@@ -86,7 +86,7 @@ impl<S: Scalar> World<S> {
             let is_fast = length(motion) + marble.max_swing(&standing) > self.free_motion(row);
             let moving_walls = &self.scratch.continuous.moving_walls;
             let may_be_met = || {
-                let bounds = path_bounds(start, motion, marble.reach());
+                let bounds = marble.bounds(motion);
                 moving_walls.iter().any(|wall| wall.is_near(&bounds))
             };
             if is_fast || (!moving_walls.is_empty() && may_be_met()) {
@@ -276,7 +276,7 @@ impl<S: Scalar> World<S> {
         let filter = self.marbles.filter_of_row(row);
         let free = self.free_motion(row);
         let start = marble.sphere.center;
-        let bounds = path_bounds(start, displacement, marble.reach());
+        let bounds = marble.bounds(displacement);
         let moves_far = |path: &RelativePath<S>| path.max_length() + marble.max_swing(path) > free;
         let moving_walls =
             if time > S::zero() { &self.scratch.continuous.moving_walls[..] } else { &[] };
