@@ -38,7 +38,8 @@ impl<S: Scalar> Walls<S> {
                 -(path.velocity(time, center) + marble.swing(path, time, anchor)).dot(normal)
             };
             let bend = marble.max_acceleration(path, normal);
-            let closes = closing(anchor) > if bend > S::zero() { S::zero() } else { near };
+            // One that rolls or pivots where it touches closes by rounding.
+            let closes = closing(anchor) > near;
             let impact = WallImpact {
                 time,
                 part,

@@ -18,6 +18,8 @@ pub(super) struct SweptMarble<S> {
     pub half_axis: Vec3<S>,
     /// Rotation of that vector on the path, an axial vector in radians.
     pub turn: Vec3<S>,
+    /// True until a wall stops its rotation.
+    pub is_free: bool,
 }
 
 /// Rotation of a capsule in a substep.
@@ -41,7 +43,7 @@ impl<S: Scalar> SweptMarble<S> {
         let sphere = Sphere { center, ..marbles.sphere(row) };
         let half = marbles.half_length(row);
         let half_axis = if half > S::zero() { marbles.axis(row) * half } else { Vec3::zero() };
-        Self { sphere, half_axis, turn: Vec3::zero() }
+        Self { sphere, half_axis, turn: Vec3::zero(), is_free: true }
     }
 
     /// Marble at the start of its free motion over `dt` seconds in a world of this model.
@@ -141,15 +143,19 @@ impl<S: Scalar> SweptMarble<S> {
         if self.turn == turn { S::zero() } else { length(self.turn) + length(turn) }
     }
 
-    /// Goes on from a fraction of the path, where a wall stops its rotation, with the rotation
-    /// `carried` of that wall over the rest, in radians.
-    pub fn bend(&mut self, time: S, center: Point3<S>, carried: Vec3<S>) {
+    /// Goes on from a fraction of the path with the rest of its rotation.
+    pub fn advance(&mut self, time: S, center: Point3<S>) {
         self.sphere.center = center;
         if !self.is_ball() {
             self.half_axis =
                 integrate_rotation(Quat::one(), self.turn, time).rotate_vector(self.half_axis);
-            self.turn = carried;
+            self.turn *= S::one() - time;
         }
+    }
+
+    /// Stops its rotation at a wall, which from there on rotates it by `carried`, in radians.
+    pub fn stop_turning(&mut self, carried: Vec3<S>) {
+        (self.turn, self.is_free) = (carried, false);
     }
 }
 
@@ -159,11 +165,10 @@ impl<S: Scalar> Turn<S> {
         Self { free, carried: integrate_rotation(Quat::one(), carried, S::one()) }
     }
 
-    /// Adds the rotation of a marble until a fraction of its path, which is the first one or a later
-    /// one of the substep.
-    pub(super) fn add(&mut self, marble: &SweptMarble<S>, time: S, is_first: bool) {
-        if is_first {
-            self.free = time;
+    /// Adds the rotation of a marble until a fraction of a path, which takes `left` of the substep.
+    pub(super) fn add(&mut self, marble: &SweptMarble<S>, time: S, left: S) {
+        if marble.is_free {
+            self.free += time * left;
         } else {
             self.carried = integrate_rotation(self.carried, marble.turn, time);
         }

@@ -140,14 +140,14 @@ impl<S: Scalar> World<S> {
     /// response*, 2003), which carries the marble along if it moves. A marble that approaches faster
     /// than [`World::resting_approach`] keeps the velocity of the impact, with which it bounces; if
     /// it would slide off the wall, it stays, since there it could not bounce. A resting one keeps
-    /// its velocity: friction needs its weight. A capsule no longer turns from there on, except
-    /// with the wall.
+    /// its velocity: friction needs its weight. A capsule that stops no longer turns from there on,
+    /// except with the wall; one that rests there turns on about the point where it touches.
     fn slide_along_walls(&mut self, row: usize, mut marble: SweptMarble<S>, dt: S) {
         let resting_approach = self.resting_approach(dt);
         let mut displacement = self.marbles.position[row] - marble.sphere.center;
         let mut velocity = self.marbles.velocity[row];
         let mut change = velocity - self.scratch.continuous.velocity[row];
-        let (mut left, mut turn) = (S::one(), Turn::default());
+        let (mut left, mut turn) = (S::one(), Turn::until(S::zero(), Vec3::zero()));
         let mut surfaces: SmallVec<[Vec3<S>; MAX_BENDS as usize]> = SmallVec::new();
         let mut carrier = None;
         while surfaces.len() < MAX_BENDS as usize
@@ -159,15 +159,21 @@ impl<S: Scalar> World<S> {
         {
             let WallImpact { time, normal, center, anchor, swing, ref place, .. } = impact;
             let (wall, rest, carried) = (impact.part.wall, S::one() - time, place.carried);
-            turn.add(&marble, time, surfaces.is_empty());
+            turn.add(&marble, time, left);
             // From here on as the wall sees it.
             (displacement, change, left) = (place.rest, change * rest, left * rest);
-            marble.bend(time, place.position, self.turn_with_wall(row, wall, left * dt));
-            let fast = -(displacement + swing * rest).dot(normal) > resting_approach * left;
+            let approach = -(displacement + swing * rest).dot(normal);
+            let fast = approach > resting_approach * left;
+            marble.advance(time, place.position);
             let radius = marble.sphere.radius;
             let along = self.along_wall(&impact, displacement, (radius, fast), &surfaces);
             surfaces.push(normal);
-            let (slid, kept) = (along * displacement, along * change);
+            let (mut slid, kept) = (along * displacement, along * change);
+            if fast || along.is_zero() {
+                marble.stop_turning(self.turn_with_wall(row, wall, left * dt));
+            } else if !marble.is_ball() {
+                slid = displacement + normal * approach;
+            }
             let surface = self.walls.surface_velocity(wall as usize, center + anchor, normal);
             let closing = (velocity + self.swing_velocity(row, anchor) - surface).dot(normal);
             let part = lost_fraction((change - kept).dot(normal), closing);
@@ -191,7 +197,7 @@ impl<S: Scalar> World<S> {
             });
         }
         if !surfaces.is_empty() && !marble.is_ball() {
-            turn.add(&marble, S::one(), false);
+            turn.add(&marble, S::one(), left);
             self.scratch.continuous.set_turn(row, turn);
         }
     }
