@@ -2,6 +2,8 @@
 
 #[path = "swept/boxes.rs"]
 mod boxes;
+#[path = "swept/capsules.rs"]
+mod capsules;
 
 use fastrand::Rng;
 use proptest::prelude::*;

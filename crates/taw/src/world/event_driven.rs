@@ -22,7 +22,7 @@ impl<S: Scalar> Method<S> for EventDriven {
         let context = world.settings.step_context(dt);
         world.marbles.mean_accelerations(context, &mut world.scratch.accelerations);
         if world.settings.model.rotation != Rotation::Dynamic {
-            world.marbles.integrate_rotations(dt, world.settings.model.rotation);
+            world.marbles.integrate_rotations(dt, world.settings.model.rotation, &[]);
         }
     }
 

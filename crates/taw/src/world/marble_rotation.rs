@@ -2,6 +2,7 @@
 
 use cgmath::{InnerSpace, One, Zero};
 
+use super::continuous::Turn;
 use super::marbles::Marbles;
 use crate::math::{Quat, Scalar, Vec3, cast_vector, is_finite};
 use crate::motion::{Rotation, integrate_rotation};
@@ -100,18 +101,15 @@ impl<S: Scalar> Marbles<S> {
 
     /// Integrates rotations over `dt` seconds. Capsules without dynamic rotation in a world of this
     /// `rotation` rotate about their axes only: otherwise they would rotate into walls and be
-    /// lifted out, which gains energy.
-    pub(super) fn integrate_rotations(&mut self, dt: S, rotation: Rotation) {
+    /// lifted out, which gains energy. `turns` says by row how walls stop the rotation of capsules; it
+    /// is empty if they stop none.
+    pub(super) fn integrate_rotations(&mut self, dt: S, rotation: Rotation, turns: &[Turn<S>]) {
         if self.has_capsules() {
             for row in 0..self.angular_velocity.len() {
-                let own = self.rotation_model.get(row).unwrap_or(rotation);
-                if own.min(rotation) == Rotation::Dynamic || self.half_length(row) == S::zero() {
-                    self.integrate_symmetric_top(row, dt);
-                } else {
-                    let axis = self.rotation[row] * Vec3::unit_y();
-                    let angular_velocity = axis * self.angular_velocity[row].dot(axis);
-                    self.rotation[row] =
-                        integrate_rotation(self.rotation[row], angular_velocity, dt);
+                let Turn { free, carried } = turns.get(row).copied().unwrap_or_default();
+                self.integrate_free_rotation(row, dt * free, rotation);
+                if carried != Quat::one() {
+                    self.carry_rotation(row, carried);
                 }
             }
             return;
@@ -119,6 +117,46 @@ impl<S: Scalar> Marbles<S> {
         for (rotation, angular_velocity) in self.rotation.iter_mut().zip(&self.angular_velocity) {
             *rotation = integrate_rotation(*rotation, *angular_velocity, dt);
         }
+    }
+
+    /// Integrates the rotation of a marble among capsules.
+    fn integrate_free_rotation(&mut self, row: usize, dt: S, model: Rotation) {
+        if self.is_dynamic(row, model) || self.half_length(row) == S::zero() {
+            self.integrate_symmetric_top(row, dt);
+        } else {
+            let axis = self.rotation[row] * Vec3::unit_y();
+            let angular_velocity = axis * self.angular_velocity[row].dot(axis);
+            self.rotation[row] = integrate_rotation(self.rotation[row], angular_velocity, dt);
+        }
+    }
+
+    /// Returns true if a marble rotates as a rigid body in a world of this model.
+    pub(super) fn is_dynamic(&self, row: usize, model: Rotation) -> bool {
+        self.rotation_of(row, model) == Rotation::Dynamic
+    }
+
+    /// Rotates a capsule with a wall that carries it, its angular velocity with it: its energy stays.
+    fn carry_rotation(&mut self, row: usize, carried: Quat<S>) {
+        let exact = Quat::from_sv(carried.s.as_f64(), cast_vector(carried.v)).normalize();
+        self.rotation[row] = (carried * self.rotation[row]).normalize();
+        self.set_angular_velocity_f64(row, exact * self.angular_velocity_f64(row));
+    }
+
+    /// Angular velocity of a capsule's axis in free motion in a world of this model, in rad/s.
+    pub(super) fn axis_velocity(&self, row: usize, model: Rotation) -> Vec3<S> {
+        if !self.is_dynamic(row, model) || self.angular_velocity[row].is_zero() {
+            return Vec3::zero();
+        }
+        cast_vector(self.precession(row, cast_vector(self.axis(row))))
+    }
+
+    /// Precession rate of a capsule with this axis, in rad/s: its angular momentum over the moment across
+    /// the axis.
+    fn precession(&self, row: usize, axis: Vec3<f64>) -> Vec3<f64> {
+        let half = self.half_length(row).as_f64();
+        let [along, across] = CapsuleInertia::unit_inertia(self.radius[row].as_f64(), half);
+        let angular_velocity = self.angular_velocity_f64(row);
+        angular_velocity + axis * (angular_velocity.dot(axis) * (along / across - 1.0))
     }
 
     /// Rotates a capsule as the symmetric top that it is: steadily about its axis, and the axis
@@ -136,14 +174,11 @@ impl<S: Scalar> Marbles<S> {
         let exact = |rotation: Quat<S>| {
             Quat::from_sv(rotation.s.as_f64(), cast_vector(rotation.v)).normalize()
         };
-        let (angular_velocity, dt) = (self.angular_velocity_f64(row), dt.as_f64());
+        let dt = dt.as_f64();
         let rotation = exact(rotation);
         let axis = (rotation * Vec3::unit_y()).normalize();
-        let [along, across] =
-            CapsuleInertia::unit_inertia(self.radius[row].as_f64(), half.as_f64());
-        // Precession rate: angular momentum over the moment across the axis.
-        let about_axis = angular_velocity.dot(axis);
-        let precession = angular_velocity + axis * (about_axis * (along / across - 1.0));
+        let about_axis = self.angular_velocity_f64(row).dot(axis);
+        let precession = self.precession(row, axis);
         let own = axis * (about_axis - precession.dot(axis));
         let rotation = integrate_rotation(integrate_rotation(rotation, own, dt), precession, dt);
         self.rotation[row] = Quat::from_sv(S::from_f64(rotation.s), cast_vector(rotation.v));

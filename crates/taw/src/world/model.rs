@@ -48,7 +48,9 @@ pub enum Detection {
     /// that move relative to each other or to a wall by more than half of their radius in a substep
     /// stop at the time of impact. Resting and sliding marbles continue along the surface; bouncing
     /// ones keep the velocity and normal of that moment, slide on along a wall, and lose the rest of
-    /// the substep at another marble. Others lose none. A wall that was
+    /// the substep at another marble. Others lose none. A capsule stops at walls with its whole length,
+    /// and turns no further until the next substep; at other marbles with the sphere around its
+    /// center only. A wall that was
     /// [set](crate::world::Walls::set) to another pose since the last step, and has a
     /// [motion](crate::world::WallMotion), meets marbles on its way through the substep and carries
     /// them along. Nearly free where nothing is fast.

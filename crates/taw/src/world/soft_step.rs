@@ -99,7 +99,7 @@ impl<S: Scalar> World<S> {
                 self.quarantine_non_finite();
             }
         } else {
-            self.marbles.integrate_rotations(dt, self.settings.model.rotation);
+            self.marbles.integrate_rotations(dt, self.settings.model.rotation, &[]);
             self.quarantine_non_finite();
         }
         self.scratch.soft_step.dt = dt.as_f64() as f32;

@@ -74,7 +74,8 @@ impl<S: Scalar> World<S> {
         let context = self.settings.step_context(dt);
         self.marbles.integrate(context, &mut self.scratch.stopped);
         self.solve_continuous(dt);
-        self.marbles.integrate_rotations(dt, self.settings.model.rotation);
+        let turns = &self.scratch.continuous.turns;
+        self.marbles.integrate_rotations(dt, self.settings.model.rotation, turns);
     }
 
     /// The second verb: finds who touches whom, and by how much.

@@ -63,7 +63,6 @@ fn plate(center: [f32; 3], half: [f32; 3]) -> Obb<f32> {
     Obb::new(Point3::from(center), Quat::new(1.0, 0.0, 0.0, 0.0), Vec3::from(half)).unwrap()
 }
 
-/// Of balls only: capsules may get through after they bounced.
 #[test]
 fn a_thin_box_is_not_passed_by_default() {
     let mut random = Rng::with_seed(2);

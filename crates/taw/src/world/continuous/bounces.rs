@@ -3,6 +3,7 @@
 
 use cgmath::InnerSpace;
 
+use super::swept_marble::SweptMarble;
 use super::walls::Motion;
 use super::{Continuous, MAX_FREE_MOTION};
 use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
@@ -87,11 +88,10 @@ impl<S: Scalar> World<S> {
     /// Stops a marble at the first wall that it would pass into by more than half of its radius, on
     /// the way from where it was before contacts moved it.
     fn stop_bounce_at_walls(&mut self, row: usize) {
-        let sphere = Sphere {
-            center: self.scratch.continuous.bounced_from[row],
-            ..self.marbles.sphere(row)
-        };
-        let displacement = self.marbles.position[row] - sphere.center;
+        let from = self.scratch.continuous.bounced_from[row];
+        let marble = SweptMarble::without_turn(&self.marbles, row, from);
+        let Sphere { radius, .. } = marble.sphere;
+        let displacement = self.marbles.position[row] - from;
         if length(displacement) <= self.free_motion(row) {
             return;
         }
@@ -101,18 +101,18 @@ impl<S: Scalar> World<S> {
                 return None; // its forces turn everything round within a half-space
             }
             let (gap, closing) = (
-                plane.signed_distance(sphere.center) - sphere.radius,
+                plane.signed_distance(from) - plane.normal().dot(marble.half_axis).abs() - radius,
                 -displacement.dot(plane.normal()),
             );
             let passes =
-                closing > S::zero() && closing > gap + sphere.radius * S::from_f64(MAX_FREE_MOTION);
+                closing > S::zero() && closing > gap + radius * S::from_f64(MAX_FREE_MOTION);
             passes.then(|| (gap / closing).max(S::zero()))
         });
         let motion = Motion { displacement, time: S::zero(), carrier: None };
-        let other = self.first_wall_impact(row, &sphere, motion).map(|stop| stop.time);
+        let other = self.first_wall_impact(row, &marble, motion).map(|stop| stop.time);
         let first = planes.chain(other).fold(S::one(), S::min);
         if first < S::one() {
-            self.marbles.position[row] = sphere.center + displacement * first;
+            self.marbles.position[row] = from + displacement * first;
         }
     }
 

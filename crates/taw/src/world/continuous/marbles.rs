@@ -4,6 +4,7 @@ use std::cmp::{Ordering, Reverse};
 
 use cgmath::{InnerSpace, SquareMatrix, Zero};
 
+use super::swept_marble::Turn;
 use super::walls::{Bend, Motion, WallImpact, lost_fraction};
 use super::{Continuous, MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::broad::Period;
@@ -299,13 +300,19 @@ impl<S: Scalar> World<S> {
             return;
         }
         self.marbles.position[row] = sphere.center;
-        let start =
-            Sphere { center: self.scratch.continuous.start[row], ..self.marbles.sphere(row) };
-        let displacement = sphere.center - start.center;
+        let start = self.swept_marble(row, self.scratch.continuous.start[row], dt);
+        let displacement = sphere.center - start.sphere.center;
         let looks = met_marble
             && !(self.walls.are_half_spaces() && self.scratch.continuous.crowded.is_empty());
         let motion = Motion { displacement, time: dt, carrier: None };
         let stop = if looks { self.first_wall_impact(row, &start, motion) } else { None };
+        if met_marble && !start.is_ball() {
+            let turn = stop.as_ref().map_or_else(Turn::default, |stop| {
+                let rest = (S::one() - stop.time) * dt;
+                Turn::until(stop.time, self.turn_with_wall(row, stop.part.wall, rest))
+            });
+            self.scratch.continuous.set_turn(row, turn);
+        }
         let Some(WallImpact { part, center, .. }) = stop else { return };
         self.marbles.position[row] = center;
         let obstacle = Obstacle::Wall(part.wall);

@@ -3,8 +3,10 @@
 //! Slower ones that only graze each other within the substep are listed as contacts.
 
 mod bounces;
+mod capsules;
 mod marbles;
 mod moving_walls;
+mod swept_marble;
 mod walls;
 
 use std::cmp::Reverse;
@@ -18,6 +20,7 @@ use crate::math::{Mat3, Point3, Scalar, Vec3, length};
 use crate::response::penalty::WallStop;
 use marbles::{Meeting, Partners, Path};
 pub(super) use moving_walls::{Frame, MovingWall, RelativePath};
+pub(super) use swept_marble::Turn;
 use walls::Bend;
 pub(super) use walls::WallImpact;
 
@@ -43,6 +46,8 @@ pub(super) struct Continuous<S> {
     /// follows a velocity: the free directions, times the remaining fraction of the substep.
     stops: Vec<StoppedMarble<S>>,
     pub projections: Vec<Option<Mat3<S>>>,
+    /// By row, rotations of the capsules that walls stopped; empty if they stopped none.
+    pub turns: Vec<Turn<S>>,
     /// Pairs that meet within the substep, stopped or not.
     pub grazes: Vec<(u32, u32)>,
     middle: Vec<Point3<S>>,
@@ -174,12 +179,19 @@ impl<S: Scalar> Continuous<S> {
         self.stops.push(stopped);
     }
 
+    /// Sets the rotation of a capsule.
+    fn set_turn(&mut self, row: usize, turn: Turn<S>) {
+        self.turns.resize(self.start.len(), Turn::default());
+        self.turns[row] = turn;
+    }
+
     /// Clears the state of the last substep.
     fn clear(&mut self) {
         self.start.clear();
         self.velocity.clear();
         self.stops.clear();
         self.projections.clear();
+        self.turns.clear();
         self.grazes.clear();
         self.bends.clear();
         self.moving_walls.clear();

@@ -81,6 +81,26 @@ impl<S: Scalar> RelativePath<S> {
             - (motion.angular_velocity * left).cross(position - motion.pivot)
     }
 
+    /// Rotates a vector of the world into the frame of the wall, at a fraction of the path.
+    pub(super) fn rotate_into_frame(&self, time: S, vector: Vec3<S>) -> Vec3<S> {
+        match self.frame {
+            Frame::Standing => vector,
+            Frame::Moving(motion, left) | Frame::Carrying(motion, left) => {
+                motion.pose_before(left * (S::one() - time)).inverse_transform_vector(vector)
+            }
+        }
+    }
+
+    /// Rotation of the wall on the path, an axial vector in radians.
+    pub(super) fn turn(&self) -> Vec3<S> {
+        match self.frame {
+            Frame::Standing => Vec3::zero(),
+            Frame::Moving(motion, left) | Frame::Carrying(motion, left) => {
+                motion.angular_velocity * left
+            }
+        }
+    }
+
     /// Motion of a wall against which the path is straight in world space, and the time left.
     fn moving(&self) -> Option<(WallMotion<S>, S)> {
         match self.frame {

@@ -3,7 +3,8 @@
 use cgmath::{InnerSpace, SquareMatrix, Zero};
 use smallvec::SmallVec;
 
-use super::moving_walls::{Frame, MovingWall, Place, RelativePath, path_bounds};
+use super::moving_walls::{Frame, MovingWall, Place, RelativePath};
+use super::swept_marble::{SweptMarble, Turn};
 use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::broad::CollisionFilter;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
@@ -15,11 +16,11 @@ use crate::world::walls::{SubShape, Walls};
 use crate::world::{WallShape, World};
 
 /// Enough iterations for any wall that a marble does not only graze.
-const MAX_ITERATIONS: u32 = 32;
+pub(super) const MAX_ITERATIONS: u32 = 32;
 
 /// Penetration, as a fraction of the radius, up to which a sphere that touches a rotating wall and
 /// parts may advance: shorter steps would lead nowhere.
-const MAX_OVERSHOOT: f64 = 0.005;
+pub(super) const MAX_OVERSHOOT: f64 = 0.005;
 
 /// Time of impact of a marble with a wall.
 pub(in crate::world) struct WallImpact<S> {
@@ -29,9 +30,13 @@ pub(in crate::world) struct WallImpact<S> {
     pub normal: Vec3<S>,
     /// Center there in the frame of the wall, which is that of the world at the end of the substep.
     pub center: Point3<S>,
-    place: Place<S>,
+    /// Vector from there to the point of a capsule's axis that is nearest to the wall, and the
+    /// velocity of that about the center, in metres and metres per path; zero for a ball.
+    pub(super) anchor: Vec3<S>,
+    pub(super) swing: Vec3<S>,
+    pub(super) place: Place<S>,
     /// Separation from the wall there, in metres.
-    gap: S,
+    pub(super) gap: S,
 }
 
 /// Motion of a marble, and the walls that it may meet.
@@ -74,19 +79,26 @@ impl<S: Scalar> World<S> {
         MovingWall::list(&self.walls, dt, &mut self.scratch.continuous.moving_walls);
         self.list_deep_marbles(|_, _| S::zero());
         for row in 0..self.marbles.len() {
-            let Sphere { center, radius } = self.marbles.sphere(row);
             let start = self.scratch.continuous.start[row];
-            let motion = center - start;
-            let is_fast = length(motion) > self.free_motion(row);
+            let marble = self.swept_marble(row, start, dt);
+            let motion = self.marbles.position[row] - start;
+            let standing = RelativePath { start, displacement: motion, frame: Frame::Standing };
+            let is_fast = length(motion) + marble.max_swing(&standing) > self.free_motion(row);
             let moving_walls = &self.scratch.continuous.moving_walls;
             let may_be_met = || {
-                let bounds = path_bounds(start, motion, radius);
+                let bounds = marble.bounds(motion);
                 moving_walls.iter().any(|wall| wall.is_near(&bounds))
             };
             if is_fast || (!moving_walls.is_empty() && may_be_met()) {
-                self.slide_along_walls(row, dt);
+                self.slide_along_walls(row, marble, dt);
             }
         }
+    }
+
+    /// Marble at the start of its free motion over `dt` seconds.
+    pub(super) fn swept_marble(&self, row: usize, start: Point3<S>, dt: S) -> SweptMarble<S> {
+        let model = self.settings.model.rotation;
+        SweptMarble::in_free_motion(&self.marbles, row, start, (model, dt))
     }
 
     /// Lists the marbles that contacts with walls, as they were found, show half inside of one after
@@ -128,42 +140,42 @@ impl<S: Scalar> World<S> {
     /// response*, 2003), which carries the marble along if it moves. A marble that approaches faster
     /// than [`World::resting_approach`] keeps the velocity of the impact, with which it bounces; if
     /// it would slide off the wall, it stays, since there it could not bounce. A resting one keeps
-    /// its velocity: friction needs its weight.
-    fn slide_along_walls(&mut self, row: usize, dt: S) {
+    /// its velocity: friction needs its weight. A capsule that stops no longer turns from there on,
+    /// except with the wall; one that rests there turns on about the point where it touches.
+    fn slide_along_walls(&mut self, row: usize, mut marble: SweptMarble<S>, dt: S) {
         let resting_approach = self.resting_approach(dt);
-        let mut sphere =
-            Sphere { center: self.scratch.continuous.start[row], ..self.marbles.sphere(row) };
-        let mut displacement = self.marbles.position[row] - sphere.center;
+        let mut displacement = self.marbles.position[row] - marble.sphere.center;
         let mut velocity = self.marbles.velocity[row];
         let mut change = velocity - self.scratch.continuous.velocity[row];
-        let mut left = S::one();
+        let (mut left, mut turn) = (S::one(), Turn::until(S::zero(), Vec3::zero()));
         let mut surfaces: SmallVec<[Vec3<S>; MAX_BENDS as usize]> = SmallVec::new();
         let mut carrier = None;
         while surfaces.len() < MAX_BENDS as usize
-            && let Some(WallImpact { time, part, normal, center, place, .. }) = self
-                .first_wall_impact(row, &sphere, Motion { displacement, time: left * dt, carrier })
+            && let Some(impact) = self.first_wall_impact(
+                row,
+                &marble,
+                Motion { displacement, time: left * dt, carrier },
+            )
         {
-            let SubShape { wall, .. } = part;
-            let (rest, carried) = (S::one() - time, place.carried);
-            sphere.center = place.position;
+            let WallImpact { time, normal, center, anchor, swing, ref place, .. } = impact;
+            let (wall, rest, carried) = (impact.part.wall, S::one() - time, place.carried);
+            turn.add(&marble, time, left);
             // From here on as the wall sees it.
             (displacement, change, left) = (place.rest, change * rest, left * rest);
-            let rounding = sphere.radius * S::from_f64(OVERLAP);
-            let mut along = along_surfaces(displacement, normal, &surfaces, rounding);
+            let approach = -(displacement + swing * rest).dot(normal);
+            let fast = approach > resting_approach * left;
+            marble.advance(time, place.position);
+            let radius = marble.sphere.radius;
+            let along = self.along_wall(&impact, displacement, (radius, fast), &surfaces);
             surfaces.push(normal);
-            let there = center + along * displacement;
-            let slides_off = || {
-                let wall = &self.walls.shapes()[wall as usize];
-                !matches!(wall, WallShape::Plane(_))
-                    && wall.project_point(there).distance > sphere.radius
-            };
-            let fast = -displacement.dot(normal) > resting_approach * left;
-            if surfaces.len() == MAX_BENDS as usize || (fast && slides_off()) {
-                along = Mat3::from_value(S::zero());
+            let (mut slid, kept) = (along * displacement, along * change);
+            if fast || along.is_zero() {
+                marble.stop_turning(self.turn_with_wall(row, wall, left * dt));
+            } else if !marble.is_ball() {
+                slid = displacement + normal * approach;
             }
-            let (slid, kept) = (along * displacement, along * change);
-            let surface = self.walls.surface_velocity(wall as usize, center, normal);
-            let closing = (velocity - surface).dot(normal);
+            let surface = self.walls.surface_velocity(wall as usize, center + anchor, normal);
+            let closing = (velocity + self.swing_velocity(row, anchor) - surface).dot(normal);
             let part = lost_fraction((change - kept).dot(normal), closing);
             let stop = StoppedMarble {
                 row: row as u32,
@@ -176,7 +188,7 @@ impl<S: Scalar> World<S> {
             carrier = Some((wall, center, slid)).filter(|_| !carried.is_zero());
             self.scratch.continuous.bends.push(Bend {
                 stop,
-                center: sphere.center,
+                center: marble.sphere.center,
                 left,
                 displacement,
                 carried,
@@ -184,39 +196,70 @@ impl<S: Scalar> World<S> {
                 along: along * rest,
             });
         }
+        if !surfaces.is_empty() && !marble.is_ball() {
+            turn.add(&marble, S::one(), left);
+            self.scratch.continuous.set_turn(row, turn);
+        }
     }
 
-    /// First time of impact of a marble's sphere with a wall that it would pass into.
+    /// Projection of the rest of a path onto the wall that it meets, after other surfaces; zero if it
+    /// stays: in a corner, or where a marble that is `fast` would slide off the wall.
+    fn along_wall(
+        &self,
+        impact: &WallImpact<S>,
+        displacement: Vec3<S>,
+        (radius, fast): (S, bool),
+        surfaces: &[Vec3<S>],
+    ) -> Mat3<S> {
+        let WallImpact { part: SubShape { wall, .. }, normal, center, anchor, .. } = *impact;
+        let along = along_surfaces(displacement, normal, surfaces, radius * S::from_f64(OVERLAP));
+        let slides_off = || {
+            let (wall, there) =
+                (&self.walls.shapes()[wall as usize], center + anchor + along * displacement);
+            !matches!(wall, WallShape::Plane(_)) && wall.project_point(there).distance > radius
+        };
+        let stays = surfaces.len() + 1 == MAX_BENDS as usize || (fast && slides_off());
+        if stays { Mat3::from_value(S::zero()) } else { along }
+    }
+
+    /// First time of impact of a marble with a wall that it would pass into.
     pub(super) fn first_wall_impact(
         &self,
         row: usize,
-        sphere: &Sphere<S>,
+        marble: &SweptMarble<S>,
         motion: Motion<S>,
     ) -> Option<WallImpact<S>> {
-        // The core (half the radius) decides whether it passes into a wall, the full sphere when:
+        // The core (half the radius) decides whether it passes into a wall, the full radius when:
         // first wherever it touches, so that at the internal edge of two flush parts the one below
         // counts.
-        let core = sphere.radius * S::from_f64(CORE);
-        let passes = self.first_impact_of(core, (row, sphere, motion))?;
+        let Sphere { radius, .. } = marble.sphere;
+        let core = marble.touching(radius * S::from_f64(CORE));
+        let passes = self.first_impact_of(core, (row, marble, motion))?;
         if self.settings.model.response.needs_penetration() {
             return Some(passes);
         }
-        let all = sphere.radius - sphere.radius * S::from_f64(OVERLAP);
-        Some(self.first_impact_of(all, (row, sphere, motion)).unwrap_or(passes))
+        let all = marble.touching(radius - radius * S::from_f64(OVERLAP));
+        Some(self.first_impact_of(all, (row, marble, motion)).unwrap_or(passes))
     }
 
-    /// First time of impact of a sphere of this radius, of the parts that are met at once the
-    /// deepest.
+    /// First time of impact of a ball or a capsule of this radius, of the parts that are met at once
+    /// the deepest.
     fn first_impact_of(
         &self,
         radius: S,
-        (row, sphere, motion): (usize, &Sphere<S>, Motion<S>),
+        (row, marble, motion): (usize, &SweptMarble<S>, Motion<S>),
     ) -> Option<WallImpact<S>> {
         let filter = self.marbles.filter_of_row(row);
         let mut best: Option<WallImpact<S>> = None;
-        self.for_each_wall_on_path(row, sphere, motion, |part, path| {
-            let Some(stop) = self.walls.time_of_impact(part, radius, path) else { return };
-            if self.walls.is_ghost_impact(&stop, &Sphere { radius, ..*sphere }, (path, filter)) {
+        let sized = SweptMarble { sphere: Sphere { radius, ..marble.sphere }, ..*marble };
+        self.for_each_wall_on_path(row, marble, motion, |part, path| {
+            let stop = if marble.is_ball() {
+                self.walls.time_of_impact(part, radius, path)
+            } else {
+                self.walls.time_of_impact_of_capsule(part, &sized, path)
+            };
+            let Some(stop) = stop else { return };
+            if self.walls.is_ghost_impact(&stop, &sized, (path, filter)) {
                 return;
             }
             let order = |stop: &WallImpact<S>| (stop.time, stop.gap);
@@ -232,16 +275,18 @@ impl<S: Scalar> World<S> {
     fn for_each_wall_on_path(
         &self,
         row: usize,
-        sphere: &Sphere<S>,
+        marble: &SweptMarble<S>,
         Motion { displacement, time, carrier }: Motion<S>,
         mut visit: impl FnMut(SubShape, &RelativePath<S>),
     ) {
         let filter = self.marbles.filter_of_row(row);
         let free = self.free_motion(row);
-        let bounds = path_bounds(sphere.center, displacement, sphere.radius);
+        let start = marble.sphere.center;
+        let bounds = marble.bounds(displacement);
+        let moves_far = |path: &RelativePath<S>| path.max_length() + marble.max_swing(path) > free;
         let moving_walls =
             if time > S::zero() { &self.scratch.continuous.moving_walls[..] } else { &[] };
-        let path = RelativePath { start: sphere.center, displacement, frame: Frame::Standing };
+        let path = RelativePath { start, displacement, frame: Frame::Standing };
         let moves = |part: SubShape| {
             time > S::zero() && self.walls.swept_motion_of_row(part.wall as usize).is_some()
         };
@@ -253,7 +298,7 @@ impl<S: Scalar> World<S> {
                 }
             }
         }
-        if path.max_length() > free {
+        if moves_far(&path) {
             self.walls.for_each_colliding(&bounds, filter, |part| {
                 if !moves(part) {
                     visit(part, &path);
@@ -271,9 +316,9 @@ impl<S: Scalar> World<S> {
             };
             if (carried.is_some() || wall.is_near(&bounds))
                 && wall.collides(&self.walls, filter)
-                && path.max_length() > free
+                && moves_far(&path)
             {
-                wall.for_each_near_path(&self.walls, &path, sphere.radius, |part| {
+                wall.for_each_near_path(&self.walls, &path, marble.reach(), |part| {
                     visit(part, &path);
                 });
             }
@@ -287,18 +332,21 @@ impl<S: Scalar> Walls<S> {
     fn is_ghost_impact(
         &self,
         impact: &WallImpact<S>,
-        sphere: &Sphere<S>,
+        marble: &SweptMarble<S>,
         (path, filter): (&RelativePath<S>, CollisionFilter),
     ) -> bool {
-        let WallImpact { time, part, normal, center, gap, .. } = *impact;
+        let WallImpact { time, part, normal, center, gap, anchor, .. } = *impact;
+        let (sphere, center) = (marble.sphere, center + anchor);
         let Some(face) = self.shapes()[part.wall as usize].face_normal(part.index, center) else {
             return false;
         };
         let closing = -path.velocity(time, center).dot(face);
-        if closing > sphere.radius * S::from_f64(OVERLAP) || path.max_acceleration() > S::zero() {
+        if closing > sphere.radius * S::from_f64(OVERLAP)
+            || marble.max_acceleration(path, face) > S::zero()
+        {
             return false;
         }
-        let flush = flush_distance(&Sphere { center, ..*sphere });
+        let flush = flush_distance(&Sphere { center, ..sphere });
         let point = center - normal * (gap + sphere.radius);
         let margin = Vec3::new(flush, flush, flush);
         let mut is_shared = false;
@@ -335,6 +383,8 @@ impl<S: Scalar> Walls<S> {
                 part,
                 normal,
                 center,
+                anchor: Vec3::zero(),
+                swing: Vec3::zero(),
                 place: path.place(time, center),
                 gap,
             });
@@ -344,23 +394,31 @@ impl<S: Scalar> Walls<S> {
             // One that touches and parts may come back where the wall rotates.
             let overshoot = radius * S::from_f64(MAX_OVERSHOOT);
             let gap = if closes { gap } else { gap.max(overshoot) };
-            time += if bend > S::zero() {
-                let root = (closing * closing + S::from_f64(2.0) * bend * gap).sqrt();
-                // Without cancellation.
-                if closing > S::zero() {
-                    S::from_f64(2.0) * gap / (closing + root)
-                } else {
-                    (root - closing) / bend
-                }
-            } else {
-                gap / closing
-            };
+            time += time_to_close(gap, closing, bend);
             if time > S::one() {
                 return None;
             }
         }
         // A grazing contact, or within rounding.
         last.filter(|last| last.gap <= radius)
+    }
+}
+
+/// Time for which a gap, in metres, stays open at least if it closes by `closing` metres per path, and
+/// by no more than `bend` faster with each path; infinite if it never closes.
+pub(super) fn time_to_close<S: Scalar>(gap: S, closing: S, bend: S) -> S {
+    if bend > S::zero() {
+        let root = (closing * closing + S::from_f64(2.0) * bend * gap).sqrt();
+        // Without cancellation.
+        if closing > S::zero() {
+            S::from_f64(2.0) * gap / (closing + root)
+        } else {
+            (root - closing) / bend
+        }
+    } else if closing > S::zero() {
+        gap / closing
+    } else {
+        S::infinity()
     }
 }
 
