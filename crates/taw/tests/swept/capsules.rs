@@ -29,7 +29,7 @@ fn unit(random: &mut Rng) -> Vec3<f64> {
     }
 }
 
-/// Numbers of equal ratio are as likely.
+/// Number whose logarithm is evenly distributed.
 fn log(random: &mut Rng, low: f64, high: f64) -> f64 {
     low * (high / low).powf(random.f64())
 }
@@ -96,9 +96,9 @@ fn lowest<S: Scalar>(world: &World<S>, pose: Pose<f64>) -> f64 {
         let marble = world.marbles.get(world.marbles.id(row).unwrap()).unwrap();
         let half = marble.rotation * Vec3::unit_y() * marble.half_length;
         let ends = [marble.position - half, marble.position, marble.position + half];
-        ends.map(|at| pose.inverse_transform_point(cast_point(at)).y)
-            .into_iter()
-            .fold(9.0, f64::min)
+        let heights = ends.map(|at| pose.inverse_transform_point(cast_point(at)).y);
+        assert!(heights.iter().all(|y| y.is_finite()), "{marble:?}");
+        heights.into_iter().fold(9.0, f64::min)
     };
     (0..world.marbles.len()).map(height).fold(9.0, f64::min)
 }
@@ -180,5 +180,34 @@ fn a_capsule_that_a_plate_stops_bounces_and_does_not_hang() {
                 before = now;
             }
         }
+    }
+}
+
+/// A flipper: one end of it is within a plate all the time.
+#[test]
+fn no_wall_stops_the_rotation_of_a_capsule_of_infinite_mass() {
+    for response in [Response::Impulse, Response::Penalty(ContactLaw::SpringDashpot)] {
+        let mut world = World::<f64>::default();
+        let rotation = Rotation::Dynamic;
+        world.set_model(Model { response, rotation, ..Model::default() }).unwrap();
+        let pose = Pose { rotation: Quat::new(1.0, 0.0, 0.0, 0.0), translation: Vec3::zero() };
+        world.walls.insert(plate::<f64>(false, pose)).unwrap();
+        let spin = Vec3::unit_y() * 3.0;
+        let flipper = Marble {
+            half_length: 1.0,
+            rotation: integrate_rotation(pose.rotation, Vec3::unit_z(), 1.5),
+            angular_velocity: spin,
+            mass: Mass::Infinite,
+            ..Marble::new(Point3::new(0.0, 0.1, 0.0), 0.1)
+        };
+        let id = world.marbles.insert(flipper).unwrap();
+        for _ in 0..60 {
+            world.step(DT).unwrap();
+        }
+        let now = world.marbles.get(id).unwrap();
+        let free = integrate_rotation(flipper.rotation, spin, 1.0);
+        let away = (now.rotation * Vec3::unit_y()).cross(free * Vec3::unit_y()).magnitude();
+        assert!(away < 1e-9, "{response:?}: {away} rad from free rotation");
+        assert!((now.position - flipper.position).magnitude() < 1e-9, "{response:?}: {now:?}");
     }
 }

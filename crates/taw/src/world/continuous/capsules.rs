@@ -69,7 +69,7 @@ impl<S: Scalar> Walls<S> {
                 S::zero()
             };
             time += first.min(second).max(around);
-            // Nor if it is no number.
+            // It never meets the wall, or is no number.
             if !time.is_finite() || time > S::one() {
                 return None;
             }
@@ -106,9 +106,12 @@ impl<S: Scalar> World<S> {
         motion.map_or_else(Vec3::zero, |motion| motion.angular_velocity * time)
     }
 
-    /// Velocity of a point of a capsule's axis about its center, in m/s; zero for a ball.
+    /// Velocity of a point of a capsule's axis about its center, in m/s; zero for a ball, and for a
+    /// capsule whose axis does not turn.
     pub(super) fn swing_velocity(&self, row: usize, anchor: Vec3<S>) -> Vec3<S> {
-        let spin = self.marbles.angular_velocity.get(row);
-        spin.map_or_else(Vec3::zero, |spin| spin.cross(anchor))
+        if anchor.is_zero() {
+            return Vec3::zero();
+        }
+        self.marbles.axis_velocity(row, self.settings.model.rotation).cross(anchor)
     }
 }

@@ -38,12 +38,17 @@ impl<S: Scalar> Default for Turn<S> {
 }
 
 impl<S: Scalar> SweptMarble<S> {
+    /// Sphere around the center of a marble.
+    pub fn ball(marbles: &Marbles<S>, row: usize, center: Point3<S>) -> Self {
+        let sphere = Sphere { center, ..marbles.sphere(row) };
+        Self { sphere, half_axis: Vec3::zero(), turn: Vec3::zero(), is_free: true }
+    }
+
     /// Marble on a path on which it does not turn.
     pub fn without_turn(marbles: &Marbles<S>, row: usize, center: Point3<S>) -> Self {
-        let sphere = Sphere { center, ..marbles.sphere(row) };
+        let ball = Self::ball(marbles, row, center);
         let half = marbles.half_length(row);
-        let half_axis = if half > S::zero() { marbles.axis(row) * half } else { Vec3::zero() };
-        Self { sphere, half_axis, turn: Vec3::zero(), is_free: true }
+        if half > S::zero() { Self { half_axis: marbles.axis(row) * half, ..ball } } else { ball }
     }
 
     /// Marble at the start of its free motion over `dt` seconds in a world of this model.

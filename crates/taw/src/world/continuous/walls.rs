@@ -95,8 +95,12 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Marble at the start of its free motion over `dt` seconds.
+    /// Marble at the start of its free motion over `dt` seconds. Of a capsule of infinite mass, which
+    /// no wall turns, the sphere around its center.
     pub(super) fn swept_marble(&self, row: usize, start: Point3<S>, dt: S) -> SweptMarble<S> {
+        if self.is_kinematic(row) {
+            return SweptMarble::ball(&self.marbles, row, start);
+        }
         let model = self.settings.model.rotation;
         SweptMarble::in_free_motion(&self.marbles, row, start, (model, dt))
     }
@@ -172,7 +176,7 @@ impl<S: Scalar> World<S> {
             if fast || along.is_zero() {
                 marble.stop_turning(self.turn_with_wall(row, wall, left * dt));
             } else if !marble.is_ball() {
-                slid = displacement + normal * approach;
+                slid = displacement + normal * approach.max(S::zero());
             }
             let surface = self.walls.surface_velocity(wall as usize, center + anchor, normal);
             let closing = (velocity + self.swing_velocity(row, anchor) - surface).dot(normal);
@@ -342,7 +346,7 @@ impl<S: Scalar> Walls<S> {
         };
         let closing = -path.velocity(time, center).dot(face);
         if closing > sphere.radius * S::from_f64(OVERLAP)
-            || marble.max_acceleration(path, face) > S::zero()
+            || marble.max_acceleration(path, face) > sphere.radius * S::from_f64(OVERLAP)
         {
             return false;
         }
