@@ -358,7 +358,7 @@ fn a_short_storm() {
 
 /// Not yet: what parts after teleports or slides on may gain energy by the core's models.
 #[test]
-#[ignore = "some of 60 seeds gain energy by Displacement"]
+#[ignore = "of 60 seeds 11 gains energy by Displacement, 16 and 41 by SoftStep"]
 fn a_calm_after_a_short_storm() {
     for seed in 0..60 {
         let (storm, frame) = run(seed);
