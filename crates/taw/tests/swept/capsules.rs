@@ -199,7 +199,7 @@ fn no_wall_stops_the_rotation_of_a_capsule_of_infinite_mass() {
             let flipper = Marble {
                 half_length: 1.0,
                 rotation: integrate_rotation(upright, Vec3::unit_z(), 1.5),
-                angular_velocity: Vec3::unit_y() * 3.0,
+                angular_velocity: Vec3::unit_y() * 10.0,
                 mass: Mass::Infinite,
                 ..Marble::new(Point3::new(0.0, 0.1, 0.0), 0.1)
             };
