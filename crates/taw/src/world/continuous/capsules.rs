@@ -10,8 +10,9 @@ use crate::shape::Capsule;
 use crate::world::walls::{SubShape, Walls};
 use crate::world::{WallShape, World};
 
-/// Where a capsule is nearest to a sub-shape of a wall.
+/// Nearest points of a capsule and a sub-shape of a wall.
 struct Nearest<S> {
+    /// Unit normal, from the wall to the capsule.
     normal: Vec3<S>,
     /// Separation of the surfaces, in metres.
     gap: S,
@@ -69,7 +70,7 @@ impl<S: Scalar> Walls<S> {
                 S::zero()
             };
             time += first.min(second).max(around);
-            // It never meets the wall, or is no number.
+            // Infinite where it never meets the wall.
             if !time.is_finite() || time > S::one() {
                 return None;
             }

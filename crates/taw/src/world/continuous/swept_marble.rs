@@ -65,7 +65,7 @@ impl<S: Scalar> SweptMarble<S> {
         Self { turn: marbles.axis_velocity(row, model) * dt, ..still }
     }
 
-    /// Predicate: it is no capsule.
+    /// Returns true for a ball, and false for a capsule.
     pub fn is_ball(&self) -> bool {
         self.half_axis.is_zero()
     }
@@ -120,7 +120,8 @@ impl<S: Scalar> SweptMarble<S> {
         (path.rotate_into_frame(time, self.turn) - path.turn()).cross(anchor)
     }
 
-    /// Upper bound of the ways of its ends about its center in the frame of the wall, in metres.
+    /// Upper bound of the distances that its ends move about its center in the frame of the wall, in
+    /// metres.
     #[inline]
     pub fn max_swing(&self, path: &RelativePath<S>) -> S {
         if self.is_ball() {
