@@ -2,6 +2,7 @@
 //! is refused has changed nothing, what overflows is named, and sane marbles far away never learn
 //! of it, to the bit.
 
+use cgmath::{EuclideanSpace, InnerSpace};
 use proptest::prelude::*;
 use taw::math::Quat;
 use taw::motion::WallMotion;
@@ -253,5 +254,35 @@ proptest! {
     ) {
         goes_well::<f32>(model, &calls);
         goes_well::<f64>(model, &calls);
+    }
+}
+
+/// Found by the test above: impulses that stopped a ball of infinite mass threw it 1e23 m far once it had
+/// another mass.
+#[test]
+fn what_was_of_infinite_mass_stays_where_it_is() {
+    let calls = [
+        (0, 0, [0.0, 0.0, 1.0345056903262422, 0.01]),
+        (0, 0, [0.0, 0.0, 0.0, 0.01]),
+        (0, 0, [0.0, 0.01, -0.9167549365496286, 0.9901304785154693]),
+        (9, 0, [0.0; 4]),
+        (19, 0, [0.0; 4]),
+        (0, 6, [-0.11068043946404425, 0.01, 0.11857535786687987, 0.5790936122987911]),
+        (26, 0, [0.0; 4]),
+        (21, 0, [-0.32019032587056423, 0.784269560868871, 0.458375913867535, 0.8324597092477246]),
+        (8, 5, [0.0; 4]),
+        (26, 0, [0.0; 4]),
+        (13, 2, [0.01, 0.0, 0.0, 0.0]),
+        (26, 0, [0.0; 4]),
+    ];
+    let response = Response::SoftStep;
+    let mut trial =
+        Trial::<f32>::new(Model { response, rotation: Rotation::Dynamic, ..Model::default() });
+    for (which, whom, numbers) in calls {
+        trial.call(&Call { which, whom, numbers });
+        for id in &trial.near {
+            let at = trial.world.marbles.get(*id).unwrap().position;
+            assert!(at.to_vec().magnitude() < 10.0, "{at:?}");
+        }
     }
 }

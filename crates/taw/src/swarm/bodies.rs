@@ -174,7 +174,7 @@ impl Swarm {
     /// Takes over what changed of bodies, and wakes those.
     pub(crate) fn write_bodies(&mut self, bodies: &[Body]) {
         self.set_layers_of_slots(bodies.iter().map(|body| (body.slot, body.layers)));
-        let (mut resized, mut resurfaced) = (false, false);
+        let (mut resized, mut resurfaced, mut lighter) = (false, false, Vec::new());
         for body in bodies {
             let row = self.ids.rows()[body.slot as usize] as usize;
             resurfaced |= self.surfaces.set(body.slot, body.surface);
@@ -187,6 +187,10 @@ impl Swarm {
             let at = self.at[row];
             resized |= at[3] != body.at[3];
             self.skin_left[row] -= squared(less(body.at, at)).sqrt() + (body.at[3] - at[3]).abs();
+            let part = self.velocity[row][3] / body.velocity[3];
+            if 0.0 < part && part < 1.0 {
+                lighter.push((row, part));
+            }
             (self.at[row], self.velocity[row]) = (body.at, body.velocity);
             let [x, y, z, _] = body.spin;
             self.spin[row] = [x, y, z, self.spin[row][3]];
@@ -194,9 +198,11 @@ impl Swarm {
         if resized {
             self.measure_radii();
         }
-        if resurfaced {
+        if resurfaced || !lighter.is_empty() {
             self.forget_contacts();
         }
+        // Their contacts give them no more velocity than before.
+        self.impulse_cache.scale(lighter.into_iter().map(|(row, part)| (self.old_rows[row], part)));
     }
 
     /// Sets the velocity changes besides gravity in the next step, in m/s; those of one slot add up.

@@ -95,6 +95,27 @@ impl ImpulseCache {
             + self.wall_contacts.capacity() * size_of::<WallContact>()
     }
 
+    /// Scales the impulses of some balls by factors, given their rows then.
+    pub fn scale(&mut self, balls: impl Iterator<Item = (u32, f32)>) {
+        let Self { start, kept, wall_contacts } = self;
+        let mut factors = vec![1.0; start.len()];
+        for (row, factor) in balls {
+            if let Some(of_row) = factors.get_mut(row as usize) {
+                *of_row = factor; // not new
+            }
+        }
+        for (range, factor) in start.windows(2).zip(&factors) {
+            for cached in &mut kept[range[0] as usize..range[1] as usize] {
+                let factor = factor.min(factors[cached.other as usize]);
+                cached.normal_impulse *= factor;
+                cached.tangent_impulse = cached.tangent_impulse.map(|x| x * factor);
+            }
+        }
+        for contact in wall_contacts {
+            contact.scale(factors[contact.row as usize]);
+        }
+    }
+
     /// Gives the pairs of a batch their cached impulses. `before` is the earlier row of each row.
     pub fn restore(&self, batches: &[Batch], old_rows: &[u32], impulses: &mut ContactImpulses) {
         for (i, batch) in batches.iter().enumerate() {

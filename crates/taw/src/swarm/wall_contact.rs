@@ -101,6 +101,15 @@ impl WallContact {
         self.borne_for_others = before.borne_for_others;
     }
 
+    /// Scales all its impulses.
+    pub fn scale(&mut self, factor: f32) {
+        self.borne_for_others *= factor;
+        self.impulse.normal *= factor;
+        self.impulse.tangent *= factor;
+        self.load = self.load.map(|load| load * factor);
+        self.torque *= factor;
+    }
+
     /// Notes what the wall bears before a ball of this velocity strikes it in a pass.
     pub fn note_impact(&mut self, pass: Pass, velocity: &Row) {
         let (Pass::Solve(params) | Pass::Relax(params)) = pass else { return };
