@@ -2,6 +2,8 @@
 
 #[path = "soft_step/breaks.rs"]
 mod breaks;
+#[path = "soft_step/columns.rs"]
+mod columns;
 #[path = "soft_step/drums.rs"]
 mod drums;
 #[path = "soft_step/impacts.rs"]

@@ -201,8 +201,11 @@ impl Swarm {
         if resurfaced || !lighter.is_empty() {
             self.forget_contacts();
         }
-        // Their contacts give them no more velocity than before.
-        self.impulse_cache.scale(lighter.into_iter().map(|(row, part)| (self.old_rows[row], part)));
+        if !lighter.is_empty() {
+            // Their contacts give them no more velocity than before.
+            let lighter = lighter.into_iter().map(|(row, part)| (self.old_rows[row], part));
+            self.impulse_cache.scale(lighter);
+        }
     }
 
     /// Sets the velocity changes besides gravity in the next step, in m/s; those of one slot add up.

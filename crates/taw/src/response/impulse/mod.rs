@@ -10,6 +10,7 @@ mod positions;
 mod prepare;
 mod rows;
 mod solve;
+mod velocities;
 
 use cgmath::{InnerSpace, Zero};
 
@@ -27,6 +28,7 @@ pub(super) use islands::UnionFind;
 use prepare::prepare;
 use rows::Rows;
 use solve::iterate;
+pub(crate) use velocities::{VelocityContact, solve_velocities};
 
 /// Solver input besides bodies and contacts.
 pub(crate) struct Context<'a, S, W, M, F> {

@@ -16,6 +16,7 @@ mod integrate;
 mod meeting;
 mod params;
 mod rolling;
+mod sinking;
 mod tipping;
 
 pub(super) use backing::LOST;
@@ -25,6 +26,7 @@ pub(super) use integrate::{
     IntegratePositions, MAX_MAGNITUDE, Predict, UpdateVelocities, largest, squared,
 };
 pub(super) use params::{GROUNDED, Pass, SolverParams, WALL_SLOP};
+pub(super) use sinking::{FindSinking, Sinking};
 
 /// Accumulated impulses of batches of pairs, batch by batch; none in the lab's tier.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -62,6 +64,11 @@ pub(super) struct StruckContact {
 }
 
 impl StruckContact {
+    /// Contact of a batch and lane, with its normal impulse before.
+    pub fn new([batch, lane]: [u32; 2], load: f32) -> Self {
+        Self { batch, lane, load }
+    }
+
     /// Notes the pairs of a batch that come together fast, and their normal impulses before.
     #[inline(always)]
     fn note<L: Simd>(

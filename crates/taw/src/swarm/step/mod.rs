@@ -2,12 +2,14 @@
 
 mod backing;
 mod bounces;
+mod cluster;
 mod lab;
 mod overflow;
 mod passages;
 mod paths;
 mod relax;
 mod sleep;
+mod unconverged;
 mod wall_contacts;
 
 pub(super) use bounces::WayToWall;
@@ -42,11 +44,15 @@ const PUSHING: f32 = 0.3;
 const SLOP: f32 = 0.04;
 /// Slop where nothing lies on anything: only so that balls that touch are left alone.
 const SLOP_WEIGHTLESS: f32 = 0.01;
+/// Part of its radius by which a ball may sink into another in a step. Half of an overlap beyond the slop goes
+/// in each substep, so at most twice as much remains: with the slop, the tenth that is seen.
+const MAX_SINKING: f32 = 0.01;
 /// Number of looks for bounces in a substep while any is found: in a gas hardly ever do five
 /// balls meet in one. What meets after that is stopped.
 const ROUNDS: usize = 4;
 /// Most passes of a substep that relax what is jammed.
 const RELAXATIONS: usize = 16;
+
 impl Swarm {
     /// Moves the balls on by `dt` seconds. `walls_identity` is another whenever a wall changed.
     pub(crate) fn step(
@@ -171,7 +177,8 @@ impl Swarm {
     }
 
     /// Moves all on by `dt` seconds, in substeps: *bounce*, *integrate velocities*, *warm start*,
-    /// *solve*, *integrate positions*, *relax* (Catto, 2024, `Solver2D`, `solve_soft_step.c`).
+    /// *solve*, *integrate positions*, *relax* (Catto, 2024, `Solver2D`, `solve_soft_step.c`); and after
+    /// *solve*, where heavy balls still sink, *solve what is unconverged*.
     fn solve(
         &mut self,
         dt: f32,
@@ -211,6 +218,7 @@ impl Swarm {
             self.find_backing();
             self.pass(Pass::WarmStart(params), |_, _| true);
             self.pass(Pass::Solve(params), |_, _| true);
+            self.solve_unconverged(&params);
             observe(Stage::Integrate);
             self.end_swift_paths([dt, h, left], walls, observe);
             self.save_proxies();
@@ -254,6 +262,7 @@ impl Swarm {
             // nothing has weight, overlap makes no speed at all.
             softness: ContactSoftness::new(h, HERTZ, DAMPING, PUSHING * length(gravity)),
             slop: if length(gravity) > 0.0 { SLOP } else { SLOP_WEIGHTLESS },
+            max_sinking: MAX_SINKING * h / dt,
             moves_apart: true,
             notes_impacts: self.bodies_are_rows,
         }
