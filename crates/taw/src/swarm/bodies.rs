@@ -187,9 +187,10 @@ impl Swarm {
             let at = self.at[row];
             resized |= at[3] != body.at[3];
             self.skin_left[row] -= squared(less(body.at, at)).sqrt() + (body.at[3] - at[3]).abs();
-            let part = self.velocity[row][3] / body.velocity[3];
-            if 0.0 < part && part < 1.0 {
-                lighter.push((row, part));
+            let fraction = self.velocity[row][3] / body.velocity[3];
+            // Passes take back impulses up to twice too large.
+            if 0.0 < fraction && fraction < 0.5 {
+                lighter.push((row, fraction));
             }
             (self.at[row], self.velocity[row]) = (body.at, body.velocity);
             let [x, y, z, _] = body.spin;
@@ -203,7 +204,7 @@ impl Swarm {
         }
         if !lighter.is_empty() {
             // Their contacts give them no more velocity than before.
-            let lighter = lighter.into_iter().map(|(row, part)| (self.old_rows[row], part));
+            let lighter = lighter.into_iter().map(|(row, fraction)| (self.old_rows[row], fraction));
             self.impulse_cache.scale(lighter);
         }
     }

@@ -6,6 +6,7 @@ use super::kernels::{GROUNDED, Pass, SolverParams, WALL_SLOP};
 use super::proxies::Proxy;
 use super::simd::Row;
 use super::surfaces::WallNumbers;
+use super::walls::StaticGeometry;
 use crate::constraint::{ContactImpulse, ContactSoftness, FrictionCone, solve_rolling};
 use crate::math::{RealVector, Vec3};
 use crate::response::Impact;
@@ -65,6 +66,15 @@ fn set(row: &mut Row, to: Vec3<f32>) {
 impl WallContact {
     pub fn separation(&self, at: &Row) -> f32 {
         self.normal.dot(xyz(at)) - self.offset - at[3]
+    }
+
+    /// Puts the wall where it is so long before the end of the step, in seconds, and reads its velocity at the
+    /// ball.
+    pub fn set_time(&mut self, walls: &dyn StaticGeometry, at: &Row, before_end: f32) {
+        let point = Point3::from_vec(xyz(at) - self.normal * at[3]);
+        self.surface = walls.surface_velocity(self.wall, point, self.normal);
+        self.offset = self.offset_at_end;
+        self.advance(-before_end);
     }
 
     /// The wall moves on for so long, in seconds; one that bears a proxy may give way to it.

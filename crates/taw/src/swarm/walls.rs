@@ -204,12 +204,9 @@ impl Chunk {
         let mut fastest = 0.0_f32;
         for contact in &mut self.wall_contacts {
             let ball = &query.at[contact.row as usize];
-            let point = center(ball) - contact.normal * ball[3];
             contact.bears_proxy = false;
-            contact.surface = walls.surface_velocity(contact.wall, point, contact.normal);
+            contact.set_time(walls, ball, query.before);
             fastest = fastest.max(contact.surface.magnitude2());
-            contact.offset = contact.offset_at_end;
-            contact.advance(-query.before);
         }
         self.wall_speed = fastest.sqrt();
     }
@@ -288,15 +285,27 @@ fn find_plane_contacts(
     row: u32,
     balls: Balls,
     planes: &[HalfSpace],
+    visit: impl FnMut(WallContact),
+) {
+    let reach = balls.reach(row as usize);
+    plane_contacts_within(reach, row, &balls.at[row as usize], balls.surfaces, planes, visit);
+}
+
+/// Visits the half-spaces that are nearer to a ball than so many metres.
+pub(super) fn plane_contacts_within(
+    reach: f32,
+    row: u32,
+    ball: &Row,
+    surfaces: SurfaceOf,
+    planes: &[HalfSpace],
     mut visit: impl FnMut(WallContact),
 ) {
-    let (ball, reach) = (&balls.at[row as usize], balls.reach(row as usize));
     for plane in planes {
         let HalfSpace { wall, normal, offset, material, layers } = *plane;
         let separation = normal.dot(center(ball).to_vec()) - offset - ball[3];
         // A wall may also come nearer; a move of it starts another search.
-        if separation < reach && balls.surfaces.filter(row).meets_wall(wall, layers) {
-            let numbers = WallNumbers::new(balls.surfaces.row(row), material);
+        if separation < reach && surfaces.filter(row).meets_wall(wall, layers) {
+            let numbers = WallNumbers::new(surfaces.row(row), material);
             visit(WallContact::new(row, [wall, 0], normal, offset, numbers));
         }
     }

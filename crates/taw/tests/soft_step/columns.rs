@@ -107,8 +107,9 @@ fn heavy_balls_sink_the_same_way_on_any_number_of_threads_and_in_a_clone() {
         let model = SwarmModel { threads, ..world.swarm.model() };
         world.swarm.set_model(model).unwrap();
         floor(&mut world);
-        for i in 0..400_u16 {
-            let [x, y, z] = [i % 8, i / 64, i / 8 % 8].map(f32::from);
+        // More than one chunk.
+        for i in 0..2_400_u16 {
+            let [x, y, z] = [i % 20, i / 400, i / 20 % 20].map(f32::from);
             let at = Point3::new(x * 0.21, 0.1 + y * 0.2, z * 0.21 + 0.01 * y);
             let mass = Mass::Kilograms(if i % 37 == 36 { 1e3 } else { 1.0 });
             world.marbles.insert(Marble { mass, ..Marble::new(at, 0.1) }).unwrap();

@@ -1,5 +1,6 @@
-//! Sequential impulses: the solver of [`Response::Impulse`](super::Response::Impulse) and of the
-//! resting clusters of [`Response::EventDriven`](super::Response::EventDriven).
+//! Sequential impulses: the solver of [`Response::Impulse`](super::Response::Impulse), of the resting
+//! clusters of [`Response::EventDriven`](super::Response::EventDriven), and of the contacts that a pass of
+//! [`Response::SoftStep`](super::Response::SoftStep) leaves unconverged.
 
 mod cache;
 mod contact;

@@ -21,7 +21,7 @@ pub(crate) struct VelocityContact<S> {
     pub target_normal_velocity: S,
     /// Coefficient of friction.
     pub friction: S,
-    /// Impulse on the second ball, in N s, that velocities have already.
+    /// Impulse on the second ball, in N s: before, that which velocities have already; afterwards, all.
     pub impulse: ContactImpulse<S>,
 }
 

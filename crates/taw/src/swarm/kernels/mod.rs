@@ -45,12 +45,13 @@ pub(super) struct ContactImpulses {
     pub jammed: bool,
     /// Impacts of the last round, if they are noted: of rows.
     pub impacts: Vec<Impact<f32>>,
-    /// Those that were struck in this substep.
+    /// Those that were struck, or solved in a cluster, in this substep.
     pub struck: Vec<StruckContact>,
 }
 
 /// Contact whose balls came together fast in a substep: faster than gravity makes balls at rest in two
-/// steps, so only where there is gravity.
+/// steps, so only where there is gravity; or that was
+/// [unconverged](super::Swarm::solve_unconverged).
 ///
 /// The impulse that stops them is no load: applied again in the next substep, it would throw them
 /// apart. Of balls that weigh about as much, contacts take it back; a light one between heavy ones

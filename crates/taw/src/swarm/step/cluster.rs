@@ -16,13 +16,13 @@ use crate::swarm::simd::Row;
 use crate::swarm::wall_contact::xyz;
 use crate::swarm::{INFINITE_MASS, Swarm};
 
-/// Most balls of a cluster whose contacts are in it, and most pairs, those next to what sinks first: as many
-/// as a game has time for in a substep. With a thousand it takes longer, and holds up no more.
+/// Number of balls, and of pairs, with which a cluster is full: as many as a game has time for in a substep.
+/// Clusters of a thousand take longer and leave as many overlaps.
 const MAX_COUNT: usize = 256;
 
 /// Contact of a cluster in the lists of the swarm.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Source {
+pub(super) enum ContactLocation {
     Pair(PairPlace),
     /// Chunk and number; and the impulse that it has borne for others, if it is the one behind the ball.
     Wall([usize; 2], Option<f32>),
@@ -41,7 +41,7 @@ pub(super) struct PairPlace {
 pub(super) struct Cluster {
     /// Those with walls come first.
     pub contacts: Vec<VelocityContact<f64>>,
-    pub sources: Vec<Source>,
+    pub locations: Vec<ContactLocation>,
     pub rows: Vec<u32>,
     pub position: Vec<Point3<f64>>,
     pub velocity: Vec<Vec3<f64>>,
@@ -92,7 +92,7 @@ impl PairsByRow {
 
 impl Cluster {
     /// Collects the contacts around some balls that sink: those that bear something, or may close within a
-    /// substep, and do not bounce then.
+    /// substep. Pairs that then bounce are left out.
     pub fn new(swarm: &Swarm, sinking: &[Sinking], params: &SolverParams) -> Self {
         let (balls, pairs) = swarm.pairs_around(sinking, params);
         let mut cluster = Self::default();
@@ -123,8 +123,8 @@ impl Cluster {
         }
     }
 
-    /// Number of a ball in the cluster.
-    fn number(&self, row: u32) -> u32 {
+    /// Index of a ball in the cluster.
+    fn local_index(&self, row: u32) -> u32 {
         self.rows.partition_point(|other| *other < row) as u32
     }
 
@@ -137,7 +137,7 @@ impl Cluster {
             self.position.push(Point3::from_vec(vector(&at)));
             self.radius.push(radius);
             self.velocity.push(vector(&swarm.velocity[*row as usize]));
-            self.inverse_mass.push(f64::from(swarm.free_mass(*row)));
+            self.inverse_mass.push(f64::from(swarm.free_inverse_mass(*row)));
             self.spin.push(vector(&spin) / radius);
             self.locked.push(surfaces.row(*row).rotation_locked);
         }
@@ -161,10 +161,10 @@ impl Cluster {
             if normal_impulse == 0.0 && separation > 2.0 * ball.approach_speed * params.time {
                 continue;
             }
-            self.sources.push(Source::Wall([chunk, i], share));
+            self.locations.push(ContactLocation::Wall([chunk, i], share));
             self.contacts.push(VelocityContact {
                 a: None,
-                b: self.number(ball.row),
+                b: self.local_index(ball.row),
                 normal: cast_vector(contact.normal),
                 surface_velocity: cast_vector(contact.surface),
                 target_normal_velocity: f64::from(-separation.max(0.0) / params.time),
@@ -178,11 +178,11 @@ impl Cluster {
     }
 
     fn add_pair(&mut self, swarm: &Swarm, place: PairPlace, rows: [u32; 2], params: &SolverParams) {
-        let [a, b] = rows.map(|row| self.number(row));
+        let [a, b] = rows.map(|row| self.local_index(row));
         let displacement = self.position[b as usize] - self.position[a as usize];
         let distance = displacement.magnitude();
         let separation = distance - self.radius[a as usize] - self.radius[b as usize];
-        self.sources.push(Source::Pair(place));
+        self.locations.push(ContactLocation::Pair(place));
         self.contacts.push(VelocityContact {
             a: Some(a),
             b,
@@ -206,7 +206,12 @@ impl Swarm {
         let (mut queue, mut queued) = (VecDeque::<Sinking>::new(), BitSet::default());
         queued.clear(self.at.len());
         let mut is_new =
-            |ball: &&Sinking| self.free_mass(ball.row) > 0.0 && queued.insert(ball.row);
+            |ball: &&Sinking| self.free_inverse_mass(ball.row) > 0.0 && queued.insert(ball.row);
+        // Those that need the largest impulses come first, whatever row they are in.
+        let mut sinking = sinking.to_vec();
+        let impulse =
+            |ball: &Sinking| ball.approach_speed / self.velocity[ball.row as usize][3].abs();
+        sinking.sort_by(|a, b| impulse(b).total_cmp(&impulse(a)).then(a.row.cmp(&b.row)));
         queue.extend(sinking.iter().filter(&mut is_new));
         let (mut balls, mut pairs, mut done) = (Vec::new(), Vec::new(), BitSet::default());
         let mut lists: Vec<Option<PairsByRow>> = Vec::new();
@@ -218,35 +223,38 @@ impl Swarm {
             balls.push(ball);
             done.insert(ball.row);
             let own = self.chunk_of(ball.row);
-            for list in
-                [own.checked_sub(1), Some(own), Some(self.chunks.len())].into_iter().flatten()
-            {
+            let near = [own.checked_sub(1), Some(own), Some(self.chunks.len())];
+            for list in near.into_iter().flatten() {
                 let batches = self.pairs_of_list(list).0;
+                if batches.is_empty() {
+                    continue;
+                }
                 let by_row = lists[list].get_or_insert_with(|| self.pairs_by_row(list));
-                for [batch, lane] in
-                    by_row.of(ball.row).iter().map(|place| place.map(|x| x as usize))
-                {
+                for [batch, lane] in by_row.of(ball.row).iter().map(|at| at.map(|x| x as usize)) {
                     let place = PairPlace { list, batch, lane };
                     let rows = batches[batch].pair(lane);
                     let other = if rows[0] == ball.row { rows[1] } else { rows[0] };
                     if done.contains(other)
-                        || !self.may_bear(place, rows, ball.approach_speed, params)
+                        || !self.is_active(place, rows, ball.approach_speed, params)
                     {
                         continue;
                     }
                     pairs.push((place, rows));
-                    if self.free_mass(other) > 0.0 && queued.insert(other) {
+                    if self.free_inverse_mass(other) > 0.0 && queued.insert(other) {
                         queue.push_back(Sinking { row: other, ..ball });
                     }
                 }
             }
         }
+        // Balls that there was no room for would have no support: their pairs stay as the pass left them.
+        let is_whole = |row: u32| done.contains(row) || self.free_inverse_mass(row) == 0.0;
+        pairs.retain(|(_, rows)| rows.iter().all(|row| is_whole(*row)));
         (balls, pairs)
     }
 
     /// Returns true if a pair beside one that sinks at this speed, in m/s, bears something, or may before the
     /// next bounce.
-    fn may_bear(
+    fn is_active(
         &self,
         place: PairPlace,
         rows: [u32; 2],
@@ -256,7 +264,7 @@ impl Swarm {
         let [a, b] = rows.map(|row| row as usize);
         let displacement = xyz(&self.at[b]) - xyz(&self.at[a]);
         let distance = displacement.magnitude();
-        let moves = rows.into_iter().any(|row| self.free_mass(row) > 0.0);
+        let moves = rows.into_iter().any(|row| self.free_inverse_mass(row) > 0.0);
         if !(moves && distance > 0.0 && distance.is_finite()) {
             return false;
         }
@@ -265,14 +273,14 @@ impl Swarm {
         let separation = distance - self.at[a][3] - self.at[b][3];
         let relative = xyz(&self.velocity[b]) - xyz(&self.velocity[a]);
         let approach_speed = -relative.dot(displacement) / distance;
-        // What is light and is struck leaves at up to twice the speed.
+        // A light ball that is struck leaves at up to twice the speed.
         let reaches = separation <= 2.0 * speed * params.time;
         (impulses.normal_impulse[batch][lane] > 0.0 || reaches)
             && !impulses.bounces([batch, lane], approach_speed, params)
     }
 
     /// Inverse mass of a ball that contacts can move, in 1/kg; zero of one that sleeps, or has infinite mass.
-    fn free_mass(&self, row: u32) -> f32 {
+    fn free_inverse_mass(&self, row: u32) -> f32 {
         let inverse_mass = self.velocity[row as usize][3];
         if inverse_mass > INFINITE_MASS { inverse_mass } else { 0.0 }
     }

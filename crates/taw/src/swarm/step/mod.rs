@@ -249,8 +249,8 @@ impl Swarm {
         let gravity = self.gravity.unwrap_or_else(Vec3::zero);
         // What gravity makes of rest in two steps is no impact.
         let restitution_threshold = 2.0 * length(gravity) * dt;
-        // Where nothing has weight, overlap makes no speed; and in swarms alone, pushes that are left over
-        // are cheaper than to take them back: a tenth of the step while most moves.
+        // Without weight, overlap makes no speed. In swarms alone, pushes that are left over are cheaper than
+        // to take them back: a tenth of the step while most moves.
         let relaxes = self.bodies_are_rows && restitution_threshold > 0.0;
         SolverParams {
             restitution_threshold,
@@ -335,33 +335,6 @@ impl Swarm {
         let any = !leaving.is_empty();
         self.scratch.leaving = leaving;
         any
-    }
-
-    /// Moves out of walls what is in them, and back what passed one: so long before the end of the step, in
-    /// seconds, the substep began, and is now. That comes last: whatever else moves balls apart, nothing is
-    /// pressed through a wall.
-    fn keep_out(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
-        let (at, skin_left) =
-            (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
-        let (chunks, slots, velocity) = (&self.chunks, self.ids.slots(), &self.velocity[..]);
-        let work = DisjointSlice::new(&mut self.scratch.outside_work);
-        let (gravity, h) = (self.gravity.unwrap_or_else(Vec3::zero), before_end[0] - before_end[1]);
-        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
-            let chunk = &chunks[chunk];
-            for contact in chunk.wall_contacts.iter().filter(|_| !chunk.asleep) {
-                let row = contact.row as usize;
-                // SAFETY: a ball of the chunk, and nobody works on others meanwhile.
-                unsafe {
-                    let push = contact.keep_out(&mut *at.row(row));
-                    *skin_left.row(row) -= push;
-                    if work.len() > 0 && !contact.bears_proxy {
-                        let work = &mut *work.row(slots[row] as usize);
-                        work.record_push(contact, [push, h], velocity[row][3], gravity);
-                    }
-                }
-            }
-        });
-        self.stop_passages(walls, before_end);
     }
 
     /// Changes velocities and moves the balls that are awake.

@@ -1,12 +1,16 @@
 //! Passages through walls: whatever moved a ball in a substep, its core stays on the side of each surface
 //! on which it was.
 
+use cgmath::Zero;
+
+use crate::math::Vec3;
 use crate::swarm::Swarm;
 use crate::swarm::kernels::squared;
 use crate::swarm::simd::Row;
 use crate::swarm::surfaces::SurfaceOf;
+use crate::swarm::wall_contact::WallContact;
 use crate::swarm::wall_paths::FAST;
-use crate::swarm::walls::StaticGeometry;
+use crate::swarm::walls::{StaticGeometry, plane_contacts_within};
 use crate::swarm::workers::{DisjointSlice, parallel_for};
 
 /// Place of a ball at the begin of a substep.
@@ -45,10 +49,59 @@ impl Swarm {
         });
     }
 
+    /// Moves out of walls what is in them, and back what passed one: so long before the end of the step, in
+    /// seconds, the substep began, and is now. That comes last: whatever else moves balls apart, nothing is
+    /// pressed through a wall.
+    pub(super) fn keep_out(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
+        let (at, skin_left) =
+            (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
+        let (chunks, slots, velocity) = (&self.chunks, self.ids.slots(), &self.velocity[..]);
+        let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
+        let planes = &self.planes[..];
+        let (proxies, proxy_rows) = (&self.proxies[..], &self.scratch.proxy_rows[..]);
+        let work = DisjointSlice::new(&mut self.scratch.outside_work);
+        let (gravity, h) = (self.gravity.unwrap_or_else(Vec3::zero), before_end[0] - before_end[1]);
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
+            let chunk = &chunks[chunk];
+            if chunk.asleep {
+                return;
+            }
+            let keep_out = |contact: &WallContact| {
+                let row = contact.row as usize;
+                // SAFETY: a ball of the chunk, and nobody works on others meanwhile.
+                unsafe {
+                    let push = contact.keep_out(&mut *at.row(row));
+                    *skin_left.row(row) -= push;
+                    if work.len() > 0 && !contact.bears_proxy {
+                        let work = &mut *work.row(slots[row] as usize);
+                        work.record_push(contact, [push, h], velocity[row][3], gravity);
+                    }
+                }
+            };
+            chunk.wall_contacts.iter().for_each(keep_out);
+            for row in chunk.own_rows() {
+                // SAFETY: as above.
+                if unsafe { *skin_left.row(row) } < 0.0
+                    && Self::proxy_at(proxies, proxy_rows, row as u32).is_none()
+                {
+                    // It was pushed to where nobody looked for walls.
+                    // SAFETY: as above.
+                    let at = unsafe { *at.row(row) };
+                    let visit = |mut contact: WallContact| {
+                        contact.set_time(walls, &at, before_end[1]);
+                        keep_out(&contact);
+                    };
+                    plane_contacts_within(0.0, row as u32, &at, surfaces, planes, visit);
+                }
+            }
+        });
+        self.stop_passages(walls, before_end);
+    }
+
     /// Puts each ball that passed through a surface since places were saved back to it, from where it
     /// slides along it. So long before the end of the step, in seconds, places were saved and balls
     /// are here.
-    pub(super) fn stop_passages(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
+    fn stop_passages(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
         if !walls.has_shapes() {
             return;
         }

@@ -3,11 +3,11 @@
 //! A pass gives a heavy ball on a light one no more than what stops the light one, so it would need as many
 //! passes as the one weighs times the other. [`SolverColumns::backing`](crate::swarm::kernels::SolverColumns)
 //! solves that for a light ball on one wall. Those on several walls and on other balls are solved here, with
-//! all that touches them, as by [`Response::Impulse`](crate::response::Response::Impulse).
+//! up to 256 balls next to them, as by [`Response::Impulse`](crate::response::Response::Impulse).
 
 use cgmath::{InnerSpace, Zero};
 
-use super::cluster::{Cluster, PairPlace, Source};
+use super::cluster::{Cluster, ContactLocation, PairPlace};
 use crate::constraint::ContactImpulse;
 use crate::math::{Vec3, cast_vector};
 use crate::response::impulse::{Scratch, SolverSettings, solve_velocities};
@@ -19,7 +19,8 @@ use crate::swarm::kernels::{
 use crate::swarm::wall_contact::xyz;
 use crate::swarm::workers::{DisjointSlice, parallel_for};
 
-/// Most iterations over a cluster. It converges in some more than there are contacts above each other.
+/// Most iterations over a cluster. It converges in some more than there are contacts above each other, so a
+/// higher column does not within a substep.
 const ITERATIONS: u32 = 50;
 /// Change of velocities in an iteration with which they end, as a part of the speed at which the smallest ball
 /// may sink.
@@ -54,10 +55,12 @@ impl Swarm {
         let mut velocities = cluster.velocity.iter().chain(&cluster.spin);
         if velocities.all(|velocity| velocity.magnitude2().is_finite()) {
             self.store_velocities(&cluster);
-            for (contact, source) in contacts.iter().zip(&cluster.sources) {
-                match *source {
-                    Source::Pair(place) => self.store_pair(contact.impulse, place),
-                    Source::Wall(place, share) => self.store_wall(contact.impulse, place, share),
+            for (contact, location) in contacts.iter().zip(&cluster.locations) {
+                match *location {
+                    ContactLocation::Pair(place) => self.store_pair(contact.impulse, place),
+                    ContactLocation::Wall(place, share) => {
+                        self.store_wall(contact.impulse, place, share)
+                    }
                 }
             }
         }
