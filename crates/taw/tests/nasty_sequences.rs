@@ -260,6 +260,7 @@ proptest! {
 /// Found by the test above: impulses that stopped a ball of infinite mass threw it 1e23 m far once it had
 /// another mass.
 #[test]
+#[expect(clippy::unreadable_literal, reason = "as they were found")]
 fn what_was_of_infinite_mass_stays_where_it_is() {
     let calls = [
         (0, 0, [0.0, 0.0, 1.0345056903262422, 0.01]),

@@ -116,7 +116,7 @@ fn heavy_balls_sink_the_same_way_on_any_number_of_threads_and_in_a_clone() {
         }
         world
     };
-    let mut worlds = [build(1), build(2), build(2)];
+    let mut worlds = vec![build(1), build(2), build(2)];
     for step in 0..60 {
         if step == 30 {
             worlds[2] = worlds[1].clone();
@@ -125,10 +125,10 @@ fn heavy_balls_sink_the_same_way_on_any_number_of_threads_and_in_a_clone() {
             world.step(1.0 / 60.0).unwrap();
         }
     }
-    let marbles = worlds.map(|world| {
+    let marbles = |world: &World<f32>| -> Vec<_> {
         let ids = (0..world.marbles.len()).map(|row| world.marbles.id(row).unwrap());
-        ids.map(|id| world.marbles.get(id).unwrap()).collect::<Vec<_>>()
-    });
-    assert_eq!(marbles[0], marbles[1]);
-    assert_eq!(marbles[0], marbles[2]);
+        ids.map(|id| world.marbles.get(id).unwrap()).collect()
+    };
+    assert_eq!(marbles(&worlds[0]), marbles(&worlds[1]));
+    assert_eq!(marbles(&worlds[0]), marbles(&worlds[2]));
 }

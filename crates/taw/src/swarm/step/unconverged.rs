@@ -59,7 +59,7 @@ impl Swarm {
                 match *location {
                     ContactLocation::Pair(place) => self.store_pair(contact.impulse, place),
                     ContactLocation::Wall(place, share) => {
-                        self.store_wall(contact.impulse, place, share)
+                        self.store_wall(contact.impulse, place, share);
                     }
                 }
             }
