@@ -63,8 +63,9 @@ pub enum Response {
     /// [substeps](crate::world::Model::substeps) of the world's model, all within the third verb.
     /// A contact sinks in by about a thousandth of the radius for three balls on it. Where masses differ
     /// by more than eight times (infinite ones too) and balls still sink after a pass over the contacts,
-    /// the contacts of up to 256 balls next to them are solved as by [`Impulse`](Self::Impulse). What lies still for half a second
-    /// sleeps. Free flight is exact for constant acceleration, and a bounce keeps its height to rounding.
+    /// the contacts of up to 256 balls next to them are solved as by [`Impulse`](Self::Impulse). What lies
+    /// still for half a second sleeps. Free flight is exact for constant acceleration, and a bounce keeps
+    /// its height to rounding.
     ///
     /// Balls only, in `f32` in any world, and no periods. Marbles may have their own mass, material,
     /// gravity scale, damping, forces and rotation model; integrators have no effect, nor has tangential

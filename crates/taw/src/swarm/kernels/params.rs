@@ -40,7 +40,7 @@ pub(in crate::swarm) struct SolverParams {
     pub slop: f32,
     /// Speed that the relax pass has to take back of a pair that is jammed, in m/s.
     pub jam_speed: f32,
-    /// Part of its radius by which a ball may sink into what it touches in a substep.
+    /// Fraction of its radius by which a ball may sink into what it touches in a substep.
     pub max_sinking: f32,
     /// Set if the relax pass moves apart what overlaps by more.
     pub moves_apart: bool,

@@ -44,7 +44,7 @@ const PUSHING: f32 = 0.3;
 const SLOP: f32 = 0.04;
 /// Slop where nothing lies on anything: only so that balls that touch are left alone.
 const SLOP_WEIGHTLESS: f32 = 0.01;
-/// Part of its radius by which a ball may sink into another in a step. Half of an overlap beyond the slop goes
+/// Fraction of its radius by which a ball may sink into another in a step. Half of an overlap beyond the slop goes
 /// in each substep, so at most twice as much remains: with the slop, the tenth that is seen.
 const MAX_SINKING: f32 = 0.01;
 /// Number of looks for bounces in a substep while any is found: in a gas hardly ever do five
