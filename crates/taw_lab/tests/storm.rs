@@ -21,10 +21,6 @@ const NOT_MENDED_YET: &[&str] = &[
     // while the heavy one comes 4 mm nearer in each: a bounce that carries it on by less than half a
     // radius is not stopped at the lift, so the next substep finds it there and not at the other one.
     "swept-stack",
-    // Balls of a swarm alone that walls squeeze are thrown out by their pushes, which are left over there, for
-    // speed: a column of five that is 8 % too long for its box doubles its speed in each step. Relaxing
-    // them as those of `SoftStep` costs a tenth of a pour, and more heaps do not fall asleep.
-    "swarm-column-squeezed-by-a-ceiling",
 ];
 
 fn regressions() -> Vec<(String, Case)> {

@@ -249,12 +249,10 @@ impl Swarm {
         let gravity = self.gravity.unwrap_or_else(Vec3::zero);
         // What gravity makes of rest in two steps is no impact.
         let restitution_threshold = 2.0 * length(gravity) * dt;
-        // Without weight, overlap makes no speed. In swarms alone, pushes that are left over are cheaper than
-        // to take them back: a tenth of the step while most moves.
-        let relaxes = self.bodies_are_rows && restitution_threshold > 0.0;
         SolverParams {
             restitution_threshold,
-            jam_speed: if relaxes { restitution_threshold } else { f32::INFINITY },
+            // Without weight, overlap makes no speed.
+            jam_speed: if gravity.is_zero() { f32::INFINITY } else { restitution_threshold },
             restitution: self.common_material().restitution,
             time: h,
             gravity: row(gravity),

@@ -2,6 +2,7 @@
 
 use super::RELAXATIONS;
 use crate::swarm::Swarm;
+use crate::swarm::batches::Batch;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::{Pass, SolverParams};
 
@@ -17,21 +18,32 @@ impl Swarm {
         // Nothing is moved apart twice in a substep.
         let stays = SolverParams { moves_apart: false, ..params };
         for _ in 0..RELAXATIONS {
-            let all = std::mem::take(&mut self.fast_movers.impulses.jammed);
-            let jammed = |chunk: Option<&Chunk>| chunk.is_some_and(|chunk| chunk.impulses.jammed);
-            let mut any = all;
-            for i in 0..self.chunks.len() {
-                let before = i.checked_sub(1).and_then(|i| self.chunks.get(i));
-                let [own, next] = [self.chunks.get(i), self.chunks.get(i + 1)];
-                let again = all || jammed(before) || jammed(own) || jammed(next);
-                any |= again;
-                self.chunks[i].again = again;
+            if !self.choose_jammed() {
+                return;
             }
-            if !any {
-                break;
-            }
-            self.chunks.iter_mut().for_each(|chunk| chunk.impulses.jammed = false);
             self.pass(Pass::Relax(stays), |chunk, _| chunk.again);
         }
+        self.choose_jammed(); // forgets them
+    }
+
+    /// Chooses the chunks with a jammed pair, and those beside them. Returns true if there are any.
+    fn choose_jammed(&mut self) -> bool {
+        if std::mem::take(&mut self.fast_movers.impulses.jammed) {
+            for row in self.fast_movers.batches.iter().flat_map(Batch::pairs).flatten() {
+                let chunk = self.chunks.partition_point(|chunk| chunk.rows[1] <= row);
+                self.chunks[chunk].impulses.jammed = true;
+            }
+        }
+        let jammed = |chunk: Option<&Chunk>| chunk.is_some_and(|chunk| chunk.impulses.jammed);
+        let mut any = false;
+        for i in 0..self.chunks.len() {
+            let before = i.checked_sub(1).and_then(|i| self.chunks.get(i));
+            let [own, next] = [self.chunks.get(i), self.chunks.get(i + 1)];
+            let again = jammed(before) || jammed(own) || jammed(next);
+            any |= again;
+            self.chunks[i].again = again;
+        }
+        self.chunks.iter_mut().for_each(|chunk| chunk.impulses.jammed = false);
+        any
     }
 }
