@@ -29,6 +29,21 @@ impl ContactKey {
         self.first_of_both() == other.first_of_both()
     }
 
+    /// Rows of both, or wall and row, if no capsule is one of them.
+    pub fn balls(&self) -> Option<(u32, u32)> {
+        (self.ends == [0; 2]).then_some((self.a, self.b))
+    }
+
+    /// Returns true for two marbles.
+    pub fn is_pair(&self) -> bool {
+        self.is_pair
+    }
+
+    /// Sub-shape of the wall.
+    pub fn part(&self) -> u32 {
+        self.part
+    }
+
     /// Row of the marble, if it touches a wall.
     pub fn marble_at_wall(&self) -> Option<usize> {
         (!self.is_pair).then_some(self.b as usize)

@@ -21,8 +21,14 @@ impl<S: Scalar> Method<S> for Impulse {
         length(world.settings.gravity) * dt * dt * S::from_f64(2.0)
     }
 
+    fn generate_contacts(&self, world: &mut World<S>) {
+        world.list_contacts();
+        world.add_lasting_contacts();
+    }
+
     fn solve(&self, world: &mut World<S>, dt: S) {
         world.begin_bounces();
+        world.forget_lasting_impulses();
         let (settings, model, scratch) =
             (world.solver_settings(dt), world.settings.model, &mut world.scratch);
         let (mut bodies, context) = scratch.columns.constrained(
@@ -44,5 +50,7 @@ impl<S: Scalar> Method<S> for Impulse {
             let AuditState { velocity, angular_velocity, work, .. } = &mut **audit_state;
             scratch.impulse.record_energy(&mut bodies, velocity, angular_velocity, work);
         }
+        drop((bodies, context));
+        world.drop_lasting_contacts();
     }
 }

@@ -13,6 +13,7 @@ mod external_forces;
 mod ignored;
 mod impulse;
 mod integrate;
+mod lasting_contacts;
 mod limits;
 mod marble;
 mod marble_rotation;

@@ -83,7 +83,7 @@ impl<S: Scalar> World<S> {
 
     /// Contact of a wall and a marble, or a capsule's sphere at `along` on its axis, by the normal
     /// of the wall and the distance of the sphere's center.
-    fn wall_contact(
+    pub(super) fn wall_contact(
         &self,
         SubShape { wall, index }: SubShape,
         b: usize,
@@ -212,7 +212,7 @@ impl<S: Scalar> World<S> {
 /// Contact of two marbles, or of two spheres at `along` on the axes of capsules; none if they are
 /// farther apart than `contact_distance` metres, or one that passes through the other.
 #[inline]
-fn marble_contact<S: Scalar>(
+pub(super) fn marble_contact<S: Scalar>(
     marbles: &Marbles<S>,
     [a, b]: [u32; 2],
     along: [S; 2],

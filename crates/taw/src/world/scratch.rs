@@ -4,6 +4,7 @@
 use super::contact_limit::ContactLimit;
 use super::continuous::Continuous;
 use super::energy_audit::AuditState;
+use super::lasting_contacts::LastingContacts;
 use super::narrow_phase::Candidate;
 use super::quarantine::StoredPoses;
 use super::soft_step::SoftRows;
@@ -42,6 +43,7 @@ pub(super) struct Scratch<S> {
     pub events: EventDriven,
     pub soft_step: SoftRows<S>,
     pub continuous: Continuous<S>,
+    pub lasting_contacts: LastingContacts,
     pub near_walls: Vec<Candidate<S>>,
     /// Bounding radii of capsules, in metres.
     pub reaches: Vec<S>,
@@ -69,6 +71,7 @@ impl<S: Scalar> Default for Scratch<S> {
             events: EventDriven::default(),
             soft_step: SoftRows::default(),
             continuous: Continuous::default(),
+            lasting_contacts: LastingContacts::default(),
             near_walls: Vec::new(),
             reaches: Vec::new(),
             audit_state: None,
