@@ -78,15 +78,16 @@ fn time_to_sleep(world: &mut World<f32>) -> Option<u32> {
     })
 }
 
-/// When the last ball rests is chance: of eight heaps, half sleep after ten seconds. Without rolling
-/// resistance, in one heap in some sixty a ball rocks between others for more than half a minute.
+/// When the last ball rests is chance: of 32 heaps, half sleep after ten seconds and nine in ten after
+/// half a minute. Without rolling resistance, in one heap in some twenty a ball rocks between others for
+/// longer.
 #[test]
 fn two_thousand_balls_fall_asleep_between_boxes_as_between_half_spaces() {
     for walls in [Walls::HalfSpaces, Walls::BoxFloor, Walls::BoxSides, Walls::Boxes] {
         let time = |seed| time_to_sleep(&mut poured(walls, seed, 0).0);
-        let mut times: Vec<_> = (1..=8).map(|seed| time(seed).unwrap_or(u32::MAX)).collect();
+        let mut times: Vec<_> = (1..=32).map(|seed| time(seed).unwrap_or(u32::MAX)).collect();
         times.sort_unstable();
-        assert!(times[3] <= 10 && times[6] <= 30, "{walls:?}: {times:?} s");
+        assert!(times[15] <= 10 && times[28] <= 30, "{walls:?}: {times:?} s");
     }
 }
 
