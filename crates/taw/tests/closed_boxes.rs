@@ -2,7 +2,8 @@
 
 use taw::math::Quat;
 use taw::prelude::*;
-use taw::shape::Obb;
+use taw::shape::{Aabb3, Obb};
+use taw::swarm::Ball;
 
 const RESPONSES: [Response; 2] = [Response::Displacement, Response::Impulse];
 
@@ -124,6 +125,40 @@ fn a_marble_of_infinite_mass_goes_through_walls_as_it_is_told() {
             }
             let y = world.marbles.position()[0].y;
             assert!((y + 1.3).abs() < 1e-9, "{response:?} {thickness:?}: {y}");
+        }
+    }
+}
+
+/// A ball of the swarm pushes a marble that bounces off it on, towards a sheet or a thick box beneath both.
+#[test]
+fn swarms_push_no_marble_through_a_wall() {
+    for (response, thickness, speed) in [
+        (Response::Impulse, 0.0, 20.0),
+        (Response::Impulse, 0.5, 80.0),
+        (Response::EventDriven, 0.0, 20.0),
+        (Response::EventDriven, 0.0, 40.0),
+    ] {
+        for restitution in [0.5, 1.0] {
+            for (radius, height) in [(0.2, 0.5), (0.1, 0.5), (0.2, 0.3)] {
+                let mut world = World::<f32>::default();
+                world.set_model(Model { response, substeps: 1, ..Model::GAME }).unwrap();
+                world.set_gravity(Vec3::new(0.0, 0.0, 0.0)).unwrap();
+                let [min, max] = [[-9.0, -thickness, -9.0], [9.0, 0.0, 9.0]].map(Point3::from);
+                world.walls.insert(Aabb3::new(min, max).unwrap()).unwrap();
+                let mut marble = Marble::new(Point3::new(0.0, 0.8, 0.0), 0.1);
+                marble.velocity.y = -speed;
+                marble.mass = Mass::Density(2500.0);
+                let material = Material { restitution, friction: 0.0, ..Material::default() };
+                marble.material = Some(material);
+                world.marbles.insert(marble).unwrap();
+                world.swarm.insert(&[Ball::new(Point3::new(0.0, height, 0.0), radius)]).unwrap();
+                for step in 1..=8 {
+                    world.step(1.0 / 60.0).unwrap();
+                    let y = world.marbles.position()[0].y;
+                    let case = format!("{response:?}, {thickness} m, {speed} m/s, {restitution}");
+                    assert!(y > 0.0, "{case}, ball {radius} m at {height}: {y} m in step {step}");
+                }
+            }
         }
     }
 }

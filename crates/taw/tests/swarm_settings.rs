@@ -274,3 +274,20 @@ fn an_acceleration_wakes_whom_it_moves_and_lets_sleep_who_leans_on_a_wall_by_it(
     assert_eq!(blow(-1.0, 200), 1);
     assert_eq!(blow(20.0, 2), 0);
 }
+
+/// Balls of the lab's tier have no spin: marbles that become rows of theirs begin without.
+#[test]
+fn marbles_beside_balls_of_the_lab_become_soft_between_two_steps() {
+    for response in [Response::Displacement, Response::Impulse, Response::EventDriven] {
+        let mut world = World::<f32>::default();
+        world.set_model(Model { response, ..Model::GAME }).unwrap();
+        world.swarm.set_model(SwarmModel { tier: Tier::Lab, ..SwarmModel::default() }).unwrap();
+        world.swarm.insert(&[Ball::new(Point3::new(0.0, 3.0, 0.0), 0.5)]).unwrap();
+        world.marbles.insert(Marble::new(Point3::new(0.0, 0.0, 0.0), 0.5)).unwrap();
+        world.step(1.0 / 60.0).unwrap();
+        world.set_model(Model::GAME).unwrap();
+        assert_eq!(world.unsupported_marbles().len(), 0, "{response:?}");
+        world.step(1.0 / 60.0).unwrap();
+        assert!(world.marbles.position()[0].y < 0.0, "{response:?}");
+    }
+}

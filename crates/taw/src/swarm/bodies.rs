@@ -430,7 +430,8 @@ impl Swarm {
     /// Position and velocity of a ball, and the speed of its surface by spin, in m/s.
     pub(crate) fn motion_of<S: Scalar>(&self, ball: BallId) -> Option<(Point3<S>, Vec3<S>, f32)> {
         let row = self.ids.row(ball)?;
-        let surface_speed = squared(self.spin[row]).sqrt();
+        // The lab's tier has no spin.
+        let surface_speed = self.spin.get(row).map_or(0.0, |spin| squared(*spin).sqrt());
         Some((Point3::from_vec(vector(&self.at[row])), vector(&self.velocity[row]), surface_speed))
     }
 

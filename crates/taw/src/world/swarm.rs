@@ -137,8 +137,9 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Gives the marbles what the swarm did to them.
+    /// Gives the marbles what the swarm did to them, and stops those at walls that it pushed through one.
     fn write_back_proxies(&mut self) {
+        self.begin_pushes();
         for ((marble, _), (before, after)) in
             self.swarm.body_balls.iter().zip(self.swarm.proxies_and_results())
         {
@@ -151,6 +152,7 @@ impl<S: Scalar> World<S> {
             let turned = change(&before.spin_velocity, &after.spin_velocity);
             self.marbles.apply_delta(*marble, moved, faster, turned);
         }
+        self.stop_bounces_at_walls();
     }
 }
 

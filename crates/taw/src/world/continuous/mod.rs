@@ -14,9 +14,10 @@ use std::collections::{BinaryHeap, HashSet};
 
 use cgmath::Zero;
 
-use super::{Detection, World};
+use super::{Detection, Model, World};
 use crate::contact::Contact;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
+use crate::response::Response;
 use crate::response::penalty::WallStop;
 use marbles::{Meeting, Partners, Path};
 pub(super) use moving_walls::{Frame, MovingWall, RelativePath};
@@ -131,6 +132,16 @@ impl<S: Scalar> World<S> {
     pub(super) fn begin_bounces(&mut self) {
         let Continuous { start, bounced_from, .. } = &mut self.scratch.continuous;
         if start.len() == self.marbles.len() {
+            bounced_from.extend_from_slice(&self.marbles.position);
+        }
+    }
+
+    /// Stores positions before the swarm pushes marbles, unless these may pass walls.
+    pub(super) fn begin_pushes(&mut self) {
+        let Model { detection, response, .. } = self.settings.model;
+        let bounced_from = &mut self.scratch.continuous.bounced_from;
+        bounced_from.clear();
+        if detection == Detection::Swept || response == Response::EventDriven {
             bounced_from.extend_from_slice(&self.marbles.position);
         }
     }
