@@ -16,12 +16,7 @@ const STEP: f64 = 1.0 / 60.0;
 const G: f64 = 9.81;
 
 /// Regression scenes that fail today: each is taken out of here when its cause is mended.
-const NOT_MENDED_YET: &[&str] = &[
-    // A light ball goes to and fro between a lift and a ball 115 times as heavy, one bounce a substep,
-    // while the heavy one comes 4 mm nearer in each: a bounce that carries it on by less than half a
-    // radius is not stopped at the lift, so the next substep finds it there and not at the other one.
-    "swept-stack",
-];
+const NOT_MENDED_YET: &[&str] = &[];
 
 fn regressions() -> Vec<(String, Case)> {
     let mut files: Vec<_> = std::fs::read_dir("scenes/regressions")
