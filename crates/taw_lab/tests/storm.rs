@@ -16,7 +16,11 @@ const STEP: f64 = 1.0 / 60.0;
 const G: f64 = 9.81;
 
 /// Regression scenes that fail today: each is taken out of here when its cause is mended.
-const NOT_MENDED_YET: &[&str] = &[];
+const NOT_MENDED_YET: &[&str] = &[
+    // A light ball between a lift and a ball 115 times as heavy: since contacts last, it overlaps neither too
+    // much, but in the mirror it goes 2e-6 m another way, twice what is allowed.
+    "swept-stack",
+];
 
 fn regressions() -> Vec<(String, Case)> {
     let mut files: Vec<_> = std::fs::read_dir("scenes/regressions")
