@@ -17,8 +17,8 @@ const G: f64 = 9.81;
 
 /// Regression scenes that fail today: each is taken out of here when its cause is mended.
 const NOT_MENDED_YET: &[&str] = &[
-    // A light ball between a lift and a ball 115 times as heavy: since contacts last, it overlaps neither too
-    // much, but in the mirror it goes 2e-6 m another way, twice what is allowed.
+    // A light ball between a lift and a ball 115 times as heavy: it overlaps neither too much, but in the
+    // mirror it goes another way, by 2e-6 of the distances in the scene, twice what is allowed.
     "swept-stack",
 ];
 

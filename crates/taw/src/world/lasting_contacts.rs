@@ -13,7 +13,7 @@ use crate::response::{ContactKey, KeyedByContact};
 pub(super) struct LastingContacts {
     /// Keys of those that are listed, sorted.
     keys: Vec<ContactKey>,
-    /// What each row touches.
+    /// Kinds of bodies that each row touches.
     touched: Vec<Touched>,
 }
 
@@ -25,7 +25,7 @@ struct Touched {
 }
 
 impl LastingContacts {
-    /// Notes what each row touches.
+    /// Notes the kinds of bodies that each row touches.
     fn note_touched<S>(&mut self, contacts: &Contacts<S>, rows: usize) {
         self.touched.clear();
         self.touched.resize(rows, Touched::default());

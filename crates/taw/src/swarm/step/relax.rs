@@ -23,7 +23,7 @@ impl Swarm {
             }
             self.pass(Pass::Relax(stays), |chunk, _| chunk.again);
         }
-        self.choose_jammed(); // forgets them
+        self.choose_jammed(); // so that none is left marked for the next substep
     }
 
     /// Chooses the chunks with a jammed pair, and those beside them. Returns true if there are any.

@@ -136,7 +136,7 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Stores positions before the swarm pushes marbles, unless these may pass walls.
+    /// Stores positions before the swarm pushes marbles, unless discrete detection lets these pass walls.
     pub(super) fn begin_pushes(&mut self) {
         let Model { detection, response, .. } = self.settings.model;
         let bounced_from = &mut self.scratch.continuous.bounced_from;
