@@ -14,6 +14,9 @@ use crate::math::{Vec3, normalize_and_length};
 const MAX_TURN: f64 = 4e-3;
 /// A curved slide shorter than this, over the substep, ends on a straight line.
 const MIN_SLIDE: f64 = 1.0 / 256.0;
+/// A regime lasts for this fraction of the substep at least; a shorter one might be below the
+/// resolution of time, and change again and again at one moment.
+const MIN_REGIME: f64 = 1e-12;
 
 /// Flat surface below a ball, its material, and the forces.
 #[derive(Clone, Copy, Debug)]
@@ -97,7 +100,8 @@ impl FlatSupport {
         let rate = self.rate(now, regime);
         let (rate, mut duration) =
             if self.is_steady(now, rate, regime) || self.is_last_slide(now, rate, regime, dt) {
-                (rate, dt.min(self.time_to_regime_change(now, rate, regime)))
+                let duration = self.time_to_regime_change(now, rate, regime);
+                (rate, duration.clamp(MIN_REGIME * dt, dt))
             } else {
                 let duration = self.max_step(now, regime, dt);
                 (self.mean_rate(now, regime, duration), duration)

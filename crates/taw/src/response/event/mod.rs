@@ -335,14 +335,18 @@ impl EventDriven {
             EventKind::RestOnWall(wall) => {
                 self.advance(row, time);
                 let trajectory = &mut self.balls[row].trajectory;
-                // A ball between two supports might alternate between them.
+                // A ball might alternate between two supports.
                 trajectory.dissipation_count +=
                     if trajectory.support.is_some() { REST_COST } else { 0.0 };
                 if self.is_collapsing(row) {
                     self.stop_collapse([row, row], time, settings);
                 } else {
                     self.start_resting(row, wall, settings);
-                    self.predict(row, time, settings);
+                    if self.is_pressed_into_another(row, wall, settings) {
+                        self.rest_again([row, row], time, settings);
+                    } else {
+                        self.predict(row, time, settings);
+                    }
                 }
             }
             EventKind::RegimeChange if self.balls[row].trajectory.clustered => {

@@ -20,7 +20,7 @@ const MAX_ADVANCES: u32 = 64;
 /// over the substep.
 const RECHECK_TIME: f64 = 1.0 / 64.0;
 /// A normal acceleration below this fraction of the external one is rounding.
-const MIN_NORMAL_ACCELERATION: f64 = 1e-9;
+pub(super) const MIN_NORMAL_ACCELERATION: f64 = 1e-9;
 
 impl EventDriven {
     /// Next event with a wall, and the seconds until it.
@@ -63,21 +63,30 @@ impl EventDriven {
         {
             return None;
         }
-        Self::wall_event(wall, separation, tolerance, is_resting, impact_threshold)
+        let keeps_approach = ball.trajectory.clustered;
+        Self::wall_event(wall, separation, tolerance, keeps_approach, impact_threshold)
     }
 
-    /// Approach speed below which a ball starts to rest on a wall, in m/s.
+    /// Approach speed below which a ball starts to rest on a wall, in m/s. One that rests already
+    /// keeps a faster approach, but none that would let it deeply into the wall until the end of the
+    /// substep, before a support may end or another one begin.
     fn impact_threshold(&self, row: usize, is_resting: bool, settings: &EventSettings) -> f64 {
-        let fall_speed = self.balls[row].external_acceleration.magnitude() * settings.dt;
-        if is_resting { PRESS_SPEED * fall_speed } else { REST_SPEED * fall_speed }
+        let ball = &self.balls[row];
+        let fall_speed = ball.external_acceleration.magnitude() * settings.dt;
+        let rest_speed = REST_SPEED * fall_speed;
+        if !is_resting {
+            return rest_speed;
+        }
+        (PRESS_SPEED * fall_speed).min(SLOP * ball.radius / settings.dt).max(rest_speed)
     }
 
-    /// Next event of a ball and a plane, and the seconds until it.
+    /// Next event of a ball and a plane, and the seconds until it. If it keeps its approach, a slow
+    /// one is an impact as soon as it exceeds the threshold.
     fn wall_event(
         wall: usize,
         separation: SeparationMotion,
         tolerance: f64,
-        is_resting: bool,
+        keeps_approach: bool,
         impact_threshold: f64,
     ) -> Option<(f64, EventKind)> {
         let pressed = separation.acceleration < 0.0;
@@ -86,7 +95,7 @@ impl EventDriven {
             let speed = separation.speed + separation.acceleration * after;
             return Some(if speed < -impact_threshold || !pressed {
                 (after, EventKind::WallImpact(wall))
-            } else if is_resting {
+            } else if keeps_approach {
                 (
                     after + (-impact_threshold * 1.01 - speed) / separation.acceleration,
                     EventKind::WallImpact(wall),
@@ -101,7 +110,7 @@ impl EventDriven {
             None
         } else if separation.speed > impact_threshold {
             Some((-2.0 * separation.speed / separation.acceleration, EventKind::WallImpact(wall)))
-        } else if is_resting {
+        } else if keeps_approach {
             Some((
                 (-impact_threshold * 1.01 - separation.speed) / separation.acceleration,
                 EventKind::WallImpact(wall),
@@ -125,14 +134,7 @@ impl EventDriven {
         let (mut time, mut step) = (now, 0);
         let is_resting = ball.trajectory.support.is_some() || ball.trajectory.clustered;
         let rest_threshold = self.impact_threshold(row, false, settings);
-        // The supporting face may end before the substep does; the ball must not penetrate the next
-        // one deeply.
         let impact_threshold = self.impact_threshold(row, is_resting, settings);
-        let impact_threshold = if ball.trajectory.touches_balls {
-            impact_threshold
-        } else {
-            impact_threshold.min(SLOP * ball.radius / settings.dt).max(rest_threshold)
-        };
         loop {
             if step == MAX_ADVANCES {
                 return Some((time - now, EventKind::RefreshCandidates));

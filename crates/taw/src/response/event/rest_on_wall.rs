@@ -6,10 +6,12 @@ use cgmath::{InnerSpace, Zero};
 
 use super::curved_support::{BallState, CurvedSupport, min_step_at};
 use super::flat_support::FlatSupport;
+use super::predict_wall::MIN_NORMAL_ACCELERATION;
 use super::support_candidates::SupportCandidates;
 use super::{
     Ball, EventDriven, EventSettings, REST_SPEED, SEAM_TOLERANCE, SUPPORT_CHECK, WallCollider,
 };
+use crate::contact::Contact;
 use crate::math::Vec3;
 use crate::response::{BallRotation, ImpulseSample};
 use crate::shape::PointProjection;
@@ -53,6 +55,32 @@ impl EventDriven {
         ball.velocity += velocity_change;
         ball.trajectory.support = Some(wall);
         self.update_support_motion(row, settings);
+    }
+
+    /// Tests if a ball that has started to rest on a wall touches another one slowly, and accelerates
+    /// into that: it rests on both.
+    pub(super) fn is_pressed_into_another(
+        &self,
+        row: usize,
+        support: usize,
+        settings: &EventSettings,
+    ) -> bool {
+        let ball = &self.balls[row];
+        let (at, now, trajectory) = (ball.position, ball.trajectory.start, &ball.trajectory);
+        let min_acceleration = MIN_NORMAL_ACCELERATION * ball.external_acceleration.magnitude();
+        let range = (at, ball.radius + self.contact_tolerance(row as u32, settings));
+        let mut is_pressed = false;
+        let cost = self.for_each_wall_within(row, range, |wall| {
+            let contact = Contact::with_wall(wall as u32, 0, row as u32);
+            is_pressed |= wall != support
+                && trajectory.support == Some(support)
+                && self.wall_contact(&contact, now, 0.0, settings).is_some_and(|it| it >= 0.0)
+                && self.normal_acceleration(row, wall, now, trajectory.acceleration)
+                    > min_acceleration
+                && !self.is_seam(row, wall, at, now, settings);
+        });
+        settings.add_cost(1 + cost);
+        is_pressed
     }
 
     /// Rechecks the support on a curved or bounded wall: another face may have taken over, or none,
