@@ -6,7 +6,7 @@ use super::bodies::{NO_ROW, VelocityChange};
 use super::state::of;
 use super::surfaces::Surface;
 use super::workers::{DisjointSlice, parallel_for_rows};
-use super::{Ball, BallId, MAX_COORDINATE, Swarm};
+use super::{Ball, BallId, Swarm};
 use crate::Error;
 use crate::broad::{CollisionLayers, IgnoredPairs};
 use crate::error::{finite, finite_vector};
@@ -190,9 +190,7 @@ impl Swarm {
     /// Changes of velocity by applied accelerations in a step of `dt` seconds.
     pub(crate) fn applied_changes(&self, dt: f32) -> impl Iterator<Item = VelocityChange> + '_ {
         self.ball_forces.accelerations.iter().filter_map(move |(ball, acceleration)| {
-            let change: [f32; 3] = (acceleration * dt).into();
-            let change = change.map(|x| x.clamp(-MAX_COORDINATE, MAX_COORDINATE));
-            Some(VelocityChange { slot: self.slot_of(*ball)?, change })
+            Some(VelocityChange { slot: self.slot_of(*ball)?, change: (acceleration * dt).into() })
         })
     }
 
@@ -245,10 +243,8 @@ impl Swarm {
                 let fields = acceleration.as_ref().map_or_else(Vec3::zero, |acceleration| {
                     acceleration(motion, inverse_mass.abs().recip())
                 });
-                let numbers: [f32; 3] = ((gravity * (scale - 1.0) + fields) * dt).into();
-                let is_number = numbers.iter().all(|x| !x.is_nan());
-                if is_number && !self.body_slots.contains(slot) {
-                    let numbers = numbers.map(|x| x.clamp(-MAX_COORDINATE, MAX_COORDINATE));
+                if !self.body_slots.contains(slot) {
+                    let numbers = ((gravity * (scale - 1.0) + fields) * dt).into();
                     *change = VelocityChange { slot, change: numbers };
                 }
             }

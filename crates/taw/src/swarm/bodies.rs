@@ -6,7 +6,7 @@ use std::sync::{Mutex, PoisonError};
 use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
 use super::batches::Batch;
-use super::kernels::squared;
+use super::kernels::{MAX_MAGNITUDE, largest, squared};
 use super::simd::Row;
 use super::surfaces::{Surface, SurfaceOf};
 use super::wall_contact::WallContact;
@@ -220,6 +220,10 @@ impl Swarm {
             }
             is_same
         });
+        // What is no number stops the body, as what overflows does; but it must equal itself.
+        for change in now.iter_mut().flat_map(|change| &mut change.change) {
+            *change = if change.is_nan() { f32::INFINITY } else { *change };
+        }
         let before = std::mem::take(&mut self.velocity_changes);
         let (mut old, mut new) = (before.iter().peekable(), now.iter().peekable());
         while let Some(slot) = [old.peek(), new.peek()].into_iter().flatten().map(|c| c.slot).min()
@@ -261,7 +265,9 @@ impl Swarm {
         for VelocityChange { slot, change } in &self.velocity_changes {
             let row = rows[*slot as usize] as usize;
             let Some(at) = self.at.get_mut(row) else { continue };
-            if self.spin[row][3] == 0.0 && !self.velocity[row][3].is_sign_negative() {
+            let [x, y, z] = *change;
+            let overflows = !(largest([x, y, z, 0.0]) < MAX_MAGNITUDE); // it has stopped the body
+            if self.spin[row][3] == 0.0 && !self.velocity[row][3].is_sign_negative() && !overflows {
                 for (x, change) in at.iter_mut().zip(change) {
                     *x += change * time;
                 }

@@ -70,7 +70,7 @@ impl Proxy {
             self.from[0] = [at[0], at[1], at[2], self.at[3]];
         }
         let fall = squared(gravity) * dt;
-        if fall > 0.0 {
+        if fall.is_normal() {
             let part = (dot(&faster, &gravity) / fall).clamp(0.0, 1.0);
             for (speed, pull) in self.from[1].iter_mut().zip(gravity).take(3) {
                 *speed -= pull * part * dt;

@@ -113,8 +113,8 @@ impl<S: Scalar> World<S> {
         let slots = &self.scratch.soft_step.slot_of_marble;
         let of_marbles =
             self.scratch.accelerations.iter().zip(slots).filter_map(|(acceleration, slot)| {
-                let change: [f64; 3] = ((acceleration - gravity) * step).into();
-                let change = change.map(|x| (x as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE));
+                // One that overflows stops its marble in the swarm.
+                let change: [f32; 3] = cast_vector((acceleration - gravity) * step).into();
                 (change != [0.0; 3] && *slot != NO_ROW)
                     .then_some(VelocityChange { slot: *slot, change })
             });

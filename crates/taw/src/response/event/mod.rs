@@ -416,14 +416,21 @@ impl EventDriven {
         !(cells <= MAX_CELLS && coordinate / self.cells.min_width() < 1e15)
     }
 
-    /// Moves a ball that became too fast out of the grid.
+    /// Moves a ball that became too fast out of the grid, and one that was pushed out of a wall over
+    /// several cells into its new one. (Next to its cell it may be by rounding.)
     fn update_cell(&mut self, row: usize, now: f64, dt: f64) {
-        if self.balls[row].trajectory.cell_slot != CellSlot::Unbounded
-            && self.exceeds_cell_limit(row, dt - now)
-        {
+        let CellSlot::Cell(cell) = self.balls[row].trajectory.cell_slot else { return };
+        if self.exceeds_cell_limit(row, dt - now) {
             self.cells_of(row).remove(row as u32);
             self.unbounded.push(row);
             self.balls[row].trajectory.cell_slot = CellSlot::Unbounded;
+            return;
+        }
+        let there = self.cells.cell(self.balls[row].position_at(now));
+        if (0..3).any(|axis| there[axis].abs_diff(cell[axis]) > 1) {
+            self.cells_of(row).remove(row as u32);
+            self.cells_of(row).insert(row as u32, there);
+            self.balls[row].trajectory.cell_slot = CellSlot::Cell(there);
         }
     }
 }
