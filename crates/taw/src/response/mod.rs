@@ -65,7 +65,8 @@ pub enum Response {
     /// by more than eight times (infinite ones too) and balls still sink after a pass over the contacts,
     /// the contacts of up to 256 balls next to them are solved as by [`Impulse`](Self::Impulse). What lies
     /// still for half a second sleeps. Free flight is exact for constant acceleration, and a bounce keeps
-    /// its height to rounding.
+    /// its height to rounding; but an approach slower than what gravity adds in two substeps ends without
+    /// one, in any direction.
     ///
     /// Balls only, in `f32` in any world, and no periods. Marbles may have their own mass, material,
     /// gravity scale, damping, forces and rotation model; integrators have no effect, nor has tangential

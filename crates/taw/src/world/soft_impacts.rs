@@ -229,7 +229,9 @@ impl<S: Scalar> World<S> {
         } else {
             own.combined_with(material(impact.a))
         };
-        let threshold = length(self.settings.gravity) * dt * S::from_f64(2.0 * (1.0 + ROUNDING));
+        let substep = dt / S::from_f64(f64::from(self.settings.model.substeps));
+        let threshold =
+            length(self.settings.gravity) * substep * S::from_f64(2.0 * (1.0 + ROUNDING));
         of_both.restitution > S::zero() && impact.approach_speed > threshold
     }
 

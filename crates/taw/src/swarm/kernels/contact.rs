@@ -22,6 +22,9 @@ use crate::swarm::workers::DisjointSlice;
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.
 const PUSH: f32 = 0.5;
+/// Largest distance of such a push, over the smaller radius. One that is farther turns the normals of
+/// other contacts before they take back what pushed the balls apart, and so leaves speed behind.
+const MAX_PUSH: f32 = 0.25;
 
 /// Mark of a ball that presses another one in this step and that no wall bears: neither flies.
 const TOUCHING: f32 = 0.5;
@@ -312,7 +315,9 @@ impl SolverColumns<'_> {
         // What flies keeps its center of mass. What a wall bears goes half each, whatever they
         // weigh: a light ball that a heavy one presses on something has nowhere to go. What sleeps
         // stays.
-        let (one, push) = (L::splat(1.0), overlap.max(zero) * L::splat(PUSH));
+        let most = smaller * L::splat(MAX_PUSH);
+        let push = overlap.max(zero) * L::splat(PUSH);
+        let (one, push) = (L::splat(1.0), most.select_gt(push, push, most));
         let borne = grounded.select_gt(L::splat(TOUCHING), one, zero);
         let a = free_a.select_gt(zero, borne.select_gt(zero, one, free_a), zero);
         let b = free_b.select_gt(zero, borne.select_gt(zero, one, free_b), zero);

@@ -247,12 +247,11 @@ impl Swarm {
     /// Parameters of a substep of `h` seconds in a step of `dt` seconds.
     fn solver_params(&self, dt: f32, h: f32) -> SolverParams {
         let gravity = self.gravity.unwrap_or_else(Vec3::zero);
-        // What gravity makes of rest in two steps is no impact.
-        let restitution_threshold = 2.0 * length(gravity) * dt;
         SolverParams {
-            restitution_threshold,
-            // Without weight, overlap makes no speed.
-            jam_speed: if gravity.is_zero() { f32::INFINITY } else { restitution_threshold },
+            // What gravity makes of rest in two substeps is no impact.
+            restitution_threshold: 2.0 * length(gravity) * h,
+            // Nor is what it makes in two steps a jam. Without weight, overlap makes no speed.
+            jam_speed: if gravity.is_zero() { f32::INFINITY } else { 2.0 * length(gravity) * dt },
             restitution: self.common_material().restitution,
             time: h,
             gravity: row(gravity),
