@@ -8,15 +8,13 @@
 
 use cgmath::{InnerSpace, Zero};
 
+use super::TIME_RESOLUTION;
 use crate::math::{Vec3, normalize_and_length};
 
 /// Largest rotation of the surface in one step, in radians.
 const MAX_TURN: f64 = 4e-3;
 /// A curved slide shorter than this, over the substep, ends on a straight line.
 const MIN_SLIDE: f64 = 1.0 / 256.0;
-/// A regime lasts for this fraction of the substep at least; a shorter one might be below the
-/// resolution of time, and change again and again at one moment.
-const MIN_REGIME: f64 = 1e-12;
 
 /// Flat surface below a ball, its material, and the forces.
 #[derive(Clone, Copy, Debug)]
@@ -101,7 +99,7 @@ impl FlatSupport {
         let (rate, mut duration) =
             if self.is_steady(now, rate, regime) || self.is_last_slide(now, rate, regime, dt) {
                 let duration = self.time_to_regime_change(now, rate, regime);
-                (rate, duration.clamp(MIN_REGIME * dt, dt))
+                (rate, duration.clamp(TIME_RESOLUTION * dt, dt))
             } else {
                 let duration = self.max_step(now, regime, dt);
                 (self.mean_rate(now, regime, duration), duration)

@@ -72,6 +72,9 @@ const REST_COST: f64 = 8.0;
 const MAX_FREEZES: i32 = 10;
 /// Largest time between simultaneous collisions, over the substep.
 const SIMULTANEOUS: f64 = 1e-13;
+/// Resolution of times, over the substep. An event that might come again and again at one moment, as
+/// rounding says, comes again after this.
+const TIME_RESOLUTION: f64 = 1e-12;
 /// Seam tolerance: a ball at most this fraction of its radius away from another wall still touches
 /// that wall; see `world::touch`.
 const SEAM_TOLERANCE: f64 = 5e-6;

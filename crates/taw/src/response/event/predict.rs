@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use cgmath::InnerSpace;
 
 use super::toi::{SeparationMotion, time_of_impact_plane};
-use super::{Ball, CellSlot, Event, EventDriven, EventKind, EventSettings};
+use super::{Ball, CellSlot, Event, EventDriven, EventKind, EventSettings, TIME_RESOLUTION};
 
 impl EventDriven {
     /// Predicts the next event of a ball and queues it.
@@ -57,7 +57,7 @@ impl EventDriven {
             }
         };
         self.for_each_near(row, settings, &mut other);
-        self.for_each_crossing(ball, now, consider);
+        self.for_each_crossing(ball, now, settings.dt, consider);
         let (time, kind) = next;
         if time <= now + remaining && time.is_finite() {
             let version = ball.trajectory.version;
@@ -70,6 +70,7 @@ impl EventDriven {
         &self,
         ball: &Ball,
         now: f64,
+        dt: f64,
         mut visit: impl FnMut(Option<f64>, EventKind),
     ) {
         let CellSlot::Cell(cell) = ball.trajectory.cell_slot else { return };
@@ -82,7 +83,10 @@ impl EventDriven {
             let below = SeparationMotion { distance: x - border, speed: v, acceleration: a };
             for (separation, step) in [(above, 1), (below, -1)] {
                 let to = cell[axis] + step;
-                visit(crossing_time(separation), EventKind::CellCrossing { axis, to });
+                visit(
+                    crossing_time(separation, TIME_RESOLUTION * dt),
+                    EventKind::CellCrossing { axis, to },
+                );
             }
         }
     }
@@ -117,14 +121,15 @@ impl EventDriven {
     }
 }
 
-/// Time until a center leaves its cell through a border, on which it may lie, in seconds.
-fn crossing_time(separation: SeparationMotion) -> Option<f64> {
+/// Time until a center leaves its cell through a border, on which it may lie, in seconds; if it comes
+/// back to that, at least the resolution of times.
+fn crossing_time(separation: SeparationMotion, resolution: f64) -> Option<f64> {
     if separation.distance > 0.0 {
         time_of_impact_plane(separation)
     } else if separation.speed < 0.0 || (separation.speed == 0.0 && separation.acceleration < 0.0) {
         Some(0.0)
     } else if separation.acceleration < 0.0 {
-        Some(-2.0 * separation.speed / separation.acceleration)
+        Some((-2.0 * separation.speed / separation.acceleration).max(resolution))
     } else {
         None
     }
