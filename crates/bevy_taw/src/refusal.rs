@@ -90,8 +90,8 @@ impl Refusals<'_> {
 }
 
 /// A marble's motion overflowed, or by `EventDriven` the step's budget of events was spent with it.
-/// It keeps its last place and has lost its velocity; no other marble was affected. Also logged as a
-/// warning.
+/// It keeps its last place and has lost its velocity. An overflow affects no other marble; at the end
+/// of the budget, all that still have events are stopped. Also logged as a warning.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct MarbleStopped {
@@ -103,7 +103,13 @@ pub struct MarbleStopped {
 pub(crate) fn report_stopped(world: Res<TawWorld>, mut stopped: MessageWriter<MarbleStopped>) {
     for id in world.stopped() {
         if let Some(&entity) = world.marble_entities.get(&id) {
-            log::warn!("taw stopped {entity}: its motion is no longer finite");
+            let cause = match world.model().response {
+                Response::EventDriven => {
+                    "its motion overflowed, or had more events than a step may"
+                }
+                _ => "its motion is no longer finite",
+            };
+            log::warn!("taw stopped {entity}: {cause}");
             stopped.write(MarbleStopped { entity });
         }
     }

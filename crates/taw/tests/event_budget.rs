@@ -1,6 +1,9 @@
-//! The budget of a step under `Response::EventDriven`: all its substeps share it.
+//! The budget of a step under `Response::EventDriven`: all its substeps share it, and ordinary scenes
+//! stay far below.
 
 use taw::prelude::*;
+use taw::shape::{Aabb3, Capsule, Sphere};
+use taw::world::WallShape;
 
 /// Tests that the documented budget of a step allows for one ball.
 const BUDGET: usize = 32_020_000;
@@ -41,5 +44,67 @@ fn the_substeps_of_a_step_share_its_budget() {
     for substeps in [1, 8] {
         let (count, stopped) = bounces(1e6, substeps);
         assert!(!stopped && count > 10_000, "{count} bounces in {substeps} substeps");
+    }
+}
+
+#[test]
+fn two_balls_that_overlap_far_inside_a_wall_need_few_events() {
+    for offset in [1e3, 1e6, 1e9, 1e12] {
+        let mut world = World::<f64>::default();
+        world.set_model(Model::EXACT).unwrap();
+        world.walls.insert(Plane::new(Vec3::unit_y(), offset).unwrap()).unwrap();
+        for i in 0..2 {
+            let at = Point3::new(0.3 * f64::from(i), 0.5 + 0.9 * f64::from(i), 0.0);
+            world.marbles.insert(Marble::new(at, 0.5)).unwrap();
+        }
+        for _ in 0..3 {
+            world.step(1.0 / 60.0).unwrap();
+            assert_eq!(world.stopped().count(), 0, "a wall at {offset} m");
+        }
+    }
+}
+
+/// A board with pins and bins between two panes, 2 cm wider than the balls. All centers are in the
+/// plane z = 0, which is the border of two cells of the grid, and leave it by rounding alone.
+#[test]
+fn a_pachinko_between_panes_needs_few_events() {
+    let mut world = World::<f32>::default();
+    world.set_model(Model::EXACT).unwrap();
+    let shape = |world: &mut World<f32>, shape: WallShape<f32>| world.walls.insert(shape).unwrap();
+    shape(&mut world, Plane::new(Vec3::unit_y(), 0.0).unwrap().into());
+    for normal in [-Vec3::unit_z(), Vec3::unit_z()] {
+        let pane = shape(&mut world, Plane::new(normal, -0.11).unwrap().into());
+        let slick = Material { friction: 0.0, ..Material::default() };
+        world.walls.set_material(pane, Some(slick)).unwrap();
+    }
+    for i in 0..=8_u8 {
+        let (x, height) = (0.5 * f32::from(i) - 2.0, if i % 8 == 0 { 8.0 } else { 1.0 });
+        let corners = [Point3::new(x - 0.02, 0.0, -0.2), Point3::new(x + 0.02, height, 0.2)];
+        shape(&mut world, Aabb3::new(corners[0], corners[1]).unwrap().into());
+    }
+    for (row, column) in (0..8_u8).flat_map(|row| (0..8 - row % 2).map(move |column| (row, column)))
+    {
+        let x = 0.5 * (f32::from(column) - 3.5) + 0.25 * f32::from(row % 2);
+        let at = Point3::new(x, 1.6 + 0.5 * f32::from(row), 0.0);
+        let half = Vec3::unit_z() * 0.15;
+        shape(
+            &mut world,
+            if row % 4 < 2 {
+                Sphere::new(at, 0.07).unwrap().into()
+            } else {
+                Capsule::new(at - half, at + half, 0.05).unwrap().into()
+            },
+        );
+    }
+    for step in 0..600_u16 {
+        if step % 5 == 0 && step < 400 {
+            let x = ((f32::from(step) / 5.0 * 0.618).fract() - 0.5) * 0.3;
+            let mut ball = Marble::new(Point3::new(x, 7.0, 0.0), 0.1);
+            let material = Material { restitution: 0.4, friction: 0.1, ..Material::default() };
+            ball.material = Some(material);
+            world.marbles.insert(ball).unwrap();
+        }
+        world.step(1.0 / 64.0).unwrap();
+        assert_eq!(world.stopped().count(), 0, "step {step}");
     }
 }
