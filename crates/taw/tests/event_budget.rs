@@ -72,7 +72,7 @@ fn a_pachinko_between_panes_needs_few_events() {
     world.set_model(Model::EXACT).unwrap();
     let shape = |world: &mut World<f32>, shape: WallShape<f32>| world.walls.insert(shape).unwrap();
     shape(&mut world, Plane::new(Vec3::unit_y(), 0.0).unwrap().into());
-    for normal in [-Vec3::unit_z(), Vec3::unit_z()] {
+    for normal in [Vec3::unit_z(), -Vec3::unit_z()] {
         let pane = shape(&mut world, Plane::new(normal, -0.11).unwrap().into());
         let slick = Material { friction: 0.0, ..Material::default() };
         world.walls.set_material(pane, Some(slick)).unwrap();
