@@ -11,7 +11,7 @@ use super::paint::{Paint, Said, look};
 const RADIUS: f32 = 0.09;
 const ROWS: i32 = 9;
 pub const BINS: i32 = 9;
-pub const MARBLES: usize = 60;
+pub const MARBLES: usize = 50;
 
 /// A bin, and how many marbles fell into it.
 #[derive(Component)]

@@ -44,24 +44,22 @@ fn position(app: &App, entity: Entity) -> Vec3 {
 }
 
 #[test]
-fn pachinko_fills_its_bins_most_in_the_middle() {
+fn pachinko_fills_all_its_bins() {
     let mut app = play(pachinko::plugin);
     scene::frames(&mut app, 64 * 30);
     let marbles = all::<Marble>(&mut app);
     assert_eq!(marbles.len(), pachinko::MARBLES);
-    assert!(marbles.iter().all(|it| position(&app, *it).y < 1.0), "one hangs in the pins");
-    let bins = all::<pachinko::Bin>(&mut app);
-    let in_bin =
-        |bin: &Entity| (position(&app, *bin).x, app.world().get::<pachinko::Bin>(*bin).unwrap().0);
-    let mut counts: Vec<_> = bins.iter().map(in_bin).collect();
-    counts.sort_by(|a, b| a.0.total_cmp(&b.0));
-    let counts: Vec<_> = counts.into_iter().map(|(_, count)| count as usize).collect();
+    let places = marbles.iter().map(|it| position(&app, *it));
+    let hanging: Vec<_> = places.filter(|at| at.y >= 1.0).collect();
+    assert!(hanging.is_empty(), "some hang in the pins: {hanging:?}");
+    let counts = all::<pachinko::Bin>(&mut app)
+        .into_iter()
+        .map(|bin| app.world().get::<pachinko::Bin>(bin).unwrap().0 as usize);
+    let counts: Vec<_> = counts.collect();
     // Who bounces in the mouth of a bin is counted twice.
     let sum: usize = counts.iter().sum();
     assert!((pachinko::MARBLES..pachinko::MARBLES * 5 / 4).contains(&sum), "{counts:?}");
-    let middle = pachinko::BINS as usize / 2;
-    let inner: usize = counts[middle - 1..=middle + 1].iter().sum();
-    assert!(inner > sum / 3 && inner < sum, "{counts:?}");
+    assert!(counts.iter().all(|count| (1..sum / 2).contains(count)), "{counts:?}");
 }
 
 #[test]
