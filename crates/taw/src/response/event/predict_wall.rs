@@ -71,13 +71,17 @@ impl EventDriven {
     /// keeps a faster approach, but none that would let it deeply into the wall until the end of the
     /// substep, before a support may end or another one begin.
     fn impact_threshold(&self, row: usize, is_resting: bool, settings: &EventSettings) -> f64 {
-        let ball = &self.balls[row];
-        let fall_speed = ball.external_acceleration.magnitude() * settings.dt;
-        let rest_speed = REST_SPEED * fall_speed;
+        let rest_speed = REST_SPEED * self.fall_speed(row, settings);
         if !is_resting {
             return rest_speed;
         }
-        (PRESS_SPEED * fall_speed).min(SLOP * ball.radius / settings.dt).max(rest_speed)
+        let press_speed = PRESS_SPEED * self.fall_speed(row, settings);
+        press_speed.min(SLOP * self.balls[row].radius / settings.dt).max(rest_speed)
+    }
+
+    /// Speed that external forces add in the substep, in m/s.
+    fn fall_speed(&self, row: usize, settings: &EventSettings) -> f64 {
+        self.balls[row].external_acceleration.magnitude() * settings.dt
     }
 
     /// Next event of a ball and a plane, and the seconds until it. If it keeps its approach, a slow
@@ -134,7 +138,12 @@ impl EventDriven {
         let (mut time, mut step) = (now, 0);
         let is_resting = ball.trajectory.support.is_some() || ball.trajectory.clustered;
         let rest_threshold = self.impact_threshold(row, false, settings);
-        let impact_threshold = self.impact_threshold(row, is_resting, settings);
+        let impact_threshold = if ball.trajectory.touches_balls {
+            // Others press it anew, into a wall that may move.
+            PRESS_SPEED * self.fall_speed(row, settings)
+        } else {
+            self.impact_threshold(row, is_resting, settings)
+        };
         loop {
             if step == MAX_ADVANCES {
                 return Some((time - now, EventKind::RefreshCandidates));
