@@ -266,8 +266,8 @@ impl Swarm {
             let row = rows[*slot as usize] as usize;
             let Some(at) = self.at.get_mut(row) else { continue };
             let [x, y, z] = *change;
-            let overflows = !(largest([x, y, z, 0.0]) < MAX_MAGNITUDE); // it has stopped the body
-            if self.spin[row][3] == 0.0 && !self.velocity[row][3].is_sign_negative() && !overflows {
+            let is_sane = largest([x, y, z, 0.0]) < MAX_MAGNITUDE; // else it has stopped the body
+            if self.spin[row][3] == 0.0 && !self.velocity[row][3].is_sign_negative() && is_sane {
                 for (x, change) in at.iter_mut().zip(change) {
                     *x += change * time;
                 }

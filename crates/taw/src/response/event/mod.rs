@@ -344,12 +344,7 @@ impl EventDriven {
                 if self.is_collapsing(row) {
                     self.stop_collapse([row, row], time, settings);
                 } else {
-                    self.start_resting(row, wall, settings);
-                    if self.is_pressed_into_another(row, wall, settings) {
-                        self.rest_again([row, row], time, settings);
-                    } else {
-                        self.predict(row, time, settings);
-                    }
+                    self.rest_on_wall(row, wall, time, settings);
                 }
             }
             EventKind::RegimeChange if self.balls[row].trajectory.clustered => {
@@ -370,6 +365,17 @@ impl EventDriven {
                 }
                 self.predict(row, time, settings);
             }
+        }
+    }
+
+    /// Puts a ball to rest on a wall, or on all that it touches if it is pressed into another one, and
+    /// predicts its next event.
+    fn rest_on_wall(&mut self, row: usize, wall: usize, time: f64, settings: &EventSettings) {
+        self.start_resting(row, wall, settings);
+        if self.is_pressed_into_another(row, wall, settings) {
+            self.rest_again([row, row], time, settings);
+        } else {
+            self.predict(row, time, settings);
         }
     }
 

@@ -58,13 +58,16 @@ impl EventDriven {
     }
 
     /// Tests if a ball that has started to rest on a wall touches another one slowly, and accelerates
-    /// into that: it rests on both.
+    /// into that: it rests on both. Half-spaces only: along parts of walls it goes by its equations.
     pub(super) fn is_pressed_into_another(
         &self,
         row: usize,
         support: usize,
         settings: &EventSettings,
     ) -> bool {
+        if !self.has_fixed_normal(support) {
+            return false;
+        }
         let ball = &self.balls[row];
         let (at, now, trajectory) = (ball.position, ball.trajectory.start, &ball.trajectory);
         let min_acceleration = MIN_NORMAL_ACCELERATION * ball.external_acceleration.magnitude();
@@ -73,6 +76,7 @@ impl EventDriven {
         let cost = self.for_each_wall_within(row, range, |wall| {
             let contact = Contact::with_wall(wall as u32, 0, row as u32);
             is_pressed |= wall != support
+                && self.has_fixed_normal(wall)
                 && trajectory.support == Some(support)
                 && self.wall_contact(&contact, now, 0.0, settings).is_some_and(|it| it >= 0.0)
                 && self.normal_acceleration(row, wall, now, trajectory.acceleration)
