@@ -63,7 +63,9 @@ impl EventDriven {
         {
             return None;
         }
-        let keeps_approach = ball.trajectory.clustered;
+        // What rests on a half-space rests on another one at once; on parts of walls as in a cluster.
+        let on_part = ball.trajectory.support.is_some_and(|it| !self.has_fixed_normal(it));
+        let keeps_approach = ball.trajectory.clustered || on_part;
         Self::wall_event(wall, separation, tolerance, keeps_approach, impact_threshold)
     }
 
