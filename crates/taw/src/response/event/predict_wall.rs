@@ -50,9 +50,11 @@ impl EventDriven {
         };
         let size = ball.radius + distance.abs() + offset.abs();
         let tolerance = f64::EPSILON * 16.0 * size;
-        let is_resting = ball.trajectory.support.is_some() || ball.trajectory.clustered;
+        // What rests on a half-space bounces off another one, or rests on both, by its own threshold.
+        let on_part = ball.trajectory.support.is_some_and(|it| !self.has_fixed_normal(it));
+        let keeps_approach = ball.trajectory.clustered || on_part;
         let impact_threshold =
-            self.impact_threshold(row, is_resting, settings).max(1e-14 * velocity.magnitude());
+            self.impact_threshold(row, keeps_approach, settings).max(1e-14 * velocity.magnitude());
         // A resting cluster absorbs such a slow approach until the end of the substep.
         let end_speed = separation.speed + separation.acceleration * (settings.dt - now);
         let rest_threshold = self.impact_threshold(row, false, settings);
@@ -63,18 +65,15 @@ impl EventDriven {
         {
             return None;
         }
-        // What rests on a half-space rests on another one at once; on parts of walls as in a cluster.
-        let on_part = ball.trajectory.support.is_some_and(|it| !self.has_fixed_normal(it));
-        let keeps_approach = ball.trajectory.clustered || on_part;
         Self::wall_event(wall, separation, tolerance, keeps_approach, impact_threshold)
     }
 
-    /// Approach speed below which a ball starts to rest on a wall, in m/s. One that rests already
-    /// keeps a faster approach, but none that would let it deeply into the wall until the end of the
-    /// substep, before a support may end or another one begin.
-    fn impact_threshold(&self, row: usize, is_resting: bool, settings: &EventSettings) -> f64 {
+    /// Approach speed below which a ball starts to rest on a wall, in m/s. One that keeps its approach
+    /// keeps a faster one, but none that would let it deeply into the wall until the end of the substep,
+    /// before a support may end or another one begin.
+    fn impact_threshold(&self, row: usize, keeps_approach: bool, settings: &EventSettings) -> f64 {
         let rest_speed = REST_SPEED * self.fall_speed(row, settings);
-        if !is_resting {
+        if !keeps_approach {
             return rest_speed;
         }
         let press_speed = PRESS_SPEED * self.fall_speed(row, settings);
