@@ -202,7 +202,8 @@ pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
 /// Marker of a marble that sleeps, to read: the plugin adds and removes it after each step.
 ///
 /// With the response [`SoftStep`](taw::response::Response::SoftStep), marbles that rest for half a
-/// second sleep together with those about them, which then cost next to nothing. They wake when they
+/// second sleep together with those about them, which then cost next to nothing: in groups of some
+/// hundreds, so that in a small world one marble that rolls keeps all awake. They wake when they
 /// are touched or written, when gravity changes, or a wall near them. Marbles of other responses do
 /// not sleep.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]

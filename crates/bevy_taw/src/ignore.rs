@@ -31,7 +31,8 @@ pub struct IgnoreCollisions(#[entities] pub Vec<Entity>);
 /// Queries without a mask find it. Removed when its time is over.
 ///
 /// A marble that is within another or in a wall by then is moved out as any other that begins so: by the
-/// response, without speed, most of it in the first steps. A ghost falls through floors; one that stands on
+/// response, most of it in the first steps. Overlap is no energy; but deep inside of a heap, neighbours may
+/// be pushed at some metres per second for a step. A ghost falls through floors; one that stands on
 /// them has a layer of its own ([`CollisionLayers`](crate::prelude::CollisionLayers)).
 ///
 /// ```

@@ -19,7 +19,8 @@ pub enum ForceField<S> {
         /// Spring constant in N/m, at least zero.
         stiffness: S,
     },
-    /// Attraction to a point with the inverse square of the distance, as to a planet: the
+    /// Attraction to a point with the inverse square of the distance, without softening, so that it grows
+    /// without bound near the point: put a wall around that, as the surface of a planet. The
     /// acceleration is equal for all masses.
     Attraction {
         /// Center, in metres.
