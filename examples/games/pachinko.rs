@@ -45,9 +45,10 @@ fn board(mut commands: Commands, mut paint: Paint) {
 }
 
 fn bins(mut commands: Commands, mut paint: Paint) {
+    let floor = Cuboid::new(6.0, 0.1, 1.0);
     commands.spawn((
-        Wall::default(),
-        paint.shape(Cuboid::new(6.0, 0.1, 1.0), tailwind::SLATE_600),
+        Wall::from(floor),
+        paint.shape(floor, tailwind::SLATE_600),
         Transform::from_xyz(0.0, -0.05, 0.0),
     ));
     let board = Cuboid::new(0.04, 1.0, 2.0 * RADIUS);
