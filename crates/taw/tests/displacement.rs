@@ -82,6 +82,43 @@ fn a_radius_that_grows_throws_nothing() {
     }
 }
 
+/// Five layers of marbles that were dropped into a shaft as a column.
+#[test]
+fn a_pit_sags_a_little_and_less_with_more_iterations() {
+    let radius = 0.09;
+    // Allowed overlap over the radius, and mean speed in m/s.
+    for (iterations, substeps, overlap, speed) in
+        [(8, 1, 0.5, 0.15), (50, 1, 0.1, 0.06), (8, 4, 0.1, 0.06)]
+    {
+        let mut world = world(Detection::Discrete, Integrator::SemiImplicitEuler);
+        world.set_model(Model { iterations, substeps, ..world.model() }).unwrap();
+        world.set_gravity(Vec3::unit_y() * -G).unwrap();
+        floor(&mut world);
+        for inward in [Vec3::unit_x(), -Vec3::unit_x(), Vec3::unit_z(), -Vec3::unit_z()] {
+            world.walls.insert(Plane::new(inward, -0.8).unwrap()).unwrap();
+        }
+        for i in 0..300_u32 {
+            let (place, aside) = (f64::from(i), |part: f64| 0.01 * (f64::from(i) * part).fract());
+            let x = (place % 4.0 - 1.5) * 0.19 + aside(0.618);
+            let z = ((place / 4.0).floor() % 4.0 - 1.5) * 0.19 + aside(0.414);
+            ball(&mut world, [x, 0.3 + 0.2 * (place / 16.0).floor(), z], radius);
+        }
+        let (mut deepest_late, mut mean_late) = (0.0_f64, 0.0_f64);
+        for step in 0..1_200 {
+            world.step(DT).unwrap();
+            if step >= 1_140 {
+                let sum: f64 = world.marbles.velocity().iter().map(|v| v.magnitude()).sum();
+                deepest_late = deepest_late.max(deepest(&world) / radius);
+                mean_late = mean_late.max(sum / 300.0);
+            }
+        }
+        let name = format!("{iterations} iterations, {substeps} substeps");
+        println!("{name}: {deepest_late} radii, {mean_late} m/s");
+        assert!(deepest_late < overlap, "{name}: {deepest_late} radii deep");
+        assert!(mean_late < speed, "{name}: {mean_late} m/s");
+    }
+}
+
 #[test]
 fn what_lies_reports_no_speed() {
     for integrator in Integrator::ALL {

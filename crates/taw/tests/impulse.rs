@@ -1,5 +1,9 @@
 //! Scenes with a known outcome, under `Response::Impulse`.
 
+#[path = "common/draw.rs"]
+mod draw;
+
+use draw::Draw;
 use taw::contact::Contact;
 use taw::prelude::*;
 use taw::world::WallMotion;
@@ -75,6 +79,43 @@ fn a_ball_rolls_down_a_slope_with_five_sevenths_of_the_pull() {
         let exact = 5.0 / 7.0 * G * 20_f64.to_radians().sin() * 4.0;
         assert!((velocity.magnitude() / exact - 1.0).abs() < 1e-9, "{velocity:?}, not {exact}");
         assert!((spin.magnitude() * 0.5 / exact - 1.0).abs() < 1e-9, "{spin:?}");
+    }
+}
+
+/// Solid ball: `7/5 m a = m g (sin - resistance cos)`, as the resistance is a torque of that part of
+/// the radius times the normal force.
+#[test]
+fn rolling_resistance_holds_up_to_its_tangent_and_brakes_beyond_it() {
+    let mut draw = Draw(6);
+    for case in 0..1_000 {
+        let (degrees, resistance) = (draw.between(1.0, 20.0), draw.between(0.01, 0.5));
+        let (sin, cos) = degrees.to_radians().sin_cos();
+        let pull = G * (sin - resistance * cos);
+        if pull.abs() < 0.1 {
+            continue;
+        }
+        let (dt, iterations) = (draw.between(1e-3, 1.0 / 30.0), [1, 2, 8, 50][case % 4]);
+        let (mut world, up, _) = slope::<f64>(degrees, Rotation::Dynamic);
+        world.set_model(Model { iterations, ..world.model() }).unwrap();
+        let material = Material { rolling_resistance: resistance, ..surface(0.0, 1.0) };
+        let start = on(up, draw.between(0.01, 1.0), material);
+        let id = world.marbles.insert(start).unwrap();
+        let steps = 60;
+        for _ in 0..steps {
+            world.step(dt).unwrap();
+        }
+        let Marble { position, velocity, .. } = world.marbles.get(id).unwrap();
+        let name = format!("{degrees}°, {resistance}, {iterations} iterations of {dt} s");
+        let (moved, time) = ((position - start.position).magnitude(), f64::from(steps) * dt);
+        if pull < 0.0 {
+            // It slid before the first contact knew what it bears, if at all.
+            assert!(moved < 1e-3 * G * dt * dt, "{name}: crept {moved} m");
+        } else {
+            let exact = 5.0 / 7.0 * pull * time;
+            // Too few iterations lag by a substep's pull.
+            let error = (velocity.magnitude() - exact).abs();
+            assert!(error < G * sin * dt, "{name}: {} m/s, not {exact}", velocity.magnitude());
+        }
     }
 }
 

@@ -61,6 +61,12 @@ impl<R: Real<Vector = V>, V: RealVector<R>> ContactImpulse<R, V> {
         normal * self.normal + self.tangent
     }
 
+    /// Sum of two impulses.
+    #[inline(always)]
+    pub fn plus(self, other: Self) -> Self {
+        Self { normal: self.normal + other.normal, tangent: self.tangent + other.tangent }
+    }
+
     /// Solves a contact point: adds the impulse that the contact wants, as if it were alone, rigid
     /// and without limits, and clamps the sum to the cone. Returns the change, to be applied to the
     /// bodies.
@@ -76,8 +82,7 @@ impl<R: Real<Vector = V>, V: RealVector<R>> ContactImpulse<R, V> {
             Some(softness) => softness.apply(wanted.normal, before.normal),
             None => wanted.normal,
         };
-        let sum = Self { normal: before.normal + normal, tangent: before.tangent + wanted.tangent };
-        *self = cone.clamp(sum);
+        *self = cone.clamp(before.plus(Self { normal, ..wanted }));
         Self { normal: self.normal - before.normal, tangent: self.tangent - before.tangent }
     }
 }

@@ -2,7 +2,7 @@
 
 use super::World;
 use super::method::Method;
-use crate::math::{Scalar, cast_vector, length};
+use crate::math::{Scalar, cast_vector};
 use crate::response::displacement::solve_displacement;
 
 /// Position projection, without masses.
@@ -11,11 +11,6 @@ pub(super) struct Displacement;
 impl<S: Scalar> Method<S> for Displacement {
     fn advance(&self, world: &mut World<S>, dt: S) {
         world.move_marbles(dt);
-    }
-
-    /// Rounding must not end the touch of what falls together.
-    fn contact_distance(&self, world: &World<S>, dt: S) -> S {
-        length(world.settings.gravity) * dt * dt * S::from_f64(1e-3)
     }
 
     fn solve(&self, world: &mut World<S>, dt: S) {

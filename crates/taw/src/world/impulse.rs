@@ -3,7 +3,7 @@
 use super::World;
 use super::energy_audit::AuditState;
 use super::method::Method;
-use crate::math::{Scalar, length};
+use crate::math::Scalar;
 use crate::response::impulse::solve_contacts;
 
 /// Sequential impulses.
@@ -15,10 +15,6 @@ impl<S: Scalar> Method<S> for Impulse {
         before.clear();
         before.extend_from_slice(world.marbles.velocity());
         world.move_marbles(dt);
-    }
-
-    fn contact_distance(&self, world: &World<S>, dt: S) -> S {
-        length(world.settings.gravity) * dt * dt * S::from_f64(2.0)
     }
 
     fn generate_contacts(&self, world: &mut World<S>) {

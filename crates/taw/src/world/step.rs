@@ -80,10 +80,11 @@ impl<S: Scalar> World<S> {
 
     /// The second verb: finds who touches whom, and by how much.
     ///
-    /// For [`Impulse`](crate::response::Response::Impulse), that is also who is so near that gravity closes the
-    /// gap within two substeps, and whom the last substep pressed together, if something may do so again;
-    /// the displacement of these is zero, and the latter are off the list after
-    /// [`World::restitute`]. For
+    /// For [`Impulse`](crate::response::Response::Impulse) and
+    /// [`Displacement`](crate::response::Response::Displacement), that is also who is so near that
+    /// gravity closes the gap within two substeps; for `Impulse`, whom the last substep pressed
+    /// together, too, if something may do so again. The displacement of these is zero, and the latter
+    /// are off the list after [`World::restitute`]. For
     /// [`EventDriven`](crate::response::Response::EventDriven) it is who may rest on each other at the start; who comes
     /// together later is found later.
     pub fn generate_contacts(&mut self) {

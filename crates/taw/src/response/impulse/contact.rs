@@ -165,26 +165,35 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &self,
         a: BodyA,
         b: usize,
+        inverse_effective_mass: InverseEffectiveMass<S>,
         material: Material<S>,
     ) -> Option<RollingConstraint<S>> {
         let Material { rolling_resistance, spinning_resistance, .. } = material;
         let is_zero = rolling_resistance == S::zero() && spinning_resistance == S::zero();
-        if is_zero {
+        let first = a.marble();
+        let inverse_inertias =
+            [first.map_or_else(S::zero, |a| self.inverse_inertia(a)), self.inverse_inertia(b)];
+        let inverse_inertia = inverse_inertias[0] + inverse_inertias[1];
+        if is_zero || inverse_inertia <= S::zero() {
             return None;
         }
-        let inverse_inertia = |row: usize| self.inverse_inertia(row);
-        let (radius, inverse_inertia) = match a {
-            BodyA::Wall(..) => (self.radius[b], inverse_inertia(b)),
-            BodyA::Marble(a) => {
-                let a = a as usize;
-                let (r, s) = (self.radius[a], self.radius[b]);
-                (r * s / (r + s), inverse_inertia(a) + inverse_inertia(b))
-            }
+        let radii = [first.map_or_else(S::zero, |a| self.radius[a]), self.radius[b]];
+        let radius =
+            if first.is_some() { radii[0] * radii[1] / (radii[0] + radii[1]) } else { radii[1] };
+        // The points of capsules are not at a radius from the center.
+        let is_round = self.capsule(b).is_none() && first.is_none_or(|a| self.capsule(a).is_none());
+        let coupling = if is_round {
+            (radii[0] * inverse_inertias[0] - radii[1] * inverse_inertias[1]) / inverse_inertia
+        } else {
+            S::zero()
         };
-        (inverse_inertia > S::zero()).then(|| RollingConstraint {
+        let held = inverse_effective_mass.tangent - coupling * coupling * inverse_inertia;
+        Some(RollingConstraint {
             rolling_lever: rolling_resistance * radius,
             torsional_lever: spinning_resistance * radius,
             inverse_inertia,
+            coupling,
+            held_ratio: inverse_effective_mass.normal / held,
             angular_impulse: Vec3::zero(),
         })
     }

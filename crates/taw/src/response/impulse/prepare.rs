@@ -98,7 +98,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             target_normal_velocity: target_normal_velocity.min(S::zero()),
             target_tangent_velocity: zero,
             impulse: ContactImpulse::zero(),
-            rolling: self.rolling_constraint(a, b, material),
+            rolling: self.rolling_constraint(a, b, inverse_effective_mass, material),
         };
         constraint.initial_relative_spin = self.relative_spin(&constraint);
         constraint.velocity_since_impact = self.velocity_since(&constraint, None, context);

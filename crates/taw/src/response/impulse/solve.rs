@@ -7,7 +7,7 @@ use super::jam::saturate;
 use super::rows::{PackedBodies, Row, Rows, SearchDirections};
 use super::{Constraint, RollingConstraint, SolverSettings};
 use crate::constraint::{ContactImpulse, solve_rolling};
-use crate::math::{Scalar, Vec3, is_finite, length};
+use crate::math::{RealVector, Scalar, Vec3, is_finite, length};
 use crate::response::SolverBodies;
 
 /// Iterates over the contacts of islands that have not converged, until they do or the iterations
@@ -120,10 +120,15 @@ impl<S: Scalar> Row<S> {
 }
 
 impl<S: Scalar> PackedBodies<'_, '_, S> {
-    /// Solves one contact point. Returns the velocity change, in m/s.
+    /// Solves one contact point. Returns the velocity change of its point, in m/s.
     fn solve_point(&mut self, row: &mut Row<S>, c: &mut Constraint<S>) -> S {
         let error = ContactImpulse::split(self.velocity_error(row, &c.arms), row.normal);
-        let wanted = ContactImpulse { tangent: error.tangent * row.tangent_ratio, ..error };
+        let tangent = c
+            .rolling
+            .as_ref()
+            .and_then(|rolling| self.hold(row, rolling, error))
+            .unwrap_or_else(|| error.tangent * row.tangent_ratio);
+        let wanted = ContactImpulse { tangent, ..error };
         let mut impulse = row.impulse;
         let mut change = impulse.solve(wanted, None, &row.cone);
         if impulse.normal > row.max_normal_impulse {
@@ -139,8 +144,9 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
         }
         row.impulse = impulse;
         self.apply_impulse(row, &c.arms, change);
-        self.solve_rolling(row, &mut c.rolling);
-        change.magnitude()
+        let spin_change = self.solve_rolling(row, &mut c.rolling);
+        // What rolling friction stops, the contact point feels in the next pass.
+        change.magnitude().max(spin_change * length(c.arms[1]))
     }
 
     /// Accelerates a pass: extends it, together with the steps before, to the combination that
@@ -209,18 +215,42 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
         }
     }
 
-    /// Solves rolling and torsional friction: one step toward zero relative spin.
-    fn solve_rolling(&mut self, row: &Row<S>, rolling: &mut Option<RollingConstraint<S>>) {
-        let Some(rolling) = rolling else { return };
+    /// Tangential impulse, in m/s, that ends slip and rolling at once; none if rolling friction cannot
+    /// bear it. One after the other, they would need a dozen passes to agree.
+    fn hold(
+        &self,
+        row: &Row<S>,
+        rolling: &RollingConstraint<S>,
+        error: ContactImpulse<S>,
+    ) -> Option<Vec3<S>> {
+        let RollingConstraint { coupling, inverse_inertia, .. } = *rolling;
+        let spin = self.relative_spin(row).reject_from(row.normal);
+        let tangent = (error.tangent + spin.cross(row.normal) * coupling) * rolling.held_ratio;
+        let wanted = ContactImpulse { tangent, ..error };
+        let impulse = row.saturate(row.cone.clamp(row.impulse.plus(wanted)));
+        let friction = (impulse.tangent - row.impulse.tangent) / row.inverse_effective_mass;
+        let angular_impulse = rolling.angular_impulse.reject_from(row.normal)
+            - spin / inverse_inertia
+            - row.normal.cross(friction) * coupling;
+        let bearable = rolling.rolling_lever * impulse.normal / row.inverse_effective_mass;
+        (length(angular_impulse) <= bearable).then_some(tangent)
+    }
+
+    /// Solves rolling and torsional friction: one step toward zero relative spin. Returns the change
+    /// of the relative spin, in rad/s.
+    fn solve_rolling(&mut self, row: &Row<S>, rolling: &mut Option<RollingConstraint<S>>) -> S {
+        let Some(rolling) = rolling else { return S::zero() };
         let wanted = self.relative_spin(row) / -rolling.inverse_inertia;
         let load = row.impulse.normal / row.inverse_effective_mass;
         let limits = [rolling.rolling_lever * load, rolling.torsional_lever * load];
         let mut angular_impulse = rolling.angular_impulse;
         let change = solve_rolling(&mut angular_impulse, wanted, row.normal, limits);
-        if is_finite(change) {
-            rolling.angular_impulse = angular_impulse;
-            self.apply_angular_impulse(row, change);
+        if !is_finite(change) {
+            return S::zero();
         }
+        rolling.angular_impulse = angular_impulse;
+        self.apply_angular_impulse(row, change);
+        length(change) * rolling.inverse_inertia
     }
 }
 
