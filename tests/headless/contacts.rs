@@ -307,6 +307,76 @@ fn what_a_wall_strikes_is_heard_at_its_speed() {
     }
 }
 
+/// Whoever plays a sound for each hit hears all bounces, however slow.
+#[test]
+fn every_bounce_off_a_rail_is_heard_at_its_speed() {
+    for (response, substeps) in
+        [(Response::Impulse, 4), (Response::EventDriven, 1), (Response::SoftStep, 4)]
+    {
+        let mut bounced = 0;
+        for case in 0..60 {
+            let speed = 0.02 + scene::random(case);
+            let mut app = scene::app();
+            let model = Model { response, substeps, ..Model::GAME };
+            app.insert_resource(TawModel(model)).add_message::<ContactHit>();
+            scene::floor(&mut app);
+            let rail = Wall::HalfSpace(Dir3::NEG_X);
+            let rail = app.world_mut().spawn((rail, Transform::from_xyz(0.2, 0.0, 0.0))).id();
+            let marble = scene::drop_marble(&mut app, 0.1, Vec3::new(0.05, 0.1, 0.0));
+            let surface = SurfaceMaterial { restitution: 0.7, friction: 0.0, ..default() };
+            app.world_mut().entity_mut(marble).insert((Velocity(Vec3::X * speed), surface));
+            let mut hits = Vec::new();
+            for _ in 0..200 {
+                app.update();
+                let messages = app.world().resource::<Messages<ContactHit>>();
+                hits.extend(messages.iter_current_update_messages().copied());
+            }
+            let after = app.world().get::<Velocity>(marble).unwrap().x;
+            let case = format!("{response:?}, {speed} m/s, {after} m/s after it: {hits:?}");
+            assert!(hits.iter().all(|hit| hit.pair.a == rail), "{case}");
+            if after < -0.01 * speed {
+                bounced += 1;
+                assert_eq!(hits.len(), 1, "{case}");
+                assert!((hits[0].approach_speed / speed - 1.0).abs() < 0.02, "{case}");
+            }
+        }
+        assert!(bounced > 50, "{response:?}: {bounced}");
+    }
+}
+
+#[test]
+fn what_lies_is_not_heard() {
+    for response in [Response::Impulse, Response::EventDriven, Response::SoftStep] {
+        for restitution in [0.0, 0.5] {
+            let mut app = scene::app();
+            let substeps = if response == Response::EventDriven { 1 } else { 4 };
+            let model = Model { response, substeps, ..Model::GAME };
+            app.insert_resource(TawModel(model)).add_message::<ContactHit>();
+            scene::floor(&mut app);
+            for side in [Dir3::X, Dir3::NEG_X, Dir3::Z, Dir3::NEG_Z] {
+                let place = Transform::from_translation(side * -0.3);
+                app.world_mut().spawn((Wall::HalfSpace(side), place));
+            }
+            let marbles = scene::drop_marbles(&mut app, 30);
+            for (i, marble) in (0_u8..).zip(&marbles) {
+                let at = Vec3::new(0.1 * f32::from(i % 3) - 0.1, 0.2 * f32::from(i), 0.01);
+                let surface =
+                    SurfaceMaterial { restitution, rolling_resistance: 0.05, ..default() };
+                let place = Transform::from_translation(at + Vec3::Y * 0.1);
+                app.world_mut().entity_mut(*marble).insert((Marble::new(0.09), surface, place));
+            }
+            scene::frames(&mut app, 1_000);
+            let mut hits = Vec::new();
+            for _ in 0..64 {
+                app.update();
+                let messages = app.world().resource::<Messages<ContactHit>>();
+                hits.extend(messages.iter_current_update_messages().map(|hit| hit.approach_speed));
+            }
+            assert!(hits.is_empty(), "{response:?}, restitution {restitution}: {hits:?}");
+        }
+    }
+}
+
 /// An observer that goes and comes back hears of no contact that ended meanwhile.
 #[test]
 fn who_listens_again_hears_nothing_stale() {

@@ -1,5 +1,6 @@
 //! Sensors: who enters, who leaves, who is inside.
 
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::message::Messages;
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
@@ -213,4 +214,50 @@ fn a_sensor_that_comes_back_lists_nobody_who_is_gone() {
     let other = scene::drop_marble(&mut app, 0.1, Vec3::ZERO);
     scene::frames(&mut app, 2);
     assert_eq!(inside(&app, zone), [other]);
+}
+
+/// However a sensor goes, who was inside leaves, so that entered minus left is who is inside.
+#[test]
+fn who_is_in_a_sensor_that_goes_leaves_it() {
+    type Deed = fn(&mut App, Entity);
+    let deeds: [(&str, Deed); 5] = [
+        ("despawned", |app, zone| {
+            app.world_mut().despawn(zone);
+        }),
+        ("disabled", |app, zone| {
+            app.world_mut().entity_mut(zone).insert(Disabled);
+        }),
+        ("no wall", |app, zone| {
+            app.world_mut().entity_mut(zone).remove::<Wall>();
+        }),
+        ("no sensor", |app, zone| {
+            app.world_mut().entity_mut(zone).remove::<Sensor>();
+        }),
+        ("no layers", |app, zone| {
+            app.world_mut().entity_mut(zone).insert(CollisionLayers::NONE);
+        }),
+    ];
+    for (name, deed) in deeds {
+        let mut app = app(Response::SoftStep);
+        let zone = gate(&mut app, Vec3::splat(2.0), Vec3::ZERO);
+        let mut marbles = [-0.5, 0.5].map(|x| scene::drop_marble(&mut app, 0.1, Vec3::X * x));
+        marbles.sort_unstable();
+        let sorted = |app: &mut App| {
+            let mut told = told(app);
+            told.sort_unstable();
+            told
+        };
+        app.update();
+        assert_eq!(sorted(&mut app), marbles.map(|it| (true, zone, it)), "{name}");
+        deed(&mut app, zone);
+        scene::frames(&mut app, 3);
+        assert_eq!(sorted(&mut app), marbles.map(|it| (false, zone, it)), "{name}");
+        if name == "disabled" {
+            assert!(inside(&app, zone).is_empty(), "{name}");
+            app.world_mut().entity_mut(zone).remove::<Disabled>();
+            scene::frames(&mut app, 3);
+            assert_eq!(sorted(&mut app), marbles.map(|it| (true, zone, it)), "enabled again");
+            assert_eq!(inside(&app, zone), marbles);
+        }
+    }
 }

@@ -28,6 +28,7 @@ use bevy::ecs::observer::CachedObservers;
 use bevy::prelude::*;
 use taw::contact::{Contact, touch_goes_on};
 use taw::math::{Vec3 as TawVec3, length};
+use taw::response::Response;
 use taw::world::ColliderId;
 
 use crate::SubstepDelta;
@@ -81,7 +82,8 @@ pub struct ContactStarted {
 /// Impact of two entities, faster than a resting contact, whether or not they touched before: a marble
 /// that runs along a mesh hits the end of it. Good for sounds and sparks.
 ///
-/// Sent for approach speeds over a millimetre a second, and over those that gravity makes in two
+/// Sent for approach speeds over a millimetre a second, and, but by [`EventDriven`](Response::EventDriven),
+/// over those that gravity makes in two
 /// substeps. A pair that touches in several places has a hit for each of them; of those in one
 /// direction, within a step, the fastest.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
@@ -328,7 +330,7 @@ pub(crate) fn write(
     events.clear(); // nobody observed those of the last step
     let fall = fall(&world, delta.0);
     let (started, hits, ongoing, ended) = &mut readers;
-    find_hits(now, 2.0 * fall / delta.0, &mut events.hits);
+    find_hits(now, fastest_rest(&world, delta.0), &mut events.hits);
     if let Some(messages) = hits {
         messages.write_batch(events.hits.iter().copied());
     }
@@ -374,6 +376,16 @@ fn find_hits(contacts: &[ContactStarted], least: f32, hits: &mut Vec<ContactHit>
         }
     }
     hits.truncate(kept);
+}
+
+/// Largest approach speed of what rests, in m/s, where the three verbs take `dt` seconds.
+fn fastest_rest(world: &TawWorld, dt: f32) -> f32 {
+    let model = world.model();
+    if model.response == Response::EventDriven {
+        return 0.0; // it lists no contact that gravity has pressed together
+    }
+    let substep = dt * model.passes() as f32 / model.substeps as f32;
+    2.0 * from_vector(world.gravity()).length() * substep
 }
 
 /// Distance that gravity closes in a substep of `dt` seconds, in metres.

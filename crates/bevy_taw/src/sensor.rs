@@ -15,6 +15,7 @@
 //! # app.add_systems(Startup, spawn).update();
 //! ```
 
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::ecs::world::DeferredWorld;
 use bevy::prelude::*;
 use taw::swarm::BallId;
@@ -73,11 +74,12 @@ pub struct SensorEntered {
     pub time_left: f32,
 }
 
-/// Message, and event of the sensor's entity: a marble left a sensor, or is gone.
+/// Message, and event of the sensor's entity: a marble left a sensor, or one of them is gone, disabled,
+/// or no longer what it was.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct SensorLeft {
-    /// The sensor.
+    /// The sensor, which may be gone.
     #[event_target]
     pub sensor: Entity,
     /// The marble, which may be gone.
@@ -103,11 +105,12 @@ fn forget(removed: On<Remove, Sensor>, mut app: DeferredWorld) {
 }
 
 impl TawWorld {
-    /// Takes the sensor of an entity out, if it is there.
+    /// Takes the sensor of an entity out, if it is there. Who was inside leaves in the next step.
     pub(crate) fn remove_sensor(&mut self, id: SensorId, entity: Entity) {
         if self.sensor_entities.get(&id) == Some(&entity) {
             self.sensor_entities.remove(&id);
-            self.sensed.retain(|(sensor, _), _| *sensor != id);
+            let left = self.sensed.extract_if(|(sensor, _), _| *sensor == id);
+            self.left_sensors.extend(left.map(|(_, marble)| (entity, marble)));
             self.stale_sensors.push(entity);
             let _ = self.world.sensors.remove(id); // a restored world may not have it
         }
@@ -117,8 +120,9 @@ impl TawWorld {
 /// Writes the sensor events of the step, and updates [`CollidingEntities`].
 pub(crate) fn scatter(
     mut world: ResMut<TawWorld>,
+    time: Res<Time>,
     states: Query<&WallState>,
-    mut colliding: Query<&mut CollidingEntities>,
+    mut colliding: Query<(&mut CollidingEntities, &mut CollidingBalls), Allow<Disabled>>,
     mut entered: MessageWriter<SensorEntered>,
     mut left: MessageWriter<SensorLeft>,
     mut commands: Commands,
@@ -127,6 +131,12 @@ pub(crate) fn scatter(
         return;
     }
     let world = &mut *world;
+    world.left_sensors.sort_unstable(); // maps have no order
+    for (sensor, marble) in world.left_sensors.drain(..) {
+        let event = SensorLeft { sensor, marble, time_left: time.delta_secs() };
+        left.write(event);
+        commands.trigger(event);
+    }
     for event in world.world.sensors.events() {
         let time_left = event.time_left;
         let Some(sensor) = world.sensor_entities.get(&event.sensor).copied() else { continue };
@@ -147,13 +157,16 @@ pub(crate) fn scatter(
     world.stale_sensors.sort_unstable();
     world.stale_sensors.dedup();
     for entity in world.stale_sensors.drain(..) {
-        let Ok(mut colliding) = colliding.get_mut(entity) else { continue };
+        let Ok((mut colliding, mut balls)) = colliding.get_mut(entity) else { continue };
         let id = states.get(entity).ok().and_then(|state| state.sensor);
         let inside = id.and_then(|id| world.world.sensors.inside(id).ok()).unwrap_or_default();
         let of_sensor = |marble: &MarbleId| world.sensed.get(&(id?, *marble));
         colliding.0.clear();
         colliding.0.extend(inside.iter().filter_map(of_sensor));
         colliding.0.sort_unstable();
+        if id.is_none() {
+            balls.0.clear();
+        }
     }
 }
 
