@@ -185,6 +185,22 @@ fn what_the_labs_method_does_to_momentum_is_seen() {
     near(world.energy_audit().unwrap().momentum, 0.0, 1e-9);
 }
 
+/// A lift at 1 m/s: the weight times its way, and what sets it in motion in the first step.
+#[test]
+fn the_labs_method_counts_what_a_lift_does() {
+    let mut lift =
+        world(Response::Displacement, material(0.0, 0.0), &[([0.0, 0.1, 0.0], [0.0; 3])]);
+    moved_floor(&mut lift, Vec3::unit_y());
+    let floor = lift.walls.id(0).unwrap();
+    let (dt, steps) = (1.0 / 60.0, 60);
+    let mut walls = 0.0;
+    for step in 1..=steps {
+        lift.walls.set(floor, Plane::new(Vec3::unit_y(), f64::from(step) * dt).unwrap()).unwrap();
+        walls += run(&mut lift, dt, dt).walls;
+    }
+    near(walls, 9.81 * f64::from(steps) * dt + 1.0, 1e-9);
+}
+
 #[test]
 fn what_rests_takes_nothing() {
     for response in BOTH {

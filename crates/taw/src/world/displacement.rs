@@ -1,5 +1,7 @@
 //! [`Response::Displacement`](crate::response::Response) in a world.
 
+use cgmath::InnerSpace;
+
 use super::World;
 use super::method::Method;
 use crate::math::{Scalar, cast_vector};
@@ -32,14 +34,18 @@ impl<S: Scalar> Method<S> for Displacement {
             &mut scratch.displacement,
             &mut world.memory.impulses,
             &mut scratch.stopped,
-            |row, change| pushes.iter_mut().for_each(|pushes| pushes.push((row, change))),
+            |row, change, surface_speed| {
+                pushes.iter_mut().for_each(|pushes| pushes.push((row, change, surface_speed)));
+            },
         );
         drop(context);
         if let Some(audit_state) = &mut scratch.audit_state {
             audit_state.work.collisions = world.contacts.len() as u32;
-            for (row, change) in pushes.into_iter().flatten() {
+            for (row, change, surface_speed) in pushes.into_iter().flatten() {
                 let mass = world.marbles.mass(row as usize).as_f64();
-                audit_state.work.momentum += cast_vector::<S, f64>(change) * mass;
+                let impulse = cast_vector::<S, f64>(change) * mass;
+                audit_state.work.momentum += impulse;
+                audit_state.work.walls += impulse.magnitude() * surface_speed.as_f64();
             }
         }
     }

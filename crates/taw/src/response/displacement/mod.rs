@@ -73,7 +73,7 @@ struct ApproachConstraint<S> {
 ///
 /// The contacts' rows exist. A row that would become infinite or NaN keeps its position, loses its
 /// velocity, and is added to `quarantined`. `on_wall_impulse` receives the velocity changes by
-/// walls.
+/// walls, with the speed of their surface along it, in m/s.
 pub(crate) fn solve_displacement<S: Scalar>(
     marbles: &mut SolverBodies<S>,
     contacts: &mut Contacts<S>,
@@ -81,7 +81,7 @@ pub(crate) fn solve_displacement<S: Scalar>(
     scratch: &mut Scratch<S>,
     cache: &mut Vec<CachedImpulse<S>>,
     quarantined: &mut Vec<u32>,
-    mut on_wall_impulse: impl FnMut(u32, Vec3<S>),
+    mut on_wall_impulse: impl FnMut(u32, Vec3<S>, S),
 ) {
     let Scratch { constraints, initial_velocity, islands, warm_starts } = scratch;
     initial_velocity.clear();
@@ -104,7 +104,7 @@ pub(crate) fn solve_displacement<S: Scalar>(
         }
     }
     for c in constraints.iter().filter(|c| c.a.marble().is_none()) {
-        on_wall_impulse(c.b as u32, c.normal * c.velocity_change);
+        on_wall_impulse(c.b as u32, c.normal * c.velocity_change, c.surface_speed);
     }
     marbles.follow_velocity_changes(initial_velocity, context, quarantined);
     for _ in 0..context.settings.iterations {

@@ -72,7 +72,7 @@ fn restituted<S: Scalar>(
         &mut scratch,
         &mut cache,
         &mut quarantined,
-        |_, _| (),
+        |_, _, _| (),
     );
     (position, velocity, quarantined)
 }

@@ -84,9 +84,7 @@ impl Ledger {
         after: &Snapshot,
         near: &Near,
     ) -> Vec<Finding> {
-        let uncounted =
-            matches!(rules.kind, Kind::Displacement | Kind::DisplacementSwept | Kind::SwarmLab);
-        if rules.moving && uncounted {
+        if rules.moving && rules.kind == Kind::SwarmLab {
             return Vec::new(); // nobody counts what walls do there
         }
         let energy = after.kinetic() + after.potential();
