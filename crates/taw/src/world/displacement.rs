@@ -16,7 +16,7 @@ impl<S: Scalar> Method<S> for Displacement {
     }
 
     fn solve(&self, world: &mut World<S>, dt: S) {
-        world.begin_bounces();
+        world.note_positions();
         let (settings, model, scratch) =
             (world.solver_settings(dt), world.settings.model, &mut world.scratch);
         let (mut bodies, context) = scratch.columns.constrained(

@@ -136,6 +136,14 @@ impl<S: Scalar> World<S> {
         }
     }
 
+    /// Stores positions before contacts move marbles, by any detection: motion may pass through a wall by
+    /// the discrete one, but others do not push through it.
+    pub(super) fn note_positions(&mut self) {
+        let bounced_from = &mut self.scratch.continuous.bounced_from;
+        bounced_from.clear();
+        bounced_from.extend_from_slice(&self.marbles.position);
+    }
+
     /// Stores positions before the swarm pushes marbles, unless discrete detection lets these pass walls.
     pub(super) fn begin_pushes(&mut self) {
         let Model { detection, response, .. } = self.settings.model;
