@@ -54,7 +54,7 @@
 //! | [`wall_motion`] | speed of walls that move |
 //! | [`interpolation`] | smooth motion between fixed steps, of marbles and of walls that move |
 //! | `picking` (feature `picking`) | pointers on marbles and walls |
-//! | `mesh_walls` (feature `render`) | walls of meshes, meshes of walls |
+//! | `mesh_walls` (feature `mesh`) | walls of meshes, meshes of walls |
 //! | `gizmos` (feature `render`) | contacts, normals, velocities, sensors and the grid, drawn |
 //! | `swarm_render` (feature `render`) | swarms on the screen |
 //! | `debug_ui` (feature `debug_ui`) | egui panels for any game |
@@ -118,7 +118,7 @@ pub mod ignore;
 pub mod ignored;
 pub mod interpolation;
 pub mod layers;
-#[cfg(feature = "render")]
+#[cfg(feature = "mesh")]
 pub mod mesh_walls;
 pub mod messages;
 #[cfg(feature = "render")]
@@ -163,7 +163,7 @@ pub mod prelude {
     pub use crate::ignore::{ColliderDisabled, IgnoreCollisions, OneWay};
     pub use crate::ignored::IgnoredComponents;
     pub use crate::layers::{CollisionLayers, LayerMask, PhysicsLayer};
-    #[cfg(feature = "render")]
+    #[cfg(feature = "mesh")]
     pub use crate::mesh_walls::{MeshShape, MeshWalls};
     pub use crate::messages::{
         ContactEnded, ContactHit, ContactOngoing, ContactPair, ContactStarted,

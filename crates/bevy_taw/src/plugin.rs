@@ -64,9 +64,10 @@ impl TawPlugins {
 impl PluginGroup for TawPlugins {
     fn build(self) -> PluginGroupBuilder {
         let group = PluginGroupBuilder::start::<Self>().add(TawPlugin).add(TawInterpolationPlugin);
+        #[cfg(feature = "mesh")]
+        let group = group.add(crate::mesh_walls::TawMeshWallsPlugin);
         #[cfg(feature = "render")]
         let group = group
-            .add(crate::mesh_walls::TawMeshWallsPlugin)
             .add(crate::gizmos::TawGizmosPlugin)
             .add(crate::swarm_render::TawSwarmRenderPlugin);
         group

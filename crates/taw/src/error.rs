@@ -1,3 +1,5 @@
+use std::fmt;
+
 use cgmath::{Array, InnerSpace};
 
 use crate::frame::NodeId;
@@ -28,7 +30,7 @@ pub enum Error {
         value: f64,
     },
     /// A number is outside the range that its meaning allows, or NaN.
-    #[error("{field} must be in [{min}, {max}], but is {value}")]
+    #[error("{field} must be {}, but is {value}", Allowed([*min, *max]))]
     OutOfRange {
         /// Name of the field.
         field: &'static str,
@@ -93,6 +95,32 @@ pub enum Error {
     /// Indices of 32 bits are exhausted.
     #[error("the world holds {0} rows already, which is all that a handle can name")]
     Full(usize),
+}
+
+/// Range of numbers, as messages name it.
+struct Allowed([f64; 2]);
+
+impl fmt::Display for Allowed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self([min, max]) = *self;
+        let [low, high] = [min, max].map(|bound| {
+            let single = bound as f32; // has fewer digits
+            if bound == 0.0 || (1e-4..1e10).contains(&bound.abs()) {
+                bound.to_string()
+            } else if f64::from(single) == bound {
+                format!("{single:e}")
+            } else {
+                format!("{bound:e}")
+            }
+        });
+        if min == max {
+            write!(f, "{low}")
+        } else if max >= f64::from(f32::MAX) {
+            write!(f, "finite and at least {low}")
+        } else {
+            write!(f, "in [{low}, {high}]")
+        }
+    }
 }
 
 /// Validates a finite number.
@@ -166,4 +194,27 @@ pub(crate) fn finite_point<S: Scalar>(
     p: Point3<S>,
 ) -> Result<Point3<S>, Error> {
     finite_vector(field, Vec3::new(p.x, p.y, p.z)).map(|_| p)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn ranges_are_named_as_people_read_them() {
+        let max = f64::from(f32::MAX);
+        let tiny = f64::from(1e-9_f32);
+        for (range, name) in [
+            ([1.0, 1000.0], "in [1, 1000]"),
+            ([tiny, 1e9], "in [1e-9, 1000000000]"),
+            ([1e-9, 1e12], "in [1e-9, 1e12]"),
+            ([0.1, 0.25], "in [0.1, 0.25]"),
+            ([4.0, 4_294_967_294.0], "in [4, 4294967294]"),
+            ([0.0, max], "finite and at least 0"),
+            ([1.0, f64::MAX], "finite and at least 1"),
+            ([4.0, 4.0], "4"),
+        ] {
+            assert_eq!(Allowed(range).to_string(), name);
+        }
+    }
 }

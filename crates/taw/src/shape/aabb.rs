@@ -132,7 +132,7 @@ mod tests {
     fn bad_input_is_refused_by_name() {
         let at = |x: f32| Point3::new(0.0, x, 0.0);
         let error = Aabb::new(at(1.0), at(0.5)).unwrap_err();
-        assert!(error.to_string().starts_with("max.y must be in [1, "), "{error}");
+        assert!(error.to_string().starts_with("max.y must be finite and at least 1, "), "{error}");
         assert!(Aabb::new(at(0.0), at(f32::NAN)).is_err());
         assert!(Aabb::new(at(1.0), at(1.0)).is_ok(), "flat");
     }

@@ -167,7 +167,7 @@ mod tests {
         let origin = Point3::new(0.0, 0.0, 0.0);
         let sizes = Vec3::new(1.0, -1.0, 1.0);
         let error = Obb::new(origin, Quat::one(), sizes).unwrap_err();
-        assert!(error.to_string().starts_with("half_extents.y must be in [0"));
+        assert!(error.to_string().starts_with("half_extents.y must be finite and at least 0, "));
         let long = Quat::new(2.0, 0.0, 0.0, 0.0);
         let error = Obb::new(origin, long, Vec3::new(1.0, 1.0, 1.0)).unwrap_err();
         assert_eq!(error, Error::NotUnit { field: "rotation", value: 2.0 });
