@@ -82,8 +82,7 @@ pub struct ContactStarted {
 /// Impact of two entities, faster than a resting contact, whether or not they touched before: a marble
 /// that runs along a mesh hits the end of it. Good for sounds and sparks.
 ///
-/// Sent for approach speeds over a millimetre a second, and, but by [`EventDriven`](Response::EventDriven),
-/// over those that gravity makes in two
+/// Sent above 1 mm/s and, except by [`EventDriven`](Response::EventDriven), above what gravity makes in two
 /// substeps. A pair that touches in several places has a hit for each of them; of those in one
 /// direction, within a step, the fastest.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
@@ -177,6 +176,8 @@ pub(crate) struct Touches {
     now: Vec<ContactStarted>,
     /// Sorted, one to a pair.
     before: Vec<ContactPair>,
+    /// Hits in the order found.
+    hits: Vec<ContactHit>,
     /// Number of this step's impacts already noted.
     impacts: usize,
     /// Events of this step for observers.
@@ -249,6 +250,17 @@ fn trigger_observed<E: ContactEvent>(world: &mut World, events: &mut Vec<E>) {
     }
 }
 
+impl Touches {
+    /// Notes a touch, and a hit if it is faster than `slowest`, in m/s.
+    fn add(&mut self, touch: ContactStarted, slowest: f32) {
+        let ContactStarted { pair, normal, point, approach_speed } = touch;
+        if approach_speed > slowest.max(SLOWEST_HIT) {
+            self.hits.push(ContactHit { pair, normal, point, approach_speed });
+        }
+        self.now.push(touch);
+    }
+}
+
 impl Events {
     fn clear(&mut self) {
         self.started.clear();
@@ -262,13 +274,21 @@ impl Events {
 /// then.
 pub(crate) fn forget(mut touches: ResMut<Touches>) {
     touches.now.clear();
+    touches.hits.clear();
     touches.before.clear();
     touches.impacts = 0;
     touches.events.clear();
 }
 
 /// Notes who touches in this substep, before anything is restituted.
-pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
+pub(crate) fn collect(
+    world: Res<TawWorld>,
+    delta: Res<SubstepDelta>,
+    mut touches: ResMut<Touches>,
+) {
+    let event_driven = world.model().response == Response::EventDriven;
+    // It lists who may rest on each other, and impacts of its own.
+    let slowest = if event_driven { f32::INFINITY } else { fastest_rest(&world, delta.0) };
     let velocity = |row: u32| world.marbles.velocity()[row as usize];
     let point_of =
         |contact: &Contact<f32>| world.marbles.position()[contact.b as usize] + contact.arms[1];
@@ -283,7 +303,7 @@ pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
     for contact in world.contacts.wm.iter().filter(|contact| contact.is_touching()) {
         if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
             let closing = velocity(contact.b) - wall_velocity(contact);
-            touches.now.push(started(ContactPair { a, b }, contact, closing));
+            touches.add(started(ContactPair { a, b }, contact, closing), slowest);
         }
     }
     for contact in world.contacts.mm.iter().filter(|contact| contact.is_touching()) {
@@ -292,13 +312,22 @@ pub(crate) fn collect(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
             let closing = velocity(contact.b) - velocity(contact.a);
             let touch = started(ContactPair { a, b }, contact, closing);
             // Rows move about; the order of entities does not.
-            touches.now.push(if b < a { touch.swapped() } else { touch });
+            touches.add(if b < a { touch.swapped() } else { touch }, slowest);
         }
     }
 }
 
 /// Notes the collisions that the response went through by itself.
-pub(crate) fn collect_impacts(world: Res<TawWorld>, mut touches: ResMut<Touches>) {
+pub(crate) fn collect_impacts(
+    world: Res<TawWorld>,
+    delta: Res<SubstepDelta>,
+    mut touches: ResMut<Touches>,
+) {
+    let model = world.model();
+    let slowest = match model.response {
+        Response::EventDriven => 0.0, // what rests has no impacts
+        _ => fastest_rest(&world, delta.0 * model.passes() as f32 / model.substeps as f32),
+    };
     // The list grows from substep to substep.
     for impact in world.impacts().iter().skip(touches.impacts) {
         let first = if impact.on_wall { TawWorld::wall_entity } else { TawWorld::marble_entity };
@@ -311,7 +340,7 @@ pub(crate) fn collect_impacts(world: Res<TawWorld>, mut touches: ResMut<Touches>
             point: from_point(impact.point),
             approach_speed: impact.approach_speed,
         };
-        touches.now.push(if !impact.on_wall && b < a { touch.swapped() } else { touch });
+        touches.add(if !impact.on_wall && b < a { touch.swapped() } else { touch }, slowest);
     }
     touches.impacts = world.impacts().len();
 }
@@ -325,12 +354,13 @@ pub(crate) fn write(
     marbles: Query<&MarbleState>,
     walls: Query<&WallState>,
 ) {
-    let Touches { now, before, impacts, events } = &mut *touches;
+    let Touches { now, hits: found, before, impacts, events } = &mut *touches;
     *impacts = 0;
     events.clear(); // nobody observed those of the last step
     let fall = fall(&world, delta.0);
     let (started, hits, ongoing, ended) = &mut readers;
-    find_hits(now, fastest_rest(&world, delta.0), &mut events.hits);
+    events.hits.append(found);
+    keep_fastest(&mut events.hits);
     if let Some(messages) = hits {
         messages.write_batch(events.hits.iter().copied());
     }
@@ -358,13 +388,8 @@ pub(crate) fn write(
     before.extend(now.drain(..).map(|touch| touch.pair));
 }
 
-/// Finds the hits among the contacts of a step, of over `least` m/s.
-fn find_hits(contacts: &[ContactStarted], least: f32, hits: &mut Vec<ContactHit>) {
-    let fast = |contact: &&ContactStarted| contact.approach_speed > least.max(SLOWEST_HIT);
-    hits.extend(contacts.iter().filter(fast).map(|contact| {
-        let ContactStarted { pair, normal, point, approach_speed } = *contact;
-        ContactHit { pair, normal, point, approach_speed }
-    }));
+/// Keeps the fastest hit of each pair and direction, sorted by pairs.
+fn keep_fastest(hits: &mut Vec<ContactHit>) {
     hits.sort_by(|x, y| x.pair.cmp(&y.pair).then(y.approach_speed.total_cmp(&x.approach_speed)));
     let mut kept = 0;
     for i in 0..hits.len() {
@@ -378,14 +403,9 @@ fn find_hits(contacts: &[ContactStarted], least: f32, hits: &mut Vec<ContactHit>
     hits.truncate(kept);
 }
 
-/// Largest approach speed of what rests, in m/s, where the three verbs take `dt` seconds.
+/// Speed that gravity makes in two times `dt` seconds, in m/s: the largest approach speed of resting contacts.
 fn fastest_rest(world: &TawWorld, dt: f32) -> f32 {
-    let model = world.model();
-    if model.response == Response::EventDriven {
-        return 0.0; // it lists no contact that gravity has pressed together
-    }
-    let substep = dt * model.passes() as f32 / model.substeps as f32;
-    2.0 * from_vector(world.gravity()).length() * substep
+    2.0 * from_vector(world.gravity()).length() * dt
 }
 
 /// Distance that gravity closes in a substep of `dt` seconds, in metres.

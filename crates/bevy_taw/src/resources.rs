@@ -79,7 +79,7 @@ pub struct TawWorld {
     pub(crate) sensor_entities: HashMap<SensorId, Entity>,
     /// Marbles inside of sensors, also those that are gone.
     pub(crate) sensed: HashMap<(SensorId, MarbleId), Entity>,
-    /// Sensors that went, and marbles that were inside, until they are told.
+    /// Events [`SensorLeft`](crate::sensor::SensorLeft) that are not sent yet: sensor and marble.
     pub(crate) left_sensors: Vec<(Entity, Entity)>,
     /// Sensor entities whose list of marbles inside is to be written anew.
     pub(crate) stale_sensors: Vec<Entity>,

@@ -74,8 +74,8 @@ pub struct SensorEntered {
     pub time_left: f32,
 }
 
-/// Message, and event of the sensor's entity: a marble left a sensor, or one of them is gone, disabled,
-/// or no longer what it was.
+/// Message, and event of the sensor's entity: a marble left a sensor, or either was despawned, disabled, or
+/// lost its component.
 #[derive(Message, EntityEvent, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct SensorLeft {

@@ -77,6 +77,7 @@ impl TawWorld {
         self.stale_sensors.extend(self.sensor_entities.values());
         self.sensor_entities.clone_from(&snapshot.sensor_entities);
         self.sensed.clone_from(&snapshot.sensed);
+        self.left_sensors.clear();
         self.stale_sensors.extend(self.sensor_entities.values());
         self.restored = self.restored.wrapping_add(1);
         self.just_restored = true;

@@ -105,20 +105,21 @@ impl fmt::Display for Allowed {
         let Self([min, max]) = *self;
         let [low, high] = [min, max].map(|bound| {
             let single = bound as f32; // has fewer digits
-            if bound == 0.0 || (1e-4..1e10).contains(&bound.abs()) {
-                bound.to_string()
-            } else if f64::from(single) == bound {
-                format!("{single:e}")
-            } else {
-                format!("{bound:e}")
+            let is_single = f64::from(single) == bound;
+            match (bound == 0.0 || (1e-4..1e10).contains(&bound.abs()), is_single) {
+                (true, true) => single.to_string(),
+                (true, false) => bound.to_string(),
+                (false, true) => format!("{single:e}"),
+                (false, false) => format!("{bound:e}"),
             }
         });
-        if min == max {
-            write!(f, "{low}")
-        } else if max >= f64::from(f32::MAX) {
-            write!(f, "finite and at least {low}")
-        } else {
-            write!(f, "in [{low}, {high}]")
+        let most = f64::from(f32::MAX);
+        match (min == max, min <= -most, max >= most) {
+            (true, ..) => write!(f, "{low}"),
+            (_, true, true) => write!(f, "finite"),
+            (_, false, true) => write!(f, "finite and at least {low}"),
+            (_, true, false) => write!(f, "finite and at most {high}"),
+            (..) => write!(f, "in [{low}, {high}]"),
         }
     }
 }
@@ -209,6 +210,9 @@ mod tests {
             ([tiny, 1e9], "in [1e-9, 1000000000]"),
             ([1e-9, 1e12], "in [1e-9, 1e12]"),
             ([0.1, 0.25], "in [0.1, 0.25]"),
+            ([f64::from(0.3_f32), max], "finite and at least 0.3"),
+            ([f64::MIN, f64::MAX], "finite"),
+            ([-max, 2.0], "finite and at most 2"),
             ([4.0, 4_294_967_294.0], "in [4, 4294967294]"),
             ([0.0, max], "finite and at least 0"),
             ([1.0, f64::MAX], "finite and at least 1"),

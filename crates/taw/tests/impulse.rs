@@ -108,7 +108,7 @@ fn rolling_resistance_holds_up_to_its_tangent_and_brakes_beyond_it() {
         let name = format!("{degrees}°, {resistance}, {iterations} iterations of {dt} s");
         let (moved, time) = ((position - start.position).magnitude(), f64::from(steps) * dt);
         if pull < 0.0 {
-            // It slid before the first contact knew what it bears, if at all.
+            // A part of what gravity does in the first substep.
             assert!(moved < 1e-3 * G * dt * dt, "{name}: crept {moved} m");
         } else {
             let exact = 5.0 / 7.0 * pull * time;
@@ -117,6 +117,58 @@ fn rolling_resistance_holds_up_to_its_tangent_and_brakes_beyond_it() {
             assert!(error < G * sin * dt, "{name}: {} m/s, not {exact}", velocity.magnitude());
         }
     }
+}
+
+/// Two balls that meet, stick and stop rolling on each other: one iteration ends where a thousand end.
+#[test]
+fn slip_and_rolling_of_a_pair_end_in_one_iteration() {
+    let mut draw = Draw(8);
+    let mut blocked = 0;
+    for case in 0..1_000 {
+        let radii = [draw.between(0.05, 1.0), draw.between(0.05, 1.0)];
+        let mut vector = |size: f64| Vec3::from([0; 3].map(|_: i32| draw.between(-size, size)));
+        let axis = vector(1.0).normalize();
+        let spins = [vector(2.0), vector(2.0)];
+        let across = vector(0.1);
+        let masses = [draw.between(0.1, 10.0), draw.between(0.1, 10.0)];
+        let material = Material { rolling_resistance: 1.0, ..surface(0.0, 1.5) };
+        let after = |iterations| {
+            let mut world = world::<f64>(Rotation::Dynamic);
+            world.set_gravity(Vec3::from([0.0; 3])).unwrap();
+            world.set_model(Model { iterations, ..world.model() }).unwrap();
+            let ids = [0, 1].map(|i| {
+                let side = if i == 0 { -1.0 } else { 1.0 };
+                let marble = Marble {
+                    velocity: axis * -side * 4.0 + across * side,
+                    angular_velocity: spins[i],
+                    // One stands as firm as a wall, or does not turn.
+                    mass: if case % 5 == 0 && i == 0 {
+                        Mass::Infinite
+                    } else {
+                        Mass::Kilograms(masses[i])
+                    },
+                    rotation_model: (case % 5 == 1 && i == 0).then_some(Rotation::None),
+                    material: Some(material),
+                    ..Marble::new(Point3::from_vec(axis * (side * radii[i] * 0.999)), radii[i])
+                };
+                world.marbles.insert(marble).unwrap()
+            });
+            world.step(1e-3).unwrap();
+            ids.map(|id| world.marbles.get(id).unwrap())
+        };
+        let (once, often) = (after(1), after(1000));
+        let spin = often[1].angular_velocity - often[0].angular_velocity;
+        if spin.cross(axis).magnitude() > 1e-3 {
+            continue; // more than rolling friction can bear
+        }
+        blocked += 1;
+        for (x, y) in once.iter().zip(&often) {
+            let error = (x.velocity - y.velocity).magnitude()
+                + (x.angular_velocity - y.angular_velocity).magnitude();
+            assert!(error < 1e-6, "{case}: {x:?}, not {y:?}");
+        }
+    }
+    assert!(blocked > 300, "{blocked}");
 }
 
 #[test]

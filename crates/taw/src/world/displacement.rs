@@ -1,7 +1,5 @@
 //! [`Response::Displacement`](crate::response::Response) in a world.
 
-use cgmath::InnerSpace;
-
 use super::World;
 use super::method::Method;
 use crate::math::{Scalar, cast_vector};
@@ -16,7 +14,7 @@ impl<S: Scalar> Method<S> for Displacement {
     }
 
     fn solve(&self, world: &mut World<S>, dt: S) {
-        world.note_positions();
+        world.store_positions_before_contacts();
         let (settings, model, scratch) =
             (world.solver_settings(dt), world.settings.model, &mut world.scratch);
         let (mut bodies, context) = scratch.columns.constrained(
@@ -34,18 +32,23 @@ impl<S: Scalar> Method<S> for Displacement {
             &mut scratch.displacement,
             &mut world.memory.impulses,
             &mut scratch.stopped,
-            |row, change, surface_speed| {
-                pushes.iter_mut().for_each(|pushes| pushes.push((row, change, surface_speed)));
+            |row, normal, speeds| {
+                if let Some(pushes) = &mut pushes {
+                    pushes.push((row, normal, speeds));
+                }
             },
         );
         drop(context);
         if let Some(audit_state) = &mut scratch.audit_state {
-            audit_state.work.collisions = world.contacts.len() as u32;
-            for (row, change, surface_speed) in pushes.into_iter().flatten() {
+            let contacts = world.contacts.wm.iter().chain(&world.contacts.mm);
+            audit_state.work.collisions = contacts.filter(|c| c.is_touching()).count() as u32;
+            for (row, normal, speeds) in pushes.into_iter().flatten() {
                 let mass = world.marbles.mass(row as usize).as_f64();
-                let impulse = cast_vector::<S, f64>(change) * mass;
-                audit_state.work.momentum += impulse;
-                audit_state.work.walls += impulse.magnitude() * surface_speed.as_f64();
+                if mass.is_finite() {
+                    let [change, surface_speed] = speeds.map(S::as_f64);
+                    audit_state.work.momentum += cast_vector::<S, f64>(normal) * (mass * change);
+                    audit_state.work.walls += mass * change * surface_speed;
+                }
             }
         }
     }

@@ -33,7 +33,7 @@ pub struct EnergyAudit {
     /// Dissipation by rolling and torsional resistance.
     pub resistance: f64,
     /// Numerical error: energy lost without a physical cause. The error of the integrator, the lift
-    /// by position correction, everything that [`Response::Displacement`] does but the work of walls; for
+    /// by position correction, everything that [`Response::Displacement`] does except the work of walls; for
     /// [`Response::EventDriven`], also the dissipation of resting contacts; for
     /// [`Response::SoftStep`], that of all contacts.
     ///

@@ -7,7 +7,7 @@ use super::impulse::Impulse;
 use super::penalty::Penalty;
 use super::soft_step::SoftStep;
 use crate::Error;
-use crate::math::{Scalar, length};
+use crate::math::Scalar;
 use crate::response::{ContactLaw, Response};
 
 /// Method of a response.
@@ -15,10 +15,10 @@ pub(super) trait Method<S: Scalar> {
     /// Moves marbles freely over `dt` seconds, from velocities and forces.
     fn advance(&self, world: &mut World<S>, dt: S);
 
-    /// Speculative margin of contacts after `dt` seconds, in metres: gravity closes it within two
-    /// substeps, and who is moved out of one contact may be moved into another.
+    /// Speculative margin of contacts after `dt` seconds, in metres. Gravity closes it within two
+    /// substeps, and a marble that one contact moves may be moved into another one.
     fn contact_distance(&self, world: &World<S>, dt: S) -> S {
-        length(world.settings.gravity) * dt * dt * S::from_f64(2.0)
+        world.resting_approach(dt)
     }
 
     /// Solves the listed contacts of a substep of `dt` seconds.

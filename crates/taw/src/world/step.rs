@@ -142,7 +142,7 @@ impl<S: Scalar> World<S> {
             return;
         }
         // The deepest contact comes first in the list, so it has the last word.
-        for contact in self.contacts.wm.iter().rev() {
+        for contact in self.contacts.wm.iter().filter(|contact| contact.is_touching()).rev() {
             let part = SubShape { wall: contact.a, index: contact.part };
             let row = contact.b as usize;
             let normal = self.walls.project_point(part, self.marbles.position()[row]).normal;

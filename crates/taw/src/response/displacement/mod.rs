@@ -73,7 +73,7 @@ struct ApproachConstraint<S> {
 ///
 /// The contacts' rows exist. A row that would become infinite or NaN keeps its position, loses its
 /// velocity, and is added to `quarantined`. `on_wall_impulse` receives the velocity changes by
-/// walls, with the speed of their surface along it, in m/s.
+/// walls: row, unit normal, change, and speed of the surface along the normal, in m/s.
 pub(crate) fn solve_displacement<S: Scalar>(
     marbles: &mut SolverBodies<S>,
     contacts: &mut Contacts<S>,
@@ -81,7 +81,7 @@ pub(crate) fn solve_displacement<S: Scalar>(
     scratch: &mut Scratch<S>,
     cache: &mut Vec<CachedImpulse<S>>,
     quarantined: &mut Vec<u32>,
-    mut on_wall_impulse: impl FnMut(u32, Vec3<S>, S),
+    mut on_wall_impulse: impl FnMut(u32, Vec3<S>, [S; 2]),
 ) {
     let Scratch { constraints, initial_velocity, islands, warm_starts } = scratch;
     initial_velocity.clear();
@@ -104,7 +104,7 @@ pub(crate) fn solve_displacement<S: Scalar>(
         }
     }
     for c in constraints.iter().filter(|c| c.a.marble().is_none()) {
-        on_wall_impulse(c.b as u32, c.normal * c.velocity_change, c.surface_speed);
+        on_wall_impulse(c.b as u32, c.normal, [c.velocity_change, c.surface_speed]);
     }
     marbles.follow_velocity_changes(initial_velocity, context, quarantined);
     for _ in 0..context.settings.iterations {
@@ -153,13 +153,15 @@ impl<S: Scalar> SolverBodies<'_, S> {
             velocity_change: zero,
         };
         let follow_time = context.follow_time(a, b);
-        // A body stopped by continuous detection is in contact, whatever rounding says.
+        // A body stopped by continuous detection does not follow.
         let is_ccd_stopped =
             context.is_ccd_stopped(b) || a.marble().is_some_and(|a| context.is_ccd_stopped(a));
-        if follow_time > S::zero() && !is_ccd_stopped {
-            c.min_separation_speed =
-                (self.separation_speed(&c) - separation / follow_time).min(S::zero());
-        }
+        let min_separation_speed = if follow_time > S::zero() && !is_ccd_stopped {
+            self.separation_speed(&c) - separation / follow_time
+        } else {
+            -separation / context.settings.dt
+        };
+        c.min_separation_speed = min_separation_speed.min(S::zero());
         Some(c)
     }
 

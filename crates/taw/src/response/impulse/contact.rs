@@ -187,13 +187,13 @@ impl<S: Scalar> SolverBodies<'_, S> {
         } else {
             S::zero()
         };
-        let held = inverse_effective_mass.tangent - coupling * coupling * inverse_inertia;
+        let blocked = inverse_effective_mass.tangent - coupling * coupling * inverse_inertia;
         Some(RollingConstraint {
             rolling_lever: rolling_resistance * radius,
             torsional_lever: spinning_resistance * radius,
             inverse_inertia,
             coupling,
-            held_ratio: inverse_effective_mass.normal / held,
+            blocked_ratio: inverse_effective_mass.normal / blocked,
             angular_impulse: Vec3::zero(),
         })
     }

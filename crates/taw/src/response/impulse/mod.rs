@@ -263,12 +263,12 @@ struct RollingConstraint<S> {
     torsional_lever: S,
     /// Change of the relative spin per angular impulse, in 1/(kg m²).
     inverse_inertia: S,
-    /// Change of the relative velocity across the normal, per change of the relative spin by an
-    /// angular impulse, in metres.
+    /// An angular impulse that changes the relative spin by `Δw` changes the relative velocity by
+    /// `coupling · Δw × normal`; in metres.
     coupling: S,
     /// Inverse effective mass along the normal, over that along the tangents of bodies that do not
     /// roll on each other.
-    held_ratio: S,
+    blocked_ratio: S,
     /// Angular impulse accumulated in this substep, in kg m²/s.
     angular_impulse: Vec3<S>,
 }

@@ -126,7 +126,7 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
         let tangent = c
             .rolling
             .as_ref()
-            .and_then(|rolling| self.hold(row, rolling, error))
+            .and_then(|rolling| self.solve_blocked(row, rolling, error))
             .unwrap_or_else(|| error.tangent * row.tangent_ratio);
         let wanted = ContactImpulse { tangent, ..error };
         let mut impulse = row.impulse;
@@ -145,7 +145,7 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
         row.impulse = impulse;
         self.apply_impulse(row, &c.arms, change);
         let spin_change = self.solve_rolling(row, &mut c.rolling);
-        // What rolling friction stops, the contact point feels in the next pass.
+        // The contact point feels a change of rolling in the next pass.
         change.magnitude().max(spin_change * length(c.arms[1]))
     }
 
@@ -215,17 +215,20 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
         }
     }
 
-    /// Tangential impulse, in m/s, that ends slip and rolling at once; none if rolling friction cannot
-    /// bear it. One after the other, they would need a dozen passes to agree.
-    fn hold(
+    /// Block solve of slip and rolling: tangential impulse, in m/s, that ends both at once; none if rolling
+    /// friction cannot bear it. One after the other, they would need a dozen passes to agree.
+    fn solve_blocked(
         &self,
         row: &Row<S>,
         rolling: &RollingConstraint<S>,
         error: ContactImpulse<S>,
     ) -> Option<Vec3<S>> {
         let RollingConstraint { coupling, inverse_inertia, .. } = *rolling;
+        if rolling.rolling_lever <= S::zero() {
+            return None;
+        }
         let spin = self.relative_spin(row).reject_from(row.normal);
-        let tangent = (error.tangent + spin.cross(row.normal) * coupling) * rolling.held_ratio;
+        let tangent = (error.tangent + spin.cross(row.normal) * coupling) * rolling.blocked_ratio;
         let wanted = ContactImpulse { tangent, ..error };
         let impulse = row.saturate(row.cone.clamp(row.impulse.plus(wanted)));
         let friction = (impulse.tangent - row.impulse.tangent) / row.inverse_effective_mass;

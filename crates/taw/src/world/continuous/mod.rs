@@ -128,30 +128,28 @@ impl<S: Scalar> World<S> {
         });
     }
 
-    /// Stores positions before they follow the velocity changes of contacts.
+    /// Stores positions before contacts move marbles, if detection is swept: walls stop what they push.
     pub(super) fn begin_bounces(&mut self) {
-        let Continuous { start, bounced_from, .. } = &mut self.scratch.continuous;
-        if start.len() == self.marbles.len() {
-            bounced_from.extend_from_slice(&self.marbles.position);
+        if self.scratch.continuous.start.len() == self.marbles.len() {
+            self.store_positions_before_contacts();
         }
-    }
-
-    /// Stores positions before contacts move marbles, by any detection: motion may pass through a wall by
-    /// the discrete one, but others do not push through it.
-    pub(super) fn note_positions(&mut self) {
-        let bounced_from = &mut self.scratch.continuous.bounced_from;
-        bounced_from.clear();
-        bounced_from.extend_from_slice(&self.marbles.position);
     }
 
     /// Stores positions before the swarm pushes marbles, unless discrete detection lets these pass walls.
     pub(super) fn begin_pushes(&mut self) {
+        self.scratch.continuous.bounced_from.clear();
         let Model { detection, response, .. } = self.settings.model;
+        let never_passes = matches!(response, Response::EventDriven | Response::Displacement);
+        if detection == Detection::Swept || never_passes {
+            self.store_positions_before_contacts();
+        }
+    }
+
+    /// Stores positions before contacts move marbles, so that walls stop what they push.
+    pub(super) fn store_positions_before_contacts(&mut self) {
         let bounced_from = &mut self.scratch.continuous.bounced_from;
         bounced_from.clear();
-        if detection == Detection::Swept || response == Response::EventDriven {
-            bounced_from.extend_from_slice(&self.marbles.position);
-        }
+        bounced_from.extend_from_slice(&self.marbles.position);
     }
 
     /// Predicate: the two bodies of a stop have a contact.
@@ -169,7 +167,7 @@ impl<S: Scalar> World<S> {
 
     /// Largest approach in metres per substep of a resting contact: that of gravity in two
     /// substeps.
-    fn resting_approach(&self, dt: S) -> S {
+    pub(super) fn resting_approach(&self, dt: S) -> S {
         length(self.settings.gravity) * dt * dt * S::from_f64(2.0)
     }
 }
