@@ -377,6 +377,37 @@ fn what_lies_is_not_heard() {
     }
 }
 
+/// It goes up and down by .2 m with 2 m/s² at most.
+#[test]
+fn what_rides_on_a_lift_is_not_heard() {
+    for (response, substeps) in
+        [(Response::Impulse, 4), (Response::EventDriven, 1), (Response::SoftStep, 4)]
+    {
+        let mut app = scene::app();
+        let model = Model { response, substeps, ..Model::GAME };
+        app.insert_resource(TawModel(model)).add_message::<ContactHit>();
+        let lift = app.world_mut().spawn((Wall::from(Cuboid::new(2.0, 0.2, 2.0)), Kinematic)).id();
+        scene::drop_marble(&mut app, 0.1, Vec3::new(-0.3, 0.2, 0.0));
+        scene::drop_marble(&mut app, 0.1, Vec3::new(0.3, 0.2, 0.0));
+        app.add_systems(
+            FixedUpdate,
+            (move |mut places: Query<&mut Transform>, time: Res<Time>| {
+                let phase = std::f32::consts::PI * time.elapsed_secs();
+                places.get_mut(lift).unwrap().translation.y = 0.2 * (1.0 - phase.cos());
+            })
+            .before(TawSystems::Gather),
+        );
+        scene::frames(&mut app, 64);
+        let mut hits = Vec::new();
+        for _ in 0..256 {
+            app.update();
+            let messages = app.world().resource::<Messages<ContactHit>>();
+            hits.extend(messages.iter_current_update_messages().map(|hit| hit.approach_speed));
+        }
+        assert!(hits.is_empty(), "{response:?}: {hits:?}");
+    }
+}
+
 /// An observer that goes and comes back hears of no contact that ended meanwhile.
 #[test]
 fn who_listens_again_hears_nothing_stale() {

@@ -261,3 +261,18 @@ fn who_is_in_a_sensor_that_goes_leaves_it() {
         }
     }
 }
+
+/// A sensor that went in a step that never was.
+#[test]
+fn who_went_back_in_time_left_no_sensor() {
+    let mut app = app(Response::SoftStep);
+    let zone = gate(&mut app, Vec3::splat(2.0), Vec3::ZERO);
+    let marble = scene::drop_marble(&mut app, 0.1, Vec3::ZERO);
+    app.update();
+    assert_eq!(told(&mut app), [(true, zone, marble)]);
+    let snapshot = app.world().resource::<TawWorld>().snapshot();
+    app.world_mut().despawn(zone);
+    app.world_mut().resource_mut::<TawWorld>().restore(&snapshot);
+    scene::frames(&mut app, 2);
+    assert_eq!(told(&mut app), [(false, zone, marble)]);
+}
