@@ -277,7 +277,7 @@ fn what_cannot_be_a_capsule_is_refused_by_name() {
     let mut world = world(dynamic(Response::Impulse));
     let bad = Marble { half_length: -1.0, ..capsule([0.0; 3], 0.0) };
     let error = world.marbles.insert(bad).unwrap_err().to_string();
-    assert!(error.starts_with("half_length must be in [0"), "{error}");
+    assert!(error.starts_with("half_length must be finite and at least 0"), "{error}");
     let id = world.marbles.insert(capsule([0.0; 3], 0.0)).unwrap();
     let events = Model { response: Response::EventDriven, ..world.model() };
     assert_eq!(world.set_model(events), Err(taw::Error::UnsupportedShape(id)));
