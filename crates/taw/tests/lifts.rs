@@ -1,5 +1,9 @@
 //! Walls that move, in steps of several substeps: each substep has them on their way.
 
+#[path = "common/draw.rs"]
+mod draw;
+
+use draw::Draw;
 use taw::frame::Pose;
 use taw::math::Quat;
 use taw::motion::integrate_rotation;
@@ -156,6 +160,45 @@ fn springs_give_way_on_a_lift_as_on_a_floor() {
                 // A thousandth of the radius: Hertz's spring has not quite come to rest.
                 assert!(error < 1e-4, "{law:?}, {integrator:?}, {speed} m/s: {moving} for {still}");
             }
+        }
+    }
+}
+
+/// A lift that goes up and down with half of what gravity does at most: whoever lies on it goes along in
+/// each step.
+#[test]
+fn what_rides_up_and_down_is_never_without_contact() {
+    let mut draw = Draw(9);
+    for case in 0..300 {
+        let (amplitude, dt) = (draw.between(0.02, 1.0), draw.between(1.0 / 240.0, 1.0 / 30.0));
+        let rate = (draw.between(0.01, 0.5) * 9.81 / amplitude).sqrt();
+        let radius = draw.between(0.02, 0.5);
+        let mut world = World::<f64>::default();
+        let substeps = [1, 2, 4, 8][case % 4];
+        world.set_model(Model { substeps, ..Model::GAME }).unwrap();
+        world.set_gravity(Vec3::unit_y() * -9.81).unwrap();
+        let lift = world.walls.insert(board()).unwrap();
+        let marble = Marble::new(Point3::new(0.1, radius, 0.0), radius);
+        let id = world.marbles.insert(marble).unwrap();
+        let (mut height, mut speed) = (0.0, 0.0);
+        for step in 1..=600 {
+            let next = amplitude * (1.0 - (rate * dt * f64::from(step)).cos());
+            let motion = rising((next - height) / dt);
+            let faster = motion.velocity.y - speed;
+            (height, speed) = (next, motion.velocity.y);
+            let pose = Pose { translation: Vec3::unit_y() * height, ..Pose::identity() };
+            world.walls.set(lift, board().transformed(pose).unwrap()).unwrap();
+            world.walls.set_motion(lift, Some(motion)).unwrap();
+            world.step(dt).unwrap();
+            let ball = world.marbles.get(id).unwrap();
+            let off = (ball.velocity.y - speed).abs();
+            // Half a second to settle; then soft contacts give a little.
+            let settled = dt * f64::from(step) > 0.5;
+            assert!(
+                !settled || off < 0.1 * 9.81 * dt + 0.2 * faster.abs(),
+                "case {case}, radius {radius}, amplitude {amplitude}, {substeps} substeps of {dt} s, step {step}: \
+                 {off} m/s off",
+            );
         }
     }
 }

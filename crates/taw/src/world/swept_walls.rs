@@ -39,11 +39,16 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
         Self { walls, moving, dt }
     }
 
-    /// Returns true if a wall goes so far in the step that it may pass a ball there.
-    fn outruns(&self, wall: &MovingWall<S>, ball: &Sphere<S>) -> bool {
+    /// Distance that a wall goes at a ball in the step, at most, in metres.
+    fn way_of(&self, wall: &MovingWall<S>, ball: &Sphere<S>) -> S {
         let WallMotion { velocity, angular_velocity, pivot } = wall.motion;
         let speed = length(velocity) + length(angular_velocity) * length(ball.center - pivot);
-        speed * self.dt > ball.radius * S::from_f64(MAX_FREE_MOTION)
+        speed * self.dt
+    }
+
+    /// Returns true if a wall goes so far in the step that it may pass a ball there.
+    fn outruns(&self, wall: &MovingWall<S>, ball: &Sphere<S>) -> bool {
+        self.way_of(wall, ball) > ball.radius * S::from_f64(MAX_FREE_MOTION)
     }
 
     /// Returns true if the wall in a row may pass a ball.
@@ -227,9 +232,19 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
     ) {
         let (sphere, reach) = (sphere(*ball), S::from_f64(reach.into()));
+        // A wall that the ball touches now may be that much further away at the end.
+        let slow = self.moving.iter().filter(|wall| !self.outruns(wall, &sphere));
+        let way = slow.map(|wall| self.way_of(wall, &sphere)).fold(S::zero(), S::max);
         let mut near = Vec::new();
-        candidate_sub_shapes(self.walls, (&sphere, filter), reach, &mut near);
-        near.retain(|it| !self.is_outrunning(it.part.wall, &sphere));
+        candidate_sub_shapes(self.walls, (&sphere, filter), reach + way, &mut near);
+        near.retain(|it| {
+            let gap = it.nearest.distance - sphere.radius;
+            match self.moving.binary_search_by_key(&it.part.wall, |wall| wall.row) {
+                Ok(i) if self.outruns(&self.moving[i], &sphere) => false,
+                Ok(i) => gap <= reach + self.way_of(&self.moving[i], &sphere),
+                Err(_) => way == S::zero() || gap <= reach,
+            }
+        });
         if near.len() > 1 {
             remove_ghost_collisions(self.walls, (&sphere, filter), &mut near);
         }
