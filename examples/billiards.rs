@@ -34,7 +34,7 @@ struct Options {
     picture: Picture,
 }
 
-/// How the cue will hit: direction in radians from +x, speed of the ball in m/s, and
+/// Aim of the cue: direction in radians from +x, speed of the ball in m/s, and
 /// where on it, as parts of its radius to the right and up.
 #[derive(Resource)]
 struct Cue {

@@ -55,7 +55,7 @@ fn hook(i: u8) -> Vec3 {
     Vec3::new((f32::from(i) - f32::from(BALLS - 1) / 2.0) * 2.0 * RADIUS, LENGTH, 0.0)
 }
 
-/// Where a ball hangs when its thread is turned by this angle.
+/// Place of a ball when its thread is turned by this angle.
 fn hanging(i: u8, angle: f32) -> Vec3 {
     hook(i) + Quat::from_rotation_z(angle) * Vec3::NEG_Y * LENGTH
 }

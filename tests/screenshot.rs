@@ -13,7 +13,7 @@ use image::{Rgb, RgbImage};
 /// A part of the picture, in pixels: left, top, right, bottom.
 type Region = [u32; 4];
 
-/// Where the panel is; its title and first sliders.
+/// Region of the panel: its title and first sliders.
 const PANEL: Region = [12, 12, 278, 420];
 /// Well inside the board, away from the pads in its corners.
 const BOARD: Region = [500, 150, 780, 560];
@@ -55,7 +55,7 @@ fn part(
     count as f32 / ((right - left) * (bottom - top)) as f32
 }
 
-/// What is wrong with the picture, one line each.
+/// Faults of the picture, one line each.
 fn faults(picture: &RgbImage) -> Vec<String> {
     let mut faults = Vec::new();
     let mut expect = |what: &str, part: f32, range: std::ops::Range<f32>| {

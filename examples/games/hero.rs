@@ -82,7 +82,7 @@ fn sail(mut ferries: Query<(&Ferry, &mut Transform)>, time: Res<Time>) {
     }
 }
 
-/// Who falls begins again.
+/// Puts a hero who fell back to the start.
 fn fall(
     mut hero: Single<(&mut Transform, &mut Velocity, &mut AngularVelocity), With<MarbleController>>,
     mut tally: ResMut<Tally>,

@@ -19,21 +19,21 @@ use crate::level::Level;
 const RAIL_HEIGHT: f32 = 1.0;
 const RAIL_WIDTH: f32 = 0.6;
 const FLOOR_DEPTH: f32 = 0.5;
-/// How fast the rails' speed may change, in m/s². Below gravity, or a board that
+/// Largest acceleration of the rails, in m/s². Below gravity, or a board that
 /// stops or sinks would let go of its marbles.
 const EDGE_ACCELERATION: f32 = 6.0;
-/// How closely the board settles: it covers this part of what is left to go, in 1/s.
+/// Rate at which the board settles: it covers this part of what is left to go, in 1/s.
 const SETTLING_RATE: f32 = 8.0;
 
 /// Marks the entity that turns. Floor and rails are its children.
 #[derive(Component)]
 pub struct Board;
 
-/// Whether the board is made of boxes, over whose rails marbles can fly, or of half-spaces.
+/// True for a board of boxes, over whose rails marbles can fly, false for one of half-spaces.
 #[derive(Resource, Clone, Copy, Default, PartialEq, Eq)]
 pub struct MadeOfBoxes(pub bool);
 
-/// What a piece of the board is as a wall while it is one.
+/// Wall of a piece of the board, while it is one.
 #[derive(Component, Clone)]
 enum Piece {
     HalfSpace(Dir3),
@@ -51,12 +51,12 @@ impl HalfWidth {
     }
 }
 
-/// How the board is tilted.
+/// Tilt of the board.
 #[derive(Resource)]
 pub struct Tilt {
     /// Toward where (x and z) and how far (its length), in radians.
     now: Vec2,
-    /// How `now` changes, in rad/s.
+    /// Rate of change of `now`, in rad/s.
     speed: Vec2,
     /// The most that it tilts, in radians.
     pub limit: f32,

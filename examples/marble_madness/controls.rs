@@ -6,12 +6,12 @@ use bevy_panorbit_camera::PanOrbitCamera;
 use leafwing_input_manager::plugin::InputManagerSystem;
 use leafwing_input_manager::prelude::*;
 
-/// What the player can do.
+/// Actions of the player.
 #[derive(Actionlike, Clone, Copy, Debug, PartialEq, Eq, Hash, Reflect)]
 pub enum Action {
     #[actionlike(DualAxis)]
     Tilt,
-    /// How far the mouse moved; only counts while [`Action::Grab`] is held.
+    /// Way of the mouse; only counts while [`Action::Grab`] is held.
     #[actionlike(DualAxis)]
     Drag,
     Grab,

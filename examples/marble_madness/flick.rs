@@ -6,7 +6,7 @@ use taw_examples::Pointer;
 
 use crate::controls::{Action, just_pressed};
 
-/// How fast a flicked marble is, in m/s.
+/// Speed of a flicked marble, in m/s.
 const SPEED: f32 = 5.0;
 
 pub fn plugin(app: &mut App) {

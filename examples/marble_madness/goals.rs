@@ -9,14 +9,14 @@ use crate::marbles::{COLOURS, Colour, Order};
 /// The radius of a pad, in metres.
 const PAD_RADIUS: f32 = 1.5;
 
-/// How the game stands.
+/// Score and progress of the game.
 #[derive(Resource, Default)]
 pub struct Score {
     /// Marbles that came home.
     pub home: u32,
     /// Seconds since the start, until the last marble came home.
     pub seconds: f32,
-    /// Whether pads take marbles at all.
+    /// True while pads take no marbles.
     pub paused: bool,
 }
 

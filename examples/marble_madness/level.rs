@@ -16,7 +16,7 @@ use crate::board::{Board, HalfWidth};
 #[derive(Resource, Default)]
 pub struct Level(pub Option<Scene>);
 
-/// How a wall of it moves, from where it began.
+/// Motion of a wall, from where it began.
 #[derive(Component)]
 struct Moves {
     movement: KinematicMotion,
@@ -65,7 +65,7 @@ impl Level {
         self.0.iter().flat_map(Scene::all_marbles).collect()
     }
 
-    /// What its marbles are made of.
+    /// Material of its marbles.
     pub fn material(&self, ball: &MarbleDesc) -> Option<SurfaceMaterial> {
         Some(material(ball.material.unwrap_or(self.0.as_ref()?.material)))
     }

@@ -31,10 +31,10 @@ use taw_examples::{ExamplePlugins, OrbitCameraPlugin, Picture};
 #[command(version)]
 #[expect(clippy::struct_excessive_bools, reason = "switches are what a command line has")]
 struct Options {
-    /// How many marbles to begin with
+    /// Number of marbles to begin with
     #[arg(long, default_value_t = 120, value_name = "N")]
     marbles: u32,
-    /// What the random sizes, colours and places are drawn from
+    /// Seed of the random sizes, colours and places
     #[arg(long, default_value_t = 1, value_name = "N")]
     seed: u64,
     /// Draw contacts, normals, velocities and the grid

@@ -10,7 +10,7 @@ use crate::board::{HalfWidth, Tilt};
 use crate::controls::{Action, just_pressed};
 use crate::level::Level;
 
-/// What somebody wants done with the marbles.
+/// Requests about the marbles.
 #[derive(Message, Clone, Copy, Debug)]
 pub enum Order {
     /// Drop so many more.
@@ -21,13 +21,13 @@ pub enum Order {
     Reset,
 }
 
-/// How marbles are made.
+/// Settings of new marbles.
 #[derive(Resource)]
 pub struct Bag {
     /// The smallest and the largest radius, in metres.
     pub smallest: f32,
     pub largest: f32,
-    /// Whether they are capsules, twice as long as wide.
+    /// True for capsules, twice as long as wide.
     pub capsules: bool,
     random: fastrand::Rng,
 }
@@ -36,7 +36,7 @@ pub struct Bag {
 #[derive(Component, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Colour(pub usize);
 
-/// What marbles and pads are coloured with.
+/// Colours of marbles and pads.
 pub const COLOURS: [Srgba; 4] =
     [tailwind::RED_500, tailwind::YELLOW_400, tailwind::GREEN_500, tailwind::BLUE_500];
 
@@ -160,7 +160,7 @@ fn shape_marbles(
     }
 }
 
-/// What fell off the board drops onto it again.
+/// Drops those onto the board again that fell off it.
 fn bring_back(
     half_width: Res<HalfWidth>,
     mut marbles: Query<(&mut Transform, &mut Velocity), With<Marble>>,

@@ -22,7 +22,7 @@ use crate::time::SingleStep;
 struct Open {
     panels: bool,
     help: bool,
-    /// How many marbles the button drops.
+    /// Number of marbles that the button drops.
     drop: u32,
     trade: bool,
 }

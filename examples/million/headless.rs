@@ -1,4 +1,4 @@
-//! The same without a window: a table of what the steps cost.
+//! The example without a window: a table of what the steps cost.
 
 use std::time::{Duration, Instant};
 

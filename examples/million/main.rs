@@ -24,10 +24,10 @@ use taw_examples::{ExamplePlugins, OrbitCameraPlugin, Picture};
 #[derive(Parser, Resource, Clone)]
 #[command(version)]
 pub struct Options {
-    /// How many marbles
+    /// Number of marbles
     #[arg(long, default_value_t = 1_000_000, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=2_000_000))]
     marbles: u32,
-    /// What is modelled: "lab" (lines and displacement) or "full" (friction, bounce, spin)
+    /// Physics: "lab" (lines and displacement) or "full" (friction, bounce, spin)
     #[arg(long, default_value = "full", value_name = "TIER", value_parser = ["lab", "full"])]
     tier: String,
     /// Into how many parts a step is cut; 1 for lab and 2 for full if not given
@@ -39,10 +39,10 @@ pub struct Options {
     /// No window: prints what the steps cost
     #[arg(long)]
     headless: bool,
-    /// How many steps of 1/60 s without a window
+    /// Number of steps of 1/60 s without a window
     #[arg(long, default_value_t = 300, value_name = "N")]
     steps: u32,
-    /// How many steps are made before the first frame, as for a picture
+    /// Number of steps before the first frame, as for a picture
     #[arg(long, default_value_t = 0, value_name = "N")]
     poured: u32,
     #[command(flatten)]

@@ -1,4 +1,4 @@
-//! What can be changed while it runs, and what it costs.
+//! Settings to change while it runs, and their cost.
 
 use bevy::diagnostic::{Diagnostic, DiagnosticsStore, FrameTimeDiagnosticsPlugin};
 use bevy::prelude::*;

@@ -13,15 +13,15 @@ use crate::Options;
 /// Radii, and the layers on top of each other that are poured.
 pub const RADII: std::ops::RangeInclusive<f32> = 0.3..=0.5;
 const LAYERS: f32 = 12.0;
-/// How far gravity turns at most.
+/// Largest angle by which gravity turns, in radians.
 const STEEPEST: f32 = 0.35;
 
-/// What is poured.
+/// The pour.
 #[derive(Resource)]
 pub struct Pour {
     pub count: u32,
     pub tint: Tint,
-    /// Whether it is to be poured anew.
+    /// True if it is to be poured anew.
     pub again: bool,
 }
 

@@ -27,14 +27,14 @@ pub enum Kind {
     HeightField,
 }
 
-/// What is shown, and where the second one is.
+/// Shapes on show, and the place of the second one.
 #[derive(Resource)]
 pub struct Scene {
     pub kinds: [Kind; 2],
     pub place: Transform,
-    /// How far from the eye it was taken hold of, and its place from there.
+    /// Distance from the eye at which it was grabbed, and its place from there.
     pub held: Option<(f32, Vec3)>,
-    /// Where it would go.
+    /// Direction in which it would go.
     pub way: Vec3,
 }
 
@@ -77,7 +77,7 @@ pub fn shape(kind: Kind) -> Option<Shape<f32>> {
     })
 }
 
-/// What only the first can be.
+/// Shapes that only the first one can be.
 pub enum Ground {
     Plane(Plane<f32>),
     Mesh(TawMesh<f32>),

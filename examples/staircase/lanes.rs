@@ -44,7 +44,7 @@ impl Runner {
         }
     }
 
-    /// Where it starts: on the landing at the top, where the ramp begins to fall.
+    /// Place at the start: on the landing at the top, where the ramp begins to fall.
     pub fn start(self) -> [f32; 3] {
         let lane = if self.stairs { HALF_WIDTH } else { -HALF_WIDTH };
         let beside = if self.capsule { 0.6 } else { -0.6 };
@@ -80,7 +80,7 @@ pub fn half_spaces() -> [([f32; 3], [f32; 3]); 2] {
     [([0.0, top() - RISE, 0.0], [RISE, RUN, 0.0]), ([0.0; 3], [0.0, 1.0, 0.0])]
 }
 
-/// What the table and the example step by.
+/// Model of the table and of the example.
 pub fn model(response: Response) -> Model {
     let rotation = Rotation::Dynamic;
     Model { response, rotation, detection: Detection::Swept, substeps: 4, ..Model::default() }
@@ -91,12 +91,12 @@ pub fn material() -> Material<f32> {
     Material { restitution: 0.3, friction: 0.6, ..Material::default() }
 }
 
-/// What a run down the lanes showed.
+/// Results of a run down the lanes.
 #[derive(Clone, Copy, Debug)]
 pub struct Run {
     /// When it arrived, in seconds, and how fast it was, in m/s.
     pub arrival: Option<(f32, f32)>,
-    /// How far it flew above the slope at most, in metres, and how often it touched down.
+    /// Largest height above the slope, in metres, and the number of touchdowns.
     pub highest: f32,
     pub hops: u32,
 }

@@ -217,7 +217,7 @@ fn panel(mut contexts: EguiContexts, tracks: Query<&Track>) -> Result {
     Ok(())
 }
 
-/// What a run shows, as Markdown.
+/// Results of a run, as Markdown.
 fn table() -> String {
     let mut lines = vec![
         "| response | who, where | arrives | at | flies up to | touches down |".to_string(),

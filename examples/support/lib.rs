@@ -1,5 +1,5 @@
-//! What the examples share: the window, a picture of it on request, and a camera
-//! that orbits, with what the mouse points at.
+//! Parts that the examples share: the window, a picture of it on request, and a camera
+//! that orbits, with picking by the mouse.
 //!
 //! No physics and no game is in here.
 

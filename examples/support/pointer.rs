@@ -1,4 +1,4 @@
-//! What the mouse points at, by taw's own camera.
+//! Picking by the mouse with taw's own camera.
 
 use bevy::ecs::system::SystemParam;
 use bevy::prelude::*;

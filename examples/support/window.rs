@@ -13,7 +13,7 @@ pub struct Picture {
     /// Save a picture (PNG) after --frames frames, and exit
     #[arg(long, value_name = "FILE")]
     pub screenshot: Option<PathBuf>,
-    /// How many frames of 1/60 s to render before the picture is taken
+    /// Number of frames of 1/60 s before the picture is taken
     #[arg(long, default_value_t = 180, value_name = "N")]
     pub frames: u32,
 }

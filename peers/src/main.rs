@@ -1,5 +1,5 @@
-//! What users of other engines run into, measured in them: with their defaults and with
-//! what their users may turn off.
+//! Limits that users of other engines run into, measured in them: with their defaults and with
+//! settings that their users may change.
 //!
 //! `cargo run --release` in this folder. f32, steps of 1/60 s unless a row says otherwise.
 
@@ -9,18 +9,18 @@ mod rapier;
 use avian::Avian;
 use rapier::Rapier;
 
-/// How a world is set up.
+/// Settings of a world.
 #[derive(Clone, Copy)]
 struct Setup {
     name: &'static str,
     /// Rapier's other model of friction.
     coulomb: bool,
     ccd: bool,
-    /// Whether Avian lets things bounce that are slower than 1 m/s.
+    /// True if Avian lets things bounce that are slower than 1 m/s.
     bouncy: bool,
     /// The length that is usual in the scene, in metres; thresholds scale by it.
     unit: f32,
-    /// How many times as many iterations (Rapier) or substeps (Avian) as by default.
+    /// Factor of the default number of iterations (Rapier) or substeps (Avian).
     finer: usize,
 }
 
@@ -42,7 +42,7 @@ impl Default for Ball {
     }
 }
 
-/// What the scenes need of an engine. Of two coefficients the larger one counts; nothing
+/// Operations that the scenes need of an engine. Of two coefficients the larger one counts; nothing
 /// sleeps.
 trait Engine {
     /// An empty world, with gravity toward -y.
@@ -188,7 +188,7 @@ fn scale_free<E: Engine>(setup: &Setup, follow: bool) -> f64 {
     worst
 }
 
-/// What a scene measures in an engine that was set up in some way.
+/// Measurement of a scene in an engine with some settings.
 type Scene = fn(&Setup) -> f64;
 
 /// A scene's name, itself in Rapier and in Avian, and what its users may set to better it.

@@ -45,7 +45,7 @@ fn marbles_stay_on_the_board_while_it_tilts_for_60_seconds() {
     assert!(deepest < 0.05, "a marble was {deepest} m deep in a wall");
 }
 
-/// How deep, in metres, any of 60 marbles ever was in a wall of a tilting board.
+/// Largest penetration of 60 marbles into walls of a tilting board, in metres.
 fn deepest_while_tilting(model: Model) -> f32 {
     let mut app = scene::app();
     let board = scene::board(&mut app);

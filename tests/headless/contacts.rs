@@ -6,7 +6,7 @@ use bevy_taw::prelude::*;
 
 use crate::scene;
 
-/// What was told, in order: the step, the kind, the pair.
+/// Messages in order: the step, the kind, the pair.
 #[derive(Resource, Default)]
 struct Told(Vec<(char, Entity, Entity)>);
 

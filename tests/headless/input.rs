@@ -6,7 +6,7 @@ use bevy_taw::prelude::*;
 
 use crate::scene;
 
-/// What was refused in the last frames, as "whose: why".
+/// Refusals of the last frames, as "whose: why".
 fn refused(app: &mut App, frames: u32) -> Vec<(Option<Entity>, String)> {
     let mut told = Vec::new();
     for _ in 0..frames {

@@ -1,4 +1,4 @@
-//! What is drawn between fixed steps.
+//! Drawn transforms between fixed steps.
 
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
@@ -239,7 +239,7 @@ fn a_child_of_what_moves_in_every_frame_is_drawn_where_it_is() {
 #[derive(Component)]
 struct Lift;
 
-/// Where an entity is drawn, in metres up.
+/// Height at which an entity is drawn, in metres.
 fn drawn(app: &App, entity: Entity) -> f32 {
     app.world().get::<GlobalTransform>(entity).unwrap().translation().y
 }

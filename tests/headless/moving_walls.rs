@@ -33,7 +33,7 @@ fn wall_velocity(app: &App) -> Option<[Vec3; 2]> {
     })
 }
 
-/// Where the world has the center of the only wall, a sphere.
+/// Center of the only wall, a sphere, in the world.
 fn wall_center(app: &App) -> Vec3 {
     use bevy_taw::taw::shape::Shape;
     use bevy_taw::taw::world::WallShape;

@@ -41,7 +41,7 @@ fn models() -> [Model; 5] {
     ]
 }
 
-/// What the physics knows of a marble.
+/// Marble of an entity in the physics.
 fn row(app: &App, entity: Entity) -> Option<bevy_taw::taw::world::Marble<f32>> {
     let world = app.world().resource::<TawWorld>();
     let row = (0..world.marbles.len()).find(|row| world.marble_entity(*row as u32) == Some(entity));

@@ -1,4 +1,4 @@
-//! What the tests share: the app, its clock, a board, a way to drop marbles.
+//! Parts that the tests share: the app, its clock, a board, a way to drop marbles.
 
 use bevy::app::Plugins;
 use bevy::prelude::*;
@@ -14,7 +14,7 @@ pub fn app() -> App {
     app_with(TawPlugin)
 }
 
-/// The same with everything that an app with a window would have.
+/// That app with everything that one with a window would have.
 pub fn smooth_app() -> App {
     app_with(TawPlugins)
 }
@@ -32,7 +32,7 @@ pub fn app_with<M>(physics: impl Plugins<M>) -> App {
     app
 }
 
-/// How much time passes per frame from now on, in seconds.
+/// Sets the time of a frame from now on, in seconds.
 pub fn frame_length(app: &mut App, seconds: f32) {
     let duration = std::time::Duration::from_secs_f32(seconds);
     app.insert_resource(TimeUpdateStrategy::ManualDuration(duration));

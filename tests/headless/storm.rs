@@ -233,7 +233,7 @@ impl Storm {
         format!("seed {seed}, frame {i} of {frame} s, {:?} {:?}", model.response, model.rotation)
     }
 
-    /// What is true of every app.
+    /// Checks the invariants of every app.
     fn judge(&mut self, what: &str) {
         agree(&mut self.app);
         let world = self.app.world().resource::<TawWorld>();
@@ -345,7 +345,7 @@ fn run(seed: u64) -> (Storm, f32) {
     (storm, frame)
 }
 
-/// What comes after a storm: no energy from nothing.
+/// Checks that after a storm no energy comes from nothing.
 fn calm(seed: u64, mut storm: Storm, frame: f32) {
     storm.calm_down(frame);
     let mut most = storm.energy();

@@ -146,7 +146,7 @@ fn the_governor_measures_when_time_passes() {
     assert!(trade.progress().is_some() || !trade.advice().candidates.is_empty());
 }
 
-/// How long frames take while models are measured, and while they are not. Prints.
+/// Prints the time of frames while models are measured, and while they are not.
 #[test]
 #[ignore = "measures: cargo test --test headless -- --ignored --nocapture hitch"]
 fn hitch() {

@@ -1,5 +1,4 @@
-//! What an entity may be to the physics. Marbles and walls need nothing but their
-//! own component; the rest is optional.
+//! Components of marbles and walls. Each needs nothing but its own; the rest is optional.
 
 use bevy::math::Isometry3d;
 use bevy::prelude::*;
@@ -54,7 +53,7 @@ pub struct Velocity(pub Vec3);
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct AngularVelocity(pub Vec3);
 
-/// How heavy a marble is. Without it, a marble is of glass.
+/// Mass of a marble. Without it, a marble is of glass.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub enum MarbleMass {
@@ -72,7 +71,7 @@ impl Default for MarbleMass {
     }
 }
 
-/// How many times the world's gravity a marble feels: 0 floats, −1 rises.
+/// Factor of the world's gravity for a marble: 0 floats, −1 rises.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Deref, DerefMut, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct GravityScale(pub f32);
@@ -83,15 +82,15 @@ impl Default for GravityScale {
     }
 }
 
-/// What a marble or a wall is made of, as far as its contacts can tell. A wall without
+/// Surface material of a marble or a wall. A wall without
 /// one leaves it to the marble; else both count, as [`combine`](Self::combine) says. The
 /// response [`Displacement`](taw::response::Response::Displacement) does not read it.
 #[derive(Component, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct SurfaceMaterial {
-    /// The part of the approach speed that a bounce gives back, in `[0, 1]`.
+    /// Coefficient of restitution: the part of the approach speed that a bounce gives back, in `[0, 1]`.
     pub restitution: f32,
-    /// The largest friction force over the normal force (Coulomb), at least zero.
+    /// Coefficient of friction (Coulomb): the largest friction force over the normal force, at least zero.
     pub friction: f32,
     /// The part of the sliding speed of the touching points that a bounce turns round,
     /// in `[-1, 1]`, as far as friction can: 0 stops them, 1 is a superball, −1 slides
@@ -105,7 +104,7 @@ pub struct SurfaceMaterial {
     /// Young's modulus in pascals, above zero, and Poisson's ratio in `[0, 0.5]`, for the
     /// response of Hertz and Mindlin.
     pub elasticity: [f32; 2],
-    /// What counts against another material.
+    /// Rule that combines it with another material.
     #[reflect(remote = CombineReflect)]
     pub combine: Combine,
 }
@@ -225,7 +224,7 @@ pub struct SleepingDisabled;
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct HalfLength(pub f32);
 
-/// Says that a new [`Transform`] is a jump: put it on a wall, or on what carries walls, together
+/// Marks a new [`Transform`] as a jump: put it on a wall, or on what carries walls, together
 /// with the place, and the next step takes that for where they are and not for how fast they came
 /// there. The step takes this off again.
 ///
@@ -273,7 +272,7 @@ pub struct Kinematic;
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct SurfaceVelocity(pub Vec3);
 
-/// What the physics knows of a marble entity.
+/// State of a marble entity in the physics.
 #[derive(Component, Clone, Copy, Debug, Default)]
 pub(crate) struct MarbleState {
     /// `None` before the first gather, while disabled, and when the input was refused.
@@ -281,9 +280,9 @@ pub(crate) struct MarbleState {
     /// The components as gather, scatter or easing last left them. What differs was
     /// written by somebody else.
     pub seen: SeenMarble,
-    /// Whether they are to be taken over.
+    /// True if the components are to be taken over.
     pub stale: bool,
-    /// Whether they could be no marble: that is tried again when they change.
+    /// True if they could be no marble: that is tried again when they change.
     pub refused: bool,
 }
 
@@ -292,7 +291,7 @@ pub(crate) struct MarbleState {
 pub(crate) struct Eased {
     /// Its place in world space when the last step began, after all teleports.
     pub from: Option<(Vec3, Option<Quat>)>,
-    /// How often the world had gone back in time by then.
+    /// Number of restores of the world by then.
     pub restored: u32,
     /// The place that was written in the last frame.
     pub wrote: Option<Vec3>,
@@ -318,18 +317,18 @@ pub(crate) struct SeenMarble {
     pub sleeping_disabled: bool,
 }
 
-/// What the physics knows of a wall entity.
+/// State of a wall entity in the physics.
 #[derive(Component, Clone, Debug, Default)]
 pub(crate) struct WallState {
     /// `None` before the first gather, while disabled, and when the input was refused.
     pub id: Option<WallId>,
     /// Handle of a sensor; `None` for a solid wall, and in the cases of `id`.
     pub sensor: Option<SensorId>,
-    /// What it is in its own frame.
+    /// Shape in its own frame.
     pub shape: Option<LocalShape>,
     /// The scale that it was last built for, whether or not it could be.
     pub built: Option<Vec3>,
-    /// Whether it could not.
+    /// True if it could not be built.
     pub refused: bool,
     /// Its place in world space as last gathered, to the bit: translation and rotation.
     pub posed: Option<([u32; 3], [u32; 4])>,
@@ -348,7 +347,7 @@ pub(crate) struct WallState {
 }
 
 impl WallState {
-    /// The same shape, on its way into a world.
+    /// State with the same shape, but without a row: on its way into a world.
     pub fn without_row(&mut self) -> Self {
         let (shape, built, refused) = (self.shape.take(), self.built, self.refused);
         Self { shape, built, refused, ..Self::default() }
@@ -359,7 +358,7 @@ impl WallState {
 #[derive(Clone, Debug)]
 pub(crate) struct LocalShape {
     pub shape: WallShape<f32>,
-    /// How far from the origin it goes, in metres.
+    /// Distance of its farthest point from the origin, in metres.
     pub reach: f32,
 }
 

@@ -1,4 +1,4 @@
-//! How long a step takes, and how much there is in it, as Bevy diagnostics.
+//! Bevy diagnostics of a step: its time, its contents, its energy.
 
 use std::time::Duration;
 
@@ -38,7 +38,7 @@ pub const SWARM_PAIRS_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/swar
 pub const SWARM_RESTITUTE_TIME: DiagnosticPath = DiagnosticPath::const_new("taw/swarm/restitute");
 /// The number of marbles in swarms, with guests.
 pub const SWARM_MARBLES: DiagnosticPath = DiagnosticPath::const_new("taw/swarm/marbles");
-/// How many of them sleep.
+/// Number of them that sleep.
 pub const SWARM_ASLEEP: DiagnosticPath = DiagnosticPath::const_new("taw/swarm/asleep");
 /// The number of marbles.
 pub const MARBLES: DiagnosticPath = DiagnosticPath::const_new("taw/marbles");
@@ -54,32 +54,32 @@ pub const KINETIC_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/energy
 pub const ROTATIONAL_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/energy/rotational");
 /// Their energy in gravity, against the origin, in joules.
 pub const POTENTIAL_ENERGY: DiagnosticPath = DiagnosticPath::const_new("taw/energy/potential");
-/// How large the sum of their momenta is, in kg m/s.
+/// Magnitude of their total momentum, in kg m/s.
 pub const MOMENTUM: DiagnosticPath = DiagnosticPath::const_new("taw/momentum");
 
-/// What sliding took in a step, in joules. This and the next eight are off until
+/// Energy that sliding took in a step, in joules. This and the next eight are off until
 /// [`enable_energy_audit`]; each is the field of an [`EnergyAudit`] by that name. Marbles count,
 /// swarms do not.
 pub const FRICTION_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/friction");
-/// What collisions took along their normals, in joules.
+/// Energy that collisions took along their normals, in joules.
 pub const RESTITUTION_LOSS: DiagnosticPath =
     DiagnosticPath::const_new("taw/energy_audit/restitution");
-/// What rolling and spinning resistance took, in joules.
+/// Energy that rolling and spinning resistance took, in joules.
 pub const RESISTANCE_LOSS: DiagnosticPath =
     DiagnosticPath::const_new("taw/energy_audit/resistance");
-/// What the method took that no law of physics asked for, in joules; negative if it gave.
+/// Energy that the method took and no law of physics asked for, in joules; negative if it gave.
 pub const SOLVER_LOSS: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/solver");
-/// What moving walls brought in, in joules.
+/// Work of moving walls, in joules.
 pub const WALL_WORK: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/walls");
-/// What force fields, pushes and damping brought in, in joules.
+/// Work of force fields, pushes and damping, in joules.
 pub const FORCE_WORK: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/forces");
 /// The momentum that came from nowhere, in kg m/s.
 pub const MOMENTUM_RESIDUAL: DiagnosticPath =
     DiagnosticPath::const_new("taw/energy_audit/momentum");
-/// How deep the deepest contact was when it was found, in metres.
+/// Largest penetration of a contact when it was found, in metres.
 pub const MAX_PENETRATION: DiagnosticPath =
     DiagnosticPath::const_new("taw/energy_audit/max_penetration");
-/// How many collisions a step had.
+/// Number of collisions in a step.
 pub const COLLISIONS: DiagnosticPath = DiagnosticPath::const_new("taw/energy_audit/collisions");
 
 /// A metric of the energy audit: diagnostic path, unit, accessor.
@@ -168,7 +168,7 @@ fn swarm_times() -> impl Iterator<Item = (DiagnosticPath, Stage)> {
     .into_iter()
 }
 
-/// Where the time of a step went.
+/// Times of the parts of a step.
 #[derive(Resource, Default)]
 pub(crate) struct StepTimes {
     began: Option<Instant>,

@@ -179,7 +179,7 @@ pub fn land(jumps: Query<Entity, With<Teleport>>, mut commands: Commands) {
 struct Gathering<'a, 'w> {
     world: &'a mut TawWorld,
     refusals: &'a mut Refusals<'w>,
-    /// Whether the world may not be what gather left.
+    /// True if the world may not be what gather left.
     all: bool,
     change: Change,
 }
@@ -381,7 +381,7 @@ impl Gathering<'_, '_> {
     }
 }
 
-/// Whether all numbers of a `Transform` are finite.
+/// Tests if all numbers of a `Transform` are finite.
 fn finite(own: &Transform) -> Result<(), taw::Error> {
     let Transform { translation, rotation, scale } = own;
     let fields = [
@@ -404,7 +404,7 @@ fn finite_surface(SurfaceVelocity(Vec3 { x, y, z }): SurfaceVelocity) -> Result<
     all_finite([("surface_velocity.x", x), ("surface_velocity.y", y), ("surface_velocity.z", z)])
 }
 
-/// Whether a shape that was built for one scale does for another.
+/// Tests if a shape that was built for one scale does for another.
 fn same_scale(built: Vec3, now: Vec3) -> bool {
     bits(built) == bits(now) || (now - built).abs().cmple(built.abs() * SAME_SCALE).all()
 }

@@ -12,7 +12,7 @@ use crate::convert::{from_point, from_vector};
 use crate::outline;
 use crate::resources::TawWorld;
 
-/// What to draw, and how large. Change it through Bevy's [`GizmoConfigStore`].
+/// Settings of the gizmos: what is drawn, and its size. Change it through Bevy's [`GizmoConfigStore`].
 #[expect(clippy::struct_excessive_bools, reason = "independent switches")]
 #[derive(Clone, Debug, Reflect, GizmoConfigGroup)]
 #[reflect(Default)]
@@ -103,7 +103,7 @@ fn draw(world: Res<TawWorld>, places: Query<&GlobalTransform>, mut gizmos: Gizmo
     }
 }
 
-/// Where a contact is: on the second marble, where it meets the first thing.
+/// Point of a contact, on the surface of the second body, and its normal.
 fn point_and_normal(world: &TawWorld, contact: &Contact<f32>) -> Option<(Vec3, Vec3)> {
     let row = contact.b as usize;
     let normal = from_vector(contact.normal);

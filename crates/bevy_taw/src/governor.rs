@@ -19,7 +19,7 @@ use crate::trade::TawTrade;
 /// that is not on the front is replaced by the dearest one there that is no dearer.
 #[derive(Resource, Clone, Debug, Default)]
 pub struct Governor {
-    /// How long a step may take, from gather to scatter. `None`: the governor is off.
+    /// Time budget of a step, from gather to scatter. `None`: the governor is off.
     pub budget: Option<Duration>,
     window: Window,
     /// For how many windows there has been room, and how many it takes.
@@ -28,9 +28,9 @@ pub struct Governor {
     asked: bool,
 }
 
-/// How many steps it takes the mean of.
+/// Number of steps in a mean.
 pub const WINDOW: u32 = 32;
-/// How many windows with room it takes to go up, at first and at most.
+/// Number of windows with room before it goes up, at first and at most.
 const WAITS: [u32; 2] = [2, 64];
 /// Which part of the budget may be used after going down, and after going up.
 const DOWN_TO: f64 = 0.9;
@@ -39,13 +39,13 @@ const UP_TO: f64 = 0.7;
 /// The [`Governor`] changed the model.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq)]
 pub struct ModelGoverned {
-    /// What it was.
+    /// Model before.
     pub from: Model,
-    /// What it is now.
+    /// Model from now on.
     pub to: Model,
-    /// What a step took in the mean.
+    /// Mean time of a step.
     pub step: Duration,
-    /// What it may take.
+    /// Time budget of a step.
     pub budget: Duration,
 }
 

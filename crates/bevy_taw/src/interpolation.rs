@@ -108,7 +108,7 @@ fn note_start(world: Res<TawWorld>, mut marbles: Query<(&MarbleState, &mut Eased
     });
 }
 
-/// Where a marble truly is, and how it is turned if the model knows that.
+/// Simulated position of a marble, and its rotation if the model knows one.
 fn place(world: &TawWorld, state: &MarbleState) -> Option<(Vec3, Option<Quat>)> {
     let row = world.marbles.row(state.id?).ok()?;
     let rotation = world.marbles.rotation().get(row).copied().map(from_rotation);
@@ -196,7 +196,7 @@ fn undo(mut world: ResMut<TawWorld>, mut marbles: Roots) {
     }
 }
 
-/// The same for children.
+/// Undoes the easing of children.
 fn undo_children(
     mut world: ResMut<TawWorld>,
     mut marbles: ParamSet<(Children, TransformHelper)>,
@@ -295,18 +295,18 @@ fn take_over(
 
 /// A translation that somebody wrote.
 struct Written {
-    /// What there was before, as drawn.
+    /// Position before the write, as drawn.
     seen: Vec3,
     now: Vec3,
-    /// What was written in the last frame.
+    /// Position written in the last frame.
     before: Option<Vec3>,
     /// So far away it is a nudge.
     within: f32,
 }
 
 impl Written {
-    /// Where a marble is after it and where it began, that truly was at `end` and began at
-    /// `start`.
+    /// Positions of a marble at the end and at the start of the step after this write; `end` and `start`
+    /// are those of the simulation.
     fn place(&self, end: Vec3, start: Vec3) -> (Vec3, Vec3) {
         let known = [Some(end), Some(start), self.before];
         let axes = [0, 1, 2].map(|i| {

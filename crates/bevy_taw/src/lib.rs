@@ -149,7 +149,7 @@ pub use plugin::{Substep, SubstepDelta, TawPlugin, TawPlugins, TawSystems};
 pub use schedule::TawSchedule;
 pub use taw;
 
-/// What nearly every game needs.
+/// Items that nearly every game needs.
 pub mod prelude {
     pub use crate::components::{
         AngularVelocity, ExternalForce, ExternalImpulse, GravityScale, HalfLength, Kinematic,

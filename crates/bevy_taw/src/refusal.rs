@@ -1,5 +1,4 @@
-//! What the physics could not do: values that it did not take over, marbles that
-//! it had to stop.
+//! Refused input, and marbles that the physics had to stop.
 
 use std::collections::HashSet;
 
@@ -45,14 +44,14 @@ pub enum Refusal {
     NoFrame(f32, f32, f32),
 }
 
-/// What was refused in this step and in the one before.
+/// Refusals of this step and of the one before.
 #[derive(Resource, Default)]
 pub(crate) struct Told {
     now: HashSet<(Option<Entity>, String)>,
     before: HashSet<(Option<Entity>, String)>,
 }
 
-/// Tells what is refused, but nothing twice while it lasts.
+/// Reports refusals, each once for as long as it lasts.
 #[derive(SystemParam)]
 pub(crate) struct Refusals<'w> {
     messages: MessageWriter<'w, InputRefused>,
@@ -67,7 +66,7 @@ impl Refusals<'_> {
         now.clear();
     }
 
-    /// Tells of an error. Gives whether there is none.
+    /// Reports an error, if there is one. Returns true if there is none.
     pub fn check<E: Into<Refusal>>(
         &mut self,
         entity: Option<Entity>,
@@ -99,7 +98,7 @@ pub struct MarbleStopped {
     pub entity: Entity,
 }
 
-/// Tells of the marbles that were stopped in this step.
+/// Reports the marbles that were stopped in this step.
 pub(crate) fn report_stopped(world: Res<TawWorld>, mut stopped: MessageWriter<MarbleStopped>) {
     for id in world.stopped() {
         if let Some(&entity) = world.marble_entities.get(&id) {

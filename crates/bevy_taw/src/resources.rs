@@ -1,4 +1,4 @@
-//! What there is one of: the model, gravity, the world.
+//! Resources: the model, gravity, the world.
 
 use bevy::platform::collections::HashMap;
 use bevy::prelude::*;
@@ -85,7 +85,7 @@ pub struct TawWorld {
     pub(crate) stale_sensors: Vec<Entity>,
     /// Marbles whose entities are disabled, as they were when they left.
     pub(crate) away: HashMap<Entity, Marble<f32>>,
-    /// How often the world went back in time, and whether it did since the last gather.
+    /// Number of restores, and true if there was one since the last gather.
     pub(crate) restored: u32,
     pub(crate) just_restored: bool,
     /// The walls' version when they were last gathered.

@@ -12,7 +12,7 @@ use crate::gather::{ChangedMarbles, MANY};
 use crate::refusal::{Refusal, Refusals};
 use crate::resources::TawWorld;
 
-/// What a marble's `Transform` is relative to.
+/// Frame that a marble's `Transform` is relative to.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Frame {
     /// From here to the world and back; none for the world itself, so that it costs no rounding.

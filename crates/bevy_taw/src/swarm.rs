@@ -37,7 +37,7 @@ pub use taw::swarm::BallId;
 /// ```
 #[derive(Component, Clone, Debug, Default)]
 pub struct Swarm {
-    /// What the colour of a marble says.
+    /// Meaning of the colour of a marble.
     pub tint: Tint,
     coming: Vec<Ball>,
     going: Vec<BallId>,
@@ -46,21 +46,21 @@ pub struct Swarm {
     layers: CollisionLayers,
 }
 
-/// What the colour of a marble says.
+/// Meaning of the colour of a marble.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Tint {
     /// Which one it is: each has a colour of its own.
     #[default]
     Id,
-    /// How fast it is: from blue at rest to red at this speed, in m/s.
+    /// Speed: from blue at rest to red at this speed, in m/s.
     Speed(f32),
-    /// How large it is: from blue for this radius to red for that, in metres.
+    /// Radius: from blue for this one to red for that one, in metres.
     Size(f32, f32),
     /// Nothing: all have this one, as linear red, green and blue in [0, 1].
     Plain([f32; 3]),
 }
 
-/// How all swarms step. May change at any time; what cannot be right is refused with an
+/// Model of all swarms. May change at any time; what cannot be right is refused with an
 /// [`InputRefused`](crate::refusal::InputRefused), and the last good one stays.
 #[derive(Resource, Clone, Copy, Debug, Default, PartialEq, Deref, DerefMut)]
 pub struct TawSwarmModel(pub SwarmModel);
@@ -75,7 +75,7 @@ impl Swarm {
     /// So many marbles of glass on a lattice that fills a region from below, with radii drawn
     /// evenly from a range, in metres. What does not fit is stacked above.
     ///
-    /// The same seed gives the same marbles.
+    /// Equal seeds give equal marbles.
     #[must_use]
     pub fn filling(
         region: Aabb3d,
@@ -143,13 +143,13 @@ impl Swarm {
         self.going.extend(self.balls.extract_if(.., |ball| !stays(*ball)));
     }
 
-    /// How many there are, with those that come with the next step.
+    /// Number of marbles, with those that come with the next step.
     #[must_use]
     pub fn len(&self) -> usize {
         self.balls.len() + self.coming.len()
     }
 
-    /// Whether there are none.
+    /// Tests if there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
         self.len() == 0
@@ -169,7 +169,7 @@ impl Swarm {
         &self.balls
     }
 
-    /// Where they are, in the same order.
+    /// Positions in metres, in the same order.
     pub fn positions<'a>(&'a self, world: &'a TawWorld) -> impl Iterator<Item = Vec3> + 'a {
         let rows = self.balls.iter().filter_map(|ball| world.swarm.row(*ball).ok());
         rows.map(|row| Vec3::from_slice(&world.swarm.balls()[row][..3]))
@@ -299,7 +299,7 @@ pub(crate) fn step(mut world: ResMut<TawWorld>, time: Res<Time>, mut times: ResM
     times.end_step();
 }
 
-/// Tells of the marbles that were stopped in this step, and once for as long as it lasts that more
+/// Reports the marbles that were stopped in this step, and once for as long as it lasts that more
 /// pairs are inside of each other than are looked at.
 pub(crate) fn report_stopped(world: Res<TawWorld>, mut waits: Local<bool>) {
     for ball in world.swarm.stopped() {

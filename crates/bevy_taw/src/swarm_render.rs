@@ -75,7 +75,7 @@ impl Material for SwarmMaterial {
     }
 }
 
-/// What there is to draw them with.
+/// GPU resources to draw them with.
 #[derive(Resource, Default)]
 struct Drawn {
     mesh: Handle<Mesh>,

@@ -1,4 +1,4 @@
-//! What each model would cost and buy in the game that is running (feature `trade`).
+//! Cost and accuracy of each model in the game that is running (feature `trade`).
 //!
 //! [`TawTrade::measure`] takes a snapshot of the marbles and runs it by every model, beside the
 //! game. `debug_ui::trade` shows what comes of it, and lets the player of the game choose;
@@ -57,10 +57,10 @@ impl Plugin for TawTradePlugin {
     }
 }
 
-/// What was measured last, and what is being measured now.
+/// The last measurement, and the one under way.
 #[derive(Resource, Debug)]
 pub struct TawTrade {
-    /// How far a measurement looks ahead, in seconds of the game.
+    /// Time that a measurement simulates ahead, in seconds of the game.
     pub seconds: f64,
     /// A model of which a run takes longer, in seconds, is not tried with more substeps.
     pub patience: f64,
@@ -79,7 +79,7 @@ struct Measuring {
     part: f32,
 }
 
-/// What a measurement has told of itself.
+/// Progress and results that a measurement has sent.
 #[derive(Debug, Default)]
 struct Told {
     part: f32,
@@ -125,13 +125,13 @@ impl TawTrade {
         self.measuring = None;
     }
 
-    /// How much of a measurement is done, from 0 to 1, if one is under way.
+    /// Progress of a measurement, from 0 to 1, if one is under way.
     #[must_use]
     pub fn progress(&self) -> Option<f32> {
         self.measuring.as_ref().map(|measuring| measuring.part)
     }
 
-    /// What is known so far.
+    /// Results so far.
     #[must_use]
     pub fn advice(&self) -> &Advice {
         &self.advice

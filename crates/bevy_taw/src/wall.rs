@@ -1,4 +1,4 @@
-//! What marbles bounce off.
+//! Walls: the fixed and moving solids that marbles collide with.
 
 use bevy::prelude::*;
 use taw::shape as core;
@@ -39,7 +39,7 @@ pub enum Wall {
     Cuboid(Cuboid),
     /// All points near a line along y. Its scale must be even.
     Capsule(Capsule3d),
-    /// What is around these points, in metres: at least four that are in no plane.
+    /// Convex hull of these points, in metres: at least four that are in no plane.
     Hull(Vec<Vec3>),
     /// Triangles, solid from both sides.
     Mesh {
@@ -51,9 +51,9 @@ pub enum Wall {
     /// A landscape about the place of the entity: a solid with vertical sides and a bottom, which is
     /// below the lowest point by the diagonal of the landscape's bounding box.
     HeightField {
-        /// How far apart the heights are along x and z, in metres.
+        /// Distance between heights along x and z, in metres.
         cell: Vec2,
-        /// How many heights there are along x.
+        /// Number of heights along x.
         columns: u32,
         /// In metres along y: row after row, from the far left (−x, −z) on.
         heights: Vec<f32>,
@@ -124,7 +124,7 @@ impl Wall {
 }
 
 impl Wall {
-    /// How far from the origin of its frame it goes at this scale, in metres.
+    /// Distance of its farthest point from the origin of its frame at this scale, in metres.
     pub(crate) fn reach(&self, scale: Vec3) -> f32 {
         let largest = scale.abs().max_element();
         let farthest = |points: &[Vec3]| {

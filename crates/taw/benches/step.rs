@@ -1,4 +1,4 @@
-//! What a step costs: `cargo bench -p taw`.
+//! Cost of a step: `cargo bench -p taw`.
 //!
 //! Marbles with radii in [0.2, 0.6] m in a box of planes, as in the demo: while
 //! they fall, and when they lie in a heap. The whole step, and each verb by itself, by
@@ -45,7 +45,7 @@ fn falling(count: u32) -> World<f32> {
     world
 }
 
-/// The same ten seconds later, by this model.
+/// That heap after ten seconds by this model.
 fn settled_by(model: Model, count: u32) -> World<f32> {
     let mut world = falling(count);
     world.set_model(model).expect("a model");
@@ -55,7 +55,7 @@ fn settled_by(model: Model, count: u32) -> World<f32> {
     world
 }
 
-/// The same ten seconds later, by the default model.
+/// That heap after ten seconds by the default model.
 fn settled(count: u32) -> World<f32> {
     settled_by(Model::default(), count)
 }
@@ -89,7 +89,7 @@ fn step_settled_impulse(bencher: Bencher, count: u32) {
     bench(bencher, settled_by(model, count), step);
 }
 
-/// The same heap, event by event.
+/// That heap, event by event.
 #[divan::bench(args = [100, 1_000])]
 fn step_settled_event_driven(bencher: Bencher, count: u32) {
     let (response, rotation) = (Response::Impulse, Rotation::Dynamic);

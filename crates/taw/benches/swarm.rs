@@ -1,4 +1,4 @@
-//! What a swarm costs: `cargo bench -p taw --bench swarm`, or with `-- 1000000` those of a
+//! Cost of a swarm: `cargo bench -p taw --bench swarm`, or with `-- 1000000` those of a
 //! million alone; with `-- stages` what each stage of a step takes.
 //!
 //! The scene is the one that the race in `peers/` begins with: balls with radii in [0.3, 0.5] m

@@ -69,7 +69,7 @@ pub mod world;
 
 pub use error::Error;
 
-/// What nearly every program needs.
+/// Items that nearly every program needs.
 pub mod prelude {
     pub use crate::broad::CollisionLayers;
     pub use crate::contact::{Contact, Contacts};

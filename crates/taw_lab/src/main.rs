@@ -45,7 +45,7 @@ enum Command {
         /// Leaves out set-up, metric and source.
         #[arg(long)]
         short: bool,
-        /// Where all of it goes besides, as JSON.
+        /// File for all of it besides, as JSON.
         #[arg(long, value_name = "FILE")]
         json: Option<PathBuf>,
         /// Number of cases measured in parallel. (Time measurements run alone.)
@@ -55,10 +55,10 @@ enum Command {
     /// Sweeps models, scalars, steps, substeps and iterations over the scenes, and draws error
     /// against cost. What was measured is kept: interrupted, it goes on where it was.
     Trade {
-        /// Where points go.
+        /// Folder of the points.
         #[arg(long, default_value = "target/trade")]
         out: PathBuf,
-        /// Where the report goes, with its charts beside it [default: report.md among the points]
+        /// File of the report, with its charts beside it [default: report.md among the points]
         #[arg(long, value_name = "FILE")]
         report: Option<PathBuf>,
         /// Only some settings: less than two minutes.
@@ -77,7 +77,7 @@ enum Command {
         #[arg(long, value_name = "FILE")]
         with: Vec<PathBuf>,
     },
-    /// Says which model suits a scene: the cheapest that is right enough, the most exact that is
+    /// Names the model that suits a scene: the cheapest that is right enough, the most exact that is
     /// cheap enough, or, asked for neither, those that no other one beats in both.
     Advise {
         /// A scene in RON (see `crates/taw_lab/scenes`).
@@ -114,10 +114,10 @@ enum Command {
     Storm(Storm),
     /// Joins the parts of a sweep into one report.
     Merge {
-        /// Where points go.
+        /// Folder of the points.
         #[arg(long, default_value = "target/trade")]
         out: PathBuf,
-        /// Where the report goes, with its charts beside it [default: report.md among the points]
+        /// File of the report, with its charts beside it [default: report.md among the points]
         #[arg(long, value_name = "FILE")]
         report: Option<PathBuf>,
         /// The parts: `points-K-of-N.jsonl`.
@@ -149,7 +149,7 @@ struct Storm {
     /// Iterations of all marbles [default: random]
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=1000))]
     iterations: Option<u32>,
-    /// Where failures go, as files for --replay; of --replay, too [default: nowhere]
+    /// Folder for failures, as files for --replay; of --replay, too [default: nowhere]
     #[arg(long, value_name = "DIR")]
     out: Option<PathBuf>,
     /// Writes failures as they are.

@@ -180,7 +180,7 @@ impl Ball {
     }
 }
 
-/// Where a ball is and how it moves, in `f64`: position, velocity, spin.
+/// State of a ball in `f64`: position, velocity, spin.
 #[must_use]
 pub fn state<S: Scalar>(world: &World<S>, id: MarbleId) -> [Vec3<f64>; 3] {
     let marble = world.marbles.get_high_precision(id).expect("nobody takes balls out");

@@ -35,7 +35,7 @@ trait Engine {
     /// Center and velocity of each ball.
     fn state(&self) -> Vec<[Vec3; 2]>;
 
-    /// What it does by default.
+    /// Description of its defaults.
     fn defaults() -> String;
 }
 
@@ -47,7 +47,7 @@ fn surface_of(ball: &MarbleDesc, scene: &Scene) -> MaterialDesc {
     ball.material.unwrap_or(scene.material)
 }
 
-/// How a wall turns about its place, in rad/s.
+/// Angular velocity of a wall about its place, in rad/s.
 fn turning(wall: &WallDesc) -> Option<Vec3> {
     match (wall.motion?, wall.shape) {
         (
@@ -303,7 +303,7 @@ fn frame(time: f64, state: &[[Vec3; 2]]) -> Frame {
     Frame { time, at, velocity, ..Frame::default() }
 }
 
-/// How deep balls are in each other and in walls, all together.
+/// Sum of the overlaps of balls with each other and with walls.
 fn overlap(scene: &Scene, balls: &[MarbleDesc], state: &[[Vec3; 2]]) -> f64 {
     let mut there = scene.clone();
     there.lattices.clear();

@@ -104,7 +104,7 @@ pub fn gravity(ui: &mut Ui, gravity: &mut ResMut<Gravity>) {
     }
 }
 
-/// How many marbles and contacts there are.
+/// Numbers of marbles and contacts.
 pub fn counts(ui: &mut Ui, diagnostics: &DiagnosticsStore) {
     egui::Grid::new("taw counts").num_columns(2).show(ui, |ui| {
         for (name, path) in [
@@ -174,8 +174,7 @@ pub fn energy(ui: &mut Ui, diagnostics: &mut DiagnosticsStore) {
     });
 }
 
-/// Where the energy of the last steps went, and how far the method was from what it should do.
-/// Measures it while it is shown.
+/// Energy audit of the last steps, and the error of the method. Measured while it is shown.
 pub fn accuracy(ui: &mut Ui, diagnostics: &mut DiagnosticsStore) {
     paths::enable_energy_audit(diagnostics, true);
     // Of a second at the usual sixty steps, for one step shows next to nothing.
@@ -244,7 +243,7 @@ fn time_plot(ui: &mut Ui, id: &str, unit: &str, draw: impl FnOnce(&mut egui_plot
         .show(ui, draw);
 }
 
-/// How a swarm steps.
+/// Settings of the model of swarms.
 pub fn swarm_model(ui: &mut Ui, model: &mut ResMut<TawSwarmModel>) {
     let mut chosen = model.0;
     ui.horizontal(|ui| {
@@ -270,7 +269,7 @@ pub fn swarm_model(ui: &mut Ui, model: &mut ResMut<TawSwarmModel>) {
     }
 }
 
-/// What a swarm's step costs, part by part.
+/// Cost of a swarm's step, part by part.
 pub fn swarm_time(ui: &mut Ui, diagnostics: &DiagnosticsStore) {
     let marbles = value(diagnostics, &paths::SWARM_MARBLES);
     let step = diagnostics.get(&paths::SWARM_TIME).and_then(Diagnostic::average).unwrap_or(0.0);
@@ -292,7 +291,7 @@ pub fn swarm_time(ui: &mut Ui, diagnostics: &DiagnosticsStore) {
     });
 }
 
-/// What to draw of the physics.
+/// Switches of the gizmos.
 #[cfg(feature = "render")]
 pub fn gizmos(ui: &mut Ui, store: &mut GizmoConfigStore) {
     let (_, config) = store.config_mut::<crate::gizmos::TawGizmos>();

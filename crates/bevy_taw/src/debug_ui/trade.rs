@@ -12,7 +12,7 @@ use crate::governor::Governor;
 use crate::resources::{TawModel, TawWorld};
 use crate::trade::{Candidate, TawTrade};
 
-/// How near to a point one has to click, in points of the screen.
+/// Largest distance of a click from a point of the chart, in points of the screen.
 const REACH: f32 = 12.0;
 
 /// Measures all models on the scene as it is (for a game with so long a `step`), and draws what
@@ -50,7 +50,7 @@ pub fn trade(
     govern(ui, governor, model.0, trade.advice());
 }
 
-/// How sure it is, in words.
+/// Confidence of the advice, in words.
 fn sure(advice: &Advice) -> String {
     let Advice { horizon, seconds, sure, .. } = advice;
     let sure = sure * 1e3;
@@ -64,7 +64,7 @@ fn sure(advice: &Advice) -> String {
     }
 }
 
-/// What the model that is used came to, if it was measured.
+/// Error and cost of the model in use, if it was measured.
 fn current(ui: &mut Ui, advice: &Advice, model: Model) {
     match advice.candidates.iter().find(|choice| choice.setting.model == model) {
         Some(choice) => ui.label(format!("Now: {}", describe(choice))),

@@ -96,7 +96,7 @@ impl BatchBuilder<'_> {
         self.left += PAIRS * balls;
     }
 
-    /// Says how many of so many pairs there is room for.
+    /// Number of pairs, of so many, that there is room for.
     #[inline(always)]
     pub fn spend_only(&mut self, pairs: usize) -> usize {
         let count = pairs.min(self.left);

@@ -169,9 +169,9 @@ pub(super) struct FindPairs<'a> {
     pub search: &'a mut Search,
     /// Number of pairs that there was no room for.
     pub unlisted: &'a mut usize,
-    /// Where pairs go that are part of no neighbour list.
+    /// Output: pairs that are part of no neighbour list.
     pub batches: &'a mut Vec<Batch>,
-    /// Where lists go, if there shall be any: [`NEIGHBOUR_ROOM`] for each row of the chunk.
+    /// Output: neighbour lists, if there shall be any: [`NEIGHBOUR_ROOM`] for each row of the chunk.
     pub lists: Option<&'a mut [u16]>,
 }
 

@@ -78,7 +78,7 @@ impl Proxy {
         }
     }
 
-    /// Says if a proxy that sleeps does so in this step too: what it does from rest is the same as
+    /// Tests if a proxy that sleeps does so in this step too: what it does from rest is the same as
     /// before, so what pulls it and holds it is. `at` is where it sleeps.
     fn sleeps_on(&mut self, at: &Row, before: &Self, sleep_speed: f32, dt: f32) -> bool {
         let now = [self.velocity, less(&self.at, at)];

@@ -46,7 +46,7 @@ impl Rest {
         self.places.capacity() * size_of::<Row>()
     }
 
-    /// Says if the balls have rested for long enough to sleep under such a gravity, in m/s²: each
+    /// Tests if the balls have rested for long enough to sleep under such a gravity, in m/s²: each
     /// has no velocity, or is borne by something and stays where it is.
     fn lasts(&self, largest: f32, gravity: f32) -> bool {
         self.time > TIME.max(FALLS * (largest / gravity).sqrt())

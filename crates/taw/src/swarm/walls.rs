@@ -26,8 +26,9 @@ pub(crate) trait StaticGeometry: Sync {
     /// Visits the removals of walls since they had this identity, in order: the row of the wall, and
     /// that whose wall moved there. Returns false if they are not known.
     fn visit_removals_since(&self, identity: u64, visit: &mut dyn FnMut([u32; 2])) -> bool;
-    /// Says if there is anything else, and if some of it may be in a box.
+    /// Tests if there are shapes other than half-spaces.
     fn has_shapes(&self) -> bool;
+    /// Tests if one of these may be in a box.
     fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;
     /// Visits what else is within `reach` metres of a ball and collides with it by this filter, without
     /// ghost collisions: the wall and its part, the normal, and the distance of the center.

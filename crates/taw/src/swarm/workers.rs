@@ -309,7 +309,7 @@ impl<'a, T> DisjointSlice<'a, T> {
         self.0.len()
     }
 
-    /// Where a row is. What is done with it must not be at odds with what others do meanwhile.
+    /// Pointer to a row. The caller must not race with what other threads do to it.
     #[inline(always)]
     pub fn row(self, row: usize) -> *mut T {
         self.0.as_ptr().wrapping_add(row).cast_mut().cast()

@@ -17,7 +17,7 @@ pub(super) struct ContactMemory<S> {
     pub event_impulses: Vec<CachedImpulse<f64>>,
     /// Decisions of one-way walls, sorted by wall and marble.
     pub one_way: Vec<OneWayState>,
-    /// Who had which row then: a removal moves another marble or wall into its row.
+    /// Handles of the rows then: a removal moves another marble or wall into its row.
     marbles: Vec<MarbleId>,
     walls: Vec<WallId>,
     /// Number of removals of marbles and of walls until then.

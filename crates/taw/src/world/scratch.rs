@@ -32,7 +32,7 @@ pub(super) struct Scratch<S> {
     pub displacement: displacement::Scratch<S>,
     pub impulse: impulse::Scratch<S>,
     pub penalty: penalty::Scratch<S>,
-    /// How walls stopped each row; empty if they stopped none.
+    /// Stop of each row at walls; empty if they stopped none.
     pub wall_stops: Vec<Option<penalty::WallStop<S>>>,
     /// Accelerations in m/s², for a response that integrates marbles by itself.
     pub accelerations: Vec<Vec3<f64>>,

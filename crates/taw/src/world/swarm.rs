@@ -109,7 +109,7 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Tells the swarm where the marbles are.
+    /// Brings the proxies of the swarm up to date with the marbles.
     fn sync_proxies(&mut self, dt: f32) -> Result<(), Error> {
         self.insert_missing_bodies()?;
         let (marbles, body_balls) = (&self.marbles, std::mem::take(&mut self.swarm.body_balls));

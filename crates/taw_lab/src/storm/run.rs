@@ -262,7 +262,7 @@ fn difference<S: Scalar>(
 /// Number of steps of a [`trail`].
 const TRAIL: u32 = 12;
 
-/// Where a body was in the steps until this one, and the energy of all: lines to read.
+/// Trail of a body in the steps until this one, and the energy of all, as lines to read.
 pub fn trail(case: &Case, body: usize, until: u32) -> String {
     match case.number {
         ScalarType::F32 => trail_in::<f32>(case, body, until),

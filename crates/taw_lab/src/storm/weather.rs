@@ -52,7 +52,7 @@ pub struct Plan {
     pub settings: Settings,
     /// Number of scenes run in parallel.
     pub jobs: usize,
-    /// Where failures go, if anywhere.
+    /// Folder for failures, if they are written.
     pub out: Option<PathBuf>,
     /// Failures are shrunk.
     pub shrink: bool,
@@ -193,7 +193,7 @@ fn report(plan: &Plan, verdicts: &BTreeMap<Name, Verdict>) -> std::io::Result<St
 /// the file.
 ///
 /// # Errors
-/// What writing a file to `out` may give.
+/// Errors of the file system.
 pub fn write(
     name: &str,
     case: Case,

@@ -37,7 +37,7 @@ pub fn draw(scene: &str, curves: &[Curve], folder: &Path) -> Result<(), Box<dyn 
     Ok(())
 }
 
-/// Where a point is: by powers of ten, better to the right and up.
+/// Position of a point in the chart: by powers of ten, better to the right and up.
 fn place(point: &Point) -> Option<(f64, f64)> {
     let error = point.error.filter(|_| point.failure.is_none())?.max(1e-16);
     let place = (point.real_time.log10(), -error.log10());

@@ -70,7 +70,7 @@ impl<S: Scalar> KeyedByContact for SpringHistory<S> {
 pub(crate) struct PenaltySettings<'a, S, W, M, F> {
     pub law: ContactLaw,
     pub context: Context<'a, S, W, M, F>,
-    /// How continuous detection stopped each row at walls; empty if it stopped none.
+    /// Stop of each row at walls by continuous detection; empty if it stopped none.
     pub wall_stops: &'a [Option<WallStop<S>>],
 }
 
@@ -79,7 +79,7 @@ pub(crate) struct PenaltySettings<'a, S, W, M, F> {
 pub(crate) const CORE: f64 = 0.5;
 pub(crate) const CORE_ROUNDING: f64 = 1e-3;
 
-/// How continuous detection stopped a marble at walls.
+/// Stop of a marble at walls by continuous detection.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WallStop<S> {
     /// Index of the wall of the last stop.

@@ -37,7 +37,7 @@ impl<L: Simd> Backing<L> {
 }
 
 impl SolverColumns<'_> {
-    /// Says if it is known who has a wall behind it.
+    /// Tests if it is known which balls have a wall behind them.
     pub fn backed(&self) -> bool {
         self.backing.len() > 0
     }

@@ -423,8 +423,8 @@ impl Swarm {
         self.scratch.outside_work = outside_work;
     }
 
-    /// Works on all chunks, each with exclusive access to the balls of it and of the next one.
-    /// Says whether the next one sleeps and how fast a ball of it is.
+    /// Runs a job on all chunks, each with exclusive access to the balls of it and of the next one. The
+    /// job is told if the next one sleeps, and the largest speed of its balls, in m/s; `None` for the last.
     fn for_each_chunk(
         &mut self,
         job: impl Fn(Option<(bool, f32)>, SolverColumns, &mut Chunk) + Sync,

@@ -15,7 +15,7 @@ pub struct Arena {
     pub size: f64,
     /// A level floor exists at height zero.
     pub floor: bool,
-    /// Where bodies begin.
+    /// Corners of the box in which bodies begin.
     pub low: [f64; 3],
     pub high: [f64; 3],
     pub closed: Option<[[f64; 3]; 2]>,

@@ -1,4 +1,4 @@
-//! Where things may be.
+//! Invariants of places: overlap, closed boxes.
 
 use taw::prelude::*;
 
