@@ -1,5 +1,6 @@
 //! Games that set no model.
 
+use bevy::ecs::entity_disabling::Disabled;
 use bevy::prelude::*;
 use bevy_taw::prelude::*;
 
@@ -96,6 +97,60 @@ fn components_that_the_model_ignores_are_named() {
     app.insert_resource(TawModel(Model::EXACT));
     app.update();
     assert_eq!(ignored(&app), [""; 0]);
+}
+
+#[test]
+fn settings_that_the_response_ignores_are_named() {
+    let mut app = app();
+    let mut ignored = |model: Model| {
+        app.insert_resource(TawModel(model));
+        app.update();
+        app.world().resource::<IgnoredComponents>().to_vec()
+    };
+    let all = Model {
+        integrator: Integrator::VelocityVerlet,
+        precision: Precision::Compensated,
+        detection: Detection::Discrete,
+        ..Model::GAME
+    };
+    assert_eq!(ignored(Model::GAME), [""; 0]);
+    assert_eq!(ignored(all), ["Model::integrator", "Model::precision", "Model::detection"]);
+    let exact = Model { response: Response::EventDriven, ..all };
+    assert_eq!(ignored(exact), ["Model::detection"]);
+    assert_eq!(ignored(Model { response: Response::Impulse, ..all }), [""; 0]);
+}
+
+#[test]
+fn components_where_they_have_no_effect_are_named() {
+    let mut app = app();
+    let ignored = |app: &App| app.world().resource::<IgnoredComponents>().to_vec();
+    let floor = scene::floor(&mut app);
+    let marble = scene::drop_marble(&mut app, 0.1, Vec3::Y);
+    app.world_mut().entity_mut(floor).insert((Sensor, OneWay::default(), Kinematic));
+    app.world_mut().entity_mut(marble).insert((Velocity::default(), GravityScale::default()));
+    app.update();
+    assert_eq!(ignored(&app), [""; 0]);
+    app.world_mut().entity_mut(floor).insert((Velocity::default(), HalfLength(1.0)));
+    app.world_mut().entity_mut(marble).insert(OneWay::default());
+    let sensor = app.world_mut().spawn((Sensor, Transform::from_xyz(0.0, 1.0, 0.0))).id();
+    app.update();
+    let expected = [
+        "Velocity of a wall",
+        "HalfLength of a wall",
+        "OneWay of a marble",
+        "Sensor without a Wall",
+    ];
+    assert_eq!(ignored(&app), expected);
+    assert_eq!(app.world().resource::<TawWorld>().sensors.len(), 1, "the floor only");
+    app.world_mut().entity_mut(sensor).insert(Wall::from(Cuboid::default()));
+    app.world_mut().entity_mut(floor).remove::<(Velocity, HalfLength)>();
+    app.world_mut().entity_mut(marble).remove::<OneWay>();
+    app.update();
+    assert_eq!(ignored(&app), [""; 0]);
+    assert_eq!(app.world().resource::<TawWorld>().sensors.len(), 2);
+    app.world_mut().entity_mut(floor).insert((Velocity::default(), Disabled));
+    app.update();
+    assert_eq!(ignored(&app), [""; 0], "whoever is disabled has no effect anyway");
 }
 
 #[test]

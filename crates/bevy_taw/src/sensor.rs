@@ -23,11 +23,11 @@ use taw::world::{MarbleId, SensorId};
 
 use crate::components::WallState;
 use crate::resources::TawWorld;
-use crate::wall::Wall;
 
 /// Makes a sensor of a [`Wall`]: marbles pass through it, and it reports which of them enter and leave,
 /// by [`SensorEntered`] and [`SensorLeft`], and which are inside, by [`CollidingEntities`]; of the balls of
-/// swarms, which are inside after each step, by [`CollidingBalls`].
+/// swarms, which are inside after each step, by [`CollidingBalls`]. Without a wall it has no shape and notices nobody,
+/// as [`IgnoredComponents`](crate::ignored::IgnoredComponents) says.
 ///
 /// It may be moved as a wall, by itself or by what carries it, and has [`CollisionLayers`]. A marble
 /// that passes through within a step enters and leaves in it, at any speed; one that is put elsewhere
@@ -35,9 +35,10 @@ use crate::wall::Wall;
 /// straight. Of a mesh, inside is what touches its surface.
 ///
 /// [`CollisionLayers`]: crate::layers::CollisionLayers
+/// [`Wall`]: crate::wall::Wall
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
-#[require(Wall, CollidingEntities, CollidingBalls)]
+#[require(CollidingEntities, CollidingBalls)]
 pub struct Sensor;
 
 /// Marbles inside of a sensor after the last step, sorted.

@@ -61,18 +61,22 @@ pub fn model(ui: &mut Ui, model: &mut ResMut<TawModel>) {
         ui.add(egui::Slider::new(&mut chosen.substeps, 1..=16));
         ui.end_row();
         ui.label("Iterations");
-        let used = matches!(chosen.response, Response::Impulse | Response::EventDriven);
+        let used = match chosen.response {
+            Response::SoftStep => false,
+            Response::Penalty(_) => chosen.detection == Detection::Swept,
+            Response::Displacement | Response::Impulse | Response::EventDriven => true,
+        };
         ui.add_enabled(used, egui::Slider::new(&mut chosen.iterations, 1..=64));
         ui.end_row();
     });
     model.set_if_neq(TawModel(chosen));
 }
 
-/// Components that the model does not read, if there are any.
+/// Components and settings that have no effect, if there are any.
 pub fn ignored(ui: &mut Ui, ignored: &IgnoredComponents) {
     if !ignored.is_empty() {
         let names = ignored.join(", ");
-        ui.colored_label(ui.visuals().warn_fg_color, format!("The model ignores {names}"));
+        ui.colored_label(ui.visuals().warn_fg_color, format!("Without effect: {names}"));
     }
 }
 

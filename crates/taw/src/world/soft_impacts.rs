@@ -183,8 +183,13 @@ impl<S: Scalar> World<S> {
         let velocity = rows.map(|row| self.marbles.velocity[row]);
         let ways = velocity.map(|velocity| velocity * dt);
         let meet_now = self.meet_now(contact, (velocity[0] - velocity[1]).dot(contact.normal), dt);
-        let later = || time_of_impact_sphere_sphere(&a, ways[0], &b, ways[1]);
-        let time = if meet_now { S::zero() } else { later().filter(|_| !contact.is_touching())? };
+        let time = if meet_now {
+            S::zero()
+        } else if contact.is_touching() {
+            return None;
+        } else {
+            time_of_impact_sphere_sphere(&a, ways[0], &b, ways[1])?
+        };
         let apart = b.center - a.center + (ways[1] - ways[0]) * time;
         let (normal, _) = normal_and_distance(apart, [contact.a, contact.b]);
         let approach_speed = (velocity[0] - velocity[1]).dot(normal);
