@@ -138,7 +138,7 @@ fn components_where_they_have_no_effect_are_named() {
         "Velocity of a wall",
         "HalfLength of a wall",
         "OneWay of a marble",
-        "Sensor without a Wall",
+        "Sensor or zone without a Wall",
     ];
     assert_eq!(ignored(&app), expected);
     assert_eq!(app.world().resource::<TawWorld>().sensors.len(), 1, "the floor only");
@@ -151,6 +151,11 @@ fn components_where_they_have_no_effect_are_named() {
     app.world_mut().entity_mut(floor).insert((Velocity::default(), Disabled));
     app.update();
     assert_eq!(ignored(&app), [""; 0], "whoever is disabled has no effect anyway");
+    let other = scene::floor(&mut app);
+    app.world_mut().entity_mut(other).insert(MarbleMass::default());
+    app.insert_resource(TawModel(Model::default()));
+    app.update();
+    assert_eq!(ignored(&app), ["MarbleMass of a wall"], "no marble has a mass");
 }
 
 #[test]

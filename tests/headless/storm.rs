@@ -255,11 +255,17 @@ impl Storm {
     /// other has half a second to part. `Displacement` stops no spin, so that a capsule that turns would
     /// lift what it lies on for ever, as a motor does.
     fn calm_down(&mut self, frame: f32) {
-        let stops_spins = self.model().response != Response::Displacement;
+        // The model that was set last is in use after a step.
+        let stepped = |app: &App| app.world().resource::<Time<Fixed>>().elapsed();
+        let before = stepped(&self.app);
+        while stepped(&self.app) == before {
+            self.app.update();
+        }
+        let keeps_spins = self.model().response == Response::Displacement;
         for marble in &self.marbles {
             let mut marble = self.app.world_mut().entity_mut(*marble);
             marble.remove::<ExternalForce>();
-            if !stops_spins {
+            if keeps_spins {
                 marble.insert(AngularVelocity(Vec3::ZERO));
             }
         }

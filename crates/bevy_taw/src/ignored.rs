@@ -23,114 +23,118 @@ use crate::wall::Wall;
 ///
 /// - components that the [`TawModel`](crate::resources::TawModel) does not read, as `SurfaceMaterial` with
 ///   `Displacement` (a `MarbleMass` that contacts do not read counts for forces still);
-/// - fields of the model that its response does not read, as `precision` with `SoftStep`;
+/// - `integrator`, `precision` and `detection` of the model where its response does not read them. (Its
+///   `iterations` are not named: every model has some.)
 /// - components of marbles on walls, as a `Velocity`, those of walls on marbles, as a `OneWay`, and a
-///   `Sensor` without a [`Wall`].
+///   `Sensor` or a zone without a [`Wall`].
 ///
 /// Each is also logged as a warning, once until it has an effect. Updated in each step, in
 /// [`TawSystems::Gather`](crate::TawSystems::Gather).
 #[derive(Resource, Clone, Debug, Default, PartialEq, Eq, Deref)]
 pub struct IgnoredComponents(Vec<&'static str>);
 
-/// Tables of the components that entities have.
-pub(crate) struct Carriers<'a> {
+/// Tables of the components that entities have, but for those that default filters hide.
+struct Carriers<'a> {
     components: &'a Components,
-    archetypes: Vec<&'a Archetype>,
+    marbles: Vec<&'a Archetype>,
+    /// Walls that are no marbles.
+    walls: Vec<&'a Archetype>,
+    /// Sensors that are neither.
+    shapeless: Vec<&'a Archetype>,
 }
 
 impl<'a> Carriers<'a> {
-    /// Components of all entities that no default filter hides.
     fn new(
         archetypes: &'a Archetypes,
         components: &'a Components,
         hidden: &DefaultQueryFilters,
     ) -> Self {
-        let is_seen = |archetype: &&Archetype| {
-            !archetype.is_empty() && !hidden.disabling_ids().any(|id| archetype.contains(id))
+        let mut all =
+            Self { components, marbles: Vec::new(), walls: Vec::new(), shapeless: Vec::new() };
+        let (marble, wall) = (all.id::<Marble>(), all.id::<Wall>());
+        let (sensor, mesh) = (all.id::<Sensor>(), mesh_id(components));
+        let has = |archetype: &Archetype, id: Option<ComponentId>| {
+            id.is_some_and(|id| archetype.contains(id))
         };
-        Self { components, archetypes: archetypes.iter().filter(is_seen).collect() }
+        for archetype in archetypes.iter() {
+            if archetype.is_empty() || hidden.disabling_ids().any(|id| archetype.contains(id)) {
+                continue;
+            }
+            if has(archetype, marble) {
+                all.marbles.push(archetype);
+            } else if has(archetype, wall) {
+                all.walls.push(archetype);
+            } else if has(archetype, sensor) && !has(archetype, mesh) {
+                all.shapeless.push(archetype); // those with a mesh may await it
+            }
+        }
+        all
     }
 
-    fn has<C: Component>(&self, archetype: &Archetype) -> bool {
-        let id: Option<ComponentId> = self.components.component_id::<C>();
-        id.is_some_and(|id| archetype.contains(id))
+    fn id<C: Component>(&self) -> Option<ComponentId> {
+        self.components.component_id::<C>()
     }
 
-    /// Tests if an entity has this component.
-    fn carry<C: Component>(&self) -> bool {
-        self.archetypes.iter().any(|archetype| self.has::<C>(archetype))
+    /// Tests if one of these has a component.
+    fn any<C: Component>(&self, of: &[&Archetype]) -> bool {
+        self.id::<C>().is_some_and(|id| of.iter().any(|archetype| archetype.contains(id)))
     }
 
-    /// Tests if a wall has this component, which is for marbles.
-    fn walls_carry<C: Component>(&self) -> bool {
-        let mut walls = self
-            .archetypes
-            .iter()
-            .filter(|archetype| self.has::<Wall>(archetype) && !self.has::<Marble>(archetype));
-        walls.any(|archetype| self.has::<C>(archetype))
-    }
-
-    /// Tests if a marble has this component, which is for walls.
-    fn marbles_carry<C: Component>(&self) -> bool {
-        let mut marbles = self.archetypes.iter().filter(|archetype| self.has::<Marble>(archetype));
-        marbles.any(|archetype| self.has::<C>(archetype))
-    }
-
-    /// Tests if an entity is a sensor without a shape.
-    fn has_sensor_without_wall(&self) -> bool {
-        let mut sensors = self.archetypes.iter().filter(|archetype| self.has::<Sensor>(archetype));
-        sensors.any(|archetype| {
-            let has_shape = self.has::<Wall>(archetype) || self.awaits_mesh(archetype);
-            !has_shape && !self.has::<Marble>(archetype)
-        })
-    }
-
-    /// Tests if the walls of an entity come with its meshes.
-    #[cfg(feature = "mesh")]
-    fn awaits_mesh(&self, archetype: &Archetype) -> bool {
-        self.has::<crate::mesh_walls::MeshWalls>(archetype)
-    }
-
-    #[cfg(not(feature = "mesh"))]
-    #[expect(clippy::unused_self, reason = "as with meshes")]
-    fn awaits_mesh(&self, _: &Archetype) -> bool {
-        false
-    }
-
-    /// Rows of a name and true if it has no effect.
-    fn rows(&self, model: Model) -> [(&'static str, bool); 24] {
+    /// Each name of what the model may not read, and true if it does not.
+    fn of_model(&self, model: Model) -> [(&'static str, bool); 9] {
         let Model { integrator, response, rotation, precision, detection, .. } = model;
         let projects = response == Response::Displacement;
         let unturned = rotation == Rotation::None;
         let soft = response == Response::SoftStep;
         let is_continuous = soft || response == Response::EventDriven;
+        let (marbles, walls) = (&self.marbles, &self.walls);
+        let has_material =
+            self.any::<SurfaceMaterial>(marbles) || self.any::<SurfaceMaterial>(walls);
         [
-            ("SurfaceMaterial", projects && self.carry::<SurfaceMaterial>()),
-            ("MarbleMass", projects && self.carry::<MarbleMass>()),
-            ("AngularVelocity", unturned && self.carry::<AngularVelocity>()),
-            ("MarbleRotation", unturned && self.carry::<MarbleRotation>()),
-            ("MarbleIntegrator", soft && self.carry::<MarbleIntegrator>()),
+            ("SurfaceMaterial", projects && has_material),
+            ("SurfaceVelocity", projects && self.any::<SurfaceVelocity>(walls)),
+            ("MarbleMass", projects && self.any::<MarbleMass>(marbles)),
+            ("AngularVelocity", unturned && self.any::<AngularVelocity>(marbles)),
+            ("MarbleRotation", unturned && self.any::<MarbleRotation>(marbles)),
+            ("MarbleIntegrator", soft && self.any::<MarbleIntegrator>(marbles)),
             ("Model::integrator", soft && integrator != Integrator::SemiImplicitEuler),
             ("Model::precision", soft && precision != Precision::Plain),
             ("Model::detection", is_continuous && detection == Detection::Discrete),
-            ("Velocity of a wall", self.walls_carry::<Velocity>()),
-            ("AngularVelocity of a wall", self.walls_carry::<AngularVelocity>()),
-            ("MarbleMass of a wall", self.walls_carry::<MarbleMass>()),
-            ("GravityScale of a wall", self.walls_carry::<GravityScale>()),
-            ("MarbleDamping of a wall", self.walls_carry::<MarbleDamping>()),
-            ("ExternalForce of a wall", self.walls_carry::<ExternalForce>()),
-            ("ExternalImpulse of a wall", self.walls_carry::<ExternalImpulse>()),
-            ("HalfLength of a wall", self.walls_carry::<HalfLength>()),
-            ("MarbleIntegrator of a wall", self.walls_carry::<MarbleIntegrator>()),
-            ("MarbleRotation of a wall", self.walls_carry::<MarbleRotation>()),
-            ("MarbleController of a wall", self.walls_carry::<MarbleController>()),
-            ("Wall of a marble", self.marbles_carry::<Wall>()),
-            ("SurfaceVelocity of a marble", self.marbles_carry::<SurfaceVelocity>()),
-            ("OneWay of a marble", self.marbles_carry::<OneWay>()),
-            ("Sensor of a marble", self.marbles_carry::<Sensor>()),
-            ("Sensor without a Wall", self.has_sensor_without_wall()),
         ]
     }
+
+    /// Each name of a component that has no effect where it is, and true if an entity has it there.
+    fn of_places(&self) -> [(&'static str, bool); 15] {
+        let (marbles, walls) = (&self.marbles, &self.walls);
+        [
+            ("Velocity of a wall", self.any::<Velocity>(walls)),
+            ("AngularVelocity of a wall", self.any::<AngularVelocity>(walls)),
+            ("MarbleMass of a wall", self.any::<MarbleMass>(walls)),
+            ("GravityScale of a wall", self.any::<GravityScale>(walls)),
+            ("MarbleDamping of a wall", self.any::<MarbleDamping>(walls)),
+            ("ExternalForce of a wall", self.any::<ExternalForce>(walls)),
+            ("ExternalImpulse of a wall", self.any::<ExternalImpulse>(walls)),
+            ("HalfLength of a wall", self.any::<HalfLength>(walls)),
+            ("MarbleIntegrator of a wall", self.any::<MarbleIntegrator>(walls)),
+            ("MarbleRotation of a wall", self.any::<MarbleRotation>(walls)),
+            ("MarbleController of a wall", self.any::<MarbleController>(walls)),
+            ("SurfaceVelocity of a marble", self.any::<SurfaceVelocity>(marbles)),
+            ("OneWay of a marble", self.any::<OneWay>(marbles)),
+            ("Sensor of a marble", self.any::<Sensor>(marbles)),
+            ("Sensor or zone without a Wall", !self.shapeless.is_empty()),
+        ]
+    }
+}
+
+/// Component of entities that may become walls once their mesh is there.
+#[cfg(feature = "mesh")]
+fn mesh_id(components: &Components) -> Option<ComponentId> {
+    components.component_id::<Mesh3d>()
+}
+
+#[cfg(not(feature = "mesh"))]
+fn mesh_id(_: &Components) -> Option<ComponentId> {
+    None
 }
 
 /// Finds the components and settings that have no effect, and says which are new.
@@ -142,19 +146,22 @@ pub(crate) fn find(
     mut found: ResMut<IgnoredComponents>,
 ) {
     let model = world.model();
-    let rows = Carriers::new(archetypes, components, &hidden).rows(model);
-    let ignored: Vec<_> =
-        rows.into_iter().filter(|(_, is_ignored)| *is_ignored).map(|(name, _)| name).collect();
+    let carriers = Carriers::new(archetypes, components, &hidden);
+    let without_effect = |rows: &[(&'static str, bool)]| -> Vec<&'static str> {
+        rows.iter().filter(|(_, is_ignored)| *is_ignored).map(|(name, _)| *name).collect()
+    };
+    let mut ignored = without_effect(&carriers.of_model(model));
     let Model { response, rotation, .. } = model;
     for name in ignored.iter().filter(|name| !found.contains(name)) {
-        if name.contains(' ') {
-            log::warn!("taw ignores a {name}");
-        } else {
-            log::warn!(
-                "taw ignores {name}{}: the TawModel's response is {response:?} and its rotation {rotation:?}",
-                if *name == "MarbleMass" { " in contacts" } else { "" }
-            );
-        }
+        log::warn!(
+            "without effect{}: {name}, as the TawModel's response is {response:?} and its rotation {rotation:?}",
+            if *name == "MarbleMass" { " in contacts" } else { "" }
+        );
     }
+    let misplaced = without_effect(&carriers.of_places());
+    for name in misplaced.iter().filter(|name| !found.contains(name)) {
+        log::warn!("without effect: {name}");
+    }
+    ignored.extend(misplaced);
     found.set_if_neq(IgnoredComponents(ignored));
 }

@@ -305,8 +305,8 @@ struct Written {
 }
 
 impl Written {
-    /// Positions of a marble at the end and at the start of the step after this write; `end` and `start`
-    /// are those of the simulation.
+    /// Positions of a marble at the end and at the start of the last step, corrected by this write; `end`
+    /// and `start` are the simulated ones.
     fn place(&self, end: Vec3, start: Vec3) -> (Vec3, Vec3) {
         let known = [Some(end), Some(start), self.before];
         let axes = [0, 1, 2].map(|i| {

@@ -97,7 +97,7 @@ pub(crate) fn register(app: &mut App) {
 }
 
 /// Takes a sensor out of the world when its component or its entity goes, also of an entity that
-/// queries do not see. What is left is a wall from the next step on.
+/// queries do not see. Its `Wall` is solid from the next step on.
 fn forget(removed: On<Remove, Sensor>, mut app: DeferredWorld) {
     let sensor = app.get::<WallState>(removed.entity).and_then(|state| state.sensor);
     if let Some(id) = sensor {

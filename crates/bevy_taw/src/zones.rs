@@ -12,7 +12,7 @@ use crate::refusal::Refusals;
 use crate::resources::TawWorld;
 use crate::sensor::Sensor;
 
-/// Gravity of its own inside of a [`Sensor`]'s shape, in m/s² in world space. A marble's
+/// Gravity of its own inside of a [`Sensor`]'s shape, its `Wall`, in m/s² in world space. A marble's
 /// [`GravityScale`](crate::components::GravityScale) counts for it, as does a ball's. Marbles do not sleep in
 /// a world without a gravity of its own.
 ///
@@ -47,7 +47,7 @@ impl Default for GravityZone {
     }
 }
 
-/// Wind inside of a [`Sensor`]'s shape: marbles and balls of swarms are dragged along. Acts in each step on
+/// Wind inside of a [`Sensor`]'s shape, its `Wall`: marbles and balls of swarms are dragged along. Acts in each step on
 /// those that were inside after the last one; winds that overlap all drag.
 ///
 /// ```

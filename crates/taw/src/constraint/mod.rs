@@ -21,7 +21,8 @@
 //!   give back a part of what has accumulated: `λ ← max(0, λ + a m (v* − v·n) − b λ)` (Catto, *Soft
 //!   contacts*, in `Solver2D`, 2024).
 //!
-//! Methods differ in the order of the contacts, the targets and the units of the impulses, which are the caller's: N s, or m/s after multiplication by an inverse mass.
+//! Methods differ in the order of the contacts, the targets and the units of the impulses. The units
+//! are the caller's: N s, or m/s after multiplication by an inverse mass.
 
 #![allow(
     clippy::inline_always,

@@ -96,7 +96,8 @@ impl BatchBuilder<'_> {
         self.left += PAIRS * balls;
     }
 
-    /// Number of pairs, of so many, that there is room for.
+    /// Takes room for these pairs as far as there is any, and counts the rest as unlisted. Returns the
+    /// number of pairs that got room.
     #[inline(always)]
     pub fn spend_only(&mut self, pairs: usize) -> usize {
         let count = pairs.min(self.left);

@@ -432,7 +432,7 @@ pub const ROWS: &[SuiteCase] = &[
 mod tests {
     use super::*;
 
-    const SEEDS: std::ops::RangeInclusive<u64> = 1..=6;
+    const SEEDS: std::ops::RangeInclusive<u64> = 1..=5;
 
     /// Measures the scene of each seed, two at a time.
     fn by_seed<T: Send>(measure: impl Fn(&mut Stopwatch, u64) -> T + Sync) -> Vec<T> {
@@ -459,7 +459,7 @@ mod tests {
     /// The rows of the suite are of one heap and of three layers. Prints those of other seeds.
     #[test]
     #[ignore = "a quarter of an hour of two cores, optimised"]
-    fn heaps_of_several_seeds() {
+    fn the_median_heap_of_several_seeds_reaches_the_targets() {
         let packings = by_seed(pack);
         for (seed, [density, touches, overlap]) in SEEDS.zip(&packings) {
             println!(
@@ -469,7 +469,8 @@ mod tests {
         let angles = by_seed(|stopwatch, seed| creep(stopwatch, seed, 0.0));
         println!("repose, degrees: {angles:.2?}");
         assert!(median(packings.iter().map(|it| it[0])) < 5e-3);
-        assert!(median(packings.iter().map(|it| it[2])) < 2e-4);
+        assert!(median(packings.iter().map(|it| it[1])) < 0.1);
+        assert!(median(packings.iter().map(|it| it[2])) < 1e-4);
         assert!((median(angles.iter().copied()) - 22.0).abs() < 2.0);
     }
 }
