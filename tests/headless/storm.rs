@@ -255,6 +255,13 @@ impl Storm {
     /// other has half a second to part. `Displacement` stops no spin, so that a capsule that turns would
     /// lift what it lies on for ever, as a motor does.
     fn calm_down(&mut self, frame: f32) {
+        // Below a parent of scale zero nothing has a place, and no write to it counts.
+        for (parent, ..) in &self.parents {
+            let place = self.app.world_mut().get_mut::<Transform>(*parent);
+            if let Some(mut place) = place.filter(|place| place.scale == Vec3::ZERO) {
+                place.scale = Vec3::ONE;
+            }
+        }
         // The model that was set last is in use after a step.
         let stepped = |app: &App| app.world().resource::<Time<Fixed>>().elapsed();
         let before = stepped(&self.app);
