@@ -26,8 +26,8 @@ use crate::resources::TawWorld;
 
 /// Makes a sensor of a [`Wall`]: marbles pass through it, and it reports which of them enter and leave,
 /// by [`SensorEntered`] and [`SensorLeft`], and which are inside, by [`CollidingEntities`]; of the balls of
-/// swarms, which are inside after each step, by [`CollidingBalls`]. Without a wall it has no shape and notices nobody,
-/// as [`IgnoredComponents`](crate::ignored::IgnoredComponents) says.
+/// swarms, which are inside after each step, by [`CollidingBalls`]. Without a wall it has no shape and
+/// notices nobody, as [`IgnoredComponents`](crate::ignored::IgnoredComponents) says.
 ///
 /// It may be moved as a wall, by itself or by what carries it, and has [`CollisionLayers`]. A marble
 /// that passes through within a step enters and leaves in it, at any speed; one that is put elsewhere

@@ -47,8 +47,8 @@ impl Default for GravityZone {
     }
 }
 
-/// Wind inside of a [`Sensor`]'s shape, its `Wall`: marbles and balls of swarms are dragged along. Acts in each step on
-/// those that were inside after the last one; winds that overlap all drag.
+/// Wind inside of a [`Sensor`]'s shape, its `Wall`: marbles and balls of swarms are dragged along. Acts in
+/// each step on those that were inside after the last one; winds that overlap all drag.
 ///
 /// ```
 /// # use bevy::prelude::*;
