@@ -109,6 +109,9 @@ impl<S: Scalar> Contact<S> {
     /// that rounding may leave under a resting marble. False for a speculative contact.
     #[must_use]
     pub fn is_touching(&self) -> bool {
+        if self.separation <= S::zero() {
+            return true;
+        }
         let arm = |arm: Vec3<S>| if arm.is_zero() { S::infinity() } else { length(arm) };
         let shorter = arm(self.arms[0]).min(arm(self.arms[1]));
         self.separation <= shorter * S::from_f64(TOUCHING)

@@ -3,18 +3,15 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use cgmath::{EuclideanSpace, InnerSpace, Zero};
+use cgmath::EuclideanSpace;
 
-use super::batches::Batch;
 use super::kernels::{MAX_MAGNITUDE, largest, squared};
 use super::simd::Row;
 use super::surfaces::{Surface, SurfaceOf};
-use super::wall_contact::WallContact;
 use super::workers::{DisjointSlice, parallel_for};
 use super::{BallId, Swarm, Tier};
 use crate::broad::CollisionLayers;
-use crate::contact::{Contact, Contacts};
-use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite};
+use crate::math::{Point3, Quat, Scalar, Vec3, is_finite};
 use crate::motion::integrate_rotation;
 use crate::response::Impact;
 
@@ -100,11 +97,11 @@ pub(crate) struct MarbleRow<S> {
     pub radius: S,
 }
 
-fn number<S: Scalar>(x: f32) -> S {
+pub(super) fn number<S: Scalar>(x: f32) -> S {
     S::from_f64(f64::from(x))
 }
 
-fn vector<S: Scalar>(row: &Row) -> Vec3<S> {
+pub(super) fn vector<S: Scalar>(row: &Row) -> Vec3<S> {
     Vec3::new(number(row[0]), number(row[1]), number(row[2]))
 }
 
@@ -328,92 +325,6 @@ impl Swarm {
                 }
             }
         });
-    }
-
-    /// Lists the contacts of bodies that are awake, with a wall or each other, of which the separation
-    /// is at most `reach` metres, besides what closes within `dt` seconds. In the order of the solver's
-    /// memory. `lists` is scratch.
-    pub(crate) fn list_contacts<S: Scalar>(
-        &self,
-        marble_of_slot: &[u32],
-        near: [f32; 2],
-        lists: &mut Vec<Contacts<S>>,
-        contacts: &mut Contacts<S>,
-    ) {
-        let chunks = self.chunks.len();
-        lists.resize_with(chunks + 1, Contacts::default);
-        lists.iter_mut().for_each(Contacts::clear);
-        let parts = DisjointSlice::new(lists);
-        parallel_for(self.scratch.threads, chunks + 1, |_, chunk| {
-            // SAFETY: each has its own list.
-            let list = unsafe { &mut *parts.row(chunk) };
-            let (wall_contacts, batches) = match self.chunks.get(chunk..) {
-                None | Some([]) => (&[][..], &self.fast_movers.batches[..]),
-                Some([chunk, ..]) if !chunk.asleep => {
-                    (&chunk.wall_contacts[..], &chunk.batches[..])
-                }
-                Some([chunk, next, ..]) if !next.asleep => (&[][..], &chunk.batches[..]),
-                Some(_) => return,
-            };
-            self.list_contacts_of(marble_of_slot, near, (wall_contacts, batches), list);
-        });
-        for list in lists {
-            contacts.wm.append(&mut list.wm);
-            contacts.mm.append(&mut list.mm);
-        }
-    }
-
-    /// Lists those of these contacts with walls and these pairs.
-    fn list_contacts_of<S: Scalar>(
-        &self,
-        marble_of_slot: &[u32],
-        [reach, dt]: [f32; 2],
-        (contacts_of_walls, batches): (&[WallContact], &[Batch]),
-        contacts: &mut Contacts<S>,
-    ) {
-        let slots = self.ids.slots();
-        let marble = |row: u32| {
-            let marble = marble_of_slot.get(slots[row as usize] as usize).copied();
-            marble.filter(|marble| *marble != NO_ROW)
-        };
-        let is_near = |separation: f32, approach_speed: f32| {
-            separation <= reach + approach_speed.max(0.0) * dt
-        };
-        let (number, centers) = (|x: f32| S::from_f64(f64::from(x)), [Zero::zero(); 2]);
-        for contact in contacts_of_walls {
-            let Some(b) = marble(contact.row) else { continue };
-            let row = contact.row as usize;
-            let separation = contact.separation(&self.at[row]);
-            let approach_speed = -(vector::<f32>(&self.velocity[row]) - contact.surface);
-            if is_near(separation, approach_speed.dot(contact.normal)) {
-                let radii = [S::zero(), number(self.at[row][3])];
-                let place = (cast_vector(contact.normal), S::zero());
-                let listed = Contact::with_wall(contact.wall, contact.part, b);
-                let listed = listed.placed(place, radii, centers);
-                contacts.wm.push(Contact { separation: number(separation), ..listed });
-            }
-        }
-        for batch in batches {
-            for lane in 0..batch.count as usize {
-                let rows = batch.pair(lane);
-                if rows.into_iter().all(|row| self.velocity[row as usize][3].is_sign_negative()) {
-                    continue; // both sleep
-                }
-                let [Some(a), Some(b)] = rows.map(marble) else { continue };
-                let [p, q] = rows.map(|row| &self.at[row as usize]);
-                let [u, v] = rows.map(|row| vector::<f32>(&self.velocity[row as usize]));
-                let apart = vector::<f32>(q) - vector(p);
-                let distance = apart.magnitude();
-                let separation = distance - (p[3] + q[3]);
-                let normal = if distance > 0.0 { apart / distance } else { Vec3::unit_x() };
-                if is_near(separation, (u - v).dot(normal)) {
-                    let radii = [number(p[3]), number(q[3])];
-                    let place = (cast_vector(normal), number(distance));
-                    let listed = Contact::between_marbles(a, b).placed(place, radii, centers);
-                    contacts.mm.push(if a < b { listed } else { listed.reversed() });
-                }
-            }
-        }
     }
 
     /// Bounces of the step, if bodies are rows: of slots, in the order in which they were solved.

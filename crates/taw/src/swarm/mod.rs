@@ -28,6 +28,7 @@ mod bit_set;
 mod bodies;
 mod build;
 mod chunk;
+mod contact_list;
 mod crowding;
 mod fast_movers;
 mod grid;
@@ -53,11 +54,13 @@ mod workers;
 
 pub(crate) use bodies::{Body, BodyColumns, MarbleRow, NO_ROW, SyncToken, VelocityChange};
 pub use ids::BallId;
+pub(crate) use kernels::NearLimits;
 pub use model::{Ball, Stage, SwarmModel, Tier};
 pub(crate) use proxies::Proxy;
 pub use simd::SimdLevel;
 pub(crate) use surfaces::Surface;
 pub(crate) use walls::StaticGeometry;
+pub(crate) use workers::append_all;
 
 use cgmath::EuclideanSpace;
 

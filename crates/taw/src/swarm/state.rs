@@ -6,7 +6,7 @@ use super::{Swarm, SwarmModel};
 
 impl Swarm {
     /// Number of threads that work on this step: of the last model until the first step begins.
-    pub(super) fn threads(&self) -> usize {
+    pub(crate) fn threads(&self) -> usize {
         self.scratch.threads.max(1)
     }
 

@@ -216,6 +216,35 @@ pub(super) fn parallel_filter(
     unsafe { lists.read(0..lists.len()) }.iter().for_each(|list| listed.extend(list));
 }
 
+/// Appends lists to one, in their order.
+pub(crate) fn append_all<'a, T: Copy + Send + Sync + 'a>(
+    threads: usize,
+    lists: impl Iterator<Item = &'a [T]>,
+    to: &mut Vec<T>,
+) {
+    let mut end = 0;
+    let lists: Vec<_> = lists
+        .map(|list| {
+            let begin = end;
+            end += list.len();
+            (begin..end, list)
+        })
+        .collect();
+    to.reserve(end);
+    let room = DisjointSlice::new(&mut to.spare_capacity_mut()[..end]);
+    let threads = if end * size_of::<T>() < SHARED_COPY { 1 } else { threads };
+    parallel_for(threads, lists.len(), |_, list| {
+        let (rows, list) = &lists[list];
+        // SAFETY: each list has its own rows.
+        unsafe { room.part(rows.clone()) }.write_copy_of_slice(list);
+    });
+    // SAFETY: all of them are written.
+    unsafe { to.set_len(to.len() + end) };
+}
+
+/// Bytes from which on it pays to copy on more than one thread.
+const SHARED_COPY: usize = 1 << 16;
+
 /// Progress of each of a row of neighbours; see [`parallel_for_odd_even`].
 const CLAIMED: u32 = 1;
 const FINISHED: u32 = 2;

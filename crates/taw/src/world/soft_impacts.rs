@@ -5,7 +5,7 @@ use cgmath::InnerSpace;
 
 use super::World;
 use super::continuous::{Frame, MovingWall, RelativePath, WallImpact};
-use crate::contact::{Contact, time_of_impact_sphere_sphere};
+use crate::contact::{Contact, Contacts, time_of_impact_sphere_sphere};
 use crate::math::{Scalar, Vec3, cast_vector, length, normal_and_distance};
 use crate::response::{Colliders as _, Impact};
 use crate::shape::{BoundedShape, Sphere};
@@ -36,6 +36,30 @@ impl<S> Default for PredictedImpacts<S> {
     }
 }
 
+/// Contacts of a chunk, and the impacts that they predict: at walls, and of pairs.
+#[derive(Clone, Debug)]
+pub(super) struct ChunkContacts<S> {
+    pub contacts: Contacts<S>,
+    /// Contacts of pairs that may come together, by index.
+    pub meetings: Vec<u32>,
+    predicted: [Vec<PredictedImpact<S>>; 2],
+}
+
+impl<S> Default for ChunkContacts<S> {
+    fn default() -> Self {
+        let (contacts, meetings) = (Contacts::default(), Vec::new());
+        Self { contacts, meetings, predicted: [Vec::new(), Vec::new()] }
+    }
+}
+
+impl<S: Scalar> ChunkContacts<S> {
+    pub fn clear(&mut self) {
+        self.contacts.clear();
+        self.meetings.clear();
+        self.predicted.iter_mut().for_each(Vec::clear);
+    }
+}
+
 /// Part of the push of an impact without restitution that shows that it took place. More than that of
 /// rounding, and less than any: a speculative contact may stop one body at the surface of the other
 /// in this step, and take the rest of the speed in the next one.
@@ -59,19 +83,44 @@ fn of_marbles<S: Scalar>(impact: &Impact<f32>, marbles: &[u32]) -> Option<Impact
 }
 
 impl<S: Scalar> World<S> {
-    /// Predicts which listed contacts begin within the step of `dt` seconds.
-    pub(super) fn predict_impacts(&mut self, dt: S) {
-        let PredictedImpacts { mut list, mut moving, mut listed, .. } =
-            std::mem::take(&mut self.scratch.soft_step.predicted);
-        list.clear();
+    /// Walls other than half-spaces that move within `dt` seconds.
+    pub(super) fn list_moving_walls(&mut self, dt: S) -> Vec<MovingWall<S>> {
+        let mut moving = std::mem::take(&mut self.scratch.soft_step.predicted.moving);
         MovingWall::list(&self.walls, dt, &mut moving);
+        moving
+    }
+
+    /// Predicts which contacts of a chunk begin within the step of `dt` seconds.
+    pub(super) fn predict_impacts(
+        &self,
+        ChunkContacts { contacts, meetings, predicted: [at_walls, of_pairs] }: &mut ChunkContacts<
+            S,
+        >,
+        moving: &[MovingWall<S>],
+        dt: S,
+    ) {
         let is_current = |contact: &&Contact<S>| {
             contact.is_touching() || moving.iter().all(|wall| wall.row != contact.a)
         };
-        let at_walls = self.contacts.wm.iter().filter(is_current);
-        list.extend(at_walls.filter_map(|contact| self.predict_wall_impact(contact, dt)));
-        let of_pairs = self.contacts.mm.iter();
-        list.extend(of_pairs.filter_map(|contact| self.predict_pair_impact(contact, dt)));
+        let current = contacts.wm.iter().filter(is_current);
+        at_walls.extend(current.filter_map(|contact| self.predict_wall_impact(contact, dt)));
+        let pairs = meetings.iter().map(|index| &contacts.mm[*index as usize]);
+        of_pairs.extend(pairs.filter_map(|contact| self.predict_pair_impact(contact, dt)));
+    }
+
+    /// Collects the impacts that chunks predict, and those of walls that move.
+    pub(super) fn collect_predicted(
+        &mut self,
+        lists: &mut [ChunkContacts<S>],
+        moving: Vec<MovingWall<S>>,
+        dt: S,
+    ) {
+        let PredictedImpacts { mut list, mut listed, .. } =
+            std::mem::take(&mut self.scratch.soft_step.predicted);
+        list.clear();
+        for part in 0..2 {
+            lists.iter_mut().for_each(|of_chunk| list.append(&mut of_chunk.predicted[part]));
+        }
         for wall in &moving {
             self.predict_impacts_of(wall, dt, (&mut listed, &mut list));
         }
@@ -142,11 +191,15 @@ impl<S: Scalar> World<S> {
         Some(PredictedImpact { impact, velocity: [surface, velocity] })
     }
 
+    /// Speed that gravity makes of rest within two steps, in m/s.
+    pub(super) fn resting_speed(&self, dt: S) -> S {
+        length(self.settings.gravity) * dt * S::from_f64(2.0)
+    }
+
     /// Returns true if two that touch already come together faster than gravity makes rest within
     /// two steps: their impact is now.
     fn meet_now(&self, contact: &Contact<S>, approach_speed: S, dt: S) -> bool {
-        contact.is_touching()
-            && approach_speed > length(self.settings.gravity) * dt * S::from_f64(2.0)
+        contact.is_touching() && approach_speed > self.resting_speed(dt)
     }
 
     /// Impact of a marble that flies along its parabola to the plane of its contact.
@@ -179,14 +232,16 @@ impl<S: Scalar> World<S> {
     /// Impact of two marbles that fly straight relative to each other.
     fn predict_pair_impact(&self, contact: &Contact<S>, dt: S) -> Option<PredictedImpact<S>> {
         let rows = [contact.a, contact.b].map(|row| row as usize);
-        let [a, b] = rows.map(|row| self.marbles.sphere(row));
         let velocity = rows.map(|row| self.marbles.velocity[row]);
+        let approach_speed = (velocity[0] - velocity[1]).dot(contact.normal);
+        let meet_now = self.meet_now(contact, approach_speed, dt);
+        if !meet_now && contact.is_touching() {
+            return None;
+        }
+        let [a, b] = rows.map(|row| self.marbles.sphere(row));
         let ways = velocity.map(|velocity| velocity * dt);
-        let meet_now = self.meet_now(contact, (velocity[0] - velocity[1]).dot(contact.normal), dt);
         let time = if meet_now {
             S::zero()
-        } else if contact.is_touching() {
-            return None;
         } else {
             time_of_impact_sphere_sphere(&a, ways[0], &b, ways[1])?
         };

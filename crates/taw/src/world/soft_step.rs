@@ -6,18 +6,20 @@ use std::collections::BTreeSet;
 use cgmath::{EuclideanSpace, Zero};
 
 use super::method::Method;
-use super::soft_impacts::PredictedImpacts;
+use super::soft_impacts::{ChunkContacts, PredictedImpacts};
 use super::swarm::MAX_COORDINATE;
 use super::swept_walls::SweptWalls;
 use super::{MarbleId, World};
 use crate::Error;
 use crate::broad::CollisionLayers;
-use crate::contact::Contacts;
 use crate::error::within;
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::Rotation;
 use crate::response::{Material, Response};
-use crate::swarm::{Body, INFINITE_MASS, MarbleRow, NO_ROW, Surface, SyncToken, VelocityChange};
+use crate::swarm::{
+    Body, INFINITE_MASS, MarbleRow, NO_ROW, NearLimits, Surface, SyncToken, VelocityChange,
+    append_all,
+};
 
 /// Correspondence of marbles and rows, and scratch memory.
 #[derive(Clone, Debug)]
@@ -29,7 +31,7 @@ pub(super) struct SoftRows<S> {
     slot_of_marble: Vec<u32>,
     pub marble_of_slot: Vec<u32>,
     changed: Vec<Body>,
-    lists: Vec<Contacts<S>>,
+    lists: Vec<ChunkContacts<S>>,
     /// Length of the step that was integrated, in seconds.
     dt: f32,
     /// Length of the step and identity of the walls for which contacts were found.
@@ -135,19 +137,37 @@ impl<S: Scalar> World<S> {
         self.swarm.prepare(dt, gravity, &walls, self.walls.identity());
         self.walls.mark_seen();
         self.scratch.soft_step.found = Some((dt, self.walls.identity()));
-        let reach = 2.0 * length(gravity) * dt * dt;
         let marbles = &self.scratch.soft_step.marble_of_slot;
         let turns = self.settings.model.rotation == Rotation::Dynamic;
         let columns = self.marbles.body_columns(turns);
         self.swarm.read_bodies(marbles, columns, None, &mut self.scratch.stopped);
-        let lists = &mut self.scratch.soft_step.lists;
-        self.swarm.list_contacts(marbles, [reach, dt], lists, &mut self.contacts);
-        let (walls, marbles) = (&self.walls, &self.marbles);
-        if !marbles.ignored_rows.is_empty() {
-            // Those of the step before are listed, too.
-            self.contacts.wm.retain(|c| walls.collides(c.a, marbles.filter_of_row(c.b as usize)));
-        }
-        self.predict_impacts(S::from_f64(dt.into()));
+        self.list_soft_contacts(S::from_f64(dt.into()));
+    }
+
+    /// Lists contacts that touch or may do so within `dt` seconds, and predicts which begin in that
+    /// time.
+    fn list_soft_contacts(&mut self, dt: S) {
+        let mut lists = std::mem::take(&mut self.scratch.soft_step.lists);
+        lists.iter_mut().for_each(ChunkContacts::clear);
+        let (time, fast) = (dt.as_f64() as f32, self.resting_speed(dt).as_f64() as f32);
+        let limits = NearLimits { reach: fast * time, time, fast };
+        let moving = self.list_moving_walls(dt);
+        self.swarm.fill_lists(&mut lists, |list, pairs| {
+            let marbles = &self.scratch.soft_step.marble_of_slot;
+            let listed = (&mut list.contacts, &mut list.meetings);
+            self.swarm.list_contacts(pairs, marbles, limits, listed);
+            if !self.marbles.ignored_rows.is_empty() {
+                // Those of the step before are listed, too.
+                let filter = |row: u32| self.marbles.filter_of_row(row as usize);
+                list.contacts.wm.retain(|c| self.walls.collides(c.a, filter(c.b)));
+            }
+            self.predict_impacts(list, &moving, dt);
+        });
+        let threads = self.swarm.threads();
+        append_all(threads, lists.iter().map(|list| &list.contacts.wm[..]), &mut self.contacts.wm);
+        append_all(threads, lists.iter().map(|list| &list.contacts.mm[..]), &mut self.contacts.mm);
+        self.collect_predicted(&mut lists, moving, dt);
+        self.scratch.soft_step.lists = lists;
     }
 
     /// The third verb: moves marbles on in substeps, and solves their contacts.

@@ -14,6 +14,7 @@ mod displace;
 mod impacts;
 mod integrate;
 mod meeting;
+mod near;
 mod params;
 mod rolling;
 mod sinking;
@@ -25,6 +26,8 @@ pub(super) use displace::{Displace, DisplaceFromPlanes, DisplaceNeighbours};
 pub(super) use integrate::{
     IntegratePositions, MAX_MAGNITUDE, Predict, UpdateVelocities, largest, squared,
 };
+pub(crate) use near::NearLimits;
+pub(super) use near::NearPairs;
 pub(super) use params::{GROUNDED, Pass, SolverParams, WALL_SLOP};
 pub(super) use sinking::{FindSinking, Sinking};
 

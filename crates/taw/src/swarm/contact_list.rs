@@ -1,0 +1,92 @@
+//! Contacts of bodies as the world lists them.
+
+use cgmath::{InnerSpace, Zero};
+
+use super::Swarm;
+use super::batches::Batch;
+use super::bodies::{NO_ROW, number, vector};
+use super::kernels::{NearLimits, NearPairs};
+use super::wall_contact::WallContact;
+use super::workers::{DisjointSlice, parallel_for};
+use crate::contact::{Contact, Contacts};
+use crate::math::{Scalar, Vec3, cast_vector};
+
+/// Contacts with walls and pairs of a chunk, in the order of the solver's memory.
+#[derive(Clone, Copy)]
+pub(crate) struct ChunkPairs<'a> {
+    with_walls: &'a [WallContact],
+    batches: &'a [Batch],
+}
+
+impl Swarm {
+    /// Gives each chunk with balls that are awake, and fast movers, a list to fill, on all threads. Those
+    /// of chunks that sleep are left as they are.
+    pub(crate) fn fill_lists<L: Default + Send + Sync>(
+        &self,
+        lists: &mut Vec<L>,
+        fill: impl Fn(&mut L, ChunkPairs) + Sync,
+    ) {
+        let chunks = self.chunks.len();
+        lists.resize_with(chunks + 1, L::default);
+        let lists = DisjointSlice::new(lists);
+        parallel_for(self.scratch.threads, chunks + 1, |_, chunk| {
+            let (with_walls, batches) = match self.chunks.get(chunk..) {
+                None | Some([]) => (&[][..], &self.fast_movers.batches[..]),
+                Some([chunk, ..]) if !chunk.asleep => {
+                    (&chunk.wall_contacts[..], &chunk.batches[..])
+                }
+                Some([chunk, next, ..]) if !next.asleep => (&[][..], &chunk.batches[..]),
+                Some(_) => return,
+            };
+            // SAFETY: each has its own list.
+            fill(unsafe { &mut *lists.row(chunk) }, ChunkPairs { with_walls, batches });
+        });
+    }
+
+    /// Lists the contacts of bodies that are awake and near a wall or each other, and which of those
+    /// between bodies may come together, by index.
+    pub(crate) fn list_contacts<S: Scalar>(
+        &self,
+        ChunkPairs { with_walls, batches }: ChunkPairs,
+        marble_of_slot: &[u32],
+        limits: NearLimits,
+        (contacts, meetings): (&mut Contacts<S>, &mut Vec<u32>),
+    ) {
+        let slots = self.ids.slots();
+        let marble = |row: u32| {
+            let marble = marble_of_slot.get(slots[row as usize] as usize).copied();
+            marble.filter(|marble| *marble != NO_ROW)
+        };
+        let centers = [Zero::zero(); 2];
+        for contact in with_walls {
+            let Some(b) = marble(contact.row) else { continue };
+            let row = contact.row as usize;
+            let separation = contact.separation(&self.at[row]);
+            let approach_speed = -(vector::<f32>(&self.velocity[row]) - contact.surface);
+            let closes = approach_speed.dot(contact.normal).max(0.0) * limits.time;
+            if separation <= limits.reach + closes {
+                let radii = [S::zero(), number(self.at[row][3])];
+                let place = (cast_vector(contact.normal), S::zero());
+                let listed = Contact::with_wall(contact.wall, contact.part, b);
+                let listed = listed.placed(place, radii, centers);
+                contacts.wm.push(Contact { separation: number(separation), ..listed });
+            }
+        }
+        let visit = |rows: [u32; 2], comes: bool| {
+            let [Some(a), Some(b)] = rows.map(marble) else { return };
+            let [p, q] = rows.map(|row| &self.at[row as usize]);
+            let apart = vector::<f32>(q) - vector(p);
+            let distance = apart.magnitude();
+            let normal = if distance > 0.0 { apart / distance } else { Vec3::unit_x() };
+            let radii = [number(p[3]), number(q[3])];
+            let place = (cast_vector(normal), number(distance));
+            let listed = Contact::between_marbles(a, b).placed(place, radii, centers);
+            if comes {
+                meetings.push(contacts.mm.len() as u32);
+            }
+            contacts.mm.push(if a < b { listed } else { listed.reversed() });
+        };
+        let (at, velocity) = (&self.at[..], &self.velocity[..]);
+        self.simd_level.run(NearPairs { at, velocity, batches, limits, visit });
+    }
+}
