@@ -28,6 +28,7 @@
 //! | room | what for |
 //! |---|---|
 //! | [`math`] | names for cgmath's types, the [`Scalar`](math::Scalar), lengths that neither overflow nor vanish |
+//! | `workers` | threads that share the work of a step |
 //! | [`frame`] | where a thing is and how it is turned: poses, every form of a rotation, motors, cameras |
 //! | [`shape`] | what a thing is: sphere, plane, boxes, capsule, hull, compound |
 //! | [`contact`] | when things touch, where, and the shortest way apart; rays and sweeps |
@@ -65,6 +66,7 @@ pub mod response;
 pub mod scene;
 pub mod shape;
 pub mod swarm;
+mod workers;
 pub mod world;
 
 pub use error::Error;

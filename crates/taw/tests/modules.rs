@@ -5,9 +5,10 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From what everything uses to what uses everything.
-const ORDER: [&str; 12] = [
+const ORDER: [&str; 13] = [
     "math",
     "handle",
+    "workers",
     "frame",
     "shape",
     "contact",

@@ -24,7 +24,10 @@ pub enum Rotation {
 /// seconds: exact for a constant one.
 #[must_use]
 #[inline(always)]
-#[expect(clippy::inline_always, reason = "passing four numbers in memory costs as much as the rest")]
+#[expect(
+    clippy::inline_always,
+    reason = "passing four numbers in memory costs as much as the rest"
+)]
 pub fn integrate_rotation<S: Scalar>(
     rotation: Quat<S>,
     angular_velocity: Vec3<S>,

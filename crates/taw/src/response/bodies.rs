@@ -229,7 +229,8 @@ pub(super) fn push<S: Scalar>(
 
 /// Relative velocity at a contact: that of the second body's contact point minus the first's, or
 /// the surface's if there is no first body; in m/s.
-#[inline]
+#[inline(always)]
+#[expect(clippy::inline_always, reason = "most of a pass is this")]
 pub(super) fn relative_velocity<S: Scalar>(
     motion: impl Fn(usize) -> Motion<S>,
     is_capsule: impl Fn(usize) -> bool,

@@ -5,7 +5,6 @@ use cgmath::Zero;
 use super::bodies::{NO_ROW, VelocityChange};
 use super::state::of;
 use super::surfaces::Surface;
-use super::workers::{DisjointSlice, parallel_for_rows};
 use super::{Ball, BallId, Swarm};
 use crate::Error;
 use crate::broad::{CollisionLayers, IgnoredPairs};
@@ -13,6 +12,7 @@ use crate::error::{finite, finite_vector};
 use crate::math::{Point3, Vec3};
 use crate::motion::{Mass, Motion};
 use crate::response::Material;
+use crate::workers::{DisjointSlice, parallel_for_rows};
 
 /// Forces on single balls.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -8,12 +8,12 @@ use cgmath::EuclideanSpace;
 use super::kernels::{MAX_MAGNITUDE, largest, squared};
 use super::simd::Row;
 use super::surfaces::{Surface, SurfaceOf};
-use super::workers::{DisjointSlice, parallel_for};
 use super::{BallId, Swarm, Tier};
 use crate::broad::CollisionLayers;
 use crate::math::{Point3, Quat, Scalar, Vec3, is_finite};
 use crate::motion::integrate_rotation;
 use crate::response::Impact;
+use crate::workers::{DisjointSlice, parallel_for};
 
 /// State of a marble as a row.
 #[derive(Clone, Copy, Debug, PartialEq)]

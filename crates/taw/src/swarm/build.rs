@@ -12,9 +12,9 @@ use super::simd::SimdLevel;
 use super::step::listed_planes;
 use super::surfaces::SurfaceOf;
 use super::sweeps::{CrowdSweep, Sweep};
-use super::workers::{DisjointSlice, parallel_filter, parallel_for, parallel_for_rows};
 use super::{Stage, StaticGeometry, Swarm, walls};
 use crate::math::length;
+use crate::workers::{DisjointSlice, parallel_filter, parallel_for, parallel_for_rows};
 
 /// Balls in a chunk at least.
 const MIN_CHUNK_ROWS: u32 = 512;

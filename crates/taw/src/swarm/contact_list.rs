@@ -7,9 +7,9 @@ use super::batches::Batch;
 use super::bodies::{NO_ROW, number, vector};
 use super::kernels::{NearLimits, NearPairs};
 use super::wall_contact::WallContact;
-use super::workers::{DisjointSlice, parallel_for};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Scalar, Vec3, cast_vector};
+use crate::workers::{DisjointSlice, parallel_for};
 
 /// Contacts with walls and pairs of a chunk, in the order of the solver's memory.
 #[derive(Clone, Copy)]

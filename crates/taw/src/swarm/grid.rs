@@ -13,7 +13,7 @@ use bytemuck::{Pod, cast_slice_mut};
 
 use super::impulse_cache::shrink_slack;
 use super::simd::Row;
-use super::workers::{DisjointSlice, ROWS, parallel_for, parallel_for_rows};
+use crate::workers::{DisjointSlice, ROWS, parallel_for, parallel_for_rows};
 
 /// Cells in all, for each ball.
 const CELLS_PER_BALL: f64 = 2.0;

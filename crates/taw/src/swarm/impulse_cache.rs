@@ -7,7 +7,7 @@ use super::fast_movers::FastMovers;
 use super::kernels::ContactImpulses;
 use super::wall_contact::WallContact;
 use super::walls::{find, shapes_of};
-use super::workers::{DisjointSlice, parallel_for};
+use crate::workers::{DisjointSlice, parallel_for};
 
 /// Impulses of a pair; stored with its first ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -50,7 +50,6 @@ mod vec3_wide;
 mod wall_contact;
 mod wall_paths;
 mod walls;
-mod workers;
 
 pub(crate) use bodies::{Body, BodyColumns, MarbleRow, NO_ROW, SyncToken, VelocityChange};
 pub use ids::BallId;
@@ -60,7 +59,6 @@ pub(crate) use proxies::Proxy;
 pub use simd::SimdLevel;
 pub(crate) use surfaces::Surface;
 pub(crate) use walls::StaticGeometry;
-pub(crate) use workers::append_all;
 
 use cgmath::EuclideanSpace;
 

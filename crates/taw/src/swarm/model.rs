@@ -67,7 +67,7 @@ impl SwarmModel {
     /// Maximum number of [substeps](Self::substeps).
     pub const MAX_SUBSTEPS: u32 = 1000;
     /// Maximum number of [threads](Self::threads).
-    pub const MAX_THREADS: u32 = super::workers::MAX_THREADS as u32;
+    pub const MAX_THREADS: u32 = crate::workers::MAX_THREADS as u32;
 
     /// Validates the model.
     pub(super) fn validated(self) -> Result<Self, Error> {
@@ -75,6 +75,11 @@ impl SwarmModel {
         within("threads", f64::from(self.threads), 0.0, f64::from(Self::MAX_THREADS))?;
         self.material.validated()?;
         Ok(self)
+    }
+
+    /// Number of threads for work that pays for all of them.
+    pub(crate) fn all_threads(self) -> usize {
+        self.threads_for(usize::MAX)
     }
 
     /// Number of threads that work on a step of this many balls; [`threads`](Self::threads) if it is

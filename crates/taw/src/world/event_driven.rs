@@ -59,7 +59,9 @@ impl<S: Scalar> World<S> {
         let dt = dt.as_f64();
         let gravity = cast_vector(self.settings.gravity);
         let cost = 0.into();
-        let settings = EventSettings { dt, iterations, gravity, source, budget_fraction, cost };
+        let threads = self.swarm.model().all_threads();
+        let settings =
+            EventSettings { dt, iterations, threads, gravity, source, budget_fraction, cost };
         events.work = self.scratch.audit_state.is_some().then(EnergyLedger::default);
         events.impulse_cache = std::mem::take(&mut self.memory.event_impulses);
         let mut impacts = Vec::new();

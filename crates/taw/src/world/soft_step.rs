@@ -18,8 +18,8 @@ use crate::motion::Rotation;
 use crate::response::{Material, Response};
 use crate::swarm::{
     Body, INFINITE_MASS, MarbleRow, NO_ROW, NearLimits, Surface, SyncToken, VelocityChange,
-    append_all,
 };
+use crate::workers::append_all;
 
 /// Correspondence of marbles and rows, and scratch memory.
 #[derive(Clone, Debug)]

@@ -100,6 +100,7 @@ impl<S: Scalar> World<S> {
             max_relative_slop: S::from_f64(0.001),
             max_relative_push: S::from_f64(0.5),
             gravity: self.settings.gravity,
+            threads: self.swarm.model().all_threads(),
             resolve_jams: true,
         }
     }

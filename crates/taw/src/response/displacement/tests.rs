@@ -53,6 +53,7 @@ fn restituted<S: Scalar>(
         max_relative_slop: zero,
         max_relative_push: zero,
         gravity: Vec3::zero(),
+        threads: 1,
         resolve_jams: false,
     };
     let context = Context {

@@ -362,6 +362,7 @@ mod tests {
             let mut method = EventDriven { balls: vec![ball], ..EventDriven::default() };
             let source = &Crowd(distance);
             let settings = EventSettings {
+                threads: 1,
                 dt: 0.01,
                 iterations: 8,
                 gravity: Vec3::new(0.0, 0.0, 0.0),

@@ -149,6 +149,7 @@ impl Cluster {
             max_relative_slop: SLOP,
             max_relative_push: f64::INFINITY,
             gravity: Vec3::zero(), // what rests does not tip
+            threads: settings.threads,
             resolve_jams: false,
         };
         let mut quarantined = Vec::new(); // non-finite balls are quarantined after the substep

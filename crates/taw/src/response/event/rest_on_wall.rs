@@ -353,6 +353,7 @@ mod tests {
             };
             let mut method = EventDriven { balls: vec![ball], ..EventDriven::default() };
             let settings = EventSettings {
+                threads: 1,
                 dt,
                 iterations: 8,
                 gravity: Vec3::new(0.0, 0.0, 0.0),

@@ -368,6 +368,7 @@ mod tests {
             let mut method =
                 EventDriven { balls: order.map(|i| balls[i]).to_vec(), ..EventDriven::default() };
             let settings = EventSettings {
+                threads: 1,
                 dt: 0.01,
                 iterations: 8,
                 gravity: Vec3::new(0.0, 0.0, 0.0),
@@ -421,6 +422,7 @@ mod tests {
         let balls = vec![ball([0.0, 1.0], 0.0, MAX_FREEZES - 1), ball([0.0, 3.0], 0.0, 0)];
         let mut method = EventDriven { balls, ..EventDriven::default() };
         let settings = EventSettings {
+            threads: 1,
             dt: 0.01,
             iterations: 8,
             gravity: Vec3::new(0.0, 0.0, 0.0),

@@ -18,8 +18,6 @@ const REGULARIZATION: f64 = 16.0;
 pub(super) struct Islands<S> {
     sets: UnionFind,
     pub list: Vec<Island<S>>,
-    /// Number of contact solves, over all iterations.
-    pub solve_count: u64,
 }
 
 /// Disjoint sets of rows that contacts connect (union-find).
@@ -93,6 +91,8 @@ pub(super) struct Island<S> {
     /// Largest velocity change in this iteration and in the last one, in m/s.
     pub change: S,
     residual: S,
+    /// Number of contact solves, over all iterations.
+    pub solve_count: u64,
     /// True once the velocity changes are within the tolerance.
     pub converged: bool,
     /// True if an earlier solution ended before convergence.
@@ -129,6 +129,11 @@ impl<S: Scalar> Islands<S> {
         self.list.iter().fold(S::zero(), |max, island| max.max(island.residual))
     }
 
+    /// Number of contact solves, over all iterations.
+    pub fn solve_count(&self) -> u64 {
+        self.list.iter().map(|island| island.solve_count).sum()
+    }
+
     /// Number of islands.
     pub fn len(&self) -> usize {
         self.list.len()
@@ -151,12 +156,6 @@ impl<S: Scalar> Islands<S> {
         self.sets.known_set_of(row).map(|set| &mut self.list[set as usize])
     }
 
-    /// Island of a row, if it is accelerated and the row takes part in it.
-    #[inline]
-    pub fn accelerating(&mut self, row: &Row<S>) -> Option<&mut Island<S>> {
-        Some(self.of_mut(row.island)).filter(|island| island.accelerating && !row.is_open())
-    }
-
     /// Restarts the iterations of some islands; all others count as converged.
     pub fn restart(&mut self, which: impl Fn(usize) -> bool) {
         for (number, island) in self.list.iter_mut().enumerate() {
@@ -170,27 +169,12 @@ impl<S: Scalar> Islands<S> {
     pub fn build(&mut self, constraints: &mut [Constraint<S>], rows: usize, speed_unit: S) {
         self.sets.build(constraints.iter().map(|c| (c.a.marble(), c.b)), rows);
         self.list.clear();
-        self.solve_count = 0;
         for c in constraints {
             c.island = self.sets.set_of(c.b);
             if c.island as usize == self.list.len() {
                 self.list.push(Island::new(c.inverse_effective_mass.normal, speed_unit));
             }
         }
-    }
-
-    /// Ends an iteration. True if all islands have converged.
-    pub fn end_iteration(&mut self, restitution_threshold: S, tolerance: S) -> bool {
-        for island in self.list.iter_mut().filter(|island| !island.converged) {
-            // The rest is below what the next iteration could resolve.
-            island.converged = island.change <= tolerance;
-            // Close to convergence plain iterations come to rest, which the search does not quite.
-            island.accelerating =
-                !island.converged && island.change > restitution_threshold * S::from_f64(1e-5);
-            island.residual = island.change;
-            island.change = S::zero();
-        }
-        self.list.iter().all(|island| island.converged)
     }
 }
 
@@ -206,11 +190,23 @@ impl<S: Scalar> Island<S> {
             time_since_impact: zero,
             change: zero,
             residual: zero,
+            solve_count: 0,
             converged: false,
             incomplete: false,
             accelerating: false,
             search: Search::new(),
         }
+    }
+
+    /// Ends an iteration.
+    pub fn end_iteration(&mut self, restitution_threshold: S, tolerance: S) {
+        // The rest is below what the next iteration could resolve.
+        self.converged = self.change <= tolerance;
+        // Close to convergence plain iterations come to rest, which the search does not quite.
+        self.accelerating =
+            !self.converged && self.change > restitution_threshold * S::from_f64(1e-5);
+        self.residual = self.change;
+        self.change = S::zero();
     }
 
     /// Product of an impulse (as a speed: times the inverse effective mass) and a velocity at a

@@ -74,6 +74,8 @@ pub(crate) struct SolverSettings<S> {
     /// Acceleration that says where the [top](crate::constraint::tipped) of a marble is, in m/s²; zero where
     /// none matters.
     pub gravity: Vec3<S>,
+    /// Number of threads that solve islands, if there are many contacts.
+    pub threads: usize,
     /// True to resolve jams; false where the caller does, which tries the walls' motion first.
     pub resolve_jams: bool,
 }
@@ -129,7 +131,7 @@ impl<S: Scalar> Scratch<S> {
 
     /// Number of contact solves, over all iterations.
     pub fn solve_count(&self) -> u64 {
-        self.islands.solve_count
+        self.islands.solve_count()
     }
 
     /// Visits the energy that moving walls and marbles of infinite mass supplied to each row, in

@@ -1,25 +1,28 @@
 //! Constraints and bodies packed for the iterations, which pass over them dozens of times: what a
 //! pass does not read would only take room in the cache.
 
+use std::ops::Range;
+
 use cgmath::InnerSpace;
 
-use super::islands::{DIRECTIONS, Islands};
-use super::{BodyA, Constraint};
+use super::islands::{DIRECTIONS, Island, Islands};
+use super::{Constraint, RollingConstraint};
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::math::{Scalar, Vec3};
-use crate::response::bodies::{Motion, push, relative_velocity};
+use crate::response::bodies::{CapsuleInertia, Motion, push, relative_velocity};
 use crate::response::{BallRotation, SolverBodies};
+use crate::workers::{DisjointSlice, parallel_for};
 
-/// Row of a wall in the list of bodies.
+/// Body of a wall, and of a marble that has none.
 const NO_BODY: u32 = u32::MAX;
+/// Number of rows from which on it pays to solve islands on all threads.
+const MANY: usize = 500;
 
 /// Constraint as a pass sees it.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Row<S> {
-    /// Index of its constraint.
-    pub constraint: u32,
-    pub island: u32,
     pub bounces: bool,
+    /// Indices of its bodies in the island.
     bodies: [u32; 2],
     /// Unit normal from the first body to the second.
     pub normal: Vec3<S>,
@@ -40,6 +43,15 @@ pub(super) struct Row<S> {
     pub impulse: ContactImpulse<S>,
 }
 
+/// What few rows need: lever arms of capsules, and rolling friction.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct RowDetails<S> {
+    /// Index of its constraint.
+    constraint: u32,
+    pub arms: [Vec3<S>; 2],
+    pub rolling: Option<RollingConstraint<S>>,
+}
+
 /// Search directions of a row, as impulses: last pass and accelerated steps before; the relative
 /// velocity that each causes; and the velocity error where the search began; in m/s.
 #[derive(Clone, Copy, Debug)]
@@ -58,85 +70,190 @@ struct Body<S> {
     spin_per_speed: S,
 }
 
-/// Rows and bodies of the islands that have not converged.
+/// Rows and bodies of the islands that have not converged, one island after another.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows<S> {
     list: Vec<Row<S>>,
+    details: Vec<RowDetails<S>>,
     searches: Vec<SearchDirections<S>>,
     bodies: Vec<Body<S>>,
+    /// Marble of each body.
+    marbles: Vec<u32>,
+    parts: Vec<Part>,
+    /// Constraints in the order of their islands.
+    order: Vec<u32>,
+    /// Number of constraints of each island, then where the next one goes.
+    next: Vec<u32>,
+    /// Index in the list of each marble's body; [`NO_BODY`] for one without.
+    body_of_marble: Vec<u32>,
+}
+
+/// Part of the lists that an island has.
+#[derive(Clone, Debug)]
+struct Part {
+    island: usize,
+    rows: Range<usize>,
+    bodies: Range<usize>,
+}
+
+/// Island while it is solved.
+pub(super) struct IslandRows<'a, 'b, S> {
+    pub island: &'a mut Island<S>,
+    pub rows: &'a mut [Row<S>],
+    pub details: &'a mut [RowDetails<S>],
+    pub searches: &'a mut [SearchDirections<S>],
+    pub bodies: PackedBodies<'a, 'b, S>,
 }
 
 /// Bodies while rows are solved.
 #[derive(Debug)]
 pub(super) struct PackedBodies<'a, 'b, S> {
     bodies: &'a mut [Body<S>],
+    /// Marbles of the bodies.
+    marbles: &'a [u32],
     /// Columns for what few rows need.
     columns: &'a SolverBodies<'b, S>,
 }
 
 impl<S: Scalar> Rows<S> {
-    /// Packs the constraints of islands that have not converged, and all bodies.
+    /// Packs the constraints of islands that have not converged, and their bodies.
     pub fn pack(
         &mut self,
         marbles: &SolverBodies<S>,
         constraints: &[Constraint<S>],
         islands: &Islands<S>,
     ) {
-        let active =
-            constraints.iter().enumerate().filter(|(_, c)| !islands.of(c.island).converged);
+        self.sort_by_island(constraints, islands);
         self.list.clear();
-        self.list.extend(active.map(|(index, c)| Row::new(index as u32, c, marbles)));
+        self.details.clear();
+        self.bodies.clear();
+        self.marbles.clear();
+        self.parts.clear();
+        self.body_of_marble.clear();
+        self.body_of_marble.resize(marbles.velocity.len(), NO_BODY);
+        let order = std::mem::take(&mut self.order);
+        for index in &order {
+            let c = &constraints[*index as usize];
+            let island = c.island as usize;
+            if self.parts.last().is_none_or(|part| part.island != island) {
+                let (row, body) = (self.list.len(), self.bodies.len());
+                self.parts.push(Part { island, rows: row..row, bodies: body..body });
+            }
+            let first = c.a.marble().map_or(NO_BODY, |a| self.body(a, marbles));
+            let bodies = [first, self.body(c.b, marbles)];
+            self.list.push(Row::new(c, marbles, bodies));
+            let Constraint { arms, rolling, .. } = *c;
+            self.details.push(RowDetails { constraint: *index, arms, rolling });
+            if let Some(part) = self.parts.last_mut() {
+                (part.rows.end, part.bodies.end) = (self.list.len(), self.bodies.len());
+            }
+        }
+        self.order = order;
         let zero = [Vec3::from([S::zero(); 3]); DIRECTIONS];
         let none = SearchDirections { directions: zero, velocities: zero, velocity_error: zero[0] };
         self.searches.clear();
         self.searches.resize(self.list.len(), none);
-        self.bodies.clear();
-        self.bodies.extend((0..marbles.velocity.len()).map(|row| Body {
-            motion: marbles.motion(row),
-            spin_per_speed: marbles.spin_per_speed(row),
-        }));
+    }
+
+    /// Orders the constraints by islands (counting sort).
+    fn sort_by_island(&mut self, constraints: &[Constraint<S>], islands: &Islands<S>) {
+        let active =
+            || constraints.iter().zip(0..).filter(|(c, _)| !islands.of(c.island).converged);
+        self.next.clear();
+        self.next.resize(islands.len(), 0);
+        let mut count = 0;
+        for (c, _) in active() {
+            self.next[c.island as usize] += 1;
+            count += 1;
+        }
+        let mut begin = 0;
+        for next in &mut self.next {
+            begin += std::mem::replace(next, begin);
+        }
+        self.order.clear();
+        self.order.resize(count, 0);
+        for (c, index) in active() {
+            let next = &mut self.next[c.island as usize];
+            self.order[*next as usize] = index;
+            *next += 1;
+        }
+    }
+
+    /// Index of a marble's body in the last island, which gets it with its first contact.
+    fn body(&mut self, marble: usize, marbles: &SolverBodies<S>) -> u32 {
+        let first = self.parts.last().map_or(0, |part| part.bodies.start) as u32;
+        let body = &mut self.body_of_marble[marble];
+        if *body == NO_BODY {
+            *body = self.bodies.len() as u32;
+            self.bodies.push(Body {
+                motion: marbles.motion(marble),
+                spin_per_speed: marbles.spin_per_speed(marble),
+            });
+            self.marbles.push(marble as u32);
+        }
+        *body - first
+    }
+
+    /// Solves each island, on so many threads: they have nothing in common.
+    pub fn solve_islands(
+        &mut self,
+        columns: &SolverBodies<S>,
+        islands: &mut Islands<S>,
+        threads: usize,
+        solve: impl Fn(IslandRows<S>) + Sync,
+    ) {
+        let threads = if self.list.len() < MANY { 1 } else { threads };
+        let islands = DisjointSlice::new(&mut islands.list);
+        let (rows, details) =
+            (DisjointSlice::new(&mut self.list), DisjointSlice::new(&mut self.details));
+        let (searches, bodies) =
+            (DisjointSlice::new(&mut self.searches), DisjointSlice::new(&mut self.bodies));
+        parallel_for(threads, self.parts.len(), |_, part| {
+            let Part { island, rows: of_rows, bodies: of_bodies } = self.parts[part].clone();
+            // SAFETY: each island has its own.
+            solve(unsafe {
+                IslandRows {
+                    island: &mut *islands.row(island),
+                    rows: rows.part(of_rows.clone()),
+                    details: details.part(of_rows.clone()),
+                    searches: searches.part(of_rows),
+                    bodies: PackedBodies {
+                        bodies: bodies.part(of_bodies.clone()),
+                        marbles: &self.marbles[of_bodies],
+                        columns,
+                    },
+                }
+            });
+        });
     }
 
     /// Writes velocities and impulses back.
     pub fn unpack(&self, marbles: &mut SolverBodies<S>, constraints: &mut [Constraint<S>]) {
-        for (row, Body { motion, .. }) in self.bodies.iter().enumerate() {
+        for (Body { motion, .. }, marble) in self.bodies.iter().zip(&self.marbles) {
+            let row = *marble as usize;
             marbles.velocity[row] = motion.velocity;
             if marbles.ball_rotation(row) == BallRotation::Free {
                 marbles.spin[row] = motion.spin;
             }
         }
-        for row in &self.list {
-            constraints[row.constraint as usize].impulse = row.impulse;
+        for (row, details) in self.list.iter().zip(&self.details) {
+            let c = &mut constraints[details.constraint as usize];
+            (c.impulse, c.rolling) = (row.impulse, details.rolling);
         }
-    }
-
-    /// Rows, their search directions, and the bodies that they push.
-    pub fn split<'a, 'b>(
-        &'a mut self,
-        columns: &'a SolverBodies<'b, S>,
-    ) -> (&'a mut [Row<S>], &'a mut [SearchDirections<S>], PackedBodies<'a, 'b, S>) {
-        let bodies = PackedBodies { bodies: &mut self.bodies, columns };
-        (&mut self.list, &mut self.searches, bodies)
     }
 }
 
 impl<S: Scalar> Row<S> {
-    fn new(constraint: u32, c: &Constraint<S>, marbles: &SolverBodies<S>) -> Self {
+    fn new(c: &Constraint<S>, marbles: &SolverBodies<S>, bodies: [u32; 2]) -> Self {
         let inverse_effective_mass = c.inverse_effective_mass.normal;
         let ratio = |row: usize| marbles.inverse_mass[row] / inverse_effective_mass;
-        let (a, first_ratio) = match c.a {
-            BodyA::Wall(..) => (NO_BODY, S::zero()),
-            BodyA::Marble(a) => (a, ratio(a as usize)),
-        };
         Self {
-            constraint,
-            island: c.island,
             bounces: c.bounces,
-            bodies: [a, c.b as u32],
+            bodies,
             normal: c.normal,
             surface_velocity: c.surface_velocity,
             target_velocity: c.normal * c.target_normal_velocity + c.target_tangent_velocity,
-            mass_ratios: [first_ratio, ratio(c.b)],
+            mass_ratios: [c.a.marble().map_or_else(S::zero, ratio), ratio(c.b)],
             tangent_ratio: inverse_effective_mass / c.inverse_effective_mass.tangent,
             inverse_effective_mass,
             cone: c.cone,
@@ -154,12 +271,13 @@ impl<S: Scalar> Row<S> {
     }
 }
 
+#[expect(clippy::inline_always, reason = "vectors as arguments go through memory otherwise")]
 impl<S: Scalar> PackedBodies<'_, '_, S> {
     /// Velocity error: target minus relative velocity, in m/s. Arms count for capsules only.
-    #[inline]
+    #[inline(always)]
     pub fn velocity_error(&self, row: &Row<S>, arms: &[Vec3<S>; 2]) -> Vec3<S> {
         let motion = |row: usize| self.bodies[row].motion;
-        let capsule = |row: usize| self.columns.capsule(row).is_some();
+        let capsule = |row: usize| self.capsule(row).is_some();
         row.target_velocity
             - relative_velocity(
                 motion,
@@ -173,14 +291,14 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
 
     /// Rounding of the velocities at a contact, in m/s. Smaller changes would only push fast bodies
     /// to one side.
-    #[inline]
+    #[inline(always)]
     pub fn velocity_rounding(&self, row: &Row<S>) -> S {
         let speed = |row: usize| self.bodies[row].motion.velocity.magnitude();
         (speed(row.second()) + row.first().map_or_else(S::zero, speed)) * S::epsilon()
     }
 
     /// Applies an impulse, in m/s, to the second body, its opposite to the first.
-    #[inline]
+    #[inline(always)]
     pub fn apply_impulse(&mut self, row: &Row<S>, arms: &[Vec3<S>; 2], impulse: Vec3<S>) {
         if let Some(a) = row.first() {
             self.push(a, -impulse * row.mass_ratios[0], -row.normal, &arms[0]);
@@ -188,12 +306,14 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
         self.push(row.second(), impulse * row.mass_ratios[1], row.normal, &arms[1]);
     }
 
-    #[inline]
+    #[inline(always)]
     fn push(&mut self, row: usize, change: Vec3<S>, normal: Vec3<S>, arm: &Vec3<S>) {
+        let turn =
+            self.capsule(row).map(|capsule| capsule.apply_inverse_inertia(arm.cross(change)));
         let Body { motion, spin_per_speed } = &mut self.bodies[row];
-        if let Some(capsule) = self.columns.capsule(row) {
+        if let Some(turn) = turn {
             motion.velocity += change;
-            motion.spin += capsule.apply_inverse_inertia(arm.cross(change));
+            motion.spin += turn;
         } else {
             push(&mut motion.velocity, &mut motion.spin, change, normal, *spin_per_speed);
         }
@@ -208,10 +328,23 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
 
     /// Applies an angular impulse, in kg m²/s, to the second body, its opposite to the first.
     pub fn apply_angular_impulse(&mut self, row: &Row<S>, angular_impulse: Vec3<S>) {
-        let second = self.columns.spin_change(row.second(), angular_impulse);
+        let change = |row: usize, impulse| self.columns.spin_change(self.marble(row), impulse);
+        let second = change(row.second(), angular_impulse);
+        let first = row.first().map(|a| (a, change(a, -angular_impulse)));
         self.bodies[row.second()].motion.spin += second;
-        if let Some(a) = row.first() {
-            self.bodies[a].motion.spin += self.columns.spin_change(a, -angular_impulse);
+        if let Some((a, first)) = first {
+            self.bodies[a].motion.spin += first;
         }
+    }
+
+    /// Axis and inertia of a body that is a capsule.
+    #[inline(always)]
+    fn capsule(&self, body: usize) -> Option<&CapsuleInertia<S>> {
+        let any = !self.columns.capsules.is_empty();
+        any.then(|| self.columns.capsule(self.marble(body))).flatten()
+    }
+
+    fn marble(&self, body: usize) -> usize {
+        self.marbles[body] as usize
     }
 }

@@ -2,9 +2,9 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::islands::{DIRECTIONS, Island, Islands, SearchStep};
+use super::islands::{DIRECTIONS, Islands, SearchStep};
 use super::jam::saturate;
-use super::rows::{PackedBodies, Row, Rows, SearchDirections};
+use super::rows::{IslandRows, PackedBodies, Row, RowDetails, Rows, SearchDirections};
 use super::{Constraint, RollingConstraint, SolverSettings};
 use crate::constraint::{ContactImpulse, solve_rolling};
 use crate::math::{RealVector, Scalar, Vec3, is_finite, length};
@@ -31,27 +31,7 @@ pub(super) fn iterate<S: Scalar>(
     settings: &SolverSettings<S>,
 ) {
     packed.pack(marbles, constraints, islands);
-    let (rows, searches, mut bodies) = packed.split(marbles);
-    for iteration in 0..settings.iterations {
-        for (row, search) in rows.iter_mut().zip(searches.iter_mut()) {
-            if islands.of(row.island).converged {
-                continue;
-            }
-            islands.solve_count += 1;
-            let previous_impulse = row.impulse();
-            let change = bodies.solve_point(row, &mut constraints[row.constraint as usize]);
-            search.directions[0] = row.impulse() - previous_impulse;
-            let island = islands.of_mut(row.island);
-            if change > island.change && change > bodies.velocity_rounding(row) {
-                island.change = change;
-            }
-        }
-        let is_last = iteration + 1 == settings.iterations;
-        if islands.end_iteration(settings.restitution_threshold, settings.tolerance) || is_last {
-            break;
-        }
-        bodies.accelerate(rows, searches, constraints, islands);
-    }
+    packed.solve_islands(marbles, islands, settings.threads, |mut rows| rows.iterate(settings));
     packed.unpack(marbles, constraints);
 }
 
@@ -119,12 +99,103 @@ impl<S: Scalar> Row<S> {
     }
 }
 
+impl<S: Scalar> IslandRows<'_, '_, S> {
+    /// Iterates over the contacts of the island until they converge or the iterations are used up.
+    fn iterate(&mut self, settings: &SolverSettings<S>) {
+        for left in (0..settings.iterations).rev() {
+            self.pass();
+            self.island.end_iteration(settings.restitution_threshold, settings.tolerance);
+            if self.island.converged || left == 0 {
+                break;
+            }
+            if self.island.accelerating {
+                self.accelerate();
+            }
+        }
+    }
+
+    /// Solves each contact point once (Gauss–Seidel).
+    fn pass(&mut self) {
+        let rows = self.rows.iter_mut().zip(&mut *self.details).zip(&mut *self.searches);
+        for ((row, details), search) in rows {
+            let previous_impulse = row.impulse();
+            let change = self.bodies.solve_point(row, details);
+            search.directions[0] = row.impulse() - previous_impulse;
+            if change > self.island.change && change > self.bodies.velocity_rounding(row) {
+                self.island.change = change;
+            }
+        }
+        self.island.solve_count += self.rows.len() as u64;
+    }
+
+    /// Accelerates a pass: extends it, together with the steps before, to the combination that
+    /// brings the island nearest to its target velocities. Rows that bear nothing take no part.
+    fn accelerate(&mut self) {
+        self.island.begin_search();
+        let Self { island, rows, details, searches, bodies } = self;
+        let arms = |at: usize| &details[at].arms;
+        for (at, (row, search)) in rows.iter().zip(searches.iter_mut()).enumerate() {
+            row.restrict_directions(search);
+            if !row.is_open() {
+                search.velocity_error = bodies.velocity_error(row, arms(at));
+            }
+        }
+        for (at, (row, search)) in closed(rows.iter().zip(searches.iter())) {
+            bodies.apply_impulse(row, arms(at), search.directions[0]);
+        }
+        for (at, (row, search)) in closed(rows.iter().zip(searches.iter_mut())) {
+            search.velocities[0] = search.velocity_error - bodies.velocity_error(row, arms(at));
+            island.add_directions(row, search, bodies.velocity_rounding(row));
+        }
+        island.solve_weights();
+        // Projected to the cones: inadmissible impulses would throw other marbles about.
+        for (at, (row, search)) in closed(rows.iter().zip(searches.iter_mut())) {
+            let [last, previous, _] = search.directions;
+            let straight = island.combine(&search.directions);
+            let direction = row.clamp_to_cone(straight);
+            let clamped = direction - straight;
+            let tangential = clamped - row.normal * clamped.dot(row.normal);
+            let rounding = (row.impulse.normal + length(straight)) * S::epsilon();
+            island.add_cone_limit(row.max_fraction(straight), length(tangential) > rounding);
+            bodies.apply_impulse(row, arms(at), direction - last);
+            // The oldest direction is dropped.
+            search.directions = [straight, direction, previous];
+            search.velocities =
+                [island.combine(&search.velocities), Vec3::zero(), search.velocities[1]];
+        }
+        for (at, (row, search)) in closed(rows.iter().zip(searches.iter_mut())) {
+            search.velocities[1] = search.velocity_error - bodies.velocity_error(row, arms(at));
+            island.add_projected(row, search);
+        }
+        let (which, fraction) = match island.choose_step() {
+            SearchStep::Projected(fraction) => (1, fraction),
+            SearchStep::Straight(fraction) => (0, fraction),
+        };
+        let rows = rows.iter_mut().zip(searches.iter_mut()).enumerate();
+        for (at, (row, search)) in rows.filter(|(_, (row, _))| !row.is_open()) {
+            let direction = search.directions[which] * fraction;
+            bodies.apply_impulse(row, arms(at), direction - search.directions[1]);
+            // Cones are convex, so only rounding can lie outside.
+            row.impulse = row.project_to_cone(row.impulse() + direction);
+            search.velocities[1] = search.velocities[which] * fraction;
+            search.directions[1] = direction;
+        }
+    }
+}
+
+/// Rows that bear something, with their indices.
+fn closed<'a, S: Scalar + 'a, T>(
+    rows: impl Iterator<Item = (&'a Row<S>, T)>,
+) -> impl Iterator<Item = (usize, (&'a Row<S>, T))> {
+    rows.enumerate().filter(|(_, (row, _))| !row.is_open())
+}
+
 impl<S: Scalar> PackedBodies<'_, '_, S> {
     /// Solves one contact point. Returns the velocity change of its point, in m/s.
-    fn solve_point(&mut self, row: &mut Row<S>, c: &mut Constraint<S>) -> S {
-        let error = ContactImpulse::split(self.velocity_error(row, &c.arms), row.normal);
-        let tangent = c
-            .rolling
+    fn solve_point(&mut self, row: &mut Row<S>, details: &mut RowDetails<S>) -> S {
+        let RowDetails { arms, rolling, .. } = details;
+        let error = ContactImpulse::split(self.velocity_error(row, arms), row.normal);
+        let tangent = rolling
             .as_ref()
             .and_then(|rolling| self.solve_blocked(row, rolling, error))
             .unwrap_or_else(|| error.tangent * row.tangent_ratio);
@@ -143,76 +214,11 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
             return S::zero(); // an overflow must not reach the other body
         }
         row.impulse = impulse;
-        self.apply_impulse(row, &c.arms, change);
-        let spin_change = self.solve_rolling(row, &mut c.rolling);
+        self.apply_impulse(row, arms, change);
+        let Some(rolling) = rolling else { return change.magnitude() };
+        let spin_change = self.solve_rolling(row, rolling);
         // The contact point feels a change of rolling in the next pass.
-        change.magnitude().max(spin_change * length(c.arms[1]))
-    }
-
-    /// Accelerates a pass: extends it, together with the steps before, to the combination that
-    /// brings each island nearest to its target velocities.
-    fn accelerate(
-        &mut self,
-        rows: &mut [Row<S>],
-        searches: &mut [SearchDirections<S>],
-        constraints: &[Constraint<S>],
-        islands: &mut Islands<S>,
-    ) {
-        islands.list.iter_mut().for_each(Island::begin_search);
-        let arms = |row: &Row<S>| &constraints[row.constraint as usize].arms;
-        for (row, search) in rows.iter().zip(searches.iter_mut()) {
-            if islands.of(row.island).accelerating {
-                row.restrict_directions(search);
-            }
-            if islands.accelerating(row).is_some() {
-                search.velocity_error = self.velocity_error(row, arms(row));
-            }
-        }
-        for (row, search) in rows.iter().zip(searches.iter()) {
-            if islands.accelerating(row).is_some() {
-                self.apply_impulse(row, arms(row), search.directions[0]);
-            }
-        }
-        for (row, search) in rows.iter().zip(searches.iter_mut()) {
-            let Some(island) = islands.accelerating(row) else { continue };
-            search.velocities[0] = search.velocity_error - self.velocity_error(row, arms(row));
-            island.add_directions(row, search, self.velocity_rounding(row));
-        }
-        islands.list.iter_mut().for_each(Island::solve_weights);
-        // Projected to the cones: inadmissible impulses would throw other marbles about.
-        for (row, search) in rows.iter().zip(searches.iter_mut()) {
-            let Some(island) = islands.accelerating(row) else { continue };
-            let [last, previous, _] = search.directions;
-            let straight = island.combine(&search.directions);
-            let direction = row.clamp_to_cone(straight);
-            let clamped = direction - straight;
-            let tangential = clamped - row.normal * clamped.dot(row.normal);
-            let rounding = (row.impulse.normal + length(straight)) * S::epsilon();
-            island.add_cone_limit(row.max_fraction(straight), length(tangential) > rounding);
-            self.apply_impulse(row, arms(row), direction - last);
-            // The oldest direction is dropped.
-            search.directions = [straight, direction, previous];
-            search.velocities =
-                [island.combine(&search.velocities), Vec3::zero(), search.velocities[1]];
-        }
-        for (row, search) in rows.iter().zip(searches.iter_mut()) {
-            let Some(island) = islands.accelerating(row) else { continue };
-            search.velocities[1] = search.velocity_error - self.velocity_error(row, arms(row));
-            island.add_projected(row, search);
-        }
-        for (row, search) in rows.iter_mut().zip(searches.iter_mut()) {
-            let Some(island) = islands.accelerating(row) else { continue };
-            let (which, fraction) = match island.choose_step() {
-                SearchStep::Projected(fraction) => (1, fraction),
-                SearchStep::Straight(fraction) => (0, fraction),
-            };
-            let direction = search.directions[which] * fraction;
-            self.apply_impulse(row, arms(row), direction - search.directions[1]);
-            // Cones are convex, so only rounding can lie outside.
-            row.impulse = row.project_to_cone(row.impulse() + direction);
-            search.velocities[1] = search.velocities[which] * fraction;
-            search.directions[1] = direction;
-        }
+        change.magnitude().max(spin_change * length(arms[1]))
     }
 
     /// Block solve of slip and rolling: tangential impulse, in m/s, that ends both at once; none if rolling
@@ -241,8 +247,7 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
 
     /// Solves rolling and torsional friction: one step toward zero relative spin. Returns the change
     /// of the relative spin, in rad/s.
-    fn solve_rolling(&mut self, row: &Row<S>, rolling: &mut Option<RollingConstraint<S>>) -> S {
-        let Some(rolling) = rolling else { return S::zero() };
+    fn solve_rolling(&mut self, row: &Row<S>, rolling: &mut RollingConstraint<S>) -> S {
         let wanted = self.relative_spin(row) / -rolling.inverse_inertia;
         let load = row.impulse.normal / row.inverse_effective_mass;
         let limits = [rolling.rolling_lever * load, rolling.torsional_lever * load];

@@ -15,6 +15,7 @@ fn solver_settings(dt: f64) -> SolverSettings<f64> {
         max_relative_slop: 0.0,
         max_relative_push: 0.0,
         gravity: Vec3::zero(),
+        threads: 1,
         resolve_jams: false,
     }
 }

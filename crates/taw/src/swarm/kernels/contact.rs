@@ -17,7 +17,7 @@ use crate::swarm::batches::Batch;
 use crate::swarm::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use crate::swarm::surfaces::{PairNumbers, SOLID_BALL};
 use crate::swarm::vec3_wide::Vec3Wide;
-use crate::swarm::workers::DisjointSlice;
+use crate::workers::DisjointSlice;
 
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.

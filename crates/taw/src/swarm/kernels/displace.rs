@@ -6,7 +6,7 @@ use crate::swarm::neighbours::NeighbourLists;
 use crate::swarm::simd::{Kernel, LANES, Row, Simd};
 use crate::swarm::vec3_wide::Vec3Wide;
 use crate::swarm::walls::HalfSpace;
-use crate::swarm::workers::DisjointSlice;
+use crate::workers::DisjointSlice;
 
 /// Moves overlapping balls apart, half each.
 pub(in crate::swarm) struct Displace<'a> {

@@ -5,8 +5,8 @@ use super::impulse_cache::{reserve_slack, shrink_slack};
 use super::simd::{LANES, Row, Simd};
 use super::surfaces::{PairNumbers, SurfaceOf};
 use super::vec3_wide::Vec3Wide;
-use super::workers::DisjointSlice;
 use crate::response::Impact;
+use crate::workers::DisjointSlice;
 
 mod backing;
 mod contact;

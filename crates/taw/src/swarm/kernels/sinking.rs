@@ -4,7 +4,7 @@ use super::{ContactImpulses, SolverParams, gather};
 use crate::swarm::batches::Batch;
 use crate::swarm::simd::{Kernel, LANES, Row, Simd};
 use crate::swarm::vec3_wide::Vec3Wide;
-use crate::swarm::workers::DisjointSlice;
+use crate::workers::DisjointSlice;
 
 /// Ball that sinks into another one, or into a wall.
 #[derive(Clone, Copy, Debug)]

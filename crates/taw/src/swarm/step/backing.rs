@@ -7,7 +7,7 @@ use crate::swarm::Swarm;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::LOST;
 use crate::swarm::wall_contact::WallContact;
-use crate::swarm::workers::{DisjointSlice, parallel_for};
+use crate::workers::{DisjointSlice, parallel_for};
 
 /// Where one ball weighs more than so many times as much as another, pairs look who has a wall
 /// behind it: a pair sinks in by that ratio times the way of gravity in a substep while its contact

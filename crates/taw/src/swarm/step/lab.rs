@@ -10,8 +10,8 @@ use crate::swarm::kernels::{
 use crate::swarm::proxies::Proxy;
 use crate::swarm::simd::{Row, SimdLevel};
 use crate::swarm::walls::HalfSpace;
-use crate::swarm::workers::{DisjointSlice, parallel_filter, parallel_for_rows};
 use crate::swarm::{Stage, StaticGeometry, Swarm};
+use crate::workers::{DisjointSlice, parallel_filter, parallel_for_rows};
 
 impl Swarm {
     pub(in crate::swarm) fn step_lab(

@@ -24,8 +24,8 @@ use super::fast_movers::FastMovers;
 use super::kernels::{IntegratePositions, Pass, SolverColumns, SolverParams, solve, squared};
 use super::simd::Row;
 use super::walls::half_spaces;
-use super::workers::{DisjointSlice, parallel_for, parallel_for_odd_even};
 use super::{Stage, StaticGeometry, Swarm, Tier};
+use crate::workers::{DisjointSlice, parallel_for, parallel_for_odd_even};
 use cgmath::Zero;
 
 use crate::constraint::ContactSoftness;

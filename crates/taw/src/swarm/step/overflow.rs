@@ -6,7 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::super::Swarm;
 use super::super::kernels::{MAX_MAGNITUDE, largest};
 use super::super::wall_contact::WallContact;
-use super::super::workers::{DisjointSlice, parallel_for};
+use crate::workers::{DisjointSlice, parallel_for};
 
 impl Swarm {
     /// Stops balls that the last solve of a step gave a velocity or a spin that is no number, or too

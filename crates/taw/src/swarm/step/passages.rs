@@ -11,7 +11,7 @@ use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::wall_contact::WallContact;
 use crate::swarm::wall_paths::FAST;
 use crate::swarm::walls::{StaticGeometry, plane_contacts_within};
-use crate::swarm::workers::{DisjointSlice, parallel_for};
+use crate::workers::{DisjointSlice, parallel_for};
 
 /// Place of a ball at the begin of a substep.
 #[derive(Clone, Copy, Debug, Default)]

@@ -11,8 +11,8 @@ use crate::swarm::chunk::Chunk;
 use crate::swarm::grid::Grid;
 use crate::swarm::kernels::{GROUNDED, squared};
 use crate::swarm::simd::Row;
-use crate::swarm::workers::{DisjointSlice, parallel_for};
 use crate::swarm::{StaticGeometry, Swarm};
+use crate::workers::{DisjointSlice, parallel_for};
 
 impl Swarm {
     /// Finds which chunks fall asleep or wake, and which balls may leave their skin in this step.

@@ -17,7 +17,7 @@ use crate::swarm::kernels::{
     ContactImpulses, FindSinking, Sinking, SolverParams, StruckContact, WALL_SLOP,
 };
 use crate::swarm::wall_contact::xyz;
-use crate::swarm::workers::{DisjointSlice, parallel_for};
+use crate::workers::{DisjointSlice, parallel_for};
 
 /// Most iterations over a cluster. It converges in some more than there are contacts above each other, so a
 /// higher column does not within a substep.
@@ -48,6 +48,7 @@ impl Swarm {
             max_relative_slop: 0.0,
             max_relative_push: 0.0,
             gravity: Vec3::zero(), // what rests does not tip
+            threads: self.threads(),
             resolve_jams: true,
         };
         let mut contacts = std::mem::take(&mut cluster.contacts);

@@ -12,8 +12,8 @@ use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::wall_contact::{WallContact, xyz};
 use crate::swarm::wall_paths::{FAST, WallQuery, is_fast, slide_along_wall};
 use crate::swarm::walls::{Balls, HalfSpace, find, near_shapes, shapes_of};
-use crate::swarm::workers::{DisjointSlice, parallel_for};
 use crate::swarm::{Stage, StaticGeometry, Swarm, Tier};
+use crate::workers::{DisjointSlice, parallel_for};
 
 impl Swarm {
     /// Time before a ball can be at a wall from which on it is searched, in seconds; in the lab's

@@ -1,7 +1,7 @@
-//! Pool of worker threads that help with a step.
+//! Pool of worker threads that help with a step. (Not rayon: its forks take longer than many a pass of a
+//! step.)
 //!
-//! They live as long as the process, wait for work without a pause for a moment and then asleep,
-//! and help with one thing at a time. Work is cut into jobs, and each thread takes the next one
+//! Workers live as long as the process, spin briefly and then sleep while idle, and run one job at a time. Work is cut into jobs, and each thread takes the next one
 //! that nobody has: so a worker that the system gives no time holds up nobody, and it does not
 //! matter to the result how many there are.
 
@@ -11,12 +11,12 @@ use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
 
 /// The most threads of a team.
-pub(super) const MAX_THREADS: usize = 64;
+pub(crate) const MAX_THREADS: usize = 64;
 /// Spins before a thread goes to sleep: some hundredths of a millisecond, longer than between two
 /// works of a step. Other threads of the process may need the core.
 const SPIN_COUNT: u32 = 1 << 11;
 /// Number of rows of a job.
-pub(super) const ROWS: usize = 1 << 13;
+pub(crate) const ROWS: usize = 1 << 13;
 
 /// Work that is going on: a pointer to a closure on the caller's stack, which gets the number of a
 /// worker.
@@ -169,7 +169,7 @@ impl Drop for AbortOnPanic {
 
 /// Does so many jobs, in any order. Each is told the number of its thread, which is less than
 /// `threads`, and its own.
-pub(super) fn parallel_for(threads: usize, count: usize, job: impl Fn(usize, usize) + Sync) {
+pub(crate) fn parallel_for(threads: usize, count: usize, job: impl Fn(usize, usize) + Sync) {
     let size = threads.clamp(1, MAX_THREADS).min(count);
     // Everybody has a share, so that memory stays with the same threads, and helps with the next
     // one then.
@@ -189,7 +189,7 @@ pub(super) fn parallel_for(threads: usize, count: usize, job: impl Fn(usize, usi
 }
 
 /// Does something with so many rows, some at a time.
-pub(super) fn parallel_for_rows(threads: usize, rows: usize, job: impl Fn(Range<usize>) + Sync) {
+pub(crate) fn parallel_for_rows(threads: usize, rows: usize, job: impl Fn(Range<usize>) + Sync) {
     parallel_for(threads, rows.div_ceil(ROWS), |_, part| {
         job(part * ROWS..rows.min((part + 1) * ROWS));
     });
@@ -197,7 +197,7 @@ pub(super) fn parallel_for_rows(threads: usize, rows: usize, job: impl Fn(Range<
 
 /// Works on parts of rows, and lists the rows that each part adds, in their order. `lists` is
 /// scratch.
-pub(super) fn parallel_filter(
+pub(crate) fn parallel_filter(
     threads: usize,
     rows: usize,
     lists: &mut Vec<Vec<u32>>,
@@ -251,7 +251,7 @@ const FINISHED: u32 = 2;
 
 /// Does so many jobs, of which neighbours must not be done at a time: even ones come before the
 /// odd ones beside them. `state` is scratch.
-pub(super) fn parallel_for_odd_even(
+pub(crate) fn parallel_for_odd_even(
     threads: usize,
     count: usize,
     state: &mut Vec<u32>,
@@ -314,7 +314,7 @@ fn wait_for(ready: impl Fn() -> bool) {
 }
 
 /// A column that several threads write, each elsewhere.
-pub(super) struct DisjointSlice<'a, T>(&'a [UnsafeCell<T>]);
+pub(crate) struct DisjointSlice<'a, T>(&'a [UnsafeCell<T>]);
 
 impl<T> Clone for DisjointSlice<'_, T> {
     fn clone(&self) -> Self {
