@@ -1,9 +1,16 @@
 //! Contacts as data: geometry that the narrow phase fills in, impulses that the response adds, and
 //! edits between the verbs that count.
 
-use cgmath::{InnerSpace, MetricSpace};
+#[path = "common/draw.rs"]
+mod draw;
+
+use std::collections::HashSet;
+
+use cgmath::{EuclideanSpace, InnerSpace, MetricSpace};
+use draw::Draw;
 use taw::prelude::*;
 use taw::response::ContactLaw;
+use taw::swarm::{SimdLevel, SwarmModel};
 
 const DT: f64 = 1.0 / 64.0;
 
@@ -183,5 +190,61 @@ fn a_contact_that_is_not_touching_says_so() {
         assert_eq!(world.contacts.wm.len(), 1, "{at}");
         assert_eq!(world.contacts.wm[0].is_touching(), touches, "{at}");
         world.marbles.remove(id).unwrap();
+    }
+}
+
+/// Marbles that fly about and overlap, at rest and fast.
+fn cloud(count: u32) -> World<f32> {
+    let mut draw = Draw(count.into());
+    let mut world = World::default();
+    world.set_model(Model { substeps: 1, ..Model::GAME }).unwrap();
+    world.walls.insert(Plane::new(Vec3::unit_y(), -2.0).unwrap()).unwrap();
+    for _ in 0..count {
+        let mut vector =
+            |most: f64| Vec3::new(0, 0, 0).map(|_: i32| draw.between(-most, most) as f32);
+        let (at, velocity) = (Point3::from_vec(vector(2.0)), vector(3.0));
+        let velocity = if at.x > 0.0 { velocity } else { velocity * 0.01 };
+        let marble = Marble { velocity, ..Marble::new(at, draw.between(0.05, 0.2) as f32) };
+        world.marbles.insert(marble).unwrap();
+    }
+    world
+}
+
+/// Of all pairs, those that touch or may do so within the step are listed, whoever looks for them, and
+/// no others.
+#[test]
+fn soft_step_lists_the_pairs_that_are_near() {
+    let dt = DT as f32;
+    for count in [300, 1_000, 3_000] {
+        let mut world = cloud(count);
+        let mut portable = world.clone();
+        portable.swarm.set_simd_level(SimdLevel::PORTABLE);
+        let model = SwarmModel { threads: 3, ..portable.swarm.model() };
+        portable.swarm.set_model(model).unwrap();
+        for world in [&mut world, &mut portable] {
+            world.begin_step();
+            world.integrate(dt).unwrap();
+            world.generate_contacts();
+        }
+        assert_eq!(world.contacts, portable.contacts, "{count} marbles");
+        let listed: HashSet<_> = world.contacts.mm.iter().map(|c| (c.a, c.b)).collect();
+        assert_eq!(listed.len(), world.contacts.mm.len(), "each once");
+        let (at, velocity) = (world.marbles.position(), world.marbles.velocity());
+        let radius = world.marbles.radius();
+        let mut near = 0;
+        for b in 0..at.len() {
+            for a in 0..b {
+                let apart = (at[b] - at[a]).cast::<f64>().unwrap();
+                let separation = apart.magnitude() - f64::from(radius[a]) - f64::from(radius[b]);
+                let speed = (velocity[a] - velocity[b]).cast::<f64>().unwrap().dot(apart);
+                let closes = (speed / apart.magnitude()).max(0.0) * DT;
+                let beyond = separation - 2.0 * 9.81 * DT * DT - closes;
+                let is_listed = listed.contains(&(a as u32, b as u32));
+                assert!(beyond.abs() < 1e-5 || is_listed == (beyond < 0.0), "{a} {b}: {beyond}");
+                near += u32::from(is_listed);
+            }
+        }
+        assert!(near > count / 20, "{near} of {count} are near");
+        world.restitute(dt).unwrap();
     }
 }

@@ -187,6 +187,38 @@ mod tests {
     use super::*;
     use cgmath::One;
 
+    /// Below and above the angle up to which series serve, and where squares vanish.
+    #[test]
+    fn a_turn_has_the_digits_of_its_scalar_at_any_angle() {
+        let axis = Vec3::new(2.0, 3.0, 6.0) / 7.0;
+        let start = Quat::new(0.5, -0.5, 0.5, 0.5);
+        for angle in [0.0, 1e-200, 1e-30, 1e-9, 1e-4, 0.03, 0.3, 0.499_999, 0.500_001, 0.7, 3.0] {
+            let expected = axis_angle(axis, angle) * start;
+            let double = integrate_rotation(start, axis * angle, 1.0);
+            assert!((double - expected).magnitude() < 4e-16, "{angle}: {double:?}");
+            let single = integrate_rotation(
+                Quat::new(0.5_f32, -0.5, 0.5, 0.5),
+                cast_vector(axis * angle),
+                1.0,
+            );
+            let single = Quat::from_sv(f64::from(single.s), cast_vector(single.v));
+            assert!((single - expected).magnitude() < 2e-7, "{angle}: {single:?}");
+        }
+    }
+
+    /// Rounding does not let the length drift, and one that is wrong is set right.
+    #[test]
+    fn a_rotation_keeps_its_length() {
+        let angular_velocity = Vec3::new(3.0, -20.0, 7.0_f32);
+        let turned = (0..100_000)
+            .fold(Quat::one(), |q, _| integrate_rotation(q, angular_velocity, 1.0 / 240.0));
+        assert!((turned.magnitude() - 1.0).abs() < 2e-7, "{turned:?}");
+        for length in [0.5, 0.9, 0.999, 1.001, 1.1, 3.0] {
+            let set = integrate_rotation(Quat::one() * length, angular_velocity, 1e-3);
+            assert!((set.magnitude() - 1.0).abs() < 2e-7, "{length}: {set:?}");
+        }
+    }
+
     #[test]
     fn a_turn_is_exact_however_long_the_step() {
         let angular_velocity = Vec3::new(0.3, -2.0, 0.7_f64);

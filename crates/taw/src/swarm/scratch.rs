@@ -41,6 +41,8 @@ pub(super) struct Scratch {
     pub substep: u32,
     /// Balls that would bounce off a wall, and those of them that another one hinders.
     pub ways_to_walls: Vec<WayToWall>,
+    /// Those of each chunk.
+    pub ways_of_chunks: Vec<Vec<WayToWall>>,
     pub held: BitSet,
     /// Impacts of the step, if they are noted: of slots.
     pub impacts: Vec<Impact<f32>>,
@@ -68,6 +70,7 @@ impl Scratch {
             places,
             substep: _,
             ways_to_walls,
+            ways_of_chunks,
             held,
             impacts,
             outside_work,
@@ -85,6 +88,8 @@ impl Scratch {
                 + of(path_changes)
                 + of(places)
                 + of(ways_to_walls)
+                + of(ways_of_chunks)
+                + ways_of_chunks.iter().map(of).sum::<usize>()
                 + held.bytes()
                 + of(impacts)
                 + of(outside_work))

@@ -16,7 +16,7 @@ use crate::workers::{DisjointSlice, parallel_for};
 /// Body of a wall, and of a marble that has none.
 const NO_BODY: u32 = u32::MAX;
 /// Number of rows from which on it pays to solve islands on all threads.
-const MANY: usize = 500;
+const MANY: usize = 128;
 
 /// Constraint as a pass sees it.
 #[derive(Clone, Copy, Debug)]

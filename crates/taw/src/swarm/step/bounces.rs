@@ -12,6 +12,7 @@ use crate::swarm::kernels::{Pass, SolverParams, squared};
 use crate::swarm::simd::Row;
 use crate::swarm::wall_contact::xyz;
 use crate::swarm::{Stage, StaticGeometry, Swarm};
+use crate::workers::{DisjointSlice, parallel_for};
 
 /// Part of both radii that another ball has to be in the way: balls that lie on each other overlap by
 /// less.
@@ -130,20 +131,33 @@ impl Swarm {
 
     /// Lists the balls that would bounce off a wall in this round, if one of them comes from so far away
     /// that another one may be between.
-    fn list_ways_to_walls(&mut self, params: &SolverParams, faster: &impl Fn(&Chunk, f32) -> bool) {
+    fn list_ways_to_walls(
+        &mut self,
+        params: &SolverParams,
+        faster: &(impl Fn(&Chunk, f32) -> bool + Sync),
+    ) {
         let ways = &mut self.scratch.ways_to_walls;
         ways.clear();
-        for (i, chunk) in self.chunks.iter().enumerate() {
-            let next = self.chunks.get(i + 1).map_or(0.0, |next| next.speed[0]);
+        let (at, velocity, chunks) = (&self.at, &self.velocity, &self.chunks);
+        let lists = &mut self.scratch.ways_of_chunks;
+        lists.resize_with(chunks.len(), Vec::new);
+        let of_chunks = DisjointSlice::new(lists);
+        parallel_for(self.scratch.threads, chunks.len(), |_, i| {
+            // SAFETY: each has its own list.
+            let list = unsafe { &mut *of_chunks.row(i) };
+            list.clear();
+            let chunk = &chunks[i];
+            let next = chunks.get(i + 1).map_or(0.0, |next| next.speed[0]);
             if chunk.asleep || !chunk.again || !faster(chunk, next) {
-                continue;
+                return;
             }
-            ways.extend(chunk.wall_contacts.iter().filter_map(|contact| {
-                let at = &self.at[contact.row as usize];
-                let bounce = contact.bounce(params, at, &self.velocity[contact.row as usize])?;
-                Some(WayToWall::new(contact.row, at, contact.normal * -bounce.separation))
+            list.extend(chunk.wall_contacts.iter().filter_map(|contact| {
+                let row = contact.row as usize;
+                let bounce = contact.bounce(params, &at[row], &velocity[row])?;
+                Some(WayToWall::new(contact.row, &at[row], contact.normal * -bounce.separation))
             }));
-        }
+        });
+        lists.iter().for_each(|list| ways.extend_from_slice(list));
         if !ways.iter().any(WayToWall::is_long) {
             ways.clear();
         }
