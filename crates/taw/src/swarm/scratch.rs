@@ -39,10 +39,11 @@ pub(super) struct Scratch {
     pub places: Vec<SavedPlace>,
     /// Number of the substep.
     pub substep: u32,
-    /// Balls that would bounce off a wall, and those of them that another one hinders.
-    pub ways_to_walls: Vec<WayToWall>,
-    /// Those of each chunk.
+    /// Ways of balls that would bounce off a wall: of each chunk, and of all.
     pub ways_of_chunks: Vec<Vec<WayToWall>>,
+    pub ways_to_walls: Vec<WayToWall>,
+    /// Rows of these balls, and of those among them that another one hinders.
+    pub with_ways: BitSet,
     pub held: BitSet,
     /// Impacts of the step, if they are noted: of slots.
     pub impacts: Vec<Impact<f32>>,
@@ -71,6 +72,7 @@ impl Scratch {
             substep: _,
             ways_to_walls,
             ways_of_chunks,
+            with_ways,
             held,
             impacts,
             outside_work,
@@ -89,6 +91,7 @@ impl Scratch {
                 + of(places)
                 + of(ways_to_walls)
                 + of(ways_of_chunks)
+                + with_ways.bytes()
                 + ways_of_chunks.iter().map(of).sum::<usize>()
                 + held.bytes()
                 + of(impacts)

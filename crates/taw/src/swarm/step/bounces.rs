@@ -174,11 +174,19 @@ impl Swarm {
         }
         // Pairs are known of balls that come nearer to each other. Those of a chunk are of its rows and
         // of the next chunk's.
+        let with_ways = &mut self.scratch.with_ways;
+        with_ways.clear(self.at.len());
+        for way in &*ways {
+            with_ways.insert(way.row);
+        }
         let first_way = |row: u32| ways.partition_point(|way| way.row < row);
         let has_ways = |chunk: &&Chunk| first_way(chunk.rows[0]) < first_way(chunk.rows[2]);
         let of_chunks = self.chunks.iter().filter(has_ways).flat_map(|chunk| &chunk.batches);
         for [a, b] in of_chunks.chain(&self.fast_movers.batches).flat_map(Batch::pairs) {
             for [row, other] in [[a, b], [b, a]] {
+                if !with_ways.contains(row) {
+                    continue;
+                }
                 let mut of_row = ways[first_way(row)..].iter().take_while(|way| way.row == row);
                 if of_row.any(|way| way.leads_through(&self.at[other as usize])) {
                     held.insert(row);
