@@ -1,16 +1,17 @@
-//! Pool of worker threads that help with a step. (Not rayon: its forks take longer than many a pass of a
-//! step.)
+//! Pool of worker threads that help with a step. (Not rayon: its forks take longer than many a pass of
+//! a step.)
 //!
-//! Workers live as long as the process, spin briefly and then sleep while idle, and run one job at a time. Work is cut into jobs, and each thread takes the next one
-//! that nobody has: so a worker that the system gives no time holds up nobody, and it does not
-//! matter to the result how many there are.
+//! Workers live as long as the process, spin briefly and then sleep while idle, and run one job at a
+//! time. Work is cut into jobs, and each thread takes the next one that nobody has: so a worker that the
+//! system gives no time holds up nobody, and it does not matter to the result how many there are. A job
+//! that panics on a worker aborts the process: others would wait for it for ever.
 
 use std::cell::UnsafeCell;
 use std::ops::Range;
 use std::sync::atomic::{AtomicU32, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
 
-/// The most threads of a team.
+/// Maximum number of threads of the pool.
 pub(crate) const MAX_THREADS: usize = 64;
 /// Spins before a thread goes to sleep: some hundredths of a millisecond, longer than between two
 /// works of a step. Other threads of the process may need the core.

@@ -210,7 +210,7 @@ fn cloud(count: u32) -> World<f32> {
     world
 }
 
-/// Of all pairs, those that touch or may do so within the step are listed, whoever looks for them, and
+/// Checks that all pairs that touch or may do so within the step are listed, whoever looks for them, and
 /// no others.
 #[test]
 fn soft_step_lists_the_pairs_that_are_near() {

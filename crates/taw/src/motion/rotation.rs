@@ -1,6 +1,6 @@
 use std::marker::PhantomData;
 
-use cgmath::{InnerSpace, Rotation as _};
+use cgmath::{InnerSpace, Rotation as _, Zero};
 
 use crate::math::{Quat, Scalar, Vec3, cast_vector, normalize_and_length};
 
@@ -33,6 +33,9 @@ pub fn integrate_rotation<S: Scalar>(
     angular_velocity: Vec3<S>,
     dt: S,
 ) -> Quat<S> {
+    if angular_velocity.is_zero() {
+        return rotation; // to the bit
+    }
     let half_angle = angular_velocity * (dt * S::from_f64(0.5));
     let squared = half_angle.magnitude2();
     let turn = if squared <= S::from_f64(SMALL) {
@@ -187,7 +190,18 @@ mod tests {
     use super::*;
     use cgmath::One;
 
-    /// Below and above the angle up to which series serve, and where squares vanish.
+    #[test]
+    fn what_does_not_turn_keeps_its_bits() {
+        for (at, s) in [0.1_f32, 0.3, 0.5, 0.7, 0.9, 1.3].into_iter().enumerate() {
+            let unit = Quat::new(s, 0.2, -0.3, 0.1 + at as f32).normalize();
+            for rotation in [unit, unit * 1.000_000_4, unit * 0.9, Quat::new(0.0, 0.0, 0.0, 0.0)] {
+                let still = Vec3::new(0.0, -0.0, 0.0);
+                assert_eq!(integrate_rotation(rotation, still, 1.0 / 60.0), rotation);
+            }
+        }
+    }
+
+    /// Checks angles below and above the one up to which series serve, and those whose squares vanish.
     #[test]
     fn a_turn_has_the_digits_of_its_scalar_at_any_angle() {
         let axis = Vec3::new(2.0, 3.0, 6.0) / 7.0;
@@ -206,7 +220,7 @@ mod tests {
         }
     }
 
-    /// Rounding does not let the length drift, and one that is wrong is set right.
+    /// Checks that rounding lets no length drift, and that a wrong one is set right.
     #[test]
     fn a_rotation_keeps_its_length() {
         let angular_velocity = Vec3::new(3.0, -20.0, 7.0_f32);

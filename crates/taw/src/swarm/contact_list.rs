@@ -19,8 +19,8 @@ pub(crate) struct ChunkPairs<'a> {
 }
 
 impl Swarm {
-    /// Gives each chunk with balls that are awake, and fast movers, a list to fill, on all threads. Those
-    /// of chunks that sleep are left as they are.
+    /// Gives each chunk a list to fill if it or the next one is awake, and the fast movers one, on the
+    /// threads of the step. The other lists are left as they are.
     pub(crate) fn fill_lists<L: Default + Send + Sync>(
         &self,
         lists: &mut Vec<L>,

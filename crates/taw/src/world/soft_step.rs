@@ -148,7 +148,6 @@ impl<S: Scalar> World<S> {
     /// time.
     fn list_soft_contacts(&mut self, dt: S) {
         let mut lists = std::mem::take(&mut self.scratch.soft_step.lists);
-        lists.iter_mut().for_each(ChunkContacts::clear);
         let (time, fast) = (dt.as_f64() as f32, self.resting_speed(dt).as_f64() as f32);
         let limits = NearLimits { reach: fast * time, time, fast };
         let moving = self.list_moving_walls(dt);
@@ -167,6 +166,7 @@ impl<S: Scalar> World<S> {
         append_all(threads, lists.iter().map(|list| &list.contacts.wm[..]), &mut self.contacts.wm);
         append_all(threads, lists.iter().map(|list| &list.contacts.mm[..]), &mut self.contacts.mm);
         self.collect_predicted(&mut lists, moving, dt);
+        lists.iter_mut().for_each(ChunkContacts::clear); // else a clone would copy them
         self.scratch.soft_step.lists = lists;
     }
 

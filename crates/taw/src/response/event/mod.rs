@@ -186,7 +186,7 @@ pub(crate) struct EventSettings<'a> {
     pub dt: f64,
     /// Iterations for clusters of resting balls.
     pub iterations: u32,
-    /// Number of threads that solve clusters.
+    /// Number of threads that solve the islands of clusters.
     pub threads: usize,
     /// Gravity, in m/s².
     pub gravity: Vec3<f64>,

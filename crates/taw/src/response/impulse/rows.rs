@@ -15,8 +15,8 @@ use crate::workers::{DisjointSlice, parallel_for};
 
 /// Body of a wall, and of a marble that has none.
 const NO_BODY: u32 = u32::MAX;
-/// Number of rows from which on it pays to solve islands on all threads.
-const MANY: usize = 128;
+/// Number of rows for each thread that solves islands: with fewer, waking one costs more than it saves.
+const ROWS_PER_THREAD: usize = 128;
 
 /// Constraint as a pass sees it.
 #[derive(Clone, Copy, Debug)]
@@ -43,7 +43,7 @@ pub(super) struct Row<S> {
     pub impulse: ContactImpulse<S>,
 }
 
-/// What few rows need: lever arms of capsules, and rolling friction.
+/// Lever arms of capsules and rolling friction, which few rows need.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct RowDetails<S> {
     /// Index of its constraint.
@@ -194,7 +194,7 @@ impl<S: Scalar> Rows<S> {
         *body - first
     }
 
-    /// Solves each island, on so many threads: they have nothing in common.
+    /// Solves each island, on so many threads at most: they have nothing in common.
     pub fn solve_islands(
         &mut self,
         columns: &SolverBodies<S>,
@@ -202,7 +202,7 @@ impl<S: Scalar> Rows<S> {
         threads: usize,
         solve: impl Fn(IslandRows<S>) + Sync,
     ) {
-        let threads = if self.list.len() < MANY { 1 } else { threads };
+        let threads = threads.min(self.list.len() / ROWS_PER_THREAD);
         let islands = DisjointSlice::new(&mut islands.list);
         let (rows, details) =
             (DisjointSlice::new(&mut self.list), DisjointSlice::new(&mut self.details));
@@ -210,7 +210,7 @@ impl<S: Scalar> Rows<S> {
             (DisjointSlice::new(&mut self.searches), DisjointSlice::new(&mut self.bodies));
         parallel_for(threads, self.parts.len(), |_, part| {
             let Part { island, rows: of_rows, bodies: of_bodies } = self.parts[part].clone();
-            // SAFETY: each island has its own.
+            // SAFETY: parts follow one another, each island has one, and no marble is in two.
             solve(unsafe {
                 IslandRows {
                     island: &mut *islands.row(island),

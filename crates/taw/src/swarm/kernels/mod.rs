@@ -207,9 +207,19 @@ fn direction([a, b]: [u32; 2]) -> [f32; 3] {
 /// The rows of a column that the pairs of a batch are about.
 #[inline(always)]
 fn gather<L: Simd>(column: DisjointSlice<Row>, batch: &Batch) -> [[L; 4]; 2] {
-    let a = column.row(batch.first[0] as usize);
-    let b = column.row(batch.first[1] as usize);
     // SAFETY: no other thread has these rows (see `Chunk`).
+    unsafe { gather_from(column.row(0), batch) }
+}
+
+/// The rows of a column that the pairs of a batch are about.
+///
+/// # Safety
+/// They exist, and no other thread writes them.
+#[inline(always)]
+unsafe fn gather_from<L: Simd>(column: *const Row, batch: &Batch) -> [[L; 4]; 2] {
+    let a = column.wrapping_add(batch.first[0] as usize);
+    let b = column.wrapping_add(batch.first[1] as usize);
+    // SAFETY: as the caller promises.
     unsafe { [L::gather(a, &batch.a), L::gather(b, &batch.b)] }
 }
 

@@ -139,6 +139,13 @@ impl Swarm {
         let ways = &mut self.scratch.ways_to_walls;
         ways.clear();
         let (at, velocity, chunks) = (&self.at, &self.velocity, &self.chunks);
+        let has_ways = |i: usize| {
+            let next = chunks.get(i + 1).map_or(0.0, |next| next.speed[0]);
+            chunks[i].again && !chunks[i].asleep && faster(&chunks[i], next)
+        };
+        if !(0..chunks.len()).any(has_ways) {
+            return;
+        }
         let lists = &mut self.scratch.ways_of_chunks;
         lists.resize_with(chunks.len(), Vec::new);
         let of_chunks = DisjointSlice::new(lists);
@@ -146,12 +153,10 @@ impl Swarm {
             // SAFETY: each has its own list.
             let list = unsafe { &mut *of_chunks.row(i) };
             list.clear();
-            let chunk = &chunks[i];
-            let next = chunks.get(i + 1).map_or(0.0, |next| next.speed[0]);
-            if chunk.asleep || !chunk.again || !faster(chunk, next) {
+            if !has_ways(i) {
                 return;
             }
-            list.extend(chunk.wall_contacts.iter().filter_map(|contact| {
+            list.extend(chunks[i].wall_contacts.iter().filter_map(|contact| {
                 let row = contact.row as usize;
                 let bounce = contact.bounce(params, &at[row], &velocity[row])?;
                 Some(WayToWall::new(contact.row, &at[row], contact.normal * -bounce.separation))
