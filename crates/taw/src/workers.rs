@@ -341,6 +341,10 @@ impl<'a, T> DisjointSlice<'a, T> {
 
     /// Pointer to a row. The caller must not race with what other threads do to it.
     #[inline(always)]
+    #[expect(
+        clippy::inline_always,
+        reason = "kernels are compiled for the instructions of their caller"
+    )]
     pub fn row(self, row: usize) -> *mut T {
         self.0.as_ptr().wrapping_add(row).cast_mut().cast()
     }

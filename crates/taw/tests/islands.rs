@@ -39,7 +39,9 @@ fn islands_have_the_same_bits_on_any_number_of_threads() {
     for response in [Response::Impulse, Response::EventDriven] {
         let mut worlds = [1, 2, 3, 7].map(|threads| piles(response, threads));
         for step in 0..40 {
-            worlds.iter_mut().for_each(|world| world.step(1.0 / 60.0).unwrap());
+            for world in &mut worlds {
+                world.step(1.0 / 60.0).unwrap();
+            }
             let [first, others @ ..] = &worlds;
             let threads = first.contacts.len() / 128;
             assert!(step < 20 || threads >= 2, "{response:?}: {threads} threads pay");

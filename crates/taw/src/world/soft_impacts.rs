@@ -119,7 +119,9 @@ impl<S: Scalar> World<S> {
             std::mem::take(&mut self.scratch.soft_step.predicted);
         list.clear();
         for part in 0..2 {
-            lists.iter_mut().for_each(|of_chunk| list.append(&mut of_chunk.predicted[part]));
+            for of_chunk in &mut *lists {
+                list.append(&mut of_chunk.predicted[part]);
+            }
         }
         for wall in &moving {
             self.predict_impacts_of(wall, dt, (&mut listed, &mut list));

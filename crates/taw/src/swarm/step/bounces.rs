@@ -162,7 +162,9 @@ impl Swarm {
                 Some(WayToWall::new(contact.row, &at[row], contact.normal * -bounce.separation))
             }));
         });
-        lists.iter().for_each(|list| ways.extend_from_slice(list));
+        for list in lists {
+            ways.extend_from_slice(list);
+        }
         if !ways.iter().any(WayToWall::is_long) {
             ways.clear();
         }
