@@ -369,3 +369,28 @@ impl<'a, T> DisjointSlice<'a, T> {
         unsafe { std::slice::from_raw_parts(cells.as_ptr().cast(), cells.len()) }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Checks it against the plain loop, with empty lists and with so many numbers that threads share
+    /// the copy.
+    #[test]
+    fn lists_are_appended_in_their_order_by_any_number_of_threads() {
+        for length in [0_u32, 1, 7, 30_000] {
+            let lists: Vec<Vec<u32>> = (0..9)
+                .map(|list| (0..length * (list % 3)).map(|i| i * 9 + list).collect())
+                .collect();
+            let mut expected = vec![42];
+            for list in &lists {
+                expected.extend_from_slice(list);
+            }
+            for threads in [0, 1, 2, 5] {
+                let mut all = vec![42];
+                append_all(threads, lists.iter().map(|list| &list[..]), &mut all);
+                assert_eq!(all, expected, "{length}, {threads} threads");
+            }
+        }
+    }
+}

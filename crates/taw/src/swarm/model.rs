@@ -41,8 +41,8 @@ pub struct SwarmModel {
     /// moved apart.
     pub substeps: u32,
     /// Number of threads that work on a step, from 1 to 64, or 0 for automatic: one per 1,000 balls,
-    /// at most all hardware threads. Islands of `Impulse` and `EventDriven` are solved by one per 128 contacts.
-    /// The result has the same bits with any number.
+    /// at most all hardware threads. Islands of `Impulse` and `EventDriven` are solved by one per 128
+    /// contacts, within the same limit. The result has the same bits with any number.
     pub threads: u32,
     /// Material of balls that have none of their own. Tangential restitution acts where restitution
     /// is above zero; [`Tier::Lab`] uses no number of it.

@@ -16,8 +16,8 @@ pub(crate) struct NearLimits {
     pub fast: f32,
 }
 
-/// Visits the pairs that are near and have a ball that is awake, and tells which may come together: begin to touch
-/// within the time, or are fast although they overlap. The rows of all pairs exist.
+/// Visits the pairs that are near and have a ball that is awake, and tells which may come together: begin
+/// to touch within the time, or are fast although they overlap. The rows of all pairs exist.
 pub(in crate::swarm) struct NearPairs<'a, V> {
     pub at: &'a [Row],
     pub velocity: &'a [Row],

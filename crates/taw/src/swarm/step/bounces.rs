@@ -179,13 +179,13 @@ impl Swarm {
         if ways.is_empty() {
             return;
         }
-        // Pairs are known of balls that come nearer to each other. Those of a chunk are of its rows and
-        // of the next chunk's.
         let with_ways = &mut self.scratch.with_ways;
         with_ways.clear(self.at.len());
         for way in &*ways {
             with_ways.insert(way.row);
         }
+        // Pairs are known of balls that come nearer to each other. Those of a chunk are of its rows and
+        // of the next chunk's.
         let first_way = |row: u32| ways.partition_point(|way| way.row < row);
         let has_ways = |chunk: &&Chunk| first_way(chunk.rows[0]) < first_way(chunk.rows[2]);
         let of_chunks = self.chunks.iter().filter(has_ways).flat_map(|chunk| &chunk.batches);
