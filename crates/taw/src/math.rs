@@ -4,8 +4,10 @@ use cgmath::num_traits::{self, Float, ToPrimitive};
 use cgmath::{BaseFloat, InnerSpace};
 
 mod real;
+mod union_find;
 
 pub(crate) use real::{Real, RealVector};
+pub(crate) use union_find::UnionFind;
 
 /// Displacement, velocity or direction.
 pub type Vec3<S> = cgmath::Vector3<S>;

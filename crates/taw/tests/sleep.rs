@@ -1,7 +1,15 @@
 //! Marbles sleep where they rest, and wake when something changes about them.
 
+#[path = "sleep/islands.rs"]
+mod islands;
+#[path = "sleep/random.rs"]
+mod random;
 #[path = "sleep/slow.rs"]
 mod slow;
+
+use islands::island;
+
+use std::collections::BTreeSet;
 
 use taw::motion::WallMotion;
 use taw::prelude::*;
@@ -59,8 +67,8 @@ fn steps(world: &mut World<f32>, count: u32) {
     (0..count).for_each(|_| world.step(DT).unwrap());
 }
 
-fn asleep(world: &World<f32>, ids: &[MarbleId]) -> usize {
-    ids.iter().filter(|id| world.is_asleep(**id).unwrap()).count()
+fn asleep<'a>(world: &World<f32>, ids: impl IntoIterator<Item = &'a MarbleId>) -> usize {
+    ids.into_iter().filter(|id| world.is_asleep(**id).unwrap()).count()
 }
 
 /// The heap after four seconds, in which it has fallen asleep.
@@ -78,15 +86,34 @@ fn sleeping() -> (World<f32>, WallId, Vec<MarbleId>) {
 type Change = fn(&mut World<f32>, WallId, MarbleId);
 
 #[test]
-fn whatever_changes_about_a_heap_wakes_it() {
+fn whatever_changes_about_a_marble_wakes_its_island() {
     let (world, floor, ids) = sleeping();
-    let changes: [(&str, Change); 14] = [
+    let changes: [(&str, Change); 6] = [
         ("impulse", |w, _, id| w.marbles.apply_impulse(id, Vec3::new(0.0, 5.0, 0.0)).unwrap()),
         ("velocity", |w, _, id| w.marbles.set_velocity(id, Vec3::new(0.0, 1.0, 0.0)).unwrap()),
         ("force", |w, _, id| w.marbles.apply_force(id, Vec3::new(0.0, 1e3, 0.0)).unwrap()),
         ("mass", |w, _, id| w.marbles.set_mass(id, Mass::Kilograms(1.0)).unwrap()),
-        ("gravity", |w, _, _| w.set_gravity(Vec3::new(0.1, -9.81, 0.0)).unwrap()),
         ("gravity scale", |w, _, id| w.marbles.set_gravity_scale(id, -1.0).unwrap()),
+        ("sleeping disabled", |w, _, id| w.marbles.set_sleeping_disabled(id, true).unwrap()),
+    ];
+    for id in &ids {
+        let island = island(&world, *id);
+        for (name, change) in changes {
+            let mut world = world.clone();
+            change(&mut world, floor, *id);
+            let version = world.sleep_version();
+            steps(&mut world, 1);
+            assert_eq!(asleep(&world, &island), 0, "{name} of {id:?}");
+            assert_ne!(world.sleep_version(), version, "{name}");
+        }
+    }
+}
+
+#[test]
+fn whatever_changes_about_a_heap_wakes_it() {
+    let (world, floor, ids) = sleeping();
+    let changes: [(&str, Change); 7] = [
+        ("gravity", |w, _, _| w.set_gravity(Vec3::new(0.1, -9.81, 0.0)).unwrap()),
         ("floor lower", |w, floor, _| {
             w.walls.set(floor, block([-5.0, -2.0, -5.0], [5.0, -1.0, 5.0])).unwrap();
         }),
@@ -98,16 +125,12 @@ fn whatever_changes_about_a_heap_wakes_it() {
             let motion = sliding(Vec3::new(1.0, 0.0, 0.0));
             w.walls.set_motion(floor, Some(motion)).unwrap();
         }),
-        ("wall inside", |w, _, _| {
-            w.walls.insert(block([0.0, 0.0, 0.0], [0.2, 0.2, 0.2])).unwrap();
-        }),
         ("half-space", |w, _, _| {
             w.walls.insert(Plane::new(Vec3::unit_y(), -20.0).unwrap()).unwrap();
         }),
         ("neighbour gone", |w, _, id| {
             let _ = w.marbles.remove(id).unwrap();
         }),
-        ("sleeping disabled", |w, _, id| w.marbles.set_sleeping_disabled(id, true).unwrap()),
     ];
     for (name, change) in changes {
         let mut world = world.clone();
@@ -128,23 +151,30 @@ fn whatever_changes_about_a_heap_wakes_it() {
 
 #[test]
 fn nothing_falls_asleep_about_a_marble_that_must_not() {
+    let (world, _, ids) = sleeping();
+    let size = |id: &&MarbleId| island(&world, **id).len();
+    let awake = *ids.iter().max_by_key(size).unwrap();
     let (mut world, _, ids) = heap();
-    world.marbles.set_sleeping_disabled(ids[3], true).unwrap();
-    assert!(world.marbles.get(ids[3]).unwrap().sleeping_disabled);
-    for _ in 0..300 {
+    world.marbles.set_sleeping_disabled(awake, true).unwrap();
+    assert!(world.marbles.get(awake).unwrap().sleeping_disabled);
+    // Towers of three fall over one by one.
+    for _ in 0..600 {
         steps(&mut world, 1);
-        assert_eq!(asleep(&world, &ids), 0);
+        assert!(!world.is_asleep(awake).unwrap());
     }
-    world.marbles.set_sleeping_disabled(ids[3], false).unwrap();
+    let around = island(&world, awake);
+    assert!(around.len() > 3);
+    assert_eq!((asleep(&world, &around), asleep(&world, &ids)), (0, ids.len() - around.len()));
+    world.marbles.set_sleeping_disabled(awake, false).unwrap();
     steps(&mut world, 60);
     assert_eq!(asleep(&world, &ids), ids.len());
     // The slot of one that is gone says nothing of the next.
-    world.marbles.set_sleeping_disabled(ids[3], true).unwrap();
+    world.marbles.set_sleeping_disabled(awake, true).unwrap();
     steps(&mut world, 1);
-    let marble = world.marbles.remove(ids[3]).unwrap();
+    let marble = world.marbles.remove(awake).unwrap();
     let id = world.marbles.insert(Marble { sleeping_disabled: false, ..marble }).unwrap();
-    steps(&mut world, 120);
-    assert!(world.is_asleep(id).unwrap() && world.is_asleep(ids[3]).is_err());
+    steps(&mut world, 400); // its neighbours fall in
+    assert!(world.is_asleep(id).unwrap() && world.is_asleep(awake).is_err());
 }
 
 #[test]
@@ -164,18 +194,33 @@ fn a_lift_wakes_only_what_it_comes_to() {
     assert_eq!(world.sleep_version(), version);
     // Within one step from far away into the heap.
     let mut jump = world.clone();
+    let met = islands_in(&world, &ids, at(0.0));
+    assert!((3..ids.len()).contains(&met.len()));
     jump.walls.set(lift, at(0.0)).unwrap();
     steps(&mut jump, 1);
-    assert_eq!(asleep(&jump, &ids), 0);
+    assert_eq!(asleep(&jump, &met), 0);
     // More changes than the log has room for, of which one is in the heap.
-    for (there, sleep) in [(3_000, ids.len()), (2_000, 0)] {
+    for (there, sleep) in [(3_000, met.len()), (2_000, 0)] {
         for step in 0..3_000_u16 {
             let x = if step == there { 0.0 } else { 20.0 + f32::from(step % 7) };
             world.walls.set(lift, at(x)).unwrap();
         }
         steps(&mut world, 1);
-        assert_eq!(asleep(&world, &ids), sleep);
+        assert_eq!(asleep(&world, &met), sleep);
     }
+}
+
+/// Marbles that a box would overlap, and their islands.
+fn islands_in(
+    world: &World<f32>,
+    ids: &[MarbleId],
+    place: Aabb<Point3<f32>>,
+) -> BTreeSet<MarbleId> {
+    let overlaps = |id: &&MarbleId| {
+        let marble = world.marbles.get(**id).unwrap();
+        place.project_point(marble.position).distance < marble.radius
+    };
+    ids.iter().filter(overlaps).flat_map(|id| island(world, *id)).collect()
 }
 
 /// Says if a ball touches a wall or another ball, or nearly.
@@ -303,7 +348,9 @@ fn a_thousand_walls_that_move_far_away_change_no_bit_of_a_heap() {
             world.walls.set(*wall, block([x, 0.0, -0.5], [x + 1.0, 1.0, 0.5])).unwrap();
         }
         steps(&mut world, 1);
-        assert_eq!(asleep(&world, &ids), 0, "wall {last} came");
+        let met = islands_in(&moving, &ids, block([-0.5, 0.0, -0.5], [0.5, 1.0, 0.5]));
+        assert!(met.len() > 3);
+        assert_eq!(asleep(&world, &met), 0, "wall {last} came");
     }
 }
 
@@ -325,135 +372,6 @@ impl Random {
         let (y, half) = (1.5 * self.next() - 0.3, 0.1 + 0.6 * self.next());
         block([x - half, y - half, z - half], [x + half, y + half, z + half])
     }
-}
-
-/// Marbles that a wall touches.
-fn beside(world: &World<f32>, ids: &[MarbleId], wall: &Aabb<Point3<f32>>) -> Vec<MarbleId> {
-    let touches = |id: &&MarbleId| {
-        world.marbles.get(**id).is_ok_and(|marble| {
-            wall.distance_to_point(marble.position) <= marble.radius
-                || wall.contains_point(marble.position)
-        })
-    };
-    ids.iter().filter(touches).copied().collect()
-}
-
-/// Changes something at random. Returns the marbles that must be awake after the next step.
-fn change(
-    world: &mut World<f32>,
-    random: &mut Random,
-    walls: &mut Vec<(WallId, Aabb<Point3<f32>>)>,
-    ids: &mut Vec<MarbleId>,
-) -> Vec<MarbleId> {
-    let (wall, marble) = (random.below(walls.len()), random.below(ids.len()));
-    let (wall_id, shape) = walls[wall];
-    let id = ids[marble];
-    match random.below(8) {
-        0 => {
-            let new = random.block();
-            let touched = [beside(world, ids, &shape), beside(world, ids, &new)].concat();
-            world.walls.set(wall_id, new).unwrap();
-            walls[wall].1 = new;
-            touched
-        }
-        1 => {
-            let new = random.block();
-            walls.push((world.walls.insert(new).unwrap(), new));
-            beside(world, ids, &new)
-        }
-        2 if walls.len() > 2 => {
-            walls.swap_remove(wall);
-            world.walls.remove(wall_id).unwrap();
-            beside(world, ids, &shape)
-        }
-        3 => {
-            let motion = sliding(Vec3::new(random.next(), 0.0, random.next()));
-            world.walls.set_motion(wall_id, Some(motion)).unwrap();
-            beside(world, ids, &shape)
-        }
-        4 => {
-            world.walls.set_motion(wall_id, None).unwrap();
-            let material = Material { friction: random.next(), ..Material::default() };
-            world.walls.set_material(wall_id, Some(material)).unwrap();
-            beside(world, ids, &shape)
-        }
-        5 => {
-            world.marbles.apply_impulse(id, Vec3::new(0.0, 9.0 * random.next(), 0.0)).unwrap();
-            vec![id]
-        }
-        6 if ids.len() > 10 => {
-            let gone = world.marbles.remove(id).unwrap();
-            ids.swap_remove(marble);
-            let near = |id: &&MarbleId| {
-                let other = world.marbles.get(**id).unwrap();
-                let apart = (other.position - gone.position).magnitude();
-                apart < (gone.radius + other.radius) * 1.01
-            };
-            ids.iter().filter(near).copied().collect()
-        }
-        _ => {
-            let at = Point3::new(random.next(), 1.0 + random.next(), random.next());
-            ids.push(world.marbles.insert(Marble::new(at, 0.05 + 0.1 * random.next())).unwrap());
-            vec![]
-        }
-    }
-}
-
-#[test]
-fn who_must_wake_wakes_and_who_sleeps_does_not_move() {
-    let mut slept = 0;
-    for seed in 1..=40_u64 {
-        let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));
-        let mut world = world();
-        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
-        let mut walls: Vec<_> = (0..4)
-            .map(|_| {
-                let shape = random.block();
-                (world.walls.insert(shape).unwrap(), shape)
-            })
-            .collect();
-        let material = Material { rolling_resistance: 0.1, ..Material::default() };
-        let mut ids: Vec<_> = (0..40)
-            .map(|_| {
-                let at =
-                    [4.0 * random.next() - 2.0, 3.0 * random.next(), 4.0 * random.next() - 2.0];
-                let mut ball = Marble::new(Point3::from(at), 0.05 + 0.1 * random.next());
-                ball.material = Some(material);
-                world.marbles.insert(ball).unwrap()
-            })
-            .collect();
-        for _ in 0..12 {
-            for _ in 0..40 {
-                let before: Vec<_> = ids
-                    .iter()
-                    .filter(|id| world.is_asleep(**id).unwrap())
-                    .map(|id| (*id, world.marbles.get(*id).unwrap()))
-                    .collect();
-                steps(&mut world, 1);
-                for (id, marble) in before {
-                    if world.is_asleep(id).unwrap() {
-                        slept += 1;
-                        assert_eq!(world.marbles.get(id).unwrap(), marble, "seed {seed}");
-                    }
-                }
-            }
-            let must_wake = change(&mut world, &mut random, &mut walls, &mut ids);
-            // Any number of threads, and a clone.
-            let mut other = world.clone();
-            let model = SwarmModel { threads: 3, ..other.swarm.model() };
-            other.swarm.set_model(model).unwrap();
-            let mut same = world.clone();
-            same.swarm.set_model(world.swarm.model()).unwrap(); // which wakes all, too
-            steps(&mut other, 20);
-            steps(&mut same, 20);
-            assert_eq!(other.marbles, same.marbles, "seed {seed}: threads");
-            steps(&mut world, 1);
-            for id in must_wake.into_iter().filter(|id| world.marbles.row(*id).is_ok()) {
-                assert!(!world.is_asleep(id).unwrap(), "seed {seed}: {id:?} sleeps on");
-            }
-        }
-    }
-    assert!(slept > 10_000, "only {slept} times did any sleep");
 }
 
 /// One lies on the floor, one floats.

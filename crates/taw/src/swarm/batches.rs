@@ -11,7 +11,9 @@ pub(super) struct Batch {
     pub a: [u16; LANES],
     pub b: [u16; LANES],
     /// Number of pairs; the rest repeat the first of them.
-    pub count: u32,
+    pub count: u16,
+    /// Set if all of these balls sleep.
+    pub is_idle: bool,
 }
 
 impl Batch {

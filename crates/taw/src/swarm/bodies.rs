@@ -165,7 +165,7 @@ impl Swarm {
             && turns()
             && self.surfaces.get(slot) == surface
             && self.surfaces.layers(slot) == layers
-            && self.sleepless.contains(slot) == sleeping_disabled
+            && self.sleep.sleepless.contains(slot) == sleeping_disabled
     }
 
     /// Takes over what changed of bodies, and wakes those.
@@ -176,9 +176,9 @@ impl Swarm {
             let row = self.ids.rows()[body.slot as usize] as usize;
             resurfaced |= self.surfaces.set(body.slot, body.surface);
             if body.sleeping_disabled {
-                self.sleepless.insert(body.slot);
+                self.sleep.sleepless.insert(body.slot);
             } else {
-                self.sleepless.remove(body.slot);
+                self.sleep.sleepless.remove(body.slot);
             }
             self.wake(row);
             let at = self.at[row];
@@ -295,13 +295,14 @@ impl Swarm {
         parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             // SAFETY: each thread has its own chunks.
             let chunk = unsafe { &mut *chunks.row(chunk) };
-            if chunk.asleep && chunk.read_asleep || !chunk.asleep && dt.is_none() {
+            let unread = std::mem::take(&mut chunk.unread);
+            if !unread && (chunk.asleep || dt.is_none()) {
                 return;
             }
-            chunk.read_asleep = chunk.asleep;
             for row in chunk.own_rows() {
                 let marble = marble_of_slot.get(slots[row] as usize).copied().unwrap_or(NO_ROW);
-                if marble == NO_ROW {
+                let is_asleep = speeds[row][3].is_sign_negative();
+                if marble == NO_ROW || !(if is_asleep { unread } else { dt.is_some() }) {
                     continue;
                 }
                 let marble = marble as usize;
@@ -335,7 +336,9 @@ impl Swarm {
     /// Slots of the balls near walls other than half-spaces.
     pub(crate) fn slots_near_shapes(&self) -> impl Iterator<Item = u32> + '_ {
         let awake = self.chunks.iter().filter(|chunk| !chunk.asleep);
-        awake.flat_map(|chunk| &chunk.near_shapes).map(|row| self.ids.slots()[*row as usize])
+        let rows = awake.flat_map(|chunk| &chunk.near_shapes).map(|row| *row as usize);
+        let awake = rows.filter(|row| self.velocity[*row][3].is_sign_positive());
+        awake.map(|row| self.ids.slots()[row])
     }
 
     /// Returns true if a ball sleeps.

@@ -65,6 +65,7 @@ impl Swarm {
         self.impulse_cache.shrink_slack();
         self.pairs_valid = true;
         self.cache_valid = false;
+        self.scratch.idle_batches = None;
     }
 
     /// Skin at the usual speed, in metres: displacement of most balls until pairs are searched
@@ -244,6 +245,10 @@ impl Swarm {
         if has_friction {
             reorder_rows(&mut self.spin, scratch, order, threads);
             reorder(&mut self.old_rows, scratch, order, threads);
+            if !self.sleep.rest.time.is_empty() {
+                reorder_rows(&mut self.sleep.rest.place, scratch, order, threads);
+                reorder(&mut self.sleep.rest.time, scratch, order, threads);
+            }
         } else {
             reorder(&mut self.displacement, scratch, order, threads);
         }
@@ -274,21 +279,14 @@ impl Swarm {
             let chunk = &mut self.chunks[count];
             chunk.layers = [begin, layer];
             chunk.rows = [first, next, next];
-            chunk.rest.end();
             let radii = self.at[first as usize..next as usize].iter().map(|at| at[3]);
             chunk.radii =
                 radii.fold([f32::MAX, 0.0], |[least, most], r| [least.min(r), most.max(r)]);
             chunk.fastest_own = None;
-            chunk.read_asleep = false;
-            let asleep = |row: &[f32; 4]| row[3].is_sign_negative();
-            let velocities = &mut self.velocity[first as usize..next as usize];
-            chunk.asleep = !velocities.is_empty() && velocities.iter().all(asleep);
-            if !chunk.asleep {
-                for velocity in velocities {
-                    self.sleep_version += u64::from(asleep(velocity));
-                    velocity[3] = velocity[3].abs();
-                }
-            }
+            let velocities = &self.velocity[first as usize..next as usize];
+            chunk.sleepers = velocities.iter().filter(|row| row[3].is_sign_negative()).count();
+            chunk.asleep = chunk.sleepers == velocities.len();
+            chunk.unread = chunk.sleepers > 0;
             if count > 0 {
                 self.chunks[count - 1].rows[2] = next;
             }

@@ -3,8 +3,6 @@ use std::ops::Range;
 use super::batches::Batch;
 use super::kernels::ContactImpulses;
 use super::neighbours::{NEIGHBOUR_ROOM, NeighbourLists};
-use super::rest::Rest;
-use super::simd::Row;
 use super::wall_contact::WallContact;
 
 /// Some layers of the grid, as much as one thread works on at a time. Pairs of its balls, among
@@ -31,21 +29,23 @@ pub(super) struct Chunk {
     pub near_shapes: Vec<u32>,
     /// Set if one near other walls is fast.
     pub has_fast: bool,
-    /// Largest speed of a ball, in m/s: of any, of one in the first layer, of one in the last.
-    pub speed: [f32; 3],
+    /// Largest speed of a ball, in m/s.
+    pub speed: f32,
     /// Largest speed of a wall at one of its balls, in m/s.
     pub wall_speed: f32,
     /// The least and the largest inverse mass, in 1/kg.
     pub inverse_masses: [f32; 2],
     /// The least and the largest radius, in metres.
     pub radii: [f32; 2],
-    /// Set while its balls sleep; and the time that they have rested.
+    /// Set while all its balls sleep.
     pub asleep: bool,
-    pub rest: Rest,
-    /// Set if they fell asleep just now.
-    pub fell_asleep: bool,
-    /// Set once the bodies that fell asleep in it were read.
-    pub read_asleep: bool,
+    /// Number of its balls that sleep.
+    pub sleepers: usize,
+    /// Set if all that are awake have rested for long enough to sleep, and if one has.
+    pub rests: bool,
+    pub has_rested: bool,
+    /// Set while bodies that fell asleep in it were not read.
+    pub unread: bool,
     /// The speed in m/s of its fastest ball that is no proxy, if it has proxies.
     pub fastest_own: Option<f32>,
     /// Set if a ball of it or of those beside it bounced just now, and in this substep.
@@ -61,16 +61,6 @@ pub(super) struct Chunk {
 }
 
 impl Chunk {
-    pub fn wake(&mut self, velocity: &mut [Row]) {
-        if self.asleep {
-            for velocity in &mut velocity[self.own_rows()] {
-                velocity[3] = velocity[3].abs();
-            }
-        }
-        self.asleep = false;
-        self.rest.end();
-    }
-
     pub fn bytes(&self) -> usize {
         let Self {
             layers: _,
@@ -89,9 +79,10 @@ impl Chunk {
             inverse_masses: _,
             radii: _,
             asleep: _,
-            rest,
-            fell_asleep: _,
-            read_asleep: _,
+            sleepers: _,
+            rests: _,
+            has_rested: _,
+            unread: _,
             fastest_own: _,
             again: _,
             struck: _,
@@ -105,7 +96,6 @@ impl Chunk {
             + impulses.bytes()
             + (wall_contacts.capacity() + old_wall_contacts.capacity()) * size_of::<WallContact>()
             + names.iter().sum::<usize>() * size_of::<u32>()
-            + rest.bytes()
     }
 
     /// Range of its neighbour lists in the list of all.

@@ -59,8 +59,10 @@ impl Swarm {
         };
         let centers = [Zero::zero(); 2];
         for contact in with_walls {
-            let Some(b) = marble(contact.row) else { continue };
-            let row = contact.row as usize;
+            let (Some(b), row) = (marble(contact.row), contact.row as usize) else { continue };
+            if self.velocity[row][3].is_sign_negative() {
+                continue;
+            }
             let separation = contact.separation(&self.at[row]);
             let approach_speed = -(vector::<f32>(&self.velocity[row]) - contact.surface);
             let closes = approach_speed.dot(contact.normal).max(0.0) * limits.time;

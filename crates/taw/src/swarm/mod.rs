@@ -42,6 +42,7 @@ mod proxies;
 mod rest;
 mod scratch;
 mod simd;
+mod sleep;
 mod state;
 mod step;
 mod surfaces;
@@ -77,6 +78,7 @@ use ids::Ids;
 use impulse_cache::ImpulseCache;
 use scratch::Scratch;
 use simd::Row;
+use sleep::SleepState;
 use surfaces::{SurfaceOf, Surfaces};
 use walls::HalfSpace;
 
@@ -140,8 +142,7 @@ pub struct Swarm {
     proxies: Vec<Proxy>,
     /// Slots of marbles.
     body_slots: BitSet,
-    /// Slots of balls that never sleep, nor those about them.
-    sleepless: BitSet,
+    sleep: SleepState,
     /// Number of times that balls fell asleep, woke, came or went.
     sleep_version: u64,
     /// Neighbour lists of all chunks, in the lab's tier; while rows are sorted, a column to sort
@@ -257,6 +258,8 @@ impl Swarm {
         retain(&mut self.skin_left, &kept);
         retain(&mut self.displacement, &kept);
         retain(&mut self.old_rows, &kept);
+        retain(&mut self.sleep.rest.place, &kept);
+        retain(&mut self.sleep.rest.time, &kept);
         self.measure_radii();
         self.wake_all();
         self.pairs_valid = false;
@@ -360,8 +363,7 @@ impl Swarm {
     /// Number of balls that sleep.
     #[must_use]
     pub fn asleep(&self) -> usize {
-        let chunks = self.chunks.iter().filter(|chunk| chunk.asleep);
-        if self.pairs_valid { chunks.map(|chunk| chunk.own_rows().len()).sum() } else { 0 }
+        self.velocity.iter().filter(|velocity| velocity[3].is_sign_negative()).count()
     }
 
     /// Number of candidate pairs of balls (broad phase).
@@ -419,6 +421,7 @@ impl Swarm {
         let (spin, displacement) = if self.has_friction() { (rows, 0) } else { (0, rows) };
         self.spin.resize(spin, [0.0; 4]);
         self.displacement.resize(displacement, 0.0);
+        self.sleep.rest.resize(if self.model.sleeps { spin } else { 0 });
         if spin == 0 {
             self.spin.shrink_to_fit();
         }

@@ -78,8 +78,10 @@ impl Swarm {
         }
         let fall = cast_vector::<f32, f64>(self.gravity.unwrap_or_else(Vec3::zero) * h);
         for at in self.chunks.iter().filter(|chunk| !chunk.asleep).flat_map(Chunk::own_rows) {
-            let slot = self.ids.slots()[at] as usize;
-            self.scratch.outside_work[slot].impulse += fall / f64::from(self.velocity[at][3].abs());
+            let (slot, inverse_mass) = (self.ids.slots()[at] as usize, self.velocity[at][3]);
+            if inverse_mass.is_sign_positive() {
+                self.scratch.outside_work[slot].impulse += fall / f64::from(inverse_mass);
+            }
         }
     }
 

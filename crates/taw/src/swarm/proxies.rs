@@ -1,9 +1,9 @@
 //! Proxies of the marbles of the world, which its own solver moves, in the swarm.
 
 use super::kernels::squared;
-use super::step::sleep_speed;
+use super::rest::sleep_speed;
 use super::{BallId, Row, Swarm};
-use crate::math::Vec3;
+use crate::math::{Vec3, length};
 
 /// A ball that the swarm pushes but does not move.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -137,7 +137,7 @@ impl Swarm {
         self.body_slots.clear(self.ids.slots().len());
         let mut proxies = std::mem::take(&mut self.proxies);
         let (has_friction, sleep_speed) =
-            (self.has_friction(), sleep_speed(gravity, self.mean_radius));
+            (self.has_friction(), sleep_speed(length(gravity), self.mean_radius));
         let pull = [gravity.x, gravity.y, gravity.z, 0.0];
         for (i, proxy) in proxies.iter_mut().enumerate() {
             let Some(row) = self.ids.row(proxy.ball) else { continue };

@@ -7,6 +7,7 @@ use super::simd::Row;
 use super::state::of;
 use super::step::{SavedPlace, WayToWall};
 use super::sweeps::Crowd;
+use crate::math::UnionFind;
 use crate::response::Impact;
 
 /// Memory that a step writes before it reads it.
@@ -24,6 +25,14 @@ pub(super) struct Scratch {
     pub leaving: Vec<u32>,
     /// Displacements of the fast balls, while pairs are searched.
     pub displacements: Vec<f32>,
+    /// Version of sleep up to which batches are marked as idle.
+    pub idle_batches: Option<u64>,
+    /// Islands of balls that bear each other; which of them has a ball that does not rest; and each
+    /// other ball, with its island.
+    pub islands: UnionFind,
+    pub restless: Vec<bool>,
+    pub resting: Vec<[u32; 2]>,
+    pub sleepers: Vec<u32>,
     /// Rows of proxies, in order, and which proxy each is.
     pub proxy_rows: Vec<(u32, u32)>,
     /// Positions and velocities of these rows before they are integrated.
@@ -66,6 +75,11 @@ impl Scratch {
             searches,
             threads: _,
             filters_changed: _,
+            idle_batches: _,
+            islands,
+            restless,
+            resting,
+            sleepers,
             crowd,
             path_changes,
             places,
@@ -84,7 +98,7 @@ impl Scratch {
             + of(proxy_rows)
             + of(saved_proxies))
             + (of(lists) + lists.iter().map(of).sum::<usize>())
-            + of(chunk_states)
+            + (of(chunk_states) + islands.bytes() + of(restless) + of(resting) + of(sleepers))
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
             + (crowd.bytes()
                 + of(path_changes)

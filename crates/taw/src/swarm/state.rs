@@ -46,7 +46,7 @@ impl Swarm {
             synced: _,
             proxies,
             body_slots,
-            sleepless,
+            sleep,
             sleep_version: _,
             neighbours,
             scratch,
@@ -60,7 +60,7 @@ impl Swarm {
         rows.into_iter().chain(numbers).chain(names).sum::<usize>()
             + (of(chunks) + chunks.iter().map(Chunk::bytes).sum::<usize>())
             + (of(planes) + of(body_balls) + of(proxies))
-            + (body_slots.bytes() + sleepless.bytes())
+            + (body_slots.bytes() + sleep.bytes())
             + (of(velocity_changes) + surfaces.bytes() + ball_forces.bytes())
             + (ids.bytes() + grid.bytes() + impulse_cache.bytes() + fast_movers.bytes())
             + scratch.bytes()
@@ -109,7 +109,7 @@ impl PartialEq for Swarm {
             synced: _,
             proxies,
             body_slots,
-            sleepless,
+            sleep,
             sleep_version: _,
             neighbours,
             scratch: _,
@@ -135,7 +135,7 @@ impl PartialEq for Swarm {
             && (bodies_are_rows, velocity_changes, surfaces)
                 == (&other.bodies_are_rows, &other.velocity_changes, &other.surfaces)
             && (ball_forces, stopped) == (&other.ball_forces, &other.stopped)
-            && (body_slots, sleepless) == (&other.body_slots, &other.sleepless)
+            && (body_slots, sleep) == (&other.body_slots, &other.sleep)
             && walls_identity.is_some() == other.walls_identity.is_some()
             && *steps_since_build == other.steps_since_build
     }

@@ -222,10 +222,13 @@ impl Chunk {
         self.wall_contacts.clear();
         let old = &self.old_wall_contacts;
         let is_fast = |row| query.displacement(row).is_some() || query.is_outrun(walls, row);
-        let kept = |contact: &&WallContact| contact.is_plane || only_fast && !is_fast(contact.row);
+        let sleeps = |row: u32| query.velocity[row as usize][3].is_sign_negative();
+        let kept = |contact: &&WallContact| {
+            contact.is_plane || sleeps(contact.row) || only_fast && !is_fast(contact.row)
+        };
         self.wall_contacts.extend(old.iter().filter(kept));
         self.has_fast = false;
-        for row in &self.near_shapes {
+        for row in self.near_shapes.iter().filter(|row| !sleeps(**row)) {
             let (displacement, filter) = (query.displacement(*row), query.surfaces.filter(*row));
             let ball = &query.ball(*row, displacement);
             let is_outrun = query.is_outrun(walls, *row);

@@ -8,10 +8,10 @@ mod tests;
 
 use cgmath::{InnerSpace, Zero};
 
-use super::impulse::{BodyA, CachedImpulse, Context, UnionFind};
+use super::impulse::{BodyA, CachedImpulse, Context};
 use super::{Colliders, ContactKey, KeyedByContact, Material, SolverBodies};
 use crate::contact::{Contact, Contacts};
-use crate::math::{Scalar, Vec3, is_finite, is_finite_point};
+use crate::math::{Scalar, UnionFind, Vec3, is_finite, is_finite_point};
 
 /// Scratch buffers, kept for their memory.
 #[derive(Clone, Debug, Default)]

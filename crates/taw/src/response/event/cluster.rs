@@ -6,10 +6,8 @@ use super::wall::MovingWalls;
 use super::{Ball, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::broad::Period;
 use crate::contact::Contacts;
-use crate::math::{Point3, Vec3};
-use crate::response::impulse::{
-    self, CachedImpulse, Context, SubstepStart, UnionFind, solve_contacts,
-};
+use crate::math::{Point3, UnionFind, Vec3};
+use crate::response::impulse::{self, CachedImpulse, Context, SubstepStart, solve_contacts};
 use crate::response::{BallRotation, EnergyLedger, Material, SolverBodies};
 
 /// Convergence tolerance over the speed that gravity adds in a substep: a hundredth of the rest

@@ -8,7 +8,7 @@ use std::collections::BTreeMap;
 use super::cells::{Cell, Cells};
 use super::{CellSlot, EventDriven};
 use crate::contact::Contact;
-use crate::response::impulse::UnionFind;
+use crate::math::UnionFind;
 
 /// Largest number of balls of its own size or larger that a ball can touch without overlap (Schütte
 /// and van der Waerden, *Das Problem der dreizehn Kugeln*, 1953). Thirteen overlap by 4 % of their

@@ -9,8 +9,7 @@ use smallvec::SmallVec;
 use super::wall::Wall;
 use super::{Ball, EventDriven, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::contact::{Contact, Contacts};
-use crate::math::{Vec3, normalize_and_length};
-use crate::response::impulse::UnionFind;
+use crate::math::{UnionFind, Vec3, normalize_and_length};
 use crate::shape::PointProjection;
 
 /// Maximum number of projections out of the deepest wall; between two walls at a right angle or

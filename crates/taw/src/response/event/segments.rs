@@ -6,9 +6,8 @@ use cgmath::InnerSpace;
 use super::cluster::Cluster;
 use super::{EventDriven, EventSettings};
 use crate::contact::{Contact, Contacts};
-use crate::math::{Point3, Vec3, normalize_and_length};
+use crate::math::{Point3, UnionFind, Vec3, normalize_and_length};
 use crate::response::KeyedByContact;
-use crate::response::impulse::UnionFind;
 
 /// Largest rotation of a normal in a segment, in radians, as on curved walls.
 const MAX_TURN: f64 = 0.02;

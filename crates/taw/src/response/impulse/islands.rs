@@ -5,7 +5,7 @@ use cgmath::InnerSpace;
 use super::Constraint;
 use super::jam::Load;
 use super::rows::{Row, SearchDirections};
-use crate::math::{Scalar, Vec3};
+use crate::math::{Scalar, UnionFind, Vec3};
 
 /// Regularization of the search: additional compliance of a contact, relative to its own, in units
 /// of the scalar's rounding. It limits impulses that cancel except for rounding: two walls that
@@ -18,59 +18,6 @@ const REGULARIZATION: f64 = 16.0;
 pub(super) struct Islands<S> {
     sets: UnionFind,
     pub list: Vec<Island<S>>,
-}
-
-/// Disjoint sets of rows that contacts connect (union-find).
-#[derive(Clone, Debug, Default)]
-pub(crate) struct UnionFind {
-    /// Parent of each row in its tree.
-    parent: Vec<u32>,
-    /// Island of each row that is a root; `u32::MAX` for none yet.
-    island_of_root: Vec<u32>,
-    count: u32,
-}
-
-impl UnionFind {
-    /// Joins the rows of all pairs (Tarjan 1975).
-    pub fn build(&mut self, pairs: impl Iterator<Item = (Option<usize>, usize)>, rows: usize) {
-        self.parent.clear();
-        self.parent.extend(0..rows as u32);
-        for (a, b) in pairs {
-            let Some(a) = a else { continue };
-            let (root_a, root_b) = (self.root(a), self.root(b));
-            self.parent[root_a.max(root_b)] = root_a.min(root_b) as u32;
-        }
-        self.island_of_root.clear();
-        self.island_of_root.resize(rows, u32::MAX);
-        self.count = 0;
-    }
-
-    /// Index of a row's set, in the order of the calls.
-    pub fn set_of(&mut self, row: usize) -> u32 {
-        let root = self.root(row);
-        if self.island_of_root[root] == u32::MAX {
-            self.island_of_root[root] = self.count;
-            self.count += 1;
-        }
-        self.island_of_root[root]
-    }
-
-    /// Index of a row's set, if it has one.
-    fn known_set_of(&mut self, row: usize) -> Option<u32> {
-        let root = self.root(row);
-        Some(self.island_of_root[root]).filter(|set| *set != u32::MAX)
-    }
-
-    /// Root of a row's tree, with path halving.
-    fn root(&mut self, row: usize) -> usize {
-        let mut row = row as u32;
-        while self.parent[row as usize] != row {
-            let parent = self.parent[row as usize];
-            self.parent[row as usize] = self.parent[parent as usize];
-            row = parent;
-        }
-        row as usize
-    }
 }
 
 /// Island: marbles connected by contacts, while it is solved.

@@ -25,7 +25,6 @@ pub(crate) use cache::CachedImpulse;
 use cache::store_impulses;
 use energy_guard::{FullRestitution, IslandEnergy};
 use islands::Islands;
-pub(super) use islands::UnionFind;
 use prepare::prepare;
 use rows::Rows;
 use solve::iterate;

@@ -346,7 +346,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
         if !OWN && params.restitution == 0.0 {
             return; // contacts stop what meets
         }
-        for (i, batch) in batches.iter().enumerate() {
+        for (i, batch) in awake(batches) {
             let at = gather::<L>(columns.at, batch);
             let velocity = gather::<L>(columns.velocity, batch);
             let numbers =
@@ -362,7 +362,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
         let Self { columns, batches, impulses, friction, .. } = self;
         let ContactImpulses { normal_impulse, tangent_impulse, torque, numbers: own, .. } =
             impulses;
-        for (i, batch) in batches.iter().enumerate() {
+        for (i, batch) in awake(batches) {
             let [a, b] = gather::<L>(columns.at, batch);
             let (normal, _) = normal_and_separation(&a, &b, ALL, |lane| batch.pair(lane));
             // It was across the normal of the last substep.
@@ -403,7 +403,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
         let ContactImpulses { normal_impulse, tangent_impulse, torque, .. } = impulses;
         let (own, struck, jammed) = (&impulses.numbers, &mut impulses.struck, &mut impulses.jammed);
         let zero = L::splat(0.0);
-        for (i, batch) in batches.iter().enumerate() {
+        for (i, batch) in awake(batches) {
             let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
             let at = gather::<L>(columns.at, batch);
             let (normal, separation) =
@@ -489,4 +489,10 @@ fn load<L: Simd>(
 fn slip<L: Simd>(relative: Vec3Wide<L>, normal: Vec3Wide<L>, [a, b]: &[[L; 4]; 2]) -> Vec3Wide<L> {
     let spin = Vec3Wide::of(a) + Vec3Wide::of(b);
     relative.reject_from(normal) - spin.cross(normal)
+}
+
+/// Batches with a ball that is awake, with their numbers.
+#[inline(always)]
+fn awake(batches: &[Batch]) -> impl Iterator<Item = (usize, &Batch)> {
+    batches.iter().enumerate().filter(|(_, batch)| !batch.is_idle)
 }

@@ -36,6 +36,9 @@ impl Kernel for IntegratePositions<'_> {
         let mut lowest = f32::MAX;
         let rows = self.at.iter_mut().zip(self.velocity).zip(self.skin_left).zip(self.spin);
         for (row, (((at, velocity), skin_left), spin)) in rows.enumerate() {
+            if velocity[3].is_sign_negative() {
+                continue; // asleep
+            }
             let new = sum(*velocity, change);
             let displacement = product(new, time);
             let displacement =

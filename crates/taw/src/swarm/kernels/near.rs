@@ -42,7 +42,7 @@ impl<V: FnMut([u32; 2], bool)> Kernel for NearPairs<'_, V> {
         let (reach, time) = (L::splat(reach), L::splat(time));
         let (fast, shrunk) = (L::splat(fast * (1.0 - MARGIN)), L::splat(1.0 - MARGIN));
         let rounding = L::splat(ROUNDING);
-        for batch in self.batches {
+        for batch in self.batches.iter().filter(|batch| !batch.is_idle) {
             debug_assert!(batch.pairs().flatten().all(|row| (row as usize) < self.at.len()));
             // SAFETY: the rows of pairs exist, and nobody writes columns that are borrowed.
             let ([p, q], [u, v]) = unsafe {
@@ -83,7 +83,7 @@ mod tests {
 
     /// Pair of rows as eight equal lanes, of which one counts.
     fn batch() -> Batch {
-        Batch { first: [0, 1], a: [0; LANES], b: [0; LANES], count: 1 }
+        Batch { first: [0, 1], a: [0; LANES], b: [0; LANES], count: 1, is_idle: false }
     }
 
     proptest! {

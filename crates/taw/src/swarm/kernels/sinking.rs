@@ -54,7 +54,7 @@ impl Kernel for FindSinking<'_> {
     #[inline(always)]
     fn run<L: Simd>(self) {
         let Self { at, velocity, batches, impulses, params, found } = self;
-        for (i, batch) in batches.iter().enumerate() {
+        for (i, batch) in batches.iter().enumerate().filter(|(_, batch)| !batch.is_idle) {
             let [at_a, at_b] = gather::<L>(at, batch);
             let [a, b] = gather::<L>(velocity, batch);
             let displacement = Vec3Wide::of(&at_b) - Vec3Wide::of(&at_a);

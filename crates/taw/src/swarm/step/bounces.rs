@@ -35,7 +35,7 @@ impl Swarm {
     ) {
         let speed = params.restitution_threshold;
         let faster =
-            |chunk: &Chunk, next: f32| 2.0 * chunk.speed[0].max(next) + chunk.wall_speed > speed;
+            |chunk: &Chunk, next: f32| 2.0 * chunk.speed.max(next) + chunk.wall_speed > speed;
         let mut all = true;
         for _ in 0..ROUNDS {
             let first = |chunk: &mut Chunk| chunk.again = all || std::mem::take(&mut chunk.struck);
@@ -99,7 +99,7 @@ impl Swarm {
             leaves(velocity, skin_left, left) || skin_left > reach || movers.is_by_path(row)
         };
         let later = substep > 0 && !self.fast_movers.crowded;
-        let turns = |chunk: &Chunk| chunk.struck || later && chunk.speed[0] * dt > reach;
+        let turns = |chunk: &Chunk| chunk.struck || later && chunk.speed * dt > reach;
         let found = self.find_pairs_within_step(turns, leaves, dt, walls, observe);
         if found {
             self.update_wall_contacts(walls, left, [dt, h], |_| true, false);
@@ -112,7 +112,7 @@ impl Swarm {
         for chunk in self.chunks.iter_mut().filter(|chunk| chunk.again && !chunk.asleep) {
             let velocities = &self.velocity[chunk.own_rows()];
             let fastest = velocities.iter().fold(0.0_f32, |most, v| most.max(squared(*v)));
-            chunk.speed[0] = chunk.speed[0].max(fastest.sqrt());
+            chunk.speed = chunk.speed.max(fastest.sqrt());
         }
     }
 
@@ -140,7 +140,7 @@ impl Swarm {
         ways.clear();
         let (at, velocity, chunks) = (&self.at, &self.velocity, &self.chunks);
         let has_ways = |i: usize| {
-            let next = chunks.get(i + 1).map_or(0.0, |next| next.speed[0]);
+            let next = chunks.get(i + 1).map_or(0.0, |next| next.speed);
             chunks[i].again && !chunks[i].asleep && faster(&chunks[i], next)
         };
         if !(0..chunks.len()).any(has_ways) {

@@ -3,6 +3,7 @@
 mod backing;
 mod bounces;
 mod cluster;
+mod islands;
 mod lab;
 mod overflow;
 mod passages;
@@ -14,7 +15,6 @@ mod wall_contacts;
 
 pub(super) use bounces::WayToWall;
 pub(super) use passages::SavedPlace;
-pub(super) use sleep::sleep_speed;
 use wall_contacts::WallPass;
 pub(super) use wall_contacts::listed_planes;
 
@@ -116,6 +116,7 @@ impl Swarm {
             self.wake_beside_changes(walls);
             (self.walls_identity, self.rows_of_walls) = (Some(identity), Some(identity));
         }
+        self.wake_beside_stirred();
         // Not before: balls beside walls that changed are known by the pairs of the last step.
         self.pairs_valid &= !std::mem::take(&mut self.scratch.filters_changed);
         self.scratch.threads = self.threads_for_awake();
@@ -153,21 +154,21 @@ impl Swarm {
     ) {
         observe(Stage::Integrate);
         if self.pairs_valid {
-            self.update_sleep(dt, gravity);
+            self.update_sleep(dt, gravity, true);
         }
         let mut leaving = std::mem::take(&mut self.scratch.leaving);
         leaving.clear();
         leaving.extend(self.chunks.iter().flat_map(|chunk| &chunk.leaving));
         if !self.pairs_valid {
             self.build(dt, walls, observe);
-            self.update_sleep(dt, gravity);
+            self.update_sleep(dt, gravity, true);
         } else if !leaving.is_empty() {
             let rebuilds = self.rebuilds;
             self.find_pairs_of(&leaving, dt, walls, observe);
             if self.rebuilds == rebuilds {
                 self.find_wall_contacts_if_changed(walls_changed, dt, walls, observe);
             } else {
-                self.update_sleep(dt, gravity);
+                self.update_sleep(dt, gravity, false);
             }
         } else {
             self.find_wall_contacts_if_changed(walls_changed, dt, walls, observe);
@@ -267,12 +268,18 @@ impl Swarm {
 
     /// Forgets who was borne by a wall two steps ago.
     fn age_marks(&mut self) {
-        let (chunks, spin) = (&self.chunks, DisjointSlice::new(&mut self.spin));
+        let (chunks, velocity) = (&self.chunks, &self.velocity);
+        let spin = DisjointSlice::new(&mut self.spin);
         parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             if !chunks[chunk].asleep {
+                let rows = chunks[chunk].own_rows();
                 // SAFETY: the rows of the chunk.
-                for spin in unsafe { spin.part(chunks[chunk].own_rows()) } {
-                    spin[3] = (spin[3] - 1.0).max(0.0);
+                for (spin, velocity) in
+                    unsafe { spin.part(rows.clone()) }.iter_mut().zip(&velocity[rows])
+                {
+                    if velocity[3].is_sign_positive() {
+                        spin[3] = (spin[3] - 1.0).max(0.0);
+                    }
                 }
             }
         });
@@ -322,7 +329,7 @@ impl Swarm {
             let rebuilds = self.rebuilds;
             self.find_pairs_of(&leaving, dt, walls, observe);
             if self.rebuilds != rebuilds {
-                self.update_sleep(dt, self.gravity.unwrap_or_else(Vec3::zero));
+                self.update_sleep(dt, self.gravity.unwrap_or_else(Vec3::zero), false);
                 self.list_proxy_rows();
             }
             self.wake_on_paths();
@@ -384,6 +391,7 @@ impl Swarm {
     /// Goes over all contacts of the chunks that are awake or beside one, and of which the
     /// condition holds, given how fast a ball of the next one is.
     fn pass(&mut self, pass: Pass, condition: impl Fn(&Chunk, f32) -> bool + Sync) {
+        self.mark_idle_batches();
         let simd_level = self.simd_level;
         let friction = self.common_material().friction;
         let mut fast_movers = std::mem::take(&mut self.fast_movers);
@@ -445,7 +453,7 @@ impl Swarm {
             unsafe {
                 let next = (chunk + 1 < chunks.len()).then(|| {
                     let next = chunks.row(chunk + 1);
-                    ((*next).asleep, (*next).speed[0])
+                    ((*next).asleep, (*next).speed)
                 });
                 job(next, columns, &mut *chunks.row(chunk));
             }

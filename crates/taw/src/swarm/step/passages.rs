@@ -66,8 +66,12 @@ impl Swarm {
             if chunk.asleep {
                 return;
             }
+            let is_asleep = |row: usize| velocity[row][3].is_sign_negative();
             let keep_out = |contact: &WallContact| {
                 let row = contact.row as usize;
+                if is_asleep(row) {
+                    return;
+                }
                 // SAFETY: a ball of the chunk, and nobody works on others meanwhile.
                 unsafe {
                     let push = contact.keep_out(&mut *at.row(row));
@@ -82,6 +86,7 @@ impl Swarm {
             for row in chunk.own_rows() {
                 // SAFETY: as above.
                 if unsafe { *skin_left.row(row) } < 0.0
+                    && !is_asleep(row)
                     && Self::proxy_at(proxies, proxy_rows, row as u32).is_none()
                 {
                     // It was pushed to where nobody looked for walls.
@@ -105,7 +110,7 @@ impl Swarm {
         if !walls.has_shapes() {
             return;
         }
-        let (chunks, slots) = (&self.chunks, self.ids.slots());
+        let (chunks, slots, velocity) = (&self.chunks, self.ids.slots(), &self.velocity[..]);
         let (places, substep) = (&self.scratch.places, self.scratch.substep);
         let (proxies, proxy_rows) = (&self.proxies[..], &self.scratch.proxy_rows[..]);
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
@@ -115,6 +120,9 @@ impl Swarm {
             let chunk = &chunks[chunk];
             for row in chunk.near_shapes.iter().filter(|_| !chunk.asleep) {
                 let row = *row as usize;
+                if velocity[row][3].is_sign_negative() {
+                    continue;
+                }
                 let saved = places.get(slots[row] as usize);
                 let Some([x, y, z]) = saved.and_then(|place| place.of(substep)) else {
                     continue; // nobody knew that it is near

@@ -1,96 +1,128 @@
-//! Sleep of chunks.
+//! Sleep: who wakes, and why. Who falls asleep is in [`islands`](super::islands).
 
 use std::mem::take;
 
 use super::{leaves, wider};
-use cgmath::Zero;
 
 use crate::math::{Vec3, length};
 use crate::swarm::batches::Batch;
 use crate::swarm::chunk::Chunk;
-use crate::swarm::grid::Grid;
-use crate::swarm::kernels::{GROUNDED, squared};
+use crate::swarm::kernels::squared;
+use crate::swarm::rest::{PLACE, RestRows, sleep_speed};
 use crate::swarm::simd::Row;
+use crate::swarm::wall_contact::WallContact;
 use crate::swarm::{StaticGeometry, Swarm};
 use crate::workers::{DisjointSlice, parallel_for};
+use cgmath::Zero;
 
 impl Swarm {
-    /// Finds which chunks fall asleep or wake, and which balls may leave their skin in this step.
-    pub(super) fn update_sleep(&mut self, dt: f32, gravity: Vec3<f32>) {
-        let sleeps = self.model.sleeps;
+    /// Finds which balls fall asleep or wake, and which may leave their skin in this step. Rest lasts
+    /// another `dt` seconds if this is the first look in the step.
+    pub(super) fn update_sleep(&mut self, dt: f32, gravity: Vec3<f32>, is_first: bool) {
         if !self.proxies.is_empty() {
             self.measure_speeds_beside_proxies();
         }
-        let (grid, at, skin_left) = (&self.grid, &self.at[..], &self.skin_left[..]);
-        let (slots, sleepless, bodies) = (self.ids.slots(), &self.sleepless, &self.body_slots);
-        let has_proxies = !self.proxies.is_empty();
-        let (all_may_sleep, reach) = (sleepless.is_empty(), self.reach_of_skins());
+        let gravity = length(gravity);
+        let (at, skin_left) = (&self.at[..], &self.skin_left[..]);
+        let (velocity, spin) = (&self.velocity[..], &self.spin[..]);
+        let (slots, bodies) = (self.ids.slots(), &self.body_slots);
+        let (has_proxies, reach) = (!self.proxies.is_empty(), self.reach_of_skins());
+        let sleeps = self.model.sleeps && gravity > 0.0;
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
-        let velocity = DisjointSlice::new(&mut self.velocity);
-        let spin = DisjointSlice::new(&mut self.spin);
+        let rest = self.sleep.rest.shared();
         let chunks = DisjointSlice::new(&mut self.chunks);
         parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
-            // SAFETY: each thread has its own chunks, and their rows.
+            // SAFETY: each thread has its own chunks.
             let chunk = unsafe { &mut *chunks.row(chunk) };
             if chunk.asleep {
                 return;
             }
-            let (velocity, spin) =
-                unsafe { (velocity.part(chunk.own_rows()), spin.part(chunk.own_rows())) };
-            let skin_left = &skin_left[chunk.own_rows()];
+            let rows = chunk.own_rows();
+            chunk.asleep = rows.is_empty();
+            let (at, velocity, spin) =
+                (&at[rows.clone()], &velocity[rows.clone()], &spin[rows.clone()]);
+            let skin_left = &skin_left[rows.clone()];
             chunk.leaving.clear();
-            let rows = (chunk.rows[0]..).zip(velocity.iter().zip(skin_left));
+            let numbered = (chunk.rows[0]..).zip(velocity.iter().zip(skin_left));
             // A path is known for one step.
-            let leaving = rows.filter(|(_, (velocity, skin_left))| {
+            let leaving = numbered.filter(|(_, (velocity, skin_left))| {
                 leaves(velocity, **skin_left, dt) || **skin_left > reach
             });
             chunk.leaving.extend(leaving.map(|(row, _)| row).take(most));
-            chunk.speed = largest_speeds(chunk, velocity, grid);
+            // Not its spin: on a single point a ball may spin for ever.
+            chunk.speed = velocity.iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt();
             let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
             chunk.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
-            let own_slots = &slots[chunk.own_rows()];
-            let fastest = chunk.fastest_own.unwrap_or(chunk.speed[0]);
-            if !sleeps || fastest >= sleep_speed(gravity, chunk.radii[1]) {
-                chunk.rest.end();
+            (chunk.rests, chunk.has_rested) = (false, false);
+            if !sleeps {
                 return;
             }
-            let rows = [&at[chunk.own_rows()], &*velocity, &*spin];
-            let is_proxy = |row: usize| has_proxies && bodies.contains(own_slots[row]);
-            let rests = chunk.rests(rows, is_proxy, gravity, dt);
-            let may_sleep =
-                || all_may_sleep || !own_slots.iter().any(|slot| sleepless.contains(*slot));
-            if rests && may_sleep() {
-                chunk.rest.end();
-                chunk.fell_asleep = true;
-                (chunk.asleep, chunk.speed) = (true, [0.0; 3]);
-                chunk.leaving.clear();
-                for (velocity, spin) in velocity.iter_mut().zip(spin) {
-                    *velocity = [0.0, 0.0, 0.0, -velocity[3]];
-                    *spin = [0.0, 0.0, 0.0, GROUNDED];
+            // SAFETY: rows of the chunk.
+            let mut rest = unsafe {
+                RestRows {
+                    place: rest.place.part(rows.clone()),
+                    time: rest.time.part(rows.clone()),
                 }
+            };
+            if is_first {
+                let is_proxy = |row: usize| has_proxies && bodies.contains(slots[rows.start + row]);
+                rest.update([at, velocity, spin], is_proxy, gravity, dt);
             }
+            chunk.end_rest_of_carried(&mut rest);
+            chunk.find_rest(at, velocity, &mut rest, gravity);
         });
-        let chunks = &mut self.chunks;
-        let fell_asleep =
-            chunks.iter_mut().filter_map(|chunk| take(&mut chunk.fell_asleep).then_some(()));
-        self.sleep_version += fell_asleep.count() as u64;
-        self.wake_beside_fast(gravity);
+        self.fall_asleep(gravity);
+        self.wake_beside_moving(gravity, dt);
     }
 
-    /// Wakes the chunks beside balls that are fast enough to disturb them.
-    fn wake_beside_fast(&mut self, gravity: Vec3<f32>) {
-        let chunks = &mut self.chunks;
-        for i in 0..chunks.len() {
-            let before = i.checked_sub(1).map_or(0.0, |i| chunks[i].speed[2]);
-            let after = chunks.get(i + 1).map_or(0.0, |chunk| chunk.speed[1]);
-            // The lightest touch that would count among its smallest balls.
-            let sleep_speed = sleep_speed(gravity, chunks[i].radii[0]);
-            if chunks[i].asleep && before.max(after) > 2.0 * sleep_speed {
-                chunks[i].wake(&mut self.velocity);
-                self.sleep_version += 1;
-            }
+    /// Wakes what sleeps beside balls that are fast enough to disturb it, or have left their place: it may
+    /// have leant on them.
+    fn wake_beside_moving(&mut self, gravity: f32, dt: f32) {
+        if !self.has_sleepers() {
+            return;
         }
+        let mut lists = take(&mut self.scratch.lists);
+        lists.resize_with(self.chunks.len().max(lists.len()), Vec::new);
+        let (chunks, velocity, at, rest) =
+            (&self.chunks, &self.velocity[..], &self.at[..], &self.sleep.rest);
+        let disturbs = |awake: usize, asleep: usize| {
+            let [a, b] = [&at[awake], &at[asleep]];
+            let speed = squared(velocity[awake]).sqrt();
+            let apart = squared([b[0] - a[0], b[1] - a[1], b[2] - a[2], 0.0]).sqrt();
+            let (radii, gap) = (a[3] + b[3], apart - (a[3] + b[3]));
+            speed > 2.0 * sleep_speed(gravity, b[3]) && gap <= 2.0 * speed * dt
+                || rest.has_left(awake) && gap <= PLACE * radii
+        };
+        let list = |batches: &[Batch], waking: &mut Vec<u32>| {
+            for pair in batches.iter().filter(|batch| !batch.is_idle).flat_map(Batch::pairs) {
+                let [a, b] = pair.map(|row| row as usize);
+                let asleep = [a, b].map(|row| velocity[row][3].is_sign_negative());
+                match asleep {
+                    [false, true] if disturbs(a, b) => waking.push(b as u32),
+                    [true, false] if disturbs(b, a) => waking.push(a as u32),
+                    _ => (),
+                }
+            }
+        };
+        let of_chunks = DisjointSlice::new(&mut lists);
+        parallel_for(self.scratch.threads, chunks.len(), |_, i| {
+            // SAFETY: each chunk has its own list.
+            let waking = unsafe { &mut *of_chunks.row(i) };
+            waking.clear();
+            let both = [chunks.get(i), chunks.get(i + 1)];
+            let both = || both.into_iter().flatten();
+            if both().any(|chunk| chunk.sleepers > 0) && both().any(|chunk| !chunk.asleep) {
+                list(&chunks[i].batches, waking);
+            }
+        });
+        if let Some(last) = lists.last_mut() {
+            list(&self.fast_movers.batches, last);
+        }
+        for row in lists.iter_mut().flat_map(|waking| waking.drain(..)) {
+            self.wake_group(row as usize);
+        }
+        self.scratch.lists = lists;
     }
 
     /// Wakes what swift balls may meet on their paths, however many chunks away.
@@ -101,53 +133,102 @@ impl Swarm {
         let (reach, fast_movers) = (self.reach_of_skins(), take(&mut self.fast_movers));
         for [a, b] in fast_movers.batches.iter().flat_map(Batch::pairs) {
             for [swift, met] in [[a as usize, b as usize], [b as usize, a as usize]] {
-                let [by, of] = [swift, met].map(|row| self.velocity[row][3]);
-                if self.skin_left[swift] > reach && by.is_sign_positive() && of.is_sign_negative() {
-                    self.wake(met);
+                if self.skin_left[swift] > reach && self.velocity[swift][3].is_sign_positive() {
+                    self.wake_group(met);
                 }
             }
         }
         for [a, b] in &fast_movers.crossing {
             let [a, b] = [*a as usize, *b as usize];
             for [swift, met] in [[a, b], [b, a]] {
-                if self.velocity[swift][3].is_sign_positive()
-                    && self.velocity[met][3].is_sign_negative()
-                {
-                    self.wake(met);
+                if self.velocity[swift][3].is_sign_positive() {
+                    self.wake_group(met);
                 }
             }
         }
         self.fast_movers = fast_movers;
     }
 
-    /// Wakes a ball, and its chunk.
+    /// Wakes a ball that something changes from outside; those that may lean on it wake when the step begins.
     pub(in crate::swarm) fn wake(&mut self, row: usize) {
-        if self.pairs_valid {
-            let chunks = &mut self.chunks;
-            let chunk = chunks.partition_point(|chunk| chunk.rows[1] as usize <= row);
-            if let Some(chunk) = chunks.get_mut(chunk) {
-                self.sleep_version += u64::from(chunk.asleep);
-                chunk.wake(&mut self.velocity);
+        if self.has_sleepers() {
+            self.sleep.stirred.push(row as u32);
+        }
+        self.wake_group(row);
+        self.sleep.rest.end(row);
+    }
+
+    /// Wakes a ball that sleeps, and all that fell asleep with it.
+    fn wake_group(&mut self, row: usize) {
+        if self.velocity[row][3].is_sign_positive() {
+            return;
+        }
+        let (slots, rows) = (self.ids.slots(), self.ids.rows());
+        let (velocity, rest, chunks) = (&mut self.velocity, &mut self.sleep.rest, &mut self.chunks);
+        self.sleep.groups.dissolve(slots[row], |slot| {
+            let row = rows[slot as usize] as usize;
+            velocity[row][3] = velocity[row][3].abs();
+            rest.end(row);
+            if self.pairs_valid {
+                let chunk = chunks.partition_point(|chunk| chunk.rows[1] as usize <= row);
+                chunks[chunk].sleepers -= 1;
+                chunks[chunk].asleep = false;
+            }
+        });
+        self.sleep_version += 1;
+    }
+
+    /// Wakes what sleeps beside balls that were changed from outside since the last step.
+    pub(super) fn wake_beside_stirred(&mut self) {
+        let mut stirred = take(&mut self.sleep.stirred);
+        stirred.sort_unstable();
+        stirred.dedup();
+        let mut waking = Vec::new();
+        if self.has_sleepers() {
+            let is_stirred = |row: u32| stirred.binary_search(&row).is_ok();
+            let asleep = |row: u32| self.velocity[row as usize][3].is_sign_negative();
+            let of_chunks = self.chunks.iter().filter(|chunk| {
+                let first = stirred.partition_point(|row| *row < chunk.rows[0]);
+                stirred.get(first).is_some_and(|row| *row < chunk.rows[2])
+            });
+            let batches = of_chunks.flat_map(|chunk| &chunk.batches);
+            for [a, b] in batches.chain(&self.fast_movers.batches).flat_map(Batch::pairs) {
+                for [by, of] in [[a, b], [b, a]] {
+                    if asleep(of) && is_stirred(by) {
+                        waking.push(of);
+                    }
+                }
             }
         }
-        self.velocity[row][3] = self.velocity[row][3].abs();
+        for row in waking {
+            self.wake_group(row as usize);
+        }
+        stirred.clear();
+        self.sleep.stirred = stirred;
+    }
+
+    /// Returns true if a ball sleeps.
+    fn has_sleepers(&self) -> bool {
+        self.chunks.iter().any(|chunk| chunk.sleepers > 0)
     }
 
     /// Wakes all balls.
     pub(in crate::swarm) fn wake_all(&mut self) {
         for chunk in &mut self.chunks {
-            chunk.asleep = false;
-            chunk.rest.end();
+            (chunk.asleep, chunk.sleepers) = (false, 0);
         }
         let mut any = false;
         for velocity in &mut self.velocity {
             any |= velocity[3].is_sign_negative();
             velocity[3] = velocity[3].abs();
         }
+        self.sleep.rest.end_all();
+        self.sleep.groups.clear();
+        self.sleep.stirred.clear();
         self.sleep_version += u64::from(any);
     }
 
-    /// Wakes the chunks with balls near walls that changed since the last step.
+    /// Wakes the balls near walls that changed since the last step.
     pub(super) fn wake_beside_changes(&mut self, walls: &dyn StaticGeometry) {
         let mut regions = Vec::new();
         let since = self.walls_identity.filter(|_| self.pairs_valid);
@@ -156,32 +237,57 @@ impl Swarm {
         if !known {
             return self.wake_all();
         }
-        for chunk in &mut self.chunks {
-            let is_near = |row: usize| {
+        for row in 0..self.at.len() {
+            let is_asleep = self.velocity[row][3].is_sign_negative();
+            if is_asleep || self.sleep.rest.is_at_rest(row) {
                 let reach = self.at[row][3] + self.skin_left[row].max(0.0);
-                regions.iter().any(|region| overlaps(region, &self.at[row], reach))
-            };
-            if (chunk.asleep || chunk.rest.began()) && chunk.own_rows().any(is_near) {
-                self.sleep_version += u64::from(chunk.asleep);
-                chunk.wake(&mut self.velocity);
+                if regions.iter().any(|region| overlaps(region, &self.at[row], reach)) {
+                    self.wake(row);
+                }
             }
         }
     }
+
+    /// Marks the batches whose balls all sleep, for passes to skip them.
+    pub(super) fn mark_idle_batches(&mut self) {
+        let version = Some(self.sleep_version);
+        if std::mem::replace(&mut self.scratch.idle_batches, version) == version {
+            return;
+        }
+        let velocity = &self.velocity;
+        let is_asleep = |row: u32| velocity[row as usize][3].is_sign_negative();
+        let chunks = DisjointSlice::new(&mut self.chunks);
+        parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
+            // SAFETY: its own.
+            for batch in unsafe { &mut (*chunks.row(chunk)).batches } {
+                let is_idle = batch.pairs().flatten().all(is_asleep);
+                batch.is_idle = is_idle;
+            }
+        });
+    }
 }
 
-/// Largest speed of a ball of a chunk, of one in its first layer, and of one in its last, in m/s.
-fn largest_speeds(chunk: &Chunk, velocity: &[Row], grid: &Grid) -> [f32; 3] {
-    let fastest = |from: u32, to: u32| {
-        let rows = (from - chunk.rows[0]) as usize..(to - chunk.rows[0]) as usize;
-        // Not its spin: on a single point a ball may spin for ever.
-        velocity[rows].iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt()
-    };
-    let [first, last] = [chunk.layers[0] + 1, chunk.layers[1] - 1];
-    [
-        fastest(chunk.rows[0], chunk.rows[1]),
-        fastest(chunk.rows[0], grid.first_of_layer(first)),
-        fastest(grid.first_of_layer(last), chunk.rows[1]),
-    ]
+impl Chunk {
+    /// Ends the rest of balls that a moving wall bears. (A wall that bears a proxy moves as the proxy does.)
+    fn end_rest_of_carried(&self, rest: &mut RestRows) {
+        let is_carried = |contact: &&WallContact| {
+            contact.impulse.normal > 0.0 && !contact.surface.is_zero() && !contact.bears_proxy
+        };
+        for contact in self.wall_contacts.iter().filter(is_carried) {
+            rest.end((contact.row - self.rows[0]) as usize);
+        }
+    }
+
+    /// Finds out if its balls have rested for long enough to sleep: all of them, or any.
+    fn find_rest(&mut self, at: &[Row], velocity: &[Row], rest: &mut RestRows, gravity: f32) {
+        if self.fastest_own == Some(f32::INFINITY) {
+            rest.end_all();
+            return;
+        }
+        let awake = || (0..at.len()).filter(|row| velocity[*row][3].is_sign_positive());
+        self.has_rested = awake().any(|row| rest.lasts(row, at[row][3], gravity));
+        self.rests = self.has_rested && awake().all(|row| rest.lasts(row, self.radii[1], gravity));
+    }
 }
 
 /// Returns true if a box and one of this half width about a ball overlap, or may by rounding.
@@ -190,9 +296,4 @@ fn overlaps([low, high]: &[[f32; 3]; 2], at: &Row, reach: f32) -> bool {
         let reach = reach + 4.0 * f32::EPSILON * (at[axis].abs() + reach);
         at[axis] + reach >= low[axis] && at[axis] - reach <= high[axis]
     })
-}
-
-/// Speed in m/s up to which a ball counts as resting, by what gravity makes of it in its radius.
-pub(in crate::swarm) fn sleep_speed(gravity: Vec3<f32>, radius: f32) -> f32 {
-    if gravity.is_zero() { 0.0 } else { 0.05 * (length(gravity) * radius).sqrt() }
 }

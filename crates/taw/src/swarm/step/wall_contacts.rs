@@ -164,6 +164,9 @@ impl Swarm {
             let (at, skin_left) = unsafe { (at.part(rows.clone()), skin_left.part(rows.clone())) };
             let columns = at.iter_mut().zip(skin_left).zip(&velocity[rows.clone()]);
             for (((at, skin_left), velocity), row) in columns.zip(rows) {
+                if velocity[3].is_sign_negative() {
+                    continue;
+                }
                 let change = path_changes.get(row).map_or_else(Vec3::zero, xyz);
                 // One that lies on a wall does not fly.
                 let saved = places.get(surfaces.slots[row] as usize);
@@ -278,6 +281,9 @@ impl WallPass<'_> {
                     &mut *columns.spin.row(row),
                 )
             };
+            if velocity[3].is_sign_negative() {
+                continue;
+            }
             if columns.backed() {
                 contact.borne_for_others = contact.share_of(unsafe { &*columns.backing.row(row) });
                 contact.note_impact(pass, velocity);
