@@ -9,7 +9,7 @@ use super::impulse_cache::{ImpulseCache, shrink_slack};
 use super::kernels::squared;
 use super::neighbours::{FindPairs, NeighbourLists, Search};
 use super::simd::SimdLevel;
-use super::step::listed_planes;
+use super::step::{inverse_masses, listed_planes};
 use super::surfaces::SurfaceOf;
 use super::sweeps::{CrowdSweep, Sweep};
 use super::{Stage, StaticGeometry, Swarm, walls};
@@ -287,6 +287,11 @@ impl Swarm {
             chunk.sleepers = velocities.iter().filter(|row| row[3].is_sign_negative()).count();
             chunk.asleep = chunk.sleepers == velocities.len();
             chunk.unread = chunk.sleepers > 0;
+            if chunk.asleep {
+                // Nobody looks at it again.
+                (chunk.speed, chunk.inverse_masses) = (0.0, inverse_masses(velocities));
+                chunk.leaving.clear();
+            }
             if count > 0 {
                 self.chunks[count - 1].rows[2] = next;
             }

@@ -112,3 +112,32 @@ impl Swarm {
         });
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use crate::math::Point3;
+    use crate::swarm::{Ball, SwarmModel};
+    use crate::world::World;
+
+    /// However chunks come and go as balls are poured.
+    #[test]
+    fn balls_of_one_mass_need_no_backing() {
+        for sleeps in [false, true] {
+            let mut world = World::<f32>::default();
+            world.swarm.set_model(SwarmModel { sleeps, ..SwarmModel::default() }).unwrap();
+            let floor = crate::shape::Plane::new(crate::math::Vec3::unit_y(), 0.0).unwrap();
+            world.walls.insert(floor).unwrap();
+            let balls = (0..3_000_u16).map(|i| {
+                let [x, y, z] = [i % 16, i / 256, i / 16 % 16].map(f32::from);
+                let aside = 0.1 * (x * 0.618).fract();
+                Ball::new(Point3::new(x * 1.2 + aside * y, 1.0 + y * 1.2, z * 1.2 + aside), 0.5)
+            });
+            world.swarm.insert(&balls.collect::<Vec<_>>()).unwrap();
+            for step in 0..150 {
+                world.step(1.0 / 60.0).unwrap();
+                assert!(world.swarm.scratch.backing.is_empty(), "step {step}, sleeps: {sleeps}");
+            }
+            assert!(world.swarm.rebuilds() > 5 && world.swarm.chunks.len() > 3);
+        }
+    }
+}

@@ -15,6 +15,7 @@ mod wall_contacts;
 
 pub(super) use bounces::WayToWall;
 pub(super) use passages::SavedPlace;
+pub(super) use sleep::inverse_masses;
 use wall_contacts::WallPass;
 pub(super) use wall_contacts::listed_planes;
 

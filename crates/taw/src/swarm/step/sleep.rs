@@ -52,8 +52,7 @@ impl Swarm {
             chunk.leaving.extend(leaving.map(|(row, _)| row).take(most));
             // Not its spin: on a single point a ball may spin for ever.
             chunk.speed = velocity.iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt();
-            let inverse_masses = velocity.iter().map(|velocity| [velocity[3].abs(); 2]);
-            chunk.inverse_masses = inverse_masses.fold([f32::MAX, 0.0], wider);
+            chunk.inverse_masses = inverse_masses(velocity);
             (chunk.rests, chunk.has_rested) = (false, false);
             if !sleeps {
                 return;
@@ -288,6 +287,11 @@ impl Chunk {
         self.has_rested = awake().any(|row| rest.lasts(row, at[row][3], gravity));
         self.rests = self.has_rested && awake().all(|row| rest.lasts(row, self.radii[1], gravity));
     }
+}
+
+/// Least and largest inverse mass of some balls, in 1/kg.
+pub(in crate::swarm) fn inverse_masses(velocity: &[Row]) -> [f32; 2] {
+    velocity.iter().map(|velocity| [velocity[3].abs(); 2]).fold([f32::MAX, 0.0], wider)
 }
 
 /// Returns true if a box and one of this half width about a ball overlap, or may by rounding.
