@@ -201,15 +201,14 @@ pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
 /// Marker of a marble that sleeps, to read: the plugin adds and removes it after each step.
 ///
 /// With the response [`SoftStep`](taw::response::Response::SoftStep), marbles that rest for half a
-/// second sleep together with those about them, which then cost next to nothing: in groups of some
-/// hundreds, so that in a small world one marble that rolls keeps all awake. They wake when they
-/// are touched or written, when gravity changes, or a wall near them. Marbles of other responses do
-/// not sleep.
+/// second fall asleep with those that they touch (their island), and then cost next to nothing; of a
+/// large heap, some hundreds do so on their own. They wake together when one of them is struck or
+/// written, when gravity changes, or a wall near them. Marbles of other responses do not sleep.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct Sleeping;
 
-/// Forbids a marble to sleep, and with it those about it.
+/// Forbids a marble to sleep, and with it those that it touches.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct SleepingDisabled;

@@ -230,19 +230,35 @@ fn remove_half(bencher: Bencher, count: usize) {
         .bench_local_refs(|world| world.swarm.remove(&half).expect("they are there"));
 }
 
-/// All asleep.
-#[divan::bench(args = COUNTS, sample_count = 30, sample_size = 1)]
-fn asleep(bencher: Bencher, count: usize) {
-    // Each by itself on the floor, a second after which all sleep.
+/// Balls on a floor, each by itself, a second and a half later. Of so many, one rolls.
+fn lying(count: usize, rolls: usize) -> World<f32> {
     let mut world = World::<f32>::default();
     world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).expect("a unit vector")).expect("a wall");
     let side = (count as f32).sqrt().ceil() as usize;
     let at = |i: usize| i as f32 * 1.1;
-    let ball = |i: usize| Ball::new(Point3::new(at(i % side), 0.5, at(i / side)), 0.5);
+    let ball = |i: usize| {
+        let velocity = if i % rolls == rolls - 1 { 1.0 } else { 0.0 };
+        let ball = Ball::new(Point3::new(at(i % side), 0.5, at(i / side)), 0.5);
+        Ball { velocity: Vec3::new(velocity, 0.0, 0.1 * velocity), ..ball }
+    };
     world.swarm.insert(&(0..count).map(ball).collect::<Vec<_>>()).expect("balls");
-    for _ in 0..60 {
+    for _ in 0..90 {
         world.step(DT).expect("a step");
     }
+    world
+}
+
+/// All asleep.
+#[divan::bench(args = COUNTS, sample_count = 30, sample_size = 1)]
+fn asleep(bencher: Bencher, count: usize) {
+    let mut world = lying(count, usize::MAX);
     assert_eq!(world.swarm.asleep(), count);
+    bencher.counter(ItemsCount::new(count)).bench_local(|| world.step(DT).expect("a step"));
+}
+
+/// All but one in 500 asleep, which roll among the others.
+#[divan::bench(args = COUNTS, sample_count = 30, sample_size = 1)]
+fn few_roll(bencher: Bencher, count: usize) {
+    let mut world = lying(count, 500);
     bencher.counter(ItemsCount::new(count)).bench_local(|| world.step(DT).expect("a step"));
 }

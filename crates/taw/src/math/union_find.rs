@@ -20,7 +20,7 @@ impl UnionFind {
         }
     }
 
-    /// Makes a set of each of so many rows.
+    /// Puts each row into a set of its own.
     pub fn reset(&mut self, rows: usize) {
         self.parent.clear();
         self.parent.extend(0..rows as u32);

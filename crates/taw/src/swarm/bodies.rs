@@ -347,6 +347,13 @@ impl Swarm {
         row.is_some_and(|row| self.velocity[row][3].is_sign_negative())
     }
 
+    /// Returns true if the ball of a slot sleeps, if there is one.
+    pub(crate) fn is_slot_asleep(&self, slot: u32) -> bool {
+        let row = self.ids.rows().get(slot as usize).map(|row| *row as usize);
+        let velocity = row.and_then(|row| self.velocity.get(row));
+        velocity.is_some_and(|velocity| velocity[3].is_sign_negative())
+    }
+
     /// Position and velocity of a ball, and the speed of its surface by spin, in m/s.
     pub(crate) fn motion_of<S: Scalar>(&self, ball: BallId) -> Option<(Point3<S>, Vec3<S>, f32)> {
         let row = self.ids.row(ball)?;

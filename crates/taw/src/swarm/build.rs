@@ -65,7 +65,7 @@ impl Swarm {
         self.impulse_cache.shrink_slack();
         self.pairs_valid = true;
         self.cache_valid = false;
-        self.scratch.idle_batches = None;
+        self.scratch.idle_marked_at = None;
     }
 
     /// Skin at the usual speed, in metres: displacement of most balls until pairs are searched
@@ -286,7 +286,7 @@ impl Swarm {
             let velocities = &self.velocity[first as usize..next as usize];
             chunk.sleepers = velocities.iter().filter(|row| row[3].is_sign_negative()).count();
             chunk.asleep = chunk.sleepers == velocities.len();
-            chunk.unread = chunk.sleepers > 0;
+            (chunk.unread, chunk.sleep_changed) = (chunk.sleepers > 0, chunk.sleepers > 0);
             if chunk.asleep {
                 // Nobody looks at it again.
                 (chunk.speed, chunk.inverse_masses) = (0.0, inverse_masses(velocities));

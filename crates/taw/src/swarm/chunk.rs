@@ -44,8 +44,12 @@ pub(super) struct Chunk {
     /// Set if all that are awake have rested for long enough to sleep, and if one has.
     pub rests: bool,
     pub has_rested: bool,
-    /// Set while bodies that fell asleep in it were not read.
+    /// Set if bodies asleep in it have still to be read.
     pub unread: bool,
+    /// Set if balls of it fell asleep or woke since batches were marked as idle, and if its batches have
+    /// to be marked.
+    pub sleep_changed: bool,
+    pub marks_idle: bool,
     /// The speed in m/s of its fastest ball that is no proxy, if it has proxies.
     pub fastest_own: Option<f32>,
     /// Set if a ball of it or of those beside it bounced just now, and in this substep.
@@ -83,6 +87,8 @@ impl Chunk {
             rests: _,
             has_rested: _,
             unread: _,
+            sleep_changed: _,
+            marks_idle: _,
             fastest_own: _,
             again: _,
             struck: _,

@@ -363,7 +363,7 @@ impl Swarm {
     /// Number of balls that sleep.
     #[must_use]
     pub fn asleep(&self) -> usize {
-        self.velocity.iter().filter(|velocity| velocity[3].is_sign_negative()).count()
+        self.sleep.sleepers
     }
 
     /// Number of candidate pairs of balls (broad phase).

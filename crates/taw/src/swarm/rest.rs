@@ -98,7 +98,7 @@ pub(super) struct RestRows<'a> {
 
 impl RestRows<'_> {
     /// Looks, `dt` seconds after the last time, which balls that are awake rest under gravity, in m/s².
-    /// Proxies are moved by others: they always do.
+    /// Proxies are moved by others: they do wherever they stay.
     pub fn update(
         &mut self,
         [at, velocity, spin]: [&[Row]; 3],
@@ -111,15 +111,11 @@ impl RestRows<'_> {
             if velocity[3].is_sign_negative() {
                 continue;
             }
-            if is_proxy(row) {
-                *time = time.max(0.0) + dt;
-                continue;
-            }
             let square = squared(*velocity);
             let is_slow = square < SLOW * SLOW * gravity * at[3];
             // The mark is that of the last step.
             let is_borne = || velocity[3] > INFINITE_MASS && spin[3] > 0.0;
-            let rests = is_slow && (is_borne() || !moves(at, velocity, dt));
+            let rests = is_proxy(row) || is_slow && (is_borne() || !moves(at, velocity, dt));
             let away = squared([at[0] - place[0], at[1] - place[1], at[2] - place[2], 0.0]);
             let is_near = away <= PLACE * PLACE * at[3] * at[3];
             let is_steady = |first: f32| square <= STEADY * STEADY * first * first;

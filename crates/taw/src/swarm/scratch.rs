@@ -26,9 +26,11 @@ pub(super) struct Scratch {
     /// Displacements of the fast balls, while pairs are searched.
     pub displacements: Vec<f32>,
     /// Version of sleep up to which batches are marked as idle.
-    pub idle_batches: Option<u64>,
-    /// Islands of balls that bear each other; which of them has a ball that does not rest; and each
-    /// other ball, with its island.
+    pub idle_marked_at: Option<u64>,
+    /// Rows that wake, by chunk.
+    pub waking: Vec<Vec<u32>>,
+    /// Islands of balls that touch; which of them has a ball that does not rest; each other ball, with its
+    /// island; and rows asleep that join these.
     pub islands: UnionFind,
     pub restless: Vec<bool>,
     pub resting: Vec<[u32; 2]>,
@@ -75,7 +77,8 @@ impl Scratch {
             searches,
             threads: _,
             filters_changed: _,
-            idle_batches: _,
+            idle_marked_at: _,
+            waking,
             islands,
             restless,
             resting,
@@ -97,7 +100,7 @@ impl Scratch {
             + of(displacements)
             + of(proxy_rows)
             + of(saved_proxies))
-            + (of(lists) + lists.iter().map(of).sum::<usize>())
+            + (of(lists) + lists.iter().chain(waking).map(of).sum::<usize>() + of(waking))
             + (of(chunk_states) + islands.bytes() + of(restless) + of(resting) + of(sleepers))
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
             + (crowd.bytes()

@@ -11,15 +11,17 @@ pub(super) struct SleepState {
     pub groups: SleepGroups,
     /// Slots of balls that never sleep, nor do their islands.
     pub sleepless: BitSet,
-    /// Rows that were changed from outside while others slept, since the last step.
+    /// Slots of balls that were changed from outside while others slept, since the last step.
     pub stirred: Vec<u32>,
-    /// Steps, in which balls rested, since islands were looked for.
+    /// Number of balls that sleep.
+    pub sleepers: usize,
+    /// Steps in which balls rested since islands were searched, below eight.
     pub clock: u32,
 }
 
 impl SleepState {
     pub fn bytes(&self) -> usize {
-        let Self { rest, groups, sleepless, stirred, clock: _ } = self;
+        let Self { rest, groups, sleepless, stirred, sleepers: _, clock: _ } = self;
         rest.bytes() + groups.bytes() + sleepless.bytes() + of(stirred)
     }
 }

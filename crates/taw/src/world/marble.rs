@@ -40,7 +40,7 @@ pub struct Marble<S> {
     pub material: Option<Material<S>>,
     /// Layers: which walls and balls it collides with.
     pub layers: CollisionLayers,
-    /// Keeps it, and those about it, awake ([`World::is_asleep`](super::World::is_asleep)).
+    /// Keeps it, and those that it touches, awake ([`World::is_asleep`](super::World::is_asleep)).
     pub sleeping_disabled: bool,
 }
 

@@ -200,7 +200,7 @@ impl<S: Scalar> Marbles<S> {
         Ok(())
     }
 
-    /// Forbids a marble to sleep, or allows it again.
+    /// Forbids a marble to sleep, and with it those that it touches; or allows it again.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].

@@ -201,19 +201,24 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Returns true if a marble sleeps: in a model with
-    /// [`Response::SoftStep`], once it and all about it have
-    /// rested: for half a second, and longer for balls of over 10 cm (five times √(r/g)), each was
-    /// borne by something and either went no further than 5 % of its radius, or was slower than .05 √(g r)
-    /// and did not speed up. What sleeps costs next to nothing, and has no velocity. It wakes when it is touched or set, when a wall or gravity
-    /// changes, and when a neighbour wakes.
+    /// Returns true if a marble sleeps: in a model with [`Response::SoftStep`], once its island has rested,
+    /// that is, it and all that it touches and these touch. (In a large heap, balls sleep in parts of some
+    /// 500 or more.) For half a second, and longer for balls of over 10 cm (five times
+    /// √(r/g)), each was borne by something and either went no further than 5 % of its radius, or was slower
+    /// than .05 √(g r) and did not speed up. What sleeps costs next to nothing, and has no velocity. It wakes
+    /// when it is set, when a wall at it or gravity changes, and when a ball comes to it at over twice that
+    /// speed or leaves it; and with it, what fell asleep with it.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
     pub fn is_asleep(&self, id: MarbleId) -> Result<bool, Error> {
-        self.marbles.row(id)?;
+        let row = self.marbles.row(id)?;
         if self.settings.model.response != Response::SoftStep {
             return Ok(false);
+        }
+        if self.changes_are_listed() {
+            let slot = self.scratch.soft_step.slot_of_marble.get(row);
+            return Ok(slot.is_some_and(|slot| self.swarm.is_slot_asleep(*slot)));
         }
         let bodies = &self.swarm.body_balls;
         let found = bodies.binary_search_by_key(&id, |(marble, _)| *marble);

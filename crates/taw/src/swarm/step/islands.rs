@@ -1,4 +1,4 @@
-//! Islands: balls that bear each other, and fall asleep together.
+//! Islands: balls that touch, and fall asleep together.
 
 use std::mem::take;
 
@@ -8,11 +8,10 @@ use crate::swarm::batches::Batch;
 use crate::swarm::fast_movers::FastMovers;
 use crate::swarm::kernels::{ContactImpulses, GROUNDED, squared};
 
-/// Number of steps from one look at islands to the next: to find them takes as long as a pass over all
-/// pairs.
-const LOOK: u32 = 8;
-/// Largest number of balls asleep that join what comes to rest on them.
-const MOST: usize = 512;
+/// Steps between two searches for islands: one takes as long as a pass over all pairs.
+const STEPS_PER_SEARCH: u32 = 8;
+/// Largest group asleep that joins what comes to rest on it. A large heap sleeps and wakes part by part.
+const MAX_JOINED: usize = 512;
 
 impl Swarm {
     /// Puts balls to sleep that have rested under gravity, in m/s²: those of chunks in which all have,
@@ -27,13 +26,15 @@ impl Swarm {
             let own = self.chunks[i].rows;
             rows.extend((own[0]..own[1]).filter(|row| self.is_awake(*row)));
             let slots = self.ids.slots();
-            if !rows.iter().any(|row| self.sleep.sleepless.contains(slots[*row as usize])) {
+            if !rows.is_empty()
+                && !rows.iter().any(|row| self.sleep.sleepless.contains(slots[*row as usize]))
+            {
                 self.put_to_sleep(&rows);
             }
         }
         self.scratch.leaving = rows;
         if self.chunks.iter().any(|chunk| chunk.has_rested && !chunk.asleep) {
-            self.sleep.clock = (self.sleep.clock + 1) % LOOK;
+            self.sleep.clock = (self.sleep.clock + 1) % STEPS_PER_SEARCH;
             if self.sleep.clock == 0 {
                 self.put_islands_to_sleep(gravity);
             }
@@ -90,23 +91,25 @@ impl Swarm {
         sets.reset(self.at.len());
         sleepers.clear();
         let (slots, rows) = (self.ids.slots(), self.ids.rows());
-        let of_chunks = self.chunks.iter().map(|chunk| (&chunk.batches, &chunk.impulses));
+        let next_sleeps = |i: usize| self.chunks.get(i + 1).is_none_or(|next| next.asleep);
+        let of_chunks = self.chunks.iter().enumerate();
+        let of_chunks = of_chunks.filter(|(i, chunk)| !(chunk.asleep && next_sleeps(*i)));
+        let of_chunks = of_chunks.map(|(_, chunk)| (&chunk.batches, &chunk.impulses));
         let FastMovers { batches, impulses, .. } = &self.fast_movers;
         for (batches, impulses) in of_chunks.chain([(batches, impulses)]) {
             for [a, b] in self.touching_pairs(batches, impulses) {
-                let [is_awake, other] = [a, b].map(|row| self.is_awake(row));
-                if is_awake && other {
+                let Some(asleep) = [a, b].into_iter().find(|row| !self.is_awake(*row)) else {
                     sets.join(a as usize, b as usize);
-                } else if is_awake || other {
-                    let (first, slot) = (sleepers.len(), slots[if other { a } else { b } as usize]);
-                    let visit = |slot: u32| sleepers.push(rows[slot as usize]);
-                    // A large heap wakes part by part.
-                    if self.sleep.groups.visit(slot, MOST, visit) {
-                        let joined = sleepers[first..].iter().chain([&a, &b]);
-                        joined.for_each(|row| sets.join(a as usize, *row as usize));
-                    } else {
-                        sleepers.truncate(first);
+                    continue;
+                };
+                let first = sleepers.len();
+                let visit = |slot: u32| sleepers.push(rows[slot as usize]);
+                if self.sleep.groups.visit(slots[asleep as usize], MAX_JOINED, visit) {
+                    for row in sleepers[first..].iter().chain([&a, &b]) {
+                        sets.join(a as usize, *row as usize);
                     }
+                } else {
+                    sleepers.truncate(first);
                 }
             }
         }
@@ -138,7 +141,8 @@ impl Swarm {
             self.sleep.groups.dissolve(slots[*row as usize], |_| ());
         }
         self.sleep.groups.join(rows.iter().map(|row| slots[*row as usize]));
-        let mut number = 0;
+        let first = rows.first().copied().unwrap_or_default();
+        let mut number = self.chunks.partition_point(|chunk| chunk.rows[1] <= first);
         for row in rows.iter().map(|row| *row as usize) {
             if self.velocity[row][3].is_sign_negative() {
                 continue;
@@ -150,7 +154,8 @@ impl Swarm {
             }
             let chunk = &mut self.chunks[number];
             chunk.sleepers += 1;
-            chunk.unread = true;
+            self.sleep.sleepers += 1;
+            (chunk.unread, chunk.sleep_changed) = (true, true);
             if chunk.sleepers == chunk.own_rows().len() {
                 (chunk.asleep, chunk.speed) = (true, 0.0);
             }

@@ -167,6 +167,7 @@ impl Swarm {
             let rebuilds = self.rebuilds;
             self.find_pairs_of(&leaving, dt, walls, observe);
             if self.rebuilds == rebuilds {
+                self.wake_beside_moving(gravity, dt); // of the new pairs
                 self.find_wall_contacts_if_changed(walls_changed, dt, walls, observe);
             } else {
                 self.update_sleep(dt, gravity, false);
@@ -175,6 +176,7 @@ impl Swarm {
             self.find_wall_contacts_if_changed(walls_changed, dt, walls, observe);
         }
         self.wake_on_paths();
+        self.mark_idle_batches();
         self.scratch.leaving = leaving;
     }
 

@@ -22,12 +22,12 @@ impl Swarm {
         if !self.proxies.is_empty() {
             self.measure_speeds_beside_proxies();
         }
-        let gravity = length(gravity);
         let (at, skin_left) = (&self.at[..], &self.skin_left[..]);
         let (velocity, spin) = (&self.velocity[..], &self.spin[..]);
         let (slots, bodies) = (self.ids.slots(), &self.body_slots);
         let (has_proxies, reach) = (!self.proxies.is_empty(), self.reach_of_skins());
-        let sleeps = self.model.sleeps && gravity > 0.0;
+        let (sleepless, weight) = (&self.sleep.sleepless, length(gravity));
+        let looks = self.model.sleeps && weight > 0.0 && is_first;
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
         let rest = self.sleep.rest.shared();
@@ -54,7 +54,7 @@ impl Swarm {
             chunk.speed = velocity.iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt();
             chunk.inverse_masses = inverse_masses(velocity);
             (chunk.rests, chunk.has_rested) = (false, false);
-            if !sleeps {
+            if !looks {
                 return;
             }
             // SAFETY: rows of the chunk.
@@ -64,25 +64,28 @@ impl Swarm {
                     time: rest.time.part(rows.clone()),
                 }
             };
-            if is_first {
-                let is_proxy = |row: usize| has_proxies && bodies.contains(slots[rows.start + row]);
-                rest.update([at, velocity, spin], is_proxy, gravity, dt);
-            }
+            let slot = |row: usize| slots[rows.start + row];
+            let is_proxy = |row: usize| has_proxies && bodies.contains(slot(row));
+            rest.update([at, velocity, spin], is_proxy, weight, dt);
             chunk.end_rest_of_carried(&mut rest);
-            chunk.find_rest(at, velocity, &mut rest, gravity);
+            let may_sleep = |row: usize| !sleepless.contains(slot(row)) && !is_proxy(row);
+            chunk.find_rest([at, velocity], may_sleep, &mut rest, weight);
         });
-        self.fall_asleep(gravity);
+        if is_first {
+            self.fall_asleep(length(gravity));
+        }
         self.wake_beside_moving(gravity, dt);
     }
 
     /// Wakes what sleeps beside balls that are fast enough to disturb it, or have left their place: it may
     /// have leant on them.
-    fn wake_beside_moving(&mut self, gravity: f32, dt: f32) {
-        if !self.has_sleepers() {
+    pub(super) fn wake_beside_moving(&mut self, gravity: Vec3<f32>, dt: f32) {
+        if self.sleep.sleepers == 0 {
             return;
         }
-        let mut lists = take(&mut self.scratch.lists);
-        lists.resize_with(self.chunks.len().max(lists.len()), Vec::new);
+        let gravity = length(gravity);
+        let mut lists = take(&mut self.scratch.waking);
+        lists.resize_with(self.chunks.len() + 1, Vec::new);
         let (chunks, velocity, at, rest) =
             (&self.chunks, &self.velocity[..], &self.at[..], &self.sleep.rest);
         let disturbs = |awake: usize, asleep: usize| {
@@ -90,8 +93,10 @@ impl Swarm {
             let speed = squared(velocity[awake]).sqrt();
             let apart = squared([b[0] - a[0], b[1] - a[1], b[2] - a[2], 0.0]).sqrt();
             let (radii, gap) = (a[3] + b[3], apart - (a[3] + b[3]));
+            // It touched where it was, as far away as it may have gone since, or will in this step.
+            let reach = PLACE * (2.0 * a[3] + radii) + speed * dt;
             speed > 2.0 * sleep_speed(gravity, b[3]) && gap <= 2.0 * speed * dt
-                || rest.has_left(awake) && gap <= PLACE * radii
+                || rest.has_left(awake) && gap <= reach
         };
         let list = |batches: &[Batch], waking: &mut Vec<u32>| {
             for pair in batches.iter().filter(|batch| !batch.is_idle).flat_map(Batch::pairs) {
@@ -116,12 +121,13 @@ impl Swarm {
             }
         });
         if let Some(last) = lists.last_mut() {
+            last.clear();
             list(&self.fast_movers.batches, last);
         }
         for row in lists.iter_mut().flat_map(|waking| waking.drain(..)) {
             self.wake_group(row as usize);
         }
-        self.scratch.lists = lists;
+        self.scratch.waking = lists;
     }
 
     /// Wakes what swift balls may meet on their paths, however many chunks away.
@@ -150,8 +156,8 @@ impl Swarm {
 
     /// Wakes a ball that something changes from outside; those that may lean on it wake when the step begins.
     pub(in crate::swarm) fn wake(&mut self, row: usize) {
-        if self.has_sleepers() {
-            self.sleep.stirred.push(row as u32);
+        if self.sleep.sleepers > 0 {
+            self.sleep.stirred.push(self.ids.slots()[row]);
         }
         self.wake_group(row);
         self.sleep.rest.end(row);
@@ -163,15 +169,18 @@ impl Swarm {
             return;
         }
         let (slots, rows) = (self.ids.slots(), self.ids.rows());
+        let sleepers = &mut self.sleep.sleepers;
         let (velocity, rest, chunks) = (&mut self.velocity, &mut self.sleep.rest, &mut self.chunks);
         self.sleep.groups.dissolve(slots[row], |slot| {
             let row = rows[slot as usize] as usize;
             velocity[row][3] = velocity[row][3].abs();
             rest.end(row);
+            *sleepers -= 1;
             if self.pairs_valid {
                 let chunk = chunks.partition_point(|chunk| chunk.rows[1] as usize <= row);
-                chunks[chunk].sleepers -= 1;
-                chunks[chunk].asleep = false;
+                let chunk = &mut chunks[chunk];
+                chunk.sleepers -= 1;
+                (chunk.asleep, chunk.sleep_changed) = (false, true);
             }
         });
         self.sleep_version += 1;
@@ -180,10 +189,13 @@ impl Swarm {
     /// Wakes what sleeps beside balls that were changed from outside since the last step.
     pub(super) fn wake_beside_stirred(&mut self) {
         let mut stirred = take(&mut self.sleep.stirred);
-        stirred.sort_unstable();
-        stirred.dedup();
         let mut waking = Vec::new();
-        if self.has_sleepers() {
+        if self.sleep.sleepers > 0 {
+            let rows = self.ids.rows();
+            for slot in &mut stirred {
+                *slot = rows[*slot as usize];
+            }
+            stirred.sort_unstable();
             let is_stirred = |row: u32| stirred.binary_search(&row).is_ok();
             let asleep = |row: u32| self.velocity[row as usize][3].is_sign_negative();
             let of_chunks = self.chunks.iter().filter(|chunk| {
@@ -206,25 +218,19 @@ impl Swarm {
         self.sleep.stirred = stirred;
     }
 
-    /// Returns true if a ball sleeps.
-    fn has_sleepers(&self) -> bool {
-        self.chunks.iter().any(|chunk| chunk.sleepers > 0)
-    }
-
     /// Wakes all balls.
     pub(in crate::swarm) fn wake_all(&mut self) {
         for chunk in &mut self.chunks {
+            chunk.sleep_changed |= chunk.sleepers > 0;
             (chunk.asleep, chunk.sleepers) = (false, 0);
         }
-        let mut any = false;
         for velocity in &mut self.velocity {
-            any |= velocity[3].is_sign_negative();
             velocity[3] = velocity[3].abs();
         }
+        self.sleep_version += u64::from(std::mem::take(&mut self.sleep.sleepers) > 0);
         self.sleep.rest.end_all();
         self.sleep.groups.clear();
         self.sleep.stirred.clear();
-        self.sleep_version += u64::from(any);
     }
 
     /// Wakes the balls near walls that changed since the last step.
@@ -249,18 +255,28 @@ impl Swarm {
 
     /// Marks the batches whose balls all sleep, for passes to skip them.
     pub(super) fn mark_idle_batches(&mut self) {
-        let version = Some(self.sleep_version);
-        if std::mem::replace(&mut self.scratch.idle_batches, version) == version {
+        let version = self.sleep_version;
+        if self.scratch.idle_marked_at.replace(version) == Some(version) {
             return;
+        }
+        for i in 0..self.chunks.len() {
+            let next = self.chunks.get(i + 1);
+            let next = next.map_or([false, true], |next| [next.sleep_changed, next.asleep]);
+            let chunk = &mut self.chunks[i];
+            let changed = std::mem::take(&mut chunk.sleep_changed) || next[0];
+            chunk.marks_idle = changed && !(chunk.asleep && next[1]);
         }
         let velocity = &self.velocity;
         let is_asleep = |row: u32| velocity[row as usize][3].is_sign_negative();
         let chunks = DisjointSlice::new(&mut self.chunks);
         parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
-            // SAFETY: its own.
-            for batch in unsafe { &mut (*chunks.row(chunk)).batches } {
-                let is_idle = batch.pairs().flatten().all(is_asleep);
-                batch.is_idle = is_idle;
+            // SAFETY: each thread has its own chunks.
+            let chunk = unsafe { &mut *chunks.row(chunk) };
+            if chunk.marks_idle {
+                for batch in &mut chunk.batches {
+                    let is_idle = batch.pairs().flatten().all(is_asleep);
+                    batch.is_idle = is_idle;
+                }
             }
         });
     }
@@ -277,15 +293,22 @@ impl Chunk {
         }
     }
 
-    /// Finds out if its balls have rested for long enough to sleep: all of them, or any.
-    fn find_rest(&mut self, at: &[Row], velocity: &[Row], rest: &mut RestRows, gravity: f32) {
+    /// Finds out if its balls have rested for long enough to sleep: all of them, or any that may alone.
+    fn find_rest(
+        &mut self,
+        [at, velocity]: [&[Row]; 2],
+        may_sleep: impl Fn(usize) -> bool,
+        rest: &mut RestRows,
+        gravity: f32,
+    ) {
         if self.fastest_own == Some(f32::INFINITY) {
             rest.end_all();
             return;
         }
         let awake = || (0..at.len()).filter(|row| velocity[*row][3].is_sign_positive());
-        self.has_rested = awake().any(|row| rest.lasts(row, at[row][3], gravity));
-        self.rests = self.has_rested && awake().all(|row| rest.lasts(row, self.radii[1], gravity));
+        let lasts = |row: usize| rest.lasts(row, at[row][3], gravity);
+        self.has_rested = awake().any(|row| lasts(row) && may_sleep(row));
+        self.rests = awake().all(|row| rest.lasts(row, self.radii[1], gravity));
     }
 }
 
