@@ -10,8 +10,9 @@ use crate::swarm::kernels::{ContactImpulses, GROUNDED, squared};
 
 /// Steps between two searches for islands: one takes as long as a pass over all pairs.
 const STEPS_PER_SEARCH: u32 = 8;
-/// Largest group asleep that joins what comes to rest on it. A large heap sleeps and wakes part by part.
-const MAX_JOINED: usize = 512;
+/// Largest group asleep that joins what comes to rest on it, and wakes with what leaves it. A large heap
+/// sleeps and wakes part by part.
+pub(super) const MAX_JOINED: usize = 512;
 
 impl Swarm {
     /// Puts balls to sleep that have rested under gravity, in m/s²: those of chunks in which all have,

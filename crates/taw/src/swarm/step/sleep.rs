@@ -2,6 +2,7 @@
 
 use std::mem::take;
 
+use super::islands::MAX_JOINED;
 use super::{leaves, wider};
 
 use crate::math::{Vec3, length};
@@ -10,6 +11,7 @@ use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::squared;
 use crate::swarm::rest::{PLACE, RestRows, sleep_speed};
 use crate::swarm::simd::Row;
+use crate::swarm::sleep::SleepState;
 use crate::swarm::wall_contact::WallContact;
 use crate::swarm::{StaticGeometry, Swarm};
 use crate::workers::{DisjointSlice, parallel_for};
@@ -78,7 +80,7 @@ impl Swarm {
     }
 
     /// Wakes what sleeps beside balls that are fast enough to disturb it, or have left their place: it may
-    /// have leant on them.
+    /// have leant on them. A part of a large heap does not wake for one of those that settle about it.
     pub(super) fn wake_beside_moving(&mut self, gravity: Vec3<f32>, dt: f32) {
         if self.sleep.sleepers == 0 {
             return;
@@ -86,8 +88,8 @@ impl Swarm {
         let gravity = length(gravity);
         let mut lists = take(&mut self.scratch.waking);
         lists.resize_with(self.chunks.len() + 1, Vec::new);
-        let (chunks, velocity, at, rest) =
-            (&self.chunks, &self.velocity[..], &self.at[..], &self.sleep.rest);
+        let (chunks, velocity, at) = (&self.chunks, &self.velocity[..], &self.at[..]);
+        let (slots, SleepState { rest, groups, .. }) = (self.ids.slots(), &self.sleep);
         let disturbs = |awake: usize, asleep: usize| {
             let [a, b] = [&at[awake], &at[asleep]];
             let speed = squared(velocity[awake]).sqrt();
@@ -96,7 +98,9 @@ impl Swarm {
             // It touched where it was, as far away as it may have gone since, or will in this step.
             let reach = PLACE * (2.0 * a[3] + radii) + speed * dt;
             speed > 2.0 * sleep_speed(gravity, b[3]) && gap <= 2.0 * speed * dt
-                || rest.has_left(awake) && gap <= reach
+                || rest.has_left(awake)
+                    && gap <= reach
+                    && groups.visit(slots[asleep], MAX_JOINED, |_| ())
         };
         let list = |batches: &[Batch], waking: &mut Vec<u32>| {
             for pair in batches.iter().filter(|batch| !batch.is_idle).flat_map(Batch::pairs) {
