@@ -20,7 +20,7 @@ pub(super) const PLACE: f32 = 0.05;
 /// of .08° gains more in that time.
 const STEADY: f32 = 1.1;
 
-/// Instead of the time of rest: the ball moves, or has just left its place.
+/// Values of the time of rest of a ball that moves, and of one that has just gone further than [`PLACE`].
 const MOVES: f32 = -1.0;
 const LEFT: f32 = -2.0;
 
@@ -98,7 +98,7 @@ pub(super) struct RestRows<'a> {
 
 impl RestRows<'_> {
     /// Looks, `dt` seconds after the last time, which balls that are awake rest under gravity, in m/s².
-    /// Proxies are moved by others: they do wherever they stay.
+    /// Proxies are moved by others, and rest wherever they stay.
     pub fn update(
         &mut self,
         [at, velocity, spin]: [&[Row]; 3],

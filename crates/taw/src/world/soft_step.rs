@@ -202,12 +202,16 @@ impl<S: Scalar> World<S> {
     }
 
     /// Returns true if a marble sleeps: in a model with [`Response::SoftStep`], once its island has rested,
-    /// that is, it and all that it touches and these touch. (Some 500 neighbours
-    /// that all rest sleep together, too, so that a large heap sleeps part by part.) For half a second, and longer for balls of over 10 cm (five times
-    /// √(r/g)), each was borne by something and either went no further than 5 % of its radius, or was slower
-    /// than .05 √(g r) and did not speed up. What sleeps costs next to nothing, and has no velocity. It wakes
-    /// when it is set, when a wall at it or gravity changes, and when a ball comes to it at over twice that
-    /// speed or leaves it; and with it, what fell asleep with it.
+    /// that is, the marble, those that it touches, those that these touch, and so on. (Some 500 neighbours in
+    /// memory that all rest fall asleep together, too, so that a large heap sleeps part by part.)
+    ///
+    /// A marble rests if for half a second, and longer if its radius is over 10 cm (five times √(r/g)), it was
+    /// borne by something and either went no further than 5 % of its radius, or was slower than
+    /// .05 √(g r) and did not speed up.
+    ///
+    /// What sleeps costs next to nothing, and has no velocity. It wakes when it is set, when gravity or a wall
+    /// near it changes, when a ball beside it comes at over twice that speed or leaves its place, and when
+    /// one wakes that fell asleep with it.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
