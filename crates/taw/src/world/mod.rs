@@ -104,7 +104,8 @@ pub struct World<S: Scalar> {
     /// Marbles that the last step stopped, sorted by handle, each once.
     quarantined: Vec<MarbleId>,
     memory: ContactMemory<S>,
-    scratch: Scratch<S>,
+    /// On the heap, since it is several kilobytes: a world is moved as a whole.
+    scratch: Box<Scratch<S>>,
 }
 
 impl<S: Scalar> World<S> {
