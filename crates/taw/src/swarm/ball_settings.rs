@@ -90,7 +90,7 @@ impl Swarm {
     }
 
     /// Changes the layers of balls, all or none: which walls, marbles and other balls they collide
-    /// with. If any had others, all balls wake.
+    /// with. Wakes those that had others, and balls beside them.
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], also for a marble's.
@@ -105,13 +105,11 @@ impl Swarm {
         &mut self,
         all: impl Iterator<Item = (u32, CollisionLayers)>,
     ) {
-        let mut changed = false;
         for (slot, layers) in all {
-            changed |= self.surfaces.set_layers(slot, layers);
-        }
-        if changed {
-            self.wake_all(); // one that bore others may be gone for them
-            self.forget_contacts();
+            if self.surfaces.set_layers(slot, layers) {
+                self.wake(self.ids.rows()[slot as usize] as usize);
+                self.forget_contacts();
+            }
         }
     }
 
@@ -136,7 +134,7 @@ impl Swarm {
     /// Has pairs and balls at walls found anew, with the impulses that they have.
     pub(super) fn forget_contacts(&mut self) {
         self.cache_impulses();
-        (self.pairs_valid, self.walls_identity) = (false, None);
+        self.pairs_valid = false;
     }
 
     /// Factor on gravity for a ball.

@@ -39,6 +39,13 @@ impl BitSet {
         word.is_some_and(|word| word >> (number % 64) & 1 == 1)
     }
 
+    /// Its numbers, in order.
+    pub fn iter(&self) -> impl Iterator<Item = u32> + '_ {
+        (0..).zip(&self.words).flat_map(|(i, word)| {
+            (0..64).filter(move |bit| word >> bit & 1 == 1).map(move |bit| 64 * i + bit)
+        })
+    }
+
     pub fn is_empty(&self) -> bool {
         self.words.iter().all(|word| *word == 0)
     }

@@ -225,7 +225,7 @@ impl Swarm {
         Ok(ids)
     }
 
-    /// Removes balls, all or none. To remove many at once takes as long as to remove one, which grows with the
+    /// Removes balls, all or none, and wakes those beside them. To remove many at once takes as long as to remove one, which grows with the
     /// number of all balls.
     ///
     /// # Errors
@@ -245,6 +245,10 @@ impl Swarm {
             return Ok(());
         }
         self.sleep_version += 1;
+        for ball in balls {
+            self.wake(self.row(*ball)?);
+        }
+        self.wake_beside_stirred(); // while they are known
         self.cache_impulses();
         for ball in balls {
             if let Some(slot) = self.slot_of(*ball) {
@@ -261,7 +265,6 @@ impl Swarm {
         retain(&mut self.sleep.rest.place, &kept);
         retain(&mut self.sleep.rest.time, &kept);
         self.measure_radii();
-        self.wake_all();
         self.pairs_valid = false;
         Ok(())
     }

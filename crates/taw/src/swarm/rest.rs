@@ -65,6 +65,11 @@ impl RestColumns {
         self.time.get(row).is_some_and(|time| *time >= 0.0)
     }
 
+    /// Returns true if any ball rests.
+    pub fn is_any_at_rest(&self) -> bool {
+        self.time.iter().any(|time| *time >= 0.0)
+    }
+
     /// Returns true if a ball has rested for long enough to sleep under gravity, in m/s².
     pub fn lasts(&self, row: usize, radius: f32, gravity: f32) -> bool {
         lasts(self.time[row], radius, gravity)

@@ -30,11 +30,13 @@ pub(super) struct Scratch {
     /// Rows that wake, by chunk.
     pub waking: Vec<Vec<u32>>,
     /// Islands of balls that touch; which of them has a ball that does not rest; each other ball, with its
-    /// island; and rows asleep that join these.
+    /// island; and rows asleep that join these, with one that each touches.
     pub islands: UnionFind,
     pub restless: Vec<bool>,
     pub resting: Vec<[u32; 2]>,
-    pub sleepers: Vec<u32>,
+    pub sleepers: Vec<[u32; 2]>,
+    /// Rows of an island.
+    pub rows: Vec<u32>,
     /// Rows of proxies, in order, and which proxy each is.
     pub proxy_rows: Vec<(u32, u32)>,
     /// Positions and velocities of these rows before they are integrated.
@@ -83,6 +85,7 @@ impl Scratch {
             restless,
             resting,
             sleepers,
+            rows,
             crowd,
             path_changes,
             places,
@@ -101,7 +104,12 @@ impl Scratch {
             + of(proxy_rows)
             + of(saved_proxies))
             + (of(lists) + lists.iter().chain(waking).map(of).sum::<usize>() + of(waking))
-            + (of(chunk_states) + islands.bytes() + of(restless) + of(resting) + of(sleepers))
+            + (of(chunk_states)
+                + islands.bytes()
+                + of(restless)
+                + of(resting)
+                + of(sleepers)
+                + of(rows))
             + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
             + (crowd.bytes()
                 + of(path_changes)

@@ -11,8 +11,8 @@ pub(super) struct SleepState {
     pub groups: SleepGroups,
     /// Slots of balls that never sleep, nor do their islands.
     pub sleepless: BitSet,
-    /// Slots of balls that were changed from outside while others slept, since the last step.
-    pub stirred: Vec<u32>,
+    /// Slots of balls that were changed from outside since the last step.
+    pub stirred: BitSet,
     /// Number of balls that sleep.
     pub sleepers: usize,
     /// Steps in which balls rested since islands were searched, below eight.
@@ -22,7 +22,7 @@ pub(super) struct SleepState {
 impl SleepState {
     pub fn bytes(&self) -> usize {
         let Self { rest, groups, sleepless, stirred, sleepers: _, clock: _ } = self;
-        rest.bytes() + groups.bytes() + sleepless.bytes() + of(stirred)
+        rest.bytes() + groups.bytes() + sleepless.bytes() + stirred.bytes()
     }
 }
 

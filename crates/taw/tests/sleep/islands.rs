@@ -24,7 +24,7 @@ pub fn island(world: &World<f32>, id: MarbleId) -> BTreeSet<MarbleId> {
 }
 
 /// A floor with 400 marbles that lie on it, of which one rolls for ever.
-fn floor_with_roller() -> (World<f32>, Vec<MarbleId>, MarbleId) {
+pub fn floor_with_roller() -> (World<f32>, Vec<MarbleId>, MarbleId) {
     let mut world = world();
     world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
     let places = (0..20_u16).flat_map(|x| (0..20_u16).map(move |z| [x, z]));

@@ -3,7 +3,7 @@
 use taw::motion::WallMotion;
 use taw::prelude::*;
 
-use crate::{DT, world};
+use crate::{DT, steps, world};
 
 fn slope(degrees: f32) -> World<f32> {
     let mut world = world();
@@ -125,5 +125,35 @@ fn a_clone_goes_on_alike_whatever_the_radius() {
         }
         assert!(clone.is_asleep(id).unwrap(), "{radius}");
         assert_eq!(clone, world, "{radius}");
+    }
+}
+
+/// One that nothing turns aside, however slowly it comes to one that sleeps.
+#[test]
+fn what_has_infinite_mass_moves_on_through_sleepers() {
+    for speed in [0.003, 0.01, 0.1, 1.0] {
+        let mut world = world();
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        let light = Marble::new(Point3::new(0.3, 0.25, 0.0), 0.25);
+        let light = world.marbles.insert(light).unwrap();
+        steps(&mut world, 120);
+        assert!(world.is_asleep(light).unwrap());
+        let down = Vec3::new(0.0, -speed, 0.0);
+        let heavy = Marble {
+            mass: Mass::Infinite,
+            gravity_scale: 0.0,
+            velocity: down,
+            ..Marble::new(Point3::new(0.0, 1.0654, 0.0), 0.6)
+        };
+        let heavy = world.marbles.insert(heavy).unwrap();
+        let count = (0.05 / speed * 60.0) as u32;
+        for step in 0..count {
+            steps(&mut world, 1);
+            let velocity = world.marbles.get(heavy).unwrap().velocity;
+            // But for what rounding adds and takes of gravity.
+            let turned = cgmath::InnerSpace::magnitude(velocity - down);
+            assert!(turned < 0.01 * speed, "{speed} m/s, step {step}: {velocity:?}");
+        }
+        assert!(world.marbles.get(light).unwrap().position.x > 0.31, "{speed} m/s");
     }
 }

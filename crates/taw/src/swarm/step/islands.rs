@@ -1,6 +1,7 @@
 //! Islands: balls that touch, and fall asleep together.
 
 use std::mem::take;
+use std::ops::Range;
 
 use crate::math::UnionFind;
 use crate::swarm::Swarm;
@@ -15,29 +16,28 @@ const STEPS_PER_SEARCH: u32 = 8;
 pub(super) const MAX_JOINED: usize = 512;
 
 impl Swarm {
-    /// Puts balls to sleep that have rested under gravity, in m/s²: those of chunks in which all have,
-    /// so that what rolls on a large heap keeps little of it awake, and those of islands in which all have.
+    /// Puts islands to sleep of which all balls have rested under gravity, in m/s²; and in chunks of which
+    /// all have, whatever they touch beyond, so that what rolls on a large heap keeps little of it awake.
     pub(super) fn fall_asleep(&mut self, gravity: f32) {
-        let mut rows = take(&mut self.scratch.leaving);
         for i in 0..self.chunks.len() {
-            if !std::mem::take(&mut self.chunks[i].rests) {
-                continue;
-            }
-            rows.clear();
-            let own = self.chunks[i].rows;
-            rows.extend((own[0]..own[1]).filter(|row| self.is_awake(*row)));
-            let slots = self.ids.slots();
-            if !rows.is_empty()
-                && !rows.iter().any(|row| self.sleep.sleepless.contains(slots[*row as usize]))
-            {
-                self.put_to_sleep(&rows);
+            if take(&mut self.chunks[i].rests) {
+                let [first, end, _] = self.chunks[i].rows;
+                self.put_islands_to_sleep(first..end, i.saturating_sub(1)..i + 1, |_, _| false);
             }
         }
-        self.scratch.leaving = rows;
         if self.chunks.iter().any(|chunk| chunk.has_rested && !chunk.asleep) {
             self.sleep.clock = (self.sleep.clock + 1) % STEPS_PER_SEARCH;
             if self.sleep.clock == 0 {
-                self.put_islands_to_sleep(gravity);
+                let has_proxies = !self.proxies.is_empty();
+                let is_restless = |swarm: &Self, row: u32| {
+                    let (slot, sleep) = (swarm.ids.slots()[row as usize], &swarm.sleep);
+                    let radius = swarm.at[row as usize][3];
+                    !sleep.rest.lasts(row as usize, radius, gravity)
+                        || sleep.sleepless.contains(slot)
+                        || has_proxies && swarm.body_slots.contains(slot)
+                };
+                let rows = 0..self.at.len() as u32;
+                self.put_islands_to_sleep(rows, 0..self.chunks.len(), is_restless);
             }
         }
         for chunk in self.chunks.iter_mut().filter(|chunk| chunk.sleepers > 0) {
@@ -50,72 +50,88 @@ impl Swarm {
         self.velocity[row as usize][3].is_sign_positive()
     }
 
-    /// Puts the islands to sleep of which all balls have rested. Proxies are in none of these.
-    fn put_islands_to_sleep(&mut self, gravity: f32) {
+    /// Puts those islands of some rows to sleep in which no ball is restless. Pairs of these rows are in the
+    /// lists of some chunks.
+    fn put_islands_to_sleep(
+        &mut self,
+        scope: Range<u32>,
+        chunks: Range<usize>,
+        is_restless: impl Fn(&Self, u32) -> bool,
+    ) {
         let mut sets = take(&mut self.scratch.islands);
         let mut resting = take(&mut self.scratch.resting);
         let mut restless = take(&mut self.scratch.restless);
         let mut sleepers = take(&mut self.scratch.sleepers);
-        self.join_islands(&mut sets, &mut sleepers);
+        self.join_islands(&scope, chunks, &mut sets, &mut sleepers);
         restless.clear();
         resting.clear();
-        let (slots, has_proxies) = (self.ids.slots(), !self.proxies.is_empty());
-        for row in (0..self.at.len() as u32).filter(|row| self.is_awake(*row)) {
-            let (set, slot) = (sets.set_of(row as usize), slots[row as usize]);
-            let radius = self.at[row as usize][3];
+        for row in scope.clone().filter(|row| self.is_awake(*row)) {
+            let set = sets.set_of((row - scope.start) as usize);
             restless.resize(restless.len().max(set as usize + 1), false);
-            if !self.sleep.rest.lasts(row as usize, radius, gravity)
-                || self.sleep.sleepless.contains(slot)
-                || has_proxies && self.body_slots.contains(slot)
-            {
+            if is_restless(self, row) {
                 restless[set as usize] = true;
             } else {
                 resting.push([set, row]);
             }
         }
-        resting.extend(sleepers.iter().map(|row| [sets.set_of(*row as usize), *row]));
+        let set_of = |[row, by]: &[u32; 2]| [sets.set_of((by - scope.start) as usize), *row];
+        resting.extend(sleepers.iter().map(set_of));
         resting.retain(|[set, _]| !restless[*set as usize]);
         resting.sort_unstable();
-        let mut rows = take(&mut sleepers);
+        let mut rows = take(&mut self.scratch.rows);
         for island in resting.chunk_by(|a, b| a[0] == b[0]) {
             rows.clear();
             rows.extend(island.iter().map(|[_, row]| *row));
             self.put_to_sleep(&rows);
         }
         (self.scratch.islands, self.scratch.resting) = (sets, resting);
-        (self.scratch.restless, self.scratch.sleepers) = (restless, rows);
+        (self.scratch.restless, self.scratch.sleepers) = (restless, sleepers);
+        self.scratch.rows = rows;
     }
 
-    /// Joins balls that touch, with those asleep that they came to rest on and what fell asleep with these.
-    /// Lists these sleepers, in order.
-    fn join_islands(&self, sets: &mut UnionFind, sleepers: &mut Vec<u32>) {
-        sets.reset(self.at.len());
+    /// Joins balls that touch, by their place among these rows, with those asleep that they came to rest on
+    /// and what fell asleep with these. Lists these sleepers, in order, each with one awake that joined it.
+    fn join_islands(
+        &self,
+        scope: &Range<u32>,
+        chunks: Range<usize>,
+        sets: &mut UnionFind,
+        sleepers: &mut Vec<[u32; 2]>,
+    ) {
+        sets.reset(scope.len());
         sleepers.clear();
         let (slots, rows) = (self.ids.slots(), self.ids.rows());
+        let place = |row: u32| (row - scope.start) as usize;
         let next_sleeps = |i: usize| self.chunks.get(i + 1).is_none_or(|next| next.asleep);
-        let of_chunks = self.chunks.iter().enumerate();
+        let of_chunks = chunks.map(|i| (i, &self.chunks[i]));
         let of_chunks = of_chunks.filter(|(i, chunk)| !(chunk.asleep && next_sleeps(*i)));
         let of_chunks = of_chunks.map(|(_, chunk)| (&chunk.batches, &chunk.impulses));
         let FastMovers { batches, impulses, .. } = &self.fast_movers;
         for (batches, impulses) in of_chunks.chain([(batches, impulses)]) {
             for [a, b] in self.touching_pairs(batches, impulses) {
-                let Some(asleep) = [a, b].into_iter().find(|row| !self.is_awake(*row)) else {
-                    sets.join(a as usize, b as usize);
+                let [awake, other] = if self.is_awake(a) { [a, b] } else { [b, a] };
+                if !scope.contains(&awake) {
                     continue;
-                };
-                let first = sleepers.len();
-                let visit = |slot: u32| sleepers.push(rows[slot as usize]);
-                if self.sleep.groups.visit(slots[asleep as usize], MAX_JOINED, visit) {
-                    for row in sleepers[first..].iter().chain([&a, &b]) {
-                        sets.join(a as usize, *row as usize);
+                }
+                if !self.is_awake(other) {
+                    let first = sleepers.len();
+                    let visit = |slot: u32| sleepers.push([rows[slot as usize], awake]);
+                    if !self.sleep.groups.visit(slots[other as usize], MAX_JOINED, visit) {
+                        sleepers.truncate(first);
                     }
-                } else {
-                    sleepers.truncate(first);
+                } else if scope.contains(&other) {
+                    sets.join(place(awake), place(other));
                 }
             }
         }
         sleepers.sort_unstable();
-        sleepers.dedup();
+        sleepers.dedup_by(|next, first| {
+            let is_same = next[0] == first[0];
+            if is_same {
+                sets.join(place(next[1]), place(first[1]));
+            }
+            is_same
+        });
     }
 
     /// Pairs of which one is awake, and that press on each other or touch.

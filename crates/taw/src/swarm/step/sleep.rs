@@ -7,13 +7,14 @@ use super::{leaves, wider};
 
 use crate::math::{Vec3, length};
 use crate::swarm::batches::Batch;
+use crate::swarm::bodies::NO_ROW;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::squared;
 use crate::swarm::rest::{PLACE, RestRows, sleep_speed};
 use crate::swarm::simd::Row;
 use crate::swarm::sleep::SleepState;
 use crate::swarm::wall_contact::WallContact;
-use crate::swarm::{StaticGeometry, Swarm};
+use crate::swarm::{INFINITE_MASS, StaticGeometry, Swarm};
 use crate::workers::{DisjointSlice, parallel_for};
 use cgmath::Zero;
 
@@ -70,8 +71,8 @@ impl Swarm {
             let is_proxy = |row: usize| has_proxies && bodies.contains(slot(row));
             rest.update([at, velocity, spin], is_proxy, weight, dt);
             chunk.end_rest_of_carried(&mut rest);
-            let may_sleep = |row: usize| !sleepless.contains(slot(row)) && !is_proxy(row);
-            chunk.find_rest([at, velocity], may_sleep, &mut rest, weight);
+            let is_sleepless = |row: usize| sleepless.contains(slot(row));
+            chunk.find_rest([at, velocity], is_sleepless, is_proxy, &mut rest, weight);
         });
         if is_first {
             self.fall_asleep(length(gravity));
@@ -97,7 +98,9 @@ impl Swarm {
             let (radii, gap) = (a[3] + b[3], apart - (a[3] + b[3]));
             // It touched where it was, as far away as it may have gone since, or will in this step.
             let reach = PLACE * (2.0 * a[3] + radii) + speed * dt;
-            speed > 2.0 * sleep_speed(gravity, b[3]) && gap <= 2.0 * speed * dt
+            // Nothing turns it aside.
+            let pushes = velocity[awake][3] <= INFINITE_MASS && !rest.is_at_rest(awake);
+            (pushes || speed > 2.0 * sleep_speed(gravity, b[3])) && gap <= 2.0 * speed * dt
                 || rest.has_left(awake)
                     && gap <= reach
                     && groups.visit(slots[asleep], MAX_JOINED, |_| ())
@@ -160,8 +163,8 @@ impl Swarm {
 
     /// Wakes a ball that something changes from outside; those that may lean on it wake when the step begins.
     pub(in crate::swarm) fn wake(&mut self, row: usize) {
-        if self.sleep.sleepers > 0 {
-            self.sleep.stirred.push(self.ids.slots()[row]);
+        if self.model.sleeps {
+            self.sleep.stirred.insert(self.ids.slots()[row]);
         }
         self.wake_group(row);
         self.sleep.rest.end(row);
@@ -190,36 +193,47 @@ impl Swarm {
         self.sleep_version += 1;
     }
 
-    /// Wakes what sleeps beside balls that were changed from outside since the last step.
-    pub(super) fn wake_beside_stirred(&mut self) {
-        let mut stirred = take(&mut self.sleep.stirred);
-        let mut waking = Vec::new();
-        if self.sleep.sleepers > 0 {
-            let rows = self.ids.rows();
-            for slot in &mut stirred {
-                *slot = rows[*slot as usize];
-            }
-            stirred.sort_unstable();
-            let is_stirred = |row: u32| stirred.binary_search(&row).is_ok();
-            let asleep = |row: u32| self.velocity[row as usize][3].is_sign_negative();
-            let of_chunks = self.chunks.iter().filter(|chunk| {
-                let first = stirred.partition_point(|row| *row < chunk.rows[0]);
-                stirred.get(first).is_some_and(|row| *row < chunk.rows[2])
-            });
-            let batches = of_chunks.flat_map(|chunk| &chunk.batches);
-            for [a, b] in batches.chain(&self.fast_movers.batches).flat_map(Batch::pairs) {
-                for [by, of] in [[a, b], [b, a]] {
-                    if asleep(of) && is_stirred(by) {
-                        waking.push(of);
-                    }
-                }
+    /// Wakes what sleeps beside balls that were changed from outside since the last step, and ends the rest
+    /// of what is awake there.
+    pub(in crate::swarm) fn wake_beside_stirred(&mut self) {
+        let someone_rests = self.sleep.sleepers > 0 || self.sleep.rest.is_any_at_rest();
+        if !(someone_rests && (self.pairs_valid || self.cache_valid)) {
+            self.sleep.stirred.clear(0);
+        }
+        if self.sleep.stirred.is_empty() {
+            return;
+        }
+        let stirred = take(&mut self.sleep.stirred);
+        let (slots, rows) = (self.ids.slots(), self.ids.rows());
+        // Pairs have the rows that balls had when they were found.
+        let rows_now = self.cache_valid.then(|| inverse(&self.old_rows));
+        let row_now = |then: u32| match &rows_now {
+            Some(rows) => rows.get(then as usize).copied().unwrap_or(NO_ROW),
+            None => then,
+        };
+        let row_then = |row: u32| if self.cache_valid { self.old_rows[row as usize] } else { row };
+        let rows = stirred.iter().map(|slot| rows[slot as usize]).filter(|row| *row != NO_ROW);
+        let mut rows: Vec<_> = rows.map(row_then).collect();
+        rows.sort_unstable();
+        let of_chunks = self.chunks.iter().filter(|chunk| {
+            let first = rows.partition_point(|row| *row < chunk.rows[0]);
+            rows.get(first).is_some_and(|row| *row < chunk.rows[2])
+        });
+        let mut beside = Vec::new();
+        let batches = of_chunks.flat_map(|chunk| &chunk.batches);
+        for pair in batches.chain(&self.fast_movers.batches).flat_map(Batch::pairs) {
+            let [a, b] = pair.map(row_now);
+            if a != NO_ROW && b != NO_ROW {
+                let is_stirred = |row: u32| stirred.contains(slots[row as usize]);
+                beside.extend(
+                    [[a, b], [b, a]].iter().filter(|[by, _]| is_stirred(*by)).map(|[_, of]| *of),
+                );
             }
         }
-        for row in waking {
-            self.wake_group(row as usize);
+        for row in beside.into_iter().map(|row| row as usize) {
+            self.wake_group(row);
+            self.sleep.rest.end(row);
         }
-        stirred.clear();
-        self.sleep.stirred = stirred;
     }
 
     /// Wakes all balls.
@@ -234,14 +248,14 @@ impl Swarm {
         self.sleep_version += u64::from(std::mem::take(&mut self.sleep.sleepers) > 0);
         self.sleep.rest.end_all();
         self.sleep.groups.clear();
-        self.sleep.stirred.clear();
+        self.sleep.stirred.clear(0);
     }
 
     /// Wakes the balls near walls that changed since the last step.
     pub(super) fn wake_beside_changes(&mut self, walls: &dyn StaticGeometry) {
         let mut regions = Vec::new();
-        let since = self.walls_identity.filter(|_| self.pairs_valid);
-        let known = since
+        let known = self
+            .walls_identity
             .is_some_and(|since| walls.visit_changes_since(since, &mut |box_| regions.push(box_)));
         if !known {
             return self.wake_all();
@@ -297,11 +311,12 @@ impl Chunk {
         }
     }
 
-    /// Finds out if its balls have rested for long enough to sleep: all of them, or any that may alone.
+    /// Finds out if its balls have rested for long enough to sleep: all of them, or any that is no proxy.
     fn find_rest(
         &mut self,
         [at, velocity]: [&[Row]; 2],
-        may_sleep: impl Fn(usize) -> bool,
+        is_sleepless: impl Fn(usize) -> bool,
+        is_proxy: impl Fn(usize) -> bool,
         rest: &mut RestRows,
         gravity: f32,
     ) {
@@ -311,9 +326,22 @@ impl Chunk {
         }
         let awake = || (0..at.len()).filter(|row| velocity[*row][3].is_sign_positive());
         let lasts = |row: usize| rest.lasts(row, at[row][3], gravity);
-        self.has_rested = awake().any(|row| lasts(row) && may_sleep(row));
-        self.rests = awake().all(|row| rest.lasts(row, self.radii[1], gravity));
+        self.has_rested = awake().any(|row| lasts(row) && !is_sleepless(row) && !is_proxy(row));
+        self.rests =
+            awake().all(|row| rest.lasts(row, self.radii[1], gravity) && !is_sleepless(row));
     }
+}
+
+/// Place of each number in a list, or [`NO_ROW`]. Numbers that stand for nothing are left out.
+fn inverse(numbers: &[u32]) -> Vec<u32> {
+    let count = numbers.iter().filter(|number| **number != NO_ROW).max().map_or(0, |most| most + 1);
+    let mut places = vec![NO_ROW; count as usize];
+    for (place, number) in (0..).zip(numbers) {
+        if let Some(of_number) = places.get_mut(*number as usize) {
+            *of_number = place;
+        }
+    }
+    places
 }
 
 /// Least and largest inverse mass of some balls, in 1/kg.
