@@ -196,6 +196,7 @@ impl Swarm {
     pub(super) fn forget_settings(&mut self, slot: u32) {
         self.surfaces.set(slot, None);
         self.surfaces.set_layers(slot, CollisionLayers::ALL);
+        self.surfaces.set_kinematic(slot, false);
         self.sleep.sleepless.remove(slot);
         if let Some(scale) = self.ball_forces.gravity_scales.get_mut(slot as usize) {
             *scale = 1.0;

@@ -28,6 +28,8 @@ pub(crate) struct Body {
     /// None for that of the swarm's model.
     pub surface: Option<Surface>,
     pub layers: CollisionLayers,
+    /// Set for infinite mass: a body of any finite mass stops at walls.
+    pub is_kinematic: bool,
     pub sleeping_disabled: bool,
 }
 
@@ -144,7 +146,7 @@ impl Swarm {
     }
 
     /// Returns true if a marble is still as [`Self::read_bodies`] left it, and the body has this
-    /// radius, in metres, inverse mass, in 1/kg, surface, layers, and permission to sleep.
+    /// radius, in metres, inverse mass, in 1/kg, surface and layers, and is kinematic and sleepless or not.
     #[inline]
     pub(crate) fn is_as_read<S: Scalar>(
         &self,
@@ -152,7 +154,7 @@ impl Swarm {
         marble: MarbleRow<S>,
         [row_radius, inverse_mass]: [f32; 2],
         (surface, layers): (Option<Surface>, CollisionLayers),
-        sleeping_disabled: bool,
+        [is_kinematic, is_sleepless]: [bool; 2],
     ) -> bool {
         let row = self.ids.rows()[slot as usize] as usize;
         let [at, velocity] = [&self.at[row], &self.velocity[row]];
@@ -165,7 +167,8 @@ impl Swarm {
             && turns()
             && self.surfaces.get(slot) == surface
             && self.surfaces.layers(slot) == layers
-            && self.sleep.sleepless.contains(slot) == sleeping_disabled
+            && self.surfaces.is_kinematic(slot) == is_kinematic
+            && self.sleep.sleepless.contains(slot) == is_sleepless
     }
 
     /// Takes over what changed of bodies, and wakes those.
@@ -174,7 +177,8 @@ impl Swarm {
         let (mut resized, mut resurfaced, mut lighter) = (false, false, Vec::new());
         for body in bodies {
             let row = self.ids.rows()[body.slot as usize] as usize;
-            resurfaced |= self.surfaces.set(body.slot, body.surface);
+            resurfaced |= self.surfaces.set(body.slot, body.surface)
+                | self.surfaces.set_kinematic(body.slot, body.is_kinematic);
             if body.sleeping_disabled {
                 self.sleep.sleepless.insert(body.slot);
             } else {

@@ -1,6 +1,7 @@
 //! Surfaces and collision layers of balls that differ, and the numbers that two of them make of a contact.
 
 use super::batches::Batch;
+use super::bit_set::BitSet;
 use super::simd::LANES;
 use crate::broad::{CollisionFilter, CollisionLayers, IgnoredPairs};
 use crate::response::Material;
@@ -36,6 +37,8 @@ pub(super) struct Surfaces {
     layers: Vec<CollisionLayers>,
     /// Pairs of marbles' slots, and of those with walls, that pass through each other.
     pub ignored: IgnoredPairs,
+    /// Slots of kinematic marbles, whose mass is infinite: they pass through walls and each other.
+    kinematic: BitSet,
 }
 
 impl Surfaces {
@@ -49,6 +52,17 @@ impl Surfaces {
             self.layers.resize(slot + 1, CollisionLayers::ALL);
         }
         std::mem::replace(&mut self.layers[slot], layers) != layers
+    }
+
+    /// Makes a slot kinematic or not. Returns whether it was otherwise.
+    pub fn set_kinematic(&mut self, slot: u32, is_kinematic: bool) -> bool {
+        if is_kinematic { self.kinematic.insert(slot) } else { self.kinematic.remove(slot) }
+    }
+
+    /// Returns true for a kinematic marble.
+    #[inline]
+    pub fn is_kinematic(&self, slot: u32) -> bool {
+        self.kinematic.contains(slot)
     }
 
     /// Layers of a slot.
@@ -112,7 +126,7 @@ impl Surfaces {
         self.list.capacity() * size_of::<Surface>()
             + (self.counts.capacity() + self.of_slot.capacity()) * size_of::<u32>()
             + self.layers.capacity() * size_of::<CollisionLayers>()
-            + self.ignored.bytes()
+            + (self.ignored.bytes() + self.kinematic.bytes())
     }
 }
 
@@ -137,7 +151,14 @@ impl SurfaceOf<'_> {
     /// True if some balls may not collide with all others.
     #[inline]
     pub fn have_filters(&self) -> bool {
-        self.has_layers() || !self.surfaces.ignored.is_empty()
+        self.has_layers()
+            || !self.surfaces.ignored.is_empty()
+            || !self.surfaces.kinematic.is_empty()
+    }
+
+    #[inline]
+    fn is_kinematic(&self, row: u32) -> bool {
+        self.surfaces.is_kinematic(self.slots[row as usize])
     }
 
     /// True if a ball may have layers other than all.
@@ -156,13 +177,14 @@ impl SurfaceOf<'_> {
         }
     }
 
-    /// Collision filter of the ball in a row.
+    /// Collision filter of the ball in a row, for walls.
     #[inline]
     pub fn filter(&self, row: u32) -> CollisionFilter<'_> {
         let ignored = &self.surfaces.ignored;
         let ignored =
             if ignored.is_empty() { &[] } else { ignored.walls_of(self.slots[row as usize]) };
-        CollisionFilter { layers: self.layers(row), ignored }
+        let layers = if self.is_kinematic(row) { CollisionLayers::NONE } else { self.layers(row) };
+        CollisionFilter { layers, ignored }
     }
 
     /// Returns true if the balls in two rows collide with each other.
@@ -173,7 +195,9 @@ impl SurfaceOf<'_> {
             let slot = |row: u32| self.slots[row as usize];
             !ignored.is_empty() && ignored.has_balls(slot(a), slot(b))
         };
-        (!self.has_layers() || self.layers(a).interacts_with(self.layers(b))) && !is_ignored()
+        let both_kinematic = || self.is_kinematic(a) && self.is_kinematic(b);
+        let meet = !self.has_layers() || self.layers(a).interacts_with(self.layers(b));
+        meet && !is_ignored() && !both_kinematic()
     }
 
     /// True if pairs need numbers of their own.

@@ -374,13 +374,16 @@ impl<S: Scalar> World<S> {
                 spin,
                 radius: marbles.radius[row],
             };
-            let inverse_mass = inverse_mass(marbles.mass(row));
+            let mass = marbles.mass(row);
+            let inverse_mass = inverse_mass(mass);
             let sleepless = marbles.sleeping_disabled.get(row).is_some();
             let numbers = [row_radius(marble.radius), inverse_mass];
             let layers = marbles.layers_of_row(row);
-            if !self.swarm.is_as_read(slot, marble, numbers, (surface, layers), sleepless) {
+            let is_kinematic = mass.is_infinite();
+            let flags = [is_kinematic, sleepless];
+            if !self.swarm.is_as_read(slot, marble, numbers, (surface, layers), flags) {
                 let body = body(slot, marble, inverse_mass, surface);
-                changed.push(Body { layers, sleeping_disabled: sleepless, ..body });
+                changed.push(Body { layers, is_kinematic, sleeping_disabled: sleepless, ..body });
             }
         }
     }
@@ -440,6 +443,7 @@ fn body<S: Scalar>(
         spin: row(spin, 0.0),
         surface,
         layers: CollisionLayers::ALL,
+        is_kinematic: false,
         sleeping_disabled: false,
     }
 }

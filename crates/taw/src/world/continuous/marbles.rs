@@ -128,6 +128,7 @@ impl<S: Scalar> World<S> {
         let Continuous { middle, reach, fast, candidates, meetings, paths, bends, .. } =
             &mut self.scratch.continuous;
         let half = S::from_f64(0.5);
+        let knows_masses = self.settings.model.response != Response::Displacement;
         let smallest = self.marbles.radius.iter().fold(S::infinity(), |least, r| least.min(*r));
         fast.clear();
         fast.extend(paths.iter().map(|path| {
@@ -155,7 +156,11 @@ impl<S: Scalar> World<S> {
             self.marbles.period,
             |a, b| {
                 let (first, second) = (a as usize, b as usize);
-                if !(fast[first] || fast[second]) || !self.marbles.may_collide(a, b) {
+                if !(fast[first] || fast[second])
+                    || !self.marbles.may_collide(a, b)
+                    || knows_masses
+                        && [first, second].iter().all(|row| self.marbles.mass(*row).is_infinite())
+                {
                     return false;
                 }
                 candidates.push((a, b));
@@ -224,6 +229,17 @@ impl<S: Scalar> World<S> {
         self.scratch.continuous.stop(bend.stop, bend.along);
     }
 
+    /// Motion in a substep, in metres, of what carries two marbles that meet: of one of them whose mass is
+    /// infinite, or of the faster one of the walls that carry them.
+    fn carried_together(&self, rows: [usize; 2], [x, y]: [&Path<S>; 2]) -> Vec3<S> {
+        match rows.map(|row| self.is_kinematic(row)) {
+            [true, _] => x.motion,
+            [_, true] => y.motion,
+            _ if y.is_carried_slower_than(x) => x.carried,
+            _ => y.carried,
+        }
+    }
+
     /// Bends the paths of two marbles where they meet. Marbles that approach faster than
     /// `resting_approach`, in metres per substep, stop, so that they bounce along the normal of
     /// that moment; resting ones continue along the surface. A marble held by a wall yields to
@@ -244,8 +260,7 @@ impl<S: Scalar> World<S> {
             displacement.met_marble && displacement.motion == displacement.carried
         });
         let slides = -closing <= resting_approach && again && !stopped && total > S::zero();
-        // A wall that carries one along carries both; of two walls the faster one.
-        let carried = if y.is_carried_slower_than(&x) { x.carried } else { y.carried };
+        let carried = self.carried_together(rows, [&x, &y]);
         // Loss of each: its share along the normal, or everything.
         let lost = |of: [Vec3<S>; 2], kept: [Vec3<S>; 2]| {
             let both = normal * (of[1] - of[0]).dot(normal);

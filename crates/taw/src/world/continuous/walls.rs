@@ -79,6 +79,9 @@ impl<S: Scalar> World<S> {
         MovingWall::list(&self.walls, dt, &mut self.scratch.continuous.moving_walls);
         self.list_deep_marbles(|_, _| S::zero());
         for row in 0..self.marbles.len() {
+            if self.is_kinematic(row) {
+                continue;
+            }
             let start = self.scratch.continuous.start[row];
             let marble = self.swept_marble(row, start, dt);
             let motion = self.marbles.position[row] - start;
@@ -95,12 +98,8 @@ impl<S: Scalar> World<S> {
         }
     }
 
-    /// Marble at the start of its free motion over `dt` seconds. Of a capsule of infinite mass, which
-    /// no wall turns, the sphere around its center.
+    /// Marble at the start of its free motion over `dt` seconds.
     pub(super) fn swept_marble(&self, row: usize, start: Point3<S>, dt: S) -> SweptMarble<S> {
-        if self.is_kinematic(row) {
-            return SweptMarble::ball(&self.marbles, row, start);
-        }
         let model = self.settings.model.rotation;
         SweptMarble::in_free_motion(&self.marbles, row, start, (model, dt))
     }
