@@ -4,7 +4,7 @@
 //!
 //! Aim with the left and right arrow keys, choose the power with up and down, where the
 //! cue hits the ball with W A S D (low for backspin), shoot with Space. R racks up anew.
-//! What to look at: the first break, straight on, comes out as its own mirror image, to
+//! Worth a look: the first break, straight on, comes out as its own mirror image, to
 //! the bit. Balls slide before they roll, and backspin brings the cue ball back.
 
 use bevy::color::palettes::tailwind;

@@ -3,7 +3,7 @@
 //!
 //! `cargo run --example cradle` (`-- --help` for options)
 //!
-//! What to look at: the five balls touch, with no gap at all. Collisions are gone
+//! Worth a look: the five balls touch, with no gap at all. Collisions are gone
 //! through one by one, so the middle ones pass on what they get; the energy below
 //! stays what it is. The threads are forces: each holds its ball on a circle about its
 //! hook. Space lets two balls swing in, R one.

@@ -3,7 +3,7 @@
 //!
 //! `cargo run --example turntable` (`-- --help` for options)
 //!
-//! What to look at: each ball's trail closes on itself, turn after turn; most engines
+//! Worth a look: each ball's trail closes on itself, turn after turn; most engines
 //! let it spiral out. The slider turns the disc faster; the circles change with it. R
 //! starts anew.
 

@@ -2,7 +2,7 @@
 //!
 //! `cargo run --example shapes` (`-- --help` for options)
 //!
-//! What to look at: drag the orange shape with the left mouse button, turn it with Q, E and
+//! Worth a look: drag the orange shape with the left mouse button, turn it with Q, E and
 //! the arrow keys. Yellow is the shortest way between the two, or out of each other; red
 //! crosses are where they touch; the green ghost is where it would stop on its way along the
 //! arrow. The panel chooses the two and has the numbers.

@@ -4,7 +4,7 @@
 //! `cargo run --example staircase` (`-- --help` for options; `-- --table` prints what a run
 //! shows, by every response, without a window)
 //!
-//! What to look at: the plots. On the ramp both roll down evenly; on the stairs they fly from
+//! Worth a look: the plots. On the ramp both roll down evenly; on the stairs they fly from
 //! edge to edge, lose what each landing takes, and come later and slower. The arrow keys
 //! push all four, R starts anew.
 

@@ -85,6 +85,31 @@ fn a_marble_that_must_not_sleep_keeps_those_about_it_awake() {
     assert_eq!(count_sleeping(&mut app), 0);
 }
 
+/// A game that spawns and despawns marbles all the time has sleepers.
+#[test]
+fn a_marble_that_comes_or_goes_wakes_no_other_one() {
+    let mut app = app();
+    scene::floor(&mut app);
+    let place = |i: u16| Vec3::new(f32::from(i % 6), 0.2, f32::from(i / 6));
+    let mut marbles: Vec<_> =
+        (0..36).map(|i| scene::drop_marble(&mut app, 0.2, place(i))).collect();
+    scene::frames(&mut app, 120);
+    assert_eq!(count_sleeping(&mut app), 36);
+    let rubber = SurfaceMaterial { restitution: 0.3, ..default() };
+    let layers = CollisionLayers::new(2, u32::MAX);
+    for round in 0..5_u16 {
+        // It lands where no other one lies.
+        let new = scene::drop_marble(&mut app, 0.1, place(7 * round) + Vec3::new(0.5, 0.5, 0.5));
+        app.world_mut().entity_mut(new).insert((rubber, layers));
+        app.world_mut().despawn(marbles.pop().unwrap());
+        for _ in 0..20 {
+            scene::frames(&mut app, 1);
+            let asleep = |marble: &&Entity| app.world().get::<Sleeping>(**marble).is_some();
+            assert_eq!(marbles.iter().filter(asleep).count(), marbles.len(), "round {round}");
+        }
+    }
+}
+
 #[test]
 fn a_wall_that_is_written_as_it_was_wakes_nobody() {
     let mut app = app();

@@ -1,6 +1,6 @@
 //! Smooth motion between fixed steps.
 //!
-//! What is on the screen lies between the last two steps, so it lags by up to one:
+//! The picture lies between the last two steps, so it lags by up to one:
 //! outside the fixed schedules, read a marble's true place from the
 //! [`TawWorld`], or leave this plugin out.
 //! Marbles get it by themselves, in world space, whatever carries them, and so do walls that move, in

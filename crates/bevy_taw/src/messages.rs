@@ -108,7 +108,7 @@ pub struct ContactOngoing {
 
 /// Two that touched in the last step no longer do. One of them may be gone, or pass through the other.
 ///
-/// What rests touches in one step and hovers in the next, so a contact ends only
+/// A resting marble touches in one step and hovers in the next, so a contact ends only
 /// when the gap is wider than a fiftieth of the smaller radius and than gravity
 /// closes in a substep (`g dt²`).
 #[derive(Message, Clone, Copy, Debug, PartialEq, Eq, Reflect)]

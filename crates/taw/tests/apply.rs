@@ -1,4 +1,4 @@
-//! What pushes, turns, slows and bounds single marbles.
+//! Forces, impulses, damping and limits of single marbles.
 
 use cgmath::InnerSpace;
 use taw::frame::Bivector;

@@ -1,4 +1,4 @@
-//! What was accepted once and should not have been, refused and changed something, or turned
+//! Input that was accepted once and should not have been, refused and changed something, or turned
 //! bad while running: case by case. Table and random sequences are in `every_entry.rs`.
 
 use std::time::Instant;

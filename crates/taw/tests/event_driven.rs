@@ -94,7 +94,7 @@ fn galperin_counts_the_digits_of_pi() {
     assert_eq!(galperin::<f64>(6), 3_141_592);
 }
 
-/// How many collisions a ball has with a wall and one that is 100^n times as heavy.
+/// Number of collisions of a ball with a wall and one that is 100^n times as heavy.
 fn galperin<S: Scalar>(n: i32) -> usize {
     let number = S::from_f64;
     let mut world = world::<S>(Rotation::None);

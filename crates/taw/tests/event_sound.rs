@@ -96,7 +96,7 @@ impl<S: Scalar> Mover<S> {
         world.walls.set_motion(self.id, Some(motion)).unwrap();
     }
 
-    /// How far a marble is off the wall.
+    /// Distance of a marble from the wall, in metres.
     fn gap(&self, world: &World<S>, row: usize) -> f64 {
         let shape = world.walls.get(self.id).unwrap();
         let near = shape.project_point(world.marbles.position()[row]);

@@ -189,7 +189,7 @@ impl<S: Scalar> Scene<S> {
         self.world.step(S::from_f64(dt)).unwrap();
     }
 
-    /// How deep anything is in a wall, over its radius.
+    /// Largest depth in a wall, over the radius.
     fn deepest(&self) -> f64 {
         let marbles = &self.world.marbles;
         let radius = |row: usize| marbles.radius()[row].as_f64();

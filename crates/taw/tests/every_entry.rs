@@ -1,7 +1,7 @@
 //! Every public way in, with every number that cannot be right: it is refused by field and value
 //! and has changed nothing, or it is accepted and does no harm.
 //!
-//! What is public is read from the sources, so that one without a row fails the test.
+//! Public entries are read from the sources, so that one without a row fails the test.
 
 #[path = "every_entry/rows.rs"]
 mod rows;
@@ -23,7 +23,7 @@ use taw::swarm::SwarmModel;
 /// few microseconds a step. What others do on the machine does not count.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// What nobody means, besides a number of no scalar at all: the least one of the scalar itself,
+/// Numbers that nobody means, besides those that are none: the least one of the scalar itself,
 /// and its largest.
 fn nasty<S: Scalar>() -> Vec<S> {
     let subnormal = S::min_positive_value() / S::from_f64(1024.0);
@@ -118,7 +118,7 @@ impl<S: Scalar> Place<S> {
         matches!(self.world.model().response, Response::EventDriven | Response::SoftStep)
     }
 
-    /// Whether all is finite, and whatever was stopped is named.
+    /// Returns true if all is finite, and whatever was stopped is named.
     fn is_sane(&self) -> bool {
         let marbles = (0..self.world.marbles.len()).filter_map(|row| self.world.marbles.id(row));
         let named: Vec<_> = self.world.stopped().collect();
@@ -134,7 +134,7 @@ impl<S: Scalar> Place<S> {
         })
     }
 
-    /// Whether those far away cannot know of it.
+    /// Returns true if those far away cannot know of it.
     fn is_local(&self) -> bool {
         let Ok(m) = self.world.marbles.get(self.subject) else { return true };
         let largest = [m.position.x, m.position.y, m.position.z].map(|x| x.abs().as_f64());
@@ -142,7 +142,7 @@ impl<S: Scalar> Place<S> {
     }
 }
 
-/// What of a place may change by it.
+/// Part of a place that may change by it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Scope {
     /// One marble, and what it touches.
@@ -205,7 +205,7 @@ fn each_row_is_refused_or_harmless<S: Scalar>() {
     assert!(wrong.is_empty(), "{} of {count}: {wrong:#?}", wrong.len());
 }
 
-/// Whether so much at once would bring a collision every few nanoseconds, which this response
+/// Returns true if so much at once would bring a collision every few nanoseconds, which this response
 /// goes through one by one up to its cap of millions: half a minute for a step.
 fn goes_from_event_to_event<S: Scalar>(model: Model, x: S) -> bool {
     let huge = x.is_finite() && x.abs() > S::from_f64(1e20);

@@ -33,7 +33,7 @@ fn cast<S: Scalar>(q: Quat<f64>) -> Quat<S> {
         .normalize()
 }
 
-/// How far two rotations are apart, in epsilons of the scalar: as components, one of which
+/// Distance of two rotations, in epsilons of the scalar: as components, one of which
 /// may have all signs turned.
 fn apart<S: Scalar>(a: Quat<S>, b: Quat<S>) -> f64 {
     let b = if a.dot(b) < S::zero() { -b } else { b };

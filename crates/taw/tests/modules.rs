@@ -1,5 +1,5 @@
 //! The order in which the core's modules may use each other, as the table in `lib.rs` has it, and
-//! the length of files. (`clippy.toml` limits that of functions.)
+//! the length of files. (`clippy.toml` limits that of functions.) And words that no doc line begins with.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -64,19 +64,47 @@ fn no_module_uses_one_that_comes_later() {
     assert!(checked > 100, "only {checked} files were found");
 }
 
-/// Lines of a source file at most.
-const LONGEST: usize = 500;
-
-#[test]
-fn no_file_is_too_long_to_read() {
+/// Source files of the workspace.
+fn sources() -> Vec<PathBuf> {
     let workspace = Path::new("../..");
     let mut all = Vec::new();
     for folder in ["crates", "examples", "tests", "peers/src"] {
         files(&workspace.join(folder), &mut all);
     }
     all.retain(|path| path.extension().is_some_and(|ending| ending == "rs"));
+    all
+}
+
+/// Lines of a source file at most.
+const LONGEST: usize = 500;
+
+#[test]
+fn no_file_is_too_long_to_read() {
+    let all = sources();
     let lines = |path: &PathBuf| fs::read_to_string(path).unwrap().lines().count();
     let long: Vec<_> = all.iter().filter(|path| lines(path) > LONGEST).collect();
     assert!(long.is_empty(), "over {LONGEST} lines: {long:#?}");
     assert!(all.len() > 300, "only {} files were found", all.len());
+}
+
+/// Documentation begins with a noun or a verb.
+const NO_BEGINNINGS: [&str; 4] = ["What", "The same", "Whether", "How"];
+
+#[test]
+fn docs_begin_with_a_noun_or_a_verb() {
+    let mut found = Vec::new();
+    for path in sources() {
+        for (number, line) in (1..).zip(fs::read_to_string(&path).unwrap().lines()) {
+            let line = line.trim_start();
+            let doc = ["/// ", "//! "].iter().find_map(|mark| line.strip_prefix(mark));
+            let begins = |word: &&str| {
+                let rest = doc.and_then(|doc| doc.strip_prefix(*word));
+                rest.is_some_and(|rest| !rest.starts_with(char::is_alphabetic))
+            };
+            if NO_BEGINNINGS.iter().any(begins) {
+                found.push(format!("{}:{number}: {line}", path.display()));
+            }
+        }
+    }
+    assert!(found.is_empty(), "{found:#?}");
 }

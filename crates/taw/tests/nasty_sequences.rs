@@ -76,7 +76,7 @@ struct Trial<S: Scalar> {
     far: Vec<[MarbleId; 2]>,
     near: Vec<MarbleId>,
     walls: Vec<WallId>,
-    /// Whether a marble or a wall may have got to those far away.
+    /// Set if a marble or a wall may have got to those far away.
     reaches_far: bool,
 }
 

@@ -143,7 +143,7 @@ fn check_sweep(
     Ok(())
 }
 
-/// The same of a sweep that turns; and that one that does not turn is as any other.
+/// Checks a sweep with rotation; and that one without is as any other.
 fn check_turning_sweep(
     a: &Thing<f64>,
     b: &Thing<f64>,
@@ -198,7 +198,7 @@ fn check_sweeps(
     Ok(())
 }
 
-/// The same as the next test, against marching in a thousand steps: `.ci/run` does it.
+/// Like the next test, against marching in a thousand steps: `.ci/run` does it.
 #[test]
 #[ignore = "takes minutes"]
 fn sweeps_agree_with_marching_in_a_thousand_steps() {
@@ -220,7 +220,7 @@ proptest! {
     }
 }
 
-/// How far off a hit may be, in f32, of a ball, a capsule and a box of one metre, for rays
+/// Error of a hit, in f32, of a ball, a capsule and a box of one metre, for rays
 /// from this far: half of what `Box3D` measures (references §6.1).
 #[test]
 fn rays_from_afar_hit_where_they_should() {

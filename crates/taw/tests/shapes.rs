@@ -1,4 +1,4 @@
-//! What shapes say of themselves.
+//! Properties of shapes: volume, inertia, bounds, rays.
 
 use cgmath::MetricSpace;
 use proptest::prelude::*;

@@ -1,4 +1,4 @@
-//! What a swarm takes from the allocator: columns of a known size, and nothing in a step that
+//! Memory of a swarm: columns of a known size, and nothing in a step that
 //! seeks no pairs anew.
 
 use std::alloc::{GlobalAlloc, Layout, System};

@@ -98,7 +98,7 @@ fn energy(scene: &Scene) -> f64 {
     (0..swarm.len()).map(of).sum()
 }
 
-/// What does not hold in a scene.
+/// Invariant that does not hold in a scene.
 fn fault(scene: &mut Scene) -> Option<String> {
     let full = scene.world.swarm.model().tier == Tier::Full;
     let alone = scene.world.marbles.is_empty();

@@ -65,7 +65,7 @@ fn ball_at(position: [f64; 3], velocity: [f64; 3]) -> Marble<f64> {
     Marble { velocity: Vec3::from(velocity), ..Marble::new(Point3::from(position), 0.5) }
 }
 
-/// What nothing slows down.
+/// Material that slows nothing down.
 fn smooth() -> Material<f64> {
     Material { friction: 0.0, ..Material::default() }
 }
@@ -269,7 +269,7 @@ fn a_thousand_flush_boxes_are_one_floor() {
     }
 }
 
-/// The same in `f32`, as far as its digits reach.
+/// In `f32`, as far as its digits reach.
 #[test]
 fn a_hundred_flush_boxes_are_one_floor_in_single_precision() {
     for model in models() {

@@ -53,7 +53,7 @@ fn things(world: &World<f64>) -> Vec<ColliderId> {
     marbles.chain(walls).collect()
 }
 
-/// How far a thing's surface is from a point.
+/// Distance of a thing's surface from a point, in metres.
 fn distance(world: &World<f64>, thing: ColliderId, point: Point3<f64>) -> f64 {
     match thing {
         ColliderId::Marble(id) => {

@@ -186,7 +186,7 @@ fn a_world_of_a_game_is_measured_as_it_is() {
     assert!(advice.candidates.iter().all(|choice| choice.cost > 0.0));
 }
 
-/// What the exact model cannot do is compared with what comes next.
+/// A scene that the exact model cannot do is compared with the next best one.
 #[test]
 fn capsules_are_measured_without_events() {
     let advice = of_snapshot(world(0.1));
@@ -219,7 +219,7 @@ fn a_snapshot_stands_still() {
     assert!(last.at[0].y > 0.2, "it has bounced");
 }
 
-/// What a game begins with is no model's fault: a marble that lies a little too deep.
+/// Overlap that a game begins with is no model's fault: a marble that lies a little too deep.
 #[test]
 fn only_overlap_beyond_that_of_the_reference_counts() {
     let depth = |advice: &Advice| {

@@ -1,4 +1,4 @@
-//! What each stage takes, on a scene of which some of it is known.
+//! Time of each stage, on a scene of which some of it is known.
 
 use std::cell::Cell;
 

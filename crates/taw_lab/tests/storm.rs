@@ -117,7 +117,7 @@ fn fallen(body: Body) -> Body {
     Body { at: body.at + moved, velocity, wall_gap: body.wall_gap + moved.y, ..body }
 }
 
-/// What does not hold when bodies go from state to state.
+/// Invariants that do not hold when bodies go from state to state.
 fn broken(case: &Case, states: &[Vec<Body>]) -> Vec<Invariant> {
     let states: Vec<_> = states.iter().cloned().map(snapshot).collect();
     let mut bench = Bench::new(case, &states[0]);

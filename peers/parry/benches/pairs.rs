@@ -1,4 +1,4 @@
-//! What a question about two shapes costs, beside the same question to parry3d:
+//! Cost of a query of two shapes, beside that of parry3d:
 //! `cargo bench` in `peers/parry`.
 //!
 //! Every line is [`COUNT`] pairs of random shapes of about a metre, some of which overlap,
@@ -20,14 +20,14 @@ use taw::shape::{Aabb3, Capsule, HeightField, Hull, Mesh, Obb, Plane, Sphere, Su
 
 /// Pairs in a line.
 const COUNT: usize = 100;
-/// How far apart two shapes may be and still be answered, in metres.
+/// Distance up to which closest points of two shapes are sought, in metres.
 const MARGIN: f32 = 100.0;
 
 fn main() {
     divan::main();
 }
 
-/// What makes one shape: where, how turned, and some sizes.
+/// Numbers of one shape: place, rotation, and some sizes.
 struct Numbers {
     at: [f32; 3],
     turn: [f32; 4],
@@ -267,7 +267,7 @@ fn height(column: usize, row: usize) -> f32 {
     (column as f32 * 0.7).sin() * (row as f32 * 0.5).cos() * 0.3
 }
 
-/// The same hills as a height field and as a mesh, in both libraries.
+/// Hills as a height field and as a mesh, in both libraries.
 struct Hills {
     field: HeightField<f32>,
     mesh: Mesh<f32>,
@@ -303,7 +303,7 @@ fn hills() -> Hills {
     }
 }
 
-/// How near a shape must come to a surface to be answered, in metres.
+/// Distance up to which closest points of a shape and a surface are sought, in metres.
 const NEAR: f32 = 0.1;
 
 /// Shapes half as large, at about the height of the hills.

@@ -14,13 +14,13 @@ use taw::shape::{BoundedShape, Capsule, Hull, Obb, Sphere};
 
 /// Pairs of each two kinds.
 const PAIRS: u32 = 4_000;
-/// What rounding to `f32` does to shapes of about four metres, and what both may add to it.
+/// Rounding to `f32` of shapes of about four metres, and of both libraries.
 const ROUNDING: f64 = 4e-6;
 
 /// A shape in both libraries; in taw in both scalars.
 struct Both {
     single: Taw<f32>,
-    /// The same shape, as the `f32` has it.
+    /// Shape with the numbers of the `f32`.
     double: Taw<f64>,
     parry: Box<dyn parry::Shape>,
     pose: Pose3,

@@ -1,5 +1,5 @@
 //! Broad phase: candidate pairs of indices, never fewer than touch and as few others as possible.
-//! Whether they touch is tested in [`contact`](crate::contact).
+//! If they touch is tested in [`contact`](crate::contact).
 
 mod brute_force;
 mod crowding;

@@ -209,7 +209,7 @@ impl<S: Scalar> World<S> {
     /// borne by something and either went no further than 5 % of its radius, or was slower than
     /// .05 √(g r) and did not speed up.
     ///
-    /// What sleeps costs next to nothing, and has no velocity. It wakes when it is set, when gravity or a wall
+    /// A sleeping marble costs next to nothing, and has no velocity. It wakes when it is set, when gravity or a wall
     /// near it changes, when a ball beside it comes at over twice that speed or leaves its place, and when
     /// one wakes that fell asleep with it.
     ///

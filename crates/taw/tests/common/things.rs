@@ -17,7 +17,7 @@ pub enum Thing<S> {
     Triangle(Triangle<S>),
 }
 
-/// The same expression for whichever kind it is.
+/// Evaluates an expression for whichever kind it is.
 #[macro_export]
 macro_rules! each {
     ($thing:expr, $name:ident => $value:expr) => {
@@ -33,7 +33,7 @@ macro_rules! each {
 }
 
 impl Thing<f64> {
-    /// The same elsewhere. A box along the axes stays one unless it is turned.
+    /// Moves it elsewhere. A box along the axes stays one unless it is turned.
     pub fn transformed(&self, pose: Pose<f64>) -> Self {
         let by = pose.translation;
         match self.clone() {

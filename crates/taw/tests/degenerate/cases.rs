@@ -47,7 +47,7 @@ impl Place {
         Point3::from_vec((self.vector(p) + offset).map(S::from_f64))
     }
 
-    /// What rounding of the input and of the answer can do, for things of this size.
+    /// Rounding of the input and of the answer, for things of this size.
     pub fn tolerance<S: Scalar>(&self, size: f64) -> f64 {
         let digits = 16.0 * S::epsilon().as_f64();
         (digits + 1e-11) * size * self.scale + digits * self.offset

@@ -8,7 +8,7 @@ use taw::prelude::*;
 use crate::cases::Def::{self, Ball, Block, Rod, Tri};
 use crate::cases::{O, Place, STRAIGHT, Tally};
 use crate::things::Thing;
-/// What should come of a sweep: a time, none, or, where rounding decides, either.
+/// Expected result of a sweep: a time, none, or, where rounding decides, either.
 #[derive(Clone, Copy, Debug)]
 enum When {
     At(f64),

@@ -1,4 +1,4 @@
-//! What is public, as the sources say: functions that may refuse, and fields of what they take.
+//! Public entries, as the sources say: functions that may refuse, and fields of what they take.
 
 use std::collections::BTreeSet;
 use std::path::Path;

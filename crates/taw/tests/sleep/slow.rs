@@ -1,4 +1,4 @@
-//! What is slow, and must not sleep.
+//! Slow marbles, which must not sleep.
 
 use taw::motion::WallMotion;
 use taw::prelude::*;
@@ -12,7 +12,7 @@ fn slope(degrees: f32) -> World<f32> {
     world
 }
 
-/// How far a marble goes in ten seconds, and if it sleeps then.
+/// Distance that a marble goes in ten seconds, in metres, and if it sleeps then.
 fn ten_seconds(world: &mut World<f32>, marble: Marble<f32>) -> (f32, bool) {
     let id = world.marbles.insert(marble).unwrap();
     for _ in 0..600 {
