@@ -61,7 +61,8 @@ pub enum MarbleMass {
     Density(f32),
     /// This many kilograms, above zero, whatever the radius.
     Kilograms(f32),
-    /// So heavy that no force and no gravity changes its velocity.
+    /// Infinite (a kinematic marble): no force, gravity, wall or marble changes its velocity, and it passes
+    /// through walls and others of its kind.
     Infinite,
 }
 

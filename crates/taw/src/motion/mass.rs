@@ -9,7 +9,9 @@ pub enum Mass<S> {
     Density(S),
     /// Mass in kilograms, above zero, independent of the size.
     Kilograms(S),
-    /// Infinite mass: no force and no gravity changes its velocity (kinematic).
+    /// Infinite mass (a kinematic marble): no force, gravity, wall or marble changes its velocity, and it passes
+    /// through walls and others of its kind. ([`Displacement`](crate::response::Response::Displacement) knows no
+    /// masses.)
     Infinite,
 }
 

@@ -202,16 +202,17 @@ impl<S: Scalar> World<S> {
     }
 
     /// Returns true if a marble sleeps: in a model with [`Response::SoftStep`], once its island has rested,
-    /// that is, the marble, those that it touches, those that these touch, and so on. (Some 500 neighbours in
-    /// memory that all rest fall asleep together, too, so that a large heap sleeps part by part.)
+    /// that is, the marble, those that it touches, those that these touch, and so on. (In a large heap only
+    /// those of some 500 neighbours in memory, so that it sleeps part by part.)
     ///
     /// A marble rests if for half a second, and longer if its radius is over 10 cm (five times √(r/g)), it was
     /// borne by something and either went no further than 5 % of its radius, or was slower than
     /// .05 √(g r) and did not speed up.
     ///
-    /// A sleeping marble costs next to nothing, and has no velocity. It wakes when it is set, when gravity or a wall
-    /// near it changes, when a ball beside it comes at over twice that speed or leaves its place, and when
-    /// one wakes that fell asleep with it.
+    /// A sleeping marble costs next to nothing, and has no velocity. It wakes when it or one
+    /// beside it is set or removed, when gravity or a wall near it changes, when a ball comes at over twice that
+    /// speed, or one of infinite mass at any speed, when one beside it leaves its place, and when one wakes that
+    /// fell asleep with it.
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
