@@ -136,8 +136,8 @@ fn a_marble_of_infinite_mass_goes_through_walls_as_it_is_told() {
             let ids = [infinite(-0.7, velocity), infinite(-1.25, Vec3::zero())]
                 .map(|marble| world.marbles.insert(marble).unwrap());
             let x = if response == Response::EventDriven { 0.5 } else { 0.02 };
-            let light = Marble::new(Point3::new(x, -0.86, 0.0), 0.05);
-            let light = world.marbles.insert(light).unwrap();
+            let start = Point3::new(x, -0.86, 0.0);
+            let light = world.marbles.insert(Marble::new(start, 0.05)).unwrap();
             for step in 1..=60 {
                 world.step(1.0 / 60.0).unwrap();
                 let y = -0.7 - speed * f64::from(step) / 60.0;
@@ -145,9 +145,64 @@ fn a_marble_of_infinite_mass_goes_through_walls_as_it_is_told() {
                 let [moves, stays] = ids.map(|id| world.marbles.get(id).unwrap());
                 assert!((moves.position.y / y - 1.0).abs() < 1e-5, "{}: {moves:?}", name());
                 assert_eq!(stays.velocity, Vec3::zero(), "{}", name());
+                assert_eq!(stays.position.y, -1.25, "{}", name());
             }
             let light = world.marbles.get(light).unwrap();
-            assert!(light.position.y > -1.0, "{response:?} {thickness:?} {speed} m/s: {light:?}");
+            let name = || format!("{response:?} {thickness:?} {speed} m/s: {light:?}");
+            assert!(light.position.y > -1.0, "{}", name());
+            let moved = (light.position - start).magnitude();
+            // Penalties do not sweep marbles against each other.
+            let meets = match response {
+                Response::EventDriven => false,
+                Response::Penalty(_) => speed < 1.0,
+                _ => true,
+            };
+            assert_eq!(moved > 0.02, meets, "{}", name());
+        }
+    }
+}
+
+/// Two of infinite mass come together about light ones, which follow the faster one.
+#[test]
+fn marbles_between_two_of_infinite_mass_are_pinched_in_finite_time() {
+    for response in [Response::Impulse, Response::SoftStep] {
+        for (count, speeds) in
+            [1, 2, 3].into_iter().flat_map(|n| [[20.0, 20.0], [5.0, 40.0]].map(|v| (n, v)))
+        {
+            for order in 0..2 {
+                let mut world = World::<f64>::default();
+                let rotation = Rotation::Dynamic;
+                world.set_model(Model { response, rotation, ..Model::default() }).unwrap();
+                world.set_gravity(Vec3::zero()).unwrap();
+                let heavy = |x: f64, speed: f64| Marble {
+                    velocity: Vec3::new(speed, 0.0, 0.0),
+                    mass: taw::motion::Mass::Infinite,
+                    ..Marble::new(Point3::new(x, 0.0, 0.0), 0.1)
+                };
+                let mut marbles = vec![heavy(-0.4, speeds[0])];
+                marbles.extend((0..count).map(|i| {
+                    let x = 0.11 * f64::from(i) - 0.055 * f64::from(count - 1);
+                    Marble::new(Point3::new(x, 0.001, 0.0), 0.05)
+                }));
+                marbles.push(heavy(0.4, -speeds[1]));
+                if order == 1 {
+                    marbles.reverse();
+                }
+                let ids: Vec<_> =
+                    marbles.iter().map(|marble| world.marbles.insert(*marble).unwrap()).collect();
+                for _ in 0..20 {
+                    world.step(1.0 / 60.0).unwrap();
+                }
+                for (id, began) in ids.iter().zip(&marbles) {
+                    let ends = world.marbles.get(*id).unwrap();
+                    assert!(ends.position.x.is_finite(), "{response:?} {speeds:?} {ends:?}");
+                    if began.mass == taw::motion::Mass::Infinite {
+                        let x = began.position.x + began.velocity.x / 3.0;
+                        let name = || format!("{response:?} {count} {speeds:?}: {ends:?}");
+                        assert!((ends.position.x - x).abs() < 1e-4, "{}", name());
+                    }
+                }
+            }
         }
     }
 }

@@ -23,7 +23,7 @@ use taw::swarm::SwarmModel;
 /// few microseconds a step. What others do on the machine does not count.
 const PATIENCE: Duration = Duration::from_secs(5);
 
-/// Numbers that nobody means, besides those that are none: the least one of the scalar itself,
+/// Numbers that nobody means, besides NaN and infinity: the least one of the scalar itself,
 /// and its largest.
 fn nasty<S: Scalar>() -> Vec<S> {
     let subnormal = S::min_positive_value() / S::from_f64(1024.0);

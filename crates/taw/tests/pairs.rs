@@ -197,7 +197,7 @@ fn offsets() -> impl Strategy<Value = f64> {
     prop::sample::select(vec![0.0, 0.0, 1e3])
 }
 
-/// Like the next test, for many minutes' worth of pairs: `.ci/run` does it.
+/// Repeats the next test, for many minutes' worth of pairs: `.ci/run` does it.
 #[test]
 #[ignore = "takes minutes"]
 fn millions_of_pairs_know_their_distance_and_their_way_out() {

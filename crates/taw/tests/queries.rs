@@ -143,7 +143,7 @@ fn check_sweep(
     Ok(())
 }
 
-/// Checks a sweep with rotation; and that one without is as any other.
+/// Checks a sweep with rotation; and that one without agrees with a plain sweep.
 fn check_turning_sweep(
     a: &Thing<f64>,
     b: &Thing<f64>,
@@ -198,7 +198,7 @@ fn check_sweeps(
     Ok(())
 }
 
-/// Like the next test, against marching in a thousand steps: `.ci/run` does it.
+/// Repeats the next test, against marching in a thousand steps: `.ci/run` does it.
 #[test]
 #[ignore = "takes minutes"]
 fn sweeps_agree_with_marching_in_a_thousand_steps() {

@@ -152,6 +152,7 @@ fn whatever_changes_about_a_heap_wakes_it() {
             woken.len()
         );
         assert_ne!(world.sleep_version(), version, "{name}");
+        assert_eq!(asleep(&world, &rest) > 0, name == "neighbour gone", "{name}");
         if name.starts_with("floor gone") {
             steps(&mut world, 60);
             let fell = |id: &MarbleId| world.marbles.get(*id).unwrap().position.y < -2.0;

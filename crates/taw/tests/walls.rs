@@ -269,7 +269,7 @@ fn a_thousand_flush_boxes_are_one_floor() {
     }
 }
 
-/// In `f32`, as far as its digits reach.
+/// Repeats the last test in `f32`, as far as its digits reach.
 #[test]
 fn a_hundred_flush_boxes_are_one_floor_in_single_precision() {
     for model in models() {

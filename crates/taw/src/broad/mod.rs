@@ -1,5 +1,5 @@
 //! Broad phase: candidate pairs of indices, never fewer than touch and as few others as possible.
-//! If they touch is tested in [`contact`](crate::contact).
+//! [`contact`](crate::contact) tests if they touch.
 
 mod brute_force;
 mod crowding;

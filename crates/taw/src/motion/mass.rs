@@ -10,8 +10,9 @@ pub enum Mass<S> {
     /// Mass in kilograms, above zero, independent of the size.
     Kilograms(S),
     /// Infinite mass (a kinematic marble): no force, gravity, wall or marble changes its velocity, and it passes
-    /// through walls and others of its kind. ([`Displacement`](crate::response::Response::Displacement) knows no
-    /// masses.)
+    /// through walls and others of its kind; by [`SoftStep`](crate::response::Response::SoftStep), no contacts
+    /// with these are listed. ([`Displacement`](crate::response::Response::Displacement) knows no masses, and
+    /// [`EventDriven`](crate::response::Response::EventDriven) stops one that presses a ball against a wall.)
     Infinite,
 }
 

@@ -134,7 +134,7 @@ impl Swarm {
     /// Has pairs and balls at walls found anew, with the impulses that they have.
     pub(super) fn forget_contacts(&mut self) {
         self.cache_impulses();
-        self.pairs_valid = false;
+        (self.pairs_valid, self.scratch.contacts_forgotten) = (false, true);
     }
 
     /// Factor on gravity for a ball.

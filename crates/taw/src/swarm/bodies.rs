@@ -139,7 +139,7 @@ impl Swarm {
 
     /// Marks which slots are bodies.
     pub(crate) fn set_bodies(&mut self, slots: impl Iterator<Item = u32>) {
-        self.body_slots.clear(self.ids.slots().len());
+        self.body_slots.clear();
         for slot in slots {
             self.body_slots.insert(slot);
         }

@@ -114,7 +114,7 @@ impl Swarm {
     /// are all that may leave the common skin before pairs are searched again, or, if they are too
     /// many, those that leave it in this step.
     fn reset_skins(&mut self, dt: f32, skin: f32) {
-        self.fast_movers.clear(self.at.len());
+        self.fast_movers.clear();
         let mut fast = std::mem::take(&mut self.scratch.leaving);
         self.list_fast([dt, skin], None, &mut fast);
         if self.fast_movers.full(fast.len(), self.at.len()) {

@@ -41,7 +41,7 @@ pub(super) struct Chunk {
     pub asleep: bool,
     /// Number of its balls that sleep.
     pub sleepers: usize,
-    /// Set if all that are awake have rested for long enough to sleep, and if one has.
+    /// Set if all that are awake have rested for long enough to sleep and may, and if one that is no proxy has.
     pub rests: bool,
     pub has_rested: bool,
     /// Set if bodies asleep in it have still to be read.

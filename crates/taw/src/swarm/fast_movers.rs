@@ -93,15 +93,15 @@ impl FastMovers {
     }
 
     /// Forgets all, in a swarm of so many.
-    pub fn clear(&mut self, balls: usize) {
+    pub fn clear(&mut self) {
         self.rows.clear();
         self.crossing.clear();
         self.crowded = false;
         self.unlisted = 0;
         self.batches.clear();
         self.impulses.reset(0);
-        self.bits.clear(balls);
-        self.by_path.clear(balls);
+        self.bits.clear();
+        self.by_path.clear();
     }
 
     /// Adds a ball; says whether its pairs are found on its path.

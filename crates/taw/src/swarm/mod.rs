@@ -225,8 +225,8 @@ impl Swarm {
         Ok(ids)
     }
 
-    /// Removes balls, all or none, and wakes those beside them. To remove many at once takes as long as to remove one, which grows with the
-    /// number of all balls.
+    /// Removes balls, all or none, and wakes those beside them. To remove many at once takes as long as to
+    /// remove one, which grows with the number of all balls.
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], also for one that is listed twice, and for a marble's.

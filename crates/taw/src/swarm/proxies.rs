@@ -134,7 +134,7 @@ impl Swarm {
     ) {
         let old = std::mem::take(&mut self.proxies);
         self.proxies.extend(proxies);
-        self.body_slots.clear(self.ids.slots().len());
+        self.body_slots.clear();
         let mut proxies = std::mem::take(&mut self.proxies);
         let (has_friction, sleep_speed) =
             (self.has_friction(), sleep_speed(length(gravity), self.mean_radius));

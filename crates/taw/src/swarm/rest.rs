@@ -120,7 +120,7 @@ impl RestRows<'_> {
             let is_slow = square < SLOW * SLOW * gravity * at[3];
             // The mark is that of the last step.
             let is_borne = || velocity[3] > INFINITE_MASS && spin[3] > 0.0;
-            let rests = is_proxy(row) || is_slow && (is_borne() || !moves(at, velocity, dt));
+            let rests = is_proxy(row) || is_slow && (is_borne() || !moves(at, velocity, spin, dt));
             let away = squared([at[0] - place[0], at[1] - place[1], at[2] - place[2], 0.0]);
             let is_near = away <= PLACE * PLACE * at[3] * at[3];
             let is_steady = |first: f32| square <= STEADY * STEADY * first * first;
@@ -159,12 +159,12 @@ fn lasts(time: f32, radius: f32, gravity: f32) -> bool {
     time > TIME && time * time * gravity > FALLS * FALLS * radius
 }
 
-/// Returns true if a ball moves on in `dt` seconds by more than its coordinates are rounded: what has
+/// Returns true if a ball moves on or turns in `dt` seconds by more than its coordinates are rounded: one of
 /// infinite mass is borne by nothing, but the solver leaves it that much.
-fn moves(at: &Row, velocity: &Row, dt: f32) -> bool {
+fn moves(at: &Row, velocity: &Row, spin: &Row, dt: f32) -> bool {
     let size = at.iter().fold(0.0_f32, |most, x| most.max(x.abs()));
     let rounding = if velocity[3] > INFINITE_MASS { 0.0 } else { f32::EPSILON * size };
-    squared(*velocity).sqrt() * dt > rounding
+    squared(*velocity).max(squared(*spin)).sqrt() * dt > rounding
 }
 
 /// Speed in m/s up to which a ball counts as resting, by gravity in m/s² and its radius in metres.

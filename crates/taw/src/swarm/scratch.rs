@@ -17,6 +17,8 @@ pub(super) struct Scratch {
     pub threads: usize,
     /// Set while other pairs pass through each other than when pairs were found, until the step begins.
     pub filters_changed: bool,
+    /// Set while surfaces or filters are others than when contacts with walls were found, likewise.
+    pub contacts_forgotten: bool,
     /// See [`SolverColumns::backing`](super::kernels::SolverColumns::backing).
     pub backing: Vec<Row>,
     /// See [`SolverColumns::backing_speed`](super::kernels::SolverColumns::backing_speed).
@@ -79,6 +81,7 @@ impl Scratch {
             searches,
             threads: _,
             filters_changed: _,
+            contacts_forgotten: _,
             idle_marked_at: _,
             waking,
             islands,

@@ -171,7 +171,7 @@ impl CrowdSweep<'_> {
         let count = self.at.len().max(1) as f64;
         let sum = |axis: usize| self.velocity.iter().map(|v| f64::from(v[axis])).sum::<f64>();
         let common = [0, 1, 2].map(|axis| (sum(axis) / count) as f32);
-        swift.clear(self.at.len());
+        swift.clear();
         paths.clear();
         for (row, velocity) in (0..).zip(self.velocity) {
             if Sweep::skin_of_path(velocity, self.dt) > self.skin {

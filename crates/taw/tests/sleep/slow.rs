@@ -128,6 +128,21 @@ fn a_clone_goes_on_alike_whatever_the_radius() {
     }
 }
 
+/// Spin alone is motion, of what nothing bears.
+#[test]
+fn what_spins_in_mid_air_goes_on() {
+    for mass in [Mass::Infinite, Mass::default()] {
+        let mut world = slope(0.0);
+        let angular_velocity = Vec3::new(0.0, 2.0, 0.0);
+        let at = Point3::new(0.0, 5.0, 0.0);
+        let spins = Marble { mass, gravity_scale: 0.0, angular_velocity, ..Marble::new(at, 0.1) };
+        let id = world.marbles.insert(spins).unwrap();
+        steps(&mut world, 600);
+        let rate = world.marbles.get(id).unwrap().angular_velocity;
+        assert!((rate.y - 2.0).abs() < 1e-3, "{mass:?}: {rate:?}");
+    }
+}
+
 /// One that nothing turns aside, however slowly it comes to one that sleeps.
 #[test]
 fn what_has_infinite_mass_moves_on_through_sleepers() {
@@ -150,7 +165,7 @@ fn what_has_infinite_mass_moves_on_through_sleepers() {
         for step in 0..count {
             steps(&mut world, 1);
             let velocity = world.marbles.get(heavy).unwrap().velocity;
-            // But for what rounding adds and takes of gravity.
+            // Except for rounding of gravity, which is added and taken.
             let turned = cgmath::InnerSpace::magnitude(velocity - down);
             assert!(turned < 0.01 * speed, "{speed} m/s, step {step}: {velocity:?}");
         }

@@ -62,6 +62,8 @@ fn one_that_comes_goes_or_changes_wakes_no_other_one() {
         for step in 0..90 {
             steps(&mut world, 1);
             assert_eq!(asleep(&world, &ids), ids.len(), "{name}: after {step} steps");
+            let wakes = step == 0 && name.starts_with("gets");
+            assert!(!(wakes && world.is_asleep(changed).unwrap()), "{name}");
         }
     }
 }
@@ -89,7 +91,7 @@ fn one_whose_support_goes_falls_whenever_it_goes() {
         ("passes through all", |w, id| w.marbles.set_layers(id, CollisionLayers::NONE).unwrap()),
     ];
     let (mut world, [lower, upper]) = tower();
-    for step in 0..60 {
+    for step in 0..120 {
         steps(&mut world, 1);
         for (name, leave) in leaves {
             let mut world = world.clone();
@@ -99,6 +101,10 @@ fn one_whose_support_goes_falls_whenever_it_goes() {
             assert!(height < 0.25, "{name} after {step} steps: at {height}");
         }
     }
+    // It had rested for long enough.
+    world.marbles.set_sleeping_disabled(lower, false).unwrap();
+    steps(&mut world, 60);
+    assert_eq!(asleep(&world, &[lower, upper]), 2);
 }
 
 fn sleeps(world: &World<f32>, ball: BallId) -> bool {
@@ -116,7 +122,7 @@ fn several_that_go_one_by_one_wake_what_lay_beside_each() {
         places.iter().map(|place| Ball::new(Point3::from(*place), 0.2)).collect()
     };
     let (mut piles, mut lone) = (Vec::new(), Vec::new());
-    for i in 0..30_u8 {
+    for i in 0..200_u8 {
         let x = 2.0 * f32::from(i);
         // Three that touch, one on top of them, and one by itself.
         let places = [[0.2, 0.2, 0.0], [-0.2, 0.2, 0.0], [0.0, 0.2, 0.346], [0.0, 0.526, 0.115]];

@@ -57,7 +57,7 @@ impl Swarm {
         faster: impl Fn(&Chunk, f32) -> bool + Sync,
     ) -> bool {
         self.chunks.iter_mut().for_each(|chunk| chunk.struck = false);
-        self.scratch.held.clear(0);
+        self.scratch.held.clear();
         for _ in 0..ROUNDS {
             self.list_ways_to_walls(&params, &faster);
             self.hold_obstructed();
@@ -180,7 +180,7 @@ impl Swarm {
             return;
         }
         let with_ways = &mut self.scratch.with_ways;
-        with_ways.clear(self.at.len());
+        with_ways.clear();
         for way in &*ways {
             with_ways.insert(way.row);
         }

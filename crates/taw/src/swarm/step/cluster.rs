@@ -204,7 +204,6 @@ impl Swarm {
         params: &SolverParams,
     ) -> (Vec<Sinking>, Vec<(PairPlace, [u32; 2])>) {
         let (mut queue, mut queued) = (VecDeque::<Sinking>::new(), BitSet::default());
-        queued.clear(self.at.len());
         let mut is_new =
             |ball: &&Sinking| self.free_inverse_mass(ball.row) > 0.0 && queued.insert(ball.row);
         // Those that need the largest impulses come first, whatever row they are in.

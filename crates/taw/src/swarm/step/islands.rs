@@ -11,8 +11,8 @@ use crate::swarm::kernels::{ContactImpulses, GROUNDED, squared};
 
 /// Steps between two searches for islands: one takes as long as a pass over all pairs.
 const STEPS_PER_SEARCH: u32 = 8;
-/// Largest group asleep that joins what comes to rest on it, and wakes with what leaves it. A large heap
-/// sleeps and wakes part by part.
+/// Largest group asleep of balls that did not rest at one time, and that wakes with what leaves it. A large
+/// heap sleeps and wakes part by part.
 pub(super) const MAX_JOINED: usize = 512;
 
 impl Swarm {
@@ -82,6 +82,9 @@ impl Swarm {
         for island in resting.chunk_by(|a, b| a[0] == b[0]) {
             rows.clear();
             rows.extend(island.iter().map(|[_, row]| *row));
+            if rows.len() > MAX_JOINED {
+                rows.retain(|row| self.is_awake(*row));
+            }
             self.put_to_sleep(&rows);
         }
         (self.scratch.islands, self.scratch.resting) = (sets, resting);
@@ -103,11 +106,16 @@ impl Swarm {
         let (slots, rows) = (self.ids.slots(), self.ids.rows());
         let place = |row: u32| (row - scope.start) as usize;
         let next_sleeps = |i: usize| self.chunks.get(i + 1).is_none_or(|next| next.asleep);
+        let near = self.chunks.get(chunks.clone()).unwrap_or_default();
+        let near = near.first().map_or(0, |chunk| chunk.rows[0])
+            ..near.last().map_or(0, |chunk| chunk.rows[2]);
         let of_chunks = chunks.map(|i| (i, &self.chunks[i]));
         let of_chunks = of_chunks.filter(|(i, chunk)| !(chunk.asleep && next_sleeps(*i)));
         let of_chunks = of_chunks.map(|(_, chunk)| (&chunk.batches, &chunk.impulses));
-        let FastMovers { batches, impulses, .. } = &self.fast_movers;
-        for (batches, impulses) in of_chunks.chain([(batches, impulses)]) {
+        let FastMovers { batches, impulses, rows: movers, .. } = &self.fast_movers;
+        let has_movers = movers.iter().any(|row| near.contains(row));
+        let of_movers = has_movers.then_some((batches, impulses));
+        for (batches, impulses) in of_chunks.chain(of_movers) {
             for [a, b] in self.touching_pairs(batches, impulses) {
                 let [awake, other] = if self.is_awake(a) { [a, b] } else { [b, a] };
                 if !scope.contains(&awake) {

@@ -118,10 +118,10 @@ impl Swarm {
             (self.walls_identity, self.rows_of_walls) = (Some(identity), Some(identity));
         }
         self.wake_beside_stirred();
-        // Not before: balls beside walls that changed are known by the pairs of the last step.
+        // Not before: who wakes is counted in its chunk only while pairs are valid.
         self.pairs_valid &= !std::mem::take(&mut self.scratch.filters_changed);
         self.scratch.threads = self.threads_for_awake();
-        walls_changed
+        walls_changed | std::mem::take(&mut self.scratch.contacts_forgotten)
     }
 
     /// Number of threads that a step pays for: none is woken for what sleeps.

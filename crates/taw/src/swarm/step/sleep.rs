@@ -196,15 +196,15 @@ impl Swarm {
     /// Wakes what sleeps beside balls that were changed from outside since the last step, and ends the rest
     /// of what is awake there.
     pub(in crate::swarm) fn wake_beside_stirred(&mut self) {
-        let someone_rests = self.sleep.sleepers > 0 || self.sleep.rest.is_any_at_rest();
-        if !(someone_rests && (self.pairs_valid || self.cache_valid)) {
-            self.sleep.stirred.clear(0);
-        }
         if self.sleep.stirred.is_empty() {
             return;
         }
-        let stirred = take(&mut self.sleep.stirred);
-        let (slots, rows) = (self.ids.slots(), self.ids.rows());
+        let someone_rests = self.sleep.sleepers > 0 || self.sleep.rest.is_any_at_rest();
+        if !(someone_rests && (self.pairs_valid || self.cache_valid)) {
+            return self.sleep.stirred.clear();
+        }
+        let mut stirred = take(&mut self.sleep.stirred);
+        let slots = self.ids.slots();
         // Pairs have the rows that balls had when they were found.
         let rows_now = self.cache_valid.then(|| inverse(&self.old_rows));
         let row_now = |then: u32| match &rows_now {
@@ -212,8 +212,9 @@ impl Swarm {
             None => then,
         };
         let row_then = |row: u32| if self.cache_valid { self.old_rows[row as usize] } else { row };
-        let rows = stirred.iter().map(|slot| rows[slot as usize]).filter(|row| *row != NO_ROW);
-        let mut rows: Vec<_> = rows.map(row_then).collect();
+        let mut rows = take(&mut self.scratch.rows);
+        rows.clear();
+        rows.extend(stirred.iter().map(|slot| row_then(self.ids.rows()[slot as usize])));
         rows.sort_unstable();
         let of_chunks = self.chunks.iter().filter(|chunk| {
             let first = rows.partition_point(|row| *row < chunk.rows[0]);
@@ -225,8 +226,13 @@ impl Swarm {
             let [a, b] = pair.map(row_now);
             if a != NO_ROW && b != NO_ROW {
                 let is_stirred = |row: u32| stirred.contains(slots[row as usize]);
+                let rests = |row: u32| {
+                    let row = row as usize;
+                    self.velocity[row][3].is_sign_negative() || self.sleep.rest.is_at_rest(row)
+                };
+                let both = [[a, b], [b, a]].into_iter();
                 beside.extend(
-                    [[a, b], [b, a]].iter().filter(|[by, _]| is_stirred(*by)).map(|[_, of]| *of),
+                    both.filter(|[by, of]| is_stirred(*by) && rests(*of)).map(|[_, of]| of),
                 );
             }
         }
@@ -234,6 +240,8 @@ impl Swarm {
             self.wake_group(row);
             self.sleep.rest.end(row);
         }
+        stirred.clear();
+        (self.sleep.stirred, self.scratch.rows) = (stirred, rows);
     }
 
     /// Wakes all balls.
@@ -248,7 +256,7 @@ impl Swarm {
         self.sleep_version += u64::from(std::mem::take(&mut self.sleep.sleepers) > 0);
         self.sleep.rest.end_all();
         self.sleep.groups.clear();
-        self.sleep.stirred.clear(0);
+        self.sleep.stirred.clear();
     }
 
     /// Wakes the balls near walls that changed since the last step.
@@ -311,7 +319,8 @@ impl Chunk {
         }
     }
 
-    /// Finds out if its balls have rested for long enough to sleep: all of them, or any that is no proxy.
+    /// Finds out if its balls have rested for long enough to sleep: all of them, or any that is no proxy; no
+    /// sleepless one counts.
     fn find_rest(
         &mut self,
         [at, velocity]: [&[Row]; 2],
@@ -334,7 +343,7 @@ impl Chunk {
 
 /// Place of each number in a list, or [`NO_ROW`]. Numbers that stand for nothing are left out.
 fn inverse(numbers: &[u32]) -> Vec<u32> {
-    let count = numbers.iter().filter(|number| **number != NO_ROW).max().map_or(0, |most| most + 1);
+    let count = numbers.iter().filter(|number| **number != NO_ROW).max().map_or(0, |max| max + 1);
     let mut places = vec![NO_ROW; count as usize];
     for (place, number) in (0..).zip(numbers) {
         if let Some(of_number) = places.get_mut(*number as usize) {

@@ -229,14 +229,14 @@ impl<S: Scalar> World<S> {
         self.scratch.continuous.stop(bend.stop, bend.along);
     }
 
-    /// Motion in a substep, in metres, of what carries two marbles that meet: of one of them whose mass is
-    /// infinite, or of the faster one of the walls that carry them.
-    fn carried_together(&self, rows: [usize; 2], [x, y]: [&Path<S>; 2]) -> Vec3<S> {
+    /// Motion in a substep, in metres, of what carries each of two marbles on that meet: one of infinite mass
+    /// carries itself, and the other one; else the faster of the walls that carry them carries both.
+    fn carried_on(&self, rows: [usize; 2], [x, y]: [&Path<S>; 2]) -> [Vec3<S>; 2] {
+        let faster = |a: Vec3<S>, b: Vec3<S>| if is_slower(a, b) { b } else { a };
         match rows.map(|row| self.is_kinematic(row)) {
-            [true, _] => x.motion,
-            [_, true] => y.motion,
-            _ if y.is_carried_slower_than(x) => x.carried,
-            _ => y.carried,
+            [true, _] => [x.motion, faster(x.motion, y.carried)],
+            [_, true] => [faster(x.carried, y.motion), y.motion],
+            _ => [faster(y.carried, x.carried); 2],
         }
     }
 
@@ -260,7 +260,7 @@ impl<S: Scalar> World<S> {
             displacement.met_marble && displacement.motion == displacement.carried
         });
         let slides = -closing <= resting_approach && again && !stopped && total > S::zero();
-        let carried = self.carried_together(rows, [&x, &y]);
+        let carried = self.carried_on(rows, [&x, &y]);
         // Loss of each: its share along the normal, or everything.
         let lost = |of: [Vec3<S>; 2], kept: [Vec3<S>; 2]| {
             let both = normal * (of[1] - of[0]).dot(normal);
@@ -270,7 +270,7 @@ impl<S: Scalar> World<S> {
                 [of[0] - kept[0], of[1] - kept[1]]
             }
         };
-        let motion = lost([x.motion, y.motion], [carried; 2]);
+        let motion = lost([x.motion, y.motion], carried);
         let change = lost([x.change, y.change], [Vec3::zero(); 2]);
         let rest = S::one() - time;
         let end = (self.marbles.velocity[rows[1]] - self.marbles.velocity[rows[0]]).dot(normal);
@@ -293,11 +293,11 @@ impl<S: Scalar> World<S> {
             self.scratch.continuous.stop(stop, along);
             self.scratch.continuous.paths[rows[side]] = Path {
                 // To the bit: who is stopped is told by it.
-                motion: if slides { displacement.motion - motion[side] } else { carried },
+                motion: if slides { displacement.motion - motion[side] } else { carried[side] },
                 change: if slides { displacement.change - change[side] } else { Vec3::zero() },
                 bends: displacement.bends + 1,
                 held_by_wall: displacement.held_by_wall || !slides,
-                carried: if slides { displacement.carried } else { carried },
+                carried: if slides { displacement.carried } else { carried[side] },
                 met_marble: true,
                 next: None,
                 ..displacement
@@ -400,16 +400,6 @@ impl<S: Scalar> Path<S> {
         Self { sphere: Sphere { center, ..self.sphere }, since: time, ..*self }
     }
 
-    /// Order of the motions of the walls that carry two paths along, total, so that no two marbles
-    /// stop each other again and again.
-    fn is_carried_slower_than(&self, other: &Self) -> bool {
-        let key = |path: &Self| {
-            let Vec3 { x, y, z } = path.carried;
-            [path.carried.magnitude2(), x, y, z]
-        };
-        key(self) < key(other)
-    }
-
     /// Bends ahead at walls that carry the marble along.
     fn carried_bends<'a>(
         &self,
@@ -439,6 +429,13 @@ impl<S: Scalar> Path<S> {
 }
 
 /// Unit vector between two marbles.
+/// Order of the motions of what carries two paths along, total, so that no two marbles stop each other again
+/// and again.
+fn is_slower<S: Scalar>(a: Vec3<S>, b: Vec3<S>) -> bool {
+    let key = |carried: Vec3<S>| [carried.magnitude2(), carried.x, carried.y, carried.z];
+    key(a) < key(b)
+}
+
 fn normal_of<S: Scalar>(x: &Path<S>, y: &Path<S>) -> Vec3<S> {
     let apart = normalize_and_length(y.sphere.center - x.sphere.center);
     apart.map_or(Vec3::unit_x(), |(normal, _)| normal)
