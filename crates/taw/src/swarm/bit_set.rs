@@ -69,7 +69,7 @@ mod tests {
         let mut set = BitSet::default();
         let numbers = [0, 63, 64, 127, 500, 3];
         assert!(numbers.iter().all(|number| set.insert(*number)) && !set.insert(64));
-        assert_eq!(Vec::from_iter(set.iter()), [0, 3, 63, 64, 127, 500]);
+        assert!(set.iter().eq([0, 3, 63, 64, 127, 500]));
         let mut other = set.clone();
         assert!(other.insert(9_000) && other != set && other.remove(9_000));
         assert_eq!(other, set);

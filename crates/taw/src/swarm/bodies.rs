@@ -76,6 +76,16 @@ pub(crate) struct VelocityChange {
     pub change: [f32; 3],
 }
 
+/// Straight path of a kinematic body in a step.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct KinematicPath {
+    slot: u32,
+    /// Center at the begin, in metres, and radius.
+    at: Row,
+    /// Velocity in m/s, and inverse mass in 1/kg.
+    velocity: Row,
+}
+
 /// Columns of the marbles that a step changes.
 pub(crate) struct BodyColumns<'a, S> {
     pub position: &'a mut [Point3<S>],
@@ -256,6 +266,28 @@ impl Swarm {
                     work.record_force(&before, velocity, fall);
                 }
             }
+        }
+    }
+
+    /// Saves where kinematic bodies are at the begin of a step.
+    pub(super) fn save_kinematic_paths(&mut self) {
+        let paths = &mut self.scratch.kinematic_paths;
+        paths.clear();
+        paths.extend(self.surfaces.kinematic().filter_map(|slot| {
+            let row = self.ids.rows()[slot as usize] as usize;
+            let (at, velocity) = (self.at[row], self.velocity[row]);
+            velocity[3].is_sign_positive().then_some(KinematicPath { slot, at, velocity })
+        }));
+    }
+
+    /// Puts kinematic bodies where they are after some seconds of the step, whatever they met.
+    pub(super) fn follow_kinematic_paths(&mut self, time: f32) {
+        for KinematicPath { slot, at, velocity } in &self.scratch.kinematic_paths {
+            let row = self.ids.rows()[*slot as usize] as usize;
+            let [x, y, z] = [0, 1, 2].map(|axis| at[axis] + velocity[axis] * time);
+            let at = [x, y, z, at[3]];
+            self.skin_left[row] -= squared(less(at, self.at[row])).sqrt();
+            (self.at[row], self.velocity[row]) = (at, *velocity);
         }
     }
 

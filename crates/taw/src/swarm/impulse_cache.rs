@@ -144,6 +144,11 @@ impl ImpulseCache {
         }
     }
 
+    /// Contacts with walls, in order, for walls that changed places.
+    pub fn wall_contacts_mut(&mut self) -> &mut Vec<WallContact> {
+        &mut self.wall_contacts
+    }
+
     /// Contacts that a ball had with shapes other than half-spaces, in order.
     pub fn shapes_of(&self, old_rows: &[u32], row: u32) -> impl Iterator<Item = WallContact> {
         let then = old_rows[row as usize];

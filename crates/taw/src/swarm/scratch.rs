@@ -1,6 +1,7 @@
 //! Scratch memory of a swarm: neither state nor compared.
 
 use super::bit_set::BitSet;
+use super::bodies::KinematicPath;
 use super::neighbours::Search;
 use super::outside_work::OutsideWork;
 use super::simd::Row;
@@ -52,6 +53,8 @@ pub(super) struct Scratch {
     pub path_changes: Vec<Row>,
     /// By slot: centers of balls near shapes at the begin of a substep.
     pub places: Vec<SavedPlace>,
+    /// Paths of kinematic bodies in the step.
+    pub kinematic_paths: Vec<KinematicPath>,
     /// Number of the substep.
     pub substep: u32,
     /// Ways of balls that would bounce off a wall: of each chunk, and of all.
@@ -92,6 +95,7 @@ impl Scratch {
             crowd,
             path_changes,
             places,
+            kinematic_paths,
             substep: _,
             ways_to_walls,
             ways_of_chunks,
@@ -117,6 +121,7 @@ impl Scratch {
             + (crowd.bytes()
                 + of(path_changes)
                 + of(places)
+                + of(kinematic_paths)
                 + of(ways_to_walls)
                 + of(ways_of_chunks)
                 + with_ways.bytes()

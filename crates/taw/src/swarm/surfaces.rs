@@ -59,6 +59,11 @@ impl Surfaces {
         if is_kinematic { self.kinematic.insert(slot) } else { self.kinematic.remove(slot) }
     }
 
+    /// Slots of kinematic marbles, in order.
+    pub fn kinematic(&self) -> impl Iterator<Item = u32> + '_ {
+        self.kinematic.iter()
+    }
+
     /// Returns true for a kinematic marble.
     #[inline]
     pub fn is_kinematic(&self, slot: u32) -> bool {

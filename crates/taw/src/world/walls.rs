@@ -131,8 +131,8 @@ impl<S: Scalar> Walls<S> {
         self.dirty = Dirty::All;
         self.version += 1;
         let last = self.shapes.len() - 1;
-        self.changes.add(None, Some([row as u32, last as u32]));
         let shape = self.shapes.swap_remove(row);
+        self.changes.add(shape.bounding_box(), Some([row as u32, last as u32]));
         self.collect_planes();
         Ok(shape)
     }

@@ -12,8 +12,8 @@ fn marble() -> Marble<f32> {
     Marble::new(Point3::new(0.0, 3.0, 0.0), 0.1)
 }
 
-fn rubber() -> Option<Material<f32>> {
-    Some(Material { restitution: 0.4, friction: 0.9, ..Material::default() })
+fn rubber() -> Material<f32> {
+    Material { restitution: 0.4, friction: 0.9, ..Material::default() }
 }
 
 const OTHERS: CollisionLayers = CollisionLayers::new(2, u32::MAX);
@@ -26,17 +26,22 @@ fn remove(world: &mut World<f32>, id: MarbleId) {
     world.marbles.remove(id).unwrap();
 }
 
+fn remove_wall(world: &mut World<f32>, wall: WallId) {
+    world.walls.remove(wall).unwrap();
+}
+
 fn move_far_wall(world: &mut World<f32>, wall: WallId) {
     world.walls.set(wall, block([40.0, 0.0, 0.0], [41.0, 1.0, 1.0])).unwrap();
 }
 
-const CHANGES: [(&str, Change); 8] = [
+const CHANGES: [(&str, Change); 9] = [
     ("comes", |w, _, _| insert(w, marble())),
-    ("comes with a material", |w, _, _| insert(w, Marble { material: rubber(), ..marble() })),
+    ("comes with a material", |w, _, _| insert(w, Marble { material: Some(rubber()), ..marble() })),
     ("comes with layers", |w, _, _| insert(w, Marble { layers: OTHERS, ..marble() })),
-    ("gets a material", |w, id, _| w.marbles.set_material(id, rubber()).unwrap()),
+    ("gets a material", |w, id, _| w.marbles.set_material(id, Some(rubber())).unwrap()),
     ("gets layers", |w, id, _| w.marbles.set_layers(id, OTHERS).unwrap()),
     ("goes", |w, id, _| remove(w, id)),
+    ("a wall far away goes", |w, _, wall| remove_wall(w, wall)),
     ("comes while a wall moves far away", |w, _, wall| {
         insert(w, marble());
         move_far_wall(w, wall);
@@ -65,6 +70,37 @@ fn one_that_comes_goes_or_changes_wakes_no_other_one() {
             let wakes = step == 0 && name.starts_with("gets");
             assert!(!(wakes && world.is_asleep(changed).unwrap()), "{name}");
         }
+    }
+}
+
+/// Rows of walls and of marbles change in one step, while others sleep on walls.
+#[test]
+fn a_block_that_goes_with_its_marble_wakes_no_other_one() {
+    let mut world = world();
+    let mut places: Vec<_> = (0..20_u8)
+        .map(|i| {
+            let x = 2.0 * f32::from(i);
+            let wall = world.walls.insert(block([x, -1.0, 0.0], [x + 1.0, 0.0, 1.0])).unwrap();
+            let marble = Marble::new(Point3::new(x + 0.5, 0.2, 0.5), 0.2);
+            (wall, world.marbles.insert(marble).unwrap())
+        })
+        .collect();
+    steps(&mut world, 90);
+    for gone in [0, 5, 18, 3, 3, 9, 0] {
+        let (wall, marble) = places.remove(gone.min(places.len() - 1));
+        remove(&mut world, marble);
+        world.walls.remove(wall).unwrap();
+        steps(&mut world, 1);
+        let ids = places.iter().map(|(_, marble)| marble);
+        assert_eq!(asleep(&world, ids), places.len());
+    }
+    for (_, marble) in &places {
+        world.marbles.set_velocity(*marble, Vec3::new(0.0, 0.01, 0.0)).unwrap();
+    }
+    steps(&mut world, 120);
+    for (_, marble) in &places {
+        let height = world.marbles.get(*marble).unwrap().position.y;
+        assert!((height - 0.2).abs() < 0.01 && world.is_asleep(*marble).unwrap(), "at {height}");
     }
 }
 

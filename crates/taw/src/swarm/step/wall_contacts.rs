@@ -42,19 +42,20 @@ impl Swarm {
         let known = self
             .rows_of_walls
             .is_some_and(|since| walls.visit_removals_since(since, &mut |it| removals.push(it)));
-        for chunk in &mut self.chunks {
+        let of_chunks = self.chunks.iter_mut().map(|chunk| &mut chunk.wall_contacts);
+        for contacts in of_chunks.chain([self.impulse_cache.wall_contacts_mut()]) {
             if !known {
-                chunk.wall_contacts.clear();
+                contacts.clear();
             }
             for [row, last] in &removals {
-                chunk.wall_contacts.retain_mut(|contact| {
+                contacts.retain_mut(|contact| {
                     let stays = contact.wall != *row;
                     if contact.wall == *last {
                         contact.wall = *row;
                     }
                     stays
                 });
-                chunk.wall_contacts.sort_unstable_by_key(WallContact::key);
+                contacts.sort_unstable_by_key(WallContact::key);
             }
         }
     }
