@@ -68,7 +68,9 @@ fn no_module_uses_one_that_comes_later() {
 fn sources() -> Vec<PathBuf> {
     let workspace = Path::new("../..");
     let mut all = Vec::new();
-    for folder in ["crates", "examples", "tests", "peers/src", "peers/parry"] {
+    for folder in
+        ["crates", "examples", "tests", "peers/src", "peers/parry/benches", "peers/parry/tests"]
+    {
         files(&workspace.join(folder), &mut all);
     }
     all.retain(|path| path.extension().is_some_and(|ending| ending == "rs"));
