@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use cgmath::EuclideanSpace;
+use cgmath::{EuclideanSpace, Zero};
 
 use super::kernels::{MAX_MAGNITUDE, largest, squared};
 use super::simd::Row;
@@ -76,14 +76,16 @@ pub(crate) struct VelocityChange {
     pub change: [f32; 3],
 }
 
-/// Straight path of a kinematic body in a step.
+/// Path of a kinematic body in a step, which only its damping changes.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct KinematicPath {
     slot: u32,
     /// Center at the begin, in metres, and radius.
     at: Row,
-    /// Velocity in m/s, and inverse mass in 1/kg.
+    /// Velocity at the begin in m/s, and inverse mass in 1/kg.
     velocity: Row,
+    /// Change of velocity in the step, in m/s.
+    change: [f32; 3],
 }
 
 /// Columns of the marbles that a step changes.
@@ -269,25 +271,40 @@ impl Swarm {
         }
     }
 
-    /// Saves where kinematic bodies are at the begin of a step.
-    pub(super) fn save_kinematic_paths(&mut self) {
+    /// Saves where kinematic bodies are at the begin of a step of `dt` seconds.
+    pub(super) fn save_kinematic_paths(&mut self, dt: f32) {
+        let fall: [f32; 3] = (self.gravity.unwrap_or_else(Vec3::zero) * dt).into();
+        let changes = &self.velocity_changes;
         let paths = &mut self.scratch.kinematic_paths;
         paths.clear();
         paths.extend(self.surfaces.kinematic().filter_map(|slot| {
             let row = self.ids.rows()[slot as usize] as usize;
             let (at, velocity) = (self.at[row], self.velocity[row]);
-            velocity[3].is_sign_positive().then_some(KinematicPath { slot, at, velocity })
+            let own = changes.binary_search_by_key(&slot, |change| change.slot);
+            // Its own change takes gravity back, but for rounding.
+            let change = own.map_or([0.0; 3], |i| {
+                [0, 1, 2].map(|axis| {
+                    let sum = changes[i].change[axis] + fall[axis];
+                    if sum.abs() > 4.0 * f32::EPSILON * fall[axis].abs() { sum } else { 0.0 }
+                })
+            });
+            let is_awake = velocity[3].is_sign_positive();
+            is_awake.then_some(KinematicPath { slot, at, velocity, change })
         }));
     }
 
-    /// Puts kinematic bodies where they are after some seconds of the step, whatever they met.
-    pub(super) fn follow_kinematic_paths(&mut self, time: f32) {
-        for KinematicPath { slot, at, velocity } in &self.scratch.kinematic_paths {
+    /// Puts kinematic bodies where they are after a fraction of the step of `dt` seconds, whatever they met.
+    pub(super) fn follow_kinematic_paths(&mut self, part: f32, dt: f32) {
+        for KinematicPath { slot, at, velocity, change } in &self.scratch.kinematic_paths {
             let row = self.ids.rows()[*slot as usize] as usize;
-            let [x, y, z] = [0, 1, 2].map(|axis| at[axis] + velocity[axis] * time);
+            let mean = |axis: usize| velocity[axis] + 0.5 * part * change[axis];
+            let [x, y, z] = [0, 1, 2].map(|axis| at[axis] + mean(axis) * (part * dt));
             let at = [x, y, z, at[3]];
             self.skin_left[row] -= squared(less(at, self.at[row])).sqrt();
-            (self.at[row], self.velocity[row]) = (at, *velocity);
+            self.at[row] = at;
+            for axis in 0..3 {
+                self.velocity[row][axis] = velocity[axis] + part * change[axis];
+            }
         }
     }
 

@@ -172,3 +172,25 @@ fn what_has_infinite_mass_moves_on_through_sleepers() {
         assert!(world.marbles.get(light).unwrap().position.x > 0.31, "{speed} m/s");
     }
 }
+
+/// Damping slows one of infinite mass as it slows others.
+#[test]
+fn damping_slows_what_has_infinite_mass() {
+    let ends = [Mass::Infinite, Mass::default()].map(|mass| {
+        let mut world = slope(0.0);
+        let slows = Marble {
+            mass,
+            gravity_scale: 0.0,
+            velocity: Vec3::new(2.0, 0.0, 0.0),
+            damping: taw::world::Damping { linear: 1.0, angular: 0.0 },
+            ..Marble::new(Point3::new(0.0, 5.0, 0.0), 0.1)
+        };
+        let id = world.marbles.insert(slows).unwrap();
+        steps(&mut world, 60);
+        world.marbles.get(id).unwrap()
+    });
+    let [infinite, finite] = ends;
+    assert!((finite.velocity.x - 2.0 * (-1.0_f32).exp()).abs() < 1e-3, "{finite:?}");
+    assert!((infinite.velocity - finite.velocity).x.abs() < 1e-3, "{infinite:?}");
+    assert!((infinite.position - finite.position).x.abs() < 1e-3, "{infinite:?}");
+}

@@ -204,7 +204,7 @@ impl Swarm {
         self.age_marks();
         self.update_wall_contacts(walls, dt, times, all, false);
         let params = self.solver_params(dt, h);
-        self.save_kinematic_paths();
+        self.save_kinematic_paths(dt);
         for substep in 0..count {
             let left = dt - h * substep as f32;
             self.save_places(walls);
@@ -246,7 +246,7 @@ impl Swarm {
             self.record_borne();
             self.forget_impacts();
             self.keep_out(walls, [before, left]);
-            self.follow_kinematic_paths(parts[1] * dt);
+            self.follow_kinematic_paths(parts[1], dt);
         }
     }
 
