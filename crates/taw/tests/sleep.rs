@@ -4,6 +4,8 @@
 mod islands;
 #[path = "sleep/random.rs"]
 mod random;
+#[path = "sleep/responses.rs"]
+mod responses;
 #[path = "sleep/slow.rs"]
 mod slow;
 #[path = "sleep/spawn.rs"]

@@ -4,6 +4,7 @@ mod force_field;
 mod free_body;
 mod integrator;
 mod mass;
+pub(crate) mod rest;
 mod rotation;
 mod wall_motion;
 

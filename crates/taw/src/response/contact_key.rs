@@ -39,6 +39,17 @@ impl ContactKey {
         self.is_pair
     }
 
+    /// Rows of two marbles.
+    pub fn pair(&self) -> Option<(u32, u32)> {
+        self.is_pair.then_some((self.a, self.b))
+    }
+
+    /// Rows of its marbles.
+    pub fn marbles(&self) -> impl Iterator<Item = usize> + use<> {
+        let first = self.is_pair.then_some(self.a as usize);
+        first.into_iter().chain([self.b as usize])
+    }
+
     /// Sub-shape of the wall.
     pub fn part(&self) -> u32 {
         self.part

@@ -1,9 +1,9 @@
 //! Proxies of the marbles of the world, which its own solver moves, in the swarm.
 
 use super::kernels::squared;
-use super::rest::sleep_speed;
 use super::{BallId, Row, Swarm};
 use crate::math::{Vec3, length};
+use crate::motion::rest::sleep_speed;
 
 /// A ball that the swarm pushes but does not move.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -13,6 +13,9 @@ use crate::response::{SpringHistory, follow_rows};
 pub(super) struct ContactMemory<S> {
     pub impulses: Vec<CachedImpulse<S>>,
     pub springs: Vec<SpringHistory<S>>,
+    /// Those of marbles that sleep.
+    pub sleeping_impulses: Vec<CachedImpulse<S>>,
+    pub sleeping_springs: Vec<SpringHistory<S>>,
     /// Impulses of the clusters at rest of [`Response::EventDriven`](crate::response::Response).
     pub event_impulses: Vec<CachedImpulse<f64>>,
     /// Decisions of one-way walls, sorted by wall and marble.
@@ -29,6 +32,8 @@ impl<S> Default for ContactMemory<S> {
         Self {
             impulses: Vec::new(),
             springs: Vec::new(),
+            sleeping_impulses: Vec::new(),
+            sleeping_springs: Vec::new(),
             event_impulses: Vec::new(),
             one_way: Vec::new(),
             marbles: Vec::new(),
@@ -43,6 +48,8 @@ impl<S: Scalar> World<S> {
     pub(super) fn forget_contacts(&mut self) {
         self.memory.impulses.clear();
         self.memory.springs.clear();
+        self.memory.sleeping_impulses.clear();
+        self.memory.sleeping_springs.clear();
         self.memory.event_impulses.clear();
     }
 
@@ -54,6 +61,8 @@ impl<S: Scalar> World<S> {
             let ContactMemory {
                 impulses,
                 springs,
+                sleeping_impulses,
+                sleeping_springs,
                 event_impulses,
                 marbles: old,
                 walls: old_walls,
@@ -63,6 +72,8 @@ impl<S: Scalar> World<S> {
             let wall = |row: usize| old_walls.get(row).and_then(|id| walls.row(*id).ok());
             follow_rows(impulses, marble, wall);
             follow_rows(springs, marble, wall);
+            follow_rows(sleeping_impulses, marble, wall);
+            follow_rows(sleeping_springs, marble, wall);
             if memory.removals[1] == removals[1] {
                 follow_rows(event_impulses, marble, Some);
             } else {

@@ -18,7 +18,6 @@ pub(super) struct EventDriven;
 
 impl<S: Scalar> Method<S> for EventDriven {
     fn advance(&self, world: &mut World<S>, dt: S) {
-        world.scratch.substep = dt;
         let context = world.settings.step_context(dt);
         world.marbles.mean_accelerations(context, &mut world.scratch.accelerations);
         if world.settings.model.rotation != Rotation::Dynamic {
@@ -42,6 +41,10 @@ impl<S: Scalar> Method<S> for EventDriven {
     }
 
     fn interpolates_walls(&self) -> bool {
+        false
+    }
+
+    fn sleeps(&self) -> bool {
         false
     }
 }

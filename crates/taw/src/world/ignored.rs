@@ -18,13 +18,14 @@ impl<S: Scalar> Marbles<S> {
     /// # Errors
     /// [`Error::NoSuchMarble`].
     pub fn set_ignored(&mut self, id: MarbleId, ignored: &[ColliderId]) -> Result<(), Error> {
-        self.row(id)?;
+        let row = self.row(id)?;
         if ignored.is_empty() {
             self.ignored.remove(&id);
         } else {
             self.ignored.insert(id, ignored.to_vec());
         }
         self.ignored_rows.found_at = None;
+        self.disturb(row);
         Ok(())
     }
 
@@ -47,6 +48,12 @@ impl<S: Scalar> Marbles<S> {
     pub(super) fn filter_of_row(&self, row: usize) -> CollisionFilter<'_> {
         let ignored = self.ignored_rows.walls_of(row as u32);
         CollisionFilter { layers: self.layers_of_row(row), ignored }
+    }
+
+    /// Returns true if two marbles sleep.
+    #[inline]
+    pub(super) fn both_sleep(&self, a: u32, b: u32) -> bool {
+        self.sleep.is_asleep(a as usize) && self.sleep.is_asleep(b as usize)
     }
 
     /// Returns true if two marbles collide with each other.

@@ -30,17 +30,30 @@ impl<S: Scalar> StepContext<'_, S> {
 }
 
 impl<S: Scalar> Marbles<S> {
-    /// Integrates all marbles. A marble whose motion would become infinite or NaN keeps its
+    /// Integrates all marbles that are awake. A marble whose motion would become infinite or NaN keeps its
     /// position, loses its velocity, and is added to `stopped`.
     pub(super) fn integrate(&mut self, context: StepContext<S>, stopped: &mut Vec<u32>) {
+        let sleep = std::mem::take(&mut self.sleep);
+        self.integrate_rows(context, stopped, |row| !sleep.is_asleep(row));
+        self.sleep = sleep;
+    }
+
+    /// Integrates the marbles that are meant, as [`Marbles::integrate`] does.
+    pub(super) fn integrate_rows(
+        &mut self,
+        context: StepContext<S>,
+        stopped: &mut Vec<u32>,
+        is_meant: impl Fn(usize) -> bool,
+    ) {
         if !self.compensation.is_empty() {
-            self.integrate_compensated(context, stopped);
+            self.integrate_compensated(context, stopped, is_meant);
             return;
         }
         // The columns are taken out while they are written, so that the others can be read.
         let mut position = std::mem::take(&mut self.position);
         let mut velocity = std::mem::take(&mut self.velocity);
-        let mut rows = Rows { position: &mut position, velocity: &mut velocity, stopped };
+        let (position_rows, velocity_rows) = (&mut position, &mut velocity);
+        let mut rows = Rows { position: position_rows, velocity: velocity_rows, stopped, is_meant };
         let only_gravity = context.forces.is_empty()
             && self.gravity_scale.is_empty()
             && self.mass.is_empty()
@@ -63,8 +76,13 @@ impl<S: Scalar> Marbles<S> {
     }
 
     /// Integrates in `f64` and stores the rounding errors in the compensation column.
-    fn integrate_compensated(&mut self, context: StepContext<S>, stopped: &mut Vec<u32>) {
-        for row in 0..self.len() {
+    fn integrate_compensated(
+        &mut self,
+        context: StepContext<S>,
+        stopped: &mut Vec<u32>,
+        is_meant: impl Fn(usize) -> bool,
+    ) {
+        for row in (0..self.len()).filter(|row| is_meant(*row)) {
             let start = self.motion_f64(row);
             let next = self.step_f64(row, context);
             let overflowed = !(is_finite_point(next.position) && is_finite(next.velocity));
@@ -150,13 +168,14 @@ impl<S: Scalar> Marbles<S> {
 }
 
 /// Columns that an integrator writes.
-struct Rows<'a, S> {
+struct Rows<'a, S, F> {
     position: &'a mut [crate::math::Point3<S>],
     velocity: &'a mut [Vec3<S>],
     stopped: &'a mut Vec<u32>,
+    is_meant: F,
 }
 
-impl<S: Scalar> Rows<'_, S> {
+impl<S: Scalar, F: Fn(usize) -> bool> Rows<'_, S, F> {
     /// Integrates all marbles with a kernel that is chosen once for all.
     fn integrate(
         &mut self,
@@ -181,6 +200,9 @@ impl<S: Scalar> Rows<'_, S> {
     fn each(&mut self, kernel: impl Fn(usize, Motion<S>) -> Motion<S>) {
         let columns = self.position.iter_mut().zip(self.velocity.iter_mut());
         for (row, (position, velocity)) in columns.enumerate() {
+            if !(self.is_meant)(row) {
+                continue;
+            }
             let next = kernel(row, Motion { position: *position, velocity: *velocity });
             if is_finite_point(next.position) && is_finite(next.velocity) {
                 (*position, *velocity) = (next.position, next.velocity);

@@ -67,6 +67,7 @@ impl<S: Scalar> Marbles<S> {
             self.enable_rotation(true);
         }
         self.half_length.set(row, half_length, self.len());
+        self.mark_changed(row);
         Ok(())
     }
 
@@ -80,6 +81,7 @@ impl<S: Scalar> Marbles<S> {
         if let Some(slot) = self.rotation.get_mut(row) {
             *slot = rotation;
         }
+        self.disturb(row);
         Ok(())
     }
 
@@ -126,6 +128,7 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         let scale = non_default(finite("gravity_scale", scale)?, S::one());
         self.gravity_scale.set(row, scale, self.len());
+        self.disturb(row);
         Ok(())
     }
 
@@ -137,6 +140,7 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         let damping = non_default(damping.validated()?, Damping::default());
         self.damping.set(row, damping, self.len());
+        self.disturb(row);
         Ok(())
     }
 
@@ -151,6 +155,7 @@ impl<S: Scalar> Marbles<S> {
     ) -> Result<(), Error> {
         let row = self.row(id)?;
         self.integrator.set(row, integrator, self.len());
+        self.disturb(row);
         Ok(())
     }
 

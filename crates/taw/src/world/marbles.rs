@@ -7,6 +7,7 @@ use cgmath::{One, Zero};
 use super::ColliderId;
 use super::changed_rows::ChangedRows;
 use super::marble::{Damping, Marble, non_default, validated_half_length, validated_rotation};
+use super::sleep_columns::SleepColumns;
 use super::sparse_column::SparseColumn;
 use crate::Error;
 use crate::broad::{CollisionLayers, IgnoredPairs, Period};
@@ -70,6 +71,7 @@ pub struct Marbles<S> {
     pub(super) layers: SparseColumn<CollisionLayers>,
     /// Marbles that never sleep.
     pub(super) sleeping_disabled: SparseColumn<()>,
+    pub(super) sleep: SleepColumns<S>,
     /// Lists of whom marbles pass through; see `ignored.rs`.
     pub(super) ignored: BTreeMap<MarbleId, Vec<ColliderId>>,
     /// Rows of these pairs.
@@ -101,6 +103,7 @@ impl<S> Default for Marbles<S> {
             material: SparseColumn::default(),
             layers: SparseColumn::default(),
             sleeping_disabled: SparseColumn::default(),
+            sleep: SleepColumns::default(),
             ignored: BTreeMap::new(),
             ignored_rows: IgnoredPairs::default(),
         }
@@ -159,6 +162,7 @@ impl<S: Scalar> Marbles<S> {
         let layers = non_default(marble.layers, CollisionLayers::ALL);
         self.layers.set(rows - 1, layers, rows);
         self.sleeping_disabled.set(rows - 1, marble.sleeping_disabled.then_some(()), rows);
+        self.sleep.push();
         Ok(MarbleId(handle))
     }
 
@@ -169,6 +173,7 @@ impl<S: Scalar> Marbles<S> {
     pub fn remove(&mut self, id: MarbleId) -> Result<Marble<S>, Error> {
         let marble = self.get(id)?;
         if let Some(row) = self.handles.swap_remove(id.0) {
+            self.sleep.swap_remove(row, marble.radius + marble.half_length);
             self.position.swap_remove(row);
             self.radius.swap_remove(row);
             self.velocity.swap_remove(row);
@@ -330,6 +335,9 @@ impl<S: Scalar> Marbles<S> {
         rim: Vec3<S>,
     ) {
         let Ok(row) = self.row(id) else { return };
+        if [way, faster, rim] != [Vec3::zero(); 3] {
+            self.disturb(row);
+        }
         let (position, velocity) = (self.position[row] + way, self.velocity[row] + faster);
         if is_finite_point(position) && is_finite(velocity) {
             (self.position[row], self.velocity[row]) = (position, velocity);
@@ -388,6 +396,22 @@ impl<S: Scalar> Marbles<S> {
     /// Lists a row as set by others than the solver.
     pub(super) fn mark_changed(&mut self, row: usize) {
         self.changed.add(row, self.position.len());
+        self.disturb(row);
+    }
+
+    /// Ends the rest of a marble.
+    pub(super) fn disturb(&mut self, row: usize) {
+        self.sleep.disturb(row, self.reach_of_row(row));
+    }
+
+    /// Radius of a ball, or of the sphere around a capsule, in metres.
+    pub(super) fn reach_of_row(&self, row: usize) -> S {
+        self.radius[row] + self.half_length(row)
+    }
+
+    /// Returns true if a marble neither moves nor turns.
+    pub(super) fn is_still(&self, row: usize) -> bool {
+        self.velocity[row].is_zero() && self.angular_velocity.get(row).is_none_or(Vec3::is_zero)
     }
 
     /// Mass in kilograms; infinite for kinematic marbles.
@@ -409,9 +433,14 @@ impl<S: Scalar> Marbles<S> {
             && self.rotation.get(row).is_none_or(turned)
     }
 
-    /// Stops a marble: clears velocity, angular velocity and their compensation.
+    /// Stops a marble that moves, and lists it as set.
     pub(super) fn stop(&mut self, row: usize) {
         self.mark_changed(row);
+        self.clear_motion(row);
+    }
+
+    /// Clears velocity, angular velocity and their compensation.
+    pub(super) fn clear_motion(&mut self, row: usize) {
         self.velocity[row] = Vec3::zero();
         if let Some(angular_velocity) = self.angular_velocity.get_mut(row) {
             *angular_velocity = Vec3::zero();

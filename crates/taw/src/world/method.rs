@@ -45,6 +45,11 @@ pub(super) trait Method<S: Scalar> {
     fn interpolates_walls(&self) -> bool {
         true
     }
+
+    /// True if marbles that rest sleep in columns of the world: none of the three verbs changes them then.
+    fn sleeps(&self) -> bool {
+        true
+    }
 }
 
 /// Method of a response.

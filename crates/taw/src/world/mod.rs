@@ -31,6 +31,8 @@ mod query_walls;
 mod scratch;
 mod sensors;
 mod settings;
+mod sleep;
+mod sleep_columns;
 mod soft_impacts;
 mod soft_step;
 mod solver_columns;
@@ -137,6 +139,7 @@ impl<S: Scalar> World<S> {
         }
         self.settings.model = model;
         self.marbles.changed.add_all();
+        self.marbles.sleep.wake_all();
         self.forget_contacts();
         self.marbles
             .enable_rotation(model.rotation != Rotation::None || self.marbles.has_capsules());
@@ -157,6 +160,9 @@ impl<S: Scalar> World<S> {
     pub fn set_gravity(&mut self, gravity: Vec3<S>) -> Result<(), Error> {
         finite_vector(["gravity.x", "gravity.y", "gravity.z"], gravity)?;
         finite("the length of gravity", length(gravity))?;
+        if gravity != self.settings.gravity {
+            self.marbles.sleep.wake_all();
+        }
         self.settings.gravity = gravity;
         Ok(())
     }
@@ -191,6 +197,7 @@ impl<S: Scalar> World<S> {
         if period != self.marbles.period {
             self.marbles.period = period;
             self.marbles.wrap();
+            self.marbles.sleep.wake_all();
             self.forget_contacts();
         }
         Ok(())
@@ -213,8 +220,11 @@ impl<S: Scalar> World<S> {
     /// # Errors
     /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a field of one of them.
     pub fn set_forces(&mut self, forces: Vec<ForceField<S>>) -> Result<(), Error> {
-        self.settings.forces =
-            forces.into_iter().map(ForceField::validated).collect::<Result<_, _>>()?;
+        let forces = forces.into_iter().map(ForceField::validated).collect::<Result<_, _>>()?;
+        if forces != self.settings.forces {
+            self.marbles.sleep.wake_all();
+        }
+        self.settings.forces = forces;
         Ok(())
     }
 

@@ -36,6 +36,9 @@ impl<S: Scalar> World<S> {
         }
         let mut candidates = std::mem::take(&mut self.scratch.near_walls);
         for b in 0..self.marbles.len() {
+            if self.marbles.sleep.is_asleep(b) {
+                continue;
+            }
             let sphere = self.marbles.sphere(b);
             if self.marbles.half_length(b) == S::zero() {
                 self.collide_sub_shapes(b, &sphere, S::zero(), contact_distance, &mut candidates);
@@ -59,7 +62,9 @@ impl<S: Scalar> World<S> {
     fn collide_half_spaces(&mut self, contact_distance: S) {
         for (wall, plane) in self.walls.planes() {
             for b in 0..self.marbles.len() {
-                if !self.walls.collides(wall, self.marbles.filter_of_row(b)) {
+                if self.marbles.sleep.is_asleep(b)
+                    || !self.walls.collides(wall, self.marbles.filter_of_row(b))
+                {
                     continue;
                 }
                 let half = self.marbles.half_length(b);
@@ -154,6 +159,9 @@ impl<S: Scalar> World<S> {
                 contact_distance,
                 period,
                 |a, b| {
+                    if self.marbles.both_sleep(a, b) {
+                        return false;
+                    }
                     if self.scratch.contact_limit.drops(&self.marbles, [a, b]) {
                         return true; // it overlaps deeper ones
                     }
@@ -169,10 +177,12 @@ impl<S: Scalar> World<S> {
             return;
         }
         self.scratch.reaches.clear();
-        let far = |row: usize| self.marbles.radius()[row] + self.marbles.half_length(row);
-        self.scratch.reaches.extend((0..self.marbles.len()).map(far));
+        self.scratch.reaches.extend((0..center.len()).map(|row| self.marbles.reach_of_row(row)));
         self.scratch.grid.rebuild(center, &self.scratch.reaches, contact_distance);
         self.scratch.grid.pairs(center, |a, b| {
+            if self.marbles.both_sleep(a, b) {
+                return;
+            }
             let line = |row: u32| {
                 let row = row as usize;
                 (self.marbles.sphere(row), self.marbles.axis(row), self.marbles.half_length(row))

@@ -7,6 +7,7 @@ use super::energy_audit::AuditState;
 use super::lasting_contacts::LastingContacts;
 use super::narrow_phase::Candidate;
 use super::quarantine::StoredPoses;
+use super::sleep::SleepScratch;
 use super::soft_step::SoftRows;
 use super::solver_columns::SolverColumns;
 use crate::broad::{Crowding, Grid, Images};
@@ -38,12 +39,13 @@ pub(super) struct Scratch<S> {
     pub accelerations: Vec<Vec3<f64>>,
     /// Time of the step that is left after the substep, in seconds; zero unless within one.
     pub rest_of_step: S,
-    /// Length of the substep in seconds, for a response that moves walls by itself.
+    /// Length of the substep that was integrated, in seconds; zero if none was since contacts were solved.
     pub substep: S,
     pub events: EventDriven,
     pub soft_step: SoftRows<S>,
     pub continuous: Continuous<S>,
     pub lasting_contacts: LastingContacts,
+    pub sleep: SleepScratch,
     pub near_walls: Vec<Candidate<S>>,
     /// Bounding radii of capsules, in metres.
     pub reaches: Vec<S>,
@@ -72,6 +74,7 @@ impl<S: Scalar> Default for Scratch<S> {
             soft_step: SoftRows::default(),
             continuous: Continuous::default(),
             lasting_contacts: LastingContacts::default(),
+            sleep: SleepScratch::default(),
             near_walls: Vec::new(),
             reaches: Vec::new(),
             audit_state: None,

@@ -89,6 +89,10 @@ impl<S: Scalar> Method<S> for SoftStep {
     fn interpolates_walls(&self) -> bool {
         false
     }
+
+    fn sleeps(&self) -> bool {
+        false // its rows do
+    }
 }
 
 impl<S: Scalar> World<S> {
@@ -201,40 +205,15 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Returns true if a marble sleeps: in a model with [`Response::SoftStep`], once its island has rested,
-    /// that is, the marble, those that it touches, those that these touch, and so on. (In a large heap only
-    /// those of some 500 neighbours in memory, so that it sleeps part by part.)
-    ///
-    /// A marble rests if for half a second, and longer if its radius is over 10 cm (five times √(r/g)), it was
-    /// borne by something and either went no further than 5 % of its radius, or was slower than
-    /// .05 √(g r) and did not speed up.
-    ///
-    /// A sleeping marble costs next to nothing, and has no velocity. It wakes when it or one
-    /// beside it is set or removed, when gravity or a wall near it changes, when a ball comes at over twice that
-    /// speed, or one of infinite mass at any speed, when one beside it leaves its place, and when one wakes that
-    /// fell asleep with it.
-    ///
-    /// # Errors
-    /// [`Error::NoSuchMarble`].
-    pub fn is_asleep(&self, id: MarbleId) -> Result<bool, Error> {
-        let row = self.marbles.row(id)?;
-        if self.settings.model.response != Response::SoftStep {
-            return Ok(false);
-        }
+    /// Returns true if a marble sleeps as a row.
+    pub(super) fn is_soft_asleep(&self, id: MarbleId, row: usize) -> bool {
         if self.changes_are_listed() {
             let slot = self.scratch.soft_step.slot_of_marble.get(row);
-            return Ok(slot.is_some_and(|slot| self.swarm.is_slot_asleep(*slot)));
+            return slot.is_some_and(|slot| self.swarm.is_slot_asleep(*slot));
         }
         let bodies = &self.swarm.body_balls;
         let found = bodies.binary_search_by_key(&id, |(marble, _)| *marble);
-        Ok(found.is_ok_and(|i| self.swarm.is_asleep(bodies[i].1)))
-    }
-
-    /// Number that changes whenever a marble or a ball falls asleep, wakes, comes or goes; to look
-    /// only then who sleeps.
-    #[must_use]
-    pub fn sleep_version(&self) -> u64 {
-        self.swarm.sleep_version()
+        found.is_ok_and(|i| self.swarm.is_asleep(bodies[i].1))
     }
 
     /// Identity of the correspondence of marbles and rows: removals, number, rotation model, and

@@ -51,14 +51,20 @@ impl<S: Scalar> World<S> {
         self.find_ignored_rows();
         self.sensors.begin_substep(&self.marbles);
         self.audit_before();
+        self.wake_changed();
+        self.scratch.substep = dt;
+        if self.are_all_asleep() {
+            self.forget_motion();
+            return Ok(());
+        }
         method_of(self.settings.model.response).integrate(self, dt)
     }
 
     /// Integrates marbles by a method: velocities, positions, rotations.
     pub(super) fn integrate_marbles(&mut self, method: &(impl Method<S> + ?Sized), dt: S) {
         self.store_poses();
+        self.forget_motion();
         self.begin_continuous();
-        self.scratch.columns.velocity_before.clear();
         let rotation = self.settings.model.rotation;
         if rotation == Rotation::Dynamic {
             self.marbles.integrate_angular_velocity(dt);
@@ -67,6 +73,12 @@ impl<S: Scalar> World<S> {
         self.quarantine_non_finite();
         self.scratch.reach = method.contact_distance(self, dt);
         self.audit_forces();
+    }
+
+    /// Forgets how marbles moved in the last substep.
+    fn forget_motion(&mut self) {
+        self.scratch.continuous.clear();
+        self.scratch.columns.velocity_before.clear();
     }
 
     /// Moves marbles freely over `dt` seconds; with continuous detection, to where they meet others.
@@ -90,14 +102,23 @@ impl<S: Scalar> World<S> {
     pub fn generate_contacts(&mut self) {
         self.contacts.clear();
         self.find_ignored_rows();
-        method_of(self.settings.model.response).generate_contacts(self);
+        self.wake_changed();
+        if !self.are_all_asleep() {
+            method_of(self.settings.model.response).generate_contacts(self);
+        }
     }
 
     /// Lists contacts up to the speculative margin.
     pub(super) fn list_contacts(&mut self) {
-        self.collide_walls(self.scratch.reach);
-        self.collide_marbles(self.scratch.reach);
-        self.add_grazing_contacts();
+        loop {
+            self.collide_walls(self.scratch.reach);
+            self.collide_marbles(self.scratch.reach);
+            self.add_grazing_contacts();
+            if !self.wake_touched() {
+                break;
+            }
+            self.contacts.clear();
+        }
         self.drop_separated_stops();
     }
 
@@ -109,7 +130,11 @@ impl<S: Scalar> World<S> {
     pub fn restitute(&mut self, dt: S) -> Result<(), Error> {
         let dt = Self::validated_dt(dt)?;
         self.find_ignored_rows();
-        method_of(self.settings.model.response).restitute(self, dt)?;
+        self.wake_changed();
+        if !self.are_all_asleep() {
+            method_of(self.settings.model.response).restitute(self, dt)?;
+        }
+        self.scratch.substep = S::zero();
         self.update_sensors(dt);
         Ok(())
     }
@@ -132,6 +157,7 @@ impl<S: Scalar> World<S> {
         self.settings.limits.apply(&mut self.marbles);
         self.audit_after();
         self.marbles.wrap();
+        self.update_sleep(dt);
     }
 
     /// Makes marbles that turn for show only roll over the walls that they touch.

@@ -6,11 +6,12 @@ use super::islands::MAX_JOINED;
 use super::{leaves, wider};
 
 use crate::math::{Vec3, length};
+use crate::motion::rest::{self, sleep_speed};
 use crate::swarm::batches::Batch;
 use crate::swarm::bodies::NO_ROW;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::squared;
-use crate::swarm::rest::{PLACE, RestRows, sleep_speed};
+use crate::swarm::rest::RestRows;
 use crate::swarm::simd::Row;
 use crate::swarm::sleep::SleepState;
 use crate::swarm::wall_contact::WallContact;
@@ -97,7 +98,7 @@ impl Swarm {
             let apart = squared([b[0] - a[0], b[1] - a[1], b[2] - a[2], 0.0]).sqrt();
             let (radii, gap) = (a[3] + b[3], apart - (a[3] + b[3]));
             // It touched where it was, as far away as it may have gone since, or will in this step.
-            let reach = PLACE * (2.0 * a[3] + radii) + speed * dt;
+            let reach = rest::PLACE as f32 * (2.0 * a[3] + radii) + speed * dt;
             // Nothing turns it aside.
             let pushes = velocity[awake][3] <= INFINITE_MASS && !rest.is_at_rest(awake);
             (pushes || speed > 2.0 * sleep_speed(gravity, b[3])) && gap <= 2.0 * speed * dt

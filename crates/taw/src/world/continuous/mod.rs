@@ -93,7 +93,6 @@ enum Obstacle {
 impl<S: Scalar> World<S> {
     /// Stores the positions before marbles move, if the model has continuous detection.
     pub(super) fn begin_continuous(&mut self) {
-        self.scratch.continuous.clear();
         if self.settings.model.detection == Detection::Swept {
             self.scratch.continuous.start.extend_from_slice(&self.marbles.position);
             self.scratch.continuous.velocity.extend_from_slice(&self.marbles.velocity);
@@ -203,7 +202,7 @@ impl<S: Scalar> Continuous<S> {
     }
 
     /// Clears the state of the last substep.
-    fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.start.clear();
         self.velocity.clear();
         self.stops.clear();

@@ -1,0 +1,319 @@
+//! Sleep by methods that list contacts: who falls asleep, and who wakes.
+
+use cgmath::InnerSpace;
+
+use super::World;
+use super::method::method_of;
+use super::sleep_columns::SleepGroup;
+use crate::Error;
+use crate::handle::MarbleId;
+use crate::math::{Point3, Scalar, UnionFind, length};
+use crate::motion::rest::{self, is_slow};
+use crate::response::{KeyedByContact, Response};
+use crate::shape::Aabb3;
+
+/// Substeps after which islands are searched, if anybody has rested for long enough.
+const SEARCH_INTERVAL: u32 = 8;
+
+/// Scratch memory of sleep.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SleepScratch {
+    /// Identity of the walls among which sleepers fell asleep.
+    walls: u64,
+    /// Version of the sleepers whose impulses are out of the cache.
+    set_aside_at: u64,
+    /// Substeps since islands were searched.
+    clock: u32,
+    woken: Vec<u32>,
+    support: Vec<Support>,
+    islands: UnionFind,
+    restless: Vec<bool>,
+}
+
+/// What a marble was borne by in a substep.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+enum Support {
+    #[default]
+    Nothing,
+    /// Something at rest.
+    Still,
+    /// A wall that moves.
+    Moving,
+}
+
+impl<S: Scalar> World<S> {
+    /// Returns true if a marble sleeps, which those of all responses do but
+    /// [`EventDriven`](crate::response::Response::EventDriven): once its island has rested, that is, the marble, those that
+    /// it touches, those that these touch, and so on. (By [`SoftStep`](crate::response::Response::SoftStep), in a large heap
+    /// only those of some 500 neighbours in memory, so that it sleeps part by part.)
+    ///
+    /// A marble rests if for half a second, and longer if its radius is over 10 cm (five times √(r/g)), it was
+    /// borne by something and either went no further than 5 % of its radius, or was slower than
+    /// .05 √(g r) and did not speed up.
+    ///
+    /// A sleeping marble costs next to nothing, and has no velocity. It wakes when it or one
+    /// beside it is set or removed, when gravity or a wall near it changes, when one that is awake touches it, and
+    /// when one wakes that fell asleep with it. (By `SoftStep`, only a ball of over twice that speed wakes it, or one
+    /// of infinite mass, or one that leaves its place beside it.)
+    ///
+    /// # Errors
+    /// [`Error::NoSuchMarble`].
+    pub fn is_asleep(&self, id: MarbleId) -> Result<bool, Error> {
+        let row = self.marbles.row(id)?;
+        Ok(if self.settings.model.response == Response::SoftStep {
+            self.is_soft_asleep(id, row)
+        } else {
+            self.marbles.sleep.is_asleep(row)
+        })
+    }
+
+    /// Number that changes whenever a marble or a ball falls asleep, wakes, comes or goes; to look
+    /// only then who sleeps.
+    #[must_use]
+    pub fn sleep_version(&self) -> u64 {
+        self.swarm.sleep_version() + self.marbles.sleep.version()
+    }
+
+    /// Returns true if marbles may sleep by the model's method, in columns of the world.
+    fn may_sleep(&self) -> bool {
+        method_of::<S>(self.settings.model.response).sleeps() && self.swarm.model().sleeps
+    }
+
+    /// Returns true if there are marbles and all sleep.
+    pub(super) fn are_all_asleep(&self) -> bool {
+        let sleepers = self.marbles.sleep.sleepers();
+        sleepers > 0 && sleepers == self.marbles.len()
+    }
+
+    /// Wakes marbles that were set, those beside them, and those near walls that changed. Each verb begins
+    /// with it.
+    pub(super) fn wake_changed(&mut self) {
+        if !self.may_sleep() {
+            self.marbles.sleep.clear();
+        } else {
+            self.marbles.sleep.resize(self.marbles.len());
+        }
+        let disturbed = self.marbles.sleep.take_disturbed();
+        if self.marbles.sleep.sleepers() > 0 {
+            let mut groups: Vec<_> = disturbed.iter().map(|it| it.group).collect();
+            for sleeper in &disturbed {
+                self.find_sleepers(&mut groups, |center, reach| {
+                    length(center - sleeper.center) <= reach + sleeper.reach
+                });
+            }
+            self.find_sleepers_at_walls(&mut groups);
+            self.scratch.sleep.woken.clear();
+            self.wake_groups(groups);
+        } else {
+            self.scratch.sleep.walls = self.walls.identity();
+            self.restore_impulses();
+        }
+    }
+
+    /// Adds the groups of sleepers whose center and reach, in metres, fulfil a condition.
+    fn find_sleepers(
+        &self,
+        groups: &mut Vec<SleepGroup>,
+        is_meant: impl Fn(Point3<S>, S) -> bool,
+    ) {
+        let wider = S::from_f64(1.0 + rest::PLACE);
+        let asleep = self.marbles.sleep.asleep().filter(|row| {
+            is_meant(self.marbles.position[*row], self.marbles.reach_of_row(*row) * wider)
+        });
+        groups.extend(asleep.filter_map(|row| self.marbles.sleep.group_of(row)));
+    }
+
+    /// Adds the groups of sleepers near walls that changed since the last look.
+    fn find_sleepers_at_walls(&mut self, groups: &mut Vec<SleepGroup>) {
+        let now = self.walls.identity();
+        let since = std::mem::replace(&mut self.scratch.sleep.walls, now);
+        if since == now {
+            return;
+        }
+        let mut regions = Vec::new();
+        if self.walls.changes().visit_since(since, |region| regions.push(region.clone())) {
+            for region in &regions {
+                self.find_sleepers(groups, |center, reach| is_within(region, center, reach));
+            }
+        } else {
+            self.find_sleepers(groups, |_, _| true);
+        }
+        self.walls.mark_seen();
+    }
+
+    /// Wakes groups, and lists their rows as woken.
+    fn wake_groups(&mut self, mut groups: Vec<SleepGroup>) {
+        groups.sort_unstable();
+        groups.dedup();
+        self.marbles.sleep.wake(&groups, &mut self.scratch.sleep.woken);
+        self.restore_impulses();
+    }
+
+    /// Wakes those that one that is awake may touch, and makes up for the first verb, which they missed.
+    /// Returns true if there were any.
+    pub(super) fn wake_touched(&mut self) -> bool {
+        let sleep = &self.marbles.sleep;
+        if sleep.sleepers() == 0 {
+            return false;
+        }
+        let touched = self.contacts.mm.iter().flat_map(|contact| {
+            [contact.a, contact.b].map(|row| sleep.group_of(row as usize))
+        });
+        let groups: Vec<_> = touched.flatten().collect();
+        if groups.is_empty() {
+            return false;
+        }
+        self.scratch.sleep.woken.clear();
+        self.wake_groups(groups);
+        let context = self.settings.step_context(self.scratch.substep);
+        if context.dt > S::zero() {
+            let woken = &self.scratch.sleep.woken;
+            let is_woken = |row: usize| woken.binary_search(&(row as u32)).is_ok();
+            self.marbles.integrate_rows(context, &mut self.scratch.stopped, is_woken);
+        }
+        true
+    }
+
+    /// Lets marbles rest for another `dt` seconds, and fall asleep.
+    pub(super) fn update_sleep(&mut self, dt: S) {
+        if !self.may_sleep() {
+            return;
+        }
+        let gravity = length(self.settings.gravity);
+        self.find_support();
+        let mut someone_lasts = false;
+        for row in 0..self.marbles.len() {
+            if self.marbles.sleep.is_asleep(row) {
+                continue;
+            }
+            let (center, radius) = (self.marbles.position[row], self.marbles.radius[row]);
+            let square = self.marbles.velocity[row].magnitude2();
+            let rests = match self.scratch.sleep.support[row] {
+                _ if self.marbles.mass(row).is_infinite() => self.marbles.is_still(row),
+                Support::Still => is_slow(square, gravity, radius),
+                Support::Nothing | Support::Moving => false,
+            };
+            let at = [center.x, center.y, center.z, radius];
+            self.marbles.sleep.update(row, &at, square, rests, dt);
+            someone_lasts |= self.marbles.sleep.lasts(row, radius, gravity);
+        }
+        self.scratch.sleep.clock += 1;
+        if someone_lasts && self.scratch.sleep.clock >= SEARCH_INTERVAL {
+            self.scratch.sleep.clock = 0;
+            self.fall_asleep(gravity);
+        }
+    }
+
+    /// Finds by what each marble is borne.
+    fn find_support(&mut self) {
+        let support = &mut self.scratch.sleep.support;
+        support.clear();
+        support.resize(self.marbles.len(), Support::Nothing);
+        let bears = |contact: &crate::contact::Contact<S>| {
+            contact.normal_impulse > S::zero() || contact.is_touching()
+        };
+        for contact in self.contacts.wm.iter().filter(|contact| bears(contact)) {
+            let moves = self.walls.motion_of_row(contact.a as usize).is_some();
+            let by = if moves { Support::Moving } else { Support::Still };
+            let its = &mut support[contact.b as usize];
+            *its = by.max(*its);
+        }
+        for contact in self.contacts.mm.iter().filter(|contact| bears(contact)) {
+            for row in [contact.a, contact.b] {
+                let its = &mut support[row as usize];
+                *its = Support::Still.max(*its);
+            }
+        }
+    }
+
+    /// Lets islands of which all have rested for long enough fall asleep.
+    fn fall_asleep(&mut self, gravity: S) {
+        let rows = self.marbles.len();
+        let SleepScratch { islands, restless, .. } = &mut self.scratch.sleep;
+        islands.reset(rows);
+        let listed = self.contacts.mm.iter().map(|contact| (contact.a, contact.b));
+        // Those that pressed each other and have opened since are not listed.
+        let pressed = self.memory.impulses.iter().filter_map(|entry| entry.key().pair());
+        for (a, b) in listed.chain(pressed) {
+            islands.join(a as usize, b as usize);
+        }
+        restless.clear();
+        restless.resize(rows, false);
+        let marbles = &mut self.marbles;
+        for row in marbles.sleep.awake() {
+            let rests = marbles.sleep.lasts(row, marbles.radius[row], gravity)
+                && marbles.sleeping_disabled.get(row).is_none();
+            restless[islands.set_of(row) as usize] |= !rests;
+        }
+        let mut groups = vec![None; rows];
+        let asleep_before = marbles.sleep.sleepers();
+        for row in 0..rows {
+            if marbles.sleep.is_asleep(row) {
+                continue;
+            }
+            let island = islands.set_of(row) as usize;
+            if !restless[island] {
+                let group = *groups[island].get_or_insert_with(|| marbles.sleep.new_group());
+                marbles.sleep.fall_asleep(row, group, marbles.position[row]);
+                marbles.clear_motion(row);
+            }
+        }
+        if marbles.sleep.sleepers() > asleep_before {
+            self.marbles.sleep.mark_changed();
+            self.set_impulses_aside();
+            let sleep = &self.marbles.sleep;
+            self.contacts.wm.retain(|contact| !sleep.is_asleep(contact.b as usize));
+            self.contacts.mm.retain(|contact| !sleep.is_asleep(contact.b as usize));
+        }
+    }
+
+    /// Takes the impulses of sleepers out of the cache, which has those of the listed contacts.
+    fn set_impulses_aside(&mut self) {
+        let (memory, sleep) = (&mut self.memory, &self.marbles.sleep);
+        let is_asleep = |row: usize| sleep.is_asleep(row);
+        move_entries(&mut memory.impulses, &mut memory.sleeping_impulses, is_asleep);
+        move_entries(&mut memory.springs, &mut memory.sleeping_springs, is_asleep);
+        self.scratch.sleep.set_aside_at = self.marbles.sleep.version();
+    }
+
+    /// Gives the impulses of those that woke back to the cache.
+    fn restore_impulses(&mut self) {
+        let version = self.marbles.sleep.version();
+        if std::mem::replace(&mut self.scratch.sleep.set_aside_at, version) == version {
+            return;
+        }
+        self.follow_contacts();
+        let (memory, sleep) = (&mut self.memory, &self.marbles.sleep);
+        let is_awake = |row: usize| !sleep.is_asleep(row);
+        move_entries(&mut memory.sleeping_impulses, &mut memory.impulses, is_awake);
+        move_entries(&mut memory.sleeping_springs, &mut memory.springs, is_awake);
+    }
+}
+
+/// Moves the entries of contacts of which each marble is meant from one sorted list to another.
+fn move_entries<T: KeyedByContact + Copy>(
+    from: &mut Vec<T>,
+    to: &mut Vec<T>,
+    is_meant: impl Fn(usize) -> bool,
+) {
+    let before = to.len();
+    from.retain(|entry| {
+        let stays = !entry.key().marbles().all(&is_meant);
+        if !stays {
+            to.push(*entry);
+        }
+        stays
+    });
+    if to.len() > before {
+        to.sort_unstable_by_key(T::key);
+    }
+}
+
+/// Returns true if a ball reaches into a box, or may by rounding.
+fn is_within<S: Scalar>(region: &Aabb3<S>, center: Point3<S>, reach: S) -> bool {
+    (0..3).all(|axis| {
+        let (x, few) = (center[axis], S::from_f64(4.0));
+        let reach = reach + few * S::epsilon() * (x.abs() + reach);
+        x + reach >= region.min[axis] && x - reach <= region.max[axis]
+    })
+}
