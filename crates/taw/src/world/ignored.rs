@@ -50,12 +50,6 @@ impl<S: Scalar> Marbles<S> {
         CollisionFilter { layers: self.layers_of_row(row), ignored }
     }
 
-    /// Returns true if two marbles sleep.
-    #[inline]
-    pub(super) fn both_sleep(&self, a: u32, b: u32) -> bool {
-        self.sleep.is_asleep(a as usize) && self.sleep.is_asleep(b as usize)
-    }
-
     /// Returns true if two marbles collide with each other.
     #[inline]
     pub(super) fn may_collide(&self, a: u32, b: u32) -> bool {

@@ -159,7 +159,7 @@ impl<S: Scalar> World<S> {
                 contact_distance,
                 period,
                 |a, b| {
-                    if self.marbles.both_sleep(a, b) {
+                    if self.marbles.sleep.are_asleep([a, b]) {
                         return false;
                     }
                     if self.scratch.contact_limit.drops(&self.marbles, [a, b]) {
@@ -180,7 +180,7 @@ impl<S: Scalar> World<S> {
         self.scratch.reaches.extend((0..center.len()).map(|row| self.marbles.reach_of_row(row)));
         self.scratch.grid.rebuild(center, &self.scratch.reaches, contact_distance);
         self.scratch.grid.pairs(center, |a, b| {
-            if self.marbles.both_sleep(a, b) {
+            if self.marbles.sleep.are_asleep([a, b]) {
                 return;
             }
             let line = |row: u32| {

@@ -111,11 +111,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Adds the groups of sleepers whose center and reach, in metres, fulfil a condition.
-    fn find_sleepers(
-        &self,
-        groups: &mut Vec<SleepGroup>,
-        is_meant: impl Fn(Point3<S>, S) -> bool,
-    ) {
+    fn find_sleepers(&self, groups: &mut Vec<SleepGroup>, is_meant: impl Fn(Point3<S>, S) -> bool) {
         let wider = S::from_f64(1.0 + rest::PLACE);
         let asleep = self.marbles.sleep.asleep().filter(|row| {
             is_meant(self.marbles.position[*row], self.marbles.reach_of_row(*row) * wider)
@@ -156,9 +152,11 @@ impl<S: Scalar> World<S> {
         if sleep.sleepers() == 0 {
             return false;
         }
-        let touched = self.contacts.mm.iter().flat_map(|contact| {
-            [contact.a, contact.b].map(|row| sleep.group_of(row as usize))
-        });
+        let touched = self
+            .contacts
+            .mm
+            .iter()
+            .flat_map(|contact| [contact.a, contact.b].map(|row| sleep.group_of(row as usize)));
         let groups: Vec<_> = touched.flatten().collect();
         if groups.is_empty() {
             return false;

@@ -77,6 +77,7 @@ impl<S: Scalar> SleepColumns<S> {
             self.rest.swap_remove(row);
             let group = self.group.swap_remove(row);
             self.sleepers -= usize::from(group.is_some());
+            self.version += u64::from(group.is_some());
         }
     }
 
@@ -111,6 +112,12 @@ impl<S: Scalar> SleepColumns<S> {
     #[inline]
     pub fn is_asleep(&self, row: usize) -> bool {
         self.group_of(row).is_some()
+    }
+
+    /// Returns true if two marbles sleep.
+    #[inline]
+    pub fn are_asleep(&self, rows: [u32; 2]) -> bool {
+        rows.into_iter().all(|row| self.is_asleep(row as usize))
     }
 
     #[inline]

@@ -75,7 +75,7 @@ fn change(
 }
 
 #[test]
-fn who_must_wake_wakes_and_who_sleeps_does_not_move() {
+pub fn who_must_wake_wakes_and_who_sleeps_does_not_move() {
     let mut slept = 0;
     for seed in 1..=40_u64 {
         let mut random = Random(seed.wrapping_mul(0x9e37_79b9_7f4a_7c15));

@@ -53,7 +53,7 @@ const CHANGES: [(&str, Change); 9] = [
 ];
 
 #[test]
-fn one_that_comes_goes_or_changes_wakes_no_other_one() {
+pub fn one_that_comes_goes_or_changes_wakes_no_other_one() {
     let (mut world, mut ids, roller) = floor_with_roller();
     world.marbles.remove(roller).unwrap();
     let wall = world.walls.insert(block([30.0, 0.0, 0.0], [31.0, 1.0, 1.0])).unwrap();
@@ -75,7 +75,7 @@ fn one_that_comes_goes_or_changes_wakes_no_other_one() {
 
 /// Rows of walls and of marbles change in one step, while others sleep on walls.
 #[test]
-fn a_block_that_goes_with_its_marble_wakes_no_other_one() {
+pub fn a_block_that_goes_with_its_marble_wakes_no_other_one() {
     let mut world = world();
     let mut places: Vec<_> = (0..20_u8)
         .map(|i| {
@@ -120,7 +120,7 @@ fn tower() -> (World<f32>, [MarbleId; 2]) {
 
 /// Also one that has rested for long, and is awake only since another one is, which now is gone.
 #[test]
-fn one_whose_support_goes_falls_whenever_it_goes() {
+pub fn one_whose_support_goes_falls_whenever_it_goes() {
     let leaves: [(&str, fn(&mut World<f32>, MarbleId)); 3] = [
         ("removed", remove),
         ("far", |w, id| w.marbles.set_position(id, Point3::new(5.0, 0.24, 0.0)).unwrap()),
@@ -149,7 +149,7 @@ fn sleeps(world: &World<f32>, ball: BallId) -> bool {
 
 /// Several are removed between two steps, one by one, so that rows move more than once.
 #[test]
-fn several_that_go_one_by_one_wake_what_lay_beside_each() {
+pub fn several_that_go_one_by_one_wake_what_lay_beside_each() {
     let mut world = world();
     let grips = Material { friction: 1.0, rolling_resistance: 0.05, ..Material::default() };
     world.swarm.set_model(SwarmModel { material: grips, ..world.swarm.model() }).unwrap();
