@@ -106,6 +106,9 @@ impl<S: Scalar> Marbles<S> {
     pub(super) fn integrate_rotations(&mut self, dt: S, rotation: Rotation, turns: &[Turn<S>]) {
         if self.has_capsules() {
             for row in 0..self.angular_velocity.len() {
+                if self.sleep.is_asleep(row) {
+                    continue;
+                }
                 let Turn { free, carried } = turns.get(row).copied().unwrap_or_default();
                 self.integrate_free_rotation(row, dt * free, rotation);
                 if carried != Quat::one() {
@@ -114,8 +117,11 @@ impl<S: Scalar> Marbles<S> {
             }
             return;
         }
-        for (rotation, angular_velocity) in self.rotation.iter_mut().zip(&self.angular_velocity) {
-            *rotation = integrate_rotation(*rotation, *angular_velocity, dt);
+        let columns = self.rotation.iter_mut().zip(&self.angular_velocity);
+        for (row, (rotation, angular_velocity)) in columns.enumerate() {
+            if !self.sleep.is_asleep(row) {
+                *rotation = integrate_rotation(*rotation, *angular_velocity, dt);
+            }
         }
     }
 
