@@ -201,10 +201,11 @@ pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
 
 /// Marker of a marble that sleeps, to read: the plugin adds and removes it after each step.
 ///
-/// With the response [`SoftStep`](taw::response::Response::SoftStep), marbles that rest for half a
-/// second fall asleep with those that they touch (their island; in a large heap part by part), and then cost
+/// Marbles that rest for half a second fall asleep with those that they touch (their island; by
+/// [`SoftStep`](taw::response::Response::SoftStep), in a large heap part by part), and then cost
 /// next to nothing. They wake together when one of them is struck or written, when one beside them is
-/// written or despawned, when gravity changes, or a wall near them. Marbles of other responses do not sleep.
+/// written or despawned, when gravity changes, or a wall near them. By
+/// [`EventDriven`](taw::response::Response::EventDriven), they do not sleep.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct Sleeping;
