@@ -10,6 +10,7 @@ use divan::counter::ItemsCount;
 use taw::math::Quat;
 use taw::motion::WallMotion;
 use taw::prelude::*;
+use taw::swarm::SwarmModel;
 
 const DT: f32 = 1.0 / 60.0;
 const COUNTS: [u32; 3] = [100, 1_000, 10_000];
@@ -18,9 +19,11 @@ fn main() {
     divan::main();
 }
 
-/// Marbles on a lattice, each well inside its cell, over a box that fits it.
+/// Marbles on a lattice, each well inside its cell, over a box that fits it. None sleeps.
 fn falling(count: u32) -> World<f32> {
     let mut world = World::default();
+    let model = SwarmModel { sleeps: false, ..SwarmModel::default() };
+    world.swarm.set_model(model).expect("a model");
     let side = f64::from(count / 5).sqrt().ceil() as u32;
     let half = side as f32 * 1.3 / 2.0;
     for (direction, offset) in [
@@ -87,6 +90,23 @@ fn step_settled_impulse(bencher: Bencher, count: u32) {
     let (response, rotation) = (Response::Impulse, Rotation::Dynamic);
     let model = Model { response, rotation, ..Model::default() };
     bench(bencher, settled_by(model, count), step);
+}
+
+/// That heap asleep.
+#[divan::bench(args = COUNTS)]
+fn step_asleep_impulse(bencher: Bencher, count: u32) {
+    let (response, rotation) = (Response::Impulse, Rotation::Dynamic);
+    let mut world = settled_by(Model { response, rotation, ..Model::default() }, count);
+    world.swarm.set_model(SwarmModel::default()).expect("a model");
+    let ids: Vec<_> = (0..count as usize).filter_map(|row| world.marbles.id(row)).collect();
+    for _ in 0..3_000 {
+        if ids.iter().all(|id| world.is_asleep(*id) == Ok(true)) {
+            break;
+        }
+        world.step(DT).expect("a step");
+    }
+    assert!(ids.iter().all(|id| world.is_asleep(*id) == Ok(true)), "it does not come to rest");
+    bench(bencher, world, step);
 }
 
 /// That heap, event by event.

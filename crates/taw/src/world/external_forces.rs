@@ -28,7 +28,6 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         let sum = self.force_with(row, force)?;
         self.force.set(row, Some(sum), self.len());
-        self.disturb(row);
         Ok(())
     }
 
@@ -75,7 +74,6 @@ impl<S: Scalar> Marbles<S> {
         let torque = self.torque_with(row, Bivector::wedge(lever, force).dual())?;
         self.force.set(row, Some(sum), self.len());
         self.torque.set(row, Some(torque), self.len());
-        self.disturb(row);
         Ok(())
     }
 
@@ -91,7 +89,6 @@ impl<S: Scalar> Marbles<S> {
         let row = self.row(id)?;
         let sum = self.torque_with(row, torque.into().dual())?;
         self.torque.set(row, Some(sum), self.len());
-        self.disturb(row);
         Ok(())
     }
 

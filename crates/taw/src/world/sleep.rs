@@ -1,13 +1,14 @@
 //! Sleep by methods that list contacts: who falls asleep, and who wakes.
 
-use cgmath::InnerSpace;
+use cgmath::{InnerSpace, Zero};
 
 use super::World;
 use super::method::method_of;
 use super::sleep_columns::SleepGroup;
 use crate::Error;
+use crate::contact::Contact;
 use crate::handle::MarbleId;
-use crate::math::{Point3, Scalar, UnionFind, length};
+use crate::math::{Point3, Scalar, UnionFind, Vec3, length};
 use crate::motion::rest::{self, is_slow};
 use crate::response::{KeyedByContact, Response};
 use crate::shape::Aabb3;
@@ -54,7 +55,8 @@ impl<S: Scalar> World<S> {
     /// A sleeping marble costs next to nothing, and has no velocity. It wakes when it or one
     /// beside it is set or removed, when gravity or a wall near it changes, when one that is awake touches it, and
     /// when one wakes that fell asleep with it. (By `SoftStep`, only a ball of over twice that speed wakes it, or one
-    /// of infinite mass, or one that leaves its place beside it.)
+    /// of infinite mass, or one that leaves its place beside it. By other responses, one that balls of a
+    /// [swarm](Self::swarm) press does not sleep.)
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
@@ -107,6 +109,20 @@ impl<S: Scalar> World<S> {
         } else {
             self.scratch.sleep.walls = self.walls.identity();
             self.restore_impulses();
+        }
+    }
+
+    /// Wakes sleepers to which another force is applied than when they fell asleep.
+    pub(super) fn wake_pulled(&mut self) {
+        let marbles = &self.marbles;
+        let force = |row: usize| marbles.force.get(row).unwrap_or_else(Vec3::zero);
+        let is_pulled = |row: &usize| {
+            force(*row) != marbles.sleep.force(*row) || marbles.torque.get(*row).is_some()
+        };
+        let pulled: Vec<_> = marbles.sleep.asleep().filter(is_pulled).collect();
+        if !pulled.is_empty() {
+            pulled.into_iter().for_each(|row| self.marbles.disturb(row));
+            self.wake_changed();
         }
     }
 
@@ -207,9 +223,8 @@ impl<S: Scalar> World<S> {
         let support = &mut self.scratch.sleep.support;
         support.clear();
         support.resize(self.marbles.len(), Support::Nothing);
-        let bears = |contact: &crate::contact::Contact<S>| {
-            contact.normal_impulse > S::zero() || contact.is_touching()
-        };
+        let bears =
+            |contact: &Contact<S>| contact.normal_impulse > S::zero() || contact.is_touching();
         for contact in self.contacts.wm.iter().filter(|contact| bears(contact)) {
             let moves = self.walls.motion_of_row(contact.a as usize).is_some();
             let by = if moves { Support::Moving } else { Support::Still };
@@ -252,7 +267,8 @@ impl<S: Scalar> World<S> {
             let island = islands.set_of(row) as usize;
             if !restless[island] {
                 let group = *groups[island].get_or_insert_with(|| marbles.sleep.new_group());
-                marbles.sleep.fall_asleep(row, group, marbles.position[row]);
+                let force = marbles.force.get(row).unwrap_or_else(Vec3::zero);
+                marbles.sleep.fall_asleep(row, group, marbles.position[row], force);
                 marbles.clear_motion(row);
             }
         }

@@ -2,7 +2,9 @@
 
 use std::num::NonZeroU32;
 
-use crate::math::{Point3, Scalar};
+use cgmath::Zero;
+
+use crate::math::{Point3, Scalar, Vec3};
 use crate::motion::rest::{self, lasts, time_of_rest};
 
 /// Number of a group of marbles that fell asleep together, and wake together.
@@ -22,11 +24,13 @@ pub(super) struct SleepColumns<S> {
     disturbed: Vec<Disturbed<S>>,
 }
 
-/// Place of a ball and its time of rest, as [`time_of_rest`] has them.
+/// Place of a ball and its time of rest, as [`time_of_rest`] has them, and the force, in N, that was applied to
+/// it when it fell asleep.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Rest<S> {
     place: [S; 4],
     time: S,
+    force: Vec3<S>,
 }
 
 /// A sleeper that was set or taken out: where it slept, and with whom.
@@ -52,7 +56,8 @@ impl<S> Default for SleepColumns<S> {
 
 impl<S: Scalar> Rest<S> {
     fn moving() -> Self {
-        Self { place: [S::max_value(); 4], time: S::from_f64(rest::MOVES) }
+        let (place, time) = ([S::max_value(); 4], S::from_f64(rest::MOVES));
+        Self { place, time, force: Vec3::zero() }
     }
 }
 
@@ -125,6 +130,11 @@ impl<S: Scalar> SleepColumns<S> {
         self.group.get(row).copied().flatten()
     }
 
+    /// Force that was applied to a sleeper when it fell asleep, in N.
+    pub fn force(&self, row: usize) -> Vec3<S> {
+        self.rest[row].force
+    }
+
     /// Number of marbles that sleep.
     pub fn sleepers(&self) -> usize {
         self.sleepers
@@ -162,7 +172,7 @@ impl<S: Scalar> SleepColumns<S> {
     /// Lets a marble rest for another `dt` seconds, if it `rests`: at this center and radius, with this
     /// square of its speed.
     pub fn update(&mut self, row: usize, at: &[S; 4], square: S, rests: bool, dt: S) {
-        let Rest { place, time } = &mut self.rest[row];
+        let Rest { place, time, .. } = &mut self.rest[row];
         *time = time_of_rest((place, *time), at, square, rests, dt);
     }
 
@@ -177,9 +187,16 @@ impl<S: Scalar> SleepColumns<S> {
         SleepGroup::MIN.saturating_add(self.last_group - 1)
     }
 
-    /// Lets a marble fall asleep where it is.
-    pub fn fall_asleep(&mut self, row: usize, group: SleepGroup, center: Point3<S>) {
-        self.rest[row].place = [center.x, center.y, center.z, S::zero()];
+    /// Lets a marble fall asleep at this center, under this force.
+    pub fn fall_asleep(
+        &mut self,
+        row: usize,
+        group: SleepGroup,
+        center: Point3<S>,
+        force: Vec3<S>,
+    ) {
+        let rest = &mut self.rest[row];
+        (rest.place, rest.force) = ([center.x, center.y, center.z, S::zero()], force);
         self.group[row] = Some(group);
         self.sleepers += 1;
     }

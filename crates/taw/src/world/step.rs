@@ -52,6 +52,7 @@ impl<S: Scalar> World<S> {
         self.sensors.begin_substep(&self.marbles);
         self.audit_before();
         self.wake_changed();
+        self.wake_pulled();
         self.scratch.substep = dt;
         if self.are_all_asleep() {
             self.forget_motion();
