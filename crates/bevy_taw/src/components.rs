@@ -205,7 +205,7 @@ pub struct MarbleRotation(#[reflect(remote = RotationReflect)] pub Rotation);
 /// [`SoftStep`](taw::response::Response::SoftStep), in a large heap part by part), and then cost
 /// next to nothing. They wake together when one of them is struck or written, when one beside them is
 /// written or despawned, when gravity changes, or a wall near them. By
-/// [`EventDriven`](taw::response::Response::EventDriven), they do not sleep.
+/// [`EventDriven`](taw::response::Response::EventDriven), all sleep or none.
 #[derive(Component, Clone, Copy, Debug, Default, PartialEq, Eq, Reflect)]
 #[reflect(Component, Debug, Default, PartialEq)]
 pub struct Sleeping;

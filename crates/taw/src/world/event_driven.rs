@@ -3,7 +3,7 @@
 
 use cgmath::InnerSpace;
 
-use super::method::Method;
+use super::method::{Method, SleepUnit};
 use super::walls::{SubShape, Walls};
 use super::{Precision, World};
 use crate::broad::Period;
@@ -44,8 +44,8 @@ impl<S: Scalar> Method<S> for EventDriven {
         false
     }
 
-    fn sleeps(&self) -> bool {
-        false
+    fn sleep_unit(&self) -> SleepUnit {
+        SleepUnit::World
     }
 }
 

@@ -46,10 +46,21 @@ pub(super) trait Method<S: Scalar> {
         true
     }
 
-    /// True if marbles that rest sleep in columns of the world: none of the three verbs changes them then.
-    fn sleeps(&self) -> bool {
-        true
+    /// Who sleeps with whom in columns of the world: none of the three verbs changes sleepers.
+    fn sleep_unit(&self) -> SleepUnit {
+        SleepUnit::Island
     }
+}
+
+/// Those that fall asleep and wake as one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum SleepUnit {
+    /// No marble sleeps in columns of the world.
+    None,
+    /// Marbles that touch, those that these touch, and so on.
+    Island,
+    /// All marbles: one that moves may meet any other one within the third verb.
+    World,
 }
 
 /// Method of a response.

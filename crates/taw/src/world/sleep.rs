@@ -3,7 +3,7 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::World;
-use super::method::method_of;
+use super::method::{SleepUnit, method_of};
 use super::sleep_columns::SleepGroup;
 use crate::Error;
 use crate::contact::Contact;
@@ -43,10 +43,10 @@ enum Support {
 }
 
 impl<S: Scalar> World<S> {
-    /// Returns true if a marble sleeps, which those of all responses do but
-    /// [`EventDriven`](crate::response::Response::EventDriven): once its island has rested, that is, the marble, those that
+    /// Returns true if a marble sleeps: once its island has rested, that is, the marble, those that
     /// it touches, those that these touch, and so on. (By [`SoftStep`](crate::response::Response::SoftStep), in a large heap
-    /// only those of some 500 neighbours in memory, so that it sleeps part by part.)
+    /// only those of some 500 neighbours in memory, so that it sleeps part by part; by
+    /// [`EventDriven`](crate::response::Response::EventDriven), only once all marbles have rested, and until any wakes.)
     ///
     /// A marble rests if for half a second, and longer if its radius is over 10 cm (five times √(r/g)), it was
     /// borne by something and either went no further than 5 % of its radius, or was slower than
@@ -76,9 +76,13 @@ impl<S: Scalar> World<S> {
         self.swarm.sleep_version() + self.marbles.sleep.version()
     }
 
-    /// Returns true if marbles may sleep by the model's method, in columns of the world.
-    fn may_sleep(&self) -> bool {
-        method_of::<S>(self.settings.model.response).sleeps() && self.swarm.model().sleeps
+    /// Who sleeps with whom in columns of the world.
+    fn sleep_unit(&self) -> SleepUnit {
+        if self.swarm.model().sleeps {
+            method_of::<S>(self.settings.model.response).sleep_unit()
+        } else {
+            SleepUnit::None
+        }
     }
 
     /// Returns true if there are marbles and all sleep.
@@ -90,10 +94,9 @@ impl<S: Scalar> World<S> {
     /// Wakes marbles that were set, those beside them, and those near walls that changed. Each verb begins
     /// with it.
     pub(super) fn wake_changed(&mut self) {
-        if !self.may_sleep() {
-            self.marbles.sleep.clear();
-        } else {
-            self.marbles.sleep.resize(self.marbles.len());
+        match self.sleep_unit() {
+            SleepUnit::None => self.marbles.sleep.clear(),
+            _ => self.marbles.sleep.resize(self.marbles.len()),
         }
         let disturbed = self.marbles.sleep.take_disturbed();
         if self.marbles.sleep.sleepers() > 0 {
@@ -104,6 +107,10 @@ impl<S: Scalar> World<S> {
                 });
             }
             self.find_sleepers_at_walls(&mut groups);
+            let someone_woke = !groups.is_empty() || !self.are_all_asleep();
+            if self.sleep_unit() == SleepUnit::World && someone_woke {
+                self.find_sleepers(&mut groups, |_, _| true);
+            }
             self.scratch.sleep.woken.clear();
             self.wake_groups(groups);
         } else {
@@ -190,7 +197,7 @@ impl<S: Scalar> World<S> {
 
     /// Lets marbles rest for another `dt` seconds, and fall asleep.
     pub(super) fn update_sleep(&mut self, dt: S) {
-        if !self.may_sleep() {
+        if self.sleep_unit() == SleepUnit::None {
             return;
         }
         let gravity = length(self.settings.gravity);
@@ -241,7 +248,7 @@ impl<S: Scalar> World<S> {
 
     /// Lets islands of which all have rested for long enough fall asleep.
     fn fall_asleep(&mut self, gravity: S) {
-        let rows = self.marbles.len();
+        let (unit, rows) = (self.sleep_unit(), self.marbles.len());
         let SleepScratch { islands, restless, .. } = &mut self.scratch.sleep;
         islands.reset(rows);
         let listed = self.contacts.mm.iter().map(|contact| (contact.a, contact.b));
@@ -257,6 +264,9 @@ impl<S: Scalar> World<S> {
             let rests = marbles.sleep.lasts(row, marbles.radius[row], gravity)
                 && marbles.sleeping_disabled.get(row).is_none();
             restless[islands.set_of(row) as usize] |= !rests;
+        }
+        if unit == SleepUnit::World && restless.contains(&true) {
+            return;
         }
         let mut groups = vec![None; rows];
         let asleep_before = marbles.sleep.sleepers();

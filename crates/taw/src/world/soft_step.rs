@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 
 use cgmath::{EuclideanSpace, Zero};
 
-use super::method::Method;
+use super::method::{Method, SleepUnit};
 use super::soft_impacts::{ChunkContacts, PredictedImpacts};
 use super::swarm::MAX_COORDINATE;
 use super::swept_walls::SweptWalls;
@@ -90,8 +90,8 @@ impl<S: Scalar> Method<S> for SoftStep {
         false
     }
 
-    fn sleeps(&self) -> bool {
-        false // its rows do
+    fn sleep_unit(&self) -> SleepUnit {
+        SleepUnit::None // its rows do
     }
 }
 

@@ -3,11 +3,13 @@
 use super::*;
 use taw::response::ContactLaw;
 
-const RESPONSES: [Response; 4] = [
+/// The last one lets all sleep or none.
+const RESPONSES: [Response; 5] = [
     Response::Impulse,
     Response::Displacement,
     Response::Penalty(ContactLaw::SpringDashpot),
     Response::Penalty(ContactLaw::HertzMindlin),
+    Response::EventDriven,
 ];
 
 /// Runs a test by each of these methods.
@@ -38,17 +40,69 @@ fn heaps_fall_asleep_about_what_must_not_or_does_not_move() {
 
 #[test]
 fn nothing_sleeps_in_mid_air_by_any_method() {
-    by(&RESPONSES, nothing_sleeps_in_mid_air);
+    by(&RESPONSES[..4], nothing_sleeps_in_mid_air);
     by(&RESPONSES, spawn::one_whose_support_goes_falls_whenever_it_goes);
 }
 
 #[test]
 fn random_changes_wake_and_who_sleeps_does_not_move() {
-    by(&RESPONSES, random::who_must_wake_wakes_and_who_sleeps_does_not_move);
+    by(&RESPONSES[..4], random::who_must_wake_wakes_and_who_sleeps_does_not_move);
 }
 
 #[test]
 fn one_that_comes_or_goes_wakes_no_other_one_by_any_method() {
-    by(&RESPONSES, spawn::one_that_comes_goes_or_changes_wakes_no_other_one);
-    by(&RESPONSES, spawn::a_block_that_goes_with_its_marble_wakes_no_other_one);
+    by(&RESPONSES[..4], spawn::one_that_comes_goes_or_changes_wakes_no_other_one);
+    by(&RESPONSES[..4], spawn::a_block_that_goes_with_its_marble_wakes_no_other_one);
+}
+
+/// A floor, a ball at rest on it, and one that is sent against it at this speed after three seconds.
+fn struck(sleeps: bool, speed: f32) -> [Vec3<f32>; 2] {
+    let mut world = world();
+    world.swarm.set_model(SwarmModel { sleeps, ..world.swarm.model() }).unwrap();
+    world.set_model(Model { detection: Detection::Swept, ..world.model() }).unwrap();
+    world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+    let ball = |x: f32| Marble::new(Point3::new(x, 0.2, 0.0), 0.2);
+    let resting = world.marbles.insert(ball(0.0)).unwrap();
+    steps(&mut world, 180);
+    assert_eq!(world.is_asleep(resting).unwrap(), sleeps);
+    let velocity = Vec3::new(speed, 0.0, 0.0);
+    let sent = world.marbles.insert(Marble { velocity, ..ball(-1.0) }).unwrap();
+    steps(&mut world, (2.0 / speed * 60.0) as u32 + 10);
+    assert!(!world.is_asleep(resting).unwrap());
+    [sent, resting].map(|id| world.marbles.get(id).unwrap().velocity)
+}
+
+#[test]
+fn a_sleeper_that_is_struck_goes_as_one_that_was_awake() {
+    by(&RESPONSES, || {
+        for speed in [1.0, 5.0, 100.0] {
+            let [asleep, awake] = [true, false].map(|sleeps| struck(sleeps, speed));
+            for (one, other) in asleep.into_iter().zip(awake) {
+                assert!((one - other).magnitude() < 1e-3 * speed, "{asleep:?}, {awake:?}");
+            }
+            assert!(asleep[1].x > 0.2 * speed, "{asleep:?}");
+        }
+    });
+}
+
+#[test]
+fn what_a_constant_force_bears_on_sleeps_until_it_changes() {
+    by(&RESPONSES, || {
+        let mut world = world();
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        let id = world.marbles.insert(Marble::new(Point3::new(0.0, 0.2, 0.0), 0.2)).unwrap();
+        let pulled = |world: &mut World<f32>, pull: f32, count: u32| {
+            for _ in 0..count {
+                world.marbles.apply_acceleration(id, Vec3::new(0.0, pull, 0.0)).unwrap();
+                steps(world, 1);
+            }
+            world.is_asleep(id).unwrap()
+        };
+        assert!(pulled(&mut world, 4.0, 180));
+        for pull in [3.0, 0.0] {
+            assert!(!pulled(&mut world, pull, 1) && pulled(&mut world, pull, 60));
+        }
+        assert!(!pulled(&mut world, 20.0, 30));
+        assert!(world.marbles.get(id).unwrap().position.y > 0.5);
+    });
 }
