@@ -160,6 +160,12 @@ impl<S: Scalar> World<S> {
                 let filter = |row: u32| self.marbles.filter_of_row(row as usize);
                 list.contacts.wm.retain(|c| self.walls.collides(c.a, filter(c.b)));
             }
+            for c in &mut list.contacts.wm {
+                c.material = self.wall_contact_material(c.a, c.b as usize);
+            }
+            for c in &mut list.contacts.mm {
+                c.material = self.marbles.contact_material(c.a as usize, c.b as usize);
+            }
             self.predict_impacts(list, &moving, dt);
         });
         let threads = self.swarm.threads();

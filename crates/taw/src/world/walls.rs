@@ -442,8 +442,4 @@ impl<S: Scalar> response::Colliders<S> for Walls<S> {
     fn surface_velocity(&self, wall: usize, point: Point3<S>, normal: Vec3<S>) -> Vec3<S> {
         self.surface_velocity_of_row(wall, point, normal)
     }
-
-    fn material(&self, wall: usize) -> Option<Material<S>> {
-        self.material.get(wall)
-    }
 }
