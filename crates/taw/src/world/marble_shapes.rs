@@ -29,8 +29,10 @@ impl<S: Scalar> Marbles<S> {
             0
         } else if along.abs() < end {
             3
+        } else if along < S::zero() {
+            1
         } else {
-            if along < S::zero() { 1 } else { 2 }
+            2
         }
     }
 

@@ -67,10 +67,11 @@ impl<S: Scalar> World<S> {
                 let ends = [-half, half].into_iter().take(if half > S::zero() { 2 } else { 1 });
                 for along in ends {
                     let center = self.marbles.position()[b] + self.anchor(b, along);
-                    let place = (plane.normal(), plane.signed_distance(center));
-                    let contact = self.wall_contact(SubShape { wall, index: 0 }, b, along, place);
-                    if contact.separation <= contact_distance {
-                        self.contacts.wm.push(contact);
+                    let distance = plane.signed_distance(center);
+                    if distance - self.marbles.radius()[b] <= contact_distance {
+                        let (part, place) =
+                            (SubShape { wall, index: 0 }, (plane.normal(), distance));
+                        self.contacts.wm.push(self.wall_contact(part, b, along, place));
                     }
                 }
             }
