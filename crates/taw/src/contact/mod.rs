@@ -1,5 +1,6 @@
 //! Narrow phase: distance, penetration, contact manifolds, ray casts and shape casts between two
-//! shapes, the lists of contacts of a step, and the materials of what touches. Candidate pairs come from [`broad`](crate::broad).
+//! shapes, the lists of contacts of a step, and the materials of what touches. Candidate pairs come
+//! from [`broad`](crate::broad).
 //!
 //! # Which function computes what
 //!
