@@ -2,7 +2,7 @@ use std::cmp::Ordering;
 
 use cgmath::Zero;
 
-use super::ContactMaterial;
+use super::{ContactMaterial, Material};
 use crate::math::{Scalar, Vec3, is_finite, length};
 
 /// Gap between two that touch, as a fraction of the shorter lever arm, at most.
@@ -61,12 +61,13 @@ pub struct Contact<S> {
 }
 
 impl<S: Scalar> Contact<S> {
-    /// Contact of a wall and a marble, not placed yet.
+    /// Contact of a wall and a marble without materials of their own, not placed yet.
     pub(crate) fn with_wall(wall: u32, part: u32, marble: u32) -> Self {
-        Self { part, ..Self::between_marbles(wall, marble) }
+        let material = Material::default().on_wall(None);
+        Self { part, material, ..Self::between_marbles(wall, marble) }
     }
 
-    /// Contact of two marbles, not placed yet.
+    /// Contact of two marbles without materials of their own, not placed yet.
     pub(crate) fn between_marbles(a: u32, b: u32) -> Self {
         let (zero, none) = (S::zero(), Vec3::zero());
         Self {

@@ -408,6 +408,11 @@ impl<S: Scalar> Walls<S> {
         self.material.get(row)
     }
 
+    /// Returns true if any wall has its own material.
+    pub(super) fn have_materials(&self) -> bool {
+        !self.material.is_empty()
+    }
+
     /// Number of insertions, removals and changes so far: unchanged as long as the walls are.
     #[must_use]
     pub fn version(&self) -> u64 {
