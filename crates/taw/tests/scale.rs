@@ -2,6 +2,7 @@
 //! scene at every size.
 
 use taw::prelude::*;
+use taw::swarm::SwarmModel;
 
 /// A small heap, dropped into a box, after two seconds of its own time: lengths are
 /// `scale` times as long, times the square root of that.
@@ -9,6 +10,8 @@ fn heap(model: Model, scale: f32, root: f32) -> World<f32> {
     assert_eq!(root * root, scale);
     let mut world = World::default();
     world.set_model(model).unwrap();
+    // How long something rests before it sleeps is in seconds, at every size.
+    world.swarm.set_model(SwarmModel { sleeps: false, ..SwarmModel::default() }).unwrap();
     for (normal, offset) in [
         (Vec3::unit_y(), 0.0),
         (Vec3::unit_x(), -1.5),

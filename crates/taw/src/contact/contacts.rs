@@ -35,7 +35,7 @@ pub struct Contact<S> {
     pub part: u32,
     /// Feature id: identifies the features that meet, stable as long as they do, since a capsule often
     /// touches with several points. That of `a` in the upper 16 bits, that of `b` in the lower ones: 0 for a
-    /// ball and for a wall, 1 and 2 for the ends of a capsule, 3 for its side. Solvers find the impulses of
+    /// ball and for a wall, 1 and 2 for the ends of a capsule, 3 for all points of its side. Solvers find the impulses of
     /// the last substep by pair, `part` and `feature`.
     pub feature: u32,
     /// Contact anchor on the axis of each body, in metres from its center: zero except for

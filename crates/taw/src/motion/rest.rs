@@ -41,7 +41,8 @@ pub(crate) fn time_of_rest<S: Scalar>(
     let (zero, near, steady) = (S::zero(), S::from_f64(PLACE), S::from_f64(STEADY));
     let [x, y, z] = [at[0] - place[0], at[1] - place[1], at[2] - place[2]];
     let is_near = x * x + y * y + z * z <= near * near * at[3] * at[3];
-    let is_steady = |first: S| square <= steady * steady * first * first;
+    // What has no speed and moves all the same is moved by corrections of overlap.
+    let is_steady = |first: S| first > zero && square <= steady * steady * first * first;
     if rests && time >= zero && (is_near || is_steady(place[3])) {
         time + dt
     } else if !is_near {

@@ -1,4 +1,4 @@
-use cgmath::{EuclideanSpace, One, Rotation};
+use cgmath::{EuclideanSpace, One, Rotation, Zero};
 
 use super::integrate_rotation;
 use crate::Error;
@@ -28,6 +28,11 @@ impl<S: Scalar> WallMotion<S> {
     #[must_use]
     pub fn velocity_at(&self, point: Point3<S>) -> Vec3<S> {
         self.velocity + self.angular_velocity.cross(point - self.pivot)
+    }
+
+    /// Returns true for a wall that stays where it is.
+    pub(crate) fn is_zero(&self) -> bool {
+        self.velocity.is_zero() && self.angular_velocity.is_zero()
     }
 
     /// The motion, if it is finite.

@@ -47,7 +47,8 @@ pub struct SwarmModel {
     /// Material of balls that have none of their own. Tangential restitution acts where restitution
     /// is above zero; [`Tier::Lab`] uses no number of it.
     pub material: Material<f32>,
-    /// Lets balls at rest fall asleep in [`Tier::Full`], with those that they touch.
+    /// Lets balls at rest fall asleep in [`Tier::Full`], with those that they touch; and marbles by every
+    /// response.
     pub sleeps: bool,
 }
 

@@ -422,6 +422,11 @@ impl<S: Scalar> Marbles<S> {
         self.radius[row] + self.half_length(row)
     }
 
+    /// Returns true if a torque is applied to a marble.
+    pub(super) fn is_twisted(&self, row: usize) -> bool {
+        self.torque.get(row).is_some_and(|torque| !torque.dual().is_zero())
+    }
+
     /// Returns true if a marble neither moves nor turns.
     pub(super) fn is_still(&self, row: usize) -> bool {
         self.velocity[row].is_zero() && self.angular_velocity.get(row).is_none_or(Vec3::is_zero)

@@ -9,6 +9,7 @@ use crate::Error;
 use crate::contact::Contact;
 use crate::handle::MarbleId;
 use crate::math::{Point3, Scalar, UnionFind, Vec3, length};
+use crate::motion::Mass;
 use crate::motion::rest::{self, is_slow};
 use crate::response::{KeyedByContact, Response};
 use crate::shape::Aabb3;
@@ -19,8 +20,8 @@ const SEARCH_INTERVAL: u32 = 8;
 /// Scratch memory of sleep.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SleepScratch {
-    /// Identity of the walls among which sleepers fell asleep.
-    walls: u64,
+    /// Identity of the walls at the end of the last step.
+    pub walls: u64,
     /// Version of the sleepers whose impulses are out of the cache.
     set_aside_at: u64,
     /// Substeps since islands were searched.
@@ -28,18 +29,19 @@ pub(super) struct SleepScratch {
     woken: Vec<u32>,
     support: Vec<Support>,
     islands: UnionFind,
+    /// By island.
     restless: Vec<bool>,
+    is_borne: Vec<bool>,
 }
 
-/// What a marble was borne by in a substep.
+/// Support of a marble in a substep; of several, the last one of these counts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 enum Support {
     #[default]
     Nothing,
-    /// Something at rest.
-    Still,
-    /// A wall that moves.
-    Moving,
+    Marble,
+    Wall,
+    MovingWall,
 }
 
 impl<S: Scalar> World<S> {
@@ -53,8 +55,9 @@ impl<S: Scalar> World<S> {
     /// .05 √(g r) and did not speed up.
     ///
     /// A sleeping marble costs next to nothing, and has no velocity. It wakes when it or one
-    /// beside it is set or removed, when gravity or a wall near it changes, when one that is awake touches it, and
-    /// when one wakes that fell asleep with it. (By `SoftStep`, only a ball of over twice that speed wakes it, or one
+    /// beside it is set or removed, when gravity, a force field, a force that is applied to it or a wall near it
+    /// changes, when one that is awake comes so near that it may touch it within the substep, and
+    /// when one wakes that fell asleep with it. Without gravity, none sleeps. (By `SoftStep`, only a ball of over twice that speed wakes it, or one
     /// of infinite mass, or one that leaves its place beside it. By other responses, one that balls of a
     /// [swarm](Self::swarm) press does not sleep.)
     ///
@@ -99,33 +102,31 @@ impl<S: Scalar> World<S> {
             _ => self.marbles.sleep.resize(self.marbles.len()),
         }
         let disturbed = self.marbles.sleep.take_disturbed();
-        if self.marbles.sleep.sleepers() > 0 {
-            let mut groups: Vec<_> = disturbed.iter().map(|it| it.group).collect();
-            for sleeper in &disturbed {
-                self.find_sleepers(&mut groups, |center, reach| {
-                    length(center - sleeper.center) <= reach + sleeper.reach
-                });
-            }
-            self.find_sleepers_at_walls(&mut groups);
-            let someone_woke = !groups.is_empty() || !self.are_all_asleep();
-            if self.sleep_unit() == SleepUnit::World && someone_woke {
-                self.find_sleepers(&mut groups, |_, _| true);
-            }
-            self.scratch.sleep.woken.clear();
-            self.wake_groups(groups);
-        } else {
-            self.scratch.sleep.walls = self.walls.identity();
-            self.restore_impulses();
+        self.walls.mark_seen();
+        if self.marbles.sleep.sleepers() == 0 {
+            return self.restore_impulses();
         }
+        self.wake_groups(disturbed.iter().map(|it| it.group).collect());
+        let mut groups = Vec::new();
+        for sleeper in &disturbed {
+            self.find_sleepers(&mut groups, |center, reach| {
+                length(center - sleeper.center) <= reach + sleeper.reach
+            });
+        }
+        self.find_sleepers_at_walls(&mut groups);
+        let someone_woke = !groups.is_empty() || !self.are_all_asleep();
+        if self.sleep_unit() == SleepUnit::World && someone_woke {
+            self.find_sleepers(&mut groups, |_, _| true);
+        }
+        self.wake_groups(groups);
     }
 
     /// Wakes sleepers to which another force is applied than when they fell asleep.
     pub(super) fn wake_pulled(&mut self) {
         let marbles = &self.marbles;
         let force = |row: usize| marbles.force.get(row).unwrap_or_else(Vec3::zero);
-        let is_pulled = |row: &usize| {
-            force(*row) != marbles.sleep.force(*row) || marbles.torque.get(*row).is_some()
-        };
+        let is_pulled =
+            |row: &usize| force(*row) != marbles.sleep.force(*row) || marbles.is_twisted(*row);
         let pulled: Vec<_> = marbles.sleep.asleep().filter(is_pulled).collect();
         if !pulled.is_empty() {
             pulled.into_iter().for_each(|row| self.marbles.disturb(row));
@@ -142,29 +143,32 @@ impl<S: Scalar> World<S> {
         groups.extend(asleep.filter_map(|row| self.marbles.sleep.group_of(row)));
     }
 
-    /// Adds the groups of sleepers near walls that changed since the last look.
-    fn find_sleepers_at_walls(&mut self, groups: &mut Vec<SleepGroup>) {
-        let now = self.walls.identity();
-        let since = std::mem::replace(&mut self.scratch.sleep.walls, now);
-        if since == now {
+    /// Adds the groups of sleepers near walls that changed since the last step: those may be on their way
+    /// throughout this one.
+    fn find_sleepers_at_walls(&self, groups: &mut Vec<SleepGroup>) {
+        let since = self.scratch.sleep.walls;
+        if since == self.walls.identity() {
             return;
         }
         let mut regions = Vec::new();
         if self.walls.changes().visit_since(since, |region| regions.push(region.clone())) {
+            regions.extend(self.walls.turning_regions());
             for region in &regions {
                 self.find_sleepers(groups, |center, reach| is_within(region, center, reach));
             }
         } else {
             self.find_sleepers(groups, |_, _| true);
         }
-        self.walls.mark_seen();
     }
 
     /// Wakes groups, and lists their rows as woken.
     fn wake_groups(&mut self, mut groups: Vec<SleepGroup>) {
-        groups.sort_unstable();
-        groups.dedup();
-        self.marbles.sleep.wake(&groups, &mut self.scratch.sleep.woken);
+        self.scratch.sleep.woken.clear();
+        if !groups.is_empty() {
+            groups.sort_unstable();
+            groups.dedup();
+            self.marbles.sleep.wake(&groups, &mut self.scratch.sleep.woken);
+        }
         self.restore_impulses();
     }
 
@@ -184,23 +188,23 @@ impl<S: Scalar> World<S> {
         if groups.is_empty() {
             return false;
         }
-        self.scratch.sleep.woken.clear();
         self.wake_groups(groups);
         let context = self.settings.step_context(self.scratch.substep);
         if context.dt > S::zero() {
             let woken = &self.scratch.sleep.woken;
             let is_woken = |row: usize| woken.binary_search(&(row as u32)).is_ok();
             self.marbles.integrate_rows(context, &mut self.scratch.stopped, is_woken);
+            self.audit_forces();
         }
         true
     }
 
     /// Lets marbles rest for another `dt` seconds, and fall asleep.
     pub(super) fn update_sleep(&mut self, dt: S) {
-        if self.sleep_unit() == SleepUnit::None {
+        let gravity = length(self.settings.gravity);
+        if self.sleep_unit() == SleepUnit::None || gravity == S::zero() {
             return;
         }
-        let gravity = length(self.settings.gravity);
         self.find_support();
         let mut someone_lasts = false;
         for row in 0..self.marbles.len() {
@@ -210,9 +214,9 @@ impl<S: Scalar> World<S> {
             let (center, radius) = (self.marbles.position[row], self.marbles.radius[row]);
             let square = self.marbles.velocity[row].magnitude2();
             let rests = match self.scratch.sleep.support[row] {
-                _ if self.marbles.mass(row).is_infinite() => self.marbles.is_still(row),
-                Support::Still => is_slow(square, gravity, radius),
-                Support::Nothing | Support::Moving => false,
+                _ if self.marbles.own_mass(row) == Mass::Infinite => self.marbles.is_still(row),
+                Support::Marble | Support::Wall => is_slow(square, gravity, radius),
+                Support::Nothing | Support::MovingWall => false,
             };
             let at = [center.x, center.y, center.z, radius];
             self.marbles.sleep.update(row, &at, square, rests, dt);
@@ -233,23 +237,25 @@ impl<S: Scalar> World<S> {
         let bears =
             |contact: &Contact<S>| contact.normal_impulse > S::zero() || contact.is_touching();
         for contact in self.contacts.wm.iter().filter(|contact| bears(contact)) {
-            let moves = self.walls.motion_of_row(contact.a as usize).is_some();
-            let by = if moves { Support::Moving } else { Support::Still };
+            let motion = self.walls.motion_of_row(contact.a as usize);
+            let moves = motion.is_some_and(|motion| !motion.is_zero());
+            let by = if moves { Support::MovingWall } else { Support::Wall };
             let its = &mut support[contact.b as usize];
             *its = by.max(*its);
         }
         for contact in self.contacts.mm.iter().filter(|contact| bears(contact)) {
             for row in [contact.a, contact.b] {
                 let its = &mut support[row as usize];
-                *its = Support::Still.max(*its);
+                *its = Support::Marble.max(*its);
             }
         }
     }
 
-    /// Lets islands of which all have rested for long enough fall asleep.
+    /// Lets islands of which all have rested for long enough fall asleep, if a wall or a marble of infinite mass
+    /// bears them: others fall, however slowly.
     fn fall_asleep(&mut self, gravity: S) {
         let (unit, rows) = (self.sleep_unit(), self.marbles.len());
-        let SleepScratch { islands, restless, .. } = &mut self.scratch.sleep;
+        let SleepScratch { islands, is_borne, restless, support, .. } = &mut self.scratch.sleep;
         islands.reset(rows);
         let listed = self.contacts.mm.iter().map(|contact| (contact.a, contact.b));
         // Those that pressed each other and have opened since are not listed.
@@ -259,13 +265,24 @@ impl<S: Scalar> World<S> {
         }
         restless.clear();
         restless.resize(rows, false);
+        is_borne.clear();
+        is_borne.resize(rows, false);
         let marbles = &mut self.marbles;
         for row in marbles.sleep.awake() {
             let rests = marbles.sleep.lasts(row, marbles.radius[row], gravity)
-                && marbles.sleeping_disabled.get(row).is_none();
-            restless[islands.set_of(row) as usize] |= !rests;
+                && marbles.sleeping_disabled.get(row).is_none()
+                && !marbles.is_twisted(row);
+            let island = islands.set_of(row) as usize;
+            restless[island] |= !rests;
+            is_borne[island] |=
+                support[row] >= Support::Wall || marbles.own_mass(row) == Mass::Infinite;
         }
-        if unit == SleepUnit::World && restless.contains(&true) {
+        for (restless, is_borne) in restless.iter_mut().zip(is_borne) {
+            *restless |= !*is_borne;
+        }
+        if unit == SleepUnit::World
+            && marbles.sleep.awake().any(|row| restless[islands.set_of(row) as usize])
+        {
             return;
         }
         let mut groups = vec![None; rows];

@@ -102,8 +102,10 @@ impl<S: Scalar> SleepColumns<S> {
     /// and those near it wake with the next verb.
     pub fn disturb(&mut self, row: usize, reach: S) {
         let Some(rest) = self.rest.get_mut(row) else { return };
-        rest.time = S::from_f64(rest::MOVES);
-        if let Some(group) = self.group[row] {
+        let time = std::mem::replace(&mut rest.time, S::from_f64(rest::MOVES));
+        if let Some(group) = self.group[row]
+            && time >= S::zero()
+        {
             let [x, y, z, _] = rest.place;
             self.disturbed.push(Disturbed { center: Point3::new(x, y, z), reach, group });
         }

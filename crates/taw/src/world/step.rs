@@ -54,11 +54,15 @@ impl<S: Scalar> World<S> {
         self.wake_changed();
         self.wake_pulled();
         self.scratch.substep = dt;
+        let method = method_of(self.settings.model.response);
         if self.are_all_asleep() {
+            // For one that is set before the other verbs.
+            self.store_poses();
             self.forget_motion();
+            self.scratch.reach = method.contact_distance(self, dt);
             return Ok(());
         }
-        method_of(self.settings.model.response).integrate(self, dt)
+        method.integrate(self, dt)
     }
 
     /// Integrates marbles by a method: velocities, positions, rotations.
@@ -144,8 +148,10 @@ impl<S: Scalar> World<S> {
     pub(super) fn solve_listed_contacts(&mut self, method: &(impl Method<S> + ?Sized), dt: S) {
         self.walls.update_tree(); // some may have been taken out since contacts were looked for
         let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
-        self.contacts.wm.retain(|c| c.a < walls && c.b < marbles);
-        self.contacts.mm.retain(|c| c.a < marbles && c.b < marbles);
+        // Nor is a sleeper one of those that were listed: it has the row of one that was taken out.
+        let is_there = |row: u32| row < marbles && !self.marbles.sleep.is_asleep(row as usize);
+        self.contacts.wm.retain(|c| c.a < walls && is_there(c.b));
+        self.contacts.mm.retain(|c| is_there(c.a) && is_there(c.b));
         self.release_separated_stops();
         self.contacts.sort();
         self.audit_contacts();
@@ -156,9 +162,9 @@ impl<S: Scalar> World<S> {
         self.quarantine_non_finite();
         self.roll_what_only_shows();
         self.settings.limits.apply(&mut self.marbles);
+        self.update_sleep(dt);
         self.audit_after();
         self.marbles.wrap();
-        self.update_sleep(dt);
     }
 
     /// Makes marbles that turn for show only roll over the walls that they touch.
@@ -203,6 +209,7 @@ impl<S: Scalar> World<S> {
     /// Ends a step, that of the [swarm](Self::step_swarm) included: walls are at the end of their
     /// ways, forces that were applied are forgotten, and sensors find the balls of the swarm.
     pub fn end_step(&mut self) {
+        self.scratch.sleep.walls = self.walls.identity();
         self.walls.finish_step();
         self.marbles.clear_forces();
         self.swarm.clear_accelerations();

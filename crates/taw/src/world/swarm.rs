@@ -152,6 +152,7 @@ impl<S: Scalar> World<S> {
             let turned = change(&before.spin_velocity, &after.spin_velocity);
             self.marbles.apply_delta(*marble, moved, faster, turned);
         }
+        self.wake_changed();
         self.stop_bounces_at_walls();
     }
 }

@@ -6,18 +6,18 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use crate::math::Scalar;
 use crate::shape::Aabb3;
 
-/// Changes kept at most; of more than that since the swarm looked, the last one stands for the rest.
+/// Changes kept at most; of more than that since a solver looked, the last one stands for the rest.
 /// A reader that is further behind takes all walls for changed.
 const MAX_CHANGES: usize = 1024;
 
-/// Regions in which walls changed, in order. Two are equal if the swarm knows of all changes, or has
+/// Regions in which walls changed, in order. Two are equal if a solver knows of all changes, or has
 /// some to learn of, in both.
 #[derive(Clone, Debug)]
 pub(super) struct WallChanges<S> {
     /// Identity of the walls before the first change of the log.
     base: u64,
     log: VecDeque<Change<S>>,
-    /// Identity of the walls when the swarm last looked at them.
+    /// Identity of the walls when a solver last looked at them.
     seen: u64,
 }
 
@@ -72,7 +72,7 @@ impl<S: Scalar> WallChanges<S> {
         self.log.back().map_or(self.base, |change| change.identity)
     }
 
-    /// Notes that the swarm knows of all changes.
+    /// Notes that a solver knows of all changes.
     pub fn mark_seen(&mut self) {
         self.seen = self.identity();
     }

@@ -1,3 +1,5 @@
+use cgmath::Zero;
+
 use super::sparse_column::SparseColumn;
 use super::wall_changes::WallChanges;
 use super::wall_shape::WallShape;
@@ -5,7 +7,7 @@ use crate::Error;
 use crate::broad::CollisionLayers;
 use crate::contact::ClosestPoints;
 use crate::handle::{Handle, Handles};
-use crate::math::{Point3, Scalar, Vec3, is_finite_point};
+use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};
 use crate::shape::{Aabb3, Bvh, Capsule, Plane, PointProjection};
@@ -206,7 +208,7 @@ impl<S: Scalar> Walls<S> {
         self.changes.identity()
     }
 
-    /// Notes that the swarm knows of all changes.
+    /// Notes that a solver knows of all changes.
     pub(super) fn mark_seen(&mut self) {
         self.changes.mark_seen();
     }
@@ -367,6 +369,21 @@ impl<S: Scalar> Walls<S> {
     /// Returns true if the wall at an index was set to another pose since the last step.
     pub(super) fn has_moved(&self, row: usize) -> bool {
         self.moved.get(row).is_some()
+    }
+
+    /// Boxes about all that walls sweep that turn on their way through this step.
+    pub(super) fn turning_regions(&self) -> impl Iterator<Item = Aabb3<S>> + '_ {
+        let rows = (0..self.shapes.len()).filter(|row| self.has_moved(*row));
+        rows.filter_map(|row| {
+            let motion = self.motion.get(row).filter(|it| !it.angular_velocity.is_zero())?;
+            let bounds = self.shapes[row].bounding_box()?;
+            let way = |corner: Point3<S>| (corner - motion.pivot).map(S::abs);
+            let [low, high] = [bounds.min, bounds.max].map(way);
+            let farthest =
+                length(Vec3::new(low.x.max(high.x), low.y.max(high.y), low.z.max(high.z)));
+            let reach = Vec3::new(farthest, farthest, farthest);
+            Some(Aabb3 { min: motion.pivot - reach, max: motion.pivot + reach })
+        })
     }
 
     /// Moves walls that were set to another pose since the last step, and have a motion, to their

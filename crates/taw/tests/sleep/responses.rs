@@ -2,6 +2,7 @@
 
 use super::*;
 use taw::response::ContactLaw;
+use taw::world::Damping;
 
 /// The last one lets all sleep or none.
 const RESPONSES: [Response; 5] = [
@@ -104,5 +105,86 @@ fn what_a_constant_force_bears_on_sleeps_until_it_changes() {
         }
         assert!(!pulled(&mut world, 20.0, 30));
         assert!(world.marbles.get(id).unwrap().position.y > 0.5);
+    });
+}
+
+#[test]
+fn the_energy_audit_has_what_sleep_takes() {
+    by(&RESPONSES, || {
+        let (mut world, _, ids) = heap();
+        world.enable_energy_audit(true);
+        let mut before = world.energy().total();
+        for _ in 0..720 {
+            steps(&mut world, 1);
+            let audit = world.energy_audit().unwrap();
+            let lost = audit.friction + audit.restitution + audit.resistance + audit.solver;
+            let now = world.energy().total();
+            assert!((before - lost - now).abs() < 1e-4 * before.abs().max(1.0), "{audit:?}");
+            before = now;
+        }
+        let asleep = asleep(&world, &ids);
+        assert!(asleep == ids.len() || RESPONSE.get() == Response::EventDriven, "{asleep}");
+    });
+}
+
+/// Friction holds the ball against it.
+#[test]
+fn no_marble_sleeps_that_a_torque_acts_on() {
+    by(&RESPONSES, || {
+        let mut world = world();
+        world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+        let grips = Material { rolling_resistance: 0.5, ..Material::default() };
+        let ball = Marble::new(Point3::new(0.0, 0.2, 0.0), 0.2);
+        let id = world.marbles.insert(Marble { material: Some(grips), ..ball }).unwrap();
+        for _ in 0..180 {
+            world.marbles.apply_torque(id, Vec3::new(0.0, 0.0, 1.0)).unwrap();
+            steps(&mut world, 1);
+            assert!(!world.is_asleep(id).unwrap());
+        }
+        steps(&mut world, 90);
+        assert!(world.is_asleep(id).unwrap());
+    });
+}
+
+/// Whenever it comes: it may be on its way through a step while the ball falls asleep.
+#[test]
+fn a_wall_that_comes_within_a_step_wakes_whom_it_meets() {
+    by(&[RESPONSES[0], RESPONSES[1], RESPONSES[4]], || {
+        for speed in [2.0, 20.0] {
+            let mut world = world();
+            world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+            let way = speed * DT;
+            let at = |x: f32| block([x - 2.0, 0.0, -1.0], [x, 1.0, 1.0]);
+            let wall = world.walls.insert(at(-0.1 - 0.7 * way)).unwrap();
+            let id = world.marbles.insert(Marble::new(Point3::new(0.0, 0.1, 0.0), 0.1)).unwrap();
+            for step in 0..60 {
+                let mut world = world.clone();
+                world.walls.set(wall, at(-0.1 + 0.3 * way)).unwrap();
+                let motion = sliding(Vec3::new(speed, 0.0, 0.0));
+                world.walls.set_motion(wall, Some(motion)).unwrap();
+                steps(&mut world, 1);
+                world.walls.set_motion(wall, None).unwrap();
+                steps(&mut world, 60);
+                let x = world.marbles.get(id).unwrap().position.x;
+                assert!(x > 0.25 * way, "{speed} m/s after {step} steps: at {x} m");
+            }
+            steps(&mut world, 60);
+        }
+    });
+}
+
+#[test]
+fn two_that_only_touch_each_other_do_not_sleep() {
+    by(&RESPONSES, || {
+        let mut world = world();
+        let damping = Damping { linear: 400.0, angular: 0.0 };
+        let ids = [5.0, 5.1999].map(|y| {
+            let ball = Marble::new(Point3::new(0.0, y, 0.0), 0.1);
+            world.marbles.insert(Marble { damping, ..ball }).unwrap()
+        });
+        for _ in 0..300 {
+            steps(&mut world, 1);
+            assert_eq!(asleep(&world, &ids), 0);
+        }
     });
 }

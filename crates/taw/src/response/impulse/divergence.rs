@@ -42,10 +42,10 @@ impl<S: Scalar> SolverBodies<'_, S> {
         rows: &mut Rows<S>,
         settings: &SolverSettings<S>,
     ) {
-        let diverged: Vec<_> = islands.list.iter().map(Island::is_diverging).collect();
-        if !diverged.contains(&true) {
+        if !islands.list.iter().any(Island::is_diverging) {
             return;
         }
+        let diverged: Vec<_> = islands.list.iter().map(Island::is_diverging).collect();
         for (island, diverged) in islands.list.iter_mut().zip(&diverged) {
             island.diverged = *diverged;
         }
