@@ -22,7 +22,7 @@ pub(crate) const LEFT: f64 = -2.0;
 
 /// Returns true for a ball of this radius, in metres, with this square of a speed, in m²/s², that is slow
 /// enough to rest under gravity, in m/s².
-#[inline(always)]
+#[inline]
 pub(crate) fn is_slow<S: Scalar>(square: S, gravity: S, radius: S) -> bool {
     square < S::from_f64(SLOW) * S::from_f64(SLOW) * gravity * radius
 }
@@ -30,7 +30,7 @@ pub(crate) fn is_slow<S: Scalar>(square: S, gravity: S, radius: S) -> bool {
 /// Time of rest in seconds, or [`MOVES`] or [`LEFT`], `dt` seconds after it was `time`, of a ball with this
 /// place (center in metres, and speed in m/s when it began to rest), center and radius, and square of its
 /// speed. `rests` says if it is slow and borne.
-#[inline(always)]
+#[inline]
 pub(crate) fn time_of_rest<S: Scalar>(
     (place, time): (&mut [S; 4], S),
     at: &[S; 4],
@@ -58,7 +58,7 @@ pub(crate) fn time_of_rest<S: Scalar>(
 
 /// Returns true if a ball of this radius, in metres, has rested for long enough to sleep under gravity, in
 /// m/s².
-#[inline(always)]
+#[inline]
 pub(crate) fn lasts<S: Scalar>(time: S, radius: S, gravity: S) -> bool {
     let falls = S::from_f64(FALLS);
     time > S::from_f64(TIME) && time * time * gravity > falls * falls * radius

@@ -129,7 +129,9 @@ impl<S: Scalar> World<S> {
             |row: &usize| force(*row) != marbles.sleep.force(*row) || marbles.is_twisted(*row);
         let pulled: Vec<_> = marbles.sleep.asleep().filter(is_pulled).collect();
         if !pulled.is_empty() {
-            pulled.into_iter().for_each(|row| self.marbles.disturb(row));
+            for row in pulled {
+                self.marbles.disturb(row);
+            }
             self.wake_changed();
         }
     }
@@ -151,7 +153,7 @@ impl<S: Scalar> World<S> {
             return;
         }
         let mut regions = Vec::new();
-        if self.walls.changes().visit_since(since, |region| regions.push(region.clone())) {
+        if self.walls.changes().visit_since(since, |region| regions.push(*region)) {
             regions.extend(self.walls.turning_regions());
             for region in &regions {
                 self.find_sleepers(groups, |center, reach| is_within(region, center, reach));
