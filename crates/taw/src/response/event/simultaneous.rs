@@ -5,9 +5,8 @@ use cgmath::{InnerSpace, Zero};
 use super::EventDriven;
 use super::collide::Collision;
 use crate::constraint::{ContactImpulse, FrictionCone};
-use crate::contact::ContactMaterial;
 use crate::math::Vec3;
-use crate::response::BallRotation;
+use crate::response::{BallRotation, Material};
 
 /// Maximum number of iterations.
 const MAX_ROUNDS: u32 = 1000;
@@ -130,8 +129,7 @@ impl EventDriven {
                 collisions.iter_mut().zip(relative_velocity).zip(initial_velocity)
             {
                 let normal = c.impact.normal;
-                let ContactMaterial { restitution, friction, tangential_restitution, .. } =
-                    c.material;
+                let Material { restitution, friction, tangential_restitution, .. } = c.material;
                 let split = |velocity| ContactImpulse::split(velocity, normal);
                 let (initial, now) = (split(*initial_velocity), split(relative_velocity));
                 let target = ContactImpulse {
