@@ -37,15 +37,13 @@ pub(super) struct Island<S> {
     pub time_since_impact: S,
     /// Largest velocity change in this iteration and in the last one, in m/s.
     pub change: S,
-    pub residual: S,
+    residual: S,
     /// Number of contact solves, over all iterations.
     pub solve_count: u64,
     /// True once the velocity changes are within the tolerance.
     pub converged: bool,
     /// True if an earlier solution ended before convergence.
     pub incomplete: bool,
-    /// True once iterations diverged: only plain passes are left.
-    pub diverged: bool,
     /// True where acceleration pays.
     pub accelerating: bool,
     search: Search<S>,
@@ -142,7 +140,6 @@ impl<S: Scalar> Island<S> {
             solve_count: 0,
             converged: false,
             incomplete: false,
-            diverged: false,
             accelerating: false,
             search: Search::new(),
         }
@@ -153,9 +150,8 @@ impl<S: Scalar> Island<S> {
         // The rest is below what the next iteration could resolve.
         self.converged = self.change <= tolerance;
         // Close to convergence plain iterations come to rest, which the search does not quite.
-        self.accelerating = !self.converged
-            && !self.diverged
-            && self.change > restitution_threshold * S::from_f64(1e-5);
+        self.accelerating =
+            !self.converged && self.change > restitution_threshold * S::from_f64(1e-5);
         self.residual = self.change;
         self.change = S::zero();
     }

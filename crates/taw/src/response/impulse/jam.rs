@@ -31,7 +31,7 @@ const ROUNDING: f64 = 256.0;
 pub(super) struct Load<S> {
     mass: S,
     /// Largest relative velocity at a contact, in m/s.
-    pub relative_speed: S,
+    relative_speed: S,
     /// Speed of the fastest wall or marble of infinite mass in contact, in units of the island.
     carrier_speed: S,
     /// Twice the kinetic energy.

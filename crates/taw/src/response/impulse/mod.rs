@@ -4,7 +4,6 @@
 
 mod cache;
 mod contact;
-mod divergence;
 mod energy_guard;
 mod islands;
 mod jam;
@@ -114,7 +113,6 @@ impl BodyA {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Scratch<S> {
     initial_velocity: Vec<Vec3<S>>,
-    initial_spin: Vec<Vec3<S>>,
     constraints: Vec<Constraint<S>>,
     islands: Islands<S>,
     rows: Rows<S>,
@@ -305,7 +303,6 @@ pub(crate) fn solve_contacts<S: Scalar>(
     let settings = context.settings;
     let Scratch {
         initial_velocity,
-        initial_spin,
         constraints,
         islands,
         rows,
@@ -314,7 +311,8 @@ pub(crate) fn solve_contacts<S: Scalar>(
         separations,
         uncorrected,
     } = scratch;
-    marbles.save_motion([initial_velocity, initial_spin]);
+    initial_velocity.clear();
+    initial_velocity.extend_from_slice(marbles.velocity);
     prepare(marbles, contacts, context, constraints, islands);
     if settings.resolve_jams {
         marbles.measure_loads(constraints, islands);
@@ -322,10 +320,6 @@ pub(crate) fn solve_contacts<S: Scalar>(
     marbles.warm_start(constraints, cache);
     marbles.scale_warm_start(constraints, islands, energies);
     iterate(marbles, constraints, islands, rows, settings);
-    if settings.resolve_jams {
-        let initial = [&**initial_velocity, initial_spin];
-        marbles.solve_diverged(constraints, islands, initial, rows, settings);
-    }
     marbles.limit_energy(constraints, islands, energies, full_restitution, rows, settings);
     if settings.resolve_jams {
         marbles.resolve_jams(constraints, islands, energies, rows, settings);

@@ -33,16 +33,7 @@ pub(crate) fn solve_velocities<S: Scalar>(
     settings: &SolverSettings<S>,
     scratch: &mut Scratch<S>,
 ) {
-    let Scratch {
-        initial_velocity,
-        initial_spin,
-        constraints,
-        islands,
-        rows,
-        energies,
-        full_restitution,
-        ..
-    } = scratch;
+    let Scratch { constraints, islands, rows, energies, full_restitution, .. } = scratch;
     constraints.clear();
     let prepared = contacts
         .iter()
@@ -52,7 +43,6 @@ pub(crate) fn solve_velocities<S: Scalar>(
     for c in constraints.iter() {
         marbles.apply_impulse_pair(c, -c.impulse());
     }
-    marbles.save_motion([initial_velocity, initial_spin]);
     for c in constraints.iter_mut() {
         c.initial_relative_velocity = marbles.relative_velocity_of(c);
         c.initial_relative_spin = marbles.relative_spin(c);
@@ -65,8 +55,6 @@ pub(crate) fn solve_velocities<S: Scalar>(
     }
     marbles.scale_warm_start(constraints, islands, energies);
     iterate(marbles, constraints, islands, rows, settings);
-    let initial = [&**initial_velocity, initial_spin];
-    marbles.solve_diverged(constraints, islands, initial, rows, settings);
     marbles.limit_energy(constraints, islands, energies, full_restitution, rows, settings);
     marbles.resolve_jams(constraints, islands, energies, rows, settings);
     for (c, contact) in constraints.iter().zip(contacts) {
