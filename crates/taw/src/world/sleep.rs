@@ -57,9 +57,9 @@ impl<S: Scalar> World<S> {
     /// A sleeping marble costs next to nothing, and has no velocity. It wakes when it or one
     /// beside it is set or removed, when gravity, a force field, a force that is applied to it or a wall near it
     /// changes, when one that is awake comes so near that it may touch it within the substep, and
-    /// when one wakes that fell asleep with it. Without gravity, none sleeps. (By `SoftStep`, only a ball of over twice that speed wakes it, or one
-    /// of infinite mass, or one that leaves its place beside it. By other responses, one that balls of a
-    /// [swarm](Self::swarm) press does not sleep.)
+    /// when one wakes that fell asleep with it. Without gravity, none sleeps, nor one that a torque acts on. (By
+    /// `SoftStep`, only a ball of over twice that speed wakes it, or one of infinite mass, or one that leaves its
+    /// place beside it. By other responses, one that balls of a [swarm](Self::swarm) press does not sleep.)
     ///
     /// # Errors
     /// [`Error::NoSuchMarble`].
