@@ -5,6 +5,7 @@ use std::time::Instant;
 use taw::Error;
 use taw::prelude::*;
 use taw::scene::Scene;
+use taw::swarm::SwarmModel;
 
 use crate::trade::trace::{RunConfig, ScalarType};
 
@@ -23,7 +24,7 @@ pub struct Stages {
     pub bytes: usize,
 }
 
-/// Runs a scene to its end. `allocated` says how many bytes are.
+/// Runs a scene to its end, in which nothing sleeps. `allocated` says how many bytes are.
 ///
 /// # Errors
 /// Errors of the world.
@@ -47,6 +48,8 @@ fn measure_in<S: Scalar>(
     let mut times = [0; 3].map(|_| Vec::with_capacity(steps));
     let before = allocated();
     let mut running = scene.run::<S>(model)?;
+    let awake = SwarmModel { sleeps: false, ..running.world.swarm.model() };
+    running.world.swarm.set_model(awake)?;
     let (step, substep) = (S::from_f64(step), S::from_f64(step / f64::from(model.passes())));
     let mut contacts = 0;
     for _ in 0..steps {
