@@ -10,6 +10,7 @@ mod limits;
 use taw::frame::{AxisAngle, Pose};
 use taw::prelude::*;
 use taw::shape::{Aabb, Capsule, HeightField, Hull, Mesh};
+use taw::swarm::SwarmModel;
 use taw::world::{WallMotion, WallShape};
 
 const DT: f64 = 1.0 / 60.0;
@@ -24,6 +25,8 @@ fn world<S: Scalar>(rotation: Rotation, substeps: u32) -> World<S> {
         ..Model::default()
     };
     world.set_model(model).unwrap();
+    // What is slow beside an unstable balance would sleep there.
+    world.swarm.set_model(SwarmModel { sleeps: false, ..SwarmModel::default() }).unwrap();
     world
 }
 
