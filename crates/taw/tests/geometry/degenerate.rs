@@ -3,7 +3,7 @@
 //!
 //! Each is asked at five scales, three offsets and three rotations, in both scalars and both
 //! orders. The numbering is that of the families in which such cases are usually listed.
-//! `cargo test -p taw --test degenerate -- --nocapture` prints how many there are.
+//! `cargo test -p taw --test geometry degenerate -- --nocapture` prints how many there are.
 
 mod cases;
 mod pairs;

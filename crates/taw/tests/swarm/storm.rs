@@ -1,5 +1,5 @@
 //! Random scenes of swarms that nobody chose, judged by what holds in every scene.
-//! `SWARM_STORM=1000 cargo test -p taw --release --test swarm_storm` runs so many of them.
+//! `SWARM_STORM=1000 cargo test -p taw --release --test swarm storm` runs so many of them.
 
 use taw::prelude::*;
 use taw::swarm::{Ball, SimdLevel, Swarm, SwarmModel, Tier};
