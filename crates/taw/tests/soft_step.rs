@@ -14,6 +14,8 @@ mod leaning;
 mod moving_walls;
 #[path = "soft_step/overlaps.rs"]
 mod overlaps;
+#[path = "soft_step/precision.rs"]
+mod precision;
 #[path = "soft_step/state.rs"]
 mod state;
 #[path = "soft_step/tangential.rs"]
