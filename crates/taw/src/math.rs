@@ -1,13 +1,26 @@
 //! Aliases of cgmath's types and the few functions that it lacks. Independent of shapes and time.
 
+#![allow(
+    clippy::inline_always,
+    reason = "kernels are compiled for the instructions of their caller"
+)]
+
 use cgmath::num_traits::{self, Float, ToPrimitive};
 use cgmath::{BaseFloat, InnerSpace};
 
+#[cfg(target_arch = "x86_64")]
+mod avx2;
+mod lanes;
 mod real;
+pub(crate) mod simd;
 mod union_find;
+mod vec3_wide;
 
+pub(crate) use lanes::{Lanes, PerScalar};
 pub(crate) use real::{Real, RealVector};
+pub(crate) use simd::{Kernel, LANES, Row, Simd, SimdLevel};
 pub(crate) use union_find::UnionFind;
+pub(crate) use vec3_wide::Vec3Wide;
 
 /// Displacement, velocity or direction.
 pub type Vec3<S> = cgmath::Vector3<S>;
@@ -21,9 +34,10 @@ pub type Mat3<S> = cgmath::Matrix3<S>;
 pub type Mat4<S> = cgmath::Matrix4<S>;
 
 /// Floating-point type of a world: `f32` or `f64`.
-pub trait Scalar: BaseFloat + Default + Send + Sync + 'static {
+pub trait Scalar: BaseFloat + Default + Send + Sync + Lanes + 'static {
     /// Rounds a constant to this type.
     #[must_use]
+    #[inline]
     fn from_f64(value: f64) -> Self {
         // Both implementors convert every f64; NaN is unreachable.
         num_traits::cast(value).unwrap_or_else(Self::nan)
@@ -31,6 +45,7 @@ pub trait Scalar: BaseFloat + Default + Send + Sync + 'static {
 
     /// Converts to `f64`, exactly.
     #[must_use]
+    #[inline]
     fn as_f64(self) -> f64 {
         ToPrimitive::to_f64(&self).unwrap_or(f64::NAN)
     }

@@ -29,7 +29,7 @@ impl<R: Real> FrictionCone<R> {
     /// Coulomb's cone.
     #[inline(always)]
     pub fn new(friction: R) -> Self {
-        let zero = R::splat(0.0);
+        let zero = R::constant(0.0);
         Self { friction, extra_friction: zero, min_normal_impulse: zero }
     }
 

@@ -5,10 +5,10 @@ use crate::math::{Real, RealVector, Scalar, Vec3, any_direction, normalize_and_l
 
 /// Sine of the angle between normal and gravity up to which a ball is on the top of another: some
 /// roundings of `f32`.
-const UPRIGHT: f32 = 1e-6;
+const UPRIGHT: f64 = 1e-6;
 /// Speed across the normal after an impact, over the approach speed: an unevenness of a tenth of a
 /// millimetre on a ball of ten centimetres.
-pub(crate) const TIPPING: f32 = 1e-3;
+pub(crate) const TIPPING: f64 = 1e-3;
 
 /// Speed across the normal by which balls leave the top that they fall onto at this approach speed; zero if
 /// the normal is not upright.
@@ -19,9 +19,9 @@ pub(crate) fn tipping_speed<R: Real>(
     approach_speed: R,
 ) -> R {
     let across = gravity.reject_from(normal);
-    let limit = gravity.inner_product(gravity) * R::splat(UPRIGHT * UPRIGHT);
+    let limit = gravity.inner_product(gravity) * R::constant(UPRIGHT * UPRIGHT);
     let on_top = across.inner_product(across);
-    limit.select_gt(on_top, approach_speed * R::splat(TIPPING), R::splat(0.0))
+    limit.select_gt(on_top, approach_speed * R::constant(TIPPING), R::constant(0.0))
 }
 
 /// Normal of the impact of two rows: an upright one leans in a direction of each pair's own, by so much
@@ -50,9 +50,9 @@ mod tests {
         for leaning in [one, other] {
             assert!((leaning.magnitude() - 1.0).abs() < 1e-15);
             let slope = (leaning - up).magnitude();
-            assert!(slope > 0.0 && slope <= f64::from(TIPPING), "{slope}");
+            assert!(slope > 0.0 && slope <= TIPPING, "{slope}");
         }
-        assert!((one - other).magnitude() > 0.1 * f64::from(TIPPING), "{one:?} {other:?}");
+        assert!((one - other).magnitude() > 0.1 * TIPPING, "{one:?} {other:?}");
         let askew = Vec3::new(2e-6, 1.0, 0.0).normalize();
         assert_eq!(tipped(askew, gravity, [0, 1]), askew);
         assert_eq!(tipped(up, Vec3::zero(), [0, 1]), up, "without gravity nothing is on top");

@@ -1,10 +1,5 @@
 //! Arithmetic of one number or of several side by side, for formulas that are written once for both.
 
-#![allow(
-    clippy::inline_always,
-    reason = "kernels are compiled for the instructions of their caller"
-)]
-
 use std::ops::{Add, Div, Mul, Sub};
 
 use cgmath::InnerSpace;
@@ -13,14 +8,21 @@ use cgmath::num_traits::Float;
 use super::{Scalar, Vec3, length};
 
 /// A number (`f32`, `f64`), or several of them side by side (SIMD).
-pub(crate) trait Real:
+pub trait Real:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
 {
+    /// One of them.
+    type Scalar: Scalar;
     /// Three of them.
     type Vector: RealVector<Self>;
 
+    /// Puts this number side by side with itself.
+    fn splat(x: Self::Scalar) -> Self;
     /// Rounds a constant to this type.
-    fn splat(x: f32) -> Self;
+    #[inline(always)]
+    fn constant(x: f64) -> Self {
+        Self::splat(Self::Scalar::from_f64(x))
+    }
     /// The larger of two; `other` where they do not compare.
     fn max(self, other: Self) -> Self;
     /// `yes` where `self` is greater than `other`, else `no`.
@@ -28,7 +30,7 @@ pub(crate) trait Real:
 }
 
 /// Vector of three [real](Real) numbers.
-pub(crate) trait RealVector<R>:
+pub trait RealVector<R>:
     Copy + Add<Output = Self> + Sub<Output = Self> + Mul<R, Output = Self>
 {
     fn inner_product(self, other: Self) -> R;
@@ -43,11 +45,12 @@ pub(crate) trait RealVector<R>:
 }
 
 impl<S: Scalar> Real for S {
+    type Scalar = S;
     type Vector = Vec3<S>;
 
     #[inline(always)]
-    fn splat(x: f32) -> Self {
-        S::from_f64(f64::from(x))
+    fn splat(x: S) -> Self {
+        x
     }
 
     #[inline(always)]

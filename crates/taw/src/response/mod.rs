@@ -68,7 +68,7 @@ pub enum Response {
     /// its height to rounding; but an approach slower than what gravity adds in two substeps ends without
     /// one, in any direction.
     ///
-    /// Balls only, in `f32` in any world, and no periods. Marbles may have their own mass, material,
+    /// Balls only, and no periods. Marbles may have their own mass, material,
     /// gravity scale, damping, forces and rotation model; integrators have no effect, nor has tangential
     /// restitution where restitution is zero. Forces are evaluated once a step. A ball stops at thin
     /// walls and other balls at any speed, whatever the world's [detection](crate::world::Detection);

@@ -9,32 +9,32 @@ use super::{Ball, BallId, Swarm};
 use crate::Error;
 use crate::broad::{CollisionLayers, IgnoredPairs};
 use crate::error::{finite, finite_vector};
-use crate::math::{Point3, Vec3};
+use crate::math::{Point3, Scalar, Vec3};
 use crate::motion::{Mass, Motion};
 use crate::response::Material;
 use crate::workers::{DisjointSlice, parallel_for_rows};
 
 /// Forces on single balls.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct BallForces {
+pub(super) struct BallForces<S> {
     /// Factors on gravity, by slot; one beyond the end.
-    gravity_scales: Vec<f32>,
+    gravity_scales: Vec<S>,
     /// Accelerations in the next step, in m/s².
-    accelerations: Vec<(BallId, Vec3<f32>)>,
+    accelerations: Vec<(BallId, Vec3<S>)>,
 }
 
-impl BallForces {
+impl<S: Scalar> BallForces<S> {
     pub fn bytes(&self) -> usize {
         of(&self.gravity_scales) + of(&self.accelerations)
     }
 }
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// State of a ball: what to insert to have another one like it.
     ///
     /// # Errors
     /// [`Error::NoSuchBall`].
-    pub fn get(&self, ball: BallId) -> Result<Ball, Error> {
+    pub fn get(&self, ball: BallId) -> Result<Ball<S>, Error> {
         let row = self.row(ball)?;
         let ([x, y, z, radius], [u, v, w, inverse_mass]) = (self.at[row], self.velocity[row]);
         Ok(Ball {
@@ -49,7 +49,7 @@ impl Swarm {
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], also for a marble's.
-    pub fn material(&self, ball: BallId) -> Result<Material<f32>, Error> {
+    pub fn material(&self, ball: BallId) -> Result<Material<S>, Error> {
         let slot = self.own_slot(ball)?;
         Ok(self.surfaces.get(slot).map_or(self.model.material, |surface| surface.material))
     }
@@ -63,7 +63,7 @@ impl Swarm {
     pub fn set_material(
         &mut self,
         ball: BallId,
-        material: Option<Material<f32>>,
+        material: Option<Material<S>>,
     ) -> Result<(), Error> {
         let slot = self.own_slot(ball)?;
         let material = material.map(Material::validated).transpose()?;
@@ -141,9 +141,9 @@ impl Swarm {
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], also for a marble's.
-    pub fn gravity_scale(&self, ball: BallId) -> Result<f32, Error> {
+    pub fn gravity_scale(&self, ball: BallId) -> Result<S, Error> {
         let slot = self.own_slot(ball)?;
-        Ok(self.ball_forces.gravity_scales.get(slot as usize).copied().unwrap_or(1.0))
+        Ok(self.ball_forces.gravity_scales.get(slot as usize).copied().unwrap_or(S::one()))
     }
 
     /// Changes the factor on gravity for a ball: zero for one that floats, negative for one that
@@ -151,11 +151,11 @@ impl Swarm {
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], also for a marble's; [`Error::NotFinite`].
-    pub fn set_gravity_scale(&mut self, ball: BallId, gravity_scale: f32) -> Result<(), Error> {
+    pub fn set_gravity_scale(&mut self, ball: BallId, gravity_scale: S) -> Result<(), Error> {
         let slot = self.own_slot(ball)? as usize;
         let gravity_scale = finite("gravity_scale", gravity_scale)?;
-        if gravity_scale != 1.0 && self.ball_forces.gravity_scales.len() <= slot {
-            self.ball_forces.gravity_scales.resize(slot + 1, 1.0);
+        if gravity_scale != S::one() && self.ball_forces.gravity_scales.len() <= slot {
+            self.ball_forces.gravity_scales.resize(slot + 1, S::one());
         }
         if let Some(scale) = self.ball_forces.gravity_scales.get_mut(slot) {
             *scale = gravity_scale;
@@ -169,11 +169,7 @@ impl Swarm {
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], also for a marble's; [`Error::NotFinite`].
-    pub fn apply_acceleration(
-        &mut self,
-        ball: BallId,
-        acceleration: Vec3<f32>,
-    ) -> Result<(), Error> {
+    pub fn apply_acceleration(&mut self, ball: BallId, acceleration: Vec3<S>) -> Result<(), Error> {
         self.own_slot(ball)?;
         let names = ["acceleration.x", "acceleration.y", "acceleration.z"];
         self.ball_forces.accelerations.push((ball, finite_vector(names, acceleration)?));
@@ -186,7 +182,7 @@ impl Swarm {
     }
 
     /// Changes of velocity by applied accelerations in a step of `dt` seconds.
-    pub(crate) fn applied_changes(&self, dt: f32) -> impl Iterator<Item = VelocityChange> + '_ {
+    pub(crate) fn applied_changes(&self, dt: S) -> impl Iterator<Item = VelocityChange<S>> + '_ {
         self.ball_forces.accelerations.iter().filter_map(move |(ball, acceleration)| {
             Some(VelocityChange { slot: self.slot_of(*ball)?, change: (acceleration * dt).into() })
         })
@@ -199,7 +195,7 @@ impl Swarm {
         self.surfaces.set_kinematic(slot, false);
         self.sleep.sleepless.remove(slot);
         if let Some(scale) = self.ball_forces.gravity_scales.get_mut(slot as usize) {
-            *scale = 1.0;
+            *scale = S::one();
         }
     }
 
@@ -214,15 +210,15 @@ impl Swarm {
     /// None where there are neither.
     pub(crate) fn field_changes(
         &self,
-        acceleration: Option<impl Fn(Motion<f32>, f32) -> Vec3<f32> + Sync>,
-        gravity: Vec3<f32>,
-        dt: f32,
-    ) -> Vec<VelocityChange> {
+        acceleration: Option<impl Fn(Motion<S>, S) -> Vec3<S> + Sync>,
+        gravity: Vec3<S>,
+        dt: S,
+    ) -> Vec<VelocityChange<S>> {
         if acceleration.is_none() && self.ball_forces.gravity_scales.is_empty() {
             return Vec::new();
         }
         let rows = self.ids.rows();
-        let none = VelocityChange { slot: 0, change: [0.0; 3] };
+        let none = VelocityChange { slot: 0, change: [S::zero(); 3] };
         let mut changes = vec![none; rows.len()];
         let parts = DisjointSlice::new(&mut changes);
         parallel_for_rows(self.scratch.threads, rows.len(), |slots| {
@@ -238,17 +234,17 @@ impl Swarm {
                 let motion =
                     Motion { position: Point3::new(x, y, z), velocity: Vec3::new(u, v, w) };
                 let scale =
-                    self.ball_forces.gravity_scales.get(slot as usize).copied().unwrap_or(1.0);
+                    self.ball_forces.gravity_scales.get(slot as usize).copied().unwrap_or(S::one());
                 let fields = acceleration.as_ref().map_or_else(Vec3::zero, |acceleration| {
                     acceleration(motion, inverse_mass.abs().recip())
                 });
                 if !self.body_slots.contains(slot) {
-                    let numbers = ((gravity * (scale - 1.0) + fields) * dt).into();
+                    let numbers = ((gravity * (scale - S::one()) + fields) * dt).into();
                     *change = VelocityChange { slot, change: numbers };
                 }
             }
         });
-        changes.retain(|change| change.change != [0.0; 3]);
+        changes.retain(|change| change.change != [S::zero(); 3]);
         changes
     }
 }

@@ -1,7 +1,7 @@
 //! Graph colouring of pairs: batches in which no ball is twice.
 
 use super::impulse_cache::reserve_slack;
-use super::simd::LANES;
+use crate::math::LANES;
 
 /// Wide constraint: eight pairs, none of which has a ball in common with another. As rows after a
 /// first one, so that two bytes suffice.

@@ -6,27 +6,27 @@ use std::sync::{Mutex, PoisonError};
 use cgmath::{EuclideanSpace, Zero};
 
 use super::kernels::{MAX_MAGNITUDE, largest, squared};
-use super::simd::Row;
 use super::surfaces::{Surface, SurfaceOf};
+use super::wall_contact::xyz;
 use super::{BallId, Swarm, Tier};
 use crate::broad::CollisionLayers;
-use crate::math::{Point3, Quat, Scalar, Vec3, is_finite};
+use crate::math::{Point3, Quat, Row, Scalar, Vec3, is_finite};
 use crate::motion::integrate_rotation;
 use crate::response::Impact;
 use crate::workers::{DisjointSlice, parallel_for};
 
 /// State of a marble as a row.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Body {
+pub(crate) struct Body<S> {
     pub slot: u32,
     /// Center and radius, in metres.
-    pub at: Row,
+    pub at: Row<S>,
     /// Velocity in m/s, and inverse mass in 1/kg.
-    pub velocity: Row,
+    pub velocity: Row<S>,
     /// Radius times angular velocity, in m/s.
-    pub spin: Row,
+    pub spin: Row<S>,
     /// None for that of the swarm's model.
-    pub surface: Option<Surface>,
+    pub surface: Option<Surface<S>>,
     pub layers: CollisionLayers,
     /// Set for infinite mass: a body of any finite mass stops at walls.
     pub is_kinematic: bool,
@@ -71,21 +71,21 @@ impl PartialEq for SyncToken {
 
 /// Change of velocity that a body gets besides gravity in a step, in m/s.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct VelocityChange {
+pub(crate) struct VelocityChange<S> {
     pub slot: u32,
-    pub change: [f32; 3],
+    pub change: [S; 3],
 }
 
 /// Path of a kinematic body in a step, which only its damping changes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct KinematicPath {
+pub(super) struct KinematicPath<S> {
     slot: u32,
     /// Center at the begin, in metres, and radius.
-    at: Row,
+    at: Row<S>,
     /// Velocity at the begin in m/s, and inverse mass in 1/kg.
-    velocity: Row,
+    velocity: Row<S>,
     /// Change of velocity in the step, in m/s.
-    change: [f32; 3],
+    change: [S; 3],
 }
 
 /// Columns of the marbles that a step changes.
@@ -111,15 +111,7 @@ pub(crate) struct MarbleRow<S> {
     pub radius: S,
 }
 
-pub(super) fn number<S: Scalar>(x: f32) -> S {
-    S::from_f64(f64::from(x))
-}
-
-pub(super) fn vector<S: Scalar>(row: &Row) -> Vec3<S> {
-    Vec3::new(number(row[0]), number(row[1]), number(row[2]))
-}
-
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Makes bodies rows of the same solve as all others, or proxies that the world's solver moves.
     pub(crate) fn set_bodies_are_rows(&mut self, bodies_are_rows: bool) {
         if bodies_are_rows == self.bodies_are_rows {
@@ -160,21 +152,21 @@ impl Swarm {
     /// Returns true if a marble is still as [`Self::read_bodies`] left it, and the body has this
     /// radius, in metres, inverse mass, in 1/kg, surface and layers, and is kinematic and sleepless or not.
     #[inline]
-    pub(crate) fn is_as_read<S: Scalar>(
+    pub(crate) fn is_as_read(
         &self,
         slot: u32,
         marble: MarbleRow<S>,
-        [row_radius, inverse_mass]: [f32; 2],
-        (surface, layers): (Option<Surface>, CollisionLayers),
+        [row_radius, inverse_mass]: [S; 2],
+        (surface, layers): (Option<Surface<S>>, CollisionLayers),
         [is_kinematic, is_sleepless]: [bool; 2],
     ) -> bool {
         let row = self.ids.rows()[slot as usize] as usize;
         let [at, velocity] = [&self.at[row], &self.velocity[row]];
         let MarbleRow { position, velocity: speed, spin, radius } = marble;
-        let turns = || spin.is_none_or(|spin| spin == vector::<S>(&self.spin[row]) / radius);
-        Point3::from_vec(vector(at)) == position
+        let turns = || spin.is_none_or(|spin| spin == xyz(&self.spin[row]) / radius);
+        Point3::from_vec(xyz(at)) == position
             && at[3] == row_radius
-            && vector(velocity) == speed
+            && xyz(velocity) == speed
             && velocity[3].abs() == inverse_mass
             && turns()
             && self.surfaces.get(slot) == surface
@@ -184,7 +176,7 @@ impl Swarm {
     }
 
     /// Takes over what changed of bodies, and wakes those.
-    pub(crate) fn write_bodies(&mut self, bodies: &[Body]) {
+    pub(crate) fn write_bodies(&mut self, bodies: &[Body<S>]) {
         self.set_layers_of_slots(bodies.iter().map(|body| (body.slot, body.layers)));
         let (mut resized, mut resurfaced, mut lighter) = (false, false, Vec::new());
         for body in bodies {
@@ -202,7 +194,7 @@ impl Swarm {
             self.skin_left[row] -= squared(less(body.at, at)).sqrt() + (body.at[3] - at[3]).abs();
             let fraction = self.velocity[row][3] / body.velocity[3];
             // Passes take back impulses up to twice too large.
-            if 0.0 < fraction && fraction < 0.5 {
+            if S::zero() < fraction && fraction < S::from_f64(0.5) {
                 lighter.push((row, fraction));
             }
             (self.at[row], self.velocity[row]) = (body.at, body.velocity);
@@ -224,7 +216,7 @@ impl Swarm {
 
     /// Sets the velocity changes besides gravity in the next step, in m/s; those of one slot add up.
     /// Wakes those for which it is another one than in the last step.
-    pub(crate) fn set_velocity_changes(&mut self, mut now: Vec<VelocityChange>) {
+    pub(crate) fn set_velocity_changes(&mut self, mut now: Vec<VelocityChange<S>>) {
         now.sort_by_key(|change| change.slot);
         now.dedup_by(|next, sum| {
             let is_same = next.slot == sum.slot;
@@ -235,13 +227,13 @@ impl Swarm {
         });
         // What is no number stops the body, as what overflows does; but it must equal itself.
         for change in now.iter_mut().flat_map(|change| &mut change.change) {
-            *change = if change.is_nan() { f32::INFINITY } else { *change };
+            *change = if change.is_nan() { S::infinity() } else { *change };
         }
         let before = std::mem::take(&mut self.velocity_changes);
         let (mut old, mut new) = (before.iter().peekable(), now.iter().peekable());
         while let Some(slot) = [old.peek(), new.peek()].into_iter().flatten().map(|c| c.slot).min()
         {
-            let of_slot = |change: &&VelocityChange| change.slot == slot;
+            let of_slot = |change: &&VelocityChange<S>| change.slot == slot;
             if old.next_if(of_slot) != new.next_if(of_slot)
                 && let Some(row) = self.ids.rows().get(slot as usize).copied()
                 && row != NO_ROW
@@ -253,7 +245,7 @@ impl Swarm {
     }
 
     /// Applies a fraction of these, where bodies are awake. In that time gravity adds `fall`, in m/s.
-    pub(super) fn apply_velocity_changes(&mut self, part: f32, fall: Vec3<f32>) {
+    pub(super) fn apply_velocity_changes(&mut self, part: S, fall: Vec3<S>) {
         let rows = self.ids.rows();
         for VelocityChange { slot, change } in &self.velocity_changes {
             let Some(velocity) = self.velocity.get_mut(rows[*slot as usize] as usize) else {
@@ -262,7 +254,7 @@ impl Swarm {
             if !velocity[3].is_sign_negative() {
                 let before = *velocity;
                 for (speed, change) in velocity.iter_mut().zip(change) {
-                    *speed += change * part;
+                    *speed += *change * part;
                 }
                 if let Some(work) = self.scratch.outside_work.get_mut(*slot as usize) {
                     work.record_force(&before, velocity, fall);
@@ -272,8 +264,8 @@ impl Swarm {
     }
 
     /// Saves where kinematic bodies are at the begin of a step of `dt` seconds.
-    pub(super) fn save_kinematic_paths(&mut self, dt: f32) {
-        let fall: [f32; 3] = (self.gravity.unwrap_or_else(Vec3::zero) * dt).into();
+    pub(super) fn save_kinematic_paths(&mut self, dt: S) {
+        let fall: [S; 3] = (self.gravity.unwrap_or_else(Vec3::zero) * dt).into();
         let changes = &self.velocity_changes;
         let paths = &mut self.scratch.kinematic_paths;
         paths.clear();
@@ -282,10 +274,14 @@ impl Swarm {
             let (at, velocity) = (self.at[row], self.velocity[row]);
             let own = changes.binary_search_by_key(&slot, |change| change.slot);
             // Its own change takes gravity back, but for rounding.
-            let change = own.map_or([0.0; 3], |i| {
+            let change = own.map_or([S::zero(); 3], |i| {
                 [0, 1, 2].map(|axis| {
                     let sum = changes[i].change[axis] + fall[axis];
-                    if sum.abs() > 4.0 * f32::EPSILON * fall[axis].abs() { sum } else { 0.0 }
+                    if sum.abs() > S::from_f64(4.0) * S::epsilon() * fall[axis].abs() {
+                        sum
+                    } else {
+                        S::zero()
+                    }
                 })
             });
             let is_awake = velocity[3].is_sign_positive();
@@ -294,10 +290,10 @@ impl Swarm {
     }
 
     /// Puts kinematic bodies where they are after a fraction of the step of `dt` seconds, whatever they met.
-    pub(super) fn follow_kinematic_paths(&mut self, part: f32, dt: f32) {
+    pub(super) fn follow_kinematic_paths(&mut self, part: S, dt: S) {
         for KinematicPath { slot, at, velocity, change } in &self.scratch.kinematic_paths {
             let row = self.ids.rows()[*slot as usize] as usize;
-            let mean = |axis: usize| velocity[axis] + 0.5 * part * change[axis];
+            let mean = |axis: usize| velocity[axis] + S::from_f64(0.5) * part * change[axis];
             let [x, y, z] = [0, 1, 2].map(|axis| at[axis] + mean(axis) * (part * dt));
             let at = [x, y, z, at[3]];
             self.skin_left[row] -= squared(less(at, self.at[row])).sqrt();
@@ -310,16 +306,20 @@ impl Swarm {
 
     /// Moves bodies that no wall bears by these changes times some seconds: back by half of what
     /// they moved too far by them, as a drift does for gravity.
-    pub(super) fn correct_free_flight(&mut self, time: f32) {
+    pub(super) fn correct_free_flight(&mut self, time: S) {
         let rows = self.ids.rows();
         for VelocityChange { slot, change } in &self.velocity_changes {
             let row = rows[*slot as usize] as usize;
             let Some(at) = self.at.get_mut(row) else { continue };
             let [x, y, z] = *change;
-            let is_sane = largest([x, y, z, 0.0]) < MAX_MAGNITUDE; // else it has stopped the body
-            if self.spin[row][3] == 0.0 && !self.velocity[row][3].is_sign_negative() && is_sane {
+            // Else it has stopped the body.
+            let is_sane = largest([x, y, z, S::zero()]) < S::from_f64(MAX_MAGNITUDE);
+            if self.spin[row][3] == S::zero()
+                && !self.velocity[row][3].is_sign_negative()
+                && is_sane
+            {
                 for (x, change) in at.iter_mut().zip(change) {
-                    *x += change * time;
+                    *x += *change * time;
                 }
             }
         }
@@ -329,7 +329,7 @@ impl Swarm {
     /// [none](NO_ROW). What slept through the step is as it was. Rotations go on by `dt` seconds;
     /// with none, only what has just fallen asleep is read. Marbles whose angular velocity overflows
     /// are added to `stopped`, in any order.
-    pub(crate) fn read_bodies<S: Scalar>(
+    pub(crate) fn read_bodies(
         &mut self,
         marble_of_slot: &[u32],
         columns: BodyColumns<S>,
@@ -361,10 +361,10 @@ impl Swarm {
                 let marble = marble as usize;
                 // SAFETY: a marble is that of one slot, and a slot that of one row.
                 unsafe {
-                    *position.row(marble) = Point3::from_vec(vector(&places[row]));
-                    *velocity.row(marble) = vector(&speeds[row]);
+                    *position.row(marble) = Point3::from_vec(xyz(&places[row]));
+                    *velocity.row(marble) = xyz(&speeds[row]);
                     if turns && !surfaces.row(row as u32).rotation_locked {
-                        let rate: Vec3<S> = vector(&spins[row]) / radius[marble];
+                        let rate: Vec3<S> = xyz(&spins[row]) / radius[marble];
                         if !is_finite(rate) {
                             let mut stopped =
                                 non_finite.lock().unwrap_or_else(PoisonError::into_inner);
@@ -382,7 +382,7 @@ impl Swarm {
     }
 
     /// Bounces of the step, if bodies are rows: of slots, in the order in which they were solved.
-    pub(crate) fn noted_impacts(&self) -> &[Impact<f32>] {
+    pub(crate) fn noted_impacts(&self) -> &[Impact<S>] {
         &self.scratch.impacts
     }
 
@@ -408,11 +408,11 @@ impl Swarm {
     }
 
     /// Position and velocity of a ball, and the speed of its surface by spin, in m/s.
-    pub(crate) fn motion_of<S: Scalar>(&self, ball: BallId) -> Option<(Point3<S>, Vec3<S>, f32)> {
+    pub(crate) fn motion_of(&self, ball: BallId) -> Option<(Point3<S>, Vec3<S>, S)> {
         let row = self.ids.row(ball)?;
         // The lab's tier has no spin.
-        let surface_speed = self.spin.get(row).map_or(0.0, |spin| squared(*spin).sqrt());
-        Some((Point3::from_vec(vector(&self.at[row])), vector(&self.velocity[row]), surface_speed))
+        let surface_speed = self.spin.get(row).map_or(S::zero(), |spin| squared(*spin).sqrt());
+        Some((Point3::from_vec(xyz(&self.at[row])), xyz(&self.velocity[row]), surface_speed))
     }
 
     /// Number that changes whenever a ball falls asleep, wakes, comes or goes.
@@ -433,6 +433,6 @@ impl Swarm {
 }
 
 /// The first three numbers of a row, less those of another.
-fn less(a: Row, b: Row) -> Row {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2], 0.0]
+fn less<S: Scalar>(a: Row<S>, b: Row<S>) -> Row<S> {
+    [a[0] - b[0], a[1] - b[1], a[2] - b[2], S::zero()]
 }

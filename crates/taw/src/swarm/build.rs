@@ -8,37 +8,36 @@ use super::grid::{Grid, reorder, reorder_rows};
 use super::impulse_cache::{ImpulseCache, shrink_slack};
 use super::kernels::squared;
 use super::neighbours::{FindPairs, NeighbourLists, Search};
-use super::simd::SimdLevel;
 use super::step::{inverse_masses, listed_planes};
 use super::surfaces::SurfaceOf;
 use super::sweeps::{CrowdSweep, Sweep};
 use super::{Stage, StaticGeometry, Swarm, walls};
-use crate::math::length;
+use crate::math::{Scalar, SimdLevel, length};
 use crate::workers::{DisjointSlice, parallel_filter, parallel_for, parallel_for_rows};
 
 /// Balls in a chunk at least.
 const MIN_CHUNK_ROWS: u32 = 512;
 /// Largest displacement between two searches for pairs: as far as a ball goes in so many steps at
 /// its speed,
-const STEPS: f32 = 12.0;
+const STEPS: f64 = 12.0;
 /// or so many times the skin at most, if it is a fast mover.
-const FAR: f32 = 16.0;
+const FAR: f64 = 16.0;
 
 /// Where a ball has fewer pairs than this, and pairs are searched again after fewer steps than
 /// this, the skin becomes up to so much wider.
-const SPARSE: f32 = 2.0;
+const SPARSE: f64 = 2.0;
 pub(super) const SOON: u32 = 6;
-const WIDEST: f32 = 6.0;
+const WIDEST: f64 = 6.0;
 /// Largest skin of balls that are no fast movers, in radii: pairs that meet beyond it are looked for
 /// along their paths.
-const WIDE: f32 = 2.0;
+const WIDE: f64 = 2.0;
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Sorts the rows and finds all pairs.
     pub(super) fn build(
         &mut self,
-        dt: f32,
-        walls: &dyn StaticGeometry,
+        dt: S,
+        walls: &dyn StaticGeometry<S>,
         observe: &mut dyn FnMut(Stage),
     ) {
         self.scratch.threads = self.model.threads_for(self.at.len());
@@ -55,8 +54,8 @@ impl Swarm {
         self.skin = self.choose_skin(dt);
         let skin = self.skin;
         // The remaining skins lend their column to the order: they are set after that.
-        let order = bytemuck::cast_slice_mut(&mut self.skin_left);
-        self.grid.sort(&self.at, 2.0 * skin, threads, order, &mut self.neighbours);
+        let order = &mut bytemuck::cast_slice_mut(&mut self.skin_left)[..self.at.len()];
+        self.grid.sort(&self.at, S::from_f64(2.0) * skin, threads, order, &mut self.neighbours);
         self.reorder();
         self.reset_skins(dt, skin);
         observe(Stage::Pairs);
@@ -70,25 +69,27 @@ impl Swarm {
 
     /// Skin at the usual speed, in metres: displacement of most balls until pairs are searched
     /// again. In the lab's tier a heap is livelier, and a pair more costs less.
-    fn margin(&self) -> f32 {
-        self.mean_radius * (1.0 + self.skin_scale) * if self.has_friction() { 0.2 } else { 0.3 }
+    fn margin(&self) -> S {
+        self.mean_radius
+            * (S::one() + self.skin_scale)
+            * if self.has_friction() { S::from_f64(0.2) } else { S::from_f64(0.3) }
     }
 
     /// Widest skin of a ball that is searched for all around, in metres.
-    pub(super) fn reach_of_skins(&self) -> f32 {
-        self.skin * FAR
+    pub(super) fn reach_of_skins(&self) -> S {
+        self.skin * S::from_f64(FAR)
     }
 
     /// Chooses the Verlet skin: the usual one, or as far as all but the fast movers go in two
     /// steps. A ball that goes further than others look for it would be found inside of them.
-    fn choose_skin(&mut self, dt: f32) -> f32 {
+    fn choose_skin(&mut self, dt: S) -> S {
         let margin = self.margin();
         if !self.has_friction() {
             return margin;
         }
         let mut displacements = std::mem::take(&mut self.scratch.displacements);
         displacements.clear();
-        let displacement = |velocity: &[f32; 4]| 2.0 * squared(*velocity).sqrt() * dt;
+        let displacement = |velocity: &[S; 4]| S::from_f64(2.0) * squared(*velocity).sqrt() * dt;
         displacements.extend(
             self.velocity.iter().map(displacement).filter(|displacement| *displacement > margin),
         );
@@ -96,24 +97,25 @@ impl Swarm {
         let mut skin = margin;
         if displacements.len() > alone {
             let nth = displacements.len() - 1 - alone;
-            skin = *displacements.select_nth_unstable_by(nth, f32::total_cmp).1;
+            skin = *displacements.select_nth_unstable_by(nth, S::total_cmp).1;
         }
         self.scratch.displacements = displacements;
-        skin.min(WIDE * self.mean_radius).max(margin)
+        skin.min(S::from_f64(WIDE) * self.mean_radius).max(margin)
     }
 
     /// Widens the skin where balls leave it soon although few are beside each other.
     fn adapt_skin(&mut self) {
-        let sparse = (self.pairs() as f32) < SPARSE * self.len() as f32;
-        let target = if sparse && self.steps_since_build < SOON { WIDEST } else { 0.0 };
-        self.skin_scale += (target - self.skin_scale) * 0.3;
+        let sparse = (self.pairs() as f64) < SPARSE * self.len() as f64;
+        let target =
+            if sparse && self.steps_since_build < SOON { S::from_f64(WIDEST) } else { S::zero() };
+        self.skin_scale += (target - self.skin_scale) * S::from_f64(0.3);
         self.steps_since_build = 0;
     }
 
     /// Sets the remaining skin of each ball: more than the common skin only for fast movers. These
     /// are all that may leave the common skin before pairs are searched again, or, if they are too
     /// many, those that leave it in this step.
-    fn reset_skins(&mut self, dt: f32, skin: f32) {
+    fn reset_skins(&mut self, dt: S, skin: S) {
         self.fast_movers.clear();
         let mut fast = std::mem::take(&mut self.scratch.leaving);
         self.list_fast([dt, skin], None, &mut fast);
@@ -122,10 +124,10 @@ impl Swarm {
         }
         if self.fast_movers.full(fast.len(), self.at.len()) {
             self.fast_movers.crowded = self.has_friction();
-            self.list_fast([dt, skin], Some(f32::MAX), &mut fast);
+            self.list_fast([dt, skin], Some(S::max_value()), &mut fast);
         }
         for row in &fast {
-            self.fast_movers.add(*row, self.skin_left[*row as usize] > skin * FAR);
+            self.fast_movers.add(*row, self.skin_left[*row as usize] > skin * S::from_f64(FAR));
         }
         self.scratch.leaving = fast;
     }
@@ -133,11 +135,11 @@ impl Swarm {
     /// Sets the remaining skins, and lists the balls whose skin is wider than the common one, no more
     /// than are too many. With `least`, only a ball that goes further in the step, in metres, may
     /// have one.
-    fn list_fast(&mut self, [dt, skin]: [f32; 2], least: Option<f32>, fast: &mut Vec<u32>) {
+    fn list_fast(&mut self, [dt, skin]: [S; 2], least: Option<S>, fast: &mut Vec<u32>) {
         let (threads, lab) = (self.threads(), !self.has_friction());
         let (at, velocity, displacement) =
             (&self.at[..], &self.velocity[..], &self.displacement[..]);
-        let narrow = if lab { 0.12 } else { 0.08 };
+        let narrow = if lab { S::from_f64(0.12) } else { S::from_f64(0.08) };
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
         let skins_left = DisjointSlice::new(&mut self.skin_left);
@@ -146,11 +148,11 @@ impl Swarm {
             // SAFETY: each job has its own rows.
             let skins_left = unsafe { skins_left.part(rows.clone()) };
             for (row, skin_left) in rows.zip(skins_left) {
-                let path = if lab { 0.0 } else { Sweep::skin_of_path(&velocity[row], dt) };
+                let path = if lab { S::zero() } else { Sweep::skin_of_path(&velocity[row], dt) };
                 let displacement =
                     if lab { displacement[row] } else { squared(velocity[row]).sqrt() * dt };
-                *skin_left = (displacement * STEPS)
-                    .clamp(skin.min(narrow * at[row][3]), skin * FAR)
+                *skin_left = (displacement * S::from_f64(STEPS))
+                    .clamp(skin.min(narrow * at[row][3]), skin * S::from_f64(FAR))
                     .max(path);
                 if least.is_some_and(|least| path.max(displacement) <= least) {
                     *skin_left = skin_left.min(skin);
@@ -166,8 +168,8 @@ impl Swarm {
     pub(super) fn find_pairs_of(
         &mut self,
         rows: &[u32],
-        dt: f32,
-        walls: &dyn StaticGeometry,
+        dt: S,
+        walls: &dyn StaticGeometry<S>,
         observe: &mut dyn FnMut(Stage),
     ) {
         if self.fast_movers.full(rows.len(), self.at.len()) {
@@ -182,19 +184,20 @@ impl Swarm {
             } else {
                 self.displacement[at]
             };
-            self.skin_left[at] = (displacement * STEPS).clamp(skin, skin * FAR);
+            self.skin_left[at] =
+                (displacement * S::from_f64(STEPS)).clamp(skin, skin * S::from_f64(FAR));
             if self.has_friction() {
                 let of_path = Sweep::skin_of_path(&self.velocity[at], dt);
                 self.skin_left[at] = self.skin_left[at].max(of_path);
             }
-            self.fast_movers.add(*row, self.skin_left[at] > skin * FAR);
+            self.fast_movers.add(*row, self.skin_left[at] > skin * S::from_f64(FAR));
         }
         self.find_fast_movers(skin, dt);
         self.find_wall_contacts_of(rows, dt, walls);
     }
 
-    fn find_fast_movers(&mut self, skin: f32, dt: f32) {
-        let gravity = self.gravity.map_or(0.0, length);
+    fn find_fast_movers(&mut self, skin: S, dt: S) {
+        let gravity = self.gravity.map_or(S::zero(), length);
         // Solver and gravity bring balls off their straight paths.
         let slack = self.margin() + gravity * dt * dt;
         if self.fast_movers.crowded {
@@ -220,7 +223,7 @@ impl Swarm {
 
     /// Finds the pairs that meet beyond the reach of skins, where more balls go that far than there
     /// may be fast movers.
-    fn find_crossing_pairs(&mut self, skin: f32, dt: f32, slack: f32) {
+    fn find_crossing_pairs(&mut self, skin: S, dt: S, slack: S) {
         let (at, velocity, skin_left) = (&self.at[..], &self.velocity[..], &self.skin_left[..]);
         let axes = self.grid.axes();
         let FastMovers { crossing, .. } = &mut self.fast_movers;
@@ -239,7 +242,8 @@ impl Swarm {
 
     fn reorder(&mut self) {
         let (threads, has_friction) = (self.threads(), self.has_friction());
-        let (order, scratch) = (bytemuck::cast_slice(&self.skin_left), &mut self.neighbours);
+        let order = &bytemuck::cast_slice(&self.skin_left)[..self.at.len()];
+        let scratch = &mut self.neighbours;
         reorder_rows(&mut self.at, scratch, order, threads);
         reorder_rows(&mut self.velocity, scratch, order, threads);
         if has_friction {
@@ -280,8 +284,8 @@ impl Swarm {
             chunk.layers = [begin, layer];
             chunk.rows = [first, next, next];
             let radii = self.at[first as usize..next as usize].iter().map(|at| at[3]);
-            chunk.radii =
-                radii.fold([f32::MAX, 0.0], |[least, most], r| [least.min(r), most.max(r)]);
+            chunk.radii = radii
+                .fold([S::max_value(), S::zero()], |[least, most], r| [least.min(r), most.max(r)]);
             chunk.fastest_own = None;
             let velocities = &self.velocity[first as usize..next as usize];
             chunk.sleepers = velocities.iter().filter(|row| row[3].is_sign_negative()).count();
@@ -289,7 +293,7 @@ impl Swarm {
             (chunk.unread, chunk.sleep_changed) = (chunk.sleepers > 0, chunk.sleepers > 0);
             if chunk.asleep {
                 // Nobody looks at it again.
-                (chunk.speed, chunk.inverse_masses) = (0.0, inverse_masses(velocities));
+                (chunk.speed, chunk.inverse_masses) = (S::zero(), inverse_masses(velocities));
                 chunk.leaving.clear();
             }
             if count > 0 {
@@ -300,7 +304,7 @@ impl Swarm {
         self.chunks.truncate(count);
     }
 
-    fn find_pairs(&mut self, skin: f32, dt: f32, walls: &dyn StaticGeometry) {
+    fn find_pairs(&mut self, skin: S, dt: S, walls: &dyn StaticGeometry<S>) {
         let (threads, has_friction, tier) = (self.threads(), self.has_friction(), self.tier());
         let (simd_level, ahead) = (self.simd_level, self.ahead(dt));
         self.scratch.searches.resize(threads, Search::default());
@@ -349,20 +353,25 @@ impl Swarm {
 }
 
 /// Search for the pairs of a chunk.
-struct PairSearch<'a> {
+struct PairSearch<'a, S> {
     simd_level: SimdLevel,
-    grid: &'a Grid,
-    balls: walls::Balls<'a>,
-    skin: f32,
+    grid: &'a Grid<S>,
+    balls: walls::Balls<'a, S>,
+    skin: S,
     /// Slots of the proxies, if there are several: they touch each other without the swarm.
     proxies: Option<&'a BitSet>,
     /// Impulses of the last search and the rows of then; only in the full tier.
-    cache: Option<(&'a ImpulseCache, &'a [u32])>,
+    cache: Option<(&'a ImpulseCache<S>, &'a [u32])>,
 }
 
-impl PairSearch<'_> {
+impl<S: Scalar> PairSearch<'_, S> {
     /// Finds them, as `neighbours` in the lab's tier, else as batches with their old impulses.
-    fn run(&self, chunk: &mut Chunk, search: &mut Search, mut neighbours: Option<&mut [u16]>) {
+    fn run(
+        &self,
+        chunk: &mut Chunk<S>,
+        search: &mut Search<S>,
+        mut neighbours: Option<&mut [u16]>,
+    ) {
         let walls::Balls { at, skin_left, surfaces, .. } = self.balls;
         self.simd_level.run(FindPairs {
             grid: self.grid,

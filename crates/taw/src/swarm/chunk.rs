@@ -4,13 +4,14 @@ use super::batches::Batch;
 use super::kernels::ContactImpulses;
 use super::neighbours::{NEIGHBOUR_ROOM, NeighbourLists};
 use super::wall_contact::WallContact;
+use crate::math::Scalar;
 
 /// Some layers of the grid, as much as one thread works on at a time. Pairs of its balls, among
 /// themselves and with those of the next chunk, are its own; so two chunks that are not neighbours
 /// have no ball in common.
 #[derive(Clone, Debug, Default, PartialEq)]
 #[expect(clippy::struct_excessive_bools, reason = "they have nothing to do with each other")]
-pub(super) struct Chunk {
+pub(super) struct Chunk<S> {
     /// The first layer, and the one after the last.
     pub layers: [u32; 2],
     /// The first row, of it, of the next one, and after that.
@@ -20,23 +21,23 @@ pub(super) struct Chunk {
     pub pairs: usize,
     /// Number of those that there was no room for.
     pub unlisted: usize,
-    pub impulses: ContactImpulses,
+    pub impulses: ContactImpulses<S>,
     /// By rows.
-    pub wall_contacts: Vec<WallContact>,
-    pub old_wall_contacts: Vec<WallContact>,
+    pub wall_contacts: Vec<WallContact<S>>,
+    pub old_wall_contacts: Vec<WallContact<S>>,
     /// The rows near half-spaces, and near other walls.
     pub near_planes: Vec<u32>,
     pub near_shapes: Vec<u32>,
     /// Set if one near other walls is fast.
     pub has_fast: bool,
     /// Largest speed of a ball, in m/s.
-    pub speed: f32,
+    pub speed: S,
     /// Largest speed of a wall at one of its balls, in m/s.
-    pub wall_speed: f32,
+    pub wall_speed: S,
     /// The least and the largest inverse mass, in 1/kg.
-    pub inverse_masses: [f32; 2],
+    pub inverse_masses: [S; 2],
     /// The least and the largest radius, in metres.
-    pub radii: [f32; 2],
+    pub radii: [S; 2],
     /// Set while all its balls sleep.
     pub asleep: bool,
     /// Number of its balls that sleep.
@@ -51,7 +52,7 @@ pub(super) struct Chunk {
     pub sleep_changed: bool,
     pub marks_idle: bool,
     /// The speed in m/s of its fastest ball that is no proxy, if it has proxies.
-    pub fastest_own: Option<f32>,
+    pub fastest_own: Option<S>,
     /// Set if a ball of it or of those beside it bounced just now, and in this substep.
     pub again: bool,
     pub struck: bool,
@@ -64,7 +65,7 @@ pub(super) struct Chunk {
     pub stopped: Vec<u32>,
 }
 
-impl Chunk {
+impl<S: Scalar> Chunk<S> {
     pub fn bytes(&self) -> usize {
         let Self {
             layers: _,
@@ -100,7 +101,8 @@ impl Chunk {
         let names = [near_planes, near_shapes, leaving, stopped].map(Vec::capacity);
         batches.capacity() * size_of::<Batch>()
             + impulses.bytes()
-            + (wall_contacts.capacity() + old_wall_contacts.capacity()) * size_of::<WallContact>()
+            + (wall_contacts.capacity() + old_wall_contacts.capacity())
+                * size_of::<WallContact<S>>()
             + names.iter().sum::<usize>() * size_of::<u32>()
     }
 

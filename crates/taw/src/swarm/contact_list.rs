@@ -4,27 +4,27 @@ use cgmath::{InnerSpace, Zero};
 
 use super::Swarm;
 use super::batches::Batch;
-use super::bodies::{NO_ROW, number, vector};
+use super::bodies::NO_ROW;
 use super::kernels::{NearLimits, NearPairs};
-use super::wall_contact::WallContact;
+use super::wall_contact::{WallContact, xyz};
 use crate::contact::{Contact, Contacts};
-use crate::math::{Scalar, Vec3, cast_vector};
+use crate::math::{Scalar, Vec3};
 use crate::workers::{DisjointSlice, parallel_for};
 
 /// Contacts with walls and pairs of a chunk, in the order of the solver's memory.
 #[derive(Clone, Copy)]
-pub(crate) struct ChunkPairs<'a> {
-    with_walls: &'a [WallContact],
+pub(crate) struct ChunkPairs<'a, S> {
+    with_walls: &'a [WallContact<S>],
     batches: &'a [Batch],
 }
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Gives each chunk a list to fill if it or the next one is awake, and the fast movers one, on the
     /// threads of the step. The other lists are left as they are.
     pub(crate) fn fill_lists<L: Default + Send + Sync>(
         &self,
         lists: &mut Vec<L>,
-        fill: impl Fn(&mut L, ChunkPairs) + Sync,
+        fill: impl Fn(&mut L, ChunkPairs<S>) + Sync,
     ) {
         let chunks = self.chunks.len();
         lists.resize_with(chunks + 1, L::default);
@@ -43,13 +43,12 @@ impl Swarm {
         });
     }
 
-    /// Lists the contacts of bodies that are awake and near a wall or each other, and which of those
-    /// between bodies may come together, by index.
-    pub(crate) fn list_contacts<S: Scalar>(
+    /// See [`Swarm::list_contacts`].
+    pub(super) fn list_contacts_here(
         &self,
-        ChunkPairs { with_walls, batches }: ChunkPairs,
+        ChunkPairs { with_walls, batches }: ChunkPairs<S>,
         marble_of_slot: &[u32],
-        limits: NearLimits,
+        limits: NearLimits<S>,
         (contacts, meetings): (&mut Contacts<S>, &mut Vec<u32>),
     ) {
         let slots = self.ids.slots();
@@ -64,24 +63,24 @@ impl Swarm {
                 continue;
             }
             let separation = contact.separation(&self.at[row]);
-            let approach_speed = -(vector::<f32>(&self.velocity[row]) - contact.surface);
-            let closes = approach_speed.dot(contact.normal).max(0.0) * limits.time;
+            let approach_speed = -(xyz(&self.velocity[row]) - contact.surface);
+            let closes = approach_speed.dot(contact.normal).max(S::zero()) * limits.time;
             if separation <= limits.reach + closes {
-                let radii = [S::zero(), number(self.at[row][3])];
-                let place = (cast_vector(contact.normal), S::zero());
+                let radii = [S::zero(), self.at[row][3]];
+                let place = (contact.normal, S::zero());
                 let listed = Contact::with_wall(contact.wall, contact.part, b);
                 let listed = listed.placed(place, radii, centers);
-                contacts.wm.push(Contact { separation: number(separation), ..listed });
+                contacts.wm.push(Contact { separation, ..listed });
             }
         }
         let visit = |rows: [u32; 2], comes: bool| {
             let [Some(a), Some(b)] = rows.map(marble) else { return };
             let [p, q] = rows.map(|row| &self.at[row as usize]);
-            let apart = vector::<f32>(q) - vector(p);
+            let apart = xyz(q) - xyz(p);
             let distance = apart.magnitude();
-            let normal = if distance > 0.0 { apart / distance } else { Vec3::unit_x() };
-            let radii = [number(p[3]), number(q[3])];
-            let place = (cast_vector(normal), number(distance));
+            let normal = if distance > S::zero() { apart / distance } else { Vec3::unit_x() };
+            let radii = [p[3], q[3]];
+            let place = (normal, distance);
             let listed = Contact::between_marbles(a, b).placed(place, radii, centers);
             if comes {
                 meetings.push(contacts.mm.len() as u32);

@@ -10,9 +10,9 @@ use super::bit_set::BitSet;
 use super::grid::Grid;
 use super::kernels::{ContactImpulses, squared};
 use super::neighbours::Search;
-use super::simd::Row;
 use super::surfaces::SurfaceOf;
 use super::sweeps::Sweep;
+use crate::math::{Row, Scalar};
 
 /// Fast movers at most: one of so many balls, and besides so many.
 const BALLS_PER_MOVER: usize = 500;
@@ -20,7 +20,7 @@ const BASE_COUNT: usize = 32;
 
 /// See the module.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct FastMovers {
+pub(super) struct FastMovers<S> {
     /// Their rows, in order, and a bit for each row.
     pub rows: Vec<u32>,
     bits: BitSet,
@@ -29,9 +29,9 @@ pub(super) struct FastMovers {
     /// Their pairs, and how many more there was no room for.
     pub batches: Vec<Batch>,
     pub unlisted: usize,
-    pub impulses: ContactImpulses,
+    pub impulses: ContactImpulses<S>,
     /// Impulses of their pairs before the last search, in order.
-    cached: Vec<CachedPair>,
+    cached: Vec<CachedPair<S>>,
     /// The fast movers along the x axis.
     sorted: Vec<u32>,
     /// Set while more balls than there may be fast movers go further than skins reach; and pairs of
@@ -43,10 +43,10 @@ pub(super) struct FastMovers {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct CachedPair {
+struct CachedPair<S> {
     pair: [u32; 2],
-    normal_impulse: f32,
-    tangent_impulse: [f32; 3],
+    normal_impulse: S,
+    tangent_impulse: [S; 3],
 }
 
 /// Largest number of fast movers among so many balls.
@@ -55,18 +55,18 @@ pub(super) fn max_count(balls: usize) -> usize {
 }
 
 /// Balls in the order of their cells.
-pub(super) struct SortedBalls<'a> {
-    pub grid: &'a Grid,
+pub(super) struct SortedBalls<'a, S> {
+    pub grid: &'a Grid<S>,
     /// Center and radius.
-    pub at: &'a [Row],
+    pub at: &'a [Row<S>],
     /// Remaining skin, in metres.
-    pub skin_left: &'a [f32],
-    pub surfaces: SurfaceOf<'a>,
+    pub skin_left: &'a [S],
+    pub surfaces: SurfaceOf<'a, S>,
     /// Paths of those that go further than skins reach; none in the lab's tier.
-    pub sweep: Option<Sweep<'a>>,
+    pub sweep: Option<Sweep<'a, S>>,
 }
 
-impl SortedBalls<'_> {
+impl<S: Scalar> SortedBalls<'_, S> {
     /// Returns true if two balls that collide might touch before one of them leaves its skin.
     fn near(&self, a: u32, b: u32) -> bool {
         let (at, skin_left) = (self.at, self.skin_left);
@@ -75,13 +75,13 @@ impl SortedBalls<'_> {
             return sweep.meet(a, b) && self.surfaces.may_collide(a, b);
         }
         let (a, b) = (a as usize, b as usize);
-        let apart = [at[b][0] - at[a][0], at[b][1] - at[a][1], at[b][2] - at[a][2], 0.0];
-        let reach = at[a][3] + skin_left[a].max(0.0) + at[b][3] + skin_left[b].max(0.0);
+        let apart = [at[b][0] - at[a][0], at[b][1] - at[a][1], at[b][2] - at[a][2], S::zero()];
+        let reach = at[a][3] + skin_left[a].max(S::zero()) + at[b][3] + skin_left[b].max(S::zero());
         squared(apart) < reach * reach && self.surfaces.may_collide(a as u32, b as u32)
     }
 }
 
-impl FastMovers {
+impl<S: Scalar> FastMovers<S> {
     /// Returns true if so many more would be too many.
     pub fn full(&self, more: usize, balls: usize) -> bool {
         more > self.remaining(balls)
@@ -131,9 +131,9 @@ impl FastMovers {
     /// of other balls since the rows were sorted. Proxies touch each other without the swarm.
     pub fn find(
         &mut self,
-        balls: &SortedBalls,
-        more: f32,
-        search: &mut Search,
+        balls: &SortedBalls<S>,
+        more: S,
+        search: &mut Search<S>,
         proxy: &dyn Fn(u32) -> bool,
         has_friction: bool,
     ) {
@@ -148,7 +148,7 @@ impl FastMovers {
             let SortedBalls { at, skin_left, .. } = *balls;
             let count = 64 * self.rows.len() + 2 * self.crossing.len();
             let mut builder = search.builder(count, &mut batches);
-            let widest = self.rows.iter().fold(0.0_f32, |most, row| {
+            let widest = self.rows.iter().fold(S::zero(), |most, row| {
                 most.max(at[*row as usize][3] + skin_left[*row as usize])
             });
             builder.allow(at.len());
@@ -196,7 +196,7 @@ impl FastMovers {
         &self,
         mover: u32,
         others: impl IntoIterator<Item = u32>,
-        balls: &SortedBalls,
+        balls: &SortedBalls<S>,
         proxy: &dyn Fn(u32) -> bool,
         builder: &mut BatchBuilder,
     ) {
@@ -213,8 +213,8 @@ impl FastMovers {
     fn find_pairs_of(
         &self,
         mover: u32,
-        balls: &SortedBalls,
-        more: f32,
+        balls: &SortedBalls<S>,
+        more: S,
         proxy: &dyn Fn(u32) -> bool,
         builder: &mut BatchBuilder,
     ) {
@@ -234,10 +234,12 @@ impl FastMovers {
         for (i, batch) in self.batches.iter().enumerate() {
             for lane in 0..batch.count as usize {
                 let normal_impulse = self.impulses.normal_impulse[i][lane];
-                if normal_impulse > 0.0 {
+                if normal_impulse > S::zero() {
                     let tangent_impulse = self.impulses.tangent_impulse.get(i);
                     let tangent_impulse = tangent_impulse
-                        .map_or([0.0; 3], |tangent_impulse| tangent_impulse.map(|axis| axis[lane]));
+                        .map_or([S::zero(); 3], |tangent_impulse| {
+                            tangent_impulse.map(|axis| axis[lane])
+                        });
                     self.cached.push(CachedPair {
                         pair: batch.pair(lane),
                         normal_impulse,
@@ -274,6 +276,6 @@ impl FastMovers {
             + self.by_path.bytes()
             + self.batches.capacity() * size_of::<Batch>()
             + self.impulses.bytes()
-            + self.cached.capacity() * size_of::<CachedPair>()
+            + self.cached.capacity() * size_of::<CachedPair<S>>()
     }
 }

@@ -12,7 +12,7 @@ use std::ops::Range;
 use bytemuck::{Pod, cast_slice_mut};
 
 use super::impulse_cache::shrink_slack;
-use super::simd::Row;
+use crate::math::{Row, Scalar};
 use crate::workers::{DisjointSlice, ROWS, parallel_for, parallel_for_rows};
 
 /// Cells in all, for each ball.
@@ -22,7 +22,7 @@ const CELLS: f64 = 4096.0;
 /// The most cells along a side on level 0, so that rounding stays far below the margin.
 const SIDE: f64 = 4096.0;
 /// Cells are wider than they need be by this part, which is more than rounding takes.
-const MARGIN: f32 = 1.005;
+const MARGIN: f64 = 1.005;
 /// Halvings of cells at most, and from one level to the next: with a level for
 /// each halving, most time goes into looking up empty cells.
 const HALVINGS: usize = 6;
@@ -32,11 +32,11 @@ const SAMPLE: usize = 1024;
 
 /// One level of cells.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct Level {
+pub(super) struct Level<S> {
     /// Cells per metre.
-    per_metre: f32,
+    per_metre: S,
     /// The widest ball that belongs here, in metres.
-    widest: f32,
+    widest: S,
     /// Number of layers, and of cells in them in rows and along a row, without empty ones around.
     pub layers: u32,
     rows: u32,
@@ -52,17 +52,17 @@ pub(super) struct Level {
 
 /// See the module.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Grid {
+pub(super) struct Grid<S> {
     /// The sides of the scene, the longest first.
     axes: [usize; 3],
-    low: [f32; 3],
-    pub levels: Vec<Level>,
+    low: [S; 3],
+    pub levels: Vec<Level<S>>,
     /// Number of cells of all levels in a layer of level 0.
     per_layer: u32,
     /// The first row of each cell, one place further, and of the one after the last.
     start: Vec<u32>,
     parts: Vec<Part>,
-    sample: Vec<f32>,
+    sample: Vec<S>,
 }
 
 /// Some rows that follow each other, before they are in order.
@@ -73,10 +73,10 @@ struct Part {
     cells: [u32; 2],
 }
 
-impl Level {
+impl<S: Scalar> Level<S> {
     /// The cell of these coordinates; empty cells lie at both ends of the rows and columns.
     #[inline(always)]
-    pub fn cell(&self, grid: &Grid, layer: u32, row: u32, cell: u32) -> u32 {
+    pub fn cell(&self, grid: &Grid<S>, layer: u32, row: u32, cell: u32) -> u32 {
         let inner = layer & ((1 << self.number) - 1);
         (layer >> self.number) * grid.per_layer
             + self.base
@@ -86,8 +86,8 @@ impl Level {
     }
 
     /// Width of a cell, in metres.
-    pub fn width(&self) -> f32 {
-        1.0 / self.per_metre
+    pub fn width(&self) -> S {
+        S::one() / self.per_metre
     }
 
     /// Number of rows, and of cells in a row, with the empty ones around.
@@ -96,10 +96,10 @@ impl Level {
     }
 }
 
-impl Grid {
+impl<S: Scalar> Grid<S> {
     pub fn bytes(&self) -> usize {
         let numbers = self.start.capacity() + self.sample.capacity();
-        let levels = self.levels.capacity() * size_of::<Level>();
+        let levels = self.levels.capacity() * size_of::<Level<S>>();
         levels + numbers * size_of::<u32>() + self.parts.capacity() * size_of::<Part>()
     }
 
@@ -126,19 +126,19 @@ impl Grid {
 
     /// The level of a ball with this radius.
     #[inline(always)]
-    pub fn level_of(&self, radius: f32) -> usize {
-        let fits = |level: &Level| 2.0 * radius <= level.widest;
+    pub fn level_of(&self, radius: S) -> usize {
+        let fits = |level: &Level<S>| S::from_f64(2.0) * radius <= level.widest;
         self.levels.iter().skip(1).take_while(|level| fits(level)).count()
     }
 
     /// Layer, row and cell of a place on a level.
     #[inline(always)]
-    pub fn coordinates(&self, level: &Level, at: &Row) -> [u32; 3] {
+    pub fn coordinates(&self, level: &Level<S>, at: &Row<S>) -> [u32; 3] {
         let axis = |i: usize, count: u32| {
             let axis = self.axes[i];
             let cell = (at[axis] - self.low[axis]) * level.per_metre;
             // What is beyond is in the last cell: neighbours stay neighbours.
-            (cell.max(0.0) as u32).min(count - 1)
+            cell.max(S::zero()).to_u32().min(count - 1)
         };
         [axis(0, level.layers), axis(1, level.rows) + 1, axis(2, level.cells) + 1]
     }
@@ -148,13 +148,13 @@ impl Grid {
     #[inline]
     pub fn for_each_run(
         &self,
-        level: &Level,
-        [x, y, z, _]: &Row,
-        far: f32,
+        level: &Level<S>,
+        &[x, y, z, _]: &Row<S>,
+        far: S,
         mut visit: impl FnMut(Range<u32>),
     ) {
-        let low = self.coordinates(level, &[x - far, y - far, z - far, 0.0]);
-        let high = self.coordinates(level, &[x + far, y + far, z + far, 0.0]);
+        let low = self.coordinates(level, &[x - far, y - far, z - far, S::zero()]);
+        let high = self.coordinates(level, &[x + far, y + far, z + far, S::zero()]);
         for layer in low[0]..=high[0] {
             for row in low[1]..=high[1] {
                 let line = level.cell(self, layer, row, 0);
@@ -169,7 +169,7 @@ impl Grid {
     }
 
     #[inline(always)]
-    fn key(&self, at: &Row) -> u32 {
+    fn key(&self, at: &Row<S>) -> u32 {
         let level = if self.levels.len() == 1 { 0 } else { self.level_of(at[3]) };
         let level = &self.levels[level];
         let [layer, row, cell] = self.coordinates(level, at);
@@ -178,20 +178,20 @@ impl Grid {
 
     /// Corners of a box around the bulk of the balls, of which the largest has this radius: a few
     /// fast movers far out cost no cells.
-    fn bounds_of_bulk(&mut self, at: &[Row], largest: f32) -> [[f32; 3]; 2] {
-        let (mut low, mut high) = ([0.0; 3], [0.0; 3]);
+    fn bounds_of_bulk(&mut self, at: &[Row<S>], largest: S) -> [[S; 3]; 2] {
+        let (mut low, mut high) = ([S::zero(); 3], [S::zero(); 3]);
         let every = at.len().div_ceil(SAMPLE).max(1);
         for axis in 0..3 {
             self.sample.clear();
             self.sample.extend(at.iter().step_by(every).map(|row| row[axis]));
-            self.sample.sort_unstable_by(f32::total_cmp);
+            self.sample.sort_unstable_by(S::total_cmp);
             let count = self.sample.len();
             if count == 0 {
                 continue;
             }
             let (a, b) = (self.sample[count / 64], self.sample[count - 1 - count / 64]);
             let (first, last) = (self.sample[0], self.sample[count - 1]);
-            let room = (b - a) * 0.1 + 4.0 * largest;
+            let room = (b - a) * S::from_f64(0.1) + S::from_f64(4.0) * largest;
             (low[axis], high[axis]) =
                 ((a - room).max(first - largest), (b + room).min(last + largest));
         }
@@ -199,21 +199,22 @@ impl Grid {
     }
 
     /// Chooses origin, size and number of the cells.
-    fn choose_cells(&mut self, at: &[Row], skin: f32) {
-        let (mut least, mut largest) = (f32::MAX, f32::MIN_POSITIVE);
+    fn choose_cells(&mut self, at: &[Row<S>], skin: S) {
+        let (mut least, mut largest) = (S::max_value(), S::min_positive_value());
         for row in at {
             largest = largest.max(row[3]);
             least = least.min(row[3]);
         }
         let [low, high] = self.bounds_of_bulk(at, largest);
         self.low = low;
-        let mut width = (2.0 * largest + skin) * MARGIN;
+        let mut width = (S::from_f64(2.0) * largest + skin) * S::from_f64(MARGIN);
         let budget = at.len() as f64 * CELLS_PER_BALL + CELLS;
-        let sides =
-            |width: f32| [0, 1, 2].map(|axis| ((high[axis] - low[axis]) / width).ceil().max(1.0));
-        let cells = |sides: [f32; 3]| sides.iter().map(|n| f64::from(*n) + 2.0).product::<f64>();
-        while cells(sides(width)) > budget || sides(width).iter().any(|n| f64::from(*n) > SIDE) {
-            width *= 1.25;
+        let sides = |width: S| {
+            [0, 1, 2].map(|axis| ((high[axis] - low[axis]) / width).ceil().max(S::one()))
+        };
+        let cells = |sides: [S; 3]| sides.iter().map(|n| n.as_f64() + 2.0).product::<f64>();
+        while cells(sides(width)) > budget || sides(width).iter().any(|n| n.as_f64() > SIDE) {
+            width *= S::from_f64(1.25);
         }
         let sides = sides(width);
         let mut axes = [0, 1, 2];
@@ -223,14 +224,14 @@ impl Grid {
         self.per_layer = 0;
         let mut total = 0.0;
         for level in (0..=HALVINGS as u32).step_by(HALVINGS_PER_LEVEL) {
-            let fine = (1_u32 << level) as f32;
-            let widest = width / fine / MARGIN - skin;
+            let fine = S::from_f64(f64::from(1_u32 << level));
+            let widest = width / fine / S::from_f64(MARGIN) - skin;
             let count = cells(sides.map(|n| n * fine));
             total += count;
-            if level > 0 && (2.0 * least > widest || total > 2.0 * budget) {
+            if level > 0 && (S::from_f64(2.0) * least > widest || total > 2.0 * budget) {
                 break;
             }
-            let [layers, rows, cells] = axes.map(|axis| (sides[axis] * fine) as u32);
+            let [layers, rows, cells] = axes.map(|axis| (sides[axis] * fine).to_u32());
             let row_stride = cells + 2;
             let layer_stride = row_stride * (rows + 2);
             self.levels.push(Level {
@@ -252,18 +253,18 @@ impl Grid {
     /// `scratch` is a buffer.
     pub fn sort(
         &mut self,
-        at: &[Row],
-        skin: f32,
+        at: &[Row<S>],
+        skin: S,
         threads: usize,
         order: &mut [u32],
-        scratch: &mut Vec<Row>,
+        scratch: &mut Vec<Row<S>>,
     ) {
         self.choose_cells(at, skin);
         let cells = (self.layers() * self.per_layer) as usize;
         let mut start = std::mem::take(&mut self.start);
         start.resize(cells + 2, 0);
         shrink_slack(&mut start);
-        scratch.resize(at.len(), [0.0; 4]);
+        scratch.resize(at.len(), [S::zero(); 4]);
         let keys = cast_slice_mut(scratch);
         self.find_keys(at, threads, keys);
         let parts = &self.parts;
@@ -325,7 +326,7 @@ impl Grid {
     }
 
     /// Cell of each row, and the cells of each part of the rows.
-    fn find_keys(&mut self, at: &[Row], threads: usize, keys: &mut [u32]) {
+    fn find_keys(&mut self, at: &[Row<S>], threads: usize, keys: &mut [u32]) {
         let mut parts = std::mem::take(&mut self.parts);
         parts.resize(at.len().div_ceil(ROWS), Part::default());
         {
@@ -346,25 +347,25 @@ impl Grid {
 }
 
 /// Puts a column of rows into the order.
-pub(super) fn reorder_rows(
-    column: &mut Vec<Row>,
-    scratch: &mut Vec<Row>,
+pub(super) fn reorder_rows<S: Scalar>(
+    column: &mut Vec<Row<S>>,
+    scratch: &mut Vec<Row<S>>,
     order: &[u32],
     threads: usize,
 ) {
-    scratch.resize(order.len(), [0.0; 4]);
+    scratch.resize(order.len(), [S::zero(); 4]);
     gather_in_order(column, DisjointSlice::new(scratch), order, threads);
     std::mem::swap(column, scratch);
 }
 
 /// Puts a column of numbers into the order.
-pub(super) fn reorder<T: Pod + Send + Sync>(
+pub(super) fn reorder<S: Scalar, T: Pod + Send + Sync>(
     column: &mut [T],
-    scratch: &mut Vec<Row>,
+    scratch: &mut Vec<Row<S>>,
     order: &[u32],
     threads: usize,
 ) {
-    scratch.resize(order.len(), [0.0; 4]);
+    scratch.resize(order.len(), [S::zero(); 4]);
     let scratch = DisjointSlice::new(cast_slice_mut(scratch));
     gather_in_order(column, scratch, order, threads);
     let column = DisjointSlice::new(column);

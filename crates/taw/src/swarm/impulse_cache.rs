@@ -7,32 +7,33 @@ use super::fast_movers::FastMovers;
 use super::kernels::ContactImpulses;
 use super::wall_contact::WallContact;
 use super::walls::{find, shapes_of};
+use crate::math::Scalar;
 use crate::workers::{DisjointSlice, parallel_for};
 
 /// Impulses of a pair; stored with its first ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct CachedImpulse {
+struct CachedImpulse<S> {
     /// The row of the second ball.
     other: u32,
-    normal_impulse: f32,
-    tangent_impulse: [f32; 3],
+    normal_impulse: S,
+    tangent_impulse: [S; 3],
 }
 
 /// See the module.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct ImpulseCache {
+pub(super) struct ImpulseCache<S> {
     /// Beginning of each row's pairs, and after the last row, one place further.
     start: Vec<u32>,
-    kept: Vec<CachedImpulse>,
-    wall_contacts: Vec<WallContact>,
+    kept: Vec<CachedImpulse<S>>,
+    wall_contacts: Vec<WallContact<S>>,
 }
 
-impl ImpulseCache {
+impl<S: Scalar> ImpulseCache<S> {
     /// Stores the impulses of all pairs and contacts with walls. The rows are as they were.
     pub fn keep(
         &mut self,
-        chunks: &[Chunk],
-        fast_movers: &FastMovers,
+        chunks: &[Chunk<S>],
+        fast_movers: &FastMovers<S>,
         rows: usize,
         threads: usize,
     ) {
@@ -44,7 +45,7 @@ impl ImpulseCache {
             let counts = DisjointSlice::new(&mut self.start);
             // SAFETY: the first ball of a pair is in the chunk, so only one thread counts it; and
             // the fast movers come alone.
-            let count = |[row, _]: [u32; 2], _: CachedImpulse| unsafe {
+            let count = |[row, _]: [u32; 2], _: CachedImpulse<S>| unsafe {
                 *counts.row(row as usize + 2) += 1;
             };
             parallel_for(threads, chunks.len(), |_, chunk| {
@@ -64,7 +65,7 @@ impl ImpulseCache {
         let (start, places) =
             (DisjointSlice::new(&mut self.start), DisjointSlice::new(&mut self.kept));
         // SAFETY: as above, and each place is given out once.
-        let place = |[row, _]: [u32; 2], kept: CachedImpulse| unsafe {
+        let place = |[row, _]: [u32; 2], kept: CachedImpulse<S>| unsafe {
             let place = start.row(row as usize + 1);
             *places.row(*place as usize) = kept;
             *place += 1;
@@ -91,14 +92,14 @@ impl ImpulseCache {
 
     pub fn bytes(&self) -> usize {
         self.start.capacity() * size_of::<u32>()
-            + self.kept.capacity() * size_of::<CachedImpulse>()
-            + self.wall_contacts.capacity() * size_of::<WallContact>()
+            + self.kept.capacity() * size_of::<CachedImpulse<S>>()
+            + self.wall_contacts.capacity() * size_of::<WallContact<S>>()
     }
 
     /// Scales the impulses of some balls by factors, given their rows then.
-    pub fn scale(&mut self, balls: impl Iterator<Item = (u32, f32)>) {
+    pub fn scale(&mut self, balls: impl Iterator<Item = (u32, S)>) {
         let Self { start, kept, wall_contacts } = self;
-        let mut factors = vec![1.0; start.len()];
+        let mut factors = vec![S::one(); start.len()];
         for (row, factor) in balls {
             if let Some(of_row) = factors.get_mut(row as usize) {
                 *of_row = factor; // not new
@@ -117,7 +118,7 @@ impl ImpulseCache {
     }
 
     /// Gives the pairs of a batch their cached impulses. `before` is the earlier row of each row.
-    pub fn restore(&self, batches: &[Batch], old_rows: &[u32], impulses: &mut ContactImpulses) {
+    pub fn restore(&self, batches: &[Batch], old_rows: &[u32], impulses: &mut ContactImpulses<S>) {
         for (i, batch) in batches.iter().enumerate() {
             for lane in 0..batch.count as usize {
                 let [a, b] = batch.pair(lane).map(|row| old_rows[row as usize]);
@@ -132,7 +133,7 @@ impl ImpulseCache {
                     impulses.normal_impulse[i][lane] += kept.normal_impulse;
                     if let Some(tangent_impulse) = impulses.tangent_impulse.get_mut(i) {
                         // The impulse is what the second of the two gets.
-                        let sign = if first == a { 1.0 } else { -1.0 };
+                        let sign = if first == a { S::one() } else { -S::one() };
                         for (axis, tangent_impulse) in
                             tangent_impulse.iter_mut().zip(kept.tangent_impulse)
                         {
@@ -145,18 +146,22 @@ impl ImpulseCache {
     }
 
     /// Contacts with walls, in order, for walls that changed places.
-    pub fn wall_contacts_mut(&mut self) -> &mut Vec<WallContact> {
+    pub fn wall_contacts_mut(&mut self) -> &mut Vec<WallContact<S>> {
         &mut self.wall_contacts
     }
 
     /// Contacts that a ball had with shapes other than half-spaces, in order.
-    pub fn shapes_of(&self, old_rows: &[u32], row: u32) -> impl Iterator<Item = WallContact> {
+    pub fn shapes_of(&self, old_rows: &[u32], row: u32) -> impl Iterator<Item = WallContact<S>> {
         let then = old_rows[row as usize];
         shapes_of(&self.wall_contacts, then).map(move |contact| WallContact { row, ..*contact })
     }
 
     /// Contact that a ball had with a wall before, with its impulses.
-    pub fn cached_contact(&self, old_rows: &[u32], contact: &WallContact) -> Option<WallContact> {
+    pub fn cached_contact(
+        &self,
+        old_rows: &[u32],
+        contact: &WallContact<S>,
+    ) -> Option<WallContact<S>> {
         let then = WallContact { row: old_rows[contact.row as usize], ..*contact };
         find(&self.wall_contacts, &then).copied()
     }
@@ -179,18 +184,19 @@ pub(super) fn shrink_slack<T>(list: &mut Vec<T>) {
 }
 
 /// Visits the pairs that carry a normal impulse.
-fn for_each_loaded(
+fn for_each_loaded<S: Scalar>(
     batches: &[Batch],
-    impulses: &ContactImpulses,
-    visit: impl Fn([u32; 2], CachedImpulse),
+    impulses: &ContactImpulses<S>,
+    visit: impl Fn([u32; 2], CachedImpulse<S>),
 ) {
     for (i, batch) in batches.iter().enumerate() {
         for lane in 0..batch.count as usize {
             let normal_impulse = impulses.normal_impulse[i][lane];
-            if normal_impulse > 0.0 {
+            if normal_impulse > S::zero() {
                 let tangent_impulse = impulses.tangent_impulse.get(i);
-                let tangent_impulse = tangent_impulse
-                    .map_or([0.0; 3], |tangent_impulse| tangent_impulse.map(|axis| axis[lane]));
+                let tangent_impulse = tangent_impulse.map_or([S::zero(); 3], |tangent_impulse| {
+                    tangent_impulse.map(|axis| axis[lane])
+                });
                 let rows = batch.pair(lane);
                 visit(rows, CachedImpulse { other: rows[1], normal_impulse, tangent_impulse });
             }

@@ -1,7 +1,7 @@
 //! Particle system of up to millions of balls, with few features each.
 //!
 //! A [`World`](crate::world::World) has marbles that differ in everything: shape, mass, material,
-//! integrator, rotation. A [`Swarm`] has balls in `f32` of any radius, mass, material and gravity
+//! integrator, rotation. A [`Swarm`] has balls of any radius, mass, material and gravity
 //! scale: see [`Tier`] for what it models. It belongs to a world: it collides with the world's walls
 //! and marbles, and the world's force fields act on it.
 //!
@@ -30,6 +30,7 @@ mod build;
 mod chunk;
 mod contact_list;
 mod crowding;
+mod entries;
 mod fast_movers;
 mod grid;
 mod ids;
@@ -41,23 +42,21 @@ mod outside_work;
 mod proxies;
 mod rest;
 mod scratch;
-mod simd;
 mod sleep;
 mod state;
 mod step;
 mod surfaces;
 mod sweeps;
-mod vec3_wide;
 mod wall_contact;
 mod wall_paths;
 mod walls;
 
+pub use crate::math::simd::SimdLevel;
 pub(crate) use bodies::{Body, BodyColumns, MarbleRow, NO_ROW, SyncToken, VelocityChange};
 pub use ids::BallId;
 pub(crate) use kernels::NearLimits;
 pub use model::{Ball, Stage, SwarmModel, Tier};
 pub(crate) use proxies::Proxy;
-pub use simd::SimdLevel;
 pub(crate) use surfaces::Surface;
 pub(crate) use walls::StaticGeometry;
 
@@ -66,7 +65,7 @@ use cgmath::EuclideanSpace;
 use crate::Error;
 use crate::error::{finite_point, finite_vector, positive, within};
 use crate::handle::MarbleId;
-use crate::math::{Point3, Vec3};
+use crate::math::{Point3, Row, Scalar, Vec3};
 use crate::response::Material;
 use ball_settings::BallForces;
 use batches::pairs_in;
@@ -77,48 +76,47 @@ use grid::Grid;
 use ids::Ids;
 use impulse_cache::ImpulseCache;
 use scratch::Scratch;
-use simd::Row;
 use sleep::SleepState;
 use surfaces::{SurfaceOf, Surfaces};
 use walls::HalfSpace;
 
 /// Minimum and maximum radius, in metres: their third and fourth powers are finite, too.
-const RADII: [f32; 2] = [1e-9, 1e9];
+const RADII: [f64; 2] = [1e-9, 1e9];
 /// Maximum coordinate in metres, and maximum component of a velocity in m/s.
-const MAX_COORDINATE: f32 = 1e12;
+const MAX_COORDINATE: f64 = 1e12;
 
 /// Inverse mass in 1/kg of a body that no force moves.
-pub(crate) const INFINITE_MASS: f32 = 1e-25;
+pub(crate) const INFINITE_MASS: f64 = 1e-25;
 
 /// Particle system of balls. See the [module](self).
 #[derive(Clone, Debug, Default)]
-pub struct Swarm {
-    model: SwarmModel,
+pub struct Swarm<S: Scalar = f32> {
+    model: SwarmModel<S>,
     simd_level: SimdLevel,
     ids: Ids,
     /// Center and radius.
-    at: Vec<Row>,
+    at: Vec<Row<S>>,
     /// Velocity and inverse mass, which has a minus sign while a ball sleeps. In the lab's tier,
     /// while it steps, the place before.
-    velocity: Vec<Row>,
+    velocity: Vec<Row<S>>,
     /// Radius times spin, and whether a wall bears it ([`GROUNDED`](kernels::GROUNDED)); only in
     /// the full tier.
-    spin: Vec<Row>,
+    spin: Vec<Row<S>>,
     /// Remaining skin of each ball: distance until pairs are searched again, in metres.
-    skin_left: Vec<f32>,
+    skin_left: Vec<S>,
     /// Predicted displacement of each ball in this step, in metres; only in the lab's tier.
-    displacement: Vec<f32>,
+    displacement: Vec<S>,
     /// The largest radius, and the mean of all.
-    max_radius: f32,
-    mean_radius: f32,
+    max_radius: S,
+    mean_radius: S,
     /// Verlet skin: largest displacement, since pairs were searched, of a ball that is no fast
     /// mover, in metres.
-    skin: f32,
-    grid: Grid,
-    chunks: Vec<Chunk>,
+    skin: S,
+    grid: Grid<S>,
+    chunks: Vec<Chunk<S>>,
     /// Pairs of balls that left their skin.
-    fast_movers: FastMovers,
-    impulse_cache: ImpulseCache,
+    fast_movers: FastMovers<S>,
+    impulse_cache: ImpulseCache<S>,
     /// For each row, the one that it was when the impulse cache was filled, if it was then.
     old_rows: Vec<u32>,
     cache_valid: bool,
@@ -126,39 +124,39 @@ pub struct Swarm {
     pairs_valid: bool,
     walls_identity: Option<u64>,
     rows_of_walls: Option<u64>,
-    gravity: Option<Vec3<f32>>,
-    planes: Vec<HalfSpace>,
+    gravity: Option<Vec3<S>>,
+    planes: Vec<HalfSpace<S>>,
     stopped: Vec<u32>,
     /// The marbles of the world that are balls here, in their order.
     pub(crate) body_balls: Vec<(MarbleId, BallId)>,
     /// Set if these are rows of the same solve as all others, and no proxies.
     bodies_are_rows: bool,
     /// Velocity changes of bodies besides gravity.
-    velocity_changes: Vec<bodies::VelocityChange>,
-    surfaces: Surfaces,
-    ball_forces: BallForces,
+    velocity_changes: Vec<bodies::VelocityChange<S>>,
+    surfaces: Surfaces<S>,
+    ball_forces: BallForces<S>,
     /// Agreement of bodies with the marbles.
     pub(crate) synced: SyncToken,
-    proxies: Vec<Proxy>,
+    proxies: Vec<Proxy<S>>,
     /// Slots of marbles.
     body_slots: BitSet,
-    sleep: SleepState,
+    sleep: SleepState<S>,
     /// Number of times that balls fell asleep, woke, came or went.
     sleep_version: u64,
     /// Neighbour lists of all chunks, in the lab's tier; while rows are sorted, a column to sort
     /// into.
-    neighbours: Vec<Row>,
-    scratch: Scratch,
+    neighbours: Vec<Row<S>>,
+    scratch: Scratch<S>,
     rebuilds: u64,
     steps_since_build: u32,
     /// Width of the skin beyond the usual, as a fraction of that.
-    skin_scale: f32,
+    skin_scale: S,
 }
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Model of its physics and solver.
     #[must_use]
-    pub fn model(&self) -> SwarmModel {
+    pub fn model(&self) -> SwarmModel<S> {
         self.model
     }
 
@@ -166,7 +164,7 @@ impl Swarm {
     ///
     /// # Errors
     /// [`Error::OutOfRange`] for a field of it.
-    pub fn set_model(&mut self, model: SwarmModel) -> Result<(), Error> {
+    pub fn set_model(&mut self, model: SwarmModel<S>) -> Result<(), Error> {
         let model = model.validated()?;
         let tier = self.tier();
         let resists = self.surface_of().differ();
@@ -195,25 +193,25 @@ impl Swarm {
     /// # Errors
     /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a field of one of them,
     /// [`Error::NotPositive`] for a mass, [`Error::Full`] at 2³² balls.
-    pub fn insert(&mut self, balls: &[Ball]) -> Result<Vec<BallId>, Error> {
+    pub fn insert(&mut self, balls: &[Ball<S>]) -> Result<Vec<BallId>, Error> {
         for ball in balls {
             validated_position(ball.position)?;
             validated_velocity(ball.velocity)?;
-            let [least, most] = RADII;
+            let [least, most] = RADII.map(S::from_f64);
             within("radius", ball.radius, least, most)?;
-            positive("mass", 1.0 / ball.mass.of(ball.radius))?;
+            positive("mass", S::one() / ball.mass.of(ball.radius))?;
         }
         self.add(balls)
     }
 
     /// Puts balls in that are known to be right.
-    fn add(&mut self, balls: &[Ball]) -> Result<Vec<BallId>, Error> {
+    fn add(&mut self, balls: &[Ball<S>]) -> Result<Vec<BallId>, Error> {
         let ids = self.ids.push(balls.len())?;
         let rows = balls.iter();
         self.at.extend(rows.clone().map(|ball| pack_row(ball.position.to_vec(), ball.radius)));
-        let moving = |ball: &Ball| pack_row(ball.velocity, 1.0 / ball.mass.of(ball.radius));
+        let moving = |ball: &Ball<S>| pack_row(ball.velocity, S::one() / ball.mass.of(ball.radius));
         self.velocity.extend(rows.map(moving));
-        self.skin_left.resize(self.at.len(), 0.0);
+        self.skin_left.resize(self.at.len(), S::zero());
         if self.has_friction() && (self.pairs_valid || self.cache_valid) {
             self.cache_impulses();
             self.old_rows.resize(self.at.len(), u32::MAX);
@@ -289,7 +287,7 @@ impl Swarm {
 
     /// Centers and radii by row, in metres. Steps reorder the rows.
     #[must_use]
-    pub fn balls(&self) -> &[[f32; 4]] {
+    pub fn balls(&self) -> &[[S; 4]] {
         &self.at
     }
 
@@ -302,14 +300,14 @@ impl Swarm {
     /// Velocities by row, in m/s. The last number is the inverse mass in 1/kg, with a minus sign if
     /// the ball sleeps.
     #[must_use]
-    pub fn velocities(&self) -> &[[f32; 4]] {
+    pub fn velocities(&self) -> &[[S; 4]] {
         &self.velocity
     }
 
     /// Radius times angular velocity by row, in m/s, and a number for internal use; empty in
     /// [`Tier::Lab`].
     #[must_use]
-    pub fn spin_velocities(&self) -> &[[f32; 4]] {
+    pub fn spin_velocities(&self) -> &[[S; 4]] {
         &self.spin
     }
 
@@ -338,7 +336,7 @@ impl Swarm {
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], [`Error::NotFinite`], [`Error::OutOfRange`].
-    pub fn set_position(&mut self, ball: BallId, position: Point3<f32>) -> Result<(), Error> {
+    pub fn set_position(&mut self, ball: BallId, position: Point3<S>) -> Result<(), Error> {
         let (row, position) = (self.row(ball)?, validated_position(position)?);
         self.wake(row);
         self.at[row] = pack_row(position.to_vec(), self.at[row][3]);
@@ -351,7 +349,7 @@ impl Swarm {
     ///
     /// # Errors
     /// [`Error::NoSuchBall`], [`Error::NotFinite`], [`Error::OutOfRange`].
-    pub fn set_velocity(&mut self, ball: BallId, velocity: Vec3<f32>) -> Result<(), Error> {
+    pub fn set_velocity(&mut self, ball: BallId, velocity: Vec3<S>) -> Result<(), Error> {
         let (row, velocity) = (self.row(ball)?, validated_velocity(velocity)?);
         self.wake(row);
         self.velocity[row] = pack_row(velocity, self.velocity[row][3]);
@@ -407,13 +405,13 @@ impl Swarm {
 
     /// Material of all pairs that have no [numbers](kernels::ContactImpulses::numbers) of their
     /// own.
-    fn common_material(&self) -> Material<f32> {
+    fn common_material(&self) -> Material<S> {
         let model = self.model.material;
         self.surfaces.common(model, self.len()).unwrap_or(model)
     }
 
     /// Surfaces by row.
-    fn surface_of(&self) -> SurfaceOf<'_> {
+    fn surface_of(&self) -> SurfaceOf<'_, S> {
         let model = self.model.material;
         SurfaceOf { model, surfaces: &self.surfaces, slots: self.ids.slots() }
     }
@@ -422,8 +420,8 @@ impl Swarm {
     fn resize_columns(&mut self) {
         let rows = self.at.len();
         let (spin, displacement) = if self.has_friction() { (rows, 0) } else { (0, rows) };
-        self.spin.resize(spin, [0.0; 4]);
-        self.displacement.resize(displacement, 0.0);
+        self.spin.resize(spin, [S::zero(); 4]);
+        self.displacement.resize(displacement, S::zero());
         self.sleep.rest.resize(if self.model.sleeps { spin } else { 0 });
         if spin == 0 {
             self.spin.shrink_to_fit();
@@ -451,30 +449,30 @@ impl Swarm {
 
     fn measure_radii(&mut self) {
         let radii = self.at.iter().map(|row| row[3]);
-        self.max_radius = radii.clone().fold(0.0, f32::max);
-        let sum = radii.map(f64::from).sum::<f64>();
-        self.mean_radius = (sum / self.at.len().max(1) as f64) as f32;
+        self.max_radius = radii.clone().fold(S::zero(), S::max);
+        let sum = radii.map(S::as_f64).sum::<f64>();
+        self.mean_radius = S::from_f64(sum / self.at.len().max(1) as f64);
     }
 }
 
-fn pack_row(vector: Vec3<f32>, last: f32) -> Row {
+fn pack_row<S: Scalar>(vector: Vec3<S>, last: S) -> Row<S> {
     [vector.x, vector.y, vector.z, last]
 }
 
-fn validated_position(place: Point3<f32>) -> Result<Point3<f32>, Error> {
+fn validated_position<S: Scalar>(place: Point3<S>) -> Result<Point3<S>, Error> {
     let names = ["position.x", "position.y", "position.z"];
     finite_point(names, place)?;
     for (name, x) in names.into_iter().zip([place.x, place.y, place.z]) {
-        within(name, x, -MAX_COORDINATE, MAX_COORDINATE)?;
+        within(name, x, -S::from_f64(MAX_COORDINATE), S::from_f64(MAX_COORDINATE))?;
     }
     Ok(place)
 }
 
-fn validated_velocity(velocity: Vec3<f32>) -> Result<Vec3<f32>, Error> {
+fn validated_velocity<S: Scalar>(velocity: Vec3<S>) -> Result<Vec3<S>, Error> {
     let names = ["velocity.x", "velocity.y", "velocity.z"];
     finite_vector(names, velocity)?;
     for (name, x) in names.into_iter().zip([velocity.x, velocity.y, velocity.z]) {
-        within(name, x, -MAX_COORDINATE, MAX_COORDINATE)?;
+        within(name, x, -S::from_f64(MAX_COORDINATE), S::from_f64(MAX_COORDINATE))?;
     }
     Ok(velocity)
 }

@@ -2,7 +2,7 @@ use std::sync::OnceLock;
 
 use crate::Error;
 use crate::error::within;
-use crate::math::{Point3, Vec3};
+use crate::math::{Point3, Scalar, Vec3};
 use crate::motion::Mass;
 use crate::response::Material;
 
@@ -34,7 +34,7 @@ pub enum Tier {
 
 /// Model by which a swarm steps.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct SwarmModel {
+pub struct SwarmModel<S: Scalar = f32> {
     /// Physics of its balls.
     pub tier: Tier,
     /// Substeps per step, from 1 to 1,000; in [`Tier::Lab`], passes in which overlapping balls are
@@ -46,13 +46,13 @@ pub struct SwarmModel {
     pub threads: u32,
     /// Material of balls that have none of their own. Tangential restitution acts where restitution
     /// is above zero; [`Tier::Lab`] uses no number of it.
-    pub material: Material<f32>,
+    pub material: Material<S>,
     /// Lets balls at rest fall asleep in [`Tier::Full`], with those that they touch; and marbles by every
     /// response.
     pub sleeps: bool,
 }
 
-impl Default for SwarmModel {
+impl<S: Scalar> Default for SwarmModel<S> {
     /// [`Tier::Full`] in two substeps, with automatic threads and sleep.
     fn default() -> Self {
         Self {
@@ -70,11 +70,13 @@ impl SwarmModel {
     pub const MAX_SUBSTEPS: u32 = 1000;
     /// Maximum number of [threads](Self::threads).
     pub const MAX_THREADS: u32 = crate::workers::MAX_THREADS as u32;
+}
 
+impl<S: Scalar> SwarmModel<S> {
     /// Validates the model.
     pub(super) fn validated(self) -> Result<Self, Error> {
-        within("substeps", f64::from(self.substeps), 1.0, f64::from(Self::MAX_SUBSTEPS))?;
-        within("threads", f64::from(self.threads), 0.0, f64::from(Self::MAX_THREADS))?;
+        within("substeps", f64::from(self.substeps), 1.0, f64::from(SwarmModel::MAX_SUBSTEPS))?;
+        within("threads", f64::from(self.threads), 0.0, f64::from(SwarmModel::MAX_THREADS))?;
         self.material.validated()?;
         Ok(self)
     }
@@ -97,22 +99,22 @@ impl SwarmModel {
 
 /// Initial state of a ball of a swarm.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ball {
+pub struct Ball<S: Scalar = f32> {
     /// Center, in metres.
-    pub position: Point3<f32>,
+    pub position: Point3<S>,
     /// Radius in metres, from 1e-9 to 1e9.
-    pub radius: f32,
+    pub radius: S,
     /// Velocity, in m/s.
-    pub velocity: Vec3<f32>,
+    pub velocity: Vec3<S>,
     /// Mass of the ball.
-    pub mass: Mass<f32>,
+    pub mass: Mass<S>,
 }
 
-impl Ball {
+impl<S: Scalar> Ball<S> {
     /// Ball at rest with the density of glass, 2,500 kg/m³.
     #[must_use]
-    pub fn new(position: Point3<f32>, radius: f32) -> Self {
-        let velocity = Vec3::new(0.0, 0.0, 0.0);
+    pub fn new(position: Point3<S>, radius: S) -> Self {
+        let velocity = Vec3::new(S::zero(), S::zero(), S::zero());
         Self { position, radius, velocity, mass: Mass::default() }
     }
 }

@@ -6,16 +6,16 @@ use std::ops::Range;
 
 use super::batches::{Batch, BatchBuilder, MAX_COLOURS, builder};
 use super::grid::{Grid, Level};
-use super::simd::{Kernel, LANES, Row, Simd};
 use super::surfaces::SurfaceOf;
+use crate::math::{Kernel, LANES, Row, Scalar, Simd};
 
 /// More than any ball is away from another, and its square is finite.
-const NOWHERE: f32 = 1e18;
+const NOWHERE: f64 = 1e18;
 
 /// Scratch of the search; one for each thread.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Search {
-    columns: CandidateWindow,
+pub(super) struct Search<S> {
+    columns: CandidateWindow<S>,
     /// Colours of a row: the open batches in which it is, as bits.
     colour_mask: Vec<u32>,
     open: [Batch; MAX_COLOURS],
@@ -23,14 +23,14 @@ pub(super) struct Search {
 
 /// See [`CandidateBlocks`].
 #[derive(Clone, Debug, Default)]
-struct CandidateWindow {
+struct CandidateWindow<S> {
     /// Of a chunk and the next one: center, and radius with remaining skin.
-    window: [Vec<f32>; 4],
+    window: [Vec<S>; 4],
     blocks: Vec<[u32; 2]>,
     found: Vec<u32>,
 }
 
-impl Search {
+impl<S: Scalar> Search<S> {
     /// Puts pairs of about so many balls into batches.
     pub fn builder<'a>(
         &'a mut self,
@@ -76,7 +76,7 @@ impl PairVisitor for BatchBuilder<'_> {
 
 /// Numbers that the list of a row may take, on average over a chunk: as many as fit into a
 /// row of a column that is not in use meanwhile.
-pub(super) const NEIGHBOUR_ROOM: usize = size_of::<Row>() / size_of::<u16>();
+pub(super) const NEIGHBOUR_ROOM: usize = size_of::<Row<f32>>() / size_of::<u16>();
 
 /// For each row of a chunk, the length of its neighbour list, and how far after it each entry is.
 #[derive(Clone, Copy, Debug)]
@@ -154,19 +154,19 @@ impl PairVisitor for NeighbourListBuilder<'_> {
 }
 
 /// Finds the pairs of a chunk: of its own balls, and of these with those of the next one.
-pub(super) struct FindPairs<'a> {
-    pub grid: &'a Grid,
-    pub at: &'a [Row],
+pub(super) struct FindPairs<'a, S> {
+    pub grid: &'a Grid<S>,
+    pub at: &'a [Row<S>],
     /// Remaining skin of each ball, in metres.
-    pub skin_left: &'a [f32],
+    pub skin_left: &'a [S],
     /// Balls with more than this are fast movers.
-    pub skin: f32,
-    pub surfaces: SurfaceOf<'a>,
+    pub skin: S,
+    pub surfaces: SurfaceOf<'a, S>,
     /// The layers of level 0 in it.
     pub layers: [u32; 2],
     /// The first row, of it, of the next one and after that.
     pub rows: [u32; 3],
-    pub search: &'a mut Search,
+    pub search: &'a mut Search<S>,
     /// Number of pairs that there was no room for.
     pub unlisted: &'a mut usize,
     /// Output: pairs that are part of no neighbour list.
@@ -175,9 +175,9 @@ pub(super) struct FindPairs<'a> {
     pub lists: Option<&'a mut [u16]>,
 }
 
-impl Kernel for FindPairs<'_> {
+impl<S: Scalar> Kernel<S> for FindPairs<'_, S> {
     #[inline(always)]
-    fn run<L: Simd>(self) {
+    fn run<L: Simd<Scalar = S>>(self) {
         let Self { grid, at, skin_left, skin, surfaces, layers, rows, .. } = self;
         let Self { search, unlisted, batches, lists, .. } = self;
         let [first, next, end] = rows;
@@ -202,11 +202,11 @@ impl Kernel for FindPairs<'_> {
 
 #[inline(always)]
 fn find<L: Simd>(
-    grid: &Grid,
-    at: &[Row],
+    grid: &Grid<L::Scalar>,
+    at: &[Row<L::Scalar>],
     layers: [u32; 2],
     rows: [u32; 3],
-    candidates: &mut CandidateBlocks,
+    candidates: &mut CandidateBlocks<L::Scalar>,
     visitor: &mut impl PairVisitor,
 ) {
     // In the order of the rows.
@@ -226,10 +226,10 @@ fn find<L: Simd>(
 /// The pairs of the balls of one layer with those of the same level.
 #[inline(always)]
 fn pairs_in_layer<L: Simd>(
-    grid: &Grid,
-    level: &Level,
+    grid: &Grid<L::Scalar>,
+    level: &Level<L::Scalar>,
     layer: u32,
-    candidates: &mut CandidateBlocks,
+    candidates: &mut CandidateBlocks<L::Scalar>,
     visitor: &mut impl PairVisitor,
 ) {
     let [row_count, cell_count] = level.size();
@@ -260,30 +260,35 @@ fn pairs_in_layer<L: Simd>(
     }
 }
 
-trait Fill {
+trait Fill<S> {
     /// Takes rows in; fast movers, with more than the common skin, are nowhere.
-    fn fill_with(&mut self, at: &[Row], skin_left: &[f32], skin: f32);
+    fn fill_with(&mut self, at: &[Row<S>], skin_left: &[S], skin: S);
 }
 
-impl Fill for [Vec<f32>; 4] {
-    fn fill_with(&mut self, at: &[Row], skin_left: &[f32], skin: f32) {
+impl<S: Scalar> Fill<S> for [Vec<S>; 4] {
+    fn fill_with(&mut self, at: &[Row<S>], skin_left: &[S], skin: S) {
         let [x, y, z, reach] = self;
         for column in [&mut *x, y, z, reach] {
             column.clear();
-            column.resize(at.len() + LANES, NOWHERE);
+            column.resize(at.len() + LANES, S::from_f64(NOWHERE));
         }
         let columns = x.iter_mut().zip(y).zip(z).zip(reach);
         for ((at, skin_left), (((x, y), z), reach)) in at.iter().zip(skin_left).zip(columns) {
-            [*x, *y, *z, *reach] = [at[0], at[1], at[2], at[3] + skin_left];
+            [*x, *y, *z, *reach] = [at[0], at[1], at[2], at[3] + *skin_left];
             if *skin_left > skin {
-                *x = f32::NAN; // near to nothing, also not to another one
+                *x = S::nan(); // near to nothing, also not to another one
             }
         }
     }
 }
 
 /// The lines of cells that come later and are beside one: where the rows of their cells begin.
-fn lines_ahead<'a>(grid: &'a Grid, level: &Level, layer: u32, row: u32) -> [&'a [u32]; 4] {
+fn lines_ahead<'a, S: Scalar>(
+    grid: &'a Grid<S>,
+    level: &Level<S>,
+    layer: u32,
+    row: u32,
+) -> [&'a [u32]; 4] {
     let cells = level.size()[1];
     let line = |layer, row| grid.starts(level.cell(grid, layer, row, 0), cells);
     let here = line(layer, row + 1);
@@ -296,11 +301,11 @@ fn lines_ahead<'a>(grid: &'a Grid, level: &Level, layer: u32, row: u32) -> [&'a 
 /// Pairs of a ball with one of a coarser level: there, all 27 cells around it.
 #[inline(always)]
 fn cross_level_pairs<L: Simd>(
-    grid: &Grid,
-    at: &[Row],
+    grid: &Grid<L::Scalar>,
+    at: &[Row<L::Scalar>],
     layers: [u32; 2],
     [first, next, end]: [u32; 3],
-    candidates: &mut CandidateBlocks,
+    candidates: &mut CandidateBlocks<L::Scalar>,
     visitor: &mut impl PairVisitor,
 ) {
     // Also of the next chunk's balls, with those of this one.
@@ -327,20 +332,24 @@ fn cross_level_pairs<L: Simd>(
 }
 
 /// Looks which balls are near one, among some runs of rows.
-struct CandidateBlocks<'a> {
+struct CandidateBlocks<'a, S> {
     /// The first row of the window.
     first: u32,
     /// The columns of the window, with [`LANES`] places more.
-    columns: [&'a [f32]; 4],
+    columns: [&'a [S]; 4],
     /// The runs by eights: where each begins in the window, and a bit for each row of the run.
     blocks: &'a mut Vec<[u32; 2]>,
     /// Those that are near.
     found: &'a mut Vec<u32>,
-    surfaces: SurfaceOf<'a>,
+    surfaces: SurfaceOf<'a, S>,
 }
 
-impl<'a> CandidateBlocks<'a> {
-    fn new(search: &'a mut CandidateWindow, window: Range<u32>, surfaces: SurfaceOf<'a>) -> Self {
+impl<'a, S: Scalar> CandidateBlocks<'a, S> {
+    fn new(
+        search: &'a mut CandidateWindow<S>,
+        window: Range<u32>,
+        surfaces: SurfaceOf<'a, S>,
+    ) -> Self {
         let size = window.len();
         let CandidateWindow { window: columns, blocks, found } = search;
         let columns = columns.each_ref().map(|column| &column[..size + LANES]);
@@ -361,7 +370,7 @@ impl<'a> CandidateBlocks<'a> {
     /// The rows near a ball of the window that it collides with. Of the first eights, as many rows are left out as come
     /// before `after`.
     #[inline(always)]
-    fn near<L: Simd>(&mut self, ball: u32, after: u32) -> &[u32] {
+    fn near<L: Simd<Scalar = S>>(&mut self, ball: u32, after: u32) -> &[u32] {
         let local = (ball - self.first) as usize;
         let [x, y, z, reach] = self.columns;
         let (ax, ay) = (L::splat(x[local]), L::splat(y[local]));
@@ -411,7 +420,7 @@ impl<'a> CandidateBlocks<'a> {
 /// # Safety
 /// There are eight from there on.
 #[inline(always)]
-unsafe fn get<L: Simd>(column: &[f32], at: usize) -> L {
+unsafe fn get<L: Simd>(column: &[L::Scalar], at: usize) -> L {
     debug_assert!(at + LANES <= column.len());
     // SAFETY: as the caller promises.
     L::load(unsafe { &*column.as_ptr().add(at).cast() })

@@ -5,9 +5,8 @@ use cgmath::{InnerSpace, Zero};
 use super::Swarm;
 use super::chunk::Chunk;
 use super::scratch::Scratch;
-use super::simd::Row;
 use super::wall_contact::{WallContact, xyz};
-use crate::math::{Vec3, cast_vector};
+use crate::math::{Row, Scalar, Vec3, cast_vector};
 
 /// Impulse and work on a ball in a step.
 #[derive(Clone, Copy, Debug)]
@@ -24,7 +23,12 @@ impl OutsideWork {
     const NONE: Self = Self { impulse: Vec3::new(0.0, 0.0, 0.0), walls: 0.0, forces: 0.0 };
 
     /// Records what a wall did to the velocity of a ball.
-    pub(super) fn record_wall(&mut self, contact: &WallContact, before: &Row, after: &Row) {
+    pub(super) fn record_wall<S: Scalar>(
+        &mut self,
+        contact: &WallContact<S>,
+        before: &Row<S>,
+        after: &Row<S>,
+    ) {
         let impulse = impulse(before, after);
         self.impulse += impulse;
         self.walls += impulse.dot(cast_vector(contact.surface));
@@ -32,33 +36,38 @@ impl OutsideWork {
 
     /// Records the lift of a ball of this inverse mass that a wall pushes out: as far as the wall came in
     /// `h` seconds, its work against gravity.
-    pub(super) fn record_push(
+    pub(super) fn record_push<S: Scalar>(
         &mut self,
-        contact: &WallContact,
-        [push, h]: [f32; 2],
-        inverse_mass: f32,
-        gravity: Vec3<f32>,
+        contact: &WallContact<S>,
+        [push, h]: [S; 2],
+        inverse_mass: S,
+        gravity: Vec3<S>,
     ) {
-        let came = (contact.surface.dot(contact.normal) * h).max(0.0).min(push);
-        self.walls -= f64::from(contact.normal.dot(gravity) * came) / f64::from(inverse_mass);
+        let came = (contact.surface.dot(contact.normal) * h).max(S::zero()).min(push);
+        self.walls -= (contact.normal.dot(gravity) * came).as_f64() / inverse_mass.as_f64();
     }
 
     /// Records what a force did to the velocity of a ball, to which gravity adds this much.
-    pub(super) fn record_force(&mut self, before: &Row, after: &Row, fall: Vec3<f32>) {
+    pub(super) fn record_force<S: Scalar>(
+        &mut self,
+        before: &Row<S>,
+        after: &Row<S>,
+        fall: Vec3<S>,
+    ) {
         let impulse = impulse(before, after);
         self.impulse += impulse;
-        let mean = (xyz(before) + xyz(after) + fall) * 0.5;
+        let mean = (xyz(before) + xyz(after) + fall) * S::from_f64(0.5);
         self.forces += impulse.dot(cast_vector(mean));
     }
 }
 
 /// Impulse that changes the velocity of a row, in N s.
-fn impulse(before: &Row, after: &Row) -> Vec3<f64> {
-    let [old, new] = [before, after].map(|row| cast_vector::<f32, f64>(xyz(row)));
-    (new - old) / f64::from(before[3].abs())
+fn impulse<S: Scalar>(before: &Row<S>, after: &Row<S>) -> Vec3<f64> {
+    let [old, new] = [before, after].map(|row| cast_vector::<S, f64>(xyz(row)));
+    (new - old) / before[3].abs().as_f64()
 }
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Records [impulse and work](OutsideWork) on each ball in the next step.
     pub(crate) fn record_outside_work(&mut self) {
         let slots = self.ids.rows().len();
@@ -72,15 +81,15 @@ impl Swarm {
     }
 
     /// Records what gravity does in a substep of `h` seconds.
-    pub(super) fn record_gravity(&mut self, h: f32) {
+    pub(super) fn record_gravity(&mut self, h: S) {
         if self.scratch.outside_work.is_empty() {
             return;
         }
-        let fall = cast_vector::<f32, f64>(self.gravity.unwrap_or_else(Vec3::zero) * h);
+        let fall = cast_vector::<S, f64>(self.gravity.unwrap_or_else(Vec3::zero) * h);
         for at in self.chunks.iter().filter(|chunk| !chunk.asleep).flat_map(Chunk::own_rows) {
             let (slot, inverse_mass) = (self.ids.slots()[at] as usize, self.velocity[at][3]);
             if inverse_mass.is_sign_positive() {
-                self.scratch.outside_work[slot].impulse += fall / f64::from(inverse_mass);
+                self.scratch.outside_work[slot].impulse += fall / inverse_mass.as_f64();
             }
         }
     }
@@ -92,9 +101,10 @@ impl Swarm {
         }
         let Scratch { backing, backing_speed, outside_work, .. } = &mut self.scratch;
         for (row, (behind, slot)) in backing.iter().zip(self.ids.slots()).enumerate() {
-            let (borne, work) = (behind[3].max(0.0), &mut outside_work[*slot as usize]);
-            work.impulse += cast_vector::<f32, f64>(xyz(behind) * borne);
-            work.walls += f64::from(borne * backing_speed.get(row).copied().unwrap_or(0.0));
+            let (borne, work) = (behind[3].max(S::zero()), &mut outside_work[*slot as usize]);
+            work.impulse += cast_vector::<S, f64>(xyz(behind) * borne);
+            let speed = backing_speed.get(row).copied().unwrap_or_default();
+            work.walls += (borne * speed).as_f64();
         }
     }
 }

@@ -4,16 +4,15 @@ use super::bit_set::BitSet;
 use super::bodies::KinematicPath;
 use super::neighbours::Search;
 use super::outside_work::OutsideWork;
-use super::simd::Row;
 use super::state::of;
 use super::step::{SavedPlace, WayToWall};
 use super::sweeps::Crowd;
-use crate::math::UnionFind;
+use crate::math::{Row, Scalar, UnionFind};
 use crate::response::Impact;
 
 /// Memory that a step writes before it reads it.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Scratch {
+pub(super) struct Scratch<S> {
     /// Number of threads that work on this step.
     pub threads: usize,
     /// Set while other pairs pass through each other than when pairs were found, until the step begins.
@@ -21,13 +20,13 @@ pub(super) struct Scratch {
     /// Set while surfaces or filters are others than when contacts with walls were found, likewise.
     pub contacts_forgotten: bool,
     /// See [`SolverColumns::backing`](super::kernels::SolverColumns::backing).
-    pub backing: Vec<Row>,
+    pub backing: Vec<Row<S>>,
     /// See [`SolverColumns::backing_speed`](super::kernels::SolverColumns::backing_speed).
-    pub backing_speed: Vec<f32>,
+    pub backing_speed: Vec<S>,
     /// Rows that would leave their skin in this step.
     pub leaving: Vec<u32>,
     /// Displacements of the fast balls, while pairs are searched.
-    pub displacements: Vec<f32>,
+    pub displacements: Vec<S>,
     /// Version of sleep up to which batches are marked as idle.
     pub idle_marked_at: Option<u64>,
     /// Rows that wake, by chunk.
@@ -43,33 +42,33 @@ pub(super) struct Scratch {
     /// Rows of proxies, in order, and which proxy each is.
     pub proxy_rows: Vec<(u32, u32)>,
     /// Positions and velocities of these rows before they are integrated.
-    pub saved_proxies: Vec<[Row; 2]>,
+    pub saved_proxies: Vec<[Row<S>; 2]>,
     /// Rows that each thread found.
     pub lists: Vec<Vec<u32>>,
     /// Progress of each chunk, while they are worked on.
     pub chunk_states: Vec<u32>,
-    pub searches: Vec<Search>,
-    pub crowd: Crowd,
-    pub path_changes: Vec<Row>,
+    pub searches: Vec<Search<S>>,
+    pub crowd: Crowd<S>,
+    pub path_changes: Vec<Row<S>>,
     /// By slot: centers of balls near shapes at the begin of a substep.
-    pub places: Vec<SavedPlace>,
+    pub places: Vec<SavedPlace<S>>,
     /// Paths of kinematic bodies in the step.
-    pub kinematic_paths: Vec<KinematicPath>,
+    pub kinematic_paths: Vec<KinematicPath<S>>,
     /// Number of the substep.
     pub substep: u32,
     /// Ways of balls that would bounce off a wall: of each chunk, and of all.
-    pub ways_of_chunks: Vec<Vec<WayToWall>>,
-    pub ways_to_walls: Vec<WayToWall>,
+    pub ways_of_chunks: Vec<Vec<WayToWall<S>>>,
+    pub ways_to_walls: Vec<WayToWall<S>>,
     /// Rows of these balls, and of those among them that another one hinders.
     pub with_ways: BitSet,
     pub held: BitSet,
     /// Impacts of the step, if they are noted: of slots.
-    pub impacts: Vec<Impact<f32>>,
+    pub impacts: Vec<Impact<S>>,
     /// Impulse and work on each ball in the step, if they are recorded: by slot.
     pub outside_work: Vec<OutsideWork>,
 }
 
-impl Scratch {
+impl<S: Scalar> Scratch<S> {
     /// Bytes that it has from the allocator.
     pub fn bytes(&self) -> usize {
         let Self {

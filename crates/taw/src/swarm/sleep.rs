@@ -3,11 +3,12 @@
 use super::bit_set::BitSet;
 use super::rest::RestColumns;
 use super::state::of;
+use crate::math::Scalar;
 
 /// All that is known of sleep, besides who is asleep.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct SleepState {
-    pub rest: RestColumns,
+pub(super) struct SleepState<S> {
+    pub rest: RestColumns<S>,
     pub groups: SleepGroups,
     /// Slots of balls that never sleep, nor do their islands.
     pub sleepless: BitSet,
@@ -19,7 +20,7 @@ pub(super) struct SleepState {
     pub clock: u32,
 }
 
-impl SleepState {
+impl<S: Scalar> SleepState<S> {
     pub fn bytes(&self) -> usize {
         let Self { rest, groups, sleepless, stirred, sleepers: _, clock: _ } = self;
         rest.bytes() + groups.bytes() + sleepless.bytes() + stirred.bytes()

@@ -1,10 +1,10 @@
 //! All of a swarm, field by field: its bytes, and whether two will go on alike.
 
 use super::chunk::Chunk;
-use super::simd::Row;
 use super::{Swarm, SwarmModel};
+use crate::math::{Row, Scalar};
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Number of threads that work on this step: of the last model until the first step begins.
     pub(crate) fn threads(&self) -> usize {
         self.scratch.threads.max(1)
@@ -72,7 +72,7 @@ pub(super) fn of<T>(column: &Vec<T>) -> usize {
     column.capacity() * size_of::<T>()
 }
 
-impl PartialEq for Swarm {
+impl<S: Scalar> PartialEq for Swarm<S> {
     /// Equal if they will go on alike, bit by bit: scratch does not count, nor do
     /// threads and instructions.
     fn eq(&self, other: &Self) -> bool {
@@ -117,9 +117,9 @@ impl PartialEq for Swarm {
             steps_since_build,
             skin_scale,
         } = self;
-        let alone = |model: SwarmModel| SwarmModel { threads: 1, ..model };
+        let alone = |model: SwarmModel<S>| SwarmModel { threads: 1, ..model };
         // As bits: most are no numbers.
-        let bits = |neighbours| bytemuck::cast_slice::<Row, u32>(neighbours);
+        let bits = |neighbours| bytemuck::cast_slice::<Row<S>, u32>(neighbours);
         (alone(*model), ids, gravity) == (alone(other.model), &other.ids, &other.gravity)
             && (at, velocity, spin) == (&other.at, &other.velocity, &other.spin)
             && (skin_left, displacement, old_rows)

@@ -2,33 +2,33 @@
 
 use super::batches::Batch;
 use super::bit_set::BitSet;
-use super::simd::LANES;
 use crate::broad::{CollisionFilter, CollisionLayers, IgnoredPairs};
+use crate::math::{LANES, Scalar};
 use crate::response::Material;
 
 /// Mass times radius squared over the moment of inertia of a solid ball.
-pub(super) const SOLID_BALL: f32 = 2.5;
+pub(super) const SOLID_BALL: f64 = 2.5;
 
 /// Surface of a ball: its material, and whether contacts can set it spinning.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Surface {
-    pub material: Material<f32>,
+pub(crate) struct Surface<S> {
+    pub material: Material<S>,
     pub rotation_locked: bool,
 }
 
-impl Surface {
+impl<S: Scalar> Surface<S> {
     /// Mass times radius squared over the moment of inertia; zero where the rotation is locked.
-    fn inertia_factor(self) -> f32 {
-        if self.rotation_locked { 0.0 } else { SOLID_BALL }
+    fn inertia_factor(self) -> S {
+        if self.rotation_locked { S::zero() } else { S::from_f64(SOLID_BALL) }
     }
 }
 
 /// Surfaces and layers of all balls. Most have the surface of the swarm's model and all layers, which
 /// takes no memory.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Surfaces {
+pub(super) struct Surfaces<S> {
     /// Different ones, in the order in which they came.
-    list: Vec<Surface>,
+    list: Vec<Surface<S>>,
     /// Number of slots of each.
     counts: Vec<u32>,
     /// One more than the place in the list, by slot; zero for the model's surface.
@@ -41,7 +41,7 @@ pub(super) struct Surfaces {
     kinematic: BitSet,
 }
 
-impl Surfaces {
+impl<S: Scalar> Surfaces<S> {
     /// Changes the layers of a slot. Returns whether it had others.
     pub fn set_layers(&mut self, slot: u32, layers: CollisionLayers) -> bool {
         let slot = slot as usize;
@@ -77,7 +77,7 @@ impl Surfaces {
     }
 
     /// Gives a slot a surface of its own, or that of the model. Returns whether it had another.
-    pub fn set(&mut self, slot: u32, surface: Option<Surface>) -> bool {
+    pub fn set(&mut self, slot: u32, surface: Option<Surface<S>>) -> bool {
         let index = surface.map_or(0, |surface| {
             let known = self.list.iter().rposition(|known| *known == surface);
             let index = known.unwrap_or_else(|| {
@@ -109,14 +109,14 @@ impl Surfaces {
     }
 
     /// Surface of a slot; none for that of the model.
-    pub fn get(&self, slot: u32) -> Option<Surface> {
+    pub fn get(&self, slot: u32) -> Option<Surface<S>> {
         let index = *self.of_slot.get(slot as usize)?;
         self.list.get((index as usize).checked_sub(1)?).copied()
     }
 
     /// Material of all balls, of which there are so many, where one is; and nobody's rotation is
     /// locked.
-    pub fn common(&self, model: Material<f32>, balls: usize) -> Option<Material<f32>> {
+    pub fn common(&self, model: Material<S>, balls: usize) -> Option<Material<S>> {
         let used = || self.counts.iter().zip(&self.list).filter(|(count, _)| **count > 0);
         match used().next() {
             None => Some(model),
@@ -128,7 +128,7 @@ impl Surfaces {
     }
 
     pub fn bytes(&self) -> usize {
-        self.list.capacity() * size_of::<Surface>()
+        self.list.capacity() * size_of::<Surface<S>>()
             + (self.counts.capacity() + self.of_slot.capacity()) * size_of::<u32>()
             + self.layers.capacity() * size_of::<CollisionLayers>()
             + (self.ignored.bytes() + self.kinematic.bytes())
@@ -137,17 +137,17 @@ impl Surfaces {
 
 /// Lookup of surfaces by row.
 #[derive(Clone, Copy)]
-pub(super) struct SurfaceOf<'a> {
-    pub model: Material<f32>,
-    pub surfaces: &'a Surfaces,
+pub(super) struct SurfaceOf<'a, S> {
+    pub model: Material<S>,
+    pub surfaces: &'a Surfaces<S>,
     /// Slot of each row.
     pub slots: &'a [u32],
 }
 
-impl SurfaceOf<'_> {
+impl<S: Scalar> SurfaceOf<'_, S> {
     /// Surface of the ball in a row.
     #[inline]
-    pub fn row(&self, row: u32) -> Surface {
+    pub fn row(&self, row: u32) -> Surface<S> {
         let own = || self.surfaces.get(self.slots[row as usize]);
         let plain = Surface { material: self.model, rotation_locked: false };
         if self.surfaces.list.is_empty() { plain } else { own().unwrap_or(plain) }
@@ -208,15 +208,15 @@ impl SurfaceOf<'_> {
     /// True if pairs need numbers of their own.
     pub fn differ(&self) -> bool {
         self.surfaces.common(self.model, self.slots.len()).is_none_or(|common| {
-            common.rolling_resistance > 0.0
-                || common.spinning_resistance > 0.0
-                || common.tangential_restitution != 0.0
+            common.rolling_resistance > S::zero()
+                || common.spinning_resistance > S::zero()
+                || common.tangential_restitution != S::zero()
         })
     }
 
     /// Fills in the numbers of the pairs of some batches; none, if all balls have one surface that
     /// resists neither rolling nor spinning and has no tangential restitution.
-    pub fn of_pairs(&self, batches: &[Batch], numbers: &mut Vec<PairNumbers>) {
+    pub fn of_pairs(&self, batches: &[Batch], numbers: &mut Vec<PairNumbers<S>>) {
         numbers.clear();
         if !self.differ() {
             return;
@@ -233,18 +233,18 @@ impl SurfaceOf<'_> {
 
 /// Numbers of the contacts of a batch.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(super) struct PairNumbers {
-    pub friction: [f32; LANES],
-    pub restitution: [f32; LANES],
-    pub tangential_restitution: [f32; LANES],
-    pub rolling_resistance: [f32; LANES],
-    pub spinning_resistance: [f32; LANES],
+pub(super) struct PairNumbers<S> {
+    pub friction: [S; LANES],
+    pub restitution: [S; LANES],
+    pub tangential_restitution: [S; LANES],
+    pub rolling_resistance: [S; LANES],
+    pub spinning_resistance: [S; LANES],
     /// Mass times radius squared over the moment of inertia of both; zero where locked.
-    pub inertia_factors: [[f32; LANES]; 2],
+    pub inertia_factors: [[S; LANES]; 2],
 }
 
-impl PairNumbers {
-    fn set(&mut self, lane: usize, [a, b]: [Surface; 2]) {
+impl<S: Scalar> PairNumbers<S> {
+    fn set(&mut self, lane: usize, [a, b]: [Surface<S>; 2]) {
         let material = a.material.combined_with(b.material);
         self.friction[lane] = material.friction;
         self.restitution[lane] = material.restitution;
@@ -260,19 +260,19 @@ impl PairNumbers {
 
 /// Numbers of the contact of a ball with a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct WallNumbers {
-    pub friction: f32,
-    pub restitution: f32,
-    pub tangential_restitution: f32,
-    pub rolling_resistance: f32,
-    pub spinning_resistance: f32,
+pub(super) struct WallNumbers<S> {
+    pub friction: S,
+    pub restitution: S,
+    pub tangential_restitution: S,
+    pub rolling_resistance: S,
+    pub spinning_resistance: S,
     /// Mass times radius squared over the moment of inertia of the ball; zero where locked.
-    pub inertia_factor: f32,
+    pub inertia_factor: S,
 }
 
-impl WallNumbers {
+impl<S: Scalar> WallNumbers<S> {
     /// Numbers of a ball on a wall, which may have a material of its own.
-    pub fn new(ball: Surface, wall: Option<Material<f32>>) -> Self {
+    pub fn new(ball: Surface<S>, wall: Option<Material<S>>) -> Self {
         let material = wall.map_or(ball.material, |wall| ball.material.combined_with(wall));
         Self {
             friction: material.friction,

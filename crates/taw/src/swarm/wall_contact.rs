@@ -4,16 +4,15 @@ use cgmath::{EuclideanSpace, InnerSpace, Point3};
 
 use super::kernels::{GROUNDED, Pass, SolverParams, WALL_SLOP};
 use super::proxies::Proxy;
-use super::simd::Row;
 use super::surfaces::WallNumbers;
 use super::walls::StaticGeometry;
 use crate::constraint::{ContactImpulse, ContactSoftness, FrictionCone, solve_rolling};
-use crate::math::{RealVector, Vec3};
+use crate::math::{RealVector, Row, Scalar, Vec3};
 use crate::response::Impact;
 
 /// Contact constraint of a ball and a part of a wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct WallContact {
+pub(super) struct WallContact<S> {
     pub row: u32,
     pub wall: u32,
     pub part: u32,
@@ -24,53 +23,53 @@ pub(super) struct WallContact {
     pub bears_proxy: bool,
     /// The plane that the wall is like there: its normal, and how far along it the surface is, now
     /// and at the end of the step.
-    pub normal: Vec3<f32>,
-    pub offset: f32,
-    pub offset_at_end: f32,
+    pub normal: Vec3<S>,
+    pub offset: S,
+    pub offset_at_end: S,
     /// The velocity of the surface, in m/s.
-    pub surface: Vec3<f32>,
-    pub numbers: WallNumbers,
+    pub surface: Vec3<S>,
+    pub numbers: WallNumbers<S>,
     /// Accumulated normal impulse for others that press on the ball, and impulse for the ball
     /// itself, in N s.
-    pub borne_for_others: f32,
-    pub impulse: ContactImpulse<f32>,
+    pub borne_for_others: S,
+    pub impulse: ContactImpulse<S>,
     /// Normal impulse before the wall was struck in this substep, in N s.
-    pub load: Option<f32>,
+    pub load: Option<S>,
     /// Angular impulse against rolling and spinning, over the radius, in N s.
-    pub torque: Vec3<f32>,
+    pub torque: Vec3<S>,
 }
 
 /// Meeting of a ball and a wall within a substep.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Bounce {
+pub(super) struct Bounce<S> {
     /// Distance that the ball has to go along the normal, in metres.
-    pub separation: f32,
+    pub separation: S,
     /// Speed at which it approaches now, and when it is there, in m/s.
-    approach_speed: f32,
-    impact_speed: f32,
+    approach_speed: S,
+    impact_speed: S,
 }
 
 /// Separation in radii, and in roundings of the coordinates, up to which a ball stands on a wall. A
 /// larger one would hold balls in the air that come down beside others.
-const TOUCHES: f32 = 1e-4;
-const ROUNDINGS: f32 = 4.0;
+const TOUCHES: f64 = 1e-4;
+const ROUNDINGS: f64 = 4.0;
 
-pub(super) fn xyz(row: &Row) -> Vec3<f32> {
+pub(super) fn xyz<S: Scalar>(row: &Row<S>) -> Vec3<S> {
     Vec3::new(row[0], row[1], row[2])
 }
 
-fn set(row: &mut Row, to: Vec3<f32>) {
+fn set<S: Scalar>(row: &mut Row<S>, to: Vec3<S>) {
     [row[0], row[1], row[2]] = to.into();
 }
 
-impl WallContact {
-    pub fn separation(&self, at: &Row) -> f32 {
+impl<S: Scalar> WallContact<S> {
+    pub fn separation(&self, at: &Row<S>) -> S {
         self.normal.dot(xyz(at)) - self.offset - at[3]
     }
 
     /// Puts the wall where it is so long before the end of the step, in seconds, and reads its velocity at the
     /// ball.
-    pub fn set_time(&mut self, walls: &dyn StaticGeometry, at: &Row, before_end: f32) {
+    pub fn set_time(&mut self, walls: &dyn StaticGeometry<S>, at: &Row<S>, before_end: S) {
         let point = Point3::from_vec(xyz(at) - self.normal * at[3]);
         self.surface = walls.surface_velocity(self.wall, point, self.normal);
         self.offset = self.offset_at_end;
@@ -78,31 +77,36 @@ impl WallContact {
     }
 
     /// The wall moves on for so long, in seconds; one that bears a proxy may give way to it.
-    pub fn advance(&mut self, time: f32) {
+    pub fn advance(&mut self, time: S) {
         self.offset += self.surface.dot(self.normal) * time;
     }
 
     /// Limits it to what the swarm presses on a proxy: the proxy's own motion into the wall and its
     /// depth there are left to the world's solver, as if the wall gave way. It follows no proxy that
     /// leaves it. The step goes on for so long, in seconds.
-    pub fn bear(&mut self, proxy: &Proxy, left: f32) {
+    pub fn bear(&mut self, proxy: &Proxy<S>, left: S) {
         self.bears_proxy = true;
-        (self.numbers.friction, self.numbers.restitution) = (0.0, 0.0);
+        (self.numbers.friction, self.numbers.restitution) = (S::zero(), S::zero());
         let own = xyz(&proxy.velocity);
-        let leaves = (own - self.surface).dot(self.normal).max(0.0);
+        let leaves = (own - self.surface).dot(self.normal).max(S::zero());
         self.surface = own - self.normal * leaves;
         self.offset = self.offset_at_end;
-        let at_end = self.separation(&proxy.at).min(0.0);
+        let at_end = self.separation(&proxy.at).min(S::zero());
         self.advance(-left);
-        let leaving = if leaves > 0.0 { self.separation(&proxy.from[0]).min(0.0) } else { 0.0 };
+        let leaving = if leaves > S::zero() {
+            self.separation(&proxy.from[0]).min(S::zero())
+        } else {
+            S::zero()
+        };
         self.offset += at_end.min(leaving);
     }
 
     /// Normal impulse in the last substep, in N s; zero if the ball has left the wall.
-    pub fn bears(&self, at: &Row) -> f32 {
+    pub fn bears(&self, at: &Row<S>) -> S {
         let place = at[0].abs() + at[1].abs() + at[2].abs();
-        let there = self.separation(at) <= at[3] * TOUCHES + place * (ROUNDINGS * f32::EPSILON);
-        if there { self.impulse.normal + self.borne_for_others } else { 0.0 }
+        let there = self.separation(at)
+            <= at[3] * S::from_f64(TOUCHES) + place * (S::from_f64(ROUNDINGS) * S::epsilon());
+        if there { self.impulse.normal + self.borne_for_others } else { S::zero() }
     }
 
     /// Takes over the impulses of an earlier contact of ball and wall.
@@ -112,7 +116,7 @@ impl WallContact {
     }
 
     /// Scales all its impulses.
-    pub fn scale(&mut self, factor: f32) {
+    pub fn scale(&mut self, factor: S) {
         self.borne_for_others *= factor;
         self.impulse.normal *= factor;
         self.impulse.tangent *= factor;
@@ -121,12 +125,12 @@ impl WallContact {
     }
 
     /// Notes what the wall bears before a ball of this velocity strikes it in a pass.
-    pub fn note_impact(&mut self, pass: Pass, velocity: &Row) {
+    pub fn note_impact(&mut self, pass: Pass<S>, velocity: &Row<S>) {
         let (Pass::Solve(params) | Pass::Relax(params)) = pass else { return };
         let approach_speed = -(xyz(velocity) - self.surface).dot(self.normal);
         let threshold = params.restitution_threshold;
-        if threshold > 0.0 && approach_speed > threshold {
-            self.load = Some(self.load.unwrap_or(f32::MAX).min(self.impulse.normal));
+        if threshold > S::zero() && approach_speed > threshold {
+            self.load = Some(self.load.unwrap_or(S::max_value()).min(self.impulse.normal));
         }
     }
 
@@ -141,20 +145,20 @@ impl WallContact {
     }
 
     /// The impulse that the wall has borne for others, if it is the one behind the ball.
-    pub fn share_of(&self, backing: &Row) -> f32 {
-        if xyz(backing) == self.normal { backing[3] } else { 0.0 }
+    pub fn share_of(&self, backing: &Row<S>) -> S {
+        if xyz(backing) == self.normal { backing[3] } else { S::zero() }
     }
 
     /// Moves the ball out.
-    pub fn displace(&self, at: &mut Row) {
-        let overlap = (-self.separation(at)).max(0.0);
+    pub fn displace(&self, at: &mut Row<S>) {
+        let overlap = (-self.separation(at)).max(S::zero());
         set(at, xyz(at) + self.normal * overlap);
     }
 
     /// Moves the ball out, but for what a contact bears. Says how far, in metres.
-    pub fn keep_out(&self, at: &mut Row) -> f32 {
+    pub fn keep_out(&self, at: &mut Row<S>) -> S {
         // All of it: a wall gives way to nobody.
-        let overlap = (-self.separation(at) - at[3] * WALL_SLOP).max(0.0);
+        let overlap = (-self.separation(at) - at[3] * S::from_f64(WALL_SLOP)).max(S::zero());
         set(at, xyz(at) + self.normal * overlap);
         overlap
     }
@@ -163,11 +167,11 @@ impl WallContact {
     /// separation.
     pub fn solve(
         &mut self,
-        pass: Pass,
-        at: &mut Row,
-        velocity: &mut Row,
-        spin: &mut Row,
-    ) -> Option<Bounce> {
+        pass: Pass<S>,
+        at: &mut Row<S>,
+        velocity: &mut Row<S>,
+        spin: &mut Row<S>,
+    ) -> Option<Bounce<S>> {
         match pass {
             Pass::Restitution(params) => {
                 return self.apply_restitution(&params, at, velocity, spin);
@@ -185,10 +189,10 @@ impl WallContact {
             }
             Pass::Relax(params) => {
                 let approach_speed = -(xyz(velocity) - self.surface).dot(self.normal);
-                let overlaps = || self.separation(at) <= 0.0;
+                let overlaps = || self.separation(at) <= S::zero();
                 // What comes fast and is not there yet keeps its speed until it is.
-                if self.impulse.normal > 0.0
-                    || self.numbers.restitution == 0.0 && overlaps()
+                if self.impulse.normal > S::zero()
+                    || self.numbers.restitution == S::zero() && overlaps()
                     || approach_speed <= params.restitution_threshold
                 {
                     self.push(params.time, None, at, velocity, spin);
@@ -199,18 +203,26 @@ impl WallContact {
     }
 
     /// Finds out if the ball meets the wall within a substep, fast enough to bounce.
-    pub fn bounce(&self, params: &SolverParams, at: &Row, velocity: &Row) -> Option<Bounce> {
+    pub fn bounce(
+        &self,
+        params: &SolverParams<S>,
+        at: &Row<S>,
+        velocity: &Row<S>,
+    ) -> Option<Bounce<S>> {
         let approach_speed = -(xyz(velocity) - self.surface).dot(self.normal);
-        let separation = self.separation(at).max(0.0);
+        let separation = self.separation(at).max(S::zero());
         // Gravity works on the ball as far as it comes nearer. As far as the contact reaches, by the
         // velocity after gravity: one that only stops the ball would take its bounce.
         let gravity = -xyz(&params.gravity).dot(self.normal);
         let nearer = (approach_speed + gravity * params.time) * params.time;
-        if self.numbers.restitution == 0.0 || approach_speed <= 0.0 || separation >= nearer {
+        if self.numbers.restitution == S::zero()
+            || approach_speed <= S::zero()
+            || separation >= nearer
+        {
             return None;
         }
-        let square = approach_speed * approach_speed + 2.0 * gravity * separation;
-        let impact_speed = square.max(0.0).sqrt();
+        let square = approach_speed * approach_speed + S::from_f64(2.0) * gravity * separation;
+        let impact_speed = square.max(S::zero()).sqrt();
         (impact_speed > params.restitution_threshold).then_some(Bounce {
             separation,
             approach_speed,
@@ -219,9 +231,9 @@ impl WallContact {
     }
 
     /// Impact of such a bounce, of a ball that was here.
-    pub fn impact(&self, bounce: &Bounce, at: &Row, velocity: &Row) -> Impact<f32> {
+    pub fn impact(&self, bounce: &Bounce<S>, at: &Row<S>, velocity: &Row<S>) -> Impact<S> {
         let Bounce { separation, approach_speed, impact_speed } = *bounce;
-        let time = separation / (0.5 * (approach_speed + impact_speed));
+        let time = separation / (S::from_f64(0.5) * (approach_speed + impact_speed));
         let along = xyz(velocity).reject_from(self.normal) * time;
         let to_wall = self.surface.dot(self.normal) * time - separation - at[3];
         let point = xyz(at) + along + self.normal * to_wall;
@@ -238,18 +250,18 @@ impl WallContact {
     /// Turns the ball back if it meets the wall, with the speed that it then has.
     fn apply_restitution(
         &self,
-        params: &SolverParams,
-        at: &mut Row,
-        velocity: &mut Row,
-        spin: &mut Row,
-    ) -> Option<Bounce> {
+        params: &SolverParams<S>,
+        at: &mut Row<S>,
+        velocity: &mut Row<S>,
+        spin: &mut Row<S>,
+    ) -> Option<Bounce<S>> {
         let bounce = self.bounce(params, at, velocity)?;
         let Bounce { separation, approach_speed, impact_speed } = bounce;
         let relative = xyz(velocity) - self.surface;
         let stopping = self.slip(relative, spin) * (-self.tangent_mass() / velocity[3]);
         let impulse = FrictionCone::new(self.numbers.friction).clamp(ContactImpulse {
             normal: (approach_speed + impact_speed * self.numbers.restitution) / velocity[3],
-            tangent: stopping * (1.0 + self.numbers.tangential_restitution),
+            tangent: stopping * (S::one() + self.numbers.tangential_restitution),
         });
         set(at, xyz(at) - self.normal * separation);
         self.apply_impulse(velocity, spin, impulse);
@@ -257,7 +269,7 @@ impl WallContact {
     }
 
     /// Velocity at which the ball's surface slides over the wall's, in m/s.
-    fn slip(&self, relative: Vec3<f32>, spin: &Row) -> Vec3<f32> {
+    fn slip(&self, relative: Vec3<S>, spin: &Row<S>) -> Vec3<S> {
         relative.reject_from(self.normal) - xyz(spin).cross(self.normal)
     }
 
@@ -265,42 +277,42 @@ impl WallContact {
     /// `time` seconds. Rigid without softness.
     fn push(
         &mut self,
-        time: f32,
-        softness: Option<ContactSoftness>,
-        at: &Row,
-        velocity: &mut Row,
-        spin: &mut Row,
+        time: S,
+        softness: Option<ContactSoftness<S>>,
+        at: &Row<S>,
+        velocity: &mut Row<S>,
+        spin: &mut Row<S>,
     ) {
-        let (separation, mass) = (self.separation(at), 1.0 / velocity[3]);
+        let (separation, mass) = (self.separation(at), S::one() / velocity[3]);
         let relative = xyz(velocity) - self.surface;
         let (target, softness) = match softness {
             Some(softness) => {
-                let (target, softness) = softness.at(separation, 1.0 / time);
+                let (target, softness) = softness.at(separation, S::one() / time);
                 (target, Some(softness))
             }
-            None => (-separation.max(0.0) / time, None),
+            None => (-separation.max(S::zero()) / time, None),
         };
         let wanted = ContactImpulse {
             normal: mass * (target - relative.dot(self.normal)),
             tangent: self.slip(relative, spin) * (-mass * self.tangent_mass()),
         };
         let change = self.impulse.solve(wanted, softness, &self.cone());
-        if self.impulse.normal + self.borne_for_others > 0.0 {
-            spin[3] = GROUNDED;
+        if self.impulse.normal + self.borne_for_others > S::zero() {
+            spin[3] = S::from_f64(GROUNDED);
         }
         self.apply_impulse(velocity, spin, change);
         self.solve_rolling(velocity, spin);
     }
 
     /// Limits of its impulse, with the friction of what it bears for others.
-    fn cone(&self) -> FrictionCone<f32> {
+    fn cone(&self) -> FrictionCone<S> {
         FrictionCone {
             extra_friction: self.numbers.friction * self.borne_for_others,
             ..FrictionCone::new(self.numbers.friction)
         }
     }
 
-    fn apply_impulse(&self, velocity: &mut Row, spin: &mut Row, impulse: ContactImpulse<f32>) {
+    fn apply_impulse(&self, velocity: &mut Row<S>, spin: &mut Row<S>, impulse: ContactImpulse<S>) {
         let inverse_mass = velocity[3];
         set(velocity, xyz(velocity) + impulse.along(self.normal) * inverse_mass);
         let turn =
@@ -309,17 +321,17 @@ impl WallContact {
     }
 
     /// Effective mass of the touched point along the wall, over the mass of the ball.
-    fn tangent_mass(&self) -> f32 {
-        1.0 / (1.0 + self.numbers.inertia_factor)
+    fn tangent_mass(&self) -> S {
+        S::one() / (S::one() + self.numbers.inertia_factor)
     }
 
     /// Slows rolling and spinning, by a torque of at most the resistance times normal force times
     /// radius.
-    fn solve_rolling(&mut self, velocity: &Row, spin: &mut Row) {
+    fn solve_rolling(&mut self, velocity: &Row<S>, spin: &mut Row<S>) {
         let WallNumbers { rolling_resistance, spinning_resistance, inertia_factor, .. } =
             self.numbers;
         let give = inertia_factor * velocity[3];
-        if rolling_resistance + spinning_resistance == 0.0 || give == 0.0 {
+        if rolling_resistance + spinning_resistance == S::zero() || give == S::zero() {
             return;
         }
         let load = self.impulse.normal;

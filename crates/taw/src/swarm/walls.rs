@@ -6,105 +6,104 @@ use super::chunk::Chunk;
 use super::impulse_cache::reserve_slack;
 use super::kernels::squared;
 use super::proxies::Proxy;
-use super::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use super::surfaces::{SurfaceOf, WallNumbers};
 use super::wall_contact::WallContact;
 use super::wall_paths::{FAST, WallQuery, along_path};
 use crate::broad::{CollisionFilter, CollisionLayers};
 use crate::constraint::ContactImpulse;
-use crate::math::{Point3, Vec3, is_finite};
+use crate::math::{Kernel, LANES, Point3, Row, Scalar, Simd, SimdLevel, Vec3, is_finite};
 use crate::response::Material;
 
 /// Static and kinematic colliders of the world, as the balls of a swarm meet them.
-pub(crate) trait StaticGeometry: Sync {
+pub(crate) trait StaticGeometry<S>: Sync {
     /// Visits all half-spaces: the wall, its normal, and the offset of the surface along it, in
     /// metres.
-    fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<f32>, f32));
+    fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<S>, S));
     /// Visits the boxes in which walls changed since they had this identity. Returns false if all may
     /// have.
-    fn visit_changes_since(&self, identity: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool;
+    fn visit_changes_since(&self, identity: u64, visit: &mut dyn FnMut([[S; 3]; 2])) -> bool;
     /// Visits the removals of walls since they had this identity, in order: the row of the wall, and
     /// that whose wall moved there. Returns false if they are not known.
     fn visit_removals_since(&self, identity: u64, visit: &mut dyn FnMut([u32; 2])) -> bool;
     /// Tests if there are shapes other than half-spaces.
     fn has_shapes(&self) -> bool;
     /// Tests if one of these may be in a box.
-    fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool;
+    fn near(&self, low: [S; 3], high: [S; 3]) -> bool;
     /// Visits what else is within `reach` metres of a ball and collides with it by this filter, without
     /// ghost collisions: the wall and its part, the normal, and the distance of the center.
     fn shapes_at(
         &self,
-        ball: &Row,
+        ball: &Row<S>,
         filter: CollisionFilter,
-        reach: f32,
-        visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
+        reach: S,
+        visit: &mut dyn FnMut([u32; 2], Vec3<S>, S),
     );
     /// The part that a ball first meets on its way, likewise: with the normal where they meet, and
     /// how far the center is from the plane across that place.
     fn first_hit_on_path(
         &self,
-        ball: &Row,
+        ball: &Row<S>,
         filter: CollisionFilter,
-        displacement: Vec3<f32>,
-    ) -> Option<([u32; 2], Vec3<f32>, f32)>;
+        displacement: Vec3<S>,
+    ) -> Option<([u32; 2], Vec3<S>, S)>;
     /// Returns true if a wall may pass a ball within the step of which it goes `way` metres: one that goes
     /// further itself than the ball is wide.
-    fn is_outrun(&self, ball: &Row, way: f32, filter: CollisionFilter) -> bool;
+    fn is_outrun(&self, ball: &Row<S>, way: S, filter: CollisionFilter) -> bool;
     /// Visits the parts of such walls, which the other visits leave out: what the ball touches, and what
     /// it meets on its way. The distance is that from the plane as it will be at the end of the step. The
     /// times are what is left of the step and what the way takes, in seconds.
     fn outrunning_at(
         &self,
-        ball: &Row,
+        ball: &Row<S>,
         filter: CollisionFilter,
-        displacement: Vec3<f32>,
-        times: [f32; 2],
-        visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
+        displacement: Vec3<S>,
+        times: [S; 2],
+        visit: &mut dyn FnMut([u32; 2], Vec3<S>, S),
     );
     /// Center, in metres, at which a ball ends that surfaces stop on its way between two places; none if
     /// none stops it. `before_end` holds the times of both places, in seconds before the end of the step.
     fn stop_passage(
         &self,
-        places: [&Row; 2],
+        places: [&Row<S>; 2],
         filter: CollisionFilter,
-        before_end: [f32; 2],
-    ) -> Option<[f32; 3]>;
+        before_end: [S; 2],
+    ) -> Option<[S; 3]>;
     /// Layers of a wall.
     fn layers(&self, wall: u32) -> CollisionLayers;
     /// Velocity of the surface at a point with this normal, in m/s.
-    fn surface_velocity(&self, wall: u32, point: Point3<f32>, normal: Vec3<f32>) -> Vec3<f32>;
+    fn surface_velocity(&self, wall: u32, point: Point3<S>, normal: Vec3<S>) -> Vec3<S>;
     /// The wall's own material.
-    fn material(&self, wall: u32) -> Option<Material<f32>>;
+    fn material(&self, wall: u32) -> Option<Material<S>>;
 }
 
 /// A half-space.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct HalfSpace {
+pub(super) struct HalfSpace<S> {
     pub wall: u32,
-    pub normal: Vec3<f32>,
-    pub offset: f32,
+    pub normal: Vec3<S>,
+    pub offset: S,
     /// Of the wall itself, if it has one.
-    material: Option<Material<f32>>,
+    material: Option<Material<S>>,
     pub layers: CollisionLayers,
 }
 
 /// The columns that say which balls may come to a wall.
 #[derive(Clone, Copy)]
-pub(super) struct Balls<'a> {
-    pub at: &'a [Row],
-    pub velocity: &'a [Row],
-    pub skin_left: &'a [f32],
+pub(super) struct Balls<'a, S> {
+    pub at: &'a [Row<S>],
+    pub velocity: &'a [Row<S>],
+    pub skin_left: &'a [S],
     /// In seconds; none in the lab's tier, where balls have moved already, and the velocities are
     /// the places before.
-    pub ahead: Option<f32>,
-    pub surfaces: SurfaceOf<'a>,
+    pub ahead: Option<S>,
+    pub surfaces: SurfaceOf<'a, S>,
 }
 
-impl Balls<'_> {
+impl<S: Scalar> Balls<'_, S> {
     /// Displacement of a ball before walls are searched again: its remaining skin, or more if it is
     /// so fast that it leaves that in a step.
     #[inline(always)]
-    pub fn reach(&self, row: usize) -> f32 {
+    pub fn reach(&self, row: usize) -> S {
         let (velocity, at) = (self.velocity[row], self.at[row]);
         let displacement = match self.ahead {
             Some(ahead) => squared(velocity).sqrt() * ahead,
@@ -115,7 +114,10 @@ impl Balls<'_> {
 }
 
 /// All half-spaces.
-pub(super) fn half_spaces(walls: &dyn StaticGeometry, planes: &mut Vec<HalfSpace>) {
+pub(super) fn half_spaces<S: Scalar>(
+    walls: &dyn StaticGeometry<S>,
+    planes: &mut Vec<HalfSpace<S>>,
+) {
     planes.clear();
     walls.planes(&mut |wall, normal, offset| {
         let (material, layers) = (walls.material(wall), walls.layers(wall));
@@ -123,18 +125,18 @@ pub(super) fn half_spaces(walls: &dyn StaticGeometry, planes: &mut Vec<HalfSpace
     });
 }
 
-pub(super) fn center(at: &Row) -> Point3<f32> {
+pub(super) fn center<S: Scalar>(at: &Row<S>) -> Point3<S> {
     Point3::new(at[0], at[1], at[2])
 }
 
-impl Chunk {
+impl<S: Scalar> Chunk<S> {
     /// Finds the balls at walls. `restore` looks up their cached contacts.
     pub fn find_wall_contacts(
         &mut self,
         simd_level: SimdLevel,
-        balls: Balls,
-        planes: &[HalfSpace],
-        restore: impl Fn(&WallContact) -> Option<WallContact>,
+        balls: Balls<S>,
+        planes: &[HalfSpace<S>],
+        restore: impl Fn(&WallContact<S>) -> Option<WallContact<S>>,
     ) {
         self.wall_contacts.clear();
         self.near_planes.clear();
@@ -157,7 +159,7 @@ impl Chunk {
 
     /// Takes over the impulses of balls near shapes other than half-spaces. Which parts they
     /// touch now is looked at before the next pass.
-    pub fn restore_shape_contacts<T: Iterator<Item = WallContact>>(
+    pub fn restore_shape_contacts<T: Iterator<Item = WallContact<S>>>(
         &mut self,
         restore: impl Fn(u32) -> T,
     ) {
@@ -173,14 +175,20 @@ impl Chunk {
     }
 
     /// Finds the half-spaces near some more balls of the chunk.
-    pub fn find_wall_contacts_of(&mut self, rows: &[u32], balls: Balls, planes: &[HalfSpace]) {
+    pub fn find_wall_contacts_of(
+        &mut self,
+        rows: &[u32],
+        balls: Balls<S>,
+        planes: &[HalfSpace<S>],
+    ) {
         std::mem::swap(&mut self.wall_contacts, &mut self.old_wall_contacts);
         self.wall_contacts.clear();
         let old = &self.old_wall_contacts;
         // Which parts of other shapes are touched is looked at before the next pass, which needs to
         // know their impulses.
-        let kept =
-            |contact: &&WallContact| !contact.is_plane || rows.binary_search(&contact.row).is_err();
+        let kept = |contact: &&WallContact<S>| {
+            !contact.is_plane || rows.binary_search(&contact.row).is_err()
+        };
         self.wall_contacts.extend(old.iter().filter(kept));
         for row in rows {
             let wall_contacts = &mut self.wall_contacts;
@@ -195,14 +203,14 @@ impl Chunk {
     /// touched. That of fast balls only, where others know it already.
     pub fn update_wall_contacts(
         &mut self,
-        walls: &dyn StaticGeometry,
-        query: &WallQuery,
+        walls: &dyn StaticGeometry<S>,
+        query: &WallQuery<S>,
         only_fast: bool,
     ) {
         if !self.near_shapes.is_empty() {
             self.find_shape_contacts(walls, query, only_fast);
         }
-        let mut fastest = 0.0_f32;
+        let mut fastest = S::zero();
         for contact in &mut self.wall_contacts {
             let ball = &query.at[contact.row as usize];
             contact.bears_proxy = false;
@@ -214,8 +222,8 @@ impl Chunk {
 
     fn find_shape_contacts(
         &mut self,
-        walls: &dyn StaticGeometry,
-        query: &WallQuery,
+        walls: &dyn StaticGeometry<S>,
+        query: &WallQuery<S>,
         only_fast: bool,
     ) {
         std::mem::swap(&mut self.wall_contacts, &mut self.old_wall_contacts);
@@ -223,7 +231,7 @@ impl Chunk {
         let old = &self.old_wall_contacts;
         let is_fast = |row| query.displacement(row).is_some() || query.is_outrun(walls, row);
         let sleeps = |row: u32| query.velocity[row as usize][3].is_sign_negative();
-        let kept = |contact: &&WallContact| {
+        let kept = |contact: &&WallContact<S>| {
             contact.is_plane || sleeps(contact.row) || only_fast && !is_fast(contact.row)
         };
         self.wall_contacts.extend(old.iter().filter(kept));
@@ -238,7 +246,7 @@ impl Chunk {
             self.has_fast |= is_outrun || displacement.is_some();
             let first = self.wall_contacts.len();
             let wall_contacts = &mut self.wall_contacts;
-            let mut visit = |ball: &Row, [wall, part]: [u32; 2], normal: Vec3<f32>, distance| {
+            let mut visit = |ball: &Row<S>, [wall, part]: [u32; 2], normal: Vec3<S>, distance| {
                 let named = wall_contacts[first..].iter();
                 if named.into_iter().any(|contact| [contact.wall, contact.part] == [wall, part]) {
                     return;
@@ -258,11 +266,17 @@ impl Chunk {
                     visit(&ball, part, normal, distance);
                 });
             }
-            let mut reach = query.skin_left[*row as usize].max(0.0);
+            let mut reach = query.skin_left[*row as usize].max(S::zero());
             if let Some(displacement) = displacement {
                 let way = displacement.magnitude();
-                reach = if query.whole_way { way } else { way.min(FAST * ball[3]) };
-                along_path(walls, (ball, filter), displacement, FAST * ball[3], &mut visit);
+                reach = if query.whole_way { way } else { way.min(S::from_f64(FAST) * ball[3]) };
+                along_path(
+                    walls,
+                    (ball, filter),
+                    displacement,
+                    S::from_f64(FAST) * ball[3],
+                    &mut visit,
+                );
             }
             walls.shapes_at(ball, filter, reach, &mut |part, normal, distance| {
                 visit(ball, part, normal, distance);
@@ -272,37 +286,37 @@ impl Chunk {
     }
 }
 
-impl HalfSpace {
+impl<S: Scalar> HalfSpace<S> {
     /// Moves a proxy out, except by how deep it was inside.
-    pub fn bear(&self, proxy: &Proxy, at: &mut Row) {
+    pub fn bear(&self, proxy: &Proxy<S>, at: &mut Row<S>) {
         let separation =
-            |ball: &Row| self.normal.dot(center(ball).to_vec()) - self.offset - ball[3];
-        let by = (separation(&proxy.at).min(0.0) - separation(at)).max(0.0);
-        for (x, normal) in at.iter_mut().zip::<[f32; 3]>(self.normal.into()) {
+            |ball: &Row<S>| self.normal.dot(center(ball).to_vec()) - self.offset - ball[3];
+        let by = (separation(&proxy.at).min(S::zero()) - separation(at)).max(S::zero());
+        for (x, normal) in at.iter_mut().zip::<[S; 3]>(self.normal.into()) {
             *x += normal * by;
         }
     }
 }
 
 /// Visits the half-spaces that a ball may reach.
-fn find_plane_contacts(
+fn find_plane_contacts<S: Scalar>(
     row: u32,
-    balls: Balls,
-    planes: &[HalfSpace],
-    visit: impl FnMut(WallContact),
+    balls: Balls<S>,
+    planes: &[HalfSpace<S>],
+    visit: impl FnMut(WallContact<S>),
 ) {
     let reach = balls.reach(row as usize);
     plane_contacts_within(reach, row, &balls.at[row as usize], balls.surfaces, planes, visit);
 }
 
 /// Visits the half-spaces that are nearer to a ball than so many metres.
-pub(super) fn plane_contacts_within(
-    reach: f32,
+pub(super) fn plane_contacts_within<S: Scalar>(
+    reach: S,
     row: u32,
-    ball: &Row,
-    surfaces: SurfaceOf,
-    planes: &[HalfSpace],
-    mut visit: impl FnMut(WallContact),
+    ball: &Row<S>,
+    surfaces: SurfaceOf<S>,
+    planes: &[HalfSpace<S>],
+    mut visit: impl FnMut(WallContact<S>),
 ) {
     for plane in planes {
         let HalfSpace { wall, normal, offset, material, layers } = *plane;
@@ -316,23 +330,23 @@ pub(super) fn plane_contacts_within(
 }
 
 /// Finds the balls that may go as far as to a half-space.
-struct NearPlanes<'a> {
-    balls: Balls<'a>,
-    planes: &'a [HalfSpace],
+struct NearPlanes<'a, S> {
+    balls: Balls<'a, S>,
+    planes: &'a [HalfSpace<S>],
     rows: Range<usize>,
     found: &'a mut Vec<u32>,
 }
 
-impl Kernel for NearPlanes<'_> {
+impl<S: Scalar> Kernel<S> for NearPlanes<'_, S> {
     #[inline(always)]
-    fn run<L: Simd>(self) {
+    fn run<L: Simd<Scalar = S>>(self) {
         let Self { balls, planes, rows, found } = self;
         let mut first = rows.start;
         while first + LANES <= rows.end {
             // SAFETY: there are eight.
             let [x, y, z, radius] =
                 unsafe { L::gather(balls.at[first..].as_ptr(), &[0, 1, 2, 3, 4, 5, 6, 7]) };
-            let mut skin_left = [0.0; LANES];
+            let mut skin_left = [S::zero(); LANES];
             for (lane, skin_left) in skin_left.iter_mut().enumerate() {
                 *skin_left = balls.reach(first + lane);
             }
@@ -343,7 +357,7 @@ impl Kernel for NearPlanes<'_> {
                 let along =
                     L::splat(normal.x) * x + L::splat(normal.y) * y + L::splat(normal.z) * z;
                 // Rather one too many: the caller looks more closely.
-                near |= (L::splat(*offset) + reach * L::splat(1.001)).gt_mask(along);
+                near |= (L::splat(*offset) + reach * L::constant(1.001)).gt_mask(along);
             }
             while near != 0 {
                 found.push(first as u32 + near.trailing_zeros());
@@ -356,32 +370,32 @@ impl Kernel for NearPlanes<'_> {
 }
 
 /// The one of the same ball and wall, among many in order.
-pub(super) fn find<'a>(
-    wall_contacts: &'a [WallContact],
-    contact: &WallContact,
-) -> Option<&'a WallContact> {
+pub(super) fn find<'a, S: Scalar>(
+    wall_contacts: &'a [WallContact<S>],
+    contact: &WallContact<S>,
+) -> Option<&'a WallContact<S>> {
     let at = wall_contacts.binary_search_by_key(&contact.key(), WallContact::key).ok()?;
     wall_contacts.get(at)
 }
 
 /// The contacts of a ball with other shapes than half-spaces, among many in order.
-pub(super) fn shapes_of(
-    wall_contacts: &[WallContact],
+pub(super) fn shapes_of<S: Scalar>(
+    wall_contacts: &[WallContact<S>],
     row: u32,
-) -> impl Iterator<Item = &WallContact> {
+) -> impl Iterator<Item = &WallContact<S>> {
     let first = wall_contacts.partition_point(|contact| contact.row < row);
     let of_row = wall_contacts[first..].iter().take_while(move |contact| contact.row == row);
     of_row.filter(|contact| !contact.is_plane)
 }
 
 /// The rows among these that are near anything but half-spaces, found by ever smaller boxes.
-pub(super) fn near_shapes(
-    walls: &dyn StaticGeometry,
-    balls: Balls,
+pub(super) fn near_shapes<S: Scalar>(
+    walls: &dyn StaticGeometry<S>,
+    balls: Balls<S>,
     rows: Range<usize>,
     found: &mut Vec<u32>,
 ) {
-    let (mut low, mut high) = ([f32::MAX; 3], [f32::MIN; 3]);
+    let (mut low, mut high) = ([S::max_value(); 3], [S::min_value(); 3]);
     for row in rows.clone() {
         let (ball, reach) = (&balls.at[row], balls.at[row][3] + balls.reach(row));
         for axis in 0..3 {
@@ -402,13 +416,13 @@ pub(super) fn near_shapes(
     near_shapes(walls, balls, middle..rows.end, found);
 }
 
-impl WallContact {
+impl<S: Scalar> WallContact<S> {
     fn new(
         row: u32,
         [wall, part]: [u32; 2],
-        normal: Vec3<f32>,
-        offset: f32,
-        numbers: WallNumbers,
+        normal: Vec3<S>,
+        offset: S,
+        numbers: WallNumbers<S>,
     ) -> Self {
         Self {
             row,
@@ -421,7 +435,7 @@ impl WallContact {
             offset_at_end: offset,
             surface: Vec3::zero(),
             numbers,
-            borne_for_others: 0.0,
+            borne_for_others: S::zero(),
             impulse: ContactImpulse::zero(),
             load: None,
             torque: Vec3::zero(),
@@ -431,9 +445,9 @@ impl WallContact {
     /// Forgets impulses, unless all of them are finite.
     pub fn forget_non_finite(&mut self) {
         let [tangent, torque] = [self.impulse.tangent, self.torque];
-        let all = [self.borne_for_others, self.impulse.normal, self.load.unwrap_or(0.0)];
+        let all = [self.borne_for_others, self.impulse.normal, self.load.unwrap_or(S::zero())];
         if !(all.iter().all(|x| x.is_finite()) && is_finite(tangent) && is_finite(torque)) {
-            self.borne_for_others = 0.0;
+            self.borne_for_others = S::zero();
             self.impulse = ContactImpulse::zero();
             self.load = None;
             self.torque = Vec3::zero();

@@ -121,7 +121,7 @@ impl<S: Scalar> World<S> {
 }
 
 /// Slot of the ball of a marble.
-fn slot_of<S: Scalar>(marbles: &Marbles<S>, swarm: &Swarm, row: u32) -> Option<u32> {
+fn slot_of<S: Scalar>(marbles: &Marbles<S>, swarm: &Swarm<S>, row: u32) -> Option<u32> {
     let id = marbles.id(row as usize)?;
     let body = swarm.body_balls.binary_search_by_key(&id, |(marble, _)| *marble).ok()?;
     swarm.slot_of(swarm.body_balls[body].1)

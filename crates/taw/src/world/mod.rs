@@ -88,7 +88,7 @@ pub struct World<S: Scalar> {
     pub walls: Walls<S>,
     /// Particle system of balls, which collide with walls, marbles and each other. (Their contacts
     /// are not listed.)
-    pub swarm: Swarm,
+    pub swarm: Swarm<S>,
     /// Sensors: shapes that tell which marbles enter and leave.
     pub sensors: Sensors<S>,
     /// Contacts of the last substep, except those of marbles [asleep](Self::is_asleep) with each

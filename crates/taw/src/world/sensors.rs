@@ -262,13 +262,10 @@ impl<S: Scalar> World<S> {
         if self.sensors.is_empty() {
             return;
         }
-        let ball = |[x, y, z, radius]: [f32; 4]| {
-            let [x, y, z, radius] = [x, y, z, radius].map(|x| S::from_f64(f64::from(x)));
-            Sphere { center: Point3::new(x, y, z), radius }
-        };
+        let ball = |[x, y, z, radius]: [S; 4]| Sphere { center: Point3::new(x, y, z), radius };
         let has_own = swarm.len() > swarm.body_balls.len();
         let blocks = swarm.balls().chunks(BLOCK).filter(|_| has_own);
-        let bounds = |block: &[[f32; 4]]| {
+        let bounds = |block: &[[S; 4]]| {
             let all = block.iter().map(|row| ball(*row).bounds());
             all.reduce(|all, one| all.union(&one))
         };

@@ -64,8 +64,10 @@ impl<S: Scalar> ChunkContacts<S> {
 /// rounding, and less than any: a speculative contact may stop one body at the surface of the other
 /// in this step, and take the rest of the speed in the next one.
 const CONFIRMING: f64 = 1e-3;
-/// Part by which an approach speed may differ from the one in single precision that decided what bounces.
+/// Part by which an approach speed may differ from the one that decided what bounces.
 const ROUNDING: f64 = 1e-3;
+/// Roundings of a speed in a step: a part in a million in `f32`.
+const SPEED_ROUNDINGS: f64 = 8.388_608;
 
 /// Identity of the two that meet.
 fn pair_of<S>(impact: &Impact<S>) -> (bool, u32, u32) {
@@ -73,11 +75,11 @@ fn pair_of<S>(impact: &Impact<S>) -> (bool, u32, u32) {
 }
 
 /// Impact of marbles, given that of slots; none if balls of the swarm take part.
-fn of_marbles<S: Scalar>(impact: &Impact<f32>, marbles: &[u32]) -> Option<Impact<S>> {
+fn of_marbles<S: Scalar>(impact: &Impact<S>, marbles: &[u32]) -> Option<Impact<S>> {
     let marble = |slot: u32| marbles.get(slot as usize).copied().filter(|marble| *marble != NO_ROW);
     let b = marble(impact.b)?;
     let a = if impact.on_wall { impact.a } else { marble(impact.a)? };
-    let listed = Impact { a, b, ..*impact }.cast();
+    let listed = Impact { a, b, ..*impact };
     let reversed = !impact.on_wall && b < a;
     Some(if reversed { Impact { a: b, b: a, normal: -listed.normal, ..listed } } else { listed })
 }
@@ -306,8 +308,8 @@ impl<S: Scalar> World<S> {
             let now = self.marbles.velocity[row];
             let push = (now - before - self.soft_acceleration(row) * dt).dot(normal);
             let alone = impact.approach_speed * inverse_mass / sum;
-            // Rows are of single precision, whatever the world is.
-            let rounding = (now.magnitude() + before.magnitude()) * S::from_f64(1e-6);
+            let roundings = S::from_f64(SPEED_ROUNDINGS) * S::epsilon();
+            let rounding = (now.magnitude() + before.magnitude()) * roundings;
             alone <= rounding || push > alone * S::from_f64(CONFIRMING)
         };
         let first = impact.on_wall || pushed(a, velocity[0], -impact.normal, of_a);

@@ -7,7 +7,7 @@ use cgmath::{EuclideanSpace, Zero};
 
 use super::method::{Method, SleepUnit};
 use super::soft_impacts::{ChunkContacts, PredictedImpacts};
-use super::swarm::MAX_COORDINATE;
+use super::swarm::{MAX_COORDINATE, clamped_row};
 use super::swept_walls::SweptWalls;
 use super::{MarbleId, World};
 use crate::Error;
@@ -30,16 +30,16 @@ pub(super) struct SoftRows<S> {
     token: SyncToken,
     slot_of_marble: Vec<u32>,
     pub marble_of_slot: Vec<u32>,
-    changed: Vec<Body>,
+    changed: Vec<Body<S>>,
     lists: Vec<ChunkContacts<S>>,
     /// Length of the step that was integrated, in seconds.
-    dt: f32,
+    dt: S,
     /// Length of the step and identity of the walls for which contacts were found.
-    found: Option<(f32, u64)>,
+    found: Option<(S, u64)>,
     pub predicted: PredictedImpacts<S>,
 }
 
-impl<S> Default for SoftRows<S> {
+impl<S: Scalar> Default for SoftRows<S> {
     fn default() -> Self {
         Self {
             known: None,
@@ -48,7 +48,7 @@ impl<S> Default for SoftRows<S> {
             marble_of_slot: Vec::new(),
             changed: Vec::new(),
             lists: Vec::new(),
-            dt: 0.0,
+            dt: S::zero(),
             found: None,
             predicted: PredictedImpacts::default(),
         }
@@ -57,10 +57,10 @@ impl<S> Default for SoftRows<S> {
 
 /// Least and largest inverse mass of a row, in 1/kg: products with it and quotients by it are
 /// numbers.
-const INVERSE_MASSES: [f32; 2] = [INFINITE_MASS, 1e25];
+const INVERSE_MASSES: [f64; 2] = [INFINITE_MASS, 1e25];
 
 /// Least radius of a row, in metres, as of the balls of a swarm.
-const LEAST_RADIUS: f32 = 1e-9;
+const LEAST_RADIUS: f64 = 1e-9;
 
 /// Soft contacts in small steps, all within the third verb.
 pub(super) struct SoftStep;
@@ -108,7 +108,7 @@ impl<S: Scalar> World<S> {
             self.marbles.integrate_rotations(dt, self.settings.model.rotation, &[]);
             self.quarantine_non_finite();
         }
-        self.scratch.soft_step.dt = dt.as_f64() as f32;
+        self.scratch.soft_step.dt = dt;
         self.sync_bodies()?;
         self.scratch.accelerations.clear();
         if !self.settings.forces.is_empty() || self.marbles.accelerate_differently() {
@@ -120,8 +120,8 @@ impl<S: Scalar> World<S> {
         let of_marbles =
             self.scratch.accelerations.iter().zip(slots).filter_map(|(acceleration, slot)| {
                 // One that overflows stops its marble in the swarm.
-                let change: [f32; 3] = cast_vector((acceleration - gravity) * step).into();
-                (change != [0.0; 3] && *slot != NO_ROW)
+                let change: [S; 3] = cast_vector((acceleration - gravity) * step).into();
+                (change != [S::zero(); 3] && *slot != NO_ROW)
                     .then_some(VelocityChange { slot: *slot, change })
             });
         let mut changes: Vec<_> = of_marbles.collect();
@@ -136,8 +136,8 @@ impl<S: Scalar> World<S> {
         if self.check_rows().and_then(|()| self.sync_bodies()).is_err() {
             return; // the third verb says so
         }
-        let (dt, gravity) = (self.scratch.soft_step.dt, cast_vector(self.settings.gravity));
-        let walls = SweptWalls::new(&self.walls, S::from_f64(dt.into()));
+        let (dt, gravity) = (self.scratch.soft_step.dt, self.settings.gravity);
+        let walls = SweptWalls::new(&self.walls, dt);
         self.swarm.prepare(dt, gravity, &walls, self.walls.identity());
         self.walls.mark_seen();
         self.scratch.soft_step.found = Some((dt, self.walls.identity()));
@@ -145,15 +145,15 @@ impl<S: Scalar> World<S> {
         let turns = self.settings.model.rotation == Rotation::Dynamic;
         let columns = self.marbles.body_columns(turns);
         self.swarm.read_bodies(marbles, columns, None, &mut self.scratch.stopped);
-        self.list_soft_contacts(S::from_f64(dt.into()));
+        self.list_soft_contacts(dt);
     }
 
     /// Lists contacts that touch or may do so within `dt` seconds, and predicts which begin in that
     /// time.
     fn list_soft_contacts(&mut self, dt: S) {
         let mut lists = std::mem::take(&mut self.scratch.soft_step.lists);
-        let (time, fast) = (dt.as_f64() as f32, self.resting_speed(dt).as_f64() as f32);
-        let limits = NearLimits { reach: fast * time, time, fast };
+        let fast = self.resting_speed(dt);
+        let limits = NearLimits { reach: fast * dt, time: dt, fast };
         let moving = self.list_moving_walls(dt);
         self.swarm.fill_lists(&mut lists, |list, pairs| {
             let marbles = &self.scratch.soft_step.marble_of_slot;
@@ -180,14 +180,14 @@ impl<S: Scalar> World<S> {
         self.audit_contacts();
         self.sync_bodies()?; // somebody may have moved some since the first verb
         self.walls.update_tree();
-        let (step, identity) = (dt.as_f64() as f32, self.walls.identity());
+        let identity = self.walls.identity();
         let found = self.scratch.soft_step.found.take();
         self.audit_rows_before();
         let walls = SweptWalls::new(&self.walls, dt);
-        if found != Some((step, identity)) || !self.swarm.is_prepared() {
-            self.swarm.prepare(step, cast_vector(self.settings.gravity), &walls, identity);
+        if found != Some((dt, identity)) || !self.swarm.is_prepared() {
+            self.swarm.prepare(dt, self.settings.gravity, &walls, identity);
         }
-        self.swarm.finish(step, self.settings.model.substeps, &walls);
+        self.swarm.finish(dt, self.settings.model.substeps, &walls);
         self.walls.mark_seen();
         let marbles = &self.scratch.soft_step.marble_of_slot;
         let stopped = self.swarm.stopped_slots();
@@ -267,9 +267,9 @@ impl<S: Scalar> World<S> {
     /// Checks that the numbers of a marble fit into a row. One that flew farther in steps may go on.
     fn check_row(&self, row: usize) -> Result<(), Error> {
         let marbles = &self.marbles;
-        let most = f64::from(MAX_COORDINATE);
+        let [least, most] = [LEAST_RADIUS, MAX_COORDINATE].map(|x| S::from_f64(x).as_f64());
         let radius = marbles.radius[row].as_f64();
-        within("radius", radius, f64::from(LEAST_RADIUS), most)?;
+        within("radius", radius, least, most)?;
         let position = cast_vector::<S, f64>(marbles.position[row].to_vec());
         let velocity = cast_vector::<S, f64>(marbles.velocity[row]);
         let [same_place, same_velocity, same_spin] = self.same_as_row(row);
@@ -295,12 +295,12 @@ impl<S: Scalar> World<S> {
         let bodies = &self.swarm.body_balls;
         let found = self.marbles.id(row).and_then(|id| {
             let i = bodies.binary_search_by_key(&id, |(marble, _)| *marble).ok()?;
-            self.swarm.motion_of::<S>(bodies[i].1)
+            self.swarm.motion_of(bodies[i].1)
         });
         let Some((position, velocity, surface_speed)) = found else { return [false; 3] };
         let (marbles, speed) = (&self.marbles, |v: Vec3<S>| length(v).as_f64());
         let turning = marbles.angular_velocity.get(row).copied().map_or(0.0, speed);
-        let rounded = f64::from(surface_speed) * 1.000_001;
+        let rounded = surface_speed.as_f64() * 1.000_001;
         [
             marbles.position[row] == position,
             speed(marbles.velocity[row]) <= speed(velocity),
@@ -344,7 +344,7 @@ impl<S: Scalar> World<S> {
             let material = marbles.material.get(row);
             let rotation_locked = marbles.rotation_of(row, rotation) != Rotation::Dynamic;
             let surface = (material.is_some() || rotation_locked || !plain_swarm).then(|| {
-                let material = material.map_or_else(Material::default, Material::cast);
+                let material = material.unwrap_or_default();
                 Surface { material, rotation_locked }
             });
             let spin = marbles.angular_velocity.get(row).copied().filter(|_| !rotation_locked);
@@ -387,9 +387,9 @@ impl<S: Scalar> World<S> {
 }
 
 /// Inverse mass of a row, in 1/kg.
-pub(super) fn inverse_mass<S: Scalar>(mass: S) -> f32 {
-    let [least, most] = INVERSE_MASSES;
-    ((S::one() / mass).as_f64() as f32).clamp(least, most)
+pub(super) fn inverse_mass<S: Scalar>(mass: S) -> S {
+    let [least, most] = INVERSE_MASSES.map(S::from_f64);
+    (S::one() / mass).clamp(least, most)
 }
 
 /// Validates that no component of a vector is larger.
@@ -402,25 +402,23 @@ fn within_vector(names: [&'static str; 3], v: Vec3<f64>, most: f64) -> Result<()
 }
 
 /// Radius of a row, in metres.
-fn row_radius<S: Scalar>(radius: S) -> f32 {
-    (radius.as_f64() as f32).clamp(LEAST_RADIUS, MAX_COORDINATE)
+fn row_radius<S: Scalar>(radius: S) -> S {
+    radius.clamp(S::from_f64(LEAST_RADIUS), S::from_f64(MAX_COORDINATE))
 }
 
 /// A marble as a row.
 fn body<S: Scalar>(
     slot: u32,
     marble: MarbleRow<S>,
-    inverse_mass: f32,
-    surface: Option<Surface>,
-) -> Body {
-    let single = |x: S| (x.as_f64() as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE);
-    let row = |v: Vec3<S>, last: f32| [single(v.x), single(v.y), single(v.z), last];
+    inverse_mass: S,
+    surface: Option<Surface<S>>,
+) -> Body<S> {
     let spin = marble.spin.map_or_else(Vec3::zero, |spin| spin * marble.radius);
     Body {
         slot,
-        at: row(marble.position.to_vec(), row_radius(marble.radius)),
-        velocity: row(marble.velocity, inverse_mass),
-        spin: row(spin, 0.0),
+        at: clamped_row(marble.position.to_vec(), row_radius(marble.radius)),
+        velocity: clamped_row(marble.velocity, inverse_mass),
+        spin: clamped_row(spin, S::zero()),
         surface,
         layers: CollisionLayers::ALL,
         is_kinematic: false,

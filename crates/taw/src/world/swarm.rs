@@ -7,7 +7,7 @@ use super::World;
 use super::soft_step::inverse_mass;
 use super::swept_walls::SweptWalls;
 use crate::Error;
-use crate::math::{Scalar, Vec3, cast_point, cast_vector};
+use crate::math::{Scalar, Vec3, cast_vector};
 use crate::motion::{Motion, acceleration_in_step};
 use crate::response::Response;
 use crate::swarm::{BallId, Proxy, Stage, VelocityChange};
@@ -36,8 +36,7 @@ impl<S: Scalar> World<S> {
         dt: S,
         observe: &mut dyn FnMut(Stage),
     ) -> Result<(), Error> {
-        let step = Self::validated_dt(dt)?;
-        let dt = step.as_f64() as f32;
+        let dt = Self::validated_dt(dt)?;
         if self.settings.model.response == Response::SoftStep {
             return Ok(()); // it moved with the marbles
         }
@@ -49,11 +48,10 @@ impl<S: Scalar> World<S> {
         self.sync_proxies(dt)?;
         self.sync_ignored_pairs();
         self.walls.update_tree();
-        let (gravity, changes) =
-            (cast_vector(self.settings.gravity), self.field_changes_of_swarm(step));
+        let (gravity, changes) = (self.settings.gravity, self.field_changes_of_swarm(dt));
         self.swarm.set_velocity_changes(changes);
         self.audit_rows_before();
-        let walls = SweptWalls::new(&self.walls, step);
+        let walls = SweptWalls::new(&self.walls, dt);
         self.swarm.step(dt, gravity, &walls, self.walls.identity(), observe);
         self.audit_rows_after();
         self.walls.mark_seen();
@@ -63,18 +61,12 @@ impl<S: Scalar> World<S> {
 
     /// Changes of velocity by force fields, gravity scales and applied accelerations of the swarm's own
     /// balls in a step of `dt` seconds.
-    pub(super) fn field_changes_of_swarm(&self, dt: S) -> Vec<VelocityChange> {
-        let acceleration = |motion: Motion<f32>, mass: f32| {
-            let motion = Motion {
-                position: cast_point(motion.position),
-                velocity: cast_vector(motion.velocity),
-            };
-            let mass = S::from_f64(f64::from(mass));
+    pub(super) fn field_changes_of_swarm(&self, dt: S) -> Vec<VelocityChange<S>> {
+        let acceleration = |motion: Motion<S>, mass: S| {
             cast_vector(acceleration_in_step(&self.settings.forces, motion, mass, dt))
         };
         let acceleration = (!self.settings.forces.is_empty()).then_some(acceleration);
-        let (gravity, dt) = (cast_vector(self.settings.gravity), dt.as_f64() as f32);
-        let mut changes = self.swarm.field_changes(acceleration, gravity, dt);
+        let mut changes = self.swarm.field_changes(acceleration, self.settings.gravity, dt);
         changes.extend(self.swarm.applied_changes(dt));
         changes
     }
@@ -110,7 +102,7 @@ impl<S: Scalar> World<S> {
     }
 
     /// Brings the proxies of the swarm up to date with the marbles.
-    fn sync_proxies(&mut self, dt: f32) -> Result<(), Error> {
+    fn sync_proxies(&mut self, dt: S) -> Result<(), Error> {
         self.insert_missing_bodies()?;
         let (marbles, body_balls) = (&self.marbles, std::mem::take(&mut self.swarm.body_balls));
         let slots = &self.swarm;
@@ -121,18 +113,18 @@ impl<S: Scalar> World<S> {
         self.swarm.set_layers_of_slots(layers.into_iter());
         let proxies = body_balls.iter().filter_map(|(marble, ball)| {
             let row = marbles.row(*marble).ok()?;
-            let single = |x: S| (x.as_f64() as f32).clamp(-MAX_COORDINATE, MAX_COORDINATE);
-            let rows = |v: Vec3<S>, last: f32| [single(v.x), single(v.y), single(v.z), last];
             let radius = marbles.radius()[row];
             let spin = marbles
                 .angular_velocity()
                 .get(row)
-                .map_or([0.0; 4], |spin| rows(*spin * radius, 0.0));
+                .map_or([S::zero(); 4], |spin| clamped_row(*spin * radius, S::zero()));
             let inverse_mass = inverse_mass(marbles.mass(row));
-            let at = rows(marbles.position()[row].to_vec(), single(radius));
-            Some(Proxy::new(*ball, at, rows(marbles.velocity()[row], inverse_mass), spin))
+            let most = S::from_f64(MAX_COORDINATE);
+            let at = clamped_row(marbles.position()[row].to_vec(), radius.min(most));
+            let velocity = clamped_row(marbles.velocity()[row], inverse_mass);
+            Some(Proxy::new(*ball, at, velocity, spin))
         });
-        self.swarm.set_proxies(proxies, dt, cast_vector(self.settings.gravity));
+        self.swarm.set_proxies(proxies, dt, self.settings.gravity);
         self.swarm.body_balls = body_balls;
         Ok(())
     }
@@ -143,9 +135,8 @@ impl<S: Scalar> World<S> {
         for ((marble, _), (before, after)) in
             self.swarm.body_balls.iter().zip(self.swarm.proxies_and_results())
         {
-            let change = |before: &[f32; 4], after: &[f32; 4]| {
-                let [x, y, z] = [0, 1, 2].map(|i| S::from_f64(f64::from(after[i] - before[i])));
-                Vec3::new(x, y, z)
+            let change = |before: &[S; 4], after: &[S; 4]| {
+                Vec3::from([0, 1, 2].map(|i| after[i] - before[i]))
             };
             let moved = change(&before.at, &after.at);
             let faster = change(&before.velocity, &after.velocity);
@@ -158,4 +149,11 @@ impl<S: Scalar> World<S> {
 }
 
 /// In metres and m/s.
-pub(super) const MAX_COORDINATE: f32 = 1e12;
+pub(super) const MAX_COORDINATE: f64 = 1e12;
+
+/// Row of a vector whose components are within the limits, and a fourth number.
+pub(super) fn clamped_row<S: Scalar>(v: Vec3<S>, last: S) -> [S; 4] {
+    let most = S::from_f64(MAX_COORDINATE);
+    let [x, y, z] = v.map(|x| x.clamp(-most, most)).into();
+    [x, y, z, last]
+}

@@ -7,7 +7,7 @@ use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisio
 use super::swarm::MAX_COORDINATE;
 use super::walls::{SubShape, Walls};
 use crate::broad::{CollisionFilter, CollisionLayers};
-use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, length};
+use crate::math::{Point3, Scalar, Vec3, length};
 use crate::motion::WallMotion;
 use crate::response::{Colliders as _, Material};
 use crate::shape::{Aabb, Aabb3, BoundedShape, PointProjection, Sphere};
@@ -121,7 +121,7 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
         let deep = sphere.radius * S::from_f64(1.0 - GRAZES);
         // One that slides along a wall in which it is goes no deeper, but for the rounding of places.
         let place = length(sphere.center.to_vec()) + sphere.radius + length(displacement);
-        let rounding = place * S::from_f64(16.0 * f64::from(f32::EPSILON));
+        let rounding = place * S::from_f64(16.0) * S::epsilon();
         let mut first: Option<S> = None;
         self.for_each_standing(reached, (sphere, filter), |part| {
             let distance = |point| self.walls.project_point(part, point).distance;
@@ -194,11 +194,10 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
     }
 }
 
-impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
-    fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<f32>, f32)) {
+impl<S: Scalar> StaticGeometry<S> for SweptWalls<'_, S> {
+    fn planes(&self, visit: &mut dyn FnMut(u32, Vec3<S>, S)) {
         for (wall, plane) in self.walls.planes() {
-            let normal: Vec3<f32> = cast_vector(plane.normal());
-            visit(wall, normal.normalize(), single(plane.offset()));
+            visit(wall, plane.normal().normalize(), not_beyond(plane.offset()));
         }
     }
 
@@ -210,15 +209,14 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         self.walls.changes().visit_removals_since(identity, visit)
     }
 
-    fn visit_changes_since(&self, identity: u64, visit: &mut dyn FnMut([[f32; 3]; 2])) -> bool {
+    fn visit_changes_since(&self, identity: u64, visit: &mut dyn FnMut([[S; 3]; 2])) -> bool {
         self.walls.changes().visit_since(identity, |region| {
-            let corner = |point: Point3<S>| cast_point::<S, f32>(point).into();
-            visit([corner(region.min), corner(region.max)]);
+            visit([region.min.into(), region.max.into()]);
         })
     }
 
-    fn near(&self, low: [f32; 3], high: [f32; 3]) -> bool {
-        let bounds = Aabb { min: cast_point(low.into()), max: cast_point(high.into()) };
+    fn near(&self, low: [S; 3], high: [S; 3]) -> bool {
+        let bounds = Aabb { min: low.into(), max: high.into() };
         let mut any = self.moving.iter().any(|wall| wall.is_near(&bounds));
         self.walls.for_each_in_box(&bounds, |_| any = true);
         any
@@ -226,12 +224,12 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
 
     fn shapes_at(
         &self,
-        ball: &[f32; 4],
+        ball: &[S; 4],
         filter: CollisionFilter,
-        reach: f32,
-        visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
+        reach: S,
+        visit: &mut dyn FnMut([u32; 2], Vec3<S>, S),
     ) {
-        let (sphere, reach) = (sphere(*ball), S::from_f64(reach.into()));
+        let sphere = sphere(*ball);
         // A wall that the ball touches now may be that much further away at the end.
         let slow = self.moving.iter().filter(|wall| !self.outruns(wall, &sphere));
         let way = slow.map(|wall| self.way_of(wall, &sphere)).fold(S::zero(), S::max);
@@ -249,20 +247,18 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
             remove_ghost_collisions(self.walls, (&sphere, filter), &mut near);
         }
         for Candidate { part: SubShape { wall, index: part }, nearest } in near {
-            let normal: Vec3<f32> = cast_vector(nearest.normal);
-            visit([wall, part], normal, single(nearest.distance));
+            visit([wall, part], nearest.normal, not_beyond(nearest.distance));
         }
     }
 
     fn first_hit_on_path(
         &self,
-        ball: &[f32; 4],
+        ball: &[S; 4],
         filter: CollisionFilter,
-        displacement: Vec3<f32>,
-    ) -> Option<([u32; 2], Vec3<f32>, f32)> {
+        displacement: Vec3<S>,
+    ) -> Option<([u32; 2], Vec3<S>, S)> {
         let sphere: Sphere<S> = sphere(*ball);
         let center = sphere.center;
-        let displacement: Vec3<S> = cast_vector(displacement);
         let (start, end) =
             (sphere.bounding_box(), Sphere { center: center + displacement, ..sphere });
         let reached = start.union(&end.bounding_box());
@@ -285,13 +281,12 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         let (part, time, nearest) = first?;
         // The plane there is nearer by the displacement up to it.
         let distance = nearest.distance - displacement.dot(nearest.normal) * time;
-        let normal: Vec3<f32> = cast_vector(nearest.normal);
-        Some(([part.wall, part.index], normal, single(distance)))
+        Some(([part.wall, part.index], nearest.normal, not_beyond(distance)))
     }
 
-    fn is_outrun(&self, &[x, y, z, radius]: &[f32; 4], way: f32, filter: CollisionFilter) -> bool {
+    fn is_outrun(&self, &[x, y, z, radius]: &[S; 4], way: S, filter: CollisionFilter) -> bool {
         let ball = sphere([x, y, z, radius]);
-        let bounds = Sphere { radius: S::from_f64((radius + way).into()), ..ball }.bounding_box();
+        let bounds = Sphere { radius: radius + way, ..ball }.bounding_box();
         let passes = |wall: &MovingWall<S>| {
             wall.is_near(&bounds) && wall.collides(self.walls, filter) && self.outruns(wall, &ball)
         };
@@ -300,14 +295,13 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
 
     fn outrunning_at(
         &self,
-        ball: &[f32; 4],
+        ball: &[S; 4],
         filter: CollisionFilter,
-        displacement: Vec3<f32>,
-        times: [f32; 2],
-        visit: &mut dyn FnMut([u32; 2], Vec3<f32>, f32),
+        displacement: Vec3<S>,
+        times: [S; 2],
+        visit: &mut dyn FnMut([u32; 2], Vec3<S>, S),
     ) {
-        let (ball, displacement) = (sphere(*ball), cast_vector(displacement));
-        let times = times.map(|time| S::from_f64(time.into()));
+        let ball = sphere(*ball);
         for wall in &self.moving {
             if wall.collides(self.walls, filter) && self.outruns(wall, &ball) {
                 self.visit_outrunning(
@@ -316,7 +310,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
                     displacement,
                     times,
                     &mut |part, normal, far| {
-                        visit([part.wall, part.index], cast_vector(normal), single(far));
+                        visit([part.wall, part.index], normal, not_beyond(far));
                     },
                 );
             }
@@ -325,10 +319,10 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
 
     fn stop_passage(
         &self,
-        [before, now]: [&[f32; 4]; 2],
+        [before, now]: [&[S; 4]; 2],
         filter: CollisionFilter,
-        before_end: [f32; 2],
-    ) -> Option<[f32; 3]> {
+        before_end: [S; 2],
+    ) -> Option<[S; 3]> {
         let [before, now]: [Sphere<S>; 2] = [sphere(*before), sphere(*now)];
         let bounds = before.bounding_box().union(&now.bounding_box());
         let (mut center, mut stopped) = (now.center, false);
@@ -338,8 +332,7 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
                 continue;
             }
             // In the frame of the wall at the end of the step.
-            let [then, here] =
-                before_end.map(|time| wall.motion.pose_before(S::from_f64(time.into())));
+            let [then, here] = before_end.map(|time| wall.motion.pose_before(time));
             let path =
                 [then.inverse_transform_point(before.center), here.inverse_transform_point(center)];
             let parts = |bounds: &Aabb3<S>, visit: &mut dyn FnMut(SubShape)| {
@@ -355,39 +348,38 @@ impl<S: Scalar> StaticGeometry for SweptWalls<'_, S> {
         if let Some(end) = self.slide([before.center, center], now.radius, &parts) {
             (center, stopped) = (end, true);
         }
-        stopped.then(|| cast_point::<S, f32>(center).into())
+        stopped.then(|| center.into())
     }
 
-    fn surface_velocity(&self, wall: u32, point: Point3<f32>, normal: Vec3<f32>) -> Vec3<f32> {
-        let (point, normal) = (cast_point(point), cast_vector(normal));
+    fn surface_velocity(&self, wall: u32, point: Point3<S>, normal: Vec3<S>) -> Vec3<S> {
         let velocity = self.walls.surface_velocity(wall as usize, point, normal);
         // No ball is set to more either: squares and products with masses stay numbers.
-        let zero_or = |x: S| if x.is_finite() { single(x) } else { 0.0 };
-        velocity.map(|x| zero_or(x).clamp(-MAX_COORDINATE, MAX_COORDINATE))
+        let most = S::from_f64(MAX_COORDINATE);
+        velocity.map(|x| if x.is_finite() { x.clamp(-most, most) } else { S::zero() })
     }
 
     fn layers(&self, wall: u32) -> CollisionLayers {
         self.walls.layers_of_row(wall)
     }
 
-    fn material(&self, wall: u32) -> Option<Material<f32>> {
-        self.walls.material_of_row(wall as usize).map(Material::cast)
+    fn material(&self, wall: u32) -> Option<Material<S>> {
+        self.walls.material_of_row(wall as usize)
     }
 }
 
 /// A ball of a swarm.
-fn sphere<S: Scalar>(ball: [f32; 4]) -> Sphere<S> {
-    let [x, y, z, radius] = ball.map(|x| S::from_f64(x.into()));
+fn sphere<S: Scalar>(ball: [S; 4]) -> Sphere<S> {
+    let [x, y, z, radius] = ball;
     Sphere { center: Point3::new(x, y, z), radius }
 }
 
 /// Beyond this, in metres, a wall is as far away as this, so that squares of distances are numbers: no
 /// ball gets there.
-const FARTHEST: f32 = 1e15;
+const FARTHEST: f64 = 1e15;
 
 /// A distance or an offset, in metres. What is no number, as of walls that move too fast for numbers,
 /// is far away.
-fn single<S: Scalar>(x: S) -> f32 {
-    let x = x.as_f64() as f32;
-    if x.is_nan() { FARTHEST } else { x.clamp(-FARTHEST, FARTHEST) }
+fn not_beyond<S: Scalar>(x: S) -> S {
+    let farthest = S::from_f64(FARTHEST);
+    if x.is_nan() { farthest } else { x.clamp(-farthest, farthest) }
 }

@@ -107,7 +107,7 @@ fn a_step_of_no_use_is_refused_beside_a_swarm<S: Scalar>() {
             let marble = Marble { velocity, ..Marble::new(at(x, y, 0.0), number(0.5)) };
             world.marbles.insert(marble).unwrap();
         }
-        world.swarm.insert(&[Ball::new(Point3::new(5.0, 0.3, 0.0), 0.2)]).unwrap();
+        world.swarm.insert(&[Ball::new(at(5.0, 0.3, 0.0), number(0.2))]).unwrap();
         for _ in 0..6 {
             world.step(number(1.0 / 60.0)).unwrap();
         }

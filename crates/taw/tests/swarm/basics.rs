@@ -18,26 +18,31 @@ impl Random {
     }
 }
 
-fn model(tier: Tier) -> SwarmModel {
-    let material = Material { friction: 0.3, restitution: 0.2, ..Material::default() };
+fn number<S: Scalar>(x: f32) -> S {
+    S::from_f64(x.into())
+}
+
+fn model<S: Scalar>(tier: Tier) -> SwarmModel<S> {
+    let (friction, restitution) = (number(0.3), number(0.2));
+    let material = Material { friction, restitution, ..Material::default() };
     SwarmModel { tier, threads: 1, material, ..SwarmModel::default() }
 }
 
 /// A world with a floor at zero, and four walls if there is room between them.
-fn world(model: SwarmModel, half: Option<f32>) -> World<f32> {
+fn world<S: Scalar>(model: SwarmModel<S>, half: Option<f32>) -> World<S> {
     let mut world = World::default();
     world.swarm.set_model(model).unwrap();
-    world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+    world.walls.insert(Plane::new(Vec3::unit_y(), S::zero()).unwrap()).unwrap();
     if let Some(half) = half {
         for direction in [Vec3::unit_x(), -Vec3::unit_x(), Vec3::unit_z(), -Vec3::unit_z()] {
-            world.walls.insert(Plane::new(direction, -half).unwrap()).unwrap();
+            world.walls.insert(Plane::new(direction, number(-half)).unwrap()).unwrap();
         }
     }
     world
 }
 
 /// So many balls on a lattice, over a box that fits it, with radii up to a half.
-fn pour(count: usize, least: f32, model: SwarmModel) -> World<f32> {
+fn pour<S: Scalar>(count: usize, least: f32, model: SwarmModel<S>) -> World<S> {
     let side = (count as f32 / 6.0).sqrt().ceil() as usize;
     let half = side as f32 * 1.05 / 2.0;
     let mut world = world(model, Some(half));
@@ -48,16 +53,17 @@ fn pour(count: usize, least: f32, model: SwarmModel) -> World<f32> {
             let place = [at(i % side) - half, at(i / side / side), at(i / side % side) - half];
             let radius = 0.5 * (least / 0.5).powf(random.next());
             let velocity = Vec3::new(random.next() - 0.5, 0.0, random.next() - 0.5) * 0.1;
-            Ball { velocity, mass: Mass::Density(1.0), ..Ball::new(place.into(), radius) }
+            let ball = Ball::new(Point3::from(place.map(number)), number(radius));
+            Ball { velocity: velocity.map(number), mass: Mass::Density(S::one()), ..ball }
         })
         .collect();
     world.swarm.insert(&balls).unwrap();
     world
 }
 
-fn steps(world: &mut World<f32>, count: u32) {
+fn steps<S: Scalar>(world: &mut World<S>, count: u32) {
     for _ in 0..count {
-        world.step(DT).unwrap();
+        world.step(number(DT)).unwrap();
     }
 }
 
@@ -98,9 +104,14 @@ fn energy(swarm: &Swarm) -> f64 {
 
 #[test]
 fn threads_and_instructions_change_no_bit() {
+    change_no_bit::<f32>();
+    change_no_bit::<f64>();
+}
+
+fn change_no_bit<S: Scalar>() {
     for tier in [Tier::Lab, Tier::Full] {
         for least in [0.3, 0.01] {
-            let start = pour(2_500, least, model(tier));
+            let start = pour::<S>(2_500, least, model(tier));
             let run = |threads: u32, instructions: SimdLevel| {
                 let mut world = start.clone();
                 world.swarm.set_model(SwarmModel { threads, ..model(tier) }).unwrap();
@@ -243,7 +254,7 @@ fn all_sleep_and_a_kick_wakes_only_what_it_should() {
 
 #[test]
 fn balls_come_and_go_by_name() {
-    let mut world = pour(2_000, 0.3, model(Tier::Full));
+    let mut world = pour::<f32>(2_000, 0.3, model(Tier::Full));
     let swarm = &world.swarm;
     let ids: Vec<_> = (0..swarm.len()).map(|row| swarm.id(row).unwrap()).collect();
     steps(&mut world, 150);
@@ -291,7 +302,7 @@ fn the_tier_changes_while_balls_come_and_go() {
 #[test]
 fn removing_a_ball_leaves_the_heap_as_it_was() {
     // What contacts bore is remembered while rows move.
-    let mut world = pour(2_000, 0.3, model(Tier::Full));
+    let mut world = pour::<f32>(2_000, 0.3, model(Tier::Full));
     steps(&mut world, 240);
     let top = (0..world.swarm.len())
         .max_by(|a, b| world.swarm.balls()[*a][1].total_cmp(&world.swarm.balls()[*b][1]))
@@ -384,7 +395,7 @@ fn extremes_stay_finite() {
 
 #[test]
 fn a_snapshot_goes_on_with_the_same_bits() {
-    let mut world = pour(1_000, 0.1, model(Tier::Full));
+    let mut world = pour::<f32>(1_000, 0.1, model(Tier::Full));
     steps(&mut world, 60);
     let mut copy = world.clone();
     steps(&mut world, 40);

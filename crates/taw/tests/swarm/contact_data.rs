@@ -191,17 +191,17 @@ fn a_contact_that_is_not_touching_says_so() {
 }
 
 /// Marbles that fly about and overlap, at rest and fast.
-fn cloud(count: u32) -> World<f32> {
+fn cloud<S: Scalar>(count: u32) -> World<S> {
     let mut draw = Draw(count.into());
     let mut world = World::default();
     world.set_model(Model { substeps: 1, ..Model::GAME }).unwrap();
-    world.walls.insert(Plane::new(Vec3::unit_y(), -2.0).unwrap()).unwrap();
+    world.walls.insert(Plane::new(Vec3::unit_y(), S::from_f64(-2.0)).unwrap()).unwrap();
     for _ in 0..count {
         let mut vector =
-            |most: f64| Vec3::new(0, 0, 0).map(|_: i32| draw.between(-most, most) as f32);
+            |most: f64| Vec3::new(0, 0, 0).map(|_: i32| S::from_f64(draw.between(-most, most)));
         let (at, velocity) = (Point3::from_vec(vector(2.0)), vector(3.0));
-        let velocity = if at.x > 0.0 { velocity } else { velocity * 0.01 };
-        let marble = Marble { velocity, ..Marble::new(at, draw.between(0.05, 0.2) as f32) };
+        let velocity = if at.x > S::zero() { velocity } else { velocity * S::from_f64(0.01) };
+        let marble = Marble { velocity, ..Marble::new(at, S::from_f64(draw.between(0.05, 0.2))) };
         world.marbles.insert(marble).unwrap();
     }
     world
@@ -211,9 +211,14 @@ fn cloud(count: u32) -> World<f32> {
 /// no others.
 #[test]
 fn soft_step_lists_the_pairs_that_are_near() {
-    let dt = DT as f32;
+    lists_the_pairs_that_are_near::<f32>();
+    lists_the_pairs_that_are_near::<f64>();
+}
+
+fn lists_the_pairs_that_are_near<S: Scalar>() {
+    let dt = S::from_f64(DT);
     for count in [300, 1_000, 3_000] {
-        let mut world = cloud(count);
+        let mut world = cloud::<S>(count);
         let mut portable = world.clone();
         portable.swarm.set_simd_level(SimdLevel::PORTABLE);
         let model = SwarmModel { threads: 3, ..portable.swarm.model() };
@@ -232,7 +237,7 @@ fn soft_step_lists_the_pairs_that_are_near() {
         for b in 0..at.len() {
             for a in 0..b {
                 let apart = (at[b] - at[a]).cast::<f64>().unwrap();
-                let separation = apart.magnitude() - f64::from(radius[a]) - f64::from(radius[b]);
+                let separation = apart.magnitude() - radius[a].as_f64() - radius[b].as_f64();
                 let speed = (velocity[a] - velocity[b]).cast::<f64>().unwrap().dot(apart);
                 let closes = (speed / apart.magnitude()).max(0.0) * DT;
                 let beyond = separation - 2.0 * 9.81 * DT * DT - closes;

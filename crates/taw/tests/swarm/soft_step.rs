@@ -7,6 +7,7 @@ mod impacts;
 mod leaning;
 mod moving_walls;
 mod overlaps;
+mod precision;
 mod state;
 mod tangential;
 mod tunnelling;

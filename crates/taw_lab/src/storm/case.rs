@@ -63,7 +63,7 @@ impl SwarmPart {
         if self.full { Tier::Full } else { Tier::Lab }
     }
 
-    fn fill(&self, swarm: &mut taw::swarm::Swarm) -> Result<(), taw::Error> {
+    fn fill<S: Scalar>(&self, swarm: &mut taw::swarm::Swarm<S>) -> Result<(), taw::Error> {
         swarm.set_model(SwarmModel {
             tier: self.tier(),
             substeps: self.substeps,
@@ -73,10 +73,10 @@ impl SwarmPart {
             sleeps: self.sleeps,
         })?;
         let balls = self.balls.iter().map(|ball| taw::swarm::Ball {
-            position: ball.position.map(|x| x as f32).into(),
-            radius: ball.radius as f32,
-            velocity: ball.velocity.map(|x| x as f32).into(),
-            mass: Mass::Density(ball.density as f32),
+            position: ball.position.map(S::from_f64).into(),
+            radius: S::from_f64(ball.radius),
+            velocity: ball.velocity.map(S::from_f64).into(),
+            mass: Mass::Density(S::from_f64(ball.density)),
         });
         swarm.insert(&balls.collect::<Vec<_>>())?;
         Ok(())

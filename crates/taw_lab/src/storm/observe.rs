@@ -156,10 +156,10 @@ fn balls<S: Scalar>(world: &World<S>) -> Vec<Body> {
     let mut balls: Vec<(u32, Body)> = (0..swarm.len())
         .filter(|row| !swarm.is_marble(*row))
         .map(|row| {
-            let [x, y, z, radius] = swarm.balls()[row].map(f64::from);
-            let [vx, vy, vz, inverse_mass] = swarm.velocities()[row].map(f64::from);
+            let [x, y, z, radius] = swarm.balls()[row].map(S::as_f64);
+            let [vx, vy, vz, inverse_mass] = swarm.velocities()[row].map(S::as_f64);
             let [sx, sy, sz, _] =
-                swarm.spin_velocities().get(row).map_or([0.0; 4], |rim| rim.map(f64::from));
+                swarm.spin_velocities().get(row).map_or([0.0; 4], |rim| rim.map(S::as_f64));
             let body = Body {
                 at: Vec3::new(x, y, z),
                 velocity: Vec3::new(vx, vy, vz),

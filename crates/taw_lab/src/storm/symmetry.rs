@@ -3,7 +3,7 @@
 use taw::prelude::*;
 use taw::scene::{Build, KinematicMotion, MarbleDesc, RotationDesc, Scene, ShapeDesc};
 
-use super::case::{Case, Kind};
+use super::case::Case;
 use super::judge::{Finding, Invariant};
 use super::observe::Snapshot;
 use super::run::advance;
@@ -24,10 +24,6 @@ const TOUCHED: u32 = 10;
 /// Differences below this fraction of the distances in the scene are rounding.
 const ALIKE: f64 = 1e-6;
 /// Growth of a difference in a touch: ten of them make a part in a million of eight roundings of `f64`.
-///
-/// [`Response::SoftStep`](taw::response::Response::SoftStep) keeps its rows in `f32`, whatever the
-/// world's scalar is. Eight of its roundings are a part in a million from the beginning, and grow as
-/// fast, so its scenes are compared for the first few touches.
 const GROWTH: f64 = 7.5;
 /// Bound above which a comparison tells nothing.
 const BLIND: f64 = 1e-2;
@@ -174,15 +170,14 @@ pub fn compare(case: &Case, symmetry: Symmetry) -> Option<Finding> {
     let (mut one, mut other) = (case.begin::<f64>().ok()?, image.begin::<f64>().ok()?);
     let mut worst =
         Finding { invariant: symmetry.invariant(), value: 0.0, bound: ALIKE, body: None };
-    let single = Kind::of(case) == Kind::SoftStep;
-    let rounding = if single { f64::from(f32::EPSILON) } else { f64::EPSILON };
     let mut touched = 0;
     for _ in 0..STEPS.min(case.steps) {
         advance(case, &mut one).ok()?;
         advance(&image, &mut other).ok()?;
         let (a, b) = (Snapshot::of(&one.world), Snapshot::of(&other.world));
         touched += touches(&a);
-        let bound = (8.0 * rounding * GROWTH.powi(touched.min(TOUCHED).cast_signed())).max(ALIKE);
+        let bound =
+            (8.0 * f64::EPSILON * GROWTH.powi(touched.min(TOUCHED).cast_signed())).max(ALIKE);
         if bound > BLIND {
             break;
         }

@@ -3,13 +3,12 @@
 
 use super::contact::SolverColumns;
 use super::{gather, inverse_mass};
+use crate::math::{LANES, Scalar, Simd, Vec3Wide};
 use crate::swarm::batches::Batch;
-use crate::swarm::simd::{LANES, Simd};
-use crate::swarm::vec3_wide::Vec3Wide;
 
 /// In place of the impulse of [`SolverColumns::backing`]: the ball has left the wall behind it. The
 /// impulses that its pairs had with that wall are larger than those without.
-pub(in crate::swarm) const LOST: f32 = -1.0;
+pub(in crate::swarm) const LOST: f64 = -1.0;
 
 /// Mass that the walls behind two balls add to their pair.
 pub(super) struct Backing<L> {
@@ -26,7 +25,7 @@ impl<L: Simd> Backing<L> {
     /// for faster.
     #[inline(always)]
     pub fn impulse(&self, alone: L, slower: L) -> L {
-        let zero = L::splat(0.0);
+        let zero = L::constant(0.0);
         let plain = alone * slower;
         let at_wall = slower + self.leaving;
         let pressed = zero - (zero - self.load * at_wall).max(zero - plain);
@@ -36,7 +35,7 @@ impl<L: Simd> Backing<L> {
     }
 }
 
-impl SolverColumns<'_> {
+impl<S: Scalar> SolverColumns<'_, S> {
     /// Tests if it is known which balls have a wall behind them.
     pub fn backed(&self) -> bool {
         self.backing.len() > 0
@@ -44,11 +43,11 @@ impl SolverColumns<'_> {
 
     /// Velocities of the walls behind two balls along their normals, in m/s.
     #[inline(always)]
-    pub(super) fn backing_speeds<L: Simd>(&self, batch: &Batch) -> [L; 2] {
+    pub(super) fn backing_speeds<L: Simd<Scalar = S>>(&self, batch: &Batch) -> [L; 2] {
         if self.backing_speed.len() == 0 {
-            return [L::splat(0.0); 2];
+            return [L::constant(0.0); 2];
         }
-        let mut speeds = [[0.0; LANES]; 2];
+        let mut speeds = [[S::zero(); LANES]; 2];
         for lane in 0..batch.count as usize {
             for (speeds, row) in speeds.iter_mut().zip(batch.pair(lane)) {
                 // SAFETY: as in `gather`.
@@ -60,13 +59,13 @@ impl SolverColumns<'_> {
 
     /// The walls behind two balls.
     #[inline(always)]
-    pub(super) fn backing_of<L: Simd>(
+    pub(super) fn backing_of<L: Simd<Scalar = S>>(
         &self,
         batch: &Batch,
         [a, b]: [&[L; 4]; 2],
         normal: Vec3Wide<L>,
     ) -> Backing<L> {
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let (zero, one) = (L::constant(0.0), L::constant(1.0));
         let [back_a, back_b] = gather::<L>(self.backing, batch);
         // How far the pair's normal goes into the wall.
         let into_a = normal.dot(Vec3Wide::of(&back_a)).max(zero);
@@ -97,7 +96,7 @@ pub(super) fn borne_by_wall<L: Simd>(
     back: &[L; 4],
     speed: L,
 ) -> (Vec3Wide<L>, [L; 4]) {
-    let (zero, one) = (L::splat(0.0), L::splat(1.0));
+    let (zero, one) = (L::constant(0.0), L::constant(1.0));
     let (normal, free) = (Vec3Wide::of(back), inverse_mass(ball));
     let some = free.select_gt(zero, normal.dot(normal), zero);
     let mass = free.select_gt(zero, one / free, zero);

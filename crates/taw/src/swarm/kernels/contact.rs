@@ -11,35 +11,33 @@ use super::{
     normal_and_separation, scatter, tipping,
 };
 use crate::constraint::{ContactImpulse, FrictionCone, Softness};
-use crate::math::RealVector;
+use crate::math::{Kernel, LANES, RealVector, Row, Scalar, Simd, SimdLevel, Vec3Wide};
 use crate::response::Impact;
 use crate::swarm::batches::Batch;
-use crate::swarm::simd::{Kernel, LANES, Row, Simd, SimdLevel};
 use crate::swarm::surfaces::{PairNumbers, SOLID_BALL};
-use crate::swarm::vec3_wide::Vec3Wide;
 use crate::workers::DisjointSlice;
 
 /// The part of an overlap that goes in a substep: where two neighbours of a ball both push it on,
 /// it goes no further than it should.
-const PUSH: f32 = 0.5;
+const PUSH: f64 = 0.5;
 /// Largest distance of such a push, over the smaller radius. One that is farther turns the normals of
 /// other contacts before they take back what pushed the balls apart, and so leaves speed behind.
-const MAX_PUSH: f32 = 0.25;
+const MAX_PUSH: f64 = 0.25;
 
 /// Mark of a ball that presses another one in this step and that no wall bears: neither flies.
-const TOUCHING: f32 = 0.5;
+const TOUCHING: f64 = 0.5;
 
 /// The columns that several threads work on.
 #[derive(Clone, Copy)]
-pub(in crate::swarm) struct SolverColumns<'a> {
+pub(in crate::swarm) struct SolverColumns<'a, S> {
     /// Center and radius.
-    pub at: DisjointSlice<'a, Row>,
+    pub at: DisjointSlice<'a, Row<S>>,
     /// Velocity and inverse mass.
-    pub velocity: DisjointSlice<'a, Row>,
+    pub velocity: DisjointSlice<'a, Row<S>>,
     /// Radius times spin, and nothing.
-    pub spin: DisjointSlice<'a, Row>,
+    pub spin: DisjointSlice<'a, Row<S>>,
     /// Remaining skin of each ball, in metres.
-    pub skin_left: DisjointSlice<'a, f32>,
+    pub skin_left: DisjointSlice<'a, S>,
     /// The normal of the wall behind each ball, and the impulse that it bears for those who press
     /// the ball on it, in N s; empty where all weigh about as much.
     ///
@@ -47,35 +45,35 @@ pub(in crate::swarm) struct SolverColumns<'a> {
     /// time, if the wall takes it after that. So the wall takes it at once, as if pair and wall
     /// were solved together: the ball is moved only by what goes along the wall, and weighs as much
     /// more along the normal of the pair (the Schur complement of the wall's contact).
-    pub backing: DisjointSlice<'a, Row>,
+    pub backing: DisjointSlice<'a, Row<S>>,
     /// Velocity of that wall along its normal, in m/s; empty if all are at rest.
-    pub backing_speed: DisjointSlice<'a, f32>,
+    pub backing_speed: DisjointSlice<'a, S>,
 }
 
 /// One pass over the pairs for their impulses.
 ///
 /// `BACKED` if it is known who has a wall behind it, `OWN` if pairs have numbers of their own: each
 /// of the four is compiled alone.
-struct Solve<'a, const BACKED: bool, const OWN: bool> {
-    pub pass: Pass,
-    pub columns: SolverColumns<'a>,
+struct Solve<'a, S, const BACKED: bool, const OWN: bool> {
+    pub pass: Pass<S>,
+    pub columns: SolverColumns<'a, S>,
     pub batches: &'a [Batch],
-    pub impulses: &'a mut ContactImpulses,
-    pub friction: f32,
+    pub impulses: &'a mut ContactImpulses<S>,
+    pub friction: S,
 }
 
 /// Goes over the pairs of some batches.
-pub(in crate::swarm) fn solve(
+pub(in crate::swarm) fn solve<S: Scalar>(
     simd_level: SimdLevel,
-    pass: Pass,
-    columns: SolverColumns,
+    pass: Pass<S>,
+    columns: SolverColumns<S>,
     batches: &[Batch],
-    impulses: &mut ContactImpulses,
-    friction: f32,
+    impulses: &mut ContactImpulses<S>,
+    friction: S,
 ) {
     macro_rules! run {
         ($backed:literal, $own:literal) => {
-            simd_level.run(Solve::<$backed, $own> { pass, columns, batches, impulses, friction })
+            simd_level.run(Solve::<S, $backed, $own> { pass, columns, batches, impulses, friction })
         };
     }
     match (columns.backed(), !impulses.numbers.is_empty()) {
@@ -86,9 +84,9 @@ pub(in crate::swarm) fn solve(
     }
 }
 
-impl<const BACKED: bool, const OWN: bool> Kernel for Solve<'_, BACKED, OWN> {
+impl<S: Scalar, const BACKED: bool, const OWN: bool> Kernel<S> for Solve<'_, S, BACKED, OWN> {
     #[inline(always)]
-    fn run<L: Simd>(self) {
+    fn run<L: Simd<Scalar = S>>(self) {
         match self.pass {
             Pass::Restitution(params) => self.restitution::<L>(params),
             Pass::WarmStart(params) => self.warm_start::<L>(params),
@@ -111,10 +109,10 @@ struct Numbers<L> {
 impl<L: Simd> Numbers<L> {
     #[inline(always)]
     fn load<const OWN: bool>(
-        own: &[PairNumbers],
+        own: &[PairNumbers<L::Scalar>],
         batch: usize,
-        friction: f32,
-        restitution: f32,
+        friction: L::Scalar,
+        restitution: L::Scalar,
     ) -> Self {
         if OWN {
             let PairNumbers {
@@ -134,8 +132,8 @@ impl<L: Simd> Numbers<L> {
             Self {
                 friction: L::splat(friction),
                 restitution: L::splat(restitution),
-                tangential_restitution: L::splat(0.0),
-                inertia_factors: [L::splat(SOLID_BALL); 2],
+                tangential_restitution: L::constant(0.0),
+                inertia_factors: [L::constant(SOLID_BALL); 2],
             }
         }
     }
@@ -144,21 +142,21 @@ impl<L: Simd> Numbers<L> {
     #[inline(always)]
     fn fresh<const FIRST: bool>(
         &self,
-        params: &SolverParams,
+        params: &SolverParams<L::Scalar>,
         at: [&[L; 4]; 2],
         velocity: [&[L; 4]; 2],
         before: L,
         [separation, parting]: [L; 2],
     ) -> L {
-        let (zero, speed) = (L::splat(0.0), L::splat(params.restitution_threshold));
-        let fast = (zero - parting).select_gt(speed, L::splat(1.0), zero);
+        let (zero, speed) = (L::constant(0.0), L::splat(params.restitution_threshold));
+        let fast = (zero - parting).select_gt(speed, L::constant(1.0), zero);
         let fresh = before.select_gt(zero, zero, fast);
         if fresh.gt_mask(zero) == 0 {
             return fresh;
         }
         let bounces = self.restitution.select_gt(zero, fresh, zero);
         // Where nothing bounces, all is a contact but what passes by far away.
-        let beside = (at[0][3] + at[1][3]) * L::splat(0.5);
+        let beside = (at[0][3] + at[1][3]) * L::constant(0.5);
         let stops = self.restitution.select_gt(zero, zero, fresh);
         let stops = separation.select_gt(beside, stops, zero);
         let unsure = if FIRST { bounces + stops } else { stops };
@@ -176,20 +174,20 @@ impl<L: Simd> Numbers<L> {
     #[inline(always)]
     fn tangent_mass<const OWN: bool>(&self, alone: L, [a, b]: [&[L; 4]; 2]) -> L {
         if OWN {
-            let one = L::splat(1.0);
+            let one = L::constant(1.0);
             let [of_a, of_b] = self.inertia_factors;
             let sum = inverse_mass(a) * (one + of_a) + inverse_mass(b) * (one + of_b);
-            sum.select_gt(L::splat(0.0), one / sum, L::splat(0.0))
+            sum.select_gt(L::constant(0.0), one / sum, L::constant(0.0))
         } else {
-            alone * L::splat(2.0 / 7.0)
+            alone * L::constant(2.0 / 7.0)
         }
     }
 }
 
-impl SolverColumns<'_> {
+impl<S: Scalar> SolverColumns<'_, S> {
     /// Applies an impulse to both balls of the pairs, with these factors of inertia.
     #[inline(always)]
-    fn apply_impulse<L: Simd, const BACKED: bool>(
+    fn apply_impulse<L: Simd<Scalar = S>, const BACKED: bool>(
         &self,
         batch: &Batch,
         [a, b]: [[L; 4]; 2],
@@ -207,7 +205,7 @@ impl SolverColumns<'_> {
             (Vec3Wide::of(&spin_b) - turn * (factor_b * mass_b)).with(spin_b[3]),
         ];
         scatter(self.spin, batch, spin);
-        let none = Vec3Wide([L::splat(0.0); 3]);
+        let none = Vec3Wide([L::constant(0.0); 3]);
         let [mut by_a, mut by_b] = [none - impulse, impulse];
         if BACKED {
             let [back_a, back_b] = gather::<L>(self.backing, batch);
@@ -226,8 +224,8 @@ impl SolverColumns<'_> {
 
     /// Counts how far the balls of the pairs went.
     #[inline(always)]
-    fn spend<L: Simd>(&self, batch: &Batch, displacements: [Vec3Wide<L>; 2]) {
-        let mut lengths = [[0.0; LANES]; 2];
+    fn spend<L: Simd<Scalar = S>>(&self, batch: &Batch, displacements: [Vec3Wide<L>; 2]) {
+        let mut lengths = [[S::zero(); LANES]; 2];
         for (lengths, displacement) in lengths.iter_mut().zip(displacements) {
             displacement.dot(displacement).sqrt().store(lengths);
         }
@@ -241,15 +239,15 @@ impl SolverColumns<'_> {
 
     /// Lets those pairs bounce that meet. Says whether any does.
     #[inline(always)]
-    fn apply_restitution<L: Simd, const OWN: bool>(
+    fn apply_restitution<L: Simd<Scalar = S>, const OWN: bool>(
         &self,
         batch: &Batch,
-        params: &SolverParams,
+        params: &SolverParams<S>,
         numbers: &Numbers<L>,
         ([at_a, at_b], [a, b]): ([[L; 4]; 2], [[L; 4]; 2]),
-        impacts: &mut Vec<Impact<f32>>,
+        impacts: &mut Vec<Impact<S>>,
     ) -> bool {
-        let zero = L::splat(0.0);
+        let zero = L::constant(0.0);
         let Meeting { normal, approach_speed, time } = meeting(params, [&at_a, &at_b], [&a, &b]);
         let tipping = tipping::tip(batch, params, normal, approach_speed);
         // What does not bounce is stopped by its contact.
@@ -270,7 +268,7 @@ impl SolverColumns<'_> {
         let mass = effective_mass(&a, &b);
         let spins = self.spins(batch);
         let slip = slip(relative, normal, &spins);
-        let one = L::splat(1.0);
+        let one = L::constant(1.0);
         let stopping = slip * (zero - numbers.tangent_mass::<OWN>(mass, [&a, &b]));
         let restitution = tipping.map_or(numbers.restitution, |tipping| {
             tipping::restitution(tipping, numbers.restitution)
@@ -290,18 +288,18 @@ impl SolverColumns<'_> {
     /// Moves apart what overlaps. That changes no velocity: overlap is not energy. Returns true if any pair
     /// is jammed: it overlaps, and its contact had to take back more speed than [`SolverParams::jam_speed`].
     #[inline(always)]
-    fn push_apart<L: Simd>(
+    fn push_apart<L: Simd<Scalar = S>>(
         &self,
         batch: &Batch,
         [at_a, at_b]: [[L; 4]; 2],
         [a, b]: [[L; 4]; 2],
         (normal, separation): (Vec3Wide<L>, L),
-        params: &SolverParams,
+        params: &SolverParams<S>,
         (grounded, change): (L, L),
     ) -> bool {
-        let zero = L::splat(0.0);
+        let zero = L::constant(0.0);
         let smaller = at_a[3] + at_b[3] - at_a[3].max(at_b[3]);
-        let overlap = zero - separation - smaller * L::splat(2.0 * params.slop);
+        let overlap = zero - separation - smaller * L::splat(S::from_f64(2.0) * params.slop);
         if overlap.gt_mask(zero) == 0 {
             return false;
         }
@@ -315,10 +313,10 @@ impl SolverColumns<'_> {
         // What flies keeps its center of mass. What a wall bears goes half each, whatever they
         // weigh: a light ball that a heavy one presses on something has nowhere to go. What sleeps
         // stays.
-        let most = smaller * L::splat(MAX_PUSH);
-        let push = overlap.max(zero) * L::splat(PUSH);
-        let (one, push) = (L::splat(1.0), most.select_gt(push, push, most));
-        let borne = grounded.select_gt(L::splat(TOUCHING), one, zero);
+        let most = smaller * L::constant(MAX_PUSH);
+        let push = overlap.max(zero) * L::constant(PUSH);
+        let (one, push) = (L::constant(1.0), most.select_gt(push, push, most));
+        let borne = grounded.select_gt(L::constant(TOUCHING), one, zero);
         let a = free_a.select_gt(zero, borne.select_gt(zero, one, free_a), zero);
         let b = free_b.select_gt(zero, borne.select_gt(zero, one, free_b), zero);
         let by = (a + b).select_gt(zero, push / (a + b), zero);
@@ -334,16 +332,16 @@ impl SolverColumns<'_> {
 
     /// The spins of a batch.
     #[inline(always)]
-    pub(super) fn spins<L: Simd>(&self, batch: &Batch) -> [[L; 4]; 2] {
+    pub(super) fn spins<L: Simd<Scalar = S>>(&self, batch: &Batch) -> [[L; 4]; 2] {
         gather(self.spin, batch)
     }
 }
 
-impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
+impl<S: Scalar, const BACKED: bool, const OWN: bool> Solve<'_, S, BACKED, OWN> {
     #[inline(always)]
-    fn restitution<L: Simd>(self, params: SolverParams) {
+    fn restitution<L: Simd<Scalar = S>>(self, params: SolverParams<S>) {
         let Self { columns, batches, impulses, friction, .. } = self;
-        if !OWN && params.restitution == 0.0 {
+        if !OWN && params.restitution == S::zero() {
             return; // contacts stop what meets
         }
         for (i, batch) in awake(batches) {
@@ -358,7 +356,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
     }
 
     #[inline(always)]
-    fn warm_start<L: Simd>(self, params: SolverParams) {
+    fn warm_start<L: Simd<Scalar = S>>(self, params: SolverParams<S>) {
         let Self { columns, batches, impulses, friction, .. } = self;
         let ContactImpulses { normal_impulse, tangent_impulse, torque, numbers: own, .. } =
             impulses;
@@ -371,7 +369,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let (velocity, spin) = (gather::<L>(columns.velocity, batch), columns.spins(batch));
             if BACKED {
                 let [back_a, back_b] = gather::<L>(columns.backing, batch);
-                let (zero, one) = (L::splat(0.0), L::splat(1.0));
+                let (zero, one) = (L::constant(0.0), L::constant(1.0));
                 let lost = zero.select_gt(back_a[3], one, zero);
                 let kept = zero.select_gt(back_b[3], zero, one - lost);
                 // Nor does it bear as much once it presses the ball along the wall: it parts them
@@ -398,11 +396,11 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
     }
 
     #[inline(always)]
-    fn solve<L: Simd, const FIRST: bool>(self, params: SolverParams) {
+    fn solve<L: Simd<Scalar = S>, const FIRST: bool>(self, params: SolverParams<S>) {
         let Self { columns, batches, impulses, friction, .. } = self;
         let ContactImpulses { normal_impulse, tangent_impulse, torque, .. } = impulses;
         let (own, struck, jammed) = (&impulses.numbers, &mut impulses.struck, &mut impulses.jammed);
-        let zero = L::splat(0.0);
+        let zero = L::constant(0.0);
         for (i, batch) in awake(batches) {
             let numbers = Numbers::<L>::load::<OWN>(own, i, friction, params.restitution);
             let at = gather::<L>(columns.at, batch);
@@ -422,7 +420,7 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
                 StruckContact::note(struck, &params, parting, (i, &normal_impulse[i]));
             }
             let alone = effective_mass(&a, &b);
-            let (target, softness) = target::<L, FIRST>(&params, separation, grounded);
+            let (target, softness) = target::<S, L, FIRST>(&params, separation, grounded);
             let slower = parting - target;
             let excess = if BACKED {
                 columns.backing_of(batch, velocity, normal).impulse(alone, slower)
@@ -440,7 +438,8 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
             let (struck_by, speeds) = ((before, change), (parting, alone));
             let change = tipping::lean(batch, &params, normal, struck_by, speeds);
             for spin in &mut spins {
-                spin[3] = impulse.normal.select_gt(zero, grounded.max(L::splat(TOUCHING)), spin[3]);
+                spin[3] =
+                    impulse.normal.select_gt(zero, grounded.max(L::constant(TOUCHING)), spin[3]);
             }
             let factors = numbers.inertia_factors;
             columns.apply_impulse::<L, BACKED>(batch, [a, b], spins, normal, change, factors);
@@ -459,18 +458,18 @@ impl<const BACKED: bool, const OWN: bool> Solve<'_, BACKED, OWN> {
 
 /// Target velocity of pairs along their normal, and the softness of the first solve.
 #[inline(always)]
-fn target<L: Simd, const FIRST: bool>(
-    params: &SolverParams,
+fn target<S: Scalar, L: Simd<Scalar = S>, const FIRST: bool>(
+    params: &SolverParams<S>,
     separation: L,
     grounded: L,
 ) -> (L, Option<Softness<L>>) {
-    let per_second = L::splat(1.0 / params.time);
-    let gap = separation.max(L::splat(0.0));
+    let per_second = L::splat(S::one() / params.time);
+    let gap = separation.max(L::constant(0.0));
     if !FIRST {
-        return (L::splat(0.0) - gap * per_second, None);
+        return (L::constant(0.0) - gap * per_second, None);
     }
     // What nothing bears is moved apart without speed.
-    let loaded = grounded.select_gt(L::splat(TOUCHING), separation, gap);
+    let loaded = grounded.select_gt(L::constant(TOUCHING), separation, gap);
     let (target, softness) = params.softness.at(loaded, per_second);
     (target, Some(softness))
 }
@@ -478,8 +477,8 @@ fn target<L: Simd, const FIRST: bool>(
 /// The accumulated impulses of a batch.
 #[inline(always)]
 fn load<L: Simd>(
-    normal: &[f32; LANES],
-    tangent: &[[f32; LANES]; 3],
+    normal: &[L::Scalar; LANES],
+    tangent: &[[L::Scalar; LANES]; 3],
 ) -> ContactImpulse<L, Vec3Wide<L>> {
     ContactImpulse { normal: L::load(normal), tangent: Vec3Wide::load(tangent) }
 }

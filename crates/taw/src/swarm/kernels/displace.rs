@@ -1,26 +1,25 @@
 //! Overlap moved apart in the lab's tier.
 
 use super::{ALL, gather, normal_and_separation, scatter};
+use crate::math::{Kernel, LANES, Row, Scalar, Simd, Vec3Wide};
 use crate::swarm::batches::Batch;
 use crate::swarm::neighbours::NeighbourLists;
-use crate::swarm::simd::{Kernel, LANES, Row, Simd};
-use crate::swarm::vec3_wide::Vec3Wide;
 use crate::swarm::walls::HalfSpace;
 use crate::workers::DisjointSlice;
 
 /// Moves overlapping balls apart, half each.
-pub(in crate::swarm) struct Displace<'a> {
-    pub at: DisjointSlice<'a, Row>,
+pub(in crate::swarm) struct Displace<'a, S> {
+    pub at: DisjointSlice<'a, Row<S>>,
     pub batches: &'a [Batch],
 }
 
-impl Kernel for Displace<'_> {
+impl<S: Scalar> Kernel<S> for Displace<'_, S> {
     #[inline(always)]
-    fn run<L: Simd>(self) {
+    fn run<L: Simd<Scalar = S>>(self) {
         for batch in self.batches {
             let [a, b] = gather::<L>(self.at, batch);
             let (normal, overlap) = normal_and_overlap(&a, &b, ALL, |lane| batch.pair(lane));
-            let by = normal * (overlap * L::splat(0.5));
+            let by = normal * (overlap * L::constant(0.5));
             let moved = [(Vec3Wide::of(&a) - by).with(a[3]), (Vec3Wide::of(&b) + by).with(b[3])];
             scatter(self.at, batch, moved);
         }
@@ -36,19 +35,19 @@ fn normal_and_overlap<L: Simd>(
     pair: impl Fn(usize) -> [u32; 2],
 ) -> (Vec3Wide<L>, L) {
     let (normal, separation) = normal_and_separation(a, b, lanes, pair);
-    let zero = L::splat(0.0);
+    let zero = L::constant(0.0);
     (normal, (zero - separation).max(zero))
 }
 
 /// Moves overlapping balls of neighbour lists apart: each ball and up to eight others at a time.
-pub(in crate::swarm) struct DisplaceNeighbours<'a> {
-    pub at: DisjointSlice<'a, Row>,
+pub(in crate::swarm) struct DisplaceNeighbours<'a, S> {
+    pub at: DisjointSlice<'a, Row<S>>,
     pub lists: NeighbourLists<'a>,
 }
 
 /// Which part of an overlap each of two balls moves, by how many overlap the first one: where
 /// these are moved together, they would move too far.
-const PART: [f32; LANES + 1] = [0.5, 0.5, 0.42, 0.38, 0.36, 0.36, 0.36, 0.36, 0.36];
+const PART: [f64; LANES + 1] = [0.5, 0.5, 0.42, 0.38, 0.36, 0.36, 0.36, 0.36, 0.36];
 
 /// All bits of the first places, by how many these are.
 static FIRST: [[u16; LANES]; LANES + 1] = {
@@ -65,9 +64,9 @@ static FIRST: [[u16; LANES]; LANES + 1] = {
     masks
 };
 
-impl Kernel for DisplaceNeighbours<'_> {
+impl<S: Scalar> Kernel<S> for DisplaceNeighbours<'_, S> {
     #[inline(always)]
-    fn run<L: Simd>(self) {
+    fn run<L: Simd<Scalar = S>>(self) {
         let NeighbourLists { first, rows, list: mut rest } = self.lists;
         for row in first..first + rows {
             let mut left = usize::from(rest[0]);
@@ -98,8 +97,8 @@ impl Kernel for DisplaceNeighbours<'_> {
                     let pair = |lane: usize| [row, row + u32::from(after[lane])];
                     let (normal, overlap) = normal_and_overlap(&a, &b, (1 << count) - 1, pair);
                     let overlap = overlap.mask_first(count);
-                    let hits = overlap.gt_mask(L::splat(0.0)).count_ones();
-                    let by = normal * (overlap * L::splat(PART[hits as usize]));
+                    let hits = overlap.gt_mask(L::constant(0.0)).count_ones();
+                    let by = normal * (overlap * L::constant(PART[hits as usize]));
                     L::scatter(ball, &after, LANES, (Vec3Wide::of(&b) + by).with(b[3]));
                     let Vec3Wide([x, y, z]) = by;
                     own = [own[0] - x.sum(), own[1] - y.sum(), own[2] - z.sum(), own[3]];
@@ -113,15 +112,15 @@ impl Kernel for DisplaceNeighbours<'_> {
 }
 
 /// Moves balls out of half-spaces.
-pub(in crate::swarm) struct DisplaceFromPlanes<'a> {
-    pub at: &'a mut [Row],
-    pub planes: &'a [HalfSpace],
+pub(in crate::swarm) struct DisplaceFromPlanes<'a, S> {
+    pub at: &'a mut [Row<S>],
+    pub planes: &'a [HalfSpace<S>],
 }
 
-impl Kernel for DisplaceFromPlanes<'_> {
+impl<S: Scalar> Kernel<S> for DisplaceFromPlanes<'_, S> {
     #[inline(always)]
-    fn run<L: Simd>(self) {
-        let zero = L::splat(0.0);
+    fn run<L: Simd<Scalar = S>>(self) {
+        let zero = L::constant(0.0);
         for rows in self.at.chunks_mut(LANES) {
             let (base, count) = (rows.as_mut_ptr(), rows.len());
             let places = [0, 1, 2, 3, 4, 5, 6, 7].map(|place: u16| place.min(count as u16 - 1));

@@ -2,24 +2,22 @@
 
 use cgmath::EuclideanSpace;
 
-use crate::math::{Point3, Vec3};
+use crate::math::{LANES, Point3, Scalar, Simd, Vec3, Vec3Wide};
 use crate::response::Impact;
 use crate::swarm::batches::Batch;
-use crate::swarm::simd::{LANES, Simd};
-use crate::swarm::vec3_wide::Vec3Wide;
 
 /// Notes the pairs of a batch that bounce, with their approach speeds, normals and points.
 #[cold]
-pub(super) fn note_impacts<L: Simd>(
-    impacts: &mut Vec<Impact<f32>>,
+pub(super) fn note_impacts<S: Scalar, L: Simd<Scalar = S>>(
+    impacts: &mut Vec<Impact<S>>,
     batch: &Batch,
     approach_speed: L,
     vectors: [Vec3Wide<L>; 2],
 ) {
-    let (mut speeds, mut places) = ([0.0; LANES], [[[0.0; LANES]; 3]; 2]);
+    let (mut speeds, mut places) = ([S::zero(); LANES], [[[S::zero(); LANES]; 3]; 2]);
     approach_speed.store(&mut speeds);
     vectors.iter().zip(&mut places).for_each(|(vector, place)| vector.store(place));
-    for ([a, b], lane) in batch.pairs().zip(0..).filter(|(_, lane)| speeds[*lane] > 0.0) {
+    for ([a, b], lane) in batch.pairs().zip(0..).filter(|(_, lane)| speeds[*lane] > S::zero()) {
         let [normal, point] = places.map(|[x, y, z]| Vec3::new(x[lane], y[lane], z[lane]));
         let point = Point3::from_vec(point);
         let approach_speed = speeds[lane];

@@ -2,8 +2,7 @@
 
 use super::ALL;
 use super::params::SolverParams;
-use crate::swarm::simd::Simd;
-use crate::swarm::vec3_wide::Vec3Wide;
+use crate::math::{Scalar, Simd, Vec3Wide};
 
 /// Meetings of the pairs of a batch within a substep.
 #[derive(Clone, Copy)]
@@ -18,12 +17,13 @@ pub(super) struct Meeting<L> {
 
 /// Finds out which pairs meet within a substep.
 #[inline(always)]
-pub(super) fn meeting<L: Simd>(
-    params: &SolverParams,
+pub(super) fn meeting<S: Scalar, L: Simd<Scalar = S>>(
+    params: &SolverParams<S>,
     [at_a, at_b]: [&[L; 4]; 2],
     [a, b]: [&[L; 4]; 2],
 ) -> Meeting<L> {
-    let (zero, one, least) = (L::splat(0.0), L::splat(1.0), L::splat(f32::MIN_POSITIVE));
+    let (zero, one, least) =
+        (L::constant(0.0), L::constant(1.0), L::splat(S::min_positive_value()));
     let displacement = Vec3Wide::of(at_b) - Vec3Wide::of(at_a);
     let relative = Vec3Wide::of(b) - Vec3Wide::of(a);
     let reach = at_a[3] + at_b[3];
@@ -32,7 +32,7 @@ pub(super) fn meeting<L: Simd>(
     let apart = (displacement.dot(displacement) - reach * reach).max(zero);
     let limit = L::splat(params.time);
     // Nobody is there before half of the time that the approach would take.
-    let farthest = approach * (limit * L::splat(2.0 * (1.0 + 1e-5)));
+    let farthest = approach * (limit * L::constant(2.0 * (1.0 + 1e-5)));
     if apart.gt_mask(farthest) == ALL {
         return Meeting { normal: displacement, approach_speed: zero, time: zero };
     }

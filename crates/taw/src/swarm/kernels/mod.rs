@@ -2,9 +2,8 @@
 
 use super::batches::Batch;
 use super::impulse_cache::{reserve_slack, shrink_slack};
-use super::simd::{LANES, Row, Simd};
 use super::surfaces::{PairNumbers, SurfaceOf};
-use super::vec3_wide::Vec3Wide;
+use crate::math::{LANES, Row, Scalar, Simd, Vec3Wide};
 use crate::response::Impact;
 use crate::workers::DisjointSlice;
 
@@ -33,23 +32,23 @@ pub(super) use sinking::{FindSinking, Sinking};
 
 /// Accumulated impulses of batches of pairs, batch by batch; none in the lab's tier.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct ContactImpulses {
+pub(super) struct ContactImpulses<S> {
     /// Normal impulses, in N s.
-    pub normal_impulse: Vec<[f32; LANES]>,
+    pub normal_impulse: Vec<[S; LANES]>,
     /// Tangent impulses (friction), in N s.
-    pub tangent_impulse: Vec<[[f32; LANES]; 3]>,
+    pub tangent_impulse: Vec<[[S; LANES]; 3]>,
     /// Angular impulses against rolling and spinning, in N m s, and the numbers of each pair: both
     /// only where surfaces differ or resist.
-    pub torque: Vec<[[f32; LANES]; 3]>,
-    pub numbers: Vec<PairNumbers>,
+    pub torque: Vec<[[S; LANES]; 3]>,
+    pub numbers: Vec<PairNumbers<S>>,
     /// Set if any of them bounced in the last round.
     pub bounced: bool,
     /// Set if any of them is jammed: see [`Swarm::relax`](super::Swarm::relax).
     pub jammed: bool,
     /// Impacts of the last round, if they are noted: of rows.
-    pub impacts: Vec<Impact<f32>>,
+    pub impacts: Vec<Impact<S>>,
     /// Those that were struck, or solved in a cluster, in this substep.
-    pub struck: Vec<StruckContact>,
+    pub struck: Vec<StruckContact<S>>,
 }
 
 /// Contact whose balls came together fast in a substep: faster than gravity makes balls at rest in two
@@ -60,50 +59,50 @@ pub(super) struct ContactImpulses {
 /// apart. Of balls that weigh about as much, contacts take it back; a light one between heavy ones
 /// takes back only what moves itself.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct StruckContact {
+pub(super) struct StruckContact<S> {
     batch: u32,
     lane: u32,
     /// Normal impulse before, in N s.
-    load: f32,
+    load: S,
 }
 
-impl StruckContact {
+impl<S: Scalar> StruckContact<S> {
     /// Contact of a batch and lane, with its normal impulse before.
-    pub fn new([batch, lane]: [u32; 2], load: f32) -> Self {
+    pub fn new([batch, lane]: [u32; 2], load: S) -> Self {
         Self { batch, lane, load }
     }
 
     /// Notes the pairs of a batch that come together fast, and their normal impulses before.
     #[inline(always)]
-    fn note<L: Simd>(
+    fn note<L: Simd<Scalar = S>>(
         struck: &mut Vec<Self>,
-        params: &SolverParams,
+        params: &SolverParams<S>,
         parting: L,
-        (batch, load): (usize, &[f32; LANES]),
+        (batch, load): (usize, &[S; LANES]),
     ) {
         let threshold = params.restitution_threshold;
-        let fast = (L::splat(0.0) - parting).gt_mask(L::splat(threshold));
-        if fast != 0 && threshold > 0.0 {
+        let fast = (L::constant(0.0) - parting).gt_mask(L::splat(threshold));
+        if fast != 0 && threshold > S::zero() {
             Self::add(struck, batch, fast, load);
         }
     }
 
     /// Adds lanes of a batch, as bits, and their normal impulses.
     #[cold]
-    fn add(struck: &mut Vec<Self>, batch: usize, lanes: u32, load: &[f32; LANES]) {
+    fn add(struck: &mut Vec<Self>, batch: usize, lanes: u32, load: &[S; LANES]) {
         let lanes = load.iter().zip(0..).filter(|(_, lane)| lanes & 1 << lane != 0);
         struck.extend(lanes.map(|(load, lane)| Self { batch: batch as u32, lane, load: *load }));
     }
 }
 
-impl ContactImpulses {
+impl<S: Scalar> ContactImpulses<S> {
     pub fn bytes(&self) -> usize {
-        self.normal_impulse.capacity() * size_of::<[f32; LANES]>()
+        self.normal_impulse.capacity() * size_of::<[S; LANES]>()
             + (self.tangent_impulse.capacity() + self.torque.capacity())
-                * size_of::<[[f32; LANES]; 3]>()
-            + self.numbers.capacity() * size_of::<PairNumbers>()
-            + self.struck.capacity() * size_of::<StruckContact>()
-            + self.impacts.capacity() * size_of::<Impact<f32>>()
+                * size_of::<[[S; LANES]; 3]>()
+            + self.numbers.capacity() * size_of::<PairNumbers<S>>()
+            + self.struck.capacity() * size_of::<StruckContact<S>>()
+            + self.impacts.capacity() * size_of::<Impact<S>>()
     }
 
     /// Forgets impulses that are no finite numbers.
@@ -111,7 +110,7 @@ impl ContactImpulses {
         let all = self.normal_impulse.as_flattened_mut().iter_mut();
         let all = all.chain(self.tangent_impulse.as_flattened_mut().as_flattened_mut());
         let all = all.chain(self.torque.as_flattened_mut().as_flattened_mut());
-        all.filter(|x| !x.is_finite()).for_each(|x| *x = 0.0);
+        all.filter(|x| !x.is_finite()).for_each(|x| *x = S::zero());
         self.struck.retain(|struck| struck.load.is_finite());
         self.impacts.retain(|impact| impact.approach_speed.is_finite());
     }
@@ -139,15 +138,15 @@ impl ContactImpulses {
             shrink_slack(column);
         }
         self.struck.clear();
-        reset(&mut self.normal_impulse, batches, [0.0; LANES]);
-        reset(&mut self.tangent_impulse, batches, [[0.0; LANES]; 3]);
+        reset(&mut self.normal_impulse, batches, [S::zero(); LANES]);
+        reset(&mut self.tangent_impulse, batches, [[S::zero(); LANES]; 3]);
     }
 
     /// Sets the numbers of each pair, where they have some.
-    pub fn set_numbers(&mut self, batches: &[Batch], surfaces: SurfaceOf) {
+    pub fn set_numbers(&mut self, batches: &[Batch], surfaces: SurfaceOf<S>) {
         surfaces.of_pairs(batches, &mut self.numbers);
         self.torque.clear();
-        self.torque.resize(self.numbers.len(), [[0.0; LANES]; 3]);
+        self.torque.resize(self.numbers.len(), [[S::zero(); LANES]; 3]);
     }
 }
 
@@ -157,14 +156,14 @@ const ALL: u32 = (1 << LANES) - 1;
 /// The normal from the first to the second ball, and the separation between them. Only those of the
 /// named lanes, as bits, are pairs of two balls.
 #[inline(always)]
-fn normal_and_separation<L: Simd>(
+fn normal_and_separation<S: Scalar, L: Simd<Scalar = S>>(
     a: &[L; 4],
     b: &[L; 4],
     lanes: u32,
     pair: impl Fn(usize) -> [u32; 2],
 ) -> (Vec3Wide<L>, L) {
-    let (zero, one) = (L::splat(0.0), L::splat(1.0));
-    let least = L::splat(f32::MIN_POSITIVE);
+    let (zero, one) = (L::constant(0.0), L::constant(1.0));
+    let least = L::splat(S::min_positive_value());
     let displacement = Vec3Wide::of(b) - Vec3Wide::of(a);
     let squared = displacement.dot(displacement);
     let distance = squared.sqrt();
@@ -174,7 +173,7 @@ fn normal_and_separation<L: Simd>(
     if least.gt_mask(squared) & lanes != 0 {
         // Where the centers coincide, any direction is as good as another; with the same for all,
         // those at one point would come into a line.
-        let mut any = [[0.0; LANES]; 3];
+        let mut any = [[S::zero(); LANES]; 3];
         for lane in 0..LANES {
             let direction = direction(pair(lane));
             for (axis, x) in any.iter_mut().zip(direction) {
@@ -194,10 +193,11 @@ fn normal_and_separation<L: Simd>(
 
 /// A direction for each pair of rows, spread over the sphere.
 #[cold]
-fn direction([a, b]: [u32; 2]) -> [f32; 3] {
+fn direction<S: Scalar>([a, b]: [u32; 2]) -> [S; 3] {
     let mixed = (a ^ b.rotate_left(16)).wrapping_mul(0x9e37_79b1);
     let mixed = (mixed ^ mixed >> 15).wrapping_mul(0x85eb_ca77);
-    let part = |shift: u32| ((mixed >> shift & 0x3ff) as f32 - 511.5) / 511.5;
+    let part =
+        |shift: u32| (S::from_f64(f64::from(mixed >> shift & 0x3ff) - 511.5)) / S::from_f64(511.5);
     let [x, y, z] = [part(0), part(11), part(22)];
     // No part is zero.
     let length = (x * x + y * y + z * z).sqrt();
@@ -206,7 +206,7 @@ fn direction([a, b]: [u32; 2]) -> [f32; 3] {
 
 /// The rows of a column that the pairs of a batch are about.
 #[inline(always)]
-fn gather<L: Simd>(column: DisjointSlice<Row>, batch: &Batch) -> [[L; 4]; 2] {
+fn gather<L: Simd>(column: DisjointSlice<Row<L::Scalar>>, batch: &Batch) -> [[L; 4]; 2] {
     // SAFETY: no other thread has these rows (see `Chunk`).
     unsafe { gather_from(column.row(0), batch) }
 }
@@ -216,7 +216,7 @@ fn gather<L: Simd>(column: DisjointSlice<Row>, batch: &Batch) -> [[L; 4]; 2] {
 /// # Safety
 /// They exist, and no other thread writes them.
 #[inline(always)]
-unsafe fn gather_from<L: Simd>(column: *const Row, batch: &Batch) -> [[L; 4]; 2] {
+unsafe fn gather_from<L: Simd>(column: *const Row<L::Scalar>, batch: &Batch) -> [[L; 4]; 2] {
     let a = column.wrapping_add(batch.first[0] as usize);
     let b = column.wrapping_add(batch.first[1] as usize);
     // SAFETY: as the caller promises.
@@ -225,7 +225,11 @@ unsafe fn gather_from<L: Simd>(column: *const Row, batch: &Batch) -> [[L; 4]; 2]
 
 /// Writes back what was gathered.
 #[inline(always)]
-fn scatter<L: Simd>(column: DisjointSlice<Row>, batch: &Batch, [of_a, of_b]: [[L; 4]; 2]) {
+fn scatter<L: Simd>(
+    column: DisjointSlice<Row<L::Scalar>>,
+    batch: &Batch,
+    [of_a, of_b]: [[L; 4]; 2],
+) {
     let a = column.row(batch.first[0] as usize);
     let b = column.row(batch.first[1] as usize);
     let count = batch.count as usize;
@@ -239,13 +243,13 @@ fn scatter<L: Simd>(column: DisjointSlice<Row>, batch: &Batch, [of_a, of_b]: [[L
 /// The inverse mass of awake balls: those of balls asleep have a minus sign.
 #[inline(always)]
 fn inverse_mass<L: Simd>(velocity: &[L; 4]) -> L {
-    velocity[3].max(L::splat(0.0))
+    velocity[3].max(L::constant(0.0))
 }
 
 /// Effective mass of both along their normal; zero if both are asleep.
 #[inline(always)]
 fn effective_mass<L: Simd>(a: &[L; 4], b: &[L; 4]) -> L {
     let sum = inverse_mass(a) + inverse_mass(b);
-    let zero = L::splat(0.0);
-    sum.select_gt(zero, L::splat(1.0) / sum, zero)
+    let zero = L::constant(0.0);
+    sum.select_gt(zero, L::constant(1.0) / sum, zero)
 }

@@ -1,47 +1,47 @@
 //! Pairs that are near.
 
 use super::gather_from;
+use crate::math::{Kernel, Row, Scalar, Simd, Vec3Wide};
 use crate::swarm::batches::Batch;
-use crate::swarm::simd::{Kernel, Row, Simd};
-use crate::swarm::vec3_wide::Vec3Wide;
 
 /// Limits within which pairs count as near.
 #[derive(Clone, Copy)]
-pub(crate) struct NearLimits {
+pub(crate) struct NearLimits<S> {
     /// Separation in metres, besides what closes within the time.
-    pub reach: f32,
+    pub reach: S,
     /// Time within which pairs may come together, in seconds.
-    pub time: f32,
+    pub time: S,
     /// Approach speed above which balls that touch come together, in m/s.
-    pub fast: f32,
+    pub fast: S,
 }
 
 /// Visits the pairs that are near and have a ball that is awake, and tells which may come together: begin
 /// to touch within the time, or are fast although they overlap. The rows of all pairs exist.
-pub(in crate::swarm) struct NearPairs<'a, V> {
-    pub at: &'a [Row],
-    pub velocity: &'a [Row],
+pub(in crate::swarm) struct NearPairs<'a, S, V> {
+    pub at: &'a [Row<S>],
+    pub velocity: &'a [Row<S>],
     pub batches: &'a [Batch],
-    pub limits: NearLimits,
+    pub limits: NearLimits<S>,
     /// Is given the two rows, and true for those that come together.
     pub visit: V,
 }
 
 /// Fraction of a separation or of a speed by which whoever decides may find them smaller or larger: with
-/// other rounding, and in `f64` if marbles have it.
-const MARGIN: f32 = 1e-3;
+/// other rounding.
+const MARGIN: f64 = 1e-3;
 /// Fraction of a distance that a separation may be off by rounding; more than
 /// [`is_touching`](crate::contact::Contact::is_touching) allows for.
-const ROUNDING: f32 = 1e-5;
+const ROUNDING: f64 = 1e-5;
 
-impl<V: FnMut([u32; 2], bool)> Kernel for NearPairs<'_, V> {
+impl<S: Scalar, V: FnMut([u32; 2], bool)> Kernel<S> for NearPairs<'_, S, V> {
     #[inline(always)]
-    fn run<L: Simd>(mut self) {
-        let (zero, least) = (L::splat(0.0), L::splat(f32::MIN_POSITIVE));
+    fn run<L: Simd<Scalar = S>>(mut self) {
+        let (zero, least) = (L::constant(0.0), L::splat(S::min_positive_value()));
         let NearLimits { reach, time, fast } = self.limits;
         let (reach, time) = (L::splat(reach), L::splat(time));
-        let (fast, shrunk) = (L::splat(fast * (1.0 - MARGIN)), L::splat(1.0 - MARGIN));
-        let rounding = L::splat(ROUNDING);
+        let (fast, shrunk) =
+            (L::splat(fast * (S::one() - S::from_f64(MARGIN))), L::constant(1.0 - MARGIN));
+        let rounding = L::constant(ROUNDING);
         for batch in self.batches.iter().filter(|batch| !batch.is_idle) {
             debug_assert!(batch.pairs().flatten().all(|row| (row as usize) < self.at.len()));
             // SAFETY: the rows of pairs exist, and nobody writes columns that are borrowed.
@@ -75,9 +75,9 @@ impl<V: FnMut([u32; 2], bool)> Kernel for NearPairs<'_, V> {
 mod tests {
     use super::*;
     use crate::contact::time_of_impact_sphere_sphere;
+    use crate::math::{LANES, SimdLevel};
     use crate::math::{Point3, Vec3, cast_vector};
     use crate::shape::Sphere;
-    use crate::swarm::simd::{LANES, SimdLevel};
     use cgmath::{EuclideanSpace, InnerSpace};
     use proptest::prelude::*;
 

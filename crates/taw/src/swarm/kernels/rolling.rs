@@ -3,10 +3,9 @@
 use super::contact::SolverColumns;
 use super::{inverse_mass, scatter};
 use crate::constraint::solve_rolling;
+use crate::math::{LANES, Scalar, Simd, Vec3Wide};
 use crate::swarm::batches::Batch;
-use crate::swarm::simd::{LANES, Simd};
 use crate::swarm::surfaces::PairNumbers;
-use crate::swarm::vec3_wide::Vec3Wide;
 
 /// Inertia of the balls of a batch against torques.
 pub(super) struct RollingInertia<L> {
@@ -23,7 +22,7 @@ pub(super) struct RollingInertia<L> {
 impl<L: Simd> RollingInertia<L> {
     #[inline(always)]
     pub fn new([at_a, at_b]: [&[L; 4]; 2], [a, b]: &[[L; 4]; 2], [of_a, of_b]: [L; 2]) -> Self {
-        let (zero, one) = (L::splat(0.0), L::splat(1.0));
+        let (zero, one) = (L::constant(0.0), L::constant(1.0));
         let [per_a, per_b] = [one / at_a[3], one / at_b[3]];
         let [by_a, by_b] = [of_a * inverse_mass(a) * per_a, of_b * inverse_mass(b) * per_b];
         let sum = by_a * per_a + by_b * per_b;
@@ -36,10 +35,10 @@ impl<L: Simd> RollingInertia<L> {
     }
 }
 
-impl SolverColumns<'_> {
+impl<S: Scalar> SolverColumns<'_, S> {
     /// Applies angular impulses about the centers of both; the second gets it as it is.
     #[inline(always)]
-    pub(super) fn apply_angular_impulse<L: Simd>(
+    pub(super) fn apply_angular_impulse<L: Simd<Scalar = S>>(
         &self,
         batch: &Batch,
         inertia: &RollingInertia<L>,
@@ -57,20 +56,20 @@ impl SolverColumns<'_> {
     /// Slows how the two turn against each other, by a torque of at most the resistance times
     /// normal force times effective radius.
     #[inline(always)]
-    pub(super) fn solve_rolling<L: Simd>(
+    pub(super) fn solve_rolling<L: Simd<Scalar = S>>(
         &self,
         batch: &Batch,
         inertia: &RollingInertia<L>,
         normal: Vec3Wide<L>,
         normal_impulse: L,
-        numbers: &PairNumbers,
-        torque: &mut [[f32; LANES]; 3],
+        numbers: &PairNumbers<S>,
+        torque: &mut [[S; LANES]; 3],
     ) {
         let most = normal_impulse * inertia.radius;
         let rolling = L::load(&numbers.rolling_resistance) * most;
         let spinning = L::load(&numbers.spinning_resistance) * most;
         let mut accumulated = Vec3Wide::<L>::load(torque);
-        let (zero, [a, b]) = (L::splat(0.0), self.spins::<L>(batch));
+        let (zero, [a, b]) = (L::constant(0.0), self.spins::<L>(batch));
         let [per_a, per_b] = inertia.per_radius;
         let relative_spin = Vec3Wide::of(&b) * per_b - Vec3Wide::of(&a) * per_a;
         let wanted = relative_spin * (zero - inertia.mass);

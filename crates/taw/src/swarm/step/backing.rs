@@ -3,6 +3,7 @@
 use cgmath::InnerSpace;
 
 use super::{row, wider};
+use crate::math::Scalar;
 use crate::swarm::Swarm;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::LOST;
@@ -12,9 +13,9 @@ use crate::workers::{DisjointSlice, parallel_for};
 /// Where one ball weighs more than so many times as much as another, pairs look who has a wall
 /// behind it: a pair sinks in by that ratio times the way of gravity in a substep while its contact
 /// learns what it bears, less than a millimetre for each such time.
-const UNEVEN: f32 = 8.0;
+const UNEVEN: f64 = 8.0;
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Finds for each ball the wall that bears most of it, where masses differ so much that pairs
     /// need to know ([`SolverColumns::backing`]).
     pub(super) fn find_backing(&mut self) {
@@ -58,21 +59,22 @@ impl Swarm {
     }
 
     fn find_walls_behind(&mut self, again: bool) {
-        let inverse = |chunk: &Chunk| chunk.inverse_masses;
-        let [least, most] = self.chunks.iter().map(inverse).fold([f32::MAX, 0.0], wider);
-        let rows = if most > UNEVEN * least { self.at.len() } else { 0 };
+        let inverse = |chunk: &Chunk<S>| chunk.inverse_masses;
+        let [least, most] =
+            self.chunks.iter().map(inverse).fold([S::max_value(), S::zero()], wider);
+        let rows = if most > S::from_f64(UNEVEN) * least { self.at.len() } else { 0 };
         self.scratch.backing.clear();
-        self.scratch.backing.resize(rows, [0.0; 4]);
+        self.scratch.backing.resize(rows, [S::zero(); 4]);
         self.scratch.backing_speed.clear();
-        if self.chunks.iter().any(|chunk| chunk.wall_speed > 0.0) {
-            self.scratch.backing_speed.resize(rows, 0.0);
+        if self.chunks.iter().any(|chunk| chunk.wall_speed > S::zero()) {
+            self.scratch.backing_speed.resize(rows, S::zero());
         }
         if rows == 0 {
             self.scratch.backing.shrink_to_fit();
             self.scratch.backing_speed.shrink_to_fit();
             // A heavy ball may have gone that a wall bore.
             let contacts = self.chunks.iter_mut().flat_map(|chunk| &mut chunk.wall_contacts);
-            contacts.for_each(|contact| contact.borne_for_others = 0.0);
+            contacts.for_each(|contact| contact.borne_for_others = S::zero());
             return;
         }
         let (chunks, at) = (&self.chunks, &self.at[..]);
@@ -81,25 +83,25 @@ impl Swarm {
         parallel_for(self.scratch.threads, chunks.len(), |_, chunk| {
             // Those of a ball follow each other.
             for of_ball in chunks[chunk].wall_contacts.chunk_by(|a, b| a.row == b.row) {
-                let (mut most, mut behind, mut last) = (0.0, [0.0; 4], &of_ball[0]);
-                let mut speed = 0.0;
-                let along = |contact: &WallContact| contact.surface.dot(contact.normal);
+                let (mut most, mut behind, mut last) = (S::zero(), [S::zero(); 4], &of_ball[0]);
+                let mut speed = S::zero();
+                let along = |contact: &WallContact<S>| contact.surface.dot(contact.normal);
                 for contact in of_ball {
                     let bears = contact.bears(&at[contact.row as usize]);
                     // A wall that bears a proxy gives way to it.
-                    if bears > most && !(contact.bears_proxy && along(contact) != 0.0) {
+                    if bears > most && !(contact.bears_proxy && along(contact) != S::zero()) {
                         (most, behind, speed) = (bears, row(contact.normal), along(contact));
                     }
                     if contact.borne_for_others > last.borne_for_others {
                         last = contact;
                     }
                 }
-                let bears = last.borne_for_others > 0.0;
+                let bears = last.borne_for_others > S::zero();
                 if again && bears {
                     (behind, speed) = (row(last.normal), along(last));
                     behind[3] = last.borne_for_others;
                 } else if bears && behind[..3] != row(last.normal)[..3] {
-                    behind = [0.0, 0.0, 0.0, LOST];
+                    behind = [S::zero(), S::zero(), S::zero(), S::from_f64(LOST)];
                 }
                 // SAFETY: a row of the chunk.
                 unsafe {

@@ -3,42 +3,43 @@
 use cgmath::InnerSpace;
 
 use super::{ROUNDS, leaves};
-use crate::math::Vec3;
+use crate::math::{Row, Scalar, Vec3};
 use crate::response::Impact;
 use crate::swarm::batches::Batch;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::fast_movers::FastMovers;
 use crate::swarm::kernels::{Pass, SolverParams, squared};
-use crate::swarm::simd::Row;
 use crate::swarm::wall_contact::xyz;
 use crate::swarm::{Stage, StaticGeometry, Swarm};
 use crate::workers::{DisjointSlice, parallel_for};
 
 /// Part of both radii that another ball has to be in the way: balls that lie on each other overlap by
 /// less.
-const IN_THE_WAY: f32 = 0.9;
+const IN_THE_WAY: f64 = 0.9;
 /// Way in radii up to which a ball goes through no other one: two that touch, and come as near to each
 /// other as [`IN_THE_WAY`] says, are apart by √(1 − .9²) of both radii along the way.
-const SHORT: f32 = 0.43;
+const SHORT: f64 = 0.43;
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Lets bounce what meets in a substep: again where a ball had to wait for another one, and where
     /// one that was struck may reach what is not listed with it yet, a wall say. Given are the seconds of
     /// the step, of a substep, and what is left.
     pub(super) fn bounce(
         &mut self,
         substep: u32,
-        times: [f32; 3],
-        params: SolverParams,
-        walls: &dyn StaticGeometry,
+        times: [S; 3],
+        params: SolverParams<S>,
+        walls: &dyn StaticGeometry<S>,
         observe: &mut dyn FnMut(Stage),
     ) {
         let speed = params.restitution_threshold;
-        let faster =
-            |chunk: &Chunk, next: f32| 2.0 * chunk.speed.max(next) + chunk.wall_speed > speed;
+        let faster = |chunk: &Chunk<S>, next: S| {
+            S::from_f64(2.0) * chunk.speed.max(next) + chunk.wall_speed > speed
+        };
         let mut all = true;
         for _ in 0..ROUNDS {
-            let first = |chunk: &mut Chunk| chunk.again = all || std::mem::take(&mut chunk.struck);
+            let first =
+                |chunk: &mut Chunk<S>| chunk.again = all || std::mem::take(&mut chunk.struck);
             self.chunks.iter_mut().for_each(first);
             let (waits, rebuilds) = (self.apply_restitution(params, faster), self.rebuilds);
             let found = self.find_pairs_after_bounces(substep, times, walls, observe);
@@ -53,8 +54,8 @@ impl Swarm {
     /// true if one waits for another; pairs have to be found before the next call.
     pub(super) fn apply_restitution(
         &mut self,
-        params: SolverParams,
-        faster: impl Fn(&Chunk, f32) -> bool + Sync,
+        params: SolverParams<S>,
+        faster: impl Fn(&Chunk<S>, S) -> bool + Sync,
     ) -> bool {
         self.chunks.iter_mut().for_each(|chunk| chunk.struck = false);
         self.scratch.held.clear();
@@ -63,7 +64,8 @@ impl Swarm {
             self.hold_obstructed();
             self.pass(Pass::Restitution(params), |chunk, next| chunk.again && faster(chunk, next));
             let all = self.fast_movers.impulses.bounced;
-            let bounced = |chunk: Option<&Chunk>| chunk.is_some_and(|chunk| chunk.impulses.bounced);
+            let bounced =
+                |chunk: Option<&Chunk<S>>| chunk.is_some_and(|chunk| chunk.impulses.bounced);
             let mut any = all;
             for i in 0..self.chunks.len() {
                 let before = i.checked_sub(1).and_then(|i| self.chunks.get(i));
@@ -90,16 +92,16 @@ impl Swarm {
     fn find_pairs_after_bounces(
         &mut self,
         substep: u32,
-        [dt, h, left]: [f32; 3],
-        walls: &dyn StaticGeometry,
+        [dt, h, left]: [S; 3],
+        walls: &dyn StaticGeometry<S>,
         observe: &mut dyn FnMut(Stage),
     ) -> bool {
         let reach = self.reach_of_skins();
-        let leaves = |row: u32, velocity: &Row, skin_left: f32, movers: &FastMovers| {
+        let leaves = |row: u32, velocity: &Row<S>, skin_left: S, movers: &FastMovers<S>| {
             leaves(velocity, skin_left, left) || skin_left > reach || movers.is_by_path(row)
         };
         let later = substep > 0 && !self.fast_movers.crowded;
-        let turns = |chunk: &Chunk| chunk.struck || later && chunk.speed * dt > reach;
+        let turns = |chunk: &Chunk<S>| chunk.struck || later && chunk.speed * dt > reach;
         let found = self.find_pairs_within_step(turns, leaves, dt, walls, observe);
         if found {
             self.update_wall_contacts(walls, left, [dt, h], |_| true, false);
@@ -111,7 +113,7 @@ impl Swarm {
     fn note_speeds(&mut self) {
         for chunk in self.chunks.iter_mut().filter(|chunk| chunk.again && !chunk.asleep) {
             let velocities = &self.velocity[chunk.own_rows()];
-            let fastest = velocities.iter().fold(0.0_f32, |most, v| most.max(squared(*v)));
+            let fastest = velocities.iter().fold(S::zero(), |most, v| most.max(squared(*v)));
             chunk.speed = chunk.speed.max(fastest.sqrt());
         }
     }
@@ -133,14 +135,14 @@ impl Swarm {
     /// that another one may be between.
     fn list_ways_to_walls(
         &mut self,
-        params: &SolverParams,
-        faster: &(impl Fn(&Chunk, f32) -> bool + Sync),
+        params: &SolverParams<S>,
+        faster: &(impl Fn(&Chunk<S>, S) -> bool + Sync),
     ) {
         let ways = &mut self.scratch.ways_to_walls;
         ways.clear();
         let (at, velocity, chunks) = (&self.at, &self.velocity, &self.chunks);
         let has_ways = |i: usize| {
-            let next = chunks.get(i + 1).map_or(0.0, |next| next.speed);
+            let next = chunks.get(i + 1).map_or(S::zero(), |next| next.speed);
             chunks[i].again && !chunks[i].asleep && faster(&chunks[i], next)
         };
         if !(0..chunks.len()).any(has_ways) {
@@ -187,7 +189,7 @@ impl Swarm {
         // Pairs are known of balls that come nearer to each other. Those of a chunk are of its rows and
         // of the next chunk's.
         let first_way = |row: u32| ways.partition_point(|way| way.row < row);
-        let has_ways = |chunk: &&Chunk| first_way(chunk.rows[0]) < first_way(chunk.rows[2]);
+        let has_ways = |chunk: &&Chunk<S>| first_way(chunk.rows[0]) < first_way(chunk.rows[2]);
         let of_chunks = self.chunks.iter().filter(has_ways).flat_map(|chunk| &chunk.batches);
         for [a, b] in of_chunks.chain(&self.fast_movers.batches).flat_map(Batch::pairs) {
             for [row, other] in [[a, b], [b, a]] {
@@ -202,7 +204,7 @@ impl Swarm {
         }
         // Those that fly to the wall together are not listed as pairs.
         let axis = widest_axis(ways);
-        let low = |way: &WayToWall| way.low[axis];
+        let low = |way: &WayToWall<S>| way.low[axis];
         ways.sort_unstable_by(|a, b| low(a).total_cmp(&low(b)).then(a.row.cmp(&b.row)));
         for (i, a) in ways.iter().enumerate() {
             for b in ways[i + 1..].iter().take_while(|b| low(b) <= a.high[axis]) {
@@ -217,9 +219,9 @@ impl Swarm {
 }
 
 /// Axis along which the balls are spread most.
-fn widest_axis(ways: &[WayToWall]) -> usize {
+fn widest_axis<S: Scalar>(ways: &[WayToWall<S>]) -> usize {
     let spread = |axis: usize| {
-        let range = ways.iter().fold([f32::MAX, f32::MIN], |[low, high], way| {
+        let range = ways.iter().fold([S::max_value(), S::min_value()], |[low, high], way| {
             [low.min(way.low[axis]), high.max(way.high[axis])]
         });
         range[1] - range[0]
@@ -230,36 +232,36 @@ fn widest_axis(ways: &[WayToWall]) -> usize {
 
 /// Straight way of a ball to the wall that it would bounce off.
 #[derive(Clone, Copy, Debug)]
-pub(in crate::swarm) struct WayToWall {
+pub(in crate::swarm) struct WayToWall<S> {
     row: u32,
-    from: Vec3<f32>,
-    radius: f32,
-    way: Vec3<f32>,
+    from: Vec3<S>,
+    radius: S,
+    way: Vec3<S>,
     /// Lowest and highest coordinates of the ball on its way, in metres.
-    low: Vec3<f32>,
-    high: Vec3<f32>,
+    low: Vec3<S>,
+    high: Vec3<S>,
 }
 
-impl WayToWall {
-    fn new(row: u32, at: &Row, way: Vec3<f32>) -> Self {
+impl<S: Scalar> WayToWall<S> {
+    fn new(row: u32, at: &Row<S>, way: Vec3<S>) -> Self {
         let (from, radius) = (xyz(at), at[3]);
-        let end = |f: fn(f32, f32) -> f32, by: f32| from + way.map(|x| f(x, 0.0) + by);
-        let (low, high) = (end(f32::min, -radius), end(f32::max, radius));
+        let end = |f: fn(S, S) -> S, by: S| from + way.map(|x| f(x, S::zero()) + by);
+        let (low, high) = (end(S::min, -radius), end(S::max, radius));
         Self { row, from, radius, way, low, high }
     }
 
     fn is_long(&self) -> bool {
-        self.way.magnitude2() > SHORT * SHORT * self.radius * self.radius
+        self.way.magnitude2() > S::from_f64(SHORT) * S::from_f64(SHORT) * self.radius * self.radius
     }
 
     /// Returns true if the way leads through another ball.
-    fn leads_through(&self, other: &Row) -> bool {
+    fn leads_through(&self, other: &Row<S>) -> bool {
         if !self.is_long() {
             return false;
         }
         let (apart, way) = (xyz(other) - self.from, self.way);
-        let fraction = (way.dot(apart) / way.magnitude2()).clamp(0.0, 1.0);
-        let reach = IN_THE_WAY * (self.radius + other[3]);
-        fraction > 0.0 && (apart - way * fraction).magnitude2() < reach * reach
+        let fraction = (way.dot(apart) / way.magnitude2()).clamp(S::zero(), S::one());
+        let reach = S::from_f64(IN_THE_WAY) * (self.radius + other[3]);
+        fraction > S::zero() && (apart - way * fraction).magnitude2() < reach * reach
     }
 }

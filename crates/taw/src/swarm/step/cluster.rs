@@ -6,13 +6,12 @@ use cgmath::{EuclideanSpace, InnerSpace, Zero};
 
 use crate::broad::Period;
 use crate::constraint::ContactImpulse;
-use crate::math::{Point3, Vec3, cast_vector};
+use crate::math::{Point3, Row, Scalar, Vec3, cast_vector};
 use crate::response::SolverBodies;
 use crate::response::impulse::VelocityContact;
 use crate::swarm::batches::Batch;
 use crate::swarm::bit_set::BitSet;
 use crate::swarm::kernels::{ContactImpulses, Sinking, SolverParams};
-use crate::swarm::simd::Row;
 use crate::swarm::wall_contact::xyz;
 use crate::swarm::{INFINITE_MASS, Swarm};
 
@@ -22,10 +21,10 @@ const MAX_COUNT: usize = 256;
 
 /// Contact of a cluster in the lists of the swarm.
 #[derive(Clone, Copy, Debug)]
-pub(super) enum ContactLocation {
+pub(super) enum ContactLocation<S> {
     Pair(PairPlace),
     /// Chunk and number; and the impulse that it has borne for others, if it is the one behind the ball.
-    Wall([usize; 2], Option<f32>),
+    Wall([usize; 2], Option<S>),
 }
 
 /// Place of a pair: its chunk, or one more than the last for those of fast movers; batch and lane.
@@ -38,10 +37,10 @@ pub(super) struct PairPlace {
 
 /// Contacts that are solved together, and their balls in the order of rows.
 #[derive(Debug, Default)]
-pub(super) struct Cluster {
+pub(super) struct Cluster<S> {
     /// Those with walls come first.
     pub contacts: Vec<VelocityContact<f64>>,
-    pub locations: Vec<ContactLocation>,
+    pub locations: Vec<ContactLocation<S>>,
     pub rows: Vec<u32>,
     pub position: Vec<Point3<f64>>,
     pub velocity: Vec<Vec3<f64>>,
@@ -90,10 +89,10 @@ impl PairsByRow {
     }
 }
 
-impl Cluster {
+impl<S: Scalar> Cluster<S> {
     /// Collects the contacts around some balls that sink: those that bear something, or may close within a
     /// substep. Pairs that then bounce are left out.
-    pub fn new(swarm: &Swarm, sinking: &[Sinking], params: &SolverParams) -> Self {
+    pub fn new(swarm: &Swarm<S>, sinking: &[Sinking<S>], params: &SolverParams<S>) -> Self {
         let (balls, pairs) = swarm.pairs_around(sinking, params);
         let mut cluster = Self::default();
         cluster.rows.extend(balls.iter().map(|ball| ball.row));
@@ -128,22 +127,22 @@ impl Cluster {
         self.rows.partition_point(|other| *other < row) as u32
     }
 
-    fn add_balls(&mut self, swarm: &Swarm) {
+    fn add_balls(&mut self, swarm: &Swarm<S>) {
         let (vector, surfaces) =
-            (|row: &Row| cast_vector::<f32, f64>(xyz(row)), swarm.surface_of());
+            (|row: &Row<S>| cast_vector::<S, f64>(xyz(row)), swarm.surface_of());
         for row in &self.rows {
             let (at, spin) = (swarm.at[*row as usize], swarm.spin[*row as usize]);
-            let radius = f64::from(at[3]);
+            let radius = at[3].as_f64();
             self.position.push(Point3::from_vec(vector(&at)));
             self.radius.push(radius);
             self.velocity.push(vector(&swarm.velocity[*row as usize]));
-            self.inverse_mass.push(f64::from(swarm.free_inverse_mass(*row)));
+            self.inverse_mass.push(swarm.free_inverse_mass(*row).as_f64());
             self.spin.push(vector(&spin) / radius);
             self.locked.push(surfaces.row(*row).rotation_locked);
         }
     }
 
-    fn add_walls(&mut self, swarm: &Swarm, ball: Sinking, params: &SolverParams) {
+    fn add_walls(&mut self, swarm: &Swarm<S>, ball: Sinking<S>, params: &SolverParams<S>) {
         let chunk = swarm.chunk_of(ball.row);
         let all = &swarm.chunks[chunk].wall_contacts;
         let first = all.partition_point(|contact| contact.row < ball.row);
@@ -154,11 +153,13 @@ impl Cluster {
                 break;
             }
             // The first one with this normal bears it all.
-            let is_behind = backing != [0.0; 4] && xyz(&backing) == contact.normal;
-            let share = is_behind.then(|| std::mem::take(&mut backing)[3].max(0.0));
-            let normal_impulse = f64::from(contact.impulse.normal + share.unwrap_or(0.0));
+            let is_behind = backing != [S::zero(); 4] && xyz(&backing) == contact.normal;
+            let share = is_behind.then(|| std::mem::take(&mut backing)[3].max(S::zero()));
+            let normal_impulse = contact.impulse.normal + share.unwrap_or_default();
             let separation = contact.separation(at);
-            if normal_impulse == 0.0 && separation > 2.0 * ball.approach_speed * params.time {
+            if normal_impulse == S::zero()
+                && separation > S::from_f64(2.0) * ball.approach_speed * params.time
+            {
                 continue;
             }
             self.locations.push(ContactLocation::Wall([chunk, i], share));
@@ -167,17 +168,23 @@ impl Cluster {
                 b: self.local_index(ball.row),
                 normal: cast_vector(contact.normal),
                 surface_velocity: cast_vector(contact.surface),
-                target_normal_velocity: f64::from(-separation.max(0.0) / params.time),
-                friction: f64::from(contact.numbers.friction),
+                target_normal_velocity: (-separation.max(S::zero()) / params.time).as_f64(),
+                friction: contact.numbers.friction.as_f64(),
                 impulse: ContactImpulse {
-                    normal: normal_impulse,
+                    normal: normal_impulse.as_f64(),
                     tangent: cast_vector(contact.impulse.tangent),
                 },
             });
         }
     }
 
-    fn add_pair(&mut self, swarm: &Swarm, place: PairPlace, rows: [u32; 2], params: &SolverParams) {
+    fn add_pair(
+        &mut self,
+        swarm: &Swarm<S>,
+        place: PairPlace,
+        rows: [u32; 2],
+        params: &SolverParams<S>,
+    ) {
         let [a, b] = rows.map(|row| self.local_index(row));
         let displacement = self.position[b as usize] - self.position[a as usize];
         let distance = displacement.magnitude();
@@ -188,28 +195,29 @@ impl Cluster {
             b,
             normal: displacement / distance,
             surface_velocity: Vec3::zero(),
-            target_normal_velocity: -separation.max(0.0) / f64::from(params.time),
+            target_normal_velocity: -separation.max(0.0) / params.time.as_f64(),
             friction: swarm.pair_friction(place),
             impulse: swarm.pair_impulse(place),
         });
     }
 }
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Balls around some that sink, the nearest ones first, and the pairs between them. Each has the speed at
     /// which the one sinks that it is near.
     fn pairs_around(
         &self,
-        sinking: &[Sinking],
-        params: &SolverParams,
-    ) -> (Vec<Sinking>, Vec<(PairPlace, [u32; 2])>) {
-        let (mut queue, mut queued) = (VecDeque::<Sinking>::new(), BitSet::default());
-        let mut is_new =
-            |ball: &&Sinking| self.free_inverse_mass(ball.row) > 0.0 && queued.insert(ball.row);
+        sinking: &[Sinking<S>],
+        params: &SolverParams<S>,
+    ) -> (Vec<Sinking<S>>, Vec<(PairPlace, [u32; 2])>) {
+        let (mut queue, mut queued) = (VecDeque::<Sinking<S>>::new(), BitSet::default());
+        let mut is_new = |ball: &&Sinking<S>| {
+            self.free_inverse_mass(ball.row) > S::zero() && queued.insert(ball.row)
+        };
         // Those that need the largest impulses come first, whatever row they are in.
         let mut sinking = sinking.to_vec();
         let impulse =
-            |ball: &Sinking| ball.approach_speed / self.velocity[ball.row as usize][3].abs();
+            |ball: &Sinking<S>| ball.approach_speed / self.velocity[ball.row as usize][3].abs();
         sinking.sort_by(|a, b| impulse(b).total_cmp(&impulse(a)).then(a.row.cmp(&b.row)));
         queue.extend(sinking.iter().filter(&mut is_new));
         let (mut balls, mut pairs, mut done) = (Vec::new(), Vec::new(), BitSet::default());
@@ -239,14 +247,14 @@ impl Swarm {
                         continue;
                     }
                     pairs.push((place, rows));
-                    if self.free_inverse_mass(other) > 0.0 && queued.insert(other) {
+                    if self.free_inverse_mass(other) > S::zero() && queued.insert(other) {
                         queue.push_back(Sinking { row: other, ..ball });
                     }
                 }
             }
         }
         // Balls that there was no room for would have no support: their pairs stay as the pass left them.
-        let is_whole = |row: u32| done.contains(row) || self.free_inverse_mass(row) == 0.0;
+        let is_whole = |row: u32| done.contains(row) || self.free_inverse_mass(row) == S::zero();
         pairs.retain(|(_, rows)| rows.iter().all(|row| is_whole(*row)));
         (balls, pairs)
     }
@@ -257,14 +265,14 @@ impl Swarm {
         &self,
         place: PairPlace,
         rows: [u32; 2],
-        speed: f32,
-        params: &SolverParams,
+        speed: S,
+        params: &SolverParams<S>,
     ) -> bool {
         let [a, b] = rows.map(|row| row as usize);
         let displacement = xyz(&self.at[b]) - xyz(&self.at[a]);
         let distance = displacement.magnitude();
-        let moves = rows.into_iter().any(|row| self.free_inverse_mass(row) > 0.0);
-        if !(moves && distance > 0.0 && distance.is_finite()) {
+        let moves = rows.into_iter().any(|row| self.free_inverse_mass(row) > S::zero());
+        if !(moves && distance > S::zero() && distance.is_finite()) {
             return false;
         }
         let PairPlace { list, batch, lane } = place;
@@ -273,15 +281,15 @@ impl Swarm {
         let relative = xyz(&self.velocity[b]) - xyz(&self.velocity[a]);
         let approach_speed = -relative.dot(displacement) / distance;
         // A light ball that is struck leaves at up to twice the speed.
-        let reaches = separation <= 2.0 * speed * params.time;
-        (impulses.normal_impulse[batch][lane] > 0.0 || reaches)
+        let reaches = separation <= S::from_f64(2.0) * speed * params.time;
+        (impulses.normal_impulse[batch][lane] > S::zero() || reaches)
             && !impulses.bounces([batch, lane], approach_speed, params)
     }
 
     /// Inverse mass of a ball that contacts can move, in 1/kg; zero of one that sleeps, or has infinite mass.
-    fn free_inverse_mass(&self, row: u32) -> f32 {
+    fn free_inverse_mass(&self, row: u32) -> S {
         let inverse_mass = self.velocity[row as usize][3];
-        if inverse_mass > INFINITE_MASS { inverse_mass } else { 0.0 }
+        if inverse_mass > S::from_f64(INFINITE_MASS) { inverse_mass } else { S::zero() }
     }
 
     fn chunk_of(&self, row: u32) -> usize {
@@ -289,7 +297,7 @@ impl Swarm {
     }
 
     /// Pairs of a chunk, or of the fast movers, and their impulses.
-    fn pairs_of_list(&self, list: usize) -> (&[Batch], &ContactImpulses) {
+    fn pairs_of_list(&self, list: usize) -> (&[Batch], &ContactImpulses<S>) {
         match self.chunks.get(list) {
             Some(chunk) => (&chunk.batches, &chunk.impulses),
             None => (&self.fast_movers.batches, &self.fast_movers.impulses),
@@ -307,13 +315,13 @@ impl Swarm {
     fn pair_friction(&self, PairPlace { list, batch, lane }: PairPlace) -> f64 {
         let numbers = self.pairs_of_list(list).1.numbers.get(batch);
         let common = || self.common_material().friction;
-        f64::from(numbers.map_or_else(common, |numbers| numbers.friction[lane]))
+        numbers.map_or_else(common, |numbers| numbers.friction[lane]).as_f64()
     }
 
     fn pair_impulse(&self, PairPlace { list, batch, lane }: PairPlace) -> ContactImpulse<f64> {
         let impulses = self.pairs_of_list(list).1;
-        let tangent = impulses.tangent_impulse[batch].map(|axis| f64::from(axis[lane]));
-        let normal = f64::from(impulses.normal_impulse[batch][lane]);
+        let tangent = impulses.tangent_impulse[batch].map(|axis| axis[lane].as_f64());
+        let normal = impulses.normal_impulse[batch][lane].as_f64();
         ContactImpulse { normal, tangent: tangent.into() }
     }
 }

@@ -3,7 +3,7 @@
 use std::mem::take;
 use std::ops::Range;
 
-use crate::math::UnionFind;
+use crate::math::{Scalar, UnionFind};
 use crate::swarm::Swarm;
 use crate::swarm::batches::Batch;
 use crate::swarm::fast_movers::FastMovers;
@@ -15,10 +15,10 @@ const STEPS_PER_SEARCH: u32 = 8;
 /// heap sleeps and wakes part by part.
 pub(super) const MAX_JOINED: usize = 512;
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Puts islands to sleep of which all balls have rested under gravity, in m/s²; and in chunks of which
     /// all have, whatever they touch beyond, so that what rolls on a large heap keeps little of it awake.
-    pub(super) fn fall_asleep(&mut self, gravity: f32) {
+    pub(super) fn fall_asleep(&mut self, gravity: S) {
         for i in 0..self.chunks.len() {
             if take(&mut self.chunks[i].rests) {
                 let [first, end, _] = self.chunks[i].rows;
@@ -146,17 +146,19 @@ impl Swarm {
     fn touching_pairs<'a>(
         &'a self,
         batches: &'a [Batch],
-        impulses: &'a ContactImpulses,
+        impulses: &'a ContactImpulses<S>,
     ) -> impl Iterator<Item = [u32; 2]> + 'a {
         let touches = move |pair: [u32; 2]| {
             let [a, b] = pair.map(|row| &self.at[row as usize]);
-            let (apart, radii) = ([b[0] - a[0], b[1] - a[1], b[2] - a[2], 0.0], a[3] + b[3]);
+            let (apart, radii) = ([b[0] - a[0], b[1] - a[1], b[2] - a[2], S::zero()], a[3] + b[3]);
             squared(apart) <= radii * radii
         };
         let batches = batches.iter().zip(&impulses.normal_impulse).filter(|(b, _)| !b.is_idle);
         let pairs = batches.flat_map(|(batch, impulses)| batch.pairs().zip(impulses));
         let awake = pairs.filter(|(pair, _)| pair.iter().any(|row| self.is_awake(*row)));
-        awake.filter(move |(pair, impulse)| **impulse > 0.0 || touches(*pair)).map(|(pair, _)| pair)
+        awake
+            .filter(move |(pair, impulse)| **impulse > S::zero() || touches(*pair))
+            .map(|(pair, _)| pair)
     }
 
     /// Puts balls to sleep, and lets them wake together. Some may sleep already.
@@ -172,8 +174,8 @@ impl Swarm {
             if self.velocity[row][3].is_sign_negative() {
                 continue;
             }
-            self.velocity[row] = [0.0, 0.0, 0.0, -self.velocity[row][3]];
-            self.spin[row] = [0.0, 0.0, 0.0, GROUNDED];
+            self.velocity[row] = [S::zero(), S::zero(), S::zero(), -self.velocity[row][3]];
+            self.spin[row] = [S::zero(), S::zero(), S::zero(), S::from_f64(GROUNDED)];
             while self.chunks[number].rows[1] as usize <= row {
                 number += 1;
             }
@@ -182,7 +184,7 @@ impl Swarm {
             self.sleep.sleepers += 1;
             (chunk.unread, chunk.sleep_changed) = (true, true);
             if chunk.sleepers == chunk.own_rows().len() {
-                (chunk.asleep, chunk.speed) = (true, 0.0);
+                (chunk.asleep, chunk.speed) = (true, S::zero());
             }
         }
         self.sleep_version += 1;

@@ -2,34 +2,33 @@
 
 use super::row;
 use crate::broad::{CollisionFilter, CollisionLayers, IgnoredPairs};
-use crate::math::Vec3;
+use crate::math::{Row, Scalar, SimdLevel, Vec3};
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::{
     Displace, DisplaceFromPlanes, DisplaceNeighbours, Predict, UpdateVelocities,
 };
 use crate::swarm::proxies::Proxy;
-use crate::swarm::simd::{Row, SimdLevel};
 use crate::swarm::walls::HalfSpace;
 use crate::swarm::{Stage, StaticGeometry, Swarm};
 use crate::workers::{DisjointSlice, parallel_filter, parallel_for_rows};
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     pub(in crate::swarm) fn step_lab(
         &mut self,
-        dt: f32,
-        gravity: Vec3<f32>,
-        walls: &dyn StaticGeometry,
+        dt: S,
+        gravity: Vec3<S>,
+        walls: &dyn StaticGeometry<S>,
         walls_changed: bool,
         observe: &mut dyn FnMut(Stage),
     ) {
         observe(Stage::Integrate);
-        self.apply_velocity_changes(1.0, gravity * dt);
+        self.apply_velocity_changes(S::one(), gravity * dt);
         self.predict(dt, gravity);
         self.reset_proxies_in_lab();
         self.find_pairs_after_prediction(dt, walls, walls_changed, observe);
         observe(Stage::Restitute);
         self.list_proxy_rows();
-        self.update_wall_contacts(walls, 0.0, [dt; 2], |_| true, false);
+        self.update_wall_contacts(walls, S::zero(), [dt; 2], |_| true, false);
         self.displace();
         observe(Stage::Integrate);
         self.update_velocities(dt);
@@ -38,8 +37,8 @@ impl Swarm {
 
     /// Moves all balls on by their velocities, which make room for the positions before, and lists
     /// those that leave their skin.
-    fn predict(&mut self, dt: f32, gravity: Vec3<f32>) {
-        let (change, time) = (row(gravity * dt), [dt, dt, dt, 0.0]);
+    fn predict(&mut self, dt: S, gravity: Vec3<S>) {
+        let (change, time) = (row(gravity * dt), [dt, dt, dt, S::zero()]);
         let (simd_level, threads) = (self.simd_level, self.scratch.threads);
         let mut leaving = std::mem::take(&mut self.scratch.leaving);
         leaving.clear();
@@ -87,8 +86,8 @@ impl Swarm {
     /// Finds pairs and walls for the balls that leave their skin, where these are known for others.
     fn find_pairs_after_prediction(
         &mut self,
-        dt: f32,
-        walls: &dyn StaticGeometry,
+        dt: S,
+        walls: &dyn StaticGeometry<S>,
         walls_changed: bool,
         observe: &mut dyn FnMut(Stage),
     ) {
@@ -158,9 +157,9 @@ impl Swarm {
     }
 
     /// Layers of all balls by row; none if all balls collide with all half-spaces.
-    fn layers_by_row(&self, planes: &[HalfSpace]) -> Vec<CollisionLayers> {
+    fn layers_by_row(&self, planes: &[HalfSpace<S>]) -> Vec<CollisionLayers> {
         let surfaces = self.surface_of();
-        let differ = |plane: &HalfSpace| plane.layers != CollisionLayers::ALL;
+        let differ = |plane: &HalfSpace<S>| plane.layers != CollisionLayers::ALL;
         if surfaces.has_layers() || planes.iter().any(differ) {
             (0..self.at.len() as u32).map(|row| surfaces.layers(row)).collect()
         } else {
@@ -169,9 +168,9 @@ impl Swarm {
     }
 
     /// Makes velocities what positions became.
-    fn update_velocities(&mut self, dt: f32) {
+    fn update_velocities(&mut self, dt: S) {
         let (simd_level, threads) = (self.simd_level, self.scratch.threads);
-        let per_second = [1.0 / dt, 1.0 / dt, 1.0 / dt, 0.0];
+        let per_second = [S::one() / dt, S::one() / dt, S::one() / dt, S::zero()];
         let velocity = DisjointSlice::new(&mut self.velocity);
         let skin_left = DisjointSlice::new(&mut self.skin_left);
         let (at, displacement) = (&self.at[..], &self.displacement[..]);
@@ -186,23 +185,23 @@ impl Swarm {
 }
 
 /// Displacement of the balls of a chunk out of walls.
-struct WallDisplacement<'a> {
+struct WallDisplacement<'a, S> {
     simd_level: SimdLevel,
     rows: &'a [(u32, u32)],
-    proxies: &'a [Proxy],
-    planes: &'a [HalfSpace],
+    proxies: &'a [Proxy<S>],
+    planes: &'a [HalfSpace<S>],
     /// Layers of all balls, if they matter.
     layers: &'a [CollisionLayers],
     passing: &'a IgnoredPairs,
 }
 
-impl WallDisplacement<'_> {
+impl<S: Scalar> WallDisplacement<'_, S> {
     /// Applies it. The world's solver moves proxies, as deep in walls as it likes: a wall only bears
     /// what the swarm presses on it.
     ///
     /// # Safety
     /// No other thread touches the balls of the chunk meanwhile.
-    unsafe fn apply(&self, chunk: &Chunk, all: DisjointSlice<Row>) {
+    unsafe fn apply(&self, chunk: &Chunk<S>, all: DisjointSlice<Row<S>>) {
         let Self { rows, proxies, planes, layers, passing, .. } = *self;
         let mut from = chunk.rows[0];
         let its = rows.partition_point(|(row, _)| *row < chunk.rows[0])
@@ -228,7 +227,7 @@ impl WallDisplacement<'_> {
 
     /// Moves balls, the first of which is in row `first`, out of the half-spaces that they collide
     /// with: all that come one after another with equal layers at a time.
-    fn displace_from_planes(&self, mut at: &mut [Row], first: u32) {
+    fn displace_from_planes(&self, mut at: &mut [Row<S>], first: u32) {
         let Self { simd_level, planes, layers, .. } = *self;
         if layers.is_empty() {
             return simd_level.run(DisplaceFromPlanes { at, planes });
@@ -237,7 +236,7 @@ impl WallDisplacement<'_> {
         while let Some(own) = layers.first() {
             let count = layers.iter().take_while(|other| *other == own).count();
             let (alike, more) = at.split_at_mut(count);
-            let collides = |plane: &&HalfSpace| plane.layers.interacts_with(*own);
+            let collides = |plane: &&HalfSpace<S>| plane.layers.interacts_with(*own);
             let planes: Vec<_> = planes.iter().filter(collides).copied().collect();
             simd_level.run(DisplaceFromPlanes { at: alike, planes: &planes });
             (at, layers) = (more, &layers[count..]);

@@ -23,44 +23,43 @@ use super::build::SOON;
 use super::chunk::Chunk;
 use super::fast_movers::FastMovers;
 use super::kernels::{IntegratePositions, Pass, SolverColumns, SolverParams, solve, squared};
-use super::simd::Row;
 use super::walls::half_spaces;
 use super::{Stage, StaticGeometry, Swarm, Tier};
+use crate::math::{Row, Scalar, Vec3, length};
 use crate::workers::{DisjointSlice, parallel_for, parallel_for_odd_even};
 use cgmath::Zero;
 
 use crate::constraint::ContactSoftness;
-use crate::math::{Vec3, length};
 
 /// Stiffness of contacts: at most so many oscillations a second, and as many times as much
 /// damping as stops them.
-const HERTZ: f32 = 60.0;
-const DAMPING: f32 = 10.0;
+const HERTZ: f64 = 60.0;
+const DAMPING: f64 = 10.0;
 /// Speed at which an overlap is pushed out at most: that which gravity gives in so many seconds.
-const PUSHING: f32 = 0.3;
+const PUSHING: f64 = 0.3;
 /// So much of twice the smaller radius two balls may overlap before they are moved apart: more than
 /// what bears a heap gets, and less than the tenth of a radius that is seen, since each substep
 /// presses in a little again. (Contacts sink by a thousandth for each three balls on them; if that
 /// is moved out, they never come to rest.)
-const SLOP: f32 = 0.04;
+const SLOP: f64 = 0.04;
 /// Slop where nothing lies on anything: only so that balls that touch are left alone.
-const SLOP_WEIGHTLESS: f32 = 0.01;
+const SLOP_WEIGHTLESS: f64 = 0.01;
 /// Fraction of its radius by which a ball may sink into another in a step. Half of an overlap beyond the slop goes
 /// in each substep, so at most twice as much remains: with the slop, the tenth that is seen.
-const MAX_SINKING: f32 = 0.01;
+const MAX_SINKING: f64 = 0.01;
 /// Number of looks for bounces in a substep while any is found: in a gas hardly ever do five
 /// balls meet in one. What meets after that is stopped.
 const ROUNDS: usize = 4;
 /// Most passes of a substep that relax what is jammed.
 const RELAXATIONS: usize = 16;
 
-impl Swarm {
-    /// Moves the balls on by `dt` seconds. `walls_identity` is another whenever a wall changed.
-    pub(crate) fn step(
+impl<S: Scalar> Swarm<S> {
+    /// See [`Swarm::step`].
+    pub(super) fn step_here(
         &mut self,
-        dt: f32,
-        gravity: Vec3<f32>,
-        walls: &dyn StaticGeometry,
+        dt: S,
+        gravity: Vec3<S>,
+        walls: &dyn StaticGeometry<S>,
         walls_identity: u64,
         observe: &mut dyn FnMut(Stage),
     ) {
@@ -76,12 +75,12 @@ impl Swarm {
         self.end();
     }
 
-    /// Begins a step of bodies and balls: finds who may touch within it.
-    pub(crate) fn prepare(
+    /// See [`Swarm::prepare`].
+    pub(super) fn prepare_here(
         &mut self,
-        dt: f32,
-        gravity: Vec3<f32>,
-        walls: &dyn StaticGeometry,
+        dt: S,
+        gravity: Vec3<S>,
+        walls: &dyn StaticGeometry<S>,
         walls_identity: u64,
     ) {
         let walls_changed = self.begin(gravity, walls, walls_identity);
@@ -94,15 +93,15 @@ impl Swarm {
         self.pairs_valid && !self.scratch.filters_changed
     }
 
-    /// Ends it: moves all on in substeps, and solves the contacts.
-    pub(crate) fn finish(&mut self, dt: f32, substeps: u32, walls: &dyn StaticGeometry) {
+    /// See [`Swarm::finish`].
+    pub(super) fn finish_here(&mut self, dt: S, substeps: u32, walls: &dyn StaticGeometry<S>) {
         self.solve(dt, substeps, walls, &mut |_| ());
         self.stop_what_overflowed();
         self.end();
     }
 
     /// Begins a step: gravity and walls. Returns whether these changed.
-    fn begin(&mut self, gravity: Vec3<f32>, walls: &dyn StaticGeometry, identity: u64) -> bool {
+    fn begin(&mut self, gravity: Vec3<S>, walls: &dyn StaticGeometry<S>, identity: u64) -> bool {
         self.stopped.clear();
         self.scratch.impacts.clear();
         self.steps_since_build = (self.steps_since_build + 1).min(SOON);
@@ -147,9 +146,9 @@ impl Swarm {
     /// Brings up to date which pairs are near, and which balls are near walls; and who sleeps.
     fn find_contacts(
         &mut self,
-        dt: f32,
-        gravity: Vec3<f32>,
-        walls: &dyn StaticGeometry,
+        dt: S,
+        gravity: Vec3<S>,
+        walls: &dyn StaticGeometry<S>,
         walls_changed: bool,
         observe: &mut dyn FnMut(Stage),
     ) {
@@ -185,9 +184,9 @@ impl Swarm {
     /// *solve*, where heavy balls still sink, *solve what is unconverged*.
     fn solve(
         &mut self,
-        dt: f32,
+        dt: S,
         count: u32,
-        walls: &dyn StaticGeometry,
+        walls: &dyn StaticGeometry<S>,
         observe: &mut dyn FnMut(Stage),
     ) {
         self.scratch.backing.clear(); // of other rows
@@ -198,27 +197,27 @@ impl Swarm {
         self.list_proxy_rows();
         observe(Stage::Restitute);
         let gravity = self.gravity.unwrap_or_else(Vec3::zero);
-        let substeps = count as f32;
+        let (zero, half, substeps) = (S::zero(), S::from_f64(0.5), S::from_f64(f64::from(count)));
         let h = dt / substeps;
-        let (times, all) = ([dt, h], |_: &Chunk| true);
+        let (times, all) = ([dt, h], |_: &Chunk<S>| true);
         self.age_marks();
         self.update_wall_contacts(walls, dt, times, all, false);
         let params = self.solver_params(dt, h);
         self.save_kinematic_paths(dt);
         for substep in 0..count {
-            let left = dt - h * substep as f32;
+            let left = dt - h * S::from_f64(f64::from(substep));
             self.save_places(walls);
             if substep > 0 {
                 self.update_wall_contacts(walls, left, times, |chunk| chunk.has_fast, true);
             }
             self.bounce(substep, [dt, h, left], params, walls, observe);
             observe(Stage::Integrate);
-            let parts = [substep as f32, (substep + 1) as f32].map(|part| part / substeps);
-            self.apply_velocity_changes(1.0 / substeps, gravity * h);
+            let parts = [substep, substep + 1].map(|part| S::from_f64(f64::from(part)) / substeps);
+            self.apply_velocity_changes(S::one() / substeps, gravity * h);
             self.record_gravity(h);
             self.save_proxies();
-            self.integrate(row(gravity * h), [0.0; 4], [0.0; 4]);
-            self.advance_proxies(parts, false, 0.0);
+            self.integrate(row(gravity * h), [zero; 4], [zero; 4]);
+            self.advance_proxies(parts, false, zero);
             observe(Stage::Restitute);
             self.find_backing();
             self.pass(Pass::WarmStart(params), |_, _| true);
@@ -227,14 +226,14 @@ impl Swarm {
             observe(Stage::Integrate);
             self.end_swift_paths([dt, h, left], walls, observe);
             self.save_proxies();
-            self.integrate([0.0; 4], [h, h, h, 0.0], row(gravity * (-0.5 * h * h)));
-            self.correct_free_flight(-0.5 * h / substeps);
+            self.integrate([zero; 4], [h, h, h, zero], row(gravity * (-half * h * h)));
+            self.correct_free_flight(-half * h / substeps);
             self.shorten_paths();
-            let caught = self.stop_at_walls(walls, h, gravity * (0.5 * h * h));
+            let caught = self.stop_at_walls(walls, h, gravity * (half * h * h));
             self.scratch.path_changes.clear();
             self.advance_proxies(parts, true, h);
             let (skin, before, left) = (self.skin, left, left - h);
-            let left_it = |_, _: &Row, skin_left: f32, _: &FastMovers| skin_left < -skin;
+            let left_it = |_, _: &Row<S>, skin_left: S, _: &FastMovers<S>| skin_left < -skin;
             if self.find_pairs_within_step(|chunk| chunk.overrun, left_it, dt, walls, observe) {
                 self.update_wall_contacts(walls, left, times, all, false);
                 self.restore_backing(); // rows may have changed
@@ -251,21 +250,33 @@ impl Swarm {
     }
 
     /// Parameters of a substep of `h` seconds in a step of `dt` seconds.
-    fn solver_params(&self, dt: f32, h: f32) -> SolverParams {
+    fn solver_params(&self, dt: S, h: S) -> SolverParams<S> {
         let gravity = self.gravity.unwrap_or_else(Vec3::zero);
         SolverParams {
             // What gravity makes of rest in two substeps is no impact.
-            restitution_threshold: 2.0 * length(gravity) * h,
+            restitution_threshold: S::from_f64(2.0) * length(gravity) * h,
             // Nor is what it makes in two steps a jam. Without weight, overlap makes no speed.
-            jam_speed: if gravity.is_zero() { f32::INFINITY } else { 2.0 * length(gravity) * dt },
+            jam_speed: if gravity.is_zero() {
+                S::infinity()
+            } else {
+                S::from_f64(2.0) * length(gravity) * dt
+            },
             restitution: self.common_material().restitution,
             time: h,
             gravity: row(gravity),
             // Soft contacts bear what lies on others; all else that overlaps is moved apart. Where
             // nothing has weight, overlap makes no speed at all.
-            softness: ContactSoftness::new(h, HERTZ, DAMPING, PUSHING * length(gravity)),
-            slop: if length(gravity) > 0.0 { SLOP } else { SLOP_WEIGHTLESS },
-            max_sinking: MAX_SINKING * h / dt,
+            softness: ContactSoftness::new(
+                h,
+                [HERTZ, DAMPING],
+                S::from_f64(PUSHING) * length(gravity),
+            ),
+            slop: if length(gravity) > S::zero() {
+                S::from_f64(SLOP)
+            } else {
+                S::from_f64(SLOP_WEIGHTLESS)
+            },
+            max_sinking: S::from_f64(MAX_SINKING) * h / dt,
             moves_apart: true,
             notes_impacts: self.bodies_are_rows,
         }
@@ -283,7 +294,7 @@ impl Swarm {
                     unsafe { spin.part(rows.clone()) }.iter_mut().zip(&velocity[rows])
                 {
                     if velocity[3].is_sign_positive() {
-                        spin[3] = (spin[3] - 1.0).max(0.0);
+                        spin[3] = (spin[3] - S::one()).max(S::zero());
                     }
                 }
             }
@@ -294,10 +305,10 @@ impl Swarm {
     /// step, since a bounce or a contact made them faster. Says whether there were any.
     fn find_pairs_within_step(
         &mut self,
-        which: impl Fn(&Chunk) -> bool,
-        leaves: impl Fn(u32, &Row, f32, &FastMovers) -> bool,
-        dt: f32,
-        walls: &dyn StaticGeometry,
+        which: impl Fn(&Chunk<S>) -> bool,
+        leaves: impl Fn(u32, &Row<S>, S, &FastMovers<S>) -> bool,
+        dt: S,
+        walls: &dyn StaticGeometry<S>,
         observe: &mut dyn FnMut(Stage),
     ) -> bool {
         let mut leaving = std::mem::take(&mut self.scratch.leaving);
@@ -319,8 +330,8 @@ impl Swarm {
     fn find_pairs_of_listed(
         &mut self,
         leaving: Vec<u32>,
-        dt: f32,
-        walls: &dyn StaticGeometry,
+        dt: S,
+        walls: &dyn StaticGeometry<S>,
         observe: &mut dyn FnMut(Stage),
     ) -> bool {
         if !leaving.is_empty() {
@@ -347,7 +358,7 @@ impl Swarm {
     }
 
     /// Changes velocities and moves the balls that are awake.
-    fn integrate(&mut self, change: Row, time: Row, correction: Row) {
+    fn integrate(&mut self, change: Row<S>, time: Row<S>, correction: Row<S>) {
         let simd_level = self.simd_level;
         let columns = SolverColumns {
             at: DisjointSlice::new(&mut self.at),
@@ -395,7 +406,7 @@ impl Swarm {
 
     /// Goes over all contacts of the chunks that are awake or beside one, and of which the
     /// condition holds, given how fast a ball of the next one is.
-    fn pass(&mut self, pass: Pass, condition: impl Fn(&Chunk, f32) -> bool + Sync) {
+    fn pass(&mut self, pass: Pass<S>, condition: impl Fn(&Chunk<S>, S) -> bool + Sync) {
         self.mark_idle_batches();
         let simd_level = self.simd_level;
         let friction = self.common_material().friction;
@@ -411,7 +422,7 @@ impl Swarm {
         };
         self.for_each_chunk(|next, columns, chunk| {
             if chunk.asleep && next.is_none_or(|(asleep, _)| asleep)
-                || !condition(chunk, next.map_or(0.0, |(_, speed)| speed))
+                || !condition(chunk, next.map_or(S::zero(), |(_, speed)| speed))
             {
                 return;
             }
@@ -440,7 +451,7 @@ impl Swarm {
     /// job is told if the next one sleeps, and the largest speed of its balls, in m/s; `None` for the last.
     fn for_each_chunk(
         &mut self,
-        job: impl Fn(Option<(bool, f32)>, SolverColumns, &mut Chunk) + Sync,
+        job: impl Fn(Option<(bool, S)>, SolverColumns<S>, &mut Chunk<S>) + Sync,
     ) {
         let columns = SolverColumns {
             at: DisjointSlice::new(&mut self.at),
@@ -467,15 +478,15 @@ impl Swarm {
 }
 
 /// The range of two ranges.
-fn wider([a, b]: [f32; 2], [c, d]: [f32; 2]) -> [f32; 2] {
+fn wider<S: Scalar>([a, b]: [S; 2], [c, d]: [S; 2]) -> [S; 2] {
     [a.min(c), b.max(d)]
 }
 
 /// Returns true if a ball leaves its skin within a time.
-fn leaves(velocity: &Row, skin_left: f32, time: f32) -> bool {
-    skin_left < 0.0 || squared(*velocity) * time * time > skin_left * skin_left
+fn leaves<S: Scalar>(velocity: &Row<S>, skin_left: S, time: S) -> bool {
+    skin_left < S::zero() || squared(*velocity) * time * time > skin_left * skin_left
 }
 
-fn row(vector: Vec3<f32>) -> Row {
-    [vector.x, vector.y, vector.z, 0.0]
+fn row<S: Scalar>(vector: Vec3<S>) -> Row<S> {
+    [vector.x, vector.y, vector.z, S::zero()]
 }

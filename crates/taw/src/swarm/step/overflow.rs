@@ -6,9 +6,10 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use super::super::Swarm;
 use super::super::kernels::{MAX_MAGNITUDE, largest};
 use super::super::wall_contact::WallContact;
+use crate::math::Scalar;
 use crate::workers::{DisjointSlice, parallel_for};
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Stops balls that the last solve of a step gave a velocity or a spin that is no number, or too
     /// large a one, and forgets impulses that are no numbers.
     pub(super) fn stop_what_overflowed(&mut self) {
@@ -24,9 +25,11 @@ impl Swarm {
             // SAFETY: each chunk has its own rows.
             let [velocity, spin] = [velocity, spin].map(|it| unsafe { it.part(chunk.own_rows()) });
             for (row, (velocity, spin)) in (chunk.rows[0]..).zip(velocity.iter_mut().zip(spin)) {
-                if !(largest(*velocity) < MAX_MAGNITUDE && largest(*spin) < MAX_MAGNITUDE) {
-                    *velocity = [0.0, 0.0, 0.0, velocity[3]];
-                    *spin = [0.0, 0.0, 0.0, spin[3]];
+                if !(largest(*velocity) < S::from_f64(MAX_MAGNITUDE)
+                    && largest(*spin) < S::from_f64(MAX_MAGNITUDE))
+                {
+                    *velocity = [S::zero(), S::zero(), S::zero(), velocity[3]];
+                    *spin = [S::zero(), S::zero(), S::zero(), spin[3]];
                     chunk.stopped.push(row);
                     any.store(true, Ordering::Relaxed);
                 }

@@ -3,10 +3,9 @@
 
 use cgmath::Zero;
 
-use crate::math::Vec3;
+use crate::math::{Row, Scalar, Vec3};
 use crate::swarm::Swarm;
 use crate::swarm::kernels::squared;
-use crate::swarm::simd::Row;
 use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::wall_contact::WallContact;
 use crate::swarm::wall_paths::FAST;
@@ -15,22 +14,22 @@ use crate::workers::{DisjointSlice, parallel_for};
 
 /// Place of a ball at the begin of a substep.
 #[derive(Clone, Copy, Debug, Default)]
-pub(in crate::swarm) struct SavedPlace {
+pub(in crate::swarm) struct SavedPlace<S> {
     /// Number of the substep.
     substep: u32,
-    center: [f32; 3],
+    center: [S; 3],
 }
 
-impl SavedPlace {
+impl<S: Scalar> SavedPlace<S> {
     /// Center at the begin of this substep, if it was saved then.
-    pub fn of(&self, substep: u32) -> Option<[f32; 3]> {
+    pub fn of(&self, substep: u32) -> Option<[S; 3]> {
         (self.substep == substep).then_some(self.center)
     }
 }
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Saves where the balls near shapes are, by slot, since rows may change within a substep.
-    pub(super) fn save_places(&mut self, walls: &dyn StaticGeometry) {
+    pub(super) fn save_places(&mut self, walls: &dyn StaticGeometry<S>) {
         if !walls.has_shapes() {
             return;
         }
@@ -52,7 +51,7 @@ impl Swarm {
     /// Moves out of walls what is in them, and back what passed one: so long before the end of the step, in
     /// seconds, the substep began, and is now. That comes last: whatever else moves balls apart, nothing is
     /// pressed through a wall.
-    pub(super) fn keep_out(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
+    pub(super) fn keep_out(&mut self, walls: &dyn StaticGeometry<S>, before_end: [S; 2]) {
         let (at, skin_left) =
             (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.skin_left));
         let (chunks, slots, velocity) = (&self.chunks, self.ids.slots(), &self.velocity[..]);
@@ -67,7 +66,7 @@ impl Swarm {
                 return;
             }
             let is_asleep = |row: usize| velocity[row][3].is_sign_negative();
-            let keep_out = |contact: &WallContact| {
+            let keep_out = |contact: &WallContact<S>| {
                 let row = contact.row as usize;
                 if is_asleep(row) {
                     return;
@@ -85,18 +84,18 @@ impl Swarm {
             chunk.wall_contacts.iter().for_each(keep_out);
             for row in chunk.own_rows() {
                 // SAFETY: as above.
-                if unsafe { *skin_left.row(row) } < 0.0
+                if unsafe { *skin_left.row(row) } < S::zero()
                     && !is_asleep(row)
                     && Self::proxy_at(proxies, proxy_rows, row as u32).is_none()
                 {
                     // It was pushed to where nobody looked for walls.
                     // SAFETY: as above.
                     let at = unsafe { *at.row(row) };
-                    let visit = |mut contact: WallContact| {
+                    let visit = |mut contact: WallContact<S>| {
                         contact.set_time(walls, &at, before_end[1]);
                         keep_out(&contact);
                     };
-                    plane_contacts_within(0.0, row as u32, &at, surfaces, planes, visit);
+                    plane_contacts_within(S::zero(), row as u32, &at, surfaces, planes, visit);
                 }
             }
         });
@@ -106,7 +105,7 @@ impl Swarm {
     /// Puts each ball that passed through a surface since places were saved back to it, from where it
     /// slides along it. So long before the end of the step, in seconds, places were saved and balls
     /// are here.
-    fn stop_passages(&mut self, walls: &dyn StaticGeometry, before_end: [f32; 2]) {
+    fn stop_passages(&mut self, walls: &dyn StaticGeometry<S>, before_end: [S; 2]) {
         if !walls.has_shapes() {
             return;
         }
@@ -134,7 +133,7 @@ impl Swarm {
                 let (at, skin_left) = unsafe { (&mut *at.row(row), &mut *skin_left.row(row)) };
                 let place = [x, y, z, at[3]];
                 let gone = distance(at, &place);
-                let (far, filter) = (FAST * at[3], surfaces.filter(row as u32));
+                let (far, filter) = (S::from_f64(FAST) * at[3], surfaces.filter(row as u32));
                 if gone <= far && !walls.is_outrun(at, gone, filter) {
                     continue;
                 }
@@ -149,6 +148,6 @@ impl Swarm {
 }
 
 /// Distance between the centers of two balls, in metres.
-fn distance(a: &Row, b: &Row) -> f32 {
+fn distance<S: Scalar>(a: &Row<S>, b: &Row<S>) -> S {
     squared([0, 1, 2, 0].map(|axis| b[axis] - a[axis])).sqrt()
 }

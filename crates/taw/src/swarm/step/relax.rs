@@ -1,19 +1,20 @@
 //! Relaxation of contacts after balls have moved.
 
 use super::RELAXATIONS;
+use crate::math::Scalar;
 use crate::swarm::Swarm;
 use crate::swarm::batches::Batch;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::{Pass, SolverParams};
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Takes the speed back by which overlaps were pushed out, and moves apart what overlaps too much.
     ///
     /// A ball between two others that walls press together is thrown out sideways by their pushes. One
     /// pass over the contacts takes back little of that: each undoes what the ones before it did. Each
     /// lowers the kinetic energy (projected Gauss–Seidel on rigid contacts is a descent), so chunks that are
     /// jammed are relaxed until their contacts agree.
-    pub(super) fn relax(&mut self, params: SolverParams) {
+    pub(super) fn relax(&mut self, params: SolverParams<S>) {
         self.pass(Pass::Relax(params), |_, _| true);
         // Nothing is moved apart twice in a substep.
         let stays = SolverParams { moves_apart: false, ..params };
@@ -34,7 +35,7 @@ impl Swarm {
                 self.chunks[chunk].impulses.jammed = true;
             }
         }
-        let jammed = |chunk: Option<&Chunk>| chunk.is_some_and(|chunk| chunk.impulses.jammed);
+        let jammed = |chunk: Option<&Chunk<S>>| chunk.is_some_and(|chunk| chunk.impulses.jammed);
         let mut any = false;
         for i in 0..self.chunks.len() {
             let before = i.checked_sub(1).and_then(|i| self.chunks.get(i));

@@ -5,24 +5,23 @@ use std::mem::take;
 use super::islands::MAX_JOINED;
 use super::{leaves, wider};
 
-use crate::math::{Vec3, length};
+use crate::math::{Row, Scalar, Vec3, length};
 use crate::motion::rest::{self, sleep_speed};
 use crate::swarm::batches::Batch;
 use crate::swarm::bodies::NO_ROW;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::squared;
 use crate::swarm::rest::RestRows;
-use crate::swarm::simd::Row;
 use crate::swarm::sleep::SleepState;
 use crate::swarm::wall_contact::WallContact;
 use crate::swarm::{INFINITE_MASS, StaticGeometry, Swarm};
 use crate::workers::{DisjointSlice, parallel_for};
 use cgmath::Zero;
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Finds which balls fall asleep or wake, and which may leave their skin in this step. Rest lasts
     /// another `dt` seconds if this is the first look in the step.
-    pub(super) fn update_sleep(&mut self, dt: f32, gravity: Vec3<f32>, is_first: bool) {
+    pub(super) fn update_sleep(&mut self, dt: S, gravity: Vec3<S>, is_first: bool) {
         if !self.proxies.is_empty() {
             self.measure_speeds_beside_proxies();
         }
@@ -31,7 +30,7 @@ impl Swarm {
         let (slots, bodies) = (self.ids.slots(), &self.body_slots);
         let (has_proxies, reach) = (!self.proxies.is_empty(), self.reach_of_skins());
         let (sleepless, weight) = (&self.sleep.sleepless, length(gravity));
-        let looks = self.model.sleeps && weight > 0.0 && is_first;
+        let looks = self.model.sleeps && weight > S::zero() && is_first;
         // More than this are too many.
         let most = self.fast_movers.remaining(self.at.len()) + 1;
         let rest = self.sleep.rest.shared();
@@ -55,7 +54,7 @@ impl Swarm {
             });
             chunk.leaving.extend(leaving.map(|(row, _)| row).take(most));
             // Not its spin: on a single point a ball may spin for ever.
-            chunk.speed = velocity.iter().fold(0.0_f32, |most, v| most.max(squared(*v))).sqrt();
+            chunk.speed = velocity.iter().fold(S::zero(), |most, v| most.max(squared(*v))).sqrt();
             chunk.inverse_masses = inverse_masses(velocity);
             (chunk.rests, chunk.has_rested) = (false, false);
             if !looks {
@@ -83,7 +82,7 @@ impl Swarm {
 
     /// Wakes what sleeps beside balls that are fast enough to disturb it, or have left their place: it may
     /// have leant on them. A part of a large heap does not wake for one of those that settle about it.
-    pub(super) fn wake_beside_moving(&mut self, gravity: Vec3<f32>, dt: f32) {
+    pub(super) fn wake_beside_moving(&mut self, gravity: Vec3<S>, dt: S) {
         if self.sleep.sleepers == 0 {
             return;
         }
@@ -95,13 +94,15 @@ impl Swarm {
         let disturbs = |awake: usize, asleep: usize| {
             let [a, b] = [&at[awake], &at[asleep]];
             let speed = squared(velocity[awake]).sqrt();
-            let apart = squared([b[0] - a[0], b[1] - a[1], b[2] - a[2], 0.0]).sqrt();
+            let apart = squared([b[0] - a[0], b[1] - a[1], b[2] - a[2], S::zero()]).sqrt();
             let (radii, gap) = (a[3] + b[3], apart - (a[3] + b[3]));
             // It touched where it was, as far away as it may have gone since, or will in this step.
-            let reach = rest::PLACE as f32 * (2.0 * a[3] + radii) + speed * dt;
+            let reach = S::from_f64(rest::PLACE) * (S::from_f64(2.0) * a[3] + radii) + speed * dt;
             // Nothing turns it aside.
-            let pushes = velocity[awake][3] <= INFINITE_MASS && !rest.is_at_rest(awake);
-            (pushes || speed > 2.0 * sleep_speed(gravity, b[3])) && gap <= 2.0 * speed * dt
+            let pushes =
+                velocity[awake][3] <= S::from_f64(INFINITE_MASS) && !rest.is_at_rest(awake);
+            (pushes || speed > S::from_f64(2.0) * sleep_speed(gravity, b[3]))
+                && gap <= S::from_f64(2.0) * speed * dt
                 || rest.has_left(awake)
                     && gap <= reach
                     && groups.visit(slots[asleep], MAX_JOINED, |_| ())
@@ -261,7 +262,7 @@ impl Swarm {
     }
 
     /// Wakes the balls near walls that changed since the last step.
-    pub(super) fn wake_beside_changes(&mut self, walls: &dyn StaticGeometry) {
+    pub(super) fn wake_beside_changes(&mut self, walls: &dyn StaticGeometry<S>) {
         let mut regions = Vec::new();
         let known = self
             .walls_identity
@@ -272,7 +273,7 @@ impl Swarm {
         for row in 0..self.at.len() {
             let is_asleep = self.velocity[row][3].is_sign_negative();
             if is_asleep || self.sleep.rest.is_at_rest(row) {
-                let reach = self.at[row][3] + self.skin_left[row].max(0.0);
+                let reach = self.at[row][3] + self.skin_left[row].max(S::zero());
                 if regions.iter().any(|region| overlaps(region, &self.at[row], reach)) {
                     self.wake(row);
                 }
@@ -309,11 +310,11 @@ impl Swarm {
     }
 }
 
-impl Chunk {
+impl<S: Scalar> Chunk<S> {
     /// Ends the rest of balls that a moving wall bears. (A wall that bears a proxy moves as the proxy does.)
-    fn end_rest_of_carried(&self, rest: &mut RestRows) {
-        let is_carried = |contact: &&WallContact| {
-            contact.impulse.normal > 0.0 && !contact.surface.is_zero() && !contact.bears_proxy
+    fn end_rest_of_carried(&self, rest: &mut RestRows<S>) {
+        let is_carried = |contact: &&WallContact<S>| {
+            contact.impulse.normal > S::zero() && !contact.surface.is_zero() && !contact.bears_proxy
         };
         for contact in self.wall_contacts.iter().filter(is_carried) {
             rest.end((contact.row - self.rows[0]) as usize);
@@ -324,13 +325,13 @@ impl Chunk {
     /// sleepless one counts.
     fn find_rest(
         &mut self,
-        [at, velocity]: [&[Row]; 2],
+        [at, velocity]: [&[Row<S>]; 2],
         is_sleepless: impl Fn(usize) -> bool,
         is_proxy: impl Fn(usize) -> bool,
-        rest: &mut RestRows,
-        gravity: f32,
+        rest: &mut RestRows<S>,
+        gravity: S,
     ) {
-        if self.fastest_own == Some(f32::INFINITY) {
+        if self.fastest_own == Some(S::infinity()) {
             rest.end_all();
             return;
         }
@@ -355,14 +356,14 @@ fn inverse(numbers: &[u32]) -> Vec<u32> {
 }
 
 /// Least and largest inverse mass of some balls, in 1/kg.
-pub(in crate::swarm) fn inverse_masses(velocity: &[Row]) -> [f32; 2] {
-    velocity.iter().map(|velocity| [velocity[3].abs(); 2]).fold([f32::MAX, 0.0], wider)
+pub(in crate::swarm) fn inverse_masses<S: Scalar>(velocity: &[Row<S>]) -> [S; 2] {
+    velocity.iter().map(|velocity| [velocity[3].abs(); 2]).fold([S::max_value(), S::zero()], wider)
 }
 
 /// Returns true if a box and one of this half width about a ball overlap, or may by rounding.
-fn overlaps([low, high]: &[[f32; 3]; 2], at: &Row, reach: f32) -> bool {
+fn overlaps<S: Scalar>([low, high]: &[[S; 3]; 2], at: &Row<S>, reach: S) -> bool {
     (0..3).all(|axis| {
-        let reach = reach + 4.0 * f32::EPSILON * (at[axis].abs() + reach);
+        let reach = reach + S::from_f64(4.0) * S::epsilon() * (at[axis].abs() + reach);
         at[axis] + reach >= low[axis] && at[axis] - reach <= high[axis]
     })
 }

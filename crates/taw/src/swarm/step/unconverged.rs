@@ -9,7 +9,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::cluster::{Cluster, ContactLocation, PairPlace};
 use crate::constraint::ContactImpulse;
-use crate::math::{Vec3, cast_vector};
+use crate::math::{Scalar, Vec3, cast_vector};
 use crate::response::impulse::{Scratch, SolverSettings, solve_velocities};
 use crate::swarm::Swarm;
 use crate::swarm::batches::Batch;
@@ -26,9 +26,9 @@ const ITERATIONS: u32 = 50;
 /// may sink.
 const TOLERANCE: f64 = 0.1;
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Solves the contacts of balls that still sink after a pass, where masses differ.
-    pub(super) fn solve_unconverged(&mut self, params: &SolverParams) {
+    pub(super) fn solve_unconverged(&mut self, params: &SolverParams<S>) {
         if self.scratch.backing.is_empty() {
             return;
         }
@@ -38,12 +38,12 @@ impl Swarm {
         }
         let mut cluster = Cluster::new(self, &sinking, params);
         let smallest = cluster.radius.iter().copied().fold(f64::INFINITY, f64::min);
-        let h = f64::from(params.time);
+        let h = params.time.as_f64();
         let settings = SolverSettings {
             iterations: ITERATIONS,
             dt: h,
-            restitution_threshold: f64::from(params.restitution_threshold),
-            tolerance: f64::from(params.max_sinking) * smallest / h * TOLERANCE,
+            restitution_threshold: params.restitution_threshold.as_f64(),
+            tolerance: params.max_sinking.as_f64() * smallest / h * TOLERANCE,
             slop: 0.0,
             max_relative_slop: 0.0,
             max_relative_push: 0.0,
@@ -68,15 +68,16 @@ impl Swarm {
     }
 
     /// Finds balls that sink into others or into walls, in the order of chunks.
-    fn find_sinking(&mut self, params: &SolverParams) -> Vec<Sinking> {
+    fn find_sinking(&mut self, params: &SolverParams<S>) -> Vec<Sinking<S>> {
         let mut lists = vec![Vec::new(); self.chunks.len() + 1];
         let last = self.chunks.len();
         let (at, velocity) =
             (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.velocity));
         let (chunks, simd_level) = (&self.chunks, self.simd_level);
-        let pairs = |batches: &[Batch], impulses: &ContactImpulses, found: &mut Vec<Sinking>| {
-            simd_level.run(FindSinking { at, velocity, batches, impulses, params, found });
-        };
+        let pairs =
+            |batches: &[Batch], impulses: &ContactImpulses<S>, found: &mut Vec<Sinking<S>>| {
+                simd_level.run(FindSinking { at, velocity, batches, impulses, params, found });
+            };
         pairs(&self.fast_movers.batches, &self.fast_movers.impulses, &mut lists[last]);
         let found = DisjointSlice::new(&mut lists);
         parallel_for(self.scratch.threads, chunks.len(), |_, i| {
@@ -92,7 +93,12 @@ impl Swarm {
                 // SAFETY: as above.
                 let (at, velocity) = unsafe { (*at.row(row), *velocity.row(row)) };
                 let approach_speed = -(xyz(&velocity) - contact.surface).dot(contact.normal);
-                if params.sinks(approach_speed, contact.separation(&at), at[3], WALL_SLOP) {
+                if params.sinks(
+                    approach_speed,
+                    contact.separation(&at),
+                    at[3],
+                    S::from_f64(WALL_SLOP),
+                ) {
                     found.push(Sinking { row: contact.row, approach_speed });
                 }
             }
@@ -100,12 +106,12 @@ impl Swarm {
         lists.concat()
     }
 
-    fn store_velocities(&mut self, cluster: &Cluster) {
+    fn store_velocities(&mut self, cluster: &Cluster<S>) {
         for (i, row) in cluster.rows.iter().map(|row| *row as usize).enumerate() {
             if cluster.inverse_mass[i] > 0.0 {
-                let velocity: [f32; 3] = cast_vector(cluster.velocity[i]).into();
+                let velocity: [S; 3] = cast_vector(cluster.velocity[i]).into();
                 self.velocity[row][..3].copy_from_slice(&velocity);
-                let spin: [f32; 3] = cast_vector(cluster.spin[i] * cluster.radius[i]).into();
+                let spin: [S; 3] = cast_vector(cluster.spin[i] * cluster.radius[i]).into();
                 self.spin[row][..3].copy_from_slice(&spin);
             }
         }
@@ -121,10 +127,10 @@ impl Swarm {
         };
         let load = impulses.normal_impulse[batch][lane];
         impulses.struck.push(StruckContact::new([batch as u32, lane as u32], load));
-        impulses.normal_impulse[batch][lane] = impulse.normal as f32;
+        impulses.normal_impulse[batch][lane] = S::from_f64(impulse.normal);
         let tangent: [f64; 3] = impulse.tangent.into();
         for (axis, x) in impulses.tangent_impulse[batch].iter_mut().zip(tangent) {
-            axis[lane] = x as f32;
+            axis[lane] = S::from_f64(x);
         }
     }
 
@@ -134,16 +140,16 @@ impl Swarm {
         &mut self,
         impulse: ContactImpulse<f64>,
         [chunk, number]: [usize; 2],
-        share: Option<f32>,
+        share: Option<S>,
     ) {
         let wall = &mut self.chunks[chunk].wall_contacts[number];
         let (row, before) = (wall.row as usize, wall.impulse);
-        let all = impulse.normal as f32;
-        wall.borne_for_others = share.map_or(0.0, |share| share.min(all));
+        let all = S::from_f64(impulse.normal);
+        wall.borne_for_others = share.map_or(S::zero(), |share| share.min(all));
         if share.is_some() {
             self.scratch.backing[row][3] = wall.borne_for_others;
         }
-        wall.load = Some(wall.load.unwrap_or(f32::MAX).min(before.normal));
+        wall.load = Some(wall.load.unwrap_or(S::max_value()).min(before.normal));
         let (normal, tangent) = (all - wall.borne_for_others, cast_vector(impulse.tangent));
         wall.impulse = ContactImpulse { normal, tangent };
         if self.scratch.outside_work.is_empty() || wall.bears_proxy {

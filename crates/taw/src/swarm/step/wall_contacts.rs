@@ -2,7 +2,7 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use crate::math::Vec3;
+use crate::math::{Scalar, Vec3};
 use crate::swarm::bit_set::BitSet;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::{Pass, SolverColumns};
@@ -15,19 +15,19 @@ use crate::swarm::walls::{Balls, HalfSpace, find, near_shapes, shapes_of};
 use crate::swarm::{Stage, StaticGeometry, Swarm, Tier};
 use crate::workers::{DisjointSlice, parallel_for};
 
-impl Swarm {
+impl<S: Scalar> Swarm<S> {
     /// Time before a ball can be at a wall from which on it is searched, in seconds; in the lab's
     /// tier, it has moved already.
-    pub(in crate::swarm) fn ahead(&self, dt: f32) -> Option<f32> {
-        self.has_friction().then_some(2.0 * dt)
+    pub(in crate::swarm) fn ahead(&self, dt: S) -> Option<S> {
+        self.has_friction().then_some(S::from_f64(2.0) * dt)
     }
 
     /// Finds the balls at walls anew, if one of these changed.
     pub(in crate::swarm) fn find_wall_contacts_if_changed(
         &mut self,
         changed: bool,
-        dt: f32,
-        walls: &dyn StaticGeometry,
+        dt: S,
+        walls: &dyn StaticGeometry<S>,
         observe: &mut dyn FnMut(Stage),
     ) {
         if changed {
@@ -37,7 +37,7 @@ impl Swarm {
     }
 
     /// Takes the contacts of removed walls out, and renames the walls that moved into their rows.
-    pub(super) fn follow_removed_walls(&mut self, walls: &dyn StaticGeometry) {
+    pub(super) fn follow_removed_walls(&mut self, walls: &dyn StaticGeometry<S>) {
         let mut removals = Vec::new();
         let known = self
             .rows_of_walls
@@ -61,7 +61,7 @@ impl Swarm {
     }
 
     /// Finds the balls at walls anew, where pairs are still known.
-    pub(in crate::swarm) fn find_wall_contacts(&mut self, dt: f32, walls: &dyn StaticGeometry) {
+    pub(in crate::swarm) fn find_wall_contacts(&mut self, dt: S, walls: &dyn StaticGeometry<S>) {
         let (simd_level, shapes) = (self.simd_level, walls.has_shapes());
         let (planes, ahead) = (listed_planes(&self.planes, self.tier()), self.ahead(dt));
         let (at, skin_left) = (&self.at[..], &self.skin_left[..]);
@@ -101,8 +101,8 @@ impl Swarm {
     pub(in crate::swarm) fn find_wall_contacts_of(
         &mut self,
         rows: &[u32],
-        dt: f32,
-        walls: &dyn StaticGeometry,
+        dt: S,
+        walls: &dyn StaticGeometry<S>,
     ) {
         let ahead = self.ahead(dt);
         let planes = listed_planes(&self.planes, self.tier());
@@ -137,9 +137,9 @@ impl Swarm {
     /// on. One that was far from shapes flew by its velocity, and that much lower. Returns true if there was any.
     pub(in crate::swarm) fn stop_at_walls(
         &mut self,
-        walls: &dyn StaticGeometry,
-        h: f32,
-        lower: Vec3<f32>,
+        walls: &dyn StaticGeometry<S>,
+        h: S,
+        lower: Vec3<S>,
     ) -> bool {
         if !walls.has_shapes() {
             return false;
@@ -175,13 +175,13 @@ impl Swarm {
                     || xyz(velocity) * h - lower + change,
                     |place| xyz(at) - Vec3::from(place),
                 );
-                let far = FAST * at[3];
+                let far = S::from_f64(FAST) * at[3];
                 if is_fast(velocity, h, at[3]) || !change.is_zero() || path.magnitude2() > far * far
                 {
                     let filter = surfaces.filter(row as u32);
                     let back = slide_along_wall(walls, at, filter, path);
                     *skin_left -= back;
-                    chunk.caught |= back > 0.0;
+                    chunk.caught |= back > S::zero();
                 }
             }
         });
@@ -192,9 +192,9 @@ impl Swarm {
     /// all if walls moved. (The solver finds them anew in each substep, and more exactly.)
     pub(in crate::swarm) fn update_contacts_on_the_way(
         &mut self,
-        walls: &dyn StaticGeometry,
+        walls: &dyn StaticGeometry<S>,
         walls_changed: bool,
-        dt: f32,
+        dt: S,
     ) {
         if walls.has_shapes() || walls_changed {
             self.update_contacts_of(walls, dt, [dt, dt], |_| true, [!walls_changed, true]);
@@ -205,10 +205,10 @@ impl Swarm {
     /// long `before`, in seconds, they were elsewhere.
     pub(in crate::swarm) fn update_wall_contacts(
         &mut self,
-        walls: &dyn StaticGeometry,
-        before: f32,
-        times: [f32; 2],
-        which: impl Fn(&Chunk) -> bool + Sync,
+        walls: &dyn StaticGeometry<S>,
+        before: S,
+        times: [S; 2],
+        which: impl Fn(&Chunk<S>) -> bool + Sync,
         only_fast: bool,
     ) {
         self.update_contacts_of(walls, before, times, which, [only_fast, false]);
@@ -216,10 +216,10 @@ impl Swarm {
 
     fn update_contacts_of(
         &mut self,
-        walls: &dyn StaticGeometry,
-        before: f32,
-        times: [f32; 2],
-        which: impl Fn(&Chunk) -> bool + Sync,
+        walls: &dyn StaticGeometry<S>,
+        before: S,
+        times: [S; 2],
+        which: impl Fn(&Chunk<S>) -> bool + Sync,
         [only_fast, whole_way]: [bool; 2],
     ) {
         let (proxies, rows) = (&self.proxies[..], &self.scratch.proxy_rows[..]);
@@ -268,7 +268,7 @@ pub(super) struct WallPass<'a> {
 }
 
 impl WallPass<'_> {
-    pub fn solve(&self, pass: Pass, columns: SolverColumns, chunk: &mut Chunk) {
+    pub fn solve<S: Scalar>(&self, pass: Pass<S>, columns: SolverColumns<S>, chunk: &mut Chunk<S>) {
         for contact in &mut chunk.wall_contacts {
             if matches!(pass, Pass::Restitution(_)) && self.held.contains(contact.row) {
                 continue;
@@ -306,6 +306,9 @@ impl WallPass<'_> {
 }
 
 /// The half-spaces of which the balls near them are listed. The lab's tier looks at all balls.
-pub(in crate::swarm) fn listed_planes(planes: &[HalfSpace], tier: Tier) -> &[HalfSpace] {
+pub(in crate::swarm) fn listed_planes<S: Scalar>(
+    planes: &[HalfSpace<S>],
+    tier: Tier,
+) -> &[HalfSpace<S>] {
     if tier == Tier::Full { planes } else { &[] }
 }

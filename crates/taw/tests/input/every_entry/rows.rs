@@ -106,13 +106,13 @@ fn with_pose<S: Scalar>(place: &mut Place<S>, pose: Pose<S>) -> Outcome {
     }
 }
 
-/// Only the swarm's own scalar has all of these numbers.
-fn single<S: Scalar>(x: S) -> f32 {
-    x.as_f64() as f32
+fn swarm_ball<S: Scalar>() -> swarm::Ball<S> {
+    let [x, y, z, radius] = [3.0, 2.0, 0.0, 0.1].map(S::from_f64);
+    swarm::Ball::new(Point3::new(x, y, z), radius)
 }
 
-fn into_swarm<S: Scalar>(place: &mut Place<S>, change: impl Fn(&mut swarm::Ball)) -> Outcome {
-    let mut ball = swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1);
+fn into_swarm<S: Scalar>(place: &mut Place<S>, change: impl Fn(&mut swarm::Ball<S>)) -> Outcome {
+    let mut ball = swarm_ball();
     change(&mut ball);
     place.world.swarm.insert(&[ball]).map(|_| ())
 }
@@ -293,26 +293,26 @@ fn swarms<S: Scalar>() -> Vec<Row<S>> {
         World 4 "Swarm::insert": |p, x| {
             let case = p.case;
             into_swarm(p, |ball| match case {
-                0 => ball.position.x = single(x),
-                1 => ball.radius = single(x),
-                2 => ball.velocity.y = single(x),
-                _ => ball.mass = Mass::Density(single(x)),
+                0 => ball.position.x = x,
+                1 => ball.radius = x,
+                2 => ball.velocity.y = x,
+                _ => ball.mass = Mass::Density(x),
             })
         };
         World 1 "Swarm::set_position": |p, x| {
             let before = p.world.clone();
-            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
-            p.world.swarm.set_position(ball, Point3::from([single(x); 3])).inspect_err(|_| p.world = before)
+            let ball = p.world.swarm.insert(&[swarm_ball()])?[0];
+            p.world.swarm.set_position(ball, Point3::from([x; 3])).inspect_err(|_| p.world = before)
         };
         World 1 "Swarm::set_velocity": |p, x| {
             let before = p.world.clone();
-            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
-            p.world.swarm.set_velocity(ball, Vec3::from([single(x); 3])).inspect_err(|_| p.world = before)
+            let ball = p.world.swarm.insert(&[swarm_ball()])?[0];
+            p.world.swarm.set_velocity(ball, Vec3::from([x; 3])).inspect_err(|_| p.world = before)
         };
         World 3 "Swarm::set_material": |p, x| {
             let before = p.world.clone();
-            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
-            let (x, plain) = (single(x), Material::default());
+            let ball = p.world.swarm.insert(&[swarm_ball()])?[0];
+            let plain = Material::default();
             let material = match p.case {
                 0 => Material { friction: x, ..plain },
                 1 => Material { restitution: x, ..plain },
@@ -321,23 +321,23 @@ fn swarms<S: Scalar>() -> Vec<Row<S>> {
             p.world.swarm.set_material(ball, Some(material)).inspect_err(|_| p.world = before)
         };
         World 1 "Swarm::set_layers": |p, x| {
-            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
+            let ball = p.world.swarm.insert(&[swarm_ball()])?[0];
             p.world.swarm.set_layers(&[ball], taw::broad::CollisionLayers::new(x.as_f64() as u32, !0))
         };
         World 1 "Sensors::set_layers": |p, x| p.world.sensors.set_layers(p.sensor, taw::broad::CollisionLayers::new(!0, x.as_f64() as u32));
         World 1 "Walls::set_layers": |p, x| p.world.walls.set_layers(p.wall, taw::broad::CollisionLayers::new(!0, x.as_f64() as u32));
         World 1 "Swarm::set_gravity_scale": |p, x| {
             let before = p.world.clone();
-            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
-            p.world.swarm.set_gravity_scale(ball, single(x)).inspect_err(|_| p.world = before)
+            let ball = p.world.swarm.insert(&[swarm_ball()])?[0];
+            p.world.swarm.set_gravity_scale(ball, x).inspect_err(|_| p.world = before)
         };
         World 3 "Swarm::apply_acceleration": |p, x| {
             let before = p.world.clone();
-            let ball = p.world.swarm.insert(&[swarm::Ball::new(Point3::new(3.0, 2.0, 0.0), 0.1)])?[0];
-            p.world.swarm.apply_acceleration(ball, on_axis(p.case, single(x))).inspect_err(|_| p.world = before)
+            let ball = p.world.swarm.insert(&[swarm_ball()])?[0];
+            p.world.swarm.apply_acceleration(ball, on_axis(p.case, x)).inspect_err(|_| p.world = before)
         };
         World 1 "Swarm::set_model": |p, x| {
-            let material = Material { friction: single(x), ..Material::default() };
+            let material = Material { friction: x, ..Material::default() };
             p.world.swarm.set_model(swarm::SwarmModel { material, ..p.world.swarm.model() })
         };
     }

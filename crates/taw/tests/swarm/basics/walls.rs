@@ -113,12 +113,11 @@ fn marbles_and_swarms_push_each_other() {
         }
         let speed = world.marbles.get(marble).unwrap().velocity.x;
         let row = world.swarm.row(id).unwrap();
-        let other = f64::from(world.swarm.velocities()[row][0]);
+        let other = world.swarm.velocities()[row][0];
         if tier == Tier::Full {
             assert!((other - 2.0).abs() < 0.02 && speed.abs() < 0.02, "{speed} and {other} m/s");
         } else {
-            let apart = f64::from(world.swarm.balls()[row][0])
-                - world.marbles.get(marble).unwrap().position.x;
+            let apart = world.swarm.balls()[row][0] - world.marbles.get(marble).unwrap().position.x;
             assert!(apart > 0.95, "{apart} m apart");
         }
         // It is one of the balls, and goes when the marble does.

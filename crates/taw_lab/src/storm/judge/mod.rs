@@ -179,7 +179,7 @@ impl Rules {
         let swarm = own_parts.then_some(if lab { 1.0 } else { parts });
         let iterations = f64::from(case.model.iterations).min(if lab { parts } else { f64::MAX });
         let marbles = f64::from(case.model.substeps);
-        let single = case.number == ScalarType::F32 || case.swarm.is_some() || soft_step;
+        let single = case.number == ScalarType::F32;
         let looks_ahead = matches!(case.model.response, Response::EventDriven | Response::SoftStep);
         let discrete = case.model.detection == Detection::Discrete && !looks_ahead;
         Self {

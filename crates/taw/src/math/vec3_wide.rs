@@ -2,12 +2,11 @@
 
 use std::ops::{Add, Mul, Sub};
 
-use super::simd::{LANES, Simd};
-use crate::math::RealVector;
+use super::{LANES, RealVector, Simd};
 
 /// Three coordinates on eight lanes.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Vec3Wide<L>(pub [L; 3]);
+pub struct Vec3Wide<L>(pub [L; 3]);
 
 impl<L: Simd> Vec3Wide<L> {
     /// Coordinates of rows.
@@ -17,12 +16,12 @@ impl<L: Simd> Vec3Wide<L> {
     }
 
     #[inline(always)]
-    pub fn load(from: &[[f32; LANES]; 3]) -> Self {
+    pub fn load(from: &[[L::Scalar; LANES]; 3]) -> Self {
         Self([L::load(&from[0]), L::load(&from[1]), L::load(&from[2])])
     }
 
     #[inline(always)]
-    pub fn store(self, to: &mut [[f32; LANES]; 3]) {
+    pub fn store(self, to: &mut [[L::Scalar; LANES]; 3]) {
         let Self([x, y, z]) = self;
         x.store(&mut to[0]);
         y.store(&mut to[1]);
@@ -88,6 +87,6 @@ impl<L: Simd> RealVector<L> for Vec3Wide<L> {
     #[inline(always)]
     fn clamp_length(self, max: L) -> Self {
         let length = self.dot(self).sqrt();
-        self * length.select_gt(max, max / length, L::splat(1.0))
+        self * length.select_gt(max, max / length, L::constant(1.0))
     }
 }
