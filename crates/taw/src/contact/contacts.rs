@@ -2,6 +2,7 @@ use std::cmp::Ordering;
 
 use cgmath::Zero;
 
+use super::{ContactMaterial, Material};
 use crate::math::{Scalar, Vec3, is_finite, length};
 
 /// Gap between two that touch, as a fraction of the shorter lever arm, at most.
@@ -32,6 +33,11 @@ pub struct Contact<S> {
     /// Sub-shape of the wall: part of a compound or triangle of a surface. Zero for simple shapes,
     /// and between marbles.
     pub part: u32,
+    /// Feature id: identifies the features that meet, stable as long as they do, since a capsule often
+    /// touches with several points. That of `a` in the upper 16 bits, that of `b` in the lower ones: 0 for a
+    /// ball and for a wall, 1 and 2 for the ends of a capsule, 3 for all points of its side. Solvers find the impulses of
+    /// the last substep by pair, `part` and `feature`.
+    pub feature: u32,
     /// Contact anchor on the axis of each body, in metres from its center: zero except for
     /// capsules.
     pub along: [S; 2],
@@ -42,6 +48,11 @@ pub struct Contact<S> {
     /// Lever arm of each body: from its center to the contact point on its surface, in metres; zero
     /// for a wall.
     pub arms: [Vec3<S>; 2],
+    /// Surface material, combined from those of both bodies whenever contacts are generated. `Impulse`
+    /// and `Penalty` solve the contact by it, so that it may be edited before
+    /// [`World::restitute`](crate::world::World::restitute), for one contact in one substep: a number
+    /// out of its range counts as the nearest one in it, NaN as the lowest.
+    pub material: ContactMaterial<S>,
     /// Normal impulse accumulated in this substep, in N s. Zero until the contact is solved;
     /// listed by `Impulse` and `Penalty`.
     pub normal_impulse: S,
@@ -50,22 +61,25 @@ pub struct Contact<S> {
 }
 
 impl<S: Scalar> Contact<S> {
-    /// Contact of a wall and a marble, not placed yet.
+    /// Contact of a wall and a marble without materials of their own, not placed yet.
     pub(crate) fn with_wall(wall: u32, part: u32, marble: u32) -> Self {
-        Self { part, ..Self::between_marbles(wall, marble) }
+        let material = Material::default().on_wall(None);
+        Self { part, material, ..Self::between_marbles(wall, marble) }
     }
 
-    /// Contact of two marbles, not placed yet.
+    /// Contact of two marbles without materials of their own, not placed yet.
     pub(crate) fn between_marbles(a: u32, b: u32) -> Self {
         let (zero, none) = (S::zero(), Vec3::zero());
         Self {
             a,
             b,
             part: 0,
+            feature: 0,
             along: [zero; 2],
             normal: none,
             separation: zero,
             arms: [none; 2],
+            material: ContactMaterial::default(),
             normal_impulse: zero,
             tangent_impulse: none,
         }
@@ -96,7 +110,8 @@ impl<S: Scalar> Contact<S> {
     pub(crate) fn reversed(self) -> Self {
         let Self { a, b, along: [x, y], arms: [p, q], .. } = self;
         let (normal, tangent_impulse) = (-self.normal, -self.tangent_impulse);
-        Self { a: b, b: a, along: [y, x], arms: [q, p], normal, tangent_impulse, ..self }
+        let feature = self.feature.rotate_left(16);
+        Self { a: b, b: a, feature, along: [y, x], arms: [q, p], normal, tangent_impulse, ..self }
     }
 
     /// Penetration along the normal, in metres; zero for separated surfaces.

@@ -1,5 +1,6 @@
 //! Narrow phase: distance, penetration, contact manifolds, ray casts and shape casts between two
-//! shapes, and the lists of contacts of a step. Candidate pairs come from [`broad`](crate::broad).
+//! shapes, the lists of contacts of a step, and the materials of what touches. Candidate pairs come
+//! from [`broad`](crate::broad).
 //!
 //! # Which function computes what
 //!
@@ -45,6 +46,7 @@ mod core;
 mod epa;
 mod gjk;
 mod manifold;
+mod material;
 mod ray_cast;
 mod shape_cast;
 mod sphere_plane;
@@ -62,6 +64,7 @@ pub use compound::{
 pub use contacts::{Contact, Contacts, touch_goes_on};
 pub use core::{Convex, Core};
 pub use manifold::{Manifold, ManifoldPoint, Points, manifold};
+pub use material::{Combine, Compliance, ContactMaterial, Elasticity, Material};
 pub use ray_cast::{RayCast, RayHit};
 pub use shape_cast::{ShapeCastHit, shape_cast};
 pub use sphere_plane::{mtv_sphere_plane, touching_sphere_plane};

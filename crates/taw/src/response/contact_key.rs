@@ -1,7 +1,6 @@
 //! Identity of a contact from one substep to the next, and its impulses meanwhile.
 
 use crate::contact::Contact;
-use crate::math::Scalar;
 
 /// Identity of a contact across substeps; sorts walls first, then by rows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -14,14 +13,14 @@ pub(crate) struct ContactKey {
     b: u32,
     /// Sub-shape of the wall.
     part: u32,
-    /// Ends of capsules that touch, since one capsule often touches with both.
-    ends: [i8; 2],
+    /// [Feature id](Contact::feature).
+    feature: u32,
 }
 
 impl ContactKey {
     /// Lowest key of the same two.
     pub fn first_of_both(self) -> Self {
-        Self { part: 0, ends: [i8::MIN; 2], ..self }
+        Self { part: 0, feature: 0, ..self }
     }
 
     /// Returns true if both keys are of the same two, whatever parts of them touch.
@@ -31,7 +30,7 @@ impl ContactKey {
 
     /// Rows of both, or wall and row, if no capsule is one of them.
     pub fn balls(&self) -> Option<(u32, u32)> {
-        (self.ends == [0; 2]).then_some((self.a, self.b))
+        (self.feature == 0).then_some((self.a, self.b))
     }
 
     /// Returns true for two marbles.
@@ -61,16 +60,14 @@ impl ContactKey {
     }
 
     /// Key of a contact with a wall.
-    pub fn with_wall<S: Scalar>(contact: &Contact<S>) -> Self {
+    pub fn with_wall<S>(contact: &Contact<S>) -> Self {
         Self { is_pair: false, ..Self::between_marbles(contact) }
     }
 
     /// Key of a contact between two marbles.
-    pub fn between_marbles<S: Scalar>(contact: &Contact<S>) -> Self {
-        let Contact { a, b, part, along, .. } = *contact;
-        let zero = S::zero();
-        let ends = along.map(|along| if along > zero { 2 } else { i8::from(along < zero) });
-        Self { is_pair: true, a, b, part, ends }
+    pub fn between_marbles<S>(contact: &Contact<S>) -> Self {
+        let Contact { a, b, part, feature, .. } = *contact;
+        Self { is_pair: true, a, b, part, feature }
     }
 
     /// Key after rows have moved; none if one of them is gone.
@@ -87,8 +84,8 @@ impl ContactKey {
     /// Key with the lower row of a pair first, and whether the two had to be swapped.
     pub fn in_order(self) -> (Self, bool) {
         let swap = self.is_pair && self.a > self.b;
-        let [first, second] = self.ends;
-        let swapped = Self { a: self.b, b: self.a, ends: [second, first], ..self };
+        let feature = self.feature.rotate_left(16);
+        let swapped = Self { a: self.b, b: self.a, feature, ..self };
         (if swap { swapped } else { self }, swap)
     }
 }

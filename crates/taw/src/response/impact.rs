@@ -1,7 +1,7 @@
 use cgmath::{InnerSpace, Zero};
 
+use crate::contact::ContactMaterial;
 use crate::math::{RealVector, Scalar, Vec3};
-use crate::response::Material;
 
 /// Inverse effective mass of a contact: change of the relative velocity of its two points per
 /// impulse, in 1/kg (the diagonal of `K` in constraint solvers).
@@ -73,7 +73,7 @@ pub fn impact<S: Scalar>(
     normal: Vec3<S>,
     relative_velocity: Vec3<S>,
     inverse_effective_mass: InverseEffectiveMass<S>,
-    material: Material<S>,
+    material: ContactMaterial<S>,
 ) -> Vec3<S> {
     let approach = -relative_velocity.dot(normal);
     if approach <= S::zero() || inverse_effective_mass.normal <= S::zero() {
@@ -94,7 +94,11 @@ mod tests {
 
     /// Bounce of a ball off a wall at rest whose normal is +y: velocity and spin speed (radius
     /// times spin about z) afterwards. The contact point moves by `vx + spin_speed` along x.
-    fn bounce<S: Scalar>(v: [f64; 2], spin_speed: f64, material: Material<S>) -> ([f64; 2], f64) {
+    fn bounce<S: Scalar>(
+        v: [f64; 2],
+        spin_speed: f64,
+        material: ContactMaterial<S>,
+    ) -> ([f64; 2], f64) {
         let number = S::from_f64;
         let relative_velocity =
             Vec3::new(number(v[0]) + number(spin_speed), number(v[1]), S::zero());
@@ -106,12 +110,12 @@ mod tests {
         (after.map(Scalar::as_f64), (number(spin_speed) + number(2.5) * j.x).as_f64())
     }
 
-    fn material<S: Scalar>(e: f64, mu: f64, beta: f64) -> Material<S> {
-        Material {
+    fn material<S: Scalar>(e: f64, mu: f64, beta: f64) -> ContactMaterial<S> {
+        ContactMaterial {
             restitution: S::from_f64(e),
             friction: S::from_f64(mu),
             tangential_restitution: S::from_f64(beta),
-            ..Material::default()
+            ..ContactMaterial::default()
         }
     }
 

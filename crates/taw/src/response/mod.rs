@@ -8,16 +8,15 @@ mod energy_ledger;
 pub(crate) mod event;
 mod impact;
 pub(crate) mod impulse;
-mod material;
 pub(crate) mod penalty;
 
+pub use crate::contact::{Combine, Elasticity, Material};
 pub(crate) use bodies::{CapsuleInertia, SolverBodies};
 pub(crate) use contact_key::{ContactKey, KeyedByContact, follow_rows, rename_rows};
 pub(crate) use energy_ledger::{EnergyLedger, ImpulseSample};
 pub use event::Impact;
 pub use impact::{BallRotation, InverseEffectiveMass, impact};
 pub(crate) use impulse::Colliders;
-pub use material::{Combine, Elasticity, Material};
 pub use penalty::ContactLaw;
 pub(crate) use penalty::SpringHistory;
 

@@ -273,7 +273,7 @@ pub(super) struct WallNumbers<S> {
 impl<S: Scalar> WallNumbers<S> {
     /// Numbers of a ball on a wall, which may have a material of its own.
     pub fn new(ball: Surface<S>, wall: Option<Material<S>>) -> Self {
-        let material = wall.map_or(ball.material, |wall| ball.material.combined_with(wall));
+        let material = ball.material.on_wall(wall);
         Self {
             friction: material.friction,
             restitution: material.restitution,

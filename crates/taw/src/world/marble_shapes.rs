@@ -10,10 +10,30 @@ use crate::motion::Rotation;
 use crate::response::CapsuleInertia;
 use crate::shape::{Capsule, Shape, Sphere};
 
+/// Fraction of the half length of a capsule from which on a point of its axis counts as an end of it:
+/// that of a parallel one is as near to it as rounding leaves it.
+pub(super) const END: f64 = 0.999;
+
 impl<S: Scalar> Marbles<S> {
     /// Half length of a marble in metres; zero for a ball.
     pub(super) fn half_length(&self, row: usize) -> S {
         self.half_length.get(row).unwrap_or_else(S::zero)
+    }
+
+    /// [Feature](crate::contact::Contact::feature) of a marble at a point of its axis, in metres from its
+    /// center.
+    #[inline]
+    pub(super) fn feature_at(&self, row: usize, along: S) -> u32 {
+        let end = self.half_length(row) * S::from_f64(END);
+        if end == S::zero() {
+            0
+        } else if along.abs() < end {
+            3
+        } else if along < S::zero() {
+            1
+        } else {
+            2
+        }
     }
 
     /// First marble that is a capsule.

@@ -11,6 +11,7 @@ use super::sleep_columns::SleepColumns;
 use super::sparse_column::SparseColumn;
 use crate::Error;
 use crate::broad::{CollisionLayers, IgnoredPairs, Period};
+use crate::contact::ContactMaterial;
 use crate::error::{finite, finite_point, finite_vector, positive};
 use crate::frame::Bivector;
 use crate::handle::{Handles, MarbleId};
@@ -253,6 +254,18 @@ impl<S: Scalar> Marbles<S> {
         })
     }
 
+    /// Material of the contact of two marbles.
+    #[inline]
+    pub(super) fn contact_material(&self, a: usize, b: usize) -> ContactMaterial<S> {
+        match [a, b].map(|row| self.material.get(row)) {
+            [None, None] => ContactMaterial::default(),
+            of => {
+                let [a, b] = of.map(Option::unwrap_or_default);
+                b.combined_with(a)
+            }
+        }
+    }
+
     /// Layers of a marble.
     #[inline]
     pub(super) fn layers_of_row(&self, row: usize) -> CollisionLayers {
@@ -350,13 +363,13 @@ impl<S: Scalar> Marbles<S> {
         }
     }
 
-    /// Columns for a response, with own materials and integrators.
+    /// Columns for a response, with own integrators.
     pub(super) fn columns<'a>(
         &'a mut self,
         inverse_mass: &'a [S],
         held: &'a [bool],
         rods: &'a [CapsuleInertia<S>],
-    ) -> (SolverBodies<'a, S>, &'a SparseColumn<Material<S>>, &'a SparseColumn<Integrator>) {
+    ) -> (SolverBodies<'a, S>, &'a SparseColumn<Integrator>) {
         let columns = SolverBodies {
             period: self.period,
             position: &mut self.position,
@@ -367,7 +380,7 @@ impl<S: Scalar> Marbles<S> {
             rotation_locked: held,
             capsules: rods,
         };
-        (columns, &self.material, &self.integrator)
+        (columns, &self.integrator)
     }
 
     /// Returns true if gravity does not accelerate all alike, or other forces act.

@@ -93,8 +93,9 @@ pub struct World<S: Scalar> {
     pub sensors: Sensors<S>,
     /// Contacts of the last substep, except those of marbles [asleep](Self::is_asleep) with each
     /// other and with walls. Between [`World::generate_contacts`] and [`World::restitute`] they may
-    /// be edited: a removed contact is not solved, a changed normal or separation is the one that
-    /// is solved, and a contact of a row that does not exist is ignored.
+    /// be edited: a removed contact is not solved, a changed normal, separation or
+    /// [material](crate::contact::Contact::material) is the one that is solved, and a contact of a row that
+    /// does not exist is ignored.
     /// ([`Response::EventDriven`] and [`Response::SoftStep`] detect collisions themselves, whatever
     /// is edited.)
     ///

@@ -5,11 +5,12 @@ use std::collections::HashSet;
 use cgmath::{InnerSpace, Zero};
 use smallvec::SmallVec;
 
+use super::marble_shapes::END;
 use super::marbles::Marbles;
 use super::walls::{SubShape, Walls};
 use super::{WallShape, World};
 use crate::broad::CollisionFilter;
-use crate::contact::Contact;
+use crate::contact::{Contact, ContactMaterial};
 use crate::math::{Scalar, Vec3, normal_and_distance};
 use crate::response::Response;
 use crate::shape::{Aabb, Aabb3, BoundedShape, PointProjection, Shape, Sphere};
@@ -71,10 +72,11 @@ impl<S: Scalar> World<S> {
                 let ends = [-half, half].into_iter().take(if half > S::zero() { 2 } else { 1 });
                 for along in ends {
                     let center = self.marbles.position()[b] + self.anchor(b, along);
-                    let place = (plane.normal(), plane.signed_distance(center));
-                    let contact = self.wall_contact(SubShape { wall, index: 0 }, b, along, place);
-                    if contact.separation <= contact_distance {
-                        self.contacts.wm.push(contact);
+                    let distance = plane.signed_distance(center);
+                    if distance - self.marbles.radius()[b] <= contact_distance {
+                        let (part, place) =
+                            (SubShape { wall, index: 0 }, (plane.normal(), distance));
+                        self.contacts.wm.push(self.wall_contact(part, b, along, place));
                     }
                 }
             }
@@ -97,8 +99,17 @@ impl<S: Scalar> World<S> {
     ) -> Contact<S> {
         let (radii, anchors) =
             ([S::zero(), self.marbles.radius()[b]], [Vec3::zero(), self.anchor(b, along)]);
-        Contact { along: [S::zero(), along], ..Contact::with_wall(wall, index, b as u32) }
-            .placed(place, radii, anchors)
+        let feature = self.marbles.feature_at(b, along);
+        let along = [S::zero(), along];
+        let material = self.wall_contact_material(wall, b);
+        let contact = Contact::with_wall(wall, index, b as u32);
+        Contact { feature, along, material, ..contact }.placed(place, radii, anchors)
+    }
+
+    /// Material of the contact of a wall and a marble.
+    pub(super) fn wall_contact_material(&self, wall: u32, b: usize) -> ContactMaterial<S> {
+        let of_marble = self.marbles.material.get(b).unwrap_or_default();
+        of_marble.on_wall(self.walls.material_of_row(wall as usize))
     }
 
     /// Collides a marble, or a sample sphere of a capsule at `along` on its axis, with sub-shapes
@@ -138,7 +149,7 @@ impl<S: Scalar> World<S> {
         self.walls.for_each_colliding(&bounds, self.marbles.filter_of_row(b), |part| {
             let Some(touch) = self.walls.closest_points(part, capsule) else { return };
             let along = (touch.on_b - center).dot(axis);
-            let inside = along.abs() < half * S::from_f64(0.999);
+            let inside = along.abs() < half * S::from_f64(END);
             let new = |other: &S| (along - *other).abs() > capsule.radius * S::from_f64(0.01);
             if inside && touch.distance <= contact_distance && samples.iter().all(new) {
                 samples.push(along);
@@ -243,7 +254,11 @@ pub(super) fn marble_contact<S: Scalar>(
         radii,
         anchors,
     );
-    (contact.separation <= contact_distance).then_some(contact)
+    (contact.separation <= contact_distance).then(|| Contact {
+        feature: marbles.feature_at(first, along[0]) << 16 | marbles.feature_at(second, along[1]),
+        material: marbles.contact_material(first, second),
+        ..contact
+    })
 }
 
 /// Closest points of two segments, as positions along their axes; for parallel ones, both ends of

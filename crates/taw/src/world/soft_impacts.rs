@@ -285,18 +285,15 @@ impl<S: Scalar> World<S> {
 
     /// Returns true for an impact that the solver notes if it happens: one fast enough to bounce.
     fn bounces(&self, impact: &Impact<S>, dt: S) -> bool {
-        let material = |row: u32| self.marbles.material.get(row as usize).unwrap_or_default();
-        let of_wall = |row: u32| self.walls.material_of_row(row as usize);
-        let own = material(impact.b);
-        let of_both = if impact.on_wall {
-            of_wall(impact.a).map_or(own, |its| own.combined_with(its))
+        let material = if impact.on_wall {
+            self.wall_contact_material(impact.a, impact.b as usize)
         } else {
-            own.combined_with(material(impact.a))
+            self.marbles.contact_material(impact.a as usize, impact.b as usize)
         };
         let substep = dt / S::from_f64(f64::from(self.settings.model.substeps));
         let threshold =
             length(self.settings.gravity) * substep * S::from_f64(2.0 * (1.0 + ROUNDING));
-        of_both.restitution > S::zero() && impact.approach_speed > threshold
+        material.restitution > S::zero() && impact.approach_speed > threshold
     }
 
     fn took_place(&self, PredictedImpact { impact, velocity }: &PredictedImpact<S>, dt: S) -> bool {

@@ -12,6 +12,7 @@ use super::swept_walls::SweptWalls;
 use super::{MarbleId, World};
 use crate::Error;
 use crate::broad::CollisionLayers;
+use crate::contact::Contacts;
 use crate::error::within;
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::Rotation;
@@ -164,6 +165,7 @@ impl<S: Scalar> World<S> {
                 let filter = |row: u32| self.marbles.filter_of_row(row as usize);
                 list.contacts.wm.retain(|c| self.walls.collides(c.a, filter(c.b)));
             }
+            self.set_materials(&mut list.contacts);
             self.predict_impacts(list, &moving, dt);
         });
         let threads = self.swarm.threads();
@@ -172,6 +174,19 @@ impl<S: Scalar> World<S> {
         self.collect_predicted(&mut lists, moving, dt);
         lists.iter_mut().for_each(ChunkContacts::clear); // else a clone would copy them
         self.scratch.soft_step.lists = lists;
+    }
+
+    /// Gives contacts their materials, if any body has one of its own.
+    fn set_materials(&self, Contacts { wm, mm }: &mut Contacts<S>) {
+        if self.marbles.material.is_empty() && !self.walls.have_materials() {
+            return;
+        }
+        for c in wm {
+            c.material = self.wall_contact_material(c.a, c.b as usize);
+        }
+        for c in mm {
+            c.material = self.marbles.contact_material(c.a as usize, c.b as usize);
+        }
     }
 
     /// The third verb: moves marbles on in substeps, and solves their contacts.

@@ -8,7 +8,7 @@ use super::walls::Walls;
 use crate::math::{Scalar, Vec3, length};
 use crate::motion::Rotation;
 use crate::response::impulse::{Context, SolverSettings, SubstepStart};
-use crate::response::{CapsuleInertia, Material, Response, SolverBodies};
+use crate::response::{CapsuleInertia, Response, SolverBodies};
 
 /// Columns that a solver reads besides those of the marbles.
 #[derive(Clone, Debug, Default)]
@@ -39,24 +39,20 @@ impl<S: Scalar> SolverColumns<S> {
         marbles.rods(model.rotation, &mut self.capsules);
     }
 
-    /// Bodies, the material of each row, and how far its position follows a change of velocity.
+    /// Bodies, and how far the position of each row follows a change of velocity.
     pub fn bodies<'a>(
         &'a self,
         marbles: &'a mut Marbles<S>,
         model: Model,
-    ) -> (
-        SolverBodies<'a, S>,
-        impl Fn(usize) -> Material<S> + use<'a, S>,
-        impl Fn(usize) -> S + use<'a, S>,
-    ) {
-        let (mut bodies, material, integrator) =
+    ) -> (SolverBodies<'a, S>, impl Fn(usize) -> S + use<'a, S>) {
+        let (mut bodies, integrator) =
             marbles.columns(&self.inverse_mass, &self.held, &self.capsules);
         if model.rotation != Rotation::Dynamic {
             bodies.spin = &mut []; // cosmetic rotation does not affect contacts
         }
         let position_weight =
             move |row| integrator.get(row).unwrap_or(model.integrator).position_weight();
-        (bodies, move |row| material.get(row).unwrap_or_default(), position_weight)
+        (bodies, position_weight)
     }
 
     /// Bodies, and what else a solver of contacts reads.
@@ -67,23 +63,14 @@ impl<S: Scalar> SolverColumns<S> {
         continuous: &'a Continuous<S>,
         model: Model,
         settings: &'a SolverSettings<S>,
-    ) -> (
-        SolverBodies<'a, S>,
-        Context<
-            'a,
-            S,
-            Walls<S>,
-            impl Fn(usize) -> Material<S> + use<'a, S>,
-            impl Fn(usize) -> S + use<'a, S>,
-        >,
-    ) {
-        let (bodies, material, position_weight) = self.bodies(marbles, model);
+    ) -> (SolverBodies<'a, S>, Context<'a, S, Walls<S>, impl Fn(usize) -> S + use<'a, S>>) {
+        let (bodies, position_weight) = self.bodies(marbles, model);
         let start = SubstepStart {
             position: &[],
             velocity: &self.velocity_before,
             ccd_stops: &continuous.projections,
         };
-        (bodies, Context { walls, material, position_weight, start, settings })
+        (bodies, Context { walls, position_weight, start, settings })
     }
 }
 

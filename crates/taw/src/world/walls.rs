@@ -425,6 +425,11 @@ impl<S: Scalar> Walls<S> {
         self.material.get(row)
     }
 
+    /// Returns true if any wall has its own material.
+    pub(super) fn have_materials(&self) -> bool {
+        !self.material.is_empty()
+    }
+
     /// Number of insertions, removals and changes so far: unchanged as long as the walls are.
     #[must_use]
     pub fn version(&self) -> u64 {
@@ -458,9 +463,5 @@ impl<S: Scalar> response::Colliders<S> for Walls<S> {
 
     fn surface_velocity(&self, wall: usize, point: Point3<S>, normal: Vec3<S>) -> Vec3<S> {
         self.surface_velocity_of_row(wall, point, normal)
-    }
-
-    fn material(&self, wall: usize) -> Option<Material<S>> {
-        self.material.get(wall)
     }
 }

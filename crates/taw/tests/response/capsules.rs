@@ -370,3 +370,42 @@ fn long_capsules_that_cross_at_a_small_angle_touch() {
     world.step(1e-3).unwrap();
     assert!(!world.contacts.mm.is_empty());
 }
+
+#[test]
+fn a_capsule_that_slides_over_the_middle_of_another_one_keeps_its_feature() {
+    let quarter = std::f64::consts::FRAC_PI_2;
+    for z in [-0.4, -0.1, -1e-16, 0.0, 1e-16, 0.1, 0.4] {
+        let mut world = world(dynamic(Response::Impulse));
+        world.marbles.insert(capsule([0.0, 0.0, 0.0], quarter)).unwrap();
+        let rotation = AxisAngle::new(Vec3::unit_x(), quarter).unwrap().into();
+        world.marbles.insert(Marble { rotation, ..capsule([0.0, 0.499, z], 0.0) }).unwrap();
+        world.generate_contacts();
+        assert_eq!(world.contacts.mm[0].feature, 3 << 16 | 3, "side on side, at {z}");
+    }
+}
+
+#[test]
+fn features_tell_the_ends_and_the_side_of_a_capsule_from_each_other() {
+    let mut world = world(dynamic(Response::Impulse));
+    world.walls.insert(Plane::new(Vec3::unit_y(), 0.0).unwrap()).unwrap();
+    let lies = std::f64::consts::FRAC_PI_2;
+    world.marbles.insert(capsule([0.0, 0.249, 0.0], lies)).unwrap();
+    for (x, z) in [(-0.7, 0.0), (0.01, 0.499), (0.7, 0.0)] {
+        world.marbles.insert(Marble::new(Point3::new(x, 0.249, z), 0.25)).unwrap();
+    }
+    // Side by side with the first one, half of it beyond an end.
+    world.marbles.insert(capsule([0.5, 0.249, -0.499], lies)).unwrap();
+    world.generate_contacts();
+    let Contacts { wm, mm } = &mut world.contacts;
+    wm.sort_by_key(|contact| (contact.b, contact.feature));
+    let on_floor: Vec<_> = wm.iter().map(|contact| (contact.b, contact.feature)).collect();
+    assert_eq!(on_floor, [(0, 1), (0, 2), (1, 0), (2, 0), (3, 0), (4, 1), (4, 2)]);
+    mm.retain(|contact| contact.a == 0);
+    mm.sort_by_key(|contact| (contact.b, contact.feature));
+    let by_capsule: Vec<_> = mm.iter().map(|contact| (contact.b, contact.feature)).collect();
+    // Its axis points to −x, so that its second end is on the left.
+    let (first, second, side) = (1, 2, 3);
+    let beside = [(4, first << 16 | side), (4, side << 16 | second)];
+    let balls = [(1, second << 16), (2, side << 16), (3, first << 16)];
+    assert_eq!(by_capsule, [&balls[..], &beside].concat());
+}

@@ -5,8 +5,8 @@ use std::collections::HashSet;
 
 use crate::draw::Draw;
 use cgmath::{EuclideanSpace, InnerSpace, MetricSpace};
+use taw::contact::{ContactMaterial, Elasticity};
 use taw::prelude::*;
-use taw::response::ContactLaw;
 use taw::swarm::{SimdLevel, SwarmModel};
 
 const DT: f64 = 1.0 / 64.0;
@@ -173,6 +173,170 @@ fn a_normal_edited_between_the_verbs_is_the_one_that_solves() {
         substep(&mut world, |world| world.contacts.wm[0].normal = ramp);
         let velocity = world.marbles.get(id).unwrap().velocity;
         assert!(velocity.x > 0.01, "{response:?}: {velocity:?}");
+    }
+}
+
+/// Velocity and spin of a marble that comes down at a slant, after a substep in which its contact, or that
+/// with another marble, is edited; and of another one that comes down far from it.
+fn edited_bounce(
+    response: Response,
+    on_marble: bool,
+    edit: impl Fn(&mut ContactMaterial<f64>),
+) -> [[Vec3<f64>; 2]; 2] {
+    let mut world = world::<f64>(response);
+    let ids = [0.0, 20.0].map(|x| {
+        let height = if on_marble {
+            let below = Marble { mass: Mass::Infinite, ..ball([x, 0.5, 0.0], 0.5) };
+            world.marbles.insert(below).unwrap();
+            1.0
+        } else {
+            0.0
+        };
+        let mut marble = ball([x, height + 0.499, 0.0], 0.5);
+        marble.velocity = Vec3::new(1.0, -2.0, 0.0);
+        let material = Material { rolling_resistance: 0.1, ..Material::default() };
+        marble.material = Some(Material { spinning_resistance: 0.1, ..material });
+        world.marbles.insert(marble).unwrap()
+    });
+    let row = world.marbles.row(ids[0]).unwrap() as u32;
+    // By springs, a bounce takes several.
+    for _ in 0..20 {
+        substep(&mut world, |world| {
+            let Contacts { wm, mm } = &mut world.contacts;
+            for contact in wm.iter_mut().chain(mm).filter(|contact| contact.b == row) {
+                edit(&mut contact.material);
+            }
+        });
+    }
+    ids.map(|id| world.marbles.get(id).unwrap()).map(|it| [it.velocity, it.angular_velocity])
+}
+
+#[test]
+fn a_contact_edited_to_ice_has_no_friction() {
+    for response in SOLVED {
+        for on_marble in [false, true] {
+            let [[velocity, spin], rough] =
+                edited_bounce(response, on_marble, |material| material.friction = 0.0);
+            let case = format!("{response:?}, {on_marble}");
+            assert!(spin.magnitude() < 1e-9, "{case}: {spin:?}");
+            assert!(rough[1].magnitude() > 0.1, "the other one turns by friction, {case}");
+            assert!(on_marble || (velocity.x - 1.0).abs() < 1e-9, "{case}: {velocity:?}");
+        }
+    }
+}
+
+#[test]
+fn a_contact_edited_to_clay_does_not_bounce() {
+    for response in SOLVED {
+        let rebound = |restitution: f64| {
+            let mut world = world::<f64>(response);
+            let mut marble = ball([0.0, 0.499, 0.0], 0.5);
+            marble.velocity = Vec3::new(0.0, -2.0, 0.0);
+            let id = world.marbles.insert(marble).unwrap();
+            let fastest = (0..20).map(|_| {
+                substep(&mut world, |world| {
+                    world.contacts.wm.iter_mut().for_each(|c| c.material.restitution = restitution);
+                });
+                world.marbles.get(id).unwrap().velocity.y
+            });
+            fastest.fold(f64::NEG_INFINITY, f64::max)
+        };
+        let [clay, rubber] = [0.0, 1.0].map(rebound);
+        assert!(clay < 0.1 && rubber > 1.5, "{response:?}: {clay} and {rubber} m/s");
+    }
+}
+
+#[test]
+fn a_contact_edited_to_a_compliance_is_as_soft_as_a_marble_that_has_it() {
+    let elasticity = Elasticity { youngs_modulus: 1e6, poissons_ratio: 0.3 };
+    let soft = Material { elasticity, ..Material::default() };
+    let fall = |material: Option<Material<f64>>, edit: &dyn Fn(&mut Contact<f64>)| {
+        let mut world = world::<f64>(Response::Penalty(ContactLaw::HertzMindlin));
+        let velocity = Vec3::new(1.0, -1.0, 0.0);
+        let marble = Marble { velocity, material, ..ball([0.0, 0.5, 0.0], 0.5) };
+        let id = world.marbles.insert(marble).unwrap();
+        for _ in 0..100 {
+            world.begin_step();
+            world.integrate(1e-3).unwrap();
+            world.generate_contacts();
+            world.contacts.wm.iter_mut().for_each(edit);
+            world.restitute(1e-3).unwrap();
+            world.end_step();
+        }
+        world.marbles.get(id).unwrap().position
+    };
+    let compliance = soft.on_wall(None).compliance;
+    let edited = fall(None, &|contact| contact.material.compliance = compliance);
+    assert_eq!(edited, fall(Some(soft), &|_| ()));
+    assert_ne!(edited, fall(None, &|_| ()));
+}
+
+/// Each number of a material, to be edited.
+const NUMBERS: [fn(&mut ContactMaterial<f64>) -> &mut f64; 7] = [
+    |material| &mut material.restitution,
+    |material| &mut material.friction,
+    |material| &mut material.tangential_restitution,
+    |material| &mut material.rolling_resistance,
+    |material| &mut material.spinning_resistance,
+    |material| &mut material.compliance.normal,
+    |material| &mut material.compliance.tangent,
+];
+
+#[test]
+fn an_edited_number_out_of_its_range_counts_as_the_nearest_one_in_it() {
+    const ENDS: [[f64; 2]; 7] = [
+        [0.0, 1.0],
+        [0.0, f64::MAX],
+        [-1.0, 1.0],
+        [0.0, f64::MAX],
+        [0.0, f64::MAX],
+        [f64::MIN_POSITIVE, f64::MAX],
+        [f64::MIN_POSITIVE, f64::MAX],
+    ];
+    for response in SOLVED {
+        let alone = edited_bounce(response, false, |_| ())[1];
+        for (number, [low, high]) in NUMBERS.into_iter().zip(ENDS) {
+            let with = |x: f64| edited_bounce(response, false, |material| *number(material) = x);
+            let ([lowest, _], [highest, _]) = (with(low), with(high));
+            for (nonsense, nearest) in [
+                (f64::NAN, lowest),
+                (f64::NEG_INFINITY, lowest),
+                (-7.0, lowest),
+                (f64::INFINITY, highest),
+            ] {
+                let [edited, other] = with(nonsense);
+                assert_eq!(edited, nearest, "{response:?}: {nonsense} as in [{low}, {high}]");
+                assert_eq!(other, alone, "{response:?}: {nonsense}");
+            }
+        }
+    }
+}
+
+#[test]
+fn listed_materials_are_those_of_both_bodies() {
+    for response in [Response::SoftStep, Response::EventDriven].into_iter().chain(LISTED) {
+        let mut world = world::<f64>(response);
+        let of = |friction: f64| Material { friction, ..Material::default() };
+        for (x, friction) in [(0.0, None), (0.95, Some(0.9))] {
+            let mut marble = ball([x, 0.5, 0.0], 0.5);
+            marble.material = friction.map(of);
+            world.marbles.insert(marble).unwrap();
+        }
+        let list = |world: &mut World<f64>| {
+            world.begin_step();
+            world.integrate(DT).unwrap();
+            world.generate_contacts();
+            let Contacts { wm, mm } = &mut world.contacts;
+            wm.sort_by_key(|contact| contact.b);
+            wm.iter().chain(&*mm).map(|contact| contact.material).collect::<Vec<_>>()
+        };
+        let (plain, own) = (Material::default(), of(0.9));
+        let pair = own.combined_with(plain);
+        assert_eq!(list(&mut world.clone()), [plain.on_wall(None), own.on_wall(None), pair]);
+        let (floor, of_floor) = (world.walls.id(0).unwrap(), of(0.1));
+        world.walls.set_material(floor, Some(of_floor)).unwrap();
+        let on_floor = [plain, own].map(|of| of.on_wall(Some(of_floor)));
+        assert_eq!(list(&mut world), [on_floor[0], on_floor[1], pair], "{response:?}");
     }
 }
 

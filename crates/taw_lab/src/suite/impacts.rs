@@ -282,7 +282,7 @@ fn fuzz(_: &mut Stopwatch) -> f64 {
             ..Material::default()
         };
         let mobility = InverseEffectiveMass::of_balls(inverse[0], inverse[1], BallRotation::Free);
-        let j = impact(normal, closing, mobility, material).map(f64::from);
+        let j = impact(normal, closing, mobility, material.on_wall(None)).map(f64::from);
         // In f64, with the f32 numbers that it was given.
         let (n, c) = (normal.map(f64::from), closing.map(f64::from));
         let approach = -c.dot(n);

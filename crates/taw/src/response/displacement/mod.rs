@@ -9,7 +9,7 @@ mod tests;
 use cgmath::{InnerSpace, Zero};
 
 use super::impulse::{BodyA, CachedImpulse, Context};
-use super::{Colliders, ContactKey, KeyedByContact, Material, SolverBodies};
+use super::{Colliders, ContactKey, KeyedByContact, SolverBodies};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Scalar, UnionFind, Vec3, is_finite, is_finite_point};
 
@@ -77,7 +77,7 @@ struct ApproachConstraint<S> {
 pub(crate) fn solve_displacement<S: Scalar>(
     marbles: &mut SolverBodies<S>,
     contacts: &mut Contacts<S>,
-    context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     scratch: &mut Scratch<S>,
     cache: &mut Vec<CachedImpulse<S>>,
     quarantined: &mut Vec<u32>,
@@ -131,7 +131,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &self,
         a: BodyA,
         contact: &Contact<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> Option<ApproachConstraint<S>> {
         let Contact { normal, separation, arms, along: axis_offset, .. } = *contact;
         if !separation.is_finite() {
@@ -176,7 +176,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     fn slop(
         &self,
         c: &ApproachConstraint<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> S {
         if context.follow_time(c.a, c.b) > S::zero() {
             return S::zero();
@@ -252,7 +252,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     fn follow_velocity_changes(
         &mut self,
         initial_velocity: &[Vec3<S>],
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
         quarantined: &mut Vec<u32>,
     ) {
         for (row, initial_velocity) in initial_velocity.iter().enumerate() {
@@ -272,7 +272,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     fn separate(
         &mut self,
         c: &ApproachConstraint<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> bool {
         let ApproachConstraint { a, b, axis_offset, .. } = *c;
         let contact = self.normal_and_separation(self.position, a, b, axis_offset, context.walls);

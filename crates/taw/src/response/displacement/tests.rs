@@ -13,10 +13,6 @@ impl<S: Scalar> Colliders<S> for Vec<Plane<S>> {
     fn surface_velocity(&self, _: usize, _: Point3<S>, _: Vec3<S>) -> Vec3<S> {
         Vec3::zero()
     }
-
-    fn material(&self, _: usize) -> Option<Material<S>> {
-        None
-    }
 }
 
 /// Solves one substep of `dt` seconds over all contacts among `spheres` (center, radius, velocity)
@@ -58,7 +54,6 @@ fn restituted<S: Scalar>(
     };
     let context = Context {
         walls: &floor,
-        material: |_| Material::default(),
         position_weight: |_| S::one(),
         start: SubstepStart { position: &[], velocity: &[], ccd_stops: &[] },
         settings: &settings,

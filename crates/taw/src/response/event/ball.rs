@@ -6,6 +6,7 @@ use super::cells::Cell;
 use super::curved_support::BallState;
 use super::{EventSettings, MAX_FREEZES, SIMULTANEOUS};
 use crate::broad::CollisionLayers;
+use crate::contact::ContactMaterial;
 use crate::math::{Point3, Vec3};
 use crate::response::{BallRotation, Material};
 
@@ -190,7 +191,7 @@ impl Ball {
     }
 
     /// Records a collision at the present time.
-    pub(super) fn collide(&mut self, material: Material<f64>, settings: &EventSettings) {
+    pub(super) fn collide(&mut self, material: ContactMaterial<f64>, settings: &EventSettings) {
         let is_simultaneous =
             self.trajectory.start - self.trajectory.last_collision <= SIMULTANEOUS * settings.dt;
         self.trajectory.dissipation_count +=

@@ -2,13 +2,13 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::wall::MovingWalls;
+use super::wall::{MovingWalls, Wall};
 use super::{Ball, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::broad::Period;
 use crate::contact::Contacts;
 use crate::math::{Point3, UnionFind, Vec3};
 use crate::response::impulse::{self, CachedImpulse, Context, SubstepStart, solve_contacts};
-use crate::response::{BallRotation, EnergyLedger, Material, SolverBodies};
+use crate::response::{BallRotation, EnergyLedger, SolverBodies};
 
 /// Convergence tolerance over the speed that gravity adds in a substep: a hundredth of the rest
 /// threshold.
@@ -35,7 +35,6 @@ pub(super) struct Cluster {
     placed: Contacts<f64>,
     /// Positions at the start of the substep.
     pub start: Vec<Point3<f64>>,
-    pub material: Vec<Material<f64>>,
     /// Connected components.
     pub sets: UnionFind,
     pub scratch: impulse::Scratch<f64>,
@@ -69,9 +68,22 @@ impl ClusterBodies {
 }
 
 impl Cluster {
-    /// Gathers the balls of some contacts, and renumbers the contacts to local indices.
-    pub fn gather(&mut self, contacts: &mut Contacts<f64>, balls: &[Ball], period: Period<f64>) {
+    /// Gathers the balls of some contacts, gives these their materials, and renumbers them to local
+    /// indices.
+    pub fn gather(
+        &mut self,
+        contacts: &mut Contacts<f64>,
+        (balls, walls): (&[Ball], &[Wall]),
+        period: Period<f64>,
+    ) {
         self.bodies.period = period;
+        let material = |row: u32| balls[row as usize].material;
+        for c in &mut contacts.wm {
+            c.material = walls[c.a as usize].combined_with(material(c.b));
+        }
+        for c in &mut contacts.mm {
+            c.material = material(c.b).combined_with(material(c.a));
+        }
         self.rows.clear();
         self.rows.extend(contacts.wm.iter().map(|c| c.b));
         self.rows.extend(contacts.mm.iter().flat_map(|c| [c.a, c.b]));
@@ -99,7 +111,6 @@ impl Cluster {
             &mut bodies.inverse_mass,
             each().map(|b| if b.is_frozen() { 0.0 } else { b.inverse_mass }),
         );
-        fill(&mut self.material, each().map(|b| b.material));
         fill(&mut bodies.rotation_locked, each().map(|b| b.rotation == BallRotation::Locked));
     }
 
@@ -153,7 +164,6 @@ impl Cluster {
         let mut quarantined = Vec::new(); // non-finite balls are quarantined after the substep
         let context = Context {
             walls,
-            material: |local: usize| self.material[local],
             position_weight: |_| 0.5,
             start: SubstepStart { position: &self.start, velocity: &[], ccd_stops: &[] },
             settings: &settings_,

@@ -7,8 +7,9 @@ use cgmath::InnerSpace;
 use super::resting_cluster::{PressedBy, RestingCluster};
 use super::{Event, EventDriven, EventKind, EventSettings, Impact, MAX_DISSIPATIONS, MAX_FREEZES};
 use crate::constraint::{ContactImpulse, tipped};
+use crate::contact::ContactMaterial;
 use crate::math::{Vec3, normalize_and_length};
-use crate::response::{ImpulseSample, InverseEffectiveMass, Material, impact};
+use crate::response::{ImpulseSample, InverseEffectiveMass, impact};
 
 /// Scratch buffers for collisions at the same time.
 #[derive(Clone, Debug, Default)]
@@ -27,7 +28,7 @@ pub(super) struct Collision {
     pub b: usize,
     pub impact: Impact<f64>,
     pub inverse_effective_mass: InverseEffectiveMass<f64>,
-    pub material: Material<f64>,
+    pub material: ContactMaterial<f64>,
     /// Relaxation factor, beside the other collisions of the two balls.
     pub relaxation: f64,
     /// Accumulated impulse, in N s.

@@ -14,6 +14,7 @@ use cgmath::{InnerSpace, Zero};
 use super::flat_support::Regime;
 use super::support_candidates::SupportCandidates;
 use super::{Ball, Wall};
+use crate::contact::ContactMaterial;
 use crate::math::{Point3, Vec3, normalize_and_length};
 use crate::response::{BallRotation, Material};
 use crate::shape::PointProjection;
@@ -104,7 +105,7 @@ pub(super) struct SupportContact {
     pub normal_rate: Vec3<f64>,
     /// Rate of change of the surface velocity at the contact point, in m/s².
     surface_acceleration: Vec3<f64>,
-    material: Material<f64>,
+    material: ContactMaterial<f64>,
 }
 
 /// Integration step.

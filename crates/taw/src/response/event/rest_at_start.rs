@@ -71,7 +71,7 @@ impl EventDriven {
                 continue;
             }
             let mut contacts = Contacts { wm: walls.to_vec(), ..Contacts::default() };
-            self.cluster.gather(&mut contacts, &self.balls, self.period);
+            self.cluster.gather(&mut contacts, (&self.balls, &self.walls), self.period);
             let max_acceleration = self.balls[row as usize].external_acceleration.magnitude();
             self.solve_inelastic_impact(&mut contacts, (0.0, false), max_acceleration, settings);
             self.end_remaining_approach(
@@ -126,7 +126,7 @@ impl EventDriven {
             }
         }
         for mut contacts in clusters.into_values().filter(|contacts| !contacts.mm.is_empty()) {
-            self.cluster.gather(&mut contacts, &self.balls, self.period);
+            self.cluster.gather(&mut contacts, (&self.balls, &self.walls), self.period);
             let max_acceleration = self.cluster.max_acceleration(&self.balls);
             self.end_approach(&mut contacts, 0.0, max_acceleration, None, settings);
             self.take_cluster_velocities();

@@ -47,7 +47,7 @@ impl EventDriven {
             .map(|row| self.balls[*row].external_acceleration.magnitude())
             .fold(0.0, f64::max);
         // First the collision.
-        self.cluster.gather(&mut contacts, &self.balls, self.period);
+        self.cluster.gather(&mut contacts, (&self.balls, &self.walls), self.period);
         let remaining = settings.dt - now;
         let ends_all = max_separation_speed == f64::INFINITY;
         let tolerance = ends_all.then(|| self.cluster.tolerance(max_acceleration, settings));
@@ -89,8 +89,8 @@ impl EventDriven {
         max_acceleration: f64,
         settings: &EventSettings,
     ) {
-        for material in &mut self.cluster.material {
-            (material.restitution, material.tangential_restitution) = (0.0, 0.0);
+        for c in contacts.wm.iter_mut().chain(&mut contacts.mm) {
+            (c.material.restitution, c.material.tangential_restitution) = (0.0, 0.0);
         }
         let walls =
             MovingWalls { walls: &self.walls, start: now, end: now, at_rest: walls_at_rest };
@@ -229,7 +229,7 @@ impl EventDriven {
         settings: &EventSettings,
         impulse_cache: &mut Vec<CachedImpulse<f64>>,
     ) {
-        self.cluster.gather(contacts, &self.balls, self.period);
+        self.cluster.gather(contacts, (&self.balls, &self.walls), self.period);
         let end = now + self.segment(contacts, now, settings.dt - now);
         let remaining = end - now;
         let max_acceleration = self.move_cluster_freely(remaining);

@@ -5,8 +5,9 @@ use cgmath::{InnerSpace, Zero};
 use super::EventDriven;
 use super::collide::Collision;
 use crate::constraint::{ContactImpulse, FrictionCone};
+use crate::contact::ContactMaterial;
 use crate::math::Vec3;
-use crate::response::{BallRotation, Material};
+use crate::response::BallRotation;
 
 /// Maximum number of iterations.
 const MAX_ROUNDS: u32 = 1000;
@@ -129,7 +130,8 @@ impl EventDriven {
                 collisions.iter_mut().zip(relative_velocity).zip(initial_velocity)
             {
                 let normal = c.impact.normal;
-                let Material { restitution, friction, tangential_restitution, .. } = c.material;
+                let ContactMaterial { restitution, friction, tangential_restitution, .. } =
+                    c.material;
                 let split = |velocity| ContactImpulse::split(velocity, normal);
                 let (initial, now) = (split(*initial_velocity), split(relative_velocity));
                 let target = ContactImpulse {

@@ -6,6 +6,7 @@ use std::sync::Arc;
 use cgmath::{InnerSpace, One, Rotation as _, Zero};
 
 use crate::broad::CollisionLayers;
+use crate::contact::ContactMaterial;
 use crate::math::{Point3, Quat, Vec3, normalize_and_length};
 use crate::motion::{WallMotion, integrate_rotation};
 use crate::response::{Colliders, Material};
@@ -150,8 +151,8 @@ impl WallCollider {
 
 impl Wall {
     /// Combined material of this wall and a ball.
-    pub fn combined_with(&self, ball: Material<f64>) -> Material<f64> {
-        self.material.map_or(ball, |its| ball.combined_with(its))
+    pub fn combined_with(&self, ball: Material<f64>) -> ContactMaterial<f64> {
+        ball.on_wall(self.material)
     }
 
     /// Motion of a moving wall, and the time until it reaches its pose, in seconds.
@@ -256,9 +257,5 @@ impl Colliders<f64> for MovingWalls<'_> {
             return Vec3::zero();
         }
         self.walls[wall].surface_velocity(normal, point, self.end)
-    }
-
-    fn material(&self, wall: usize) -> Option<Material<f64>> {
-        self.walls[wall].material
     }
 }

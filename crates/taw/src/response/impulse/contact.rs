@@ -5,10 +5,10 @@ use cgmath::{InnerSpace, Zero};
 
 use super::{BodyA, Colliders, Constraint, Context, RollingConstraint};
 use crate::constraint::tipped;
-use crate::contact::{Contact, Contacts};
+use crate::contact::{Contact, ContactMaterial, Contacts};
 use crate::math::{Point3, Scalar, Vec3, cast_vector, is_finite, normal_and_distance};
 use crate::response::bodies::relative_velocity;
-use crate::response::{BallRotation, InverseEffectiveMass, Material, SolverBodies};
+use crate::response::{BallRotation, InverseEffectiveMass, SolverBodies};
 
 impl<S: Scalar> SolverBodies<'_, S> {
     /// Normal of a contact, from first to second, and separation of the surfaces, in metres
@@ -39,16 +39,15 @@ impl<S: Scalar> SolverBodies<'_, S> {
 
     /// Normal by which two balls meet that overlap, or that continuous detection stopped: it
     /// [leans](tipped) where one falls exactly onto the top of the other.
-    pub(in crate::response) fn impact_normal<W, M, F>(
+    pub(in crate::response) fn impact_normal<W, F>(
         &self,
         a: BodyA,
         b: usize,
         (normal, separation): (Vec3<S>, S),
-        context: &Context<S, W, M, F>,
+        context: &Context<S, W, F>,
     ) -> Vec3<S>
     where
         W: Colliders<S>,
-        M: Fn(usize) -> Material<S>,
         F: Fn(usize) -> S,
     {
         let BodyA::Marble(first) = a else { return normal };
@@ -166,9 +165,9 @@ impl<S: Scalar> SolverBodies<'_, S> {
         a: BodyA,
         b: usize,
         inverse_effective_mass: InverseEffectiveMass<S>,
-        material: Material<S>,
+        material: ContactMaterial<S>,
     ) -> Option<RollingConstraint<S>> {
-        let Material { rolling_resistance, spinning_resistance, .. } = material;
+        let ContactMaterial { rolling_resistance, spinning_resistance, .. } = material;
         let is_zero = rolling_resistance == S::zero() && spinning_resistance == S::zero();
         let first = a.marble();
         let inverse_inertias =

@@ -19,7 +19,7 @@ use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Mat3, Point3, Scalar, Vec3, cast_vector};
 use crate::response::{
-    ContactKey, EnergyLedger, ImpulseSample, InverseEffectiveMass, Material, SolverBodies,
+    ContactKey, EnergyLedger, ImpulseSample, InverseEffectiveMass, SolverBodies,
 };
 pub(crate) use cache::CachedImpulse;
 use cache::store_impulses;
@@ -31,10 +31,8 @@ use solve::iterate;
 pub(crate) use velocities::{VelocityContact, solve_velocities};
 
 /// Solver input besides bodies and contacts.
-pub(crate) struct Context<'a, S, W, M, F> {
+pub(crate) struct Context<'a, S, W, F> {
     pub walls: &'a W,
-    /// Material of a marble, by row.
-    pub material: M,
     /// Position weight of a velocity change: fraction of the substep for which the position of a
     /// row follows it.
     pub position_weight: F,
@@ -230,6 +228,7 @@ pub(super) struct Constraint<S> {
     surface_velocity: Vec3<S>,
     inverse_effective_mass: InverseEffectiveMass<S>,
     restitution: S,
+    tangential_restitution: S,
     friction: S,
     /// Limits of the impulse, in m/s.
     cone: FrictionCone<S>,
@@ -295,7 +294,7 @@ impl<S: Scalar> Constraint<S> {
 pub(crate) fn solve_contacts<S: Scalar>(
     marbles: &mut SolverBodies<S>,
     contacts: &mut Contacts<S>,
-    context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     scratch: &mut Scratch<S>,
     cache: &mut Vec<CachedImpulse<S>>,
     quarantined: &mut Vec<u32>,
@@ -330,7 +329,7 @@ pub(crate) fn solve_contacts<S: Scalar>(
     marbles.quarantine_non_finite(constraints, quarantined);
 }
 
-/// Wall geometry and materials, by row, as the solver reads them.
+/// Wall geometry, by row, as the solver reads it.
 pub(crate) trait Colliders<S> {
     /// Normal of a sub-shape at its point nearest to this one, and signed distance to it.
     fn normal_and_distance(&self, wall: usize, part: u32, point: Point3<S>) -> (Vec3<S>, S);
@@ -346,8 +345,6 @@ pub(crate) trait Colliders<S> {
     /// Velocity of the surface at a point with this normal, in m/s; tangential if the wall stays where
     /// it is, as a conveyor belt does.
     fn surface_velocity(&self, wall: usize, point: Point3<S>, normal: Vec3<S>) -> Vec3<S>;
-    /// Material of the wall, if it has its own.
-    fn material(&self, wall: usize) -> Option<Material<S>>;
 }
 
 /// Walls at the start of the substep.
@@ -360,9 +357,5 @@ impl<S, W: Colliders<S>> Colliders<S> for WallsAtStart<'_, W> {
 
     fn surface_velocity(&self, wall: usize, point: Point3<S>, normal: Vec3<S>) -> Vec3<S> {
         self.0.surface_velocity(wall, point, normal)
-    }
-
-    fn material(&self, wall: usize) -> Option<Material<S>> {
-        self.0.material(wall)
     }
 }

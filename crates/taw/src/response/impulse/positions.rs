@@ -2,7 +2,7 @@
 
 use super::{Colliders, Constraint, Context};
 use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
-use crate::response::{Material, SolverBodies};
+use crate::response::SolverBodies;
 
 /// Iterations of the position solver over penetrating contacts.
 const POSITION_ITERATIONS: u32 = 3;
@@ -14,7 +14,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &mut self,
         initial_velocity: &[Vec3<S>],
         constraints: &[Constraint<S>],
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) {
         let follow_time = |row: usize| context.follow_time_of(row);
         for (row, initial_velocity) in initial_velocity.iter().enumerate() {
@@ -43,7 +43,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     pub(super) fn solve_positions(
         &mut self,
         constraints: &[Constraint<S>],
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
         separations: &mut Vec<S>,
         uncorrected: &mut Vec<Point3<S>>,
     ) {
@@ -67,7 +67,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     fn min_separation(
         &self,
         c: &Constraint<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> S {
         let contact =
             self.normal_and_separation(self.position, c.a, c.b, c.axis_offset, context.walls);
@@ -81,7 +81,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &mut self,
         c: &Constraint<S>,
         kept: S,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) {
         let contact =
             self.normal_and_separation(self.position, c.a, c.b, c.axis_offset, context.walls);
@@ -96,7 +96,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     fn allowed_penetration(
         &self,
         c: &Constraint<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> S {
         let settings = context.settings;
         let min_radius =
@@ -107,7 +107,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     fn solve_position(
         &mut self,
         c: &Constraint<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
         uncorrected: &[Point3<S>],
     ) {
         let contact =

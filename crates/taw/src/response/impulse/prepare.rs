@@ -7,13 +7,13 @@ use super::{BodyA, Colliders, Constraint, Context, WallsAtStart};
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Mat3, Scalar, Vec3, normalize_and_length};
-use crate::response::{Material, SolverBodies};
+use crate::response::SolverBodies;
 
 /// Prepares a constraint per contact, walls first, and assigns islands.
 pub(super) fn prepare<S: Scalar>(
     marbles: &SolverBodies<S>,
     contacts: &Contacts<S>,
-    context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+    context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     constraints: &mut Vec<Constraint<S>>,
     islands: &mut Islands<S>,
 ) {
@@ -50,13 +50,13 @@ impl<S: Scalar> SolverBodies<'_, S> {
         index: usize,
         a: BodyA,
         contact: &Contact<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> Option<Constraint<S>> {
         let (b, axis_offset) = (contact.b as usize, contact.along);
         let (normal, separation) = self.contact_geometry(a, contact, context)?;
         let normal = self.impact_normal(a, b, (normal, separation), context);
         let arms = self.arms(a, b, axis_offset, normal);
-        let material = context.material_of(a, b);
+        let material = contact.material.clamped();
         let surface_velocity = self.surface_velocity(a, b, (arms, normal), context.walls);
         let inverse_effective_mass = self.pair_inverse_effective_mass(a, b, arms, normal);
         let relative_velocity = self.relative_velocity(a, b, arms, normal, surface_velocity);
@@ -87,6 +87,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             surface_velocity,
             inverse_effective_mass,
             restitution: material.restitution,
+            tangential_restitution: material.tangential_restitution,
             friction: material.friction,
             cone: FrictionCone::new(material.friction),
             max_normal_impulse: S::infinity(),
@@ -113,7 +114,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &self,
         c: &mut Constraint<S>,
         separation: S,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) {
         // A body stopped by continuous detection is in contact, whatever rounding says.
         let ccd_stopped =
@@ -137,7 +138,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &self,
         a: BodyA,
         contact: &Contact<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> Option<(Vec3<S>, S)> {
         let Contact { normal, separation, along: axis_offset, .. } = *contact;
         let b = contact.b as usize;
@@ -168,7 +169,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         b: usize,
         axis_offset: [S; 2],
         normal: Vec3<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> Option<(Vec3<S>, S)> {
         let a = a.marble()?;
         let dt = context.settings.dt;
@@ -209,7 +210,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &self,
         c: &Constraint<S>,
         separation: S,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> S {
         let normal_acceleration = self.relative_acceleration(c, context).dot(c.normal);
         // Under constant acceleration positions lie on a parabola, with the integrator's velocity
@@ -231,15 +232,14 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &self,
         c: &mut Constraint<S>,
         island: &Island<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) {
         let time_since_impact = (!island.has_resting_contact).then_some(island.time_since_impact);
         let velocity_since_impact = self.velocity_since(c, time_since_impact, context);
         let speed = c.restitution * c.approach_speed(velocity_since_impact);
         let velocity_at_impact = c.initial_relative_velocity - velocity_since_impact;
         let tangent_velocity = velocity_at_impact - c.normal * velocity_at_impact.dot(c.normal);
-        let target_velocity = velocity_since_impact
-            - tangent_velocity * context.material_of(c.a, c.b).tangential_restitution;
+        let target_velocity = velocity_since_impact - tangent_velocity * c.tangential_restitution;
         c.time_since_impact = c.time_since_impact.and(time_since_impact);
         c.target_normal_velocity = speed + target_velocity.dot(c.normal);
         (c.target_tangent_velocity, c.velocity_since_impact) =
@@ -255,7 +255,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
         &self,
         c: &Constraint<S>,
         time_since_impact: Option<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> Vec3<S> {
         let dt = context.settings.dt;
         let of = |row: usize| {
@@ -273,7 +273,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     fn relative_acceleration(
         &self,
         c: &Constraint<S>,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> Vec3<S> {
         let first = c.a.marble().map_or_else(Vec3::zero, |a| self.acceleration(a, context));
         self.acceleration(c.b, context) - first
@@ -283,7 +283,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     fn acceleration(
         &self,
         row: usize,
-        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> Material<S>, impl Fn(usize) -> S>,
+        context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
     ) -> Vec3<S> {
         let change = context.start.velocity.get(row).map(|before| self.velocity[row] - before);
         change
@@ -299,23 +299,12 @@ impl<S: Scalar> Constraint<S> {
     }
 }
 
-impl<S, W, M, F> Context<'_, S, W, M, F>
+impl<S, W, F> Context<'_, S, W, F>
 where
     S: Scalar,
     W: Colliders<S>,
-    M: Fn(usize) -> Material<S>,
     F: Fn(usize) -> S,
 {
-    fn material_of(&self, a: BodyA, b: usize) -> Material<S> {
-        let own = (self.material)(b);
-        match a {
-            BodyA::Wall(wall, _) => {
-                self.walls.material(wall as usize).map_or(own, |its| own.combined_with(its))
-            }
-            BodyA::Marble(a) => own.combined_with((self.material)(a as usize)),
-        }
-    }
-
     /// Tells if continuous collision detection stopped a row within the substep.
     #[inline]
     pub(in crate::response) fn is_ccd_stopped(&self, row: usize) -> bool {

@@ -85,6 +85,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
             surface_velocity,
             inverse_effective_mass,
             restitution: S::zero(),
+            tangential_restitution: S::zero(),
             friction,
             cone: FrictionCone::new(friction),
             max_normal_impulse: S::infinity(),

@@ -3,13 +3,11 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::{CORE, CORE_ROUNDING, PenaltySettings, SpringHistory};
-use crate::contact::Contact;
+use crate::contact::{Contact, ContactMaterial};
 use crate::math::{Scalar, Vec3, cast_vector, is_finite, length};
 use crate::response::impulse::BodyA;
-use crate::response::material::Compliance;
 use crate::response::{
-    Colliders, ContactKey, EnergyLedger, ImpulseSample, InverseEffectiveMass, Material,
-    SolverBodies,
+    Colliders, ContactKey, EnergyLedger, ImpulseSample, InverseEffectiveMass, SolverBodies,
 };
 
 /// Penalty contact: bodies, geometry and relative motion.
@@ -36,16 +34,13 @@ pub(super) struct PenaltyContact<S> {
     pub has_capsule: bool,
     /// Sum of the curvatures, in 1/m.
     pub curvature: S,
-    pub material: Material<S>,
-    /// Sum of the compliances.
-    pub compliance: Compliance<S>,
+    pub material: ContactMaterial<S>,
 }
 
-impl<S, W, M, F> PenaltySettings<'_, S, W, M, F>
+impl<S, W, F> PenaltySettings<'_, S, W, F>
 where
     S: Scalar,
     W: Colliders<S>,
-    M: Fn(usize) -> Material<S>,
     F: Fn(usize) -> S,
 {
     /// State of a contact; none without penetration, or if nothing can move.
@@ -92,7 +87,6 @@ where
         };
         let surface_velocity =
             marbles.surface_velocity(body_a, b, (arms, normal), self.context.walls);
-        let (material, compliance) = self.surfaces(a, contact);
         let core = marbles.radius[b] * S::from_f64(CORE * (1.0 - CORE_ROUNDING));
         let none = InverseEffectiveMass { normal: S::zero(), tangent: S::zero() };
         let found = PenaltyContact {
@@ -113,25 +107,9 @@ where
             has_capsule,
             curvature: a.map_or_else(S::zero, |a| marbles.radius[a].recip())
                 + marbles.radius[b].recip(),
-            material,
-            compliance,
+            material: contact.material.clamped(),
         };
         (separation < S::zero() && found.is_active()).then_some(found)
-    }
-
-    /// Combined material and compliance of the surfaces of a contact.
-    fn surfaces(
-        &self,
-        marble_a: Option<usize>,
-        contact: &Contact<S>,
-    ) -> (Material<S>, Compliance<S>) {
-        let own = (self.context.material)(contact.b as usize);
-        let compliance = own.elasticity.compliance();
-        let wall = || self.context.walls.material(contact.a as usize);
-        let other = marble_a.map_or_else(wall, |a| Some((self.context.material)(a)));
-        // A wall without a material of its own is rigid.
-        let Some(other) = other else { return (own, compliance) };
-        (own.combined_with(other), compliance.plus(other.elasticity.compliance()))
     }
 }
 
@@ -230,7 +208,7 @@ impl<S: Scalar> PenaltyContact<S> {
     /// Angular impulse that would stop the relative spin, in kg m²/s, if `counts` contacts share
     /// each body; zero without rolling or torsional friction.
     pub fn rolling_impulse(&self, marbles: &SolverBodies<S>, counts: [S; 2]) -> Vec3<S> {
-        let Material { rolling_resistance, spinning_resistance, .. } = self.material;
+        let ContactMaterial { rolling_resistance, spinning_resistance, .. } = self.material;
         if rolling_resistance == S::zero() && spinning_resistance == S::zero() {
             return Vec3::zero();
         }

@@ -8,7 +8,7 @@ use super::mass_split::{damped_fraction, undamped_fraction};
 use super::{PenaltySettings, SpringHistory};
 use crate::constraint::solve_rolling;
 use crate::math::{RealVector, Scalar, Vec3, cast_vector, is_finite};
-use crate::response::{Colliders, EnergyLedger, Material, SolverBodies};
+use crate::response::{Colliders, EnergyLedger, SolverBodies};
 
 /// Contact with its forces in this substep.
 #[derive(Clone, Debug)]
@@ -44,11 +44,10 @@ pub(super) struct ContactForce<S> {
     pub ends: bool,
 }
 
-impl<S, W, M, F> PenaltySettings<'_, S, W, M, F>
+impl<S, W, F> PenaltySettings<'_, S, W, F>
 where
     S: Scalar,
     W: Colliders<S>,
-    M: Fn(usize) -> Material<S>,
     F: Fn(usize) -> S,
 {
     #[inline]

@@ -87,8 +87,9 @@ impl ContactLaw {
             Self::HertzMindlin => {
                 let two = number(2.0);
                 let contact_radius = (penetration / contact.curvature).sqrt();
-                let stiffness = two * contact_radius / contact.compliance.normal;
-                let tangent_stiffness = number(8.0) * contact_radius / contact.compliance.tangent;
+                let stiffness = two * contact_radius / contact.material.compliance.normal;
+                let tangent_stiffness =
+                    number(8.0) * contact_radius / contact.material.compliance.tangent;
                 let hertz = number(2.0 / 3.0) * stiffness.min(max_stiffness);
                 let elastic_force = if stiffness <= max_stiffness {
                     hertz * penetration

@@ -21,9 +21,7 @@ use cgmath::{InnerSpace, Zero};
 use crate::contact::Contacts;
 use crate::math::{RealVector, Scalar, Vec3, is_finite};
 use crate::response::impulse::{BodyA, Context, SolverSettings};
-use crate::response::{
-    Colliders, ContactKey, EnergyLedger, KeyedByContact, Material, SolverBodies,
-};
+use crate::response::{Colliders, ContactKey, EnergyLedger, KeyedByContact, SolverBodies};
 use force::ContactForce;
 use mass_split::ContactLoad;
 use parting::depths_in_walls;
@@ -67,9 +65,9 @@ impl<S: Scalar> KeyedByContact for SpringHistory<S> {
 }
 
 /// Penalty method in a substep, by its settings.
-pub(crate) struct PenaltySettings<'a, S, W, M, F> {
+pub(crate) struct PenaltySettings<'a, S, W, F> {
     pub law: ContactLaw,
-    pub context: Context<'a, S, W, M, F>,
+    pub context: Context<'a, S, W, F>,
     /// Stop of each row at walls by continuous detection; empty if it stopped none.
     pub wall_stops: &'a [Option<WallStop<S>>],
 }
@@ -105,11 +103,10 @@ pub(crate) struct Scratch<S> {
     depths: Vec<S>,
 }
 
-impl<S, W, M, F> PenaltySettings<'_, S, W, M, F>
+impl<S, W, F> PenaltySettings<'_, S, W, F>
 where
     S: Scalar,
     W: Colliders<S>,
-    M: Fn(usize) -> Material<S>,
     F: Fn(usize) -> S,
 {
     /// Applies penalty forces: they change velocities, and positions by what the integrator moved too

@@ -8,16 +8,15 @@ use super::contact::PenaltyContact;
 use super::force::ContactForce;
 use super::{PenaltySettings, SpringHistory};
 use crate::math::{Scalar, Vec3, is_finite_point, length};
-use crate::response::{Colliders, Material, SolverBodies};
+use crate::response::{Colliders, SolverBodies};
 
 /// Passes over all contacts per substep, each of which resolves half of what is left.
 const PASSES: u32 = 3;
 
-impl<S, W, M, F> PenaltySettings<'_, S, W, M, F>
+impl<S, W, F> PenaltySettings<'_, S, W, F>
 where
     S: Scalar,
     W: Colliders<S>,
-    M: Fn(usize) -> Material<S>,
     F: Fn(usize) -> S,
 {
     /// Overlap of a contact that loads no spring, in metres.

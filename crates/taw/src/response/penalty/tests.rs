@@ -1,8 +1,9 @@
 use super::*;
 use crate::broad::Period;
+use crate::contact::Contact;
 use crate::math::Point3;
-use crate::response::Elasticity;
 use crate::response::impulse::{SolverSettings, SubstepStart};
+use crate::response::{Elasticity, Material};
 
 /// Settings of a substep, of which springs only use its length.
 fn solver_settings(dt: f64) -> SolverSettings<f64> {
@@ -31,6 +32,7 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
     let mut position = [Point3::new(-radius, 0.0, 0.0), Point3::new(radius, 0.0, 0.0)];
     let mut velocity = [Vec3::new(speed, 0.0, 0.0), Vec3::new(-speed, 0.0, 0.0)];
     let own = Material { restitution: 1.0, elasticity, ..Material::default() };
+    let material = own.combined_with(own);
     let (mut time, mut penetration, mut force) = (0.0_f64, 0.0_f64, 0.0_f64);
     let mut histories = Vec::new();
     let walls: Vec<crate::shape::Plane<f64>> = Vec::new();
@@ -45,7 +47,7 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
             return [time, penetration, force];
         }
         let mut contacts = Contacts::default();
-        contacts.mm.push(crate::contact::Contact::between_marbles(0, 1));
+        contacts.mm.push(Contact { material, ..Contact::between_marbles(0, 1) });
         let before = velocity[1].x;
         let mut columns = SolverBodies {
             period: Period::default(),
@@ -63,7 +65,6 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
             wall_stops: &[],
             context: Context {
                 walls: &walls,
-                material: |_| own,
                 position_weight: |_| 0.0,
                 start: SubstepStart { position: &[], velocity: &[], ccd_stops: &[] },
                 settings: &solver_settings(dt),

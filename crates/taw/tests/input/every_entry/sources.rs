@@ -28,7 +28,7 @@ const TAKEN: &[(&str, &[&str])] = &[
     ("motion/mass.rs", &["Mass"]),
     ("motion/wall_motion.rs", &["WallMotion"]),
     ("motion/force_field.rs", &["ForceField", "Medium"]),
-    ("response/material.rs", &["Material", "Elasticity"]),
+    ("contact/material.rs", &["Material", "Elasticity"]),
     ("frame/pose.rs", &["Pose"]),
     ("shape/ball.rs", &["Ball"]),
     ("shape/aabb.rs", &["Aabb"]),

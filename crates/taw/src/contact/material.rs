@@ -2,12 +2,12 @@ use crate::Error;
 use crate::error::{positive, within};
 use crate::math::Scalar;
 
-/// Surface material of a contact. The marble's material counts where a wall has none of its own;
-/// otherwise [`Material::combined_with`] mixes both.
+/// Surface material of a body. Two make the [`ContactMaterial`] of their contact; a wall may have none of
+/// its own.
 ///
 /// [`Response::Displacement`] has neither restitution nor friction and ignores it.
 ///
-/// [`Response::Displacement`]: super::Response::Displacement
+/// [`Response::Displacement`]: crate::response::Response::Displacement
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Material<S> {
     /// Coefficient of restitution: separation speed over approach speed, in `[0, 1]`.
@@ -25,7 +25,7 @@ pub struct Material<S> {
     /// Torsional (spinning) friction: torque that resists spin about the normal, over normal force
     /// times radius, at least zero. It takes `5/2 · spinning_resistance · g / radius` per second.
     pub spinning_resistance: S,
-    /// Stiffness; only [`ContactLaw::HertzMindlin`](super::ContactLaw) uses it.
+    /// Stiffness; only [`ContactLaw::HertzMindlin`](crate::response::ContactLaw) uses it.
     pub elasticity: Elasticity<S>,
     /// Rule that combines it with another material.
     pub combine: Combine,
@@ -48,9 +48,9 @@ impl<S: Scalar> Default for Elasticity<S> {
     }
 }
 
-/// Compliance of two surfaces in contact, in 1/Pa.
+/// Compliance of two surfaces in contact, in 1/Pa (Hertz 1882; Mindlin 1949).
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Compliance<S> {
+pub struct Compliance<S> {
     /// Sum of `(1 − ν²) / E`.
     pub normal: S,
     /// Sum of `(2 − ν) / G`.
@@ -58,7 +58,7 @@ pub(super) struct Compliance<S> {
 }
 
 impl<S: Scalar> Elasticity<S> {
-    pub(super) fn compliance(self) -> Compliance<S> {
+    pub(crate) fn compliance(self) -> Compliance<S> {
         let (modulus, ratio) = (self.youngs_modulus, self.poissons_ratio);
         let two = S::one() + S::one();
         Compliance {
@@ -69,8 +69,54 @@ impl<S: Scalar> Elasticity<S> {
 }
 
 impl<S: Scalar> Compliance<S> {
-    pub(super) fn plus(self, other: Self) -> Self {
+    fn plus(self, other: Self) -> Self {
         Self { normal: self.normal + other.normal, tangent: self.tangent + other.tangent }
+    }
+}
+
+/// Surface material of a contact: that of its two bodies, combined.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ContactMaterial<S> {
+    /// Coefficient of restitution, in `[0, 1]`.
+    pub restitution: S,
+    /// Coefficient of friction, at least zero.
+    pub friction: S,
+    /// Tangential restitution, in `[-1, 1]`.
+    pub tangential_restitution: S,
+    /// Rolling friction, at least zero.
+    pub rolling_resistance: S,
+    /// Torsional friction, at least zero.
+    pub spinning_resistance: S,
+    /// Sum of the compliances of both, above zero; only
+    /// [`ContactLaw::HertzMindlin`](crate::response::ContactLaw) uses it.
+    pub compliance: Compliance<S>,
+}
+
+impl<S: Scalar> Default for ContactMaterial<S> {
+    /// Contact of two bodies of the default [`Material`].
+    fn default() -> Self {
+        Material::default().combined_with(Material::default())
+    }
+}
+
+impl<S: Scalar> ContactMaterial<S> {
+    /// Material with each number moved into its range; NaN goes to the lower end.
+    pub(crate) fn clamped(self) -> Self {
+        let (zero, one, max) = (S::zero(), S::one(), S::max_value());
+        let within = |number: S, low: S, high: S| number.max(low).min(high);
+        let not_negative = |number: S| within(number, zero, max);
+        let compliance = |number: S| within(number, S::min_positive_value(), max);
+        Self {
+            restitution: within(self.restitution, zero, one),
+            friction: not_negative(self.friction),
+            tangential_restitution: within(self.tangential_restitution, -one, one),
+            rolling_resistance: not_negative(self.rolling_resistance),
+            spinning_resistance: not_negative(self.spinning_resistance),
+            compliance: Compliance {
+                normal: compliance(self.compliance.normal),
+                tangent: compliance(self.compliance.tangent),
+            },
+        }
     }
 }
 
@@ -133,21 +179,37 @@ impl<S: Scalar> Material<S> {
         Ok(self)
     }
 
-    /// Combined material of two surfaces.
+    /// Material of the contact of two bodies.
+    #[inline]
     #[must_use]
-    pub fn combined_with(self, other: Self) -> Self {
+    pub fn combined_with(self, other: Self) -> ContactMaterial<S> {
         let combine = self.combine.max(other.combine);
         let of = |number: fn(&Self) -> S| combine.of(number(&self), number(&other));
-        Self {
+        ContactMaterial {
             restitution: of(|m| m.restitution),
             friction: of(|m| m.friction),
             tangential_restitution: of(|m| m.tangential_restitution),
             rolling_resistance: of(|m| m.rolling_resistance),
             spinning_resistance: of(|m| m.spinning_resistance),
-            // Compliances add up whatever the rule; see `Compliance`.
-            elasticity: self.elasticity,
-            combine,
+            // Whatever the rule: both give way under the same force.
+            compliance: self.elasticity.compliance().plus(other.elasticity.compliance()),
         }
+    }
+
+    /// Material of the contact of a marble with a wall. A wall without a material of its own is rigid, and
+    /// has the coefficients of the marble.
+    #[inline]
+    #[must_use]
+    pub fn on_wall(self, wall: Option<Self>) -> ContactMaterial<S> {
+        let alone = || ContactMaterial {
+            restitution: self.restitution,
+            friction: self.friction,
+            tangential_restitution: self.tangential_restitution,
+            rolling_resistance: self.rolling_resistance,
+            spinning_resistance: self.spinning_resistance,
+            compliance: self.elasticity.compliance(),
+        };
+        wall.map_or_else(alone, |wall| self.combined_with(wall))
     }
 
     /// Converts to another scalar.
@@ -187,7 +249,7 @@ mod tests {
     }
 
     #[test]
-    fn what_two_materials_give_is_a_material() {
+    fn a_contact_of_two_materials_is_in_range() {
         let ends = [-1.0, -0.5, 0.0, 0.5, 1.0_f64];
         for combine in [Combine::Average, Combine::Min, Combine::Multiply, Combine::Max] {
             for (a, b) in ends.into_iter().flat_map(|a| ends.map(|b| (a, b))) {
@@ -197,7 +259,8 @@ mod tests {
                     combine,
                     ..Material::default()
                 };
-                of(a).combined_with(of(b)).validated().unwrap();
+                let pair = of(a).combined_with(of(b));
+                assert_eq!(pair, pair.clamped(), "{combine:?} of {a} and {b}");
             }
         }
     }
