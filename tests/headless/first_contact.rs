@@ -121,6 +121,22 @@ fn settings_that_the_response_ignores_are_named() {
 }
 
 #[test]
+fn an_integrator_has_an_effect_where_forces_act() {
+    let mut app = app();
+    let marble = scene::drop_marble(&mut app, 0.1, Vec3::ZERO);
+    app.world_mut().entity_mut(marble).insert(MarbleIntegrator::default());
+    let mut ignored = |forces: Vec<ForceField<f32>>| {
+        app.insert_resource(Forces(forces));
+        app.update();
+        app.world().resource::<IgnoredComponents>().to_vec()
+    };
+    assert_eq!(ignored(Vec::new()), ["MarbleIntegrator"]);
+    let anchor = [0.0; 3].into();
+    let spring = ForceField::Spring { anchor, rest_length: 0.0, stiffness: 1.0 };
+    assert_eq!(ignored(vec![spring]), [""; 0]);
+}
+
+#[test]
 fn components_where_they_have_no_effect_are_named() {
     let mut app = app();
     let ignored = |app: &App| app.world().resource::<IgnoredComponents>().to_vec();

@@ -23,7 +23,8 @@ use crate::wall::Wall;
 ///
 /// - components that the [`TawModel`](crate::resources::TawModel) does not read, as `SurfaceMaterial` with
 ///   `Displacement` (a `MarbleMass` that contacts do not read counts for forces still);
-/// - `integrator`, `precision` and `detection` of the model where its response does not read them. (Its
+/// - `integrator`, `precision` and `detection` of the model where its response does not read them; an
+///   integrator by `SoftStep` where no [`Forces`](crate::resources::Forces) act. (Its
 ///   `iterations` are not named: every model has some.)
 /// - components of marbles on walls, as a `Velocity`, those of walls on marbles, as a `OneWay`, and a
 ///   `Sensor` or a zone without a [`Wall`].
@@ -81,11 +82,12 @@ impl<'a> Carriers<'a> {
     }
 
     /// Each name of what the model may not read, and true if it does not.
-    fn of_model(&self, model: Model) -> [(&'static str, bool); 9] {
+    fn of_model(&self, model: Model, has_forces: bool) -> [(&'static str, bool); 9] {
         let Model { integrator, response, rotation, precision, detection, .. } = model;
         let projects = response == Response::Displacement;
         let unturned = rotation == Rotation::None;
         let soft = response == Response::SoftStep;
+        let is_parabola = soft && !has_forces; // whatever the integrator
         let is_continuous = soft || response == Response::EventDriven;
         let (marbles, walls) = (&self.marbles, &self.walls);
         let has_material =
@@ -96,8 +98,8 @@ impl<'a> Carriers<'a> {
             ("MarbleMass", projects && self.any::<MarbleMass>(marbles)),
             ("AngularVelocity", unturned && self.any::<AngularVelocity>(marbles)),
             ("MarbleRotation", unturned && self.any::<MarbleRotation>(marbles)),
-            ("MarbleIntegrator", soft && self.any::<MarbleIntegrator>(marbles)),
-            ("Model::integrator", soft && integrator != Integrator::SemiImplicitEuler),
+            ("MarbleIntegrator", is_parabola && self.any::<MarbleIntegrator>(marbles)),
+            ("Model::integrator", is_parabola && integrator != Integrator::SemiImplicitEuler),
             ("Model::precision", soft && precision != Precision::Plain),
             ("Model::detection", is_continuous && detection == Detection::Discrete),
         ]
@@ -150,7 +152,7 @@ pub(crate) fn find(
     let without_effect = |rows: &[(&'static str, bool)]| -> Vec<&'static str> {
         rows.iter().filter(|(_, is_ignored)| *is_ignored).map(|(name, _)| *name).collect()
     };
-    let mut ignored = without_effect(&carriers.of_model(model));
+    let mut ignored = without_effect(&carriers.of_model(model, !world.forces().is_empty()));
     let Model { response, rotation, .. } = model;
     for name in ignored.iter().filter(|name| !found.contains(name)) {
         log::warn!(

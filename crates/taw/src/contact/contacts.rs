@@ -35,8 +35,9 @@ pub struct Contact<S> {
     pub part: u32,
     /// Feature id: identifies the features that meet, stable as long as they do, since a capsule often
     /// touches with several points. That of `a` in the upper 16 bits, that of `b` in the lower ones: 0 for a
-    /// ball and for a wall, 1 and 2 for the ends of a capsule, 3 for all points of its side. Solvers find the impulses of
-    /// the last substep by pair, `part` and `feature`.
+    /// ball and for a wall, 1 and 2 for the ends of a capsule, 3 for all points of its side, and 4 and 5 for the two points at
+    /// which capsules lie side by side. Solvers find the impulses of the last substep by pair, `part` and
+    /// `feature`.
     pub feature: u32,
     /// Contact anchor on the axis of each body, in metres from its center: zero except for
     /// capsules.
@@ -51,7 +52,8 @@ pub struct Contact<S> {
     /// Surface material, combined from those of both bodies whenever contacts are generated. `Impulse`
     /// and `Penalty` solve the contact by it, so that it may be edited before
     /// [`World::restitute`](crate::world::World::restitute), for one contact in one substep: a number
-    /// out of its range counts as the nearest one in it, NaN as the lowest.
+    /// out of its range counts as the nearest one in it, NaN as the lowest. A material that is set on a
+    /// body after that counts from the next substep on.
     pub material: ContactMaterial<S>,
     /// Normal impulse accumulated in this substep, in N s. Zero until the contact is solved;
     /// listed by `Impulse` and `Penalty`.

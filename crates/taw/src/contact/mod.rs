@@ -29,7 +29,7 @@
 //!
 //! Except for the first two, all are computed in `f64` relative to the center of one of the two
 //! shapes, and rounded once to the scalar. Where edges or faces are parallel to within 1e-7 rad,
-//! the distance is accurate to that angle. `tests/degenerate.rs` lists degenerate cases that break
+//! the distance is accurate to that angle. `tests/geometry/degenerate.rs` lists degenerate cases that break
 //! such code elsewhere.
 //!
 //! # Minimum translation vector

@@ -187,7 +187,7 @@ fn compress(bits: u32, from: u32, to: &mut [u32; LANES]) {
     }
 }
 
-/// Eight lanes of two registers, likewise.
+/// Eight lanes of two registers, which [`run`] alone makes, too.
 #[derive(Clone, Copy, Debug)]
 pub struct AvxPair([__m256d; 2]);
 

@@ -1,6 +1,7 @@
-//! Parts of [`Scalar`] that are nobody's business outside of the crate.
+//! Parts of [`Scalar`] for this crate only.
 
 use bytemuck::Pod;
+use cgmath::num_traits::float::TotalOrder;
 
 use super::Scalar;
 #[cfg(target_arch = "x86_64")]
@@ -12,19 +13,19 @@ pub trait PerScalar {
 }
 
 /// Choices by scalar.
-pub trait Lanes: Pod {
-    /// Eight of them by AVX2.
+pub trait Lanes: Pod + TotalOrder {
+    /// Eight lanes in AVX2 registers.
+    #[doc(hidden)]
     #[cfg(target_arch = "x86_64")]
     type Avx2: Simd<Scalar = Self>;
 
     /// Chooses the value for this scalar.
+    #[doc(hidden)]
     fn choose<T: PerScalar>(single: T::Of<f32>, double: T::Of<f64>) -> T::Of<Self>
     where
         Self: Scalar;
 
-    /// Whole number below it, from 0 to 2³² − 1; 0 for NaN.
-    fn to_u32(self) -> u32;
-
-    /// Order in which NaN has a place, too.
-    fn total_cmp(&self, other: &Self) -> std::cmp::Ordering;
+    /// Floor, saturated to `u32`; 0 for NaN.
+    #[doc(hidden)]
+    fn floor_to_u32(self) -> u32;
 }

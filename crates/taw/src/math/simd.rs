@@ -1,7 +1,6 @@
 //! SIMD: eight numbers at once, by the processor's own instructions where it has them, else in
 //! plain Rust. Both round each operation alike, so a step gives the same bits by either.
 
-use std::cmp::Ordering;
 use std::ops::{Add, Div, Mul, Sub};
 
 #[cfg(target_arch = "x86_64")]
@@ -103,7 +102,7 @@ impl SimdLevel {
 pub struct Portable<S>([S; LANES]);
 
 impl<S: Scalar> Portable<S> {
-    /// (Lane by lane: loops take the compiler twice as long.)
+    /// Lane by lane: loops take the compiler twice as long.
     #[inline(always)]
     fn both(self, other: Self, of: impl Fn(S, S) -> S) -> Self {
         let (Self([a, b, c, d, e, f, g, h]), Self([i, j, k, l, m, n, o, p])) = (self, other);
@@ -138,11 +137,7 @@ impl<S: Scalar> Real for Portable<S> {
 
     #[inline(always)]
     fn max(self, other: Self) -> Self {
-        let mut out = self.0;
-        for (a, b) in out.iter_mut().zip(other.0) {
-            *a = if *a > b { *a } else { b };
-        }
-        Self(out)
+        self.both(other, |a, b| if a > b { a } else { b })
     }
 
     #[inline(always)]
@@ -234,13 +229,8 @@ impl Lanes for f32 {
     }
 
     #[inline(always)]
-    fn to_u32(self) -> u32 {
+    fn floor_to_u32(self) -> u32 {
         self as u32
-    }
-
-    #[inline(always)]
-    fn total_cmp(&self, other: &Self) -> Ordering {
-        f32::total_cmp(self, other)
     }
 }
 
@@ -254,12 +244,7 @@ impl Lanes for f64 {
     }
 
     #[inline(always)]
-    fn to_u32(self) -> u32 {
+    fn floor_to_u32(self) -> u32 {
         self as u32
-    }
-
-    #[inline(always)]
-    fn total_cmp(&self, other: &Self) -> Ordering {
-        f64::total_cmp(self, other)
     }
 }

@@ -68,8 +68,9 @@ pub enum Response {
     /// one, in any direction.
     ///
     /// Balls only, and no periods. Marbles may have their own mass, material,
-    /// gravity scale, damping, forces and rotation model; integrators have no effect, nor has tangential
-    /// restitution where restitution is zero. Forces are evaluated once a step. A ball stops at thin
+    /// gravity scale, damping, forces and rotation model; tangential restitution has no effect where
+    /// restitution is zero. Force fields and damping act once a step, by the integrator's mean acceleration
+    /// over it; free flight is the parabola of that acceleration, whatever the integrator. A ball stops at thin
     /// walls and other balls at any speed, whatever the world's [detection](crate::world::Detection);
     /// so it does at walls that were [set](crate::world::Walls::set) elsewhere and have a motion;
     /// but rows of touching balls of very unlike masses that a fast one hits may end in another order,

@@ -25,7 +25,7 @@ impl<S: Scalar> Entries<S> {
     };
 }
 
-/// Whoever uses these compiles none of the functions: only what is generic is compiled again.
+/// Compiled here, once for each scalar: other crates read pointers.
 static OF_F32: Entries<f32> = Entries::ALL;
 static OF_F64: Entries<f64> = Entries::ALL;
 

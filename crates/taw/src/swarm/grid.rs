@@ -12,6 +12,7 @@ use std::ops::Range;
 use bytemuck::{Pod, cast_slice_mut};
 
 use super::impulse_cache::shrink_slack;
+use super::state::of;
 use crate::math::{Row, Scalar};
 use crate::workers::{DisjointSlice, ROWS, parallel_for, parallel_for_rows};
 
@@ -98,9 +99,7 @@ impl<S: Scalar> Level<S> {
 
 impl<S: Scalar> Grid<S> {
     pub fn bytes(&self) -> usize {
-        let numbers = self.start.capacity() + self.sample.capacity();
-        let levels = self.levels.capacity() * size_of::<Level<S>>();
-        levels + numbers * size_of::<u32>() + self.parts.capacity() * size_of::<Part>()
+        of(&self.levels) + of(&self.start) + of(&self.sample) + of(&self.parts)
     }
 
     /// Number of layers of level 0.
@@ -138,7 +137,7 @@ impl<S: Scalar> Grid<S> {
             let axis = self.axes[i];
             let cell = (at[axis] - self.low[axis]) * level.per_metre;
             // What is beyond is in the last cell: neighbours stay neighbours.
-            cell.max(S::zero()).to_u32().min(count - 1)
+            cell.max(S::zero()).floor_to_u32().min(count - 1)
         };
         [axis(0, level.layers), axis(1, level.rows) + 1, axis(2, level.cells) + 1]
     }
@@ -231,7 +230,7 @@ impl<S: Scalar> Grid<S> {
             if level > 0 && (S::from_f64(2.0) * least > widest || total > 2.0 * budget) {
                 break;
             }
-            let [layers, rows, cells] = axes.map(|axis| (sides[axis] * fine).to_u32());
+            let [layers, rows, cells] = axes.map(|axis| (sides[axis] * fine).floor_to_u32());
             let row_stride = cells + 2;
             let layer_stride = row_stride * (rows + 2);
             self.levels.push(Level {

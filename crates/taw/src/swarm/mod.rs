@@ -1,4 +1,4 @@
-//! Particle system of up to millions of balls, with few features each.
+//! Particle system of up to millions of balls, with few features each, in the scalar of its world.
 //!
 //! A [`World`](crate::world::World) has marbles that differ in everything: shape, mass, material,
 //! integrator, rotation. A [`Swarm`] has balls of any radius, mass, material and gravity

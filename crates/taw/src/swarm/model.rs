@@ -66,9 +66,9 @@ impl<S: Scalar> Default for SwarmModel<S> {
 }
 
 impl SwarmModel {
-    /// Maximum number of [substeps](Self::substeps).
+    /// Maximum number of [substeps](Self::substeps), for any scalar.
     pub const MAX_SUBSTEPS: u32 = 1000;
-    /// Maximum number of [threads](Self::threads).
+    /// Maximum number of [threads](Self::threads), for any scalar.
     pub const MAX_THREADS: u32 = crate::workers::MAX_THREADS as u32;
 }
 

@@ -6,6 +6,7 @@ use std::ops::Range;
 
 use super::batches::{Batch, BatchBuilder, MAX_COLOURS, builder};
 use super::grid::{Grid, Level};
+use super::state::of;
 use super::surfaces::SurfaceOf;
 use crate::math::{Kernel, LANES, Row, Scalar, Simd};
 
@@ -42,8 +43,8 @@ impl<S: Scalar> Search<S> {
 
     pub fn bytes(&self) -> usize {
         let CandidateWindow { window, blocks, found } = &self.columns;
-        let columns = window.iter().map(Vec::capacity).sum::<usize>();
-        (columns + blocks.capacity() * 2 + found.capacity() + self.colour_mask.capacity()) * 4
+        let columns = window.iter().map(of).sum::<usize>();
+        columns + of(blocks) + of(found) + of(&self.colour_mask)
     }
 }
 

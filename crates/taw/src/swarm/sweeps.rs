@@ -80,7 +80,7 @@ impl<S: Scalar> Sweep<'_, S> {
                 beside.extend(0..self.at.len() as u32);
                 return;
             }
-            for piece in 0..pieces.to_u32() {
+            for piece in 0..pieces.floor_to_u32() {
                 let part = (S::from_f64(f64::from(piece)) + S::from_f64(0.5)) / pieces;
                 let [x, y, z] = [0, 1, 2].map(|axis| at[axis] + path[axis] * part);
                 grid.for_each_run(level, &[x, y, z, S::zero()], far, |rows| beside.extend(rows));
@@ -207,7 +207,7 @@ impl<S: Scalar> CrowdSweep<'_, S> {
         // Twice as wide as the boxes, on average.
         let width = (S::from_f64(2.0) * sum / S::from_f64(paths.len() as f64))
             .max((high - low) / S::from_f64(BINS));
-        let bin = |x: S| ((x - low) / width).clamp(S::zero(), S::from_f64(BINS)).to_u32();
+        let bin = |x: S| ((x - low) / width).clamp(S::zero(), S::from_f64(BINS)).floor_to_u32();
         entries.clear();
         for row in 0..paths.len() {
             let [from, to] = extent(row, second).map(bin);

@@ -10,9 +10,10 @@ use crate::motion::Rotation;
 use crate::response::CapsuleInertia;
 use crate::shape::{Capsule, Shape, Sphere};
 
-/// Fraction of the half length of a capsule from which on a point of its axis counts as an end of it:
-/// that of a parallel one is as near to it as rounding leaves it.
+/// Fraction of the half length of a capsule from which on a point of its axis counts as an end of it.
 pub(super) const END: f64 = 0.999;
+/// Feature of both capsules at the first of two points where parallel ones touch.
+pub(super) const SIDE_BY_SIDE: u32 = 4;
 
 impl<S: Scalar> Marbles<S> {
     /// Half length of a marble in metres; zero for a ball.

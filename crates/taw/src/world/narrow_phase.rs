@@ -5,7 +5,7 @@ use std::collections::HashSet;
 use cgmath::{InnerSpace, Zero};
 use smallvec::SmallVec;
 
-use super::marble_shapes::END;
+use super::marble_shapes::{END, SIDE_BY_SIDE};
 use super::marbles::Marbles;
 use super::walls::{SubShape, Walls};
 use super::{WallShape, World};
@@ -198,9 +198,13 @@ impl<S: Scalar> World<S> {
                 let row = row as usize;
                 (self.marbles.sphere(row), self.marbles.axis(row), self.marbles.half_length(row))
             };
-            for along in closest_points_of_segments(line(a), line(b)) {
+            let (points, are_parallel) = closest_points_of_segments(line(a), line(b));
+            for (end, along) in (0_u32..).zip(points) {
                 let contact = marble_contact(&self.marbles, [a, b], along, contact_distance);
-                if let Some(contact) = contact {
+                if let Some(mut contact) = contact {
+                    if are_parallel {
+                        contact.feature = (SIDE_BY_SIDE + end) << 16 | (SIDE_BY_SIDE + end);
+                    }
                     self.scratch.contact_limit.add(&mut self.contacts.mm, &self.marbles, contact);
                 }
             }
@@ -262,11 +266,11 @@ pub(super) fn marble_contact<S: Scalar>(
 }
 
 /// Closest points of two segments, as positions along their axes; for parallel ones, both ends of
-/// their overlap.
+/// their overlap, in the order of the ends of the second one, and true.
 fn closest_points_of_segments<S: Scalar>(
     (first, x, half_x): (Sphere<S>, Vec3<S>, S),
     (second, y, half_y): (Sphere<S>, Vec3<S>, S),
-) -> SmallVec<[[S; 2]; 2]> {
+) -> (SmallVec<[[S; 2]; 2]>, bool) {
     let apart = second.center - first.center;
     let clamp = |along: S, half: S| along.max(-half).min(half);
     let (cos, on_x, on_y) = (x.dot(y), apart.dot(x), apart.dot(y));
@@ -282,12 +286,12 @@ fn closest_points_of_segments<S: Scalar>(
         if samples[1] != samples[0] {
             both.push(samples[1]);
         }
-        return both;
+        return (both, true);
     }
     let start = if squared_sin > S::zero() { (on_x - cos * on_y) / squared_sin } else { S::zero() };
     let on_second = clamp(cos * clamp(start, half_x) - on_y, half_y);
     let on_first = clamp(on_x + cos * on_second, half_x);
-    SmallVec::from_slice(&[[on_first, on_second]])
+    (SmallVec::from_slice(&[[on_first, on_second]]), false)
 }
 
 /// Collects the sub-shapes of walls, except half-spaces, within `contact_distance` metres of a

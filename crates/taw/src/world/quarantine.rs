@@ -56,7 +56,7 @@ impl<S: Scalar> StoredPoses<S> {
 
 impl<S: Scalar> World<S> {
     /// Shortest and longest duration in seconds of a step and of each substep: their squares and
-    /// reciprocals are representable in `f32`, in which the swarm computes.
+    /// reciprocals are representable in either scalar.
     pub const TIMES: [f64; 2] = [1e-18, 1e18];
 
     /// Length of a substep; validates a step of `dt` seconds.

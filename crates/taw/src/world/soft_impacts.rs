@@ -66,7 +66,7 @@ impl<S: Scalar> ChunkContacts<S> {
 const CONFIRMING: f64 = 1e-3;
 /// Part by which an approach speed may differ from the one that decided what bounces.
 const ROUNDING: f64 = 1e-3;
-/// Roundings of a speed in a step: a part in a million in `f32`.
+/// Roundings of a speed in a step: together a part in a million in `f32`, 1e-6 · 2²³.
 const SPEED_ROUNDINGS: f64 = 8.388_608;
 
 /// Identity of the two that meet.

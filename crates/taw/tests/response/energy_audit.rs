@@ -268,7 +268,7 @@ fn moved_floor(world: &mut World<f64>, velocity: Vec3<f64>) {
     world.walls.set_motion(floor, Some(motion)).unwrap();
 }
 
-/// Soft contacts are solved in `f32`, and a thousandth of a radius is pressed in: hence the tolerances.
+/// A thousandth of a radius is pressed in: hence the tolerances.
 #[test]
 fn soft_contacts_count_what_walls_and_forces_do() {
     let material = material(0.0, 0.3);

@@ -295,9 +295,11 @@ fn an_edited_number_out_of_its_range_counts_as_the_nearest_one_in_it() {
     ];
     for response in SOLVED {
         let alone = edited_bounce(response, false, |_| ())[1];
+        let mut read = 0;
         for (number, [low, high]) in NUMBERS.into_iter().zip(ENDS) {
             let with = |x: f64| edited_bounce(response, false, |material| *number(material) = x);
             let ([lowest, _], [highest, _]) = (with(low), with(high));
+            read += u32::from(lowest != highest);
             for (nonsense, nearest) in [
                 (f64::NAN, lowest),
                 (f64::NEG_INFINITY, lowest),
@@ -309,6 +311,7 @@ fn an_edited_number_out_of_its_range_counts_as_the_nearest_one_in_it() {
                 assert_eq!(other, alone, "{response:?}: {nonsense}");
             }
         }
+        assert!(read >= 3, "{response:?} reads {read} numbers");
     }
 }
 
@@ -332,7 +335,8 @@ fn listed_materials_are_those_of_both_bodies() {
         };
         let (plain, own) = (Material::default(), of(0.9));
         let pair = own.combined_with(plain);
-        assert_eq!(list(&mut world.clone()), [plain.on_wall(None), own.on_wall(None), pair]);
+        let alone = [plain.on_wall(None), own.on_wall(None), pair];
+        assert_eq!(list(&mut world.clone()), alone, "{response:?}");
         let (floor, of_floor) = (world.walls.id(0).unwrap(), of(0.1));
         world.walls.set_material(floor, Some(of_floor)).unwrap();
         let on_floor = [plain, own].map(|of| of.on_wall(Some(of_floor)));

@@ -1,5 +1,7 @@
 //! Worlds of `f64`, in which rows have the precision of the world.
 
+use taw::motion::{ForceField, Integrator};
+use taw::swarm::{Ball, SwarmModel, Tier};
 use taw::world::Mass;
 
 use super::*;
@@ -40,6 +42,46 @@ fn a_slow_ball_far_from_the_origin_goes_on() {
     assert!(error < 1e-8, "{error} m");
 }
 
+#[test]
+fn a_slow_ball_of_a_swarm_far_from_the_origin_goes_on() {
+    for (tier, response) in [Tier::Lab, Tier::Full]
+        .into_iter()
+        .flat_map(|tier| [Response::SoftStep, Response::Impulse].map(|response| (tier, response)))
+    {
+        let mut world = world::<f64>(2);
+        world.set_model(Model { response, ..world.model() }).unwrap();
+        world.set_gravity(Vec3::zero()).unwrap();
+        world.swarm.set_model(SwarmModel { tier, ..world.swarm.model() }).unwrap();
+        let (far, velocity) = (Point3::new(1e5, -1e5, 0.0), Vec3::new(1e-3, 2e-3, 0.0));
+        world.swarm.insert(&[Ball { velocity, ..Ball::new(far, 0.1) }]).unwrap();
+        for _ in 0..60 {
+            world.step(1.0 / 60.0).unwrap();
+        }
+        let [x, y, z, _] = world.swarm.balls()[0];
+        let error = (Point3::new(x, y, z) - far - velocity).magnitude();
+        assert!(error < 1e-8, "{tier:?}, {response:?}: {error} m");
+    }
+}
+
+/// A marble by `Impulse` is a proxy in the swarm.
+#[test]
+fn a_marble_that_a_ball_strikes_takes_its_momentum_to_rounding() {
+    let mut world = world::<f64>(2);
+    world.set_model(Model { response: Response::Impulse, ..world.model() }).unwrap();
+    world.set_gravity(Vec3::zero()).unwrap();
+    let [marble, ball] = [0.3, 0.7].map(Mass::Kilograms);
+    let at = |x: f64| Point3::new(x, 0.0, 0.0);
+    world.marbles.insert(Marble { mass: marble, ..Marble::new(at(0.5), 0.1) }).unwrap();
+    let velocity = Vec3::new(1.0, 0.0, 0.0);
+    world.swarm.insert(&[Ball { velocity, mass: ball, ..Ball::new(at(0.0), 0.1) }]).unwrap();
+    for _ in 0..60 {
+        world.step(1.0 / 60.0).unwrap();
+    }
+    let taken = world.marbles.velocity()[0].x * 0.3;
+    let error = taken + world.swarm.velocities()[0][0] * 0.7 - 0.7;
+    assert!(taken > 0.1 && error.abs() < 1e-13, "{taken} N s taken, {error} lost");
+}
+
 /// Bounces are along the line of centers, and friction is equal and opposite.
 #[test]
 fn a_gas_keeps_its_momentum_to_rounding() {
@@ -67,4 +109,30 @@ fn a_gas_keeps_its_momentum_to_rounding() {
     }
     let error = (momentum(&world) - before).magnitude();
     assert!(impacts > 300 && error < 1e-11, "{error} N s after {impacts} impacts");
+}
+
+/// Error of a marble on a spring after two seconds, in radii of its first swing.
+fn spring_error(integrator: Integrator) -> f64 {
+    let (stiffness, origin) = (10.0, Point3::new(0.0, 0.0, 0.0));
+    let mut world = world::<f64>(4);
+    world.set_gravity(Vec3::zero()).unwrap();
+    let spring = ForceField::Spring { anchor: origin, rest_length: 0.0, stiffness };
+    world.set_forces(vec![spring]).unwrap();
+    let marble = Marble {
+        mass: Mass::Kilograms(1.0),
+        integrator: Some(integrator),
+        ..Marble::new(Point3::new(1.0, 0.0, 0.0), 0.1)
+    };
+    world.marbles.insert(marble).unwrap();
+    for _ in 0..120 {
+        world.step(1.0 / 60.0).unwrap();
+    }
+    (world.marbles.position()[0].x - (2.0 * stiffness.sqrt()).cos()).abs()
+}
+
+#[test]
+fn an_integrator_counts_for_force_fields() {
+    let [euler, verlet, rk4] =
+        [Integrator::ExplicitEuler, Integrator::VelocityVerlet, Integrator::Rk4].map(spring_error);
+    assert!(euler > 0.03 && verlet < 0.003 && rk4 < 0.003, "{euler} {verlet} {rk4}");
 }
