@@ -364,7 +364,7 @@ fn capsules_side_by_side_keep_their_features_while_they_shake() {
         let mut world = world(dynamic(Response::Impulse));
         world.marbles.insert(capsule([0.0, 0.0, 0.0], lies)).unwrap();
         let turn: taw::math::Quat<f64> = AxisAngle::new(Vec3::unit_y(), yaw).unwrap().into();
-        let other = capsule([shift, 0.0, 0.499], lies);
+        let other = capsule([shift, 0.0, 0.49], lies);
         world.marbles.insert(Marble { rotation: turn * other.rotation, ..other }).unwrap();
         world.generate_contacts();
         let features: Vec<_> = world.contacts.mm.iter().map(|contact| contact.feature).collect();
