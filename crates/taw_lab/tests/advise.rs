@@ -25,8 +25,9 @@ fn on(text: &str, wish: Requirements) -> (taw::scene::Scene, Advice) {
     (scene, advice)
 }
 
-/// As the README says: what is tilted or passes on a push wants the event-driven model, the only one
-/// that one substep suffices for. What bounces alone on a floor, impulses have as exactly.
+/// As the README says: what is tilted or passes on a push wants the event-driven model. In a maze it is the
+/// only one that one substep suffices for; in a cradle soft contacts in `f64` have the push in time, too. What
+/// bounces alone on a floor, impulses have as exactly.
 ///
 /// Costs are read from the clock, so none is judged here but by what was measured in this very run.
 #[test]
@@ -45,7 +46,7 @@ fn the_documented_model_suffices_on_three_scenes() {
             .map(|model| model.response)
             .collect();
         assert!(by_one_substep.contains(&response), "{}: {by_one_substep:?}", scene.description);
-        if response == exact {
+        if text == MAZE {
             assert!(by_one_substep.iter().all(|by| *by == exact), "{by_one_substep:?}");
         }
         let best = advice.best(wish).unwrap();
