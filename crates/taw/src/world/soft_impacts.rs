@@ -5,6 +5,7 @@ use cgmath::InnerSpace;
 
 use super::World;
 use super::continuous::{Frame, MovingWall, RelativePath, WallImpact};
+use super::marbles::Marbles;
 use crate::contact::{Contact, Contacts, time_of_impact_sphere_sphere};
 use crate::math::{Scalar, Vec3, cast_vector, length, normal_and_distance};
 use crate::response::{Colliders as _, Impact};
@@ -33,6 +34,13 @@ struct PredictedImpact<S> {
 impl<S> Default for PredictedImpacts<S> {
     fn default() -> Self {
         Self { list: Vec::new(), moving: Vec::new(), listed: Vec::new(), rows: (0, 0) }
+    }
+}
+
+impl<S: Scalar> PredictedImpacts<S> {
+    /// Returns true if no row has gone or come since.
+    pub fn are_of(&self, marbles: &Marbles<S>) -> bool {
+        self.rows == (marbles.removals(), marbles.len())
     }
 }
 
@@ -269,7 +277,7 @@ impl<S: Scalar> World<S> {
         let mut told: Vec<_> = self.impacts[before..].iter().map(pair_of).collect();
         told.sort_unstable();
         let predicted = std::mem::take(&mut self.scratch.soft_step.predicted);
-        if predicted.rows == (self.marbles.removals(), self.marbles.len()) {
+        if predicted.are_of(&self.marbles) {
             let took_place = predicted.list.iter().filter(|predicted| {
                 let impact = &predicted.impact;
                 told.binary_search(&pair_of(impact)).is_err()

@@ -192,14 +192,17 @@ impl<S: Scalar> World<S> {
     /// The third verb: moves marbles on in substeps, and solves their contacts.
     fn solve_soft_contacts(&mut self, dt: S) -> Result<(), Error> {
         self.check_rows()?;
+        let identity = self.walls.identity();
+        let is_changed = self.scratch.soft_step.found.take() != Some((dt, identity));
+        if is_changed || !self.scratch.soft_step.predicted.are_of(&self.marbles) {
+            self.drop_missing_contacts();
+        }
         self.audit_contacts();
         self.sync_bodies()?; // somebody may have moved some since the first verb
         self.walls.update_tree();
-        let identity = self.walls.identity();
-        let found = self.scratch.soft_step.found.take();
         self.audit_rows_before();
         let walls = SweptWalls::new(&self.walls, dt);
-        if found != Some((dt, identity)) || !self.swarm.is_prepared() {
+        if is_changed || !self.swarm.is_prepared() {
             self.swarm.prepare(dt, self.settings.gravity, &walls, identity);
         }
         self.swarm.finish(dt, self.settings.model.substeps, &walls);

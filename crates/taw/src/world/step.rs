@@ -4,6 +4,7 @@ use super::World;
 use super::method::{Method, method_of};
 use super::walls::SubShape;
 use crate::Error;
+use crate::contact::Contact;
 use crate::math::Scalar;
 use crate::motion::Rotation;
 
@@ -147,11 +148,7 @@ impl<S: Scalar> World<S> {
     /// Solves the listed contacts by a method.
     pub(super) fn solve_listed_contacts(&mut self, method: &(impl Method<S> + ?Sized), dt: S) {
         self.walls.update_tree(); // some may have been taken out since contacts were looked for
-        let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
-        // Nor is a sleeper one of those that were listed: it has the row of one that was taken out.
-        let is_there = |row: u32| row < marbles && !self.marbles.sleep.is_asleep(row as usize);
-        self.contacts.wm.retain(|c| c.a < walls && is_there(c.b));
-        self.contacts.mm.retain(|c| is_there(c.a) && is_there(c.b));
+        self.drop_missing_contacts();
         self.release_separated_stops();
         self.contacts.sort();
         self.audit_contacts();
@@ -167,6 +164,15 @@ impl<S: Scalar> World<S> {
         self.marbles.wrap();
     }
 
+    /// Drops contacts of rows that do not exist any more.
+    pub(super) fn drop_missing_contacts(&mut self) {
+        let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
+        // Nor is a sleeper one of those that were listed: it has the row of one that was taken out.
+        let is_there = |row: u32| row < marbles && !self.marbles.sleep.is_asleep(row as usize);
+        self.contacts.wm.retain(|c| c.a < walls && is_there(c.b));
+        self.contacts.mm.retain(|c| is_there(c.a) && is_there(c.b));
+    }
+
     /// Makes marbles that turn for show only roll over the walls that they touch.
     pub(super) fn roll_what_only_shows(&mut self) {
         let all_dynamic =
@@ -175,7 +181,9 @@ impl<S: Scalar> World<S> {
             return;
         }
         // The deepest contact comes first in the list, so it has the last word.
-        for contact in self.contacts.wm.iter().filter(|contact| contact.is_touching()).rev() {
+        let (walls, marbles) = (self.walls.len() as u32, self.marbles.len() as u32);
+        let is_there = |c: &&Contact<S>| c.a < walls && c.b < marbles && c.is_touching();
+        for contact in self.contacts.wm.iter().filter(is_there).rev() {
             let part = SubShape { wall: contact.a, index: contact.part };
             let row = contact.b as usize;
             let normal = self.walls.project_point(part, self.marbles.position()[row]).normal;

@@ -393,3 +393,27 @@ fn a_wall_may_be_removed_while_marbles_touch_another() {
         }
     }
 }
+
+/// Of a marble that turns for show only, the listed contact says which way.
+#[test]
+fn walls_and_marbles_may_be_removed_between_the_verbs() {
+    for rotation in [Rotation::Rolling, Rotation::Dynamic] {
+        let mut world = world::<f32>(1);
+        world.set_model(Model { rotation, ..world.model() }).unwrap();
+        let walls: Vec<_> = (0..3).map(|_| floor(&mut world)).collect();
+        let marbles: Vec<_> = (0..3_u8)
+            .map(|x| Marble::new(Point3::new(f32::from(x), 0.099, 0.0), 0.1))
+            .map(|marble| world.marbles.insert(marble).unwrap())
+            .collect();
+        for (wall, marble) in walls.into_iter().zip(marbles) {
+            world.begin_step();
+            world.integrate(1.0 / 60.0).unwrap();
+            world.generate_contacts();
+            world.walls.remove(wall).unwrap();
+            world.marbles.remove(marble).unwrap();
+            world.restitute(1.0 / 60.0).unwrap();
+            world.end_step();
+        }
+        assert!(world.contacts.is_empty());
+    }
+}
