@@ -3,6 +3,7 @@
 use std::time::Duration;
 
 use taw::prelude::*;
+use taw::swarm::SwarmModel;
 use web_time::Instant;
 
 /// Earth's gravity, in m/s².
@@ -64,11 +65,14 @@ impl Stopwatch {
     }
 }
 
-/// An empty world of this model.
+/// An empty world of this model, in which nothing sleeps.
 #[must_use]
 pub fn world<S: Scalar>(model: Model) -> World<S> {
     let mut world = World::default();
     world.set_model(model).expect("the suite's models are right");
+    // What is slow beside an unstable balance would sleep there.
+    let awake = SwarmModel { sleeps: false, ..world.swarm.model() };
+    world.swarm.set_model(awake).expect("as it was");
     world
 }
 
