@@ -248,3 +248,80 @@ impl Lanes for f64 {
         self as u32
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Puts the bits of all operations on eight lanes of rows behind each other.
+    struct All<'a, S> {
+        rows: &'a [Row<S>],
+        at: [u16; LANES],
+        count: usize,
+        out: &'a mut Vec<u8>,
+    }
+
+    impl<S: Scalar> Kernel<S> for All<'_, S> {
+        #[inline(always)]
+        fn run<L: Simd<Scalar = S>>(self) {
+            // SAFETY: `at` are places of rows, which nobody writes.
+            let [a, b, c, d] = unsafe { L::gather(self.rows.as_ptr(), &self.at) };
+            let mut lanes = [S::zero(); LANES];
+            for lanes_of in [
+                a + b,
+                a - b,
+                a * b,
+                a / b,
+                a.max(b),
+                a.select_gt(b, c, d),
+                (a * a).sqrt(),
+                a.mask_first(self.count),
+                L::splat(a.sum()),
+                L::constant(0.1),
+            ] {
+                lanes_of.store(&mut lanes);
+                L::load(&lanes).store(&mut lanes);
+                self.out.extend(bytemuck::bytes_of(&lanes));
+            }
+            let bits = a.gt_mask(b);
+            let mut set = [0; LANES];
+            L::compress(bits, 7, &mut set);
+            self.out.extend(bits.to_le_bytes());
+            self.out.extend(bytemuck::cast_slice(&set[..bits.count_ones() as usize]));
+            let mut written = self.rows.to_vec();
+            // SAFETY: as above, and the rows are this function's own.
+            unsafe { L::scatter(written.as_mut_ptr(), &self.at, self.count, [d, c, b, a]) };
+            self.out.extend(bytemuck::cast_slice::<_, u8>(&written));
+        }
+    }
+
+    /// Every level gives the bits of plain Rust.
+    fn levels_agree<S: Scalar>() {
+        let mut random = fastrand::Rng::with_seed(3);
+        let special = [0.0, -0.0, 1.0, -1.0, 1e30, -1e-30, f64::INFINITY];
+        for round in 0..2_000 {
+            let mut number = || match random.usize(..24) {
+                i if i < special.len() => S::from_f64(special[i]),
+                _ => S::from_f64((random.f64() - 0.5) * 10_f64.powi(random.i32(-6..7))),
+            };
+            let rows: Vec<Row<S>> = (0..20).map(|_| [(); 4].map(|()| number())).collect();
+            let mut places: Vec<u16> = (0..20).collect();
+            random.shuffle(&mut places);
+            let at = std::array::from_fn(|lane| places[lane]);
+            let bits_by = |level: SimdLevel| {
+                let mut out = Vec::new();
+                level.run(All { rows: &rows, at, count: round % (LANES + 1), out: &mut out });
+                out
+            };
+            for level in SimdLevel::available() {
+                assert!(bits_by(level) == bits_by(SimdLevel::PORTABLE), "{level:?}: {rows:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn instructions_change_no_bit() {
+        levels_agree::<f32>();
+        levels_agree::<f64>();
+    }
+}

@@ -238,6 +238,7 @@ fn off_a_sphere(stopwatch: &mut Stopwatch, model: Model, friction: f64, cosine: 
     let (far, (sin, cos)) = (1.1, 1e-3_f64.sin_cos());
     let ball = Ball { at: [far * sin, far * cos, 0.0], radius: 0.1, ..Ball::default() };
     let id = Ball { material: surface(0.0, friction), ..ball }.insert(&mut world);
+    // It leaves within three seconds; one that never does has no angle.
     for _ in 0..1200 {
         if state(&world, id)[0].y <= -1.0 {
             break;
