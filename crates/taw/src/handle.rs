@@ -1,4 +1,4 @@
-//! Stable handles of rows that move: an index and a generation.
+//! Stable handles of rows that move: a slot and a generation.
 
 use crate::Error;
 
@@ -6,7 +6,11 @@ use crate::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MarbleId(pub(crate) Handle);
 
-/// Generational handle of an index that may move. The generation distinguishes it from earlier
+/// Stable handle of a ball of a swarm.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct BallId(pub(crate) Handle);
+
+/// Generational handle of a row that may move. The generation distinguishes it from earlier
 /// handles of the same slot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub(crate) struct Handle {
@@ -14,23 +18,23 @@ pub(crate) struct Handle {
     pub generation: u32,
 }
 
-/// Bidirectional map of handles and indices (a generational arena).
+/// Row of a slot that is free, and slot of none.
+pub(crate) const NO_ROW: u32 = u32::MAX;
+
+/// Bidirectional map of handles and rows (a generational arena).
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(crate) struct Handles {
-    slots: Vec<Slot>,
-    /// Slot of each index.
+    /// Slot of each row.
+    slots: Vec<u32>,
+    /// Row of each slot, or [`NO_ROW`].
     rows: Vec<u32>,
-    /// Free slots, the last freed first.
+    /// Generation of the current or next handle of each slot; zero for those beyond the end, of
+    /// which no handle was removed.
+    generations: Vec<u32>,
+    /// Free slots, the last freed last.
     free: Vec<u32>,
-    /// Number of removals, each of which moves another index.
+    /// Number of removals, each of which may move other rows.
     removals: u64,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-struct Slot {
-    /// Generation of the current or next handle.
-    generation: u32,
-    row: Option<u32>,
 }
 
 impl Handles {
@@ -39,52 +43,120 @@ impl Handles {
         self.removals
     }
 
-    /// Creates a handle for a new last index.
-    pub fn push(&mut self) -> Result<Handle, Error> {
-        let full = |_| Error::Full(self.rows.len());
-        let row = u32::try_from(self.rows.len()).map_err(full)?;
-        let slot = if let Some(slot) = self.free.pop() {
-            slot
-        } else {
-            let slot = u32::try_from(self.slots.len()).map_err(full)?;
-            self.slots.push(Slot { generation: 0, row: None });
-            slot
-        };
-        self.rows.push(slot);
-        let entry = &mut self.slots[slot as usize];
-        entry.row = Some(row);
-        Ok(Handle { slot, generation: entry.generation })
+    /// Slot of each row.
+    pub fn slots(&self) -> &[u32] {
+        &self.slots
     }
 
-    /// Removes a handle. The last index is swapped into its place, which is returned.
+    /// Row of each slot; [`NO_ROW`] for a free one.
+    pub fn rows(&self) -> &[u32] {
+        &self.rows
+    }
+
+    /// Slots by row and rows by slot, for a caller that reorders rows.
+    pub fn columns(&mut self) -> (&mut Vec<u32>, &mut [u32]) {
+        (&mut self.slots, &mut self.rows)
+    }
+
+    /// Creates a handle for a new last row.
+    ///
+    /// # Errors
+    /// [`Error::Full`] at 2³² − 1 slots.
+    pub fn push(&mut self) -> Result<Handle, Error> {
+        self.push_many(1)?;
+        Ok(self.of_slot(self.slots[self.slots.len() - 1]))
+    }
+
+    /// Creates handles for so many new rows at the end, all or none. Returns the first of them.
+    ///
+    /// # Errors
+    /// [`Error::Full`] at 2³² − 1 slots.
+    pub fn push_many(&mut self, count: usize) -> Result<usize, Error> {
+        let first = self.slots.len();
+        let reused = count.min(self.free.len());
+        let slots = self.rows.len().checked_add(count - reused);
+        let Some(slots) = slots.filter(|slots| *slots <= NO_ROW as usize) else {
+            return Err(Error::Full(first));
+        };
+        let new = self.rows.len() as u32..slots as u32;
+        self.slots.extend(self.free.drain(self.free.len() - reused..).chain(new));
+        self.rows.resize(slots, NO_ROW);
+        self.index_rows(first);
+        Ok(first)
+    }
+
+    /// Removes a handle. The last row is swapped into its place, which is returned.
     pub fn swap_remove(&mut self, handle: Handle) -> Option<usize> {
         let row = self.row(handle)?;
-        self.rows.swap_remove(row);
-        self.removals += 1;
-        if let Some(moved) = self.rows.get(row) {
-            self.slots[*moved as usize].row = Some(row as u32);
-        }
-        let slot = &mut self.slots[handle.slot as usize];
-        slot.row = None;
-        // A slot with exhausted generations is never reused.
-        if let Some(next) = slot.generation.checked_add(1) {
-            slot.generation = next;
-            self.free.push(handle.slot);
+        self.retire(handle);
+        self.slots.swap_remove(row);
+        if let Some(moved) = self.slots.get(row) {
+            self.rows[*moved as usize] = row as u32;
         }
         Some(row)
     }
 
-    /// Current index of a handle.
-    pub fn row(&self, handle: Handle) -> Option<usize> {
-        let slot = self.slots.get(handle.slot as usize)?;
-        let row = slot.row? as usize;
-        (slot.generation == handle.generation).then_some(row)
+    /// Removes handles that exist, each listed once; the rows that are left move up. Returns by row if
+    /// it is left.
+    pub fn remove_many(&mut self, handles: impl Iterator<Item = Handle>) -> Vec<bool> {
+        let mut kept = vec![true; self.slots.len()];
+        for handle in handles {
+            if let Some(row) = self.row(handle) {
+                kept[row] = false;
+                self.retire(handle);
+            }
+        }
+        let mut row = 0;
+        self.slots.retain(|_| {
+            row += 1;
+            kept[row - 1]
+        });
+        self.index_rows(0);
+        kept
     }
 
-    /// Handle of an index.
+    /// Notes where the slots of rows from `first` on are.
+    fn index_rows(&mut self, first: usize) {
+        for (row, slot) in (first as u32..).zip(&self.slots[first..]) {
+            self.rows[*slot as usize] = row;
+        }
+    }
+
+    /// Frees the slot of a handle.
+    fn retire(&mut self, Handle { slot, generation }: Handle) {
+        self.removals += 1;
+        self.rows[slot as usize] = NO_ROW;
+        if self.generations.len() <= slot as usize {
+            self.generations.resize(self.rows.len(), 0);
+        }
+        // A slot with exhausted generations is never reused.
+        if let Some(next) = generation.checked_add(1) {
+            self.generations[slot as usize] = next;
+            self.free.push(slot);
+        }
+    }
+
+    /// Current row of a handle.
+    pub fn row(&self, handle: Handle) -> Option<usize> {
+        let row = *self.rows.get(handle.slot as usize)?;
+        (row != NO_ROW && self.of_slot(handle.slot) == handle).then_some(row as usize)
+    }
+
+    /// Handle of a row.
     pub fn handle(&self, row: usize) -> Option<Handle> {
-        let slot = *self.rows.get(row)?;
-        Some(Handle { slot, generation: self.slots[slot as usize].generation })
+        self.slots.get(row).map(|slot| self.of_slot(*slot))
+    }
+
+    /// Current or next handle of a slot.
+    fn of_slot(&self, slot: u32) -> Handle {
+        let generation = self.generations.get(slot as usize).copied().unwrap_or(0);
+        Handle { slot, generation }
+    }
+
+    /// Bytes that it has from the allocator.
+    pub fn bytes(&self) -> usize {
+        let all = [&self.slots, &self.rows, &self.generations, &self.free];
+        all.iter().map(|column| column.capacity() * size_of::<u32>()).sum()
     }
 }
 
@@ -118,7 +190,7 @@ mod tests {
                 removed.push(handle);
             }
             if i % 97 == 0 {
-                assert_eq!(handles.rows.len(), expected.len());
+                assert_eq!(handles.slots().len(), expected.len());
                 for (handle, value) in &expected {
                     let row = handles.row(*handle).unwrap();
                     assert_eq!(values[row], *value);
@@ -144,10 +216,26 @@ mod tests {
     fn a_slot_whose_generations_are_used_up_retires() {
         let mut handles = Handles::default();
         let mut handle = handles.push().unwrap();
-        handles.slots[0].generation = u32::MAX;
+        handles.generations = vec![u32::MAX];
         handle.generation = u32::MAX;
         assert_eq!(handles.swap_remove(handle), Some(0));
         assert_eq!(handles.push().unwrap().slot, 1);
         assert_eq!(handles.row(handle), None);
+    }
+
+    #[test]
+    fn rows_move_up_where_many_are_removed_at_once() {
+        let mut handles = Handles::default();
+        assert_eq!(handles.push_many(5).unwrap(), 0);
+        let all: Vec<_> = (0..5).map(|row| handles.handle(row).unwrap()).collect();
+        let kept = handles.remove_many([all[3], all[0]].into_iter());
+        assert_eq!(kept, [false, true, true, false, true]);
+        let rows: Vec<_> = all.iter().map(|handle| handles.row(*handle)).collect();
+        assert_eq!(rows, [None, Some(0), Some(1), None, Some(2)]);
+        assert_eq!(handles.removals(), 2);
+        // Their slots are used again, with the next generation, and a new one after them.
+        assert_eq!(handles.push_many(3).unwrap(), 3);
+        let new = [3, 4, 5].map(|row| handles.handle(row).unwrap());
+        assert_eq!(new.map(|handle| (handle.slot, handle.generation)), [(3, 1), (0, 1), (5, 0)]);
     }
 }

@@ -66,6 +66,7 @@ pub mod response;
 pub mod scene;
 pub mod shape;
 pub mod swarm;
+mod uncompared;
 mod workers;
 pub mod world;
 

@@ -1,11 +1,13 @@
 //! The order in which the core's modules may use each other, as the table in `lib.rs` has it, and
 //! the length of files. (`clippy.toml` limits that of functions.) And words that no doc line begins with.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 /// From what everything uses to what uses everything.
-const ORDER: [&str; 13] = [
+const ORDER: [&str; 14] = [
+    "uncompared",
     "math",
     "handle",
     "workers",
@@ -87,6 +89,30 @@ fn no_file_is_too_long_to_read() {
     let long: Vec<_> = all.iter().filter(|path| lines(path) > LONGEST).collect();
     assert!(long.is_empty(), "over {LONGEST} lines: {long:#?}");
     assert!(all.len() > 300, "only {} files were found", all.len());
+}
+
+#[test]
+fn no_type_name_has_two_meanings() {
+    let mut all = Vec::new();
+    files(Path::new("src"), &mut all);
+    let mut defined: BTreeMap<String, Vec<String>> = BTreeMap::new();
+    for path in all {
+        let text = fs::read_to_string(&path).unwrap();
+        let code = text.split("#[cfg(test)]").next().unwrap_or(&text);
+        for line in code.lines() {
+            let item = line.strip_prefix("pub").map_or(line, |rest| {
+                rest.strip_prefix('(').and_then(|rest| rest.split_once(')')).map_or(rest, |it| it.1)
+            });
+            let mut words = item.split_whitespace();
+            if words.next().is_some_and(|word| ["struct", "enum", "trait"].contains(&word)) {
+                let name = words.next().unwrap().split(|c: char| !c.is_alphanumeric()).next();
+                defined.entry(name.unwrap().into()).or_default().push(path.display().to_string());
+            }
+        }
+    }
+    assert!(defined.len() > 300, "only {} types were found", defined.len());
+    defined.retain(|_, places| places.len() > 1);
+    assert!(defined.is_empty(), "{defined:#?}");
 }
 
 /// Words that begin no documentation, which names the thing or says what is done.

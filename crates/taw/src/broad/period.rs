@@ -13,17 +13,10 @@ use crate::math::{Point3, Scalar, Vec3};
 const LEAST_DIAMETERS: f64 = 4.01;
 
 /// Lengths of a periodic box along the axes, around the origin.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct Period<S> {
     /// Lengths in metres; none along a non-periodic axis.
     pub lengths: [Option<S>; 3],
-}
-
-impl<S> Default for Period<S> {
-    /// Not periodic.
-    fn default() -> Self {
-        Self { lengths: [None, None, None] }
-    }
 }
 
 impl<S: Scalar> Period<S> {
@@ -72,18 +65,12 @@ impl<S: Scalar> Period<S> {
 }
 
 /// Spheres with their periodic images, and scratch memory of the pair search.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct Images<S> {
     center: Vec<Point3<S>>,
     radius: Vec<S>,
     row: Vec<u32>,
     pairs: Vec<(u32, u32)>,
-}
-
-impl<S> Default for Images<S> {
-    fn default() -> Self {
-        Self { center: Vec::new(), radius: Vec::new(), row: Vec::new(), pairs: Vec::new() }
-    }
 }
 
 impl<S: Scalar> Images<S> {

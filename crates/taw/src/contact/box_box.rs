@@ -5,7 +5,7 @@ use cgmath::InnerSpace;
 
 use super::brute_force::{Axis, AxisSource, at_right_angles, crossing};
 use super::closest::{LocalClosestPoints, TOLERANCE};
-use super::core::{Core, Cuboid, Kind};
+use super::core::{Core, CoreKind, Cuboid};
 use super::manifold::deepest;
 use crate::math::Vec3;
 
@@ -84,7 +84,7 @@ impl BoxAxis {
     /// Adds the deepest points.
     pub fn with_points(self, a: &Core<'_>, b: &Core<'_>) -> LocalClosestPoints {
         let Self { normal, distance, of } = self;
-        let on_b = if let (Kind::Cuboid(x), Kind::Cuboid(y), BoxAxisSource::Edges(i, j)) =
+        let on_b = if let (CoreKind::Cuboid(x), CoreKind::Cuboid(y), BoxAxisSource::Edges(i, j)) =
             (&a.kind, &b.kind, of)
         {
             // The support edges.

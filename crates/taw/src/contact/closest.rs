@@ -2,7 +2,7 @@ use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::box_box::{BoxAxis, boxes};
 use super::brute_force;
-use super::core::{Convex, Core, Kind};
+use super::core::{Convex, Core, CoreKind};
 use super::epa::penetration;
 use super::gjk::{Gjk, gjk};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
@@ -177,11 +177,13 @@ pub(super) fn local_closest_points_within(
 pub(super) fn core_distance(a: &Core<'_>, b: &Core<'_>, limit: f64) -> Option<CoreDistance> {
     let (size, limit) = (a.size() + b.size(), limit + a.radius + b.radius);
     let found = match (&a.kind, &b.kind) {
-        (Kind::Segment(a), Kind::Segment(b)) => closest_points_of_segments(*a, *b, size, limit),
-        (Kind::Triangle(corners), Kind::Point(point)) => {
+        (CoreKind::Segment(a), CoreKind::Segment(b)) => {
+            closest_points_of_segments(*a, *b, size, limit)
+        }
+        (CoreKind::Triangle(corners), CoreKind::Point(point)) => {
             closest_points_of_triangle_and_point(*corners, *point)
         }
-        (Kind::Cuboid(x), Kind::Cuboid(y)) => {
+        (CoreKind::Cuboid(x), CoreKind::Cuboid(y)) => {
             let axis = boxes(x, y, size);
             if axis.distance > limit {
                 return None;

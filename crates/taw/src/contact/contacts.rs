@@ -149,18 +149,12 @@ impl<S: Scalar> Contact<S> {
 }
 
 /// Contact lists of a substep.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct Contacts<S> {
     /// Wall–marble contacts.
     pub wm: Vec<Contact<S>>,
     /// Marble–marble contacts.
     pub mm: Vec<Contact<S>>,
-}
-
-impl<S> Default for Contacts<S> {
-    fn default() -> Self {
-        Self { wm: Vec::new(), mm: Vec::new() }
-    }
 }
 
 impl<S: Scalar> Contacts<S> {

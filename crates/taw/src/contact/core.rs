@@ -9,13 +9,13 @@ use crate::shape::{Aabb3, BoundedShape, Capsule, Face, Hull, Obb, Sphere, Triang
 /// nearby origin, so that nothing is lost far from the origin of the world.
 #[derive(Clone, Copy, Debug)]
 pub struct Core<'a> {
-    pub(super) kind: Kind<'a>,
+    pub(super) kind: CoreKind<'a>,
     /// Rounding radius, in metres.
     pub(super) radius: f64,
 }
 
 #[derive(Clone, Copy, Debug)]
-pub(super) enum Kind<'a> {
+pub(super) enum CoreKind<'a> {
     Point(Vec3<f64>),
     Segment([Vec3<f64>; 2]),
     Triangle([Vec3<f64>; 3]),
@@ -126,14 +126,14 @@ impl Core<'_> {
             best
         };
         match &self.kind {
-            Kind::Point(point) => (*point, 0),
-            Kind::Segment(ends) => support(ends),
-            Kind::Triangle(corners) => support(corners),
-            Kind::Cuboid(cuboid) => {
+            CoreKind::Point(point) => (*point, 0),
+            CoreKind::Segment(ends) => support(ends),
+            CoreKind::Triangle(corners) => support(corners),
+            CoreKind::Cuboid(cuboid) => {
                 let corner = cuboid.support(direction);
                 (cuboid.corner(corner), corner)
             }
-            Kind::Hull { points, rotation, translation, .. } => {
+            CoreKind::Hull { points, rotation, translation, .. } => {
                 let local = Vec3::new(
                     rotation.x.dot(direction),
                     rotation.y.dot(direction),
@@ -149,39 +149,39 @@ impl Core<'_> {
     pub(super) fn size(&self) -> f64 {
         let largest = |v: Vec3<f64>| v.x.abs().max(v.y.abs()).max(v.z.abs());
         let far = match &self.kind {
-            Kind::Point(_) => 0.0,
-            Kind::Segment([a, b]) => largest(b - a),
-            Kind::Triangle([a, b, c]) => largest(b - a).max(largest(c - a)),
-            Kind::Cuboid(cuboid) => 2.0 * largest(cuboid.half.into()),
-            Kind::Hull { size, .. } => *size,
+            CoreKind::Point(_) => 0.0,
+            CoreKind::Segment([a, b]) => largest(b - a),
+            CoreKind::Triangle([a, b, c]) => largest(b - a).max(largest(c - a)),
+            CoreKind::Cuboid(cuboid) => 2.0 * largest(cuboid.half.into()),
+            CoreKind::Hull { size, .. } => *size,
         };
         far.max(self.radius)
     }
 
     /// Returns true for a triangle that is not degenerate.
     pub(super) fn is_nondegenerate_triangle(&self) -> bool {
-        matches!(&self.kind, Kind::Triangle(corners) if normal_of(*corners).is_some())
+        matches!(&self.kind, CoreKind::Triangle(corners) if normal_of(*corners).is_some())
     }
 
     /// A point inside the core.
     pub(super) fn inside(&self) -> Vec3<f64> {
         match &self.kind {
-            Kind::Point(point) => *point,
-            Kind::Segment([a, b]) => (a + b) * 0.5,
-            Kind::Triangle([a, b, c]) => (a + b + c) / 3.0,
-            Kind::Cuboid(cuboid) => cuboid.center,
-            Kind::Hull { translation, .. } => *translation,
+            CoreKind::Point(point) => *point,
+            CoreKind::Segment([a, b]) => (a + b) * 0.5,
+            CoreKind::Triangle([a, b, c]) => (a + b + c) / 3.0,
+            CoreKind::Cuboid(cuboid) => cuboid.center,
+            CoreKind::Hull { translation, .. } => *translation,
         }
     }
 
     /// Translates the core.
     pub(super) fn translated(mut self, by: Vec3<f64>) -> Self {
         match &mut self.kind {
-            Kind::Point(point) => *point += by,
-            Kind::Segment(ends) => ends.iter_mut().for_each(|end| *end += by),
-            Kind::Triangle(corners) => corners.iter_mut().for_each(|corner| *corner += by),
-            Kind::Cuboid(cuboid) => cuboid.center += by,
-            Kind::Hull { translation, .. } => *translation += by,
+            CoreKind::Point(point) => *point += by,
+            CoreKind::Segment(ends) => ends.iter_mut().for_each(|end| *end += by),
+            CoreKind::Triangle(corners) => corners.iter_mut().for_each(|corner| *corner += by),
+            CoreKind::Cuboid(cuboid) => cuboid.center += by,
+            CoreKind::Hull { translation, .. } => *translation += by,
         }
         self
     }
@@ -189,14 +189,18 @@ impl Core<'_> {
     /// Rotates the core about the origin.
     pub(super) fn rotated(mut self, by: Mat3<f64>) -> Self {
         match &mut self.kind {
-            Kind::Point(point) => *point = by * *point,
-            Kind::Segment(ends) => ends.iter_mut().for_each(|end| *end = by * *end),
-            Kind::Triangle(corners) => corners.iter_mut().for_each(|corner| *corner = by * *corner),
-            Kind::Cuboid(cuboid) => {
+            CoreKind::Point(point) => *point = by * *point,
+            CoreKind::Segment(ends) => ends.iter_mut().for_each(|end| *end = by * *end),
+            CoreKind::Triangle(corners) => {
+                for corner in corners {
+                    *corner = by * *corner;
+                }
+            }
+            CoreKind::Cuboid(cuboid) => {
                 cuboid.center = by * cuboid.center;
                 cuboid.axes.iter_mut().for_each(|axis| *axis = by * *axis);
             }
-            Kind::Hull { rotation, translation, .. } => {
+            CoreKind::Hull { rotation, translation, .. } => {
                 (*rotation, *translation) = (by * *rotation, by * *translation);
             }
         }
@@ -206,12 +210,12 @@ impl Core<'_> {
     /// Index of the face whose normal is within [`PARALLEL_SIN`] of a direction.
     pub(super) fn face_along(&self, direction: Vec3<f64>) -> Option<usize> {
         let face = match &self.kind {
-            Kind::Point(_) | Kind::Segment(_) => None,
-            Kind::Triangle(corners) => {
+            CoreKind::Point(_) | CoreKind::Segment(_) => None,
+            CoreKind::Triangle(corners) => {
                 normal_of(*corners).map(|normal| usize::from(normal.dot(direction) < 0.0))
             }
-            Kind::Cuboid(cuboid) => Some(cuboid.facing(direction)),
-            Kind::Hull { faces, rotation, .. } => {
+            CoreKind::Cuboid(cuboid) => Some(cuboid.facing(direction)),
+            CoreKind::Hull { faces, rotation, .. } => {
                 let local = Vec3::new(
                     rotation.x.dot(direction),
                     rotation.y.dot(direction),
@@ -234,27 +238,27 @@ impl Core<'_> {
     /// The normal of a face.
     pub(super) fn normal(&self, face: usize) -> Vec3<f64> {
         match &self.kind {
-            Kind::Cuboid(cuboid) => cuboid.normal(face),
-            Kind::Hull { faces, rotation, .. } => rotation * faces[face].normal,
-            Kind::Triangle(corners) => {
+            CoreKind::Cuboid(cuboid) => cuboid.normal(face),
+            CoreKind::Hull { faces, rotation, .. } => rotation * faces[face].normal,
+            CoreKind::Triangle(corners) => {
                 let normal = normal_of(*corners).unwrap_or_else(Vec3::unit_x);
                 if face == 0 { normal } else { -normal }
             }
-            Kind::Point(_) | Kind::Segment(_) => Vec3::unit_x(),
+            CoreKind::Point(_) | CoreKind::Segment(_) => Vec3::unit_x(),
         }
     }
 
     /// The vertices of a face, counterclockwise.
     pub(super) fn face(&self, face: usize) -> Polygon {
         match &self.kind {
-            Kind::Cuboid(cuboid) => {
+            CoreKind::Cuboid(cuboid) => {
                 BOX_FACES[face].iter().map(|corner| (cuboid.corner(*corner), *corner)).collect()
             }
-            Kind::Hull { points, faces, rotation, translation, .. } => {
+            CoreKind::Hull { points, faces, rotation, translation, .. } => {
                 let corner = |i: &u32| (placed(rotation, *translation, points[*i as usize]), *i);
                 faces[face].corners.iter().map(corner).collect()
             }
-            Kind::Triangle([a, b, c]) => {
+            CoreKind::Triangle([a, b, c]) => {
                 let corners = if face == 0 {
                     [(*a, 0), (*b, 1), (*c, 2)]
                 } else {
@@ -262,8 +266,8 @@ impl Core<'_> {
                 };
                 corners.into_iter().collect()
             }
-            Kind::Point(point) => std::iter::once((*point, 0)).collect(),
-            Kind::Segment([a, b]) => [(*a, 0), (*b, 1)].into_iter().collect(),
+            CoreKind::Point(point) => std::iter::once((*point, 0)).collect(),
+            CoreKind::Segment([a, b]) => [(*a, 0), (*b, 1)].into_iter().collect(),
         }
     }
 
@@ -271,12 +275,12 @@ impl Core<'_> {
     /// aligned with it; else the segment or the point.
     pub(super) fn facing(&self, direction: Vec3<f64>) -> Polygon {
         let face = match &self.kind {
-            Kind::Point(_) | Kind::Segment(_) => 0,
-            Kind::Triangle(corners) => {
+            CoreKind::Point(_) | CoreKind::Segment(_) => 0,
+            CoreKind::Triangle(corners) => {
                 usize::from(normal_of(*corners).is_some_and(|normal| normal.dot(direction) < 0.0))
             }
-            Kind::Cuboid(cuboid) => cuboid.facing(direction),
-            Kind::Hull { points, faces, rotation, size, .. } => {
+            CoreKind::Cuboid(cuboid) => cuboid.facing(direction),
+            CoreKind::Hull { points, faces, rotation, size, .. } => {
                 let local = Vec3::new(
                     rotation.x.dot(direction),
                     rotation.y.dot(direction),
@@ -306,7 +310,7 @@ fn local<S: Scalar>(point: Point3<S>, origin: Point3<f64>) -> Vec3<f64> {
 
 impl<S: Scalar> Convex<S> for Sphere<S> {
     fn core(&self, origin: Point3<f64>) -> Core<'_> {
-        Core { kind: Kind::Point(local(self.center, origin)), radius: self.radius.as_f64() }
+        Core { kind: CoreKind::Point(local(self.center, origin)), radius: self.radius.as_f64() }
     }
 
     fn center(&self) -> Point3<S> {
@@ -321,7 +325,7 @@ impl<S: Scalar> Convex<S> for Sphere<S> {
 impl<S: Scalar> Convex<S> for Capsule<S> {
     fn core(&self, origin: Point3<f64>) -> Core<'_> {
         let ends = [self.a, self.b].map(|end| local(end, origin));
-        Core { kind: Kind::Segment(ends), radius: self.radius.as_f64() }
+        Core { kind: CoreKind::Segment(ends), radius: self.radius.as_f64() }
     }
 
     fn center(&self) -> Point3<S> {
@@ -341,7 +345,7 @@ impl<S: Scalar> Convex<S> for Obb<S> {
             axes: self.axes_f64(),
             half: cast_vector(self.half_extents).into(),
         };
-        Core { kind: Kind::Cuboid(cuboid), radius: 0.0 }
+        Core { kind: CoreKind::Cuboid(cuboid), radius: 0.0 }
     }
 
     fn center(&self) -> Point3<S> {
@@ -355,7 +359,7 @@ impl<S: Scalar> Convex<S> for Aabb3<S> {
         let half = (high - low) * 0.5;
         let axes = [Vec3::unit_x(), Vec3::unit_y(), Vec3::unit_z()];
         let cuboid = Cuboid { center: low + half, axes, half: half.into() };
-        Core { kind: Kind::Cuboid(cuboid), radius: 0.0 }
+        Core { kind: CoreKind::Cuboid(cuboid), radius: 0.0 }
     }
 
     fn center(&self) -> Point3<S> {
@@ -366,7 +370,7 @@ impl<S: Scalar> Convex<S> for Aabb3<S> {
 impl<S: Scalar> Convex<S> for Triangle<S> {
     fn core(&self, origin: Point3<f64>) -> Core<'_> {
         let corners = self.corners.map(|corner| local(corner, origin));
-        Core { kind: Kind::Triangle(corners), radius: 0.0 }
+        Core { kind: CoreKind::Triangle(corners), radius: 0.0 }
     }
 
     fn center(&self) -> Point3<S> {
@@ -378,7 +382,7 @@ impl<S: Scalar> Convex<S> for Triangle<S> {
 impl<S: Scalar> Convex<S> for Hull<S> {
     fn core(&self, origin: Point3<f64>) -> Core<'_> {
         let pose = self.pose_f64();
-        let kind = Kind::Hull {
+        let kind = CoreKind::Hull {
             points: self.local_points(),
             edges: self.edges(),
             faces: self.faces(),

@@ -4,7 +4,7 @@ use smallvec::SmallVec;
 
 use super::brute_force::{Axis, AxisSource};
 use super::closest::{ClosestPoints, LocalClosestPoints, closest_points, core_distance};
-use super::core::{Convex, Core, IndexedVertex, Kind, PARALLEL_SIN, Polygon};
+use super::core::{Convex, Core, CoreKind, IndexedVertex, PARALLEL_SIN, Polygon};
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, normalize_and_length};
 
 /// Contact manifold: a point, the ends of a segment, or up to four vertices of a polygon.
@@ -129,7 +129,7 @@ fn contact_points(a: &Core<'_>, b: &Core<'_>, axis: &Axis) -> ContactPoints {
             points
         }
         AxisSource::Edges => match (&a.kind, &b.kind) {
-            (Kind::Segment(a), Kind::Segment(b)) => {
+            (CoreKind::Segment(a), CoreKind::Segment(b)) => {
                 contact_points_of_parallel_segments(*a, *b, axis.normal)
             }
             _ => ContactPoints::new(),

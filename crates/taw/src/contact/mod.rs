@@ -37,6 +37,7 @@
 //! displacement of the second shape that takes it out of the first. Touching without overlap is a
 //! contact with a displacement of zero.
 
+mod advance;
 mod box_box;
 mod brute_force;
 mod closest;
@@ -54,6 +55,7 @@ mod sphere_sphere;
 mod surface;
 mod time_of_impact;
 
+pub(crate) use advance::time_to_close;
 pub use brute_force::Features;
 pub use closest::{
     ClosestPoints, closest_points, closest_points_brute_force, closest_points_of_plane,

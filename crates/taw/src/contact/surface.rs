@@ -3,7 +3,7 @@ use cgmath::{EuclideanSpace, InnerSpace};
 use super::closest::{
     ClosestPoints, LocalClosestPoints, closest_points, local_closest_points_within,
 };
-use super::core::{Convex, Core, Kind};
+use super::core::{Convex, Core, CoreKind};
 use super::manifold::{Manifold, manifold};
 use super::ray_cast::RayHit;
 use super::shape_cast::{ShapeCastHit, shape_cast};
@@ -89,7 +89,7 @@ fn closest_of_sphere<S: Scalar>(
 
 /// Lower bound of the distance of a triangle and a shape: separation along the triangle's normal.
 fn distance_lower_bound(triangle: &Core<'_>, core: &Core<'_>) -> f64 {
-    let Kind::Triangle([a, b, c]) = &triangle.kind else { return f64::NEG_INFINITY };
+    let CoreKind::Triangle([a, b, c]) = &triangle.kind else { return f64::NEG_INFINITY };
     let Some((normal, _)) = normalize_and_length((b - a).cross(c - a)) else {
         return f64::NEG_INFINITY;
     };

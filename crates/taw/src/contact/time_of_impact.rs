@@ -1,5 +1,6 @@
 use cgmath::{InnerSpace, Matrix3, Quaternion};
 
+use super::advance::time_to_close;
 use super::closest::{LocalClosestPoints, local_closest_points};
 use super::core::{Convex, Core};
 use super::shape_cast::{SLIDING, ShapeCastHit};
@@ -127,14 +128,9 @@ pub fn time_of_impact<S: Scalar>(
         if separation(left) > 0.0 {
             return None;
         }
-        // Root if the closest points stay the same, in the form without cancellation.
-        let curvature = x.curvature + y.curvature;
-        let root = (approach_speed * approach_speed + 4.0 * curvature * lower_bound).sqrt();
-        let guess = if approach_speed > 0.0 {
-            2.0 * lower_bound / (root + approach_speed)
-        } else {
-            (root - approach_speed) / (2.0 * curvature)
-        };
+        // As if the closest points stayed the same.
+        let acceleration = 2.0 * (x.curvature + y.curvature);
+        let guess = time_to_close(lower_bound, approach_speed, acceleration);
         time += safe_advance(separation, lower_bound, guess, left, near);
     }
     None

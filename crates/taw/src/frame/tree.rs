@@ -13,11 +13,11 @@ new_key_type! {
 /// a root.
 #[derive(Clone, Debug, Default)]
 pub struct Tree<S> {
-    nodes: SlotMap<NodeId, Node<S>>,
+    nodes: SlotMap<NodeId, FrameNode<S>>,
 }
 
 #[derive(Clone, Debug)]
-struct Node<S> {
+struct FrameNode<S> {
     local: Pose<S>,
     parent: Option<NodeId>,
     children: Vec<NodeId>,
@@ -33,7 +33,7 @@ impl<S: Scalar> Tree<S> {
         if let Some(parent) = parent {
             self.node(parent)?;
         }
-        let id = self.nodes.insert(Node { local, parent, children: Vec::new() });
+        let id = self.nodes.insert(FrameNode { local, parent, children: Vec::new() });
         self.attach(id, parent);
         Ok(id)
     }
@@ -127,7 +127,7 @@ impl<S: Scalar> Tree<S> {
         Ok(())
     }
 
-    fn node(&self, id: NodeId) -> Result<&Node<S>, Error> {
+    fn node(&self, id: NodeId) -> Result<&FrameNode<S>, Error> {
         self.nodes.get(id).ok_or(Error::NoSuchNode(id))
     }
 

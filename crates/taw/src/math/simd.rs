@@ -54,10 +54,10 @@ pub trait Kernel<S> {
 
 /// Instruction set that a swarm uses. Each gives the same bits.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct SimdLevel(Kind);
+pub struct SimdLevel(SimdKind);
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Kind {
+enum SimdKind {
     Portable,
     /// AVX2, BMI1 and POPCNT; only where the processor has them.
     #[cfg(target_arch = "x86_64")]
@@ -73,7 +73,7 @@ impl Default for SimdLevel {
 
 impl SimdLevel {
     /// Those that every machine of its kind has.
-    pub const PORTABLE: Self = Self(Kind::Portable);
+    pub const PORTABLE: Self = Self(SimdKind::Portable);
 
     /// All that this machine has, the fastest first.
     pub fn available() -> impl Iterator<Item = Self> {
@@ -81,7 +81,7 @@ impl SimdLevel {
         let more = (std::is_x86_feature_detected!("avx2")
             && std::is_x86_feature_detected!("bmi1")
             && std::is_x86_feature_detected!("popcnt"))
-        .then_some(Self(Kind::Avx2));
+        .then_some(Self(SimdKind::Avx2));
         #[cfg(not(target_arch = "x86_64"))]
         let more = None;
         more.into_iter().chain([Self::PORTABLE])
@@ -89,10 +89,10 @@ impl SimdLevel {
 
     pub(crate) fn run<S: Scalar>(self, kernel: impl Kernel<S>) {
         match self.0 {
-            Kind::Portable => kernel.run::<Portable<S>>(),
+            SimdKind::Portable => kernel.run::<Portable<S>>(),
             // SAFETY: a value of this kind comes from `available` only.
             #[cfg(target_arch = "x86_64")]
-            Kind::Avx2 => unsafe { avx2::run(kernel) },
+            SimdKind::Avx2 => unsafe { avx2::run(kernel) },
         }
     }
 }

@@ -141,8 +141,8 @@ impl<S: Scalar> SolverBodies<'_, S> {
 
     /// Motion of a row, as contacts see it.
     #[inline]
-    pub(super) fn motion(&self, row: usize) -> Motion<S> {
-        Motion {
+    pub(super) fn motion(&self, row: usize) -> BodyMotion<S> {
+        BodyMotion {
             velocity: self.velocity[row],
             spin: self.unlocked_spin(row),
             radius: self.radius[row],
@@ -205,7 +205,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
 
 /// Motion of a body, as contacts see it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Motion<S> {
+pub(super) struct BodyMotion<S> {
     /// Velocity of the center, in m/s.
     pub velocity: Vec3<S>,
     /// Angular velocity, in rad/s; zero if the rotation is locked.
@@ -232,7 +232,7 @@ pub(super) fn push<S: Scalar>(
 #[inline(always)]
 #[expect(clippy::inline_always, reason = "most of a pass is this")]
 pub(super) fn relative_velocity<S: Scalar>(
-    motion: impl Fn(usize) -> Motion<S>,
+    motion: impl Fn(usize) -> BodyMotion<S>,
     is_capsule: impl Fn(usize) -> bool,
     (a, b): (Option<usize>, usize),
     arms: &[Vec3<S>; 2],
@@ -244,7 +244,7 @@ pub(super) fn relative_velocity<S: Scalar>(
     // The arms of balls lie along the normal: one product does for both. A ball among capsules
     // moves to the same bits as without them.
     let mut radius_times_spin = Vec3::zero();
-    let mut add_spin = |row: usize, motion: &Motion<S>, arm: &Vec3<S>, sign: S| {
+    let mut add_spin = |row: usize, motion: &BodyMotion<S>, arm: &Vec3<S>, sign: S| {
         if is_capsule(row) {
             velocity += motion.spin.cross(*arm) * sign;
         } else {

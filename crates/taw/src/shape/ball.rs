@@ -7,7 +7,7 @@ use crate::math::{Point3, Scalar, Vec3, normalize_and_length};
 
 /// Ball: all points within `radius` of `center`, in two or three dimensions.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Ball<P, S> {
+pub struct NBall<P, S> {
     /// Center, in metres.
     pub center: P,
     /// Radius in metres, finite and above zero.
@@ -15,12 +15,12 @@ pub struct Ball<P, S> {
 }
 
 /// A ball in three dimensions.
-pub type Sphere<S> = Ball<Point3<S>, S>;
+pub type Sphere<S> = NBall<Point3<S>, S>;
 
 /// A ball in two dimensions.
-pub type Circle<S> = Ball<Point2<S>, S>;
+pub type Circle<S> = NBall<Point2<S>, S>;
 
-impl<P, S: Scalar> Ball<P, S>
+impl<P, S: Scalar> NBall<P, S>
 where
     P: Array<Element = S> + Copy,
 {

@@ -4,26 +4,20 @@ use super::{Aabb, Aabb3};
 use crate::math::{Point3, Scalar};
 
 /// Bounding volume hierarchy: a binary tree of bounding boxes, for queries of items by place.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct Bvh<S> {
-    nodes: Vec<Node<S>>,
+    nodes: Vec<BvhNode<S>>,
     /// Items, leaf by leaf.
     items: Vec<u32>,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Node<S> {
+struct BvhNode<S> {
     bounds: Aabb3<S>,
     /// First item of a leaf; else the index of the second child. The first child follows the node.
     next: u32,
     /// Number of items; zero for an inner node.
     count: u32,
-}
-
-impl<S> Default for Bvh<S> {
-    fn default() -> Self {
-        Self { nodes: Vec::new(), items: Vec::new() }
-    }
 }
 
 /// Maximum number of items per leaf.
@@ -45,7 +39,7 @@ impl<S: Scalar> Bvh<S> {
         let first = of(self.items[from]);
         let bounds = self.items[from..to].iter().fold(first, |all, i| all.union(&of(*i)));
         let node = self.nodes.len();
-        let leaf = Node { bounds, next: from as u32, count: (to - from) as u32 };
+        let leaf = BvhNode { bounds, next: from as u32, count: (to - from) as u32 };
         self.nodes.push(leaf);
         if to - from <= MAX_LEAF_ITEMS {
             return;
@@ -74,7 +68,7 @@ impl<S: Scalar> Bvh<S> {
     pub fn refit(&mut self, boxes: &[Aabb3<S>]) {
         // Children come after their parents.
         for number in (0..self.nodes.len()).rev() {
-            let Node { next, count, .. } = self.nodes[number];
+            let BvhNode { next, count, .. } = self.nodes[number];
             let around = if count > 0 {
                 let from = next as usize;
                 let items = self.items[from..from + count as usize].iter();

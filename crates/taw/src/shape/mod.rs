@@ -15,7 +15,7 @@ mod surface;
 mod triangle;
 
 pub use aabb::{Aabb, Aabb2, Aabb3};
-pub use ball::{Ball, Circle, Sphere};
+pub use ball::{Circle, NBall, Sphere};
 pub use bvh::Bvh;
 pub use capsule::Capsule;
 pub(crate) use capsule::any_perpendicular;

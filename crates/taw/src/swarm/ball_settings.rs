@@ -2,13 +2,14 @@
 
 use cgmath::Zero;
 
-use super::bodies::{NO_ROW, VelocityChange};
+use super::bodies::VelocityChange;
 use super::state::of;
-use super::surfaces::Surface;
+use super::surfaces::BallSurface;
 use super::{Ball, BallId, Swarm};
 use crate::Error;
 use crate::broad::{CollisionLayers, IgnoredPairs};
 use crate::error::{finite, finite_vector};
+use crate::handle::NO_ROW;
 use crate::math::{Point3, Scalar, Vec3};
 use crate::motion::{Mass, Motion};
 use crate::response::Material;
@@ -67,7 +68,7 @@ impl<S: Scalar> Swarm<S> {
     ) -> Result<(), Error> {
         let slot = self.own_slot(ball)?;
         let material = material.map(Material::validated).transpose()?;
-        let surface = material.map(|material| Surface { material, rotation_locked: false });
+        let surface = material.map(|material| BallSurface { material, rotation_locked: false });
         if self.surfaces.set(slot, surface) {
             self.wake(self.row(ball)?);
             self.forget_contacts();

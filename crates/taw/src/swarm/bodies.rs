@@ -6,10 +6,13 @@ use std::sync::{Mutex, PoisonError};
 use cgmath::{EuclideanSpace, Zero};
 
 use super::kernels::{MAX_MAGNITUDE, largest, squared};
-use super::surfaces::{Surface, SurfaceOf};
+use super::rows::less;
+use super::state::KnownIdentity;
+use super::surfaces::{BallSurface, SurfaceOf};
 use super::wall_contact::xyz;
 use super::{BallId, Swarm, Tier};
 use crate::broad::CollisionLayers;
+use crate::handle::NO_ROW;
 use crate::math::{Point3, Quat, Row, Scalar, Vec3, is_finite};
 use crate::motion::integrate_rotation;
 use crate::response::Impact;
@@ -26,7 +29,7 @@ pub(crate) struct Body<S> {
     /// Radius times angular velocity, in m/s.
     pub spin: Row<S>,
     /// None for that of the swarm's model.
-    pub surface: Option<Surface<S>>,
+    pub surface: Option<BallSurface<S>>,
     pub layers: CollisionLayers,
     /// Set for infinite mass: a body of any finite mass stops at walls.
     pub is_kinematic: bool,
@@ -98,9 +101,6 @@ pub(crate) struct BodyColumns<'a, S> {
     pub radius: &'a [S],
 }
 
-/// No row.
-pub(crate) const NO_ROW: u32 = u32::MAX;
-
 /// Numbers of a marble that a step changes, and its radius.
 #[derive(Clone, Copy)]
 pub(crate) struct MarbleRow<S> {
@@ -131,7 +131,8 @@ impl<S: Scalar> Swarm<S> {
             self.forget_settings(slot); // balls that are no bodies keep theirs
         }
         self.synced = SyncToken::default();
-        (self.pairs_valid, self.cache_valid, self.walls_identity) = (false, false, None);
+        (self.pairs_valid, self.walls_identity) = (false, KnownIdentity::default());
+        self.forget_cache();
         self.resize_columns();
         self.wake_all();
     }
@@ -157,7 +158,7 @@ impl<S: Scalar> Swarm<S> {
         slot: u32,
         marble: MarbleRow<S>,
         [row_radius, inverse_mass]: [S; 2],
-        (surface, layers): (Option<Surface<S>>, CollisionLayers),
+        (surface, layers): (Option<BallSurface<S>>, CollisionLayers),
         [is_kinematic, is_sleepless]: [bool; 2],
     ) -> bool {
         let row = self.ids.rows()[slot as usize] as usize;
@@ -191,7 +192,7 @@ impl<S: Scalar> Swarm<S> {
             self.wake(row);
             let at = self.at[row];
             resized |= at[3] != body.at[3];
-            self.skin_left[row] -= squared(less(body.at, at)).sqrt() + (body.at[3] - at[3]).abs();
+            self.skin_left[row] -= squared(less(&body.at, &at)).sqrt() + (body.at[3] - at[3]).abs();
             let fraction = self.velocity[row][3] / body.velocity[3];
             // Passes take back impulses up to twice too large.
             if S::zero() < fraction && fraction < S::from_f64(0.5) {
@@ -296,7 +297,7 @@ impl<S: Scalar> Swarm<S> {
             let mean = |axis: usize| velocity[axis] + S::from_f64(0.5) * part * change[axis];
             let [x, y, z] = [0, 1, 2].map(|axis| at[axis] + mean(axis) * (part * dt));
             let at = [x, y, z, at[3]];
-            self.skin_left[row] -= squared(less(at, self.at[row])).sqrt();
+            self.skin_left[row] -= squared(less(&at, &self.at[row])).sqrt();
             self.at[row] = at;
             for axis in 0..3 {
                 self.velocity[row][axis] = velocity[axis] + part * change[axis];
@@ -396,7 +397,7 @@ impl<S: Scalar> Swarm<S> {
 
     /// Returns true if a ball sleeps.
     pub(crate) fn is_asleep(&self, ball: BallId) -> bool {
-        let row = self.ids.row(ball);
+        let row = self.ids.row(ball.0);
         row.is_some_and(|row| self.velocity[row][3].is_sign_negative())
     }
 
@@ -409,7 +410,7 @@ impl<S: Scalar> Swarm<S> {
 
     /// Position and velocity of a ball, and the speed of its surface by spin, in m/s.
     pub(crate) fn motion_of(&self, ball: BallId) -> Option<(Point3<S>, Vec3<S>, S)> {
-        let row = self.ids.row(ball)?;
+        let row = self.ids.row(ball.0)?;
         // The lab's tier has no spin.
         let surface_speed = self.spin.get(row).map_or(S::zero(), |spin| squared(*spin).sqrt());
         Some((Point3::from_vec(xyz(&self.at[row])), xyz(&self.velocity[row]), surface_speed))
@@ -417,12 +418,12 @@ impl<S: Scalar> Swarm<S> {
 
     /// Number that changes whenever a ball falls asleep, wakes, comes or goes.
     pub(crate) fn sleep_version(&self) -> u64 {
-        self.sleep_version
+        *self.sleep_version
     }
 
     /// Slot of a ball.
     pub(crate) fn slot_of(&self, ball: BallId) -> Option<u32> {
-        self.ids.row(ball).map(|row| self.ids.slots()[row])
+        self.ids.row(ball.0).map(|row| self.ids.slots()[row])
     }
 
     /// Rows that the last step stopped, as slots.
@@ -430,9 +431,4 @@ impl<S: Scalar> Swarm<S> {
         let slots = self.ids.slots();
         self.stopped.iter().filter_map(|row| slots.get(*row as usize).copied())
     }
-}
-
-/// The first three numbers of a row, less those of another.
-fn less<S: Scalar>(a: Row<S>, b: Row<S>) -> Row<S> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2], S::zero()]
 }

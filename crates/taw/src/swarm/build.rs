@@ -4,13 +4,13 @@ use super::batches::{pairs_in, take_out};
 use super::bit_set::BitSet;
 use super::chunk::Chunk;
 use super::fast_movers::{FastMovers, SortedBalls};
-use super::grid::{Grid, reorder, reorder_rows};
+use super::grid::{SortedGrid, reorder, reorder_rows};
 use super::impulse_cache::{ImpulseCache, shrink_slack};
 use super::kernels::squared;
-use super::neighbours::{FindPairs, NeighbourLists, Search};
+use super::neighbours::{FindPairs, NeighbourLists, NeighbourSearch};
 use super::step::{inverse_masses, listed_planes};
 use super::surfaces::SurfaceOf;
-use super::sweeps::{CrowdSweep, Sweep};
+use super::sweeps::{BallSweep, CrowdSweep};
 use super::{Stage, StaticGeometry, Swarm, walls};
 use crate::math::{Scalar, SimdLevel, length};
 use crate::workers::{DisjointSlice, parallel_filter, parallel_for, parallel_for_rows};
@@ -40,11 +40,12 @@ impl<S: Scalar> Swarm<S> {
         walls: &dyn StaticGeometry<S>,
         observe: &mut dyn FnMut(Stage),
     ) {
-        self.scratch.threads = self.model.threads_for(self.at.len());
+        self.scratch.threads = self.model().threads_for(self.at.len());
         let threads = self.threads();
         self.rebuilds += 1;
         observe(Stage::Pairs);
-        if self.has_friction() {
+        let lab = !self.has_friction();
+        if !lab {
             self.cache_impulses();
         }
         observe(Stage::Order);
@@ -55,7 +56,8 @@ impl<S: Scalar> Swarm<S> {
         let skin = self.skin;
         // The remaining skins lend their column to the order: they are set after that.
         let order = &mut bytemuck::cast_slice_mut(&mut self.skin_left)[..self.at.len()];
-        self.grid.sort(&self.at, S::from_f64(2.0) * skin, threads, order, &mut self.neighbours);
+        let column = if lab { &mut self.neighbours.0 } else { &mut self.scratch.column };
+        self.grid.sort(&self.at, S::from_f64(2.0) * skin, threads, order, column);
         self.reorder();
         self.reset_skins(dt, skin);
         observe(Stage::Pairs);
@@ -63,7 +65,7 @@ impl<S: Scalar> Swarm<S> {
         self.find_pairs(skin, dt, walls);
         self.impulse_cache.shrink_slack();
         self.pairs_valid = true;
-        self.cache_valid = false;
+        self.forget_cache();
         self.scratch.idle_marked_at = None;
     }
 
@@ -148,7 +150,8 @@ impl<S: Scalar> Swarm<S> {
             // SAFETY: each job has its own rows.
             let skins_left = unsafe { skins_left.part(rows.clone()) };
             for (row, skin_left) in rows.zip(skins_left) {
-                let path = if lab { S::zero() } else { Sweep::skin_of_path(&velocity[row], dt) };
+                let path =
+                    if lab { S::zero() } else { BallSweep::skin_of_path(&velocity[row], dt) };
                 let displacement =
                     if lab { displacement[row] } else { squared(velocity[row]).sqrt() * dt };
                 *skin_left = (displacement * S::from_f64(STEPS))
@@ -187,7 +190,7 @@ impl<S: Scalar> Swarm<S> {
             self.skin_left[at] =
                 (displacement * S::from_f64(STEPS)).clamp(skin, skin * S::from_f64(FAR));
             if self.has_friction() {
-                let of_path = Sweep::skin_of_path(&self.velocity[at], dt);
+                let of_path = BallSweep::skin_of_path(&self.velocity[at], dt);
                 self.skin_left[at] = self.skin_left[at].max(of_path);
             }
             self.fast_movers.add(*row, self.skin_left[at] > skin * S::from_f64(FAR));
@@ -212,7 +215,7 @@ impl<S: Scalar> Swarm<S> {
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
         let (grid, at, skin_left) = (&self.grid, &self.at[..], &self.skin_left[..]);
         let velocity = &self.velocity[..];
-        let sweep = has_friction.then_some(Sweep { at, velocity, skin_left, dt, reach, slack });
+        let sweep = has_friction.then_some(BallSweep { at, velocity, skin_left, dt, reach, slack });
         let balls = SortedBalls { grid, at, skin_left, surfaces, sweep };
         self.fast_movers.find(&balls, self.max_radius + skin, search, &proxy, has_friction);
         if has_friction {
@@ -243,7 +246,7 @@ impl<S: Scalar> Swarm<S> {
     fn reorder(&mut self) {
         let (threads, has_friction) = (self.threads(), self.has_friction());
         let order = &bytemuck::cast_slice(&self.skin_left)[..self.at.len()];
-        let scratch = &mut self.neighbours;
+        let scratch = if has_friction { &mut self.scratch.column } else { &mut self.neighbours.0 };
         reorder_rows(&mut self.at, scratch, order, threads);
         reorder_rows(&mut self.velocity, scratch, order, threads);
         if has_friction {
@@ -306,15 +309,15 @@ impl<S: Scalar> Swarm<S> {
 
     fn find_pairs(&mut self, skin: S, dt: S, walls: &dyn StaticGeometry<S>) {
         let (threads, has_friction, tier) = (self.threads(), self.has_friction(), self.tier());
-        let (simd_level, ahead) = (self.simd_level, self.ahead(dt));
-        self.scratch.searches.resize(threads, Search::default());
+        let (simd_level, ahead) = (*self.simd_level, self.ahead(dt));
+        self.scratch.searches.resize(threads, NeighbourSearch::default());
         let chunks = DisjointSlice::new(&mut self.chunks);
         let searches = DisjointSlice::new(&mut self.scratch.searches);
         let (at, skin_left, slots) = (&self.at[..], &self.skin_left[..], self.ids.slots());
         let (impulse_cache, old_rows, planes) =
             (&self.impulse_cache, &self.old_rows[..], listed_planes(&self.planes, tier));
         let shapes = walls.has_shapes();
-        let neighbours = DisjointSlice::new(bytemuck::cast_slice_mut(&mut self.neighbours));
+        let neighbours = DisjointSlice::new(bytemuck::cast_slice_mut(&mut self.neighbours.0));
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
         let balls = walls::Balls { at, velocity: &self.velocity, skin_left, ahead, surfaces };
         let pairs = PairSearch {
@@ -355,7 +358,7 @@ impl<S: Scalar> Swarm<S> {
 /// Search for the pairs of a chunk.
 struct PairSearch<'a, S> {
     simd_level: SimdLevel,
-    grid: &'a Grid<S>,
+    grid: &'a SortedGrid<S>,
     balls: walls::Balls<'a, S>,
     skin: S,
     /// Slots of the proxies, if there are several: they touch each other without the swarm.
@@ -369,7 +372,7 @@ impl<S: Scalar> PairSearch<'_, S> {
     fn run(
         &self,
         chunk: &mut Chunk<S>,
-        search: &mut Search<S>,
+        search: &mut NeighbourSearch<S>,
         mut neighbours: Option<&mut [u16]>,
     ) {
         let walls::Balls { at, skin_left, surfaces, .. } = self.balls;
@@ -410,7 +413,7 @@ mod tests {
 
     use crate::math::{Point3, Vec3};
     use crate::swarm::kernels::squared;
-    use crate::swarm::sweeps::Sweep;
+    use crate::swarm::sweeps::BallSweep;
     use crate::swarm::{Ball, Swarm, SwarmModel, Tier};
     use crate::world::{SweptWalls, World};
 
@@ -419,7 +422,7 @@ mod tests {
         let rows = 0..swarm.at.len() as u32;
         let Swarm { at, velocity, skin_left, .. } = swarm;
         let (dt, reach) = (1.0 / 60.0, swarm.reach_of_skins());
-        let sweep = Sweep { at, velocity, skin_left, dt, reach, slack: 0.0 };
+        let sweep = BallSweep { at, velocity, skin_left, dt, reach, slack: 0.0 };
         let near = |[a, b]: &[u32; 2]| {
             if swarm.has_friction() && (sweep.is_swift(*a) || sweep.is_swift(*b)) {
                 return sweep.meet(*a, *b); // on their paths
@@ -471,7 +474,7 @@ mod tests {
             let chunks = all.iter().map(|chunk| &chunk.batches);
             let mut found = BTreeSet::new();
             let lab = tier == Tier::Lab;
-            let neighbours = if lab { bytemuck::cast_slice(&swarm.neighbours) } else { &[] };
+            let neighbours = if lab { bytemuck::cast_slice(&swarm.neighbours.0) } else { &[] };
             for chunk in all {
                 for (row, neighbours_after) in
                     (chunk.rows[0]..).zip(chunk.neighbours(neighbours).of_rows())

@@ -4,10 +4,10 @@ use cgmath::{InnerSpace, Zero};
 
 use super::Swarm;
 use super::batches::Batch;
-use super::bodies::NO_ROW;
 use super::kernels::{NearLimits, NearPairs};
 use super::wall_contact::{WallContact, xyz};
 use crate::contact::{Contact, Contacts};
+use crate::handle::NO_ROW;
 use crate::math::{Scalar, Vec3};
 use crate::workers::{DisjointSlice, parallel_for};
 

@@ -7,11 +7,11 @@
 
 use super::batches::{Batch, BatchBuilder};
 use super::bit_set::BitSet;
-use super::grid::Grid;
+use super::grid::SortedGrid;
 use super::kernels::{ContactImpulses, squared};
-use super::neighbours::Search;
+use super::neighbours::NeighbourSearch;
 use super::surfaces::SurfaceOf;
-use super::sweeps::Sweep;
+use super::sweeps::BallSweep;
 use crate::math::{Row, Scalar};
 
 /// Fast movers at most: one of so many balls, and besides so many.
@@ -56,14 +56,14 @@ pub(super) fn max_count(balls: usize) -> usize {
 
 /// Balls in the order of their cells.
 pub(super) struct SortedBalls<'a, S> {
-    pub grid: &'a Grid<S>,
+    pub grid: &'a SortedGrid<S>,
     /// Center and radius.
     pub at: &'a [Row<S>],
     /// Remaining skin, in metres.
     pub skin_left: &'a [S],
     pub surfaces: SurfaceOf<'a, S>,
     /// Paths of those that go further than skins reach; none in the lab's tier.
-    pub sweep: Option<Sweep<'a, S>>,
+    pub sweep: Option<BallSweep<'a, S>>,
 }
 
 impl<S: Scalar> SortedBalls<'_, S> {
@@ -133,7 +133,7 @@ impl<S: Scalar> FastMovers<S> {
         &mut self,
         balls: &SortedBalls<S>,
         more: S,
-        search: &mut Search<S>,
+        search: &mut NeighbourSearch<S>,
         proxy: &dyn Fn(u32) -> bool,
         has_friction: bool,
     ) {

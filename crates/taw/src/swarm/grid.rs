@@ -53,7 +53,7 @@ pub(super) struct Level<S> {
 
 /// See the module.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(super) struct Grid<S> {
+pub(super) struct SortedGrid<S> {
     /// The sides of the scene, the longest first.
     axes: [usize; 3],
     low: [S; 3],
@@ -62,13 +62,13 @@ pub(super) struct Grid<S> {
     per_layer: u32,
     /// The first row of each cell, one place further, and of the one after the last.
     start: Vec<u32>,
-    parts: Vec<Part>,
+    parts: Vec<GridPart>,
     sample: Vec<S>,
 }
 
 /// Some rows that follow each other, before they are in order.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct Part {
+struct GridPart {
     first: u32,
     /// The first cell that one of them is in, and the last one.
     cells: [u32; 2],
@@ -77,7 +77,7 @@ struct Part {
 impl<S: Scalar> Level<S> {
     /// The cell of these coordinates; empty cells lie at both ends of the rows and columns.
     #[inline(always)]
-    pub fn cell(&self, grid: &Grid<S>, layer: u32, row: u32, cell: u32) -> u32 {
+    pub fn cell(&self, grid: &SortedGrid<S>, layer: u32, row: u32, cell: u32) -> u32 {
         let inner = layer & ((1 << self.number) - 1);
         (layer >> self.number) * grid.per_layer
             + self.base
@@ -97,7 +97,7 @@ impl<S: Scalar> Level<S> {
     }
 }
 
-impl<S: Scalar> Grid<S> {
+impl<S: Scalar> SortedGrid<S> {
     pub fn bytes(&self) -> usize {
         of(&self.levels) + of(&self.start) + of(&self.sample) + of(&self.parts)
     }
@@ -275,7 +275,7 @@ impl<S: Scalar> Grid<S> {
         // about where they belong. Each is named with its cell, counted from the first one.
         let rows_in = |cells: &Range<usize>, visit: &mut dyn FnMut(u32, usize)| {
             let (low, count) = (cells.start as u32, cells.len() as u32);
-            for Part { first, cells } in parts {
+            for GridPart { first, cells } in parts {
                 if cells[0] < low + count && cells[1] >= low {
                     let rows = *first as usize..at.len().min(*first as usize + ROWS);
                     for (row, key) in (*first..).zip(&keys[rows]) {
@@ -327,7 +327,7 @@ impl<S: Scalar> Grid<S> {
     /// Cell of each row, and the cells of each part of the rows.
     fn find_keys(&mut self, at: &[Row<S>], threads: usize, keys: &mut [u32]) {
         let mut parts = std::mem::take(&mut self.parts);
-        parts.resize(at.len().div_ceil(ROWS), Part::default());
+        parts.resize(at.len().div_ceil(ROWS), GridPart::default());
         {
             let (keys, parts) = (DisjointSlice::new(keys), DisjointSlice::new(&mut parts));
             parallel_for_rows(threads, at.len(), |rows| {
@@ -338,7 +338,9 @@ impl<S: Scalar> Grid<S> {
                     *key = self.key(at);
                     cells = [cells[0].min(*key), cells[1].max(*key)];
                 }
-                unsafe { *parts.row(rows.start / ROWS) = Part { first: rows.start as u32, cells } };
+                unsafe {
+                    *parts.row(rows.start / ROWS) = GridPart { first: rows.start as u32, cells }
+                };
             });
         }
         self.parts = parts;

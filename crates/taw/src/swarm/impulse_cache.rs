@@ -12,7 +12,7 @@ use crate::workers::{DisjointSlice, parallel_for};
 
 /// Impulses of a pair; stored with its first ball.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-struct CachedImpulse<S> {
+struct CachedPair<S> {
     /// The row of the second ball.
     other: u32,
     normal_impulse: S,
@@ -24,7 +24,7 @@ struct CachedImpulse<S> {
 pub(super) struct ImpulseCache<S> {
     /// Beginning of each row's pairs, and after the last row, one place further.
     start: Vec<u32>,
-    kept: Vec<CachedImpulse<S>>,
+    kept: Vec<CachedPair<S>>,
     wall_contacts: Vec<WallContact<S>>,
 }
 
@@ -45,7 +45,7 @@ impl<S: Scalar> ImpulseCache<S> {
             let counts = DisjointSlice::new(&mut self.start);
             // SAFETY: the first ball of a pair is in the chunk, so only one thread counts it; and
             // the fast movers come alone.
-            let count = |[row, _]: [u32; 2], _: CachedImpulse<S>| unsafe {
+            let count = |[row, _]: [u32; 2], _: CachedPair<S>| unsafe {
                 *counts.row(row as usize + 2) += 1;
             };
             parallel_for(threads, chunks.len(), |_, chunk| {
@@ -60,12 +60,12 @@ impl<S: Scalar> ImpulseCache<S> {
         }
         self.kept.clear();
         reserve_slack(&mut self.kept, sum as usize);
-        self.kept.resize(sum as usize, CachedImpulse::default());
+        self.kept.resize(sum as usize, CachedPair::default());
         // As pairs are placed, each start grows to the one after it.
         let (start, places) =
             (DisjointSlice::new(&mut self.start), DisjointSlice::new(&mut self.kept));
         // SAFETY: as above, and each place is given out once.
-        let place = |[row, _]: [u32; 2], kept: CachedImpulse<S>| unsafe {
+        let place = |[row, _]: [u32; 2], kept: CachedPair<S>| unsafe {
             let place = start.row(row as usize + 1);
             *places.row(*place as usize) = kept;
             *place += 1;
@@ -92,7 +92,7 @@ impl<S: Scalar> ImpulseCache<S> {
 
     pub fn bytes(&self) -> usize {
         self.start.capacity() * size_of::<u32>()
-            + self.kept.capacity() * size_of::<CachedImpulse<S>>()
+            + self.kept.capacity() * size_of::<CachedPair<S>>()
             + self.wall_contacts.capacity() * size_of::<WallContact<S>>()
     }
 
@@ -187,7 +187,7 @@ pub(super) fn shrink_slack<T>(list: &mut Vec<T>) {
 fn for_each_loaded<S: Scalar>(
     batches: &[Batch],
     impulses: &ContactImpulses<S>,
-    visit: impl Fn([u32; 2], CachedImpulse<S>),
+    visit: impl Fn([u32; 2], CachedPair<S>),
 ) {
     for (i, batch) in batches.iter().enumerate() {
         for lane in 0..batch.count as usize {
@@ -198,7 +198,7 @@ fn for_each_loaded<S: Scalar>(
                     tangent_impulse.map(|axis| axis[lane])
                 });
                 let rows = batch.pair(lane);
-                visit(rows, CachedImpulse { other: rows[1], normal_impulse, tangent_impulse });
+                visit(rows, CachedPair { other: rows[1], normal_impulse, tangent_impulse });
             }
         }
     }

@@ -33,7 +33,6 @@ mod crowding;
 mod entries;
 mod fast_movers;
 mod grid;
-mod ids;
 mod impulse_cache;
 mod kernels;
 mod model;
@@ -41,6 +40,7 @@ mod neighbours;
 mod outside_work;
 mod proxies;
 mod rest;
+mod rows;
 mod scratch;
 mod sleep;
 mod state;
@@ -51,49 +51,56 @@ mod wall_contact;
 mod wall_paths;
 mod walls;
 
+pub use crate::handle::BallId;
 pub use crate::math::simd::SimdLevel;
-pub(crate) use bodies::{Body, BodyColumns, MarbleRow, NO_ROW, SyncToken, VelocityChange};
-pub use ids::BallId;
+pub(crate) use bodies::{Body, BodyColumns, MarbleRow, SyncToken, VelocityChange};
 pub(crate) use kernels::NearLimits;
 pub use model::{Ball, Stage, SwarmModel, Tier};
 pub(crate) use proxies::Proxy;
-pub(crate) use surfaces::Surface;
+pub(crate) use surfaces::BallSurface;
 pub(crate) use walls::StaticGeometry;
 
 use cgmath::EuclideanSpace;
 
 use crate::Error;
 use crate::error::{finite_point, finite_vector, positive, within};
-use crate::handle::MarbleId;
+use crate::handle::{Handles, MarbleId};
 use crate::math::{Point3, Row, Scalar, Vec3};
 use crate::response::Material;
+use crate::uncompared::Uncompared;
 use ball_settings::BallForces;
 use batches::pairs_in;
 use bit_set::BitSet;
 use chunk::Chunk;
 use fast_movers::FastMovers;
-use grid::Grid;
-use ids::Ids;
+use grid::SortedGrid;
 use impulse_cache::ImpulseCache;
-use scratch::Scratch;
+use neighbours::NeighbourColumn;
+use scratch::SwarmScratch;
 use sleep::SleepState;
+use state::KnownIdentity;
 use surfaces::{SurfaceOf, Surfaces};
 use walls::HalfSpace;
 
 /// Minimum and maximum radius, in metres: their third and fourth powers are finite, too.
-const RADII: [f64; 2] = [1e-9, 1e9];
+pub(crate) const RADII: [f64; 2] = [1e-9, 1e9];
 /// Maximum coordinate in metres, and maximum component of a velocity in m/s.
-const MAX_COORDINATE: f64 = 1e12;
+pub(crate) const MAX_COORDINATE: f64 = 1e12;
 
 /// Inverse mass in 1/kg of a body that no force moves.
 pub(crate) const INFINITE_MASS: f64 = 1e-25;
 
 /// Particle system of balls. See the [module](self).
-#[derive(Clone, Debug, Default)]
+///
+/// Two are equal if they go on alike, bit by bit: scratch memory does not count, nor do threads and
+/// instructions.
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Swarm<S: Scalar = f32> {
+    /// All of the model but its threads.
     model: SwarmModel<S>,
-    simd_level: SimdLevel,
-    ids: Ids,
+    threads: Uncompared<u32>,
+    simd_level: Uncompared<SimdLevel>,
+    ids: Handles,
     /// Center and radius.
     at: Vec<Row<S>>,
     /// Velocity and inverse mass, which has a minus sign while a ball sleeps. In the lab's tier,
@@ -112,7 +119,7 @@ pub struct Swarm<S: Scalar = f32> {
     /// Verlet skin: largest displacement, since pairs were searched, of a ball that is no fast
     /// mover, in metres.
     skin: S,
-    grid: Grid<S>,
+    grid: SortedGrid<S>,
     chunks: Vec<Chunk<S>>,
     /// Pairs of balls that left their skin.
     fast_movers: FastMovers<S>,
@@ -122,8 +129,8 @@ pub struct Swarm<S: Scalar = f32> {
     cache_valid: bool,
     /// Set while pairs and balls at walls are up to date.
     pairs_valid: bool,
-    walls_identity: Option<u64>,
-    rows_of_walls: Option<u64>,
+    walls_identity: KnownIdentity,
+    rows_of_walls: Uncompared<Option<u64>>,
     gravity: Option<Vec3<S>>,
     planes: Vec<HalfSpace<S>>,
     stopped: Vec<u32>,
@@ -142,11 +149,9 @@ pub struct Swarm<S: Scalar = f32> {
     body_slots: BitSet,
     sleep: SleepState<S>,
     /// Number of times that balls fell asleep, woke, came or went.
-    sleep_version: u64,
-    /// Neighbour lists of all chunks, in the lab's tier; while rows are sorted, a column to sort
-    /// into.
-    neighbours: Vec<Row<S>>,
-    scratch: Scratch<S>,
+    sleep_version: Uncompared<u64>,
+    neighbours: NeighbourColumn<S>,
+    scratch: SwarmScratch<S>,
     rebuilds: u64,
     steps_since_build: u32,
     /// Width of the skin beyond the usual, as a fraction of that.
@@ -157,7 +162,7 @@ impl<S: Scalar> Swarm<S> {
     /// Model of its physics and solver.
     #[must_use]
     pub fn model(&self) -> SwarmModel<S> {
-        self.model
+        SwarmModel { threads: *self.threads, ..self.model }
     }
 
     /// Sets the model. All balls wake.
@@ -168,24 +173,27 @@ impl<S: Scalar> Swarm<S> {
         let model = model.validated()?;
         let tier = self.tier();
         let resists = self.surface_of().differ();
-        self.model = model;
+        self.model = SwarmModel { threads: 0, ..model };
+        *self.threads = model.threads;
         self.scratch.threads = model.threads as usize;
         if self.tier() != tier {
-            (self.pairs_valid, self.cache_valid) = (false, false);
+            self.pairs_valid = false;
+            self.forget_cache();
+            (self.neighbours, self.scratch.column) = Default::default();
             self.old_rows.clear();
         } else if resists || self.surface_of().differ() {
             self.cache_impulses();
             self.pairs_valid = false; // pairs have numbers of their own
         }
         self.resize_columns();
-        self.walls_identity = None;
+        self.walls_identity = KnownIdentity::default();
         self.wake_all();
         Ok(())
     }
 
     /// Sets the SIMD instructions that it uses. The result has the same bits with any of them.
     pub fn set_simd_level(&mut self, simd_level: SimdLevel) {
-        self.simd_level = simd_level;
+        *self.simd_level = simd_level;
     }
 
     /// Inserts balls, all or none.
@@ -206,7 +214,7 @@ impl<S: Scalar> Swarm<S> {
 
     /// Puts balls in that are known to be right.
     fn add(&mut self, balls: &[Ball<S>]) -> Result<Vec<BallId>, Error> {
-        let ids = self.ids.push(balls.len())?;
+        let first = self.ids.push_many(balls.len())?;
         let rows = balls.iter();
         self.at.extend(rows.clone().map(|ball| pack_row(ball.position.to_vec(), ball.radius)));
         let moving = |ball: &Ball<S>| pack_row(ball.velocity, S::one() / ball.mass.of(ball.radius));
@@ -216,11 +224,11 @@ impl<S: Scalar> Swarm<S> {
             self.cache_impulses();
             self.old_rows.resize(self.at.len(), u32::MAX);
         }
-        self.sleep_version += 1;
+        *self.sleep_version += 1;
         self.resize_columns();
         self.measure_radii();
         self.pairs_valid = false;
-        Ok(ids)
+        Ok((first..self.len()).filter_map(|row| self.id(row)).collect())
     }
 
     /// Removes balls, all or none, and wakes those beside them. To remove many at once takes as long as to
@@ -238,11 +246,11 @@ impl<S: Scalar> Swarm<S> {
 
     /// Takes balls out, those of marbles too.
     pub(crate) fn take_out(&mut self, balls: &[BallId]) -> Result<(), Error> {
-        self.ids.check(balls)?;
+        self.check_listed(balls)?;
         if balls.is_empty() {
             return Ok(());
         }
-        self.sleep_version += 1;
+        *self.sleep_version += 1;
         for ball in balls {
             self.wake(self.row(*ball)?);
         }
@@ -253,7 +261,7 @@ impl<S: Scalar> Swarm<S> {
                 self.forget_settings(slot);
             }
         }
-        let kept = self.ids.remove(balls);
+        let kept = self.ids.remove_many(balls.iter().map(|ball| ball.0));
         retain(&mut self.at, &kept);
         retain(&mut self.velocity, &kept);
         retain(&mut self.spin, &kept);
@@ -267,10 +275,21 @@ impl<S: Scalar> Swarm<S> {
         Ok(())
     }
 
+    /// Checks that all of these balls are there, and listed once.
+    fn check_listed(&self, balls: &[BallId]) -> Result<(), Error> {
+        let mut seen = vec![false; self.len()];
+        for ball in balls {
+            if std::mem::replace(&mut seen[self.row(*ball)?], true) {
+                return Err(Error::NoSuchBall(*ball));
+            }
+        }
+        Ok(())
+    }
+
     /// Number of balls that were removed so far; to look only when it changes which are gone.
     #[must_use]
     pub fn removals(&self) -> u64 {
-        self.ids.removed()
+        self.ids.removals()
     }
 
     /// Number of balls.
@@ -314,7 +333,7 @@ impl<S: Scalar> Swarm<S> {
     /// Ball in a row.
     #[must_use]
     pub fn id(&self, row: usize) -> Option<BallId> {
-        self.ids.id(row)
+        self.ids.handle(row).map(BallId)
     }
 
     /// Slot of the ball in each row: an index that a ball keeps as long as it exists, below the
@@ -329,7 +348,7 @@ impl<S: Scalar> Swarm<S> {
     /// # Errors
     /// [`Error::NoSuchBall`].
     pub fn row(&self, ball: BallId) -> Result<usize, Error> {
-        self.ids.row(ball).ok_or(Error::NoSuchBall(ball))
+        self.ids.row(ball.0).ok_or(Error::NoSuchBall(ball))
     }
 
     /// Sets the position of a ball (teleports it), in metres, and wakes it.
@@ -358,7 +377,7 @@ impl<S: Scalar> Swarm<S> {
 
     /// Balls that the last step stopped because their motion overflowed.
     pub fn stopped(&self) -> impl Iterator<Item = BallId> + '_ {
-        self.stopped.iter().filter_map(|row| self.ids.id(*row as usize))
+        self.stopped.iter().filter_map(|row| self.id(*row as usize))
     }
 
     /// Number of balls that sleep.
@@ -445,6 +464,12 @@ impl<S: Scalar> Swarm<S> {
         self.old_rows.clear();
         self.old_rows.extend(0..self.at.len() as u32);
         self.cache_valid = true;
+    }
+
+    /// Forgets the cached impulses.
+    fn forget_cache(&mut self) {
+        self.cache_valid = false;
+        self.impulse_cache.forget(0);
     }
 
     fn measure_radii(&mut self) {

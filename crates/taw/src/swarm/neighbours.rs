@@ -5,17 +5,29 @@
 use std::ops::Range;
 
 use super::batches::{Batch, BatchBuilder, MAX_COLOURS, builder};
-use super::grid::{Grid, Level};
+use super::grid::{Level, SortedGrid};
 use super::state::of;
 use super::surfaces::SurfaceOf;
 use crate::math::{Kernel, LANES, Row, Scalar, Simd};
+
+/// Neighbour lists of all chunks, in the lab's tier, and a column to sort its rows into. Compared as
+/// bits, since most are no numbers.
+#[derive(Clone, Debug, Default)]
+pub(super) struct NeighbourColumn<S>(pub Vec<Row<S>>);
+
+impl<S: Scalar> PartialEq for NeighbourColumn<S> {
+    fn eq(&self, other: &Self) -> bool {
+        let bits = |column| bytemuck::cast_slice::<Row<S>, u32>(column);
+        bits(&self.0) == bits(&other.0)
+    }
+}
 
 /// More than any ball is away from another, and its square is finite.
 const NOWHERE: f64 = 1e18;
 
 /// Scratch of the search; one for each thread.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Search<S> {
+pub(super) struct NeighbourSearch<S> {
     columns: CandidateWindow<S>,
     /// Colours of a row: the open batches in which it is, as bits.
     colour_mask: Vec<u32>,
@@ -31,7 +43,7 @@ struct CandidateWindow<S> {
     found: Vec<u32>,
 }
 
-impl<S: Scalar> Search<S> {
+impl<S: Scalar> NeighbourSearch<S> {
     /// Puts pairs of about so many balls into batches.
     pub fn builder<'a>(
         &'a mut self,
@@ -156,7 +168,7 @@ impl PairVisitor for NeighbourListBuilder<'_> {
 
 /// Finds the pairs of a chunk: of its own balls, and of these with those of the next one.
 pub(super) struct FindPairs<'a, S> {
-    pub grid: &'a Grid<S>,
+    pub grid: &'a SortedGrid<S>,
     pub at: &'a [Row<S>],
     /// Remaining skin of each ball, in metres.
     pub skin_left: &'a [S],
@@ -167,7 +179,7 @@ pub(super) struct FindPairs<'a, S> {
     pub layers: [u32; 2],
     /// The first row, of it, of the next one and after that.
     pub rows: [u32; 3],
-    pub search: &'a mut Search<S>,
+    pub search: &'a mut NeighbourSearch<S>,
     /// Number of pairs that there was no room for.
     pub unlisted: &'a mut usize,
     /// Output: pairs that are part of no neighbour list.
@@ -183,7 +195,7 @@ impl<S: Scalar> Kernel<S> for FindPairs<'_, S> {
         let Self { search, unlisted, batches, lists, .. } = self;
         let [first, next, end] = rows;
         let window = first as usize..end as usize;
-        let Search { columns, colour_mask, open } = search;
+        let NeighbourSearch { columns, colour_mask, open } = search;
         columns.window.fill_with(&at[window.clone()], &skin_left[window.clone()], skin);
         batches.clear();
         let mut builder = builder(colour_mask, open, window.len(), batches);
@@ -203,7 +215,7 @@ impl<S: Scalar> Kernel<S> for FindPairs<'_, S> {
 
 #[inline(always)]
 fn find<L: Simd>(
-    grid: &Grid<L::Scalar>,
+    grid: &SortedGrid<L::Scalar>,
     at: &[Row<L::Scalar>],
     layers: [u32; 2],
     rows: [u32; 3],
@@ -227,7 +239,7 @@ fn find<L: Simd>(
 /// The pairs of the balls of one layer with those of the same level.
 #[inline(always)]
 fn pairs_in_layer<L: Simd>(
-    grid: &Grid<L::Scalar>,
+    grid: &SortedGrid<L::Scalar>,
     level: &Level<L::Scalar>,
     layer: u32,
     candidates: &mut CandidateBlocks<L::Scalar>,
@@ -285,7 +297,7 @@ impl<S: Scalar> Fill<S> for [Vec<S>; 4] {
 
 /// The lines of cells that come later and are beside one: where the rows of their cells begin.
 fn lines_ahead<'a, S: Scalar>(
-    grid: &'a Grid<S>,
+    grid: &'a SortedGrid<S>,
     level: &Level<S>,
     layer: u32,
     row: u32,
@@ -302,7 +314,7 @@ fn lines_ahead<'a, S: Scalar>(
 /// Pairs of a ball with one of a coarser level: there, all 27 cells around it.
 #[inline(always)]
 fn cross_level_pairs<L: Simd>(
-    grid: &Grid<L::Scalar>,
+    grid: &SortedGrid<L::Scalar>,
     at: &[Row<L::Scalar>],
     layers: [u32; 2],
     [first, next, end]: [u32; 3],

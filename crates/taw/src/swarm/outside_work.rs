@@ -4,7 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::Swarm;
 use super::chunk::Chunk;
-use super::scratch::Scratch;
+use super::scratch::SwarmScratch;
 use super::wall_contact::{WallContact, xyz};
 use crate::math::{Row, Scalar, Vec3, cast_vector};
 
@@ -99,7 +99,7 @@ impl<S: Scalar> Swarm<S> {
         if self.scratch.outside_work.is_empty() {
             return;
         }
-        let Scratch { backing, backing_speed, outside_work, .. } = &mut self.scratch;
+        let SwarmScratch { backing, backing_speed, outside_work, .. } = &mut self.scratch;
         for (row, (behind, slot)) in backing.iter().zip(self.ids.slots()).enumerate() {
             let (borne, work) = (behind[3].max(S::zero()), &mut outside_work[*slot as usize]);
             work.impulse += cast_vector::<S, f64>(xyz(behind) * borne);

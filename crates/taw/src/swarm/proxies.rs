@@ -1,6 +1,7 @@
 //! Proxies of the marbles of the world, which its own solver moves, in the swarm.
 
 use super::kernels::squared;
+use super::rows::{dot, less};
 use super::{BallId, Swarm};
 use crate::math::{Row, Scalar, Vec3, length};
 use crate::motion::rest::sleep_speed;
@@ -103,20 +104,11 @@ impl<S: Scalar> Proxy<S> {
     }
 }
 
-/// The first three numbers of one row, less those of another.
-fn less<S: Scalar>(a: &Row<S>, b: &Row<S>) -> Row<S> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2], S::zero()]
-}
-
-fn dot<S: Scalar>(a: &Row<S>, b: &Row<S>) -> S {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 impl<S: Scalar> Swarm<S> {
     /// Proxies before and after the last step, in the order of [`set_proxies`](Self::set_proxies).
     pub(crate) fn proxies_and_results(&self) -> impl Iterator<Item = (&Proxy<S>, Proxy<S>)> {
         self.proxies.iter().map(|proxy| {
-            let Some(row) = self.ids.row(proxy.ball) else { return (proxy, *proxy) };
+            let Some(row) = self.ids.row(proxy.ball.0) else { return (proxy, *proxy) };
             let spin_velocity = self.spin.get(row).copied().unwrap_or([S::zero(); 4]);
             let after =
                 Proxy { at: self.at[row], velocity: self.velocity[row], spin_velocity, ..*proxy };
@@ -140,7 +132,7 @@ impl<S: Scalar> Swarm<S> {
             (self.has_friction(), sleep_speed(length(gravity), self.mean_radius));
         let pull = [gravity.x, gravity.y, gravity.z, S::zero()];
         for (i, proxy) in proxies.iter_mut().enumerate() {
-            let Some(row) = self.ids.row(proxy.ball) else { continue };
+            let Some(row) = self.ids.row(proxy.ball.0) else { continue };
             self.body_slots.insert(self.ids.slots()[row]);
             let (at, velocity) = (self.at[row], self.velocity[row]);
             self.max_radius = self.max_radius.max(proxy.at[3]);
@@ -208,7 +200,7 @@ impl<S: Scalar> Swarm<S> {
     pub(super) fn list_proxy_rows(&mut self) {
         self.scratch.proxy_rows.clear();
         let rows = self.proxies.iter().zip(0..);
-        let rows = rows.filter_map(|(proxy, i)| Some((self.ids.row(proxy.ball)? as u32, i)));
+        let rows = rows.filter_map(|(proxy, i)| Some((self.ids.row(proxy.ball.0)? as u32, i)));
         self.scratch.proxy_rows.extend(rows);
         self.scratch.proxy_rows.sort_unstable();
     }
@@ -263,7 +255,7 @@ impl<S: Scalar> Swarm<S> {
     /// the place before.
     pub(super) fn reset_proxies_in_lab(&mut self) {
         for proxy in &self.proxies {
-            let Some(row) = self.ids.row(proxy.ball) else { continue };
+            let Some(row) = self.ids.row(proxy.ball.0) else { continue };
             self.at[row] = proxy.at;
             let [x, y, z, _] = proxy.at;
             self.velocity[row] = [x, y, z, proxy.velocity[3]];
@@ -275,7 +267,7 @@ impl<S: Scalar> Swarm<S> {
     /// were pushed.
     pub(super) fn update_proxy_velocities_in_lab(&mut self, dt: S) {
         for proxy in &self.proxies {
-            let Some(row) = self.ids.row(proxy.ball) else { continue };
+            let Some(row) = self.ids.row(proxy.ball.0) else { continue };
             let ([x, y, z, _], [a, b, c, _]) = (self.at[row], proxy.at);
             let push = [x - a, y - b, z - c];
             let [u, v, w, mass] = proxy.velocity;

@@ -2,7 +2,7 @@
 
 use super::bit_set::BitSet;
 use super::bodies::KinematicPath;
-use super::neighbours::Search;
+use super::neighbours::NeighbourSearch;
 use super::outside_work::OutsideWork;
 use super::state::of;
 use super::step::{SavedPlace, WayToWall};
@@ -10,15 +10,17 @@ use super::sweeps::Crowd;
 use crate::math::{Row, Scalar, UnionFind};
 use crate::response::Impact;
 
-/// Memory that a step writes before it reads it.
+/// Memory that a step writes before it reads it. Two are always equal.
 #[derive(Clone, Debug, Default)]
-pub(super) struct Scratch<S> {
+pub(super) struct SwarmScratch<S> {
     /// Number of threads that work on this step.
     pub threads: usize,
     /// Set while other pairs pass through each other than when pairs were found, until the step begins.
     pub filters_changed: bool,
     /// Set while surfaces or filters are others than when contacts with walls were found, likewise.
     pub contacts_forgotten: bool,
+    /// Column to sort rows into, in the full tier.
+    pub column: Vec<Row<S>>,
     /// See [`SolverColumns::backing`](super::kernels::SolverColumns::backing).
     pub backing: Vec<Row<S>>,
     /// See [`SolverColumns::backing_speed`](super::kernels::SolverColumns::backing_speed).
@@ -47,7 +49,7 @@ pub(super) struct Scratch<S> {
     pub lists: Vec<Vec<u32>>,
     /// Progress of each chunk, while they are worked on.
     pub chunk_states: Vec<u32>,
-    pub searches: Vec<Search<S>>,
+    pub searches: Vec<NeighbourSearch<S>>,
     pub crowd: Crowd<S>,
     pub path_changes: Vec<Row<S>>,
     /// By slot: centers of balls near shapes at the begin of a substep.
@@ -68,10 +70,11 @@ pub(super) struct Scratch<S> {
     pub outside_work: Vec<OutsideWork>,
 }
 
-impl<S: Scalar> Scratch<S> {
+impl<S: Scalar> SwarmScratch<S> {
     /// Bytes that it has from the allocator.
     pub fn bytes(&self) -> usize {
         let Self {
+            column,
             backing,
             backing_speed,
             leaving,
@@ -103,7 +106,8 @@ impl<S: Scalar> Scratch<S> {
             impacts,
             outside_work,
         } = self;
-        (of(backing)
+        (of(column)
+            + of(backing)
             + of(backing_speed)
             + of(leaving)
             + of(displacements)
@@ -116,7 +120,7 @@ impl<S: Scalar> Scratch<S> {
                 + of(resting)
                 + of(sleepers)
                 + of(rows))
-            + (of(searches) + searches.iter().map(Search::bytes).sum::<usize>())
+            + (of(searches) + searches.iter().map(NeighbourSearch::bytes).sum::<usize>())
             + (crowd.bytes()
                 + of(path_changes)
                 + of(places)
@@ -128,5 +132,11 @@ impl<S: Scalar> Scratch<S> {
                 + held.bytes()
                 + of(impacts)
                 + of(outside_work))
+    }
+}
+
+impl<S> PartialEq for SwarmScratch<S> {
+    fn eq(&self, _: &Self) -> bool {
+        true
     }
 }

@@ -11,12 +11,12 @@ pub(super) const SOLID_BALL: f64 = 2.5;
 
 /// Surface of a ball: its material, and whether contacts can set it spinning.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Surface<S> {
+pub(crate) struct BallSurface<S> {
     pub material: Material<S>,
     pub rotation_locked: bool,
 }
 
-impl<S: Scalar> Surface<S> {
+impl<S: Scalar> BallSurface<S> {
     /// Mass times radius squared over the moment of inertia; zero where the rotation is locked.
     fn inertia_factor(self) -> S {
         if self.rotation_locked { S::zero() } else { S::from_f64(SOLID_BALL) }
@@ -28,7 +28,7 @@ impl<S: Scalar> Surface<S> {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Surfaces<S> {
     /// Different ones, in the order in which they came.
-    list: Vec<Surface<S>>,
+    list: Vec<BallSurface<S>>,
     /// Number of slots of each.
     counts: Vec<u32>,
     /// One more than the place in the list, by slot; zero for the model's surface.
@@ -77,7 +77,7 @@ impl<S: Scalar> Surfaces<S> {
     }
 
     /// Gives a slot a surface of its own, or that of the model. Returns whether it had another.
-    pub fn set(&mut self, slot: u32, surface: Option<Surface<S>>) -> bool {
+    pub fn set(&mut self, slot: u32, surface: Option<BallSurface<S>>) -> bool {
         let index = surface.map_or(0, |surface| {
             let known = self.list.iter().rposition(|known| *known == surface);
             let index = known.unwrap_or_else(|| {
@@ -109,7 +109,7 @@ impl<S: Scalar> Surfaces<S> {
     }
 
     /// Surface of a slot; none for that of the model.
-    pub fn get(&self, slot: u32) -> Option<Surface<S>> {
+    pub fn get(&self, slot: u32) -> Option<BallSurface<S>> {
         let index = *self.of_slot.get(slot as usize)?;
         self.list.get((index as usize).checked_sub(1)?).copied()
     }
@@ -128,7 +128,7 @@ impl<S: Scalar> Surfaces<S> {
     }
 
     pub fn bytes(&self) -> usize {
-        self.list.capacity() * size_of::<Surface<S>>()
+        self.list.capacity() * size_of::<BallSurface<S>>()
             + (self.counts.capacity() + self.of_slot.capacity()) * size_of::<u32>()
             + self.layers.capacity() * size_of::<CollisionLayers>()
             + (self.ignored.bytes() + self.kinematic.bytes())
@@ -147,9 +147,9 @@ pub(super) struct SurfaceOf<'a, S> {
 impl<S: Scalar> SurfaceOf<'_, S> {
     /// Surface of the ball in a row.
     #[inline]
-    pub fn row(&self, row: u32) -> Surface<S> {
+    pub fn row(&self, row: u32) -> BallSurface<S> {
         let own = || self.surfaces.get(self.slots[row as usize]);
-        let plain = Surface { material: self.model, rotation_locked: false };
+        let plain = BallSurface { material: self.model, rotation_locked: false };
         if self.surfaces.list.is_empty() { plain } else { own().unwrap_or(plain) }
     }
 
@@ -244,14 +244,14 @@ pub(super) struct PairNumbers<S> {
 }
 
 impl<S: Scalar> PairNumbers<S> {
-    fn set(&mut self, lane: usize, [a, b]: [Surface<S>; 2]) {
+    fn set(&mut self, lane: usize, [a, b]: [BallSurface<S>; 2]) {
         let material = a.material.combined_with(b.material);
         self.friction[lane] = material.friction;
         self.restitution[lane] = material.restitution;
         self.tangential_restitution[lane] = material.tangential_restitution;
         self.rolling_resistance[lane] = material.rolling_resistance;
         self.spinning_resistance[lane] = material.spinning_resistance;
-        let factors = [a, b].map(Surface::inertia_factor);
+        let factors = [a, b].map(BallSurface::inertia_factor);
         for (lanes, factor) in self.inertia_factors.iter_mut().zip(factors) {
             lanes[lane] = factor;
         }
@@ -272,7 +272,7 @@ pub(super) struct WallNumbers<S> {
 
 impl<S: Scalar> WallNumbers<S> {
     /// Numbers of a ball on a wall, which may have a material of its own.
-    pub fn new(ball: Surface<S>, wall: Option<Material<S>>) -> Self {
+    pub fn new(ball: BallSurface<S>, wall: Option<Material<S>>) -> Self {
         let material = ball.material.on_wall(wall);
         Self {
             friction: material.friction,

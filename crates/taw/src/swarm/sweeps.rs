@@ -5,7 +5,8 @@
 //! Detection", 5.5.5. What all balls have in common, gravity, is left out of it.
 
 use super::bit_set::BitSet;
-use super::grid::Grid;
+use super::grid::SortedGrid;
+use super::rows::dot;
 use crate::math::{Row, Scalar};
 
 /// Part of its path by which a ball may go further, since rounding and gravity take some.
@@ -15,7 +16,7 @@ const BINS: f64 = 1024.0;
 
 /// Paths of balls in a step.
 #[derive(Clone, Copy)]
-pub(super) struct Sweep<'a, S> {
+pub(super) struct BallSweep<'a, S> {
     /// Center and radius.
     pub at: &'a [Row<S>],
     pub velocity: &'a [Row<S>],
@@ -29,7 +30,7 @@ pub(super) struct Sweep<'a, S> {
     pub slack: S,
 }
 
-impl<S: Scalar> Sweep<'_, S> {
+impl<S: Scalar> BallSweep<'_, S> {
     /// Returns true if a ball goes further than skins reach.
     #[inline]
     pub fn is_swift(&self, row: u32) -> bool {
@@ -67,10 +68,10 @@ impl<S: Scalar> Sweep<'_, S> {
 
     /// Lists balls along the path of a swift one, each once and in order: all that are within `more`
     /// metres of what it touches.
-    pub fn visit_path(&self, row: u32, grid: &Grid<S>, more: S, beside: &mut Vec<u32>) {
+    pub fn visit_path(&self, row: u32, grid: &SortedGrid<S>, more: S, beside: &mut Vec<u32>) {
         beside.clear();
         let (at, path) = (self.at[row as usize], self.path(row));
-        let length = dot(path, path).sqrt();
+        let length = dot(&path, &path).sqrt();
         for level in &grid.levels {
             let pieces = (length / level.width()).ceil().max(S::one());
             let far = S::from_f64(0.5) * length / pieces + at[3] + self.slack + more;
@@ -91,20 +92,16 @@ impl<S: Scalar> Sweep<'_, S> {
     }
 }
 
-fn dot<S: Scalar>(a: [S; 3], b: [S; 3]) -> S {
-    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
-}
-
 /// Returns true if a point that begins there and goes along such a path comes as near to the origin.
 fn comes_near<S: Scalar>(begin: [S; 3], path: [S; 3], reach: S) -> bool {
-    let square = dot(path, path);
+    let square = dot(&path, &path);
     let time = if square > S::zero() {
-        (-dot(begin, path) / square).clamp(S::zero(), S::one())
+        (-dot(&begin, &path) / square).clamp(S::zero(), S::one())
     } else {
         S::zero()
     };
     let nearest = [0, 1, 2].map(|axis| begin[axis] + path[axis] * time);
-    dot(nearest, nearest) < reach * reach
+    dot(&nearest, &nearest) < reach * reach
 }
 
 /// Scratch of the search.
@@ -154,7 +151,7 @@ impl<S: Scalar> CrowdSweep<'_, S> {
     /// goes further than `skin`.
     pub fn find(&self, scratch: &mut Crowd<S>, pairs: &mut Vec<[u32; 2]>) {
         pairs.clear();
-        let goes_far = |velocity: &Row<S>| Sweep::skin_of_path(velocity, self.dt) > self.skin;
+        let goes_far = |velocity: &Row<S>| BallSweep::skin_of_path(velocity, self.dt) > self.skin;
         if !self.velocity.iter().any(goes_far) {
             return;
         }
@@ -182,7 +179,7 @@ impl<S: Scalar> CrowdSweep<'_, S> {
         swift.clear();
         paths.clear();
         for (row, velocity) in (0..).zip(self.velocity) {
-            if Sweep::skin_of_path(velocity, self.dt) > self.skin {
+            if BallSweep::skin_of_path(velocity, self.dt) > self.skin {
                 swift.insert(row);
             }
             paths.push(
@@ -226,6 +223,6 @@ impl<S: Scalar> CrowdSweep<'_, S> {
         let radii = self.at[a][3] + self.at[b][3];
         let known = radii + self.skin_left[a].max(S::zero()) + self.skin_left[b].max(S::zero());
         comes_near(apart, by, radii + S::from_f64(2.0) * self.slack)
-            && dot(apart, apart) >= known * known
+            && dot(&apart, &apart) >= known * known
     }
 }

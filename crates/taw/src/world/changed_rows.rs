@@ -1,22 +1,14 @@
 //! Rows of marbles that were set since a solver last read them.
 
 use crate::swarm::SyncToken;
+use crate::uncompared::Uncompared;
 
 /// Rows that were set; all while the token is unset.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct ChangedRows {
     token: SyncToken,
-    rows: Listed,
-}
-
-/// Rows in any order, some more than once. Do not count in comparisons.
-#[derive(Clone, Debug, Default)]
-struct Listed(Vec<u32>);
-
-impl PartialEq for Listed {
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
+    /// In any order, some more than once.
+    rows: Uncompared<Vec<u32>>,
 }
 
 impl ChangedRows {

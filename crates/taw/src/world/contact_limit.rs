@@ -16,7 +16,7 @@ const MAX_CONTACTS_OF_CAPSULE: usize = 1024;
 ///
 /// A contact counts for the smaller of the two, or for the higher index: a boulder may have
 /// thousands of pebbles around it, but a pebble only few boulders.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct ContactLimit<S> {
     /// By index: the last contact that was kept when some were dropped. Later ranks are dropped
     /// too.
@@ -31,12 +31,6 @@ pub(super) struct ContactLimit<S> {
 /// Order of contacts: smaller separation first, in metres; ties in a deterministic order.
 #[derive(Clone, Copy, Debug, PartialEq, PartialOrd)]
 struct Rank<S>(S, u64, [S; 2]);
-
-impl<S> Default for ContactLimit<S> {
-    fn default() -> Self {
-        Self { last: Vec::new(), start: Vec::new(), order: Vec::new(), limit: 0 }
-    }
-}
 
 impl<S: Scalar> Rank<S> {
     fn of(contact: &Contact<S>) -> Self {

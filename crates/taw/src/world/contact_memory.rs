@@ -9,7 +9,7 @@ use crate::response::impulse::CachedImpulse;
 use crate::response::{SpringHistory, follow_rows};
 
 /// Impulses and springs of the last substep's contacts, by row.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub(super) struct ContactMemory<S> {
     pub impulses: Vec<CachedImpulse<S>>,
     pub springs: Vec<SpringHistory<S>>,
@@ -25,22 +25,6 @@ pub(super) struct ContactMemory<S> {
     walls: Vec<WallId>,
     /// Number of removals of marbles and of walls until then.
     removals: [u64; 2],
-}
-
-impl<S> Default for ContactMemory<S> {
-    fn default() -> Self {
-        Self {
-            impulses: Vec::new(),
-            springs: Vec::new(),
-            sleeping_impulses: Vec::new(),
-            sleeping_springs: Vec::new(),
-            event_impulses: Vec::new(),
-            one_way: Vec::new(),
-            marbles: Vec::new(),
-            walls: Vec::new(),
-            removals: [0; 2],
-        }
-    }
 }
 
 impl<S: Scalar> World<S> {

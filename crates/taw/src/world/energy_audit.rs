@@ -4,9 +4,9 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::World;
+use crate::handle::NO_ROW;
 use crate::math::{Scalar, Vec3};
 use crate::response::{EnergyLedger, Response};
-use crate::swarm::NO_ROW;
 
 /// Energy audit of a step, in joules. Dissipated energy counts positive.
 ///

@@ -10,7 +10,7 @@ use crate::broad::Period;
 use crate::contact::Contact;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, is_finite};
 use crate::motion::{Motion, Rotation, WallMotion};
-use crate::response::event::{self, Ball, EventSettings, Trajectory, Wall};
+use crate::response::event::{self, EventBall, EventSettings, Trajectory, Wall};
 use crate::response::{BallRotation, EnergyLedger, Impact, Material};
 
 /// Collisions in the order of time; the third verb moves marbles.
@@ -98,7 +98,7 @@ impl<S: Scalar> World<S> {
             let largest = position.x.abs().max(position.y.abs()).max(position.z.abs());
             let digit = if exact { f64::EPSILON } else { S::epsilon().as_f64() };
             let radius = marbles.radius()[row].as_f64();
-            Ball {
+            EventBall {
                 position,
                 velocity,
                 spin: marbles.angular_velocity_f64(row),

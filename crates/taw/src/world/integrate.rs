@@ -53,7 +53,8 @@ impl<S: Scalar> Marbles<S> {
         let mut position = std::mem::take(&mut self.position);
         let mut velocity = std::mem::take(&mut self.velocity);
         let (position_rows, velocity_rows) = (&mut position, &mut velocity);
-        let mut rows = Rows { position: position_rows, velocity: velocity_rows, stopped, is_meant };
+        let mut rows =
+            IntegratedRows { position: position_rows, velocity: velocity_rows, stopped, is_meant };
         let only_gravity = context.forces.is_empty()
             && self.gravity_scale.is_empty()
             && self.mass.is_empty()
@@ -168,14 +169,14 @@ impl<S: Scalar> Marbles<S> {
 }
 
 /// Columns that an integrator writes.
-struct Rows<'a, S, F> {
+struct IntegratedRows<'a, S, F> {
     position: &'a mut [crate::math::Point3<S>],
     velocity: &'a mut [Vec3<S>],
     stopped: &'a mut Vec<u32>,
     is_meant: F,
 }
 
-impl<S: Scalar, F: Fn(usize) -> bool> Rows<'_, S, F> {
+impl<S: Scalar, F: Fn(usize) -> bool> IntegratedRows<'_, S, F> {
     /// Integrates all marbles with a kernel that is chosen once for all.
     fn integrate(
         &mut self,

@@ -6,19 +6,12 @@ use crate::error::positive;
 use crate::math::{Scalar, length};
 
 /// Speed limits of marbles, for games. None by default.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct SpeedLimits<S> {
     /// Maximum speed in m/s, above zero.
     pub linear: Option<S>,
     /// Maximum angular speed in rad/s, above zero.
     pub angular: Option<S>,
-}
-
-impl<S> Default for SpeedLimits<S> {
-    /// None.
-    fn default() -> Self {
-        Self { linear: None, angular: None }
-    }
 }
 
 impl<S: Scalar> SpeedLimits<S> {

@@ -70,19 +70,12 @@ impl<S: Scalar> Marble<S> {
 /// Exponential damping: removes the fraction `1 − e^−rate` of the velocity per second. A
 /// convenience for games; for the drag of a medium see
 /// [`ForceField::Drag`](crate::motion::ForceField).
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Damping<S> {
     /// Rate for the velocity in 1/s, at least zero.
     pub linear: S,
     /// Rate for the angular velocity in 1/s, at least zero. Used with dynamic rotation only.
     pub angular: S,
-}
-
-impl<S: Scalar> Default for Damping<S> {
-    /// None.
-    fn default() -> Self {
-        Self { linear: S::zero(), angular: S::zero() }
-    }
 }
 
 impl<S: Scalar> Damping<S> {

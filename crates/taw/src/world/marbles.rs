@@ -37,7 +37,7 @@ impl<S: Scalar> Default for Compensation<S> {
 /// Marbles (dynamic spheres and capsules) as columns: index *i* of each belongs to one marble.
 ///
 /// Indices change when marbles are removed; a [`MarbleId`] stays valid.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub struct Marbles<S> {
     handles: Handles,
     /// Flags: columns for rotation and for compensation exist.
@@ -77,38 +77,6 @@ pub struct Marbles<S> {
     pub(super) ignored: BTreeMap<MarbleId, Vec<ColliderId>>,
     /// Rows of these pairs.
     pub(super) ignored_rows: IgnoredPairs,
-}
-
-impl<S> Default for Marbles<S> {
-    fn default() -> Self {
-        Self {
-            handles: Handles::default(),
-            has_rotation: false,
-            compensated: false,
-            period: Period::default(),
-            changed: ChangedRows::default(),
-            position: Vec::new(),
-            radius: Vec::new(),
-            half_length: SparseColumn::default(),
-            velocity: Vec::new(),
-            rotation: Vec::new(),
-            angular_velocity: Vec::new(),
-            compensation: Vec::new(),
-            mass: SparseColumn::default(),
-            gravity_scale: SparseColumn::default(),
-            damping: SparseColumn::default(),
-            force: SparseColumn::default(),
-            torque: SparseColumn::default(),
-            integrator: SparseColumn::default(),
-            rotation_model: SparseColumn::default(),
-            material: SparseColumn::default(),
-            layers: SparseColumn::default(),
-            sleeping_disabled: SparseColumn::default(),
-            sleep: SleepColumns::default(),
-            ignored: BTreeMap::new(),
-            ignored_rows: IgnoredPairs::default(),
-        }
-    }
 }
 
 pub(super) const POSITION: [&str; 3] = ["position.x", "position.y", "position.z"];

@@ -71,7 +71,7 @@ use crate::motion::{ForceField, Rotation};
 use crate::response::{Impact, Response};
 use crate::swarm::Swarm;
 use contact_memory::ContactMemory;
-use scratch::Scratch;
+use scratch::WorldScratch;
 use settings::Settings;
 
 /// Marbles, walls and balls, and the settings of their simulation.
@@ -108,7 +108,7 @@ pub struct World<S: Scalar> {
     quarantined: Vec<MarbleId>,
     memory: ContactMemory<S>,
     /// On the heap, since it is several kilobytes: a world is moved as a whole.
-    scratch: Box<Scratch<S>>,
+    scratch: Box<WorldScratch<S>>,
 }
 
 impl<S: Scalar> World<S> {

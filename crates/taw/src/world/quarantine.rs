@@ -12,18 +12,12 @@ use crate::math::{Point3, Quat, Scalar, is_finite, is_finite_point};
 use crate::response::{Response, rename_rows};
 
 /// Poses at the start of the substep.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct StoredPoses<S> {
     position: Vec<Point3<S>>,
     rotation: Vec<Quat<S>>,
     /// Number of removals at that time: with others, the stored indices are stale.
     removals: u64,
-}
-
-impl<S> Default for StoredPoses<S> {
-    fn default() -> Self {
-        Self { position: Vec::new(), rotation: Vec::new(), removals: 0 }
-    }
 }
 
 impl<S: Scalar> StoredPoses<S> {

@@ -35,7 +35,7 @@ pub struct QueryHit<T> {
 
 /// Query acceleration structure of a world for [`World::queries`]. Kept between queries, it is only
 /// refitted.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct QueryTree<S> {
     tree: Bvh<S>,
     items: Vec<Item>,
@@ -47,12 +47,6 @@ pub struct QueryTree<S> {
 enum Item {
     Marble(MarbleId),
     Wall(SubShape),
-}
-
-impl<S> Default for QueryTree<S> {
-    fn default() -> Self {
-        Self { tree: Bvh::default(), items: Vec::new(), boxes: Vec::new() }
-    }
 }
 
 impl<S: Scalar> QueryTree<S> {

@@ -294,14 +294,14 @@ impl<S: Scalar> World<S> {
 }
 
 /// Path of a marble in a substep, in the frame of a sensor: that of the world at the end of the step.
-struct Path<S> {
+struct SensedPath<S> {
     /// The marble at its end.
     end: Shape<S>,
     /// In metres.
     displacement: Vec3<S>,
 }
 
-impl<S: Scalar> Path<S> {
+impl<S: Scalar> SensedPath<S> {
     /// The marble at its beginning.
     fn start(&self) -> Shape<S> {
         self.end.transformed(Pose { rotation: Quat::one(), translation: -self.displacement })
@@ -315,7 +315,7 @@ fn paths<'a, S: Scalar>(
     start: &'a [Point3<S>],
     sensor: &Sensor<S>,
     [rest, dt]: [S; 2],
-) -> impl Iterator<Item = (MarbleId, Path<S>)> + use<'a, S> {
+) -> impl Iterator<Item = (MarbleId, SensedPath<S>)> + use<'a, S> {
     let (bounds, layers) = (sensor.shape.bounding_box(), sensor.layers);
     let frame = |time: S| sensor.motion.map(|motion| motion.pose_before(time).inverse());
     let [at_start, at_end] = [frame(rest + dt), frame(rest)];
@@ -336,7 +336,7 @@ fn paths<'a, S: Scalar>(
         }
         let shape = marbles.shape_of_row(row);
         let end = at_end.map_or_else(|| shape.clone(), |frame| shape.transformed(frame));
-        Some((marbles.id(row)?, Path { end, displacement: to - from }))
+        Some((marbles.id(row)?, SensedPath { end, displacement: to - from }))
     })
 }
 

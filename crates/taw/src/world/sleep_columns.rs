@@ -11,7 +11,7 @@ use crate::motion::rest::{self, lasts, time_of_rest};
 pub(super) type SleepGroup = NonZeroU32;
 
 /// Rest and sleep by row; empty while no marble may sleep.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, Default)]
 pub(super) struct SleepColumns<S> {
     rest: Vec<Rest<S>>,
     /// None for a marble that is awake.
@@ -39,19 +39,6 @@ pub(super) struct Disturbed<S> {
     pub center: Point3<S>,
     pub reach: S,
     pub group: SleepGroup,
-}
-
-impl<S> Default for SleepColumns<S> {
-    fn default() -> Self {
-        Self {
-            rest: Vec::new(),
-            group: Vec::new(),
-            sleepers: 0,
-            last_group: 0,
-            version: 0,
-            disturbed: Vec::new(),
-        }
-    }
 }
 
 impl<S: Scalar> Rest<S> {

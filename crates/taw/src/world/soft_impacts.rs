@@ -7,13 +7,13 @@ use super::World;
 use super::continuous::{Frame, MovingWall, RelativePath, WallImpact};
 use super::marbles::Marbles;
 use crate::contact::{Contact, Contacts, time_of_impact_sphere_sphere};
+use crate::handle::NO_ROW;
 use crate::math::{Scalar, Vec3, cast_vector, length, normal_and_distance};
 use crate::response::{Colliders as _, Impact};
 use crate::shape::{BoundedShape, Sphere};
-use crate::swarm::NO_ROW;
 
 /// Impacts that free motion has in the step.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct PredictedImpacts<S> {
     list: Vec<PredictedImpact<S>>,
     /// Walls other than half-spaces that move.
@@ -31,12 +31,6 @@ struct PredictedImpact<S> {
     velocity: [Vec3<S>; 2],
 }
 
-impl<S> Default for PredictedImpacts<S> {
-    fn default() -> Self {
-        Self { list: Vec::new(), moving: Vec::new(), listed: Vec::new(), rows: (0, 0) }
-    }
-}
-
 impl<S: Scalar> PredictedImpacts<S> {
     /// Returns true if no row has gone or come since.
     pub fn are_of(&self, marbles: &Marbles<S>) -> bool {
@@ -45,19 +39,12 @@ impl<S: Scalar> PredictedImpacts<S> {
 }
 
 /// Contacts of a chunk, and the impacts that they predict: at walls, and of pairs.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct ChunkContacts<S> {
     pub contacts: Contacts<S>,
     /// Contacts of pairs that may come together, by index.
     pub meetings: Vec<u32>,
     predicted: [Vec<PredictedImpact<S>>; 2],
-}
-
-impl<S> Default for ChunkContacts<S> {
-    fn default() -> Self {
-        let (contacts, meetings) = (Contacts::default(), Vec::new());
-        Self { contacts, meetings, predicted: [Vec::new(), Vec::new()] }
-    }
 }
 
 impl<S: Scalar> ChunkContacts<S> {

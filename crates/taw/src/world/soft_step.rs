@@ -7,23 +7,25 @@ use cgmath::{EuclideanSpace, Zero};
 
 use super::method::{Method, SleepUnit};
 use super::soft_impacts::{ChunkContacts, PredictedImpacts};
-use super::swarm::{MAX_COORDINATE, clamped_row};
+use super::swarm::clamped_row;
 use super::swept_walls::SweptWalls;
 use super::{MarbleId, World};
 use crate::Error;
 use crate::broad::CollisionLayers;
 use crate::contact::Contacts;
 use crate::error::within;
+use crate::handle::NO_ROW;
 use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::Rotation;
 use crate::response::{Material, Response};
 use crate::swarm::{
-    Body, INFINITE_MASS, MarbleRow, NO_ROW, NearLimits, Surface, SyncToken, VelocityChange,
+    BallSurface, Body, INFINITE_MASS, MAX_COORDINATE, MarbleRow, NearLimits, RADII, SyncToken,
+    VelocityChange,
 };
 use crate::workers::append_all;
 
 /// Correspondence of marbles and rows, and scratch memory.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct SoftRows<S> {
     /// Number of removals and of marbles, rotation model, and whether the swarm has the default
     /// material: others change the rows of all.
@@ -40,28 +42,9 @@ pub(super) struct SoftRows<S> {
     pub predicted: PredictedImpacts<S>,
 }
 
-impl<S: Scalar> Default for SoftRows<S> {
-    fn default() -> Self {
-        Self {
-            known: None,
-            token: SyncToken::default(),
-            slot_of_marble: Vec::new(),
-            marble_of_slot: Vec::new(),
-            changed: Vec::new(),
-            lists: Vec::new(),
-            dt: S::zero(),
-            found: None,
-            predicted: PredictedImpacts::default(),
-        }
-    }
-}
-
 /// Least and largest inverse mass of a row, in 1/kg: products with it and quotients by it are
 /// numbers.
 const INVERSE_MASSES: [f64; 2] = [INFINITE_MASS, 1e25];
-
-/// Least radius of a row, in metres, as of the balls of a swarm.
-const LEAST_RADIUS: f64 = 1e-9;
 
 /// Soft contacts in small steps, all within the third verb.
 pub(super) struct SoftStep;
@@ -285,7 +268,7 @@ impl<S: Scalar> World<S> {
     /// Checks that the numbers of a marble fit into a row. One that flew farther in steps may go on.
     fn check_row(&self, row: usize) -> Result<(), Error> {
         let marbles = &self.marbles;
-        let [least, most] = [LEAST_RADIUS, MAX_COORDINATE].map(|x| S::from_f64(x).as_f64());
+        let [least, most] = [RADII[0], MAX_COORDINATE].map(|x| S::from_f64(x).as_f64());
         let radius = marbles.radius[row].as_f64();
         within("radius", radius, least, most)?;
         let position = cast_vector::<S, f64>(marbles.position[row].to_vec());
@@ -363,7 +346,7 @@ impl<S: Scalar> World<S> {
             let rotation_locked = marbles.rotation_of(row, rotation) != Rotation::Dynamic;
             let surface = (material.is_some() || rotation_locked || !plain_swarm).then(|| {
                 let material = material.unwrap_or_default();
-                Surface { material, rotation_locked }
+                BallSurface { material, rotation_locked }
             });
             let spin = marbles.angular_velocity.get(row).copied().filter(|_| !rotation_locked);
             let marble = MarbleRow {
@@ -421,7 +404,7 @@ fn within_vector(names: [&'static str; 3], v: Vec3<f64>, most: f64) -> Result<()
 
 /// Radius of a row, in metres.
 fn row_radius<S: Scalar>(radius: S) -> S {
-    radius.clamp(S::from_f64(LEAST_RADIUS), S::from_f64(MAX_COORDINATE))
+    radius.clamp(S::from_f64(RADII[0]), S::from_f64(MAX_COORDINATE))
 }
 
 /// A marble as a row.
@@ -429,7 +412,7 @@ fn body<S: Scalar>(
     slot: u32,
     marble: MarbleRow<S>,
     inverse_mass: S,
-    surface: Option<Surface<S>>,
+    surface: Option<BallSurface<S>>,
 ) -> Body<S> {
     let spin = marble.spin.map_or_else(Vec3::zero, |spin| spin * marble.radius);
     Body {

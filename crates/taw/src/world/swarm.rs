@@ -10,7 +10,7 @@ use crate::Error;
 use crate::math::{Scalar, Vec3, cast_vector};
 use crate::motion::{Motion, acceleration_in_step};
 use crate::response::Response;
-use crate::swarm::{BallId, Proxy, Stage, VelocityChange};
+use crate::swarm::{BallId, MAX_COORDINATE, Proxy, Stage, VelocityChange};
 
 impl<S: Scalar> World<S> {
     /// Moves the [swarm](Self::swarm) on, which a step does after the marbles, before it
@@ -147,9 +147,6 @@ impl<S: Scalar> World<S> {
         self.stop_bounces_at_walls();
     }
 }
-
-/// In metres and m/s.
-pub(super) const MAX_COORDINATE: f64 = 1e12;
 
 /// Row of a vector whose components are within the limits, and a fourth number.
 pub(super) fn clamped_row<S: Scalar>(v: Vec3<S>, last: S) -> [S; 4] {

@@ -4,14 +4,13 @@ use cgmath::{EuclideanSpace, InnerSpace};
 
 use super::continuous::{Frame, MAX_FREE_MOTION, MovingWall, RelativePath};
 use super::narrow_phase::{Candidate, candidate_sub_shapes, remove_ghost_collisions};
-use super::swarm::MAX_COORDINATE;
 use super::walls::{SubShape, Walls};
 use crate::broad::{CollisionFilter, CollisionLayers};
 use crate::math::{Point3, Scalar, Vec3, length};
 use crate::motion::WallMotion;
 use crate::response::{Colliders as _, Material};
 use crate::shape::{Aabb, Aabb3, BoundedShape, PointProjection, Sphere};
-use crate::swarm::StaticGeometry;
+use crate::swarm::{MAX_COORDINATE, StaticGeometry};
 
 /// Overlap in radii at the end of a path up to which a ball only grazes a wall.
 const GRAZES: f64 = 0.02;

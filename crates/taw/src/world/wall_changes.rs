@@ -12,7 +12,7 @@ const MAX_CHANGES: usize = 1024;
 
 /// Regions in which walls changed, in order. Two are equal if a solver knows of all changes, or has
 /// some to learn of, in both.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(super) struct WallChanges<S> {
     /// Identity of the walls before the first change of the log.
     base: u64,
@@ -32,15 +32,17 @@ struct Change<S> {
     removed: Option<[u32; 2]>,
 }
 
-impl<S: Scalar> PartialEq for WallChanges<S> {
+impl<S> PartialEq for WallChanges<S> {
     fn eq(&self, other: &Self) -> bool {
         (self.identity() == self.seen) == (other.identity() == other.seen)
     }
 }
 
-impl<S> Default for WallChanges<S> {
-    fn default() -> Self {
-        Self { base: 0, log: VecDeque::new(), seen: 0 }
+impl<S> WallChanges<S> {
+    /// Identity of the walls as they are: that of their clones until one of them changes, and of no
+    /// others.
+    pub fn identity(&self) -> u64 {
+        self.log.back().map_or(self.base, |change| change.identity)
     }
 }
 
@@ -64,12 +66,6 @@ impl<S: Scalar> WallChanges<S> {
             self.base = dropped.identity;
         }
         self.log.push_back(Change { identity, region, removed });
-    }
-
-    /// Identity of the walls as they are: that of their clones until one of them changes, and of no
-    /// others.
-    pub fn identity(&self) -> u64 {
-        self.log.back().map_or(self.base, |change| change.identity)
     }
 
     /// Notes that a solver knows of all changes.

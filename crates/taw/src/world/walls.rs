@@ -11,6 +11,7 @@ use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};
 use crate::shape::{Aabb3, Bvh, Capsule, Plane, PointProjection};
+use crate::uncompared::Uncompared;
 
 /// Stable handle of a wall.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -24,12 +25,12 @@ pub(super) struct SubShape {
 }
 
 /// Walls: static and kinematic colliders, which no contact moves.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Walls<S> {
     handles: Handles,
     shapes: Vec<WallShape<S>>,
     /// Indices of half-spaces, in order: every step visits them, among however many others.
-    planes: Vec<u32>,
+    planes: Uncompared<Vec<u32>>,
     /// Motion of moving walls.
     motion: SparseColumn<WallMotion<S>>,
     /// Materials of walls that have their own.
@@ -41,14 +42,14 @@ pub struct Walls<S> {
     /// Walls that were set to another pose since the last step.
     moved: SparseColumn<()>,
     /// Final shapes and motions, by index, of walls on their way through a step.
-    ends: Vec<(usize, WallShape<S>, WallMotion<S>)>,
+    ends: Uncompared<Vec<(usize, WallShape<S>, WallMotion<S>)>>,
     /// Bounding boxes of all walls except half-spaces, and their sub-shapes.
-    boxes: Vec<Aabb3<S>>,
-    sub_shapes: Vec<SubShape>,
-    tree: Bvh<S>,
-    dirty: Dirty,
+    boxes: Uncompared<Vec<Aabb3<S>>>,
+    sub_shapes: Uncompared<Vec<SubShape>>,
+    tree: Uncompared<Bvh<S>>,
+    dirty: Uncompared<Dirty>,
     /// Number of insertions, removals and changes.
-    version: u64,
+    version: Uncompared<u64>,
     changes: WallChanges<S>,
 }
 
@@ -59,38 +60,6 @@ enum Dirty {
     Nothing,
     Poses,
     All,
-}
-
-impl<S> Default for Walls<S> {
-    fn default() -> Self {
-        Self {
-            handles: Handles::default(),
-            shapes: Vec::new(),
-            planes: Vec::new(),
-            motion: SparseColumn::default(),
-            material: SparseColumn::default(),
-            layers: SparseColumn::default(),
-            one_way: SparseColumn::default(),
-            moved: SparseColumn::default(),
-            ends: Vec::new(),
-            boxes: Vec::new(),
-            sub_shapes: Vec::new(),
-            tree: Bvh::default(),
-            dirty: Dirty::Nothing,
-            version: 0,
-            changes: WallChanges::default(),
-        }
-    }
-}
-
-impl<S: Scalar> PartialEq for Walls<S> {
-    fn eq(&self, other: &Self) -> bool {
-        // The other fields follow from the shapes.
-        let Self { handles, shapes, motion, material, layers, one_way, moved, changes, .. } = self;
-        (handles, shapes, changes) == (&other.handles, &other.shapes, &other.changes)
-            && (motion, material) == (&other.motion, &other.material)
-            && (layers, one_way, moved) == (&other.layers, &other.one_way, &other.moved)
-    }
 }
 
 impl<S: Scalar> Walls<S> {
@@ -130,8 +99,8 @@ impl<S: Scalar> Walls<S> {
         self.one_way.swap_remove(row);
         self.moved.swap_remove(row);
         // Another wall has this index now.
-        self.dirty = Dirty::All;
-        self.version += 1;
+        *self.dirty = Dirty::All;
+        *self.version += 1;
         let last = self.shapes.len() - 1;
         let shape = self.shapes.swap_remove(row);
         self.changes.add(shape.bounding_box(), Some([row as u32, last as u32]));
@@ -185,15 +154,15 @@ impl<S: Scalar> Walls<S> {
 
     /// Records that a wall is new or elsewhere.
     fn change(&mut self, shape: &WallShape<S>, dirty: Dirty) {
-        self.version += 1;
+        *self.version += 1;
         if dirty == Dirty::All || !matches!(shape, WallShape::Plane(_)) {
-            self.dirty = self.dirty.max(dirty);
+            *self.dirty = self.dirty.max(dirty);
         }
     }
 
     /// Records a change of a wall that stays in place.
     pub(super) fn mark_changed(&mut self, row: usize) {
-        self.version += 1;
+        *self.version += 1;
         self.log_change(self.shapes[row].bounding_box());
     }
 
@@ -220,7 +189,7 @@ impl<S: Scalar> Walls<S> {
 
     /// Updates the tree. Moved walls are refitted.
     pub(super) fn update_tree(&mut self) {
-        if self.dirty == Dirty::Nothing {
+        if *self.dirty == Dirty::Nothing {
             return;
         }
         self.boxes.clear();
@@ -231,12 +200,12 @@ impl<S: Scalar> Walls<S> {
                 self.boxes.push(bounds);
             });
         }
-        if self.dirty == Dirty::Poses {
+        if *self.dirty == Dirty::Poses {
             self.tree.refit(&self.boxes);
         } else {
-            self.tree = Bvh::new(&self.boxes);
+            *self.tree = Bvh::new(&self.boxes);
         }
-        self.dirty = Dirty::Nothing;
+        *self.dirty = Dirty::Nothing;
     }
 
     /// Returns true if all walls are half-spaces.
@@ -393,9 +362,9 @@ impl<S: Scalar> Walls<S> {
             let rows = (0..self.shapes.len()).filter(|row| self.moved.get(*row).is_some());
             let ends =
                 rows.filter_map(|row| Some((row, self.shapes[row].clone(), self.motion.get(row)?)));
-            self.ends = ends.collect();
+            *self.ends = ends.collect();
         }
-        for (row, end, motion) in &self.ends {
+        for (row, end, motion) in self.ends.iter() {
             // An invalid pose is skipped.
             let on_its_way =
                 || end.transformed(motion.pose_before(left)).and_then(WallShape::validated).ok();
@@ -404,7 +373,7 @@ impl<S: Scalar> Walls<S> {
             let pivot = Some(motion.pivot - motion.velocity * left).filter(|p| is_finite_point(*p));
             let pivot = pivot.unwrap_or(motion.pivot);
             self.motion.set(*row, Some(WallMotion { pivot, ..*motion }), self.shapes.len());
-            self.dirty = self.dirty.max(Dirty::Poses);
+            *self.dirty = self.dirty.max(Dirty::Poses);
         }
     }
 
@@ -433,7 +402,7 @@ impl<S: Scalar> Walls<S> {
     /// Number of insertions, removals and changes so far: unchanged as long as the walls are.
     #[must_use]
     pub fn version(&self) -> u64 {
-        self.version
+        *self.version
     }
 
     /// Number of removals so far.

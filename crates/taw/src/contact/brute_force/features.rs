@@ -1,6 +1,6 @@
 use cgmath::{EuclideanSpace, InnerSpace};
 
-use crate::contact::core::{BOX_FACES, Core, Kind};
+use crate::contact::core::{BOX_FACES, Core, CoreKind};
 use crate::math::{Vec3, normalize_and_length};
 
 /// Vertices, edges and faces of a [`Core`].
@@ -37,17 +37,17 @@ impl Features {
     #[must_use]
     pub fn of(core: &Core<'_>) -> Self {
         let (points, edges, faces): (Vec<_>, Vec<_>, _) = match &core.kind {
-            Kind::Point(point) => (vec![*point], Vec::new(), 0),
-            Kind::Segment(ends) => (ends.to_vec(), vec![[0, 1]], 0),
+            CoreKind::Point(point) => (vec![*point], Vec::new(), 0),
+            CoreKind::Segment(ends) => (ends.to_vec(), vec![[0, 1]], 0),
             // Both sides count. A degenerate triangle has none.
-            Kind::Triangle(corners) => {
+            CoreKind::Triangle(corners) => {
                 let edges = vec![[0, 1], [1, 2], [2, 0]];
                 (corners.to_vec(), edges, 2 * usize::from(core.is_nondegenerate_triangle()))
             }
-            Kind::Cuboid(cuboid) => {
+            CoreKind::Cuboid(cuboid) => {
                 ((0..8).map(|i| cuboid.corner(i)).collect(), BOX_EDGES.to_vec(), BOX_FACES.len())
             }
-            Kind::Hull { points, edges, faces, rotation, translation, .. } => {
+            CoreKind::Hull { points, edges, faces, rotation, translation, .. } => {
                 let there = points.iter().map(|point| rotation * point.to_vec() + translation);
                 (there.collect(), edges.to_vec(), faces.len())
             }
@@ -56,7 +56,7 @@ impl Features {
             (core.normal(face), core.face(face).into_iter().map(|(_, number)| number).collect())
         };
         let mut directions: Vec<Vec3<f64>> = match &core.kind {
-            Kind::Cuboid(cuboid) => cuboid.axes.to_vec(), // a flat one has them, too
+            CoreKind::Cuboid(cuboid) => cuboid.axes.to_vec(), // a flat one has them, too
             _ => Vec::new(),
         };
         for [a, b] in &edges {

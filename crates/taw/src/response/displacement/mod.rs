@@ -15,7 +15,7 @@ use crate::math::{Scalar, UnionFind, Vec3, is_finite, is_finite_point};
 
 /// Scratch buffers, kept for their memory.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Scratch<S> {
+pub(crate) struct DisplacementScratch<S> {
     constraints: Vec<ApproachConstraint<S>>,
     initial_velocity: Vec<Vec3<S>>,
     islands: UnionFind,
@@ -78,12 +78,12 @@ pub(crate) fn solve_displacement<S: Scalar>(
     marbles: &mut SolverBodies<S>,
     contacts: &mut Contacts<S>,
     context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
-    scratch: &mut Scratch<S>,
+    scratch: &mut DisplacementScratch<S>,
     cache: &mut Vec<CachedImpulse<S>>,
     quarantined: &mut Vec<u32>,
     mut on_wall_impulse: impl FnMut(u32, Vec3<S>, [S; 2]),
 ) {
-    let Scratch { constraints, initial_velocity, islands, warm_starts } = scratch;
+    let DisplacementScratch { constraints, initial_velocity, islands, warm_starts } = scratch;
     initial_velocity.clear();
     initial_velocity.extend_from_slice(marbles.velocity);
     constraints.clear();

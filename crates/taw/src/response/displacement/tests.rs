@@ -58,7 +58,8 @@ fn restituted<S: Scalar>(
         start: SubstepStart { position: &[], velocity: &[], ccd_stops: &[] },
         settings: &settings,
     };
-    let (mut scratch, mut cache, mut quarantined) = (Scratch::default(), vec![], vec![]);
+    let (mut scratch, mut cache, mut quarantined) =
+        (DisplacementScratch::default(), vec![], vec![]);
     columns.place_contacts(&mut contacts, &floor);
     contacts.sort();
     solve_displacement(

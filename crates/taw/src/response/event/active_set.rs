@@ -10,7 +10,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::cluster::ClusterBodies;
 use super::wall::MovingWalls;
-use super::{EventDriven, EventSettings};
+use super::{EventSettings, EventSolver};
 use crate::broad::Period;
 use crate::contact::Contacts;
 use crate::math::{Point3, Vec3, normalize_and_length};
@@ -199,7 +199,7 @@ impl ActiveSet<'_> {
     }
 }
 
-impl EventDriven {
+impl EventSolver {
     /// Ends the approach that a cluster's instantaneous solve has left, above `tolerance`, in m/s.
     pub(super) fn end_remaining_approach(
         &mut self,

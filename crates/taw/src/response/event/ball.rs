@@ -12,7 +12,7 @@ use crate::response::{BallRotation, Material};
 
 /// Ball: state from the world, and its present trajectory.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Ball {
+pub(crate) struct EventBall {
     /// Center at the start of the trajectory, in metres.
     pub position: Point3<f64>,
     /// Velocity at the start of the trajectory, in m/s.
@@ -109,7 +109,7 @@ impl Default for Trajectory {
     }
 }
 
-impl Ball {
+impl EventBall {
     pub(super) fn position_at(&self, time: f64) -> Point3<f64> {
         let t = time - self.trajectory.start;
         self.position + (self.velocity + self.trajectory.acceleration * (0.5 * t)) * t

@@ -7,7 +7,7 @@ use std::collections::BTreeMap;
 use cgmath::InnerSpace;
 use smallvec::SmallVec;
 
-use super::{Ball, EventDriven, EventSettings, SEAM_TOLERANCE, Wall};
+use super::{EventBall, EventSettings, EventSolver, SEAM_TOLERANCE, Wall};
 use crate::broad::CollisionFilter;
 use crate::math::Point3;
 
@@ -71,7 +71,7 @@ pub(super) struct CandidateWall {
 
 /// Range of a search for the candidate walls of a ball.
 #[derive(Clone, Copy, Debug)]
-struct Search {
+struct CandidateSearch {
     center: Point3<f64>,
     /// Range to be searched, in metres.
     covered: f64,
@@ -79,7 +79,7 @@ struct Search {
     max_range: f64,
 }
 
-impl EventDriven {
+impl EventSolver {
     /// Finds the candidate walls of all balls at the start of a substep.
     pub(super) fn find_candidates(&mut self, settings: &EventSettings) {
         let source = settings.source;
@@ -134,19 +134,20 @@ impl EventDriven {
     fn list_candidates(
         &mut self,
         row: usize,
-        mut search: Search,
+        mut search: CandidateSearch,
         mut ids: Vec<(u32, u32)>,
         settings: &EventSettings,
     ) -> BallCandidates {
         while ids.len() <= FEW_PARTS && search.covered < search.max_range {
-            let next = Search { covered: search.max_range.min(2.0 * search.covered), ..search };
+            let next =
+                CandidateSearch { covered: search.max_range.min(2.0 * search.covered), ..search };
             let next_ids = self.ids_within(row, &next, settings);
             if next_ids.len() > FEW_PARTS {
                 break;
             }
             (search, ids) = (next, next_ids);
         }
-        let Search { center, covered, .. } = search;
+        let CandidateSearch { center, covered, .. } = search;
         let max_distance = covered + self.margin(row);
         let Self { candidates: WallCandidates { index, lists, .. }, walls, ignored, .. } = self;
         let ignored = ignored.walls_of(row as u32);
@@ -174,7 +175,12 @@ impl EventDriven {
     }
 
     /// Sub-shapes of walls within the range of a search.
-    fn ids_within(&self, row: usize, search: &Search, settings: &EventSettings) -> Vec<(u32, u32)> {
+    fn ids_within(
+        &self,
+        row: usize,
+        search: &CandidateSearch,
+        settings: &EventSettings,
+    ) -> Vec<(u32, u32)> {
         let (mut ids, range) = (Vec::new(), search.covered + self.margin(row));
         settings.source.near(search.center, range, &mut |row, part| ids.push((row, part)));
         settings.add_cost(ids.len() as u64 + SEARCH_COST);
@@ -216,13 +222,13 @@ impl EventDriven {
     }
 
     /// Range of a first search around a ball.
-    fn search_range(&self, row: usize, now: f64, settings: &EventSettings) -> Search {
+    fn search_range(&self, row: usize, now: f64, settings: &EventSettings) -> CandidateSearch {
         let ball = &self.balls[row];
         let remaining = settings.dt - now;
         let max_range =
             2.0 * max_speed(ball, now, remaining) * remaining + EXTRA_RANGE * ball.radius;
         let covered = max_range.min(MAX_CELLS_AROUND * self.cells.min_width());
-        Search { center: ball.position_at(now), covered, max_range }
+        CandidateSearch { center: ball.position_at(now), covered, max_range }
     }
 
     fn margin(&self, row: usize) -> f64 {
@@ -291,12 +297,12 @@ impl EventDriven {
 }
 
 /// Upper bound of a ball's speed over the next `remaining` seconds without an event, in m/s.
-fn max_speed(ball: &Ball, now: f64, remaining: f64) -> f64 {
+fn max_speed(ball: &EventBall, now: f64, remaining: f64) -> f64 {
     ball.velocity_at(now).magnitude() + max_acceleration(ball) * remaining
 }
 
 /// Upper bound of a ball's acceleration without contacts, in m/s².
-fn max_acceleration(ball: &Ball) -> f64 {
+fn max_acceleration(ball: &EventBall) -> f64 {
     ball.external_acceleration.magnitude().max(ball.trajectory.acceleration.magnitude())
 }
 
@@ -344,7 +350,7 @@ mod tests {
 
     #[test]
     fn a_fast_ball_looks_as_far_as_walls_are_few_and_no_farther() {
-        let ball = Ball {
+        let ball = EventBall {
             position: Point3::new(0.0, 0.0, 0.0),
             velocity: Vec3::unit_x() * 1e6,
             spin: Vec3::zero(),
@@ -359,7 +365,7 @@ mod tests {
             trajectory: Trajectory::default(),
         };
         for (distance, covered) in [(10.0, 5.0..10.0), (1e9, 2e4..1e9)] {
-            let mut method = EventDriven { balls: vec![ball], ..EventDriven::default() };
+            let mut method = EventSolver { balls: vec![ball], ..EventSolver::default() };
             let source = &Crowd(distance);
             let settings = EventSettings {
                 threads: 1,

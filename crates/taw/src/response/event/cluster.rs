@@ -3,7 +3,7 @@
 use cgmath::{InnerSpace, Zero};
 
 use super::wall::{MovingWalls, Wall};
-use super::{Ball, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
+use super::{EventBall, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::broad::Period;
 use crate::contact::Contacts;
 use crate::math::{Point3, UnionFind, Vec3};
@@ -37,7 +37,7 @@ pub(super) struct Cluster {
     pub start: Vec<Point3<f64>>,
     /// Connected components.
     pub sets: UnionFind,
-    pub scratch: impulse::Scratch<f64>,
+    pub scratch: impulse::ImpulseScratch<f64>,
 }
 
 /// Columns of the cluster's balls.
@@ -73,7 +73,7 @@ impl Cluster {
     pub fn gather(
         &mut self,
         contacts: &mut Contacts<f64>,
-        (balls, walls): (&[Ball], &[Wall]),
+        (balls, walls): (&[EventBall], &[Wall]),
         period: Period<f64>,
     ) {
         self.bodies.period = period;
@@ -104,7 +104,7 @@ impl Cluster {
         fill(&mut bodies.velocity, each().map(|b| b.velocity));
         // What is frozen stands still with its surface, which would drive the others without losing
         // anything, and between two that turn against each other a ball has no solution.
-        let spin = |b: &Ball| if b.is_frozen() { Vec3::zero() } else { b.spin };
+        let spin = |b: &EventBall| if b.is_frozen() { Vec3::zero() } else { b.spin };
         fill(&mut bodies.spin, each().map(spin));
         fill(&mut bodies.radius, each().map(|b| b.radius));
         fill(
@@ -121,7 +121,7 @@ impl Cluster {
     }
 
     /// Largest acceleration of the balls by external forces, in m/s².
-    pub fn max_acceleration(&self, balls: &[Ball]) -> f64 {
+    pub fn max_acceleration(&self, balls: &[EventBall]) -> f64 {
         let of = |row: &u32| balls[*row as usize].external_acceleration.magnitude();
         self.rows.iter().map(of).fold(0.0, f64::max)
     }

@@ -5,7 +5,7 @@ use std::cmp::Reverse;
 use cgmath::InnerSpace;
 
 use super::resting_cluster::{PressedBy, RestingCluster};
-use super::{Event, EventDriven, EventKind, EventSettings, Impact, MAX_DISSIPATIONS, MAX_FREEZES};
+use super::{Event, EventKind, EventSettings, EventSolver, Impact, MAX_DISSIPATIONS, MAX_FREEZES};
 use crate::constraint::{ContactImpulse, tipped};
 use crate::contact::ContactMaterial;
 use crate::math::{Vec3, normalize_and_length};
@@ -35,7 +35,7 @@ pub(super) struct Collision {
     pub impulse: ContactImpulse<f64>,
 }
 
-impl EventDriven {
+impl EventSolver {
     /// Detects inelastic collapse: collisions that would not end.
     pub(super) fn is_collapsing(&self, row: usize) -> bool {
         self.balls[row].trajectory.dissipation_count >= MAX_DISSIPATIONS

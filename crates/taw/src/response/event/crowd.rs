@@ -6,7 +6,7 @@
 use std::collections::BTreeMap;
 
 use super::cells::{Cell, Cells};
-use super::{CellSlot, EventDriven};
+use super::{CellSlot, EventSolver};
 use crate::contact::Contact;
 use crate::math::UnionFind;
 
@@ -52,7 +52,7 @@ impl Crowds {
     }
 }
 
-impl EventDriven {
+impl EventSolver {
     /// Finds the crowds among the contacts at the start of a substep.
     pub(super) fn find_crowds(&mut self, contacts: &[Contact<f64>]) {
         let deep: Vec<_> = contacts.iter().filter(|c| self.is_deep_in_ball(c)).collect();

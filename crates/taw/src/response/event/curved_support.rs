@@ -13,7 +13,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::flat_support::Regime;
 use super::support_candidates::SupportCandidates;
-use super::{Ball, Wall};
+use super::{EventBall, Wall};
 use crate::contact::ContactMaterial;
 use crate::math::{Point3, Vec3, normalize_and_length};
 use crate::response::{BallRotation, Material};
@@ -70,8 +70,8 @@ pub(super) struct BallState {
 }
 
 impl BallState {
-    pub fn of(ball: &Ball) -> Self {
-        let Ball { position, velocity, spin, trajectory, .. } = *ball;
+    pub fn of(ball: &EventBall) -> Self {
+        let EventBall { position, velocity, spin, trajectory, .. } = *ball;
         Self { time: trajectory.start, position, velocity, spin }
     }
 

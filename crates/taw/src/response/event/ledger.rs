@@ -2,11 +2,11 @@
 
 use cgmath::InnerSpace;
 
-use super::{Ball, EventDriven, Wall};
+use super::{EventBall, EventSolver, Wall};
 use crate::math::Vec3;
 use crate::response::{BallRotation, EnergyLedger};
 
-impl EventDriven {
+impl EventSolver {
     /// Advances a ball's trajectory, and books the energy of the motion.
     pub(super) fn advance(&mut self, row: usize, time: f64) {
         if let Some(mut work) = self.work.take() {
@@ -17,7 +17,7 @@ impl EventDriven {
     }
 
     /// Books the work of forces and of the supporting wall up to a time.
-    fn record_motion(&self, ball: &Ball, time: f64, work: &mut EnergyLedger) {
+    fn record_motion(&self, ball: &EventBall, time: f64, work: &mut EnergyLedger) {
         let dt = time - ball.trajectory.start;
         if dt <= 0.0 || ball.inverse_mass == 0.0 {
             return;
@@ -58,7 +58,7 @@ impl EventDriven {
         };
         let rotation = later.rotation_increment - ball.rotation_increment;
         let ball_work = if is_curved {
-            let energy = |ball: &Ball| {
+            let energy = |ball: &EventBall| {
                 0.5 * (mass * ball.velocity.magnitude2() + inertia * ball.spin.magnitude2())
             };
             energy(&later) - energy(ball) - mass * ball.external_acceleration.dot(displacement)
@@ -74,7 +74,7 @@ impl EventDriven {
 }
 
 /// Velocity of the surface at the contact point, and slip over it.
-fn surface_and_slip(ball: &Ball, wall: &Wall) -> (Vec3<f64>, Vec3<f64>) {
+fn surface_and_slip(ball: &EventBall, wall: &Wall) -> (Vec3<f64>, Vec3<f64>) {
     let normal = wall.nearest(ball.position, ball.trajectory.start).normal;
     let contact_point = ball.position - normal * ball.radius;
     let surface = wall.surface_velocity(normal, contact_point, ball.trajectory.start);

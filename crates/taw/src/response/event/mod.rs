@@ -42,7 +42,7 @@ use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector, is_finite, is_f
 use crate::response::EnergyLedger;
 use crate::response::impulse::CachedImpulse;
 use ball::CellSlot;
-pub(crate) use ball::{Ball, Trajectory};
+pub(crate) use ball::{EventBall, Trajectory};
 use candidates::WallCandidates;
 pub(crate) use candidates::WallSource;
 use cells::Cells;
@@ -207,9 +207,9 @@ impl EventSettings<'_> {
 
 /// Event-driven solver, with its scratch buffers.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct EventDriven {
+pub(crate) struct EventSolver {
     /// Balls, filled in and read back by the caller.
-    pub balls: Vec<Ball>,
+    pub balls: Vec<EventBall>,
     /// Period of the world.
     pub period: Period<f64>,
     /// Balls that pass through each other, and through walls, by their rows in the world.
@@ -235,7 +235,7 @@ pub(crate) struct EventDriven {
     partners: Vec<Vec<Partner>>,
 }
 
-impl EventDriven {
+impl EventSolver {
     /// Simulates a substep. Appends to `impacts` in the order of time, and returns the rows that
     /// became infinite or NaN or did not finish; the former keep their initial positions.
     pub fn run(&mut self, settings: &EventSettings, impacts: &mut Vec<Impact<f64>>) -> Vec<u32> {
@@ -389,7 +389,7 @@ impl EventDriven {
     }
 
     /// Vector between the centers of two balls, in metres.
-    fn center_offset(&self, first: &Ball, second: &Ball) -> Vec3<f64> {
+    fn center_offset(&self, first: &EventBall, second: &EventBall) -> Vec3<f64> {
         self.period.minimum_image(second.position - first.position)
     }
 
@@ -414,7 +414,7 @@ impl EventDriven {
     }
 
     fn exceeds_cell_limit(&self, row: usize, remaining: f64) -> bool {
-        let Ball { velocity, trajectory, .. } = &self.balls[row];
+        let EventBall { velocity, trajectory, .. } = &self.balls[row];
         let max_speed = velocity.magnitude() + trajectory.acceleration.magnitude() * remaining;
         // Non-finite cells fail the test, too.
         let cells = max_speed * remaining / self.cells.min_width();

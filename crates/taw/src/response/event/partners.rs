@@ -2,7 +2,7 @@
 //! the substep, by a collision, takes its own force along, and the force on its partners has lost its
 //! reaction: they rest anew.
 
-use super::{EventDriven, EventSettings, MAX_DISSIPATIONS, PRESS_SPEED, REST_COST, REST_SPEED};
+use super::{EventSettings, EventSolver, MAX_DISSIPATIONS, PRESS_SPEED, REST_COST, REST_SPEED};
 
 /// Number of times in a substep that a ball may rest anew soon after a partner has left it, as often as
 /// it may start to rest on others.
@@ -16,7 +16,7 @@ pub(super) struct Partner {
     versions: [u32; 2],
 }
 
-impl EventDriven {
+impl EventSolver {
     /// Notes who presses whom in the cluster that has just been solved. A crowd is solved once per
     /// substep, so nobody in it has partners.
     pub(super) fn note_partners(&mut self) {

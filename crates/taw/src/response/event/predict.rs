@@ -5,9 +5,9 @@ use std::cmp::Reverse;
 use cgmath::InnerSpace;
 
 use super::toi::{SeparationMotion, time_of_impact_plane};
-use super::{Ball, CellSlot, Event, EventDriven, EventKind, EventSettings, TIME_RESOLUTION};
+use super::{CellSlot, Event, EventBall, EventKind, EventSettings, EventSolver, TIME_RESOLUTION};
 
-impl EventDriven {
+impl EventSolver {
     /// Predicts the next event of a ball and queues it.
     pub(super) fn predict(&mut self, row: usize, now: f64, settings: &EventSettings) {
         self.leave_partners(row, now, settings);
@@ -68,7 +68,7 @@ impl EventDriven {
     /// Visits the crossings of the borders of a ball's cell, with the seconds until them.
     fn for_each_crossing(
         &self,
-        ball: &Ball,
+        ball: &EventBall,
         now: f64,
         dt: f64,
         mut visit: impl FnMut(Option<f64>, EventKind),

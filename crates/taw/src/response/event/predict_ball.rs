@@ -5,7 +5,7 @@ use std::f64::consts::SQRT_2;
 use cgmath::{InnerSpace, Zero};
 
 use super::toi::time_of_impact_spheres;
-use super::{EventDriven, EventKind, EventSettings, PRESS_SPEED, REST_SPEED};
+use super::{EventKind, EventSettings, EventSolver, PRESS_SPEED, REST_SPEED};
 use crate::math::{Vec3, is_finite, normalize_and_length};
 
 /// Relative motion of two balls, of the second to the first.
@@ -51,7 +51,7 @@ impl RelativeMotion {
     }
 }
 
-impl EventDriven {
+impl EventSolver {
     /// Next event of two balls, and the seconds until it.
     pub(super) fn predict_ball(
         &self,

@@ -7,7 +7,7 @@ use cgmath::InnerSpace;
 use super::toi::{SeparationMotion, time_of_impact_plane};
 use super::wall::distance_rounding;
 use super::{
-    EventDriven, EventKind, EventSettings, PRESS_SPEED, REST_SPEED, SEAM_TOLERANCE, SLOP,
+    EventKind, EventSettings, EventSolver, PRESS_SPEED, REST_SPEED, SEAM_TOLERANCE, SLOP,
     WallCollider,
 };
 use crate::math::Point3;
@@ -22,7 +22,7 @@ const RECHECK_TIME: f64 = 1.0 / 64.0;
 /// A normal acceleration below this fraction of the external one is rounding.
 pub(super) const MIN_NORMAL_ACCELERATION: f64 = 1e-9;
 
-impl EventDriven {
+impl EventSolver {
     /// Next event with a wall, and the seconds until it.
     pub(super) fn predict_wall(
         &self,

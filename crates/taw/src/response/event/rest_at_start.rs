@@ -7,7 +7,7 @@ use cgmath::{InnerSpace, Zero};
 use smallvec::SmallVec;
 
 use super::wall::Wall;
-use super::{Ball, EventDriven, EventSettings, PRESS_SPEED, REST_SPEED, SLOP};
+use super::{EventBall, EventSettings, EventSolver, PRESS_SPEED, REST_SPEED, SLOP};
 use crate::contact::{Contact, Contacts};
 use crate::math::{UnionFind, Vec3, normalize_and_length};
 use crate::shape::PointProjection;
@@ -16,7 +16,7 @@ use crate::shape::PointProjection;
 /// more, two suffice.
 const MAX_MOVES: u32 = 16;
 
-impl EventDriven {
+impl EventSolver {
     /// Finds balls at rest at the start of a substep.
     pub(super) fn find_resting(&mut self, settings: &EventSettings) {
         self.near.wm.clear();
@@ -150,7 +150,7 @@ impl EventDriven {
     ) {
         self.push_out_of_walls(row, 0.0);
         let mut near = std::mem::take(&mut self.near.wm);
-        let Ball { position: at, radius, .. } = self.balls[row];
+        let EventBall { position: at, radius, .. } = self.balls[row];
         let range = (at, radius + self.contact_tolerance(row as u32, settings));
         let cost = self.for_each_wall_within(row, range, |wall| {
             let contact = Contact::with_wall(wall as u32, 0, row as u32);
@@ -176,7 +176,7 @@ impl EventDriven {
             return; // infinite mass: walls do not stop it
         }
         self.push_out(row, now, |method| {
-            let Ball { position, radius, .. } = method.balls[row];
+            let EventBall { position, radius, .. } = method.balls[row];
             method.parts_within(row, (position, radius))
         });
         // Half-spaces come last, and static ones after moving ones: behind them there is nothing.
@@ -221,7 +221,7 @@ impl EventDriven {
         settings: &EventSettings,
     ) -> bool {
         let mut touches = false;
-        let Ball { position, radius, .. } = self.balls[row];
+        let EventBall { position, radius, .. } = self.balls[row];
         self.for_each_wall_within(row, (position, radius), |wall| {
             let contact = Contact::with_wall(wall as u32, 0, row as u32);
             touches |= self.is_moving(wall)
@@ -369,7 +369,7 @@ impl EventDriven {
     fn part_from_wall(&mut self, contact: &Contact<f64>, settings: &EventSettings) {
         let row = contact.b as usize;
         if self.balls[row].inverse_mass > 0.0 && self.overlaps_wall(contact, settings) {
-            let Ball { position, radius, .. } = self.balls[row];
+            let EventBall { position, radius, .. } = self.balls[row];
             let PointProjection { normal, distance, .. } =
                 self.walls[contact.a as usize].nearest(position, 0.0);
             self.balls[row].position += normal * (radius - distance);

@@ -9,7 +9,7 @@ use super::flat_support::FlatSupport;
 use super::predict_wall::MIN_NORMAL_ACCELERATION;
 use super::support_candidates::SupportCandidates;
 use super::{
-    Ball, EventDriven, EventSettings, REST_SPEED, SEAM_TOLERANCE, SUPPORT_CHECK, WallCollider,
+    EventBall, EventSettings, EventSolver, REST_SPEED, SEAM_TOLERANCE, SUPPORT_CHECK, WallCollider,
 };
 use crate::contact::Contact;
 use crate::math::Vec3;
@@ -19,7 +19,7 @@ use crate::shape::PointProjection;
 /// Bisections of a time to find the end of a face.
 const BISECTIONS: u32 = 24;
 
-impl EventDriven {
+impl EventSolver {
     /// Starts the rest of a ball on a wall that it touches.
     pub(super) fn start_resting(&mut self, row: usize, wall: usize, settings: &EventSettings) {
         let ball = &mut self.balls[row];
@@ -173,7 +173,7 @@ impl EventDriven {
     /// Starts a segment on a flat surface, in closed form.
     fn start_flat_segment(
         ground: &CurvedSupport,
-        ball: &mut Ball,
+        ball: &mut EventBall,
         support: usize,
         is_fixed: bool,
         settings: &EventSettings,
@@ -223,7 +223,7 @@ impl EventDriven {
     /// force.
     fn start_curved_segment(
         ground: &CurvedSupport,
-        ball: &mut Ball,
+        ball: &mut EventBall,
         settings: &EventSettings,
     ) -> bool {
         let (start, dt) = (BallState::of(ball), settings.dt);
@@ -248,7 +248,7 @@ impl EventDriven {
     }
 }
 
-impl Ball {
+impl EventBall {
     /// Starts free flight from a wall that does not press any more.
     fn leave_wall(&mut self, wall: usize) {
         self.fly_free();
@@ -259,10 +259,10 @@ impl Ball {
 fn support_of<'a>(
     walls: &'a [super::Wall],
     candidates: &'a SupportCandidates,
-    ball: &Ball,
+    ball: &EventBall,
     min_step: f64,
 ) -> CurvedSupport<'a> {
-    let Ball { external_acceleration, radius, rotation, material, .. } = *ball;
+    let EventBall { external_acceleration, radius, rotation, material, .. } = *ball;
     CurvedSupport {
         walls,
         candidates,
@@ -277,7 +277,7 @@ fn support_of<'a>(
 
 /// Time until a ball on a flat face reaches the end of it, or another face; `duration` if the face
 /// continues.
-fn end_of_face(ground: &CurvedSupport, ball: &Ball, normal: Vec3<f64>, duration: f64) -> f64 {
+fn end_of_face(ground: &CurvedSupport, ball: &EventBall, normal: Vec3<f64>, duration: f64) -> f64 {
     let now = ball.trajectory.start;
     let is_on_face = |t: f64| ground.has_normal(ball.position_at(now + t), now + t, normal);
     if is_on_face(duration) {
@@ -337,7 +337,7 @@ mod tests {
         let dt = 1.0 / 64.0;
         let mut counts = Vec::new();
         for slip in [1e-6, 1e-5, 1e-4, 1e-3] {
-            let ball = Ball {
+            let ball = EventBall {
                 position: Point3::new(0.0, 0.2, 0.0),
                 velocity: Vec3::new(1.0 + slip, 0.0, 0.0),
                 spin: Vec3::new(0.0, 0.0, -1.0 / 0.2),
@@ -351,7 +351,7 @@ mod tests {
                 rotation_increment: Vec3::zero(),
                 trajectory: Trajectory::default(),
             };
-            let mut method = EventDriven { balls: vec![ball], ..EventDriven::default() };
+            let mut method = EventSolver { balls: vec![ball], ..EventSolver::default() };
             let settings = EventSettings {
                 threads: 1,
                 dt,

@@ -4,7 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::cluster::{Cluster, ClusterBodies};
 use super::wall::MovingWalls;
-use super::{Ball, EventDriven, EventSettings, MAX_CONTACTS, Trajectory};
+use super::{EventBall, EventSettings, EventSolver, MAX_CONTACTS, Trajectory};
 use crate::contact::{Contact, Contacts};
 use crate::math::Vec3;
 use crate::response::impulse::CachedImpulse;
@@ -29,7 +29,7 @@ pub(super) enum PressedBy {
     FixedBody,
 }
 
-impl EventDriven {
+impl EventSolver {
     /// Puts balls to rest, with all that touch them and each other. Pairs that separate faster than
     /// `max_separation_speed`, in m/s, and than the rest threshold do not count as touching. The
     /// caller predicts their events again.
@@ -207,7 +207,7 @@ impl EventDriven {
         settings: &EventSettings,
         contacts: &mut Vec<Contact<f64>>,
     ) {
-        let Ball { position: at, radius, .. } = self.balls[row];
+        let EventBall { position: at, radius, .. } = self.balls[row];
         let range = (at, radius + self.contact_tolerance(row as u32, settings));
         let cost = self.for_each_wall_within(row, range, |wall| {
             let contact = Contact::with_wall(wall as u32, 0, row as u32);
@@ -339,8 +339,8 @@ mod tests {
         }
     }
 
-    fn ball(position: [f64; 2], spin: f64, freeze_count: i32) -> Ball {
-        Ball {
+    fn ball(position: [f64; 2], spin: f64, freeze_count: i32) -> EventBall {
+        EventBall {
             position: Point3::new(position[0], position[1], 0.0),
             velocity: Vec3::zero(),
             spin: Vec3::unit_z() * spin,
@@ -361,12 +361,12 @@ mod tests {
         // Friction holds it in the wedge: the line through the contact points is within both cones.
         let (x, y) = (f64::sqrt(3.0), 1.0);
         let frozen = MAX_FREEZES;
-        let light = Ball { velocity: Vec3::unit_y() * -0.1, ..ball([0.0, 0.0], 0.0, 0) };
+        let light = EventBall { velocity: Vec3::unit_y() * -0.1, ..ball([0.0, 0.0], 0.0, 0) };
         let balls = [ball([-x, -y], -9.0, frozen), light, ball([x, -y], 9.0, frozen)];
         for order in [[0, 1, 2], [0, 2, 1], [1, 0, 2], [1, 2, 0], [2, 0, 1], [2, 1, 0]] {
             let place = |of: usize| order.iter().position(|ball| *ball == of).unwrap();
             let mut method =
-                EventDriven { balls: order.map(|i| balls[i]).to_vec(), ..EventDriven::default() };
+                EventSolver { balls: order.map(|i| balls[i]).to_vec(), ..EventSolver::default() };
             let settings = EventSettings {
                 threads: 1,
                 dt: 0.01,
@@ -420,7 +420,7 @@ mod tests {
     #[test]
     fn a_ball_that_freezes_carries_no_other_on() {
         let balls = vec![ball([0.0, 1.0], 0.0, MAX_FREEZES - 1), ball([0.0, 3.0], 0.0, 0)];
-        let mut method = EventDriven { balls, ..EventDriven::default() };
+        let mut method = EventSolver { balls, ..EventSolver::default() };
         let settings = EventSettings {
             threads: 1,
             dt: 0.01,

@@ -4,7 +4,7 @@
 use cgmath::InnerSpace;
 
 use super::cluster::Cluster;
-use super::{EventDriven, EventSettings};
+use super::{EventSettings, EventSolver};
 use crate::contact::{Contact, Contacts};
 use crate::math::{Point3, UnionFind, Vec3, normalize_and_length};
 use crate::response::KeyedByContact;
@@ -34,7 +34,7 @@ impl Cluster {
     }
 }
 
-impl EventDriven {
+impl EventSolver {
     /// Time in which no normal of a gathered cluster turns too far, in seconds; see
     /// [`Cluster::segment`]. Normals of walls turn where a ball reaches an edge.
     pub(super) fn segment(&self, contacts: &Contacts<f64>, now: f64, remaining: f64) -> f64 {

@@ -2,7 +2,7 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::EventDriven;
+use super::EventSolver;
 use super::collide::Collision;
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::contact::ContactMaterial;
@@ -15,9 +15,9 @@ const MAX_ROUNDS: u32 = 1000;
 const ROUNDING: f64 = 1e-12;
 
 /// Velocity in m/s and spin in rad/s.
-type Motion = [Vec3<f64>; 2];
+type VelocityAndSpin = [Vec3<f64>; 2];
 
-impl EventDriven {
+impl EventSolver {
     /// Solves simultaneous collisions with shared balls: each keeps its own restitution and
     /// friction while all others act (Newton's law), or as much of its restitution as energy allows.
     pub(super) fn solve_simultaneous(&mut self, collisions: &mut [Collision], rows: &[usize]) {
@@ -48,7 +48,7 @@ impl EventDriven {
         collisions: &mut [Collision],
         rows: &[usize],
         initial_velocity: &[Vec3<f64>],
-        before: &[Motion],
+        before: &[VelocityAndSpin],
     ) {
         let is_driven = |row: &usize| {
             let ball = &self.balls[*row];
@@ -68,9 +68,13 @@ impl EventDriven {
         }
         self.iterate_simultaneous(collisions, rows, initial_velocity);
         let inelastic = self.motions(rows);
-        let combine = |first: &[Motion], second: &[Motion], fraction: f64| -> Vec<Motion> {
-            let combine =
-                |(a, b): (&Motion, &Motion)| [a[0] + b[0] * fraction, a[1] + b[1] * fraction];
+        let combine = |first: &[VelocityAndSpin],
+                       second: &[VelocityAndSpin],
+                       fraction: f64|
+         -> Vec<VelocityAndSpin> {
+            let combine = |(a, b): (&VelocityAndSpin, &VelocityAndSpin)| {
+                [a[0] + b[0] * fraction, a[1] + b[1] * fraction]
+            };
             first.iter().zip(second).map(combine).collect()
         };
         // Largest fraction of the difference with which the energy is that before.
@@ -87,11 +91,11 @@ impl EventDriven {
         }
     }
 
-    fn motions(&self, rows: &[usize]) -> Vec<Motion> {
+    fn motions(&self, rows: &[usize]) -> Vec<VelocityAndSpin> {
         rows.iter().map(|row| [self.balls[*row].velocity, self.balls[*row].spin]).collect()
     }
 
-    fn set_motions(&mut self, rows: &[usize], motions: &[Motion]) {
+    fn set_motions(&mut self, rows: &[usize], motions: &[VelocityAndSpin]) {
         for (row, [velocity, spin]) in rows.iter().zip(motions) {
             (self.balls[*row].velocity, self.balls[*row].spin) = (*velocity, *spin);
         }
@@ -99,8 +103,13 @@ impl EventDriven {
 
     /// Product of two motions in the metric of kinetic energy, in joules: twice the energy, of one
     /// with itself.
-    fn energy_product(&self, rows: &[usize], first: &[Motion], second: &[Motion]) -> f64 {
-        let of_ball = |(row, (a, b)): (&usize, (&Motion, &Motion))| {
+    fn energy_product(
+        &self,
+        rows: &[usize],
+        first: &[VelocityAndSpin],
+        second: &[VelocityAndSpin],
+    ) -> f64 {
+        let of_ball = |(row, (a, b)): (&usize, (&VelocityAndSpin, &VelocityAndSpin))| {
             let ball = &self.balls[*row];
             let inertia = match ball.rotation {
                 BallRotation::Free => 0.4 * ball.radius * ball.radius,

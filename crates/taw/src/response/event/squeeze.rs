@@ -3,14 +3,14 @@
 //! walls would buckle the faster, the straighter it is. Then the balls give way, and overlap.
 
 use super::wall::MovingWalls;
-use super::{EventDriven, EventSettings};
+use super::{EventSettings, EventSolver};
 use crate::contact::Contacts;
 use crate::response::impulse::CachedImpulse;
 
 /// Relative rounding of energies, many times that of their sums.
 const ROUNDING: f64 = 1e-9;
 
-impl EventDriven {
+impl EventSolver {
     /// Ends the approach of a gathered cluster as one collision without restitution, down to
     /// `tolerance` in m/s, if there is one; `max_acceleration` in m/s². If walls squeeze it, it ends
     /// its approach to where they are, and they go on into it; returns true then.

@@ -7,7 +7,7 @@ use cgmath::{InnerSpace, Zero};
 use smallvec::{SmallVec, smallvec};
 
 use super::wall::distance_rounding;
-use super::{EventDriven, EventSettings, PART_COST, SUPPORT_CHECK, Wall};
+use super::{EventSettings, EventSolver, PART_COST, SUPPORT_CHECK, Wall};
 use crate::math::{Point3, Vec3};
 use crate::shape::PointProjection;
 
@@ -105,7 +105,7 @@ impl SupportCandidates {
     }
 }
 
-impl EventDriven {
+impl EventSolver {
     /// Walls that may support a ball on a wall soon.
     pub(super) fn support_candidates(
         &self,

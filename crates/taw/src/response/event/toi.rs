@@ -3,6 +3,7 @@
 
 use cgmath::InnerSpace;
 
+use crate::contact::time_to_close;
 use crate::math::Vec3;
 
 /// Separation along a normal, its rate and the rate of that: m, m/s, m/s².
@@ -16,13 +17,7 @@ pub(super) struct SeparationMotion {
 /// Time of impact on a plane, in seconds, from a positive separation; none if there is no impact.
 pub(super) fn time_of_impact_plane(separation: SeparationMotion) -> Option<f64> {
     let SeparationMotion { distance, speed, acceleration } = separation;
-    let discriminant = speed * speed - 2.0 * acceleration * distance;
-    if discriminant < 0.0 || (speed >= 0.0 && acceleration >= 0.0) {
-        return None;
-    }
-    let root = discriminant.sqrt();
-    // Root of the quadratic equation in the form without cancellation.
-    Some(if speed < 0.0 { 2.0 * distance / (root - speed) } else { (speed + root) / -acceleration })
+    Some(time_to_close(distance, -speed, -acceleration)).filter(|time| !time.is_infinite())
 }
 
 /// Time of impact of two spheres between `start` and `end`, in seconds, from the offset of their

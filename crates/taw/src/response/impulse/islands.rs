@@ -46,7 +46,7 @@ pub(super) struct Island<S> {
     pub incomplete: bool,
     /// True where acceleration pays.
     pub accelerating: bool,
-    search: Search<S>,
+    search: SubspaceSearch<S>,
 }
 
 /// Number of search directions: the last iteration, and the accelerated steps before it.
@@ -55,7 +55,7 @@ pub(super) const DIRECTIONS: usize = 3;
 /// Subspace search: the combination of directions that brings an island nearest to the target
 /// velocities of its contacts.
 #[derive(Clone, Copy, Debug)]
-struct Search<S> {
+struct SubspaceSearch<S> {
     /// Linear and quadratic terms of the energy over the directions.
     gradient: [S; DIRECTIONS],
     curvature: [[S; DIRECTIONS]; DIRECTIONS],
@@ -141,7 +141,7 @@ impl<S: Scalar> Island<S> {
             converged: false,
             incomplete: false,
             accelerating: false,
-            search: Search::new(),
+            search: SubspaceSearch::new(),
         }
     }
 
@@ -172,7 +172,7 @@ impl<S: Scalar> Island<S> {
 
     /// Resets the search.
     pub fn begin_search(&mut self) {
-        self.search = Search::new();
+        self.search = SubspaceSearch::new();
     }
 
     /// Adds the terms of one contact for each direction; `rounding` is the error of its velocities,
@@ -185,7 +185,7 @@ impl<S: Scalar> Island<S> {
         let directions = search.directions.map(|direction| direction * scale);
         let velocities = search.velocities.map(|velocity| velocity * scale);
         let (error, rounding) = (search.velocity_error * scale, rounding * scale);
-        let Search { gradient, curvature, .. } = &mut self.search;
+        let SubspaceSearch { gradient, curvature, .. } = &mut self.search;
         for (row, direction) in directions.iter().enumerate() {
             let squared = direction.magnitude2();
             gradient[row] += direction.dot(error) * weight;
@@ -236,7 +236,7 @@ pub(super) enum SearchStep<S> {
     Straight(S),
 }
 
-impl<S: Scalar> Search<S> {
+impl<S: Scalar> SubspaceSearch<S> {
     fn new() -> Self {
         let zero = S::zero();
         Self {

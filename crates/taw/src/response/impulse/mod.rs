@@ -109,7 +109,7 @@ impl BodyA {
 
 /// Scratch buffers, kept for their memory.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Scratch<S> {
+pub(crate) struct ImpulseScratch<S> {
     initial_velocity: Vec<Vec3<S>>,
     constraints: Vec<Constraint<S>>,
     islands: Islands<S>,
@@ -120,7 +120,7 @@ pub(crate) struct Scratch<S> {
     uncorrected: Vec<Point3<S>>,
 }
 
-impl<S: Scalar> Scratch<S> {
+impl<S: Scalar> ImpulseScratch<S> {
     /// Largest velocity change in the last iteration, in m/s.
     pub fn residual(&self) -> S {
         self.islands.residual()
@@ -295,12 +295,12 @@ pub(crate) fn solve_contacts<S: Scalar>(
     marbles: &mut SolverBodies<S>,
     contacts: &mut Contacts<S>,
     context: &Context<S, impl Colliders<S>, impl Fn(usize) -> S>,
-    scratch: &mut Scratch<S>,
+    scratch: &mut ImpulseScratch<S>,
     cache: &mut Vec<CachedImpulse<S>>,
     quarantined: &mut Vec<u32>,
 ) {
     let settings = context.settings;
-    let Scratch {
+    let ImpulseScratch {
         initial_velocity,
         constraints,
         islands,

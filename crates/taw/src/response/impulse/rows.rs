@@ -9,7 +9,7 @@ use super::islands::{DIRECTIONS, Island, Islands};
 use super::{Constraint, RollingConstraint};
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::math::{Scalar, Vec3};
-use crate::response::bodies::{CapsuleInertia, Motion, push, relative_velocity};
+use crate::response::bodies::{BodyMotion, CapsuleInertia, push, relative_velocity};
 use crate::response::{BallRotation, SolverBodies};
 use crate::workers::{DisjointSlice, parallel_for};
 
@@ -63,8 +63,8 @@ pub(super) struct SearchDirections<S> {
 
 /// Body as a pass sees it.
 #[derive(Clone, Copy, Debug)]
-struct Body<S> {
-    motion: Motion<S>,
+struct PackedBody<S> {
+    motion: BodyMotion<S>,
     /// Spin per change of the velocity at right angles to the normal, in 1/m; zero if the rotation
     /// is locked.
     spin_per_speed: S,
@@ -76,10 +76,10 @@ pub(super) struct Rows<S> {
     list: Vec<Row<S>>,
     details: Vec<RowDetails<S>>,
     searches: Vec<SearchDirections<S>>,
-    bodies: Vec<Body<S>>,
+    bodies: Vec<PackedBody<S>>,
     /// Marble of each body.
     marbles: Vec<u32>,
-    parts: Vec<Part>,
+    parts: Vec<IslandPart>,
     /// Constraints in the order of their islands.
     order: Vec<u32>,
     /// Number of constraints of each island, then where the next one goes.
@@ -90,7 +90,7 @@ pub(super) struct Rows<S> {
 
 /// Part of the lists that an island has.
 #[derive(Clone, Debug)]
-struct Part {
+struct IslandPart {
     island: usize,
     rows: Range<usize>,
     bodies: Range<usize>,
@@ -108,7 +108,7 @@ pub(super) struct IslandRows<'a, 'b, S> {
 /// Bodies while rows are solved.
 #[derive(Debug)]
 pub(super) struct PackedBodies<'a, 'b, S> {
-    bodies: &'a mut [Body<S>],
+    bodies: &'a mut [PackedBody<S>],
     /// Marbles of the bodies.
     marbles: &'a [u32],
     /// Columns for what few rows need.
@@ -137,7 +137,7 @@ impl<S: Scalar> Rows<S> {
             let island = c.island as usize;
             if self.parts.last().is_none_or(|part| part.island != island) {
                 let (row, body) = (self.list.len(), self.bodies.len());
-                self.parts.push(Part { island, rows: row..row, bodies: body..body });
+                self.parts.push(IslandPart { island, rows: row..row, bodies: body..body });
             }
             let first = c.a.marble().map_or(NO_BODY, |a| self.body(a, marbles));
             let bodies = [first, self.body(c.b, marbles)];
@@ -185,7 +185,7 @@ impl<S: Scalar> Rows<S> {
         let body = &mut self.body_of_marble[marble];
         if *body == NO_BODY {
             *body = self.bodies.len() as u32;
-            self.bodies.push(Body {
+            self.bodies.push(PackedBody {
                 motion: marbles.motion(marble),
                 spin_per_speed: marbles.spin_per_speed(marble),
             });
@@ -209,7 +209,7 @@ impl<S: Scalar> Rows<S> {
         let (searches, bodies) =
             (DisjointSlice::new(&mut self.searches), DisjointSlice::new(&mut self.bodies));
         parallel_for(threads, self.parts.len(), |_, part| {
-            let Part { island, rows: of_rows, bodies: of_bodies } = self.parts[part].clone();
+            let IslandPart { island, rows: of_rows, bodies: of_bodies } = self.parts[part].clone();
             // SAFETY: parts follow one another, each island has one, and no marble is in two.
             solve(unsafe {
                 IslandRows {
@@ -229,7 +229,7 @@ impl<S: Scalar> Rows<S> {
 
     /// Writes velocities and impulses back.
     pub fn unpack(&self, marbles: &mut SolverBodies<S>, constraints: &mut [Constraint<S>]) {
-        for (Body { motion, .. }, marble) in self.bodies.iter().zip(&self.marbles) {
+        for (PackedBody { motion, .. }, marble) in self.bodies.iter().zip(&self.marbles) {
             let row = *marble as usize;
             marbles.velocity[row] = motion.velocity;
             if marbles.ball_rotation(row) == BallRotation::Free {
@@ -310,7 +310,7 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
     fn push(&mut self, row: usize, change: Vec3<S>, normal: Vec3<S>, arm: &Vec3<S>) {
         let turn =
             self.capsule(row).map(|capsule| capsule.apply_inverse_inertia(arm.cross(change)));
-        let Body { motion, spin_per_speed } = &mut self.bodies[row];
+        let PackedBody { motion, spin_per_speed } = &mut self.bodies[row];
         if let Some(turn) = turn {
             motion.velocity += change;
             motion.spin += turn;

@@ -1,6 +1,6 @@
 //! Velocities alone, of contacts that another solver has prepared: no bounces, no positions, no memory.
 
-use super::{BodyA, Constraint, Scratch, SolverSettings, iterate};
+use super::{BodyA, Constraint, ImpulseScratch, SolverSettings, iterate};
 use crate::constraint::{ContactImpulse, FrictionCone};
 use crate::contact::Contact;
 use crate::math::{RealVector, Scalar, Vec3};
@@ -31,9 +31,9 @@ pub(crate) fn solve_velocities<S: Scalar>(
     marbles: &mut SolverBodies<S>,
     contacts: &mut [VelocityContact<S>],
     settings: &SolverSettings<S>,
-    scratch: &mut Scratch<S>,
+    scratch: &mut ImpulseScratch<S>,
 ) {
-    let Scratch { constraints, islands, rows, energies, full_restitution, .. } = scratch;
+    let ImpulseScratch { constraints, islands, rows, energies, full_restitution, .. } = scratch;
     constraints.clear();
     let prepared = contacts
         .iter()

@@ -91,7 +91,7 @@ pub(crate) struct WallStop<S> {
 
 /// Scratch buffers, kept for their memory.
 #[derive(Clone, Debug, Default)]
-pub(crate) struct Scratch<S> {
+pub(crate) struct PenaltyScratch<S> {
     before: Vec<SpringHistory<S>>,
     forces: Vec<ContactForce<S>>,
     loads: Vec<ContactLoad<S>>,
@@ -119,11 +119,11 @@ where
         marbles: &mut SolverBodies<S>,
         contacts: &mut Contacts<S>,
         histories: &mut Vec<SpringHistory<S>>,
-        scratch: &mut Scratch<S>,
+        scratch: &mut PenaltyScratch<S>,
         quarantined: &mut Vec<u32>,
         mut work: Option<&mut EnergyLedger>,
     ) {
-        let Scratch { before, forces, loads, followed, pushes, depths } = scratch;
+        let PenaltyScratch { before, forces, loads, followed, pushes, depths } = scratch;
         std::mem::swap(before, histories);
         histories.clear();
         self.keep_sides(marbles, contacts, before);

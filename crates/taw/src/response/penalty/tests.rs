@@ -76,7 +76,7 @@ fn head_on(elasticity: Elasticity<f64>, density: f64, radius: f64, speed: f64) -
             &mut columns,
             &mut contacts,
             &mut histories,
-            &mut Scratch::default(),
+            &mut PenaltyScratch::default(),
             &mut quarantined,
             None,
         );

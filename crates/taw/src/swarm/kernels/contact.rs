@@ -3,7 +3,7 @@
 
 use super::backing::borne_by_wall;
 use super::impacts::note_impacts;
-use super::meeting::{Meeting, meeting};
+use super::meeting::{ClosestApproach, meeting};
 use super::params::{Pass, SolverParams};
 use super::rolling::RollingInertia;
 use super::{
@@ -248,7 +248,8 @@ impl<S: Scalar> SolverColumns<'_, S> {
         impacts: &mut Vec<Impact<S>>,
     ) -> bool {
         let zero = L::constant(0.0);
-        let Meeting { normal, approach_speed, time } = meeting(params, [&at_a, &at_b], [&a, &b]);
+        let ClosestApproach { normal, approach_speed, time } =
+            meeting(params, [&at_a, &at_b], [&a, &b]);
         let tipping = tipping::tip(batch, params, normal, approach_speed);
         // What does not bounce is stopped by its contact.
         let approach_speed = if OWN {

@@ -37,7 +37,7 @@ pub(super) struct PairPlace {
 
 /// Contacts that are solved together, and their balls in the order of rows.
 #[derive(Debug, Default)]
-pub(super) struct Cluster<S> {
+pub(super) struct UnconvergedCluster<S> {
     /// Those with walls come first.
     pub contacts: Vec<VelocityContact<f64>>,
     pub locations: Vec<ContactLocation<S>>,
@@ -89,7 +89,7 @@ impl PairsByRow {
     }
 }
 
-impl<S: Scalar> Cluster<S> {
+impl<S: Scalar> UnconvergedCluster<S> {
     /// Collects the contacts around some balls that sink: those that bear something, or may close within a
     /// substep. Pairs that then bounce are left out.
     pub fn new(swarm: &Swarm<S>, sinking: &[Sinking<S>], params: &SolverParams<S>) -> Self {

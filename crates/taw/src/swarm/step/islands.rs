@@ -187,6 +187,6 @@ impl<S: Scalar> Swarm<S> {
                 (chunk.asleep, chunk.speed) = (true, S::zero());
             }
         }
-        self.sleep_version += 1;
+        *self.sleep_version += 1;
     }
 }

@@ -39,7 +39,7 @@ impl<S: Scalar> Swarm<S> {
     /// those that leave their skin.
     fn predict(&mut self, dt: S, gravity: Vec3<S>) {
         let (change, time) = (row(gravity * dt), [dt, dt, dt, S::zero()]);
-        let (simd_level, threads) = (self.simd_level, self.scratch.threads);
+        let (simd_level, threads) = (*self.simd_level, self.scratch.threads);
         let mut leaving = std::mem::take(&mut self.scratch.leaving);
         leaving.clear();
         // More than this are too many.
@@ -113,11 +113,11 @@ impl<S: Scalar> Swarm<S> {
 
     /// Moves balls out of each other and out of walls.
     fn displace(&mut self) {
-        let simd_level = self.simd_level;
+        let simd_level = *self.simd_level;
         let rows = std::mem::take(&mut self.scratch.proxy_rows);
         let proxies = std::mem::take(&mut self.proxies);
         let planes = std::mem::take(&mut self.planes);
-        let scratch = std::mem::take(&mut self.neighbours);
+        let scratch = std::mem::take(&mut self.neighbours.0);
         let neighbours: &[u16] = bytemuck::cast_slice(&scratch);
         let (layers, passing) = (self.layers_by_row(&planes), self.passed_walls_by_row());
         let walls = WallDisplacement {
@@ -145,7 +145,7 @@ impl<S: Scalar> Swarm<S> {
             unsafe { walls.apply(chunk, columns.at) };
         });
         (self.scratch.proxy_rows, self.proxies) = (rows, proxies);
-        (self.planes, self.neighbours) = (planes, scratch);
+        (self.planes, self.neighbours.0) = (planes, scratch);
     }
 
     /// Walls through which proxies pass, by row.
@@ -169,7 +169,7 @@ impl<S: Scalar> Swarm<S> {
 
     /// Makes velocities what positions became.
     fn update_velocities(&mut self, dt: S) {
-        let (simd_level, threads) = (self.simd_level, self.scratch.threads);
+        let (simd_level, threads) = (*self.simd_level, self.scratch.threads);
         let per_second = [S::one() / dt, S::one() / dt, S::one() / dt, S::zero()];
         let velocity = DisjointSlice::new(&mut self.velocity);
         let skin_left = DisjointSlice::new(&mut self.skin_left);

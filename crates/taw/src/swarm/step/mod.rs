@@ -23,6 +23,7 @@ use super::build::SOON;
 use super::chunk::Chunk;
 use super::fast_movers::FastMovers;
 use super::kernels::{IntegratePositions, Pass, SolverColumns, SolverParams, solve, squared};
+use super::state::KnownIdentity;
 use super::walls::half_spaces;
 use super::{Stage, StaticGeometry, Swarm, Tier};
 use crate::math::{Row, Scalar, Vec3, length};
@@ -109,12 +110,13 @@ impl<S: Scalar> Swarm<S> {
             self.gravity = Some(gravity);
             self.wake_all();
         }
-        let walls_changed = self.walls_identity != Some(identity);
+        let walls_changed = self.walls_identity.0 != Some(identity);
         if walls_changed {
             half_spaces(walls, &mut self.planes);
             self.follow_removed_walls(walls);
             self.wake_beside_changes(walls);
-            (self.walls_identity, self.rows_of_walls) = (Some(identity), Some(identity));
+            self.walls_identity = KnownIdentity(Some(identity));
+            *self.rows_of_walls = Some(identity);
         }
         self.wake_beside_stirred();
         // Not before: who wakes is counted in its chunk only while pairs are valid.
@@ -126,12 +128,12 @@ impl<S: Scalar> Swarm<S> {
     /// Number of threads that a step pays for: none is woken for what sleeps.
     fn threads_for_awake(&self) -> usize {
         if !self.pairs_valid {
-            return self.model.threads_for(self.at.len());
+            return self.model().threads_for(self.at.len());
         }
         let awake = self.chunks.iter().filter(|chunk| !chunk.asleep);
         match awake.map(|chunk| chunk.own_rows().len()).sum() {
             0 => 1,
-            rows => self.model.threads_for(rows),
+            rows => self.model().threads_for(rows),
         }
     }
 
@@ -359,7 +361,7 @@ impl<S: Scalar> Swarm<S> {
 
     /// Changes velocities and moves the balls that are awake.
     fn integrate(&mut self, change: Row<S>, time: Row<S>, correction: Row<S>) {
-        let simd_level = self.simd_level;
+        let simd_level = *self.simd_level;
         let columns = SolverColumns {
             at: DisjointSlice::new(&mut self.at),
             velocity: DisjointSlice::new(&mut self.velocity),
@@ -408,7 +410,7 @@ impl<S: Scalar> Swarm<S> {
     /// condition holds, given how fast a ball of the next one is.
     fn pass(&mut self, pass: Pass<S>, condition: impl Fn(&Chunk<S>, S) -> bool + Sync) {
         self.mark_idle_batches();
-        let simd_level = self.simd_level;
+        let simd_level = *self.simd_level;
         let friction = self.common_material().friction;
         let mut fast_movers = std::mem::take(&mut self.fast_movers);
         let held = std::mem::take(&mut self.scratch.held);

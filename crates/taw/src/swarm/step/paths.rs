@@ -4,6 +4,7 @@ use super::leaves;
 use crate::math::{Row, Scalar};
 use crate::swarm::batches::Batch;
 use crate::swarm::kernels::squared;
+use crate::swarm::rows::{dot, less, sum};
 use crate::swarm::{Stage, StaticGeometry, Swarm};
 
 /// Number of times that pairs are looked at: a ball that stops before one stands in the way of another.
@@ -120,20 +121,9 @@ impl<S: Scalar> Swarm<S> {
     }
 }
 
-/// The first three numbers of a row, and those of another.
-fn sum<S: Scalar>(a: &Row<S>, b: &Row<S>) -> Row<S> {
-    [a[0] + b[0], a[1] + b[1], a[2] + b[2], a[3]]
-}
-
-/// The first three numbers of a row, less those of another.
-fn less<S: Scalar>(a: &Row<S>, b: &Row<S>) -> Row<S> {
-    [a[0] - b[0], a[1] - b[1], a[2] - b[2], S::zero()]
-}
-
 /// The part of a path, relative to a ball that is `apart`, that can be gone until they meet; all of
 /// it if it does not lead through the ball.
 fn free_part<S: Scalar>(apart: Row<S>, path: Row<S>, radii: S) -> S {
-    let dot = |a: &Row<S>, b: &Row<S>| a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
     let square = squared(path);
     let nearest = -dot(&apart, &path);
     if nearest <= S::zero() || square < S::min_positive_value() {

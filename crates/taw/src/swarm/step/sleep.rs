@@ -5,10 +5,10 @@ use std::mem::take;
 use super::islands::MAX_JOINED;
 use super::{leaves, wider};
 
+use crate::handle::NO_ROW;
 use crate::math::{Row, Scalar, Vec3, length};
 use crate::motion::rest::{self, sleep_speed};
 use crate::swarm::batches::Batch;
-use crate::swarm::bodies::NO_ROW;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::squared;
 use crate::swarm::rest::RestRows;
@@ -192,7 +192,7 @@ impl<S: Scalar> Swarm<S> {
                 (chunk.asleep, chunk.sleep_changed) = (false, true);
             }
         });
-        self.sleep_version += 1;
+        *self.sleep_version += 1;
     }
 
     /// Wakes what sleeps beside balls that were changed from outside since the last step, and ends the rest
@@ -255,7 +255,7 @@ impl<S: Scalar> Swarm<S> {
         for velocity in &mut self.velocity {
             velocity[3] = velocity[3].abs();
         }
-        self.sleep_version += u64::from(std::mem::take(&mut self.sleep.sleepers) > 0);
+        *self.sleep_version += u64::from(std::mem::take(&mut self.sleep.sleepers) > 0);
         self.sleep.rest.end_all();
         self.sleep.groups.clear();
         self.sleep.stirred.clear();
@@ -266,6 +266,7 @@ impl<S: Scalar> Swarm<S> {
         let mut regions = Vec::new();
         let known = self
             .walls_identity
+            .0
             .is_some_and(|since| walls.visit_changes_since(since, &mut |box_| regions.push(box_)));
         if !known {
             return self.wake_all();
@@ -283,7 +284,7 @@ impl<S: Scalar> Swarm<S> {
 
     /// Marks the batches whose balls all sleep, for passes to skip them.
     pub(super) fn mark_idle_batches(&mut self) {
-        let version = self.sleep_version;
+        let version = *self.sleep_version;
         if self.scratch.idle_marked_at.replace(version) == Some(version) {
             return;
         }

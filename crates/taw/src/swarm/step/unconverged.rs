@@ -7,10 +7,10 @@
 
 use cgmath::{InnerSpace, Zero};
 
-use super::cluster::{Cluster, ContactLocation, PairPlace};
+use super::cluster::{ContactLocation, PairPlace, UnconvergedCluster};
 use crate::constraint::ContactImpulse;
 use crate::math::{Scalar, Vec3, cast_vector};
-use crate::response::impulse::{Scratch, SolverSettings, solve_velocities};
+use crate::response::impulse::{ImpulseScratch, SolverSettings, solve_velocities};
 use crate::swarm::Swarm;
 use crate::swarm::batches::Batch;
 use crate::swarm::kernels::{
@@ -36,7 +36,7 @@ impl<S: Scalar> Swarm<S> {
         if sinking.is_empty() {
             return;
         }
-        let mut cluster = Cluster::new(self, &sinking, params);
+        let mut cluster = UnconvergedCluster::new(self, &sinking, params);
         let smallest = cluster.radius.iter().copied().fold(f64::INFINITY, f64::min);
         let h = params.time.as_f64();
         let settings = SolverSettings {
@@ -52,7 +52,12 @@ impl<S: Scalar> Swarm<S> {
             resolve_jams: true,
         };
         let mut contacts = std::mem::take(&mut cluster.contacts);
-        solve_velocities(&mut cluster.bodies(), &mut contacts, &settings, &mut Scratch::default());
+        solve_velocities(
+            &mut cluster.bodies(),
+            &mut contacts,
+            &settings,
+            &mut ImpulseScratch::default(),
+        );
         let mut velocities = cluster.velocity.iter().chain(&cluster.spin);
         if velocities.all(|velocity| velocity.magnitude2().is_finite()) {
             self.store_velocities(&cluster);
@@ -73,7 +78,7 @@ impl<S: Scalar> Swarm<S> {
         let last = self.chunks.len();
         let (at, velocity) =
             (DisjointSlice::new(&mut self.at), DisjointSlice::new(&mut self.velocity));
-        let (chunks, simd_level) = (&self.chunks, self.simd_level);
+        let (chunks, simd_level) = (&self.chunks, *self.simd_level);
         let pairs =
             |batches: &[Batch], impulses: &ContactImpulses<S>, found: &mut Vec<Sinking<S>>| {
                 simd_level.run(FindSinking { at, velocity, batches, impulses, params, found });
@@ -106,7 +111,7 @@ impl<S: Scalar> Swarm<S> {
         lists.concat()
     }
 
-    fn store_velocities(&mut self, cluster: &Cluster<S>) {
+    fn store_velocities(&mut self, cluster: &UnconvergedCluster<S>) {
         for (i, row) in cluster.rows.iter().map(|row| *row as usize).enumerate() {
             if cluster.inverse_mass[i] > 0.0 {
                 let velocity: [S; 3] = cast_vector(cluster.velocity[i]).into();

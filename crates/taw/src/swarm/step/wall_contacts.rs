@@ -7,7 +7,7 @@ use crate::swarm::bit_set::BitSet;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::{Pass, SolverColumns};
 use crate::swarm::outside_work::OutsideWork;
-use crate::swarm::scratch::Scratch;
+use crate::swarm::scratch::SwarmScratch;
 use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::wall_contact::{WallContact, xyz};
 use crate::swarm::wall_paths::{FAST, WallQuery, is_fast, slide_along_wall};
@@ -62,7 +62,7 @@ impl<S: Scalar> Swarm<S> {
 
     /// Finds the balls at walls anew, where pairs are still known.
     pub(in crate::swarm) fn find_wall_contacts(&mut self, dt: S, walls: &dyn StaticGeometry<S>) {
-        let (simd_level, shapes) = (self.simd_level, walls.has_shapes());
+        let (simd_level, shapes) = (*self.simd_level, walls.has_shapes());
         let (planes, ahead) = (listed_planes(&self.planes, self.tier()), self.ahead(dt));
         let (at, skin_left) = (&self.at[..], &self.skin_left[..]);
         let balls = Balls {
@@ -146,7 +146,7 @@ impl<S: Scalar> Swarm<S> {
         }
         let count = self.chunks.len();
         let (chunks, velocity) = (DisjointSlice::new(&mut self.chunks), &self.velocity);
-        let Scratch { path_changes, places, substep, .. } = &self.scratch;
+        let SwarmScratch { path_changes, places, substep, .. } = &self.scratch;
         let surfaces = SurfaceOf {
             model: self.model.material,
             surfaces: &self.surfaces,

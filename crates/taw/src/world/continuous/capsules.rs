@@ -4,7 +4,8 @@ use cgmath::{InnerSpace, Zero};
 
 use super::moving_walls::RelativePath;
 use super::swept_marble::SweptMarble;
-use super::walls::{MAX_ITERATIONS, MAX_OVERSHOOT, WallImpact, time_to_close};
+use super::walls::{MAX_ITERATIONS, MAX_OVERSHOOT, WallImpact};
+use crate::contact::time_to_close;
 use crate::math::{Scalar, Vec3, length};
 use crate::shape::Capsule;
 use crate::world::walls::{SubShape, Walls};

@@ -7,6 +7,7 @@ use super::moving_walls::{Frame, MovingWall, Place, RelativePath};
 use super::swept_marble::{SweptMarble, Turn};
 use super::{MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::broad::CollisionFilter;
+use crate::contact::time_to_close;
 use crate::math::{Mat3, Point3, Scalar, Vec3, length};
 use crate::response::penalty::CORE;
 use crate::response::{Colliders as _, Response};
@@ -41,7 +42,7 @@ pub(in crate::world) struct WallImpact<S> {
 
 /// Motion of a marble, and the walls that it may meet.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Motion<S> {
+pub(super) struct WallApproach<S> {
     /// Displacement, in metres.
     pub displacement: Vec3<S>,
     /// Time that it takes until the end of the substep, in seconds; zero for one that takes place
@@ -157,7 +158,7 @@ impl<S: Scalar> World<S> {
             && let Some(impact) = self.first_wall_impact(
                 row,
                 &marble,
-                Motion { displacement, time: left * dt, carrier },
+                WallApproach { displacement, time: left * dt, carrier },
             )
         {
             let WallImpact { time, normal, center, anchor, swing, ref place, .. } = impact;
@@ -230,7 +231,7 @@ impl<S: Scalar> World<S> {
         &self,
         row: usize,
         marble: &SweptMarble<S>,
-        motion: Motion<S>,
+        motion: WallApproach<S>,
     ) -> Option<WallImpact<S>> {
         // The core (half the radius) decides whether it passes into a wall, the full radius when:
         // first wherever it touches, so that at the internal edge of two flush parts the one below
@@ -250,7 +251,7 @@ impl<S: Scalar> World<S> {
     fn first_impact_of(
         &self,
         radius: S,
-        (row, marble, motion): (usize, &SweptMarble<S>, Motion<S>),
+        (row, marble, motion): (usize, &SweptMarble<S>, WallApproach<S>),
     ) -> Option<WallImpact<S>> {
         let filter = self.marbles.filter_of_row(row);
         let mut best: Option<WallImpact<S>> = None;
@@ -279,7 +280,7 @@ impl<S: Scalar> World<S> {
         &self,
         row: usize,
         marble: &SweptMarble<S>,
-        Motion { displacement, time, carrier }: Motion<S>,
+        WallApproach { displacement, time, carrier }: WallApproach<S>,
         mut visit: impl FnMut(SubShape, &RelativePath<S>),
     ) {
         let filter = self.marbles.filter_of_row(row);
@@ -404,24 +405,6 @@ impl<S: Scalar> Walls<S> {
         }
         // A grazing contact, or within rounding.
         last.filter(|last| last.gap <= radius)
-    }
-}
-
-/// Time for which a gap, in metres, stays open at least if it closes by `closing` metres per path, and
-/// by no more than `bend` faster with each path; infinite if it never closes.
-pub(super) fn time_to_close<S: Scalar>(gap: S, closing: S, bend: S) -> S {
-    if bend > S::zero() {
-        let root = (closing * closing + S::from_f64(2.0) * bend * gap).sqrt();
-        // Without cancellation.
-        if closing > S::zero() {
-            S::from_f64(2.0) * gap / (closing + root)
-        } else {
-            (root - closing) / bend
-        }
-    } else if closing > S::zero() {
-        gap / closing
-    } else {
-        S::infinity()
     }
 }
 
