@@ -3,9 +3,8 @@ use std::fmt;
 use cgmath::{Array, InnerSpace};
 
 use crate::frame::NodeId;
+use crate::handle::{BallId, MarbleId, SensorId, WallId};
 use crate::math::{Point3, Quat, Scalar, Vec3, length};
-use crate::swarm::BallId;
-use crate::world::{MarbleId, SensorId, WallId};
 
 /// Reason why an input was rejected. A function that returns one has changed nothing.
 ///

@@ -6,6 +6,14 @@ use crate::Error;
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct MarbleId(pub(crate) Handle);
 
+/// Stable handle of a wall.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct WallId(pub(crate) Handle);
+
+/// Stable handle of a sensor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct SensorId(pub(crate) Handle);
+
 /// Stable handle of a ball of a swarm.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct BallId(pub(crate) Handle);
@@ -18,7 +26,7 @@ pub(crate) struct Handle {
     pub generation: u32,
 }
 
-/// Row of a slot that is free, and slot of none.
+/// Row of a slot that is free, and of whatever has none.
 pub(crate) const NO_ROW: u32 = u32::MAX;
 
 /// Bidirectional map of handles and rows (a generational arena).

@@ -2,8 +2,8 @@
 
 use std::ops::{Deref, DerefMut};
 
-/// Value that any other one equals: scratch memory, settings that change no bit, what follows from
-/// compared values.
+/// Value that any other one equals: scratch memory, settings that change no bit, counters of changes, and
+/// what follows from compared values.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Uncompared<T>(pub T);
 

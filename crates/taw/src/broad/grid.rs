@@ -46,7 +46,7 @@ const LEAST_CELL: f64 = 1e-300;
 #[derive(Clone, Debug, Default)]
 pub struct Grid {
     /// Sorted by key, then by index.
-    cells: Vec<Cell>,
+    cells: Vec<CellEntry>,
     /// Center of the scene, at the middle of the coordinate range, in metres.
     origin: [f64; 3],
     /// Width of a cell on level 0, in metres.
@@ -54,7 +54,7 @@ pub struct Grid {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
-struct Cell {
+struct CellEntry {
     key: u64,
     row: u32,
 }
@@ -70,7 +70,7 @@ impl Grid {
         self.cells.clear();
         for (row, (center, radius)) in center.iter().zip(radius).enumerate() {
             let level = level_of(*radius + half_reach, largest);
-            self.cells.push(Cell { key: self.key(*center, level), row: row as u32 });
+            self.cells.push(CellEntry { key: self.key(*center, level), row: row as u32 });
         }
         self.cells.sort_unstable();
     }
@@ -92,7 +92,7 @@ impl Grid {
         center: &[Point3<S>],
         mut pair: impl FnMut(u32, u32) -> bool,
     ) {
-        let mut emit = |a: &Cell, b: &Cell| pair(a.row.min(b.row), a.row.max(b.row));
+        let mut emit = |a: &CellEntry, b: &CellEntry| pair(a.row.min(b.row), a.row.max(b.row));
         for level in 0..LEVELS {
             let cells = &self.cells[self.level(level)];
             if cells.is_empty() {
@@ -146,10 +146,10 @@ impl Grid {
     /// center.
     fn pairs_across<S: Scalar>(
         &self,
-        cells: &[Cell],
+        cells: &[CellEntry],
         coarser: u32,
         center: &[Point3<S>],
-        emit: &mut impl FnMut(&Cell, &Cell) -> bool,
+        emit: &mut impl FnMut(&CellEntry, &CellEntry) -> bool,
     ) {
         let others = &self.cells[self.level(coarser)];
         if others.is_empty() {
@@ -182,7 +182,7 @@ const ROWS_AHEAD: [i64; 4] = [ROW, LAYER - ROW, LAYER, LAYER + ROW];
 
 /// Pairs within equal and neighbouring cells of one level. Only later neighbours are visited, so
 /// that each pair is reported once.
-fn pairs_in_level(cells: &[Cell], emit: &mut impl FnMut(&Cell, &Cell) -> bool) {
+fn pairs_in_level(cells: &[CellEntry], emit: &mut impl FnMut(&CellEntry, &CellEntry) -> bool) {
     let mut end = 0;
     for (i, cell) in cells.iter().enumerate() {
         while end < cells.len() && cells[end].key <= cell.key + 1 {
@@ -207,7 +207,11 @@ fn pairs_in_level(cells: &[Cell], emit: &mut impl FnMut(&Cell, &Cell) -> bool) {
 }
 
 /// Visits the others in three cells side by side, until [`MOST`] of them overlap.
-fn visit_run(cell: &Cell, others: &[Cell], emit: &mut impl FnMut(&Cell, &Cell) -> bool) {
+fn visit_run(
+    cell: &CellEntry,
+    others: &[CellEntry],
+    emit: &mut impl FnMut(&CellEntry, &CellEntry) -> bool,
+) {
     if others.len() <= MOST {
         for other in others {
             emit(cell, other);

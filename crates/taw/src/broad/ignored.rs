@@ -72,12 +72,6 @@ impl IgnoredPairs {
     }
 }
 
-impl PartialEq for IgnoredPairs {
-    fn eq(&self, _: &Self) -> bool {
-        true
-    }
-}
-
 /// Collision filter of a ball.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct CollisionFilter<'a> {

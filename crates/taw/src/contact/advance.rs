@@ -4,7 +4,7 @@
 
 use crate::math::Scalar;
 
-/// Time for which a gap, in metres, stays open at least if it closes by `closing` m/s, and by
+/// Time for which a gap of zero or more metres stays open at least if it closes by `closing` m/s, and by
 /// `acceleration` m/s² at most beyond that; infinite if it never closes. (With paths instead of seconds,
 /// per path.)
 pub(crate) fn time_to_close<S: Scalar>(gap: S, closing: S, acceleration: S) -> S {

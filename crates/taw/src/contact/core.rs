@@ -14,6 +14,7 @@ pub struct Core<'a> {
     pub(super) radius: f64,
 }
 
+/// Points whose convex hull is the core.
 #[derive(Clone, Copy, Debug)]
 pub(super) enum CoreKind<'a> {
     Point(Vec3<f64>),

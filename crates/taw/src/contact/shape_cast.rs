@@ -1,5 +1,6 @@
 use cgmath::InnerSpace;
 
+use super::advance::time_to_close;
 use super::closest::{LocalClosestPoints, local_closest_points, should_swap};
 use super::core::Convex;
 use crate::math::{Point3, Scalar, Vec3, cast_point, cast_vector};
@@ -63,7 +64,7 @@ pub fn shape_cast<S: Scalar>(
                 point: cast_point(origin + on_a + first * time),
             });
         }
-        time += distance / approach_speed;
+        time += time_to_close(distance, approach_speed, 0.0);
         if time > 1.0 {
             return None;
         }

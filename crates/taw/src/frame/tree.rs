@@ -16,6 +16,7 @@ pub struct Tree<S> {
     nodes: SlotMap<NodeId, FrameNode<S>>,
 }
 
+/// Frame in the tree: its pose in its parent, and the frames in it.
 #[derive(Clone, Debug)]
 struct FrameNode<S> {
     local: Pose<S>,

@@ -56,6 +56,7 @@ pub trait Kernel<S> {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct SimdLevel(SimdKind);
 
+/// Instruction sets.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum SimdKind {
     Portable,

@@ -23,13 +23,13 @@ pub struct Simulation<S: Scalar> {
     /// The world, with marbles in the order of the scene.
     pub world: World<S>,
     scene: Scene,
-    moving: Vec<(WallId, WallOrigin, KinematicMotion)>,
+    moving: Vec<(WallId, InitialShape, KinematicMotion)>,
     time: f64,
 }
 
 /// Initial shape of a kinematic wall.
 #[derive(Clone, Debug)]
-enum WallOrigin {
+enum InitialShape {
     ShapeDesc(ShapeDesc),
     /// Index of a structure.
     Structure(usize),
@@ -64,11 +64,16 @@ impl Scene {
             Ok::<_, Error>(())
         };
         for WallDesc { shape, material, motion } in &self.walls {
-            insert(shape.wall(Pose::identity())?, material, motion, WallOrigin::ShapeDesc(*shape))?;
+            insert(
+                shape.wall(Pose::identity())?,
+                material,
+                motion,
+                InitialShape::ShapeDesc(*shape),
+            )?;
         }
         for (number, Structure { shape, material, motion }) in self.structures.iter().enumerate() {
             let wall = shape.wall(Pose::identity())?;
-            insert(wall, material, motion, WallOrigin::Structure(number))?;
+            insert(wall, material, motion, InitialShape::Structure(number))?;
         }
         for ball in self.all_marbles() {
             world.marbles.insert(ball.marble(self.material)?)?;
@@ -147,8 +152,8 @@ impl<S: Scalar> Simulation<S> {
                 (WallShape::HeightField(field, _), _) => {
                     WallShape::HeightField(Arc::clone(field), cast_pose(pose))
                 }
-                (_, WallOrigin::ShapeDesc(form)) => form.wall(pose)?,
-                (_, WallOrigin::Structure(number)) => {
+                (_, InitialShape::ShapeDesc(form)) => form.wall(pose)?,
+                (_, InitialShape::Structure(number)) => {
                     self.scene.structures[*number].shape.wall(pose)?
                 }
             };

@@ -11,6 +11,7 @@ pub struct Bvh<S> {
     items: Vec<u32>,
 }
 
+/// Node of the hierarchy: a box, and the nodes or items in it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct BvhNode<S> {
     bounds: Aabb3<S>,

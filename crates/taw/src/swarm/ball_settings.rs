@@ -127,7 +127,7 @@ impl<S: Scalar> Swarm<S> {
                 self.wake(*row as usize);
             }
         }
-        self.surfaces.ignored = ignored;
+        *self.surfaces.ignored = ignored;
         self.cache_impulses();
         self.scratch.filters_changed = true;
     }

@@ -120,7 +120,7 @@ impl<S: Scalar> Swarm<S> {
         let tier = self.tier();
         self.bodies_are_rows = bodies_are_rows;
         if self.tier() != tier {
-            self.old_rows.clear();
+            self.forget_pairs();
         }
         self.proxies.clear();
         self.scratch.proxy_rows.clear();

@@ -10,7 +10,7 @@ use super::kernels::squared;
 use super::neighbours::{FindPairs, NeighbourLists, NeighbourSearch};
 use super::step::{inverse_masses, listed_planes};
 use super::surfaces::SurfaceOf;
-use super::sweeps::{BallSweep, CrowdSweep};
+use super::sweeps::{BallPaths, CrowdSweep};
 use super::{Stage, StaticGeometry, Swarm, walls};
 use crate::math::{Scalar, SimdLevel, length};
 use crate::workers::{DisjointSlice, parallel_filter, parallel_for, parallel_for_rows};
@@ -45,9 +45,7 @@ impl<S: Scalar> Swarm<S> {
         self.rebuilds += 1;
         observe(Stage::Pairs);
         let lab = !self.has_friction();
-        if !lab {
-            self.cache_impulses();
-        }
+        self.cache_impulses(); // if there are any
         observe(Stage::Order);
         if self.pairs_valid {
             self.adapt_skin();
@@ -151,7 +149,7 @@ impl<S: Scalar> Swarm<S> {
             let skins_left = unsafe { skins_left.part(rows.clone()) };
             for (row, skin_left) in rows.zip(skins_left) {
                 let path =
-                    if lab { S::zero() } else { BallSweep::skin_of_path(&velocity[row], dt) };
+                    if lab { S::zero() } else { BallPaths::skin_of_path(&velocity[row], dt) };
                 let displacement =
                     if lab { displacement[row] } else { squared(velocity[row]).sqrt() * dt };
                 *skin_left = (displacement * S::from_f64(STEPS))
@@ -190,7 +188,7 @@ impl<S: Scalar> Swarm<S> {
             self.skin_left[at] =
                 (displacement * S::from_f64(STEPS)).clamp(skin, skin * S::from_f64(FAR));
             if self.has_friction() {
-                let of_path = BallSweep::skin_of_path(&self.velocity[at], dt);
+                let of_path = BallPaths::skin_of_path(&self.velocity[at], dt);
                 self.skin_left[at] = self.skin_left[at].max(of_path);
             }
             self.fast_movers.add(*row, self.skin_left[at] > skin * S::from_f64(FAR));
@@ -213,10 +211,9 @@ impl<S: Scalar> Swarm<S> {
         let apart = has_friction && !self.proxies.is_empty();
         let proxy = |row: u32| apart && proxies.contains(slots[row as usize]);
         let surfaces = SurfaceOf { model: self.model.material, surfaces: &self.surfaces, slots };
-        let (grid, at, skin_left) = (&self.grid, &self.at[..], &self.skin_left[..]);
-        let velocity = &self.velocity[..];
-        let sweep = has_friction.then_some(BallSweep { at, velocity, skin_left, dt, reach, slack });
-        let balls = SortedBalls { grid, at, skin_left, surfaces, sweep };
+        let (at, velocity, skin_left) = (&self.at[..], &self.velocity[..], &self.skin_left[..]);
+        let sweep = has_friction.then_some(BallPaths { at, velocity, skin_left, dt, reach, slack });
+        let balls = SortedBalls { grid: &self.grid, at, skin_left, surfaces, sweep };
         self.fast_movers.find(&balls, self.max_radius + skin, search, &proxy, has_friction);
         if has_friction {
             let FastMovers { batches, impulses, .. } = &mut self.fast_movers;
@@ -413,7 +410,7 @@ mod tests {
 
     use crate::math::{Point3, Vec3};
     use crate::swarm::kernels::squared;
-    use crate::swarm::sweeps::BallSweep;
+    use crate::swarm::sweeps::BallPaths;
     use crate::swarm::{Ball, Swarm, SwarmModel, Tier};
     use crate::world::{SweptWalls, World};
 
@@ -422,7 +419,7 @@ mod tests {
         let rows = 0..swarm.at.len() as u32;
         let Swarm { at, velocity, skin_left, .. } = swarm;
         let (dt, reach) = (1.0 / 60.0, swarm.reach_of_skins());
-        let sweep = BallSweep { at, velocity, skin_left, dt, reach, slack: 0.0 };
+        let sweep = BallPaths { at, velocity, skin_left, dt, reach, slack: 0.0 };
         let near = |[a, b]: &[u32; 2]| {
             if swarm.has_friction() && (sweep.is_swift(*a) || sweep.is_swift(*b)) {
                 return sweep.meet(*a, *b); // on their paths

@@ -11,7 +11,7 @@ use super::grid::SortedGrid;
 use super::kernels::{ContactImpulses, squared};
 use super::neighbours::NeighbourSearch;
 use super::surfaces::SurfaceOf;
-use super::sweeps::BallSweep;
+use super::sweeps::BallPaths;
 use crate::math::{Row, Scalar};
 
 /// Fast movers at most: one of so many balls, and besides so many.
@@ -31,7 +31,7 @@ pub(super) struct FastMovers<S> {
     pub unlisted: usize,
     pub impulses: ContactImpulses<S>,
     /// Impulses of their pairs before the last search, in order.
-    cached: Vec<CachedPair<S>>,
+    cached: Vec<SavedPair<S>>,
     /// The fast movers along the x axis.
     sorted: Vec<u32>,
     /// Set while more balls than there may be fast movers go further than skins reach; and pairs of
@@ -43,7 +43,7 @@ pub(super) struct FastMovers<S> {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct CachedPair<S> {
+struct SavedPair<S> {
     pair: [u32; 2],
     normal_impulse: S,
     tangent_impulse: [S; 3],
@@ -63,7 +63,7 @@ pub(super) struct SortedBalls<'a, S> {
     pub skin_left: &'a [S],
     pub surfaces: SurfaceOf<'a, S>,
     /// Paths of those that go further than skins reach; none in the lab's tier.
-    pub sweep: Option<BallSweep<'a, S>>,
+    pub sweep: Option<BallPaths<'a, S>>,
 }
 
 impl<S: Scalar> SortedBalls<'_, S> {
@@ -240,7 +240,7 @@ impl<S: Scalar> FastMovers<S> {
                         .map_or([S::zero(); 3], |tangent_impulse| {
                             tangent_impulse.map(|axis| axis[lane])
                         });
-                    self.cached.push(CachedPair {
+                    self.cached.push(SavedPair {
                         pair: batch.pair(lane),
                         normal_impulse,
                         tangent_impulse,
@@ -258,7 +258,7 @@ impl<S: Scalar> FastMovers<S> {
                 let Ok(at) = self.cached.binary_search_by_key(&pair, |cached| cached.pair) else {
                     continue;
                 };
-                let CachedPair { normal_impulse, tangent_impulse, .. } = self.cached[at];
+                let SavedPair { normal_impulse, tangent_impulse, .. } = self.cached[at];
                 self.impulses.normal_impulse[i][lane] = normal_impulse;
                 if let Some(to) = self.impulses.tangent_impulse.get_mut(i) {
                     for (axis, tangent_impulse) in to.iter_mut().zip(tangent_impulse) {
@@ -276,6 +276,6 @@ impl<S: Scalar> FastMovers<S> {
             + self.by_path.bytes()
             + self.batches.capacity() * size_of::<Batch>()
             + self.impulses.bytes()
-            + self.cached.capacity() * size_of::<CachedPair<S>>()
+            + self.cached.capacity() * size_of::<SavedPair<S>>()
     }
 }

@@ -82,11 +82,16 @@ impl<S: Scalar> ImpulseCache<S> {
         shrink_slack(&mut self.kept);
     }
 
-    /// Empties the cache, for so many rows.
-    pub fn forget(&mut self, rows: usize) {
+    /// Empties the cache.
+    pub fn clear(&mut self) {
         self.wall_contacts.clear();
         self.kept.clear();
         self.start.clear();
+    }
+
+    /// Caches that none of so many rows bears anything.
+    pub fn forget(&mut self, rows: usize) {
+        self.clear();
         self.start.resize(rows + 2, 0);
     }
 

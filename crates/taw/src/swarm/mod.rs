@@ -35,6 +35,7 @@ mod fast_movers;
 mod grid;
 mod impulse_cache;
 mod kernels;
+mod limits;
 mod model;
 mod neighbours;
 mod outside_work;
@@ -55,6 +56,7 @@ pub use crate::handle::BallId;
 pub use crate::math::simd::SimdLevel;
 pub(crate) use bodies::{Body, BodyColumns, MarbleRow, SyncToken, VelocityChange};
 pub(crate) use kernels::NearLimits;
+pub(crate) use limits::{LEAST_RADIUS, MAX_COORDINATE};
 pub use model::{Ball, Stage, SwarmModel, Tier};
 pub(crate) use proxies::Proxy;
 pub(crate) use surfaces::BallSurface;
@@ -63,7 +65,7 @@ pub(crate) use walls::StaticGeometry;
 use cgmath::EuclideanSpace;
 
 use crate::Error;
-use crate::error::{finite_point, finite_vector, positive, within};
+use crate::error::{positive, within};
 use crate::handle::{Handles, MarbleId};
 use crate::math::{Point3, Row, Scalar, Vec3};
 use crate::response::Material;
@@ -75,17 +77,14 @@ use chunk::Chunk;
 use fast_movers::FastMovers;
 use grid::SortedGrid;
 use impulse_cache::ImpulseCache;
+use limits::{RADII, validated_position, validated_velocity};
 use neighbours::NeighbourColumn;
+use rows::retain;
 use scratch::SwarmScratch;
 use sleep::SleepState;
 use state::KnownIdentity;
 use surfaces::{SurfaceOf, Surfaces};
 use walls::HalfSpace;
-
-/// Minimum and maximum radius, in metres: their third and fourth powers are finite, too.
-pub(crate) const RADII: [f64; 2] = [1e-9, 1e9];
-/// Maximum coordinate in metres, and maximum component of a velocity in m/s.
-pub(crate) const MAX_COORDINATE: f64 = 1e12;
 
 /// Inverse mass in 1/kg of a body that no force moves.
 pub(crate) const INFINITE_MASS: f64 = 1e-25;
@@ -96,9 +95,9 @@ pub(crate) const INFINITE_MASS: f64 = 1e-25;
 /// instructions.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Swarm<S: Scalar = f32> {
-    /// All of the model but its threads.
+    /// Model, with zero threads: [`Swarm::model`] puts the setting in.
     model: SwarmModel<S>,
-    threads: Uncompared<u32>,
+    threads_of_model: Uncompared<u32>,
     simd_level: Uncompared<SimdLevel>,
     ids: Handles,
     /// Center and radius.
@@ -162,7 +161,7 @@ impl<S: Scalar> Swarm<S> {
     /// Model of its physics and solver.
     #[must_use]
     pub fn model(&self) -> SwarmModel<S> {
-        SwarmModel { threads: *self.threads, ..self.model }
+        SwarmModel { threads: *self.threads_of_model, ..self.model }
     }
 
     /// Sets the model. All balls wake.
@@ -174,13 +173,10 @@ impl<S: Scalar> Swarm<S> {
         let tier = self.tier();
         let resists = self.surface_of().differ();
         self.model = SwarmModel { threads: 0, ..model };
-        *self.threads = model.threads;
+        *self.threads_of_model = model.threads;
         self.scratch.threads = model.threads as usize;
         if self.tier() != tier {
-            self.pairs_valid = false;
-            self.forget_cache();
-            (self.neighbours, self.scratch.column) = Default::default();
-            self.old_rows.clear();
+            self.forget_pairs();
         } else if resists || self.surface_of().differ() {
             self.cache_impulses();
             self.pairs_valid = false; // pairs have numbers of their own
@@ -200,7 +196,7 @@ impl<S: Scalar> Swarm<S> {
     ///
     /// # Errors
     /// [`Error::NotFinite`] or [`Error::OutOfRange`] for a field of one of them,
-    /// [`Error::NotPositive`] for a mass, [`Error::Full`] at 2³² balls.
+    /// [`Error::NotPositive`] for a mass, [`Error::Full`] at 2³² − 1 balls.
     pub fn insert(&mut self, balls: &[Ball<S>]) -> Result<Vec<BallId>, Error> {
         for ball in balls {
             validated_position(ball.position)?;
@@ -466,10 +462,18 @@ impl<S: Scalar> Swarm<S> {
         self.cache_valid = true;
     }
 
+    /// Forgets pairs and impulses: those of one tier are not those of the other.
+    fn forget_pairs(&mut self) {
+        self.pairs_valid = false;
+        self.forget_cache();
+        self.old_rows.clear();
+        (self.neighbours, self.scratch.column) = Default::default();
+    }
+
     /// Forgets the cached impulses.
     fn forget_cache(&mut self) {
         self.cache_valid = false;
-        self.impulse_cache.forget(0);
+        self.impulse_cache.clear();
     }
 
     fn measure_radii(&mut self) {
@@ -482,37 +486,4 @@ impl<S: Scalar> Swarm<S> {
 
 fn pack_row<S: Scalar>(vector: Vec3<S>, last: S) -> Row<S> {
     [vector.x, vector.y, vector.z, last]
-}
-
-fn validated_position<S: Scalar>(place: Point3<S>) -> Result<Point3<S>, Error> {
-    let names = ["position.x", "position.y", "position.z"];
-    finite_point(names, place)?;
-    for (name, x) in names.into_iter().zip([place.x, place.y, place.z]) {
-        within(name, x, -S::from_f64(MAX_COORDINATE), S::from_f64(MAX_COORDINATE))?;
-    }
-    Ok(place)
-}
-
-fn validated_velocity<S: Scalar>(velocity: Vec3<S>) -> Result<Vec3<S>, Error> {
-    let names = ["velocity.x", "velocity.y", "velocity.z"];
-    finite_vector(names, velocity)?;
-    for (name, x) in names.into_iter().zip([velocity.x, velocity.y, velocity.z]) {
-        within(name, x, -S::from_f64(MAX_COORDINATE), S::from_f64(MAX_COORDINATE))?;
-    }
-    Ok(velocity)
-}
-
-/// Leaves the rows that are kept, in their order.
-fn retain<T: Copy>(column: &mut Vec<T>, kept: &[bool]) {
-    if column.is_empty() {
-        return;
-    }
-    let mut to = 0;
-    for (from, kept) in kept.iter().enumerate() {
-        if *kept {
-            column[to] = column[from];
-            to += 1;
-        }
-    }
-    column.truncate(to);
 }

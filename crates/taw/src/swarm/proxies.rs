@@ -218,7 +218,7 @@ impl<S: Scalar> Swarm<S> {
     /// Inserts balls for so many bodies.
     pub(crate) fn insert_bodies(&mut self, count: usize) -> Result<Vec<BallId>, crate::Error> {
         let position = crate::math::Point3::new(S::zero(), S::zero(), S::zero());
-        self.add(&vec![super::Ball::new(position, S::from_f64(super::RADII[0])); count])
+        self.add(&vec![super::Ball::new(position, S::from_f64(super::LEAST_RADIUS)); count])
     }
 
     /// Saves the rows of the proxies, before they are integrated.

@@ -1,4 +1,4 @@
-//! Sums and products of rows: vectors, with a fourth number that has another meaning.
+//! Rows: vectors, with a fourth number that has another meaning.
 
 use crate::math::{Row, Scalar};
 
@@ -15,4 +15,19 @@ pub(super) fn less<S: Scalar>(a: &Row<S>, b: &Row<S>) -> Row<S> {
 /// Inner product of the first three numbers.
 pub(super) fn dot<S: Scalar, const N: usize>(a: &[S; N], b: &[S; N]) -> S {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// Drops the entries of a column that are not kept.
+pub(super) fn retain<T: Copy>(column: &mut Vec<T>, kept: &[bool]) {
+    if column.is_empty() {
+        return;
+    }
+    let mut to = 0;
+    for (from, kept) in kept.iter().enumerate() {
+        if *kept {
+            column[to] = column[from];
+            to += 1;
+        }
+    }
+    column.truncate(to);
 }

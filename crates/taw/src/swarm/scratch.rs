@@ -10,7 +10,8 @@ use super::sweeps::Crowd;
 use crate::math::{Row, Scalar, UnionFind};
 use crate::response::Impact;
 
-/// Memory that a step writes before it reads it. Two are always equal.
+/// Memory that a step writes before it reads it, and marks of what has changed since the last one. Two are
+/// always equal.
 #[derive(Clone, Debug, Default)]
 pub(super) struct SwarmScratch<S> {
     /// Number of threads that work on this step.

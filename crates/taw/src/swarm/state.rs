@@ -1,4 +1,4 @@
-//! Bytes of a swarm, field by field.
+//! Memory of a swarm, field by field, the threads of a step, and the walls that a swarm knows.
 
 use super::Swarm;
 use super::chunk::Chunk;
@@ -16,7 +16,7 @@ impl<S: Scalar> Swarm<S> {
         // All are named, so that none is left out.
         let Self {
             model: _,
-            threads: _,
+            threads_of_model: _,
             simd_level: _,
             ids,
             at,

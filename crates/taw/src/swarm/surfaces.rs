@@ -5,6 +5,7 @@ use super::bit_set::BitSet;
 use crate::broad::{CollisionFilter, CollisionLayers, IgnoredPairs};
 use crate::math::{LANES, Scalar};
 use crate::response::Material;
+use crate::uncompared::Uncompared;
 
 /// Mass times radius squared over the moment of inertia of a solid ball.
 pub(super) const SOLID_BALL: f64 = 2.5;
@@ -36,7 +37,7 @@ pub(super) struct Surfaces<S> {
     /// Layers, by slot; all beyond the end.
     layers: Vec<CollisionLayers>,
     /// Pairs of marbles' slots, and of those with walls, that pass through each other.
-    pub ignored: IgnoredPairs,
+    pub ignored: Uncompared<IgnoredPairs>,
     /// Slots of kinematic marbles, whose mass is infinite: they pass through walls and each other.
     kinematic: BitSet,
 }

@@ -16,7 +16,7 @@ const BINS: f64 = 1024.0;
 
 /// Paths of balls in a step.
 #[derive(Clone, Copy)]
-pub(super) struct BallSweep<'a, S> {
+pub(super) struct BallPaths<'a, S> {
     /// Center and radius.
     pub at: &'a [Row<S>],
     pub velocity: &'a [Row<S>],
@@ -30,7 +30,7 @@ pub(super) struct BallSweep<'a, S> {
     pub slack: S,
 }
 
-impl<S: Scalar> BallSweep<'_, S> {
+impl<S: Scalar> BallPaths<'_, S> {
     /// Returns true if a ball goes further than skins reach.
     #[inline]
     pub fn is_swift(&self, row: u32) -> bool {
@@ -151,7 +151,7 @@ impl<S: Scalar> CrowdSweep<'_, S> {
     /// goes further than `skin`.
     pub fn find(&self, scratch: &mut Crowd<S>, pairs: &mut Vec<[u32; 2]>) {
         pairs.clear();
-        let goes_far = |velocity: &Row<S>| BallSweep::skin_of_path(velocity, self.dt) > self.skin;
+        let goes_far = |velocity: &Row<S>| BallPaths::skin_of_path(velocity, self.dt) > self.skin;
         if !self.velocity.iter().any(goes_far) {
             return;
         }
@@ -179,7 +179,7 @@ impl<S: Scalar> CrowdSweep<'_, S> {
         swift.clear();
         paths.clear();
         for (row, velocity) in (0..).zip(self.velocity) {
-            if BallSweep::skin_of_path(velocity, self.dt) > self.skin {
+            if BallPaths::skin_of_path(velocity, self.dt) > self.skin {
                 swift.insert(row);
             }
             paths.push(

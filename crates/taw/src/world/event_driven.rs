@@ -91,7 +91,7 @@ impl<S: Scalar> World<S> {
         let events = &mut self.scratch.events;
         events.period =
             Period { lengths: marbles.period.lengths.map(|length| length.map(S::as_f64)) };
-        events.ignored.clone_from(&marbles.ignored_rows);
+        events.ignored.clone_from(&*marbles.ignored_rows);
         events.balls.clear();
         events.balls.extend((0..marbles.len()).map(|row| {
             let Motion { position, velocity } = marbles.motion_f64(row);

@@ -105,7 +105,7 @@ impl<S: Scalar> World<S> {
             }
         }
         let found = IgnoredPairs::new(of_marbles, of_walls);
-        self.marbles.ignored_rows = IgnoredPairs { found_at: now, ..found };
+        *self.marbles.ignored_rows = IgnoredPairs { found_at: now, ..found };
     }
 
     /// Gives the swarm the pairs that pass through each other.
@@ -113,7 +113,7 @@ impl<S: Scalar> World<S> {
         self.find_ignored_rows();
         let (marbles, swarm) = (&self.marbles, &self.swarm);
         let slot = |row: u32| slot_of(marbles, swarm, row);
-        let IgnoredPairs { balls, walls, .. } = &marbles.ignored_rows;
+        let IgnoredPairs { balls, walls, .. } = &*marbles.ignored_rows;
         let balls = balls.iter().filter_map(|[a, b]| Some([slot(*a)?, slot(*b)?])).collect();
         let walls = walls.iter().filter_map(|[row, wall]| Some([slot(*row)?, *wall])).collect();
         self.swarm.set_ignored(IgnoredPairs::new(balls, walls));

@@ -19,6 +19,7 @@ use crate::math::{Point3, Quat, Scalar, Vec3, cast_vector, is_finite, is_finite_
 use crate::motion::{Integrator, Mass, Motion, Rotation};
 use crate::response::{CapsuleInertia, Material, SolverBodies};
 use crate::swarm::BodyColumns;
+use crate::uncompared::Uncompared;
 
 /// Compensation: the low parts of a marble's double-single numbers, which the scalar cuts off.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -76,7 +77,7 @@ pub struct Marbles<S> {
     /// Lists of whom marbles pass through; see `ignored.rs`.
     pub(super) ignored: BTreeMap<MarbleId, Vec<ColliderId>>,
     /// Rows of these pairs.
-    pub(super) ignored_rows: IgnoredPairs,
+    pub(super) ignored_rows: Uncompared<IgnoredPairs>,
 }
 
 pub(super) const POSITION: [&str; 3] = ["position.x", "position.y", "position.z"];
@@ -90,7 +91,7 @@ impl<S: Scalar> Marbles<S> {
     /// # Errors
     /// [`Error::NotFinite`], [`Error::NotPositive`], [`Error::NotUnit`] or [`Error::OutOfRange`]
     /// for its fields, also if size and density together make a mass that the scalar cannot
-    /// represent; [`Error::Full`] at 2³² marbles.
+    /// represent; [`Error::Full`] at 2³² − 1 marbles.
     pub fn insert(&mut self, marble: Marble<S>) -> Result<MarbleId, Error> {
         let position = finite_point(POSITION, marble.position)?;
         let radius = positive("radius", marble.radius)?;

@@ -9,7 +9,7 @@ use super::narrow_phase::Candidate;
 use super::quarantine::StoredPoses;
 use super::sleep::SleepScratch;
 use super::soft_step::SoftRows;
-use super::solver_columns::SolverColumns;
+use super::solver_columns::MarbleColumns;
 use crate::broad::{Crowding, Grid, Images};
 use crate::math::Vec3;
 use crate::response::displacement::DisplacementScratch;
@@ -31,7 +31,7 @@ pub(super) struct WorldScratch<S> {
     /// Speculative margin: maximum separation of a contact, in metres. Gravity closes it within two
     /// substeps, for a response that looks ahead.
     pub reach: S,
-    pub columns: SolverColumns<S>,
+    pub columns: MarbleColumns<S>,
     pub displacement: DisplacementScratch<S>,
     pub impulse: ImpulseScratch<S>,
     pub penalty: PenaltyScratch<S>,

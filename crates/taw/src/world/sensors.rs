@@ -6,15 +6,12 @@ use super::{MarbleId, Marbles, WallShape, World};
 use crate::Error;
 use crate::broad::CollisionLayers;
 use crate::frame::Pose;
-use crate::handle::{Handle, Handles};
+use crate::handle::Handles;
+pub use crate::handle::SensorId;
 use crate::math::{Point3, Quat, Scalar, Vec3};
 use crate::motion::WallMotion;
 use crate::shape::{Aabb3, Shape, Sphere};
 use crate::swarm::BallId;
-
-/// Stable handle of a sensor.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct SensorId(Handle);
 
 /// Marble that entered or left a sensor in a step.
 #[derive(Clone, Copy, Debug, PartialEq)]

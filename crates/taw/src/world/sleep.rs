@@ -24,8 +24,6 @@ pub(super) struct SleepScratch {
     pub walls: u64,
     /// Version of the sleepers whose impulses are out of the cache.
     set_aside_at: u64,
-    /// Substeps since islands were searched.
-    clock: u32,
     woken: Vec<u32>,
     support: Vec<Support>,
     islands: UnionFind,
@@ -224,9 +222,10 @@ impl<S: Scalar> World<S> {
             self.marbles.sleep.update(row, &at, square, rests, dt);
             someone_lasts |= self.marbles.sleep.lasts(row, radius, gravity);
         }
-        self.scratch.sleep.clock += 1;
-        if someone_lasts && self.scratch.sleep.clock >= SEARCH_INTERVAL {
-            self.scratch.sleep.clock = 0;
+        let clock = self.marbles.sleep.clock.saturating_add(1);
+        let searches = someone_lasts && clock >= SEARCH_INTERVAL;
+        self.marbles.sleep.clock = if searches { 0 } else { clock.min(SEARCH_INTERVAL) };
+        if searches {
             self.fall_asleep(gravity);
         }
     }

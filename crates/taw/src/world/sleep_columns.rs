@@ -20,6 +20,8 @@ pub(super) struct SleepColumns<S> {
     last_group: u32,
     /// Number of times that marbles fell asleep or woke.
     version: u64,
+    /// Substeps since islands were searched.
+    pub clock: u32,
     /// Sleepers that were set or taken out since somebody looked who leant on them.
     disturbed: Vec<Disturbed<S>>,
 }

@@ -19,8 +19,8 @@ use crate::math::{Scalar, Vec3, cast_vector, length};
 use crate::motion::Rotation;
 use crate::response::{Material, Response};
 use crate::swarm::{
-    BallSurface, Body, INFINITE_MASS, MAX_COORDINATE, MarbleRow, NearLimits, RADII, SyncToken,
-    VelocityChange,
+    BallSurface, Body, INFINITE_MASS, LEAST_RADIUS, MAX_COORDINATE, MarbleRow, NearLimits,
+    SyncToken, VelocityChange,
 };
 use crate::workers::append_all;
 
@@ -268,7 +268,7 @@ impl<S: Scalar> World<S> {
     /// Checks that the numbers of a marble fit into a row. One that flew farther in steps may go on.
     fn check_row(&self, row: usize) -> Result<(), Error> {
         let marbles = &self.marbles;
-        let [least, most] = [RADII[0], MAX_COORDINATE].map(|x| S::from_f64(x).as_f64());
+        let [least, most] = [LEAST_RADIUS, MAX_COORDINATE].map(|x| S::from_f64(x).as_f64());
         let radius = marbles.radius[row].as_f64();
         within("radius", radius, least, most)?;
         let position = cast_vector::<S, f64>(marbles.position[row].to_vec());
@@ -404,7 +404,7 @@ fn within_vector(names: [&'static str; 3], v: Vec3<f64>, most: f64) -> Result<()
 
 /// Radius of a row, in metres.
 fn row_radius<S: Scalar>(radius: S) -> S {
-    radius.clamp(S::from_f64(RADII[0]), S::from_f64(MAX_COORDINATE))
+    radius.clamp(S::from_f64(LEAST_RADIUS), S::from_f64(MAX_COORDINATE))
 }
 
 /// A marble as a row.

@@ -12,7 +12,7 @@ use crate::response::{CapsuleInertia, Response, SolverBodies};
 
 /// Columns that a solver reads besides those of the marbles.
 #[derive(Clone, Debug, Default)]
-pub(super) struct SolverColumns<S> {
+pub(super) struct MarbleColumns<S> {
     /// Inverse masses, in 1/kg; empty for a method that ignores masses.
     inverse_mass: Vec<S>,
     /// Velocities before forces changed them in this substep, in m/s; empty for a method that does
@@ -24,7 +24,7 @@ pub(super) struct SolverColumns<S> {
     capsules: Vec<CapsuleInertia<S>>,
 }
 
-impl<S: Scalar> SolverColumns<S> {
+impl<S: Scalar> MarbleColumns<S> {
     /// Brings masses, locks and capsules up to date with the marbles.
     pub fn read(&mut self, marbles: &mut Marbles<S>, model: Model) {
         self.inverse_mass.clear();

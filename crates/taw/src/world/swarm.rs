@@ -21,7 +21,7 @@ impl<S: Scalar> World<S> {
     ///
     /// # Errors
     /// [`Error::NotPositive`] for `dt`, [`Error::OutOfRange`] if it is not in [`World::TIMES`],
-    /// [`Error::TooManyPairs`] if more than [`World::MAX_PAIRS`] overlap, [`Error::Full`] at 2³²
+    /// [`Error::TooManyPairs`] if more than [`World::MAX_PAIRS`] overlap, [`Error::Full`] at 2³² − 1
     /// balls.
     pub fn step_swarm(&mut self, dt: S, observe: &mut dyn FnMut(Stage)) -> Result<(), Error> {
         if self.settings.model.response != Response::SoftStep {

@@ -32,9 +32,13 @@ struct Change<S> {
     removed: Option<[u32; 2]>,
 }
 
-impl<S> PartialEq for WallChanges<S> {
+impl<S: PartialEq> PartialEq for WallChanges<S> {
+    /// Equal if what changed since a solver looked is.
     fn eq(&self, other: &Self) -> bool {
-        (self.identity() == self.seen) == (other.identity() == other.seen)
+        match (self.unseen(), other.unseen()) {
+            (Some(own), Some(others)) => own.eq(others),
+            (own, others) => own.is_none() == others.is_none(),
+        }
     }
 }
 
@@ -43,6 +47,18 @@ impl<S> WallChanges<S> {
     /// others.
     pub fn identity(&self) -> u64 {
         self.log.back().map_or(self.base, |change| change.identity)
+    }
+
+    /// Changes since the walls had this identity; none if that is not known.
+    fn since(&self, identity: u64) -> Option<impl Iterator<Item = &Change<S>>> {
+        let known = self.log.iter().rposition(|change| change.identity == identity);
+        let new = known.map(|at| at + 1).or((identity == self.base).then_some(0))?;
+        Some(self.log.range(new..))
+    }
+
+    /// Regions and removals that no solver has seen yet; none if they are not known.
+    fn unseen(&self) -> Option<impl Iterator<Item = (&Option<Aabb3<S>>, Option<[u32; 2]>)>> {
+        Some(self.since(self.seen)?.map(|change| (&change.region, change.removed)))
     }
 }
 
@@ -90,12 +106,5 @@ impl<S: Scalar> WallChanges<S> {
         let Some(changes) = self.since(identity) else { return false };
         changes.filter_map(|change| change.removed).for_each(visit);
         true
-    }
-
-    /// Changes since the walls had this identity; none if that is not known.
-    fn since(&self, identity: u64) -> Option<impl Iterator<Item = &Change<S>>> {
-        let known = self.log.iter().rposition(|change| change.identity == identity);
-        let new = known.map(|at| at + 1).or((identity == self.base).then_some(0))?;
-        Some(self.log.range(new..))
     }
 }

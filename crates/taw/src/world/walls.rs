@@ -6,16 +6,13 @@ use super::wall_shape::WallShape;
 use crate::Error;
 use crate::broad::CollisionLayers;
 use crate::contact::ClosestPoints;
-use crate::handle::{Handle, Handles};
+use crate::handle::Handles;
+pub use crate::handle::WallId;
 use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
 use crate::motion::WallMotion;
 use crate::response::{self, Material};
 use crate::shape::{Aabb3, Bvh, Capsule, Plane, PointProjection};
 use crate::uncompared::Uncompared;
-
-/// Stable handle of a wall.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
-pub struct WallId(Handle);
 
 /// Sub-shape of a wall: part of a compound, or triangle of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -66,7 +63,7 @@ impl<S: Scalar> Walls<S> {
     /// Adds a wall: a half-space, any shape, a mesh or a height field.
     ///
     /// # Errors
-    /// [`Error::Full`] at 2³² walls; for a number that a wall cannot have, as the constructor of
+    /// [`Error::Full`] at 2³² − 1 walls; for a number that a wall cannot have, as the constructor of
     /// its shape, or [`Pose::validated`](crate::frame::Pose::validated).
     pub fn insert(&mut self, wall: impl Into<WallShape<S>>) -> Result<WallId, Error> {
         let shape = wall.into().validated()?;

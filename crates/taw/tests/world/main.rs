@@ -5,6 +5,7 @@ mod draw;
 
 mod apply;
 mod conveyors;
+mod equality;
 mod ignored;
 mod layers;
 mod lifts;

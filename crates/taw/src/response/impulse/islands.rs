@@ -4,7 +4,7 @@ use cgmath::InnerSpace;
 
 use super::Constraint;
 use super::jam::Load;
-use super::rows::{Row, SearchDirections};
+use super::rows::{ConstraintRow, SearchDirections};
 use crate::math::{Scalar, UnionFind, Vec3};
 
 /// Regularization of the search: additional compliance of a contact, relative to its own, in units
@@ -178,7 +178,12 @@ impl<S: Scalar> Island<S> {
     /// Adds the terms of one contact for each direction; `rounding` is the error of its velocities,
     /// in m/s.
     #[inline]
-    pub fn add_directions(&mut self, row: &Row<S>, search: &SearchDirections<S>, rounding: S) {
+    pub fn add_directions(
+        &mut self,
+        row: &ConstraintRow<S>,
+        search: &SearchDirections<S>,
+        rounding: S,
+    ) {
         let scale = self.inverse_speed_unit;
         let weight = self.inverse_mass_unit / row.inverse_effective_mass;
         let regularization = S::epsilon() * S::from_f64(REGULARIZATION);
@@ -214,7 +219,7 @@ impl<S: Scalar> Island<S> {
     }
 
     /// Adds the terms of one contact for the projected step.
-    pub fn add_projected(&mut self, row: &Row<S>, search: &SearchDirections<S>) {
+    pub fn add_projected(&mut self, row: &ConstraintRow<S>, search: &SearchDirections<S>) {
         let mass = row.inverse_effective_mass;
         let (direction, velocity) = (search.directions[1], search.velocities[1]);
         self.search.projected_gradient += self.energy(mass, direction, search.velocity_error);

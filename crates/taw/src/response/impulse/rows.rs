@@ -20,7 +20,7 @@ const ROWS_PER_THREAD: usize = 128;
 
 /// Constraint as a pass sees it.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Row<S> {
+pub(super) struct ConstraintRow<S> {
     pub bounces: bool,
     /// Indices of its bodies in the island.
     bodies: [u32; 2],
@@ -73,7 +73,7 @@ struct PackedBody<S> {
 /// Rows and bodies of the islands that have not converged, one island after another.
 #[derive(Clone, Debug, Default)]
 pub(super) struct Rows<S> {
-    list: Vec<Row<S>>,
+    list: Vec<ConstraintRow<S>>,
     details: Vec<RowDetails<S>>,
     searches: Vec<SearchDirections<S>>,
     bodies: Vec<PackedBody<S>>,
@@ -99,7 +99,7 @@ struct IslandPart {
 /// Island while it is solved.
 pub(super) struct IslandRows<'a, 'b, S> {
     pub island: &'a mut Island<S>,
-    pub rows: &'a mut [Row<S>],
+    pub rows: &'a mut [ConstraintRow<S>],
     pub details: &'a mut [RowDetails<S>],
     pub searches: &'a mut [SearchDirections<S>],
     pub bodies: PackedBodies<'a, 'b, S>,
@@ -141,7 +141,7 @@ impl<S: Scalar> Rows<S> {
             }
             let first = c.a.marble().map_or(NO_BODY, |a| self.body(a, marbles));
             let bodies = [first, self.body(c.b, marbles)];
-            self.list.push(Row::new(c, marbles, bodies));
+            self.list.push(ConstraintRow::new(c, marbles, bodies));
             let Constraint { arms, rolling, .. } = *c;
             self.details.push(RowDetails { constraint: *index, arms, rolling });
             if let Some(part) = self.parts.last_mut() {
@@ -243,7 +243,7 @@ impl<S: Scalar> Rows<S> {
     }
 }
 
-impl<S: Scalar> Row<S> {
+impl<S: Scalar> ConstraintRow<S> {
     fn new(c: &Constraint<S>, marbles: &SolverBodies<S>, bodies: [u32; 2]) -> Self {
         let inverse_effective_mass = c.inverse_effective_mass.normal;
         let ratio = |row: usize| marbles.inverse_mass[row] / inverse_effective_mass;
@@ -275,7 +275,7 @@ impl<S: Scalar> Row<S> {
 impl<S: Scalar> PackedBodies<'_, '_, S> {
     /// Velocity error: target minus relative velocity, in m/s. Arms count for capsules only.
     #[inline(always)]
-    pub fn velocity_error(&self, row: &Row<S>, arms: &[Vec3<S>; 2]) -> Vec3<S> {
+    pub fn velocity_error(&self, row: &ConstraintRow<S>, arms: &[Vec3<S>; 2]) -> Vec3<S> {
         let motion = |row: usize| self.bodies[row].motion;
         let capsule = |row: usize| self.capsule(row).is_some();
         row.target_velocity
@@ -292,14 +292,14 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
     /// Rounding of the velocities at a contact, in m/s. Smaller changes would only push fast bodies
     /// to one side.
     #[inline(always)]
-    pub fn velocity_rounding(&self, row: &Row<S>) -> S {
+    pub fn velocity_rounding(&self, row: &ConstraintRow<S>) -> S {
         let speed = |row: usize| self.bodies[row].motion.velocity.magnitude();
         (speed(row.second()) + row.first().map_or_else(S::zero, speed)) * S::epsilon()
     }
 
     /// Applies an impulse, in m/s, to the second body, its opposite to the first.
     #[inline(always)]
-    pub fn apply_impulse(&mut self, row: &Row<S>, arms: &[Vec3<S>; 2], impulse: Vec3<S>) {
+    pub fn apply_impulse(&mut self, row: &ConstraintRow<S>, arms: &[Vec3<S>; 2], impulse: Vec3<S>) {
         if let Some(a) = row.first() {
             self.push(a, -impulse * row.mass_ratios[0], -row.normal, &arms[0]);
         }
@@ -320,14 +320,14 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
     }
 
     /// Relative spin of a contact, in rad/s.
-    pub fn relative_spin(&self, row: &Row<S>) -> Vec3<S> {
+    pub fn relative_spin(&self, row: &ConstraintRow<S>) -> Vec3<S> {
         let spin = |row: usize| self.bodies[row].motion.spin;
         let second = spin(row.second());
         row.first().map_or(second, |a| second - spin(a))
     }
 
     /// Applies an angular impulse, in kg m²/s, to the second body, its opposite to the first.
-    pub fn apply_angular_impulse(&mut self, row: &Row<S>, angular_impulse: Vec3<S>) {
+    pub fn apply_angular_impulse(&mut self, row: &ConstraintRow<S>, angular_impulse: Vec3<S>) {
         let change = |row: usize, impulse| self.columns.spin_change(self.marble(row), impulse);
         let second = change(row.second(), angular_impulse);
         let first = row.first().map(|a| (a, change(a, -angular_impulse)));

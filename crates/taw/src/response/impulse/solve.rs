@@ -4,7 +4,7 @@ use cgmath::{InnerSpace, Zero};
 
 use super::islands::{DIRECTIONS, Islands, SearchStep};
 use super::jam::saturate;
-use super::rows::{IslandRows, PackedBodies, Row, RowDetails, Rows, SearchDirections};
+use super::rows::{ConstraintRow, IslandRows, PackedBodies, RowDetails, Rows, SearchDirections};
 use super::{Constraint, RollingConstraint, SolverSettings};
 use crate::constraint::{ContactImpulse, solve_rolling};
 use crate::math::{RealVector, Scalar, Vec3, is_finite, length};
@@ -35,7 +35,7 @@ pub(super) fn iterate<S: Scalar>(
     packed.unpack(marbles, constraints);
 }
 
-impl<S: Scalar> Row<S> {
+impl<S: Scalar> ConstraintRow<S> {
     /// Accumulated impulse, in m/s as in [`Constraint`].
     fn impulse(&self) -> Vec3<S> {
         self.impulse.along(self.normal)
@@ -185,14 +185,14 @@ impl<S: Scalar> IslandRows<'_, '_, S> {
 
 /// Rows that bear something, with their indices.
 fn closed<'a, S: Scalar + 'a, T>(
-    rows: impl Iterator<Item = (&'a Row<S>, T)>,
-) -> impl Iterator<Item = (usize, (&'a Row<S>, T))> {
+    rows: impl Iterator<Item = (&'a ConstraintRow<S>, T)>,
+) -> impl Iterator<Item = (usize, (&'a ConstraintRow<S>, T))> {
     rows.enumerate().filter(|(_, (row, _))| !row.is_open())
 }
 
 impl<S: Scalar> PackedBodies<'_, '_, S> {
     /// Solves one contact point. Returns the velocity change of its point, in m/s.
-    fn solve_point(&mut self, row: &mut Row<S>, details: &mut RowDetails<S>) -> S {
+    fn solve_point(&mut self, row: &mut ConstraintRow<S>, details: &mut RowDetails<S>) -> S {
         let RowDetails { arms, rolling, .. } = details;
         let error = ContactImpulse::split(self.velocity_error(row, arms), row.normal);
         let tangent = rolling
@@ -225,7 +225,7 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
     /// friction cannot bear it. One after the other, they would need a dozen passes to agree.
     fn solve_blocked(
         &self,
-        row: &Row<S>,
+        row: &ConstraintRow<S>,
         rolling: &RollingConstraint<S>,
         error: ContactImpulse<S>,
     ) -> Option<Vec3<S>> {
@@ -247,7 +247,7 @@ impl<S: Scalar> PackedBodies<'_, '_, S> {
 
     /// Solves rolling and torsional friction: one step toward zero relative spin. Returns the change
     /// of the relative spin, in rad/s.
-    fn solve_rolling(&mut self, row: &Row<S>, rolling: &mut RollingConstraint<S>) -> S {
+    fn solve_rolling(&mut self, row: &ConstraintRow<S>, rolling: &mut RollingConstraint<S>) -> S {
         let wanted = self.relative_spin(row) / -rolling.inverse_inertia;
         let load = row.impulse.normal / row.inverse_effective_mass;
         let limits = [rolling.rolling_lever * load, rolling.torsional_lever * load];

@@ -3,7 +3,7 @@
 
 use super::backing::borne_by_wall;
 use super::impacts::note_impacts;
-use super::meeting::{ClosestApproach, meeting};
+use super::meeting::{PairMeeting, meeting};
 use super::params::{Pass, SolverParams};
 use super::rolling::RollingInertia;
 use super::{
@@ -248,7 +248,7 @@ impl<S: Scalar> SolverColumns<'_, S> {
         impacts: &mut Vec<Impact<S>>,
     ) -> bool {
         let zero = L::constant(0.0);
-        let ClosestApproach { normal, approach_speed, time } =
+        let PairMeeting { normal, approach_speed, time } =
             meeting(params, [&at_a, &at_b], [&a, &b]);
         let tipping = tipping::tip(batch, params, normal, approach_speed);
         // What does not bounce is stopped by its contact.

@@ -6,7 +6,7 @@ use crate::math::{Scalar, Simd, Vec3Wide};
 
 /// Meetings of the pairs of a batch within a substep.
 #[derive(Clone, Copy)]
-pub(super) struct ClosestApproach<L> {
+pub(super) struct PairMeeting<L> {
     /// Normal when they meet.
     pub normal: Vec3Wide<L>,
     /// Speed at which they then approach, in m/s: zero for those that do not meet, or too slowly.
@@ -21,7 +21,7 @@ pub(super) fn meeting<S: Scalar, L: Simd<Scalar = S>>(
     params: &SolverParams<S>,
     [at_a, at_b]: [&[L; 4]; 2],
     [a, b]: [&[L; 4]; 2],
-) -> ClosestApproach<L> {
+) -> PairMeeting<L> {
     let (zero, one, least) =
         (L::constant(0.0), L::constant(1.0), L::splat(S::min_positive_value()));
     let displacement = Vec3Wide::of(at_b) - Vec3Wide::of(at_a);
@@ -34,7 +34,7 @@ pub(super) fn meeting<S: Scalar, L: Simd<Scalar = S>>(
     // Nobody is there before half of the time that the approach would take.
     let farthest = approach * (limit * L::constant(2.0 * (1.0 + 1e-5)));
     if apart.gt_mask(farthest) == ALL {
-        return ClosestApproach { normal: displacement, approach_speed: zero, time: zero };
+        return PairMeeting { normal: displacement, approach_speed: zero, time: zero };
     }
     // By how far it goes past the point, which is exact from afar too.
     let speed = relative.dot(relative);
@@ -53,5 +53,5 @@ pub(super) fn meeting<S: Scalar, L: Simd<Scalar = S>>(
     let approach_speed =
         approach_speed.select_gt(L::splat(params.restitution_threshold), approach_speed, zero);
     let approach_speed = square.select_gt(zero, approach_speed, zero);
-    ClosestApproach { normal, approach_speed: meets.select_gt(zero, approach_speed, zero), time }
+    PairMeeting { normal, approach_speed: meets.select_gt(zero, approach_speed, zero), time }
 }

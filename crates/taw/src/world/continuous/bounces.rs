@@ -4,7 +4,7 @@
 use cgmath::InnerSpace;
 
 use super::swept_marble::SweptMarble;
-use super::walls::WallApproach;
+use super::walls::MarbleMotion;
 use super::{Continuous, MAX_FREE_MOTION};
 use crate::math::{Point3, Scalar, Vec3, is_finite_point, length};
 use crate::shape::Sphere;
@@ -108,7 +108,7 @@ impl<S: Scalar> World<S> {
                 closing > S::zero() && closing > gap + radius * S::from_f64(MAX_FREE_MOTION);
             passes.then(|| (gap / closing).max(S::zero()))
         });
-        let motion = WallApproach { displacement, time: S::zero(), carrier: None };
+        let motion = MarbleMotion { displacement, time: S::zero(), carrier: None };
         let other = self.first_wall_impact(row, &marble, motion).map(|stop| stop.time);
         let first = planes.chain(other).fold(S::one(), S::min);
         if first < S::one() {

@@ -5,7 +5,7 @@ use std::cmp::{Ordering, Reverse};
 use cgmath::{InnerSpace, SquareMatrix, Zero};
 
 use super::swept_marble::Turn;
-use super::walls::{Bend, WallApproach, WallImpact, lost_fraction};
+use super::walls::{Bend, MarbleMotion, WallImpact, lost_fraction};
 use super::{Continuous, MAX_BENDS, MAX_FREE_MOTION, OVERLAP, Obstacle, StoppedMarble, outer};
 use crate::broad::Period;
 use crate::contact::time_of_impact_sphere_sphere;
@@ -319,7 +319,7 @@ impl<S: Scalar> World<S> {
         let displacement = sphere.center - start.sphere.center;
         let looks = met_marble
             && !(self.walls.are_half_spaces() && self.scratch.continuous.crowded.is_empty());
-        let motion = WallApproach { displacement, time: dt, carrier: None };
+        let motion = MarbleMotion { displacement, time: dt, carrier: None };
         let stop = if looks { self.first_wall_impact(row, &start, motion) } else { None };
         if met_marble && !start.is_ball() {
             let turn = stop.as_ref().map_or_else(Turn::default, |stop| {

@@ -116,7 +116,9 @@ impl<S: Scalar> RelativePath<S> {
         self.moving().map_or(S::zero(), |(motion, left)| {
             let angle = length(motion.angular_velocity) * left;
             let relative = length(self.displacement - motion.velocity * left);
-            angle * (two * relative + angle * self.max_lever(motion, left))
+            // The lever may overflow.
+            let lever = if angle > S::zero() { self.max_lever(motion, left) } else { S::zero() };
+            angle * (two * relative + angle * lever)
         })
     }
 

@@ -42,7 +42,7 @@ pub(in crate::world) struct WallImpact<S> {
 
 /// Motion of a marble, and the walls that it may meet.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct WallApproach<S> {
+pub(super) struct MarbleMotion<S> {
     /// Displacement, in metres.
     pub displacement: Vec3<S>,
     /// Time that it takes until the end of the substep, in seconds; zero for one that takes place
@@ -158,7 +158,7 @@ impl<S: Scalar> World<S> {
             && let Some(impact) = self.first_wall_impact(
                 row,
                 &marble,
-                WallApproach { displacement, time: left * dt, carrier },
+                MarbleMotion { displacement, time: left * dt, carrier },
             )
         {
             let WallImpact { time, normal, center, anchor, swing, ref place, .. } = impact;
@@ -231,7 +231,7 @@ impl<S: Scalar> World<S> {
         &self,
         row: usize,
         marble: &SweptMarble<S>,
-        motion: WallApproach<S>,
+        motion: MarbleMotion<S>,
     ) -> Option<WallImpact<S>> {
         // The core (half the radius) decides whether it passes into a wall, the full radius when:
         // first wherever it touches, so that at the internal edge of two flush parts the one below
@@ -251,7 +251,7 @@ impl<S: Scalar> World<S> {
     fn first_impact_of(
         &self,
         radius: S,
-        (row, marble, motion): (usize, &SweptMarble<S>, WallApproach<S>),
+        (row, marble, motion): (usize, &SweptMarble<S>, MarbleMotion<S>),
     ) -> Option<WallImpact<S>> {
         let filter = self.marbles.filter_of_row(row);
         let mut best: Option<WallImpact<S>> = None;
@@ -280,7 +280,7 @@ impl<S: Scalar> World<S> {
         &self,
         row: usize,
         marble: &SweptMarble<S>,
-        WallApproach { displacement, time, carrier }: WallApproach<S>,
+        MarbleMotion { displacement, time, carrier }: MarbleMotion<S>,
         mut visit: impl FnMut(SubShape, &RelativePath<S>),
     ) {
         let filter = self.marbles.filter_of_row(row);

@@ -345,10 +345,10 @@ fn swarms<S: Scalar>() -> Vec<Row<S>> {
 
 fn walls<S: Scalar>() -> Vec<Row<S>> {
     table! {
-        World 4 "Walls::insert Walls::set Ball.center": |p, x| {
+        World 4 "Walls::insert Walls::set NBall.center": |p, x| {
             solid(p, Shape::Sphere(Sphere { center: point(x, zero(), x), radius: one() }))
         };
-        World 4 "Ball.radius": |p, x| {
+        World 4 "NBall.radius": |p, x| {
             solid(p, Shape::Sphere(Sphere { center: point(zero(), -one::<S>(), zero()), radius: x }))
         };
         World 4 "Aabb.min": |p, x| solid(p, Shape::Aabb(Aabb { min: point(x, x, x), max: point(one(), zero(), one()) }));
@@ -407,7 +407,7 @@ fn walls<S: Scalar>() -> Vec<Row<S>> {
 
 fn constructors<S: Scalar>() -> Vec<Row<S>> {
     table! {
-        World 4 "Ball::new": |p, x| {
+        World 4 "NBall::new": |p, x| {
             let (at, radius) = if p.case < 2 { (x, one()) } else { (zero(), x) };
             wall(p, Sphere::new(point(at, at, at), radius)?)
         };

@@ -30,7 +30,7 @@ const TAKEN: &[(&str, &[&str])] = &[
     ("motion/force_field.rs", &["ForceField", "Medium"]),
     ("contact/material.rs", &["Material", "Elasticity"]),
     ("frame/pose.rs", &["Pose"]),
-    ("shape/ball.rs", &["Ball"]),
+    ("shape/ball.rs", &["NBall"]),
     ("shape/aabb.rs", &["Aabb"]),
     ("shape/obb.rs", &["Obb"]),
     ("shape/capsule.rs", &["Capsule"]),
