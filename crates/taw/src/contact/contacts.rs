@@ -56,7 +56,8 @@ pub struct Contact<S> {
     /// body after that counts from the next substep on.
     pub material: ContactMaterial<S>,
     /// Normal impulse accumulated in this substep, in N s. Zero until the contact is solved;
-    /// listed by `Impulse` and `Penalty`.
+    /// listed by `Impulse` and `Penalty`, and by `SoftStep`, of the whole step, in a world that
+    /// [records impulses](crate::world::World::set_records_impulses).
     pub normal_impulse: S,
     /// Friction impulse on `b` accumulated in this substep, in N s; that on `a` is its opposite.
     pub tangent_impulse: Vec3<S>,

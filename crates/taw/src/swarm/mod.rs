@@ -40,6 +40,7 @@ mod model;
 mod neighbours;
 mod outside_work;
 mod proxies;
+mod recorded_impulses;
 mod rest;
 mod rows;
 mod scratch;

@@ -4,6 +4,7 @@ use super::bit_set::BitSet;
 use super::bodies::KinematicPath;
 use super::neighbours::NeighbourSearch;
 use super::outside_work::OutsideWork;
+use super::recorded_impulses::RecordedImpulses;
 use super::state::of;
 use super::step::{SavedPlace, WayToWall};
 use super::sweeps::Crowd;
@@ -69,6 +70,8 @@ pub(super) struct SwarmScratch<S> {
     pub impacts: Vec<Impact<S>>,
     /// Impulse and work on each ball in the step, if they are recorded: by slot.
     pub outside_work: Vec<OutsideWork>,
+    /// Impulses of contacts in the step, if they are recorded.
+    pub recorded_impulses: Option<RecordedImpulses<S>>,
 }
 
 impl<S: Scalar> SwarmScratch<S> {
@@ -106,9 +109,9 @@ impl<S: Scalar> SwarmScratch<S> {
             held,
             impacts,
             outside_work,
+            recorded_impulses,
         } = self;
-        (of(column)
-            + of(backing)
+        ([column, backing].map(of).iter().sum::<usize>()
             + of(backing_speed)
             + of(leaving)
             + of(displacements)
@@ -132,7 +135,8 @@ impl<S: Scalar> SwarmScratch<S> {
                 + ways_of_chunks.iter().map(of).sum::<usize>()
                 + held.bytes()
                 + of(impacts)
-                + of(outside_work))
+                + of(outside_work)
+                + recorded_impulses.as_ref().map_or(0, RecordedImpulses::bytes))
     }
 }
 

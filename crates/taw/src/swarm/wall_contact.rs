@@ -230,8 +230,14 @@ impl<S: Scalar> WallContact<S> {
         })
     }
 
-    /// Impact of such a bounce, of a ball that was here.
-    pub fn impact(&self, bounce: &Bounce<S>, at: &Row<S>, velocity: &Row<S>) -> Impact<S> {
+    /// Impact of such a bounce, of a ball with this center, velocity and spin before it, and this velocity
+    /// after it.
+    pub fn impact(
+        &self,
+        bounce: &Bounce<S>,
+        [at, velocity, spin]: [&Row<S>; 3],
+        after: &Row<S>,
+    ) -> Impact<S> {
         let Bounce { separation, approach_speed, impact_speed } = *bounce;
         let time = separation / (S::from_f64(0.5) * (approach_speed + impact_speed));
         let along = xyz(velocity).reject_from(self.normal) * time;
@@ -241,9 +247,12 @@ impl<S: Scalar> WallContact<S> {
             a: self.wall,
             on_wall: true,
             b: self.row,
+            part: self.part,
             normal: self.normal,
             point: Point3::from_vec(point),
             approach_speed: impact_speed,
+            slip: self.slip(xyz(velocity) - self.surface, spin),
+            impulse: (xyz(after) - xyz(velocity)) / velocity[3],
         }
     }
 

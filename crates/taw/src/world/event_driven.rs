@@ -225,6 +225,7 @@ impl<S: Scalar> event::WallSource for Source<'_, S> {
             bounds: form.bounds(),
             collider: form,
             row,
+            part,
             motion,
             arrival_time: moved.then_some(self.there),
             material: self.walls.material_of_row(place).map(Material::cast),

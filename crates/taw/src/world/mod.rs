@@ -1,6 +1,7 @@
 //! World: its state as columns, its step, queries, and the energy audit.
 
 mod changed_rows;
+mod contact_impulses;
 mod contact_limit;
 mod contact_memory;
 mod continuous;

@@ -13,6 +13,8 @@ pub(super) struct Settings<S: Scalar> {
     pub gravity: Vec3<S>,
     pub forces: Vec<ForceField<S>>,
     pub limits: SpeedLimits<S>,
+    /// True to fill contacts of `SoftStep` with the impulses of the step.
+    pub records_impulses: bool,
 }
 
 impl<S: Scalar> Default for Settings<S> {
@@ -23,6 +25,7 @@ impl<S: Scalar> Default for Settings<S> {
             gravity: Vec3::unit_y() * S::from_f64(-9.81),
             forces: Vec::new(),
             limits: SpeedLimits::default(),
+            records_impulses: false,
         }
     }
 }

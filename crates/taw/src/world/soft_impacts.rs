@@ -1,14 +1,15 @@
 //! Impacts within a step of [`Response::SoftStep`](crate::response::Response::SoftStep): contacts
 //! that begin while it is solved, and may end in it, too.
 
-use cgmath::InnerSpace;
+use cgmath::{InnerSpace, Zero};
 
 use super::World;
 use super::continuous::{Frame, MovingWall, RelativePath, WallImpact};
 use super::marbles::Marbles;
+use super::walls::SubShape;
 use crate::contact::{Contact, Contacts, time_of_impact_sphere_sphere};
 use crate::handle::NO_ROW;
-use crate::math::{Scalar, Vec3, cast_vector, length, normal_and_distance};
+use crate::math::{Point3, RealVector, Scalar, Vec3, cast_vector, length, normal_and_distance};
 use crate::response::{Colliders as _, Impact};
 use crate::shape::{BoundedShape, Sphere};
 
@@ -75,8 +76,7 @@ fn of_marbles<S: Scalar>(impact: &Impact<S>, marbles: &[u32]) -> Option<Impact<S
     let b = marble(impact.b)?;
     let a = if impact.on_wall { impact.a } else { marble(impact.a)? };
     let listed = Impact { a, b, ..*impact };
-    let reversed = !impact.on_wall && b < a;
-    Some(if reversed { Impact { a: b, b: a, normal: -listed.normal, ..listed } } else { listed })
+    Some(if !impact.on_wall && b < a { listed.reversed() } else { listed })
 }
 
 impl<S: Scalar> World<S> {
@@ -178,7 +178,7 @@ impl<S: Scalar> World<S> {
                 first = Some(impact);
             }
         });
-        let WallImpact { time, normal, .. } = first?;
+        let WallImpact { time, normal, part: SubShape { index: part, .. }, .. } = first?;
         let point = sphere.center + displacement * time - normal * sphere.radius;
         let surface = wall.motion.velocity_at(point);
         let at_impact = velocity + self.soft_acceleration(row) * (dt * time);
@@ -186,8 +186,8 @@ impl<S: Scalar> World<S> {
         if approach_speed <= S::zero() {
             return None;
         }
-        let impact = Impact { a: wall.row, on_wall: true, b, normal, point, approach_speed };
-        Some(PredictedImpact { impact, velocity: [surface, velocity] })
+        let place = (part, normal, point);
+        Some(self.predicted((wall.row, true), b, place, approach_speed, [surface, velocity]))
     }
 
     /// Speed that gravity makes of rest within two steps, in m/s.
@@ -224,8 +224,9 @@ impl<S: Scalar> World<S> {
         let time = (separation * two / (start_speed + approach_speed)).min(dt);
         let fall = self.soft_acceleration(b) * (time * time * half);
         let point = position + contact.arms[1] + velocity * time + fall;
-        let impact = Impact { a: wall, on_wall: true, b: contact.b, normal, point, approach_speed };
-        Some(PredictedImpact { impact, velocity: [surface, velocity] })
+        let place = (contact.part, normal, point);
+        let velocities = [surface, velocity];
+        Some(self.predicted((wall, true), contact.b, place, approach_speed, velocities))
     }
 
     /// Impact of two marbles that fly straight relative to each other.
@@ -249,8 +250,33 @@ impl<S: Scalar> World<S> {
         let approach_speed = (velocity[0] - velocity[1]).dot(normal);
         let point = a.center + ways[0] * time + normal * a.radius;
         let Contact { a, b, .. } = *contact;
-        let impact = Impact { a, on_wall: false, b, normal, point, approach_speed };
-        Some(PredictedImpact { impact, velocity })
+        Some(self.predicted((a, false), b, (0, normal, point), approach_speed, velocity))
+    }
+
+    /// Impact of a wall or a marble `a` on a marble `b`, which have these velocities before it.
+    fn predicted(
+        &self,
+        (a, on_wall): (u32, bool),
+        b: u32,
+        (part, normal, point): (u32, Vec3<S>, Point3<S>),
+        approach_speed: S,
+        velocity: [Vec3<S>; 2],
+    ) -> PredictedImpact<S> {
+        // Radius times spin, as the arms of both lie along the normal.
+        let turning = |row: u32| {
+            let spin = self.marbles.angular_velocity.get(row as usize).copied();
+            spin.map_or_else(Vec3::zero, |spin| spin * self.marbles.radius[row as usize])
+        };
+        let inverse_mass = |row: u32| S::one() / self.marbles.mass(row as usize);
+        let (of_a, turning_a) =
+            if on_wall { (S::zero(), Vec3::zero()) } else { (inverse_mass(a), turning(a)) };
+        let relative = velocity[1] - velocity[0];
+        let slip = relative.reject_from(normal) - (turning_a + turning(b)).cross(normal);
+        let sum = of_a + inverse_mass(b);
+        let stop = if sum > S::zero() { approach_speed / sum } else { S::zero() };
+        let impulse = normal * stop;
+        let impact = Impact { a, on_wall, b, part, normal, point, approach_speed, slip, impulse };
+        PredictedImpact { impact, velocity }
     }
 
     /// Lists the bounces as they were solved. What does not bounce is stopped by its contact: of these,

@@ -188,6 +188,9 @@ impl<S: Scalar> World<S> {
         if is_changed || !self.swarm.is_prepared() {
             self.swarm.prepare(dt, self.settings.gravity, &walls, identity);
         }
+        if self.settings.records_impulses {
+            self.swarm.record_impulses();
+        }
         self.swarm.finish(dt, self.settings.model.substeps, &walls);
         self.walls.mark_seen();
         let marbles = &self.scratch.soft_step.marble_of_slot;
@@ -198,6 +201,7 @@ impl<S: Scalar> World<S> {
         let columns = self.marbles.body_columns(turns);
         self.swarm.read_bodies(marbles, columns, Some(dt), &mut self.scratch.stopped);
         self.quarantine_stopped();
+        self.fill_in_impulses();
         self.list_impacts(dt);
         self.audit_rows_after();
         self.roll_what_only_shows();

@@ -4,6 +4,7 @@ mod breaks;
 mod columns;
 mod drums;
 mod impacts;
+mod impulses;
 mod leaning;
 mod moving_walls;
 mod overlaps;

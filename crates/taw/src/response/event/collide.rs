@@ -2,13 +2,15 @@
 
 use std::cmp::Reverse;
 
-use cgmath::InnerSpace;
+use cgmath::{InnerSpace, Zero};
 
 use super::resting_cluster::{PressedBy, RestingCluster};
-use super::{Event, EventKind, EventSettings, EventSolver, Impact, MAX_DISSIPATIONS, MAX_FREEZES};
+use super::{
+    Event, EventKind, EventSettings, EventSolver, Impact, MAX_DISSIPATIONS, MAX_FREEZES, Wall,
+};
 use crate::constraint::{ContactImpulse, tipped};
 use crate::contact::ContactMaterial;
-use crate::math::{Vec3, normalize_and_length};
+use crate::math::{RealVector, Vec3, normalize_and_length};
 use crate::response::{ImpulseSample, InverseEffectiveMass, impact};
 
 /// Scratch buffers for collisions at the same time.
@@ -115,9 +117,8 @@ impl EventSolver {
         for row in &rows {
             self.balls[*row].fly_free();
         }
-        impacts.extend(collisions.iter().map(|c| c.impact));
         if rows.len() == 2 * pairs.len() {
-            for c in &collisions {
+            for c in &mut collisions {
                 let relative_velocity = self.relative_velocity(c);
                 let impulse = impact(
                     c.impact.normal,
@@ -127,11 +128,16 @@ impl EventSolver {
                 );
                 self.balls[c.a].apply_impulse(-impulse, -c.impact.normal);
                 self.balls[c.b].apply_impulse(impulse, c.impact.normal);
+                c.impact.impulse = impulse;
                 self.record_impact(c, impulse, relative_velocity);
             }
         } else {
             self.solve_simultaneous(&mut collisions, &rows);
+            for c in &mut collisions {
+                c.impact.impulse = c.impulse.along(c.impact.normal);
+            }
         }
+        impacts.extend(collisions.iter().map(|c| c.impact));
         for row in &rows {
             self.predict(*row, time, settings);
         }
@@ -200,8 +206,19 @@ impl EventSolver {
         self.balls[b].collide(material, settings);
         let (first, second) = (a as u32, b as u32);
         let point = self.balls[a].position + normal * self.balls[a].radius;
-        let impact = Impact { a: first, on_wall: false, b: second, normal, point, approach_speed };
-        Collision {
+        let zero = Vec3::zero();
+        let impact = Impact {
+            a: first,
+            on_wall: false,
+            b: second,
+            part: 0,
+            normal,
+            point,
+            approach_speed,
+            slip: zero,
+            impulse: zero,
+        };
+        let mut collision = Collision {
             a,
             b,
             impact,
@@ -209,7 +226,9 @@ impl EventSolver {
             material,
             relaxation: 1.0,
             impulse: ContactImpulse::zero(),
-        }
+        };
+        collision.impact.slip = self.relative_velocity(&collision).reject_from(normal);
+        collision
     }
 
     /// Relative velocity of the contact points, in m/s.
@@ -267,7 +286,9 @@ impl EventSolver {
             work.record_impulse(ImpulseSample { impulse, normal, mean_velocity, fixed_velocity });
             work.collisions += 1;
         }
-        let (a, b) = (self.walls[wall].row, row as u32);
-        Impact { a, on_wall: true, b, normal, point: contact_point, approach_speed }
+        let Wall { row: a, part, .. } = self.walls[wall];
+        let slip = relative_velocity.reject_from(normal);
+        let (b, point) = (row as u32, contact_point);
+        Impact { a, on_wall: true, b, part, normal, point, approach_speed, slip, impulse }
     }
 }

@@ -106,12 +106,29 @@ pub struct Impact<S> {
     pub on_wall: bool,
     /// Row of the second body, a marble.
     pub b: u32,
+    /// Sub-shape of the wall: part of a compound or triangle of a surface; zero for simple shapes, and
+    /// between marbles.
+    pub part: u32,
     /// Unit normal from the first to the second.
     pub normal: Vec3<S>,
     /// Contact point at that time, in metres.
     pub point: Point3<S>,
     /// Approach speed along the normal, in m/s.
     pub approach_speed: S,
+    /// Slip: velocity of the second surface over the first, across the normal, in m/s.
+    pub slip: Vec3<S>,
+    /// Impulse on the second body, in N s; on the first it is the opposite. By
+    /// [`SoftStep`](super::Response::SoftStep), for an impact that does not bounce, the one that stops the
+    /// approach of the two alone, without friction.
+    pub impulse: Vec3<S>,
+}
+
+impl<S: Scalar> Impact<S> {
+    /// Impact with the two bodies swapped.
+    pub(crate) fn reversed(self) -> Self {
+        let (normal, slip, impulse) = (-self.normal, -self.slip, -self.impulse);
+        Self { a: self.b, b: self.a, normal, slip, impulse, ..self }
+    }
 }
 
 impl<T: Scalar> Impact<T> {
@@ -121,9 +138,12 @@ impl<T: Scalar> Impact<T> {
             a: self.a,
             on_wall: self.on_wall,
             b: self.b,
+            part: self.part,
             normal: cast_vector(self.normal),
             point: cast_point(self.point),
             approach_speed: S::from_f64(self.approach_speed.as_f64()),
+            slip: cast_vector(self.slip),
+            impulse: cast_vector(self.impulse),
         }
     }
 }

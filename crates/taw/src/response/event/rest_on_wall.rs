@@ -323,6 +323,7 @@ mod tests {
                 collider,
                 bounds,
                 row,
+                part: 0,
                 motion,
                 arrival_time,
                 material,

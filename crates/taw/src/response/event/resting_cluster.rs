@@ -408,6 +408,7 @@ mod tests {
                 collider: WallCollider::Plane { normal, offset: 0.01 },
                 bounds: None,
                 row,
+                part: 0,
                 motion: Some(WallMotion { velocity: normal, angular_velocity, pivot }),
                 arrival_time,
                 material: None,

@@ -32,8 +32,9 @@ pub(crate) struct Wall {
     pub collider: WallCollider,
     /// Bounding volume of the shape, if it is bounded.
     pub bounds: Option<Bounds>,
-    /// Row of the wall in the world.
+    /// Row of the wall in the world, and sub-shape.
     pub row: u32,
+    pub part: u32,
     pub motion: Option<WallMotion<f64>>,
     /// Time after the start of the substep when a moving wall reaches its pose, in seconds; before,
     /// its motion is rewound. None for a static wall, whose motion only moves the surface, like a

@@ -261,10 +261,6 @@ impl<S: Scalar> SolverColumns<'_, S> {
         if !bounces && tipping.is_none() {
             return false;
         }
-        if params.notes_impacts {
-            let point = Vec3Wide::of(&at_a) + Vec3Wide::of(&a) * time + normal * at_a[3];
-            note_impacts(impacts, batch, approach_speed, [normal, point]);
-        }
         let relative = Vec3Wide::of(&b) - Vec3Wide::of(&a);
         let mass = effective_mass(&a, &b);
         let spins = self.spins(batch);
@@ -280,6 +276,11 @@ impl<S: Scalar> SolverColumns<'_, S> {
         });
         if let Some(tipping) = tipping {
             impulse.tangent = impulse.tangent + tipping * mass;
+        }
+        if params.notes_impacts {
+            let point = Vec3Wide::of(&at_a) + Vec3Wide::of(&a) * time + normal * at_a[3];
+            let vectors = [normal, point, slip, impulse.along(normal)];
+            note_impacts(impacts, batch, approach_speed, vectors);
         }
         let factors = numbers.inertia_factors;
         self.apply_impulse::<L, false>(batch, [a, b], spins, normal, impulse, factors);

@@ -245,6 +245,7 @@ impl<S: Scalar> Swarm<S> {
             observe(Stage::Restitute);
             self.relax(params);
             self.record_borne();
+            self.record_substep_impulses();
             self.forget_impacts();
             self.keep_out(walls, [before, left]);
             self.follow_kinematic_paths(parts[1], dt);

@@ -289,17 +289,18 @@ impl WallPass<'_> {
                 contact.borne_for_others = contact.share_of(unsafe { &*columns.backing.row(row) });
                 contact.note_impact(pass, velocity);
             }
-            let before = (*at, *velocity);
+            let before = [*at, *velocity, *spin];
             let bounce = contact.solve(pass, at, velocity, spin);
             if let Some(slot) = self.slots.get(row).filter(|_| !contact.bears_proxy) {
                 let work = unsafe { &mut *self.work.row(*slot as usize) };
-                work.record_wall(contact, &before.1, velocity);
+                work.record_wall(contact, &before[1], velocity);
             }
             let Some(bounce) = bounce else { continue };
             unsafe { *columns.skin_left.row(row) -= bounce.separation };
             chunk.impulses.bounced = true;
             if self.notes_impacts {
-                chunk.impulses.impacts.push(contact.impact(&bounce, &before.0, &before.1));
+                let impact = contact.impact(&bounce, before.each_ref(), velocity);
+                chunk.impulses.impacts.push(impact);
             }
         }
     }
