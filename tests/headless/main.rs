@@ -3,6 +3,7 @@
 
 mod board;
 mod capsules;
+mod contact_forces;
 mod contacts;
 mod disabling;
 mod first_contact;

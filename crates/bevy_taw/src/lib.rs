@@ -101,12 +101,14 @@
 
 mod ball;
 pub mod components;
+pub mod contact_force;
 pub mod controller;
 mod convert;
 #[cfg(feature = "debug_ui")]
 pub mod debug_ui;
 pub mod diagnostics;
 mod forget;
+mod gap;
 mod gather;
 mod gather_walls;
 #[cfg(feature = "render")]
@@ -156,6 +158,7 @@ pub mod prelude {
         Marble, MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping,
         SleepingDisabled, SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
     };
+    pub use crate::contact_force::ContactForce;
     pub use crate::controller::{Drive, MarbleController};
     #[cfg(feature = "render")]
     pub use crate::gizmos::TawGizmos;

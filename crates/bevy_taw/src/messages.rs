@@ -26,14 +26,15 @@ use bevy::ecs::event::EntityTrigger;
 use bevy::ecs::message::Messages;
 use bevy::ecs::observer::CachedObservers;
 use bevy::prelude::*;
-use taw::contact::{Contact, touch_goes_on};
+use taw::contact::Contact;
 use taw::math::{Vec3 as TawVec3, length};
 use taw::response::Response;
-use taw::world::ColliderId;
 
 use crate::SubstepDelta;
 use crate::components::{MarbleState, WallState};
+use crate::contact_force::{PairImpulses, step_of};
 use crate::convert::{from_point, from_vector};
+use crate::gap::{fall, gap};
 use crate::resources::TawWorld;
 
 /// Slowest hit, in m/s.
@@ -75,8 +76,24 @@ pub struct ContactStarted {
     pub normal: Vec3,
     /// Contact point, in metres in world space.
     pub point: Vec3,
+    /// Sub-shape of a wall: part of a compound, or triangle of a mesh.
+    pub part: u32,
     /// Approach speed of the two along the normal, in m/s. Negative if they were already parting.
     pub approach_speed: f32,
+    /// Speed at which the surfaces slide over each other, in m/s.
+    pub slip_speed: f32,
+    /// Impulse of all contacts of the pair in the step, on `b`, in N s; see [`ContactForce`](crate::prelude::ContactForce) for
+    /// when it is known.
+    pub impulse: Vec3,
+}
+
+impl ContactStarted {
+    /// Contact that goes on, of which nobody reads more than the pair.
+    fn going_on(pair: ContactPair) -> Self {
+        let zero = Vec3::ZERO;
+        let (part, approach_speed, slip_speed) = (0, 0.0, 0.0);
+        Self { pair, normal: zero, point: zero, part, approach_speed, slip_speed, impulse: zero }
+    }
 }
 
 /// Impact of two entities, faster than a resting contact, whether or not they touched before: a marble
@@ -94,16 +111,26 @@ pub struct ContactHit {
     pub normal: Vec3,
     /// Contact point, in metres in world space.
     pub point: Vec3,
+    /// Sub-shape of a wall: part of a compound, or triangle of a mesh.
+    pub part: u32,
     /// Approach speed along the normal, in m/s.
     pub approach_speed: f32,
+    /// Speed at which the surfaces slide over each other, in m/s.
+    pub slip_speed: f32,
+    /// Impulse on `b`, in N s: of the impact by responses that tell of [impacts](taw::world::World::impacts), else of all
+    /// contacts of the pair in the step.
+    pub impulse: Vec3,
 }
 
 /// Two that touched in the last step still do.
-#[derive(Message, Clone, Copy, Debug, PartialEq, Eq, Reflect)]
+#[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct ContactOngoing {
     /// The two entities.
     pub pair: ContactPair,
+    /// Mean force of all contacts of the pair in the step, on `b`, in N; what sleeps keeps it. See
+    /// [`ContactForce`](crate::prelude::ContactForce) for when it is known.
+    pub force: Vec3,
 }
 
 /// Two that touched in the last step no longer do. One of them may be gone, or pass through the other.
@@ -132,19 +159,21 @@ impl ContactPair {
 
 impl ContactEvent for ContactStarted {
     fn swapped(self) -> Self {
-        Self { pair: self.pair.swapped(), normal: -self.normal, ..self }
+        let (normal, impulse) = (-self.normal, -self.impulse);
+        Self { pair: self.pair.swapped(), normal, impulse, ..self }
     }
 }
 
 impl ContactEvent for ContactHit {
     fn swapped(self) -> Self {
-        Self { pair: self.pair.swapped(), normal: -self.normal, ..self }
+        let (normal, impulse) = (-self.normal, -self.impulse);
+        Self { pair: self.pair.swapped(), normal, impulse, ..self }
     }
 }
 
 impl ContactEvent for ContactOngoing {
     fn swapped(self) -> Self {
-        Self { pair: self.pair.swapped() }
+        Self { pair: self.pair.swapped(), force: -self.force }
     }
 }
 
@@ -253,9 +282,11 @@ fn trigger_observed<E: ContactEvent>(world: &mut World, events: &mut Vec<E>) {
 impl Touches {
     /// Notes a touch, and a hit if it is faster than `slowest`, in m/s.
     fn add(&mut self, touch: ContactStarted, slowest: f32) {
-        let ContactStarted { pair, normal, point, approach_speed } = touch;
+        let ContactStarted { pair, normal, point, part, approach_speed, slip_speed, impulse } =
+            touch;
         if approach_speed > slowest.max(SLOWEST_HIT) {
-            self.hits.push(ContactHit { pair, normal, point, approach_speed });
+            let hit = ContactHit { pair, normal, point, part, approach_speed, slip_speed, impulse };
+            self.hits.push(hit);
         }
         self.now.push(touch);
     }
@@ -292,9 +323,24 @@ pub(crate) fn collect(
     let velocity = |row: u32| world.marbles.velocity()[row as usize];
     let point_of =
         |contact: &Contact<f32>| world.marbles.position()[contact.b as usize] + contact.arms[1];
-    let started = |pair: ContactPair, contact: &Contact<f32>, closing: TawVec3<f32>| {
+    let spin = |row: u32| world.marbles.angular_velocity().get(row as usize).copied();
+    let turning = |row: u32, arm: TawVec3<f32>| {
+        spin(row).map_or(Vec3::ZERO, |spin| from_vector(spin).cross(from_vector(arm)))
+    };
+    let started = |pair: ContactPair, contact: &Contact<f32>, closing: TawVec3<f32>, on_wall| {
         let (normal, point) = (from_vector(contact.normal), from_point(point_of(contact)));
-        ContactStarted { pair, normal, point, approach_speed: -from_vector(closing).dot(normal) }
+        let closing = from_vector(closing);
+        let first = if on_wall { Vec3::ZERO } else { turning(contact.a, contact.arms[0]) };
+        let relative = closing + turning(contact.b, contact.arms[1]) - first;
+        ContactStarted {
+            pair,
+            normal,
+            point,
+            part: contact.part,
+            approach_speed: -closing.dot(normal),
+            slip_speed: relative.reject_from_normalized(normal).length(),
+            impulse: Vec3::ZERO, // not solved yet
+        }
     };
     let wall_velocity = |contact: &Contact<f32>| {
         let (row, normal) = (contact.a as usize, contact.normal);
@@ -303,14 +349,14 @@ pub(crate) fn collect(
     for contact in world.contacts.wm.iter().filter(|contact| contact.is_touching()) {
         if let (Some(a), Some(b)) = (world.wall_entity(contact.a), world.marble_entity(contact.b)) {
             let closing = velocity(contact.b) - wall_velocity(contact);
-            touches.add(started(ContactPair { a, b }, contact, closing), slowest);
+            touches.add(started(ContactPair { a, b }, contact, closing, true), slowest);
         }
     }
     for contact in world.contacts.mm.iter().filter(|contact| contact.is_touching()) {
         if let (Some(a), Some(b)) = (world.marble_entity(contact.a), world.marble_entity(contact.b))
         {
             let closing = velocity(contact.b) - velocity(contact.a);
-            let touch = started(ContactPair { a, b }, contact, closing);
+            let touch = started(ContactPair { a, b }, contact, closing, false);
             // Rows move about; the order of entities does not.
             touches.add(if b < a { touch.swapped() } else { touch }, slowest);
         }
@@ -338,7 +384,10 @@ pub(crate) fn collect_impacts(
             pair: ContactPair { a, b },
             normal: from_vector(impact.normal),
             point: from_point(impact.point),
+            part: impact.part,
             approach_speed: impact.approach_speed,
+            slip_speed: length(impact.slip),
+            impulse: from_vector(impact.impulse),
         };
         touches.add(if !impact.on_wall && b < a { touch.swapped() } else { touch }, slowest);
     }
@@ -350,7 +399,7 @@ pub(crate) fn write(
     mut touches: ResMut<Touches>,
     mut readers: Readers,
     world: Res<TawWorld>,
-    delta: Res<SubstepDelta>,
+    (delta, impulses): (Res<SubstepDelta>, Res<PairImpulses>),
     marbles: Query<&MarbleState>,
     walls: Query<&WallState>,
 ) {
@@ -361,14 +410,17 @@ pub(crate) fn write(
     let (started, hits, ongoing, ended) = &mut readers;
     events.hits.append(found);
     keep_fastest(&mut events.hits);
+    for hit in events.hits.iter_mut().filter(|hit| hit.impulse == Vec3::ZERO) {
+        hit.impulse = impulses.of(hit.pair);
+    }
     if let Some(messages) = hits {
         messages.write_batch(events.hits.iter().copied());
     }
     now.extend(before.iter().filter_map(|&pair| {
         let gap = gap(pair, &world, &marbles, &walls)?;
-        let (normal, point) = (Vec3::ZERO, Vec3::ZERO); // read by nobody, as it goes on
-        gap.is_closed(fall).then_some(ContactStarted { pair, normal, point, approach_speed: 0.0 })
+        gap.is_closed(fall).then_some(ContactStarted::going_on(pair))
     }));
+    let per_second = 1.0 / step_of(&world, delta.0);
     // Stable, so that the first substep's touch stands for its pair.
     now.sort_by_key(|touch| touch.pair);
     now.dedup_by_key(|touch| touch.pair);
@@ -378,9 +430,11 @@ pub(crate) fn write(
             tell(ended, &mut events.ended, ContactEnded { pair });
         }
         if last.next_if_eq(&touch.pair).is_some() {
-            tell(ongoing, &mut events.ongoing, ContactOngoing { pair: touch.pair });
+            let (pair, force) = (touch.pair, impulses.of(touch.pair) * per_second);
+            tell(ongoing, &mut events.ongoing, ContactOngoing { pair, force });
         } else {
-            tell(started, &mut events.started, *touch);
+            let impulse = impulses.of(touch.pair);
+            tell(started, &mut events.started, ContactStarted { impulse, ..*touch });
         }
     }
     last.for_each(|pair| tell(ended, &mut events.ended, ContactEnded { pair }));
@@ -406,48 +460,6 @@ fn keep_fastest(hits: &mut Vec<ContactHit>) {
 /// Speed that gravity makes in two times `dt` seconds, in m/s: the largest approach speed of resting contacts.
 fn fastest_rest(world: &TawWorld, dt: f32) -> f32 {
     2.0 * from_vector(world.gravity()).length() * dt
-}
-
-/// Distance that gravity closes in a substep of `dt` seconds, in metres.
-pub(crate) fn fall(world: &TawWorld, dt: f32) -> f32 {
-    from_vector(world.gravity()).length() * dt * dt
-}
-
-/// Separation of two surfaces, and the smaller radius, in metres.
-pub(crate) struct Gap {
-    pub width: f32,
-    pub radius: f32,
-}
-
-impl Gap {
-    /// Returns true if two that touched still do: what rests touches in one step and hovers in the
-    /// next. `fall` is the distance that gravity closes in a substep, in metres.
-    pub(crate) fn is_closed(&self, fall: f32) -> bool {
-        touch_goes_on(self.width, self.radius, fall)
-    }
-}
-
-/// The gap of a pair, or `None` if one of the two is gone or passes through the other.
-pub(crate) fn gap(
-    pair: ContactPair,
-    world: &TawWorld,
-    marbles: &Query<&MarbleState>,
-    walls: &Query<&WallState>,
-) -> Option<Gap> {
-    let id = marbles.get(pair.b).ok()?.id?;
-    let collides = |other| world.may_collide(id, other) == Ok(true);
-    let b = world.marbles.get(id).ok()?;
-    if let Ok(wall) = walls.get(pair.a) {
-        let id = wall.id.filter(|id| collides(ColliderId::Wall(*id)))?;
-        let wall = world.walls.get(id).ok()?;
-        Some(Gap { width: wall.project_point(b.position).distance - b.radius, radius: b.radius })
-    } else {
-        let id = marbles.get(pair.a).ok()?.id;
-        let id = id.filter(|id| collides(ColliderId::Marble(*id)))?;
-        let a = world.marbles.get(id).ok()?;
-        let width = length(b.position - a.position) - a.radius - b.radius;
-        Some(Gap { width, radius: a.radius.min(b.radius) })
-    }
 }
 
 /// Writes a message, and keeps it for observers.

@@ -8,6 +8,7 @@ use crate::components::{
     MarbleDamping, MarbleIntegrator, MarbleMass, MarbleRotation, Sleeping, SleepingDisabled,
     SurfaceMaterial, SurfaceVelocity, Teleport, Velocity,
 };
+use crate::contact_force::{ContactForce, PairImpulses};
 use crate::controller::MarbleController;
 use crate::diagnostics::{self, StepTimes};
 use crate::grounded::Grounded;
@@ -24,7 +25,10 @@ use crate::spatial_query::SpatialTree;
 use crate::swarm::{self, TawSwarmModel};
 use crate::wall::Wall;
 use crate::zones::{GravityZone, WindZone, ZoneGravity};
-use crate::{controller, forget, gather, gather_walls, grounded, scatter, sensor, sleep, zones};
+use crate::{
+    contact_force, controller, forget, gather, gather_walls, grounded, scatter, sensor, sleep,
+    zones,
+};
 
 /// Everything: the physics, interpolation between its steps, and with the feature
 /// `render` the gizmos, and swarms on the screen.
@@ -137,6 +141,7 @@ impl Plugin for TawPlugin {
             .init_resource::<StepTimes>()
             .init_resource::<gather::ChangedMarbles>()
             .init_resource::<Touches>()
+            .init_resource::<PairImpulses>()
             .init_resource::<Told>()
             .init_resource::<SpatialTree>()
             .init_resource::<ZoneGravity>()
@@ -149,7 +154,7 @@ impl Plugin for TawPlugin {
             .register_type::<(MarbleDamping, ExternalForce, ExternalImpulse)>()
             .register_type::<(SurfaceMaterial, MarbleIntegrator, MarbleRotation, HalfLength)>()
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
-            .register_type::<(Grounded, MarbleController, GravityZone, WindZone)>()
+            .register_type::<(Grounded, ContactForce, MarbleController, GravityZone, WindZone)>()
             .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay)>()
             .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity)>();
         diagnostics::register(app);
@@ -255,6 +260,7 @@ fn add_gather(app: &mut App) {
             swarm::gather,
             gather_walls::land,
             gather::finish,
+            contact_force::are_read.pipe(contact_force::set_recording),
         )
             .chain(),
     )
@@ -274,6 +280,9 @@ fn add_scatter(app: &mut App) {
             sensor::scatter,
             sensor::scatter_balls,
             grounded::find.run_if(any_with_component::<Grounded>),
+            contact_force::finish.run_if(contact_force::are_read),
+            contact_force::forget.run_if(not(contact_force::are_read)),
+            contact_force::write.run_if(any_with_component::<ContactForce>),
             messages::write.run_if(messages::are_read),
             messages::forget.run_if(not(messages::are_read)),
             diagnostics::measure,
@@ -300,6 +309,7 @@ fn add_substep(app: &mut App) {
                 .chain()
                 .in_set(TawSystems::Restitute),
             messages::collect_impacts.run_if(messages::are_read).after(TawSystems::Restitute),
+            contact_force::collect.run_if(contact_force::are_read).after(TawSystems::Restitute),
         ),
     );
     app.edit_schedule(Substep, one_by_one);

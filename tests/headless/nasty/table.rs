@@ -63,6 +63,8 @@ pub const TABLE: &[(&str, &str, Takes)] = &[
     ("Transform", ".scale", Takes::All),
     ("Wall", "", Takes::Some),
     ("OneWay", ".0", Takes::Some),
+    ("ContactForce", ".total", Takes::All),
+    ("ContactForce", ".pressure", Takes::All),
     ("Grounded", ".max_slope", Takes::Within(0.0, std::f32::consts::PI)),
     ("MarbleController", ".direction", Takes::Finite),
     ("MarbleController", ".jump_speed", Takes::Finite),
@@ -118,7 +120,7 @@ fn marble(entity: &mut EntityWorldMut) {
         ),
         (GravityScale(1.0), SurfaceMaterial::default(), MarbleDamping::default()),
         (ExternalForce::default(), ExternalImpulse::default(), HalfLength(0.0)),
-        (Grounded::default(), MarbleController::default()),
+        (Grounded::default(), ContactForce::default(), MarbleController::default()),
         Transform::from_xyz(0.0, 1.0, 0.0),
     );
     entity.insert(all);
@@ -145,6 +147,7 @@ const OF_MARBLES: &[&str] = &[
     "ExternalImpulse",
     "HalfLength",
     "Grounded",
+    "ContactForce",
     "MarbleController",
     "Transform",
 ];

@@ -201,7 +201,7 @@ impl<S: Scalar> Swarm<S> {
     }
 
     /// Slot of a ball that is no marble.
-    fn own_slot(&self, ball: BallId) -> Result<u32, Error> {
+    pub(super) fn own_slot(&self, ball: BallId) -> Result<u32, Error> {
         let slot = self.slot_of(ball).ok_or(Error::NoSuchBall(ball))?;
         if self.body_slots.contains(slot) { Err(Error::NoSuchBall(ball)) } else { Ok(slot) }
     }

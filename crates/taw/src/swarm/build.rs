@@ -337,6 +337,7 @@ impl<S: Scalar> Swarm<S> {
             });
             shrink_slack(&mut chunk.wall_contacts);
             chunk.near_shapes.clear();
+            chunk.shapes_are_new = shapes;
             if shapes {
                 walls::near_shapes(walls, balls, chunk.own_rows(), &mut chunk.near_shapes);
             }

@@ -28,6 +28,8 @@ pub(super) struct Chunk<S> {
     /// The rows near half-spaces, and near other walls.
     pub near_planes: Vec<u32>,
     pub near_shapes: Vec<u32>,
+    /// Set while contacts of some of the latter have still to be looked for.
+    pub shapes_are_new: bool,
     /// Set if one near other walls is fast.
     pub has_fast: bool,
     /// Largest speed of a ball, in m/s.
@@ -78,6 +80,7 @@ impl<S: Scalar> Chunk<S> {
             old_wall_contacts,
             near_planes,
             near_shapes,
+            shapes_are_new: _,
             has_fast: _,
             speed: _,
             wall_speed: _,

@@ -234,10 +234,7 @@ impl<S: Scalar> Swarm<S> {
     /// # Errors
     /// [`Error::NoSuchBall`], also for one that is listed twice, and for a marble's.
     pub fn remove(&mut self, balls: &[BallId]) -> Result<(), Error> {
-        let is_marble = |id: &&BallId| self.row(**id).is_ok_and(|row| self.is_marble(row));
-        if let Some(id) = balls.iter().find(is_marble).filter(|_| self.bodies_are_rows) {
-            return Err(Error::NoSuchBall(*id));
-        }
+        balls.iter().try_for_each(|ball| self.own_slot(*ball).map(|_| ()))?;
         self.take_out(balls)
     }
 
@@ -256,6 +253,7 @@ impl<S: Scalar> Swarm<S> {
         for ball in balls {
             if let Some(slot) = self.slot_of(*ball) {
                 self.forget_settings(slot);
+                self.body_slots.remove(slot);
             }
         }
         let kept = self.ids.remove_many(balls.iter().map(|ball| ball.0));
@@ -351,8 +349,9 @@ impl<S: Scalar> Swarm<S> {
     /// Sets the position of a ball (teleports it), in metres, and wakes it.
     ///
     /// # Errors
-    /// [`Error::NoSuchBall`], [`Error::NotFinite`], [`Error::OutOfRange`].
+    /// [`Error::NoSuchBall`], also for a marble's, [`Error::NotFinite`], [`Error::OutOfRange`].
     pub fn set_position(&mut self, ball: BallId, position: Point3<S>) -> Result<(), Error> {
+        self.own_slot(ball)?;
         let (row, position) = (self.row(ball)?, validated_position(position)?);
         self.wake(row);
         self.at[row] = pack_row(position.to_vec(), self.at[row][3]);
@@ -364,8 +363,9 @@ impl<S: Scalar> Swarm<S> {
     /// Sets the velocity of a ball, in m/s, and wakes it and those around.
     ///
     /// # Errors
-    /// [`Error::NoSuchBall`], [`Error::NotFinite`], [`Error::OutOfRange`].
+    /// [`Error::NoSuchBall`], also for a marble's, [`Error::NotFinite`], [`Error::OutOfRange`].
     pub fn set_velocity(&mut self, ball: BallId, velocity: Vec3<S>) -> Result<(), Error> {
+        self.own_slot(ball)?;
         let (row, velocity) = (self.row(ball)?, validated_velocity(velocity)?);
         self.wake(row);
         self.velocity[row] = pack_row(velocity, self.velocity[row][3]);

@@ -30,7 +30,7 @@ impl<S> Default for RecordedImpulses<S> {
 #[derive(Clone, Debug)]
 pub(crate) struct ImpulseSums<K, S> {
     list: Vec<(K, Vec3<S>)>,
-    /// Place at which the next contact is sought first: contacts come in the order of the substep before.
+    /// Place at which the next contact is sought first: contacts come in the order of the time before.
     next: usize,
 }
 
@@ -55,7 +55,7 @@ impl<K: PartialEq, S: Scalar> ImpulseSums<K, S> {
         }
     }
 
-    /// Begins a substep.
+    /// Begins to add the impulses of all contacts.
     fn begin(&mut self) {
         self.next = 0;
     }
@@ -87,24 +87,28 @@ impl<S: Scalar> Swarm<S> {
         self.scratch.recorded_impulses.take()
     }
 
-    /// Records the impulses that contacts have accumulated in a substep.
-    pub(super) fn record_substep_impulses(&mut self) {
+    /// Records the impulses that contacts have accumulated in a substep along the normals that they have
+    /// now, times a factor.
+    pub(super) fn record_contact_impulses(&mut self, factor: S) {
         let Some(mut recorded) = self.scratch.recorded_impulses.take() else { return };
         recorded.pairs.begin();
         recorded.with_walls.begin();
         for chunk in &self.chunks {
-            self.record_pairs(&chunk.batches, &chunk.impulses, &mut recorded.pairs);
+            self.record_pairs(&chunk.batches, &chunk.impulses, factor, &mut recorded.pairs);
         }
         let FastMovers { batches, impulses, .. } = &self.fast_movers;
-        self.record_pairs(batches, impulses, &mut recorded.pairs);
+        self.record_pairs(batches, impulses, factor, &mut recorded.pairs);
         let slots = self.ids.slots();
         for contact in self.chunks.iter().flat_map(|chunk| &chunk.wall_contacts) {
-            let normal = contact.impulse.normal + contact.borne_for_others;
-            let awake = self.velocity[contact.row as usize][3].is_sign_positive();
+            let row = contact.row as usize;
+            let backing = self.scratch.backing.get(row);
+            let borne = backing.map_or(S::zero(), |backing| contact.share_of(backing));
+            let normal = contact.impulse.normal + borne;
+            let awake = self.velocity[row][3].is_sign_positive();
             if normal > S::zero() && awake {
                 let impulse = contact.normal * normal + contact.impulse.tangent;
-                let key = [contact.wall, contact.part, slots[contact.row as usize]];
-                recorded.with_walls.add(key, impulse);
+                let key = [contact.wall, contact.part, slots[row]];
+                recorded.with_walls.add(key, impulse * factor);
             }
         }
         self.scratch.recorded_impulses = Some(recorded);
@@ -114,6 +118,7 @@ impl<S: Scalar> Swarm<S> {
         &self,
         batches: &[Batch],
         impulses: &ContactImpulses<S>,
+        factor: S,
         sums: &mut ImpulseSums<[u32; 2], S>,
     ) {
         let slots = self.ids.slots();
@@ -127,7 +132,7 @@ impl<S: Scalar> Swarm<S> {
                     let along = if distance > S::zero() { apart / distance } else { apart };
                     let [x, y, z] = [0, 1, 2].map(|axis| tangent_impulse[axis][lane]);
                     let impulse = along * normal_impulse[lane] + Vec3::new(x, y, z);
-                    sums.add([slots[a as usize], slots[b as usize]], impulse);
+                    sums.add([slots[a as usize], slots[b as usize]], impulse * factor);
                 }
             }
         }

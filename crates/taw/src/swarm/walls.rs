@@ -236,19 +236,20 @@ impl<S: Scalar> Chunk<S> {
         };
         self.wall_contacts.extend(old.iter().filter(kept));
         self.has_fast = false;
+        // Of slow balls that came near a shape, the contacts that are not known yet.
+        let adds_new = std::mem::take(&mut self.shapes_are_new) && only_fast;
         for row in self.near_shapes.iter().filter(|row| !sleeps(**row)) {
             let (displacement, filter) = (query.displacement(*row), query.surfaces.filter(*row));
             let ball = &query.ball(*row, displacement);
             let is_outrun = query.is_outrun(walls, *row);
-            if only_fast && displacement.is_none() && !is_outrun {
+            let is_slow = displacement.is_none() && !is_outrun;
+            if only_fast && is_slow && !adds_new {
                 continue;
             }
             self.has_fast |= is_outrun || displacement.is_some();
-            let first = self.wall_contacts.len();
-            let wall_contacts = &mut self.wall_contacts;
+            let (first, wall_contacts) = (self.wall_contacts.len(), &mut self.wall_contacts);
             let mut visit = |ball: &Row<S>, [wall, part]: [u32; 2], normal: Vec3<S>, distance| {
-                let named = wall_contacts[first..].iter();
-                if named.into_iter().any(|contact| [contact.wall, contact.part] == [wall, part]) {
+                if wall_contacts[first..].iter().any(|it| [it.wall, it.part] == [wall, part]) {
                     return;
                 }
                 let numbers = WallNumbers::new(query.surfaces.row(*row), walls.material(wall));
@@ -256,6 +257,9 @@ impl<S: Scalar> Chunk<S> {
                 let mut contact = WallContact::new(*row, [wall, part], normal, offset, numbers);
                 contact.is_plane = false;
                 if let Some(same) = find(old, &contact) {
+                    if only_fast && is_slow {
+                        return; // it is kept
+                    }
                     contact.restore(same);
                 }
                 wall_contacts.push(contact);

@@ -32,7 +32,8 @@ impl<S: Scalar> StoredPoses<S> {
 
     /// Restores the stored pose of a marble where the current one is not finite.
     fn restore(&self, marbles: &mut Marbles<S>, row: usize) {
-        let position = self.position.get(row).filter(|_| self.removals == marbles.removals());
+        let is_known = self.removals == marbles.removals();
+        let position = self.position.get(row).filter(|_| is_known);
         if !is_finite_point(marbles.position[row]) {
             marbles.position[row] =
                 position.copied().unwrap_or_else(|| Point3::from([S::zero(); 3]));
@@ -43,7 +44,8 @@ impl<S: Scalar> StoredPoses<S> {
         if let Some(rotation) = marbles.rotation.get_mut(row)
             && !(rotation.s.is_finite() && is_finite(rotation.v))
         {
-            *rotation = self.rotation.get(row).copied().unwrap_or_else(Quat::one);
+            let known = self.rotation.get(row).filter(|_| is_known);
+            *rotation = known.copied().unwrap_or_else(Quat::one);
         }
     }
 }

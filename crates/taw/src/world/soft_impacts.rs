@@ -1,6 +1,8 @@
 //! Impacts within a step of [`Response::SoftStep`](crate::response::Response::SoftStep): contacts
 //! that begin while it is solved, and may end in it, too.
 
+use std::collections::HashSet;
+
 use cgmath::{InnerSpace, Zero};
 
 use super::World;
@@ -64,6 +66,25 @@ const CONFIRMING: f64 = 1e-3;
 const ROUNDING: f64 = 1e-3;
 /// Roundings of a speed in a step: together a part in a million in `f32`, 1e-6 · 2²³.
 const SPEED_ROUNDINGS: f64 = 8.388_608;
+
+/// Drops those of the last list, of fast movers, that a chunk lists, too: such a pair is solved twice, and
+/// is one contact.
+pub(super) fn drop_listed_twice<S: Scalar>(lists: &mut [ChunkContacts<S>], marbles: usize) {
+    let Some((of_movers, of_chunks)) = lists.split_last_mut() else { return };
+    if of_movers.contacts.mm.is_empty() {
+        return;
+    }
+    let mut is_first = vec![false; marbles];
+    for contact in &of_movers.contacts.mm {
+        is_first[contact.a as usize] = true;
+    }
+    let of_chunks = of_chunks.iter().flat_map(|list| &list.contacts.mm);
+    let listed = of_chunks.filter(|contact| is_first[contact.a as usize]);
+    let listed: HashSet<_> = listed.map(|contact| (contact.a, contact.b)).collect();
+    of_movers.contacts.mm.retain(|contact| !listed.contains(&(contact.a, contact.b)));
+    let is_new = |it: &PredictedImpact<S>| !listed.contains(&(it.impact.a, it.impact.b));
+    of_movers.predicted[1].retain(is_new);
+}
 
 /// Identity of the two that meet.
 fn pair_of<S>(impact: &Impact<S>) -> (bool, u32, u32) {

@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 use cgmath::{EuclideanSpace, Zero};
 
 use super::method::{Method, SleepUnit};
-use super::soft_impacts::{ChunkContacts, PredictedImpacts};
+use super::soft_impacts::{ChunkContacts, PredictedImpacts, drop_listed_twice};
 use super::swarm::clamped_row;
 use super::swept_walls::SweptWalls;
 use super::{MarbleId, World};
@@ -151,6 +151,7 @@ impl<S: Scalar> World<S> {
             self.set_materials(&mut list.contacts);
             self.predict_impacts(list, &moving, dt);
         });
+        drop_listed_twice(&mut lists, self.marbles.len());
         let threads = self.swarm.threads();
         append_all(threads, lists.iter().map(|list| &list.contacts.wm[..]), &mut self.contacts.wm);
         append_all(threads, lists.iter().map(|list| &list.contacts.mm[..]), &mut self.contacts.mm);

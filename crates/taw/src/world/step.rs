@@ -25,10 +25,12 @@ impl<S: Scalar> World<S> {
     /// or balls of the swarm at one point on. Then nothing has changed.
     pub fn step(&mut self, dt: S) -> Result<(), Error> {
         let substep = self.validated_substep(dt)?;
+        self.check_shapes()?;
+        self.check_crowding()?;
         self.begin_step();
         for after in (0..self.settings.model.passes()).rev() {
             self.begin_substep(substep * S::from_f64(f64::from(after)));
-            self.integrate(substep)?;
+            self.integrate_checked(substep)?;
             self.generate_contacts();
             self.restitute(substep)?;
         }
@@ -48,6 +50,11 @@ impl<S: Scalar> World<S> {
         let dt = Self::validated_dt(dt)?;
         self.check_shapes()?;
         self.check_crowding()?;
+        self.integrate_checked(dt)
+    }
+
+    /// See [`World::integrate`].
+    fn integrate_checked(&mut self, dt: S) -> Result<(), Error> {
         self.decide_one_way(dt);
         self.find_ignored_rows();
         self.sensors.begin_substep(&self.marbles);

@@ -38,8 +38,8 @@ pub struct Walls<S> {
     pub(super) one_way: SparseColumn<Vec3<S>>,
     /// Walls that were set to another pose since the last step.
     moved: SparseColumn<()>,
-    /// Final shapes and motions, by index, of walls on their way through a step.
-    ends: Uncompared<Vec<(usize, WallShape<S>, WallMotion<S>)>>,
+    /// Final shapes and motions of walls on their way through a step.
+    ends: Uncompared<Vec<(WallId, WallShape<S>, WallMotion<S>)>>,
     /// Bounding boxes of all walls except half-spaces, and their sub-shapes.
     boxes: Uncompared<Vec<Aabb3<S>>>,
     sub_shapes: Uncompared<Vec<SubShape>>,
@@ -126,6 +126,7 @@ impl<S: Scalar> Walls<S> {
             count
         };
         let same = parts(&shape) == parts(&self.shapes[row]);
+        self.leave_way(id);
         if shape.is_same(&self.shapes[row]) {
             return Ok(());
         }
@@ -272,6 +273,14 @@ impl<S: Scalar> Walls<S> {
         if self.motion.get(row) != motion {
             self.mark_changed(row);
         }
+        if let Some(way) = self.ends.iter().position(|(other, ..)| *other == id) {
+            if let Some(motion) = motion {
+                self.ends[way].2 = motion;
+            } else {
+                self.shapes[row] = self.ends.remove(way).1;
+                *self.dirty = self.dirty.max(Dirty::Poses);
+            }
+        }
         self.motion.set(row, motion, self.shapes.len());
         Ok(())
     }
@@ -357,21 +366,28 @@ impl<S: Scalar> Walls<S> {
     pub(super) fn interpolate_to(&mut self, left: S) {
         if self.ends.is_empty() && left > S::zero() {
             let rows = (0..self.shapes.len()).filter(|row| self.moved.get(*row).is_some());
-            let ends =
-                rows.filter_map(|row| Some((row, self.shapes[row].clone(), self.motion.get(row)?)));
+            let ends = rows.filter_map(|row| {
+                Some((self.id(row)?, self.shapes[row].clone(), self.motion.get(row)?))
+            });
             *self.ends = ends.collect();
         }
-        for (row, end, motion) in self.ends.iter() {
+        for (id, end, motion) in self.ends.iter() {
+            let Some(row) = self.handles.row(id.0) else { continue };
             // An invalid pose is skipped.
             let on_its_way =
                 || end.transformed(motion.pose_before(left)).and_then(WallShape::validated).ok();
             let shape = if left > S::zero() { on_its_way() } else { None };
-            self.shapes[*row] = shape.unwrap_or_else(|| end.clone());
+            self.shapes[row] = shape.unwrap_or_else(|| end.clone());
             let pivot = Some(motion.pivot - motion.velocity * left).filter(|p| is_finite_point(*p));
             let pivot = pivot.unwrap_or(motion.pivot);
-            self.motion.set(*row, Some(WallMotion { pivot, ..*motion }), self.shapes.len());
+            self.motion.set(row, Some(WallMotion { pivot, ..*motion }), self.shapes.len());
             *self.dirty = self.dirty.max(Dirty::Poses);
         }
+    }
+
+    /// Takes a wall that is set within a step off its way: it stays as it is set.
+    fn leave_way(&mut self, id: WallId) {
+        self.ends.retain(|(other, ..)| *other != id);
     }
 
     /// Moves walls back to their final poses, and forgets these.

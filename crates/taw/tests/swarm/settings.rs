@@ -291,3 +291,35 @@ fn marbles_beside_balls_of_the_lab_become_soft_between_two_steps() {
         assert!(world.marbles.position()[0].y < 0.0, "{response:?}");
     }
 }
+
+/// Balls of the swarm that stand for marbles belong to these; and their slots are given out again as those of
+/// any ball.
+#[test]
+fn a_marbles_ball_is_the_marbles() {
+    for response in [Response::SoftStep, Response::Impulse] {
+        let mut world = world(Tier::Full, 1);
+        world.set_model(Model { response, ..Model::default() }).unwrap();
+        let marble = world.marbles.insert(Marble::new(Point3::new(0.0, 3.0, 0.0), 0.5)).unwrap();
+        let own = world.swarm.insert(&[ball([5.0, 3.0, 0.0], [0.0; 3])]).unwrap()[0];
+        steps(&mut world, 1);
+        let is_marble = |row: &usize| world.swarm.is_marble(*row);
+        let row = (0..world.swarm.len()).find(is_marble).unwrap();
+        let of_marble = world.swarm.id(row).unwrap();
+        let before = world.clone();
+        let refused = Err(Error::NoSuchBall(of_marble));
+        assert_eq!(world.swarm.remove(&[of_marble]), refused, "{response:?}");
+        assert_eq!(world.swarm.remove(&[own, of_marble]), refused);
+        assert_eq!(world.swarm.set_position(of_marble, Point3::new(0.0, 9.0, 0.0)), refused);
+        assert_eq!(world.swarm.set_velocity(of_marble, Vec3::unit_x()), refused);
+        assert!(world == before);
+        // Slots of both are free again.
+        world.swarm.remove(&[own]).unwrap();
+        let _ = world.marbles.remove(marble).unwrap();
+        steps(&mut world, 1);
+        let new = [ball([5.0, 3.0, 0.0], [0.0; 3]), ball([7.0, 3.0, 0.0], [0.0; 3])];
+        for id in world.swarm.insert(&new).unwrap() {
+            assert!(!world.swarm.is_marble(world.swarm.row(id).unwrap()), "{response:?}");
+            world.swarm.set_gravity_scale(id, 0.0).unwrap();
+        }
+    }
+}

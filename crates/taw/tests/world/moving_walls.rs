@@ -5,7 +5,7 @@ use taw::frame::Pose;
 use taw::math::{Quat, Scalar};
 use taw::motion::integrate_rotation;
 use taw::prelude::*;
-use taw::shape::{Mesh, Obb};
+use taw::shape::{Aabb, Mesh, Obb, Shape};
 use taw::world::WallMotion;
 
 const DT: f64 = 1.0 / 60.0;
@@ -292,4 +292,69 @@ fn sweep_up<S: Scalar>(run: u64) -> Result<(), String> {
 #[test]
 fn a_plate_at_any_speed_passes_through_no_crowd() {
     all_right((0..600).flat_map(|run| [sweep_up::<f64>(run), sweep_up::<f32>(run)]));
+}
+
+/// Walls that come, go or are set between the substeps of a step, whose verbs are called one by one, are
+/// what they were set to: another one on its way lends them nothing.
+#[test]
+fn walls_change_between_substeps() {
+    let block =
+        |x: f32| Aabb { min: Point3::new(x, 5.0, -1.0), max: Point3::new(x + 2.0, 5.2, 1.0) };
+    let motion = WallMotion {
+        velocity: Vec3::unit_x() * 50.0,
+        angular_velocity: Vec3::new(0.0, 0.0, 0.0),
+        pivot: Point3::new(0.0, 0.0, 0.0),
+    };
+    let responses = [Response::SoftStep, Response::Impulse, Response::Displacement];
+    for (response, change) in
+        responses.into_iter().flat_map(|it| [(it, 0), (it, 1), (it, 2), (it, 3)])
+    {
+        let mut world = World::<f32>::default();
+        world.set_model(Model { response, ..Model::default() }).unwrap();
+        let [first, second] = [0.0, 10.0].map(|x| world.walls.insert(block(x)).unwrap());
+        world.step(0.02).unwrap();
+        for (wall, x) in [(first, 1.0), (second, 11.0)] {
+            world.walls.set(wall, block(x)).unwrap();
+            world.walls.set_motion(wall, Some(motion)).unwrap();
+        }
+        world.begin_step();
+        world.begin_substep(0.01);
+        world.integrate(0.01).unwrap();
+        let mut new = None;
+        match change {
+            0 => drop(world.walls.remove(first).unwrap()),
+            1 => {
+                world.walls.remove(first).unwrap();
+                new = Some(
+                    world
+                        .walls
+                        .insert(Sphere::new(Point3::new(0.0, 9.0, 0.0), 1.0).unwrap())
+                        .unwrap(),
+                );
+            }
+            2 => world.walls.set(first, block(-7.0)).unwrap(),
+            _ => world.walls.set_motion(first, None).unwrap(),
+        }
+        world.generate_contacts();
+        world.restitute(0.01).unwrap();
+        world.begin_substep(0.0);
+        world.integrate(0.01).unwrap();
+        world.generate_contacts();
+        world.restitute(0.01).unwrap();
+        world.end_step();
+        let is_block = |id: WallId, x: f32| matches!(world.walls.get(id), Ok(WallShape::Solid(Shape::Aabb(it))) if *it == block(x));
+        assert!(is_block(second, 11.0), "{response:?} {change}");
+        match change {
+            0 => assert!(world.walls.get(first).is_err()),
+            1 => {
+                let shape = world.walls.get(new.unwrap()).unwrap();
+                assert!(matches!(shape, WallShape::Solid(Shape::Sphere(_))), "{response:?}");
+            }
+            2 => assert!(is_block(first, -7.0), "{response:?}"),
+            _ => {
+                assert!(is_block(first, 1.0), "{response:?}");
+                assert_eq!(world.walls.motion(first), Ok(None));
+            }
+        }
+    }
 }

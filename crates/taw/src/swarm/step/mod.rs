@@ -225,6 +225,7 @@ impl<S: Scalar> Swarm<S> {
             self.pass(Pass::WarmStart(params), |_, _| true);
             self.pass(Pass::Solve(params), |_, _| true);
             self.solve_unconverged(&params);
+            self.record_contact_impulses(S::one());
             observe(Stage::Integrate);
             self.end_swift_paths([dt, h, left], walls, observe);
             self.save_proxies();
@@ -243,9 +244,8 @@ impl<S: Scalar> Swarm<S> {
                 self.update_wall_contacts(walls, left, times, |chunk| chunk.caught, true);
             }
             observe(Stage::Restitute);
-            self.relax(params);
+            self.relax_recorded(params);
             self.record_borne();
-            self.record_substep_impulses();
             self.forget_impacts();
             self.keep_out(walls, [before, left]);
             self.follow_kinematic_paths(parts[1], dt);

@@ -8,13 +8,20 @@ use crate::swarm::chunk::Chunk;
 use crate::swarm::kernels::{Pass, SolverParams};
 
 impl<S: Scalar> Swarm<S> {
+    /// Relaxes, and records what that changes, along the normals of now.
+    pub(super) fn relax_recorded(&mut self, params: SolverParams<S>) {
+        self.record_contact_impulses(-S::one());
+        self.relax(params);
+        self.record_contact_impulses(S::one());
+    }
+
     /// Takes the speed back by which overlaps were pushed out, and moves apart what overlaps too much.
     ///
     /// A ball between two others that walls press together is thrown out sideways by their pushes. One
     /// pass over the contacts takes back little of that: each undoes what the ones before it did. Each
     /// lowers the kinetic energy (projected Gauss–Seidel on rigid contacts is a descent), so chunks that are
     /// jammed are relaxed until their contacts agree.
-    pub(super) fn relax(&mut self, params: SolverParams<S>) {
+    fn relax(&mut self, params: SolverParams<S>) {
         self.pass(Pass::Relax(params), |_, _| true);
         // Nothing is moved apart twice in a substep.
         let stays = SolverParams { moves_apart: false, ..params };

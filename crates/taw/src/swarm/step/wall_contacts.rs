@@ -89,6 +89,7 @@ impl<S: Scalar> Swarm<S> {
                 find(&old, contact).copied()
             });
             chunk.near_shapes.clear();
+            chunk.shapes_are_new = shapes;
             if shapes {
                 near_shapes(walls, balls, chunk.own_rows(), &mut chunk.near_shapes);
             }
@@ -126,6 +127,7 @@ impl<S: Scalar> Swarm<S> {
                     let row = *row as usize;
                     near_shapes(walls, balls, row..row + 1, &mut chunk.near_shapes);
                 }
+                chunk.shapes_are_new = true;
                 chunk.near_shapes.sort_unstable();
                 chunk.near_shapes.dedup();
             }
@@ -188,8 +190,8 @@ impl<S: Scalar> Swarm<S> {
         self.chunks.iter().any(|chunk| chunk.caught)
     }
 
-    /// Finds the contacts of fast balls with all that they may meet in the step of `dt` seconds, and of
-    /// all if walls moved. (The solver finds them anew in each substep, and more exactly.)
+    /// Finds the contacts of fast balls with all that they may meet in the step of `dt` seconds, of those
+    /// that came near a shape, and of all if walls moved. (The solver finds them anew in each substep, and more exactly.)
     pub(in crate::swarm) fn update_contacts_on_the_way(
         &mut self,
         walls: &dyn StaticGeometry<S>,

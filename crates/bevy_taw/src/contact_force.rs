@@ -1,0 +1,177 @@
+//! Forces of contacts: what a wall or a marble bears, and what contact messages say.
+
+use std::collections::BTreeMap;
+
+use bevy::prelude::*;
+use taw::math::Vec3 as TawVec3;
+use taw::prelude::{InnerSpace as _, Zero as _};
+use taw::response::Response;
+
+use crate::SubstepDelta;
+use crate::components::MarbleState;
+use crate::convert::from_vector;
+use crate::messages::{self, ContactPair};
+use crate::resources::TawWorld;
+
+/// Force that contacts exert on a wall or a marble, in N: add it to those of which you want to know it, a
+/// button or a scale. Updated after each step; what sleeps keeps its force.
+///
+/// Known where marbles touch, by `SoftStep`, `Impulse` and `Penalty`; zero by `Displacement`, which has no
+/// masses, and by `EventDriven`, except for impacts. Of balls of swarms, only what they press on marbles counts in
+/// the motion of these, not here.
+///
+/// ```
+/// # use bevy::prelude::*;
+/// # use bevy_taw::prelude::*;
+/// # #[derive(Component)]
+/// # struct Button;
+/// fn press(buttons: Query<&ContactForce, With<Button>>) {
+///     for force in &buttons {
+///         if force.pressure > 50.0 {
+///             println!("pressed with {} N", force.pressure);
+///         }
+///     }
+/// }
+/// ```
+#[derive(Component, Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Component, Debug, Default, PartialEq)]
+pub struct ContactForce {
+    /// Sum of the forces of all contacts, friction included: their impulses in the last step over its
+    /// time.
+    pub total: Vec3,
+    /// Sum of the magnitudes of the normal forces: not zero for a marble that is squeezed from both sides.
+    pub pressure: f32,
+}
+
+/// Impulse of the contacts of a pair, on its second entity, in N s.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct PairImpulse {
+    pub impulse: Vec3,
+    /// Sum of the magnitudes of the normal impulses.
+    normal: f32,
+}
+
+/// Impulses of the contacts of this step.
+#[derive(Resource, Default)]
+pub(crate) struct PairImpulses {
+    /// Of this step so far, several to a pair if there are several contacts or substeps.
+    now: Vec<(ContactPair, PairImpulse)>,
+    /// Of the last step, sorted, one to a pair.
+    list: Vec<(ContactPair, PairImpulse)>,
+    /// Number of this step's impacts already noted.
+    impacts: usize,
+}
+
+impl PairImpulses {
+    /// Impulse of a pair in the last step, on its second entity.
+    pub fn of(&self, pair: ContactPair) -> Vec3 {
+        let found = self.list.binary_search_by_key(&pair, |(pair, _)| *pair);
+        found.map_or(Vec3::ZERO, |at| self.list[at].1.impulse)
+    }
+}
+
+/// Tells if somebody reads impulses of contacts.
+pub(crate) fn are_read(world: &World, forces: Query<(), With<ContactForce>>) -> bool {
+    !forces.is_empty() || messages::are_read(world)
+}
+
+/// Lets the next step record impulses, if somebody reads them.
+pub(crate) fn set_recording(In(are_read): In<bool>, mut world: ResMut<TawWorld>) {
+    if world.records_impulses() != are_read {
+        world.set_records_impulses(are_read);
+    }
+}
+
+/// Notes the impulses of a substep after it is solved.
+pub(crate) fn collect(world: Res<TawWorld>, mut impulses: ResMut<PairImpulses>) {
+    let PairImpulses { now, impacts, .. } = &mut *impulses;
+    let mut add = |on_wall: bool, rows: [u32; 2], impulse: TawVec3<f32>, normal: f32| {
+        let first = if on_wall { TawWorld::wall_entity } else { TawWorld::marble_entity };
+        let (a, b) = (first(&world, rows[0]), world.marble_entity(rows[1]));
+        let (Some(a), Some(b), true) = (a, b, impulse != TawVec3::zero()) else { return };
+        let (impulse, normal) = (from_vector(impulse), normal.abs());
+        // Rows move about; the order of entities does not.
+        let turned = !on_wall && b < a;
+        let pair = if turned { ContactPair { a: b, b: a } } else { ContactPair { a, b } };
+        let impulse = if turned { -impulse } else { impulse };
+        now.push((pair, PairImpulse { impulse, normal }));
+    };
+    for c in &world.contacts.wm {
+        add(true, [c.a, c.b], c.impulse(), c.normal_impulse);
+    }
+    for c in &world.contacts.mm {
+        add(false, [c.a, c.b], c.impulse(), c.normal_impulse);
+    }
+    // Its contacts are those at the begin, and have no impulses; by the others, contacts have those of impacts.
+    if world.model().response == Response::EventDriven {
+        for it in world.impacts().iter().skip(*impacts) {
+            add(it.on_wall, [it.a, it.b], it.impulse, it.impulse.dot(it.normal));
+        }
+    }
+    *impacts = world.impacts().len();
+}
+
+/// Sums the impulses of a step by pairs. Contacts of what sleeps are not listed: they keep theirs.
+pub(crate) fn finish(
+    world: Res<TawWorld>,
+    mut impulses: ResMut<PairImpulses>,
+    marbles: Query<&MarbleState>,
+) {
+    let PairImpulses { now, list, impacts } = &mut *impulses;
+    *impacts = 0;
+    let sleeps = |entity: Entity| {
+        let id = marbles.get(entity).ok().map(|state| state.id);
+        // A wall does as if it slept.
+        id.is_none_or(|id| id.is_some_and(|id| world.is_asleep(id) == Ok(true)))
+    };
+    now.sort_by_key(|(pair, _)| *pair);
+    now.dedup_by(|(pair, impulse), (kept, sum)| {
+        let same = pair == kept;
+        if same {
+            sum.impulse += impulse.impulse;
+            sum.normal += impulse.normal;
+        }
+        same
+    });
+    let awake = now.len();
+    let is_new =
+        |pair: &ContactPair| now[..awake].binary_search_by_key(pair, |(pair, _)| *pair).is_err();
+    list.retain(|(pair, _)| {
+        is_new(pair) && marbles.contains(pair.b) && sleeps(pair.b) && sleeps(pair.a)
+    });
+    list.append(now);
+    list.sort_by_key(|(pair, _)| *pair);
+}
+
+/// Forgets the impulses while nobody reads them.
+pub(crate) fn forget(mut impulses: ResMut<PairImpulses>) {
+    impulses.now.clear();
+    impulses.list.clear();
+}
+
+/// Writes what walls and marbles bear.
+pub(crate) fn write(
+    world: Res<TawWorld>,
+    (delta, impulses): (Res<SubstepDelta>, Res<PairImpulses>),
+    mut forces: Query<(Entity, &mut ContactForce)>,
+) {
+    let per_second = 1.0 / step_of(&world, delta.0);
+    let mut sums: BTreeMap<Entity, ContactForce> = BTreeMap::new();
+    for (ContactPair { a, b }, PairImpulse { impulse, normal }) in &impulses.list {
+        for (entity, impulse) in [(*a, -*impulse), (*b, *impulse)] {
+            if forces.contains(entity) {
+                let sum = sums.entry(entity).or_default();
+                sum.total += impulse * per_second;
+                sum.pressure += normal * per_second;
+            }
+        }
+    }
+    for (entity, mut written) in &mut forces {
+        written.set_if_neq(sums.get(&entity).copied().unwrap_or_default());
+    }
+}
+
+/// Length of a step, of which substeps take `dt` seconds each.
+pub(crate) fn step_of(world: &TawWorld, dt: f32) -> f32 {
+    dt * world.model().passes() as f32
+}

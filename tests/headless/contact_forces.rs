@@ -1,0 +1,110 @@
+//! Forces of contacts: on components, and in messages.
+
+use bevy::ecs::message::Messages;
+use bevy::prelude::*;
+use bevy_taw::prelude::*;
+use taw::response::{ContactLaw, Response};
+
+use crate::scene;
+
+/// Weight of a marble of glass, in N.
+fn weight(app: &App, marble: Entity) -> f32 {
+    let radius = app.world().get::<Marble>(marble).unwrap().radius;
+    taw::world::Mass::<f32>::default().of(radius) * 9.81
+}
+
+fn force(app: &App, entity: Entity) -> ContactForce {
+    *app.world().get::<ContactForce>(entity).unwrap()
+}
+
+/// A scale reads the weight of what lies on it, awake and asleep, and nothing when it is gone.
+#[test]
+fn a_floor_bears_the_weight_of_a_stack() {
+    let penalty = Response::Penalty(ContactLaw::SpringDashpot);
+    for response in [Response::SoftStep, Response::Impulse, penalty] {
+        let mut app = scene::app();
+        let detection = taw::world::Detection::Discrete;
+        *app.world_mut().resource_mut::<TawModel>() =
+            TawModel(Model { response, detection, ..Model::GAME });
+        let floor = scene::floor(&mut app);
+        app.world_mut().entity_mut(floor).insert(ContactForce::default());
+        let lower = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
+        let upper = scene::drop_marble(&mut app, 0.25, Vec3::Y * 1.25);
+        app.world_mut().entity_mut(lower).insert(ContactForce::default());
+        scene::frames(&mut app, 20);
+        for frames in [0, 100] {
+            scene::frames(&mut app, frames);
+            let both = weight(&app, lower) + weight(&app, upper);
+            let ContactForce { total, pressure } = force(&app, floor);
+            assert!((total.y / -both - 1.0).abs() < 0.02, "{response:?}: {total} {both}");
+            assert!((pressure / both - 1.0).abs() < 0.02, "{response:?}: {pressure} {both}");
+            // From below by both weights, from above by one.
+            let of_lower = force(&app, lower);
+            assert!((of_lower.total.y / weight(&app, lower) - 1.0).abs() < 0.05, "{of_lower:?}");
+            let squeezed = both + weight(&app, upper);
+            assert!((of_lower.pressure / squeezed - 1.0).abs() < 0.02, "{of_lower:?}");
+        }
+        if response != penalty {
+            assert!(app.world().get::<Sleeping>(lower).is_some(), "{response:?}");
+        }
+        app.world_mut().despawn(lower);
+        app.world_mut().despawn(upper);
+        scene::frames(&mut app, 2);
+        assert_eq!(force(&app, floor), ContactForce::default(), "{response:?}");
+    }
+}
+
+#[derive(Resource, Default)]
+struct Forces(Vec<f32>);
+
+/// Messages tell the force of what goes on, and the impulse of a hit: momentum before and after.
+#[test]
+fn messages_have_impulses_and_forces() {
+    for response in [Response::SoftStep, Response::Impulse, Response::EventDriven] {
+        let mut app = scene::app();
+        let keep = |ongoing: On<ContactOngoing>, mut forces: ResMut<Forces>| {
+            forces.0.push(ongoing.force.y);
+        };
+        app.add_message::<ContactHit>().init_resource::<Forces>();
+        *app.world_mut().resource_mut::<TawModel>() = TawModel(Model { response, ..Model::GAME });
+        let floor = scene::floor(&mut app);
+        let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 2.5);
+        let bouncy = SurfaceMaterial { restitution: 0.5, ..default() };
+        app.world_mut().entity_mut(marble).insert(bouncy);
+        app.world_mut().entity_mut(floor).observe(keep);
+        let mut hits = Vec::new();
+        for _ in 0..60 {
+            app.update();
+            let mut messages = app.world_mut().resource_mut::<Messages<ContactHit>>();
+            hits.extend(messages.drain());
+        }
+        let mass = weight(&app, marble) / 9.81;
+        let first = hits.first().unwrap_or_else(|| panic!("{response:?}: no hit"));
+        let expected = mass * first.approach_speed * 1.5;
+        let (normal, part) = (first.impulse.dot(first.normal), first.part);
+        assert!((normal / expected - 1.0).abs() < 0.05, "{response:?}: {normal} {expected}");
+        assert!(first.slip_speed < 1e-3 && part == 0, "{first:?}");
+        scene::frames(&mut app, 200);
+        let forces = &app.world().resource::<Forces>().0;
+        if response != Response::EventDriven {
+            let last = forces.last().unwrap() / -weight(&app, marble);
+            assert!((last - 1.0).abs() < 0.02, "{response:?}: {last}");
+        }
+    }
+}
+
+/// Impulses are recorded only while somebody reads them.
+#[test]
+fn nothing_is_recorded_for_nobody() {
+    let mut app = scene::app();
+    let floor = scene::floor(&mut app);
+    let records = |app: &App| app.world().resource::<TawWorld>().records_impulses();
+    scene::frames(&mut app, 2);
+    assert!(!records(&app));
+    app.world_mut().entity_mut(floor).insert(ContactForce::default());
+    scene::frames(&mut app, 2);
+    assert!(records(&app));
+    app.world_mut().entity_mut(floor).remove::<ContactForce>();
+    scene::frames(&mut app, 2);
+    assert!(!records(&app));
+}
