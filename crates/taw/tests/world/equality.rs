@@ -24,7 +24,7 @@ fn resting(response: Response) -> (World<f32>, WallId) {
 }
 
 fn block(x: f32) -> Aabb<Point3<f32>> {
-    Aabb { min: Point3::new(x - 0.1, 0.52, -0.1), max: Point3::new(x + 0.1, 0.8, 0.1) }
+    Aabb { min: Point3::new(x - 0.1, 0.3, -0.1), max: Point3::new(x + 0.1, 0.8, 0.1) }
 }
 
 #[test]
