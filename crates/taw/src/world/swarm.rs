@@ -8,7 +8,7 @@ use super::soft_step::inverse_mass;
 use super::swept_walls::SweptWalls;
 use crate::Error;
 use crate::math::{Scalar, Vec3, cast_vector};
-use crate::motion::{Motion, acceleration_in_step};
+use crate::motion::{Mass, Motion, acceleration_in_step};
 use crate::response::Response;
 use crate::swarm::{BallId, MAX_COORDINATE, Proxy, Stage, VelocityChange};
 
@@ -129,12 +129,17 @@ impl<S: Scalar> World<S> {
         Ok(())
     }
 
-    /// Gives the marbles what the swarm did to them, and stops those at walls that it pushed through one.
+    /// Gives the marbles what the swarm did to them, and stops those at walls that it pushed through one. Those
+    /// of infinite mass go as they are told.
     fn write_back_proxies(&mut self) {
         self.begin_pushes();
         for ((marble, _), (before, after)) in
             self.swarm.body_balls.iter().zip(self.swarm.proxies_and_results())
         {
+            let row = self.marbles.row(*marble);
+            if row.is_ok_and(|row| self.marbles.own_mass(row) == Mass::Infinite) {
+                continue;
+            }
             let change = |before: &[S; 4], after: &[S; 4]| {
                 Vec3::from([0, 1, 2].map(|i| after[i] - before[i]))
             };

@@ -108,3 +108,24 @@ fn a_pachinko_between_panes_needs_few_events() {
         assert_eq!(world.stopped().count(), 0, "step {step}");
     }
 }
+
+/// In a periodic box a marble crosses cells as long as it moves: so fast that a step would take seconds, it is
+/// stopped and named; a tenth of that is done.
+#[test]
+fn cells_of_a_periodic_box_cost_what_they_take() {
+    let stopped = |speed: f32| {
+        let mut world = World::<f32>::default();
+        world.set_model(Model::EXACT).unwrap();
+        world.set_gravity(Vec3::new(0.0, 0.0, 0.0)).unwrap();
+        world.set_period([Some(8.0), None, Some(8.0)]).unwrap();
+        let velocity = Vec3::new(1.0, 0.0, 0.3) * speed;
+        let marble = Marble { velocity, ..Marble::new(Point3::new(0.0, 1.0, 0.0), 0.2) };
+        let id = world.marbles.insert(marble).unwrap();
+        world.step(1.0 / 60.0).unwrap();
+        let stopped: Vec<_> = world.stopped().collect();
+        assert!(stopped.is_empty() || stopped == [id]);
+        !stopped.is_empty()
+    };
+    assert!(stopped(1e8));
+    assert!(!stopped(1e7));
+}

@@ -94,6 +94,9 @@ const COST_PER_BALL: u64 = 20_000;
 pub(crate) const MAX_CONTACTS: u32 = 64;
 /// Cost of a test against a sub-shape that is no half-space.
 const PART_COST: u64 = 8;
+/// Cost of an event, which a ball may have by the million in a periodic world: it crosses cells as long as it
+/// moves.
+const EVENT_COST: u64 = 32;
 /// Cost of a time of impact of two balls with different accelerations (a quartic).
 const QUARTIC_COST: u64 = 16;
 
@@ -379,6 +382,9 @@ impl EventSolver {
             }
             EventKind::RefreshCandidates => self.predict(row, time, settings),
             EventKind::CellCrossing { axis, to } => {
+                if !self.period.is_open() {
+                    settings.add_cost(EVENT_COST);
+                }
                 if let CellSlot::Cell(mut cell) = self.balls[row].trajectory.cell_slot {
                     self.cells_of(row).remove(row as u32);
                     cell[axis] = to;

@@ -191,6 +191,36 @@ fn a_marble_of_infinite_mass_in_a_wall_stays_a_number() {
     }
 }
 
+/// It goes as it is told, through a half-space too, whatever balls a swarm has, far away or in its way.
+#[test]
+fn a_marble_of_infinite_mass_goes_as_it_is_told_among_balls() {
+    let responses = [Response::Impulse, Response::EventDriven];
+    for (tier, response) in
+        [Tier::Full, Tier::Lab].into_iter().flat_map(|t| responses.map(|r| (t, r)))
+    {
+        let run = |ball: Option<Point3<f32>>| {
+            let mut world = world(model(tier), None);
+            world.set_model(Model { response, ..Model::default() }).unwrap();
+            world.set_gravity(Vec3::new(0.0, 0.0, 0.0)).unwrap();
+            world.walls.insert(Plane::new(-Vec3::unit_x(), -1.0).unwrap()).unwrap();
+            let marble = Marble {
+                mass: Mass::Infinite,
+                velocity: Vec3::unit_x() * 5.0,
+                ..Marble::new(Point3::new(0.0, 2.0, 0.0), 0.5)
+            };
+            let marble = world.marbles.insert(marble).unwrap();
+            let ball = ball.map(|at| Ball::new(at, 0.3));
+            world.swarm.insert(ball.as_slice()).unwrap();
+            steps(&mut world, 64);
+            world.marbles.get(marble).unwrap()
+        };
+        let alone = run(None);
+        for at in [Point3::new(0.0, 2.0, 50.0), Point3::new(0.9, 2.1, 0.0)] {
+            assert!(run(Some(at)) == alone, "{tier:?}, {response:?}: {:?}", run(Some(at)));
+        }
+    }
+}
+
 /// A plate that goes further in a step than it is wide strikes what it meets, whatever steps the
 /// marbles.
 #[test]
