@@ -87,7 +87,7 @@ fn messages_have_impulses_and_forces() {
         scene::frames(&mut app, 200);
         let forces = &app.world().resource::<Forces>().0;
         if response != Response::EventDriven {
-            let last = forces.last().unwrap() / -weight(&app, marble);
+            let last = forces.last().unwrap() / weight(&app, marble); // on the marble
             assert!((last - 1.0).abs() < 0.02, "{response:?}: {last}");
         }
     }

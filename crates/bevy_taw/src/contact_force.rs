@@ -133,12 +133,9 @@ pub(crate) fn finish(
         }
         same
     });
-    let awake = now.len();
-    let is_new =
-        |pair: &ContactPair| now[..awake].binary_search_by_key(pair, |(pair, _)| *pair).is_err();
-    list.retain(|(pair, _)| {
-        is_new(pair) && marbles.contains(pair.b) && sleeps(pair.b) && sleeps(pair.a)
-    });
+    // One that fell asleep within the step bore its contacts for a part of it only.
+    list.retain(|(pair, _)| marbles.contains(pair.b) && sleeps(pair.b) && sleeps(pair.a));
+    now.retain(|(pair, _)| list.binary_search_by_key(pair, |(pair, _)| *pair).is_err());
     list.append(now);
     list.sort_by_key(|(pair, _)| *pair);
 }
