@@ -16,9 +16,8 @@ use crate::resources::TawWorld;
 /// Force that contacts exert on a wall or a marble, in N: add it to those of which you want to know it, a
 /// button or a scale. Updated after each step; what sleeps keeps its force.
 ///
-/// Known where marbles touch, by `SoftStep`, `Impulse` and `Penalty`; zero by `Displacement`, which has no
-/// masses, and by `EventDriven`, except for impacts. Of balls of swarms, only what they press on marbles counts in
-/// the motion of these, not here.
+/// Known by `SoftStep`, `Impulse` and `Penalty`; zero by `Displacement`, which has no masses. By `EventDriven`, that of
+/// impacts only, so that it is zero under what rests. Contacts with balls of swarms do not count.
 ///
 /// ```
 /// # use bevy::prelude::*;
