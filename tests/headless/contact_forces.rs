@@ -109,3 +109,47 @@ fn nothing_is_recorded_for_nobody() {
     scene::frames(&mut app, 2);
     assert!(!records(&app));
 }
+
+/// A scale that comes late weighs what sleeps on it already.
+#[test]
+fn a_scale_that_is_added_late_reads_what_lies_on_it() {
+    for response in [Response::SoftStep, Response::Impulse] {
+        let mut app = scene::app();
+        *app.world_mut().resource_mut::<TawModel>() = TawModel(Model { response, ..Model::GAME });
+        let floor = scene::floor(&mut app);
+        let marble = scene::drop_marble(&mut app, 0.5, Vec3::Y * 0.5);
+        scene::frames(&mut app, 100);
+        assert!(app.world().get::<Sleeping>(marble).is_some());
+        for _ in 0..2 {
+            app.world_mut().entity_mut(floor).insert(ContactForce::default());
+            scene::frames(&mut app, 3);
+            let off = force(&app, floor).pressure / weight(&app, marble) - 1.0;
+            assert!(off.abs() < 0.02, "{response:?}: {off}");
+            app.world_mut().entity_mut(floor).remove::<ContactForce>();
+            scene::frames(&mut app, 100);
+        }
+    }
+}
+
+/// Two scales read what lay on them at the time that is restored.
+#[test]
+fn a_restored_world_weighs_what_it_did() {
+    let mut app = scene::app();
+    let marble = scene::drop_marble(&mut app, 0.5, Vec3::new(-3.0, 0.5, 0.0));
+    let scales = [-3.0, 3.0].map(|x| {
+        let plate = Wall::from(Cuboid::new(4.0, 1.0, 4.0));
+        let at = Transform::from_xyz(x, -0.5, 0.0);
+        app.world_mut().spawn((plate, at, ContactForce::default())).id()
+    });
+    let reads = |app: &App| scales.map(|scale| force(app, scale).pressure / weight(app, marble));
+    let near = |[a, b]: [f32; 2], [c, d]: [f32; 2]| (a - c).abs() < 0.02 && (b - d).abs() < 0.02;
+    scene::frames(&mut app, 150);
+    assert!(near(reads(&app), [1.0, 0.0]), "{:?}", reads(&app));
+    let saved = app.world().resource::<TawWorld>().snapshot();
+    app.world_mut().get_mut::<Transform>(marble).unwrap().translation.x = 3.0;
+    scene::frames(&mut app, 150);
+    assert!(near(reads(&app), [0.0, 1.0]), "{:?}", reads(&app));
+    app.world_mut().resource_mut::<TawWorld>().restore(&saved);
+    scene::frames(&mut app, 3);
+    assert!(near(reads(&app), [1.0, 0.0]), "{:?}", reads(&app));
+}

@@ -17,13 +17,17 @@ use crate::resources::TawWorld;
 /// button or a scale. Updated after each step; what sleeps keeps its force.
 ///
 /// Known by `SoftStep`, `Impulse` and `Penalty`; zero by `Displacement`, which has no masses. By `EventDriven`, that of
-/// impacts only, so that it is zero under what rests. Contacts with balls of swarms do not count.
+/// impacts only, so that it is zero under what rests. Contacts with balls of swarms do not count. The force of a
+/// hit is its impulse over the length of a step: shorter steps make it larger, so decide by impulses
+/// ([`ContactHit`](crate::prelude::ContactHit)) or by a mean over time what breaks. The first one that is added, while
+/// nobody reads contacts, wakes all.
 ///
 /// ```
 /// # use bevy::prelude::*;
 /// # use bevy_taw::prelude::*;
 /// # #[derive(Component)]
 /// # struct Button;
+/// // In `FixedUpdate`, after `TawSystems::Scatter`, so that no step is missed.
 /// fn press(buttons: Query<&ContactForce, With<Button>>) {
 ///     for force in &buttons {
 ///         if force.pressure > 50.0 {
@@ -53,20 +57,16 @@ pub(crate) struct PairImpulse {
 /// Impulses of the contacts of this step.
 #[derive(Resource, Default)]
 pub(crate) struct PairImpulses {
-    /// Of this step so far, several to a pair if there are several contacts or substeps.
+    /// In the order found, several to a pair if there are several contacts or substeps.
     now: Vec<(ContactPair, PairImpulse)>,
-    /// Of the last step, sorted, one to a pair.
-    list: Vec<(ContactPair, PairImpulse)>,
     /// Number of this step's impacts already noted.
     impacts: usize,
 }
 
-impl PairImpulses {
-    /// Impulse of a pair in the last step, on its second entity.
-    pub fn of(&self, pair: ContactPair) -> Vec3 {
-        let found = self.list.binary_search_by_key(&pair, |(pair, _)| *pair);
-        found.map_or(Vec3::ZERO, |at| self.list[at].1.impulse)
-    }
+/// Impulse of a pair in the last step, on its second entity.
+pub(crate) fn impulse_of(world: &TawWorld, pair: ContactPair) -> Vec3 {
+    let found = world.pair_impulses.binary_search_by_key(&pair, |(pair, _)| *pair);
+    found.map_or(Vec3::ZERO, |at| world.pair_impulses[at].1.impulse)
 }
 
 /// Tells if somebody reads impulses of contacts.
@@ -112,11 +112,12 @@ pub(crate) fn collect(world: Res<TawWorld>, mut impulses: ResMut<PairImpulses>) 
 
 /// Sums the impulses of a step by pairs. Contacts of what sleeps are not listed: they keep theirs.
 pub(crate) fn finish(
-    world: Res<TawWorld>,
+    mut world: ResMut<TawWorld>,
     mut impulses: ResMut<PairImpulses>,
     marbles: Query<&MarbleState>,
 ) {
-    let PairImpulses { now, list, impacts } = &mut *impulses;
+    let mut list = std::mem::take(&mut world.pair_impulses);
+    let PairImpulses { now, impacts } = &mut *impulses;
     *impacts = 0;
     let sleeps = |entity: Entity| {
         let id = marbles.get(entity).ok().map(|state| state.id);
@@ -137,23 +138,26 @@ pub(crate) fn finish(
     now.retain(|(pair, _)| list.binary_search_by_key(pair, |(pair, _)| *pair).is_err());
     list.append(now);
     list.sort_by_key(|(pair, _)| *pair);
+    world.pair_impulses = list;
 }
 
 /// Forgets the impulses while nobody reads them.
-pub(crate) fn forget(mut impulses: ResMut<PairImpulses>) {
+pub(crate) fn forget(mut world: ResMut<TawWorld>, mut impulses: ResMut<PairImpulses>) {
+    if !world.pair_impulses.is_empty() {
+        world.pair_impulses.clear();
+    }
     impulses.now.clear();
-    impulses.list.clear();
 }
 
 /// Writes what walls and marbles bear.
 pub(crate) fn write(
     world: Res<TawWorld>,
-    (delta, impulses): (Res<SubstepDelta>, Res<PairImpulses>),
+    delta: Res<SubstepDelta>,
     mut forces: Query<(Entity, &mut ContactForce)>,
 ) {
     let per_second = 1.0 / step_of(&world, delta.0);
     let mut sums: BTreeMap<Entity, ContactForce> = BTreeMap::new();
-    for (ContactPair { a, b }, PairImpulse { impulse, normal }) in &impulses.list {
+    for (ContactPair { a, b }, PairImpulse { impulse, normal }) in &world.pair_impulses {
         for (entity, impulse) in [(*a, -*impulse), (*b, *impulse)] {
             if forces.contains(entity) {
                 let sum = sums.entry(entity).or_default();

@@ -32,7 +32,7 @@ use taw::response::Response;
 
 use crate::SubstepDelta;
 use crate::components::{MarbleState, WallState};
-use crate::contact_force::{PairImpulses, step_of};
+use crate::contact_force::{impulse_of, step_of};
 use crate::convert::{from_point, from_vector};
 use crate::gap::{fall, gap};
 use crate::resources::TawWorld;
@@ -101,7 +101,8 @@ impl ContactStarted {
 ///
 /// Sent above 1 mm/s and, except by [`EventDriven`](Response::EventDriven), above what gravity makes in two
 /// substeps. A pair that touches in several places has a hit for each of them; of those in one
-/// direction, within a step, the fastest.
+/// direction, within a step, the fastest. Within a step they come in the order of time by `EventDriven`, else in any
+/// order.
 #[derive(Message, Clone, Copy, Debug, PartialEq, Reflect)]
 #[reflect(Debug, PartialEq)]
 pub struct ContactHit {
@@ -399,7 +400,7 @@ pub(crate) fn write(
     mut touches: ResMut<Touches>,
     mut readers: Readers,
     world: Res<TawWorld>,
-    (delta, impulses): (Res<SubstepDelta>, Res<PairImpulses>),
+    delta: Res<SubstepDelta>,
     marbles: Query<&MarbleState>,
     walls: Query<&WallState>,
 ) {
@@ -411,7 +412,7 @@ pub(crate) fn write(
     events.hits.append(found);
     keep_fastest(&mut events.hits);
     for hit in events.hits.iter_mut().filter(|hit| hit.impulse == Vec3::ZERO) {
-        hit.impulse = impulses.of(hit.pair);
+        hit.impulse = impulse_of(&world, hit.pair);
     }
     if let Some(messages) = hits {
         messages.write_batch(events.hits.iter().copied());
@@ -430,10 +431,10 @@ pub(crate) fn write(
             tell(ended, &mut events.ended, ContactEnded { pair });
         }
         if last.next_if_eq(&touch.pair).is_some() {
-            let (pair, force) = (touch.pair, impulses.of(touch.pair) * per_second);
+            let (pair, force) = (touch.pair, impulse_of(&world, touch.pair) * per_second);
             tell(ongoing, &mut events.ongoing, ContactOngoing { pair, force });
         } else {
-            let impulse = impulses.of(touch.pair);
+            let impulse = impulse_of(&world, touch.pair);
             tell(started, &mut events.started, ContactStarted { impulse, ..*touch });
         }
     }
@@ -442,19 +443,21 @@ pub(crate) fn write(
     before.extend(now.drain(..).map(|touch| touch.pair));
 }
 
-/// Keeps the fastest hit of each pair and direction, sorted by pairs.
+/// Keeps the fastest hit of each pair and direction, in the order found.
 fn keep_fastest(hits: &mut Vec<ContactHit>) {
-    hits.sort_by(|x, y| x.pair.cmp(&y.pair).then(y.approach_speed.total_cmp(&x.approach_speed)));
-    let mut kept = 0;
-    for i in 0..hits.len() {
-        let hit = hits[i];
-        let mut of_pair = hits[..kept].iter().rev().take_while(|it| it.pair == hit.pair);
-        if !of_pair.any(|it| it.normal.dot(hit.normal) > ONE_DIRECTION) {
-            hits[kept] = hit;
-            kept += 1;
+    let mut sorted: Vec<_> = hits.drain(..).enumerate().collect();
+    sorted.sort_by(|(_, x), (_, y)| {
+        x.pair.cmp(&y.pair).then(y.approach_speed.total_cmp(&x.approach_speed))
+    });
+    let mut kept: Vec<(usize, ContactHit)> = Vec::with_capacity(sorted.len());
+    for (at, hit) in sorted {
+        let mut of_pair = kept.iter().rev().take_while(|(_, it)| it.pair == hit.pair);
+        if !of_pair.any(|(_, it)| it.normal.dot(hit.normal) > ONE_DIRECTION) {
+            kept.push((at, hit));
         }
     }
-    hits.truncate(kept);
+    kept.sort_by_key(|(at, _)| *at);
+    hits.extend(kept.into_iter().map(|(_, hit)| hit));
 }
 
 /// Speed that gravity makes in two times `dt` seconds, in m/s: the largest approach speed of resting contacts.

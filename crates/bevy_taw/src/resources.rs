@@ -5,6 +5,8 @@ use bevy::prelude::*;
 use taw::motion::ForceField;
 use taw::world::{Marble, MarbleId, Model, SensorId, WallId};
 
+use crate::contact_force::PairImpulse;
+use crate::messages::ContactPair;
 use crate::reflect::ModelReflect;
 
 /// Simulation settings: by default [`Model::GAME`].
@@ -83,6 +85,8 @@ pub struct TawWorld {
     pub(crate) left_sensors: Vec<(Entity, Entity)>,
     /// Sensor entities whose list of marbles inside is to be written anew.
     pub(crate) stale_sensors: Vec<Entity>,
+    /// Impulses of the contacts of the last step, sorted, one to a pair.
+    pub(crate) pair_impulses: Vec<(ContactPair, PairImpulse)>,
     /// Marbles whose entities are disabled, as they were when they left.
     pub(crate) away: HashMap<Entity, Marble<f32>>,
     /// Number of restores, and true if there was one since the last gather.

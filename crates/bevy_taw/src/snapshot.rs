@@ -7,6 +7,8 @@ use taw::swarm::BallId;
 use taw::world::{MarbleId, SensorId, WallId};
 
 use crate::components::{MarbleState, Sleeping, WallState};
+use crate::contact_force::PairImpulse;
+use crate::messages::ContactPair;
 use crate::resources::TawWorld;
 
 /// The physics of an app as it was: see [`TawWorld::snapshot`].
@@ -17,6 +19,7 @@ pub struct TawSnapshot {
     wall_entities: HashMap<WallId, Entity>,
     sensor_entities: HashMap<SensorId, Entity>,
     sensed: HashMap<(SensorId, MarbleId), Entity>,
+    pair_impulses: Vec<(ContactPair, PairImpulse)>,
 }
 
 /// A row of the world that no entity stood behind was taken out, as after a
@@ -42,6 +45,7 @@ impl TawWorld {
             wall_entities: self.wall_entities.clone(),
             sensor_entities: self.sensor_entities.clone(),
             sensed: self.sensed.clone(),
+            pair_impulses: self.pair_impulses.clone(),
         }
     }
 
@@ -77,6 +81,7 @@ impl TawWorld {
         self.stale_sensors.extend(self.sensor_entities.values());
         self.sensor_entities.clone_from(&snapshot.sensor_entities);
         self.sensed.clone_from(&snapshot.sensed);
+        self.pair_impulses.clone_from(&snapshot.pair_impulses);
         self.left_sensors.clear();
         self.stale_sensors.extend(self.sensor_entities.values());
         self.restored = self.restored.wrapping_add(1);

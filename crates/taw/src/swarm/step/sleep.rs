@@ -247,7 +247,7 @@ impl<S: Scalar> Swarm<S> {
     }
 
     /// Wakes all balls.
-    pub(in crate::swarm) fn wake_all(&mut self) {
+    pub(crate) fn wake_all(&mut self) {
         for chunk in &mut self.chunks {
             chunk.sleep_changed |= chunk.sleepers > 0;
             (chunk.asleep, chunk.sleepers) = (false, 0);
