@@ -135,6 +135,7 @@ fn a_scale_that_is_added_late_reads_what_lies_on_it() {
 #[test]
 fn a_restored_world_weighs_what_it_did() {
     let mut app = scene::app();
+    *app.world_mut().resource_mut::<TawModel>() = TawModel(Model::GAME);
     let marble = scene::drop_marble(&mut app, 0.5, Vec3::new(-3.0, 0.5, 0.0));
     let scales = [-3.0, 3.0].map(|x| {
         let plate = Wall::from(Cuboid::new(4.0, 1.0, 4.0));
