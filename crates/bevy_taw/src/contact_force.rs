@@ -69,7 +69,7 @@ pub(crate) fn impulse_of(world: &TawWorld, pair: ContactPair) -> Vec3 {
     found.map_or(Vec3::ZERO, |at| world.pair_impulses[at].1.impulse)
 }
 
-/// Tells if somebody reads impulses of contacts.
+/// Run condition: somebody reads impulses of contacts.
 pub(crate) fn are_read(world: &World, forces: Query<(), With<ContactForce>>) -> bool {
     !forces.is_empty() || messages::are_read(world)
 }
@@ -83,7 +83,7 @@ pub(crate) fn set_recording(In(are_read): In<bool>, mut world: ResMut<TawWorld>)
 
 /// Notes the impulses of a substep after it is solved.
 pub(crate) fn collect(world: Res<TawWorld>, mut impulses: ResMut<PairImpulses>) {
-    let PairImpulses { now, impacts, .. } = &mut *impulses;
+    let PairImpulses { now, impacts } = &mut *impulses;
     let mut add = |on_wall: bool, rows: [u32; 2], impulse: TawVec3<f32>, normal: f32| {
         let first = if on_wall { TawWorld::wall_entity } else { TawWorld::marble_entity };
         let (a, b) = (first(&world, rows[0]), world.marble_entity(rows[1]));
@@ -147,6 +147,7 @@ pub(crate) fn forget(mut world: ResMut<TawWorld>, mut impulses: ResMut<PairImpul
         world.pair_impulses.clear();
     }
     impulses.now.clear();
+    impulses.impacts = 0;
 }
 
 /// Writes what walls and marbles bear.

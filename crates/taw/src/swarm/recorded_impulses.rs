@@ -12,7 +12,7 @@ use crate::math::{Scalar, Vec3};
 
 /// Impulses of contacts in a step, on the second body of each, in N s. By slots, which rows may leave
 /// within a step.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct RecordedImpulses<S> {
     /// By the slots of two balls.
     pub pairs: ImpulseSums<[u32; 2], S>,
@@ -20,24 +20,12 @@ pub(crate) struct RecordedImpulses<S> {
     pub with_walls: ImpulseSums<[u32; 3], S>,
 }
 
-impl<S> Default for RecordedImpulses<S> {
-    fn default() -> Self {
-        Self { pairs: ImpulseSums::default(), with_walls: ImpulseSums::default() }
-    }
-}
-
 /// Sums of impulses by contact.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub(crate) struct ImpulseSums<K, S> {
     list: Vec<(K, Vec3<S>)>,
-    /// Place at which the next contact is sought first: contacts come in the order of the time before.
+    /// Place of the contact that comes next if contacts come in the same order as last time.
     next: usize,
-}
-
-impl<K, S> Default for ImpulseSums<K, S> {
-    fn default() -> Self {
-        Self { list: Vec::new(), next: 0 }
-    }
 }
 
 impl<K: PartialEq, S: Scalar> ImpulseSums<K, S> {
@@ -82,7 +70,8 @@ impl<S: Scalar> Swarm<S> {
         self.scratch.recorded_impulses = Some(RecordedImpulses::default());
     }
 
-    /// Impulses of the last step, if they were recorded: those of bounces included.
+    /// Impulses of the last step, if they were recorded; without those of bounces, which
+    /// [noted impacts](Self::noted_impacts) have.
     pub(crate) fn take_recorded_impulses(&mut self) -> Option<RecordedImpulses<S>> {
         self.scratch.recorded_impulses.take()
     }

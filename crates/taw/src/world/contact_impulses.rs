@@ -18,8 +18,9 @@ impl<S: Scalar> World<S> {
 
     /// Fills the contacts that [`SoftStep`](crate::response::Response::SoftStep) lists with the impulses of
     /// the whole step, those of bounces included, from the next step on; contacts that nobody could foresee at
-    /// its begin are listed then, too. Contacts of what sleeps are not listed, so to switch it on wakes all. It is off by default, since adding up
-    /// the impulses of all substeps takes time; `Impulse` and `Penalty` list theirs in any case.
+    /// its begin are listed then, too. Contacts of what sleeps are not listed, so switching this on wakes all. It
+    /// is off by default, since adding up the impulses of all substeps takes time; `Impulse` and `Penalty` list
+    /// theirs in any case.
     pub fn set_records_impulses(&mut self, records_impulses: bool) {
         if records_impulses && !self.settings.records_impulses {
             self.marbles.sleep.wake_all();

@@ -202,10 +202,10 @@ impl<S: Scalar> World<S> {
         let columns = self.marbles.body_columns(turns);
         self.swarm.read_bodies(marbles, columns, Some(dt), &mut self.scratch.stopped);
         self.quarantine_stopped();
-        self.fill_in_impulses();
         self.list_impacts(dt);
         self.audit_rows_after();
         self.roll_what_only_shows();
+        self.fill_in_impulses(); // after all that reads the list: it may add to it
         self.settings.limits.apply(&mut self.marbles);
         self.audit_after();
         Ok(())
