@@ -6,6 +6,7 @@ use super::kernels::{GROUNDED, Pass, SolverParams, WALL_SLOP};
 use super::proxies::Proxy;
 use super::surfaces::WallNumbers;
 use super::walls::StaticGeometry;
+use crate::broad::CollisionFilter;
 use crate::constraint::{ContactImpulse, ContactSoftness, FrictionCone, solve_rolling};
 use crate::math::{RealVector, Row, Scalar, Vec3};
 use crate::response::Impact;
@@ -47,6 +48,16 @@ pub(super) struct Bounce<S> {
     /// Speed at which it approaches now, and when it is there, in m/s.
     approach_speed: S,
     impact_speed: S,
+}
+
+/// Approach of a ball to a wall that it reaches within a substep.
+struct Approach<S> {
+    /// In m/s, along the normal.
+    speed: S,
+    /// In metres, not less than zero.
+    separation: S,
+    /// Acceleration towards the wall, in m/s².
+    gravity: S,
 }
 
 /// Separation in radii, and in roundings of the coordinates, up to which a ball stands on a wall. A
@@ -202,6 +213,57 @@ impl<S: Scalar> WallContact<S> {
         None
     }
 
+    /// Finds out if the ball comes to the wall within a substep.
+    fn approach(
+        &self,
+        params: &SolverParams<S>,
+        at: &Row<S>,
+        velocity: &Row<S>,
+    ) -> Option<Approach<S>> {
+        let speed = -(xyz(velocity) - self.surface).dot(self.normal);
+        let separation = self.separation(at).max(S::zero());
+        // Gravity works on the ball as far as it comes nearer. As far as the contact reaches, by the
+        // velocity after gravity: one that only stops the ball would take its bounce.
+        let gravity = -xyz(&params.gravity).dot(self.normal);
+        let nearer = (speed + gravity * params.time) * params.time;
+        (speed > S::zero() && separation < nearer).then_some(Approach {
+            speed,
+            separation,
+            gravity,
+        })
+    }
+
+    /// Puts the plane where the ball first touches the wall on its way in a substep, if it comes fast: by
+    /// then, the point of a round wall or of an edge that is nearest to it is another one. So long before
+    /// the end of the step the substep begins, in seconds.
+    pub fn look_ahead(
+        &mut self,
+        walls: &dyn StaticGeometry<S>,
+        params: &SolverParams<S>,
+        (at, velocity, filter): (&Row<S>, &Row<S>, CollisionFilter),
+        before_end: S,
+    ) {
+        let approach = self.approach(params, at, velocity);
+        if approach.is_none_or(|approach| approach.speed <= params.restitution_threshold) {
+            return;
+        }
+        let time = params.time;
+        let way = xyz(velocity) * time + xyz(&params.gravity) * (time * time);
+        let part = [self.wall, self.part];
+        if let Some((normal, distance)) =
+            walls.plane_on_way(part, at, filter, way, [before_end, time])
+        {
+            self.normal = normal;
+            self.offset_at_end = normal.dot(xyz(at)) - distance;
+            self.set_time(walls, at, before_end);
+        } else {
+            // Beyond what the ball reaches.
+            let beyond = way.magnitude() + at[3];
+            self.offset_at_end -= beyond;
+            self.offset -= beyond;
+        }
+    }
+
     /// Finds out if the ball meets the wall within a substep, fast enough to bounce.
     pub fn bounce(
         &self,
@@ -209,18 +271,11 @@ impl<S: Scalar> WallContact<S> {
         at: &Row<S>,
         velocity: &Row<S>,
     ) -> Option<Bounce<S>> {
-        let approach_speed = -(xyz(velocity) - self.surface).dot(self.normal);
-        let separation = self.separation(at).max(S::zero());
-        // Gravity works on the ball as far as it comes nearer. As far as the contact reaches, by the
-        // velocity after gravity: one that only stops the ball would take its bounce.
-        let gravity = -xyz(&params.gravity).dot(self.normal);
-        let nearer = (approach_speed + gravity * params.time) * params.time;
-        if self.numbers.restitution == S::zero()
-            || approach_speed <= S::zero()
-            || separation >= nearer
-        {
+        if self.numbers.restitution == S::zero() {
             return None;
         }
+        let Approach { speed: approach_speed, separation, gravity } =
+            self.approach(params, at, velocity)?;
         let square = approach_speed * approach_speed + S::from_f64(2.0) * gravity * separation;
         let impact_speed = square.max(S::zero()).sqrt();
         (impact_speed > params.restitution_threshold).then_some(Bounce {

@@ -88,8 +88,6 @@ pub(super) struct WallQuery<'a, S> {
     pub before: S,
     /// Lengths of a step and of a substep, in seconds.
     pub times: [S; 2],
-    /// Surfaces as far away as a fast ball goes are found, too, not only those that it may pass.
-    pub whole_way: bool,
     pub gravity: Vec3<S>,
 }
 

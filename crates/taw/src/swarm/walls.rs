@@ -60,6 +60,18 @@ pub(crate) trait StaticGeometry<S>: Sync {
         times: [S; 2],
         visit: &mut dyn FnMut([u32; 2], Vec3<S>, S),
     );
+    /// Plane that a part is like where a ball first touches it on its way, or else where that ends: its
+    /// normal, and the distance of the center, where it is now, from that plane as it is at the end of the
+    /// step. Where others cover the part, that of what the ball first touches; none if half-spaces do. The times are
+    /// what is left of the step and what the way takes, in seconds.
+    fn plane_on_way(
+        &self,
+        part: [u32; 2],
+        ball: &Row<S>,
+        filter: CollisionFilter,
+        displacement: Vec3<S>,
+        times: [S; 2],
+    ) -> Option<(Vec3<S>, S)>;
     /// Center, in metres, at which a ball ends that surfaces stop on its way between two places; none if
     /// none stops it. `before_end` holds the times of both places, in seconds before the end of the step.
     fn stop_passage(
@@ -272,8 +284,7 @@ impl<S: Scalar> Chunk<S> {
             }
             let mut reach = query.skin_left[*row as usize].max(S::zero());
             if let Some(displacement) = displacement {
-                let way = displacement.magnitude();
-                reach = if query.whole_way { way } else { way.min(S::from_f64(FAST) * ball[3]) };
+                reach = displacement.magnitude();
                 along_path(
                     walls,
                     (ball, filter),

@@ -3,6 +3,7 @@
 mod breaks;
 mod columns;
 mod drums;
+mod glancing;
 mod impacts;
 mod impulses;
 mod leaning;

@@ -9,6 +9,7 @@ use crate::swarm::batches::Batch;
 use crate::swarm::chunk::Chunk;
 use crate::swarm::fast_movers::FastMovers;
 use crate::swarm::kernels::{Pass, SolverParams, squared};
+use crate::swarm::surfaces::SurfaceOf;
 use crate::swarm::wall_contact::xyz;
 use crate::swarm::{Stage, StaticGeometry, Swarm};
 use crate::workers::{DisjointSlice, parallel_for};
@@ -41,8 +42,12 @@ impl<S: Scalar> Swarm<S> {
             let first =
                 |chunk: &mut Chunk<S>| chunk.again = all || std::mem::take(&mut chunk.struck);
             self.chunks.iter_mut().for_each(first);
-            let (waits, rebuilds) = (self.apply_restitution(params, faster), self.rebuilds);
+            let (waits, rebuilds) =
+                (self.apply_restitution(params, (walls, times[2]), faster), self.rebuilds);
             let found = self.find_pairs_after_bounces(substep, times, walls, observe);
+            if found {
+                self.look_ahead_to_shapes(&params, (walls, times[2]), &faster, |_| true);
+            }
             if !waits && !found {
                 break;
             }
@@ -51,15 +56,18 @@ impl<S: Scalar> Swarm<S> {
     }
 
     /// Lets bounce what meets, again where a bounce may have sent a ball on to the next one. Returns
-    /// true if one waits for another; pairs have to be found before the next call.
-    pub(super) fn apply_restitution(
+    /// true if one waits for another; pairs have to be found before the next call. Given is how long before
+    /// the end of the step the substep begins, in seconds.
+    fn apply_restitution(
         &mut self,
         params: SolverParams<S>,
+        (walls, left): (&dyn StaticGeometry<S>, S),
         faster: impl Fn(&Chunk<S>, S) -> bool + Sync,
     ) -> bool {
         self.chunks.iter_mut().for_each(|chunk| chunk.struck = false);
         self.scratch.held.clear();
         for _ in 0..ROUNDS {
+            self.look_ahead_to_shapes(&params, (walls, left), &faster, |chunk| chunk.again);
             self.list_ways_to_walls(&params, &faster);
             self.hold_obstructed();
             self.pass(Pass::Restitution(params), |chunk, next| chunk.again && faster(chunk, next));
@@ -129,6 +137,38 @@ impl<S: Scalar> Swarm<S> {
             let a = if impact.on_wall { impact.a } else { slot(impact.a) };
             impacts.push(Impact { a, b: slot(impact.b), ..impact });
         }
+    }
+
+    /// Finds where balls of some chunks that come fast first touch shapes other than half-spaces.
+    fn look_ahead_to_shapes(
+        &mut self,
+        params: &SolverParams<S>,
+        (walls, left): (&dyn StaticGeometry<S>, S),
+        faster: &(impl Fn(&Chunk<S>, S) -> bool + Sync),
+        which: impl Fn(&Chunk<S>) -> bool + Sync,
+    ) {
+        if !walls.has_shapes() {
+            return;
+        }
+        let (slots, model) = (self.ids.slots(), self.model.material);
+        let surfaces = SurfaceOf { model, surfaces: &self.surfaces, slots };
+        let (at, velocity, count) = (&self.at[..], &self.velocity[..], self.chunks.len());
+        let chunks = DisjointSlice::new(&mut self.chunks);
+        parallel_for(self.scratch.threads, count, |_, i| {
+            // SAFETY: its own. Nobody changes speeds meanwhile.
+            let chunk = unsafe { &mut *chunks.row(i) };
+            if chunk.asleep || !which(chunk) || !faster(chunk, S::zero()) {
+                return;
+            }
+            for contact in &mut chunk.wall_contacts {
+                let row = contact.row as usize;
+                if !contact.is_plane && !contact.bears_proxy && !velocity[row][3].is_sign_negative()
+                {
+                    let ball = (&at[row], &velocity[row], surfaces.filter(row as u32));
+                    contact.look_ahead(walls, params, ball, left);
+                }
+            }
+        });
     }
 
     /// Lists the balls that would bounce off a wall in this round, if one of them comes from so far away
