@@ -354,7 +354,7 @@ fn to_core(
     }
 }
 
-/// Makes a marble that comes back go on as it was, but for what was written since.
+/// Makes a marble that comes back go on as it was, except for what was written since.
 fn come_back(
     now: &mut core::Marble<f32>,
     away: &core::Marble<f32>,
@@ -376,7 +376,7 @@ fn come_back(
 }
 
 /// Takes over the fields that changed from `last` to `seen`, each on its own: one
-/// that is refused does not keep back the rest. Of a world that was restored `all`, but for
+/// that is refused does not keep back the rest. Of a world that was restored `all`, except
 /// its motion.
 fn update(
     marbles: &mut core::Marbles<f32>,

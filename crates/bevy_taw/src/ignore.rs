@@ -51,7 +51,7 @@ pub struct ColliderDisabled {
 }
 
 impl ColliderDisabled {
-    /// Ghost for so many seconds, at least zero.
+    /// Ghost for this time in seconds, at least zero.
     #[must_use]
     pub const fn for_seconds(seconds: f32) -> Self {
         Self { time_left: Some(seconds) }

@@ -34,7 +34,7 @@ use crate::wall::Wall;
 #[derive(Resource, Clone, Debug, Default, PartialEq, Eq, Deref)]
 pub struct IgnoredComponents(Vec<&'static str>);
 
-/// Tables of the components that entities have, but for those that default filters hide.
+/// Tables of the components that entities have, except those that default filters hide.
 struct Carriers<'a> {
     components: &'a Components,
     marbles: Vec<&'a Archetype>,

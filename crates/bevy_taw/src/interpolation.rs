@@ -115,7 +115,7 @@ fn place(world: &TawWorld, state: &MarbleState) -> Option<(Vec3, Option<Quat>)> 
     Some((from_point(world.marbles.position()[row]), rotation))
 }
 
-/// Draws marbles between the last two steps, but for those that somebody moved since.
+/// Draws marbles between the last two steps, except those that somebody moved since.
 fn ease(world: Res<TawWorld>, time: Res<Time<Fixed>>, mut marbles: Roots) {
     let part = time.overstep_fraction();
     marbles.par_iter_mut().for_each(|(_, state, transform, eased, _)| {

@@ -83,7 +83,7 @@ pub struct TawWorld {
     pub(crate) sensed: HashMap<(SensorId, MarbleId), Entity>,
     /// Events [`SensorLeft`](crate::sensor::SensorLeft) that are not sent yet: sensor and marble.
     pub(crate) left_sensors: Vec<(Entity, Entity)>,
-    /// Sensor entities whose list of marbles inside is to be written anew.
+    /// Sensor entities whose list of marbles inside is out of date.
     pub(crate) stale_sensors: Vec<Entity>,
     /// Impulses of the contacts of the last step, sorted, one to a pair.
     pub(crate) pair_impulses: Vec<(ContactPair, PairImpulse)>,

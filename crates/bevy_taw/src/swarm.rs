@@ -120,7 +120,7 @@ impl Swarm {
         self.coming.extend(balls);
     }
 
-    /// Takes marbles out with the next step, the last ones first, until so many are left.
+    /// Takes marbles out with the next step, the last ones first, until `count` are left.
     pub fn truncate(&mut self, count: usize) {
         let all = self.len();
         self.coming.truncate(count.saturating_sub(self.balls.len()));

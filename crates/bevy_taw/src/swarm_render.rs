@@ -134,7 +134,7 @@ fn draw(
         0.0
     };
     let data = quads(swarm, blocks, ago, &tint_of);
-    // A buffer of the same size is written, not made anew.
+    // A buffer of the same size is written, not created again.
     let buffer = drawn.buffer.clone();
     if drawn.blocks.len() == blocks
         && let Some(mut buffer) = buffers.get_mut(&buffer)

@@ -135,7 +135,7 @@ impl Drawing {
 }
 
 impl Hierarchy<'_, '_> {
-    /// Draws an entity, and what it carries but for marbles, by a displacement beside where it is.
+    /// Draws an entity, and what it carries except marbles, by a displacement beside where it is.
     fn place(&self, entity: Entity, by: Affine3A, globals: &mut Query<&mut GlobalTransform>) {
         let Ok(place) = self.places.compute_global_transform(entity) else { return };
         let mut open = vec![(entity, GlobalTransform::from(by * place.affine()))];

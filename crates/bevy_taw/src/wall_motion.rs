@@ -211,7 +211,7 @@ impl Displacement {
         }
     }
 
-    /// Velocity of what moves so in so many seconds.
+    /// Velocity of a displacement over a time in seconds.
     fn over(self, seconds: f32) -> WallVelocity {
         if self == Self::default() {
             return WallVelocity::default();

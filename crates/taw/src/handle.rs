@@ -75,7 +75,7 @@ impl Handles {
         Ok(self.of_slot(self.slots[self.slots.len() - 1]))
     }
 
-    /// Creates handles for so many new rows at the end, all or none. Returns the first of them.
+    /// Creates handles for `count` new rows at the end, all or none. Returns the first of them.
     ///
     /// # Errors
     /// [`Error::Full`] at 2³² − 1 slots.

@@ -86,3 +86,8 @@ pub mod prelude {
     };
     pub use cgmath::prelude::*;
 }
+
+/// The examples of `docs/hello.md`, tested.
+#[cfg(doctest)]
+#[doc = include_str!("../../../docs/hello.md")]
+mod hello {}

@@ -58,8 +58,8 @@ struct Workers {
 
 static WORKERS: Mutex<Option<Workers>> = Mutex::new(None);
 
-/// Calls this on the current thread, as number 0, and meanwhile on up to so many in all: the ones
-/// that come in time.
+/// Calls this on the current thread, as number 0, and meanwhile on up to `threads` threads in all: those that
+/// come in time.
 fn run_on_workers(threads: usize, work: impl Fn(usize) + Sync) {
     if threads <= 1 {
         return work(0);
@@ -98,7 +98,7 @@ impl Drop for Running<'_> {
 }
 
 impl Workers {
-    /// Makes so many, if the system gives them; says how many may take part.
+    /// Spawns up to `count` workers; returns how many there are.
     fn at_least(&mut self, count: usize) -> usize {
         while self.count < count {
             let job_slot = self.job_slot.clone();
@@ -168,7 +168,7 @@ impl Drop for AbortOnPanic {
     }
 }
 
-/// Does so many jobs, in any order. Each is told the number of its thread, which is less than
+/// Runs `count` jobs, in any order. Each is told the number of its thread, which is less than
 /// `threads`, and its own.
 pub(crate) fn parallel_for(threads: usize, count: usize, job: impl Fn(usize, usize) + Sync) {
     let size = threads.clamp(1, MAX_THREADS).min(count);
@@ -189,7 +189,7 @@ pub(crate) fn parallel_for(threads: usize, count: usize, job: impl Fn(usize, usi
     });
 }
 
-/// Does something with so many rows, some at a time.
+/// Runs a job over `count` rows, some at a time.
 pub(crate) fn parallel_for_rows(threads: usize, rows: usize, job: impl Fn(Range<usize>) + Sync) {
     parallel_for(threads, rows.div_ceil(ROWS), |_, part| {
         job(part * ROWS..rows.min((part + 1) * ROWS));
@@ -250,7 +250,7 @@ const SHARED_COPY: usize = 1 << 16;
 const CLAIMED: u32 = 1;
 const FINISHED: u32 = 2;
 
-/// Does so many jobs, of which neighbours must not be done at a time: even ones come before the
+/// Runs `count` jobs, of which neighbours must not run at the same time: even ones come before the
 /// odd ones beside them. `state` is scratch.
 pub(crate) fn parallel_for_odd_even(
     threads: usize,
@@ -374,7 +374,7 @@ impl<'a, T> DisjointSlice<'a, T> {
 mod tests {
     use super::*;
 
-    /// Checks it against the plain loop, with empty lists and with so many numbers that threads share
+    /// Checks it against the plain loop, with empty lists and with enough numbers that threads share
     /// the copy.
     #[test]
     fn lists_are_appended_in_their_order_by_any_number_of_threads() {

@@ -24,7 +24,7 @@ pub(crate) fn tipping_speed<R: Real>(
     limit.select_gt(on_top, approach_speed * R::constant(TIPPING), R::constant(0.0))
 }
 
-/// Normal of the impact of two rows: an upright one leans in a direction of each pair's own, by so much
+/// Normal of the impact of two rows: an upright one leans in a direction of each pair's own, by this
 /// that what is stopped along it leaves the top by the [tipping speed](tipping_speed). An impulse along
 /// another unit normal conserves momentum and energy as one along the old one does.
 pub(crate) fn tipped<S: Scalar>(normal: Vec3<S>, gravity: Vec3<S>, [a, b]: [u32; 2]) -> Vec3<S> {

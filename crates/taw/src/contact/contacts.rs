@@ -15,7 +15,7 @@ const PARTING: f64 = 0.02;
 /// Tells if a touch of the last step goes on in this one (hysteresis): two that touched touch until the
 /// gap between their surfaces is wider than a fiftieth of the smaller radius, and than the distance that
 /// gravity closes in a substep, both in metres. What rests in a heap touches in one step and hovers in
-/// the next, by less than that; a touch begins anew only by
+/// the next, by less than that; a touch begins again only by
 /// [`is_touching`](Contact::is_touching) after it has ended.
 #[must_use]
 pub fn touch_goes_on<S: Scalar>(separation: S, smaller_radius: S, fall: S) -> bool {

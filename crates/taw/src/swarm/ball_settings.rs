@@ -132,7 +132,7 @@ impl<S: Scalar> Swarm<S> {
         self.scratch.filters_changed = true;
     }
 
-    /// Has pairs and balls at walls found anew, with the impulses that they have.
+    /// Has pairs and balls at walls searched again, with the impulses that they have.
     pub(super) fn forget_contacts(&mut self) {
         self.cache_impulses();
         (self.pairs_valid, self.scratch.contacts_forgotten) = (false, true);

@@ -56,9 +56,9 @@ pub(super) fn pairs_in(batches: &[Batch]) -> usize {
 pub(super) const MAX_COLOURS: usize = 32;
 /// Rows by which a later pair may lie before the first one of a batch.
 const BEFORE: u32 = 1 << 14;
-/// Number of pairs listed at most, for each ball on average, and besides. A ball has six pairs
-/// with those of its size that touch it, and some more within the margin; only balls inside of each
-/// other have more, and part as well if each is pushed by so many of the others at a time.
+/// Number of pairs listed at most: for each ball on average, and in addition. A ball has six pairs
+/// with those of its size that touch it, and some more within the margin. Only balls inside of each
+/// other have more, and they part as well if each is pushed by this number of the others at a time.
 const PAIRS: usize = 64;
 const MORE_PAIRS: usize = 4096;
 
@@ -86,14 +86,14 @@ pub(super) fn builder<'a>(
 }
 
 impl BatchBuilder<'_> {
-    /// Makes room for the pairs of a ball; says how many of so many there is room for.
+    /// Makes room for the pairs of a ball; returns how many of them there is room for.
     #[inline(always)]
     pub fn spend(&mut self, pairs: usize) -> usize {
         self.allow(1);
         self.spend_only(pairs)
     }
 
-    /// Makes room for the pairs of so many balls.
+    /// Makes room for the pairs of this number of balls.
     pub fn allow(&mut self, balls: usize) {
         self.left += PAIRS * balls;
     }

@@ -274,7 +274,7 @@ impl<S: Scalar> Swarm<S> {
             let row = self.ids.rows()[slot as usize] as usize;
             let (at, velocity) = (self.at[row], self.velocity[row]);
             let own = changes.binary_search_by_key(&slot, |change| change.slot);
-            // Its own change takes gravity back, but for rounding.
+            // Its own change takes gravity back, up to rounding.
             let change = own.map_or([S::zero(); 3], |i| {
                 [0, 1, 2].map(|axis| {
                     let sum = changes[i].change[axis] + fall[axis];

@@ -17,14 +17,14 @@ use crate::workers::{DisjointSlice, parallel_filter, parallel_for, parallel_for_
 
 /// Balls in a chunk at least.
 const MIN_CHUNK_ROWS: u32 = 512;
-/// Largest displacement between two searches for pairs: as far as a ball goes in so many steps at
+/// Largest displacement between two searches for pairs: as far as a ball goes in this number of steps at
 /// its speed,
 const STEPS: f64 = 12.0;
-/// or so many times the skin at most, if it is a fast mover.
+/// or this multiple of the skin at most, if it is a fast mover.
 const FAR: f64 = 16.0;
 
 /// Where a ball has fewer pairs than this, and pairs are searched again after fewer steps than
-/// this, the skin becomes up to so much wider.
+/// this, the skin becomes wider by up to this factor.
 const SPARSE: f64 = 2.0;
 pub(super) const SOON: u32 = 6;
 const WIDEST: f64 = 6.0;

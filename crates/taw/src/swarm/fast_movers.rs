@@ -14,7 +14,7 @@ use super::surfaces::SurfaceOf;
 use super::sweeps::BallPaths;
 use crate::math::{Row, Scalar};
 
-/// Fast movers at most: one of so many balls, and besides so many.
+/// Fast movers at most: `BASE_COUNT`, and one of each `BALLS_PER_MOVER` balls.
 const BALLS_PER_MOVER: usize = 500;
 const BASE_COUNT: usize = 32;
 
@@ -49,7 +49,7 @@ struct SavedPair<S> {
     tangent_impulse: [S; 3],
 }
 
-/// Largest number of fast movers among so many balls.
+/// Largest number of fast movers among `balls` balls.
 pub(super) fn max_count(balls: usize) -> usize {
     BASE_COUNT + balls / BALLS_PER_MOVER
 }
@@ -82,17 +82,17 @@ impl<S: Scalar> SortedBalls<'_, S> {
 }
 
 impl<S: Scalar> FastMovers<S> {
-    /// Returns true if so many more would be too many.
+    /// Returns true if `more` further ones are too many.
     pub fn full(&self, more: usize, balls: usize) -> bool {
         more > self.remaining(balls)
     }
 
-    /// Number that may still be added, among so many balls.
+    /// Number that may still be added, among `balls` balls.
     pub fn remaining(&self, balls: usize) -> usize {
         max_count(balls).saturating_sub(self.rows.len())
     }
 
-    /// Forgets all, in a swarm of so many.
+    /// Forgets all fast movers and their pairs.
     pub fn clear(&mut self) {
         self.rows.clear();
         self.crossing.clear();

@@ -16,9 +16,8 @@ use super::state::of;
 use crate::math::{Row, Scalar};
 use crate::workers::{DisjointSlice, ROWS, parallel_for, parallel_for_rows};
 
-/// Cells in all, for each ball.
+/// Number of cells: for each ball, and in addition.
 const CELLS_PER_BALL: f64 = 2.0;
-/// And besides.
 const CELLS: f64 = 4096.0;
 /// The most cells along a side on level 0, so that rounding stays far below the margin.
 const SIDE: f64 = 4096.0;
@@ -118,7 +117,7 @@ impl<S: Scalar> SortedGrid<S> {
         self.start[cell as usize + 1]
     }
 
-    /// The first row of each of so many cells in a line, and of the one after them.
+    /// First row of each cell in a line, and of the one after them.
     pub fn starts(&self, cell: u32, count: u32) -> &[u32] {
         &self.start[cell as usize + 1..(cell + count) as usize + 2]
     }

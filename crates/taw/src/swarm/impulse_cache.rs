@@ -89,7 +89,7 @@ impl<S: Scalar> ImpulseCache<S> {
         self.start.clear();
     }
 
-    /// Caches that none of so many rows bears anything.
+    /// Caches that none of `rows` rows bears anything.
     pub fn forget(&mut self, rows: usize) {
         self.clear();
         self.start.resize(rows + 2, 0);
@@ -172,7 +172,7 @@ impl<S: Scalar> ImpulseCache<S> {
     }
 }
 
-/// Makes room for so many, and a few more. (A list that doubles is half empty for a long time.)
+/// Reserves room for `count` entries, and a few more. (A list that doubles is half empty for a long time.)
 #[inline(always)]
 pub(super) fn reserve_slack<T>(list: &mut Vec<T>, count: usize) {
     if list.capacity() < count {

@@ -44,7 +44,7 @@ struct CandidateWindow<S> {
 }
 
 impl<S: Scalar> NeighbourSearch<S> {
-    /// Puts pairs of about so many balls into batches.
+    /// Puts pairs of about this number of balls into batches.
     pub fn builder<'a>(
         &'a mut self,
         balls: usize,

@@ -215,7 +215,7 @@ impl<S: Scalar> Swarm<S> {
         proxies.get(proxy_rows[at].1 as usize)
     }
 
-    /// Inserts balls for so many bodies.
+    /// Inserts a ball for each of `count` bodies.
     pub(crate) fn insert_bodies(&mut self, count: usize) -> Result<Vec<BallId>, crate::Error> {
         let position = crate::math::Point3::new(S::zero(), S::zero(), S::zero());
         self.add(&vec![super::Ball::new(position, S::from_f64(super::LEAST_RADIUS)); count])

@@ -115,7 +115,7 @@ impl<S: Scalar> Surfaces<S> {
         self.list.get((index as usize).checked_sub(1)?).copied()
     }
 
-    /// Material of all balls, of which there are so many, where one is; and nobody's rotation is
+    /// Material of all balls, where they have one in common; and nobody's rotation is
     /// locked.
     pub fn common(&self, model: Material<S>, balls: usize) -> Option<Material<S>> {
         let used = || self.counts.iter().zip(&self.list).filter(|(count, _)| **count > 0);

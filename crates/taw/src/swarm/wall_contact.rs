@@ -166,7 +166,7 @@ impl<S: Scalar> WallContact<S> {
         set(at, xyz(at) + self.normal * overlap);
     }
 
-    /// Moves the ball out, but for what a contact bears. Says how far, in metres.
+    /// Moves the ball out, except for the overlap that a contact bears. Returns the distance, in metres.
     pub fn keep_out(&self, at: &mut Row<S>) -> S {
         // All of it: a wall gives way to nobody.
         let overlap = (-self.separation(at) - at[3] * S::from_f64(WALL_SLOP)).max(S::zero());

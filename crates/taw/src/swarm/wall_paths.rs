@@ -64,7 +64,7 @@ pub(super) fn slide_along_wall<S: Scalar>(
     back
 }
 
-/// Returns true if a ball of this velocity and radius is fast for a step of so many seconds.
+/// Returns true if a ball of this velocity and radius is fast for a step of `time` seconds.
 pub(super) fn is_fast<S: Scalar>(velocity: &Row<S>, time: S, radius: S) -> bool {
     squared(*velocity) * time * time > S::from_f64(FAST) * S::from_f64(FAST) * radius * radius
 }

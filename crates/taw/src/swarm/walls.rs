@@ -324,7 +324,7 @@ fn find_plane_contacts<S: Scalar>(
     plane_contacts_within(reach, row, &balls.at[row as usize], balls.surfaces, planes, visit);
 }
 
-/// Visits the half-spaces that are nearer to a ball than so many metres.
+/// Visits the half-spaces that are nearer to a ball than `reach` metres.
 pub(super) fn plane_contacts_within<S: Scalar>(
     reach: S,
     row: u32,

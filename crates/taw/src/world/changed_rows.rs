@@ -12,7 +12,7 @@ pub(super) struct ChangedRows {
 }
 
 impl ChangedRows {
-    /// Adds one of so many rows.
+    /// Adds a row, given how many there are.
     pub fn add(&mut self, row: usize, rows: usize) {
         if !self.token.is_set() {
             return;

@@ -32,7 +32,7 @@ impl<S: Scalar> World<S> {
         for row in self.finite_mass_indices() {
             let mass = self.marbles.mass(row).as_f64();
             let Motion { position, velocity } = self.marbles.motion_f64(row);
-            let scale = self.marbles.gravity_scale.get(row).unwrap_or(S::one()).as_f64();
+            let scale = self.marbles.own.gravity_scale.get(row).unwrap_or(S::one()).as_f64();
             energy.kinetic += 0.5 * mass * velocity.magnitude2();
             if self.marbles.rotation_of(row, self.settings.model.rotation) == Rotation::Dynamic {
                 energy.rotational += 0.5 * mass * self.marbles.rotational_energy(row);
@@ -46,7 +46,7 @@ impl<S: Scalar> World<S> {
     pub(super) fn excess_potential(&self) -> f64 {
         let gravity = cast_vector::<S, f64>(self.gravity());
         let excess = |row| {
-            let scale = self.marbles.gravity_scale.get(row)?.as_f64();
+            let scale = self.marbles.own.gravity_scale.get(row)?.as_f64();
             let position = self.marbles.motion_f64(row).position.to_vec();
             Some(-self.marbles.mass(row).as_f64() * (scale - 1.0) * gravity.dot(position))
         };

@@ -110,7 +110,7 @@ impl<S: Scalar> World<S> {
                     .unwrap_or(Vec3::new(0.0, 0.0, 0.0)),
                 radius,
                 inverse_mass: 1.0 / marbles.mass(row).as_f64(),
-                material: marbles.material.get(row).unwrap_or_default().cast(),
+                material: marbles.own.material.get(row).unwrap_or_default().cast(),
                 layers: marbles.layers_of_row(row),
                 rotation: match self.settings.model.rotation {
                     Rotation::Dynamic if !marbles.is_rotation_locked(row) => BallRotation::Free,

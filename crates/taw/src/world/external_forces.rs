@@ -27,7 +27,7 @@ impl<S: Scalar> Marbles<S> {
     pub fn apply_force(&mut self, id: MarbleId, force: Vec3<S>) -> Result<(), Error> {
         let row = self.row(id)?;
         let sum = self.force_with(row, force)?;
-        self.force.set(row, Some(sum), self.len());
+        self.own.force.set(row, Some(sum), self.len());
         Ok(())
     }
 
@@ -46,13 +46,13 @@ impl<S: Scalar> Marbles<S> {
     /// Accumulated force of a marble plus another one.
     fn force_with(&self, row: usize, force: Vec3<S>) -> Result<Vec3<S>, Error> {
         finite_vector(FORCE, force)?;
-        finite_vector(FORCE, self.force.get(row).unwrap_or_else(Vec3::zero) + force)
+        finite_vector(FORCE, self.own.force.get(row).unwrap_or_else(Vec3::zero) + force)
     }
 
     /// Accumulated torque of a marble plus another one.
     fn torque_with(&self, row: usize, torque: Vec3<S>) -> Result<Bivector<S>, Error> {
         finite_vector(TORQUE, torque)?;
-        let sum = self.torque.get(row).unwrap_or_else(Bivector::zero).dual() + torque;
+        let sum = self.own.torque.get(row).unwrap_or_else(Bivector::zero).dual() + torque;
         finite_vector(TORQUE, sum).map(Bivector::from)
     }
 
@@ -72,8 +72,8 @@ impl<S: Scalar> Marbles<S> {
         let lever = finite_point(POINT, point)? - self.position[row];
         let sum = self.force_with(row, force)?;
         let torque = self.torque_with(row, Bivector::wedge(lever, force).dual())?;
-        self.force.set(row, Some(sum), self.len());
-        self.torque.set(row, Some(torque), self.len());
+        self.own.force.set(row, Some(sum), self.len());
+        self.own.torque.set(row, Some(torque), self.len());
         Ok(())
     }
 
@@ -88,14 +88,14 @@ impl<S: Scalar> Marbles<S> {
     ) -> Result<(), Error> {
         let row = self.row(id)?;
         let sum = self.torque_with(row, torque.into().dual())?;
-        self.torque.set(row, Some(sum), self.len());
+        self.own.torque.set(row, Some(sum), self.len());
         Ok(())
     }
 
     /// Clears all applied forces and torques. A step ends with this.
     pub fn clear_forces(&mut self) {
-        self.force.clear();
-        self.torque.clear();
+        self.own.force.clear();
+        self.own.torque.clear();
     }
 
     /// Applies an impulse (in N s) at the center of a marble: changes its velocity by the impulse

@@ -54,7 +54,7 @@ impl<S: Scalar> Marbles<S> {
     #[inline]
     pub(super) fn may_collide(&self, a: u32, b: u32) -> bool {
         let layers = |row: u32| self.layers_of_row(row as usize);
-        (self.layers.is_empty() || layers(a).interacts_with(layers(b)))
+        (self.own.layers.is_empty() || layers(a).interacts_with(layers(b)))
             && !self.ignored_rows.has_balls(a, b)
     }
 }

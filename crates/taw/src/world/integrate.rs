@@ -23,8 +23,8 @@ impl<S: Scalar> StepContext<'_, S> {
         if mass.is_infinite() {
             return Vec3::zero();
         }
-        let scale = marbles.gravity_scale.get(row).unwrap_or(S::one());
-        let own = marbles.force.get(row).unwrap_or_else(Vec3::zero) / mass;
+        let scale = marbles.own.gravity_scale.get(row).unwrap_or(S::one());
+        let own = marbles.own.force.get(row).unwrap_or_else(Vec3::zero) / mass;
         self.gravity * scale + own + acceleration_in_step(self.forces, motion, mass, self.dt)
     }
 }
@@ -56,10 +56,10 @@ impl<S: Scalar> Marbles<S> {
         let mut rows =
             IntegratedRows { position: position_rows, velocity: velocity_rows, stopped, is_meant };
         let only_gravity = context.forces.is_empty()
-            && self.gravity_scale.is_empty()
-            && self.mass.is_empty()
-            && self.force.is_empty();
-        let same_for_all = self.integrator.is_empty() && self.damping.is_empty();
+            && self.own.gravity_scale.is_empty()
+            && self.own.mass.is_empty()
+            && self.own.force.is_empty();
+        let same_for_all = self.own.integrator.is_empty() && self.own.damping.is_empty();
         if only_gravity && same_for_all {
             rows.integrate(context.integrator, context.dt, |_, _| context.gravity);
         } else if same_for_all {
@@ -67,7 +67,7 @@ impl<S: Scalar> Marbles<S> {
             rows.integrate(context.integrator, context.dt, all);
         } else {
             rows.each(|row, motion| {
-                let integrator = self.integrator.get(row).unwrap_or(context.integrator);
+                let integrator = self.own.integrator.get(row).unwrap_or(context.integrator);
                 let next = motion
                     .step(integrator, context.dt, |motion| context.acceleration(self, row, motion));
                 Motion { velocity: next.velocity * self.damping_factor(row, context.dt), ..next }
@@ -102,7 +102,7 @@ impl<S: Scalar> Marbles<S> {
         mean.extend((0..self.len()).map(|row| {
             let change = self.step_f64(row, context).velocity - self.motion_f64(row).velocity;
             // Under gravity alone, without the rounding of a difference.
-            if context.forces.is_empty() && self.damping.get(row).is_none() {
+            if context.forces.is_empty() && self.own.damping.get(row).is_none() {
                 cast_vector(context.acceleration(self, row, self.motion(row)))
             } else {
                 change / context.dt.as_f64()
@@ -111,7 +111,7 @@ impl<S: Scalar> Marbles<S> {
     }
 
     fn step_f64(&self, row: usize, context: StepContext<S>) -> Motion<f64> {
-        let integrator = self.integrator.get(row).unwrap_or(context.integrator);
+        let integrator = self.own.integrator.get(row).unwrap_or(context.integrator);
         let next = self.motion_f64(row).step(integrator, context.dt.as_f64(), |at| {
             let (position, velocity) = (cast_point(at.position), cast_vector(at.velocity));
             cast_vector(context.acceleration(self, row, Motion { position, velocity }))
@@ -155,7 +155,7 @@ impl<S: Scalar> Marbles<S> {
 
     /// Fraction of the velocity left by damping after `dt` seconds.
     fn damping_factor(&self, row: usize, dt: S) -> S {
-        self.damping.get(row).map_or(S::one(), |damping| (-damping.linear * dt).exp_portable())
+        self.own.damping.get(row).map_or(S::one(), |damping| (-damping.linear * dt).exp_portable())
     }
 
     /// Adds or drops the compensation column.

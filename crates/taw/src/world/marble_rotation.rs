@@ -11,7 +11,7 @@ use crate::response::CapsuleInertia;
 impl<S: Scalar> Marbles<S> {
     /// Rotation model of a marble in a world of this model.
     pub(super) fn rotation_of(&self, row: usize, world: Rotation) -> Rotation {
-        self.rotation_model.get(row).map_or(world, |own| own.min(world))
+        self.own.rotation_model.get(row).map_or(world, |own| own.min(world))
     }
 
     /// Returns true if contacts and torques do not affect the marble's rotation.
@@ -21,7 +21,7 @@ impl<S: Scalar> Marbles<S> {
 
     /// Returns true if any marble has its own rotation model.
     pub(super) fn has_rotation_locks(&self) -> bool {
-        !self.rotation_model.is_empty()
+        !self.own.rotation_model.is_empty()
     }
 
     /// Adds or drops the columns for rotation. New ones start with no rotation, at rest.
@@ -37,7 +37,7 @@ impl<S: Scalar> Marbles<S> {
     /// Sets the angular velocity of rolling without slip over a surface at rest with this normal.
     pub(super) fn roll_without_slip(&mut self, row: usize, normal: Vec3<S>) {
         let angular_velocity = normal.cross(self.velocity[row]) / self.radius[row];
-        if self.half_length.get(row).is_some() {
+        if self.own.half_length.get(row).is_some() {
             return; // it does not roll whichever way it goes
         }
         if let Some(slot) = self.angular_velocity.get_mut(row)
@@ -78,7 +78,7 @@ impl<S: Scalar> Marbles<S> {
 
     /// Integrates torques and angular damping over `dt` seconds.
     pub(super) fn integrate_angular_velocity(&mut self, dt: S) {
-        if self.torque.is_empty() && self.damping.is_empty() {
+        if self.own.torque.is_empty() && self.own.damping.is_empty() {
             return;
         }
         for row in 0..self.angular_velocity.len() {
@@ -86,10 +86,10 @@ impl<S: Scalar> Marbles<S> {
                 continue;
             }
             let mut angular_velocity = self.angular_velocity[row];
-            if let Some(torque) = self.torque.get(row) {
+            if let Some(torque) = self.own.torque.get(row) {
                 angular_velocity += self.apply_inverse_inertia(row, torque.dual()) * dt;
             }
-            if let Some(damping) = self.damping.get(row) {
+            if let Some(damping) = self.own.damping.get(row) {
                 angular_velocity *= (-damping.angular * dt).exp_portable();
             }
             if is_finite(angular_velocity) && angular_velocity != self.angular_velocity[row] {

@@ -66,7 +66,7 @@ impl<S: Scalar> Marbles<S> {
         if half_length.is_some() {
             self.enable_rotation(true);
         }
-        self.half_length.set(row, half_length, self.len());
+        self.own.half_length.set(row, half_length, self.len());
         self.mark_changed(row);
         Ok(())
     }
@@ -115,7 +115,7 @@ impl<S: Scalar> Marbles<S> {
     pub fn set_mass(&mut self, id: MarbleId, mass: Mass<S>) -> Result<(), Error> {
         let (row, mass) = (self.row(id)?, mass.validated()?);
         mass.of_size(self.radius[row], self.half_length(row))?;
-        self.mass.set(row, non_default(mass, Mass::default()), self.len());
+        self.own.mass.set(row, non_default(mass, Mass::default()), self.len());
         self.mark_changed(row);
         Ok(())
     }
@@ -127,7 +127,7 @@ impl<S: Scalar> Marbles<S> {
     pub fn set_gravity_scale(&mut self, id: MarbleId, scale: S) -> Result<(), Error> {
         let row = self.row(id)?;
         let scale = non_default(finite("gravity_scale", scale)?, S::one());
-        self.gravity_scale.set(row, scale, self.len());
+        self.own.gravity_scale.set(row, scale, self.len());
         self.disturb(row);
         Ok(())
     }
@@ -139,7 +139,7 @@ impl<S: Scalar> Marbles<S> {
     pub fn set_damping(&mut self, id: MarbleId, damping: Damping<S>) -> Result<(), Error> {
         let row = self.row(id)?;
         let damping = non_default(damping.validated()?, Damping::default());
-        self.damping.set(row, damping, self.len());
+        self.own.damping.set(row, damping, self.len());
         self.disturb(row);
         Ok(())
     }
@@ -154,7 +154,7 @@ impl<S: Scalar> Marbles<S> {
         integrator: Option<Integrator>,
     ) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.integrator.set(row, integrator, self.len());
+        self.own.integrator.set(row, integrator, self.len());
         self.disturb(row);
         Ok(())
     }
@@ -170,7 +170,7 @@ impl<S: Scalar> Marbles<S> {
         model: Option<Rotation>,
     ) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.rotation_model.set(row, model, self.len());
+        self.own.rotation_model.set(row, model, self.len());
         self.mark_changed(row);
         if model == Some(Rotation::None) {
             self.set_angular_velocity(id, Vec3::zero())?;
@@ -189,7 +189,7 @@ impl<S: Scalar> Marbles<S> {
     ) -> Result<(), Error> {
         let row = self.row(id)?;
         let material = material.map(Material::validated).transpose()?;
-        self.material.set(row, material, self.len());
+        self.own.material.set(row, material, self.len());
         self.mark_changed(row);
         Ok(())
     }
@@ -200,7 +200,7 @@ impl<S: Scalar> Marbles<S> {
     /// [`Error::NoSuchMarble`].
     pub fn set_layers(&mut self, id: MarbleId, layers: CollisionLayers) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.layers.set(row, non_default(layers, CollisionLayers::ALL), self.len());
+        self.own.layers.set(row, non_default(layers, CollisionLayers::ALL), self.len());
         self.mark_changed(row);
         Ok(())
     }
@@ -211,7 +211,7 @@ impl<S: Scalar> Marbles<S> {
     /// [`Error::NoSuchMarble`].
     pub fn set_sleeping_disabled(&mut self, id: MarbleId, disabled: bool) -> Result<(), Error> {
         let row = self.row(id)?;
-        self.sleeping_disabled.set(row, disabled.then_some(()), self.len());
+        self.own.sleeping_disabled.set(row, disabled.then_some(()), self.len());
         self.mark_changed(row);
         Ok(())
     }

@@ -18,7 +18,7 @@ pub(super) const SIDE_BY_SIDE: u32 = 4;
 impl<S: Scalar> Marbles<S> {
     /// Half length of a marble in metres; zero for a ball.
     pub(super) fn half_length(&self, row: usize) -> S {
-        self.half_length.get(row).unwrap_or_else(S::zero)
+        self.own.half_length.get(row).unwrap_or_else(S::zero)
     }
 
     /// [Feature](crate::contact::Contact::feature) of a marble at a point of its axis, in metres from its
@@ -39,14 +39,14 @@ impl<S: Scalar> Marbles<S> {
 
     /// First marble that is a capsule.
     pub(super) fn first_capsule(&self) -> Option<MarbleId> {
-        let row = (0..self.len()).find(|row| self.half_length.get(*row).is_some())?;
+        let row = (0..self.len()).find(|row| self.own.half_length.get(*row).is_some())?;
         self.id(row)
     }
 
     /// Returns true if any marble is a capsule.
     #[must_use]
     pub fn has_capsules(&self) -> bool {
-        !self.half_length.is_empty()
+        !self.own.half_length.is_empty()
     }
 
     /// Current shape of a marble: a sphere or a capsule.
@@ -60,7 +60,7 @@ impl<S: Scalar> Marbles<S> {
     pub(super) fn shape_of_row(&self, row: usize) -> Shape<S> {
         let Sphere { center, radius } = self.sphere(row);
         let half = self.axis(row) * self.half_length(row);
-        if self.half_length.get(row).is_some() {
+        if self.own.half_length.get(row).is_some() {
             Shape::Capsule(Capsule { a: center - half, b: center + half, radius })
         } else {
             Shape::Sphere(Sphere { center, radius })

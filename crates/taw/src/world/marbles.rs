@@ -8,7 +8,7 @@ use super::ColliderId;
 use super::changed_rows::ChangedRows;
 use super::marble::{Damping, Marble, non_default, validated_half_length, validated_rotation};
 use super::sleep_columns::SleepColumns;
-use super::sparse_column::SparseColumn;
+use super::sparse_column::{SparseColumn, sparse_columns};
 use crate::Error;
 use crate::broad::{CollisionLayers, IgnoredPairs, Period};
 use crate::contact::ContactMaterial;
@@ -35,6 +35,31 @@ impl<S: Scalar> Default for Compensation<S> {
     }
 }
 
+sparse_columns! {
+    /// Columns of what few marbles have.
+    OwnColumns, OwnValues {
+        /// Capsules only.
+        half_length: S,
+        /// Non-default masses.
+        mass: Mass<S>,
+        /// Gravity scales other than one.
+        gravity_scale: S,
+        /// Non-zero damping.
+        damping: Damping<S>,
+        /// Applied force of this step.
+        force: Vec3<S>,
+        /// Applied torque of this step.
+        torque: Bivector<S>,
+        integrator: Integrator,
+        rotation_model: Rotation,
+        material: Material<S>,
+        /// Layers other than all.
+        layers: CollisionLayers,
+        /// Marbles that never sleep.
+        sleeping_disabled: (),
+    }
+}
+
 /// Marbles (dynamic spheres and capsules) as columns: index *i* of each belongs to one marble.
 ///
 /// Indices change when marbles are removed; a [`MarbleId`] stays valid.
@@ -48,31 +73,13 @@ pub struct Marbles<S> {
     pub(super) changed: ChangedRows,
     pub(super) position: Vec<Point3<S>>,
     pub(super) radius: Vec<S>,
-    /// Capsules only.
-    pub(super) half_length: SparseColumn<S>,
     pub(super) velocity: Vec<Vec3<S>>,
     /// Empty in a model without rotation, as is `angular_velocity`.
     pub(super) rotation: Vec<Quat<S>>,
     pub(super) angular_velocity: Vec<Vec3<S>>,
     /// Empty in a model of plain precision.
     pub(super) compensation: Vec<Compensation<S>>,
-    /// Non-default masses.
-    pub(super) mass: SparseColumn<Mass<S>>,
-    /// Gravity scales other than one.
-    pub(super) gravity_scale: SparseColumn<S>,
-    /// Non-zero damping.
-    pub(super) damping: SparseColumn<Damping<S>>,
-    /// Applied force of this step.
-    pub(super) force: SparseColumn<Vec3<S>>,
-    /// Applied torque of this step.
-    pub(super) torque: SparseColumn<Bivector<S>>,
-    pub(super) integrator: SparseColumn<Integrator>,
-    pub(super) rotation_model: SparseColumn<Rotation>,
-    pub(super) material: SparseColumn<Material<S>>,
-    /// Layers other than all.
-    pub(super) layers: SparseColumn<CollisionLayers>,
-    /// Marbles that never sleep.
-    pub(super) sleeping_disabled: SparseColumn<()>,
+    pub(super) own: OwnColumns<S>,
     pub(super) sleep: SleepColumns<S>,
     /// Lists of whom marbles pass through; see `ignored.rs`.
     pub(super) ignored: BTreeMap<MarbleId, Vec<ColliderId>>,
@@ -119,19 +126,20 @@ impl<S: Scalar> Marbles<S> {
         if self.compensated {
             self.compensation.push(Compensation::default());
         }
-        let rows = self.position.len();
-        self.half_length.set(rows - 1, half_length, rows);
-        self.mass.set(rows - 1, non_default(mass, Mass::default()), rows);
-        self.gravity_scale.set(rows - 1, non_default(gravity_scale, S::one()), rows);
-        self.damping.set(rows - 1, non_default(damping, Damping::default()), rows);
-        self.force.set(rows - 1, None, rows);
-        self.torque.set(rows - 1, None, rows);
-        self.integrator.set(rows - 1, marble.integrator, rows);
-        self.rotation_model.set(rows - 1, marble.rotation_model, rows);
-        self.material.set(rows - 1, material, rows);
-        let layers = non_default(marble.layers, CollisionLayers::ALL);
-        self.layers.set(rows - 1, layers, rows);
-        self.sleeping_disabled.set(rows - 1, marble.sleeping_disabled.then_some(()), rows);
+        let own = OwnValues {
+            half_length,
+            mass: non_default(mass, Mass::default()),
+            gravity_scale: non_default(gravity_scale, S::one()),
+            damping: non_default(damping, Damping::default()),
+            force: None,
+            torque: None,
+            integrator: marble.integrator,
+            rotation_model: marble.rotation_model,
+            material,
+            layers: non_default(marble.layers, CollisionLayers::ALL),
+            sleeping_disabled: marble.sleeping_disabled.then_some(()),
+        };
+        self.own.push(own, self.position.len());
         self.sleep.push();
         Ok(MarbleId(handle))
     }
@@ -143,29 +151,33 @@ impl<S: Scalar> Marbles<S> {
     pub fn remove(&mut self, id: MarbleId) -> Result<Marble<S>, Error> {
         let marble = self.get(id)?;
         if let Some(row) = self.handles.swap_remove(id.0) {
-            self.sleep.swap_remove(row, marble.radius + marble.half_length);
-            self.position.swap_remove(row);
-            self.radius.swap_remove(row);
-            self.velocity.swap_remove(row);
-            if self.has_rotation {
-                self.rotation.swap_remove(row);
-                self.angular_velocity.swap_remove(row);
-            }
-            if self.compensated {
-                self.compensation.swap_remove(row);
-            }
-            self.half_length.swap_remove(row);
-            self.mass.swap_remove(row);
-            self.gravity_scale.swap_remove(row);
-            self.damping.swap_remove(row);
-            self.force.swap_remove(row);
-            self.torque.swap_remove(row);
-            self.integrator.swap_remove(row);
-            self.rotation_model.swap_remove(row);
-            self.material.swap_remove(row);
-            self.layers.swap_remove(row);
-            self.sleeping_disabled.swap_remove(row);
-            self.ignored.remove(&id);
+            // All fields by name, so that none is forgotten.
+            let Self {
+                handles: _,
+                has_rotation: _,
+                compensated: _,
+                period: _,
+                changed: _,
+                position,
+                radius,
+                velocity,
+                rotation,
+                angular_velocity,
+                compensation,
+                own,
+                sleep,
+                ignored,
+                ignored_rows: _,
+            } = self;
+            position.swap_remove(row);
+            radius.swap_remove(row);
+            velocity.swap_remove(row);
+            swap_remove_if_any(rotation, row);
+            swap_remove_if_any(angular_velocity, row);
+            swap_remove_if_any(compensation, row);
+            own.swap_remove(row);
+            sleep.swap_remove(row, marble.radius + marble.half_length);
+            ignored.remove(&id);
         }
         Ok(marble)
     }
@@ -183,14 +195,14 @@ impl<S: Scalar> Marbles<S> {
             velocity: self.velocity[row],
             rotation: self.rotation.get(row).copied().unwrap_or_else(Quat::one),
             angular_velocity: self.angular_velocity.get(row).copied().unwrap_or_else(Vec3::zero),
-            mass: self.mass.get(row).unwrap_or_default(),
-            gravity_scale: self.gravity_scale.get(row).unwrap_or(S::one()),
-            damping: self.damping.get(row).unwrap_or_default(),
-            integrator: self.integrator.get(row),
-            rotation_model: self.rotation_model.get(row),
-            material: self.material.get(row),
+            mass: self.own.mass.get(row).unwrap_or_default(),
+            gravity_scale: self.own.gravity_scale.get(row).unwrap_or(S::one()),
+            damping: self.own.damping.get(row).unwrap_or_default(),
+            integrator: self.own.integrator.get(row),
+            rotation_model: self.own.rotation_model.get(row),
+            material: self.own.material.get(row),
             layers: self.layers_of_row(row),
-            sleeping_disabled: self.sleeping_disabled.get(row).is_some(),
+            sleeping_disabled: self.own.sleeping_disabled.get(row).is_some(),
         })
     }
 
@@ -226,7 +238,7 @@ impl<S: Scalar> Marbles<S> {
     /// Material of the contact of two marbles.
     #[inline]
     pub(super) fn contact_material(&self, a: usize, b: usize) -> ContactMaterial<S> {
-        match [a, b].map(|row| self.material.get(row)) {
+        match [a, b].map(|row| self.own.material.get(row)) {
             [None, None] => ContactMaterial::default(),
             of => {
                 let [a, b] = of.map(Option::unwrap_or_default);
@@ -238,12 +250,12 @@ impl<S: Scalar> Marbles<S> {
     /// Layers of a marble.
     #[inline]
     pub(super) fn layers_of_row(&self, row: usize) -> CollisionLayers {
-        self.layers.get(row).unwrap_or_default()
+        self.own.layers.get(row).unwrap_or_default()
     }
 
     /// Returns true if any marble has applied forces, torques or damping.
     pub(super) fn has_external_forces(&self) -> bool {
-        !(self.force.is_empty() && self.torque.is_empty() && self.damping.is_empty())
+        !(self.own.force.is_empty() && self.own.torque.is_empty() && self.own.damping.is_empty())
     }
 
     /// Centers by index, in metres.
@@ -349,14 +361,14 @@ impl<S: Scalar> Marbles<S> {
             rotation_locked: held,
             capsules: rods,
         };
-        (columns, &self.integrator)
+        (columns, &self.own.integrator)
     }
 
     /// Returns true if gravity does not accelerate all alike, or other forces act.
     pub(super) fn accelerate_differently(&self) -> bool {
         self.has_external_forces()
-            || !self.gravity_scale.is_empty()
-            || self.mass.values().any(|mass| mass == Mass::Infinite)
+            || !self.own.gravity_scale.is_empty()
+            || self.own.mass.values().any(|mass| mass == Mass::Infinite)
     }
 
     /// Columns that a solver of rows writes.
@@ -393,7 +405,7 @@ impl<S: Scalar> Marbles<S> {
 
     /// Returns true if a torque is applied to a marble.
     pub(super) fn is_twisted(&self, row: usize) -> bool {
-        self.torque.get(row).is_some_and(|torque| !torque.dual().is_zero())
+        self.own.torque.get(row).is_some_and(|torque| !torque.dual().is_zero())
     }
 
     /// Returns true if a marble neither moves nor turns.
@@ -407,7 +419,7 @@ impl<S: Scalar> Marbles<S> {
     }
 
     pub(super) fn own_mass(&self, row: usize) -> Mass<S> {
-        self.mass.get(row).unwrap_or_default()
+        self.own.mass.get(row).unwrap_or_default()
     }
 
     /// Returns true if the state of a marble is finite.
@@ -435,5 +447,12 @@ impl<S: Scalar> Marbles<S> {
         if let Some(low) = self.compensation.get_mut(row) {
             (low.velocity, low.angular_velocity) = (Vec3::zero(), Vec3::zero());
         }
+    }
+}
+
+/// Removes a row of a column that may not exist; the last one takes its place.
+fn swap_remove_if_any<T>(column: &mut Vec<T>, row: usize) {
+    if !column.is_empty() {
+        column.swap_remove(row);
     }
 }

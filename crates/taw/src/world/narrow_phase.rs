@@ -108,7 +108,7 @@ impl<S: Scalar> World<S> {
 
     /// Material of the contact of a wall and a marble.
     pub(super) fn wall_contact_material(&self, wall: u32, b: usize) -> ContactMaterial<S> {
-        let of_marble = self.marbles.material.get(b).unwrap_or_default();
+        let of_marble = self.marbles.own.material.get(b).unwrap_or_default();
         of_marble.on_wall(self.walls.material_of_row(wall as usize))
     }
 

@@ -231,7 +231,7 @@ fn contacts_of<S: Scalar>(
     contacts
 }
 
-/// A box with a margin of so many metres.
+/// A box with a margin, in metres.
 fn grown<S: Scalar>(bounds: Aabb3<S>, by: S) -> Aabb3<S> {
     let by = Vec3::new(by, by, by);
     Aabb3 { min: bounds.min - by, max: bounds.max + by }

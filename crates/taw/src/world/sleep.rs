@@ -122,7 +122,7 @@ impl<S: Scalar> World<S> {
     /// Wakes sleepers to which another force is applied than when they fell asleep.
     pub(super) fn wake_pulled(&mut self) {
         let marbles = &self.marbles;
-        let force = |row: usize| marbles.force.get(row).unwrap_or_else(Vec3::zero);
+        let force = |row: usize| marbles.own.force.get(row).unwrap_or_else(Vec3::zero);
         let is_pulled =
             |row: &usize| force(*row) != marbles.sleep.force(*row) || marbles.is_twisted(*row);
         let pulled: Vec<_> = marbles.sleep.asleep().filter(is_pulled).collect();
@@ -271,7 +271,7 @@ impl<S: Scalar> World<S> {
         let marbles = &mut self.marbles;
         for row in marbles.sleep.awake() {
             let rests = marbles.sleep.lasts(row, marbles.radius[row], gravity)
-                && marbles.sleeping_disabled.get(row).is_none()
+                && marbles.own.sleeping_disabled.get(row).is_none()
                 && !marbles.is_twisted(row);
             let island = islands.set_of(row) as usize;
             restless[island] |= !rests;
@@ -295,7 +295,7 @@ impl<S: Scalar> World<S> {
             let island = islands.set_of(row) as usize;
             if !restless[island] {
                 let group = *groups[island].get_or_insert_with(|| marbles.sleep.new_group());
-                let force = marbles.force.get(row).unwrap_or_else(Vec3::zero);
+                let force = marbles.own.force.get(row).unwrap_or_else(Vec3::zero);
                 marbles.sleep.fall_asleep(row, group, marbles.position[row], force);
                 marbles.clear_motion(row);
             }

@@ -162,7 +162,7 @@ impl<S: Scalar> World<S> {
 
     /// Gives contacts their materials, if any body has one of its own.
     fn set_materials(&self, Contacts { wm, mm }: &mut Contacts<S>) {
-        if self.marbles.material.is_empty() && !self.walls.have_materials() {
+        if self.marbles.own.material.is_empty() && !self.walls.have_materials() {
             return;
         }
         for c in wm {
@@ -347,7 +347,7 @@ impl<S: Scalar> World<S> {
             let Some(slot) = slot_of_marble.get(row).copied().filter(|slot| *slot != NO_ROW) else {
                 continue;
             };
-            let material = marbles.material.get(row);
+            let material = marbles.own.material.get(row);
             let rotation_locked = marbles.rotation_of(row, rotation) != Rotation::Dynamic;
             let surface = (material.is_some() || rotation_locked || !plain_swarm).then(|| {
                 let material = material.unwrap_or_default();
@@ -362,7 +362,7 @@ impl<S: Scalar> World<S> {
             };
             let mass = marbles.mass(row);
             let inverse_mass = inverse_mass(mass);
-            let sleepless = marbles.sleeping_disabled.get(row).is_some();
+            let sleepless = marbles.own.sleeping_disabled.get(row).is_some();
             let numbers = [row_radius(marble.radius), inverse_mass];
             let layers = marbles.layers_of_row(row);
             let is_kinematic = mass.is_infinite();

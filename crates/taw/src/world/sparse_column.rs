@@ -62,6 +62,37 @@ impl<T: Copy> SparseColumn<T> {
     }
 }
 
+/// Declares a set of sparse columns, and the values that one row has of them, from one list.
+macro_rules! sparse_columns {
+    ($(#[$doc:meta])* $columns:ident, $values:ident {
+        $($(#[$field_doc:meta])* $field:ident: $type:ty,)*
+    }) => {
+        $(#[$doc])*
+        #[derive(Clone, Debug, PartialEq, Default)]
+        pub(super) struct $columns<S> {
+            $($(#[$field_doc])* pub $field: SparseColumn<$type>,)*
+        }
+
+        /// Values of one row.
+        pub(super) struct $values<S> {
+            $(pub $field: Option<$type>,)*
+        }
+
+        impl<S: Scalar> $columns<S> {
+            /// Adds a row, as the last one of `rows`.
+            pub fn push(&mut self, values: $values<S>, rows: usize) {
+                $(self.$field.set(rows - 1, values.$field, rows);)*
+            }
+
+            /// Removes a row; the last one takes its place.
+            pub fn swap_remove(&mut self, row: usize) {
+                $(self.$field.swap_remove(row);)*
+            }
+        }
+    };
+}
+pub(super) use sparse_columns;
+
 #[cfg(test)]
 mod tests {
     use super::*;

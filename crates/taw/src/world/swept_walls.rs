@@ -172,7 +172,7 @@ impl<'a, S: Scalar> SweptWalls<'a, S> {
         let core = sphere.radius * S::from_f64(CORE);
         let path = RelativePath { start: sphere.center, displacement, frame: Frame::Standing };
         let deep = sphere.radius * S::from_f64(1.0 - GRAZES);
-        // One that slides along a wall in which it is goes no deeper, but for the rounding of places.
+        // One that slides along a wall in which it is goes no deeper, up to the rounding of places.
         let place = length(sphere.center.to_vec()) + sphere.radius + length(displacement);
         let rounding = place * S::from_f64(16.0) * S::epsilon();
         let mut first: Option<S> = None;

@@ -83,7 +83,7 @@ const CREEPS: f64 = 0.1;
 /// lacks: so that it comes to its speed in a second, and not beyond.
 const LIFTS: [f64; 2] = [36.0, 18.0];
 
-/// Lays about a thousand balls on a floor of glued ones in a box that is periodic but for its
+/// Lays about a thousand balls on a floor of glued ones in a box that is periodic except for its
 /// height, and lifts and lowers the slope so that they creep: where flow begins and where it ends
 /// (Silbert et al., *Granular flow down an inclined plane*, 2001, §III).
 fn creep(stopwatch: &mut Stopwatch, seed: u64, rolling_resistance: f64) -> f64 {

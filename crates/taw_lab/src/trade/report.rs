@@ -199,7 +199,7 @@ fn guide(text: &mut String, points: &[Point]) -> std::fmt::Result {
     Ok(())
 }
 
-/// The cheapest setting of ours at 1/60 s in `f32` that errs by so much at most in all of the
+/// The cheapest setting of ours at 1/60 s in `f32` that errs by `error` at most in all of the
 /// scenes, with its mean cost.
 fn cheapest<'a>(points: &'a [Point], scenes: &[&str], most: f64) -> Option<(f64, &'a Point)> {
     let good = |point: &&Point| {

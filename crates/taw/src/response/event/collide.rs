@@ -62,7 +62,7 @@ impl EventSolver {
             }
         }
         if freezes {
-            // What is frozen carries nothing on from a wall, so the others rest against it anew: the
+            // What is frozen carries nothing on from a wall, so the others rest against it again: the
             // force that it had would drive them without a reaction.
             let again = self.rest_cluster(seeds, f64::INFINITY, time, settings);
             rows.extend(again.rows);

@@ -97,7 +97,7 @@ impl EventSolver {
         if self.crowds.is_in_largest(row) { &mut self.crowds.cells } else { &mut self.cells }
     }
 
-    /// Visits the rows in a cell and around it, but for those that are in the largest crowd as the row is.
+    /// Visits the rows in a cell and around it, except those that are in the largest crowd as the row is.
     pub(super) fn for_each_around(&self, row: usize, cell: Cell, mut visit: impl FnMut(usize)) {
         self.cells.for_each_near(cell, &mut visit);
         if self.crowds.largest.is_some() && !self.crowds.is_in_largest(row) {

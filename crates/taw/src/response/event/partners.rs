@@ -1,10 +1,10 @@
 //! Partners: balls of a resting cluster that press each other. One that leaves the cluster within
 //! the substep, by a collision, takes its own force along, and the force on its partners has lost its
-//! reaction: they rest anew.
+//! reaction: they are put to rest again.
 
 use super::{EventSettings, EventSolver, MAX_DISSIPATIONS, PRESS_SPEED, REST_COST, REST_SPEED};
 
-/// Number of times in a substep that a ball may rest anew soon after a partner has left it, as often as
+/// Number of times in a substep that a ball may be put to rest again soon after a partner has left it, as often as
 /// it may start to rest on others.
 const MAX_SOON: f64 = MAX_DISSIPATIONS / REST_COST;
 
@@ -34,7 +34,7 @@ impl EventSolver {
         });
     }
 
-    /// Lets the partners rest anew that a ball has left: soon, when the collisions of this moment
+    /// Puts the partners that a ball has left to rest again: soon, when the collisions of this moment
     /// are over; or after as long as pressed balls take to collide again, if that has been too often.
     pub(super) fn leave_partners(&mut self, row: usize, now: f64, settings: &EventSettings) {
         let Some(list) = self.partners.get_mut(row) else { return };

@@ -140,7 +140,7 @@ impl EventSolver {
         let is_resting = ball.trajectory.support.is_some() || ball.trajectory.clustered;
         let rest_threshold = self.impact_threshold(row, false, settings);
         let impact_threshold = if ball.trajectory.touches_balls {
-            // Others press it anew, into a wall that may move.
+            // Others press it again, into a wall that may move.
             PRESS_SPEED * self.fall_speed(row, settings)
         } else {
             self.impact_threshold(row, is_resting, settings)

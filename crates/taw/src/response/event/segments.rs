@@ -13,7 +13,7 @@ use crate::response::KeyedByContact;
 const MAX_TURN: f64 = 0.02;
 /// Bisections of a time to find where a normal has turned that far.
 const BISECTIONS: u32 = 8;
-/// A segment is at least this fraction of the time that is left, one over so many, which limits the
+/// A segment is at least this fraction of the time that is left, one over their largest number, which limits the
 /// cost of fast balls.
 const MAX_SEGMENTS: f64 = 16.0;
 

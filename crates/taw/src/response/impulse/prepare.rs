@@ -247,7 +247,7 @@ impl<S: Scalar> SolverBodies<'_, S> {
     }
 
     /// Relative velocity that forces gave the two bodies of a contact since its impulse, in m/s:
-    /// since an impact so many seconds before the end of the substep, or since positions follow.
+    /// since an impact at this time, in seconds, before the end of the substep, or since positions follow.
     /// Each body has its own time: one that continuous collision detection stopped follows no more,
     /// and feels the impulse where it stopped, while the other one is moved back along its path.
     /// With a common time that one would keep speed of a fall that is undone.

@@ -194,7 +194,7 @@ impl<S: Scalar> Rows<S> {
         *body - first
     }
 
-    /// Solves each island, on so many threads at most: they have nothing in common.
+    /// Solves each island, on `threads` threads at most: they have nothing in common.
     pub fn solve_islands(
         &mut self,
         columns: &SolverBodies<S>,

@@ -134,7 +134,7 @@ where
     }
 }
 
-/// Deepest penetration of each of so many marbles into a wall at the last kick, in metres.
+/// Deepest penetration of each marble into a wall at the last kick, in metres.
 pub(super) fn depths_in_walls<S: Scalar>(
     before: &[SpringHistory<S>],
     marbles: usize,

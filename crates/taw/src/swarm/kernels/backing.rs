@@ -21,8 +21,8 @@ pub(super) struct Backing<L> {
 }
 
 impl<L: Simd> Backing<L> {
-    /// The impulse that makes a pair of this mass part by so many m/s more slowly, less than zero
-    /// for faster.
+    /// Impulse that lowers the speed at which a pair of this mass parts by `slower`, in m/s; less than zero
+    /// raises it.
     #[inline(always)]
     pub fn impulse(&self, alone: L, slower: L) -> L {
         let zero = L::constant(0.0);

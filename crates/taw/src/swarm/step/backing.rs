@@ -10,13 +10,12 @@ use crate::swarm::kernels::LOST;
 use crate::swarm::wall_contact::WallContact;
 use crate::workers::{DisjointSlice, parallel_for};
 
-/// Where one ball weighs more than so many times as much as another, pairs look who has a wall
-/// behind it: a pair sinks in by that ratio times the way of gravity in a substep while its contact
-/// learns what it bears, less than a millimetre for each such time.
+/// Mass ratio from which on pairs look who has a wall behind it. While a contact learns what it bears, a
+/// pair sinks in by the mass ratio times the fall of a substep: by less than a millimetre times this.
 const UNEVEN: f64 = 8.0;
 
 impl<S: Scalar> Swarm<S> {
-    /// Finds for each ball the wall that bears most of it, where masses differ so much that pairs
+    /// Finds for each ball the wall that bears most of it, where masses are so uneven that pairs
     /// need to know ([`SolverColumns::backing`]).
     pub(super) fn find_backing(&mut self) {
         self.find_walls_behind(false);

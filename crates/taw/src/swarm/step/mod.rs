@@ -32,11 +32,10 @@ use cgmath::Zero;
 
 use crate::constraint::ContactSoftness;
 
-/// Stiffness of contacts: at most so many oscillations a second, and as many times as much
-/// damping as stops them.
+/// Stiffness of contacts: natural frequency at most, in Hz, and damping ratio.
 const HERTZ: f64 = 60.0;
 const DAMPING: f64 = 10.0;
-/// Speed at which an overlap is pushed out at most: that which gravity gives in so many seconds.
+/// Largest speed at which an overlap is pushed out, as a time of free fall, in seconds.
 const PUSHING: f64 = 0.3;
 /// So much of twice the smaller radius two balls may overlap before they are moved apart: more than
 /// what bears a heap gets, and less than the tenth of a radius that is seen, since each substep

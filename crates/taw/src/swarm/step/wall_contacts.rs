@@ -22,7 +22,7 @@ impl<S: Scalar> Swarm<S> {
         self.has_friction().then_some(S::from_f64(2.0) * dt)
     }
 
-    /// Finds the balls at walls anew, if one of these changed.
+    /// Searches the balls at walls again, if one of these changed.
     pub(in crate::swarm) fn find_wall_contacts_if_changed(
         &mut self,
         changed: bool,
@@ -60,7 +60,7 @@ impl<S: Scalar> Swarm<S> {
         }
     }
 
-    /// Finds the balls at walls anew, where pairs are still known.
+    /// Searches the balls at walls again, where pairs are still known.
     pub(in crate::swarm) fn find_wall_contacts(&mut self, dt: S, walls: &dyn StaticGeometry<S>) {
         let (simd_level, shapes) = (*self.simd_level, walls.has_shapes());
         let (planes, ahead) = (listed_planes(&self.planes, self.tier()), self.ahead(dt));
@@ -191,7 +191,7 @@ impl<S: Scalar> Swarm<S> {
     }
 
     /// Finds the contacts of fast balls with all that they may meet in the step of `dt` seconds, of those
-    /// that came near a shape, and of all if walls moved. (The solver finds them anew in each substep, and more exactly.)
+    /// that came near a shape, and of all if walls moved. (The solver finds them again in each substep, and more exactly.)
     pub(in crate::swarm) fn update_contacts_on_the_way(
         &mut self,
         walls: &dyn StaticGeometry<S>,

@@ -76,7 +76,7 @@ impl<S: Scalar> SweptMarble<S> {
     }
 
     /// Radius of a sweep that stops so that a capsule touches with this radius: where it stops is
-    /// known up to rounding, and its rotation is rounded anew there. A ball stops where it touches.
+    /// known up to rounding, and its rotation is rounded again there. A ball stops where it touches.
     pub fn touching(&self, radius: S) -> S {
         if self.is_ball() {
             return radius;

@@ -40,7 +40,7 @@ impl Dice {
         of[self.below(of.len())]
     }
 
-    /// True in so many of all cases.
+    /// True with this probability.
     pub fn chance(&mut self, part: f64) -> bool {
         self.0.f64() < part
     }
@@ -57,7 +57,7 @@ impl Dice {
         Vec3::new(across * angle.cos(), y, across * angle.sin())
     }
 
-    /// A unit vector that leans from the vertical by so many radians at most.
+    /// A unit vector at most this angle, in radians, from the vertical.
     pub fn upward(&mut self, most: f64) -> Vec3<f64> {
         let (lean, angle) = (self.between(0.0, most), self.between(0.0, TAU));
         Vec3::new(lean.sin() * angle.cos(), lean.cos(), lean.sin() * angle.sin())

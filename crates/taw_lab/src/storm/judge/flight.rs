@@ -110,9 +110,9 @@ pub struct Falls {
     late: Vec<u32>,
 }
 
-/// Where bodies that meet on their way stop, they lose the rest of it, as documented: in the step
-/// in which they meet, and, should they still close, in the next ones. What is held up for longer
-/// than so many steps hangs.
+/// Largest number of steps for which a body may be held up. Bodies that meet on their way stop there and
+/// lose the rest of it, as documented: in the step in which they meet, and, while they still close, in the
+/// next ones. A body that is held up for longer hangs.
 const LATE: u32 = 5;
 
 /// Sums over a cluster.

@@ -21,7 +21,7 @@ impl Lies {
     /// The speed reported is the speed moved: over a step, a body goes by its velocity, up to
     /// - the change of the velocity in the step, since it is not known when it changed;
     /// - a hundredth of what gravity does in a step, below which nobody sees it;
-    /// - where there is overlap, what parts it in a step (but for springs, which move nothing by
+    /// - where there is overlap, what parts it in a step (except for springs, which move nothing by
     ///   themselves);
     /// - rounding: that of the velocity, and of two places by the step.
     ///
