@@ -2,8 +2,12 @@
 
 use taw_lab::suite::{CostClass, Report, measure, rows};
 
-/// Quick rows that are known to be missed, as name and model, with what stops each: none.
-const MISSED: &[(&str, &str)] = &[];
+/// Quick rows that are known to be missed, as name and model, with what stops each.
+const MISSED: &[(&str, &str)] = &[
+    // A marble that goes less than half its radius in a step is not swept, and bounces by the normal where it is
+    // in the wall at the end of the step.
+    ("glancing/pin", "impulse, swept"),
+];
 
 #[test]
 fn quick_rows_are_reached_but_those_that_are_known_not_to_be() {

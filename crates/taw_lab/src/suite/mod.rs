@@ -7,6 +7,7 @@
 mod bouncing;
 mod fast;
 mod gas;
+mod glancing;
 mod granular;
 mod impacts;
 mod long_rolls;
@@ -168,7 +169,7 @@ pub fn measure(
 /// All cases, in the order of `references.md`.
 pub fn rows() -> impl Iterator<Item = &'static SuiteCase> {
     let rolling = [rolling::ROWS, long_rolls::ROWS];
-    let impacts = [bouncing::ROWS, impacts::ROWS, fast::ROWS];
+    let impacts = [bouncing::ROWS, impacts::ROWS, glancing::ROWS, fast::ROWS];
     let many = [gas::ROWS, granular::ROWS, ordinary::ROWS, swarms::ROWS, numbers::ROWS];
     rolling.into_iter().chain(impacts).chain(many).flatten()
 }
