@@ -1,6 +1,7 @@
 //! Whole scenes in Bevy apps without a window: `MinimalPlugins`, `TawPlugins`, and
 //! a clock that the test turns.
 
+mod balls;
 mod board;
 mod capsules;
 mod contact_forces;

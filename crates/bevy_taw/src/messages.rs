@@ -239,7 +239,7 @@ pub(crate) fn are_read(world: &World) -> bool {
         || are_observed(world)
 }
 
-fn is_read<M: Message>(world: &World) -> bool {
+pub(crate) fn is_read<M: Message>(world: &World) -> bool {
     world.contains_resource::<Messages<M>>()
 }
 
@@ -252,7 +252,7 @@ pub(crate) fn are_observed(world: &World) -> bool {
 }
 
 /// Observers of an event, if there are any.
-fn observers<E: Event>(world: &World) -> Option<&CachedObservers> {
+pub(crate) fn observers<E: Event>(world: &World) -> Option<&CachedObservers> {
     let observers = world.observers().try_get_observers(world.event_key::<E>()?)?;
     let nobody = observers.global_observers().is_empty() && observers.entity_observers().is_empty();
     (!nobody).then_some(observers)

@@ -26,8 +26,8 @@ use crate::swarm::{self, TawSwarmModel};
 use crate::wall::Wall;
 use crate::zones::{GravityZone, WindZone, ZoneGravity};
 use crate::{
-    contact_force, controller, forget, gather, gather_walls, grounded, scatter, sensor, sleep,
-    zones,
+    ball_sensor, contact_force, controller, forget, gather, gather_walls, grounded, scatter,
+    sensor, sleep, zones,
 };
 
 /// Everything: the physics, interpolation between its steps, and with the feature
@@ -134,7 +134,6 @@ impl Plugin for TawPlugin {
         app.init_resource::<TawWorld>()
             .init_resource::<TawModel>()
             .init_resource::<TawSwarmModel>()
-            .init_resource::<swarm::Owners>()
             .init_resource::<Gravity>()
             .init_resource::<Forces>()
             .init_resource::<SubstepDelta>()
@@ -279,6 +278,8 @@ fn add_scatter(app: &mut App) {
             swarm::report_stopped,
             sensor::scatter,
             sensor::scatter_balls,
+            ball_sensor::write.run_if(ball_sensor::are_read),
+            ball_sensor::forget.run_if(not(ball_sensor::are_read)),
             grounded::find.run_if(any_with_component::<Grounded>),
             contact_force::finish.run_if(contact_force::are_read),
             contact_force::forget.run_if(not(contact_force::are_read)),

@@ -21,12 +21,13 @@ use bevy::prelude::*;
 use taw::swarm::BallId;
 use taw::world::{MarbleId, SensorId};
 
+pub use crate::ball_sensor::{BallEntered, BallLeft};
 use crate::components::WallState;
 use crate::resources::TawWorld;
 
 /// Makes a sensor of a [`Wall`]: marbles pass through it, and it reports which of them enter and leave,
 /// by [`SensorEntered`] and [`SensorLeft`], and which are inside, by [`CollidingEntities`]; of the balls of
-/// swarms, which are inside after each step, by [`CollidingBalls`]. Without a wall it has no shape and
+/// swarms, which are inside after each step, by [`CollidingBalls`], [`BallEntered`] and [`BallLeft`]. Without a wall it has no shape and
 /// notices nobody, as [`IgnoredComponents`](crate::ignored::IgnoredComponents) says.
 ///
 /// It may be moved as a wall, by itself or by what carries it, and has [`CollisionLayers`]. A marble
