@@ -6,8 +6,8 @@ use bevy::ecs::message::Messages;
 use bevy::prelude::*;
 use taw::swarm::BallId;
 
-use crate::messages::{is_read, observers};
 use crate::resources::TawWorld;
+use crate::touches::{is_read, observers};
 
 /// Message, and event of the sensor's entity: after a step, a ball of a swarm is inside of a sensor in which
 /// it was not before. One that passes through within a step is not noticed.

@@ -141,6 +141,7 @@ pub mod spatial_query;
 pub mod swarm;
 #[cfg(feature = "render")]
 pub mod swarm_render;
+mod touches;
 #[cfg(feature = "trade")]
 pub mod trade;
 pub mod wall;

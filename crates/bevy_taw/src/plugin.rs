@@ -16,13 +16,13 @@ use crate::ignore::{self, ColliderDisabled, IgnoreCollisions, OneWay};
 use crate::ignored::{self, IgnoredComponents};
 use crate::interpolation::TawInterpolationPlugin;
 use crate::layers::CollisionLayers;
-use crate::messages::{self, Touches};
 use crate::refusal::{self, InputRefused, MarbleStopped, Refusals, Told, report};
 use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::schedule::{SchedulePlugin, TawSchedule};
 use crate::snapshot::RowRemoved;
 use crate::spatial_query::SpatialTree;
 use crate::swarm::{self, TawSwarmModel};
+use crate::touches::{self, Touches};
 use crate::wall::Wall;
 use crate::zones::{GravityZone, WindZone, ZoneGravity};
 use crate::{
@@ -284,10 +284,10 @@ fn add_scatter(app: &mut App) {
             contact_force::finish.run_if(contact_force::are_read),
             contact_force::forget.run_if(not(contact_force::are_read)),
             contact_force::write.run_if(any_with_component::<ContactForce>),
-            messages::write.run_if(messages::are_read),
-            messages::forget.run_if(not(messages::are_read)),
+            touches::write.run_if(touches::are_read),
+            touches::forget.run_if(not(touches::are_read)),
             diagnostics::measure,
-            messages::trigger.run_if(messages::are_observed),
+            touches::trigger.run_if(touches::are_observed),
         )
             .chain(),
     )
@@ -306,10 +306,10 @@ fn add_substep(app: &mut App) {
             integrate.in_set(TawSystems::Integrate),
             generate_contacts.in_set(TawSystems::GenerateContacts),
             // What a game takes out of the contacts before they are restituted is not told.
-            (messages::collect.run_if(messages::are_read), restitute)
+            (touches::collect.run_if(touches::are_read), restitute)
                 .chain()
                 .in_set(TawSystems::Restitute),
-            messages::collect_impacts.run_if(messages::are_read).after(TawSystems::Restitute),
+            touches::collect_impacts.run_if(touches::are_read).after(TawSystems::Restitute),
             contact_force::collect.run_if(contact_force::are_read).after(TawSystems::Restitute),
         ),
     );
