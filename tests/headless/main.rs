@@ -20,6 +20,7 @@ mod motion;
 mod moving_walls;
 mod nasty;
 mod picking;
+mod previews;
 mod queries;
 mod scene;
 mod schedules;

@@ -47,6 +47,7 @@
 //! | [`zones`] | gravity and wind of their own in places |
 //! | [`spatial_query`] | rays, shapes and points among marbles, walls and balls of swarms |
 //! | [`snapshot`] | back in time, and rows without entities |
+//! | [`preview`] | paths that marbles would take, and shots |
 //! | [`ignore`] | marbles that pass through others, one-way walls |
 //! | [`ignored`] | components that the model does not read |
 //! | [`refusal`] | input that was refused, marbles that had to be stopped |
@@ -129,6 +130,7 @@ mod outline;
 #[cfg(feature = "picking")]
 pub mod picking;
 mod plugin;
+pub mod preview;
 mod reflect;
 pub mod refusal;
 pub mod resources;
@@ -175,6 +177,7 @@ pub mod prelude {
     };
     #[cfg(feature = "picking")]
     pub use crate::picking::TawPickingPlugin;
+    pub use crate::preview::Preview;
     pub use crate::refusal::{InputRefused, MarbleStopped, Refusal};
     pub use crate::resources::{Forces, Gravity, TawModel, TawWorld};
     pub use crate::sensor::{

@@ -98,6 +98,8 @@ pub struct TawWorld {
     /// Number of restores, and true if there was one since the last gather.
     pub(crate) restored: u32,
     pub(crate) just_restored: bool,
+    /// Walls that move in this step, or did in the last one.
+    pub(crate) moving_walls: Vec<WallId>,
     /// The walls' version when they were last gathered.
     pub(crate) walls_gathered: u64,
     /// True if the world refused to integrate, and the rest of the substep is left out.

@@ -21,6 +21,7 @@ pub struct TawSnapshot {
     sensor_entities: HashMap<SensorId, Entity>,
     ball_entities: Vec<Option<Entity>>,
     sensed_balls: Vec<SensedBall>,
+    moving_walls: Vec<WallId>,
     sensed: HashMap<(SensorId, MarbleId), Entity>,
     pair_impulses: Vec<(ContactPair, PairImpulse)>,
 }
@@ -49,6 +50,7 @@ impl TawWorld {
             sensor_entities: self.sensor_entities.clone(),
             ball_entities: self.ball_entities.clone(),
             sensed_balls: self.sensed_balls.clone(),
+            moving_walls: self.moving_walls.clone(),
             sensed: self.sensed.clone(),
             pair_impulses: self.pair_impulses.clone(),
         }
@@ -87,6 +89,7 @@ impl TawWorld {
         self.sensor_entities.clone_from(&snapshot.sensor_entities);
         self.ball_entities.clone_from(&snapshot.ball_entities);
         self.sensed_balls.clone_from(&snapshot.sensed_balls);
+        self.moving_walls.clone_from(&snapshot.moving_walls);
         self.sensed.clone_from(&snapshot.sensed);
         self.pair_impulses.clone_from(&snapshot.pair_impulses);
         self.left_sensors.clear();
