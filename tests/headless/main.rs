@@ -19,6 +19,7 @@ mod mesh_walls;
 mod motion;
 mod moving_walls;
 mod nasty;
+mod panels;
 mod picking;
 mod previews;
 mod queries;
