@@ -23,6 +23,7 @@ mod panels;
 mod picking;
 mod previews;
 mod queries;
+mod reflection;
 mod scene;
 mod schedules;
 mod sensors;

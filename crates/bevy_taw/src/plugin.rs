@@ -21,7 +21,7 @@ use crate::resources::{Forces, Gravity, TawModel, TawWorld};
 use crate::schedule::{SchedulePlugin, TawSchedule};
 use crate::snapshot::RowRemoved;
 use crate::spatial_query::SpatialTree;
-use crate::swarm::{self, TawSwarmModel};
+use crate::swarm::{self, Swarm, TawSwarmModel};
 use crate::touches::{self, Touches};
 use crate::wall::Wall;
 use crate::zones::{GravityZone, WindZone, ZoneGravity};
@@ -155,7 +155,7 @@ impl Plugin for TawPlugin {
             .register_type::<(Wall, Kinematic, Teleport, Sleeping, SleepingDisabled, CollisionLayers)>()
             .register_type::<(Grounded, ContactForce, MarbleController, GravityZone, WindZone)>()
             .register_type::<(IgnoreCollisions, ColliderDisabled, OneWay)>()
-            .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity)>();
+            .register_type::<(TawModel, Gravity, SubstepDelta, SurfaceVelocity, Swarm)>();
         diagnostics::register(app);
         sensor::register(app);
         observe(app);

@@ -35,19 +35,27 @@ pub use taw::swarm::BallId;
 ///     commands.spawn(Swarm::filling(region, 1_000, 0.1..=0.2, 1));
 /// });
 /// ```
-#[derive(Component, Clone, Debug, Default)]
+///
+/// Reflected is the tint alone.
+#[derive(Component, Clone, Debug, Default, Reflect)]
+#[reflect(Component, Debug, Default)]
 pub struct Swarm {
     /// Meaning of the colour of a marble.
     pub tint: Tint,
+    #[reflect(ignore)]
     coming: Vec<Ball>,
+    #[reflect(ignore)]
     going: Vec<BallId>,
+    #[reflect(ignore)]
     balls: Vec<BallId>,
     /// Layers that the balls have.
+    #[reflect(ignore)]
     layers: CollisionLayers,
 }
 
 /// Meaning of the colour of a marble.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Reflect)]
+#[reflect(Debug, Default, PartialEq)]
 pub enum Tint {
     /// Which one it is: each has a colour of its own.
     #[default]
@@ -258,8 +266,8 @@ fn name_balls<'a>(
     }
 }
 
-/// The marbles of a swarm go when it goes.
-pub(crate) fn forget(removed: On<Remove, Swarm>, mut app: DeferredWorld) {
+/// The marbles of a swarm go when it goes, or another one takes its place.
+pub(crate) fn forget(removed: On<Discard, Swarm>, mut app: DeferredWorld) {
     let Some(swarm) = app.get::<Swarm>(removed.entity) else { return };
     let balls: Vec<_> = swarm.balls.iter().chain(&swarm.going).copied().collect();
     let mut world = app.resource_mut::<TawWorld>();
